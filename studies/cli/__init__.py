@@ -1,0 +1,92 @@
+"""The command line `hrg`: one file per command, loaded only when that command runs.
+
+Exit status: 0 done, 1 a fault of the program, 2 unusable input or arguments, 3 the environment,
+4 a study finished with failed cases, 130 interrupted and resumable.
+"""
+
+import sys
+from collections.abc import Sequence
+
+COMMANDS: dict[str, tuple[str, str]] = {
+    # name: (module:function, one line of help)
+    "doctor": ("studies.cli.doctor:doctor", "Show what this environment has and what it lacks."),
+}
+EPILOGUE = "Every command that computes takes --json. --debug shows the traceback of an error."
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run one command and return its exit status."""
+    from studies.cli.guard import find_name_clash
+
+    words = list(sys.argv[1:] if arguments is None else arguments)
+    debug = "--debug" in words
+    words = [word for word in words if word != "--debug"]
+    clash = find_name_clash()
+    if clash:
+        return _complain(clash, 3)
+
+    from cyclopts import App, CycloptsError
+
+    from studies import __version__
+    from studies.errors import UNUSABLE_INPUT, MissingEnvironment
+
+    app = App(
+        name="hrg",
+        help="Study workbench for hemispherical, cylindrical and bell-shaped resonator gyroscopes.",
+        help_epilogue=EPILOGUE,
+        version=f"hrg-workbench {__version__}",
+        result_action="return_value",
+        exit_on_error=False,
+        print_error=False,
+        suppress_keyboard_interrupt=False,
+    )
+    groups: dict[str, App] = {}
+    for name, (target, help_line) in COMMANDS.items():
+        *group, command = name.split(" ")
+        parent = app
+        if group:
+            if group[0] not in groups:
+                groups[group[0]] = App(name=group[0], help=GROUPS[group[0]])
+                app.command(groups[group[0]])
+            parent = groups[group[0]]
+        parent.command(target, name=command, help=help_line)
+    try:
+        status = app(words)
+    except CycloptsError as error:
+        return _complain(f"{str(error).strip()} See 'hrg --help'.", 2, error if debug else None)
+    except UNUSABLE_INPUT as error:
+        return _complain(str(error), 2, error if debug else None)
+    except MissingEnvironment as error:
+        return _complain(str(error), 3, error if debug else None)
+    except KeyboardInterrupt:
+        return _complain("interrupted.", 130)
+    except BrokenPipeError:
+        sys.stderr.close()
+        return 0
+    except Exception as error:
+        return _complain(
+            f"internal fault: {type(error).__name__}: {error}. Run again with --debug and report it.",
+            1,
+            error if debug else None,
+        )
+    return int(status) if isinstance(status, int) else 0
+
+
+GROUPS = {
+    "fit": "Calibrate a compensation model from measured data.",
+    "study": "Parametric studies: run, status, report, export.",
+}
+
+
+def _complain(message: str, status: int, error: BaseException | None = None) -> int:
+    if error is not None:
+        import traceback
+
+        traceback.print_exception(error)
+    print(f"hrg: {message}", file=sys.stderr)
+    return status
+
+
+def run() -> None:
+    """Entry point of the console script."""
+    sys.exit(main())

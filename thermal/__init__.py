@@ -1,0 +1,3 @@
+"""Lumped thermal networks: chamber profile to temperatures."""
+
+__version__ = "0.1.0"
