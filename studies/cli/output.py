@@ -19,8 +19,13 @@ def print_table(title: str, columns: Sequence[str], rows: Sequence[Sequence[obje
     from rich.table import Table
     from rich.text import Text
 
-    table = Table(title=Text(title), title_justify="left", caption=Text(note) if note else None,
-                  caption_justify="left", header_style="bold")
+    table = Table(
+        title=Text(title),
+        title_justify="left",
+        caption=Text(note) if note else None,
+        caption_justify="left",
+        header_style="bold",
+    )
     for k, column in enumerate(columns):
         numeric = bool(rows) and all(_looks_numeric(row[k]) for row in rows)
         table.add_column(Text(column), justify="right" if numeric else "left")

@@ -1,0 +1,215 @@
+"""Comma-separated tables of numbers, read fast and refused with the line that is wrong.
+
+A table is UTF-8 text: optional comment lines that start with `#`, one header line, then numbers; an empty cell
+is a missing value.
+"""
+
+import codecs
+import csv
+import hashlib
+import io
+import re
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from studies.errors import InputError, nearest
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+# Anything but plain decimal numbers, commas and line ends: 'nan', quotes, comments, blanks.
+_UNUSUAL = re.compile(rb"[^0-9eE+.,\r\n-]")
+
+
+@dataclass(frozen=True)
+class Columns:
+    """The columns of one file under the names of its header, its comments, and the hash of its bytes."""
+
+    path: str
+    values: "Mapping[str, NDArray[np.float64]]"
+    comments: tuple[str, ...] = ()
+    sha256: str = ""
+    first_line: int = field(default=2, repr=False)
+
+    def line(self, row: int) -> int:
+        """Return the line of the file on which a row (from 0) stands, when no empty line comes before it."""
+        return self.first_line + row
+
+
+def read_columns(
+    path: str | Path, known: Collection[str], required: Collection[str] = (), prefixes: Collection[str] = ()
+) -> Columns:
+    """Read a table of numbers.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file.
+    known : collection of str
+        Column names that may appear.
+    required : collection of str
+        Column names that must appear.
+    prefixes : collection of str
+        Beginnings of further names that may appear.
+
+    Raises
+    ------
+    InputError
+        Anything that is not such a table: the message names file, line or column, and the mend.
+    """
+    data = _read_bytes(path)
+    comments, header, header_line, body_start = _split_head(path, data)
+    names = _check_names(path, header, header_line, known, required, prefixes)
+    if body_start >= len(data) or not data[body_start:].strip():
+        raise InputError(f"{path}: the table has a header but no rows; add one line per measurement.")
+    values = _parse_fast(data, body_start, names)
+    if values is None:
+        values = _parse_by_line(path, data[body_start:].decode(), names, header_line + 1)
+    return Columns(str(path), values, comments, hashlib.sha256(data).hexdigest(), header_line + 1)
+
+
+def read_header(path: str | Path) -> list[str]:
+    """Return the column names of a table without reading its numbers."""
+    _, header, _, _ = _split_head(path, _read_bytes(path))
+    return [name.strip() for name in header]
+
+
+def _read_bytes(path: str | Path) -> bytes:
+    """Read the file and make sure that it is UTF-8 text with something in it."""
+    try:
+        data = Path(path).read_bytes()
+    except IsADirectoryError:
+        raise InputError(f"{path}: is a folder; give the name of a file.") from None
+    except FileNotFoundError:
+        raise InputError(f"{path}: there is no such file.") from None
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read ({error.strerror}).") from error
+    data = data.removeprefix(codecs.BOM_UTF8)
+    if b"\0" in data:
+        raise InputError(f"{path}: not a text table (it holds zero bytes); export it as CSV in UTF-8.")
+    if not data.isascii():
+        try:
+            data.decode()
+        except UnicodeDecodeError as error:
+            line = data.count(b"\n", 0, error.start) + 1
+            raise InputError(f"{path}, line {line}: not UTF-8 text; save the file as UTF-8 (CSV).") from None
+    if not data.strip():
+        raise InputError(f"{path}: the file is empty; it needs a header line and rows of numbers.")
+    return data
+
+
+def _split_head(path: str | Path, data: bytes) -> tuple[tuple[str, ...], list[str], int, int]:
+    """Return the comments, the header's cells, the header's line number, and where the body starts."""
+    comments: list[str] = []
+    position = 0
+    for number, raw in enumerate(io.BytesIO(data), start=1):
+        position += len(raw)
+        line = raw.decode().strip("\r\n")
+        if line.startswith("#"):
+            comments.append(line[1:].strip())
+        elif line.strip():
+            return tuple(comments), next(csv.reader([line])), number, position
+    raise InputError(f"{path}: there are only comments; a header line and rows of numbers are missing.")
+
+
+def _check_names(
+    path: str | Path,
+    header: list[str],
+    header_line: int,
+    known: Collection[str],
+    required: Collection[str],
+    prefixes: Collection[str],
+) -> list[str]:
+    names = [name.strip() for name in header]
+    where = f"{path}, line {header_line}"
+    if len(names) == 1 and (";" in names[0] or "\t" in names[0]):
+        raise InputError(f"{where}: the columns are not separated by commas; 'hrg import' reads such files.")
+    if all(_is_number(name) for name in names):
+        raise InputError(f"{where}: a header line with the column names is missing; add {','.join(required)}.")
+    for name in names:
+        if names.count(name) > 1:
+            raise InputError(f"{where}: the column '{name}' stands twice; remove one.")
+        if name not in known and not any(name.startswith(prefix) for prefix in prefixes):
+            raise InputError(f"{where}: unknown column '{name}'{nearest(name, known)}")
+    for name in required:
+        if name not in names:
+            raise InputError(f"{where}: the column '{name}' is missing; the header has {', '.join(names)}.")
+    return names
+
+
+def _parse_fast(data: bytes, start: int, names: list[str]) -> "dict[str, NDArray[np.float64]] | None":
+    """Parse a clean table quickly; None when anything is unusual and the careful way must decide."""
+    import pandas as pd
+
+    rows = data.count(b"\n", start) + (not data.endswith(b"\n"))
+    if data.count(b",", start) != rows * (len(names) - 1) or _UNUSUAL.search(data, start):
+        return None
+    body = io.BytesIO(data)
+    body.seek(start)
+    try:
+        frame = pd.read_csv(
+            body,
+            names=names,
+            header=None,
+            dtype="float64",
+            keep_default_na=False,
+            na_values=[""],
+            skip_blank_lines=False,
+            index_col=False,
+            float_precision="round_trip",
+        )
+    except ValueError:
+        return None
+    if len(frame) != rows:
+        return None
+    return {name: frame[name].to_numpy() for name in names}
+
+
+def _parse_by_line(path: str | Path, body: str, names: list[str], first_line: int) -> "dict[str, NDArray[np.float64]]":
+    import numpy as np
+
+    rows: list[list[float]] = []
+    reader = csv.reader(io.StringIO(body, newline=""))
+    try:
+        for cells in reader:
+            number = first_line + reader.line_num - 1
+            if not any(cell.strip() for cell in cells):
+                if len(cells) > 1 or (cells and len(names) == 1):
+                    rows.append([np.nan] * len(names))
+                continue
+            if cells[0].startswith("#"):
+                raise InputError(f"{path}, line {number}: comments may stand only above the header; move it there.")
+            if len(cells) != len(names):
+                raise InputError(
+                    f"{path}, line {number}: {len(cells)} values where the header has {len(names)} columns"
+                    f" ({', '.join(names)}); decimal commas must become points."
+                )
+            rows.append([_number(path, number, name, cell) for name, cell in zip(names, cells, strict=True)])
+    except csv.Error as error:
+        raise InputError(f"{path}, line {first_line + reader.line_num - 1}: {error}.") from None
+    table = np.array(rows, dtype=float).reshape(-1, len(names))
+    return {name: np.ascontiguousarray(table[:, k]) for k, name in enumerate(names)}
+
+
+def _number(path: str | Path, line: int, name: str, cell: str) -> float:
+    text = cell.strip()
+    if not text:
+        return float("nan")
+    if not _is_number(text):
+        raise InputError(
+            f"{path}, line {line}: '{text}' in column '{name}' is not a number; correct it, or leave the cell"
+            " empty where the value is missing."
+        )
+    return float(text)
+
+
+def _is_number(text: str) -> bool:
+    """Tell whether the text is a finite decimal number (not 'nan', 'inf' or '1_000', which float() would take)."""
+    try:
+        value = float(text)
+    except ValueError:
+        return False
+    return abs(value) != float("inf") and value == value and "_" not in text

@@ -1,0 +1,123 @@
+"""TOML files of users: every key is known, has the right type and lies in its range, or the error names it."""
+
+import math
+import tomllib
+from collections.abc import Collection, Mapping
+from pathlib import Path
+from typing import Any
+
+from studies.errors import InputError, nearest
+
+
+def read_toml(path: str | Path, schema: str | None = None) -> dict[str, Any]:
+    """Read a TOML file and check its `schema` key.
+
+    Raises
+    ------
+    InputError
+        No such file, not UTF-8, a syntax error (with its line), or another schema.
+    """
+    try:
+        content = tomllib.loads(Path(path).read_bytes().decode("utf-8-sig"))
+    except FileNotFoundError:
+        raise InputError(f"{path}: there is no such file.") from None
+    except IsADirectoryError:
+        raise InputError(f"{path}: is a folder; give the name of a TOML file.") from None
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read ({error.strerror}).") from error
+    except UnicodeDecodeError:
+        raise InputError(f"{path}: not UTF-8 text; save the file as UTF-8.") from None
+    except tomllib.TOMLDecodeError as error:
+        raise InputError(f"{path}: not valid TOML: {error}.") from None
+    except RecursionError:
+        raise InputError(f"{path}: not valid TOML: nested too deeply.") from None
+    if schema is not None:
+        found = content.get("schema")
+        if found != schema:
+            raise InputError(f'{path}: schema must be "{schema}", not {found!r}; add or correct that line.')
+    return content
+
+
+class Section:
+    """One table of a TOML file, from which keys are taken by name and type until none may be left."""
+
+    def __init__(self, values: Mapping[str, Any], where: str, known: Collection[str]) -> None:
+        self.values = values
+        self.where = where
+        for key in values:
+            if key not in known:
+                raise InputError(f"{where}: unknown key '{key}'{nearest(key, known)}")
+
+    def __contains__(self, key: str) -> bool:
+        return key in self.values
+
+    def number(
+        self,
+        key: str,
+        default: float | None = None,
+        *,
+        above: float | None = None,
+        least: float | None = None,
+        below: float | None = None,
+        most: float | None = None,
+    ) -> float:
+        """Take a finite number within its bounds; without a default the key is required."""
+        value = self._take(key, default)
+        return check_number(value, f"{self.where}: {key}", above=above, least=least, below=below, most=most)
+
+    def text(self, key: str, default: str | None = None, choices: Collection[str] | None = None) -> str:
+        """Take a text, one of `choices` where they are given."""
+        value = self._take(key, default)
+        if not isinstance(value, str):
+            raise InputError(f"{self.where}: {key} must be text in quotes, not {value!r}.")
+        if choices is not None and value not in choices:
+            raise InputError(f"{self.where}: {key} = '{value}' is unknown{nearest(value, choices)}")
+        return value
+
+    def section(self, key: str, known: Collection[str]) -> "Section":
+        """Take a sub-table."""
+        value = self._take(key, None)
+        if not isinstance(value, Mapping):
+            raise InputError(f"{self.where}: {key} must be a table ([{key}]), not {value!r}.")
+        return Section(value, f"{self.where} [{key}]", known)
+
+    def sections(self, key: str, known: Collection[str]) -> "list[Section]":
+        """Take an array of tables; empty when the key is absent."""
+        value = self.values.get(key, [])
+        if not isinstance(value, list) or not all(isinstance(item, Mapping) for item in value):
+            raise InputError(f"{self.where}: {key} must be an array of tables ([[{key}]]).")
+        return [Section(item, f"{self.where} [[{key}]] number {k}", known) for k, item in enumerate(value, 1)]
+
+    def raw(self, key: str, default: Any = None) -> Any:
+        """Take a value of any type, to be checked by the caller."""
+        return self._take(key, default)
+
+    def _take(self, key: str, default: Any) -> Any:
+        if key in self.values:
+            return self.values[key]
+        if default is None:
+            raise InputError(f"{self.where}: the key '{key}' is missing; add it.")
+        return default
+
+
+def check_number(
+    value: Any,
+    what: str,
+    *,
+    above: float | None = None,
+    least: float | None = None,
+    below: float | None = None,
+    most: float | None = None,
+) -> float:
+    """Return a finite float within its bounds, or say what was found instead."""
+    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+        raise InputError(f"{what} must be a finite number, not {value!r}.")
+    for bound, bad, words in (
+        (above, above is not None and not value > above, "above"),
+        (least, least is not None and not value >= least, "at least"),
+        (below, below is not None and not value < below, "below"),
+        (most, most is not None and not value <= most, "at most"),
+    ):
+        if bad:
+            raise InputError(f"{what} must be {words} {bound:g}, not {value:g}.")
+    return float(value)

@@ -1,0 +1,200 @@
+"""Records: one run of a gyro, measured or simulated; steady-state tables; chamber profiles (CSV files).
+
+Columns keep the names of the file, which carry their units; missing values are NaN.
+"""
+
+import datetime
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from studies.errors import InputError, nearest
+from studies.files.columns import Columns, read_columns, read_header
+from studies.files.writing import written_whole
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+COLUMNS = {
+    "time_s": "time since the start of the run",
+    "housing_temperature_degC": "temperature sensor on the housing",
+    "chamber_temperature_degC": "chamber set point or air",
+    "resonator_temperature_degC": "temperature of the resonator (simulations only)",
+    "frequency_Hz": "n = 2 frequency by the gyro's clock",
+    "reference_frequency_Hz": "n = 2 frequency by an external clock",
+    "bias_deg_per_h": "zero-rate output",
+    "measured_rate_deg_per_s": "rate output",
+    "output_counts": "raw output",
+    "rate_deg_per_s": "applied rate",
+    "inverse_q": "1/Q of the drive mode",
+    "drive_amplitude_V": "commanded vibration amplitude",
+    "electrode_bias_V": "polarisation or trim voltage",
+    "quadrature_V": "quadrature-control effort",
+    "pattern_angle_deg": "azimuth of the standing wave",
+}
+COMPENSATED = "compensated_"
+TABLE_COLUMNS = ("temperature_degC", "frequency_Hz")
+PROFILE_COLUMNS = ("time_s", "chamber_temperature_degC")
+
+
+@dataclass(frozen=True)
+class Record:
+    """One run: its columns by name, and what its comment lines say of it."""
+
+    columns: "Mapping[str, NDArray[np.float64]]"
+    path: str = ""
+    sha256: str = ""
+    instrument: str = ""
+    source: str = ""
+    start: datetime.datetime | None = None
+    resolution: Mapping[str, float] = field(default_factory=dict)
+    comments: tuple[str, ...] = ()
+
+    def __getitem__(self, name: str) -> "NDArray[np.float64]":
+        if name not in self.columns:
+            raise InputError(
+                f"{self.path or 'record'}: the column '{name}' is missing; it has {', '.join(self.columns)}."
+            )
+        return self.columns[name]
+
+    def __contains__(self, name: str) -> bool:
+        return name in self.columns
+
+    def __len__(self) -> int:
+        return len(self.columns["time_s"])
+
+    def with_columns(self, more: "Mapping[str, NDArray[np.float64]]") -> "Record":
+        """Return a new record with further (or replaced) columns."""
+        return replace(self, columns={**self.columns, **more})
+
+
+def read_record(path: str | Path) -> Record:
+    """Read one run.
+
+    Raises
+    ------
+    InputError
+        Not a record: the message names file, line or column, and the mend.
+    """
+    import numpy as np
+
+    if "time_s" not in (names := read_header(path)) and "temperature_degC" in names:
+        raise InputError(f"{path}: a steady-state table (no time_s) where a record in time is needed.")
+    table = read_columns(path, COLUMNS, required=("time_s",), prefixes=(COMPENSATED,))
+    time = table.values["time_s"]
+    if np.isnan(time).any():
+        row = int(np.flatnonzero(np.isnan(time))[0])
+        raise InputError(f"{path}, line {table.line(row)}: time_s is empty; every row needs its time.")
+    backwards = np.flatnonzero(np.diff(time) <= 0)
+    if len(backwards):
+        line = table.line(int(backwards[0]) + 1)
+        raise InputError(f"{path}, line {line}: time_s does not increase; sort the rows and remove repeated ones.")
+    _check_temperatures(table)
+    notes = _read_notes(path, table)
+    return Record(table.values, str(path), table.sha256, **notes)  # type: ignore[arg-type]
+
+
+def read_frequency_table(path: str | Path) -> Columns:
+    """Read a steady-state table `temperature_degC,frequency_Hz` (HRG paper, Table 1); no value may be missing."""
+    import numpy as np
+
+    table = read_columns(path, TABLE_COLUMNS, required=TABLE_COLUMNS)
+    for name in TABLE_COLUMNS:
+        gaps = np.flatnonzero(np.isnan(table.values[name]))
+        if len(gaps):
+            line = table.line(int(gaps[0]))
+            raise InputError(f"{path}, line {line}: {name} is empty; a steady-state table needs every value.")
+    _check_temperatures(table)
+    if (table.values["frequency_Hz"] <= 0).any():
+        line = table.line(int(np.flatnonzero(table.values["frequency_Hz"] <= 0)[0]))
+        raise InputError(f"{path}, line {line}: frequency_Hz must be positive.")
+    return table
+
+
+def read_profile(path: str | Path) -> Columns:
+    """Read a chamber profile `time_s,chamber_temperature_degC`, linear between its rows."""
+    import numpy as np
+
+    table = read_columns(path, PROFILE_COLUMNS, required=PROFILE_COLUMNS)
+    for name in PROFILE_COLUMNS:
+        gaps = np.flatnonzero(np.isnan(table.values[name]))
+        if len(gaps):
+            raise InputError(f"{path}, line {table.line(int(gaps[0]))}: {name} is empty; a profile needs every value.")
+    backwards = np.flatnonzero(np.diff(table.values["time_s"]) <= 0)
+    if len(backwards):
+        raise InputError(f"{path}, line {table.line(int(backwards[0]) + 1)}: time_s does not increase; sort the rows.")
+    _check_temperatures(table)
+    return table
+
+
+def write_record(record: Record, path: str | Path, progress: Callable[[int], None] | None = None) -> None:
+    """Write one run, whole or not at all; `progress` is told the number of rows written so far."""
+    import pandas as pd
+
+    notes = [f"# {note}" for note in record.comments]
+    if record.instrument:
+        notes.append(f"# instrument: {_one_line(record.instrument)}")
+    if record.source:
+        notes.append(f"# source: {_one_line(record.source)}")
+    if record.start:
+        notes.append(f"# start: {record.start.isoformat()}")
+    notes += [f"# resolution {name}: {value!r}" for name, value in record.resolution.items()]
+    frame = pd.DataFrame(dict(record.columns))
+    with written_whole(path) as file:
+        file.write("".join(f"{note}\n" for note in [*notes]).encode())
+        file.write((",".join(frame.columns) + "\n").encode())
+        for begin in range(0, len(frame), 100_000):
+            part = frame.iloc[begin : begin + 100_000]
+            file.write(part.to_csv(index=False, header=False, lineterminator="\n").encode())
+            if progress is not None:
+                progress(begin + len(part))
+
+
+def _check_temperatures(table: Columns) -> None:
+    import numpy as np
+
+    for name, values in table.values.items():
+        if not name.endswith("temperature_degC"):
+            continue
+        outside = np.flatnonzero((values < -200) | (values > 200))
+        if len(outside):
+            row = int(outside[0])
+            value = values[row]
+            hint = "it looks like kelvin: subtract 273.15" if 200 < value < 500 else "check its unit"
+            raise InputError(f"{table.path}, line {table.line(row)}: {name} = {value:g} cannot be in °C; {hint}.")
+
+
+def _read_notes(path: str | Path, table: Columns) -> dict[str, object]:
+    notes: dict[str, object] = {}
+    resolution: dict[str, float] = {}
+    free: list[str] = []
+    for comment in table.comments:
+        key, colon, value = (part.strip() for part in comment.partition(":"))
+        if colon and key in ("instrument", "source"):
+            notes[key] = value
+        elif colon and key == "start":
+            try:
+                notes["start"] = datetime.datetime.fromisoformat(value)
+            except ValueError:
+                raise InputError(
+                    f"{path}: '# start: {value}' is not an ISO 8601 time such as 2026-01-31T12:00:00."
+                ) from None
+        elif colon and key.startswith("resolution "):
+            column = key.removeprefix("resolution ").strip()
+            if column not in COLUMNS:
+                raise InputError(f"{path}: '# {comment}' names no column{nearest(column, COLUMNS)}")
+            try:
+                resolution[column] = float(value)
+            except ValueError:
+                raise InputError(f"{path}: '# {comment}' needs a number after the colon.") from None
+            if not 0 < resolution[column] < float("inf"):
+                raise InputError(f"{path}: '# {comment}' needs a positive number.")
+        else:
+            free.append(comment)
+    return {**notes, "resolution": resolution, "comments": tuple(free)}
+
+
+def _one_line(text: str) -> str:
+    return " ".join(text.split())
