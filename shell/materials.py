@@ -1,0 +1,327 @@
+"""Materials over temperature: published laws with source, range and uncertainty (`materials.toml`).
+
+Temperatures are in kelvin here; the files state degrees Celsius. Outside a law's range there is an error, never an
+extrapolation, and a property that no source states is refused by name.
+"""
+
+import difflib
+import tomllib
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from shell.elastic import Elastic
+from shell.errors import ShellError
+
+ZERO_CELSIUS = 273.15
+PROPERTIES = {
+    "shear_modulus": "Pa",
+    "youngs_modulus": "Pa",
+    "poisson_ratio": "1",
+    "density": "kg/m³",
+    "expansion": "1/K",
+    "conductivity": "W/(m K)",
+    "heat_capacity": "J/(kg K)",
+}
+ELASTIC = ("shear_modulus", "youngs_modulus", "poisson_ratio")
+_SHIPPED = Path(__file__).with_name("materials.toml")
+
+
+def _constant(T: NDArray[np.float64], p: Mapping[str, Any]) -> NDArray[np.float64]:
+    return np.full_like(T, p["value"])
+
+
+def _linear(T: NDArray[np.float64], p: Mapping[str, Any]) -> NDArray[np.float64]:
+    return np.asarray(p["value"] * (1 + p["slope"] * (T - ZERO_CELSIUS - p["at_degC"])))
+
+
+def _parabola(T: NDArray[np.float64], p: Mapping[str, Any]) -> NDArray[np.float64]:
+    distance = (T - ZERO_CELSIUS - p["maximum_degC"]) / (p["at_degC"] - p["maximum_degC"])
+    return np.asarray(p["value"] * (1 + p["rise"] * (1 - distance**2)))
+
+
+def _table(T: NDArray[np.float64], p: Mapping[str, Any]) -> NDArray[np.float64]:
+    from scipy.interpolate import PchipInterpolator
+
+    values = PchipInterpolator(p["temperature_degC"], p["values"], extrapolate=False)(T - ZERO_CELSIUS)
+    return np.asarray(p.get("value", 1.0) * values)
+
+
+FORMS: dict[str, tuple[Callable[[NDArray[np.float64], Mapping[str, Any]], NDArray[np.float64]], tuple[str, ...]]] = {
+    # form: (function of temperature, the numbers that it needs)
+    "constant": (_constant, ("value",)),
+    "linear": (_linear, ("value", "at_degC", "slope")),
+    "parabola": (_parabola, ("value", "at_degC", "rise", "maximum_degC")),
+    "table": (_table, ("temperature_degC", "values")),
+}
+
+
+@dataclass(frozen=True)
+class Property:
+    """One property over temperature: a form, its numbers, and the standard uncertainty of any of them."""
+
+    form: str
+    numbers: Mapping[str, Any]
+    uncertainty: Mapping[str, float] = field(default_factory=dict)
+    source: str = ""
+
+    def __call__(self, temperature: ArrayLike) -> NDArray[np.float64]:
+        """Evaluate the form at temperatures in kelvin."""
+        return FORMS[self.form][0](np.asarray(temperature, dtype=float), self.numbers)
+
+    def with_number(self, name: str, value: float) -> "Property":
+        """Return the same property with one of its numbers changed."""
+        return replace(self, numbers={**self.numbers, name: value})
+
+    def scaled(self, factor: float) -> "Property":
+        """Return the property times a factor, its relative shape over temperature unchanged."""
+        shifted = {**self.uncertainty}
+        if "value" in shifted:
+            shifted["value"] *= abs(factor)
+        value = self.numbers.get("value", 1.0) * factor
+        return replace(self, numbers={**self.numbers, "value": value}, uncertainty=shifted)
+
+
+@dataclass(frozen=True)
+class Material:
+    """One law of one material: properties over a range of temperature, and where they come from."""
+
+    name: str
+    law: str
+    lowest: float
+    highest: float
+    properties: Mapping[str, Property]
+    source: str = ""
+    note: str = ""
+
+    def value(self, name: str, temperature: ArrayLike) -> NDArray[np.float64]:
+        """Return a property at temperatures in kelvin; E, G and nu are derived from the two that are stated.
+
+        Raises
+        ------
+        ShellError
+            The sources state no such property, or a temperature lies outside the law's range.
+        """
+        T = self.check(temperature)
+        if name in self.properties:
+            if name == "density":
+                return self.properties[name](T) * self._growth_since_density(T) ** -3
+            return self.properties[name](T)
+        if name not in ELASTIC:
+            raise ShellError(self._lack(name))
+        for other in ELASTIC:
+            if other != name and other not in self.properties:
+                raise ShellError(self._lack(other))
+        if name == "youngs_modulus":
+            return 2 * self.properties["shear_modulus"](T) * (1 + self.properties["poisson_ratio"](T))
+        if name == "shear_modulus":
+            return self.properties["youngs_modulus"](T) / (2 * (1 + self.properties["poisson_ratio"](T)))
+        return self.properties["youngs_modulus"](T) / (2 * self.properties["shear_modulus"](T)) - 1
+
+    def elastic(self, temperature: float) -> Elastic:
+        """Return E, nu and rho at one temperature in kelvin."""
+        E, nu, rho = (float(self.value(p, temperature)) for p in ("youngs_modulus", "poisson_ratio", "density"))
+        return Elastic(E, nu, rho)
+
+    def growth(self, temperature: ArrayLike, reference: float) -> NDArray[np.float64]:
+        """Return the length at a temperature over the length at the reference, exp(∫ alpha dT)."""
+        if "expansion" not in self.properties:
+            raise ShellError(self._lack("expansion"))
+        T = self.check(temperature)
+        self.check(reference)
+        x, w = np.polynomial.legendre.leggauss(16)
+        half = (T - reference) / 2
+        nodes = reference + half[..., None] * (1 + x)
+        return np.asarray(np.exp(half * (self.properties["expansion"](nodes) @ w)))
+
+    def check(self, temperature: ArrayLike) -> NDArray[np.float64]:
+        """Return the temperatures, or raise ShellError when one lies outside the law's range."""
+        T = np.asarray(temperature, dtype=float)
+        outside = (T < self.lowest - 1e-9) | (T > self.highest + 1e-9) | ~np.isfinite(T)
+        if outside.any():
+            worst = float(T[outside][0]) - ZERO_CELSIUS
+            low, high = self.lowest - ZERO_CELSIUS, self.highest - ZERO_CELSIUS
+            raise ShellError(
+                f"{worst:g} °C is outside the range of {self.name}, law '{self.law}' ({low:g} to {high:g} °C);"
+                " choose another temperature or a law that covers it ('hrg materials' lists them)."
+            )
+        return T
+
+    def uncertain_numbers(self) -> list[tuple[str, str, float]]:
+        """Return (property, number, standard uncertainty) for every number that has one."""
+        return [(p, n, u) for p, prop in self.properties.items() for n, u in prop.uncertainty.items() if u > 0]
+
+    def with_number(self, name: str, number: str, value: float) -> "Material":
+        """Return the same material with one number of one property changed."""
+        changed = self.properties[name].with_number(number, value)
+        return replace(self, properties={**self.properties, name: changed})
+
+    def rescaled(self, reference: float, **given: float) -> "Material":
+        """Return the material with given values at the reference temperature, its laws' shapes kept.
+
+        Parameters
+        ----------
+        reference : float, K
+            Temperature at which the given values hold.
+        **given : float
+            Any of `youngs_modulus`, `poisson_ratio`, `density`; what the law does not state becomes a constant.
+        """
+        target = dict(given)
+        properties = dict(self.properties)
+        stated = [name for name in ELASTIC if name in properties]
+        if "youngs_modulus" in target and "youngs_modulus" not in stated and "shear_modulus" in stated:
+            nu = target.get("poisson_ratio")
+            nu = float(self.value("poisson_ratio", reference)) if nu is None else nu
+            target["shear_modulus"] = target.pop("youngs_modulus") / (2 * (1 + nu))
+        elif "poisson_ratio" in target and "shear_modulus" in stated:
+            E = float(self.value("youngs_modulus", reference))
+            target["shear_modulus"] = E / (2 * (1 + target["poisson_ratio"]))
+        for name, value in target.items():
+            if name in properties:
+                now = float(self.value(name, reference))
+                properties[name] = properties[name].scaled(value / now)
+            else:
+                numbers = {"value": value, "at_degC": reference - ZERO_CELSIUS}
+                properties[name] = Property("constant", numbers, source="given value")
+        return replace(self, properties=properties)
+
+    def _growth_since_density(self, T: NDArray[np.float64]) -> NDArray[np.float64]:
+        if "expansion" not in self.properties:
+            return np.ones_like(T)
+        return self.growth(T, self.properties["density"].numbers["at_degC"] + ZERO_CELSIUS)
+
+    def _lack(self, name: str) -> str:
+        return (
+            f"material '{self.name}', law '{self.law}': no source states its {name.replace('_', ' ')};"
+            " give it in the card or in a material file of your own."
+        )
+
+
+def constant_material(name: str, youngs_modulus: float, poisson_ratio: float, density: float) -> Material:
+    """Return a material whose given values (Pa, 1, kg/m³) hold at every temperature and that does not expand."""
+    given = {"youngs_modulus": youngs_modulus, "poisson_ratio": poisson_ratio, "density": density}
+    properties = {key: Property("constant", {"value": value}, source="given value") for key, value in given.items()}
+    properties["expansion"] = Property("constant", {"value": 0.0}, source="given values do not expand")
+    return Material(name, "given values", 0.0, 5000.0, properties, source="given in the card")
+
+
+@lru_cache(maxsize=8)
+def read_materials(path: str | Path = _SHIPPED) -> Mapping[str, Mapping[str, Material]]:
+    """Read a table of materials: name -> law -> Material; the default law stands first.
+
+    Raises
+    ------
+    ShellError
+        The file cannot be read or a key is wrong: the message names file, key and mend.
+    """
+    try:
+        content = tomllib.loads(Path(path).read_bytes().decode("utf-8-sig"))
+    except OSError as error:
+        raise ShellError(f"{path}: cannot be read ({error.strerror}).") from error
+    except (UnicodeDecodeError, tomllib.TOMLDecodeError, RecursionError) as error:
+        raise ShellError(f"{path}: not a valid TOML file: {error}.") from None
+    if content.pop("schema", None) != "hrg.materials/1":
+        raise ShellError(f'{path}: the line schema = "hrg.materials/1" is missing; add it at the top.')
+    if not content:
+        raise ShellError(f"{path}: no material in it; add a table [name] with [name.laws.law].")
+    return {name: _read_material(f"{path} [{name}]", name, entry) for name, entry in content.items()}
+
+
+def find_material(name: str, law: str = "default", path: str | Path | None = None) -> Material:
+    """Return one law of one material, from the shipped table or a user's own file."""
+    table = read_materials(path) if path is not None else read_materials()
+    if name not in table:
+        raise ShellError(f"unknown material '{name}'{_nearest(name, table)}")
+    laws = table[name]
+    if law == "default":
+        return next(iter(laws.values()))
+    if law not in laws:
+        raise ShellError(f"material '{name}' has no law '{law}'{_nearest(law, laws)}")
+    return laws[law]
+
+
+def _read_material(where: str, name: str, entry: Any) -> Mapping[str, Material]:
+    _check_keys(where, entry, ("description", "default", "laws"), required=("laws",))
+    laws = entry["laws"]
+    if not isinstance(laws, dict) or not laws:
+        raise ShellError(f"{where}: laws must be tables [{name}.laws.law].")
+    default = entry.get("default", next(iter(laws)))
+    if default not in laws:
+        raise ShellError(f"{where}: default = '{default}' is not one of its laws{_nearest(str(default), laws)}")
+    ordered = [default, *(law for law in laws if law != default)]
+    return {law: _read_law(f"{where} law '{law}'", name, law, laws[law]) for law in ordered}
+
+
+def _read_law(where: str, name: str, law: str, entry: Any) -> Material:
+    _check_keys(where, entry, ("source", "note", "range_degC", *PROPERTIES), required=("source", "range_degC"))
+    span = entry["range_degC"]
+    if not (isinstance(span, list) and len(span) == 2 and all(_is_number(x) for x in span) and span[0] < span[1]):
+        raise ShellError(f"{where}: range_degC must be [lowest, highest], not {span!r}.")
+    low, high = (x + ZERO_CELSIUS for x in span)
+    if low < 0:
+        raise ShellError(f"{where}: range_degC begins below absolute zero.")
+    found = {p: _read_property(f"{where}: {p}", p, entry[p], span) for p in PROPERTIES if p in entry}
+    if all(p in found for p in ELASTIC):
+        raise ShellError(f"{where}: give two of {', '.join(ELASTIC)}; the third follows.")
+    return Material(name, law, low, high, found, str(entry["source"]), str(entry.get("note", "")))
+
+
+def _read_property(where: str, name: str, entry: Any, span: list[float]) -> Property:
+    _check_keys(where, entry, None, required=("form",))
+    if entry["form"] not in FORMS:
+        raise ShellError(f"{where}: unknown form '{entry['form']}'{_nearest(str(entry['form']), FORMS)}")
+    needed = FORMS[entry["form"]][1] + (("at_degC",) if name == "density" else ())
+    _check_keys(where, entry, ("form", "source", "uncertainty", "at_degC", *needed), required=needed)
+    numbers = {key: value for key, value in entry.items() if key not in ("form", "source", "uncertainty")}
+    for key, value in numbers.items():
+        listed = value if isinstance(value, list) else [value]
+        if not all(_is_number(x) for x in listed):
+            raise ShellError(f"{where}: {key} must be a number, not {value!r}.")
+    if entry["form"] == "table":
+        at, values = np.array(numbers["temperature_degC"]), numbers["values"]
+        if len(at) != len(values) or len(at) < 2 or (np.diff(at) <= 0).any():
+            raise ShellError(
+                f"{where}: temperature_degC must increase and have as many entries as values (two or more)."
+            )
+        if at[0] > span[0] or at[-1] < span[1]:
+            raise ShellError(f"{where}: the table covers {at[0]:g} to {at[-1]:g} °C, less than the law's range_degC.")
+    uncertainty = entry.get("uncertainty", {})
+    _check_keys(f"{where} uncertainty", uncertainty, needed)
+    if not all(_is_number(x) and x >= 0 for x in uncertainty.values()):
+        raise ShellError(f"{where}: uncertainties must be numbers, zero or more.")
+    result = Property(entry["form"], numbers, uncertainty, str(entry.get("source", "")))
+    _check_sign(where, name, result, span)
+    return result
+
+
+def _check_sign(where: str, name: str, found: Property, span: list[float]) -> None:
+    values = found(np.linspace(span[0], span[1], 101) + ZERO_CELSIUS)
+    if name == "poisson_ratio" and not ((values > -1) & (values < 0.5)).all():
+        raise ShellError(f"{where}: leaves the range -1 to 0.5 within range_degC.")
+    if name not in ("poisson_ratio", "expansion") and not (values > 0).all():
+        raise ShellError(f"{where}: is not positive everywhere within range_degC.")
+
+
+def _check_keys(where: str, entry: Any, known: tuple[str, ...] | None, required: tuple[str, ...] = ()) -> None:
+    if not isinstance(entry, dict):
+        raise ShellError(f"{where}: must be a table, not {entry!r}.")
+    for key in entry if known is not None else ():
+        if known is not None and key not in known:
+            raise ShellError(f"{where}: unknown key '{key}'{_nearest(key, known)}")
+    for key in required:
+        if key not in entry:
+            raise ShellError(f"{where}: the key '{key}' is missing; add it.")
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and bool(np.isfinite(value))
+
+
+def _nearest(word: str, known: Any) -> str:
+    close = difflib.get_close_matches(word, list(known), n=1, cutoff=0.5)
+    return f"; did you mean '{close[0]}'?" if close else f"; known: {', '.join(known)}."

@@ -1,0 +1,1 @@
+"""Instruments: a card (TOML) becomes a resonator, a material and the tables that other parts read."""
