@@ -123,6 +123,17 @@ class Material:
             return self.properties["youngs_modulus"](T) / (2 * (1 + self.properties["poisson_ratio"](T)))
         return self.properties["youngs_modulus"](T) / (2 * self.properties["shear_modulus"](T)) - 1
 
+    def slope(self, name: str, temperature: float) -> float:
+        """Return the slope of a property per kelvin, by a central difference that stays inside the range."""
+        step = 0.05
+        middle = min(max(temperature, self.lowest + step), self.highest - step)
+        low, high = self.value(name, np.array([middle - step, middle + step]))
+        return float((high - low) / (2 * step))
+
+    def log_slope(self, name: str, temperature: float) -> float:
+        """Return the relative slope of a property, d ln p/dT in 1/K."""
+        return self.slope(name, temperature) / float(self.value(name, temperature))
+
     def elastic(self, temperature: float) -> Elastic:
         """Return E, nu and rho at one temperature in kelvin."""
         E, nu, rho = (float(self.value(p, temperature)) for p in ("youngs_modulus", "poisson_ratio", "density"))
