@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable, Mapping
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 from studies.errors import InputError
@@ -130,7 +131,7 @@ def _thickness(table: Section) -> Profile:
         for s, h in value
     ]
     places = [s for s, _ in profile]
-    if any(b <= a for a, b in zip(places, places[1:], strict=False)):
+    if any(b <= a for a, b in pairwise(places)):
         raise InputError(f"{what}: the positions must increase from 0 (start) to 1 (rim).")
     return profile
 
