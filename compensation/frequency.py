@@ -1,0 +1,278 @@
+"""Frequency against temperature as a polynomial, and temperature from frequency as its root.
+
+f(T) = f₀ + a₁ (T − T₀) + a₂ (T − T₀)² + …, HRG paper eqs. (16)–(18), of any order. The resonator is its own
+thermometer, so the inverse matters as much as the fit: it is refused where the curve is not monotonic or
+where nothing was measured. Temperatures here are in °C, as the names say; frequencies in Hz.
+"""
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy import stats
+from scipy.optimize import elementwise
+
+from compensation.errors import CompensationError
+from compensation.polynomial import PolynomialFit, fit_polynomial
+from compensation.regression import FTest, compare_nested
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class FrequencyFit:
+    """The fitted curve f(T), valid between the temperatures that were measured.
+
+    `coefficients` f₀ (Hz), a₁ (Hz/°C), a₂ (Hz/°C²) … about `reference_temperature_degC`, with their
+    `covariance`; `temperature_range_degC` lowest and highest temperature fitted; `resolution` of the
+    readings in Hz, if known.
+    """
+
+    reference_temperature_degC: float
+    temperature_range_degC: tuple[float, float]
+    coefficients: Array
+    covariance: Array
+    resolution: float | None
+    polynomial: PolynomialFit
+
+    @property
+    def order(self) -> int:
+        """Highest power of the polynomial."""
+        return self.polynomial.order
+
+    @property
+    def residuals(self) -> Array:
+        """Measured less fitted frequency (Hz), in the order of the data."""
+        return self.polynomial.regression.residuals
+
+    @property
+    def sum_of_squares(self) -> float:
+        """Residual sum of squares (Hz²)."""
+        return self.polynomial.regression.sum_of_squares
+
+    @property
+    def degrees_of_freedom(self) -> int:
+        """Number of readings less number of coefficients."""
+        return self.polynomial.regression.degrees_of_freedom
+
+    @property
+    def leave_one_out_rms(self) -> float:
+        """Rms error (Hz) of predicting each reading from a curve fitted to the others."""
+        return self.polynomial.regression.leave_one_out_rms
+
+    @property
+    def reading_variance(self) -> float:
+        """Variance of one reading (Hz²): of the residuals, but never below that of rounding, resolution²/12."""
+        return self.polynomial.regression.variance
+
+    @property
+    def standard_errors(self) -> Array:
+        """Standard deviations of the coefficients."""
+        return np.sqrt(np.diag(self.covariance))
+
+    @property
+    def chi_squared(self) -> float | None:
+        """Sum of squares over the variance of rounding, resolution²/12; None when no resolution is known."""
+        return None if self.resolution is None else self.sum_of_squares / (self.resolution**2 / 12)
+
+    @property
+    def chi_squared_p_value(self) -> float | None:
+        """Probability that rounding alone leaves as large a sum of squares."""
+        chi = self.chi_squared
+        return None if chi is None else float(stats.chi2.sf(chi, self.degrees_of_freedom))
+
+    @property
+    def largest_residual_of_span(self) -> float:
+        """Largest |residual| over the span of the measured frequencies (1)."""
+        measured = self.polynomial.regression.fitted + self.residuals
+        return float(np.max(np.abs(self.residuals)) / np.ptp(measured))
+
+    def frequency(self, temperature_degC: ArrayLike, *, extrapolate: bool = False) -> Array:
+        """Return f(T) in Hz; temperatures that were not covered raise unless `extrapolate`."""
+        return self.polynomial.value(self._within(temperature_degC, extrapolate))
+
+    def slope(self, temperature_degC: ArrayLike, *, extrapolate: bool = False) -> Array:
+        """Return df/dT in Hz/°C."""
+        return self.polynomial.slope(self._within(temperature_degC, extrapolate))
+
+    def slope_ppm(self, temperature_degC: ArrayLike, *, extrapolate: bool = False) -> Array:
+        """Return (df/dT) / f in ppm/°C, the TCF of HRG paper eq. (15)."""
+        return 1e6 * self.slope(temperature_degC, extrapolate=extrapolate) / self.frequency(
+            temperature_degC, extrapolate=extrapolate
+        )
+
+    def frequency_uncertainty(self, temperature_degC: ArrayLike) -> Array:
+        """Return the standard uncertainty (Hz) of the curve itself at T."""
+        return np.sqrt(self.polynomial.variance(temperature_degC))
+
+    def temperature(self, frequency: ArrayLike) -> Array:
+        """Return the temperature (°C) whose frequency this is: the inverse of f(T), HRG paper Table 2.
+
+        The root is bracketed, so it cannot leave the measured range by more than the fit's own errors
+        (three residual standard deviations, or the largest residual where that is more).
+
+        Raises
+        ------
+        CompensationError
+            The curve is not monotonic, or a frequency lies outside the range of the readings.
+        """
+        frequency = np.asarray(frequency, dtype=np.float64)
+        if not np.all(np.isfinite(frequency)):
+            raise CompensationError("a frequency is missing or infinite; remove those rows.")
+        low, high = self._bracket()
+        ends = self.polynomial.value(np.array([low, high]))
+        outside = (frequency < ends.min()) | (frequency > ends.max())
+        if np.any(outside):
+            raise CompensationError(
+                f"{frequency[outside][0]:.6g} Hz lies outside {ends.min():.6g} to {ends.max():.6g} Hz, the range that "
+                f"was fitted ({low:.1f} to {high:.1f} °C); measure there before using the curve there."
+            )
+        if frequency.size == 0:
+            return frequency
+
+        def excess(T: Array, f: Array) -> Array:
+            return self.polynomial.value(T) - f
+
+        return np.asarray(elementwise.find_root(excess, (low, high), args=(frequency,)).x, dtype=np.float64)
+
+    def temperature_uncertainty(self, frequency: ArrayLike) -> Array:
+        """Return the standard uncertainty (°C) of `temperature(frequency)` for one new reading.
+
+        u²(T) = (variance of the curve + variance of a reading) / (df/dT)²; both rest on `degrees_of_freedom`.
+        """
+        T = self.temperature(frequency)
+        variance = self.frequency_uncertainty(T) ** 2 + self.reading_variance
+        return np.sqrt(variance) / np.abs(self.polynomial.slope(T))
+
+    def _within(self, temperature_degC: ArrayLike, extrapolate: bool) -> Array:
+        T = np.asarray(temperature_degC, dtype=np.float64)
+        low, high = self.temperature_range_degC
+        outside = np.isnan(T) | np.less(T, low) | np.greater(T, high)
+        if not extrapolate and np.any(outside):
+            raise CompensationError(
+                f"{T[outside][0]:g} °C lies outside the fitted range {low:g} to {high:g} °C; "
+                "measure there, or ask for extrapolation."
+            )
+        return T
+
+    def _bracket(self) -> tuple[float, float]:
+        """Return the measured range, widened by the fit's own errors, on which f(T) must be monotonic."""
+        low, high = self.temperature_range_degC
+        margin = max(3 * np.sqrt(self.reading_variance), float(np.max(np.abs(self.residuals))))
+        slopes = np.abs(self.polynomial.slope(np.array([low, high])))
+        reach = np.minimum(margin / np.maximum(slopes, 1e-300), 0.05 * (high - low))
+        low, high = low - float(reach[0]), high + float(reach[1])
+        turns = self.polynomial.turning_points(low, high)
+        if turns.size:
+            raise CompensationError(
+                f"the curve of order {self.order} turns round at {turns[0]:.1f} °C, so two temperatures have the same "
+                "frequency there and it cannot be inverted; fit a narrower range of temperature or another order."
+            )
+        return low, high
+
+
+@dataclass(frozen=True)
+class OrderComparison:
+    """Fits of rising order to the same readings, and the F-test of each order against the next.
+
+    `against_next[k]` compares `fits[k]` with `fits[k + 1]`; `recommended` is the lowest order that the next
+    one does not improve on at `level`.
+    """
+
+    fits: tuple[FrequencyFit, ...]
+    against_next: tuple[FTest, ...]
+    level: float
+    recommended: int
+
+
+def fit_frequency(
+    temperature_degC: ArrayLike,
+    frequency: ArrayLike,
+    order: int = 3,
+    reference_temperature_degC: float = 0.0,
+    resolution: float | None = None,
+) -> FrequencyFit:
+    """Fit f(T) by least squares, HRG paper eqs. (16)–(18).
+
+    Parameters
+    ----------
+    temperature_degC, frequency : array, shape (m,)
+        Settled temperatures (°C) and the resonator's frequency there (Hz).
+    order : int
+        Highest power; the paper takes 3.
+    reference_temperature_degC : float
+        T₀, about which the coefficients are stated.
+    resolution : float, optional
+        Step of the frequency readings (Hz): rounding to it has the variance resolution²/12.
+
+    Raises
+    ------
+    CompensationError
+        Frequencies that are not positive, a constant column, values that are not finite, or too few
+        different temperatures for the order.
+    """
+    T, f = np.asarray(temperature_degC, dtype=np.float64), np.asarray(frequency, dtype=np.float64)
+    if resolution is not None and not (np.isfinite(resolution) and resolution > 0):
+        raise CompensationError(f"the resolution of the readings must be positive, not {resolution:g} Hz.")
+    rounding = 0.0 if resolution is None else resolution**2 / 12
+    polynomial = fit_polynomial(T, f, order, "temperature_degC", least_variance=rounding)
+    if np.any(f <= 0):
+        raise CompensationError(f"a frequency must be positive, not {f[f <= 0][0]:g} Hz.")
+    if np.ptp(f) == 0:
+        raise CompensationError(
+            f"'frequency' is constant ({f[0]:g} Hz): it says nothing of temperature; check the column."
+        )
+    coefficients, covariance = polynomial.about(reference_temperature_degC)
+    return FrequencyFit(
+        reference_temperature_degC=float(reference_temperature_degC),
+        temperature_range_degC=(float(T.min()), float(T.max())),
+        coefficients=coefficients,
+        covariance=covariance,
+        resolution=resolution,
+        polynomial=polynomial,
+    )
+
+
+def compare_orders(
+    temperature_degC: ArrayLike,
+    frequency: ArrayLike,
+    highest: int = 5,
+    reference_temperature_degC: float = 0.0,
+    resolution: float | None = None,
+    level: float = 0.05,
+) -> OrderComparison:
+    """Fit every order from 1 to `highest` (or as far as the readings allow) and test each against the next.
+
+    F(1, m − p) = (SSE_k − SSE_{k+1}) / (SSE_{k+1} / (m − p)). The search for the recommended order starts at
+    1 and stops where the next order does not help, so a cubic without any quadratic part can be missed.
+    """
+    readings = np.unique(np.asarray(temperature_degC, dtype=np.float64)).size
+    highest = min(highest, readings - 2)
+    if highest < 1:
+        raise CompensationError(
+            f"comparing orders needs at least 3 different temperatures, not {readings}; measure more."
+        )
+    fits = tuple(
+        fit_frequency(temperature_degC, frequency, order, reference_temperature_degC, resolution)
+        for order in range(1, highest + 1)
+    )
+    tests = tuple(
+        compare_nested(small.polynomial.regression, large.polynomial.regression)
+        for small, large in pairwise(fits)
+    )
+    needed = [test.p_value < level for test in tests]
+    recommended = needed.index(False) + 1 if False in needed else highest
+    return OrderComparison(fits, tests, level, recommended)
+
+
+def disagreement_degC(
+    one: FrequencyFit, other: FrequencyFit, temperature_degC: ArrayLike, slope_temperature_degC: float = 20.0
+) -> Array:
+    """Return how far two curves differ at T, as a temperature: Δf(T) over df/dT of `one` at one temperature.
+
+    The slope is taken inside the measured range because outside it the two slopes differ as well.
+    """
+    T = np.asarray(temperature_degC, dtype=np.float64)
+    difference = other.frequency(T, extrapolate=True) - one.frequency(T, extrapolate=True)
+    return np.asarray(difference / one.slope(slope_temperature_degC))

@@ -1,0 +1,122 @@
+"""Polynomials of one variable, fitted in a centred and scaled variable u = (x − centre) / half_span.
+
+Powers of u are nearly independent columns where powers of x are nearly equal ones, so the fit keeps its
+digits; the coefficients about any reference follow by the binomial theorem, and so does their covariance.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from compensation.errors import CompensationError
+from compensation.regression import LinearFit, fit_linear
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class PolynomialFit:
+    """y = Σ cₖ uᵏ with u = (x − centre) / half_span; `regression` holds c and everything about the fit."""
+
+    centre: float
+    half_span: float
+    regression: LinearFit
+
+    @property
+    def order(self) -> int:
+        """Highest power."""
+        return self.regression.coefficients.size - 1
+
+    def scaled(self, x: ArrayLike) -> Array:
+        """Return u = (x − centre) / half_span."""
+        return (np.asarray(x, dtype=np.float64) - self.centre) / self.half_span
+
+    def powers(self, x: ArrayLike) -> Array:
+        """Return the rows 1, u, u², … at x, shape (…, order + 1)."""
+        u = self.scaled(x)
+        return np.asarray(np.stack([u**k for k in range(self.order + 1)], axis=-1), dtype=np.float64)
+
+    def value(self, x: ArrayLike) -> Array:
+        """Return y(x)."""
+        return self.powers(x) @ self.regression.coefficients
+
+    def slope(self, x: ArrayLike) -> Array:
+        """Return dy/dx."""
+        c = self.regression.coefficients
+        return self.powers(x)[..., :-1] @ (np.arange(1, c.size) * c[1:]) / self.half_span
+
+    def variance(self, x: ArrayLike) -> Array:
+        """Return the variance of the fitted curve at x that the coefficients' covariance causes."""
+        rows = self.powers(x)
+        return np.asarray(np.einsum("...i,ij,...j->...", rows, self.regression.covariance, rows))
+
+    def turning_points(self, low: float, high: float) -> Array:
+        """Return the x between low and high, in rising order, at which dy/dx = 0."""
+        c = self.regression.coefficients
+        roots = np.polynomial.polynomial.polyroots(np.arange(1, c.size) * c[1:])
+        real = roots[np.abs(roots.imag) < 1e-9].real * self.half_span + self.centre
+        return np.sort(real[(real >= low) & (real <= high)])
+
+    def about(self, reference: float) -> tuple[Array, Array]:
+        """Return coefficients b and covariance of the same curve, y = Σ bⱼ (x − reference)ʲ."""
+        size = self.order + 1
+        offset = np.longdouble(reference - self.centre) / np.longdouble(self.half_span)
+        M = np.zeros((size, size), dtype=np.longdouble)
+        for k in range(size):
+            for j in range(k + 1):
+                M[j, k] = math.comb(k, j) * offset ** (k - j) / np.longdouble(self.half_span) ** j
+        return (
+            (M @ self.regression.coefficients).astype(np.float64),
+            (M @ self.regression.covariance @ M.T).astype(np.float64),
+        )
+
+
+def fit_polynomial(
+    x: ArrayLike, y: ArrayLike, order: int, name: str = "x", least_variance: float = 0.0
+) -> PolynomialFit:
+    """Fit a polynomial of the given order by least squares.
+
+    Parameters
+    ----------
+    x, y : array, shape (m,)
+    order : int
+        Highest power, 1 or more.
+    name : str
+        What errors call x.
+    least_variance : float
+        Variance that every observation has at least, such as that of its rounding.
+
+    Raises
+    ------
+    CompensationError
+        Order below 1, values not finite, x constant, or too few distinct x for the order.
+    """
+    if order < 1:
+        raise CompensationError(f"a polynomial fit needs an order of 1 or more, not {order}.")
+    x, y = np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64)
+    if x.ndim != 1 or x.shape != y.shape:
+        raise CompensationError(
+            f"'{name}' and its observations must be equally long, not {x.shape} and {y.shape}."
+        )
+    if not np.all(np.isfinite(x)):
+        raise CompensationError(f"'{name}' has missing or infinite values; remove those rows.")
+    distinct = np.unique(x).size
+    if distinct == 1:
+        raise CompensationError(
+            f"'{name}' is constant ({x[0]:g}): nothing can be learnt from it; record data in which it varies."
+        )
+    if distinct <= order or x.size <= order + 1:
+        raise CompensationError(
+            f"order {order} needs at least {order + 1} different values of '{name}' and {order + 2} rows, "
+            f"not {distinct} and {x.size}; lower the order or measure more."
+        )
+    # A centre and span with few bits make the scaled variable exact for tabulated values.
+    half_span = float(2.0 ** np.ceil(np.log2(np.ptp(x) / 2)))
+    centre = float(np.round((x.min() + x.max()) / 2 / half_span * 16) / 16 * half_span)
+    u = (x - centre) / half_span
+    powers = u[:, None] ** np.arange(1, order + 1)
+    names = [name] + [f"{name}^{k}" for k in range(2, order + 1)]
+    regression = fit_linear(powers, y, names, least_variance=least_variance)
+    return PolynomialFit(centre, half_span, regression)

@@ -1,0 +1,100 @@
+"""Planted curves come back with honest intervals; data that cannot carry a curve are refused."""
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from compensation.errors import CompensationError
+from compensation.frequency import compare_orders, fit_frequency
+
+T = np.linspace(-20, 40, 13)
+TRUTH = (4424.9, 0.3716, -9.7e-4, 1.53e-5)
+
+
+def reading(rng, noise=0.02):
+    return np.polynomial.polynomial.polyval(T, TRUTH) + noise * rng.normal(size=T.size)
+
+
+def test_intervals_of_coefficients_and_temperature_cover_the_truth():
+    rng = np.random.default_rng(11)
+    inside = np.zeros(5)
+    runs = 400
+    for _ in range(runs):
+        fit = fit_frequency(T, reading(rng))
+        t = stats.t.ppf(0.95, fit.degrees_of_freedom)
+        inside[:4] += np.abs(fit.coefficients - TRUTH) < t * fit.standard_errors
+        f = np.polynomial.polynomial.polyval(13.7, TRUTH) + 0.02 * rng.normal()
+        inside[4] += abs(fit.temperature(f) - 13.7) < t * fit.temperature_uncertainty(f)
+    assert np.all(np.abs(inside / runs - 0.90) < 3 * np.sqrt(0.09 / runs))
+
+
+def test_coefficients_about_another_reference_describe_the_same_curve():
+    f = reading(np.random.default_rng(3))
+    about_zero, about_25 = fit_frequency(T, f), fit_frequency(T, f, reference_temperature_degC=25.0)
+    shifted = np.polynomial.polynomial.polyval(T - 25.0, about_25.coefficients)
+    assert shifted == pytest.approx(about_zero.frequency(T), rel=1e-13)
+    assert about_25.standard_errors[0] == pytest.approx(about_zero.frequency_uncertainty(25.0), rel=1e-9)
+
+
+def test_the_inverse_undoes_the_curve():
+    fit = fit_frequency(T, reading(np.random.default_rng(4)))
+    inner = np.linspace(-20, 40, 101).reshape(1, -1)
+    assert fit.temperature(fit.frequency(inner)) == pytest.approx(inner, abs=1e-9)
+
+
+def test_a_falling_curve_is_inverted_too():
+    fit = fit_frequency(T, 9000 - 0.5 * T - 1e-4 * T**2 + 1e-3 * np.cos(T), order=2)
+    assert fit.temperature(fit.frequency(7.0)) == pytest.approx(7.0, abs=1e-9)
+
+
+def test_a_straight_line_with_noise_asks_for_no_second_order():
+    rng = np.random.default_rng(8)
+    asked = [
+        compare_orders(T, 4425 + 0.37 * T + 0.02 * rng.normal(size=T.size)).recommended > 1 for _ in range(300)
+    ]
+    assert abs(np.mean(asked) - 0.05) < 3 * np.sqrt(0.05 * 0.95 / 300)
+
+
+def test_rounding_alone_passes_its_own_test():
+    """Readings rounded to 0.01 Hz: χ² against resolution²/12 rejects the true order about one time in twenty."""
+    rng = np.random.default_rng(9)
+    rejected = []
+    for _ in range(300):
+        truth = rng.uniform(4400, 4500) + rng.uniform(0.3, 0.4) * T + rng.uniform(-1e-3, 0) * T**2
+        rejected.append(fit_frequency(T, np.round(truth, 2), 2, resolution=0.01).chi_squared_p_value < 0.05)
+    assert np.mean(rejected) < 0.09
+
+
+@pytest.mark.parametrize(
+    ("temperature", "frequency", "options", "message"),
+    [
+        (np.full(7, 20.0), 4400 + np.arange(7.0), {}, "'temperature_degC' is constant"),
+        (np.arange(7.0), np.full(7, 4400.0), {}, "'frequency' is constant"),
+        ([0, 0, 10, 10, 20, 20], np.arange(6.0) + 4400, {}, "needs at least 4 different values"),
+        ([0.0, 10, 20, 30], [4400.0, 4403, 4407, 4410], {}, "5 rows"),
+        (np.arange(6.0), [4400, np.nan, 4402, 4403, 4404, 4405], {}, "'y' has 1 missing"),
+        ([0, np.nan, 2, 3, 4, 5], np.arange(6.0), {}, "'temperature_degC' has missing"),
+        (np.arange(6.0), np.arange(6.0) - 2, {}, "must be positive"),
+        (np.arange(6.0), np.arange(6.0) + 4400, {"order": 0}, "order of 1 or more"),
+        (np.arange(6.0), np.arange(6.0) + 4400, {"resolution": 0.0}, "resolution"),
+        (np.arange(6.0), np.arange(5.0) + 4400, {}, "equally long"),
+    ],
+)
+def test_unusable_tables_are_refused(temperature, frequency, options, message):
+    with pytest.raises(CompensationError, match=message):
+        fit_frequency(temperature, frequency, **options)
+
+
+def test_a_curve_that_turns_round_is_not_inverted():
+    fit = fit_frequency(T, 4425 + 0.1 * T - 5e-3 * T**2 + 1e-6 * T**3)
+    with pytest.raises(CompensationError, match=r"turns round at 10\.\d °C"):
+        fit.temperature(4425.0)
+
+
+def test_nothing_is_extrapolated_unless_asked():
+    fit = fit_frequency(T, reading(np.random.default_rng(2)))
+    with pytest.raises(CompensationError, match="outside the fitted range -20 to 40"):
+        fit.frequency([0.0, 41.0])
+    with pytest.raises(CompensationError, match="lies outside"):
+        fit.temperature(4450.0)
+    assert fit.frequency(41.0, extrapolate=True) > fit.frequency(40.0)
