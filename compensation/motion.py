@@ -1,0 +1,227 @@
+"""Full motion of the sensitive element, equations (1) and (2) of the CVG papers, without the slow approximation.
+
+`integrate_motion` follows every cycle of the carrier with a general integrator. `propagate_envelope` solves the same
+equations for the complex amplitudes x = Im{A e^{jωt}} by matrix exponentials, so its step need not resolve the
+carrier. `demodulate` turns the first into what the second gives. All take the rate as samples, linear in between.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from compensation.errors import CompensationError
+from compensation.samples import check_time, read_columns, require_regular
+from compensation.sensitive_element import SensitiveElement
+
+Real = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+
+@dataclass(frozen=True)
+class Motion:
+    """Primary and secondary motion (m) over time (s): real displacements, or complex amplitudes."""
+
+    time: Real
+    primary: NDArray[Any]
+    secondary: NDArray[Any]
+
+
+def write_dynamics(
+    element: SensitiveElement, rate: ArrayLike, rate_slope: ArrayLike, zeta12: ArrayLike = 0.0, zeta21: ArrayLike = 0.0
+) -> Real:
+    """Return the matrices M of ẏ = M y + (0, 0, q₁, 0, 0), y = (x₁, x₂, ẋ₁, ẋ₂, 1): CVG cross-damping eq. (2).
+
+    Parameters
+    ----------
+    element : SensitiveElement
+        The oscillators.
+    rate, rate_slope : array (...,)
+        Ω (rad/s) and its time derivative (rad/s²).
+    zeta12, zeta21 : array (...,)
+        Relative cross-damping (1); with both zero these are equations (1).
+
+    Returns
+    -------
+    array (..., 5, 5)
+        The last state is the constant 1 and carries no force here; the caller adds the excitation in its column.
+    """
+    e = element
+    Omega, slope, cross12, cross21 = np.broadcast_arrays(
+        *(np.asarray(values, dtype=float) for values in (rate, rate_slope, zeta12, zeta21))
+    )
+    M = np.zeros((*Omega.shape, 5, 5))
+    M[..., 0, 2] = M[..., 1, 3] = 1.0
+    M[..., 2, 0] = -(e.k1**2 - e.d1 * Omega**2)
+    M[..., 2, 2] = -2 * e.zeta1 * e.k1
+    M[..., 2, 3] = -(e.g1 * Omega + 2 * cross21 * e.k1)
+    M[..., 2, 1] = -e.d3 * slope
+    M[..., 3, 1] = -(e.k2**2 - e.d2 * Omega**2)
+    M[..., 3, 3] = -2 * e.zeta2 * e.k2
+    M[..., 3, 2] = e.g2 * Omega + 2 * cross12 * e.k2
+    M[..., 3, 0] = slope
+    return M
+
+
+def integrate_motion(
+    element: SensitiveElement,
+    time: ArrayLike,
+    rate: ArrayLike,
+    *,
+    zeta12: ArrayLike | None = None,
+    zeta21: ArrayLike | None = None,
+    samples_per_cycle: int = 16,
+    tolerance: float = 1e-10,
+) -> Motion:
+    """Integrate equation (2) through every carrier cycle, from a settled primary and a resting secondary.
+
+    Parameters
+    ----------
+    element : SensitiveElement
+        The oscillators.
+    time, rate : array (N,)
+        Times (s) and angular rate (rad/s) there, linear in between.
+    zeta12, zeta21 : array (N,), optional
+        Cross-damping (1) at these times; zero when left out.
+    samples_per_cycle : int
+        Density of the returned displacements, an even grid.
+    tolerance : float
+        Relative tolerance of the integrator (Dormand–Prince 8(5,3)).
+
+    Returns
+    -------
+    Motion
+        Real displacements x₁, x₂.
+    """
+    from scipy.integrate import solve_ivp
+
+    t, Omega, cross12, cross21 = _read_inputs(time, rate, zeta12, zeta21)
+    slopes = np.diff(Omega) / np.diff(t)
+    omega, q10 = element.omega, element.q10
+
+    def derivative(at: float, y: Real) -> Real:
+        k = min(max(int(np.searchsorted(t, at, side="right")) - 1, 0), len(t) - 2)
+        share = (at - t[k]) / (t[k + 1] - t[k])
+        M = write_dynamics(
+            element,
+            Omega[k] + slopes[k] * (at - t[k]),
+            slopes[k],
+            cross12[k] + share * (cross12[k + 1] - cross12[k]),
+            cross21[k] + share * (cross21[k + 1] - cross21[k]),
+        )
+        out: Real = M[:4, :4] @ y
+        out[2] += q10 * np.sin(omega * at)
+        return out
+
+    A1 = element.primary_amplitude * np.exp(1j * omega * t[0])
+    start = [A1.imag, 0.0, (1j * omega * A1).imag, 0.0]
+    step = 2 * np.pi / omega / samples_per_cycle
+    grid = t[0] + step * np.arange(int((t[-1] - t[0]) / step * (1 + 1e-12)) + 1)
+    solution = solve_ivp(
+        derivative, (t[0], t[-1]), start, method="DOP853", t_eval=grid, rtol=tolerance,
+        atol=tolerance * abs(A1) * np.array([1, 1, omega, omega]), max_step=float(np.max(np.diff(t))),
+    )
+    if not solution.success:
+        raise CompensationError(f"the motion could not be integrated: {solution.message}")
+    return Motion(grid, solution.y[0], solution.y[1])
+
+
+def propagate_envelope(
+    element: SensitiveElement,
+    time: ArrayLike,
+    rate: ArrayLike,
+    *,
+    zeta12: ArrayLike | None = None,
+    zeta21: ArrayLike | None = None,
+) -> Motion:
+    """Propagate the complex amplitudes of equation (2), nothing neglected, from one sample to the next.
+
+    With x = Im{A e^{jωt}} the state obeys ẏ = (M(t) − jω) y + (0, 0, q₁₀, 0). Each step is one matrix exponential,
+    exact where the rate is constant. Where it changes, a step that resolves the carrier (h ω < 1) uses the
+    fourth-order Magnus expansion h M(mid) + h³/12 [M′, M(mid)], a longer one M(mid) alone: second order in h, and
+    slow amplitudes do not feel the carrier that it steps over.
+
+    Parameters
+    ----------
+    element, time, rate, zeta12, zeta21
+        As for `integrate_motion`.
+
+    Returns
+    -------
+    Motion
+        Complex amplitudes A₁, A₂ at `time`.
+    """
+    from scipy.linalg import expm
+
+    t, Omega, cross12, cross21 = _read_inputs(time, rate, zeta12, zeta21)
+    h = np.diff(t)
+    rise = np.diff(Omega) / h
+    middle = [(values[:-1] + values[1:]) / 2 for values in (Omega, cross12, cross21)]
+    carrier = 1j * element.omega * np.diag([1, 1, 1, 1, 0])
+    M = write_dynamics(element, middle[0], rise, middle[1], middle[2]) - carrier
+    M[:, 2, 4] = element.q10
+    # (Ω²)′ at the middle of a step is 2 Ω Ω′, and M depends on Ω otherwise linearly.
+    drift = np.zeros_like(M)
+    drift[:, 2, 0] = 2 * element.d1 * middle[0] * rise
+    drift[:, 3, 1] = 2 * element.d2 * middle[0] * rise
+    drift[:, 2, 3] = -element.g1 * rise - 2 * element.k1 * np.diff(cross21) / h
+    drift[:, 3, 2] = element.g2 * rise + 2 * element.k2 * np.diff(cross12) / h
+    hh = h[:, None, None]
+    resolved = hh * element.omega < 1
+    exponents = hh * M + np.where(resolved, hh**3 / 12, 0.0) * (drift @ M - M @ drift)
+    kinds, kind = np.unique(exponents, axis=0, return_inverse=True)
+    steps = expm(kinds)
+    y = np.empty((len(t), 5), dtype=complex)
+    A1 = element.primary_amplitude
+    y[0] = [A1, 0, 1j * element.omega * A1, 0, 1]
+    for n, k in enumerate(kind.ravel()):
+        y[n + 1] = steps[k] @ y[n]
+    return Motion(t, y[:, 0], y[:, 1])
+
+
+def demodulate(time: ArrayLike, displacement: ArrayLike, omega: float) -> tuple[Real, Complex]:
+    """Return the complex amplitude A of x = Im{A e^{jωt}} by synchronous detection over two carrier periods.
+
+    2 j x e^{−jωt} = A − A* e^{−2jωt}; a moving mean over one period, taken twice, removes the second term as long
+    as A changes linearly over the window, and does not shift A in time.
+
+    Parameters
+    ----------
+    time, displacement : array (N,)
+        Even times (s), a whole number per period, and x (m).
+    omega : float
+        Carrier frequency (rad/s).
+
+    Returns
+    -------
+    time, amplitude : arrays
+        Shorter than the input by one period at either end.
+
+    Raises
+    ------
+    CompensationError
+        On uneven times, or when a period is not a whole number of samples (four or more).
+    """
+    t, x = read_columns(time=time, displacement=displacement)
+    step = require_regular(t, "synchronous demodulation")
+    period = 2 * np.pi / omega / step
+    m = round(period)
+    if m < 4 or abs(period - m) > 1e-6 * m:
+        raise CompensationError(f"a carrier period holds {period:.6g} samples; it must be a whole number, at least 4.")
+    window = np.convolve(np.full(m, 1 / m), np.full(m, 1 / m))
+    if len(t) < len(window):
+        raise CompensationError(f"demodulation needs two carrier periods, {len(window)} rows, not {len(t)}.")
+    mixed = 2j * x * np.exp(-1j * omega * t)
+    return t[m - 1 : len(t) - m + 1], np.convolve(mixed, window, mode="valid")
+
+
+def _read_inputs(
+    time: ArrayLike, rate: ArrayLike, zeta12: ArrayLike | None, zeta21: ArrayLike | None
+) -> list[Real]:
+    zero = np.zeros(np.shape(time))
+    columns = read_columns(
+        time=time, rate=rate, zeta12=zero if zeta12 is None else zeta12, zeta21=zero if zeta21 is None else zeta21
+    )
+    check_time(columns[0])
+    return columns

@@ -1,0 +1,61 @@
+"""Checks of sampled columns, so that no function here computes with a hole, a NaN or time that runs back."""
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from compensation.errors import CompensationError
+
+REGULAR = 1e-3
+"""Largest departure from an even grid, as a part of the mean step, that still counts as even sampling."""
+
+
+def read_columns(**columns: ArrayLike) -> list[NDArray[np.float64]]:
+    """Return the named columns as arrays of floats, all finite and of one length.
+
+    Raises
+    ------
+    CompensationError
+        When a column is not one-dimensional, differs in length from the first, or has a value that is not finite.
+    """
+    arrays = [np.asarray(values, dtype=float) for values in columns.values()]
+    for name, values in zip(columns, arrays, strict=True):
+        if values.ndim != 1 or len(values) != len(arrays[0]):
+            raise CompensationError(
+                f"'{name}' has shape {values.shape} where one value a row, {len(arrays[0])} in all, is needed."
+            )
+        holes = np.flatnonzero(~np.isfinite(values))
+        if len(holes):
+            raise CompensationError(
+                f"'{name}' has {len(holes)} missing or infinite values, the first in row {holes[0] + 1}; "
+                "fill them or leave these rows out."
+            )
+    return arrays
+
+
+def check_time(time: NDArray[np.float64]) -> None:
+    """Raise unless `time` (s) has two rows or more and increases strictly."""
+    if len(time) < 2:
+        raise CompensationError(f"'time' has {len(time)} rows; a time series needs two or more.")
+    back = np.flatnonzero(np.diff(time) <= 0)
+    if len(back):
+        raise CompensationError(f"'time' does not increase from row {back[0] + 1} to row {back[0] + 2}.")
+
+
+def is_regular(time: NDArray[np.float64]) -> bool:
+    """Tell whether `time` (s) lies on an even grid, to a thousandth of its step."""
+    grid = np.linspace(time[0], time[-1], len(time))
+    return bool(np.max(np.abs(time - grid)) <= REGULAR * (grid[1] - grid[0]))
+
+
+def require_regular(time: NDArray[np.float64], purpose: str) -> float:
+    """Return the even step of `time` (s), or raise naming the row where it is not even and the `purpose`."""
+    check_time(time)
+    step = float((time[-1] - time[0]) / (len(time) - 1))
+    if not is_regular(time):
+        steps = np.diff(time)
+        row = int(np.argmax(np.abs(steps - np.median(steps))))
+        raise CompensationError(
+            f"{purpose} needs even sampling, but the step after row {row + 1} is {steps[row]:g} s where "
+            f"{np.median(steps):g} s is usual; resample the record or cut it at its gaps."
+        )
+    return step

@@ -1,0 +1,81 @@
+"""The sensitive element of a Coriolis vibratory gyro: two oscillators coupled by the angular rate.
+
+Symbols, as in the papers on demodulated dynamics and on cross-damping: x₁, x₂ primary and secondary motion;
+k₁, k₂ natural frequencies (rad/s); ζ₁, ζ₂ relative damping; Ω angular rate (rad/s); ω excitation frequency (rad/s);
+q₁₀ excitation acceleration (m/s²); d, g dimensionless coefficients of the design.
+"""
+
+import math
+from dataclasses import dataclass
+
+from compensation.errors import CompensationError
+
+
+@dataclass(frozen=True)
+class SensitiveElement:
+    """Parameters of the motion equations (1) of both CVG papers.
+
+    Parameters
+    ----------
+    k1, k2 : float
+        Natural frequencies of the primary and secondary motion (rad/s).
+    zeta1, zeta2 : float
+        Relative damping (1), 1/(2 Q).
+    omega : float
+        Excitation frequency (rad/s).
+    q10 : float
+        Amplitude of the excitation (m/s²).
+    d1, d2, d3, g1, g2 : float
+        Coefficients of the design (1); the defaults are those of a vibrating cylinder.
+
+    Raises
+    ------
+    CompensationError
+        When a frequency is not positive or a damping lies outside 0 < ζ < 1/√2, where no resonance exists.
+    """
+
+    k1: float
+    k2: float
+    zeta1: float
+    zeta2: float
+    omega: float
+    q10: float = 1.0
+    d1: float = 1.0
+    d2: float = 1.0
+    d3: float = 1.0
+    g1: float = 2.0
+    g2: float = 2.0
+
+    def __post_init__(self) -> None:
+        for name in ("k1", "k2", "omega"):
+            if not (math.isfinite(getattr(self, name)) and getattr(self, name) > 0):
+                raise CompensationError(f"{name} must be a positive angular frequency in rad/s.")
+        for name in ("zeta1", "zeta2"):
+            if not 0 < getattr(self, name) < math.sqrt(0.5):
+                raise CompensationError(f"{name} = {getattr(self, name):g} must lie between 0 and 0.707.")
+        if not self.g2:
+            raise CompensationError("g2 must not be zero: without it the gyro does not sense rate.")
+
+    @property
+    def primary_amplitude(self) -> complex:
+        """A₁ = q₁₀ / (k₁² − ω² + 2 j k₁ ζ₁ ω), the settled primary motion (m), demodulated-dynamics eq. (8)."""
+        return self.q10 / (self.k1**2 - self.omega**2 + 2j * self.k1 * self.zeta1 * self.omega)
+
+
+def tune(k: float, zeta: float, *, q10: float = 1.0) -> SensitiveElement:
+    """Return the tuned element k₁ = k₂ = k, ζ₁ = ζ₂ = ζ, driven at resonance, ω = k √(1 − 2ζ²).
+
+    This is the case in which CVG cross-damping eq. (9) and demodulated-dynamics eqs. (23)–(25) hold.
+
+    Parameters
+    ----------
+    k : float
+        Natural frequency (rad/s).
+    zeta : float
+        Relative damping (1).
+    q10 : float
+        Amplitude of the excitation (m/s²).
+    """
+    if not 0 < zeta < math.sqrt(0.5):
+        raise CompensationError(f"zeta = {zeta:g} must lie between 0 and 0.707.")
+    return SensitiveElement(k, k, zeta, zeta, omega=k * math.sqrt(1 - 2 * zeta**2), q10=q10)

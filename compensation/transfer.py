@@ -1,0 +1,192 @@
+"""Transfer functions with real or complex coefficients, as values: response, poles, time simulation.
+
+Demodulated gyro dynamics have complex coefficients, because the carrier frequency enters as s + jω. The common
+control libraries drop imaginary parts, so the few operations that are needed are written out here.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from compensation.errors import CompensationError
+from compensation.samples import check_time, is_regular
+
+Complex = NDArray[np.complex128]
+
+
+@dataclass(frozen=True)
+class TransferFunction:
+    """A rational function W(s) = numerator(s) / denominator(s).
+
+    Parameters
+    ----------
+    numerator, denominator : tuple of complex
+        Coefficients, highest power of s (1/s) first.
+
+    Raises
+    ------
+    CompensationError
+        When a coefficient is not finite or the denominator is zero.
+    """
+
+    numerator: tuple[complex, ...]
+    denominator: tuple[complex, ...]
+
+    def __post_init__(self) -> None:
+        for name in ("numerator", "denominator"):
+            coefficients = np.trim_zeros(np.asarray(getattr(self, name), dtype=complex), "f")
+            if not np.all(np.isfinite(coefficients)):
+                raise CompensationError(f"the {name} of a transfer function has a coefficient that is not finite.")
+            object.__setattr__(self, name, tuple(coefficients.tolist()) or (0j,))
+        if self.denominator == (0j,):
+            raise CompensationError("the denominator of a transfer function is zero.")
+
+    def __call__(self, s: ArrayLike) -> Any:
+        """Return W(s) at any complex s (1/s)."""
+        s = np.asarray(s, dtype=complex)
+        return np.polyval(self.numerator, s) / np.polyval(self.denominator, s)
+
+    def __mul__(self, other: "TransferFunction | complex") -> "TransferFunction":
+        """Return the two in series, or this one times a number."""
+        if not isinstance(other, TransferFunction):
+            return TransferFunction(tuple(other * np.asarray(self.numerator)), self.denominator)
+        return TransferFunction(
+            tuple(np.polymul(self.numerator, other.numerator)),
+            tuple(np.polymul(self.denominator, other.denominator)),
+        )
+
+    def respond(self, frequency: ArrayLike) -> Any:
+        """Return the frequency response W(jλ) at the angular frequencies `frequency` (rad/s, any sign)."""
+        return self(1j * np.asarray(frequency, dtype=float))
+
+    @property
+    def is_real(self) -> bool:
+        """Whether all coefficients are real, so that a real input gives a real output."""
+        return not np.any(np.imag(self.numerator)) and not np.any(np.imag(self.denominator))
+
+    @cached_property
+    def poles(self) -> Complex:
+        """Zeros of the denominator (1/s)."""
+        return np.roots(self.denominator).astype(complex)
+
+    @cached_property
+    def zeros(self) -> Complex:
+        """Zeros of the numerator (1/s)."""
+        return np.roots(self.numerator).astype(complex)
+
+    @property
+    def is_stable(self) -> bool:
+        """Whether every pole lies to the left of the imaginary axis."""
+        return bool(np.all(self.poles.real < 0))
+
+    @property
+    def steady_gain(self) -> complex:
+        """W(0), what remains of a constant input."""
+        if self.denominator[-1] == 0:
+            raise CompensationError("the transfer function has a pole at s = 0, so it has no steady gain.")
+        return complex(self.numerator[-1] / self.denominator[-1])
+
+    def realise(self) -> tuple[Complex, Complex, Complex, complex]:
+        """Return A, B, C, D of ẋ = A x + B u, y = C x + D u, with W(s) = C (s − A)⁻¹ B + D.
+
+        The companion form is written in time units of the fastest pole, which keeps its entries of order one.
+        """
+        n = len(self.denominator) - 1
+        if len(self.numerator) > n + 1:
+            raise CompensationError("the numerator has a higher degree than the denominator: not causal.")
+        scale = float(np.max(np.abs(self.poles), initial=0.0)) or 1.0
+        powers = scale ** np.arange(n, -1, -1.0)
+        denominator = np.asarray(self.denominator) * powers
+        numerator = np.zeros(n + 1, dtype=complex)
+        numerator[n + 1 - len(self.numerator) :] = self.numerator
+        numerator = numerator * powers / denominator[0]
+        denominator = denominator / denominator[0]
+        A = np.diag(np.ones(max(n - 1, 0), dtype=complex), -1)[:n, :n] if n else np.zeros((0, 0), complex)
+        if n:
+            A[0] = -denominator[1:]
+        B = np.eye(n, 1, dtype=complex)[:, 0]
+        D = complex(numerator[0])
+        C: Complex = numerator[1:] - D * denominator[1:]
+        return np.asarray(scale * A, complex), np.asarray(scale * B, complex), C, D
+
+    def simulate(self, time: ArrayLike, values: ArrayLike, *, settled: bool = False) -> NDArray[Any]:
+        """Return the output for an input that is linear between its samples, propagated exactly.
+
+        Parameters
+        ----------
+        time : array (N,)
+            Strictly increasing times (s). An even grid is fast; any other is followed step by step.
+        values : array (N,)
+            The input at these times, real or complex.
+        settled : bool
+            Start from the steady state under the first value instead of from rest.
+
+        Returns
+        -------
+        array (N,)
+            The output, real when the input and all coefficients are.
+
+        Raises
+        ------
+        CompensationError
+            On times that do not increase, on values that are not finite, or on a numerator of too high a degree.
+        """
+        t, u = np.asarray(time, dtype=float), np.asarray(values)
+        check_time(t)
+        if u.shape != t.shape or not np.all(np.isfinite(u)):
+            raise CompensationError("the input of a simulation needs one finite value for every time.")
+        A, B, C, D = self.realise()
+        x0 = np.zeros(len(B), dtype=complex)
+        if settled:
+            x0 = np.linalg.solve(A, -B * u[0]).astype(complex)
+        x = _march_evenly(A, B, t, u, x0) if is_regular(t) else _march(A, B, t, u, x0)
+        y = C @ x + D * u
+        return y.real if self.is_real and not np.iscomplexobj(u) else y
+
+
+def _step(A: Complex, B: Complex, steps: NDArray[np.float64]) -> tuple[Complex, Complex, Complex]:
+    """Φ, Γ₀, Γ₁ of x⁺ = Φ x + Γ₀ u + Γ₁ (u⁺ − u) for each step, from one augmented matrix exponential."""
+    from scipy.linalg import expm
+
+    n = len(B)
+    augmented = np.zeros((len(steps), n + 2, n + 2), dtype=complex)
+    augmented[:, :n, :n] = A * steps[:, None, None]
+    augmented[:, :n, n] = B * steps[:, None]
+    augmented[:, n, n + 1] = 1.0
+    exponential: Complex = np.asarray(expm(augmented), dtype=complex)
+    return exponential[:, :n, :n], exponential[:, :n, n], exponential[:, :n, n + 1]
+
+
+def _march_evenly(A: Complex, B: Complex, t: NDArray[np.float64], u: NDArray[Any], x0: Complex) -> Complex:
+    """States on an even grid; the Schur form turns the recursion into a chain of first-order filters."""
+    from scipy.linalg import schur
+    from scipy.signal import lfilter
+
+    step = np.array([(t[-1] - t[0]) / (len(t) - 1)])
+    (transition,), (held,), (ramp,) = _step(A, B, step)
+    if not len(B):
+        return np.zeros((0, len(t)), dtype=complex)
+    T, Z = schur(transition, output="complex")
+    forcing = Z.conj().T @ (np.outer(held, u[:-1]) + np.outer(ramp, np.diff(u)))
+    z = np.empty((len(B), len(t)), dtype=complex)
+    z[:, 0] = Z.conj().T @ x0
+    for i in reversed(range(len(B))):
+        driven = forcing[i] + T[i, i + 1 :] @ z[i + 1 :, :-1]
+        z[i, 1:] = lfilter([1.0], [1.0, -T[i, i]], driven, zi=[T[i, i] * z[i, 0]])[0]
+    states: Complex = Z @ z
+    return states
+
+
+def _march(A: Complex, B: Complex, t: NDArray[np.float64], u: NDArray[Any], x0: Complex) -> Complex:
+    """States on any grid, step by step; equal steps share one matrix exponential."""
+    steps, kind = np.unique(np.diff(t), return_inverse=True)
+    transition, held, ramp = _step(A, B, steps)
+    x = np.empty((len(B), len(t)), dtype=complex)
+    x[:, 0] = x0
+    rise = np.diff(u)
+    for i, k in enumerate(kind):
+        x[:, i + 1] = transition[k] @ x[:, i] + held[k] * u[i] + ramp[k] * rise[i]
+    return x

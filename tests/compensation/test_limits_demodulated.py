@@ -1,0 +1,193 @@
+"""Demodulated dynamics against direct integration of the motion equations (1), carrier and all."""
+
+import numpy as np
+import pytest
+from scipy.interpolate import CubicSpline
+
+from compensation.demodulated import (
+    find_poles,
+    find_slow_pole,
+    map_integral_error,
+    measure_rate,
+    relate_rate_to_measured_rate,
+    relate_rate_to_secondary,
+    relate_rate_to_slow_secondary,
+    relate_rate_to_tuned_amplitude,
+    respond_to_oscillating_rate,
+    split_primary,
+    split_secondary,
+)
+from compensation.errors import CompensationError
+from compensation.motion import demodulate, integrate_motion, propagate_envelope
+from compensation.sensitive_element import SensitiveElement, tune
+
+MISTUNED = SensitiveElement(3141.0, 3200.0, 0.02, 0.03, 3100.0, q10=2.0, d3=0.6, g1=1.2, g2=1.7)
+TUNED = tune(2 * np.pi * 500, 0.025)
+
+
+def ramp(element, rate, *, rows=2001, length=10.0, rise=0.5):
+    """A rate that rises from zero within `rise` time constants and then stays."""
+    tau = 1 / (element.k1 * element.zeta1)
+    time = np.linspace(0, length * tau, rows)
+    return time, rate * np.clip(time / (rise * tau), 0, 1)
+
+
+@pytest.mark.parametrize("element", [TUNED, MISTUNED], ids=["tuned", "mistuned"])
+def test_envelope_equals_the_integrated_carrier(element):
+    time, rate = ramp(element, 5.0, length=4, rows=1601)
+    motion = integrate_motion(element, time, rate, samples_per_cycle=96)
+    envelope = propagate_envelope(element, time, rate)
+    for real, complex_amplitude in ((motion.primary, envelope.primary), (motion.secondary, envelope.secondary)):
+        carrier = (complex_amplitude * np.exp(1j * element.omega * time)).imag
+        inside = time <= motion.time[-1]
+        error = np.max(np.abs(CubicSpline(motion.time, real)(time) - carrier)[inside])
+        # What is left is the spline between 96 samples of a cycle, about 5 (2π/96)⁴/384 = 2.4e-7 inside.
+        assert error < 1e-6 * np.max(np.abs(real))
+
+
+@pytest.mark.parametrize(("rows", "rate_of_convergence"), [(161, 12.0), (41, 3.0)], ids=["Magnus", "midpoint"])
+def test_envelope_converges_with_the_step(rows, rate_of_convergence):
+    """Where a step resolves the carrier the order is four, where it does not it is two: halving the step divides
+    the error by 16 or 4 in the limit. The rate is a straight line, so that its sampling adds nothing."""
+    element = SensitiveElement(1000.0, 1010.0, 0.02, 0.03, 1000.0)
+
+    def final(n):
+        time = np.linspace(0, 0.1, n)
+        return propagate_envelope(element, time, 300 * time).secondary[-1]
+
+    reference = final(20 * (rows - 1) + 1)
+    coarse, fine = abs(final(rows) - reference), abs(final(2 * rows - 1) - reference)
+    assert coarse / fine > rate_of_convergence
+
+
+def test_demodulated_carrier_gives_the_transfer_function_and_its_error_falls_with_the_rate():
+    """Eq. (12) neglects the reaction on the primary: error (Ω/kζ)² of the carrier-resolved amplitude."""
+    errors = []
+    for rate in (2.0, 8.0):
+        time, Omega = ramp(TUNED, rate, rows=401)
+        motion = integrate_motion(TUNED, time, Omega)
+        at, amplitude = demodulate(motion.time, motion.secondary, TUNED.omega)
+        expected = relate_rate_to_secondary(TUNED).simulate(time, Omega)
+        settled = abs(amplitude[-1] - expected[-1]) / abs(expected[-1])
+        errors.append(settled / (rate / (TUNED.k1 * TUNED.zeta1)) ** 2)
+        assert at[-1] < time[-1]
+    # The factor before (Ω/kζ)² is one: Ω² g₁ g₂ ω² / (2ωkζ)².
+    np.testing.assert_allclose(errors, 1.0, atol=0.05)
+
+
+def test_demodulated_transient_of_the_carrier_follows_the_transfer_function():
+    time, rate = ramp(TUNED, 0.2, rows=3001, length=6, rise=3)
+    motion = integrate_motion(TUNED, time, rate, samples_per_cycle=32)
+    at, amplitude = demodulate(motion.time, motion.secondary, TUNED.omega)
+    expected = CubicSpline(time, relate_rate_to_secondary(TUNED).simulate(time, rate))(at)
+    # The smooth ramp leaves the double frequency part of (12) at ζ/(2·rise), which detection removes.
+    assert np.max(np.abs(amplitude - expected)) < 0.005 * np.abs(expected[-1])
+
+
+def test_reaction_on_the_primary_scales_with_the_square_of_the_rate():
+    errors = []
+    for rate in (0.1, 1.0):
+        time, Omega = ramp(TUNED, rate)
+        full = propagate_envelope(TUNED, time, Omega).secondary
+        linear = relate_rate_to_secondary(TUNED).simulate(time, Omega)
+        errors.append(np.max(np.abs(full - linear)) / np.abs(linear[-1]))
+    assert errors[1] / errors[0] == pytest.approx(100, rel=0.01)
+    assert errors[1] == pytest.approx((1 / (TUNED.k1 * TUNED.zeta1)) ** 2, rel=0.02)
+
+
+def test_slow_form_errs_in_proportion_to_damping_and_tuned_amplitude_to_its_square():
+    slow, tuned = [], []
+    for zeta in (0.02, 0.01, 0.005):
+        element = tune(2 * np.pi * 500, zeta)
+        time, Omega = ramp(element, 0.01)
+        exact = relate_rate_to_secondary(element).simulate(time, Omega)
+        size = np.abs(exact[-1])
+        slow.append(np.max(np.abs(relate_rate_to_slow_secondary(element).simulate(time, Omega) - exact)) / size)
+        simple = relate_rate_to_tuned_amplitude(element).simulate(time, Omega)
+        tuned.append(np.max(np.abs(np.abs(exact) - simple)) / size)
+    np.testing.assert_allclose(np.array(slow[:-1]) / slow[1:], 2, rtol=0.1)
+    np.testing.assert_allclose(np.array(tuned[:-1]) / tuned[1:], 4, rtol=0.25)
+    assert tuned[0] < 4e-4
+
+
+def test_poles():
+    """Eq. (15) are the roots of the denominator of (12); (17) approaches the slow one as damping falls."""
+    for pole in find_poles(MISTUNED):
+        assert np.min(np.abs(relate_rate_to_secondary(MISTUNED).poles - pole)) < 1e-9 * abs(pole)
+    distance = [abs(find_slow_pole(tune(1.0, zeta)) - find_poles(tune(1.0, zeta))[0]) / zeta for zeta in (0.02, 0.01)]
+    assert distance[0] / distance[1] == pytest.approx(2, rel=0.1)
+    assert find_slow_pole(TUNED) == pytest.approx(-TUNED.k1 * TUNED.zeta1, rel=1e-12)
+
+
+def test_amplitude_and_phase_are_those_of_the_complex_response():
+    """Eq. (14) from (13)."""
+    frequency = np.array([-400.0, -59.0, 0.0, 3.0, 41.0, 5000.0])
+    amplitude, phase = respond_to_oscillating_rate(MISTUNED, frequency)
+    np.testing.assert_allclose(
+        amplitude * np.exp(1j * phase), relate_rate_to_secondary(MISTUNED).respond(frequency), rtol=1e-12
+    )
+
+
+def test_real_and_imaginary_parts():
+    """Eqs. (19)–(22): real coefficients, and together the complex transfer function."""
+    assert complex(*split_primary(MISTUNED)) == pytest.approx(MISTUNED.primary_amplitude, rel=1e-14)
+    real, imaginary = split_secondary(MISTUNED)
+    assert real.is_real
+    assert imaginary.is_real
+    s = np.array([0.3 + 2j, -7 + 300j, 1e4 + 0j])
+    np.testing.assert_allclose(real(s) + 1j * imaginary(s), relate_rate_to_secondary(MISTUNED)(s), rtol=1e-12)
+    time, rate = ramp(MISTUNED, 1.0, rows=801)
+    both = real.simulate(time, rate) + 1j * imaginary.simulate(time, rate)
+    whole = relate_rate_to_secondary(MISTUNED).simulate(time, rate)
+    np.testing.assert_allclose(both, whole, atol=1e-11 * np.max(np.abs(whole)))
+
+
+def test_tuned_transfer_function_symbolically():
+    """Eq. (24): |A₁ j ω g₂ / (2 (kζ + jω))| is its gain, for every ζ, when ω = k √(1 − 2ζ²)."""
+    import sympy
+
+    k, zeta, g2, q10 = sympy.symbols("k zeta g_2 q_10", positive=True)
+    omega = k * sympy.sqrt(1 - 2 * zeta**2)
+    squared = (q10 * omega * g2) ** 2 / (
+        ((k**2 - omega**2) ** 2 + 4 * k**2 * zeta**2 * omega**2) * 4 * ((k * zeta) ** 2 + omega**2)
+    )
+    printed = g2 * q10 * sympy.sqrt(1 - 2 * zeta**2) / (4 * zeta * k**2 * (1 - zeta**2))
+    assert sympy.simplify(squared - printed**2) == 0
+    element = tune(300.0, 0.03, q10=4.0)
+    gain = printed.subs({k: 300, zeta: 0.03, g2: 2, q10: 4}) / 300 / sympy.Float(0.03)
+    assert relate_rate_to_tuned_amplitude(element).steady_gain.real == pytest.approx(float(gain), rel=1e-12)
+
+
+def test_error_map_is_least_for_the_tuned_gyro():
+    ratios, dampings = np.linspace(0.96, 1.04, 9), np.linspace(0.6, 1.4, 5)
+    error = map_integral_error(ratios, dampings, k=TUNED.k1, zeta=TUNED.zeta1).error
+    assert np.unravel_index(np.argmin(error), error.shape) == (2, 4)
+    assert error[2, 4] < 1e-5
+    # A static check of the corner: the amplitude settles at |W₂(0)| of the mistuned gyro.
+    assert np.all(np.diff(error[2, 4:]) > 0)
+
+
+def test_measured_rate_follows_the_simplest_dynamics():
+    """Eq. (25), and it keeps the sign of the rate."""
+    time, rate = ramp(TUNED, -0.5)
+    measured = measure_rate(TUNED, time, rate)
+    expected = relate_rate_to_measured_rate(TUNED.k1, TUNED.zeta1).simulate(time, rate)
+    assert np.max(np.abs(measured - expected)) < 0.01 * 0.5
+    assert measured[-1] == pytest.approx(-0.5, rel=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("act", "words"),
+    [
+        (lambda: SensitiveElement(1.0, -1.0, 0.1, 0.1, 1.0), "k2"),
+        (lambda: tune(1.0, 0.8), "zeta"),
+        (lambda: SensitiveElement(1.0, 1.0, 0.1, 0.1, 1.0, g2=0.0), "g2"),
+        (lambda: map_integral_error([0.0], [1.0], k=1.0, zeta=0.1), "positive"),
+        (lambda: demodulate([0.0, 1.0, 2.5], [0, 0, 0], 1.0), "even sampling"),
+        (lambda: demodulate(np.arange(40.0), np.zeros(40), 1.0), "whole number"),
+        (lambda: propagate_envelope(TUNED, [0, 1, 2], [0, np.nan, 0]), "row 2"),
+    ],
+)
+def test_what_cannot_be_computed_is_refused(act, words):
+    with pytest.raises(CompensationError, match=words):
+        act()
