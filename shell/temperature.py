@@ -1,6 +1,6 @@
 """The resonator's frequency over temperature and the parts of its slope (HRG paper eq. 15).
 
-A free resonator of one material expands evenly, so f(T) is f(E(T), nu(T), rho(T)) of the undeformed shape over the growth
+A free resonator of one material expands evenly: f(T) is f(E(T), nu(T), rho(T)) of the undeformed shape over the growth
 of its lengths, whatever theory gives f. Its slope has five parts,
 
     d ln f/dT = ½ E'/E + (∂ ln f/∂nu) nu' − ½ rho'/rho + (∂ ln f/∂ ln h) h'/h + (∂ ln f/∂ ln r) r'/r ,

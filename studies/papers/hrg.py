@@ -1,0 +1,151 @@
+"""The HRG paper's Table 1, Table 2 and figures 4 and 5, recomputed from its data and set beside first principles.
+
+Sensors 2012, 12, 6434. The resonator's geometry is not printed there: the shipped card `hrg-30mm` stands for it.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from importlib.resources import files
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from compensation.frequency import FrequencyFit, OrderComparison, compare_orders, fit_frequency
+
+if TYPE_CHECKING:
+    from shell.temperature import Model, TemperatureCoefficient
+    from studies.instrument.card import Instrument
+
+Array = NDArray[np.float64]
+ZERO_CELSIUS = 273.15
+RESOLUTION = 0.01  # Hz, last printed digit of Table 1
+CARD = "hrg-30mm"
+
+
+@dataclass(frozen=True)
+class FrequencyStudy:
+    """A steady-state table, its fits of rising order, and the temperatures that they give back.
+
+    `temperature_degC` and `frequency` as measured; `fit` of the chosen order; `orders` all of them;
+    `calculated_degC` from the fit's inverse; `local_degC`, `local_slope_ppm`, `local_uncertainty_ppm` between
+    neighbouring points.
+    """
+
+    temperature_degC: Array
+    frequency: Array
+    fit: FrequencyFit
+    orders: OrderComparison
+    calculated_degC: Array
+    local_degC: Array
+    local_slope_ppm: Array
+    local_uncertainty_ppm: float
+
+    @property
+    def error_degC(self) -> Array:
+        """Actual minus calculated temperature, as in the paper's Table 2."""
+        return self.temperature_degC - self.calculated_degC
+
+    @property
+    def next_fit(self) -> FrequencyFit | None:
+        """The fit of the next order, where the readings allow one."""
+        higher = [fit for fit in self.orders.fits if fit.order == self.fit.order + 1]
+        return higher[0] if higher else None
+
+
+@dataclass(frozen=True)
+class PhysicsComparison:
+    """What the material's published laws predict for a card, beside the measured table.
+
+    `coefficients` of the default law at the local temperatures and, last, at 20 °C; `laws` (name, slope at 20 °C, its
+    uncertainty in ppm/°C) of every published law; `imposed_residual` (Hz) when the default law's shape is
+    imposed on the table with two free numbers; curvatures in ppm/°C², twice the quadratic coefficient of ln f.
+    """
+
+    instrument: "Instrument"
+    coefficients: "Sequence[TemperatureCoefficient]"
+    laws: Sequence[tuple[str, float, float]]
+    imposed_residual: Array
+    curvature_measured: float
+    curvature_law: float
+
+    @property
+    def at_20(self) -> "TemperatureCoefficient":
+        """The slope at 20 °C and its parts."""
+        return self.coefficients[-1]
+
+
+def printed_table1() -> tuple[Array, Array]:
+    """Return temperatures (°C) and frequencies (Hz) of the paper's Table 1."""
+    from studies.record import read_frequency_table
+
+    table = read_frequency_table(_data("hrg_table1.csv"))
+    return table.values["temperature_degC"], table.values["frequency_Hz"]
+
+
+def printed_table2() -> tuple[Array, Array]:
+    """Return the calculated temperatures and the errors (°C) that the paper's Table 2 prints."""
+    from studies.files.columns import read_columns
+
+    names = ("frequency_Hz", "actual_temperature_C", "calculated_temperature_C", "error_C")
+    table = read_columns(_data("hrg_table2.csv"), names, required=names)
+    return table.values["calculated_temperature_C"], table.values["error_C"]
+
+
+def study_table(
+    temperature_degC: Array, frequency: Array, order: int = 3, resolution: float | None = None
+) -> FrequencyStudy:
+    """Fit a steady-state table as the paper does (eqs. 16-18), invert it (Table 2), and test the next orders."""
+    # A step of the table below half a digit would make the slopes of neighbours pure rounding.
+    ascending = np.argsort(temperature_degC)
+    T, f = temperature_degC[ascending], frequency[ascending]
+    fit = fit_frequency(T, f, order, 0.0, resolution)
+    orders = compare_orders(T, f, order + 2, 0.0, resolution)
+    middle = (f[1:] + f[:-1]) / 2
+    rounding = 0.0 if resolution is None else resolution / np.sqrt(6)
+    return FrequencyStudy(
+        temperature_degC=T,
+        frequency=f,
+        fit=fit,
+        orders=orders,
+        calculated_degC=fit.temperature(f),
+        local_degC=(T[1:] + T[:-1]) / 2,
+        local_slope_ppm=1e6 * np.diff(f) / np.diff(T) / middle,
+        local_uncertainty_ppm=float(1e6 * np.max(rounding / np.diff(T) / middle)),
+    )
+
+
+def compare_physics(study: FrequencyStudy, instrument: "Instrument", model: "Model") -> PhysicsComparison:
+    """Set first-principles physics beside a measured table.
+
+    Parameters
+    ----------
+    study : FrequencyStudy
+    instrument : Instrument
+        Its material law and reference temperature.
+    model : callable
+        Elastic -> FrequencyGradient of the instrument's resonator (`shell.temperature`).
+    """
+    from shell.materials import read_materials
+    from shell.temperature import frequency_over_temperature, temperature_coefficients
+
+    T0, material = instrument.reference_temperature, instrument.material
+    at = np.append(study.local_degC, 20.0) + ZERO_CELSIUS
+    coefficients = temperature_coefficients(model, material, T0, at)
+    laws = []
+    for law in read_materials()[material.name].values():
+        c = temperature_coefficients(model, law, T0, 20.0 + ZERO_CELSIUS)[0]
+        laws.append((law.law, 1e6 * c.total, 1e6 * c.uncertainty))
+    predicted = frequency_over_temperature(model, material, T0, study.temperature_degC + ZERO_CELSIUS)
+    free = np.column_stack([np.ones_like(predicted), predicted])
+    residual = study.frequency - free @ np.linalg.lstsq(free, study.frequency, rcond=None)[0]
+    curvature = [
+        2e6 * np.polynomial.Polynomial.fit(study.temperature_degC, np.log(f), 2).convert().coef[2]
+        for f in (study.frequency, predicted)
+    ]
+    return PhysicsComparison(instrument, coefficients, laws, residual, *curvature)
+
+
+def _data(name: str) -> Path:
+    return Path(str(files("studies"))) / "papers" / name

@@ -1,0 +1,252 @@
+"""The page of `hrg reproduce`: the HRG paper from its own data, first principles beside it, and where they differ."""
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from studies.papers import hrg
+from studies.reports import style
+from studies.reports.frequency import coefficients_table, error_figure, fit_figure, order_chapter
+from studies.reports.page import Block, Chapter, Facts, Picture, Table, Text, draw, render_page
+
+if TYPE_CHECKING:
+    from studies.papers.hrg import FrequencyStudy, PhysicsComparison
+
+SOURCES = (
+    "Wang X. et al., Sensors 2012, 12, 6434–6446, doi:10.3390/s120506434: Table 1, Table 2, equations (8)–(18).",
+    "Spinner S., J. Am. Ceram. Soc. 1962, abstract: G(T), E(T) and Poisson's ratio of vitreous silica.",
+    "Luo et al., Rev. Sci. Instrum. 2015, 86: shear thermoelasticity of a drawn fused-silica fibre.",
+    "gwinc interferometer model (LIGO): E, d ln E/dT, expansion, heat capacity of fused silica.",
+)
+
+
+def reproduce_page(
+    study: "FrequencyStudy", physics: "PhysicsComparison", more: Sequence[Chapter], mode: Sequence[Block]
+) -> str:
+    """Return the whole page; `more` are chapters that other parts add, `mode` shows the mode shape."""
+    lead = (
+        "Table 1, Table 2 and figures 4 and 5 of the HRG paper recomputed from its measured data, what first-principles"
+        " physics predicts for the same resonator, and where the two differ."
+    )
+    chapters = [
+        Chapter("In short", [_facts(study, physics), *_short(study, physics)]),
+        Chapter(
+            "Table 1 and figure 4: frequency over temperature",
+            [_table1(study), coefficients_table(study), fit_figure(study)],
+        ),
+        Chapter("Table 2 and figure 5(a): temperature from frequency", [_table2(study), error_figure(study)]),
+        order_chapter(study),
+        Chapter("What first principles predict", _physics(physics, study)),
+        Chapter("Where measurement and physics differ", _difference(study, physics)),
+        Chapter("The n = 2 mode", list(mode)),
+        *more,
+    ]
+    return render_page("Temperature and frequency of a hemispherical resonator", lead, chapters, SOURCES)
+
+
+def summarise(study: "FrequencyStudy", physics: "PhysicsComparison") -> dict[str, Any]:
+    """Return the numbers of the page, schema `hrg.reproduce/1`."""
+    fit, better = study.fit, study.next_fit
+    assert better is not None
+    at = physics.at_20
+    return {
+        "schema": "hrg.reproduce/1",
+        "cubic": {
+            "reference_temperature_degC": fit.reference_temperature_degC,
+            "coefficients": fit.coefficients,
+            "standard_errors": fit.standard_errors,
+            "sum_of_squares_Hz2": fit.sum_of_squares,
+            "leave_one_out_Hz": fit.leave_one_out_rms,
+            "largest_residual_Hz": float(np.abs(fit.residuals).max()),
+            "largest_residual_of_span": fit.largest_residual_of_span,
+        },
+        "quartic": {
+            "sum_of_squares_Hz2": better.sum_of_squares,
+            "leave_one_out_Hz": better.leave_one_out_rms,
+            "chi_squared": better.chi_squared,
+            "degrees_of_freedom": better.degrees_of_freedom,
+            "F_against_cubic": study.orders.against_next[fit.order - 1].statistic,
+        },
+        "table2": {"calculated_degC": study.calculated_degC, "error_degC": study.error_degC},
+        "sensitivity_ppm_per_degC": {
+            "measured": float(fit.slope_ppm(20.0)),
+            "simulated": 1e6 * at.total,
+            "uncertainty": 1e6 * at.uncertainty,
+            "local_degC": study.local_degC,
+            "local_measured": study.local_slope_ppm,
+            "local_simulated": [1e6 * c.total for c in physics.coefficients[:-1]],
+            "laws": {name: {"value": value, "uncertainty": u} for name, value, u in physics.laws},
+        },
+        "law_imposed": {
+            "residual_rms_Hz": float(np.sqrt(np.mean(physics.imposed_residual**2))),
+            "curvature_measured_ppm_per_degC2": physics.curvature_measured,
+            "curvature_law_ppm_per_degC2": physics.curvature_law,
+        },
+        "card": physics.instrument.name,
+    }
+
+
+def _facts(study: "FrequencyStudy", physics: "PhysicsComparison") -> Facts:
+    at = physics.at_20
+    return Facts(
+        [
+            (
+                "Measured slope at 20 °C",
+                f"{float(study.fit.slope_ppm(20.0)):.1f} ppm/°C",
+                "cubic on Table 1; the paper says about 80",
+            ),
+            (
+                "Predicted slope at 20 °C",
+                f"{1e6 * at.total:.0f} ± {1e6 * at.uncertainty:.0f} ppm/°C",
+                "solid solver, default silica law",
+            ),
+            (
+                "Temperature from frequency",
+                f"within {np.abs(study.error_degC).max():.3f} °C",
+                "largest error of Table 2, as printed",
+            ),
+            (
+                "Left when the law is imposed",
+                f"{1e3 * np.sqrt(np.mean(physics.imposed_residual**2)):.0f} mHz rms",
+                "readings are rounded to 10 mHz",
+            ),
+        ]
+    )
+
+
+def _short(study: "FrequencyStudy", physics: "PhysicsComparison") -> list[Text]:
+    better = study.next_fit
+    assert better is not None
+    ratio = physics.curvature_measured / physics.curvature_law
+    return [
+        Text(
+            "The paper's tables are reproduced to the last printed digit or one unit of it. Its conclusion that higher orders have"
+            f" little effect is not: a quartic leaves {better.sum_of_squares:.1e} Hz² where the cubic leaves"
+            f" {study.fit.sum_of_squares:.2e} Hz², and predicts points left out"
+            f" {study.fit.leave_one_out_rms / better.leave_one_out_rms:.1f} times better."
+        ),
+        Text(
+            "Physics gives the slope, within what the literature knows of fused silica. It does not give the curvature: the table"
+            f" bends {ratio:.1f} times as much as the law, and its slope rises again above 25 °C, which no published silica law does."
+            " Seven points, each approached once, cannot say whether that is the glass, the thermometer, the mounting or"
+            " the soak: a staircase up and down with a second thermometer would.",
+            "note",
+        ),
+    ]
+
+
+def _table1(study: "FrequencyStudy") -> Table:
+    rows = [
+        [f"{T:g}", f"{f:.2f}", f"{f - r:.3f}", f"{1e3 * r:+.1f}"]
+        for T, f, r in zip(study.temperature_degC, study.frequency, study.fit.residuals, strict=True)
+    ]
+    note = (
+        f"Largest residual {1e3 * np.abs(study.fit.residuals).max():.1f} mHz = {100 * study.fit.largest_residual_of_span:.2f} % of the"
+        " span; the paper prints 0.12 %."
+    )
+    return Table("Table 1 and its cubic", ["T (°C)", "Measured (Hz)", "Cubic (Hz)", "Residual (mHz)"], rows, note)
+
+
+def _table2(study: "FrequencyStudy") -> Table:
+    printed, printed_error = hrg.printed_table2()
+    rows = [
+        [f"{f:.2f}", f"{T:g}", f"{p:g}", f"{c:.4f}", f"{c - p:+.4f}", f"{pe:+g}", f"{e:+.4f}"]
+        for f, T, p, c, pe, e in zip(
+            study.frequency,
+            study.temperature_degC,
+            printed,
+            study.calculated_degC,
+            printed_error,
+            study.error_degC,
+            strict=True,
+        )
+    ]
+    columns = [
+        "f (Hz)",
+        "Actual (°C)",
+        "Printed (°C)",
+        "Ours (°C)",
+        "Ours − printed",
+        "Printed error",
+        "Our error (°C)",
+    ]
+    return Table("Table 2, printed and recomputed", columns, rows, "Error is actual minus calculated temperature.")
+
+
+def _physics(physics: "PhysicsComparison", study: "FrequencyStudy") -> list[Block]:
+    rows = [
+        [f"{c.temperature - hrg.ZERO_CELSIUS:.0f}"]
+        + [f"{1e6 * part:+.2f}" for part in (c.E, c.nu, c.rho, c.h, c.r)]
+        + [f"{1e6 * c.total:.2f} ± {1e6 * c.uncertainty:.1f}", measured]
+        for c, measured in zip(physics.coefficients, _measured(study), strict=True)
+    ]
+    columns = ["T (°C)", "E", "μ", "ρ", "h", "r", "Predicted", "Measured"]
+    parts = Table(
+        "Slope of ln f and its parts (ppm/°C), equation (15)",
+        columns,
+        rows,
+        "Measured: between neighbouring points of Table 1, ± 0.09 from rounding; at 20 °C the cubic's slope. The uncertainty is one"
+        " standard deviation, from what the material law states of itself.",
+    )
+    laws = Table(
+        "Slope at 20 °C by published law of fused silica",
+        ["Law", "Slope (ppm/°C)", "Stated uncertainty"],
+        [[name, f"{value:.1f}", f"{u:.1f}" if u else "none stated"] for name, value, u in physics.laws],
+        "The laws differ by more than any of them admits: most of the spread is the literature's, not the solver's.",
+    )
+    return [
+        Text(
+            f"The card '{physics.instrument.name}' stands for the paper's resonator, whose geometry is not printed:"
+            f" {physics.instrument.content.get('note', '')}"
+        ),
+        parts,
+        _slope_figure(physics, study),
+        laws,
+    ]
+
+
+def _measured(study: "FrequencyStudy") -> list[str]:
+    return [f"{s:.1f}" for s in study.local_slope_ppm] + [f"{float(study.fit.slope_ppm(20.0)):.1f}"]
+
+
+def _slope_figure(physics: "PhysicsComparison", study: "FrequencyStudy") -> Picture:
+    local = physics.coefficients[:-1]
+    total = 1e6 * np.array([c.total for c in local])
+    spread = 1e6 * np.array([c.uncertainty for c in local])
+    with style.figure(height=3.2) as (made, axes):
+        axes.fill_between(
+            study.local_degC, total - spread, total + spread, color=style.SKY, alpha=0.3, label="± 1 standard deviation"
+        )
+        axes.plot(study.local_degC, total, color=style.BLUE, label="predicted, default law")
+        axes.plot(
+            study.local_degC, study.local_slope_ppm, "o", color=style.BLACK, label="measured, neighbouring points"
+        )
+        axes.set_xlabel("temperature (°C)")
+        axes.set_ylabel("slope of ln f (ppm/°C)")
+        axes.legend()
+    caption = "The prediction has the right size; the measured slope falls faster and turns up above 25 °C."
+    return draw(made, caption, "Predicted and measured slopes over temperature.")
+
+
+def _difference(study: "FrequencyStudy", physics: "PhysicsComparison") -> list[Block]:
+    residual = physics.imposed_residual
+    slope = float(study.fit.slope(20.0))
+    rms = float(np.sqrt(np.mean(residual**2)))
+    with style.figure(height=2.8) as (made, axes):
+        axes.axhline(0, color=style.BLACK, linewidth=0.8)
+        axes.plot(study.temperature_degC, 1e3 * residual, "o-", color=style.VERMILION)
+        axes.set_xlabel("temperature (°C)")
+        axes.set_ylabel("measured − law (mHz)")
+    caption = (
+        f"What is left of Table 1 when the law's shape is imposed with two free numbers: {1e3 * rms:.0f} mHz rms, that is"
+        f" {rms / slope:.2f} °C rms, where rounding alone would leave 3 mHz."
+    )
+    return [
+        draw(made, caption, "A smooth, curved residual of about 0.2 Hz."),
+        Table(
+            "Curvature of ln f",
+            ["", "ppm/°C²"],
+            [["measured", f"{physics.curvature_measured:.3f}"], ["default law", f"{physics.curvature_law:.3f}"]],
+        ),
+    ]
