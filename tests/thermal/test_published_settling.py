@@ -1,0 +1,101 @@
+"""The heat path of the gyro: settling of the HRG paper's Figure 3 and the emissivities of the field notes."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from thermal.errors import ThermalError
+from thermal.meridian import cut_meridian, lump
+from thermal.network import Boundary, Node, Radiator, assemble, linearise
+from thermal.relaxation import find_relaxation
+from thermal.resonator import HeatPath, describe_resonator, describe_shell_and_stem, shell_weights
+from thermal.settling import identify_conductance, step_remaining
+
+R, H, ROOT = 0.015, 0.86e-3, np.arcsin(2.5 / 15)
+PATH = HeatPath(
+    cells=cut_meridian(
+        R * (np.pi / 2 - ROOT), lambda s: R * np.sin(ROOT + s / R), lambda s: np.full_like(s, H), 16
+    ),
+    volumetric_capacity=2203 * 740.0,
+    conductivity=1.38,
+    stem_radius=2.5e-3,
+    stem_length=19.5e-3,
+    emissivity=0.03,
+    base_capacity=25.0,
+    housing_capacity=70.0,
+    mount_conductance=0.01,
+    mount_exchange=1e-3,
+    chamber_conductance=0.1,
+)
+
+
+def network(path):
+    return assemble(describe_resonator(path))
+
+
+def weights(path):
+    nodes = tuple(node.name for node in network(path).nodes)
+    return shell_weights(nodes, path.cells.volume)
+
+
+@pytest.mark.parametrize(("emissivity", "expected"), [(0.03, 4000.0), (0.8, 150.0)])
+def test_film_emissivity_sets_the_radiative_time_constant_of_the_shell(emissivity, expected):
+    """Field notes, "Heat path": a 2.6 g shell with 2.0 J/K radiating from both faces."""
+    shell = Node("shell", 2.6e-3 * 740.0)
+    area = 2 * 2 * np.pi * R**2
+    alone = assemble([Boundary("base"), shell, Radiator("shell", "base", emissivity * area)])
+    assert find_relaxation(alone, 293.15).time_constants[0] == pytest.approx(expected, rel=0.05)
+
+
+def test_shell_and_stem_alone_settle_in_the_range_of_the_theory_sheet():
+    """Field notes: a stem of 2 to 3 mm radius and 10 mm length; theory sheet: 700 to 1500 s with a 2.5 mm stem."""
+    alone = replace(PATH, emissivity=0.0, stem_length=0.01)
+    network = assemble([Boundary("base"), *describe_shell_and_stem(alone)])
+    assert 700.0 < find_relaxation(network, 293.15).time_constants[0] < 1500.0
+
+
+def test_one_conductance_identified_from_95_percent_at_9000_s_leaves_under_1_percent_at_15000_s():
+    """HRG paper, text around Figure 3, read as the theory sheet does; the second number is a prediction."""
+
+    def remaining(conductance, time=9000.0):
+        path = replace(PATH, mount_conductance=conductance)
+        return step_remaining(linearise(network(path), 293.15), 293.15, 263.15, weights(path), [time])[0]
+
+    mount = identify_conductance(remaining, 0.05)
+    assert remaining(mount) == pytest.approx(0.05, abs=1e-9)
+    assert 0 < remaining(mount, 15000.0) < 0.01
+
+
+def test_radiation_makes_cooling_slower_than_heating():
+    cold, hot = (step_remaining(network(PATH), 293.15, T, weights(PATH), [9000.0])[0] for T in (263.15, 313.15))
+    assert cold > 1.2 * hot
+
+
+def test_an_even_step_of_a_linear_network_leaves_the_same_share_of_any_size():
+    linear = linearise(network(PATH), 293.15)
+    shares = [step_remaining(linear, 293.15, T, weights(PATH), [9000.0])[0] for T in (253.15, 313.15)]
+    assert shares[0] == pytest.approx(shares[1], rel=1e-9)
+
+
+def test_a_capacity_may_depend_on_temperature():
+    warm = replace(PATH, volumetric_capacity=lambda T: 2203 * 740.0 * (1 + 2e-3 * (T - 293.15)))
+    even = find_relaxation(network(warm), 293.15).time_constants
+    assert even == pytest.approx(find_relaxation(network(PATH), 293.15).time_constants, rel=1e-12)
+    assert find_relaxation(network(warm), 313.15).time_constants[-1] > even[-1]
+
+
+def test_one_lump_stands_for_the_shell():
+    one = replace(PATH, cells=lump(PATH.cells))
+    assert find_relaxation(network(one), 293.15).time_constants[:2] == pytest.approx(
+        find_relaxation(network(PATH), 293.15).time_constants[:2], rel=2e-3
+    )
+
+
+def test_impossible_paths_are_refused():
+    with pytest.raises(ThermalError, match="emissivity must lie between 0 and 1"):
+        replace(PATH, emissivity=1.2)
+    with pytest.raises(ThermalError, match="stem needs a positive radius"):
+        replace(PATH, stem_length=0.0)
+    with pytest.raises(ThermalError, match=r"no conductance leaves 0\.05"):
+        identify_conductance(lambda conductance: 0.2, 0.05)

@@ -1,0 +1,78 @@
+"""How a network relaxes: its time constants, their modes, and what each constant of the network does to them."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import eigh
+
+from thermal.network import Array, Network, linearise
+
+
+@dataclass(frozen=True)
+class Relaxation:
+    """Modes of C dT/dt = −G T, slowest first.
+
+    Attributes
+    ----------
+    nodes : names of the nodes
+    temperature : float, K, where the network was linearised
+    capacity : array (n,), J/K
+    conductance : array (n, n), W/K, the matrix G over the nodes
+    coupling : array (n, boundaries), W/K, heat into the nodes per kelvin of each boundary
+    time_constants : array (n,), s
+    shapes : array (n, n); column k is mode k, normalised to shapesᵀ C shapes = 1
+    """
+
+    nodes: tuple[str, ...]
+    temperature: float
+    capacity: Array
+    conductance: Array
+    coupling: Array
+    time_constants: Array
+    shapes: Array
+
+
+def find_relaxation(network: Network, temperature: float) -> Relaxation:
+    """Solve G v = λ C v for the network linearised at a uniform temperature (K); time constants are 1/λ."""
+    linear = linearise(network, temperature)
+    n = linear.count
+    L = linear.conduction
+    capacity = linear.capacities(np.full(n, temperature))
+    rates, shapes = eigh(L[:n, :n], np.diag(capacity))
+    return Relaxation(
+        nodes=tuple(node.name for node in network.nodes),
+        temperature=temperature,
+        capacity=capacity,
+        conductance=L[:n, :n],
+        coupling=-L[:n, n:],
+        time_constants=1 / rates,
+        shapes=shapes,
+    )
+
+
+def time_constant_sensitivities(network: Network, temperature: float) -> dict[str, Array]:
+    """Relative change of every time constant per relative change of each constant of the network.
+
+    d ln τ_k / d ln p = −(1/λ_k) v_kᵀ (∂G/∂ln p − λ_k ∂C/∂ln p) v_k, from the derivative of a simple eigenvalue.
+
+    Returns
+    -------
+    dict
+        "capacity NODE", "conductance ONE-OTHER", "exchange ONE-OTHER" to an array (n,) in the order of
+        `find_relaxation`. Capacities sum to 1 in every mode, conductances and exchange areas together to −1.
+        Links that share both ends are counted together.
+    """
+    modes = find_relaxation(network, temperature)
+    n = network.count
+    shares = {
+        f"capacity {name}": C * modes.shapes[i] ** 2
+        for i, (name, C) in enumerate(zip(modes.nodes, modes.capacity, strict=True))
+    }
+    linear = linearise(network, temperature)
+    kinds = ["conductance"] * len(network.conductors) + ["exchange"] * len(network.radiators)
+    ends = np.vstack([modes.shapes, np.zeros((len(network.boundaries), n))])
+    for kind, link in zip(kinds, linear.conductors, strict=True):
+        drop = ends[network.index(link.one)] - ends[network.index(link.other)]
+        key = f"{kind} {link.name}"
+        shares[key] = shares.get(key, 0.0) - modes.time_constants * link.conductance * drop**2
+    return shares

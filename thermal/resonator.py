@@ -1,0 +1,101 @@
+"""The heat path of a hemispherical resonator gyro: chamber, housing, base with electrodes, stem and shell.
+
+    chamber —film of air— housing —mount, radiation— base —stem— shell, and the shell's faces radiate to the base
+
+The resonator stands in vacuum: its shell sees the base and the electrodes on it by radiation, and the base's
+temperature through the stem by conduction. Residual gas and the stem's own radiation are left out.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from thermal.errors import ThermalError
+from thermal.meridian import Capacity, MeridianCells, cell_names, describe_meridian, scale
+from thermal.network import Array, Boundary, Conductor, Node, Part, Radiator
+
+
+@dataclass(frozen=True)
+class HeatPath:
+    """Plain numbers of the heat path.
+
+    Attributes
+    ----------
+    cells : MeridianCells
+        The shell's meridian from the stem to the rim; `meridian.lump` makes them one.
+    volumetric_capacity : float or callable of temperature (K)
+        ρ c of shell and stem, J/(m³ K).
+    conductivity : float
+        k of shell and stem, W/(m K).
+    stem_radius, stem_length : float
+        m.
+    emissivity : float
+        Effective emissivity between each face of the shell and what it faces (`network.effective_emissivity`);
+        decided by the metal film.
+    base_capacity, housing_capacity : float
+        J/K.
+    mount_conductance : float
+        Base to housing, W/K.
+    mount_exchange : float
+        Base to housing, exchange area in m².
+    chamber_conductance : float
+        Housing to chamber, W/K.
+    """
+
+    cells: MeridianCells
+    volumetric_capacity: Capacity
+    conductivity: float
+    stem_radius: float
+    stem_length: float
+    emissivity: float
+    base_capacity: float
+    housing_capacity: float
+    mount_conductance: float
+    mount_exchange: float
+    chamber_conductance: float
+
+    def __post_init__(self) -> None:
+        if not 0 <= self.emissivity <= 1:
+            raise ThermalError(f"an emissivity must lie between 0 and 1, not {self.emissivity:g}.")
+        if not (self.stem_radius > 0 and self.stem_length > 0):
+            raise ThermalError("a stem needs a positive radius and a positive length.")
+
+
+def describe_shell_and_stem(path: HeatPath) -> list[Part]:
+    """Return the parts of shell and stem, which are joined to a node or boundary "base"."""
+    section = np.pi * path.stem_radius**2
+    half_resistance = path.stem_length / 2 / (path.conductivity * section)
+    stem = scale(path.volumetric_capacity, section * path.stem_length)
+    shell = describe_meridian(
+        path.cells,
+        "stem",
+        path.volumetric_capacity,
+        path.conductivity,
+        root_resistance=half_resistance,
+        exchange=2 * path.emissivity,
+        surroundings="base",
+    )
+    return [Node("stem", stem), Conductor("base", "stem", 1 / half_resistance), *shell]
+
+
+def describe_resonator(path: HeatPath) -> list[Part]:
+    """Return the parts of the whole heat path, from the boundary "chamber" to the cells "shell-1" … of the shell."""
+    parts: list[Part] = [
+        Boundary("chamber"),
+        Node("housing", path.housing_capacity),
+        Conductor("chamber", "housing", path.chamber_conductance),
+        Node("base", path.base_capacity),
+        Conductor("housing", "base", path.mount_conductance),
+    ]
+    if path.mount_exchange:
+        parts.append(Radiator("housing", "base", path.mount_exchange))
+    return parts + describe_shell_and_stem(path)
+
+
+def shell_weights(nodes: tuple[str, ...], weights: Array) -> Array:
+    """Row of weights, of sum one, over all nodes of a network for a mean over the cells of its shell."""
+    row = np.zeros(len(nodes))
+    for name, weight in zip(cell_names(len(weights)), weights, strict=True):
+        row[nodes.index(name)] = weight
+    normalised: Array = row / row.sum()
+    return normalised
