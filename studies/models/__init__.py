@@ -1,0 +1,74 @@
+"""Fitted compensation models as files: saved, read, applied to a record, emitted as C for firmware.
+
+A kind of model is one module in `studies.models.kinds`, found by its name (`cross-damping` is
+`cross_damping.py`), with two functions:
+
+    def compensate(model: Model, record: Record, *, extrapolate: bool) -> dict[str, NDArray[np.float64]]:
+        "Return the `compensated_…` columns; a row that lacks an input stays NaN, never silently wrong."
+
+    def emit_c(model: Model) -> str:
+        "Return a C99 translation unit without dependencies beyond math.h."
+
+A fit makes its `Model` with a function beside those (`kinds.frequency.save_frequency(fit, …)`), writes it
+with `write_model`, and needs nothing else to be applied by `hrg compensate`. `model.check_range` refuses to
+extrapolate, `model.part(name)` and `model.number(key)` take what the formula needs or name what is missing.
+"""
+
+from importlib import import_module
+from pkgutil import iter_modules
+from typing import Any
+
+from studies.errors import InputError, nearest
+from studies.models import kinds
+from studies.models.file import Model, Part, Source, format_model, make_part, read_model, write_model
+from studies.record import COMPENSATED, Record
+
+__all__ = [
+    "Model", "Part", "Source", "compensate", "emit_c", "format_model", "make_part", "model_kinds", "read_model",
+    "source_of", "write_model",
+]  # fmt: skip
+
+
+def model_kinds() -> list[str]:
+    """Return the kinds of model that can be applied."""
+    return sorted(m.name.replace("_", "-") for m in iter_modules(kinds.__path__))
+
+
+def source_of(record: Record) -> Source:
+    """Return what a model keeps of a record that it was fitted to: file name, hash of its bytes, rows."""
+    from pathlib import Path
+
+    return Source(Path(record.path).name, record.sha256, len(record))
+
+
+def compensate(model: Model, record: Record, *, extrapolate: bool = False) -> Record:
+    """Return the record with the model's `compensated_…` columns added.
+
+    Raises
+    ------
+    InputError
+        A kind that is not known, a column that the record lacks or already has, or values that the fit
+        has not seen (unless `extrapolate`).
+    """
+    try:
+        columns = _module(model).compensate(model, record, extrapolate=extrapolate)
+    except InputError as error:
+        where = f"{record.path}: " if record.path and record.path not in str(error) else ""
+        raise InputError(f"{where}{error}") from error
+    for name in columns:
+        if not name.startswith(COMPENSATED):
+            raise ValueError(f"{model.kind} writes '{name}', which is no {COMPENSATED}… column")
+        if name in record:
+            raise InputError(f"{record.path}: has a column '{name}' already; remove it or start from the raw record.")
+    return record.with_columns(columns)
+
+
+def emit_c(model: Model) -> str:
+    """Return the model as C99 source for firmware, with its origin in the head comment."""
+    return str(_module(model).emit_c(model))
+
+
+def _module(model: Model) -> Any:
+    if model.kind not in model_kinds():
+        raise InputError(f"{model.path or 'model'}: unknown kind '{model.kind}'{nearest(model.kind, model_kinds())}")
+    return import_module(f"{kinds.__name__}.{model.kind.replace('-', '_')}")

@@ -1,0 +1,27 @@
+"""Pieces of C99 source that every emitted model shares: the head comment, polynomials with all digits."""
+
+from collections.abc import Sequence
+
+from studies.models.file import Model
+
+
+def head(model: Model) -> str:
+    """Return the comment that says where the code comes from and where it holds, and the includes."""
+    lines = [
+        f"Compensation model '{model.kind}' for {model.compensates}, made by {model.made_by or 'an unknown program'}.",
+        *(f"Fitted to {s.path}, {s.rows} rows, sha256 {s.sha256 or 'unknown'}." for s in model.sources),
+        *(f"Valid for {name} from {low:.9g} to {high:.9g}." for name, (low, high) in model.validity.items()),
+    ]
+    return "\n".join(f"/* {_one_comment(line)} */" for line in lines) + "\n#include <math.h>\n"
+
+
+def polynomial(name: str, variable: str, coefficients: Sequence[float]) -> str:
+    """Return a static C function that evaluates Σ cₖ xᵏ by Horner's rule."""
+    expression = f"{float(coefficients[-1])!r}"
+    for c in reversed(coefficients[:-1]):
+        expression = f"({expression}) * {variable} + ({float(c)!r})"
+    return f"static double {name}(double {variable}) {{\n    return {expression};\n}}"
+
+
+def _one_comment(text: str) -> str:
+    return " ".join(text.split()).replace("*/", "* /").replace("/*", "/ *")

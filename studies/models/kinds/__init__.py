@@ -1,0 +1,1 @@
+"""One module per kind of compensation model; `studies.models` says what each must provide."""

@@ -1,0 +1,114 @@
+"""Model files: what is saved is read back, what is broken is named, what is emitted compiles and agrees."""
+
+import ctypes
+import shutil
+import subprocess
+import tomllib
+
+import numpy as np
+import pytest
+
+from compensation.frequency import fit_frequency
+from studies.errors import InputError
+from studies.models import Source, compensate, emit_c, format_model, model_kinds, read_model, write_model
+from studies.models.kinds.frequency import save_frequency
+from studies.record import Record
+
+T = np.linspace(-20, 40, 7)
+F = 4424.9 + 0.3716 * T - 9.7e-4 * T**2 + 1.5e-5 * T**3 + 0.01 * np.cos(5 * T)
+
+
+@pytest.fixture
+def model():
+    return save_frequency(fit_frequency(T, F), (Source('a "b" */ ü.csv', "ab12", 7),), "test")
+
+
+def compile_c(source, folder):
+    compiler = shutil.which("cc") or shutil.which("gcc")
+    if compiler is None:
+        pytest.skip("no C compiler on this machine")
+    (folder / "model.c").write_text(source, encoding="utf-8")
+    flags = ["-std=c99", "-Wall", "-Wextra", "-Werror", "-pedantic", "-O2", "-shared", "-fPIC"]
+    subprocess.run([compiler, *flags, "model.c", "-o", "model.so", "-lm"], cwd=folder, check=True)
+    return ctypes.CDLL(str(folder / "model.so"))
+
+
+def test_a_saved_model_is_read_back_to_the_last_bit(model, tmp_path):
+    write_model(model, tmp_path / "m.toml")
+    again = read_model(tmp_path / "m.toml")
+    assert (again.parts, again.validity, again.sources) == (model.parts, model.validity, model.sources)
+    assert again.settings == model.settings
+    assert again.part("frequency")["a1"] == model.parts[0].values[1]
+    assert len((tmp_path / "m.toml").read_text().splitlines()) < 45
+
+
+def test_every_kind_can_be_applied_and_emitted():
+    from importlib import import_module
+
+    for kind in model_kinds():
+        module = import_module(f"studies.models.kinds.{kind.replace('-', '_')}")
+        assert callable(module.compensate)
+        assert callable(module.emit_c)
+
+
+def test_frequency_c_code_agrees_with_the_fit(model, tmp_path):
+    library = compile_c(emit_c(model), tmp_path)
+    library.hrg_frequency.restype = library.hrg_temperature.restype = ctypes.c_double
+    library.hrg_frequency.argtypes = [ctypes.c_double]
+    library.hrg_temperature.argtypes = [ctypes.c_double, ctypes.POINTER(ctypes.c_int)]
+    fit, ok = fit_frequency(T, F), ctypes.c_int()
+    for t in (-20.0, 3.3, 40.0):
+        assert library.hrg_frequency(t) == pytest.approx(float(fit.frequency(t)), rel=1e-14)
+        assert library.hrg_temperature(float(fit.frequency(t)), ctypes.byref(ok)) == pytest.approx(t, abs=1e-8)
+    library.hrg_temperature(4500.0, ctypes.byref(ok))
+    assert ok.value == 0
+
+
+def test_compensation_takes_the_curve_out_and_refuses_to_extrapolate(model):
+    fit = fit_frequency(T, F)
+    time, housing = np.arange(5.0), np.array([-10.0, 0.0, 10.0, np.nan, 30.0])
+    record = Record({"time_s": time, "housing_temperature_degC": housing, "frequency_Hz": fit.frequency(20.0) + 0 * time})
+    out = compensate(model, record)["compensated_frequency_Hz"]
+    expected = fit.frequency(20.0) - fit.frequency(np.nan_to_num(housing)) + fit.coefficients[0]
+    assert out[[0, 1, 2, 4]] == pytest.approx(expected[[0, 1, 2, 4]], abs=1e-9)
+    assert np.isnan(out[3])
+    hot = record.with_columns({"housing_temperature_degC": housing + 20})
+    with pytest.raises(InputError, match=r"from 10 to 50, outside -20 to 40 .*--extrapolate"):
+        compensate(model, hot)
+    assert np.isfinite(compensate(model, hot, extrapolate=True)["compensated_frequency_Hz"][0])
+    with pytest.raises(InputError, match="already"):
+        compensate(model, compensate(model, record))
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ('schema = "hrg.model/1"', 'schema = "hrg.model/9"', "schema must be"),
+        ("kind =", "kinds =", "unknown key 'kinds'.*did you mean 'kind'"),
+        ("coefficients = [", "coefficients = [3,", "array of tables"),
+        ('name = "a1"', 'name = "f0"', "same name"),
+        ("frequency_Hz\"", "frequency_Hz", "not valid TOML"),
+        ("temperature_degC = [-20.0, 40.0]", "temperature_degC = [40.0, -20.0]", "must be below"),
+        ("reference_temperature_degC = 0.0", "reference_temperature_degC = nan", "finite number"),
+        ("rows = 7", 'rows = "7"', "finite number"),
+    ],
+)
+def test_a_broken_file_is_refused_by_key(model, tmp_path, old, new, message):
+    text = format_model(model)
+    assert old in text
+    text = text.replace(old, new, 1)
+    (tmp_path / "m.toml").write_text(text, encoding="utf-8")
+    with pytest.raises(InputError, match=message):
+        read_model(tmp_path / "m.toml")
+
+
+def test_an_unknown_kind_and_a_wrong_covariance_are_refused(model, tmp_path):
+    content = format_model(model)
+    tomllib.loads(content)
+    (tmp_path / "m.toml").write_text(content.replace('kind = "frequency"', 'kind = "frequenzy"'), encoding="utf-8")
+    with pytest.raises(InputError, match="unknown kind 'frequenzy'; did you mean 'frequency'"):
+        compensate(read_model(tmp_path / "m.toml"), Record({"time_s": np.arange(2.0)}))
+    start = content.index("covariance = [")
+    (tmp_path / "m.toml").write_text(content[:start] + "covariance = [[1.0]]\n", encoding="utf-8")
+    with pytest.raises(InputError, match="covariance must be 4 lists of 4 numbers"):
+        read_model(tmp_path / "m.toml")
