@@ -89,6 +89,21 @@ class TransferFunction:
             raise CompensationError("the transfer function has a pole at s = 0, so it has no steady gain.")
         return complex(self.numerator[-1] / self.denominator[-1])
 
+    def cancel(self, tolerance: float = 1e-7) -> "TransferFunction":
+        """Return the same function without pairs of pole and zero that agree to `tolerance`, relative to the pole."""
+        zeros, poles = list(self.zeros), []
+        for pole in self.poles:
+            near = [zero for zero in zeros if abs(zero - pole) <= tolerance * abs(pole)]
+            if near:
+                zeros.remove(near[0])
+            else:
+                poles.append(pole)
+        pair = []
+        for first, roots in ((self.numerator[0], zeros), (self.denominator[0], poles)):
+            polynomial = np.atleast_1d(first * np.poly(roots))
+            pair.append(tuple((polynomial.real if self.is_real else polynomial).tolist()))
+        return TransferFunction(*pair)
+
     def realise(self) -> tuple[Complex, Complex, Complex, complex]:
         """Return A, B, C, D of ẋ = A x + B u, y = C x + D u, with W(s) = C (s − A)⁻¹ B + D.
 

@@ -1,0 +1,203 @@
+"""Kalman filter of a sampled linear system, and the model of a gyro for it.
+
+Equation numbers are those of the paper on demodulated dynamics and optimal noise filtering for CVGs. Symbols: x state,
+P its covariance, F transition, C measurement matrix, Q and R variances of process and measurement noise per step.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from compensation.errors import CompensationError
+
+Real = NDArray[np.float64]
+_NOT_STEADY = "this model has no steady filter: a lasting state is not observed, or no process noise reaches it."
+
+
+@dataclass(frozen=True)
+class LinearModel:
+    """x⁺ = F x + w, z = C x + v: eq. (37).
+
+    Parameters
+    ----------
+    transition : array (n, n)
+        F.
+    measurement : array (m, n)
+        C.
+    process_noise : array (n, n)
+        Q, covariance of w over one step.
+    measurement_noise : array (m, m)
+        R, covariance of v.
+
+    Raises
+    ------
+    CompensationError
+        When shapes disagree, Q or R is not symmetric and non-negative, or R is singular.
+    """
+
+    transition: Real
+    measurement: Real
+    process_noise: Real
+    measurement_noise: Real
+
+    def __post_init__(self) -> None:
+        for name in ("transition", "measurement", "process_noise", "measurement_noise"):
+            object.__setattr__(self, name, np.atleast_2d(np.asarray(getattr(self, name), dtype=float)))
+        n, m = self.transition.shape[0], self.measurement.shape[0]
+        if self.transition.shape != (n, n) or self.measurement.shape != (m, n):
+            raise CompensationError("the transition must be square and the measurement matrix as wide as it.")
+        for name, size in (("process_noise", n), ("measurement_noise", m)):
+            matrix = getattr(self, name)
+            if matrix.shape != (size, size) or not np.allclose(matrix, matrix.T) or np.linalg.eigvalsh(matrix)[0] < 0:
+                raise CompensationError(f"{name} must be a symmetric, non-negative {size} by {size} matrix.")
+        if np.linalg.eigvalsh(self.measurement_noise)[0] <= 0:
+            raise CompensationError("measurement_noise must be positive: a perfect measurement needs no filter.")
+
+    @property
+    def observability(self) -> Real:
+        """(C; C F; C F²; …) with as many blocks as states: eq. (41)."""
+        powers = [np.linalg.matrix_power(self.transition, i) for i in range(len(self.transition))]
+        return np.vstack([self.measurement @ power for power in powers])
+
+
+def model_gyro(k: float, zeta: float, step: float, process_noise: ArrayLike, measurement_noise: float) -> LinearModel:
+    """Return the model of a tuned gyro with the states (Ω measured, Ω₀ true), Ω₀ a random walk: eqs. (37)–(40).
+
+    A = ((−kζ, kζ), (0, 0)) and C = (1, 0); F = exp(A t), that is e^{−kζt}, 1 − e^{−kζt} in the first row.
+
+    Parameters
+    ----------
+    k, zeta : float
+        Natural frequency (rad/s) and relative damping (1).
+    step : float
+        Sampling step t (s); the paper does not give its own.
+    process_noise : array (2, 2)
+        Q, rad²/s² per step.
+    measurement_noise : float
+        R, rad²/s².
+    """
+    if not (k > 0 and zeta > 0 and step > 0):
+        raise CompensationError("the gyro model needs a positive natural frequency, damping and sampling step.")
+    kept = np.exp(-k * zeta * step)
+    return LinearModel(
+        np.array([[kept, 1 - kept], [0.0, 1.0]]),
+        np.array([[1.0, 0.0]]),
+        np.asarray(process_noise, dtype=float),
+        np.array([[measurement_noise]]),
+    )
+
+
+def predict(model: LinearModel, x: Real, P: Real) -> tuple[Real, Real]:
+    """Return state and covariance one step on: F x, F P Fᵀ + Q."""
+    F = model.transition
+    return F @ x, F @ P @ F.T + model.process_noise
+
+
+def update(model: LinearModel, x: Real, P: Real, z: Real) -> tuple[Real, Real, Real, Real]:
+    """Return state and covariance after a measurement z (m,), its innovation (m,) and the innovation's covariance.
+
+    The covariance is (1 − K C) P (1 − K C)ᵀ + K R Kᵀ, Joseph's form, which stays symmetric and positive.
+    """
+    C, R = model.measurement, model.measurement_noise
+    innovation = z - C @ x
+    S = C @ P @ C.T + R
+    K = np.linalg.solve(S, C @ P).T
+    kept = np.eye(len(x)) - K @ C
+    return x + K @ innovation, kept @ P @ kept.T + K @ R @ K.T, innovation, S
+
+
+@dataclass(frozen=True)
+class KalmanRun:
+    """States (N, n) and covariances (N, n, n) after each measurement, innovations (N, m), their covariances (N, m, m)."""
+
+    states: Real
+    covariances: Real
+    innovations: Real
+    innovation_covariances: Real
+
+    @property
+    def nis(self) -> Real:
+        """Normalised innovation squared νᵀ S⁻¹ ν (N,): chi-squared with m degrees of freedom if the model is right."""
+        solved = np.linalg.solve(self.innovation_covariances, self.innovations[..., None])[..., 0]
+        return np.asarray(np.einsum("ni,ni->n", self.innovations, solved), dtype=float)
+
+    def nees(self, truth: ArrayLike) -> Real:
+        """Normalised estimation error squared (N,) against the true states (N, n): chi-squared with n degrees."""
+        error = self.states - np.asarray(truth, dtype=float)
+        solved = np.linalg.solve(self.covariances, error[..., None])[..., 0]
+        return np.asarray(np.einsum("ni,ni->n", error, solved), dtype=float)
+
+
+def run_filter(model: LinearModel, measurements: ArrayLike, start: ArrayLike, covariance: ArrayLike) -> KalmanRun:
+    """Filter a series of evenly sampled measurements.
+
+    Parameters
+    ----------
+    model : LinearModel
+        The system.
+    measurements : array (N,) or (N, m)
+        z, one row a step; the first is one step after `start`.
+    start, covariance : array (n,), array (n, n)
+        State and its covariance before the first step.
+
+    Raises
+    ------
+    CompensationError
+        When a measurement is not finite (leave a gap out by calling `predict` over it) or shapes disagree.
+    """
+    z = np.asarray(measurements, dtype=float)
+    z = z[:, None] if z.ndim == 1 else z
+    m, n = model.measurement.shape
+    if z.ndim != 2 or z.shape[1] != m:
+        raise CompensationError(f"a measurement of this model has {m} values, not the shape {z.shape}.")
+    holes = np.flatnonzero(~np.all(np.isfinite(z), axis=1))
+    if len(holes):
+        raise CompensationError(f"measurement {holes[0] + 1} is missing or infinite; predict over the gap instead.")
+    x, P = np.asarray(start, dtype=float), np.asarray(covariance, dtype=float)
+    if x.shape != (n,) or P.shape != (n, n):
+        raise CompensationError(f"the start needs {n} states and a {n} by {n} covariance, not {x.shape} and {P.shape}.")
+    states, covariances = np.empty((len(z), n)), np.empty((len(z), n, n))
+    innovations, spreads = np.empty((len(z), m)), np.empty((len(z), m, m))
+    for i, row in enumerate(z):
+        x, P = predict(model, x, P)
+        x, P, innovations[i], spreads[i] = update(model, x, P, row)
+        states[i], covariances[i] = x, P
+    return KalmanRun(states, covariances, innovations, spreads)
+
+
+def settle(model: LinearModel) -> tuple[Real, Real, Real]:
+    """Return gain K, and covariance before and after a measurement, that the filter tends to.
+
+    The covariance before solves P = F P Fᵀ − F P Cᵀ (C P Cᵀ + R)⁻¹ C P Fᵀ + Q.
+
+    Raises
+    ------
+    CompensationError
+        When there is none: the state cannot be observed, or is never stirred by noise.
+    """
+    from scipy.linalg import LinAlgError, solve_discrete_are
+
+    C, R = model.measurement, model.measurement_noise
+    try:
+        P = np.asarray(solve_discrete_are(model.transition.T, C.T, model.process_noise, R), dtype=float)
+    except LinAlgError as error:
+        raise CompensationError(_NOT_STEADY) from error
+    K = np.asarray(np.linalg.solve(C @ P @ C.T + R, C @ P).T, dtype=float)
+    kept = np.eye(len(P)) - K @ C
+    if np.max(np.abs(np.linalg.eigvals(kept @ model.transition))) > 1 - 1e-12:
+        raise CompensationError(_NOT_STEADY)
+    return K, P, kept @ P @ kept.T + K @ R @ K.T
+
+
+def expect_mean_nis(rows: int, degrees: int, probability: float = 0.95) -> tuple[float, float]:
+    """Return the band in which the mean of `rows` NIS or NEES values lies with `probability`, from chi-squared.
+
+    Innovations are white, so this holds for NIS over time; NEES values of one run are correlated and must be averaged
+    over independent runs instead.
+    """
+    from scipy.stats import chi2
+
+    beside = (1 - probability) / 2
+    low, high = chi2.ppf(beside, rows * degrees), chi2.ppf(1 - beside, rows * degrees)
+    return float(low) / rows, float(high) / rows
