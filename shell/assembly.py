@@ -1,0 +1,226 @@
+"""From a resonator to element matrices: unknowns, poles, clamps, and the ties between shell and solid blocks."""
+
+from dataclasses import dataclass, field
+from functools import cached_property, lru_cache
+from typing import Literal
+
+import numpy as np
+from scipy.sparse import csr_matrix
+
+from shell.eigen import Index, Pattern, find_pattern
+from shell.kernel import (
+    Orders,
+    Section,
+    StrainTable,
+    integrate_mass,
+    integrate_stiffness,
+    shell_table,
+    station_mass,
+    station_stiffness,
+)
+from shell.layout import Chain, lay_chain
+from shell.meridian import Resonator
+from shell.quadrature import Array, gauss, legendre, nodal
+
+Theory = Literal["solid", "shell", "rayleigh"]
+Part = Literal["shell", "root", "stem", "corner"]
+Rows = dict[int, list[tuple[int, float]]]
+
+
+@dataclass(frozen=True)
+class Level:
+    """Polynomial orders: (u, v, w) through the thickness, along the meridian, in blocks; rings around sharp corners."""
+
+    through: Orders
+    along: int
+    block: int
+    rings: int
+    split: int = 1
+
+
+LEVELS: dict[str, tuple[Level, ...]] = {
+    "solid": (
+        Level((3, 3, 3), 9, 6, 3),
+        Level((5, 5, 4), 12, 8, 5),
+        Level((7, 7, 6), 16, 10, 7),
+        Level((9, 9, 8), 20, 12, 9),
+        Level((11, 11, 10), 20, 14, 11, 2),
+    ),
+    "shell": (
+        Level((1, 1, 0), 8, 6, 3),
+        Level((1, 1, 0), 12, 8, 5),
+        Level((1, 1, 0), 16, 10, 7),
+        Level((1, 1, 0), 20, 12, 9),
+        Level((1, 1, 0), 20, 14, 11, 2),
+    ),
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Group:
+    """Elements of one kind: their strain table, their unknowns with orientation signs, and what part they belong to."""
+
+    table: StrainTable
+    unknowns: Index
+    signs: Array
+    part: Part
+    frame: tuple[Array, Array] | None = None  # t_r, t_z at the stations of a shell; None where the axes are r, θ, z
+
+
+@dataclass(frozen=True, eq=False)
+class System:
+    """Every element of a resonator at one harmonic and level, with the constraints between raw and free unknowns.
+
+    raw = constraint @ free. Matrices come per unit λ, G, ρ, so that a new material or temperature costs no geometry.
+    """
+
+    groups: tuple[Group, ...]
+    constraint: csr_matrix
+    rigid_motions: int
+    n: int
+    _maps: list[tuple[Index, Array | None]] = field(default_factory=list, repr=False)
+
+    def __post_init__(self) -> None:
+        for group in self.groups:
+            self._maps.extend(
+                self._free(members, signs) for members, signs in zip(group.unknowns, group.signs, strict=True)
+            )
+
+    @cached_property
+    def pattern(self) -> Pattern:
+        """The elements' free unknowns."""
+        return find_pattern([free for free, _ in self._maps], self.constraint.shape[1])
+
+    @cached_property
+    def stations(self) -> list[tuple[Array, Array, Array]]:
+        """Station matrices per unit λ, G and ρ of every group."""
+        return [(*station_stiffness(group.table), station_mass(group.table)) for group in self.groups]
+
+    @cached_property
+    def units(self) -> list[tuple[Array, Array, Array]]:
+        """Element matrices on free unknowns per unit λ, G and ρ, the same material everywhere."""
+        found: list[tuple[Array, Array, Array]] = []
+        for group, (trace, shear, mass) in zip(self.groups, self.stations, strict=True):
+            along = group.table.along
+            found += zip(
+                integrate_stiffness(trace, along), integrate_stiffness(shear, along), integrate_mass(mass, along), strict=True
+            )
+        return [
+            (_restrict(trace, at), _restrict(shear, at), _restrict(mass, at))
+            for (trace, shear, mass), (_, at) in zip(found, self._maps, strict=True)
+        ]
+
+    def varying(self, lam: list[Array], G: list[Array], rho: list[Array]) -> tuple[list[Array], list[Array]]:
+        """Stiffness and mass of every element with λ, G, ρ given at the stations of every group."""
+        K: list[Array] = []
+        M: list[Array] = []
+        for k, (group, (trace, shear, mass)) in enumerate(zip(self.groups, self.stations, strict=True)):
+            there = lam[k][..., None, None] * trace + G[k][..., None, None] * shear
+            K += list(integrate_stiffness(there, group.table.along))
+            M += list(integrate_mass(rho[k][..., None, None] * mass, group.table.along))
+        maps = [at for _, at in self._maps]
+        return (
+            [_restrict(matrix, at) for matrix, at in zip(K, maps, strict=True)],
+            [_restrict(matrix, at) for matrix, at in zip(M, maps, strict=True)],
+        )
+
+    def spread(self, free: Array) -> list[Array]:
+        """Element unknowns (elements, size) of every group from the free unknowns of one vector."""
+        raw = self.constraint @ free
+        return [group.signs * raw[group.unknowns] for group in self.groups]
+
+    def _free(self, members: Index, signs: Array) -> tuple[Index, Array | None]:
+        rows = self.constraint[members]
+        if rows.nnz == len(members) and np.all(np.diff(rows.indptr) == 1) and np.all(rows.data * signs == 1):
+            return rows.indices.astype(np.intp), None
+        free = np.unique(rows.indices).astype(np.intp)
+        return free, signs[:, None] * rows[:, free].toarray()
+
+
+def _restrict(matrix: Array, to_free: Array | None) -> Array:
+    return matrix if to_free is None else np.asarray(to_free.T @ matrix @ to_free)
+
+
+@lru_cache(maxsize=24)
+def build_system(resonator: Resonator, n: int, theory: Theory, level: Level) -> System:
+    """Lay out, number and tabulate a resonator; cached, since only the material changes with temperature."""
+    chains = lay_resonator(resonator, n, level)
+    groups, rows, size = [], {}, 0
+    for chain in chains:
+        group, constrained, size = _shell_group(resonator, chain, n, level, size)
+        groups.append(group)
+        rows.update(constrained)
+    held = resonator.support != "free"
+    return System(tuple(groups), _constraint(rows, size), 0 if held or n > 1 else 2, n)
+
+
+def lay_resonator(resonator: Resonator, n: int, level: Level) -> list[Chain]:
+    """The chains of shell elements."""
+    first: Literal["pole", "clamped", "free"] = "pole" if resonator.starts_on_axis else "free"
+    last: Literal["pole", "clamped", "free"] = "pole" if resonator.ends_on_axis else "free"
+    if resonator.support == "clamped-pole":
+        first = "clamped"
+    if resonator.support == "clamped-rim":
+        last = "clamped"
+    return [lay_chain(resonator, 0.0, resonator.length, (first, last), n, level.split)]
+
+
+def _shell_group(resonator: Resonator, chain: Chain, n: int, level: Level, start: int) -> tuple[Group, Rows, int]:
+    """Tabulate one chain and number its unknowns, (node, amplitude) from `start`."""
+    p, orders = level.along, level.through
+    xi, weights = gauss(p + 2)
+    eta = gauss(max(orders) + 2)
+    section = _sections(resonator, chain, xi, weights)
+    table = shell_table(
+        section, n,
+        tuple(legendre(order, eta[0]) for order in orders), eta, nodal(p, xi),  # type: ignore[arg-type]
+    )
+    elements, m = len(chain.segments), sum(orders) + 3
+    nodes = p * np.arange(elements)[:, None] + np.arange(p + 1)
+    unknowns = start + (nodes[:, :, None] * m + np.arange(m)).reshape(elements, -1)
+    rows: Rows = {}
+    for end, node, s in ((chain.ends[0], 0, chain.breaks[0]), (chain.ends[1], elements * p, chain.breaks[-1])):
+        at = [start + node * m + k for k in range(m)]
+        if end == "clamped":
+            rows.update({unknown: [] for unknown in at})
+        elif end == "pole":
+            t_r = float(resonator.at([s], chain.segments[0 if node == 0 else -1]).tangent_r[0])
+            rows.update(_pole_rows(at, orders, n, round(t_r)))
+    group = Group(table, unknowns, np.ones(unknowns.shape), "shell", (section.tangent_r, section.tangent_z))
+    return group, rows, start + (elements * p + 1) * m
+
+
+def _sections(resonator: Resonator, chain: Chain, xi: Array, weights: Array) -> Section:
+    names = ("r", "tangent_r", "tangent_z", "curvature", "thickness", "thickness_slope", "position")
+    gathered: dict[str, list[Array]] = {name: [] for name in names}
+    for one, two, segment in zip(chain.breaks, chain.breaks[1:], chain.segments, strict=False):
+        points = resonator.at((one + two) / 2 + (two - one) / 2 * xi, segment)
+        for name in names:
+            gathered[name].append(getattr(points, name))
+    halves = np.diff(np.array(chain.breaks)) / 2
+    shape = (len(halves), len(xi))
+    return Section(
+        **{name: np.array(values) for name, values in gathered.items()},
+        ds=np.broadcast_to(halves[:, None], shape), weight=np.broadcast_to(weights, shape),
+    )
+
+
+def _pole_rows(at: list[int], orders: Orders, n: int, t_r: int) -> Rows:
+    """What stays regular on the axis: n = 0 only w; n = 1 the translation v = -t_r u; n > 1 nothing."""
+    u, v, w = np.split(np.array(at), np.cumsum([orders[0] + 1, orders[1] + 1]))
+    if n == 0:
+        return {int(k): [] for k in (*u, *v)}
+    if n == 1:
+        return {int(k): [] for k in w} | {int(b): [(int(a), -float(t_r))] for a, b in zip(u, v, strict=True)}
+    return {k: [] for k in at}
+
+
+def _constraint(rows: Rows, size: int) -> csr_matrix:
+    """The sparse matrix from free to raw unknowns; a row not listed is free."""
+    free = np.array([k not in rows for k in range(size)])
+    column = np.cumsum(free) - 1
+    entries = [(k, int(column[k]), 1.0) for k in np.flatnonzero(free)]
+    for k, row in rows.items():
+        entries += [(k, int(column[master]), factor) for master, factor in row]
+    i, j, value = (np.array(values) for values in zip(*entries, strict=True))
+    return csr_matrix((value, (i, j)), shape=(size, int(free.sum())))

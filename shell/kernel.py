@@ -1,0 +1,243 @@
+"""The one kernel: strains of displacements that vary as cos nθ and sin nθ, in the meridional section.
+
+Every element is a product of polynomials along a first direction ξ (the meridian) and a second one η (the thickness).
+At each *station* ξ_i the strain at the points η_j is a linear function of the *section amplitudes* and of their
+derivatives along ξ. This table of strains is all the mechanics there is: energies, matrices, and stresses follow from it.
+The same table serves the shell (displacements u, v, w along tangent, circumference and normal) and the solid blocks of
+roots and corners (displacements along r, θ, z).
+
+Components of strain, in order: three normal strains, then the engineering shears 12, 13, 23, where the axes 1, 2, 3 are
+(s, θ, ζ) in the shell and (r, θ, z) in a block.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shell.quadrature import Array, Basis
+
+SHEAR_CORRECTION = 5 / 6
+Orders = tuple[int, int, int]
+
+
+@dataclass(frozen=True, eq=False)
+class StrainTable:
+    """Strains at the quadrature points of elements, per unit of their section amplitudes.
+
+    strain : (elements, stations, 6, points, 2, amplitudes); the axis of length 2 is value and ξ-derivative.
+    displacement : (elements, stations, 3, points, amplitudes).
+    volume : (elements, stations, points), dr dz times r and the quadrature weights (times π it is a volume in m³).
+    along : (2, stations, functions), the polynomials along ξ and their derivatives.
+    position : (elements, stations), where on the meridian (0 ... 1) the material is to be taken.
+    """
+
+    strain: Array
+    displacement: Array
+    volume: Array
+    along: Array
+    position: Array
+    transverse_shear: float = 1.0
+    plane_stress: bool = False
+
+    @property
+    def size(self) -> int:
+        """Unknowns of one element."""
+        return int(self.along.shape[2] * self.strain.shape[5])
+
+
+@dataclass(frozen=True, eq=False)
+class Section:
+    """The middle surface at stations: arrays (elements, stations) and the factor ds/dξ."""
+
+    r: Array
+    tangent_r: Array
+    tangent_z: Array
+    curvature: Array
+    thickness: Array
+    thickness_slope: Array
+    ds: Array
+    weight: Array
+    position: Array
+
+
+def shell_table(section: Section, n: int, through: tuple[Basis, Basis, Basis], eta: tuple[Array, Array], along: Basis) -> StrainTable:
+    """Strains of a shell of revolution in its own frame, without approximation in z/R.
+
+    With ζ = η h/2, A = 1 + κ ζ and ρ = r + ζ n_r (the radius of the point), subscripts for derivatives:
+
+    ε_s = (u_s + κ w)/A,  ε_θ = (n v + t_r u + n_r w)/ρ,  ε_ζ = w_ζ,
+    γ_sθ = v_s/A - (n u + t_r v)/ρ,  γ_sζ = u_ζ + (w_s - κ u)/A,  γ_θζ = v_ζ - (n w + n_r v)/ρ.
+
+    Where the thickness varies, the derivative at constant ζ is ∂_s - (h'/h) η ∂_η.
+
+    Parameters
+    ----------
+    section : the middle surface at the stations.
+    n : circumferential harmonic; u, w vary as cos nθ, v as sin nθ (for n = 0, v as 1).
+    through : Legendre modes of u, v, w at the thickness points.
+    eta : thickness points on [-1, 1] and their weights.
+    along : polynomials along the meridian at the stations.
+    """
+    points, weights = eta
+    h, slope, ds = (_tall(a) for a in (section.thickness, section.thickness_slope, section.ds))
+    t_r, kappa, n_r = _tall(section.tangent_r), _tall(section.curvature), _tall(-section.tangent_z)
+    zeta = h * points[:, None, None] / 2
+    A, rho = 1 + kappa * zeta, _tall(section.r) + n_r * zeta
+    counts = [basis.values.shape[1] for basis in through]
+    value, d_eta, d_xi = _jets(through, counts)
+    u, v, w = value
+    u_zeta, v_zeta, w_zeta = (2 / h * d for d in d_eta)
+    drift = slope / h * points[:, None, None]
+    u_s, v_s, w_s = (f / ds - drift * g for f, g in zip(d_xi, d_eta, strict=True))
+    strain = np.stack(
+        np.broadcast_arrays(
+            (u_s + kappa * w) / A,
+            (n * v + t_r * u + n_r * w) / rho,
+            w_zeta,
+            v_s / A - (n * u + t_r * v) / rho,
+            u_zeta + (w_s - kappa * u) / A,
+            v_zeta - (n * w + n_r * v) / rho,
+        ),
+        axis=2,
+    )
+    volume = (ds * A * rho * h / 2)[..., 0, 0] * section.weight[..., None] * weights
+    displacement = np.broadcast_to(np.stack([f[:, 0] for f in value]), (*section.r.shape, 3, len(points), sum(counts)))
+    naghdi = counts[2] == 1
+    return StrainTable(
+        strain, displacement, volume, np.stack([along.values, along.slopes]), section.position,
+        SHEAR_CORRECTION if naghdi else 1.0, naghdi,
+    )
+
+
+def block_table(
+    corners: tuple[Array, Array], jacobian: Array, weights: Array, n: int, across: Basis, along: Basis, position: Array
+) -> StrainTable:
+    """Strains of a solid of revolution in cylindrical components (a, b, c) along r, θ, z.
+
+    ε_r = a_r,  ε_θ = (n b + a)/r,  ε_z = c_z,  γ_rθ = b_r - (n a + b)/r,  γ_rz = a_z + c_r,  γ_θz = b_z - n c/r.
+
+    Parameters
+    ----------
+    corners : r and z at the points, (elements, stations, points).
+    jacobian : ∂(r, z)/∂(ξ, η), (2, 2, elements, stations, points).
+    weights : quadrature weights (stations, points).
+    n : circumferential harmonic.
+    across, along : polynomials in η and in ξ.
+    position : where on the meridian (0 ... 1) each element's material is taken.
+    """
+    r = corners[0][..., None, None]
+    (r_xi, r_eta), (z_xi, z_eta) = jacobian
+    det = r_xi * z_eta - r_eta * z_xi
+    xi_r, xi_z, eta_r, eta_z = (
+        _flat / det for _flat in (z_eta, -r_eta, -z_xi, r_xi)
+    )
+    count = across.values.shape[1]
+    (a, b, c), d_eta, d_xi = _jets((across, across, across), [count] * 3)
+
+    def gradient(xi: Array, eta: Array) -> list[Array]:
+        return [xi[..., None, None] * f + eta[..., None, None] * g for f, g in zip(d_xi, d_eta, strict=True)]
+
+    a_r, b_r, c_r = gradient(xi_r, eta_r)
+    a_z, b_z, c_z = gradient(xi_z, eta_z)
+    strain = np.stack(
+        [a_r, (n * b + a) / r, c_z, b_r - (n * a + b) / r, a_z + c_r, b_z - n * c / r], axis=2
+    )
+    volume = abs(det) * corners[0] * weights
+    displacement = np.broadcast_to(
+        np.stack([f[:, 0] for f in (a, b, c)]), (*r.shape[:2], 3, r.shape[2], 3 * count)
+    )
+    stations = np.broadcast_to(position[:, None], r.shape[:2])
+    return StrainTable(strain, displacement, volume, np.stack([along.values, along.slopes]), stations)
+
+
+def lame(E: Array, nu: Array, plane_stress: bool) -> tuple[Array, Array]:
+    """Lamé's λ and G; in plane stress λ is replaced by 2 G λ/(λ + 2 G) = E ν/(1 - ν²)."""
+    G = E / (2 * (1 + nu))
+    if plane_stress:
+        return E * nu / (1 - nu**2), G
+    return E * nu / ((1 + nu) * (1 - 2 * nu)), G
+
+
+def energy_weights(table: StrainTable) -> Array:
+    """Weights g_c of the shear modulus: 2 U = ∫ λ (ε_1 + ε_2 + ε_3)² + G Σ g_c ε_c²."""
+    k = table.transverse_shear
+    return np.array([2.0, 2.0, 2.0, 1.0, k, k])
+
+
+def station_stiffness(table: StrainTable) -> tuple[Array, Array]:
+    """Energy of each station's section amplitudes per unit λ and per unit G: (elements, stations, 2m, 2m) each."""
+    shape = table.strain.shape
+    flat = table.strain.reshape(*shape[:4], -1)
+    root = np.sqrt(table.volume)[:, :, None, :, None]
+    trace = (flat[:, :, 0] + flat[:, :, 1] + flat[:, :, 2]) * root[:, :, 0]
+    sheared = flat * (root * np.sqrt(energy_weights(table))[:, None, None])
+    sheared = sheared.reshape(*shape[:2], -1, flat.shape[-1])
+    return np.swapaxes(trace, -1, -2) @ trace, np.swapaxes(sheared, -1, -2) @ sheared
+
+
+def station_mass(table: StrainTable) -> Array:
+    """Kinetic energy of each station's section amplitudes per unit density: (elements, stations, m, m)."""
+    shape = table.displacement.shape
+    moved = (table.displacement * np.sqrt(table.volume)[:, :, None, :, None]).reshape(*shape[:2], -1, shape[-1])
+    return np.asarray(np.swapaxes(moved, -1, -2) @ moved)
+
+
+def integrate_stiffness(stations: Array, along: Array) -> Array:
+    """Sum the stations of each element into its stiffness: (elements, size, size), unknowns ordered (function, amplitude)."""
+    elements, count, double, _ = stations.shape
+    m, functions = double // 2, along.shape[2]
+    pairs = np.einsum("dia,eib->abide", along, along).reshape(functions**2, -1)
+    inner = stations.reshape(elements, count, 2, m, 2, m).transpose(0, 1, 2, 4, 3, 5).reshape(elements, -1, m * m)
+    return _unravel(pairs @ inner, functions, m)
+
+
+def integrate_mass(stations: Array, along: Array) -> Array:
+    """Sum the stations of each element into its mass: (elements, size, size)."""
+    elements, count, m, _ = stations.shape
+    functions = along.shape[2]
+    pairs = np.einsum("ia,ib->abi", along[0], along[0]).reshape(functions**2, -1)
+    return _unravel(pairs @ stations.reshape(elements, count, m * m), functions, m)
+
+
+def strains(table: StrainTable, unknowns: Array) -> Array:
+    """Strain (elements, stations, 6, points) of element unknowns (elements, size)."""
+    elements, stations, _, points = table.strain.shape[:4]
+    amplitudes = unknowns.reshape(elements, table.along.shape[2], -1)
+    jets = np.einsum("dia,eam->eidm", table.along, amplitudes).reshape(elements, stations, -1, 1)
+    flat = table.strain.reshape(elements, stations, 6 * points, -1)
+    return np.asarray((flat @ jets).reshape(elements, stations, 6, points))
+
+
+def displacements(table: StrainTable, unknowns: Array) -> Array:
+    """Displacement (elements, stations, 3, points) of element unknowns (elements, size)."""
+    elements = len(unknowns)
+    amplitudes = np.einsum("ia,eam->eim", table.along[0], unknowns.reshape(elements, table.along.shape[2], -1))
+    return np.einsum("eicjm,eim->eicj", table.displacement, amplitudes)
+
+
+def _tall(per_station: Array) -> NDArray[np.float64]:
+    """Give an array (elements, stations) the axes point, jet and amplitude."""
+    return per_station[..., None, None, None]
+
+
+def _jets(bases: tuple[Basis, Basis, Basis], counts: list[int]) -> tuple[list[Array], list[Array], list[Array]]:
+    """The three displacements, their η- and their ξ-derivatives as rows (point, jet, amplitude)."""
+    total, start = sum(counts), 0
+    value, d_eta, d_xi = [], [], []
+    for basis, count in zip(bases, counts, strict=True):
+        rows = [np.zeros((len(basis.values), 2, total)) for _ in range(3)]
+        columns = slice(start, start + count)
+        rows[0][:, 0, columns] = basis.values
+        rows[1][:, 0, columns] = basis.slopes
+        rows[2][:, 1, columns] = basis.values
+        for target, row in zip((value, d_eta, d_xi), rows, strict=True):
+            target.append(row)
+        start += count
+    return value, d_eta, d_xi
+
+
+def _unravel(integrals: Array, functions: int, m: int) -> Array:
+    elements = len(integrals)
+    blocks = integrals.reshape(elements, functions, functions, m, m).transpose(0, 1, 3, 2, 4)
+    return blocks.reshape(elements, functions * m, functions * m)

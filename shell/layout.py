@@ -1,0 +1,65 @@
+"""Where the elements of a meridian break: joints, knots of the thickness, and the layers that edges and joints cause."""
+
+import itertools
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from shell.meridian import Resonator
+
+End = Literal["pole", "free", "clamped", "tied"]
+
+SMOOTH_JOINT = 1e-6  # rad; a larger change of the tangent is a kink and gets a solid corner
+LONGEST = 1.6  # element length over the radius
+
+
+@dataclass(frozen=True)
+class Chain:
+    """A run of shell elements without a kink: arc lengths of their ends (m), the curve each lies on, what holds the ends."""
+
+    breaks: tuple[float, ...]
+    segments: tuple[int, ...]
+    ends: tuple[End, End]
+
+
+def lay_chain(resonator: Resonator, start: float, stop: float, ends: tuple[End, End], n: int, split: int = 1) -> Chain:
+    """Break the meridian between two arc lengths into elements.
+
+    The edge of a shell carries two layers: the three-dimensional one, about 2 h wide, and the bending layer, about
+    5 √(h R). A jump of curvature carries the bending layer on both sides. Each gets its own element where it fits.
+    `split` cuts every element into that many.
+    """
+    length = stop - start
+    joints = [s for s in resonator.joints if start + 1e-9 * length < s < stop - 1e-9 * length]
+    knots = [position * resonator.length for position, _ in resonator.thickness[1:-1]]
+    firm = sorted({start, stop, *joints, *(s for s in knots if start + 1e-9 * length < s < stop - 1e-9 * length)})
+    wanted: list[tuple[float, float]] = []  # (distance from its edge, arc length)
+    for edge, inward, end in ((start, 1, ends[0]), (stop, -1, ends[1])):
+        if end != "pole":
+            wanted += _layers(resonator, edge, inward, end)
+    for joint in joints:
+        wanted += [(width, joint + side * width) for side in (-1, 1) for width, _ in _layers(resonator, joint, side, "tied")]
+    for width, s in sorted(wanted):
+        if min(abs(s - other) for other in firm) > 0.4 * width and start < s < stop:
+            firm = sorted([*firm, s])
+    longest = LONGEST * resonator.size * min(1.0, 4 / max(n, 1))
+    breaks: list[float] = [start]
+    for one, two in itertools.pairwise(firm):
+        pieces = split * int(np.ceil((two - one) / longest - 1e-9))
+        breaks += np.linspace(one, two, pieces + 1)[1:].tolist()
+    bounds = np.array(resonator._starts)
+    middles = (np.array(breaks[1:]) + np.array(breaks[:-1])) / 2
+    segments = np.clip(np.searchsorted(bounds, middles, side="right") - 1, 0, len(resonator.segments) - 1)
+    return Chain(tuple(breaks), tuple(int(k) for k in segments), ends)
+
+
+def _layers(resonator: Resonator, edge: float, inward: int, end: End) -> list[tuple[float, float]]:
+    just_inside = edge + inward * 1e-6 * resonator.length
+    there = resonator.at([just_inside])
+    h = float(there.thickness[0])
+    bend = max(abs(float(there.curvature[0])), abs(float(there.normal_r[0] / there.r[0])))
+    widths = [] if end == "tied" else [2 * h]
+    if bend * resonator.size > 0.02:
+        widths.append(5 * float(np.sqrt(h / bend)))
+    return [(width, edge + inward * width) for width in widths]

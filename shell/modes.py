@@ -1,0 +1,233 @@
+"""Modes of a resonator of revolution: frequencies with their error, Bryan factors, shapes.
+
+>>> mode, = solve_modes(hemisphere(radius=15e-3, thickness=0.9e-3), Elastic(72.7e9, 0.17, 2203.0))
+"""
+
+import warnings
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from math import pi, sqrt
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from shell.assembly import LEVELS, Level, System, Theory, build_system
+from shell.curves import Arc
+from shell.eigen import lowest_vectors
+from shell.elastic import Elastic
+from shell.errors import ShellError
+from shell.kernel import lame
+from shell.meridian import Resonator
+from shell.quadrature import Array
+from shell.solution import Constants, Solution, total
+
+THEORIES = ("solid", "shell", "rayleigh")
+THICKEST_SHELL = 0.1  # h/R up to which shell theory has been held against the solid
+THINNEST = 1e-5  # h/R below which double precision loses the digits
+
+
+class TheoryRangeWarning(UserWarning):
+    """The design lies outside the range in which the chosen theory can be trusted."""
+
+
+@dataclass(frozen=True)
+class VaryingElastic:
+    """E (Pa), ν and ρ (kg/m³) along the meridian: numbers or functions of the position 0 ... 1 of the arc length.
+
+    A solid root takes the values of the place where it joins the shell.
+    """
+
+    E: float | Callable[[Array], ArrayLike]
+    nu: float | Callable[[Array], ArrayLike]
+    rho: float | Callable[[Array], ArrayLike]
+
+    def at(self, position: Array) -> tuple[Array, Array, Array]:
+        """E, ν, ρ at positions; raises ShellError where a value is impossible."""
+        E, nu, rho = (
+            np.broadcast_to(np.asarray(value(position) if callable(value) else value, dtype=float), position.shape)
+            for value in (self.E, self.nu, self.rho)
+        )
+        if not (np.all(E > 0) and np.all(rho > 0) and np.all((nu > -1) & (nu < 0.5))):
+            raise ShellError("along the meridian E and the density must be positive and Poisson's ratio in -1 ... 0.5.")
+        return E, nu, rho
+
+
+@dataclass(frozen=True)
+class Mode:
+    """A mode of vibration.
+
+    harmonic : n, the number of waves around.
+    index : 0 for the lowest mode of its harmonic.
+    frequency : Hz.
+    theory : "solid", "shell" or "rayleigh".
+    relative_error_estimate : of the frequency against the exact solution *of this theory*; for "rayleigh" against shell
+        theory, since Rayleigh's solution violates the edge conditions.
+    bryan_factor : precession of the standing wave per angle of rotation; 0 for n = 0, which has no pattern to turn.
+    label : "torsion" or "axial" for n = 0, else empty.
+    solution : the eigenvector and its energies (None for "rayleigh").
+    """
+
+    harmonic: int
+    index: int
+    frequency: float
+    theory: Theory
+    relative_error_estimate: float
+    bryan_factor: float
+    label: str = ""
+    solution: Solution | None = field(default=None, repr=False, compare=False)
+
+
+def solve_modes(
+    resonator: Resonator,
+    elastic: Elastic | VaryingElastic,
+    harmonic: int = 2,
+    count: int = 1,
+    theory: Theory = "solid",
+    tolerance: float = 1e-5,
+) -> tuple[Mode, ...]:
+    """The lowest modes of one circumferential harmonic, without rigid motions.
+
+    The polynomial orders rise until the frequencies of one level lie within `tolerance` of the next; that distance is
+    the error estimate of the level that is returned.
+
+    Parameters
+    ----------
+    resonator : meridian, thickness, support.
+    elastic : E, ν, ρ, constant or varying along the meridian.
+    harmonic : n >= 0.
+    count : number of modes.
+    theory : "solid" (three-dimensional), "shell" (Naghdi) or "rayleigh" (inextensional hemisphere, closed form).
+    tolerance : wanted relative error of the frequency.
+
+    Returns
+    -------
+    tuple[Mode, ...]
+        Sorted by frequency.
+
+    Raises
+    ------
+    ShellError
+        On arguments that make no sense.
+
+    Warns
+    -----
+    TheoryRangeWarning
+        Where the theory is outside its range, or the tolerance is out of reach.
+    """
+    _check_arguments(harmonic, count, theory, tolerance)
+    _check_range(resonator, theory)
+    if theory == "rayleigh":
+        return _rayleigh(resonator, elastic, harmonic, count)
+    levels = LEVELS[theory]
+    accuracy = max(1e-3 * tolerance, 1e-12)
+    solutions = _solve_level(resonator, elastic, harmonic, count, theory, levels[0], accuracy)
+    for level in levels[1:]:
+        finer = _solve_level(resonator, elastic, harmonic, count, theory, level, accuracy)
+        errors = [
+            abs(sqrt(one.eigenvalue / two.eigenvalue) - 1) for one, two in zip(solutions, finer, strict=True)
+        ]
+        if max(errors) <= tolerance or level is levels[-1]:
+            break
+        solutions = finer
+    if max(errors) > tolerance:
+        warnings.warn(
+            f"the frequency is known to {max(errors):.1g}, {max(errors) / tolerance:.2g} times the tolerance asked for.",
+            TheoryRangeWarning, stacklevel=2,
+        )
+    return tuple(
+        Mode(harmonic, k, sqrt(solution.eigenvalue) / (2 * pi), theory, max(error, 1e-13), solution.bryan_factor,
+             _label(solution), solution)
+        for k, (solution, error) in enumerate(zip(solutions, errors, strict=True))
+    )
+
+
+def _solve_level(
+    resonator: Resonator, elastic: Elastic | VaryingElastic, n: int, count: int, theory: Theory, level: Level, accuracy: float
+) -> list[Solution]:
+    """The `count` lowest elastic modes at one level, sorted by their Rayleigh quotient."""
+    system = build_system(resonator, n, theory, level)
+    constants = tuple(_constants(group.table.position, elastic, group.table.plane_stress) for group in system.groups)
+    K, M = _matrices(system, elastic, constants)
+    # a small shift factors the rigid motions and leaves the elastic modes in order
+    stiffness, density = (float(np.mean(values)) for values in (constants[0].G, constants[0].rho))
+    shift = 1e-2 * stiffness / density / resonator.size**2 if system.rigid_motions else 0.0
+    vectors = lowest_vectors(system.pattern, K, M, count + system.rigid_motions, shift, accuracy)
+    found = sorted((Solution(system, constants, vector) for vector in vectors.T), key=lambda solution: solution.eigenvalue)
+    return found[system.rigid_motions :]
+
+
+def _matrices(
+    system: System, elastic: Elastic | VaryingElastic, constants: tuple[Constants, ...]
+) -> tuple[list[Array], list[Array]]:
+    if isinstance(elastic, VaryingElastic):
+        return system.varying([c.lam for c in constants], [c.G for c in constants], [c.rho for c in constants])
+    uniform = [
+        (float(c.lam[0, 0]), float(c.G[0, 0]), float(c.rho[0, 0]))
+        for c, group in zip(constants, system.groups, strict=True)
+        for _ in group.unknowns
+    ]
+    K = [lam * trace + G * shear for (lam, G, _), (trace, shear, _) in zip(uniform, system.units, strict=True)]
+    M = [rho * mass for (_, _, rho), (_, _, mass) in zip(uniform, system.units, strict=True)]
+    return K, M
+
+
+def _constants(position: Array, elastic: Elastic | VaryingElastic, plane_stress: bool) -> Constants:
+    if isinstance(elastic, VaryingElastic):
+        E, nu, rho = elastic.at(position)
+    else:
+        E, nu, rho = (np.broadcast_to(value, position.shape) for value in (elastic.E, elastic.nu, elastic.rho))
+    return Constants(*lame(E, nu, plane_stress), rho)
+
+
+def _label(solution: Solution) -> str:
+    if solution.system.n:
+        return ""
+    around = sum(
+        float(np.sum(c.rho[..., None] * d[:, :, 1] ** 2 * group.table.volume))
+        for group, c, d in zip(solution.system.groups, solution.constants, solution.displacement, strict=True)
+    )
+    return "torsion" if around > total(solution.kinetic) / 2 else "axial"
+
+
+def _check_arguments(harmonic: int, count: int, theory: str, tolerance: float) -> None:
+    if theory not in THEORIES:
+        raise ShellError(f"the theory is one of {', '.join(THEORIES)}, not {theory!r}.")
+    if harmonic != int(harmonic) or harmonic < 0:
+        raise ShellError(f"the harmonic is a whole number from 0 up, not {harmonic!r}.")
+    if count < 1:
+        raise ShellError(f"at least one mode must be asked for, not {count}.")
+    if not 0 < tolerance < 1:
+        raise ShellError(f"the tolerance is a relative error between 0 and 1, not {tolerance:g}.")
+
+
+def _check_range(resonator: Resonator, theory: Theory) -> None:
+    ratio = max(value for _, value in resonator.thickness) / resonator.size
+    if theory != "solid" and ratio > THICKEST_SHELL:
+        warnings.warn(
+            f"h/R = {ratio:.3g} is {ratio / THICKEST_SHELL:.2g} times the thickest ({THICKEST_SHELL:g}) for which the "
+            f"{theory} theory is meant: use the solid theory.",
+            TheoryRangeWarning, stacklevel=3,
+        )
+    thinnest = min(value for _, value in resonator.thickness) / resonator.size
+    if theory != "rayleigh" and thinnest < THINNEST:
+        warnings.warn(
+            f"h/R = {thinnest:.3g} is {THINNEST / thinnest:.2g} times thinner than double precision resolves ({THINNEST:g}).",
+            TheoryRangeWarning, stacklevel=3,
+        )
+
+
+def _rayleigh(resonator: Resonator, elastic: Elastic | VaryingElastic, n: int, count: int) -> tuple[Mode, ...]:
+    """Rayleigh's closed form; its error is its distance from shell theory."""
+    from shell.rayleigh import rayleigh_bryan_factor, rayleigh_frequency
+
+    dome = resonator.segments[0]
+    thicknesses = {value for _, value in resonator.thickness}
+    if len(resonator.segments) != 1 or not isinstance(dome, Arc) or dome.center != (0.0, 0.0) or len(thicknesses) != 1:
+        raise ShellError("Rayleigh's closed form holds for a hemisphere of constant thickness: use theory solid or shell.")
+    if resonator.support != "free" or n < 2 or count != 1 or not isinstance(elastic, Elastic):
+        raise ShellError("Rayleigh's closed form is one mode for each n >= 2 of a free shell of one material: use theory solid or shell.")
+    h = thicknesses.pop()
+    f = float(rayleigh_frequency(n, elastic.E, elastic.nu, elastic.rho, h, dome.radius, dome.first_angle, dome.last_angle))
+    (bent,) = solve_modes(resonator, elastic, n, theory="shell")
+    bryan = rayleigh_bryan_factor(n, dome.first_angle, dome.last_angle)
+    return (Mode(n, 0, f, "rayleigh", abs(f / bent.frequency - 1), bryan),)

@@ -1,0 +1,70 @@
+"""Gauss points and the one-dimensional polynomial bases from which every element is a product."""
+
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+from numpy.polynomial import legendre as series
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Basis:
+    """Values and slopes of a polynomial basis at points of [-1, 1]; arrays of shape (points, functions)."""
+
+    values: Array
+    slopes: Array
+
+
+@cache
+def gauss(count: int) -> tuple[Array, Array]:
+    """Points and weights of the Gauss-Legendre rule on [-1, 1], exact to degree 2 count - 1."""
+    points, weights = series.leggauss(count)
+    return points, weights
+
+
+@cache
+def lobatto(degree: int) -> Array:
+    """Gauss-Lobatto-Legendre nodes: both ends of [-1, 1] and the extrema of P_degree between them."""
+    last = np.zeros(degree + 1)
+    last[-1] = 1.0
+    inner = series.legroots(series.legder(last))
+    return np.concatenate([[-1.0], np.sort(inner.real), [1.0]])
+
+
+def legendre(degree: int, points: Array) -> Basis:
+    """Legendre polynomials P_0 ... P_degree, the modes through the thickness."""
+    return Basis(series.legvander(points, degree), _derivative(degree, points))
+
+
+def nodal(degree: int, points: Array) -> Basis:
+    """Lagrange polynomials on the Gauss-Lobatto-Legendre nodes, the functions along the meridian."""
+    to_modes = np.linalg.inv(series.legvander(lobatto(degree), degree))
+    modal = legendre(degree, points)
+    return Basis(modal.values @ to_modes, modal.slopes @ to_modes)
+
+
+def hierarchic(degree: int, points: Array) -> Basis:
+    """Two linear end functions, then the integrated Legendre polynomials, which vanish at both ends.
+
+    φ_k = (P_k - P_(k-2)) / √(2 (2k - 1)), k = 2 ... degree. An edge of lower degree is had by dropping functions.
+    """
+    p = series.legvander(points, degree)
+    k = np.arange(2, degree + 1)
+    bubbles = (p[:, 2:] - p[:, :-2]) / np.sqrt(2 * (2 * k - 1))
+    half = np.full_like(points, 0.5)
+    values = np.column_stack([(1 - points) / 2, (1 + points) / 2, bubbles])
+    slopes = np.column_stack([-half, half, p[:, 1:-1] * np.sqrt((2 * k - 1) / 2)])
+    return Basis(values, slopes)
+
+
+def interpolate_hierarchic(degree: int, values: Array) -> Array:
+    """Coefficients in the hierarchic basis of a polynomial given at the Gauss-Lobatto-Legendre nodes."""
+    return np.asarray(np.linalg.solve(hierarchic(degree, lobatto(degree)).values, values))
+
+
+def _derivative(degree: int, points: Array) -> Array:
+    matrix = series.legder(np.eye(degree + 1), axis=0) if degree else np.zeros((1, 1))
+    return np.asarray(series.legvander(points, max(degree - 1, 0)) @ matrix)
