@@ -113,6 +113,12 @@ def read_frequency_table(path: str | Path) -> Columns:
     return table
 
 
+def reading_resolution(values: "NDArray[np.float64]") -> float:
+    """Return the step of readings that were rounded to decimals: one unit of the last digit that any of them shows."""
+    decimals = max(len(repr(float(value)).partition(".")[2].rstrip("0")) for value in values)
+    return float(10.0**-decimals)
+
+
 def read_profile(path: str | Path) -> Columns:
     """Read a chamber profile `time_s,chamber_temperature_degC`, linear between its rows."""
     import numpy as np

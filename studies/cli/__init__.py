@@ -9,6 +9,11 @@ from collections.abc import Sequence
 
 COMMANDS: dict[str, tuple[str, str]] = {
     # name: (module:function, one line of help)
+    "reproduce": ("studies.cli.reproduce:reproduce", "The HRG paper's tables and figures from its own data."),
+    "tcf": ("studies.cli.tcf:tcf", "Frequency against temperature and its parts."),
+    "fit frequency": ("studies.cli.fit_frequency:fit_frequency", "f(T) and its inverse from a steady-state table."),
+    "cards": ("studies.cli.cards:cards", "The instrument cards that ship."),
+    "materials": ("studies.cli.cards:materials", "The materials and their published laws."),
     "doctor": ("studies.cli.doctor:doctor", "Show what this environment has and what it lacks."),
 }
 EPILOGUE = "Every command that computes takes --json. --debug shows the traceback of an error."
@@ -25,7 +30,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if clash:
         return _complain(clash, 3)
 
-    from cyclopts import App, CycloptsError
+    from cyclopts import App, CycloptsError, Parameter
 
     from studies import __version__
     from studies.errors import UNUSABLE_INPUT, MissingEnvironment
@@ -39,6 +44,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         exit_on_error=False,
         print_error=False,
         suppress_keyboard_interrupt=False,
+        default_parameter=Parameter(negative=""),
     )
     groups: dict[str, App] = {}
     for name, (target, help_line) in COMMANDS.items():

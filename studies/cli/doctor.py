@@ -2,5 +2,65 @@
 
 
 def doctor(*, json: bool = False) -> int:
-    """Show versions, OpenGL and name clashes, with the remedy for what is missing."""
-    raise NotImplementedError
+    """Show versions, OpenGL and the optional parts, with the remedy for what is missing.
+
+    Exit status 3 when pictures cannot be drawn.
+
+    Parameters
+    ----------
+    json : bool
+        Print one JSON object (schema hrg.doctor/1) instead of a table.
+    """
+    import platform
+    import shutil
+    from importlib.metadata import PackageNotFoundError, version
+
+    from shell.render import can_draw
+    from studies.cli.guard import PACKAGES, package_home
+    from studies.cli.output import print_json, print_table
+
+    checks = [("Python", True, platform.python_version(), "")]
+    for name in (
+        "numpy",
+        "scipy",
+        "sympy",
+        "pandas",
+        "pyvista",
+        "vtk",
+        "trimesh",
+        "matplotlib",
+        "cyclopts",
+        "rich",
+        "jinja2",
+    ):
+        try:
+            checks.append((name, True, version(name), ""))
+        except PackageNotFoundError:
+            checks.append((name, False, "missing", f"pip install {name}"))
+    checks += [(f"package '{name}'", True, str(package_home(name)), "") for name in PACKAGES]
+    drawn, remedy = can_draw()
+    checks.append(("OpenGL", drawn, "pictures can be drawn" if drawn else "no pictures", remedy))
+    for name, command, brings in (
+        ("C compiler", "cc", "needed only to compile code that 'hrg derive' and models emit"),
+        (
+            "distributed (cluster)",
+            "dask",
+            "needed only for studies on several machines: pip install 'dask[distributed]'",
+        ),
+    ):
+        found = shutil.which(command)
+        checks.append((name, True, found or "not found (optional)", "" if found else brings))
+    healthy = all(ok for _, ok, _, _ in checks)
+    if json:
+        fields = ("name", "ok", "found", "remedy")
+        print_json(
+            {
+                "schema": "hrg.doctor/1",
+                "healthy": healthy,
+                "checks": [dict(zip(fields, c, strict=True)) for c in checks],
+            }
+        )
+    else:
+        rows = [[name, "ok" if ok else "missing", found, remedy] for name, ok, found, remedy in checks]
+        print_table("Environment", ["Part", "State", "Found", "Remedy"], rows)
+    return 0 if healthy else 3

@@ -8,9 +8,13 @@ from typing import Any
 
 
 def print_json(payload: Mapping[str, Any]) -> None:
-    """Print one JSON object; NaN and infinity become null, numpy values plain numbers."""
-    json_module.dump(_plain(payload), sys.stdout, indent=2, allow_nan=False, ensure_ascii=False)
-    sys.stdout.write("\n")
+    """Print one JSON object."""
+    sys.stdout.write(dump_json(payload))
+
+
+def dump_json(payload: Mapping[str, Any]) -> str:
+    """Return the text of one JSON object; NaN and infinity become null, numpy values plain numbers."""
+    return json_module.dumps(_plain(payload), indent=2, allow_nan=False, ensure_ascii=False) + "\n"
 
 
 def print_table(title: str, columns: Sequence[str], rows: Sequence[Sequence[object]], note: str = "") -> None:

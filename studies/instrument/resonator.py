@@ -80,13 +80,14 @@ def _bell(table: Section) -> "Resonator":
 
 
 def _meridian(table: Section) -> "Resonator":
-    from shell.meridian import Arc, Line, meridian
+    from shell.curves import Arc, Line
+    from shell.meridian import meridian
 
     segments: list[Line | Arc] = []
     for part in table.sections("segment", ("kind", "from_mm", "to_mm", "center_mm")):
         kind = part.text("kind", choices=("line", "arc"))
         start, end = _point(part, "from_mm"), _point(part, "to_mm")
-        segments.append(Line(start, end) if kind == "line" else Arc(start, end, _point(part, "center_mm")))
+        segments.append(Line(start, end) if kind == "line" else Arc.through(start, end, _point(part, "center_mm")))
     if not segments:
         raise InputError(f"{table.where}: shape = 'meridian' needs at least one [[resonator.segment]].")
     support, _ = _support(table)
@@ -111,11 +112,12 @@ def _support(table: Section) -> "tuple[str, Stem | None]":
     if side == "both":
         if not isinstance(end, list) or len(end) != 2:
             raise InputError(f"{part.where}: with side = 'both' end_mm must be [inner, outer], not {end!r}.")
-        ends = tuple(check_number(value, f"{part.where}: end_mm") * MM for value in end)
+        inner, outer = (check_number(value, f"{part.where}: end_mm") * MM for value in end)
+        ends: float | tuple[float, float] = (inner, outer)
     else:
-        ends = (check_number(end, f"{part.where}: end_mm") * MM,)
+        ends = check_number(end, f"{part.where}: end_mm") * MM
     return support, Stem(
-        radius=_mm(part, "radius_mm"), ends=ends, side=side, fillet=part.number("fillet_mm", 0.0, least=0.0) * MM
+        radius=_mm(part, "radius_mm"), ends=ends, fillet=part.number("fillet_mm", 0.0, least=0.0) * MM, side=side
     )
 
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from compensation.frequency import FrequencyFit, OrderComparison, compare_orders, fit_frequency
 
 if TYPE_CHECKING:
-    from shell.temperature import Model, TemperatureCoefficient
+    from shell.temperature import TemperatureCoefficient
     from studies.instrument.card import Instrument
 
 Array = NDArray[np.float64]
@@ -94,43 +94,45 @@ def printed_table2() -> tuple[Array, Array]:
 
 
 def study_table(
-    temperature_degC: Array, frequency: Array, order: int = 3, resolution: float | None = None
+    temperature_degC: Array,
+    frequency: Array,
+    order: int = 3,
+    reference_temperature_degC: float = 0.0,
+    resolution: float | None = None,
 ) -> FrequencyStudy:
     """Fit a steady-state table as the paper does (eqs. 16-18), invert it (Table 2), and test the next orders."""
-    # A step of the table below half a digit would make the slopes of neighbours pure rounding.
     ascending = np.argsort(temperature_degC)
     T, f = temperature_degC[ascending], frequency[ascending]
-    fit = fit_frequency(T, f, order, 0.0, resolution)
-    orders = compare_orders(T, f, order + 2, 0.0, resolution)
-    middle = (f[1:] + f[:-1]) / 2
+    fit = fit_frequency(T, f, order, reference_temperature_degC, resolution)
+    orders = compare_orders(T, f, order + 2, reference_temperature_degC, resolution)
     rounding = 0.0 if resolution is None else resolution / np.sqrt(6)
+    at, slopes = local_slopes(T, f)
     return FrequencyStudy(
         temperature_degC=T,
         frequency=f,
         fit=fit,
         orders=orders,
         calculated_degC=fit.temperature(f),
-        local_degC=(T[1:] + T[:-1]) / 2,
-        local_slope_ppm=1e6 * np.diff(f) / np.diff(T) / middle,
-        local_uncertainty_ppm=float(1e6 * np.max(rounding / np.diff(T) / middle)),
+        local_degC=at,
+        local_slope_ppm=slopes,
+        local_uncertainty_ppm=float(1e6 * np.max(rounding / np.diff(T) / f[:-1])),
     )
 
 
-def compare_physics(study: FrequencyStudy, instrument: "Instrument", model: "Model") -> PhysicsComparison:
-    """Set first-principles physics beside a measured table.
+def local_slopes(temperature_degC: Array, frequency: Array) -> tuple[Array, Array]:
+    """Return the mid temperatures (°C) and the slopes over the local frequency (ppm/°C) between neighbours."""
+    ascending = np.argsort(temperature_degC)
+    T, f = temperature_degC[ascending], frequency[ascending]
+    return (T[1:] + T[:-1]) / 2, 2e6 * np.diff(f) / np.diff(T) / (f[1:] + f[:-1])
 
-    Parameters
-    ----------
-    study : FrequencyStudy
-    instrument : Instrument
-        Its material law and reference temperature.
-    model : callable
-        Elastic -> FrequencyGradient of the instrument's resonator (`shell.temperature`).
-    """
+
+def compare_physics(study: FrequencyStudy, instrument: "Instrument") -> PhysicsComparison:
+    """Set first-principles physics, the solid solver over the card's material law, beside a measured table."""
     from shell.materials import read_materials
-    from shell.temperature import frequency_over_temperature, temperature_coefficients
+    from shell.temperature import frequency_over_temperature, mode_model, temperature_coefficients
 
     T0, material = instrument.reference_temperature, instrument.material
+    model = mode_model(instrument.resonator)
     at = np.append(study.local_degC, 20.0) + ZERO_CELSIUS
     coefficients = temperature_coefficients(model, material, T0, at)
     laws = []

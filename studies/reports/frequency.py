@@ -1,6 +1,5 @@
 """The chapters that any steady-state table gets: fit, inverse, order, and what lies outside the range."""
 
-from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -8,9 +7,10 @@ import numpy as np
 from compensation.errors import CompensationError
 from compensation.frequency import disagreement_degC
 from studies.reports import style
-from studies.reports.page import Chapter, Facts, Picture, Table, Text, draw, render_page
+from studies.reports.page import Block, Chapter, Facts, Picture, Table, Text, draw, render_page
 
 if TYPE_CHECKING:
+    from compensation.frequency import FrequencyFit
     from studies.papers.hrg import FrequencyStudy
 
 ORDERS = {1: "line", 2: "quadratic", 3: "cubic", 4: "quartic", 5: "quintic"}
@@ -56,7 +56,7 @@ def coefficients_table(study: "FrequencyStudy") -> Table:
     rows = [
         [
             f"a{k}" if k else "f0",
-            f"{c:.7g}" if k == 0 else f"{c:.6e}",
+            f"{c:.8g}" if k == 0 else f"{c:.6e}",
             f"{u:.2e}",
             "Hz" + (f"/°C^{k}" if k > 1 else "/°C" * k),
         ]
@@ -129,45 +129,34 @@ def error_figure(study: "FrequencyStudy") -> Picture:
 
 def order_chapter(study: "FrequencyStudy") -> Chapter:
     """Return the chapter that asks which order the readings call for, and what it means outside the range."""
-    rows: list[list[str]] = []
-    tests = [None, *study.orders.against_next]
-    for fit, test in zip(study.orders.fits, tests, strict=False):
-        chi = "" if fit.chi_squared is None else f"{fit.chi_squared:.3g}"
+    blocks: list[Block] = [order_table(study), Text(order_sentence(study), "note")]
+    if study.next_fit is not None:
+        blocks.append(_extrapolation(study, study.next_fit))
+    return Chapter("Is the order high enough?", blocks)
+
+
+def order_table(study: "FrequencyStudy") -> Table:
+    """Return the fits of rising order and the F-test of each against the one before."""
+    rows = []
+    for fit, test in zip(study.orders.fits, [None, *study.orders.against_next], strict=False):
         rows.append(
             [
                 name_order(fit.order),
                 str(fit.degrees_of_freedom),
                 f"{fit.sum_of_squares:.3e}",
-                chi,
+                "" if fit.chi_squared is None else f"{fit.chi_squared:.3g}",
                 f"{fit.leave_one_out_rms:.4f}",
                 "" if test is None else f"{test.statistic:.3g}",
                 "" if test is None else f"{test.p_value:.2g}",
             ]
         )
-    columns = [
-        "Order",
-        "Degrees of freedom",
-        "SSE (Hz²)",
-        "χ² against rounding",
-        "Leave-one-out (Hz)",
-        "F against lower",
-        "p",
-    ]
-    blocks: list[Text | Table | Picture] = [
-        Table(
-            "Which order do the readings ask for?",
-            columns,
-            rows,
-            "χ² takes rounding to the last digit as the only noise.",
-        ),
-        Text(_order_sentence(study), "note"),
-    ]
-    if study.next_fit is not None:
-        blocks.append(_extrapolation(study))
-    return Chapter("Is the order high enough?", blocks)
+    columns = ["Order", "Free", "SSE (Hz²)", "χ² (rounding)", "Leave-one-out (Hz)", "F against lower", "p"]
+    note = "χ² takes rounding to the last digit as the only noise; free is the number of degrees of freedom."
+    return Table("Which order do the readings ask for?", columns, rows, note)
 
 
-def _order_sentence(study: "FrequencyStudy") -> str:
+def order_sentence(study: "FrequencyStudy") -> str:
+    """Say which order the readings ask for."""
     asked = study.orders.recommended
     chosen = name_order(study.fit.order)
     if asked == study.fit.order:
@@ -180,11 +169,9 @@ def _order_sentence(study: "FrequencyStudy") -> str:
     )
 
 
-def _extrapolation(study: "FrequencyStudy") -> Picture:
+def _extrapolation(study: "FrequencyStudy", other: "FrequencyFit") -> Picture:
     low, high = study.fit.temperature_range_degC
     T = np.linspace(low - 20, high + 20, 200)
-    other = study.next_fit
-    assert other is not None
     difference = disagreement_degC(study.fit, other, T, (low + high) / 2)
     ends = disagreement_degC(study.fit, other, np.array([low - 20, high + 20]), (low + high) / 2)
     with style.figure(height=2.8) as (made, axes):
@@ -205,7 +192,7 @@ def _extrapolation(study: "FrequencyStudy") -> Picture:
     )
 
 
-def _fits(study: "FrequencyStudy") -> Sequence[tuple]:  # type: ignore[type-arg]
+def _fits(study: "FrequencyStudy") -> "list[tuple[FrequencyFit, str, str]]":
     shown = [(study.fit, style.BLUE, "o")]
     if study.next_fit is not None:
         shown.append((study.next_fit, style.VERMILION, "s"))

@@ -1,0 +1,119 @@
+"""`hrg cards` and `hrg materials`: what ships with the package."""
+
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from shell.materials import Material
+
+
+def cards(*, json: bool = False) -> int:
+    """List the instrument cards that ship with the package.
+
+    Parameters
+    ----------
+    json : bool
+        Print one JSON object instead of a table.
+    """
+    from studies.cli.output import print_json, print_table
+    from studies.instrument.card import load_card, shipped_cards
+
+    found = [load_card(path) for path in shipped_cards().values()]
+    if json:
+        entries = [
+            {
+                "name": card.name,
+                "shape": card.content["resonator"]["shape"],
+                "material": card.content["material"]["name"],
+                "note": card.content.get("note", ""),
+                "path": card.path,
+            }
+            for card in found
+        ]
+        print_json({"schema": "hrg.cards/1", "cards": entries})
+        return 0
+    rows = [
+        [c.name, c.content["resonator"]["shape"], c.content["material"]["name"], c.content.get("note", "")]
+        for c in found
+    ]
+    print_table("Cards", ["Name", "Shape", "Material", "What is printed, what is illustrative"], rows)
+    return 0
+
+
+def materials(name: str = "", *, json: bool = False) -> int:
+    """List the materials and their published laws.
+
+    Parameters
+    ----------
+    name : str
+        Show one material's laws with their properties, sources and ranges.
+    json : bool
+        Print one JSON object instead of a table.
+    """
+    from shell.materials import read_materials
+    from studies.cli.output import print_json, print_table
+    from studies.errors import InputError, nearest
+
+    table = read_materials()
+    if name and name not in table:
+        raise InputError(f"unknown material '{name}'{nearest(name, table)}")
+    chosen = {key: laws for key, laws in table.items() if name in ("", key)}
+    if json:
+        print_json(
+            {
+                "schema": "hrg.materials-list/1",
+                "materials": [_describe(law) for laws in chosen.values() for law in laws.values()],
+            }
+        )
+        return 0
+    rows = []
+    for key, laws in chosen.items():
+        for k, law in enumerate(laws.values()):
+            low, high = law.lowest - 273.15, law.highest - 273.15
+            lacking = ", ".join(_lacking(law)) or "nothing"
+            rows.append([key if k == 0 else "", law.law, f"{low:g} to {high:g}", lacking, law.source])
+    print_table(
+        "Materials",
+        ["Name", "Law", "Range (°C)", "Lacks", "Source"],
+        rows,
+        "The first law of a material is its default.",
+    )
+    if name:
+        for law in chosen[name].values():
+            _print_law(law)
+    return 0
+
+
+def _print_law(law: "Material") -> None:
+    from shell.materials import PROPERTIES
+    from studies.cli.output import print_table
+
+    rows = []
+    for key, prop in law.properties.items():
+        numbers = ", ".join(f"{k} = {v}" for k, v in prop.numbers.items())
+        spread = ", ".join(f"{k} ± {v:g}" for k, v in prop.uncertainty.items())
+        rows.append([key, PROPERTIES[key], prop.form, numbers, spread, prop.source])
+    columns = ["Property", "Unit", "Form", "Numbers", "Standard uncertainty", "Source"]
+    print_table(f"{law.name}, law '{law.law}'", columns, rows, law.note)
+
+
+def _describe(law: "Material") -> "dict[str, Any]":
+    return {
+        "name": law.name,
+        "law": law.law,
+        "range_degC": [law.lowest - 273.15, law.highest - 273.15],
+        "source": law.source,
+        "note": law.note,
+        "lacks": _lacking(law),
+        "properties": {
+            key: {"form": p.form, **p.numbers, "uncertainty": dict(p.uncertainty), "source": p.source}
+            for key, p in law.properties.items()
+        },
+    }
+
+
+def _lacking(law: "Material") -> "list[str]":
+    from shell.materials import ELASTIC, PROPERTIES
+
+    stated = [p for p in ELASTIC if p in law.properties]
+    elastic = [] if len(stated) > 1 else ["poisson_ratio" if "poisson_ratio" not in stated else "youngs_modulus"]
+    return elastic + [p for p in PROPERTIES if p not in ELASTIC and p not in law.properties]

@@ -1,0 +1,111 @@
+"""`hrg tcf`: frequency against temperature and its parts."""
+
+from typing import TYPE_CHECKING, Annotated, Any
+
+from cyclopts import Parameter
+
+if TYPE_CHECKING:
+    from shell.temperature import TemperatureCoefficient
+
+
+def tcf(
+    card: str,
+    *,
+    from_degC: Annotated[float, Parameter(name="--from")] = -20.0,
+    to_degC: Annotated[float, Parameter(name="--to")] = 40.0,
+    step: float = 10.0,
+    harmonic: int = 2,
+    theory: str = "solid",
+    measured: str | None = None,
+    json: bool = False,
+) -> int:
+    """Show the frequency over temperature, its slope in ppm/°C, and the slope's parts from E, μ, ρ, h and r.
+
+    Parameters
+    ----------
+    card : str
+        Path of a card, or the name of one that ships (hrg cards).
+    from_degC : float
+        Lowest temperature in °C.
+    to_degC : float
+        Highest temperature in °C.
+    step : float
+        Step in °C.
+    harmonic : int
+        Circumferential harmonic n.
+    theory : str
+        solid (three-dimensional), shell (Naghdi) or rayleigh (closed form).
+    measured : str
+        A steady-state table (temperature_degC,frequency_Hz) whose local slopes stand beside; with the card hrg-30mm it is
+        the HRG paper's Table 1 unless another is given.
+    json : bool
+        Print one JSON object (schema hrg.tcf/1) instead of a table.
+    """
+    import numpy as np
+
+    from shell.temperature import mode_model, temperature_coefficients
+    from studies.cli.output import print_json, print_table
+    from studies.errors import InputError
+    from studies.instrument.card import load_card
+
+    if not step > 0 or not to_degC >= from_degC:
+        raise InputError(
+            f"--from {from_degC:g} --to {to_degC:g} --step {step:g}: the step must be positive and --to not below --from."
+        )
+    instrument = load_card(card)
+    at = np.arange(from_degC, to_degC + 1e-9 * step, step)
+    model = mode_model(instrument.resonator, harmonic, theory)
+    found = temperature_coefficients(model, instrument.material, instrument.reference_temperature, at + 273.15)
+    local = _measured_slopes(instrument.name, measured)
+    if json:
+        print_json(
+            {
+                "schema": "hrg.tcf/1",
+                "card": instrument.name,
+                "theory": theory,
+                "harmonic": harmonic,
+                "law": instrument.material.law,
+                "points": [_point(c) for c in found],
+                "measured": [{"temperature_degC": T, "slope_ppm_per_degC": s} for T, s in local],
+            }
+        )
+        return 0
+    rows = [
+        [f"{p['temperature_degC']:.1f}", f"{p['frequency_Hz']:.3f}"]
+        + [f"{p['parts_ppm_per_degC'][k]:+.2f}" for k in ("E", "nu", "rho", "h", "r")]
+        + [f"{p['slope_ppm_per_degC']:.2f} ± {p['uncertainty_ppm_per_degC']:.1f}"]
+        for p in map(_point, found)
+    ]
+    columns = ["T (°C)", "f (Hz)", "E", "μ", "ρ", "h", "r", "slope"]
+    note = f"Slopes in ppm/°C; ± is one standard deviation that law '{instrument.material.law}' states of itself."
+    print_table(f"{instrument.name}, n = {harmonic}, {theory}", columns, rows, note)
+    if local:
+        beside = [[f"{T:.1f}", f"{s:.2f}"] for T, s in local]
+        print_table("Measured, between neighbouring points", ["T (°C)", "slope (ppm/°C)"], beside)
+    return 0
+
+
+def _point(c: "TemperatureCoefficient") -> "dict[str, Any]":
+    return {
+        "temperature_degC": c.temperature - 273.15,
+        "frequency_Hz": c.frequency,
+        "slope_ppm_per_degC": 1e6 * c.total,
+        "uncertainty_ppm_per_degC": 1e6 * c.uncertainty,
+        "parts_ppm_per_degC": {name: 1e6 * getattr(c, name) for name in ("E", "nu", "rho", "h", "r")},
+    }
+
+
+def _measured_slopes(card: str, path: str | None) -> list[tuple[float, float]]:
+    """Return (temperature, slope in ppm/°C) between neighbouring points of a table; empty without one."""
+    from studies.papers import hrg
+    from studies.record import read_frequency_table
+
+    if path is not None:
+        table = read_frequency_table(path)
+        T, f = table.values["temperature_degC"], table.values["frequency_Hz"]
+    elif card == hrg.CARD:
+        T, f = hrg.printed_table1()
+    else:
+        return []
+    at, slopes = hrg.local_slopes(T, f)
+    return list(zip(at.tolist(), slopes.tolist(), strict=True))
