@@ -119,8 +119,14 @@ def integrate_motion(
     step = 2 * np.pi / omega / samples_per_cycle
     grid = t[0] + step * np.arange(int((t[-1] - t[0]) / step * (1 + 1e-12)) + 1)
     solution = solve_ivp(
-        derivative, (t[0], t[-1]), start, method="DOP853", t_eval=grid, rtol=tolerance,
-        atol=tolerance * abs(A1) * np.array([1, 1, omega, omega]), max_step=float(np.max(np.diff(t))),
+        derivative,
+        (t[0], t[-1]),
+        start,
+        method="DOP853",
+        t_eval=grid,
+        rtol=tolerance,
+        atol=tolerance * abs(A1) * np.array([1, 1, omega, omega]),
+        max_step=float(np.max(np.diff(t))),
     )
     if not solution.success:
         raise CompensationError(f"the motion could not be integrated: {solution.message}")
@@ -216,9 +222,7 @@ def demodulate(time: ArrayLike, displacement: ArrayLike, omega: float) -> tuple[
     return t[m - 1 : len(t) - m + 1], np.convolve(mixed, window, mode="valid")
 
 
-def _read_inputs(
-    time: ArrayLike, rate: ArrayLike, zeta12: ArrayLike | None, zeta21: ArrayLike | None
-) -> list[Real]:
+def _read_inputs(time: ArrayLike, rate: ArrayLike, zeta12: ArrayLike | None, zeta21: ArrayLike | None) -> list[Real]:
     zero = np.zeros(np.shape(time))
     columns = read_columns(
         time=time, rate=rate, zeta12=zero if zeta12 is None else zeta12, zeta21=zero if zeta21 is None else zeta21

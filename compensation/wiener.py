@@ -37,7 +37,9 @@ class Spectrum:
         for name in ("numerator", "denominator"):
             coefficients = np.trim_zeros(np.asarray(getattr(self, name), dtype=float), "f")
             if not len(coefficients) or not np.all(np.isfinite(coefficients)):
-                raise CompensationError(f"the {name} of a spectral density must have finite coefficients, not all zero.")
+                raise CompensationError(
+                    f"the {name} of a spectral density must have finite coefficients, not all zero."
+                )
             if np.any(coefficients[-2::-2]):
                 raise CompensationError(f"the {name} of a spectral density must be even in s.")
             object.__setattr__(self, name, tuple(coefficients.tolist()))
@@ -187,17 +189,13 @@ def design_wiener_filter(gyro: TransferFunction, rate: Spectrum, noise: Spectrum
     return judge_filter(best, gyro, rate, noise)
 
 
-def judge_filter(
-    candidate: TransferFunction, gyro: TransferFunction, rate: Spectrum, noise: Spectrum
-) -> WienerFilter:
+def judge_filter(candidate: TransferFunction, gyro: TransferFunction, rate: Spectrum, noise: Spectrum) -> WienerFilter:
     """Return any filter behind the gyro with its error variances: eqs. (30), (31)."""
     n, d = np.real(candidate.numerator), np.real(candidate.denominator)
     n_w, d_w = np.real(gyro.numerator), np.real(gyro.denominator)
     whole = _multiply(d, d_w)
     deviation = np.asarray(np.polysub(_multiply(n, n_w), whole), dtype=float)
-    return WienerFilter(
-        candidate, _shape(rate, deviation, whole).variance, _shape(noise, n, d).variance
-    )
+    return WienerFilter(candidate, _shape(rate, deviation, whole).variance, _shape(noise, n, d).variance)
 
 
 def renormalise(candidate: TransferFunction, gyro: TransferFunction) -> TransferFunction:

@@ -99,7 +99,9 @@ def test_fast_sampling_gives_the_wiener_filter_behind_the_gyro():
     from scipy.linalg import expm
 
     a, B, sigma, gamma = K * ZETA, 2 * np.pi * 3, 0.3, 0.1
-    best = design_wiener_filter(relate_rate_to_measured_rate(K, ZETA), rate_spectrum(sigma, B), white_spectrum(gamma, sigma))
+    best = design_wiener_filter(
+        relate_rate_to_measured_rate(K, ZETA), rate_spectrum(sigma, B), white_spectrum(gamma, sigma)
+    )
     A, frequency = np.array([[-a, a], [0.0, -B]]), np.array([0.0, 10.0, 50.0, 200.0])
     errors, differences = [], []
     for step in (4e-5, 2e-5):
@@ -107,9 +109,7 @@ def test_fast_sampling_gives_the_wiener_filter_behind_the_gyro():
         model = LinearModel(F, [[1.0, 0.0]], np.diag([0.0, (sigma * B) ** 2 * step]), [[(gamma * sigma) ** 2 / step]])
         gain, _, after = settle(model)
         kept = (np.eye(2) - gain @ model.measurement) @ F
-        response = [
-            np.linalg.solve(np.eye(2) - kept * np.exp(-1j * at * step), gain)[1, 0] for at in frequency
-        ]
+        response = [np.linalg.solve(np.eye(2) - kept * np.exp(-1j * at * step), gain)[1, 0] for at in frequency]
         errors.append(abs(after[1, 1] / best.error - 1))
         differences.append(np.max(np.abs(response - best.filter.respond(frequency))))
     assert errors[1] < 0.002

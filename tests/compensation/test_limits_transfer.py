@@ -41,8 +41,13 @@ def test_complex_simulation_equals_a_general_integrator():
     drive = np.sin(7 * time) + 1j * time
     A, B, C, D = TURNING.realise()
     solution = integrate.solve_ivp(
-        lambda t, x: A @ x + B * np.interp(t, time, drive), (0, 2), np.zeros(2, complex),
-        t_eval=time, rtol=1e-10, atol=1e-12, max_step=0.005,
+        lambda t, x: A @ x + B * np.interp(t, time, drive),
+        (0, 2),
+        np.zeros(2, complex),
+        t_eval=time,
+        rtol=1e-10,
+        atol=1e-12,
+        max_step=0.005,
     )
     np.testing.assert_allclose(TURNING.simulate(time, drive), C @ solution.y + D * drive, atol=1e-8)
 

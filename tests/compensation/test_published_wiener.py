@@ -40,7 +40,9 @@ def noise_spectrum(noise, gamma, sigma, B):
 
 
 @pytest.mark.parametrize("noise", ["white", "high-pass"])
-@pytest.mark.parametrize(("gamma", "B", "zeta", "k"), [(GAMMA, B, ZETA, K), (2.0, 30.0, 0.004, 900.0), (0.01, 5.0, 0.3, 7.0)])
+@pytest.mark.parametrize(
+    ("gamma", "B", "zeta", "k"), [(GAMMA, B, ZETA, K), (2.0, 30.0, 0.004, 900.0), (0.01, 5.0, 0.3, 7.0)]
+)
 def test_numeric_factorisation_gives_the_printed_filters_after_renormalisation(noise, gamma, B, zeta, k):
     gyro = relate_rate_to_measured_rate(k, zeta)
     best = design_wiener_filter(gyro, rate_spectrum(0.7, B), noise_spectrum(noise, gamma, 0.7, B))
@@ -56,7 +58,9 @@ def test_symbolic_derivation_gives_the_printed_filters(noise):
     s = sympy.Symbol("s")
     root, a = sympy.sqrt(1 + gamma**2), k * zeta
     printed = {
-        "white": B * root * (s + a)
+        "white": B
+        * root
+        * (s + a)
         / (gamma * s**2 + s * sympy.sqrt(gamma * (B**2 * gamma + a**2 * gamma + 2 * a * B * root)) + a * B * root),
         "high-pass": B * (s + a) / (s**2 * gamma + s * sympy.sqrt(a * gamma * (2 * B + a * gamma)) + B * a),
     }[noise]
@@ -73,7 +77,11 @@ def test_symbolic_derivation_gives_the_printed_filters(noise):
 @pytest.mark.parametrize("noise", ["white", "high-pass"])
 def test_no_other_filter_errs_less(noise):
     """The optimum is stationary and least against every change of its coefficients; renormalising costs error."""
-    gyro, rate, disturbance = relate_rate_to_measured_rate(K, ZETA), rate_spectrum(1, B), noise_spectrum(noise, GAMMA, 1, B)
+    gyro, rate, disturbance = (
+        relate_rate_to_measured_rate(K, ZETA),
+        rate_spectrum(1, B),
+        noise_spectrum(noise, GAMMA, 1, B),
+    )
     best = design_wiener_filter(gyro, rate, disturbance)
     generator = np.random.default_rng(3)
     for _ in range(40):

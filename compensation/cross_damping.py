@@ -1,0 +1,236 @@
+"""Bias of a Coriolis vibratory gyro from cross-damping that varies with temperature, and its compensation.
+
+Equation numbers are those of the CVG cross-damping paper (Apostolyuk, Chikovani). Equations (1), (2) are in
+`compensation.motion`; (3) is printed with k₁ in its cross-damping term where (2), (4) and (8) have k₂, and k₂ is right.
+
+Only the product ζ₁₂ · 2k/g₂ is seen in the output, so the *scale* of ζ₁₂ is as good as k; and the printed
+coefficients of (10) would mean tens of rad/s, so they serve as the shape ζ₁₂(T)/ζ₁₂(0) only.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from compensation.correlated import correlated_covariance
+from compensation.demodulated import expand_secondary, expand_slow_secondary, relate_rate_to_secondary
+from compensation.errors import CompensationError
+from compensation.regression import fit_linear, refuse_constant_columns
+from compensation.samples import check_time, read_columns
+from compensation.sensitive_element import SensitiveElement
+from compensation.transfer import TransferFunction
+
+Real = NDArray[np.float64]
+
+
+def relate_cross_damping_to_secondary(element: SensitiveElement) -> TransferFunction:
+    """W₂ᶻ(s) = 2 A₁ j ω k₂ / ((s + jω)² + 2 ζ₂ k₂ (s + jω) + k₂²), in m per unit ζ₁₂: second of eqs. (6).
+
+    Its companion, rate to secondary, is `demodulated.relate_rate_to_secondary`; both with the denominator of (4)
+    instead are the slow forms.
+    """
+    return TransferFunction((_drive_by_damping(element),), expand_secondary(element))
+
+
+def relate_cross_damping_to_slow_secondary(element: SensitiveElement) -> TransferFunction:
+    """The same with the second derivative of the amplitude neglected, m per unit ζ₁₂: the ζ₁₂ part of eq. (4)."""
+    return TransferFunction((_drive_by_damping(element),), expand_slow_secondary(element))
+
+
+def relate_cross_damping_to_rate(element: SensitiveElement) -> TransferFunction:
+    """Cross-damping to erroneous rate, rad/s per unit ζ₁₂: eq. (8).
+
+    W(s) = W₂ᶻ(s) / W₂(0) = 2 k₂ (k₂² − ω² + 2 j k₂ ω ζ₂) / (g₂ (k₂² − ω² + 2 k₂ ζ₂ s + 2 j ω (s + k₂ ζ₂))),
+    which takes W₂ᶻ in its slow form (4), not in the form (6).
+    """
+    return relate_cross_damping_to_slow_secondary(element) * (1 / relate_rate_to_secondary(element).steady_gain)
+
+
+def relate_cross_damping_to_rate_when_tuned(k: float, zeta: float, g2: float = 2.0) -> TransferFunction:
+    """W(s) = 2 k² ζ / (g₂ (s + k ζ)), rad/s per unit ζ₁₂, for equal modes driven at resonance: eq. (9).
+
+    Parameters
+    ----------
+    k : float
+        Natural frequency (rad/s).
+    zeta : float
+        Relative damping (1).
+    g2 : float
+        Coriolis coefficient (1); 2 for a cylinder.
+    """
+    if not (k > 0 and zeta > 0 and g2 != 0):
+        raise CompensationError("eq. (9) needs a positive natural frequency and damping, and g2 other than zero.")
+    return TransferFunction((2 * k**2 * zeta / g2,), (1.0, k * zeta))
+
+
+def derive_tuned_transfer() -> tuple[Any, Any]:
+    """Return eq. (8) under ω = k √(1 − 2ζ²), k₁ = k₂ = k, ζ₁ = ζ₂ = ζ, and eq. (9), as SymPy expressions.
+
+    The first is simplified from (8) and not typed in, so that their equality proves the step from (8) to (9).
+    """
+    import sympy
+
+    k, zeta, g2 = sympy.symbols("k zeta g_2", positive=True)
+    s = sympy.Symbol("s")
+    omega = k * sympy.sqrt(1 - 2 * zeta**2)
+    j = sympy.I
+    stiffness = k**2 - omega**2
+    general = (
+        2
+        * k
+        * (stiffness + 2 * j * k * omega * zeta)
+        / (g2 * (stiffness + 2 * k * zeta * s + 2 * j * omega * (s + k * zeta)))
+    )
+    return sympy.factor(sympy.simplify(sympy.expand(general))), 2 * k**2 * zeta / (g2 * (s + k * zeta))
+
+
+def evaluate_cross_damping(coefficients: ArrayLike, shift: ArrayLike) -> Real:
+    """ζ₁₂(T) = Σ ζᵢ Tⁱ: eq. (10), with T the shift (K) from the calibration temperature, ζᵢ in K⁻ⁱ."""
+    shift = np.asarray(shift, dtype=float)
+    return np.asarray(np.polynomial.polynomial.polyval(shift, np.asarray(coefficients, dtype=float)), dtype=float)
+
+
+@dataclass(frozen=True)
+class CrossDampingModel:
+    """ζ₁₂(T) of one gyro and what turns it into rate: eqs. (9), (10).
+
+    Attributes
+    ----------
+    coefficients : array (n + 1,)
+        ζᵢ (K⁻ⁱ), constant first.
+    covariance : array (n + 1, n + 1)
+        Covariance of the coefficients.
+    calibration_temperature : float
+        Temperature (K) from which T is counted.
+    k, zeta, g2 : float
+        Natural frequency (rad/s), relative damping (1) and Coriolis coefficient (1) of eq. (9).
+    lowest, highest : float
+        Temperatures (K) between which it was fitted.
+    noise : float
+        Standard deviation (rad/s) of what the fit left.
+    """
+
+    coefficients: Real
+    covariance: Real
+    calibration_temperature: float
+    k: float
+    zeta: float
+    g2: float
+    lowest: float
+    highest: float
+    noise: float
+
+    def cross_damping(self, temperature: ArrayLike) -> Real:
+        """Return ζ₁₂ (1) at a temperature (K): eq. (10)."""
+        return evaluate_cross_damping(self.coefficients, np.asarray(temperature) - self.calibration_temperature)
+
+    def predict(self, time: ArrayLike, temperature: ArrayLike, *, extrapolate: bool = False) -> Real:
+        """Return the erroneous rate (rad/s) over time: ζ₁₂(T(t)) through the filter (9), settled at the start.
+
+        Parameters
+        ----------
+        time, temperature : array (N,)
+            Times (s) and temperature (K), linear in between.
+        extrapolate : bool
+            Allow temperatures outside the fitted range.
+
+        Raises
+        ------
+        CompensationError
+            On values that are not finite, times that do not increase, or temperatures outside the fitted range.
+        """
+        t, T = read_columns(time=time, temperature=temperature)
+        _check_range(T, self.lowest, self.highest, extrapolate)
+        return simulate_bias(t, self.cross_damping(T), self.k, self.zeta, self.g2)
+
+    def compensate(
+        self, time: ArrayLike, rate: ArrayLike, temperature: ArrayLike, *, extrapolate: bool = False
+    ) -> Real:
+        """Return the rate (rad/s) less its predicted cross-damping error; parameters as for `predict`."""
+        _, Omega, _ = read_columns(time=time, rate=rate, temperature=temperature)
+        return Omega - self.predict(time, temperature, extrapolate=extrapolate)
+
+    def memory(self, time: ArrayLike, temperature: ArrayLike) -> float:
+        """Return the largest part (rad/s) that the dynamics of (9) has in the compensation of this profile.
+
+        It is the difference to the static curve 2k/g₂ ζ₁₂(T); where it lies below the noise, the profile was slow
+        against 1/(kζ) and the record says nothing on the filter.
+        """
+        static = 2 * self.k / self.g2 * self.cross_damping(temperature)
+        return float(np.max(np.abs(self.predict(time, temperature, extrapolate=True) - static)))
+
+
+def simulate_bias(time: ArrayLike, cross_damping: ArrayLike, k: float, zeta: float, g2: float = 2.0) -> Real:
+    """Return the erroneous rate (rad/s) that a history of ζ₁₂ causes, through eq. (9), settled at the start."""
+    filter9 = relate_cross_damping_to_rate_when_tuned(k, zeta, g2)
+    return np.asarray(filter9.simulate(time, cross_damping, settled=True), dtype=float)
+
+
+def fit_cross_damping(
+    time: ArrayLike,
+    rate: ArrayLike,
+    temperature: ArrayLike,
+    *,
+    k: float,
+    zeta: float,
+    g2: float = 2.0,
+    calibration_temperature: float = 293.15,
+    order: int = 3,
+) -> CrossDampingModel:
+    """Fit ζ₁₂(T) to the output of a gyro at rest: eq. (10) through eq. (9).
+
+    The model is linear in ζᵢ: each column of the regression is Tⁱ after the filter (9), so the fit is dynamic too.
+    The intervals allow for residuals that are correlated in time (see `regression`).
+
+    Parameters
+    ----------
+    time, rate, temperature : array (N,)
+        Times (s), output at zero rate (rad/s) and temperature (K).
+    k, zeta, g2 : float
+        Constants of eq. (9): natural frequency (rad/s), relative damping and Coriolis coefficient (1).
+    calibration_temperature : float
+        Temperature (K) from which T is counted.
+    order : int
+        Highest power of T, 1 or more; 3 in the paper.
+
+    Raises
+    ------
+    CompensationError
+        On values that are not finite, a constant temperature, too few rows, or times that do not increase.
+    """
+    t, Omega, T = read_columns(time=time, rate=rate, temperature=temperature)
+    check_time(t)
+    if order < 1:
+        raise CompensationError(f"the polynomial of eq. (10) needs an order of 1 or more, not {order}.")
+    shift = T - calibration_temperature
+    size = float(np.max(np.abs(shift))) or 1.0
+    refuse_constant_columns(T[:, None], ["temperature"])
+    columns = [simulate_bias(t, (shift / size) ** i, k, zeta, g2) for i in range(order + 1)]
+    names = [f"zeta_{i}" for i in range(order + 1)]
+    fit = fit_linear(np.column_stack(columns), Omega, names, constant=False)
+    scale = size ** -np.arange(order + 1.0)
+    return CrossDampingModel(
+        coefficients=scale * fit.coefficients,
+        covariance=scale[:, None] * correlated_covariance(fit) * scale,
+        calibration_temperature=calibration_temperature,
+        k=k,
+        zeta=zeta,
+        g2=g2,
+        lowest=float(np.min(T)),
+        highest=float(np.max(T)),
+        noise=fit.standard_deviation,
+    )
+
+
+def _check_range(temperature: Real, lowest: float, highest: float, extrapolate: bool) -> None:
+    low, high = float(np.min(temperature)), float(np.max(temperature))
+    if not extrapolate and (low < lowest or high > highest):
+        raise CompensationError(
+            f"the temperature runs from {low - 273.15:.2f} to {high - 273.15:.2f} °C, but the model was fitted between "
+            f"{lowest - 273.15:.2f} and {highest - 273.15:.2f} °C; allow extrapolation or fit a wider record."
+        )
+
+
+def _drive_by_damping(element: SensitiveElement) -> complex:
+    return 2j * element.primary_amplitude * element.omega * element.k2
