@@ -216,7 +216,8 @@ class Material:
 def constant_material(name: str, youngs_modulus: float, poisson_ratio: float, density: float) -> Material:
     """Return a material whose given values (Pa, 1, kg/m³) hold at every temperature and that does not expand."""
     given = {"youngs_modulus": youngs_modulus, "poisson_ratio": poisson_ratio, "density": density}
-    properties = {key: Property("constant", {"value": value}, source="given value") for key, value in given.items()}
+    numbers = {key: {"value": value, "at_degC": 20.0} for key, value in given.items()}
+    properties = {key: Property("constant", n, source="given value") for key, n in numbers.items()}
     properties["expansion"] = Property("constant", {"value": 0.0}, source="given values do not expand")
     return Material(name, "given values", 0.0, 5000.0, properties, source="given in the card")
 

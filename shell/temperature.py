@@ -8,7 +8,7 @@ of its lengths, whatever theory gives f. Its slope has five parts,
 with ∂ ln f/∂ ln h + ∂ ln f/∂ ln r = −1 and h'/h = r'/r = alpha.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -19,6 +19,7 @@ from shell.elastic import Elastic
 from shell.materials import Material
 
 if TYPE_CHECKING:
+    from shell.assembly import Theory
     from shell.meridian import Resonator
 
 
@@ -75,7 +76,7 @@ def rayleigh_model(n: int, h: float, R: float, phi_1: float = 0.0, phi_2: float 
     return model
 
 
-def mode_model(resonator: "Resonator", harmonic: int = 2, theory: str = "solid") -> Model:
+def mode_model(resonator: "Resonator", harmonic: int = 2, theory: "Theory" = "solid") -> Model:
     """Return f of the lowest mode of a harmonic from the shell-mode solver."""
     from shell.modes import solve_modes
 
@@ -135,7 +136,7 @@ def _coefficient(model: Model, material: Material, reference: float, T: float) -
     return TemperatureCoefficient(T, frequency, *parts, uncertainty=uncertainty)
 
 
-def _parts(gradient: FrequencyGradient, material: Material, T: float) -> Sequence[float]:
+def _parts(gradient: FrequencyGradient, material: Material, T: float) -> tuple[float, float, float, float, float]:
     """Return the parts from E, nu, rho, h and r, in 1/K."""
     alpha = float(material.value("expansion", T))
     return (

@@ -25,7 +25,7 @@ from shell.derivation.symbols import (
     tan_half,
 )
 
-I, J = sp.symbols("I J", positive=True)
+I, J = sp.symbols("I J", real=True)
 """The shape integrals of bending and of mass."""
 
 
@@ -120,7 +120,7 @@ def log_derivatives() -> LogDerivatives:
     rim = sum(sp.simplify(logarithm.diff(integral)) * slope for integral, slope in at_rim.items())
     return LogDerivatives(
         E=by_logarithm[E],
-        nu=sp.simplify(logarithm.diff(nu)),
+        nu=sp.factor(logarithm.diff(nu)),
         rho=by_logarithm[rho],
         h=by_logarithm[h],
         r=by_logarithm[r],

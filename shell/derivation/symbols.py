@@ -10,7 +10,7 @@ n = sp.Symbol("n", integer=True, positive=True)
 """Circumferential harmonic."""
 r, h = sp.symbols("r h", positive=True)
 """Radius of the middle surface and thickness (m)."""
-E, rho = sp.symbols("E rho", positive=True)
+E, rho = sp.symbols("E rho", real=True)
 """Young's modulus (Pa) and density (kg/m³)."""
 nu = sp.Symbol("nu", real=True)
 """Poisson ratio, the HRG paper's μ."""

@@ -1,6 +1,6 @@
 """`hrg tcf`: frequency against temperature and its parts."""
 
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import Parameter
 
@@ -15,7 +15,7 @@ def tcf(
     to_degC: Annotated[float, Parameter(name="--to")] = 40.0,
     step: float = 10.0,
     harmonic: int = 2,
-    theory: str = "solid",
+    theory: Literal["solid", "shell", "rayleigh"] = "solid",
     measured: str | None = None,
     json: bool = False,
 ) -> int:

@@ -159,7 +159,6 @@ def _parse_fast(data: bytes, start: int, names: list[str]) -> "dict[str, NDArray
             na_values=[""],
             skip_blank_lines=False,
             index_col=False,
-            float_precision="round_trip",
         )
     except ValueError:
         return None

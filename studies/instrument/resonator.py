@@ -3,13 +3,13 @@
 import math
 from collections.abc import Callable, Mapping
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal, cast
 
 from studies.errors import InputError
 from studies.files.toml import Section, check_number
 
 if TYPE_CHECKING:
-    from shell.meridian import Resonator, Stem
+    from shell.meridian import Resonator, Stem, Support
 
 MM = 1e-3
 SUPPORTS = ("free", "clamped-pole", "clamped-rim", "stem")
@@ -96,10 +96,10 @@ def _meridian(table: Section) -> "Resonator":
     return meridian(segments, thickness=_thickness(table), support=support)
 
 
-def _support(table: Section) -> "tuple[str, Stem | None]":
+def _support(table: Section) -> "tuple[Support, Stem | None]":
     from shell.meridian import Stem
 
-    support = table.text("support", "free", SUPPORTS)
+    support = cast("Support", table.text("support", "free", SUPPORTS))
     if (support == "stem") != ("stem" in table):
         raise InputError(
             f"{table.where}: support = 'stem' and a table [resonator.stem] go together; give both or none."
@@ -107,7 +107,7 @@ def _support(table: Section) -> "tuple[str, Stem | None]":
     if support != "stem":
         return support, None
     part = table.section("stem", STEM_KEYS)
-    side = part.text("side", "inner", ("inner", "outer", "both"))
+    side = cast("Literal['inner', 'outer', 'both']", part.text("side", "inner", ("inner", "outer", "both")))
     end = part.raw("end_mm")
     if side == "both":
         if not isinstance(end, list) or len(end) != 2:

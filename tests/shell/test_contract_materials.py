@@ -1,0 +1,132 @@
+"""Contract: every law of every material keeps its promises; what no source states is refused by name."""
+
+import numpy as np
+import pytest
+
+from shell.errors import ShellError
+from shell.materials import ELASTIC, PROPERTIES, ZERO_CELSIUS, constant_material, find_material, read_materials
+
+LAWS = [law for laws in read_materials().values() for law in laws.values()]
+
+
+@pytest.mark.parametrize("law", LAWS, ids=lambda law: f"{law.name}:{law.law}")
+def test_law_has_source_range_and_sane_values(law):
+    assert law.source
+    T = np.linspace(law.lowest, law.highest, 50)
+    for name in PROPERTIES:
+        try:
+            values = law.value(name, T)
+        except ShellError as error:
+            assert "no source states" in str(error)  # noqa: PT017
+            assert name not in law.properties
+            continue
+        assert np.isfinite(values).all()
+    for outside in (law.lowest - 1, law.highest + 1, np.nan):
+        with pytest.raises(ShellError, match="outside the range"):
+            law.value(next(iter(law.properties)), outside)
+
+
+def test_incomplete_material_loads_and_names_what_it_lacks():
+    steel = find_material("maraging-steel")
+    assert steel.value("youngs_modulus", 293.15) == 187e9
+    with pytest.raises(ShellError, match="density"):
+        steel.value("density", 293.15)
+    with pytest.raises(ShellError, match=r"maraging-steel.*(poisson ratio|shear modulus)"):
+        steel.elastic(293.15)
+
+
+def test_spinner_law_has_its_published_statements():
+    """Spinner 1962: G 9 % above room temperature at its maximum, nu from 1/6 to 1/5, E more than 11 % (12.1 % here)."""
+    law = find_material("fused-silica").properties
+    at_maximum = 1125.0 + ZERO_CELSIUS
+    room = 25.0 + ZERO_CELSIUS
+    assert law["shear_modulus"](at_maximum) / law["shear_modulus"](room) == pytest.approx(1.09)
+    assert law["poisson_ratio"](room) == pytest.approx(1 / 6, abs=1e-4)
+    assert law["poisson_ratio"](at_maximum) == pytest.approx(1 / 5, abs=1e-4)
+
+
+def test_slope_of_g_lies_in_the_published_band():
+    """Maximum at 1050 to 1200 °C: d ln G/dT at 25 °C between 1.53e-4 and 1.76e-4 1/K."""
+    material = find_material("fused-silica")
+    slopes = [
+        material.with_number("shear_modulus", "maximum_degC", top).log_slope("shear_modulus", 298.15)
+        for top in (1050.0, 1200.0)
+    ]
+    assert slopes == pytest.approx([1.756e-4, 1.532e-4], rel=2e-3)
+    assert slopes[1] < material.log_slope("shear_modulus", 298.15) < slopes[0]
+
+
+def test_elastic_constants_are_consistent_for_every_pair():
+    T = np.array([260.0, 293.15, 320.0])
+    law = find_material("fused-silica")
+    E, G, nu = (law.value(name, T) for name in ("youngs_modulus", "shear_modulus", "poisson_ratio"))
+    np.testing.assert_allclose(E, 2 * G * (1 + nu), rtol=1e-14)
+    gwinc = find_material("fused-silica", "gwinc")
+    E, G, nu = (gwinc.value(name, T) for name in ("youngs_modulus", "shear_modulus", "poisson_ratio"))
+    np.testing.assert_allclose(G, E / (2 * (1 + nu)), rtol=1e-14)
+
+
+def test_expansion_conserves_mass():
+    law = find_material("fused-silica")
+    T = np.linspace(260, 330, 8)
+    mass = law.value("density", T) * law.growth(T, 293.15) ** 3
+    np.testing.assert_allclose(mass, mass[0], rtol=1e-14)
+    assert law.growth(303.15, 293.15) == pytest.approx(np.exp(5.1e-6), rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("broken", "words"),
+    [
+        ("", ["schema"]),
+        ('schema = "hrg.materials/1"', ["no material"]),
+        ('schema = "hrg.materials/1"\n[x]\n', ["laws"]),
+        ('schema = "hrg.materials/1"\n[x.laws.a]\nsource="s"\nrange_degC=[10, 0]', ["range_degC"]),
+        ('schema = "hrg.materials/1"\n[x.laws.a]\nsource="s"\nrange_degC=[-300, 0]', ["absolute zero"]),
+        (
+            'schema = "hrg.materials/1"\n[x.laws.a]\nsource="s"\nrange_degC=[0, 9]\nyoung={form="constant",value=1}',
+            ["'young'"],
+        ),
+        (
+            'schema = "hrg.materials/1"\n[x.laws.a]\nsource="s"\nrange_degC=[0, 9]\nyoungs_modulus={form="cubic"}',
+            ["'cubic'"],
+        ),
+        (
+            'schema = "hrg.materials/1"\n[x.laws.a]\nsource="s"\nrange_degC=[0, 9]\nyoungs_modulus={form="linear",value=1}',
+            ["at_degC"],
+        ),
+        (
+            'schema = "hrg.materials/1"\n[x.laws.a]\nsource="s"\nrange_degC=[0, 9]\npoisson_ratio={form="constant",value=0.6}',
+            ["poisson_ratio"],
+        ),
+        (
+            'schema = "hrg.materials/1"\n[x.laws.a]\nsource="s"\nrange_degC=[0, 9]\n'
+            'youngs_modulus={form="table",temperature_degC=[0,5],values=[1,2]}',
+            ["covers"],
+        ),
+        ('schema = "hrg.materials/1"\n[x', ["TOML"]),
+    ],
+)
+def test_broken_material_file_is_refused(tmp_path, broken, words):
+    path = tmp_path / "mine.toml"
+    path.write_text(broken)
+    with pytest.raises(ShellError) as caught:
+        read_materials(path)
+    for word in [str(path), *words]:
+        assert word in str(caught.value)
+
+
+def test_own_table_passes_through_its_points(tmp_path):
+    path = tmp_path / "mine.toml"
+    path.write_text(
+        'schema = "hrg.materials/1"\n[glass.laws.data]\nsource = "mine"\nrange_degC = [0, 50]\n'
+        'youngs_modulus = {form = "table", temperature_degC = [0, 20, 50], values = [70e9, 70.2e9, 70.5e9]}\n'
+        'poisson_ratio = {form = "constant", value = 0.2}\ndensity = {form = "constant", value = 2300, at_degC = 20}\n'
+    )
+    law = find_material("glass", path=path)
+    np.testing.assert_allclose(law.value("youngs_modulus", np.array([273.15, 293.15, 323.15])), [70e9, 70.2e9, 70.5e9])
+
+
+def test_constant_material_does_not_change():
+    law = constant_material("m", 70e9, 0.3, 2700.0)
+    assert law.elastic(250.0) == law.elastic(350.0)
+    assert all(name in law.properties for name in ELASTIC[1:])

@@ -1,0 +1,112 @@
+"""Contract: every shipped card loads and says what is illustrative; a wrong card is refused by key with the mend."""
+
+import tomllib
+
+import pytest
+
+from studies.errors import InputError
+from studies.instrument.card import load_card, save_card, shipped_cards
+
+HRG = shipped_cards()["hrg-30mm"].read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("name", sorted(shipped_cards()))
+def test_shipped_card_is_complete(name):
+    card = load_card(name)
+    assert card.name == name
+    assert "llustrative" in card.content["note"]
+    elastic = card.material.elastic(card.reference_temperature)
+    assert 1e10 < elastic.E < 3e11
+    assert card.resonator.length > 0
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("hrg.card/1", "hrg.card/9", ["schema", "hrg.card/1"]),
+        ("radius_mm = 15.0", "raduis_mm = 15.0", ["'raduis_mm'", "'radius_mm'"]),
+        ("radius_mm = 15.0", "", ["radius_mm", "missing"]),
+        ("radius_mm = 15.0", 'radius_mm = "15"', ["radius_mm", "number"]),
+        ("radius_mm = 15.0", "radius_mm = nan", ["radius_mm", "finite"]),
+        ("radius_mm = 15.0", "radius_mm = true", ["radius_mm", "number"]),
+        ("radius_mm = 15.0", "radius_mm = ]", ["TOML"]),
+        ('shape = "hemisphere"', 'shape = "sphere"', ["shape", "hemisphere"]),
+        ('support = "stem"', 'support = "stme"', ["support", "'stem'"]),
+        ('support = "stem"', 'support = "free"', ["[resonator.stem]"]),
+        ("radius_mm = 2.5", "radius_mm = 25.0", ["stem", "larger"]),
+        ("end_mm = -5.0", "end_mm = [-5.0, 20.0]", ["end_mm"]),
+        ('side = "inner"', 'side = "both"', ["end_mm", "[inner, outer]"]),
+        ('name = "fused-silica"', 'name = "fused-silca"', ["'fused-silica'"]),
+        ('name = "fused-silica"', 'name = "fused-silica"\nlaw = "spiner"', ["'spinner'"]),
+        ('name = "fused-silica"', 'name = "fused-silica"\npoisson_ratio = 0.5', ["poisson_ratio"]),
+        ('name = "fused-silica"', 'name = "mystery"\nyoungs_modulus_GPa = 70', ["mystery", "poisson_ratio, density"]),
+        ('name = "fused-silica"', 'name = "fused-silica"\nyoungs_modulus_GPa = -1', ["youngs_modulus_GPa", "above 0"]),
+        ('name = "fused-silica"', 'name = "fused-silica"\nfile = "none.toml"', ["none.toml", "cannot be read"]),
+        ("[material]", "[[effect]]\nsize = 1\n[material]", ["[[effect]] number 1", "name"]),
+        ("[material]", "[noize]\n[material]", ["'noize'", "'noise'"]),
+    ],
+)
+def test_wrong_card_is_refused_by_key(tmp_path, old, new, words):
+    assert old in HRG
+    path = tmp_path / "card.toml"
+    path.write_text(HRG.replace(old, new, 1), encoding="utf-8")
+    with pytest.raises(InputError) as caught:
+        load_card(path)
+    for word in [str(tmp_path), *words]:
+        assert word in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    "thickness", ["0", "-0.9", "40.0", "[[0, 1]]", "[[0, 1], [0.5, 1]]", "[[0.5, 1], [0.2, 1]]", "[1, 2]"]
+)
+def test_impossible_thickness_is_refused(tmp_path, thickness):
+    path = tmp_path / "card.toml"
+    lines = [f"thickness_mm = {thickness}" if line.startswith("thickness_mm") else line for line in HRG.splitlines()]
+    path.write_text("\n".join(lines), encoding="utf-8")
+    with pytest.raises(InputError, match="thickness"):
+        load_card(path)
+
+
+def test_unknown_bare_name_suggests_a_shipped_card():
+    with pytest.raises(InputError, match="hrg-30mm"):
+        load_card("hrg-30m")
+
+
+def test_given_values_rescale_the_law_at_the_reference_temperature(tmp_path):
+    path = tmp_path / "card.toml"
+    given = 'name = "fused-silica"\nyoungs_modulus_GPa = 73.0\npoisson_ratio = 0.18\ndensity_kg_m3 = 2201'
+    path.write_text(HRG.replace('name = "fused-silica"', given), encoding="utf-8")
+    plain, own = load_card("hrg-30mm").material, load_card(path).material
+    at = own.elastic(293.15)
+    assert (at.E, at.nu, at.rho) == pytest.approx((73e9, 0.18, 2201), rel=1e-12)
+    for name in ("shear_modulus", "poisson_ratio"):
+        law = plain.value(name, 323.15) / plain.value(name, 293.15)
+        assert own.value(name, 323.15) / own.value(name, 293.15) == pytest.approx(law, rel=1e-12)
+
+
+def test_a_name_outside_the_table_with_given_values_is_constant(tmp_path):
+    path = tmp_path / "card.toml"
+    given = 'name = "mystery"\nyoungs_modulus_GPa = 70\npoisson_ratio = 0.3\ndensity_kg_m3 = 2700'
+    path.write_text(HRG.replace('name = "fused-silica"', given), encoding="utf-8")
+    material = load_card(path).material
+    assert material.elastic(200.0) == material.elastic(400.0)
+
+
+def test_saved_card_loads_equal_even_from_another_folder(tmp_path):
+    own = tmp_path / "a" / "mine.toml"
+    own.parent.mkdir()
+    own.write_text(
+        'schema = "hrg.materials/1"\n[glass.laws.data]\nsource = "mine"\nrange_degC = [0, 50]\n'
+        'youngs_modulus = {form = "constant", value = 70e9}\npoisson_ratio = {form = "constant", value = 0.2}\n'
+        'density = {form = "constant", value = 2300, at_degC = 20}\nexpansion = {form = "constant", value = 1e-6}\n'
+    )
+    card = tmp_path / "a" / "card.toml"
+    card.write_text(HRG.replace('name = "fused-silica"', 'name = "glass"\nfile = "mine.toml"'), encoding="utf-8")
+    first = load_card(card)
+    moved = tmp_path / "b" / "card.toml"
+    save_card(first.with_table("effect", [{"name": "second-lag", "weight": 0.1}]), moved)
+    again = load_card(moved)
+    assert again.material == first.material
+    assert again.resonator == first.resonator
+    assert again.effects == [{"name": "second-lag", "weight": 0.1}]
+    assert tomllib.loads(moved.read_text())["schema"] == "hrg.card/1"
