@@ -1,0 +1,189 @@
+"""The four-step chain of the bell-shaped gyro: planted coefficients come back, intervals hold, nonsense is refused."""
+
+import numpy as np
+import pytest
+
+from compensation.bell import (
+    Chain,
+    Curve,
+    Run,
+    apply_chain,
+    design_smoother,
+    fit_chain,
+    fit_rough,
+    invert_chain,
+    measure_linearity,
+    smooth,
+)
+from compensation.errors import CompensationError
+
+DEG = np.pi / 180
+NONE = np.zeros((3, 3))
+EVERYWHERE = (-1e9, 1e9)
+PRINTED = Chain(
+    null=-703.3858,
+    scale=0.0242 * DEG,
+    bias=Curve(np.array([0.1673, -0.0056, 2.52e-5]) * DEG, NONE, 273.15, *EVERYWHERE),
+    scale_over_rate=Curve(np.array([-0.12 * DEG, 0.99, 5.89e-6 / DEG]), NONE, 0.0, *EVERYWHERE),
+    scale_over_temperature=Curve(np.array([0.9979, -1.83e-5, -1.26e-7]), NONE, 273.15, *EVERYWHERE),
+    taps=np.empty(0),
+    sampling=0.1,
+)
+STEP = 0.1
+
+
+def make_runs(generator, noise, rows=4000, dwell=200):
+    """Rates −360…360 °/s at 25 °C, rest and 300 °/s over −45…55 °C, of a gyro that the printed chain describes.
+
+    `noise` is the standard deviation (°/s) of the output, brought to counts by the rough scale.
+    """
+    sweep = 273.15 + np.linspace(-45, 55, rows)
+    plateaus = np.repeat(np.arange(-360, 361, 40) * DEG, dwell)
+
+    def run(rate, temperature):
+        counts = invert_chain(PRINTED, rate, temperature)
+        counts = counts + noise / 0.0242 * generator.standard_normal(len(rate))
+        return Run(STEP * np.arange(len(rate)), counts, temperature, rate)
+
+    return (
+        run(plateaus, np.full(len(plateaus), 298.15)),
+        run(np.zeros(rows), sweep),
+        run(np.full(rows, 300 * DEG), sweep),
+    )
+
+
+def fit_planted(seed, noise=0.06):
+    rates, rest, turning = make_runs(np.random.default_rng(seed), noise)
+    return fit_chain(rates, rest, turning, cutoff=None), (rates, rest, turning)
+
+
+def test_inverse_then_chain_is_the_identity():
+    rate, temperature = np.linspace(-6, 6, 50), np.linspace(230, 328, 50)
+    counts = invert_chain(PRINTED, rate, temperature)
+    result = apply_chain(PRINTED, np.arange(50.0), counts, temperature)
+    np.testing.assert_allclose(result.filtered, rate, rtol=1e-12, atol=1e-14)
+
+
+def test_noise_free_records_are_compensated_and_give_the_printed_coefficients():
+    """Scale is shared between S₁, (35) and (36), and the null between N₁ and (34): the products come back."""
+    chain, (rates, rest, turning) = fit_planted(0, noise=0.0)
+    for run in (rates, rest, turning):
+        result = apply_chain(chain, run.time, run.output, run.temperature)
+        np.testing.assert_allclose(result.temperature_compensated, run.rate, atol=2e-5 * 360 * DEG)
+    share = chain.scale / PRINTED.scale
+    at_25 = PRINTED.scale_over_temperature.value(298.15)
+    bias = chain.bias.coefficients - share * PRINTED.bias.coefficients
+    np.testing.assert_allclose(bias[1:], 0, atol=1e-9 * DEG)
+    slope = chain.scale_over_rate.coefficients[1] * share / at_25
+    assert slope == pytest.approx(PRINTED.scale_over_rate.coefficients[1], rel=1e-5)
+    assert chain.scale_over_rate.coefficients[2] * share**2 / at_25 == pytest.approx(5.89e-6 / DEG, rel=1e-3)
+    np.testing.assert_allclose(
+        chain.scale_over_temperature.coefficients * at_25, PRINTED.scale_over_temperature.coefficients, rtol=1e-4
+    )
+
+
+def test_rough_step_of_two_plateaus_passes_both_means():
+    generator = np.random.default_rng(4)
+    rate = np.repeat([0.0, 100 * DEG], 300)
+    counts = invert_chain(PRINTED, rate, np.full(600, 298.15)) + generator.standard_normal(600)
+    null, scale, _ = fit_rough(Run(STEP * np.arange(600), counts, np.full(600, 298.15), rate))
+    assert null == pytest.approx(np.mean(counts[:300]), rel=1e-10)
+    assert scale == pytest.approx(100 * DEG / (np.mean(counts[300:]) - null), rel=1e-10)
+
+
+def test_intervals_cover():
+    """95 % intervals of every step, given the steps before it, hold what noise-free data would give."""
+    runs, held = 200, {"rough": np.zeros(2), "bias": np.zeros(3), "rate": np.zeros(3), "temperature": np.zeros(3)}
+    clean = make_runs(np.random.default_rng(0), 0.0, 600, 30)
+    clean_null, clean_scale, _ = fit_rough(clean[0])
+    for seed in range(runs):
+        noisy = make_runs(np.random.default_rng(seed), 0.06, 600, 30)
+        null, scale, covariance = fit_rough(noisy[0])
+        off = np.array([null - clean_null, scale - clean_scale])
+        held["rough"] += np.abs(off) < 1.96 * np.sqrt(np.diag(covariance))
+        chain = fit_chain(*noisy, cutoff=None)
+        truth = _fit_clean(chain, clean)
+        for name, curve, true in zip(
+            ("bias", "rate", "temperature"),
+            (chain.bias, chain.scale_over_rate, chain.scale_over_temperature),
+            truth,
+            strict=True,
+        ):
+            off = np.abs(curve.coefficients - true)
+            held[name] += off < 1.96 * np.sqrt(np.diag(curve.covariance))
+    for name, count in held.items():
+        assert np.all(np.abs(count / runs - 0.95) < 4 * np.sqrt(0.95 * 0.05 / runs)), (name, count / runs)
+
+
+def _fit_clean(chain, clean):
+    """What each step would be on noise-free records after the same earlier steps."""
+    from compensation.bell import fit_bias, fit_scale_over_rate, fit_scale_over_temperature
+
+    rates, rest, turning = clean
+    bias = fit_bias(rest.temperature, chain.scale * (rest.output - chain.null))
+    straight = chain.scale * (rates.output - chain.null) - chain.bias.value(rates.temperature)
+    over_rate = fit_scale_over_rate(straight, rates.rate)
+    rough = chain.scale * (turning.output - chain.null) - chain.bias.value(turning.temperature)
+    constant = chain.scale_over_rate.value(rough)
+    over_temperature = fit_scale_over_temperature(turning.temperature, constant, turning.rate)
+    return [curve.coefficients for curve in (bias, over_rate, over_temperature)]
+
+
+def test_held_out_records_are_compensated_to_the_noise():
+    chain, _ = fit_planted(1)
+    for run in make_runs(np.random.default_rng(99), 0.06):
+        before, after = (
+            getattr(apply_chain(chain, run.time, run.output, run.temperature), step) - run.rate
+            for step in ("rough", "temperature_compensated")
+        )
+        assert np.std(after) / DEG == pytest.approx(0.06, rel=0.05)
+        assert np.sqrt(np.mean(before**2)) > 1.5 * np.sqrt(np.mean(after**2))
+
+
+def test_filter_passes_a_constant_and_delays_a_ramp():
+    taps = design_smoother(STEP, 1.0)
+    assert len(taps) == 51
+    np.testing.assert_allclose(smooth(np.full(80, 3.7), taps), 3.7, rtol=1e-12)
+    ramp = np.arange(200) * STEP
+    np.testing.assert_allclose(smooth(ramp, taps)[60:], ramp[60:] - 25 * STEP, rtol=1e-12)
+
+
+def test_nonlinearity_of_a_parabola():
+    """y = x + c x² on an even grid: the line leaves c (x² − mean x²), largest at the ends."""
+    x = np.linspace(-2, 2, 41)
+    result = measure_linearity(x, x + 0.01 * x**2)
+    assert result.nonlinearity == pytest.approx(0.01 * (4 - np.mean(x**2)) / 2, rel=1e-12)
+    assert result.slope == pytest.approx(1.0, rel=1e-12)
+
+
+def replace(run, **columns):
+    return Run(**{name: columns.get(name, getattr(run, name)) for name in ("time", "output", "temperature", "rate")})
+
+
+RATES, REST, TURNING = make_runs(np.random.default_rng(8), 0.06)
+
+
+@pytest.mark.parametrize(
+    ("act", "words"),
+    [
+        (lambda: design_smoother(0.1, 200.0), "200 Hz is impossible"),
+        (lambda: fit_chain(replace(RATES, rate=np.full(3800, 1.0)), REST, TURNING), r"\(33\): 'rate' is constant"),
+        (
+            lambda: fit_chain(RATES, replace(REST, temperature=np.full(4000, 300.0)), TURNING),
+            r"\(34\): 'temperature' is constant",
+        ),
+        (lambda: fit_chain(RATES, REST, replace(TURNING, rate=0 * TURNING.rate)), r"\(36\)"),
+        (lambda: replace(RATES, output=np.r_[np.nan, RATES.output[1:]]), "'output' has 1 missing"),
+        (lambda: replace(RATES, output=RATES.output[1:]), "'output' has shape"),
+        (lambda: apply_chain(fit_planted(1)[0], [0, 1], [0, 0], [200.0, 300.0]), "extrapolation"),
+        (lambda: apply_chain(fit_planted(1)[0], [0, 1], [0, 1e5], [290.0, 300.0]), "rate runs"),
+        (lambda: measure_linearity([1, 1, 2], [1, 1, 2]), "three applied rates"),
+        (
+            lambda: apply_chain(fit_chain(RATES, REST, TURNING), np.arange(9.0), np.full(9, -703.0), np.full(9, 300.0)),
+            "designed for an output every 0.1 s",
+        ),
+    ],
+)
+def test_what_cannot_be_compensated_is_refused(act, words):
+    with pytest.raises(CompensationError, match=words):
+        act()
