@@ -1,0 +1,372 @@
+"""A campaign: several records of one gyro, checked, freed of outliers and put on one even time grid."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from studies.diagnosis.effects import RESPONSES
+from studies.diagnosis.states import FloatArray, States, average
+from studies.errors import InputError
+from studies.record import Record
+
+TEMPERATURES = ("housing_temperature_degC", "chamber_temperature_degC", "resonator_temperature_degC")
+COMMANDS = ("drive_amplitude_V", "electrode_bias_V", "quadrature_V", "pattern_angle_deg")
+OUTLIER_WINDOW, OUTLIER_LIMIT = 11, 6.0
+MOST_BINS = 960
+FINEST = 12
+FEWEST_BINS = 24
+LONGEST_GAP = 900.0
+
+
+@dataclass(frozen=True)
+class Run:
+    """One unbroken stretch of a record on the even grid, with its own rows beside it.
+
+    Attributes
+    ----------
+    record, label : int, str
+        Number of the record it comes from, and its file name.
+    states : States
+        Drives and thermal state on the fine grid, `group` samples to a step of the coarse one.
+    time : (N,) array
+        Centres of the steps of the coarse grid, s.
+    responses : mapping to (N,) arrays
+        Means of the responses over the steps; NaN where there is no row.
+    row_time, row_responses : (M,) arrays
+        The record's own rows, outliers as NaN.
+    """
+
+    record: int
+    label: str
+    states: States
+    time: FloatArray
+    responses: dict[str, FloatArray]
+    row_time: FloatArray
+    row_responses: dict[str, FloatArray]
+
+
+@dataclass(frozen=True)
+class Campaign:
+    """All runs of one gyro on one grid."""
+
+    runs: tuple[Run, ...]
+    step: float
+    group: int
+    responses: tuple[str, ...]
+    reference: float
+    temperature_source: str
+    timed: bool
+    notes: tuple[str, ...] = ()
+    skipped: dict[str, str] = field(default_factory=dict)
+    outliers: int = 0
+
+    @property
+    def records(self) -> tuple[int, ...]:
+        """Numbers of the records, each once."""
+        return tuple(dict.fromkeys(run.record for run in self.runs))
+
+
+def load_campaign(records: Sequence[Record], reference_degC: float | None = None) -> Campaign:
+    """Check several records of one gyro and put them on one even grid.
+
+    A row is an outlier when it deviates from the running median of 11 rows by more than six robust standard
+    deviations (1.4826 times the median absolute deviation over the run); it is left out of fit and score alike.
+
+    Raises
+    ------
+    InputError
+        If the records disagree about the gyro, lack a temperature or a response, or use another unit.
+    """
+    notes: list[str] = []
+    records = _drop_duplicates(records, notes)
+    source = _temperature_source(records)
+    tables = [_columns(record, source) for record in records]
+    _check_units(records, tables)
+    _check_device(records, tables)
+    outliers = sum(_remove_outliers(table) for table in tables)
+    if outliers:
+        notes.append(f"{outliers} outlying values were left out.")
+    responses, skipped = _usable_responses(records, tables)
+    offsets, timed = _place_in_time(records)
+    if not timed and len(records) > 1:
+        notes.append("the records do not all say when they start: taken one after the other, gaps unknown.")
+    spans = [float(table["time_s"][-1] - table["time_s"][0]) for table in tables]
+    sampling = max(float(np.median(np.diff(table["time_s"]))) if table["time_s"].size > 1 else 1.0 for table in tables)
+    step = max(sampling, sum(spans) / MOST_BINS)
+    group = max(1, min(FINEST, int(step / sampling)))
+    temperature = np.concatenate([table["temperature"] for table in tables])
+    if not np.isfinite(temperature).any():
+        raise InputError(f"{records[0].path}: {source} has no value at all.")
+    middle = 0.5 * (np.nanmin(temperature) + np.nanmax(temperature)) + 273.15
+    reference = middle if reference_degC is None else reference_degC + 273.15
+    runs: list[Run] = []
+    for number, (record, table, offset) in enumerate(zip(records, tables, offsets, strict=True)):
+        for begin, end in _stretches(table):
+            run = _grid_run(
+                number,
+                len(runs),
+                record.path or f"run {number + 1}",
+                {key: values[begin:end] for key, values in table.items()},
+                step / group,
+                group,
+                offset,
+                reference,
+                responses,
+            )
+            if run is not None:
+                runs.append(run)
+    if len(runs) > len(records):
+        notes.append("long gaps split a record: each stretch has its own unknown thermal state.")
+    for drive in ("amplitude_squared", "voltage_squared", "quadrature", "pattern_angle"):
+        if any(getattr(run.states, drive) is None for run in runs) and any(
+            getattr(run.states, drive) is not None for run in runs
+        ):
+            notes.append(f"{drive} is not in every record and is left out.")
+            runs = [_without(run, drive) for run in runs]
+    return Campaign(tuple(runs), step, group, responses, float(reference), source, timed, tuple(notes), skipped, outliers)
+
+
+def _without(run: Run, drive: str) -> Run:
+    from dataclasses import replace
+
+    return replace(run, states=replace(run.states, **{drive: None}))  # type: ignore[arg-type]
+
+
+def _drop_duplicates(records: Sequence[Record], notes: list[str]) -> list[Record]:
+    if not records:
+        raise InputError("a diagnosis needs one record or more.")
+    kept: list[Record] = []
+    for record in records:
+        twin = next((other for other in kept if _same(record, other)), None)
+        if twin is None:
+            kept.append(record)
+        else:
+            notes.append(f"{record.path or 'a record'} repeats {twin.path or 'another'} and is left out.")
+    return kept
+
+
+def _same(one: Record, two: Record) -> bool:
+    if one.sha256 and one.sha256 == two.sha256:
+        return True
+    return set(one.columns) == set(two.columns) and all(
+        np.array_equal(one.columns[key], two.columns[key], equal_nan=True) for key in one.columns
+    )
+
+
+def _temperature_source(records: Sequence[Record]) -> str:
+    for name in TEMPERATURES:
+        if all(name in record and np.isfinite(record[name]).sum() > 1 for record in records):
+            return name
+    lacking = next(
+        (r for r in records if not any(n in r and np.isfinite(r[n]).sum() > 1 for n in TEMPERATURES)), records[0]
+    )
+    raise InputError(
+        f"{lacking.path or 'record'}: a diagnosis needs housing_temperature_degC or chamber_temperature_degC, "
+        "the same one in every record."
+    )
+
+
+def _columns(record: Record, source: str) -> dict[str, FloatArray]:
+    table = {"time_s": np.asarray(record["time_s"], dtype=float).copy(), "temperature": record[source].copy()}
+    for name in (*RESPONSES, *COMMANDS):
+        if name in record and np.isfinite(record[name]).any():
+            table[name] = np.asarray(record[name], dtype=float).copy()
+    if "bias_deg_per_h" not in table and "measured_rate_deg_per_s" in record:
+        applied = record["rate_deg_per_s"] if "rate_deg_per_s" in record else 0.0
+        table["bias_deg_per_h"] = 3600.0 * (record["measured_rate_deg_per_s"] - applied)
+    if "reference_frequency_Hz" in record and np.isfinite(record["reference_frequency_Hz"]).any():
+        table["reference_frequency_Hz"] = np.asarray(record["reference_frequency_Hz"], dtype=float).copy()
+    table["time_s"] -= table["time_s"][0]
+    return table
+
+
+def _check_units(records: Sequence[Record], tables: Sequence[dict[str, FloatArray]]) -> None:
+    for record, table in zip(records, tables, strict=True):
+        where = record.path or "record"
+        if "frequency_Hz" in table and not 100.0 < (value := float(np.nanmedian(table["frequency_Hz"]))) < 1e6:
+            raise InputError(
+                f"{where}: frequency_Hz is about {value:g}; a resonator vibrates at 100 Hz to 1 MHz. Is it in another unit?"
+            )
+        if "inverse_q" in table and not 0.0 < (value := float(np.nanmedian(table["inverse_q"]))) < 0.1:
+            raise InputError(
+                f"{where}: inverse_q is about {value:g}; it must be 1/Q, between 0 and 0.1. Is it Q itself?"
+            )
+
+
+def _check_device(records: Sequence[Record], tables: Sequence[dict[str, FloatArray]]) -> None:
+    names = {record.instrument: record.path for record in records if record.instrument}
+    if len(names) > 1:
+        (one, first), (two, second), *_ = names.items()
+        raise InputError(f"{second}: instrument '{two}' is not that of {first}, '{one}'; diagnose one gyro at a time.")
+    for name, most in (("frequency_Hz", 1.03), ("inverse_q", 30.0)):
+        levels = [
+            (float(np.nanmedian(table[name])), record.path)
+            for record, table in zip(records, tables, strict=True)
+            if name in table
+        ]
+        if levels and max(levels)[0] > most * min(levels)[0]:
+            raise InputError(
+                f"{max(levels)[1]}: {name} is about {max(levels)[0]:g}, in {min(levels)[1]} about {min(levels)[0]:g}; "
+                "the records are of different gyros, or one is in another unit."
+            )
+    spreads = []
+    for record, table in zip(records, tables, strict=True):
+        if "bias_deg_per_h" in table and np.isfinite(table["bias_deg_per_h"]).sum() > FEWEST_BINS:
+            noise = float(np.nanmedian(np.abs(np.diff(table["bias_deg_per_h"]))))
+            if noise > 0:
+                spreads.append((noise, record.path))
+    if spreads and max(spreads)[0] > 150.0 * min(spreads)[0]:
+        raise InputError(
+            f"{max(spreads)[1]}: bias_deg_per_h is {max(spreads)[0] / min(spreads)[0]:.0f} times as noisy as in "
+            f"{min(spreads)[1]}; one of the two is in another unit, or of another gyro."
+        )
+
+
+def _remove_outliers(table: dict[str, FloatArray]) -> int:
+    """Set outlying rows of every measured column to NaN and return how many there were."""
+    count = 0
+    for name in ("temperature", *RESPONSES, "quadrature_V", "reference_frequency_Hz"):
+        if name not in table:
+            continue
+        outlying = find_outliers(table[name])
+        table[name][outlying] = np.nan
+        count += int(outlying.sum())
+    return count
+
+
+def find_outliers(values: FloatArray) -> np.ndarray:
+    """Return a mask of the rows that the stated rule calls outliers."""
+    from scipy.ndimage import median_filter
+
+    present = np.isfinite(values)
+    mask = np.zeros(values.shape, dtype=bool)
+    kept = values[present]
+    if kept.size < 3 * OUTLIER_WINDOW:
+        return mask
+    deviation = kept - median_filter(kept, OUTLIER_WINDOW, mode="nearest")
+    deviation -= np.median(deviation)
+    scale = 1.4826 * float(np.median(np.abs(deviation)))
+    if scale == 0.0:
+        scale = float(np.std(deviation))
+    levels = np.abs(np.diff(kept))
+    resolution = float(levels[levels > 0].min()) if (levels > 0).any() else 0.0
+    mask[present] = np.abs(deviation) > max(OUTLIER_LIMIT * scale, 1.5 * resolution)
+    return mask
+
+
+def _usable_responses(
+    records: Sequence[Record], tables: Sequence[dict[str, FloatArray]]
+) -> tuple[tuple[str, ...], dict[str, str]]:
+    usable, skipped = [], {}
+    for name in RESPONSES:
+        values = np.concatenate([table[name] for table in tables if name in table] or [np.empty(0)])
+        values = values[np.isfinite(values)]
+        if values.size == 0:
+            if any(name in record.columns for record in records):
+                skipped[name] = "every value is missing"
+        elif values.size < FEWEST_BINS:
+            skipped[name] = f"only {values.size} values"
+        elif np.ptp(values) == 0.0:
+            skipped[name] = "constant"
+        else:
+            usable.append(name)
+    if not usable and not skipped:
+        raise InputError(f"{records[0].path or 'record'}: a diagnosis needs frequency_Hz, bias_deg_per_h or inverse_q.")
+    return tuple(usable), skipped
+
+
+def _place_in_time(records: Sequence[Record]) -> tuple[list[float], bool]:
+    starts = [record.start for record in records]
+    if all(start is not None for start in starts):
+        try:
+            moments = [start.timestamp() for start in starts if start is not None]
+        except (OverflowError, OSError):
+            moments = []
+        if len(set(moments)) == len(records):
+            return [moment - min(moments) for moment in moments], True
+    offsets, now = [], 0.0
+    for record in records:
+        offsets.append(now)
+        now += float(record["time_s"][-1] - record["time_s"][0])
+    return offsets, False
+
+
+def _stretches(table: dict[str, FloatArray]) -> list[tuple[int, int]]:
+    """Split where the temperature is unknown for long: the thermal state after the gap is anyone's guess."""
+    time = table["time_s"]
+    known = np.flatnonzero(np.isfinite(table["temperature"]))
+    if known.size < 2:
+        return []
+    limit = max(LONGEST_GAP, 20.0 * float(np.median(np.diff(time[known]))))
+    breaks = np.flatnonzero(np.diff(time[known]) > limit)
+    begins = [known[0], *known[breaks + 1]]
+    ends = [*(known[breaks] + 1), known[-1] + 1]
+    return list(zip(map(int, begins), map(int, ends), strict=True))
+
+
+def _grid_run(
+    record: int, run: int, label: str, table: dict[str, FloatArray], step: float, group: int, offset: float,
+    reference: float, responses: Sequence[str],
+) -> Run | None:
+    time = table["time_s"]
+    count = int((time[-1] - time[0]) / step + 0.5) // group
+    if count < 5 or time.size < 6:
+        return None
+    fine = time[0] + step * np.arange(count * group)
+    coarse = average(fine, group)
+    slot = np.floor((time - time[0]) / step + 0.5).astype(int)
+    inside = slot < fine.size
+    slot, rows = slot[inside], {key: column[inside] for key, column in table.items()}
+    binned = {
+        name: _bin(rows[name], rows["time_s"], slot // group, coarse) if name in rows else np.full(count, np.nan)
+        for name in responses
+    }
+    return Run(
+        record, label, _states(run, fine, offset, reference, rows, slot), coarse, binned, time,
+        {name: table.get(name, np.full(time.shape, np.nan)) for name in responses},
+    )
+
+
+def _bin(column: FloatArray, time: FloatArray, slot: np.ndarray, grid: FloatArray) -> FloatArray:
+    """Mean over each step of the grid, moved along the slope from the rows' mean time to the centre."""
+    present = np.isfinite(column)
+    weight = np.bincount(slot[present], minlength=grid.size)
+    full = weight >= max(1.0, 0.34 * float(np.median(weight[weight > 0]))) if weight.any() else weight > 0
+    with np.errstate(invalid="ignore", divide="ignore"):
+        mean = np.bincount(slot[present], column[present], grid.size) / weight
+        lead = np.bincount(slot[present], time[present], grid.size) / weight - grid
+    mean[~full] = np.nan
+    known = np.flatnonzero(full)
+    if known.size > 3:
+        slope = np.gradient(mean[known], (grid + lead)[known])
+        mean[known] -= slope * lead[known]
+    return np.asarray(mean)
+
+
+def _states(
+    run: int, grid: FloatArray, offset: float, reference: float, table: dict[str, FloatArray], slot: np.ndarray
+) -> States:
+    """Drives on the fine grid: the temperature between its rows, commands held until they change."""
+    time = table["time_s"]
+    known = np.isfinite(table["temperature"])
+    if known.sum() > 1.5 * grid.size:  # finer than the grid: average
+        means = _bin(table["temperature"], time, slot, grid)
+        solid = np.isfinite(means)
+        housing = np.interp(grid, grid[solid], means[solid]) + 273.15
+    else:
+        housing = np.interp(grid, time[known], table["temperature"][known]) + 273.15
+
+    def command(name: str) -> FloatArray | None:
+        if name not in table or not (known := np.isfinite(table[name])).any():
+            return None
+        index = np.searchsorted(time[known], grid + 1e-9, side="right") - 1
+        return np.asarray(table[name][known][np.clip(index, 0, None)])
+
+    amplitude, voltage, angle = map(command, ("drive_amplitude_V", "electrode_bias_V", "pattern_angle_deg"))
+    return States(
+        run=run, time=grid, campaign_time=grid + offset, housing=housing, resonator=housing, tau=1.0,
+        reference=reference, amplitude_squared=None if amplitude is None else amplitude**2,
+        voltage_squared=None if voltage is None else voltage**2, quadrature=command("quadrature_V"),
+        pattern_angle=None if angle is None else np.radians(angle),
+    )

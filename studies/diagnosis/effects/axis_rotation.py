@@ -1,0 +1,35 @@
+"""Axis rotation: the principal axes of the resonator turn with temperature."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from studies.diagnosis.effects import Effect, Parameter, Span
+from studies.diagnosis.states import FloatArray, States
+
+
+def columns(states: States, shape: Sequence[float], response: str) -> FloatArray:
+    """B = D sin 4(θ − ψ(T)) with ψ = ψ₀ + ψ₁ x, x = T_r − T₀ in units of 10 K: sine and cosine part."""
+    assert states.pattern_angle is not None
+    angle = 4.0 * (states.pattern_angle - np.radians(shape[0]) * states.excess / 10.0)
+    return np.stack([np.sin(angle), np.cos(angle)], axis=1)
+
+
+def grid(span: Span, response: str) -> list[tuple[float, ...]]:
+    """Rotations in both senses, up to a turn of the n = 2 pattern over the covered range."""
+    most = 90.0 / max(span.temperature_range / 10.0, 1e-3)
+    return [(float(sense * most * part),) for part in (0.03, 0.1, 0.2, 0.35, 0.6, 1.0) for sense in (1, -1)]
+
+
+EFFECT = Effect(
+    name="axis-rotation",
+    summary="the principal axes turn with temperature, so the bias depends on azimuth and temperature together",
+    source="two-axis damping and stiffness mismatch, B = D sin 4(θ − ψ)",
+    isolate="the same temperatures at two azimuths or more",
+    responses=("bias_deg_per_h",),
+    needs=("pattern_angle",),
+    coefficients=("sine_{unit}", "cosine_{unit}"),
+    shape=(Parameter("rotation_deg_per_10K", -90.0, 90.0, "turn of the axes", False),),
+    columns=columns,
+    grid=grid,
+)

@@ -1,0 +1,44 @@
+"""Periodic disturbance: a line at one period."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from studies.diagnosis.effects import Effect, Parameter, Span
+from studies.diagnosis.states import FloatArray, States
+
+
+def columns(states: States, shape: Sequence[float], response: str) -> FloatArray:
+    """a sin(2πt/P) + b cos(2πt/P), t from the start of the campaign or, after a restart, of the run."""
+    period, restarts = shape
+    phase = 2.0 * np.pi * (states.time if restarts else states.campaign_time) / period
+    return np.stack([np.sin(phase), np.cos(phase)], axis=1)
+
+
+def grid(span: Span, response: str) -> list[tuple[float, ...]]:
+    """Periods from four steps of the grid to two thirds of a run, spaced finer than a phase slip of 1/4 turn."""
+    slowest, fastest = 1.0 / (0.5 * span.longest_run), 1.0 / (5.0 * span.step)
+    in_run = np.arange(slowest, fastest, 0.35 / span.longest_run)
+    forms = [(float(1.0 / f), 1.0) for f in in_run]
+    if span.runs > 1:
+        across = np.arange(
+            slowest, min(fastest, slowest + 500 * 0.4 / span.campaign_length), 0.4 / span.campaign_length
+        )
+        forms += [(float(1.0 / f), 0.0) for f in across]
+    return forms
+
+
+EFFECT = Effect(
+    name="periodic",
+    summary="a disturbance of one period: an air conditioner, a table, a beat of two clocks",
+    source="harmonic regression",
+    isolate="change the period of the chamber's control, or let the table turn at a known rate",
+    responses=("bias_deg_per_h", "frequency_Hz", "inverse_q"),
+    coefficients=("sine_{unit}", "cosine_{unit}"),
+    shape=(
+        Parameter("period_s", 1.0, 1e7, "period"),
+        Parameter("restarts_each_run", 0.0, 1.0, "1 when each run starts with the same phase", False, True),
+    ),
+    columns=columns,
+    grid=grid,
+)

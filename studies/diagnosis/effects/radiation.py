@@ -1,0 +1,45 @@
+"""Radiation: the time constant shortens with the cube of the temperature."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from studies.diagnosis.effects import Effect, Parameter, Span
+from studies.diagnosis.states import FloatArray, States, lag
+
+
+def columns(states: States, shape: Sequence[float], response: str) -> FloatArray:
+    """Solve τ(T) T_r′ = T_h − T_r with τ(T) = τ / (1 − ρ + ρ (T/T₀)³) and return the change over ρ."""
+    share = shape[0]
+    housing, step, tau = states.housing, states.step, states.tau
+    plain = lag(housing, step, tau)
+    state = plain
+    for _ in range(4):  # the conductance of the previous pass makes each pass a linear lag
+        faster = share * ((state / states.reference) ** 3 - 1.0)
+        state = plain + _lag_with_feed(faster * (housing - state), step, tau)
+    return ((state - plain) / share)[:, None]
+
+
+def _lag_with_feed(feed: FloatArray, step: float, tau: float) -> FloatArray:
+    """Return the solution of τ y′ = −y + feed from y = 0."""
+    return lag(np.concatenate([[0.0], feed]), step, tau)[1:]
+
+
+def grid(span: Span, response: str) -> list[tuple[float, ...]]:
+    """One share is enough: the signature hardly changes its form with it."""
+    return [(0.5,)]
+
+
+EFFECT = Effect(
+    name="radiation",
+    summary="part of the heat is radiated, so the thermal time constant is shorter when hot",
+    source="Stefan-Boltzmann exchange linearised about the reference: conductance 4 ε σ A T³",
+    isolate="the same step at a cold and at a hot mean temperature",
+    responses=("frequency_Hz",),
+    acts_on="temperature",
+    coefficients=("radiated_share",),
+    shape=(Parameter("share_of_form", 0.02, 1.0, "share at which the form is computed", steady=True),),
+    columns=columns,
+    grid=grid,
+    fine=True,
+)

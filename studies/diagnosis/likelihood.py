@@ -1,0 +1,143 @@
+"""Coloured noise: white noise and a random walk of unknown share, in the basis where both are independent.
+
+The noise of one run has the covariance σ² (1 + q K), K_ij = (min(t_i, t_j) + c t₈) / t₈ with t₈ = 8 h: white noise and a
+random walk that has already wandered when the run starts. K has the same eigenvectors for every q, so one
+rotation makes the rows independent and the share q is profiled by weights alone. It is the batch form of the
+steady-state Kalman filter (1 − L)/(1 − θL), exact at the start of each run and across missing rows.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+from studies.diagnosis.states import FloatArray
+
+WALK_TIME = 8 * 3600.0
+WALKED_BEFORE = 0.5
+SHARES = np.array([0.0, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0, 400.0, 2000.0, 2e4])
+
+
+@lru_cache(maxsize=64)
+def _eigenbasis(times: bytes) -> tuple[FloatArray, FloatArray]:
+    t = np.frombuffer(times)
+    walk = (np.minimum(t[:, None], t[None, :]) - t[0]) / WALK_TIME + WALKED_BEFORE
+    values, vectors = np.linalg.eigh(walk)
+    return np.clip(values, 0.0, None), vectors
+
+
+@dataclass(frozen=True)
+class NoiseBasis:
+    """Rotation of the present rows of all runs into independent ones.
+
+    Attributes
+    ----------
+    vectors : sequence of (n_r, n_r) arrays
+        Eigenvectors of K, run by run.
+    walk : (M,) array
+        Eigenvalues of K, stacked: the variance of row i is σ² (1 + q walk_i).
+    """
+
+    vectors: tuple[FloatArray, ...]
+    walk: FloatArray
+
+    @classmethod
+    def of(cls, times: Sequence[FloatArray]) -> "NoiseBasis":
+        """Build the basis from the times of the present rows, one array a run."""
+        parts = [_eigenbasis(np.ascontiguousarray(t - t[0] if t.size else t).tobytes()) for t in times]
+        return cls(tuple(vectors for _, vectors in parts), np.concatenate([values for values, _ in parts]))
+
+    def with_row(self) -> "NoiseBasis":
+        """Return the basis with one white row more, for a prior."""
+        return NoiseBasis((*self.vectors, np.ones((1, 1))), np.append(self.walk, 0.0))
+
+    def rotate(self, stacked: FloatArray) -> FloatArray:
+        """Rotate columns of stacked rows, (M,) or (M, k)."""
+        out = np.empty_like(stacked)
+        begin = 0
+        for vectors in self.vectors:
+            end = begin + vectors.shape[0]
+            out[begin:end] = vectors.T @ stacked[begin:end]
+            begin = end
+        return out
+
+    def steps(self, run: int) -> FloatArray:
+        """Rotated unit steps of one run: column k is 0 up to row k and 1 after it."""
+        vectors = self.vectors[run]
+        return np.asarray((np.cumsum(vectors[::-1], axis=0)[::-1])[1:].T)
+
+    def weights(self, share: float) -> FloatArray:
+        """Inverse variances over σ², (M,)."""
+        return np.asarray(1.0 / (1.0 + share * self.walk))
+
+    def log_determinant(self, share: float) -> float:
+        """Sum of log(1 + q walk)."""
+        return float(np.log1p(share * self.walk).sum())
+
+
+@dataclass(frozen=True)
+class LinearFit:
+    """A linear model fitted by generalised least squares at the most likely share.
+
+    Attributes
+    ----------
+    score : float
+        Minus twice the log-likelihood, up to a constant.
+    share, variance : float
+        q and σ².
+    coefficients : (p,) array
+    covariance : (p, p) array
+    """
+
+    score: float
+    share: float
+    variance: float
+    coefficients: FloatArray
+    covariance: FloatArray
+
+
+def fit_linear(
+    basis: NoiseBasis, target: FloatArray, columns: FloatArray, shares: Sequence[float] | FloatArray = SHARES
+) -> LinearFit:
+    """Fit rotated `target` by rotated `columns`, the share of the random walk profiled over `shares`."""
+    rows, count = columns.shape
+    scale = np.linalg.norm(columns, axis=0)
+    scale[scale == 0.0] = 1.0
+    unit = columns / scale
+    best: tuple[float, float, float] | None = None
+    for share in shares:
+        root = np.sqrt(basis.weights(share))
+        rss = _residual(unit * root[:, None], target * root)
+        score = rows * np.log(max(rss, 1e-300)) + basis.log_determinant(share)
+        if best is None or score < best[0]:
+            best = (float(score), float(share), rss)
+    assert best is not None
+    root = np.sqrt(basis.weights(best[1]))
+    u, s, vt = np.linalg.svd(unit * root[:, None], full_matrices=False)
+    kept = s > 1e-10 * s[0]
+    inverse = np.where(kept, 1.0 / np.where(kept, s, 1.0), 0.0)
+    coefficients = (vt.T * inverse) @ (u.T @ (target * root)) / scale
+    freedom = max(rows - int(kept.sum()), 1)
+    variance = best[2] / freedom
+    covariance = variance * ((vt.T * inverse**2) @ vt) / np.outer(scale, scale)
+    return LinearFit(best[0], best[1], variance, np.asarray(coefficients), np.asarray(covariance))
+
+
+def _residual(columns: FloatArray, target: FloatArray) -> float:
+    ortho = orthonormal(columns)
+    return float(np.sum((target - ortho @ (ortho.T @ target)) ** 2))
+
+
+def orthonormal(columns: FloatArray) -> FloatArray:
+    """Return an orthonormal basis of the columns; those that the earlier ones already span are dropped."""
+    q, r = np.linalg.qr(columns)
+    size = np.abs(np.diag(r))
+    return np.asarray(q[:, size > 1e-9 * max(float(size.max()), 1e-300)])
+
+
+def profile_shares(score: FloatArray, most: int = 5) -> FloatArray:
+    """Return the shares worth trying around the most likely one, given the score at each of `SHARES`."""
+    best = int(np.argmin(score))
+    low = max(0, best - most + 2)
+    return SHARES[low : min(len(SHARES), best + 2)]

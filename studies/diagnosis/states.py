@@ -1,0 +1,134 @@
+"""What one run goes through on an even time grid, and the operators with memory that act on it."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import lfilter
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class States:
+    """The drives and the thermal state of one run on an even time grid.
+
+    Attributes
+    ----------
+    run : int
+        Number of the run in its campaign, from 0.
+    time : (N,) array
+        Seconds since the start of the run, evenly spaced.
+    campaign_time : (N,) array
+        Seconds since the start of the first run.
+    housing : (N,) array
+        Temperature that drives the resonator (housing sensor, else chamber), K.
+    resonator : (N,) array
+        Temperature of the resonator, K: the housing's through one lag `tau`, unless something better is known.
+    tau : float
+        Time constant of that lag, s.
+    reference : float
+        Temperature from which polynomials count, K.
+    amplitude_squared, voltage_squared, quadrature, pattern_angle : (N,) array or None
+        Square of the drive amplitude and of the electrode bias, V²; quadrature control, V; azimuth, rad.
+    """
+
+    run: int
+    time: FloatArray
+    campaign_time: FloatArray
+    housing: FloatArray
+    resonator: FloatArray
+    tau: float
+    reference: float
+    amplitude_squared: FloatArray | None = None
+    voltage_squared: FloatArray | None = None
+    quadrature: FloatArray | None = None
+    pattern_angle: FloatArray | None = None
+
+    @property
+    def step(self) -> float:
+        """Time step of the grid, s."""
+        return float(self.time[1] - self.time[0]) if self.time.size > 1 else 1.0
+
+    @property
+    def excess(self) -> FloatArray:
+        """Resonator temperature minus the reference, K."""
+        return self.resonator - self.reference
+
+    @property
+    def rate(self) -> FloatArray:
+        """Rate of the resonator temperature, K/s."""
+        if self.time.size < 2:
+            return np.zeros_like(self.time)
+        return np.asarray(np.gradient(self.resonator, self.step))
+
+    def averaged(self, group: int) -> "States":
+        """Return the means over `group` samples at a time: the same run on a coarser grid."""
+        if group == 1:
+            return self
+
+        def mean(values: FloatArray | None) -> FloatArray | None:
+            return None if values is None else average(values, group)
+
+        return replace(
+            self, time=average(self.time, group), campaign_time=average(self.campaign_time, group),
+            housing=average(self.housing, group), resonator=average(self.resonator, group),
+            amplitude_squared=mean(self.amplitude_squared), voltage_squared=mean(self.voltage_squared),
+            quadrature=mean(self.quadrature), pattern_angle=mean(self.pattern_angle),
+        )
+
+    def with_lag(self, tau: float) -> "States":
+        """Return the same run with the resonator following the housing through the lag `tau`, s."""
+        return replace(self, tau=tau, resonator=lag(self.housing, self.step, tau))
+
+
+def average(values: FloatArray, group: int) -> FloatArray:
+    """Return means of `group` samples at a time along the first axis; an incomplete last group is left out."""
+    count = values.shape[0] // group
+    return np.asarray(values[: count * group].reshape(count, group, *values.shape[1:]).mean(axis=1))
+
+
+def lag(drive: FloatArray, step: float, tau: float) -> FloatArray:
+    """Return the response of a first-order lag, τ y′ = u − y, started in equilibrium.
+
+    Exact for a drive that is linear between its samples (first-order hold).
+
+    Parameters
+    ----------
+    drive : (N,) array
+        Input on an even grid.
+    step, tau : float
+        Time step and time constant, s.
+    """
+    ratio = step / tau
+    decay = np.exp(-ratio)
+    ramp = -np.expm1(-ratio) / ratio if ratio > 1e-12 else 1.0
+    ahead, behind = 1.0 - ramp, ramp - decay
+    start = drive[:1] * (1.0 - ahead)
+    out, _ = lfilter([ahead, behind], [1.0, -decay], drive, zi=start)
+    return np.asarray(out)
+
+
+def play(drive: FloatArray, radius: float, start: float = 0.0) -> FloatArray:
+    """Return the play (backlash) operator, the elementary rate-independent hysteresis.
+
+    p_k = min(u_k + r, max(u_k − r, p_{k−1})), with p_0 = u_0 + start · r.
+
+    Parameters
+    ----------
+    drive : (N,) array
+        Input.
+    radius : float
+        Half width of the loop, in the unit of the drive.
+    start : float
+        Where in its band the operator starts, −1 … 1.
+    """
+    out = np.empty_like(drive)
+    state = float(drive[0]) + start * radius
+    for k, value in enumerate(drive.tolist()):
+        if state < value - radius:
+            state = value - radius
+        elif state > value + radius:
+            state = value + radius
+        out[k] = state
+    return out

@@ -1,0 +1,41 @@
+"""Noise of five families, unit rms of the white part per row."""
+
+import numpy as np
+
+FAMILIES = ("white", "walk", "flicker", "correlated", "outliers")
+
+
+def draw(family, time, rng):
+    """Noise of one run in units of its white part."""
+    n = time.size
+    white = rng.standard_normal(n)
+    dt = np.diff(time, prepend=time[0])
+    hours = (time[-1] - time[0]) / 3600.0
+    if family == "white":
+        return white
+    if family == "walk":
+        total = np.exp(rng.uniform(np.log(0.2), np.log(2.0)))
+        return white + total * np.cumsum(rng.standard_normal(n) * np.sqrt(dt / 3600.0 / hours))
+    if family == "flicker":
+        level = np.exp(rng.uniform(np.log(0.05), np.log(0.3)))
+        out = white
+        for tau in 30.0 * 4.0 ** np.arange(7):
+            out = out + level * _ou(dt, tau, rng)
+        return out
+    if family == "correlated":
+        return white + rng.uniform(0.1, 0.5) * _ou(dt, 1500.0, rng)
+    spikes = rng.random(n) < 0.004
+    return white + spikes * rng.standard_normal(n) * 25.0
+
+
+def _ou(dt, tau, rng):
+    """Ornstein-Uhlenbeck of unit rms on uneven steps, started in its stationary state."""
+    kicks = rng.standard_normal(dt.size)
+    decay = np.exp(-dt / tau)
+    out = np.empty(dt.size)
+    state = kicks[0]
+    spread = np.sqrt(1.0 - decay**2)
+    for k in range(dt.size):
+        state = decay[k] * state + spread[k] * kicks[k] if k else kicks[0]
+        out[k] = state
+    return out
