@@ -7,6 +7,7 @@ Only the product ζ₁₂ · 2k/g₂ is seen in the output, so the *scale* of ζ
 coefficients of (10) would mean tens of rad/s, so they serve as the shape ζ₁₂(T)/ζ₁₂(0) only.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -167,10 +168,23 @@ def simulate_bias(time: ArrayLike, cross_damping: ArrayLike, k: float, zeta: flo
     return np.asarray(filter9.simulate(time, cross_damping, settled=True), dtype=float)
 
 
+@dataclass(frozen=True)
+class RestRun:
+    """One run of a gyro that does not turn: time (s), output (rad/s), temperature (K); arrays (N,)."""
+
+    time: Real
+    rate: Real
+    temperature: Real
+
+    def __post_init__(self) -> None:
+        columns = read_columns(time=self.time, rate=self.rate, temperature=self.temperature)
+        for name, values in zip(("time", "rate", "temperature"), columns, strict=True):
+            object.__setattr__(self, name, values)
+        check_time(columns[0])
+
+
 def fit_cross_damping(
-    time: ArrayLike,
-    rate: ArrayLike,
-    temperature: ArrayLike,
+    runs: Sequence[RestRun],
     *,
     k: float,
     zeta: float,
@@ -181,12 +195,12 @@ def fit_cross_damping(
     """Fit ζ₁₂(T) to the output of a gyro at rest: eq. (10) through eq. (9).
 
     The model is linear in ζᵢ: each column of the regression is Tⁱ after the filter (9), so the fit is dynamic too.
-    The intervals allow for residuals that are correlated in time (see `regression`).
+    The covariance allows for errors that wander (see `correlated`).
 
     Parameters
     ----------
-    time, rate, temperature : array (N,)
-        Times (s), output at zero rate (rad/s) and temperature (K).
+    runs : sequence of RestRun
+        One or more runs.
     k, zeta, g2 : float
         Constants of eq. (9): natural frequency (rad/s), relative damping and Coriolis coefficient (1).
     calibration_temperature : float
@@ -197,28 +211,37 @@ def fit_cross_damping(
     Raises
     ------
     CompensationError
-        On values that are not finite, a constant temperature, too few rows, or times that do not increase.
+        When there is no run, the temperature is constant or takes too few values for the order, or rows are too few.
     """
-    t, Omega, T = read_columns(time=time, rate=rate, temperature=temperature)
-    check_time(t)
     if order < 1:
         raise CompensationError(f"the polynomial of eq. (10) needs an order of 1 or more, not {order}.")
-    shift = T - calibration_temperature
-    size = float(np.max(np.abs(shift))) or 1.0
-    refuse_constant_columns(T[:, None], ["temperature"])
-    columns = [simulate_bias(t, (shift / size) ** i, k, zeta, g2) for i in range(order + 1)]
-    names = [f"zeta_{i}" for i in range(order + 1)]
-    fit = fit_linear(np.column_stack(columns), Omega, names, constant=False)
+    if not runs:
+        raise CompensationError("the cross-damping fit needs at least one run of the gyro at rest.")
+    time, rate, temperature = (
+        np.concatenate([getattr(run, name) for run in runs]) for name in ("time", "rate", "temperature")
+    )
+    refuse_constant_columns(temperature[:, None], ["temperature"])
+    size = float(np.max(np.abs(temperature - calibration_temperature)))
+    powers = [
+        np.concatenate(
+            [
+                simulate_bias(run.time, ((run.temperature - calibration_temperature) / size) ** i, k, zeta, g2)
+                for run in runs
+            ]
+        )
+        for i in range(order + 1)
+    ]
+    fit = fit_linear(np.column_stack(powers), rate, [f"zeta_{i}" for i in range(order + 1)], constant=False)
     scale = size ** -np.arange(order + 1.0)
     return CrossDampingModel(
         coefficients=scale * fit.coefficients,
-        covariance=scale[:, None] * correlated_covariance(fit) * scale,
+        covariance=scale[:, None] * correlated_covariance(fit, time) * scale,
         calibration_temperature=calibration_temperature,
         k=k,
         zeta=zeta,
         g2=g2,
-        lowest=float(np.min(T)),
-        highest=float(np.max(T)),
+        lowest=float(np.min(temperature)),
+        highest=float(np.max(temperature)),
         noise=fit.standard_deviation,
     )
 
