@@ -55,7 +55,10 @@ class PolynomialFit:
     def turning_points(self, low: float, high: float) -> Array:
         """Return the x between low and high, in rising order, at which dy/dx = 0."""
         c = self.regression.coefficients
-        roots = np.polynomial.polynomial.polyroots(np.arange(1, c.size) * c[1:])
+        derivative = np.arange(1, c.size) * c[1:]
+        # A leading coefficient that is only rounding would throw the true roots away.
+        derivative = np.polynomial.polynomial.polytrim(derivative, 1e-12 * float(np.abs(derivative).max()))
+        roots = np.polynomial.polynomial.polyroots(derivative)
         real = roots[np.abs(roots.imag) < 1e-9].real * self.half_span + self.centre
         return np.sort(real[(real >= low) & (real <= high)])
 

@@ -1,7 +1,9 @@
 """The errors that a user can mend, by the exit status that they cause."""
 
 import difflib
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
 
 from compensation.errors import CompensationError
 from shell.errors import ShellError
@@ -17,6 +19,15 @@ class MissingEnvironment(RuntimeError):
 
 
 UNUSABLE_INPUT = (InputError, ShellError, ThermalError, CompensationError)
+
+
+@contextmanager
+def naming(place: str | Path) -> Iterator[None]:
+    """Give what the physics packages refuse the name of the file or key that it came from."""
+    try:
+        yield
+    except (ShellError, ThermalError, CompensationError) as error:
+        raise InputError(f"{place}: {error}") from error
 
 
 def nearest(word: str, known: Iterable[str]) -> str:

@@ -10,6 +10,7 @@ from collections.abc import Sequence
 COMMANDS: dict[str, tuple[str, str]] = {
     # name: (module:function, one line of help)
     "reproduce": ("studies.cli.reproduce:reproduce", "The HRG paper's tables and figures from its own data."),
+    "modes": ("studies.cli.modes:modes", "Frequencies, Bryan factors and sensitivities of the modes."),
     "tcf": ("studies.cli.tcf:tcf", "Frequency against temperature and its parts."),
     "fit frequency": ("studies.cli.fit_frequency:fit_frequency", "f(T) and its inverse from a steady-state table."),
     "cards": ("studies.cli.cards:cards", "The instrument cards that ship."),
@@ -59,7 +60,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         status = app(words)
     except CycloptsError as error:
-        return _complain(f"{str(error).strip()} See 'hrg --help'.", 2, error if debug else None)
+        asked = " ".join(["hrg", *_command_words(words), "--help"])
+        return _complain(f"{' '.join(str(error).split())} See '{asked}'.", 2, error if debug else None)
     except UNUSABLE_INPUT as error:
         return _complain(str(error), 2, error if debug else None)
     except MissingEnvironment as error:
@@ -82,6 +84,14 @@ GROUPS = {
     "fit": "Calibrate a compensation model from measured data.",
     "study": "Parametric studies: run, status, report, export.",
 }
+
+
+def _command_words(words: Sequence[str]) -> list[str]:
+    """Return the leading words that name a command, for a hint that leads to its help."""
+    for size in (2, 1):
+        if " ".join(words[:size]) in COMMANDS:
+            return list(words[:size])
+    return []
 
 
 def _complain(message: str, status: int, error: BaseException | None = None) -> int:

@@ -31,6 +31,7 @@ def fit_frequency(
         Print one JSON object (schema hrg.fit-frequency/1) instead of tables.
     """
     from studies.cli.output import print_json, print_table, say
+    from studies.errors import naming
     from studies.files.writing import write_text
     from studies.papers.hrg import study_table
     from studies.record import read_frequency_table, reading_resolution
@@ -39,7 +40,8 @@ def fit_frequency(
     data = read_frequency_table(table)
     T, f = data.values["temperature_degC"], data.values["frequency_Hz"]
     step = resolution if resolution is not None else reading_resolution(f)
-    study = study_table(T, f, order, reference_temperature, step)
+    with naming(table):
+        study = study_table(T, f, order, reference_temperature, step)
     if save is not None:
         from pathlib import Path
 

@@ -12,11 +12,12 @@ from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from studies.errors import InputError, nearest
+from studies.errors import InputError, naming, nearest
 from studies.files.toml import Section, check_number, read_toml
 from studies.files.writing import write_text
 
 if TYPE_CHECKING:
+    from shell.elastic import Elastic
     from shell.materials import Material
     from shell.meridian import Resonator
 
@@ -69,6 +70,11 @@ class Instrument:
     def material(self) -> "Material":
         """The material over temperature."""
         return _build_material(self.content["material"], self.path, self.reference_temperature)
+
+    def at(self, temperature: float) -> "tuple[Resonator, Elastic]":
+        """Return the resonator, grown by its expansion, and its elastic constants at a uniform temperature (K)."""
+        growth = float(self.material.growth(temperature, self.reference_temperature))
+        return self.resonator.scaled(growth), self.material.elastic(temperature)
 
     @property
     def effects(self) -> Sequence[Mapping[str, Any]]:
@@ -147,7 +153,6 @@ def shipped_cards() -> dict[str, Path]:
 
 
 def _build_material(table: Mapping[str, Any], path: str, reference: float) -> "Material":
-    from shell.errors import ShellError
     from shell.materials import constant_material, find_material, read_materials
 
     section = Section(table, f"{path} [material]", MATERIAL_KEYS)
@@ -166,7 +171,7 @@ def _build_material(table: Mapping[str, Any], path: str, reference: float) -> "M
         raise InputError(f"{section.where}: poisson_ratio must lie between -1 and 0.5, not {given['poisson_ratio']:g}.")
     own = Path(path).parent / section.text("file") if "file" in section else None
     law = section.text("law", "default")
-    try:
+    with naming(section.where):
         if own is None and name not in read_materials() and given:
             missing = [k for k in ("youngs_modulus", "poisson_ratio", "density") if k not in given]
             if missing:
@@ -176,5 +181,3 @@ def _build_material(table: Mapping[str, Any], path: str, reference: float) -> "M
                 )
             return constant_material(name, **given)
         return find_material(name, law, own).rescaled(reference, **given)
-    except ShellError as error:
-        raise InputError(f"{section.where}: {error}") from error

@@ -5,7 +5,7 @@ from collections.abc import Callable, Mapping
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any, Literal, cast
 
-from studies.errors import InputError
+from studies.errors import InputError, naming
 from studies.files.toml import Section, check_number
 
 if TYPE_CHECKING:
@@ -26,16 +26,12 @@ def build_resonator(table: Mapping[str, Any], where: str) -> "Resonator":
     InputError
         An unknown shape or key, a missing or impossible dimension.
     """
-    from shell.errors import ShellError
-
     shape = table.get("shape")
     if not isinstance(shape, str) or shape not in SHAPES:
         raise InputError(f"{where}: shape must be one of {', '.join(SHAPES)}, not {shape!r}.")
     known, build = SHAPES[shape]
-    try:
+    with naming(where):
         return build(Section(table, where, ("shape", *known)))
-    except ShellError as error:
-        raise InputError(f"{where}: {error}") from error
 
 
 def _hemisphere(table: Section) -> "Resonator":

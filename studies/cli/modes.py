@@ -1,0 +1,98 @@
+"""`hrg modes`: frequencies, Bryan factors and sensitivities of a card's modes."""
+
+from typing import Annotated, Literal
+
+from cyclopts import Parameter
+
+
+def modes(
+    card: str,
+    *,
+    harmonic: Annotated[tuple[int, ...], Parameter(consume_multiple=True)] = (2,),
+    count: int = 1,
+    temperature: float | None = None,
+    theory: Literal["solid", "shell", "rayleigh"] = "solid",
+    tolerance: float = 1e-5,
+    sensitivities: bool = False,
+    json: bool = False,
+) -> int:
+    """Compute the lowest modes of a resonator: frequency, Bryan factor, energies, sensitivities.
+
+    Parameters
+    ----------
+    card : str
+        Path of a card, or the name of one that ships (hrg cards).
+    harmonic : tuple[int, ...]
+        One or more circumferential harmonics n, for example --harmonic 0 1 2 3.
+    count : int
+        Number of modes of each harmonic.
+    temperature : float
+        Temperature of the resonator in °C; the card's reference temperature unless given.
+    theory : str
+        solid (three-dimensional), shell (Naghdi) or rayleigh (closed form, hemisphere of constant thickness).
+    tolerance : float
+        Relative error that the frequency may have against its own theory.
+    sensitivities : bool
+        Show how each frequency follows E, nu, rho, thickness and radius, and where its energy is.
+    json : bool
+        Print one JSON object (schema hrg.modes/1) instead of a table.
+    """
+    from shell.modes import solve_modes
+    from studies.cli.output import print_json, print_table
+    from studies.errors import InputError
+    from studies.instrument.card import ZERO_CELSIUS, load_card
+
+    if count < 1:
+        raise InputError(f"--count {count}: at least one mode must be asked for.")
+    instrument = load_card(card)
+    T = instrument.reference_temperature if temperature is None else temperature + ZERO_CELSIUS
+    resonator, elastic = instrument.at(T)
+    found = [m for n in harmonic for m in solve_modes(resonator, elastic, n, count, theory, tolerance)]
+    detailed = theory != "rayleigh"
+    if json:
+        entries = []
+        for m in found:
+            entry = {
+                "harmonic": m.harmonic,
+                "index": m.index,
+                "label": m.label,
+                "frequency_Hz": m.frequency,
+                "bryan_factor": m.bryan_factor,
+                "relative_error_estimate": m.relative_error_estimate,
+            }
+            if detailed:
+                entry |= {
+                    "modal_mass_kg": m.modal_mass,
+                    "sensitivities": vars(m.sensitivities),
+                    "energy_fractions": vars(m.energy_fractions),
+                }
+            entries.append(entry)
+        print_json(
+            {
+                "schema": "hrg.modes/1",
+                "card": instrument.name,
+                "temperature_degC": T - ZERO_CELSIUS,
+                "theory": theory,
+                "modes": entries,
+            }
+        )
+        return 0
+    rows = [
+        [
+            str(m.harmonic),
+            str(m.index),
+            m.label,
+            f"{m.frequency:.4f}",
+            f"{m.bryan_factor:.5f}",
+            f"{m.relative_error_estimate:.0e}",
+        ]
+        for m in found
+    ]
+    columns = ["n", "index", "kind", "frequency (Hz)", "Bryan factor", "relative error"]
+    note = "The error estimate is against the exact solution of the same theory."
+    if theory == "rayleigh":
+        note = "Rayleigh's closed form ignores the free edge: on a hemisphere it lies several per cent too high."
+    print_table(f"{instrument.name} at {T - ZERO_CELSIUS:g} °C, {theory}", columns, rows, note)
+    if sensitivities and detailed:
+        _print_details(found)
+    return 0

@@ -1,0 +1,132 @@
+"""Contract of the command line: light start, exit statuses, one object on stdout, errors without traceback (real processes)."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from studies.cli import COMMANDS, main
+
+ROOT = Path(__file__).parents[2]
+HEAVY = ("pandas", "scipy", "sympy", "matplotlib", "pyvista", "trimesh", "dask", "vtk")
+
+
+def hrg(*words: str, cwd: Path = ROOT) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-c", "from studies.cli import run; run()", *words]
+    environment = {**os.environ, "PYTHONPATH": str(ROOT), "COLUMNS": "120"}
+    return subprocess.run(command, capture_output=True, text=True, cwd=cwd, env=environment, timeout=300)
+
+
+@pytest.mark.parametrize("words", [["--help"], ["--version"], ["fit", "--help"]])
+def test_help_starts_without_the_heavy_packages(words):
+    code = (
+        "import sys\nfrom studies.cli import main\n"
+        f"status = main({words!r})\n"
+        f"print('HEAVY', [m for m in {HEAVY!r} if m in sys.modules], status)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=ROOT, timeout=60)
+    assert "HEAVY [] 0" in done.stdout, done.stdout[-500:] + done.stderr[-500:]
+
+
+@pytest.mark.parametrize("name", sorted(COMMANDS))
+def test_every_command_has_help_that_documents_json(name, capsys):
+    assert main([*name.split(), "--help"]) == 0
+    assert "--json" in capsys.readouterr().out
+
+
+def test_every_command_is_listed(capsys):
+    assert main(["--help"]) == 0
+    text = capsys.readouterr().out
+    for name in COMMANDS:
+        assert name.split()[0] in text
+
+
+def test_an_error_of_a_real_process_is_status_2_without_traceback():
+    done = hrg("tcf", "none.toml")
+    assert (done.returncode, done.stdout) == (2, "")
+    assert "Traceback" not in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("words", "part"),
+    [
+        (["nonsense"], "nonsense"),
+        (["tcf"], "card"),
+        (["tcf", "hrg-30m"], "hrg-30mm"),
+        (["tcf", "none.toml"], "no such file"),
+        (["tcf", "hrg-30mm", "--from", "-300", "--theory", "shell"], "outside the range"),
+        (["tcf", "hrg-30mm", "--step", "0"], "step"),
+        (["modes", "hrg-30mm", "--count", "0"], "count"),
+        (["materials", "fused-silca"], "fused-silica"),
+        (["fit", "frequency", "none.csv"], "no such file"),
+        (["fit", "frequency", "studies/papers/hrg_table1.csv", "--order", "7"], "order"),
+        (["reproduce", "--out", "README.md/sub"], "cannot be written"),
+    ],
+)
+def test_unusable_input_is_one_plain_message_and_status_2(words, part, capsys, monkeypatch):
+    monkeypatch.chdir(ROOT)
+    assert main(words) == 2
+    out, err = capsys.readouterr()
+    assert part in err
+    assert "Traceback" not in err
+    assert out == ""
+
+
+def test_debug_shows_the_traceback(capsys):
+    assert main(["tcf", "none.toml", "--debug"]) == 2
+    assert "Traceback" in capsys.readouterr().err
+
+
+def test_json_is_one_object_and_nothing_else():
+    done = hrg("fit", "frequency", "studies/papers/hrg_table1.csv", "--json")
+    assert done.returncode == 0, done.stderr
+    found = json.loads(done.stdout)
+    assert found["schema"] == "hrg.fit-frequency/1"
+    assert len(found["coefficients"]) == 4
+
+
+def test_a_foreign_package_of_our_name_is_status_3(tmp_path):
+    (tmp_path / "thermal.py").write_text("")
+    code = "import sys; sys.path.insert(0, sys.argv.pop(1)); from studies.cli import main; sys.exit(main(['cards']))"
+    done = subprocess.run(
+        [sys.executable, "-c", code, str(tmp_path)], capture_output=True, text=True, cwd=ROOT, timeout=60
+    )
+    assert done.returncode == 3
+    assert "thermal" in done.stderr
+    assert "uninstall" in done.stderr
+
+
+def test_fit_frequency_writes_page_and_model_whole(tmp_path):
+    table, page, model = ROOT / "studies/papers/hrg_table1.csv", tmp_path / "p.html", tmp_path / "m.toml"
+    assert main(["fit", "frequency", str(table), "--report", str(page), "--save", str(model)]) == 0
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["m.toml", "p.html"]
+    text = page.read_text(encoding="utf-8")
+    assert "quartic is significantly better" in text
+    assert "http://" not in text.replace("http://www.w3.org", "")
+    assert text.count("data:image/svg+xml;base64") == 3
+
+
+def test_text_of_users_is_escaped_in_a_page(tmp_path):
+    table = tmp_path / "<script>alert(1)<"
+    table.write_text((ROOT / "studies/papers/hrg_table1.csv").read_text(encoding="utf-8"), encoding="utf-8")
+    assert main(["fit", "frequency", str(table), "--report", str(tmp_path / "p.html")]) == 0
+    assert "<script>alert" not in (tmp_path / "p.html").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize(
+    ("rows", "part"),
+    [
+        ("0,4424.9\n0,4424.9\n0,4424.9\n0,4424.9\n0,4424.9\n", "constant"),
+        ("0,4424.9\n10,4428.5\n", "different values"),
+        ("0,4424\n10,4424\n20,4424\n30,4424\n40,4424\n50,4424\n", "constant"),
+        ("0,4424\n10,4430\n20,4432\n30,4430\n40,4424\n50,4414\n", "turns"),
+    ],
+)
+def test_unusable_tables_are_refused(tmp_path, rows, part, capsys):
+    path = tmp_path / "t.csv"
+    path.write_text("temperature_degC,frequency_Hz\n" + rows)
+    assert main(["fit", "frequency", str(path)]) == 2
+    assert part in capsys.readouterr().err
