@@ -7,7 +7,10 @@ from typing import Literal
 import numpy as np
 from scipy.sparse import csr_matrix
 
+from shell.blocks import Rows, Solid, Tie, constrain, mesh_solid, number_unknowns, tabulate
+from shell.corner import find_kinks, lay_clamped_face, lay_corner
 from shell.eigen import Index, Pattern, find_pattern
+from shell.errors import ShellError
 from shell.kernel import (
     Orders,
     Section,
@@ -18,13 +21,13 @@ from shell.kernel import (
     station_mass,
     station_stiffness,
 )
-from shell.layout import Chain, lay_chain
+from shell.layout import Chain, End, lay_chain
 from shell.meridian import Resonator
+from shell.patches import Part
 from shell.quadrature import Array, gauss, legendre, nodal
+from shell.root import lay_root
 
 Theory = Literal["solid", "shell", "rayleigh"]
-Part = Literal["shell", "root", "stem", "corner"]
-Rows = dict[int, list[tuple[int, float]]]
 
 
 @dataclass(frozen=True)
@@ -58,12 +61,12 @@ LEVELS: dict[str, tuple[Level, ...]] = {
 
 @dataclass(frozen=True, eq=False)
 class Group:
-    """Elements of one kind: their strain table, their unknowns with orientation signs, and what part they belong to."""
+    """Elements of one kind: their strain table, their unknowns with orientation signs, and the part each belongs to."""
 
     table: StrainTable
     unknowns: Index
     signs: Array
-    part: Part
+    parts: tuple[Part, ...]
     frame: tuple[Array, Array] | None = None  # t_r, t_z at the stations of a shell; None where the axes are r, θ, z
 
 
@@ -141,53 +144,98 @@ def _restrict(matrix: Array, to_free: Array | None) -> Array:
     return matrix if to_free is None else np.asarray(to_free.T @ matrix @ to_free)
 
 
+@dataclass(frozen=True, eq=False)
+class Layout:
+    """Chains of shell elements, the solid parts, and for each solid part the (chain, end) that it ties."""
+
+    chains: tuple[Chain, ...]
+    solids: tuple[tuple[Solid, tuple[tuple[int, int], ...]], ...]
+
+
 @lru_cache(maxsize=24)
 def build_system(resonator: Resonator, n: int, theory: Theory, level: Level) -> System:
     """Lay out, number and tabulate a resonator; cached, since only the material changes with temperature."""
-    chains = lay_resonator(resonator, n, level)
-    groups, rows, size = [], {}, 0
-    for chain in chains:
-        group, constrained, size = _shell_group(resonator, chain, n, level, size)
+    layout = lay_resonator(resonator, n, level)
+    groups: list[Group] = []
+    rows: Rows = {}
+    ends: dict[tuple[int, int], Tie] = {}
+    size = 0
+    for k, chain in enumerate(layout.chains):
+        group, size = _shell_group(resonator, chain, n, level, size)
         groups.append(group)
-        rows.update(constrained)
+        for side in (0, 1):
+            ends[k, side] = _chain_end(resonator, chain, group, side, level.through)
+            rows.update(_end_rows(chain.ends[side], ends[k, side], n))
+    for solid, tied in layout.solids:
+        mesh = mesh_solid(solid, level.block)
+        rows.update(constrain(mesh, solid, tuple(ends[at] for at in tied), level.block, n, size))
+        numbers, signs, size = number_unknowns(mesh, level.block, size)
+        groups.append(Group(tabulate(mesh, solid, level.block, n), numbers, signs, mesh.parts))
     held = resonator.support != "free"
     return System(tuple(groups), _constraint(rows, size), 0 if held or n > 1 else 2, n)
 
 
-def lay_resonator(resonator: Resonator, n: int, level: Level) -> list[Chain]:
-    """The chains of shell elements."""
-    first: Literal["pole", "clamped", "free"] = "pole" if resonator.starts_on_axis else "free"
-    last: Literal["pole", "clamped", "free"] = "pole" if resonator.ends_on_axis else "free"
+def lay_resonator(resonator: Resonator, n: int, level: Level) -> Layout:
+    """Divide the section: a solid root or clamped face first, then chains of shell with a solid corner at every kink."""
+    start, first = 0.0, _free_or_pole(resonator.starts_on_axis)
+    solids: list[tuple[Solid, tuple[tuple[int, int], ...]]] = []
     if resonator.support == "clamped-pole":
         first = "clamped"
-    if resonator.support == "clamped-rim":
-        last = "clamped"
-    return [lay_chain(resonator, 0.0, resonator.length, (first, last), n, level.split)]
+    elif resonator.support == "stem":
+        solid, start = lay_root(resonator, level.rings)
+        solids.append((solid, ((0, 0),)))
+        first = "tied"
+    elif resonator.support == "clamped-face":
+        solid, start = lay_clamped_face(resonator, level.rings)
+        solids.append((solid, ((0, 0),)))
+        first = "tied"
+    chains: list[Chain] = []
+    for joint in find_kinks(resonator):
+        corner, (stop, restart) = lay_corner(resonator, joint, level.rings)
+        if not stop > start:
+            raise ShellError("two solid corners or clamps of the meridian overlap: lengthen the segment between them.")
+        chains.append(lay_chain(resonator, start, stop, (first, "tied"), n, level.split))
+        solids.append((corner, ((len(chains) - 1, 1), (len(chains), 0))))
+        start, first = restart, "tied"
+    last: End = "clamped" if resonator.support == "clamped-rim" else _free_or_pole(resonator.ends_on_axis)
+    chains.append(lay_chain(resonator, start, resonator.length, (first, last), n, level.split))
+    return Layout(tuple(chains), tuple(solids))
 
 
-def _shell_group(resonator: Resonator, chain: Chain, n: int, level: Level, start: int) -> tuple[Group, Rows, int]:
+def _free_or_pole(on_axis: bool) -> End:
+    return "pole" if on_axis else "free"
+
+
+def _shell_group(resonator: Resonator, chain: Chain, n: int, level: Level, start: int) -> tuple[Group, int]:
     """Tabulate one chain and number its unknowns, (node, amplitude) from `start`."""
     p, orders = level.along, level.through
     xi, weights = gauss(p + 2)
     eta = gauss(max(orders) + 2)
     section = _sections(resonator, chain, xi, weights)
-    table = shell_table(
-        section, n,
-        tuple(legendre(order, eta[0]) for order in orders), eta, nodal(p, xi),  # type: ignore[arg-type]
-    )
+    u, v, w = (legendre(order, eta[0]) for order in orders)
+    table = shell_table(section, n, (u, v, w), eta, nodal(p, xi))
     elements, m = len(chain.segments), sum(orders) + 3
     nodes = p * np.arange(elements)[:, None] + np.arange(p + 1)
     unknowns = start + (nodes[:, :, None] * m + np.arange(m)).reshape(elements, -1)
-    rows: Rows = {}
-    for end, node, s in ((chain.ends[0], 0, chain.breaks[0]), (chain.ends[1], elements * p, chain.breaks[-1])):
-        at = [start + node * m + k for k in range(m)]
-        if end == "clamped":
-            rows.update({unknown: [] for unknown in at})
-        elif end == "pole":
-            t_r = float(resonator.at([s], chain.segments[0 if node == 0 else -1]).tangent_r[0])
-            rows.update(_pole_rows(at, orders, n, round(t_r)))
-    group = Group(table, unknowns, np.ones(unknowns.shape), "shell", (section.tangent_r, section.tangent_z))
-    return group, rows, start + (elements * p + 1) * m
+    parts: tuple[Part, ...] = ("shell",) * elements
+    group = Group(table, unknowns, np.ones(unknowns.shape), parts, (section.tangent_r, section.tangent_z))
+    return group, start + (elements * p + 1) * m
+
+
+def _chain_end(resonator: Resonator, chain: Chain, group: Group, side: int, orders: Orders) -> Tie:
+    """The cross-section at one end of a chain and its unknowns."""
+    place = resonator.at([chain.breaks[-side]], chain.segments[-side])
+    m = sum(orders) + 3
+    members = group.unknowns[0, :m] if side == 0 else group.unknowns[-1, -m:]
+    return Tie(place, orders, tuple(int(k) for k in members))
+
+
+def _end_rows(end: End, tie: Tie, n: int) -> Rows:
+    if end == "clamped":
+        return {k: [] for k in tie.unknowns}
+    if end == "pole":
+        return _pole_rows(tie.unknowns, tie.orders, n, round(float(tie.place.tangent_r[0])))
+    return {}
 
 
 def _sections(resonator: Resonator, chain: Chain, xi: Array, weights: Array) -> Section:
@@ -205,7 +253,7 @@ def _sections(resonator: Resonator, chain: Chain, xi: Array, weights: Array) -> 
     )
 
 
-def _pole_rows(at: list[int], orders: Orders, n: int, t_r: int) -> Rows:
+def _pole_rows(at: tuple[int, ...], orders: Orders, n: int, t_r: int) -> Rows:
     """What stays regular on the axis: n = 0 only w; n = 1 the translation v = -t_r u; n > 1 nothing."""
     u, v, w = np.split(np.array(at), np.cumsum([orders[0] + 1, orders[1] + 1]))
     if n == 0:

@@ -1,0 +1,139 @@
+"""Solid corners where the meridian kinks, and the ring around a clamped face, where stress is singular."""
+
+from math import hypot
+
+import numpy as np
+from scipy.optimize import root
+
+from shell.blocks import Solid
+from shell.errors import ShellError
+from shell.layout import SMOOTH_JOINT
+from shell.meridian import MeridianPoints, Resonator
+from shell.patches import Cell, Part, Patch, Path, rings, shrinking, straight, whole
+from shell.quadrature import Array
+
+Spot = tuple[float, float]
+
+COLLAR = 1.5  # width of the solid strip beside a corner, in thicknesses
+
+
+def find_kinks(resonator: Resonator) -> list[int]:
+    """Joints (index of the segment before) at which the tangent turns."""
+    kinks = []
+    for k, s in enumerate(resonator.joints):
+        before, after = resonator.at([s], k), resonator.at([s], k + 1)
+        if abs(_turn(before, after)) > SMOOTH_JOINT:
+            kinks.append(k)
+    return kinks
+
+
+def lay_corner(resonator: Resonator, joint: int, ring_count: int) -> tuple[Solid, tuple[float, float]]:
+    """Patches of one corner, and the arc lengths where the shell ends before it and begins after it.
+
+    Both faces are continued straight until they meet. The kite between the inner meeting point I, the two cross-sections
+    through I and the outer meeting point O is one patch, with a strip of shell on either side:
+
+        strip | kite | strip,  all three refined towards I.
+    """
+    s = resonator.joints[joint]
+    turn = _turn(resonator.at([s], joint), resonator.at([s], joint + 1))
+    if abs(turn) > 3.0:
+        raise ShellError(f"segments {joint + 1} and {joint + 2} of the meridian fold back on each other.")
+    inner = 1.0 if turn > 0 else -1.0  # the side of the normal on which the faces meet first
+    s_1, s_2 = _meet(resonator, joint, inner)
+    before, after = resonator.at([s_1], joint), resonator.at([s_2], joint + 1)
+    meeting, feet = _face(before, inner), (_face(before, -inner), _face(after, -inner))
+    outer = _cross(feet[0], _tangent(before), feet[1], _tangent(after))
+    cells = rings(shrinking(ring_count))
+    kite = Patch(straight(meeting, feet[0]), straight(feet[1], outer), straight(meeting, feet[1]), straight(feet[0], outer),
+                 cells, "corner")
+    ends = (_strip_end(resonator, joint, s_1, -1), _strip_end(resonator, joint + 1, s_2, 1))
+    strips = (
+        _strip(resonator, joint, s_1, ends[0], inner, cells),
+        _strip(resonator, joint + 1, s_2, ends[1], inner, cells),
+    )
+    return Solid((kite, *strips), lambda r, z: False, s / resonator.length), ends
+
+
+def lay_clamped_face(resonator: Resonator, ring_count: int) -> tuple[Solid, float]:
+    """Patches of a flat bottom around the edge of its clamp, and the arc length where the shell begins."""
+    c = resonator.clamp_radius
+    h = float(resonator.at([0.0], 0).thickness[0])
+    low = float(resonator.at([0.0], 0).z[0]) - h / 2
+    width = min(COLLAR * h, 0.6 * c)
+    cells = rings(shrinking(ring_count))
+    patches = [
+        _box((c, low), (c + width, low + h), cells),
+        _box((c, low), (c - width, low + h), cells),
+        _box((0.0, low), (c - width, low + h), whole()),
+    ]
+    margin = 1e-9 * resonator.length
+    held = lambda r, z: abs(z - low) < margin and r <= c + margin  # noqa: E731
+    return Solid(tuple(patches), held, c / resonator.length), c + width
+
+
+def _turn(before: MeridianPoints, after: MeridianPoints) -> float:
+    """Angle from one tangent to the next, positive towards the normal n = (-t_z, t_r)."""
+    along = before.tangent_r * after.tangent_r + before.tangent_z * after.tangent_z
+    aside = before.tangent_r * after.tangent_z - before.tangent_z * after.tangent_r
+    return float(np.arctan2(aside, along)[0])
+
+
+def _meet(resonator: Resonator, joint: int, inner: float) -> tuple[float, float]:
+    """Arc lengths on the two segments whose cross-sections share the inner corner I."""
+    s = resonator.joints[joint]
+
+    def gap(x: Array) -> list[float]:
+        one, two = _face(resonator.at([x[0]], joint), inner), _face(resonator.at([x[1]], joint + 1), inner)
+        return [one[0] - two[0], one[1] - two[1]]
+
+    h = float(resonator.at([s], joint).thickness[0])
+    found = root(gap, [s - h / 2, s + h / 2], tol=1e-14)
+    s_1, s_2 = (float(x) for x in found.x)
+    if hypot(*gap(found.x)) > 1e-9 * h or not resonator._starts[joint] < s_1 <= s <= s_2 < resonator._starts[joint + 2]:
+        raise ShellError(f"the corner between segments {joint + 1} and {joint + 2} is too sharp or its segments too short for the thickness.")
+    return s_1, s_2
+
+
+def _strip_end(resonator: Resonator, segment: int, s: float, direction: int) -> float:
+    """Where the solid strip ends: a few thicknesses on, but not beyond the middle of the segment."""
+    h = float(resonator.at([s], segment).thickness[0])
+    first, last = resonator._starts[segment], resonator._starts[segment + 1]
+    room = (last - s if direction > 0 else s - first) * 0.4
+    return s + direction * min(COLLAR * h, room)
+
+
+def _strip(resonator: Resonator, segment: int, s: float, end: float, inner: float, cells: tuple[Cell, ...]) -> Patch:
+    def side(eta: float) -> Path:
+        def path(x: Array) -> tuple[Array, Array]:
+            points = resonator.at(np.ravel(s + (end - s) * x), segment)
+            zeta = eta * points.thickness / 2
+            return (points.r + zeta * points.normal_r).reshape(np.shape(x)), (points.z + zeta * points.normal_z).reshape(np.shape(x))
+
+        return path
+
+    start, stop = resonator.at([s], segment), resonator.at([end], segment)
+    return Patch(straight(_face(start, inner), _face(start, -inner)), straight(_face(stop, inner), _face(stop, -inner)),
+                 side(inner), side(-inner), cells, "corner")
+
+
+def _face(points: MeridianPoints, eta: float) -> Spot:
+    zeta = eta * points.thickness[0] / 2
+    return float(points.r[0] + zeta * points.normal_r[0]), float(points.z[0] + zeta * points.normal_z[0])
+
+
+def _tangent(points: MeridianPoints) -> Spot:
+    return float(points.tangent_r[0]), float(points.tangent_z[0])
+
+
+def _cross(one: Spot, along_one: Spot, two: Spot, along_two: Spot) -> Spot:
+    """Where the straight lines through two points meet."""
+    det = along_one[0] * along_two[1] - along_one[1] * along_two[0]
+    x = ((two[0] - one[0]) * along_two[1] - (two[1] - one[1]) * along_two[0]) / det
+    return one[0] + x * along_one[0], one[1] + x * along_one[1]
+
+
+def _box(corner: Spot, opposite: Spot, cells: tuple[Cell, ...], part: Part = "root") -> Patch:
+    (r0, z0), (r1, z1) = corner, opposite
+    return Patch(straight((r0, z0), (r1, z0)), straight((r0, z1), (r1, z1)), straight((r0, z0), (r0, z1)),
+                 straight((r1, z0), (r1, z1)), cells, part)

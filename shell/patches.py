@@ -1,0 +1,102 @@
+"""Curved quadrilaterals of the (r, z) plane and how they are cut into cells, finer towards a corner."""
+
+import itertools
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from shell.quadrature import Array
+
+Planar = tuple[Array, Array]
+Path = Callable[[Array], Planar]
+Part = Literal["shell", "root", "stem", "corner"]
+Cell = tuple[tuple[float, float], tuple[float, float], tuple[float, float], tuple[float, float]]
+
+SHRINK = 0.18  # size of one ring of cells around a sharp corner over the ring outside it
+
+
+@dataclass(frozen=True)
+class Patch:
+    """A curved quadrilateral and its cells.
+
+    The four sides map [0, 1] to (r, z): `bottom` and `top` run along x, `left` and `right` along y. A cell is four
+    points of the unit square, in the order (ξ, η) = (-1, -1), (1, -1), (-1, 1), (1, 1).
+    """
+
+    bottom: Path
+    top: Path
+    left: Path
+    right: Path
+    cells: tuple[Cell, ...]
+    part: Part
+
+    def place(self, x: Array, y: Array) -> Planar:
+        """The transfinite (Coons) interpolation of the sides at points of the unit square."""
+        zero, one = np.zeros(1), np.ones(1)
+        corners = {(0, 0): self.bottom(zero), (1, 0): self.bottom(one), (0, 1): self.top(zero), (1, 1): self.top(one)}
+        bottom, top, left, right = self.bottom(x), self.top(x), self.left(y), self.right(y)
+        r, z = (
+            (1 - y) * bottom[k] + y * top[k] + (1 - x) * left[k] + x * right[k]
+            - (1 - x) * (1 - y) * corners[0, 0][k] - x * (1 - y) * corners[1, 0][k]
+            - (1 - x) * y * corners[0, 1][k] - x * y * corners[1, 1][k]
+            for k in (0, 1)
+        )
+        return r, z
+
+    def place_cell(self, cell: Cell, xi: Array, eta: Array) -> Planar:
+        """Points of one cell at ξ, η in [-1, 1]."""
+        weights = [(1 - xi) * (1 - eta) / 4, (1 + xi) * (1 - eta) / 4, (1 - xi) * (1 + eta) / 4, (1 + xi) * (1 + eta) / 4]
+        x, y = (sum(weight * point[k] for weight, point in zip(weights, cell, strict=True)) for k in (0, 1))
+        return self.place(np.asarray(x), np.asarray(y))
+
+
+def whole() -> tuple[Cell, ...]:
+    """One cell."""
+    return (((0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (1.0, 1.0)),)
+
+
+def layers(steps: tuple[float, ...]) -> tuple[Cell, ...]:
+    """Cells between the falling steps 1, ..., > 0 of x, and the last down to 0, each over all of y."""
+    bounds = (*steps, 0.0)
+    return tuple(
+        ((inner, 0.0), (outer, 0.0), (inner, 1.0), (outer, 1.0)) for outer, inner in itertools.pairwise(bounds)
+    )
+
+
+def rings(steps: tuple[float, ...]) -> tuple[Cell, ...]:
+    """Rings of two cells around the corner (0, 0) between the falling steps, and one square at the corner.
+
+    The sides x = 1 and y = 1 stay whole; the sides through the corner are cut as `layers` cuts them.
+    """
+    last = steps[-1]
+    cells: list[Cell] = [((0.0, 0.0), (last, 0.0), (0.0, last), (last, last))]
+    for outer, inner in itertools.pairwise(steps):
+        cells.append(((inner, 0.0), (outer, 0.0), (inner, inner), (outer, outer)))
+        cells.append(((0.0, inner), (inner, inner), (0.0, outer), (outer, outer)))
+    return tuple(cells)
+
+
+def shrinking(count: int, ratio: float = SHRINK) -> tuple[float, ...]:
+    """The steps 1, q, q², ... of `count` rings."""
+    return tuple(ratio**k for k in range(count + 1))
+
+
+def straight(start: tuple[float, float], end: tuple[float, float]) -> Path:
+    """The straight side from one point to another."""
+
+    def path(x: Array) -> Planar:
+        return start[0] + (end[0] - start[0]) * x, start[1] + (end[1] - start[1]) * x
+
+    return path
+
+
+def circular(center: tuple[float, float], radius: float, first: float, last: float) -> Path:
+    """A circular side, center + radius (cos ψ, sin ψ) for ψ from `first` to `last`."""
+
+    def path(x: Array) -> Planar:
+        psi = first + (last - first) * x
+        return center[0] + radius * np.cos(psi), center[1] + radius * np.sin(psi)
+
+    return path

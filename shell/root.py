@@ -1,0 +1,192 @@
+r"""The root of a stem: the solid region where a cylinder on the axis grows out of the dome.
+
+The section is cut along the cross-section of the shell where the fillet (or the sharp corner) touches the dome:
+
+    far face   pole ----- X ------- O ---- collar end      (for an inner stem the far face is the outer one)
+                |  core   |   \\      |       |
+               axis ----- X1 -- M/T1-T2 ---- collar end
+                |  stem   | side |
+
+T2 and T1 are the fillet's ends on the dome and on the stem, M its middle; with a sharp corner they are one point.
+"""
+
+import itertools
+from collections.abc import Callable
+from dataclasses import dataclass
+from math import atan2, ceil, hypot, log, pi
+
+import numpy as np
+from scipy.optimize import brentq
+
+from shell.blocks import Solid
+from shell.errors import ShellError
+from shell.meridian import Resonator, Stem
+from shell.patches import Patch, Path, Planar, circular, layers, rings, shrinking, straight, whole
+from shell.quadrature import Array
+
+Spot = tuple[float, float]
+
+COLLAR = 1.5  # width of the solid ring around the root, in thicknesses
+FILLET_SHRINK = 0.3
+
+
+@dataclass(frozen=True)
+class Contact:
+    """Where one stem meets the dome: arc length of T2, fillet centre, its two ends; `face` -1 inner, +1 outer."""
+
+    face: int
+    end: float
+    s: float
+    center: Spot
+    on_dome: Spot
+    on_stem: Spot
+
+
+def lay_root(resonator: Resonator, ring_count: int) -> tuple[Solid, float]:
+    """Patches of cap, root and stem, and the arc length where the shell begins."""
+    stem = resonator.stem
+    assert stem is not None
+    contacts = [_touch(resonator, stem, face, end) for face, end in stem.roots]
+    h = float(resonator.at([contacts[0].s]).thickness[0])
+    widest = max(contact.s for contact in contacts)
+    collar = widest + COLLAR * h + min(stem.fillet, h)
+    if collar > widest + 0.5 * (resonator.length - widest):
+        raise ShellError("the stem leaves no room for the shell: make the stem or its fillet smaller, or the shell thinner.")
+    inset = min(0.5 * stem.radius, 2 * h + stem.fillet)
+    patches: list[Patch] = []
+    for contact in contacts:
+        far = 0.0 if len(contacts) == 2 else -float(contact.face)
+        patches += _half_root(resonator, stem, contact, far, widest, collar, stem.radius - inset, ring_count)
+    ends = [contact.end for contact in contacts]
+
+    def held(r: float, z: float) -> bool:
+        return any(abs(z - end) < 1e-9 * resonator.length for end in ends)
+
+    return Solid(tuple(patches), held, collar / resonator.length), collar
+
+
+def _touch(resonator: Resonator, stem: Stem, face: int, end: float) -> Contact:
+    """Solve for the fillet that touches the stem's side and the dome's face; radius 0 gives the corner itself."""
+
+    def center(s: float) -> tuple[float, float]:
+        r, z = (float(x[0]) for x in _offset(resonator, face)(np.array([s])))
+        normal_r, normal_z = _face_normal(resonator, face, s)
+        return r + stem.fillet * normal_r, z + stem.fillet * normal_z
+
+    reach = stem.radius + stem.fillet
+    dome = resonator.segments[0].length
+    trial = np.linspace(0, dome, 200)
+    beyond = np.flatnonzero([center(float(s))[0] > reach for s in trial])
+    if not len(beyond):
+        raise ShellError("the stem with its fillet is larger than the dome it stands on.")
+    s = float(brentq(lambda x: center(float(x))[0] - reach, trial[beyond[0] - 1], trial[beyond[0]], xtol=1e-15 * dome, rtol=1e-15))
+    middle = center(s)
+    on_dome = tuple(float(x[0]) for x in _offset(resonator, face)(np.array([s])))
+    return Contact(face, end, s, middle, (on_dome[0], on_dome[1]), (stem.radius, middle[1]))
+
+
+def _half_root(
+    resonator: Resonator, stem: Stem, contact: Contact, far: float, s_far: float, collar: float, r_inner: float, ring_count: int
+) -> list[Patch]:
+    """The patches between one face of the dome and `far` (η of the opposite face, or 0: the middle surface)."""
+    near_face, far_face = _offset(resonator, contact.face), _offset(resonator, far)
+    s_x = float(brentq(lambda s: far_face(np.array([s]))[0][0] - r_inner, 0.0, s_far, xtol=1e-15 * s_far))
+    over = _point(far_face, s_x)  # X
+    corner = _point(far_face, s_far)  # O
+    level = contact.on_stem[1]
+    under: Spot = (r_inner, level)  # X1
+    foot: Spot = (stem.radius, level)  # T1
+    steps = _steps(stem.fillet, min(hypot(foot[0] - under[0], 0.0), _distance(contact.on_dome, corner)), ring_count)
+    rim_near, rim_far = _point(near_face, collar), _point(far_face, collar)
+    cross, roof = straight(contact.on_dome, corner), _along(far_face, s_far, s_x)
+    patches = [
+        Patch(cross, straight(rim_near, rim_far), _along(near_face, contact.s, collar), _along(far_face, s_far, collar),
+              rings(steps), "root"),
+        Patch(straight((0.0, level), under), _along(far_face, 0.0, s_x), straight((0.0, level), _point(far_face, 0.0)),
+              straight(under, over), whole(), "root"),
+    ]
+    if stem.fillet:
+        patches += _fillet(contact, stem.fillet, cross, roof, straight(foot, under), straight(under, over), over, steps)
+    else:
+        patches.append(Patch(cross, straight(under, over), straight(foot, under), roof, rings(steps), "root"))
+    return patches + _column(stem.radius, r_inner, level, contact.end, steps)
+
+
+def _fillet(
+    contact: Contact, radius: float, cross: Path, roof: Path, floor: Path, wall: Path, over: Spot, steps: tuple[float, ...]
+) -> list[Patch]:
+    """Two patches that meet on the line from the middle of the fillet to X."""
+    (r, z), on_dome, on_stem = contact.center, contact.on_dome, contact.on_stem
+    first = atan2(on_dome[1] - z, on_dome[0] - r)
+    turn = (atan2(on_stem[1] - z, on_stem[0] - r) - first + pi) % (2 * pi) - pi
+    middle = first + turn / 2
+    center_line = straight((r + radius * np.cos(middle), z + radius * np.sin(middle)), over)
+    return [
+        Patch(cross, center_line, circular((r, z), radius, first, middle), roof, layers(steps), "root"),
+        Patch(floor, center_line, circular((r, z), radius, first + turn, middle), wall, layers(steps), "root"),
+    ]
+
+
+def _column(radius: float, r_inner: float, top: float, end: float, steps: tuple[float, ...]) -> list[Patch]:
+    """The stem itself, from its root to the clamped end, in two columns of growing cells."""
+    direction = 1.0 if end > top else -1.0
+    heights, step = [0.0], radius - r_inner
+    while heights[-1] < abs(end - top) - 1e-12:
+        heights.append(heights[-1] + step)
+        step = min(2.5 * step, 1.5 * radius)
+    heights = heights[:-1] if len(heights) > 2 and abs(end - top) - heights[-2] < 0.3 * (heights[-1] - heights[-2]) else heights
+    heights[-1] = abs(end - top)
+    levels = [top + direction * height for height in heights]
+    patches = []
+    for k, (one, two) in enumerate(itertools.pairwise(levels)):
+        patches.append(_rectangle((radius, one), (r_inner, two), rings(steps) if k == 0 else whole()))
+        patches.append(_rectangle((0.0, one), (r_inner, two), whole()))
+    return patches
+
+
+def _rectangle(corner: Spot, opposite: Spot, cells: tuple) -> Patch:  # type: ignore[type-arg]
+    (r0, z0), (r1, z1) = corner, opposite
+    return Patch(straight((r0, z0), (r1, z0)), straight((r0, z1), (r1, z1)), straight((r0, z0), (r0, z1)),
+                 straight((r1, z0), (r1, z1)), cells, "stem")
+
+
+def _steps(fillet: float, reach: float, ring_count: int) -> tuple[float, ...]:
+    """Rings shrink to nothing at a sharp corner, and to the size of the fillet at a rounded one."""
+    if not fillet:
+        return shrinking(ring_count)
+    return shrinking(max(0, ceil(log(reach / (2 * fillet)) / -log(FILLET_SHRINK))) + 1, FILLET_SHRINK)
+
+
+def _offset(resonator: Resonator, eta: float) -> Callable[[Array], Planar]:
+    """The surface at η h/2 from the middle surface, as a function of its arc length."""
+
+    def surface(s: Array) -> Planar:
+        shape = np.shape(s)
+        points = resonator.at(np.ravel(s), 0)
+        zeta = eta * points.thickness / 2
+        return (points.r + zeta * points.normal_r).reshape(shape), (points.z + zeta * points.normal_z).reshape(shape)
+
+    return surface
+
+
+def _face_normal(resonator: Resonator, face: int, s: float) -> Spot:
+    """Unit normal of a face of the dome, out of the material."""
+    there = resonator.at([s], 0)
+    stretch = 1 + there.curvature[0] * face * there.thickness[0] / 2
+    rise = face * there.thickness_slope[0] / 2
+    r = stretch * there.tangent_r[0] + rise * there.normal_r[0]
+    z = stretch * there.tangent_z[0] + rise * there.normal_z[0]
+    return -face * z / hypot(r, z), face * r / hypot(r, z)
+
+
+def _along(surface: Callable[[Array], Planar], first: float, last: float) -> Path:
+    return lambda x: surface(first + (last - first) * x)
+
+
+def _point(surface: Callable[[Array], Planar], s: float) -> Spot:
+    r, z = surface(np.array([s]))
+    return float(r[0]), float(z[0])
+
+
+def _distance(one: Spot, two: Spot) -> float:
+    return hypot(one[0] - two[0], one[1] - two[1])
