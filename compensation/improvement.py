@@ -53,5 +53,4 @@ def hold_out(
     if len(runs) < 2:
         raise CompensationError("a held-out improvement needs two runs or more.")
     after = [compensate([*runs[:i], *runs[i + 1 :]], run) for i, run in enumerate(runs)]
-    before = np.concatenate([output(run) - np.mean(output(run)) for run in runs])
-    return compare_outputs(before, np.concatenate(after))
+    return compare_outputs(np.concatenate([output(run) for run in runs]), np.concatenate(after))

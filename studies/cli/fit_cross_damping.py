@@ -1,0 +1,128 @@
+"""`hrg fit cross-damping`: the bias of a CVG from cross-damping over temperature."""
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from studies.record import Record
+
+
+def fit_cross_damping(
+    *data: str,
+    frequency: float | None = None,
+    quality: float | None = None,
+    order: int = 3,
+    calibration_temperature: float = 20.0,
+    save: str | None = None,
+    report: str | None = None,
+    json: bool = False,
+) -> int:
+    """Fit the cross-damping of a cylindrical gyro over temperature (CVG cross-damping paper, equations 9 and 10).
+
+    The records are of a gyro at rest: time_s, a temperature, and bias_deg_per_h or measured_rate_deg_per_s.
+    Only the product of cross-damping and frequency is seen in the output, so the scale of the coefficients
+    is as good as the frequency given.
+
+    Parameters
+    ----------
+    data : str
+        One or more records (CSV).
+    frequency : float
+        Natural frequency in Hz; by default the median of the records' frequency_Hz.
+    quality : float
+        Quality factor Q, from which the relative damping 1/(2Q) follows; by default from the records' inverse_q.
+    order : int
+        Highest power of the temperature; the paper takes 3.
+    calibration_temperature : float
+        Temperature in °C from which the shift T is counted.
+    save : str
+        Write the model (TOML), for hrg compensate.
+    report : str
+        Write a page (HTML).
+    json : bool
+        Print one JSON object (schema hrg.fit-cross-damping/1) instead of tables.
+    """
+    import math
+
+    import numpy as np
+
+    from studies.cli.output import print_json, print_table, say
+    from studies.cross_damping import study_cross_damping
+    from studies.errors import InputError
+    from studies.files.writing import write_text
+    from studies.models import source_of, write_model
+    from studies.models.kinds.cross_damping import OUTPUTS, save_cross_damping
+    from studies.record import read_record
+    from studies.reports import cross_damping as page
+    from studies.rest import gather_rest
+
+    if not data:
+        raise InputError("name at least one record (CSV) of a gyro at rest.")
+    records = [read_record(path) for path in data]
+    carrier = frequency if frequency is not None else _median(records, "frequency_Hz", "--frequency")
+    Q = quality if quality is not None else 1 / _median(records, "inverse_q", "--quality")
+    if not (math.isfinite(Q) and Q > 1 and carrier > 0):
+        raise InputError(
+            f"a frequency of {carrier:g} Hz with Q = {Q:g} is no resonator; both must be positive, Q above 1."
+        )
+    gathered = gather_rest(records, OUTPUTS)
+    study = study_cross_damping(
+        gathered.runs,
+        k=2 * math.pi * carrier,
+        zeta=1 / (2 * Q),
+        calibration_temperature=calibration_temperature + 273.15,
+        order=order,
+    )
+    model = save_cross_damping(
+        study.model,
+        gathered.output,
+        gathered.temperature_column,
+        tuple(source_of(record) for record in records),
+        "hrg-workbench, hrg fit cross-damping",
+    )
+    if save is not None:
+        write_model(model, save)
+        say(f"model: {save}")
+    if gathered.left_out:
+        say(f"{gathered.left_out} rows without output or temperature were left out.")
+    if gathered.block_s:
+        say(f"long records were averaged over {gathered.block_s:g} s before the fit.")
+    if report is not None:
+        write_text(report, page.cross_damping_page(study, gathered, ", ".join(data)))
+        say(f"report: {report}")
+    unit = OUTPUTS[gathered.output]
+    if json:
+        print_json(
+            {
+                "schema": "hrg.fit-cross-damping/1",
+                "records": list(data),
+                "output": gathered.output,
+                "temperature": gathered.temperature_column,
+                "frequency_Hz": carrier,
+                "quality": Q,
+                "calibration_temperature_degC": calibration_temperature,
+                "coefficients": study.model.coefficients,
+                "standard_errors": np.sqrt(np.diag(study.model.covariance)),
+                "training": {"before": study.training.before / unit, "after": study.training.after / unit},
+                "held_out": {"before": study.held_out.before / unit, "after": study.held_out.after / unit},
+                "improvement_training": study.training.ratio,
+                "improvement_held_out": study.held_out.ratio,
+                "dynamic_part": study.memory / unit,
+                "rows_left_out": gathered.left_out,
+            }
+        )
+        return 0
+    for block in (page.coefficients_table(study), page.improvement_table(study, gathered)):
+        print_table(block.caption, block.columns, block.rows, block.note)
+    return 0
+
+
+def _median(records: "list[Record]", column: str, option: str) -> float:
+    """Median of a column over all records that have it."""
+    import numpy as np
+
+    from studies.errors import InputError
+
+    values = np.concatenate([record[column] for record in records if column in record] or [np.empty(0)])
+    if not np.any(np.isfinite(values)):
+        raise InputError(f"the records have no {column}; give {option}.")
+    return float(np.nanmedian(values))

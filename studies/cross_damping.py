@@ -1,0 +1,57 @@
+"""A cross-damping calibration as a study: the fit, what it improves, and what it improves on data it has not seen."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from compensation.cross_damping import CrossDampingModel, RestRun, fit_cross_damping
+from compensation.improvement import Improvement, compare_outputs, hold_out
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+BLOCKS = 5
+"""Parts into which a single run is cut, each to be predicted from the others."""
+
+
+@dataclass(frozen=True)
+class CrossDampingStudy:
+    """The model, the runs, the improvement on them, and the improvement on runs or blocks left out."""
+
+    model: CrossDampingModel
+    runs: tuple[RestRun, ...]
+    training: Improvement
+    held_out: Improvement
+
+    @property
+    def memory(self) -> float:
+        """Largest part of the compensation (rad/s) that is due to the dynamics of eq. (9)."""
+        return max(self.model.memory(run.time, run.temperature) for run in self.runs)
+
+
+def study_cross_damping(
+    runs: Sequence[RestRun], *, k: float, zeta: float, calibration_temperature: float = 293.15, order: int = 3
+) -> CrossDampingStudy:
+    """Fit ζ₁₂(T) and judge it; parameters as for `compensation.cross_damping.fit_cross_damping`."""
+    import numpy as np
+
+    def fit(chosen: Sequence[RestRun]) -> CrossDampingModel:
+        return fit_cross_damping(chosen, k=k, zeta=zeta, calibration_temperature=calibration_temperature, order=order)
+
+    def compensate(chosen: Sequence[RestRun], run: RestRun) -> "NDArray[np.float64]":
+        return fit(chosen).compensate(run.time, run.rate, run.temperature, extrapolate=True)
+
+    model = fit(runs)
+    after = np.concatenate([model.compensate(run.time, run.rate, run.temperature) for run in runs])
+    training = compare_outputs(np.concatenate([run.rate for run in runs]), after)
+    pieces = runs if len(runs) > 1 else split_run(runs[0], BLOCKS)
+    return CrossDampingStudy(model, tuple(runs), training, hold_out(pieces, lambda run: run.rate, compensate))
+
+
+def split_run(run: RestRun, parts: int) -> list[RestRun]:
+    """Return the run cut into parts of equal length, in order of time."""
+    import numpy as np
+
+    pieces = np.array_split(np.arange(len(run.time)), parts)
+    return [RestRun(run.time[piece], run.rate[piece], run.temperature[piece]) for piece in pieces]

@@ -1,0 +1,132 @@
+"""Models of kind `cross-damping`: ζ₁₂(T) through the filter (9) of the CVG cross-damping paper, and its C code.
+
+The file has one part "cross-damping" (zeta_0, zeta_1 …, per power of °C of shift) and the settings
+`calibration_temperature_degC`, `frequency_Hz`, `relative_damping`, `g2` and `temperature_column`.
+"""
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from studies.errors import InputError
+from studies.models.c_source import head, polynomial
+from studies.models.file import Model, Part, Source, make_part
+from studies.record import COMPENSATED, Record
+
+if TYPE_CHECKING:
+    from compensation.cross_damping import CrossDampingModel
+
+CELSIUS_ZERO = 273.15
+OUTPUTS = {"bias_deg_per_h": math.radians(1 / 3600), "measured_rate_deg_per_s": math.radians(1.0)}
+"""Columns that a cross-damping model can compensate, with the size of their unit in rad/s."""
+
+
+def save_cross_damping(
+    fit: "CrossDampingModel", output: str, temperature_column: str, sources: tuple[Source, ...], made_by: str
+) -> Model:
+    """Return a fitted ζ₁₂(T) as a model that compensates the column `output`."""
+    order = len(fit.coefficients) - 1
+    names = [f"zeta_{i}" for i in range(order + 1)]
+    units = ["1", "1/degC", *(f"1/degC^{i}" for i in range(2, order + 1))][: order + 1]
+    return Model(
+        kind="cross-damping",
+        compensates=output,
+        parts=(make_part("cross-damping", names, fit.coefficients, units, fit.covariance),),
+        settings={
+            "calibration_temperature_degC": fit.calibration_temperature - CELSIUS_ZERO,
+            "frequency_Hz": fit.k / (2 * math.pi),
+            "relative_damping": fit.zeta,
+            "g2": fit.g2,
+            "temperature_column": temperature_column,
+        },
+        validity={temperature_column: (fit.lowest - CELSIUS_ZERO, fit.highest - CELSIUS_ZERO)},
+        sources=sources,
+        made_by=made_by,
+    )
+
+
+def load_cross_damping(model: Model) -> "CrossDampingModel":
+    """Return the fit that a model file holds."""
+    from compensation.cross_damping import CrossDampingModel
+
+    part, column = _part(model), _temperature_column(model)
+    if column not in model.validity:
+        raise InputError(f"{model.path or 'model'} [validity]: the range of '{column}' is missing; add it.")
+    low, high = model.validity[column]
+    return CrossDampingModel(
+        coefficients=np.array(part.values),
+        covariance=np.array(part.covariance) if part.covariance else np.full((len(part.values),) * 2, np.nan),
+        calibration_temperature=model.number("calibration_temperature_degC") + CELSIUS_ZERO,
+        k=2 * math.pi * model.number("frequency_Hz"),
+        zeta=model.number("relative_damping"),
+        g2=model.number("g2"),
+        lowest=low + CELSIUS_ZERO,
+        highest=high + CELSIUS_ZERO,
+        noise=math.nan,
+    )
+
+
+def compensate(model: Model, record: Record, *, extrapolate: bool) -> dict[str, NDArray[np.float64]]:
+    """Subtract the predicted cross-damping error; rows without temperature or output stay empty."""
+    output, column = model.compensates, _temperature_column(model)
+    if output not in OUTPUTS:
+        raise InputError(f"{model.path or 'model'}: a cross-damping model compensates {' or '.join(OUTPUTS)}.")
+    for name in (output, column):
+        if name not in record:
+            raise InputError(f"the column '{name}' is missing; this cross-damping model needs it.")
+    temperature = record[column]
+    model.check_range(column, temperature, extrapolate)
+    known = np.isfinite(temperature)
+    if np.count_nonzero(known) < 2:
+        raise InputError(f"the column '{column}' has fewer than two values; nothing can be compensated.")
+    predicted = load_cross_damping(model).predict(
+        record["time_s"][known], temperature[known] + CELSIUS_ZERO, extrapolate=True
+    )
+    compensated = np.full(len(record), np.nan)
+    compensated[known] = record[output][known] - predicted / OUTPUTS[output]
+    return {f"{COMPENSATED}{output}": compensated}
+
+
+def emit_c(model: Model) -> str:
+    """Return `hrg_cross_damping_step(&state, T, dt)`, the erroneous rate to subtract, in C99."""
+    part = _part(model)
+    unit = OUTPUTS.get(model.compensates)
+    if unit is None:
+        raise InputError(f"{model.path or 'model'}: a cross-damping model compensates {' or '.join(OUTPUTS)}.")
+    pole = 2 * math.pi * model.number("frequency_Hz") * model.number("relative_damping")
+    gain = 2 * (2 * math.pi * model.number("frequency_Hz")) / model.number("g2") / unit
+    return f"""{head(model)}
+{polynomial("hrg_cross_damping", "shift", part.values)}
+
+/* Set the state as if temperature_degC had lasted; call once before the first step. */
+void hrg_cross_damping_settle(double *state, double temperature_degC) {{
+    *state = {gain!r} * hrg_cross_damping(temperature_degC - ({model.number("calibration_temperature_degC")!r}));
+}}
+
+/* Error of {model.compensates} at this temperature, one step of dt_s seconds later: subtract it from the output. */
+double hrg_cross_damping_step(double *state, double temperature_degC, double dt_s) {{
+    double target;
+    hrg_cross_damping_settle(&target, temperature_degC);
+    *state = target + (*state - target) * exp(-{pole!r} * dt_s);
+    return *state;
+}}
+"""
+
+
+def _part(model: Model) -> Part:
+    part = model.part("cross-damping")
+    expected = tuple(f"zeta_{i}" for i in range(len(part.values)))
+    if part.names != expected:
+        raise InputError(
+            f"{model.path or 'model'} [[part]] cross-damping: the coefficients must be {', '.join(expected)}, in this order."
+        )
+    return part
+
+
+def _temperature_column(model: Model) -> str:
+    column = model.settings.get("temperature_column")
+    if not isinstance(column, str):
+        raise InputError(f"{model.path or 'model'} [settings]: the key 'temperature_column' must name a column.")
+    return column

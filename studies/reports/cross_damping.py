@@ -1,0 +1,135 @@
+"""The page of a cross-damping calibration, and the pictures like the CVG paper's figures 1 and 2."""
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from studies.models.kinds.cross_damping import OUTPUTS
+from studies.reports import style
+from studies.reports.page import Chapter, Facts, Picture, Table, Text, draw, render_page
+
+if TYPE_CHECKING:
+    from compensation.cross_damping import CrossDampingModel, RestRun
+    from studies.cross_damping import CrossDampingStudy
+    from studies.rest import RestData
+
+SOURCES = ("Apostolyuk V., Chikovani V., Temperature error model in Coriolis vibratory gyroscopes: eqs. (1)–(10).",)
+UNITS = {"bias_deg_per_h": "°/h", "measured_rate_deg_per_s": "°/s"}
+MOST_POINTS = 4000
+
+
+def cross_damping_page(study: "CrossDampingStudy", data: "RestData", source: str) -> str:
+    """Return the page for a user's own records."""
+    lead = (
+        f"The zero-rate output of {source} as cross-damping that varies with temperature, through the filter (9), with a"
+        f" polynomial of order {len(study.model.coefficients) - 1} for eq. (10)."
+    )
+    chapters = [
+        Chapter("In short", [_facts(study, data)]),
+        Chapter("Output before and after", [output_figure(study, data.output), improvement_table(study, data)]),
+        Chapter(
+            "Cross-damping over temperature", [curve_figure(study), coefficients_table(study), Text(SCALE, "note")]
+        ),
+    ]
+    return render_page("Cross-damping over temperature", lead, chapters, SOURCES)
+
+
+SCALE = (
+    "The output shows only 2k/g₂ · ζ₁₂, so the size of ζ₁₂ is as good as the natural frequency given, and a constant bias of"
+    " any other origin counts into ζ₀."
+)
+
+
+def _facts(study: "CrossDampingStudy", data: "RestData") -> Facts:
+    unit, name = OUTPUTS[data.output], UNITS[data.output]
+    return Facts(
+        [
+            ("Improvement", f"{study.training.ratio:.2f} times", "on the data that were fitted"),
+            ("Improvement, held out", f"{study.held_out.ratio:.2f} times", "on runs or blocks left out of the fit"),
+            ("Left after compensation", f"{study.held_out.after / unit:.3g} {name}", "rms, held out"),
+            (
+                "Part of the dynamics",
+                f"{study.memory / unit:.2g} {name}",
+                "largest share of the filter (9) in the correction",
+            ),
+        ]
+    )
+
+
+def coefficients_table(study: "CrossDampingStudy") -> Table:
+    """Return ζᵢ with their standard errors, and their ratio to ζ₀, which does not depend on the frequency given."""
+    model = study.model
+    rows = [
+        [
+            f"zeta_{i}",
+            f"{value:.5e}",
+            f"{error:.1e}",
+            ("1", "1/°C")[i] if i < 2 else f"1/°C^{i}",
+            f"{value / model.coefficients[0]:+.4e}",
+        ]
+        for i, (value, error) in enumerate(zip(model.coefficients, np.sqrt(np.diag(model.covariance)), strict=True))
+    ]
+    at = model.calibration_temperature - 273.15
+    columns = ["Coefficient", "Value", "Standard error", "Unit", "Over zeta_0"]
+    note = "The errors allow for white noise plus a random walk of the bias."
+    return Table(f"Cross-damping about {at:g} °C", columns, rows, note)
+
+
+def improvement_table(study: "CrossDampingStudy", data: "RestData") -> Table:
+    """Return the zero-rate output before and after, on the fitted data and on data left out."""
+    unit, name = OUTPUTS[data.output], UNITS[data.output]
+    rows = [
+        [label, f"{case.before / unit:.4g}", f"{case.after / unit:.4g}", f"{case.ratio:.2f}"]
+        for label, case in (("fitted", study.training), ("held out", study.held_out))
+    ]
+    columns = ["Data", f"Before ({name})", f"After ({name})", "Times better"]
+    note = "Before: standard deviation about the mean; after: rms. Held out: each run, or each fifth of a single run, predicted from the others."
+    return Table("Zero-rate output", columns, rows, note)
+
+
+def curve_figure(study: "CrossDampingStudy") -> Picture:
+    """Draw ζ₁₂(T)/ζ₁₂(0) with its 90 % band."""
+    model = study.model
+    T = np.linspace(model.lowest, model.highest, 200)
+    powers = (T - model.calibration_temperature)[:, None] ** np.arange(len(model.coefficients))
+    size = model.coefficients[0]
+    spread = 1.645 * np.sqrt(np.einsum("ni,ij,nj->n", powers, model.covariance, powers)) / abs(size)
+    middle = powers @ model.coefficients / size
+    with style.figure(height=3.0) as (made, axes):
+        axes.fill_between(T - 273.15, middle - spread, middle + spread, color=style.SKY, alpha=0.4, label="90 % band")
+        axes.plot(T - 273.15, middle, color=style.BLUE, label="fitted")
+        axes.set_xlabel("temperature (°C)")
+        axes.set_ylabel("ζ₁₂ over its value at calibration")
+        axes.legend()
+    return draw(made, "Shape of the cross-damping over temperature.", "A curve of relative cross-damping.")
+
+
+def output_figure(study: "CrossDampingStudy", output: str) -> Picture:
+    """Draw temperature and output over time, before and after (CVG cross-damping paper, figures 1 and 2)."""
+    return draw_runs(study.runs, study.model, OUTPUTS[output], UNITS[output])
+
+
+def draw_runs(runs: "tuple[RestRun, ...]", model: "CrossDampingModel", unit: float, name: str) -> Picture:
+    """Draw runs one after the other; `unit` in rad/s, called `name`."""
+    with style.figure(2, height=4.8, sharex=True, height_ratios=(1, 2)) as (made, (upper, lower)):
+        begin = 0.0
+        for i, run in enumerate(runs):
+            rows = np.unique(np.linspace(0, len(run.time) - 1, MOST_POINTS).astype(int))
+            hours = (run.time[rows] - run.time[0]) / 3600 + begin
+            begin = hours[-1]
+            after = model.compensate(run.time, run.rate, run.temperature, extrapolate=True)[rows]
+            upper.plot(hours, run.temperature[rows] - 273.15, color=style.VERMILION)
+            lower.plot(
+                hours, run.rate[rows] / unit, color=style.ORANGE, linewidth=0.8, label=None if i else "uncompensated"
+            )
+            lower.plot(hours, after / unit, color=style.BLUE, linewidth=0.8, label=None if i else "compensated")
+        lower.axhline(0, color=style.BLACK, linewidth=0.8)
+        upper.set_ylabel("temperature (°C)")
+        lower.set_ylabel(f"zero-rate output ({name})")
+        lower.set_xlabel("time (h)")
+        lower.legend()
+    return draw(
+        made,
+        "Temperature, and zero-rate output before and after compensation.",
+        "Temperature over time above, output with and without compensation below.",
+    )

@@ -1,0 +1,79 @@
+"""Zero-rate runs of a gyro from record files: which columns count, rows left out, long records averaged."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from studies.errors import InputError
+
+if TYPE_CHECKING:
+    from compensation.cross_damping import RestRun
+    from studies.record import Record
+
+TEMPERATURES = ("housing_temperature_degC", "resonator_temperature_degC", "chamber_temperature_degC")
+CELSIUS_ZERO = 273.15
+MOST_ROWS = 20_000
+"""Rows beyond which a run is averaged in blocks before a fit: temperature is slow, and noise averages."""
+LARGEST_REST = 1e-3
+"""Applied rate in °/s that still counts as rest (a quarter of the earth's)."""
+
+
+@dataclass(frozen=True)
+class RestData:
+    """Runs for a fit at rest, with the columns that they came from and the rows that were left out."""
+
+    runs: "tuple[RestRun, ...]"
+    output: str
+    temperature_column: str
+    left_out: int
+    block_s: float
+
+
+def choose_column(records: "Sequence[Record]", candidates: Sequence[str], purpose: str) -> str:
+    """Return the first candidate that every record has.
+
+    Raises
+    ------
+    InputError
+        When there is none; the message names the file and what would do.
+    """
+    for name in candidates:
+        if all(name in record for record in records):
+            return name
+    path = next((r.path for r in records if not any(name in r for name in candidates)), records[0].path)
+    raise InputError(f"{path}: {purpose} needs the same one of {', '.join(candidates)} in every record.")
+
+
+def gather_rest(records: "Sequence[Record]", outputs: "dict[str, float]") -> RestData:
+    """Return the runs of these records in SI units; `outputs` gives the output columns and their unit in rad/s.
+
+    Raises
+    ------
+    InputError
+        A column is missing, the gyro turns, or a record has no complete row.
+    """
+    import numpy as np
+
+    from compensation.cross_damping import RestRun
+    from compensation.decimation import average_blocks
+
+    output = choose_column(records, tuple(outputs), "a fit at zero rate")
+    column = choose_column(records, TEMPERATURES, "a fit over temperature")
+    runs, left_out, widest = [], 0, 0.0
+    for record in records:
+        if "rate_deg_per_s" in record and np.nanmax(np.abs(record["rate_deg_per_s"]), initial=0.0) > LARGEST_REST:
+            raise InputError(f"{record.path}: rate_deg_per_s is not zero; this fit needs the gyro at rest.")
+        time, values, temperature = record["time_s"], record[output], record[column]
+        complete = np.isfinite(values) & np.isfinite(temperature)
+        left_out += int(np.count_nonzero(~complete))
+        if np.count_nonzero(complete) < 2:
+            raise InputError(f"{record.path}: no rows with both {output} and {column}; the temperature is missing.")
+        time, values, temperature = time[complete], values[complete], temperature[complete]
+        if len(time) > MOST_ROWS:
+            width = math.ceil((time[-1] - time[0]) / MOST_ROWS * 10) / 10
+            blocks = average_blocks(time, {"output": values, "temperature": temperature}, width)
+            time, values, temperature = blocks.time, blocks.columns["output"], blocks.columns["temperature"]
+            widest = max(widest, width)
+        runs.append(RestRun(time, values * outputs[output], temperature + CELSIUS_ZERO))
+    return RestData(tuple(runs), output, column, left_out, widest)
