@@ -22,7 +22,9 @@ class Stresses(NamedTuple):
 
 STRAIN = LayerStrains(*sp.symbols("e_phi e_theta e_z gamma_phi_theta gamma_phi_z gamma_theta_z", real=True))
 STRESS = Stresses(*sp.symbols("sigma_phi sigma_theta sigma_z sigma_phi_theta sigma_phi_z sigma_theta_z", real=True))
-DEFORMATION = Deformation(*sp.symbols("epsilon_phi epsilon_theta epsilon_phi_theta kappa_phi kappa_theta tau", real=True))
+DEFORMATION = Deformation(
+    *sp.symbols("epsilon_phi epsilon_theta epsilon_phi_theta kappa_phi kappa_theta tau", real=True)
+)
 
 
 @cache
@@ -67,8 +69,10 @@ def surface_energy_density() -> sp.Expr:
     layer = thin_energy_density().subs(hooke()).subs(dict(zip(STRAIN, thin_layer_strains(DEFORMATION), strict=True)))
     integral = sp.expand(sp.integrate(sp.expand(layer), (z, -h / 2, h / 2)))
     membrane, bending = E * h / 2 / (1 - nu**2), E * h**3 / 24 / (1 - nu**2)
-    brackets = [sp.expand(sp.cancel(integral.coeff(h, power) * h**power / scale))
-                for power, scale in ((1, membrane), (3, bending))]
+    brackets = [
+        sp.expand(sp.cancel(integral.coeff(h, power) * h**power / scale))
+        for power, scale in ((1, membrane), (3, bending))
+    ]
     shears = [DEFORMATION.epsilon_phitheta**2, DEFORMATION.tau**2]
     stretching, curving = (sp.collect(bracket, shears, sp.factor) for bracket in brackets)
     return membrane * stretching + bending * curving

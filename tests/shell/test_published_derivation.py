@@ -73,20 +73,30 @@ def test_printed_twist_has_the_wrong_parity_and_the_corrected_the_right_one():
 
 
 def test_hooke_is_equation_5():
-    stress, strain = energies.hooke(), energies.STRAIN
+    stress, law, strain = energies.STRESS, energies.hooke(), energies.STRAIN
     plate = E / (1 - nu**2)
-    assert sp.simplify(stress.sigma_phi - plate * (strain.e_phi + nu * strain.e_theta)) == 0
-    assert sp.simplify(stress.sigma_theta - plate * (strain.e_theta + nu * strain.e_phi)) == 0
-    assert sp.simplify(stress.sigma_phitheta - E / (2 * (1 + nu)) * strain.gamma_phitheta) == 0
+    assert sp.simplify(law[stress.sigma_phi] - plate * (strain.e_phi + nu * strain.e_theta)) == 0
+    assert sp.simplify(law[stress.sigma_theta] - plate * (strain.e_theta + nu * strain.e_phi)) == 0
+    assert sp.simplify(law[stress.sigma_phitheta] - E / (2 * (1 + nu)) * strain.gamma_phitheta) == 0
 
 
-def test_reduced_energy_is_the_full_one_when_the_kirchhoff_stresses_vanish():
-    stress = energies.hooke()
-    values = dict(zip(("sigma_phi", "sigma_theta", "tau_phitheta"), stress, strict=True))
-    values |= {"sigma_z": 0, "tau_phiz": 0, "tau_thetaz": 0}
-    full = energies.full_energy_density()
-    full = full.subs({symbol: values[symbol.name] for symbol in full.free_symbols if symbol.name in values})
-    assert sp.simplify(full - energies.energy_density()) == 0
+def test_plane_stress_is_three_dimensional_hooke_without_pressure_across():
+    """With σ_z = λ(e_φ + e_θ + e_z) + 2G e_z = 0 the full law of the BVG paper, eq. (5), becomes eq. (5) here."""
+    stress, law, strain = energies.STRESS, energies.hooke(), energies.STRAIN
+    G = E / (2 * (1 + nu))
+    lame = 2 * G * nu / (1 - 2 * nu)
+    across = sp.solve(lame * (strain.e_phi + strain.e_theta + strain.e_z) + 2 * G * strain.e_z, strain.e_z)[0]
+    volume = strain.e_phi + strain.e_theta + across
+    assert sp.simplify(lame * volume + 2 * G * strain.e_phi - law[stress.sigma_phi]) == 0
+    assert sp.simplify(lame * volume + 2 * G * strain.e_theta - law[stress.sigma_theta]) == 0
+
+
+def test_thin_energy_is_equation_4():
+    stress, strain = energies.STRESS, energies.STRAIN
+    expected = stress.sigma_phi * strain.e_phi + stress.sigma_theta * strain.e_theta
+    expected += stress.sigma_phitheta * strain.gamma_phitheta
+    assert sp.simplify(energies.thin_energy_density() - expected / 2) == 0
+    assert len(sp.Add.make_args(sp.expand(energies.full_energy_density()))) == 6
 
 
 def test_thickness_integral_is_equation_7():

@@ -1,0 +1,127 @@
+"""The frequency formula (13), (14) as self-contained Python or C code for design work.
+
+The integrals of the chosen harmonic and polar range are worked out in closed form and written with 17
+digits, which a double holds exactly; the formula and its derivatives are printed from the symbolic ones.
+"""
+
+from string import Template
+from typing import Literal
+
+import sympy as sp
+
+from shell.derivation import frequency
+from shell.derivation.chain import Case
+from shell.derivation.symbols import n, r
+
+PYTHON = Template('''\
+"""Rayleigh's frequency of an inextensional spherical shell, harmonic n = $n, from $start to $end degrees.
+
+HRG paper, equation $equation; written by `hrg derive --code python`. Rayleigh's mode ignores the conditions at
+the free edge: the true frequency is lower, about 11 % at h/R = 0.06.
+"""
+
+from math import pi, sqrt
+
+BENDING_INTEGRAL = $I
+MASS_INTEGRAL = $J
+
+
+def rayleigh_frequency(E, nu, rho, h, R):
+    """Return the frequency in Hz, equation $equation.
+
+    Young's modulus E (Pa), Poisson ratio nu, density rho (kg/m^3), thickness h and radius R (m).
+    """
+    omega_squared = $omega_squared
+    return sqrt(omega_squared) / (2 * pi)
+
+
+def rayleigh_bryan_factor():
+    """Return how far the standing wave lags behind the turning shell, per angle turned."""
+    return $K
+
+
+def rayleigh_log_derivatives(nu):
+    """Return the derivatives of ln(frequency) by ln E, nu, ln rho, ln h, ln R and the rim angle (1/rad)."""
+    return {
+        "E": $by_E,
+        "nu": $by_nu,
+        "rho": $by_rho,
+        "h": $by_h,
+        "R": $by_r,
+        "phi_2": $by_phi_2,
+    }
+''')
+
+C = Template("""\
+/* Rayleigh's frequency of an inextensional spherical shell, harmonic n = $n, from $start to $end degrees.
+ *
+ * HRG paper, equation $equation; written by `hrg derive --code c`. Rayleigh's mode ignores the conditions at
+ * the free edge: the true frequency is lower, about 11 % at h/R = 0.06.
+ */
+#include <math.h>
+
+static const double PI = 3.1415926535897932;
+static const double BENDING_INTEGRAL = $I;
+static const double MASS_INTEGRAL = $J;
+
+/* Frequency in Hz, equation $equation: Young's modulus E (Pa), Poisson ratio nu, density rho (kg/m^3),
+ * thickness h and radius R (m). */
+double rayleigh_frequency(double E, double nu, double rho, double h, double R)
+{
+    const double omega_squared = $omega_squared;
+    return sqrt(omega_squared) / (2.0 * PI);
+}
+
+/* How far the standing wave lags behind the turning shell, per angle turned. */
+double rayleigh_bryan_factor(void)
+{
+    return $K;
+}
+
+/* Derivatives of ln(frequency) by ln E, nu, ln rho, ln h, ln R and the rim angle (1/rad), in this order. */
+void rayleigh_log_derivatives(double nu, double derivative[6])
+{
+    derivative[0] = $by_E;
+    derivative[1] = $by_nu;
+    derivative[2] = $by_rho;
+    derivative[3] = $by_h;
+    derivative[4] = $by_r;
+    derivative[5] = $by_phi_2;
+}
+""")
+
+
+def emit_code(case: Case, language: Literal["python", "c"]) -> str:
+    """Return a module of Python or of C with the frequency, the Bryan factor and the derivatives of ln f."""
+    template, write = (PYTHON, sp.pycode) if language == "python" else (C, sp.ccode)
+    given = {
+        r: sp.Symbol("R", positive=True),
+        frequency.I: sp.Symbol("BENDING_INTEGRAL"),
+        frequency.J: sp.Symbol("MASS_INTEGRAL"),
+    }
+    omega_squared = frequency.omega_squared().subs(n, case.harmonic)
+    by = frequency.log_derivatives()
+    return template.substitute(
+        n=case.harmonic,
+        start=_degrees(case.start),
+        end=_degrees(case.end),
+        equation="(14)" if case.harmonic == 2 else "(13)",
+        I=_digits(case.bending),
+        J=_digits(case.mass),
+        K=_digits(case.precession),
+        omega_squared=write(omega_squared.subs(given)),
+        by_E=_digits(by.E),
+        by_nu=write(by.nu),
+        by_rho=_digits(by.rho),
+        by_h=_digits(by.h),
+        by_r=_digits(by.r),
+        by_phi_2=_digits(case.rim_derivative),
+    )
+
+
+def _digits(value: sp.Expr) -> str:
+    return repr(float(value)) if value in (sp.S.Half, -sp.S.Half) or value.is_Integer else str(sp.N(value, 17))
+
+
+def _degrees(angle: sp.Expr) -> str:
+    return f"{float(angle * 180 / sp.pi):g}"

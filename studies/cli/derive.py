@@ -1,0 +1,80 @@
+"""`hrg derive`: the symbolic derivation of the HRG paper's equations (1)–(14), for people and for design code."""
+
+from typing import Any, Literal
+
+
+def derive(
+    *,
+    latex: bool = False,
+    code: Literal["python", "c"] | None = None,
+    harmonic: int = 2,
+    pole_angle_deg: float = 0.0,
+    rim_angle_deg: float = 90.0,
+    json: bool = False,
+) -> int:
+    """Derive the frequency of the inextensional spherical shell, HRG paper equations (1)-(14).
+
+    Prints the chain of equations for any harmonic n, from the displacements to the frequency, and its
+    closed forms for one harmonic and one polar range.
+
+    Parameters
+    ----------
+    latex : bool
+        Print a LaTeX fragment (amsmath) instead.
+    code : {'python', 'c'}, optional
+        Print the frequency, Bryan factor and derivatives as self-contained code instead.
+    harmonic : int
+        Circumferential harmonic n of the closed forms and of the code, at least 2.
+    pole_angle_deg : float
+        Polar angle where the shell starts; above 0 the pole is open.
+    rim_angle_deg : float
+        Polar angle where the shell ends.
+    json : bool
+        Print one JSON object (schema hrg.derive/1) instead: every equation in LaTeX, the numbers, the code if asked.
+    """
+    from math import radians
+
+    from shell.derivation.chain import Case
+    from shell.derivation.design_code import emit_code
+    from shell.derivation.emit import emit_latex, emit_text
+    from shell.rayleigh import rayleigh_integrals
+    from studies.cli.output import print_json
+    from studies.errors import InputError
+
+    if latex and code is not None:
+        raise InputError("--latex and --code each print in another form; choose one of them.")
+    rayleigh_integrals(harmonic, radians(pole_angle_deg), radians(rim_angle_deg))  # refuses impossible shells
+    case = Case.from_degrees(harmonic, pole_angle_deg, rim_angle_deg)
+    if json:
+        text = {} if code is None else {"code": {"language": code, "text": emit_code(case, code)}}
+        print_json(_payload(case, pole_angle_deg, rim_angle_deg) | text)
+    elif code is not None:
+        print(emit_code(case, code), end="")
+    else:
+        print(emit_latex(case) if latex else emit_text(case), end="")
+    return 0
+
+
+def _payload(case: Any, pole_angle_deg: float, rim_angle_deg: float) -> dict[str, Any]:
+    from shell.derivation.chain import steps
+    from shell.derivation.emit import typeset, write_plainly
+
+    return {
+        "schema": "hrg.derive/1",
+        "harmonic": case.harmonic,
+        "pole_angle_deg": pole_angle_deg,
+        "rim_angle_deg": rim_angle_deg,
+        "I": {"closed_form": str(case.bending), "value": float(case.bending.evalf(20))},
+        "J": {"closed_form": str(case.mass), "value": float(case.mass.evalf(20))},
+        "bryan_factor": {"closed_form": str(case.precession), "value": float(case.precession.evalf(20))},
+        "d_ln_f_d_rim_angle_per_rad": float(case.rim_derivative.evalf(20)),
+        "equations": [
+            {
+                "number": step.number or None,
+                "title": step.title,
+                "latex": [typeset(equation) for equation in step.equations],
+                "plain": [write_plainly(equation) for equation in step.equations],
+            }
+            for step in steps(case)
+        ],
+    }

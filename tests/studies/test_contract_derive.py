@@ -1,0 +1,185 @@
+"""`hrg derive` speaks as promised, and the code that it prints agrees with quadrature."""
+
+import ctypes
+import importlib.util
+import json
+import re
+import shutil
+import subprocess
+from math import pi, radians
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+
+from studies.cli import main
+
+CASES = [(2, 0.0, 90.0), (3, 12.5, 77.0), (4, 0.0, 120.0), (7, 0.0, 20.0)]
+
+
+def speak(capsys, *words):
+    status = main(["derive", *words])
+    return status, capsys.readouterr()
+
+
+def options(n, start, end):
+    return ["--harmonic", str(n), "--pole-angle-deg", str(start), "--rim-angle-deg", str(end)]
+
+
+def frequency_by_quadrature(n, start, end, E, nu, rho, h, R):
+    """HRG paper eq. (13), its integrals written anew in x = sin²(φ/2)."""
+    lower, upper = (np.sin(radians(angle) / 2) ** 2 for angle in (start, end))
+
+    def tangent_power(x):
+        return (x / (1 - x)) ** n
+
+    def bending(x):
+        return tangent_power(x) / (8 * (x * (1 - x)) ** 2)
+
+    def mass(x):
+        return 2 * ((n + 1 - 2 * x) ** 2 + 8 * x * (1 - x)) * tangent_power(x)
+
+    I, J = (quad(f, lower, upper, epsabs=0, epsrel=1e-12)[0] for f in (bending, mass))
+    return n * (n**2 - 1) * h / R**2 * np.sqrt(E * I / (3 * (1 + nu) * rho * J)) / (2 * pi)
+
+
+def random_shells(seed, count=20):
+    rng = np.random.default_rng(seed)
+    for _ in range(count):
+        yield {
+            "E": rng.uniform(1e9, 3e11),
+            "nu": rng.uniform(-0.5, 0.49),
+            "rho": rng.uniform(1e3, 2e4),
+            "h": rng.uniform(1e-5, 1e-2),
+            "R": rng.uniform(1e-3, 1.0),
+        }
+
+
+@pytest.mark.parametrize("case", CASES, ids=str)
+def test_emitted_python_agrees_with_quadrature(case, tmp_path, capsys):
+    status, said = speak(capsys, "--code", "python", *options(*case))
+    assert status == 0
+    file = tmp_path / "rayleigh_design.py"
+    file.write_text(said.out)
+    spec = importlib.util.spec_from_file_location("rayleigh_design", file)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    for shell in random_shells(seed=4):
+        assert module.rayleigh_frequency(**shell) == pytest.approx(frequency_by_quadrature(*case, **shell), rel=1e-11)
+    check_derivatives(case, module.rayleigh_log_derivatives(0.2))
+    check_bryan_factor(case, module.rayleigh_bryan_factor())
+
+
+@pytest.mark.skipif(shutil.which("cc") is None, reason="no C compiler 'cc' on this machine")
+@pytest.mark.parametrize("case", CASES, ids=str)
+def test_emitted_c_compiles_and_agrees_with_quadrature(case, tmp_path, capsys):
+    status, said = speak(capsys, "--code", "c", *options(*case))
+    assert status == 0
+    source, library = tmp_path / "rayleigh.c", tmp_path / "rayleigh.so"
+    source.write_text(said.out)
+    strict = ["-std=c99", "-Wall", "-Wextra", "-Werror", "-pedantic"]
+    subprocess.run(["cc", *strict, "-shared", "-fPIC", str(source), "-o", str(library), "-lm"], check=True)
+    compiled = ctypes.CDLL(str(library))
+    for function in (compiled.rayleigh_frequency, compiled.rayleigh_bryan_factor):
+        function.restype = ctypes.c_double
+    for shell in random_shells(seed=5):
+        value = compiled.rayleigh_frequency(*(ctypes.c_double(shell[name]) for name in ("E", "nu", "rho", "h", "R")))
+        assert value == pytest.approx(frequency_by_quadrature(*case, **shell), rel=1e-11)
+    derivative = (ctypes.c_double * 6)()
+    compiled.rayleigh_log_derivatives(ctypes.c_double(0.2), derivative)
+    check_derivatives(case, dict(zip(("E", "nu", "rho", "h", "R", "phi_2"), derivative, strict=True)))
+    check_bryan_factor(case, compiled.rayleigh_bryan_factor())
+
+
+def check_derivatives(case, derivative):
+    """Against central differences of the quadrature."""
+    shell = {"E": 7e10, "nu": 0.2, "rho": 2200.0, "h": 1e-3, "R": 2e-2}
+    n, start, end = case
+
+    def log_frequency(end=end, **change):
+        return np.log(frequency_by_quadrature(n, start, end, **(shell | change)))
+
+    for name in ("E", "rho", "h", "R"):
+        up, down = (log_frequency(**{name: shell[name] * (1 + sign * 1e-4)}) for sign in (1, -1))
+        assert derivative[name] == pytest.approx((up - down) / 2e-4, abs=1e-7)
+    up, down = (log_frequency(nu=0.2 + sign * 1e-4) for sign in (1, -1))
+    assert derivative["nu"] == pytest.approx((up - down) / 2e-4, abs=1e-7)
+    up, down = (log_frequency(end=end + sign * 0.01) for sign in (1, -1))
+    assert derivative["phi_2"] == pytest.approx((up - down) / radians(0.02), rel=1e-5)
+
+
+def check_bryan_factor(case, value):
+    """K = −2 ∫ V (U cos φ + W sin φ) sin φ dφ / (n ∫ (U² + V² + W²) sin φ dφ) of HRG paper eq. (10)."""
+    n, start, end = case
+
+    def mode(phi):
+        power = np.tan(phi / 2) ** n
+        return np.sin(phi) * power, np.sin(phi) * power, -(n + np.cos(phi)) * power
+
+    def coupling(phi):
+        U, V, W = mode(phi)
+        return -2 * V * (U * np.cos(phi) + W * np.sin(phi)) * np.sin(phi)
+
+    def mass(phi):
+        return sum(part**2 for part in mode(phi)) * np.sin(phi)
+
+    above, below = (quad(f, radians(start), radians(end), epsabs=0, epsrel=1e-12)[0] for f in (coupling, mass))
+    assert value == pytest.approx(above / (n * below), rel=1e-11)
+
+
+def test_plain_text_walks_through_the_numbered_equations(capsys):
+    status, said = speak(capsys)
+    assert status == 0
+    numbers = re.findall(r"^\((\d+)\)", said.out, flags=re.MULTILINE)
+    assert numbers == [str(k) for k in range(1, 15)]
+    assert max(len(line) for line in said.out.splitlines()) <= 120
+    assert "↪" not in said.out
+
+
+def test_latex_fragment_is_balanced_and_tagged(capsys):
+    status, said = speak(capsys, "--latex", "--harmonic", "3")
+    assert status == 0
+    assert said.out.count(r"\begin{gather}") == said.out.count(r"\end{gather}") > 20
+    assert all(rf"\tag{{{k}}}" in said.out for k in range(1, 14))
+    assert said.out.count("{") == said.out.count("}")
+    assert said.out.count(r"\left") == said.out.count(r"\right")
+    assert said.out.isascii()
+
+
+def test_latex_equations_are_typeset_by_an_independent_parser(capsys):
+    from matplotlib.mathtext import MathTextParser
+
+    status, said = speak(capsys, "--json")
+    assert status == 0
+    parser = MathTextParser("path")
+    for step in json.loads(said.out)["equations"]:
+        for latex in step["latex"]:
+            parser.parse("$" + latex.replace(r"\limits", "") + "$")
+
+
+def test_json_carries_the_published_integrals(capsys):
+    status, said = speak(capsys, "--json")
+    assert status == 0
+    payload = json.loads(said.out)
+    assert payload["schema"] == "hrg.derive/1"
+    assert payload["I"] == {"closed_form": "7/24", "value": pytest.approx(7 / 24)}
+    assert payload["J"]["value"] == pytest.approx(20 * np.log(2) - 37 / 3)
+    assert payload["bryan_factor"]["value"] == pytest.approx(0.27699, abs=5e-6)
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["--harmonic", "1"],
+        ["--rim-angle-deg", "180"],
+        ["--pole-angle-deg", "95"],
+        ["--code", "fortran"],
+        ["--latex", "--code", "c"],
+    ],
+    ids=" ".join,
+)
+def test_unusable_arguments_end_with_one_sentence(words, capsys):
+    status, said = speak(capsys, *words)
+    assert status == 2
+    assert said.out == ""
+    assert said.err.startswith("hrg: ")
