@@ -226,7 +226,7 @@ def _check_device(records: Sequence[Record], tables: Sequence[dict[str, FloatArr
 def _remove_outliers(table: dict[str, FloatArray]) -> int:
     """Set outlying rows of every measured column to NaN and return how many there were."""
     count = 0
-    for name in ("temperature", *RESPONSES, "quadrature_V", "reference_frequency_Hz"):
+    for name in ("temperature", *RESPONSES, "reference_frequency_Hz"):
         if name not in table:
             continue
         outlying = find_outliers(table[name])

@@ -9,14 +9,20 @@ from studies.diagnosis.states import FloatArray, States, lag
 
 
 def columns(states: States, shape: Sequence[float], response: str) -> FloatArray:
-    """Solve τ(T) T_r′ = T_h − T_r with τ(T) = τ / (1 − ρ + ρ (T/T₀)³) and return the change over ρ."""
-    share = shape[0]
+    """Solve τ T_r′ = (1 − ρ + ρ g)(T_h − T_r) and return the change over ρ.
+
+    g = (T_h + T_r)(T_h² + T_r²)/(4 T₀³) for exchange between housing and resonator, or (T_r/T₀)³ for τ(T_r).
+    """
+    share, exchange = shape
     housing, step, tau = states.housing, states.step, states.tau
     plain = lag(housing, step, tau)
     state = plain
     for _ in range(4):  # the conductance of the previous pass makes each pass a linear lag
-        faster = share * ((state / states.reference) ** 3 - 1.0)
-        state = plain + _lag_with_feed(faster * (housing - state), step, tau)
+        if exchange:
+            conductance = (housing + state) * (housing**2 + state**2) / (4.0 * states.reference**3)
+        else:
+            conductance = (state / states.reference) ** 3
+        state = plain + _lag_with_feed(share * (conductance - 1.0) * (housing - state), step, tau)
     return ((state - plain) / share)[:, None]
 
 
@@ -26,8 +32,8 @@ def _lag_with_feed(feed: FloatArray, step: float, tau: float) -> FloatArray:
 
 
 def grid(span: Span, response: str) -> list[tuple[float, ...]]:
-    """One share is enough: the signature hardly changes its form with it."""
-    return [(0.5,)]
+    """One share is enough, for its form hardly changes with it; both laws of conductance."""
+    return [(0.4, 1.0), (0.4, 0.0)]
 
 
 EFFECT = Effect(
@@ -38,7 +44,10 @@ EFFECT = Effect(
     responses=("frequency_Hz",),
     acts_on="temperature",
     coefficients=("radiated_share",),
-    shape=(Parameter("share_of_form", 0.02, 1.0, "share at which the form is computed", steady=True),),
+    shape=(
+        Parameter("share_of_form", 0.02, 1.0, "share at which the form is computed", steady=True),
+        Parameter("exchange", 0.0, 1.0, "1: exchange with the housing, 0: by the resonator alone", False, True),
+    ),
     columns=columns,
     grid=grid,
     fine=True,

@@ -1,0 +1,145 @@
+"""What the extension is worth: residuals on the records' own rows, and on runs that were left out of the fit."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from studies.diagnosis.baseline import Problem, Term, View, baseline_columns, term_columns
+from studies.diagnosis.campaign import Campaign
+from studies.diagnosis.fit import Fit, fit_terms
+from studies.diagnosis.likelihood import NoiseBasis
+from studies.diagnosis.states import FloatArray, States
+
+BLOCKS = 5
+
+
+@dataclass(frozen=True)
+class Score:
+    """Residual rms on the rows of the fit and on rows that the fit has not seen (None where that cannot be had)."""
+
+    residual_rms: float
+    held_out_rms: float | None
+
+
+def row_residuals(fit: Fit, campaign: Campaign) -> list[FloatArray]:
+    """Return the residual of every run on its own rows; NaN where a row is missing or an outlier."""
+    return [
+        run.row_responses[fit.problem.response] - row_model(fit.problem, fit.terms, campaign, k) @ fit.linear.coefficients
+        for k, run in enumerate(campaign.runs)
+    ]
+
+
+def row_model(problem: Problem, terms: Sequence[Term], campaign: Campaign, k: int) -> FloatArray:
+    """Return the columns of baseline and terms on the own rows of run `k`."""
+    run = campaign.runs[k]
+    fine = problem.states[k].with_lag(problem.tau) if problem.lagged else problem.states[k]
+    view = View(fine, fine, 1)
+    thermometer = None
+    if problem.thermometer is not None:
+        thermometer = [np.interp(fine.time, run.time, values) if j == k else np.zeros(1)
+                       for j, values in enumerate(problem.thermometer)]
+    dummies = [fine if j == k else _short(s) for j, s in enumerate(problem.states)]
+    base = baseline_columns(problem, dummies, thermometer)[k]
+    columns = np.concatenate([base, *(term_columns(problem, term, view) for term in terms)], axis=1)
+    place = np.clip((run.row_time - fine.time[0]) / fine.step, 0.0, fine.time.size - 1.0)
+    below = np.minimum(place.astype(int), fine.time.size - 2) if fine.time.size > 1 else place.astype(int)
+    part = (place - below)[:, None]
+    return np.asarray((1.0 - part) * columns[below] + part * columns[np.minimum(below + 1, fine.time.size - 1)])
+
+
+def _short(states: States) -> States:
+    return replace(states, time=states.time[:1], campaign_time=states.campaign_time[:1],
+                   housing=states.housing[:1], resonator=states.resonator[:1])
+
+
+def own_columns(problem: Problem, k: int) -> list[int]:
+    """Return which baseline columns belong to run `k` alone: its offset and its initial thermal state."""
+    runs = len(problem.states)
+    own = []
+    if problem.response == "bias_deg_per_h":
+        own.append(3 + k)
+        if problem.lagged:
+            own.append(3 + runs + k)
+    elif problem.lagged:
+        own.append(3 + k)
+    return own
+
+
+def rms(parts: Sequence[FloatArray]) -> float:
+    """Root mean square of what is finite."""
+    values = np.concatenate([part[np.isfinite(part)] for part in parts] or [np.empty(0)])
+    return float(np.sqrt(np.mean(values**2))) if values.size else float("nan")
+
+
+def score(fit: Fit, campaign: Campaign) -> Score:
+    """Return training and held-out residual of a fit.
+
+    One record is left out at a time, the rest is fitted anew (coefficients, shapes and lag); of the record that was
+    left out only its own offset and initial state are refitted. With one record it is cut into blocks in time, with
+    one thermal constant left out on both sides.
+    """
+    training = rms(row_residuals(fit, campaign))
+    if len(campaign.records) > 1:
+        return Score(training, _leave_one_record_out(fit, campaign))
+    return Score(training, _leave_one_block_out(fit, campaign))
+
+
+def _restricted(problem: Problem, keep: Sequence[np.ndarray]) -> Problem:
+    """Return the problem on fewer rows."""
+    present = tuple(mask & kept for mask, kept in zip(problem.present, keep, strict=True))
+    chosen = np.concatenate([kept[mask] for mask, kept in zip(problem.present, keep, strict=True)])
+    values = problem.values[: chosen.size][chosen]
+    times = [s.averaged(problem.group).time[m] for s, m in zip(problem.states, present, strict=True)]
+    basis = NoiseBasis.of([t for t in times if t.size])
+    if problem.delay_row is not None:
+        values, basis = np.append(values, 0.0), basis.with_row()
+    return replace(problem, present=present, values=values, basis=basis)
+
+
+def _leave_one_record_out(fit: Fit, campaign: Campaign) -> float | None:
+    residuals = []
+    for record in campaign.records:
+        keep = [np.full(mask.shape, run.record != record)
+                for mask, run in zip(fit.problem.present, campaign.runs, strict=True)]
+        if sum(int((m & k).sum()) for m, k in zip(fit.problem.present, keep, strict=True)) < 40:
+            return None
+        trained = fit_terms(_restricted(fit.problem, keep), fit.terms, rounds=2)
+        for k, run in enumerate(campaign.runs):
+            if run.record == record:
+                residuals.append(_refit_own(trained, campaign, k))
+    return rms(residuals)
+
+
+def _refit_own(trained: Fit, campaign: Campaign, k: int) -> FloatArray:
+    columns = row_model(trained.problem, trained.terms, campaign, k)
+    own = own_columns(trained.problem, k)
+    coefficients = trained.linear.coefficients.copy()
+    coefficients[own] = 0.0
+    rest = campaign.runs[k].row_responses[trained.problem.response] - columns @ coefficients
+    known = np.isfinite(rest)
+    if own and known.sum() > len(own):
+        rest = rest - columns[:, own] @ np.linalg.lstsq(columns[known][:, own], rest[known], rcond=None)[0]
+    return np.asarray(rest)
+
+
+def _leave_one_block_out(fit: Fit, campaign: Campaign) -> float | None:
+    problem = fit.problem
+    begin = campaign.runs[0].row_time[0]
+    end = campaign.runs[-1].row_time[-1]
+    gap = problem.tau if problem.lagged else problem.states[0].tau
+    if (end - begin) / BLOCKS < 2.0 * campaign.step or end - begin < 4.0 * gap:
+        return None
+    residuals = []
+    for block in range(BLOCKS):
+        low, high = (begin + (end - begin) * part / BLOCKS for part in (block, block + 1))
+        keep = [(run.time < low - gap) | (run.time > high + gap) for run in campaign.runs]
+        if sum(int((m & k).sum()) for m, k in zip(problem.present, keep, strict=True)) < 40:
+            return None
+        trained = fit_terms(_restricted(problem, keep), fit.terms, rounds=2)
+        for k, run in enumerate(campaign.runs):
+            inside = (run.row_time >= low) & (run.row_time < high + (1e-9 if block < BLOCKS - 1 else 1.0))
+            if inside.any():
+                columns = row_model(trained.problem, trained.terms, campaign, k)[inside]
+                residuals.append(run.row_responses[problem.response][inside] - columns @ trained.linear.coefficients)
+    return rms(residuals)

@@ -1,0 +1,233 @@
+"""The diagnosis of a campaign, from records to verdict."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from studies.diagnosis.advice import suggest_next
+from studies.diagnosis.baseline import Law, Problem, pose, span_of
+from studies.diagnosis.campaign import FEWEST_BINS, Campaign
+from studies.diagnosis.discrepancy import Leftover, generic_bases, leftover_evidence, strongest
+from studies.diagnosis.effects import Effect
+from studies.diagnosis.fit import intervals
+from studies.diagnosis.gain import Score, rms, row_residuals, score
+from studies.diagnosis.null import bootstrap_levels, draw_null, levels_of, shipped_levels
+from studies.diagnosis.scan import applicable, build_dictionary
+from studies.diagnosis.selection import Found, Selection, scan_model, select
+from studies.diagnosis.thermometer import Thermometer, read_thermometer
+from studies.diagnosis.verdict import Cause, ResponseResult, Verdict, equivalent_to, overall, probability_of
+
+THRESHOLD = 17.0
+LEFT_OVER_THRESHOLD = 17.0
+LEFT_OVER_SHARE = 0.05
+NARROW_RANGE = 1.0
+
+
+@dataclass(frozen=True)
+class Inquiry:
+    """One response under inquiry: its selection and what the generic witness saw after it."""
+
+    problem: Problem
+    selection: Selection
+    leftover: Leftover
+    evidence_levels: Mapping[str, float]
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """A verdict with the fits behind it, for pages and extended models."""
+
+    verdict: Verdict
+    campaign: Campaign
+    inquiries: Mapping[str, Inquiry]
+
+
+def investigate(
+    campaign: Campaign, law: Law | None = None, draws: int = 0, rng: np.random.Generator | None = None,
+    effects: Sequence[Effect] | None = None, held_out: bool = True,
+) -> Diagnosis:
+    """Find what the baseline leaves, name it, and measure what the extension is worth.
+
+    Parameters
+    ----------
+    campaign : Campaign
+    law : callable, optional
+        Relative frequency law of the card, of temperature in K.
+    draws : int
+        Draws of this campaign's own null for thresholds; 0 takes the shipped, conservative ones.
+    rng : numpy Generator, optional
+        For the draws.
+    effects : sequence of Effect, optional
+        A smaller library.
+    held_out : bool
+        Measure the gain, the slowest part.
+    """
+    rng = np.random.default_rng(0) if rng is None else rng
+    inquiries: dict[str, Inquiry] = {}
+    thermometer: Thermometer | None = None
+    for response in campaign.responses:
+        problem = _pose_one(campaign, response, inquiries, thermometer, law)
+        if problem is None:
+            continue
+        if response != "frequency_Hz" and "frequency_Hz" in inquiries:
+            problem, thermometer = _best_thermometer(campaign, response, inquiries["frequency_Hz"], problem)
+        inquiries[response] = inquire(campaign, problem, draws, rng, effects)
+        if response == "frequency_Hz":
+            thermometer = read_thermometer(campaign, inquiries[response].selection.fit)
+    causes = merge_causes(inquiries, campaign)
+    results = {
+        response: _result(campaign, inquiries[response], causes, held_out)
+        if response in inquiries
+        else _too_little("too few values")
+        for response in campaign.responses
+    }
+    for response, reason in campaign.skipped.items():
+        results[response] = _too_little(reason)
+    verdict = overall([result.verdict for result in results.values()])
+    advice = suggest_next(campaign, verdict, causes, results)
+    return Diagnosis(
+        Verdict(verdict, causes, results, advice, campaign.notes), campaign, inquiries
+    )
+
+
+def _too_little(reason: str) -> ResponseResult:
+    return ResponseResult("not-identifiable", None, (None, None), None, "none", remark=reason)
+
+
+def _pose_one(
+    campaign: Campaign, response: str, inquiries: Mapping[str, Inquiry], thermometer: Thermometer | None, law: Law | None
+) -> Problem | None:
+    rows = sum(int(np.isfinite(run.responses[response]).sum()) for run in campaign.runs)
+    if rows < FEWEST_BINS + 2 * len(campaign.runs):
+        return None
+    if thermometer is None:
+        return pose(campaign, response, law=law)
+    readings = thermometer.change if response == "bias_deg_per_h" else thermometer.excess
+    return pose(campaign, response, readings, thermometer.states)
+
+
+def _best_thermometer(
+    campaign: Campaign, response: str, frequency: Inquiry, corrected: Problem
+) -> tuple[Problem, Thermometer | None]:
+    """Take the frequency with or without its non-thermal terms, whichever the response follows."""
+    fit = frequency.selection.fit
+    clean = read_thermometer(campaign, fit)
+    raw = read_thermometer(campaign, fit, corrected=False)
+    if clean is None or raw is None or not any(t.effect.acts_on == "response" for t in fit.terms):
+        return corrected, clean
+    other = _pose_one(campaign, response, {}, raw, None)
+    assert other is not None
+    from studies.diagnosis.fit import fit_terms
+
+    if fit_terms(other, ()).score < fit_terms(corrected, ()).score - 6.0:
+        return other, clean
+    return corrected, clean
+
+
+def inquire(
+    campaign: Campaign, problem: Problem, draws: int, rng: np.random.Generator, effects: Sequence[Effect] | None
+) -> Inquiry:
+    """Select the effects of one response and ask the generic witness about the rest."""
+    span = span_of(campaign, problem.tau if problem.lagged else 1000.0)
+    usable = applicable(problem, effects)
+    dictionary = build_dictionary(problem, span, usable)
+    from studies.diagnosis.fit import fit_terms
+
+    plain = fit_terms(problem, ())
+    levels = shipped_levels([effect.name for effect in usable])
+    bases = generic_bases(problem)
+    generic_levels: dict[str, float] = {}
+    if draws:
+        levels = bootstrap_levels(problem, dictionary, scan_model(plain), draws, rng)
+        noise = draw_null(problem, scan_model(plain), min(draws, 100), rng)
+        generic_levels = {
+            name: float(levels_of(values[None, :])[0]) for name, values in leftover_evidence(plain, bases, noise).items()
+        }
+    selection = select(problem, span, levels, THRESHOLD, effects, dictionary)
+    leftover = strongest(leftover_evidence(selection.fit, bases), generic_levels)
+    return Inquiry(problem, selection, leftover, levels)
+
+
+def has_leftover(inquiry: Inquiry) -> bool:
+    """Whether structure is left: the generic evidence passes its threshold and is not a trifle beside what was explained."""
+    selection = inquiry.selection
+    explained = max(selection.plain.score - selection.fit.score, 0.0)
+    return inquiry.leftover.evidence > max(LEFT_OVER_THRESHOLD, LEFT_OVER_SHARE * explained)
+
+
+def merge_causes(inquiries: Mapping[str, Inquiry], campaign: Campaign) -> tuple[Cause, ...]:
+    """List the causes, one entry a physical cause, under the response where its evidence is largest."""
+    causes: list[Cause] = []
+    for response, inquiry in inquiries.items():
+        seen: set[str] = set()
+        for found in inquiry.selection.found:
+            cause = _cause(inquiry, found, response)
+            if cause.effect in seen:
+                continue
+            seen.add(cause.effect)
+            causes.append(cause)
+    causes.sort(key=lambda cause: -cause.evidence)
+    kept: list[Cause] = []
+    for cause in causes:
+        if any(_same_cause(cause, other) for other in kept):
+            continue
+        kept.append(cause)
+    return tuple(kept)
+
+
+def _cause(inquiry: Inquiry, found: Found, response: str) -> Cause:
+    winner = found.rivals[0]
+    equivalent = equivalent_to(found, response)
+    index = found.index if winner.name == found.name else len(winner.fit.terms) - 1
+    return Cause(
+        winner.name, response,
+        probability_of(found, equivalent, inquiry.selection.threshold, has_leftover(inquiry)), equivalent,
+        intervals(winner.fit, index), winner.evidence,
+    )
+
+
+def _same_cause(one: Cause, two: Cause) -> bool:
+    """The same effect in two responses is one cause when its shape agrees."""
+    if one.response == two.response or one.effect != two.effect:
+        return False
+    for name in ("time_s", "temperature_degC", "period_s", "run"):
+        if name in one.parameters and name in two.parameters:
+            a, b = one.parameters[name], two.parameters[name]
+            slack = 300.0 if name == "time_s" else 0.05 * abs(b.value) + 0.5
+            if not (a.low - slack <= b.value <= a.high + slack or b.low - slack <= a.value <= b.high + slack):
+                return False
+    return True
+
+
+def _result(
+    campaign: Campaign, inquiry: Inquiry, causes: Sequence[Cause], held_out: bool
+) -> ResponseResult:
+    selection = inquiry.selection
+    response = inquiry.problem.response
+    left = has_leftover(inquiry)
+    base = score(selection.plain, campaign) if held_out else Score(rms(row_residuals(selection.plain, campaign)), None)
+    extended = None
+    if selection.found:
+        extended = score(selection.fit, campaign) if held_out else Score(
+            rms(row_residuals(selection.fit, campaign)), None
+        )
+    remark = ""
+    if left:
+        verdict = "unexplained"
+    elif selection.found:
+        ambiguous = any(equivalent_to(found, response) for found in selection.found)
+        verdict = "not-identifiable" if ambiguous else "explained"
+    else:
+        verdict = "adequate"
+        temperature = np.concatenate([run.states.housing for run in campaign.runs])
+        if np.ptp(temperature) < NARROW_RANGE:
+            verdict, remark = "not-identifiable", f"the temperature varies by {np.ptp(temperature):.2g} K only"
+    noise = (extended or base).residual_rms
+    return ResponseResult(
+        verdict, noise, (base.residual_rms, base.held_out_rms),
+        None if extended is None else (extended.residual_rms, extended.held_out_rms),
+        "structure" if left else "none", inquiry.leftover.input if left else "", inquiry.leftover.evidence, remark,
+    )
+
+

@@ -1,0 +1,149 @@
+"""Forward selection: add the hypothesis with the strongest evidence until nothing beyond chance is left."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from studies.diagnosis.baseline import Problem, Term
+from studies.diagnosis.effects import Effect, Span
+from studies.diagnosis.fit import Fit, fit_terms
+from studies.diagnosis.scan import Candidate, Dictionary, applicable, build_dictionary, scan
+from studies.diagnosis.states import FloatArray
+
+MOST_TERMS = 4
+CONTENDERS = 5
+
+
+@dataclass(frozen=True)
+class Rival:
+    """One explanation in competition for the same residual, with its evidence net of its null level."""
+
+    name: str
+    evidence: float
+    fit: Fit
+
+
+@dataclass(frozen=True)
+class Found:
+    """One selected effect: its place in the final fit, its evidence, and who else could stand there."""
+
+    index: int
+    name: str
+    evidence: float
+    rivals: tuple[Rival, ...]
+
+
+@dataclass(frozen=True)
+class Selection:
+    """What forward selection made of one response.
+
+    Attributes
+    ----------
+    plain, fit : Fit
+        Baseline alone, and with the selected effects.
+    found : tuple of Found
+        Selected effects, strongest evidence first.
+    levels : mapping
+        Null level of every effect.
+    threshold : float
+        Evidence, net of its level, that an effect needs.
+    """
+
+    plain: Fit
+    fit: Fit
+    found: tuple[Found, ...]
+    levels: Mapping[str, float]
+    threshold: float
+
+
+def scan_model(fit: Fit) -> FloatArray:
+    """Return the rotated columns of a fit with the derivative of the lag, against which candidates are scored."""
+    problem = fit.problem
+    columns = fit.columns()
+    lag = problem.lag_column(problem.tau, fit.terms, fit.linear.coefficients)
+    return problem.basis.rotate(np.concatenate([columns, lag], axis=1))
+
+
+def select(
+    problem: Problem, span: Span, levels: Mapping[str, float], threshold: float,
+    effects: Sequence[Effect] | None = None, dictionary: Dictionary | None = None,
+) -> Selection:
+    """Select the effects that one response needs.
+
+    Parameters
+    ----------
+    problem, span
+        The response, and what the campaign covers.
+    levels : mapping
+        Gain that chance gives each effect.
+    threshold : float
+        Evidence beyond the level at which an effect counts.
+    effects : sequence of Effect, optional
+        A smaller library.
+    dictionary : Dictionary, optional
+        Signatures at the problem's lag, when they are known already.
+    """
+    usable = applicable(problem, effects)
+    plain = fit = fit_terms(problem, ())
+    if dictionary is None or abs(np.log(plain.problem.tau / problem.tau)) > 0.02:
+        dictionary = build_dictionary(plain.problem, replace(span, tau=plain.problem.tau), usable)
+    built_at = plain.problem.tau
+    while len(fit.terms) < MOST_TERMS:
+        if abs(np.log(fit.problem.tau / built_at)) > 0.02:
+            dictionary = build_dictionary(fit.problem, replace(span, tau=fit.problem.tau), usable)
+            built_at = fit.problem.tau
+        rivals = compete(fit, dictionary, levels, threshold)
+        if not rivals or rivals[0].evidence < threshold:
+            break
+        fit = rivals[0].fit
+    return _settle(plain, fit, dictionary, levels, threshold)
+
+
+def compete(fit: Fit, dictionary: Dictionary, levels: Mapping[str, float], threshold: float) -> list[Rival]:
+    """Return what each contending effect would add to a fit, after polishing, strongest first."""
+    candidates = scan(fit.problem, dictionary, scan_model(fit))
+    nets = sorted(candidates, key=lambda c: levels[c.term.name] - c.gain)
+    if not nets or nets[0].gain - levels[nets[0].term.name] < 0.6 * threshold:
+        return []
+    return polish_contenders(fit, nets, levels)
+
+
+def polish_contenders(fit: Fit, nets: Sequence[Candidate], levels: Mapping[str, float]) -> list[Rival]:
+    """Polish the most promising candidates on top of a fit."""
+    top = nets[0].gain - levels[nets[0].term.name]
+    rivals = []
+    for candidate in nets[:CONTENDERS]:
+        if candidate.gain - levels[candidate.term.name] < 0.5 * top - 8.0:
+            continue
+        polished = fit_terms(fit.problem, (*fit.terms, candidate.term))
+        rivals.append(Rival(candidate.term.name, fit.score - polished.score - levels[candidate.term.name], polished))
+    return sorted(rivals, key=lambda rival: -rival.evidence)
+
+
+def _settle(
+    plain: Fit, fit: Fit, dictionary: Dictionary, levels: Mapping[str, float], threshold: float
+) -> Selection:
+    """Drop effects that the others made superfluous, and let every effect defend its place against its rivals."""
+    while fit.terms:
+        found = []
+        for index, term in enumerate(fit.terms):
+            others = fit.terms[:index] + fit.terms[index + 1 :]
+            without = fit_terms(fit.problem, others) if others else plain
+            evidence = without.score - fit.score - levels[term.name]
+            found.append((evidence, index, without))
+        weakest = min(found, key=lambda item: item[0])
+        if weakest[0] >= threshold or len(fit.terms) == 1:
+            break
+        fit = weakest[2]
+    else:
+        return Selection(plain, fit, (), levels, threshold)
+    places = []
+    for evidence, index, without in found:
+        name = fit.terms[index].name
+        candidates = scan(without.problem, dictionary, scan_model(without))
+        nets = sorted(candidates, key=lambda c: levels[c.term.name] - c.gain)
+        rivals = [r for r in polish_contenders(without, nets, levels) if r.name != name]
+        rivals.insert(0, Rival(name, evidence, fit))
+        places.append(Found(index, name, evidence, tuple(sorted(rivals, key=lambda r: -r.evidence))))
+    return Selection(plain, fit, tuple(sorted(places, key=lambda f: -f.evidence)), levels, threshold)
