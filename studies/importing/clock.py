@@ -1,0 +1,193 @@
+"""Clocks of loggers: their stamps become seconds, and seconds of several clocks become those of one."""
+
+import datetime
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from studies.errors import InputError
+from studies.importing.raw import RawTable, shorten
+
+if TYPE_CHECKING:
+    import numpy as np
+    import pandas as pd
+    from numpy.typing import NDArray
+
+    from studies.importing.mapping import FileMap
+
+    Array = NDArray[np.float64]
+
+SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "min": 60.0, "h": 3600.0, "days": 86400.0}
+NUMERIC = (*SECONDS, "unix-s", "unix-ms", "excel-days")
+FORMATS = (*NUMERIC, "iso")
+_EXCEL_EPOCH = datetime.datetime(1899, 12, 30)
+_UNIX_EPOCH = datetime.datetime(1970, 1, 1, tzinfo=datetime.UTC)
+_HALF_DAY = 43200.0
+
+
+@dataclass(frozen=True)
+class Times:
+    """Seconds after an origin (None: the clock's own zero), NaN where a row has no time; what was done, in words."""
+
+    seconds: "Array"
+    origin: datetime.datetime | None
+    notes: tuple[str, ...] = ()
+
+
+def read_times(table: RawTable, file: "FileMap") -> Times:
+    """Return the times of a raw file by its own clock, corrected as its map says.
+
+    A clock that runs fast by ε and is behind by d at its zero gives t = t' / (1 + ε) + d.
+    """
+    form = file.time_format
+    origin, notes = file.start, []
+    if form in NUMERIC and len(file.time) > 1:
+        raise InputError(
+            f"{table.path}: time_format = '{form}' is a number in one column, but 'time' names {len(file.time)}."
+        )
+    if form in SECONDS:
+        seconds = table.numbers(file.time[0]) * SECONDS[form]
+    elif form in ("unix-s", "unix-ms"):
+        seconds, origin = _from_first(table.numbers(file.time[0]) * (1.0 if form == "unix-s" else 1e-3), _UNIX_EPOCH)
+    elif form == "excel-days":
+        seconds, origin = _from_first(table.numbers(file.time[0]) * 86400.0, _EXCEL_EPOCH)
+    else:
+        seconds, origin = _read_stamps(table, file)
+        if origin.year == 1900:  # a pattern without a date: what strptime then supplies
+            seconds, nights = _unroll_midnights(seconds)
+            origin = _combine(file.start, origin)
+            notes += [f"{nights} midnights passed: a day added at each"] if nights else []
+    if file.clock_rate:
+        seconds = seconds / (1 + file.clock_rate)
+        notes.append(f"its clock runs {file.clock_rate * 1e6:g} ppm fast: times divided by {1 + file.clock_rate!r}")
+    if file.clock_offset:
+        seconds = seconds + file.clock_offset
+        notes.append(f"{file.clock_offset:g} s added to its times")
+    return Times(seconds, origin, tuple(notes))
+
+
+def drop_repeated(table: RawTable, times: Times, rule: str) -> "tuple[Times, NDArray[np.intp]]":
+    """Return strictly increasing times and the rows that they belong to; rows without a time are left out.
+
+    Raises
+    ------
+    InputError
+        Times go back, or repeat while the rule is "error".
+    """
+    import numpy as np
+
+    rows = np.flatnonzero(np.isfinite(times.seconds))
+    if not len(rows):
+        raise InputError(f"{table.path}: no row has a time.")
+    t = times.seconds[rows]
+    notes = list(times.notes)
+    lost = len(times.seconds) - len(rows)
+    if lost:
+        first = int(np.flatnonzero(~np.isfinite(times.seconds))[0])
+        notes.append(f"{lost} rows without a time left out (first: line {table.line(first)})")
+    steps = np.diff(t)
+    if (steps < 0).any():
+        row = int(rows[int(np.flatnonzero(steps < 0)[0]) + 1])
+        raise InputError(
+            f"{table.path}, line {table.line(row)}: the time goes back by {-steps.min():g} s at most; split the file there"
+            " (a restart or a change to winter time), or end it with last_line in the map."
+        )
+    same = np.flatnonzero(steps == 0)
+    if len(same) and rule == "error":
+        raise InputError(
+            f"{table.path}, line {table.line(int(rows[same[0] + 1]))}: the time of the line before is repeated ({len(same)}"
+            " such rows); set repeated_times = 'first' or 'spread' in the map."
+        )
+    if len(same) and rule == "first":
+        notes.append(f"{len(same)} rows with a repeated time left out")
+        kept = np.concatenate([[True], steps > 0])
+        rows, t = rows[kept], t[kept]
+    elif len(same):
+        notes.append(f"{len(same)} repeated times spread evenly up to the next stamp")
+        t = _spread(t)
+    return Times(t, times.origin, tuple(notes)), rows
+
+
+def seconds_between(one: datetime.datetime, two: datetime.datetime, path: str) -> float:
+    """Return two - one in seconds; stamps with and without a time zone cannot be compared."""
+    if (one.tzinfo is None) != (two.tzinfo is None):
+        raise InputError(
+            f"{path}: one clock states its time zone and the other does not; give 'start' or a pattern with %z."
+        )
+    return (two - one).total_seconds()
+
+
+def _from_first(seconds: "Array", epoch: datetime.datetime) -> "tuple[Array, datetime.datetime]":
+    """Move the origin to the first whole second, so that small steps keep their digits."""
+    import numpy as np
+
+    known = seconds[np.isfinite(seconds)]
+    if not len(known) or not abs(known[0]) < 1e11:
+        return seconds, epoch
+    first = float(np.floor(known[0]))
+    return seconds - first, epoch + datetime.timedelta(seconds=first)
+
+
+def _read_stamps(table: RawTable, file: "FileMap") -> "tuple[Array, datetime.datetime]":
+    """Parse stamps written as text; several time zones in one file are brought to UTC."""
+    import numpy as np
+    import pandas as pd
+
+    name = " ".join(file.time)
+    text = table.joined(file.time)
+    empty = table.is_empty(text)
+    plain = text.str.replace(",", ".", regex=False) if file.decimal == "," else text
+    form = "ISO8601" if file.time_format == "iso" else file.time_format
+    stamps = _parse(plain.mask(empty), form, table, file)
+    bad = np.flatnonzero(np.asarray(stamps.isna()) & ~empty)
+    if len(bad):
+        raise InputError(
+            f"{table.path}, line {table.line(bad[0])}: '{shorten(text.iloc[bad[0]])}' in column '{name}' is not a time"
+            f" of the form '{file.time_format}'; correct time_format in the map."
+        )
+    known = stamps.dropna()
+    if not len(known):
+        raise InputError(f"{table.path}: no row has a time in column '{name}'.")
+    origin = known.iloc[0]
+    seconds = np.asarray((stamps - origin) / pd.Timedelta(seconds=1), dtype=float)
+    return seconds, origin.to_pydatetime()
+
+
+def _parse(text: "pd.Series[str]", form: str, table: RawTable, file: "FileMap") -> "pd.Series[pd.Timestamp]":
+    import pandas as pd
+
+    zoned = "%z" in form or (form == "ISO8601" and bool(text.dropna().str.contains(r"(?:[Zz]|[+-]\d\d:?\d\d)$").any()))
+    try:
+        return pd.to_datetime(text, format=form, errors="coerce", utc=zoned)
+    except ValueError as error:
+        raise InputError(
+            f"{table.path}: time_format = '{file.time_format}' does not fit column '{' '.join(file.time)}' ({shorten(str(error))})."
+        ) from None
+
+
+def _unroll_midnights(seconds: "Array") -> "tuple[Array, int]":
+    """Add a day whenever a clock without a date jumps back by more than half a day."""
+    import numpy as np
+
+    known = np.flatnonzero(np.isfinite(seconds))
+    jumps = np.diff(seconds[known]) < -_HALF_DAY
+    unrolled = seconds.copy()
+    unrolled[known[1:]] += 86400.0 * np.cumsum(jumps)
+    return unrolled, int(jumps.sum())
+
+
+def _combine(start: datetime.datetime | None, clock: datetime.datetime) -> datetime.datetime | None:
+    """Give the first stamp of a clock without a date the date of `start`."""
+    return (
+        None if start is None else datetime.datetime.combine(start.date(), clock.time(), clock.tzinfo or start.tzinfo)
+    )
+
+
+def _spread(t: "Array") -> "Array":
+    """Spread rows with the same stamp evenly up to the next stamp; the last group takes the usual step."""
+    import numpy as np
+
+    stamps, first, count = np.unique(t, return_index=True, return_counts=True)
+    usual = float(np.median(np.diff(stamps))) if len(stamps) > 1 else 1.0
+    width = np.append(np.diff(stamps), usual)
+    within = np.arange(len(t)) - np.repeat(first, count)
+    return np.asarray(t + within * np.repeat(width / count, count))

@@ -1,0 +1,227 @@
+"""Columns of several loggers, each with its own clock and rate, brought onto the times of one record."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from studies.errors import InputError
+from studies.importing.clock import drop_repeated, read_times, seconds_between
+from studies.importing.mapping import ColumnMap, FileMap, ImportMap
+from studies.importing.raw import RawTable, read_raw
+from studies.record import Record
+
+if TYPE_CHECKING:
+    import datetime
+
+    from numpy.typing import NDArray
+
+    Array = NDArray[np.float64]
+
+LARGEST = 50_000_000  # rows of a regular grid
+USUAL_GAP = 10.0  # sampling steps that a gap may have before nothing is interpolated across it
+
+
+@dataclass(frozen=True)
+class Series:
+    """One raw file after its own map: times by its clock, converted columns, and what was changed, in words."""
+
+    file: FileMap
+    path: str
+    time: "Array"
+    origin: "datetime.datetime | None"
+    columns: "dict[str, Array]"
+    notes: tuple[str, ...]
+
+    @property
+    def longest_gap(self) -> float:
+        """The longest gap across which values are interpolated, s."""
+        if self.file.longest_gap is not None:
+            return self.file.longest_gap
+        return USUAL_GAP * float(np.median(np.diff(self.time))) if len(self.time) > 1 else 0.0
+
+
+def import_record(paths: Sequence[str], import_map: ImportMap) -> Record:
+    """Read raw files, convert and join them into one record.
+
+    The comments of the record's header list every change; nothing is extrapolated, and nothing interpolated across gaps.
+
+    Raises
+    ------
+    InputError
+        A file does not fit its map, or the clocks cannot be placed against each other.
+    """
+    wanted = len(import_map.files)
+    if len(paths) != wanted:
+        raise InputError(f"{import_map.path}: describes {wanted} raw files, but {len(paths)} are given.")
+    series = [read_series(path, file) for path, file in zip(paths, import_map.files, strict=True)]
+    base = series[0]
+    shifts = [_shift(base, other) for other in series]
+    grid = _lay_grid(base, import_map)
+    notes = [f"imported with {import_map.path}; every change is listed here"]
+    columns: dict[str, Array] = {"time_s": grid - grid[0]}
+    for number, (one, shift) in enumerate(zip(series, shifts, strict=True), 1):
+        notes += [f"file {number}, {note}" for note in one.notes]
+        if number > 1:
+            notes.append(f"file {number}, its zero lies at {shift - float(base.time[0]):.6g} s of the record")
+        for column in one.file.columns:
+            values = one.columns[column.target]
+            if one is not base or import_map.step is not None:
+                values = resample(one.time + shift, values, grid, column.resample, one.longest_gap)
+            columns[column.target] = values
+            notes.append(_describe(column, values, moved=one is not base or import_map.step is not None))
+        if one is not base or import_map.step is not None:
+            notes.append(f"file {number}, nothing is interpolated across gaps longer than {one.longest_gap:.6g} s")
+    if import_map.step is not None:
+        notes.append(f"regular time grid of {import_map.step:g} s")
+    start = None if base.origin is None else _later(base.origin, float(grid[0]))
+    return Record(
+        columns,
+        instrument=import_map.instrument,
+        source=import_map.source,
+        start=start,
+        comments=tuple(" ".join(note.split()) for note in notes),
+    )
+
+
+def read_series(path: str, file: FileMap) -> Series:
+    """Read one raw file: its clock corrected, its columns converted, rows without a time left out."""
+    table = read_raw(path, file)
+    times, rows = drop_repeated(table, read_times(table, file), file.repeated_times)
+    columns = {column.target: convert(table, column)[rows] for column in file.columns}
+    _check_lone_values(table, columns, rows)
+    name = " ".join(str(path).split())
+    notes = (
+        f"{name}, sha256 {table.sha256}, {len(rows)} rows from '{' '.join(file.time)}' ({file.time_format})",
+        *times.notes,
+    )
+    return Series(file, str(path), times.seconds, times.origin, columns, notes)
+
+
+def convert(table: RawTable, column: ColumnMap) -> "Array":
+    """Return a raw column in the unit of the record: sign × unit(reading × scale + offset)."""
+    unit = column.conversion
+    reading = table.numbers(column.source) * column.scale + column.offset
+    if unit.divides and (reading == 0).any():
+        row = int(np.flatnonzero(reading == 0)[0])
+        raise InputError(
+            f"{table.path}, line {table.line(row)}: 0 in column '{column.source}' cannot be a {column.unit}; add '0' to"
+            " 'missing' in the map where it marks a missing value."
+        )
+    values = column.sign * unit.convert(reading, *column.settings)
+    if (
+        column.target.endswith("temperature_degC")
+        and (outside := np.flatnonzero((values < -200) | (values > 200))).size
+    ):
+        line = table.line(outside[0])
+        raise InputError(
+            f"{table.path}, line {line}: '{column.source}' becomes {values[outside[0]]:g} °C; check unit, scale and offset"
+            " in the map."
+        )
+    return np.asarray(values, dtype=float)
+
+
+def resample(time: "Array", values: "Array", grid: "Array", how: str, longest_gap: float) -> "Array":
+    """Return the values at the times of the grid, NaN outside their range and within gaps.
+
+    linear: between the neighbours. mean: of the samples that lie nearer to this grid time than to any other.
+    nearest: the nearest sample. previous: the last sample, held (for set points).
+    """
+    known = np.isfinite(values)
+    t, v = time[known], values[known]
+    if not len(t):
+        return np.full(len(grid), np.nan)
+    after = np.searchsorted(t, grid)
+    left, right = np.clip(after - 1, 0, len(t) - 1), np.clip(after, 0, len(t) - 1)
+    if how == "previous":
+        held = np.searchsorted(t, grid, side="right") - 1
+        return np.where(held >= 0, v[np.clip(held, 0, None)], np.nan)
+    if how == "mean":
+        return _bin_means(t, v, grid)
+    if how == "nearest":
+        nearest = np.where(abs(grid - t[left]) <= abs(t[right] - grid), left, right)
+        return np.where(abs(t[nearest] - grid) <= longest_gap / 2, v[nearest], np.nan)
+    exact = t[right] == grid
+    reachable = exact | ((after > 0) & (after < len(t)) & (t[right] - t[left] <= longest_gap))
+    return np.where(reachable, np.interp(grid, t, v), np.nan)
+
+
+def _bin_means(t: "Array", v: "Array", grid: "Array") -> "Array":
+    if len(grid) < 2:
+        return np.full(len(grid), float(np.mean(v)))
+    middles = (grid[1:] + grid[:-1]) / 2
+    edges = np.concatenate([[grid[0] - (middles[0] - grid[0])], middles, [grid[-1] + (grid[-1] - middles[-1])]])
+    which = np.searchsorted(edges, t, side="right") - 1
+    inside = (which >= 0) & (which < len(grid))
+    total = np.bincount(which[inside], v[inside], len(grid))
+    count = np.bincount(which[inside], minlength=len(grid))
+    return np.asarray(np.divide(total, count, out=np.full(len(grid), np.nan), where=count > 0))
+
+
+def _lay_grid(base: Series, import_map: ImportMap) -> "Array":
+    """Return the times of the record by the first file's clock: its own, or a regular grid over its range."""
+    if import_map.step is None:
+        return base.time
+    count = np.floor((base.time[-1] - base.time[0]) / import_map.step) + 1
+    if not count <= LARGEST:
+        raise InputError(
+            f"{import_map.path}: step_s = {import_map.step:g} makes {count:.3g} rows; {LARGEST:,} is the most."
+        )
+    return np.asarray(base.time[0] + import_map.step * np.arange(int(count)))
+
+
+def _shift(base: Series, other: Series) -> float:
+    """Return what must be added to the other file's times to bring them onto the first file's clock."""
+    if base.origin is None and other.origin is None:
+        return 0.0
+    if base.origin is None or other.origin is None:
+        lost = base if base.origin is None else other
+        raise InputError(
+            f"{lost.path}: counts from 0 while another file has dates; say when its clock was started ('start' in the map)."
+        )
+    shift = seconds_between(base.origin, other.origin, other.path)
+    first, last = other.time[0] + shift, other.time[-1] + shift
+    if other is not base and (last < base.time[0] or first > base.time[-1]):
+        raise InputError(
+            f"{other.path}: lies wholly {'before' if last < base.time[0] else 'after'} {base.path} (from {first - base.time[0]:g}"
+            f" to {last - base.time[0]:g} s of the record); check the dates, 'start' and clock_offset_s."
+        )
+    return shift
+
+
+def _check_lone_values(table: RawTable, columns: "dict[str, Array]", rows: "NDArray[np.intp]") -> None:
+    """Refuse a file whose mapped columns hold no value at all."""
+    for name, values in columns.items():
+        if not np.isfinite(values).any():
+            raise InputError(f"{table.path}: the column for {name} holds no value in any of the {len(rows)} rows.")
+
+
+def _describe(column: ColumnMap, values: "Array", moved: bool) -> str:
+    unit = column.conversion
+    steps = [f"x = '{column.source}'"]
+    if column.scale != 1 or column.offset != 0:
+        steps.append(f"x × {column.scale!r} + {column.offset!r}")
+    named = dict(zip(unit.settings, column.settings, strict=True))
+    stated = "".join(f", {key} = {value!r}" for key, value in named.items())
+    same = unit.words == "x"
+    steps.append(f"in {column.unit}" if same else f"{column.unit} to {column.target}: {unit.words}{stated}")
+    if column.sign < 0:
+        steps.append("sign turned")
+    if moved:
+        steps.append(f"resampled: {column.resample}")
+    empty = int(np.isnan(values).sum())
+    if empty:
+        steps.append(f"{empty} of {len(values)} values missing")
+    return f"{column.target} from " + "; ".join(steps)
+
+
+def _later(origin: "datetime.datetime", seconds: float) -> "datetime.datetime":
+    import datetime
+
+    try:
+        return origin + datetime.timedelta(seconds=seconds)
+    except OverflowError:
+        raise InputError(
+            f"the first time of the record, {seconds:g} s after {origin}, is no date; check time_format."
+        ) from None

@@ -1,0 +1,252 @@
+"""The map of an import, `schema = "hrg.map/1"`: what each raw file's columns are and how they become a record.
+
+```toml
+schema = "hrg.map/1"
+instrument = "unit 7"            # optional: goes into the record's header, as does source = "..."
+step_s = 1.0                     # optional: a regular time grid; without it the times of the first file
+
+[[file]]                         # one table for each raw file, in the order of the command line
+separator = ";"                  # ";" "," "tab" "space"
+decimal = ","                    # "." or ","
+encoding = "utf-8"               # utf-8, utf-16, cp1252, latin-1
+header_line = 1                  # the line with the column names
+data_line = 2                    # the first line with numbers; default: the line after the header
+last_line = 9000                 # optional: what follows is not data
+sheet = "Sheet1"                 # Excel workbooks only
+missing = ["---", "OVL"]         # cells that mean "no value", besides empty ones
+time = "Zeit"                    # the column with the time; ["Datum", "Zeit"] joins two with a blank
+time_format = "s"                # see studies.importing.clock.FORMATS, or a pattern such as "%d.%m.%Y %H:%M:%S"
+start = 2026-01-31T12:00:00      # optional: when a clock that counts from 0 was started
+clock_offset_s = 0.0             # added to this file's times: positive when its clock is behind
+clock_rate_ppm = 0.0             # by how much its clock runs fast
+repeated_times = "error"         # error | first (keep the first row) | spread (evenly up to the next time)
+longest_gap_s = 10.0             # nothing is interpolated across longer gaps; default: 10 sampling steps
+
+[[file.column]]
+from = "T Gehäuse [K]"           # the name in the raw file
+to = "housing_temperature_degC"  # the column of the record
+unit = "K"                       # see studies.importing.units; (reading × scale + offset) is in this unit
+scale = 1.0
+offset = 0.0
+sign = 1                         # -1 turns the converted value's sign
+resample = "linear"              # linear | mean | nearest | previous
+# unit "period-counts" needs clock_Hz and periods, "gate-counts" needs gate_s
+```
+"""
+
+import datetime
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Literal, cast
+
+from studies.errors import InputError, nearest
+from studies.files.toml import Section, read_toml
+from studies.importing.clock import FORMATS
+from studies.importing.raw import SEPARATORS
+from studies.importing.units import SETTINGS, TARGETS, Unit, units_of
+
+SCHEMA = "hrg.map/1"
+ENCODINGS = ("utf-8", "utf-16", "cp1252", "latin-1")
+FILE_KEYS = (
+    "separator",
+    "decimal",
+    "encoding",
+    "header_line",
+    "data_line",
+    "last_line",
+    "sheet",
+    "missing",
+    "time",
+    "time_format",
+    "start",
+    "clock_offset_s",
+    "clock_rate_ppm",
+    "repeated_times",
+    "longest_gap_s",
+    "column",
+)
+COLUMN_KEYS = ("from", "to", "unit", "scale", "offset", "sign", "resample", *SETTINGS)
+RESAMPLING = ("linear", "mean", "nearest", "previous")
+
+Resampling = Literal["linear", "mean", "nearest", "previous"]
+
+
+@dataclass(frozen=True)
+class ColumnMap:
+    """One raw column and what it becomes: sign × unit(reading × scale + offset)."""
+
+    source: str
+    target: str
+    unit: str
+    scale: float = 1.0
+    offset: float = 0.0
+    sign: float = 1.0
+    resample: Resampling = "linear"
+    settings: tuple[float, ...] = ()
+
+    @property
+    def conversion(self) -> Unit:
+        """The unit's conversion."""
+        return units_of(self.target)[self.unit]
+
+
+@dataclass(frozen=True)
+class FileMap:
+    """One raw file: its notation, its clock, its columns. The keys are those of the module's docstring."""
+
+    columns: tuple[ColumnMap, ...]
+    time: tuple[str, ...]
+    time_format: str
+    separator: str = ","
+    decimal: str = "."
+    encoding: str = "utf-8"
+    header_line: int = 1
+    data_line: int = 2
+    last_line: int | None = None
+    sheet: str | None = None
+    missing: tuple[str, ...] = ()
+    start: datetime.datetime | None = None
+    clock_offset: float = 0.0
+    clock_rate: float = 0.0
+    repeated_times: str = "error"
+    longest_gap: float | None = None
+
+
+@dataclass(frozen=True)
+class ImportMap:
+    """A whole map: the files in the order of the command line, and what the record's header shall say."""
+
+    files: tuple[FileMap, ...]
+    step: float | None = None
+    instrument: str = ""
+    source: str = ""
+    path: str = field(default="", compare=False)
+
+
+def load_map(path: str | Path) -> ImportMap:
+    """Read a map.
+
+    Raises
+    ------
+    InputError
+        Unknown keys, units or columns, missing or impossible values: the message names the place and the mend.
+    """
+    top = Section(read_toml(path, SCHEMA), str(path), ("schema", "instrument", "source", "step_s", "file"))
+    files = tuple(_read_file(section) for section in top.sections("file", FILE_KEYS))
+    if not files:
+        raise InputError(f"{path}: a table [[file]] is missing; 'hrg import RAW --draft MAP.toml' drafts one.")
+    step = top.number("step_s", above=0.0) if "step_s" in top else None
+    seen: dict[str, int] = {}
+    for number, file in enumerate(files, 1):
+        for column in file.columns:
+            if column.target in seen:
+                raise InputError(
+                    f"{path}: '{column.target}' is filled twice, by files {seen[column.target]} and {number}."
+                )
+            seen[column.target] = number
+    return ImportMap(files, step, _text(top, "instrument"), _text(top, "source"), str(path))
+
+
+def _read_file(section: Section) -> FileMap:
+    where = section.where
+    columns = tuple(_read_column(part) for part in section.sections("column", COLUMN_KEYS))
+    if not columns:
+        raise InputError(f"{where}: no [[file.column]] says which column becomes what; add one.")
+    header = _line(section, "header_line", 1)
+    data = _line(section, "data_line", header + 1)
+    last = _line(section, "last_line", 0) if "last_line" in section else None
+    if data <= header or (last is not None and last < data):
+        raise InputError(
+            f"{where}: header_line, data_line and last_line must follow each other ({header}, {data}, {last})."
+        )
+    return FileMap(
+        columns,
+        _read_time(section),
+        _read_time_format(section),
+        section.text("separator", ",", tuple(SEPARATORS)),
+        section.text("decimal", ".", (".", ",")),
+        section.text("encoding", "utf-8", ENCODINGS),
+        header,
+        data,
+        last,
+        _text(section, "sheet") or None,
+        _read_missing(section),
+        _read_start(section),
+        section.number("clock_offset_s", 0.0, least=-1e9, most=1e9),
+        section.number("clock_rate_ppm", 0.0, least=-1e5, most=1e5) * 1e-6,
+        section.text("repeated_times", "error", ("error", "first", "spread")),
+        section.number("longest_gap_s", above=0.0) if "longest_gap_s" in section else None,
+    )
+
+
+def _read_column(section: Section) -> ColumnMap:
+    target = section.text("to")
+    if target not in TARGETS:
+        raise InputError(f"{section.where}: to = '{target}' is no column of a record{nearest(target, TARGETS)}")
+    units: Mapping[str, Unit] = units_of(target)
+    unit = section.text("unit", choices=tuple(units))
+    settings = tuple(section.number(key, above=0.0) for key in units[unit].settings)
+    for key in SETTINGS:
+        if key in section and key not in units[unit].settings:
+            raise InputError(f"{section.where}: {key} has no meaning with unit = '{unit}'; remove it.")
+    scale = section.number("scale", 1.0)
+    if scale == 0:
+        raise InputError(f"{section.where}: scale must not be 0.")
+    sign = section.number("sign", 1.0)
+    if sign not in (1.0, -1.0):
+        raise InputError(f"{section.where}: sign must be 1 or -1, not {sign:g}.")
+    usual = "nearest" if target == "pattern_angle_deg" else "linear"  # an angle may jump by a turn
+    resample = cast("Resampling", section.text("resample", usual, RESAMPLING))
+    offset = section.number("offset", 0.0)
+    return ColumnMap(section.text("from"), target, unit, scale, offset, sign, resample, settings)
+
+
+def _read_time(section: Section) -> tuple[str, ...]:
+    value = section.raw("time")
+    names = [value] if isinstance(value, str) else value
+    if not isinstance(names, list) or not names or not all(isinstance(name, str) for name in names):
+        raise InputError(f"{section.where}: time must be a column name, or a list of names to join, not {value!r}.")
+    return tuple(names)
+
+
+def _read_time_format(section: Section) -> str:
+    found = section.text("time_format")
+    if "%" not in found and found not in FORMATS:
+        raise InputError(
+            f"{section.where}: time_format = '{found}' is unknown{nearest(found, FORMATS)} A pattern needs %, such as"
+            " '%d.%m.%Y %H:%M:%S'."
+        )
+    return found
+
+
+def _read_missing(section: Section) -> tuple[str, ...]:
+    cells = section.raw("missing", [])
+    if not isinstance(cells, list) or not all(isinstance(cell, str) for cell in cells):
+        raise InputError(f"{section.where}: missing must be a list of texts, such as ['---'], not {cells!r}.")
+    return tuple(cells)
+
+
+def _read_start(section: Section) -> datetime.datetime | None:
+    if "start" not in section:
+        return None
+    value = section.raw("start")
+    if isinstance(value, str):
+        try:
+            value = datetime.datetime.fromisoformat(value)
+        except ValueError:
+            value = None
+    if not isinstance(value, datetime.datetime):
+        raise InputError(f"{section.where}: start must be a time such as 2026-01-31T12:00:00.")
+    return value
+
+
+def _line(section: Section, key: str, default: int) -> int:
+    value = section.raw(key, default)
+    if isinstance(value, bool) or not isinstance(value, int) or not 1 <= value <= 10**9:
+        raise InputError(f"{section.where}: {key} must be a line number from 1 up, not {value!r}.")
+    return value
+
+
+def _text(section: Section, key: str) -> str:
+    return " ".join(section.text(key).split()) if key in section else ""

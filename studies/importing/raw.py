@@ -1,0 +1,234 @@
+"""Raw tables: text of any separator and encoding, or Excel sheets, as cells of text with the lines that they stand on."""
+
+import csv
+import hashlib
+import importlib
+import io
+import warnings
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from studies.errors import InputError, MissingEnvironment, nearest
+
+if TYPE_CHECKING:
+    import numpy as np
+    import pandas as pd
+    from numpy.typing import NDArray
+
+    from studies.importing.mapping import FileMap
+
+SEPARATORS = {";": ";", ",": ",", "tab": "\t", "space": r"\s+"}
+EXCEL = (".xlsx", ".xlsm")
+OVERFLOW = "(beyond the header)"
+
+
+@dataclass(frozen=True)
+class RawTable:
+    """The cells of one raw file, all text, and where they stood."""
+
+    path: str
+    cells: "pd.DataFrame"
+    first_line: int
+    sha256: str
+    decimal: str
+    missing: tuple[str, ...]
+
+    def joined(self, columns: Sequence[str]) -> "pd.Series[str]":
+        """Return several columns joined by a blank, such as a date and a time of day."""
+        text = self.text(columns[0])
+        for column in columns[1:]:
+            text = text + " " + self.text(column)
+        return text.str.strip()
+
+    def text(self, column: str) -> "pd.Series[str]":
+        """Return the cells of one column without the blanks around them."""
+        if column not in self.cells:
+            known = [str(name) for name in self.cells if name != OVERFLOW]
+            raise InputError(f"{self.path}: there is no column '{column}'{nearest(column, known)}")
+        return self.cells[column].str.strip()
+
+    def is_empty(self, text: "pd.Series[str]") -> "NDArray[np.bool_]":
+        """Tell which cells hold no value."""
+        import numpy as np
+
+        return np.asarray(text.isin(["", *self.missing]))
+
+    def numbers(self, column: str) -> "NDArray[np.float64]":
+        """Return a column as numbers, NaN where a value is missing; anything else is an error that names the line."""
+        import numpy as np
+        import pandas as pd
+
+        text = self.text(column)
+        empty = self.is_empty(text)
+        plain = text.str.replace(self.decimal, ".", regex=False) if self.decimal != "." else text
+        values = pd.to_numeric(plain.mask(empty, "nan"), errors="coerce").to_numpy(dtype=float, copy=True)
+        bad = np.flatnonzero(~np.isfinite(values) & ~empty)
+        if len(bad):
+            raise InputError(
+                f"{self.path}, line {self.line(bad[0])}: '{shorten(text.iloc[bad[0]])}' in column '{column}' is not a"
+                f" number (decimal = '{self.decimal}'); where it marks a missing value, add it to 'missing' in the map."
+            )
+        return values
+
+    def line(self, row: int) -> int:
+        """Return the line of the file on which a row (from 0) stands."""
+        return self.first_line + int(row)
+
+
+def read_raw(path: str | Path, file: "FileMap") -> RawTable:
+    """Read one raw file as its map describes it.
+
+    Raises
+    ------
+    InputError
+        The file cannot be read that way; the message names line, key and mend.
+    MissingEnvironment
+        An Excel workbook where openpyxl is not installed.
+    """
+    import pandas as pd
+
+    data = read_bytes(path)
+    decimal = file.decimal
+    if Path(path).suffix.lower() in EXCEL:
+        lines = read_sheet(path, file.sheet)
+        names, rows = _head(path, lines, file), lines[file.data_line - 1 : file.last_line]
+        width = len(names) + 1
+        if any(any(row[width - 1 :]) for row in rows):
+            raise InputError(f"{path}: some rows of the sheet are longer than its header (line {file.header_line}).")
+        filled = [(row + [""] * width)[:width] for row in rows]
+        cells, decimal = pd.DataFrame(filled, columns=[*names, OVERFLOW], dtype=str), "."
+    else:
+        text = decode(path, data, file.encoding)
+        names = _head(path, _split_lines(path, text, file), file)
+        cells = _read_text(path, text, file, names)
+    if not len(cells):
+        raise InputError(f"{path}: there are no rows from line {file.data_line} on (data_line in the map).")
+    return RawTable(str(path), cells, file.data_line, hashlib.sha256(data).hexdigest(), decimal, file.missing)
+
+
+def read_bytes(path: str | Path) -> bytes:
+    """Read a file that must exist and hold something."""
+    try:
+        data = Path(path).read_bytes()
+    except FileNotFoundError:
+        raise InputError(f"{path}: there is no such file.") from None
+    except IsADirectoryError:
+        raise InputError(f"{path}: is a folder; give the name of a file.") from None
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read ({error.strerror}).") from error
+    if not data.strip():
+        raise InputError(f"{path}: the file is empty.")
+    return data
+
+
+def decode(path: str | Path, data: bytes, encoding: str) -> str:
+    """Return the text of a file; a byte that the encoding does not know is an error that names its line."""
+    try:
+        text = data.decode("utf-8-sig" if encoding == "utf-8" else encoding)
+    except UnicodeDecodeError as error:
+        line = data.count(b"\n", 0, error.start) + 1
+        raise InputError(
+            f"{path}, line {line}: not {encoding} text; set 'encoding' in the map (cp1252 is common)."
+        ) from None
+    except UnicodeError:
+        raise InputError(f"{path}: not {encoding} text; set 'encoding' in the map.") from None
+    if "\0" in text:
+        raise InputError(f"{path}: not a text table (it holds zero bytes); is it UTF-16 or a binary file?")
+    return text.replace("\r\n", "\n").replace("\r", "\n")
+
+
+def read_sheet(path: str | Path, sheet: str | None) -> list[list[str]]:
+    """Return the rows of an Excel sheet as text: dates in ISO 8601, numbers with all their digits."""
+    try:
+        openpyxl = importlib.import_module("openpyxl")
+    except ImportError:
+        raise MissingEnvironment(
+            f"{path}: reading Excel needs openpyxl: pip install 'hrg-workbench[excel]', or export the sheet as CSV."
+        ) from None
+    try:
+        book = openpyxl.load_workbook(path, read_only=True, data_only=True)
+    except Exception as error:  # openpyxl lets errors of zip, XML and its own through
+        raise InputError(f"{path}: not an Excel workbook that can be read ({shorten(str(error))}).") from None
+    if sheet is not None and sheet not in book.sheetnames:
+        raise InputError(f"{path}: there is no sheet '{sheet}'{nearest(sheet, book.sheetnames)}")
+    page = book[sheet] if sheet is not None else book.worksheets[0]
+    return [[_cell_text(value) for value in row] for row in page.iter_rows(values_only=True)]
+
+
+def shorten(text: str) -> str:
+    """Return at most 60 characters of somebody's text, on one line."""
+    line = " ".join(text.split())
+    return line if len(line) <= 60 else line[:57] + "..."
+
+
+def _cell_text(value: object) -> str:
+    if value is None:
+        return ""
+    return value.isoformat(sep=" ") if hasattr(value, "isoformat") else str(value)
+
+
+def _split_lines(path: str | Path, text: str, file: "FileMap") -> list[list[str]]:
+    """Return the cells of the lines down to the header."""
+    lines = text.split("\n", file.header_line)[: file.header_line]
+    separator = SEPARATORS[file.separator]
+    if file.separator == "space":
+        return [line.split() for line in lines]
+    try:
+        return [next(csv.reader([line], delimiter=separator), []) for line in lines]
+    except csv.Error as error:
+        raise InputError(f"{path}, line {file.header_line}: the header cannot be read ({error}).") from None
+
+
+def _head(path: str | Path, lines: Sequence[Sequence[str]], file: "FileMap") -> list[str]:
+    """Return the column names of the header line; a repeated name gets its number, a nameless column its place."""
+    if len(lines) < file.header_line:
+        raise InputError(f"{path}: has {len(lines)} lines, but header_line is {file.header_line} in the map.")
+    names: list[str] = []
+    cells = [" ".join(cell.split()) for cell in lines[file.header_line - 1]]
+    while cells and not cells[-1]:
+        cells.pop()
+    for place, name in enumerate(cells, 1):
+        wanted = name or f"column {place}"
+        names.append(f"{wanted} #{place}" if wanted in [*names, OVERFLOW] else wanted)
+    if not names:
+        raise InputError(f"{path}, line {file.header_line}: the header line is empty; set header_line in the map.")
+    return names
+
+
+def _read_text(path: str | Path, text: str, file: "FileMap", names: list[str]) -> "pd.DataFrame":
+    import pandas as pd
+
+    rows = None if file.last_line is None else file.last_line - file.data_line + 1
+    body = text.split("\n", file.data_line - 1)[-1] if text.count("\n") >= file.data_line - 1 else ""
+    if not body.strip():
+        raise InputError(f"{path}: there are no rows from line {file.data_line} on (data_line in the map).")
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("error", pd.errors.ParserWarning)
+            cells = pd.read_csv(
+                io.StringIO(body),
+                sep=SEPARATORS[file.separator],
+                header=None,
+                names=[*names, OVERFLOW],
+                dtype=str,
+                na_filter=False,
+                skip_blank_lines=False,
+                index_col=False,
+                nrows=rows,
+            )
+    except (pd.errors.ParserError, pd.errors.ParserWarning, pd.errors.EmptyDataError) as error:
+        raise InputError(
+            f"{path}: the rows from line {file.data_line} on do not fit the {len(names)} columns of the header"
+            f" ({shorten(str(error))}); check separator and decimal in the map."
+        ) from None
+    cells = cells.fillna("")
+    longer = cells.index[cells[OVERFLOW].str.strip() != ""]
+    if len(longer):
+        line = file.data_line + int(longer[0])
+        raise InputError(
+            f"{path}, line {line}: more values than the {len(names)} columns of the header; check separator and decimal"
+            " in the map."
+        )
+    return cells

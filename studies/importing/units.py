@@ -1,0 +1,98 @@
+"""Units that laboratory files use, by the column of the record that they become; each conversion in words and as code."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from math import pi
+from typing import TYPE_CHECKING
+
+from studies.record import COLUMNS
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Unit:
+    """How a reading x in this unit becomes a value of the record.
+
+    `settings` are the keys of the map that the conversion needs besides x, in the order of its arguments; `divides`
+    tells that x = 0 has no meaning.
+    """
+
+    convert: "Callable[..., Array]"
+    words: str
+    settings: tuple[str, ...] = ()
+    divides: bool = False
+
+
+def _times(factor: float, words: str) -> Unit:
+    return Unit(lambda x: x * factor, words)
+
+
+def _over(numerator: float, words: str) -> Unit:
+    return Unit(lambda x: numerator / x, words, divides=True)
+
+
+_SAME = Unit(lambda x: x, "x")
+_TEMPERATURE = {
+    "degC": _SAME,
+    "K": Unit(lambda x: x - 273.15, "x - 273.15"),
+    "degF": Unit(lambda x: (x - 32) / 1.8, "(x - 32) / 1.8"),
+}
+_FREQUENCY = {
+    "Hz": _SAME,
+    "kHz": _times(1e3, "1000 x"),
+    "MHz": _times(1e6, "1e6 x"),
+    "rad/s": _times(1 / (2 * pi), "x / 2 pi"),
+    "period-s": _over(1.0, "1 / x"),
+    "period-ms": _over(1e3, "1000 / x"),
+    "period-us": _over(1e6, "1e6 / x"),
+    "period-counts": Unit(
+        lambda x, clock, periods: periods * clock / x, "periods clock_Hz / x", ("clock_Hz", "periods"), divides=True
+    ),
+    "gate-counts": Unit(lambda x, gate: x / gate, "x / gate_s", ("gate_s",)),
+}
+_RATE_PER_H = {
+    "deg/h": _SAME,
+    "deg/s": _times(3600.0, "3600 x"),
+    "mdeg/s": _times(3.6, "3.6 x"),
+    "rad/s": _times(3600 * 180 / pi, "3600 (180 / pi) x"),
+    "arcsec/s": _SAME,
+}
+_RATE_PER_S = {
+    "deg/s": _SAME,
+    "mdeg/s": _times(1e-3, "x / 1000"),
+    "deg/h": _times(1 / 3600, "x / 3600"),
+    "rad/s": _times(180 / pi, "(180 / pi) x"),
+    "rpm": _times(6.0, "6 x"),
+}
+_VOLTAGE = {
+    "V": _SAME,
+    "mV": _times(1e-3, "x / 1000"),
+    "uV": _times(1e-6, "x / 1e6"),
+    "kV": _times(1e3, "1000 x"),
+}
+_ANGLE = {"deg": _SAME, "rad": _times(180 / pi, "(180 / pi) x"), "turns": _times(360.0, "360 x")}
+
+_BY_ENDING: Mapping[str, Mapping[str, Unit]] = {
+    "_degC": _TEMPERATURE,
+    "_Hz": _FREQUENCY,
+    "_deg_per_h": _RATE_PER_H,
+    "_deg_per_s": _RATE_PER_S,
+    "_V": _VOLTAGE,
+    "_deg": _ANGLE,
+    "_counts": {"counts": _SAME},
+    "inverse_q": {"1/Q": _SAME, "Q": _over(1.0, "1 / x"), "ppm": _times(1e-6, "x / 1e6")},
+}
+
+
+def units_of(column: str) -> Mapping[str, Unit]:
+    """Return the units from which a column of the record can be made; the first one is its own."""
+    return next(units for ending, units in _BY_ENDING.items() if column.endswith(ending))
+
+
+TARGETS = tuple(name for name in COLUMNS if name != "time_s")
+SETTINGS = ("clock_Hz", "periods", "gate_s")
