@@ -15,6 +15,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "fit frequency": ("studies.cli.fit_frequency:fit_frequency", "f(T) and its inverse from a steady-state table."),
     "fit cross-damping": ("studies.cli.fit_cross_damping:fit_cross_damping", "Cross-damping bias over temperature."),
     "derive": ("studies.cli.derive:derive", "The symbolic derivation, as equations, LaTeX or code."),
+    "import": ("studies.cli.import_:import_", "Laboratory files into the record format."),
     "cards": ("studies.cli.cards:cards", "The instrument cards that ship."),
     "materials": ("studies.cli.cards:materials", "The materials and their published laws."),
     "doctor": ("studies.cli.doctor:doctor", "Show what this environment has and what it lacks."),
