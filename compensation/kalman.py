@@ -12,6 +12,8 @@ from numpy.typing import ArrayLike, NDArray
 from compensation.errors import CompensationError
 
 Real = NDArray[np.float64]
+SETTLED = 1e-13
+"""Relative change of the covariance in one step below which it has settled."""
 _NOT_STEADY = "this model has no steady filter: a lasting state is not observed, or no process noise reaches it."
 
 
@@ -94,17 +96,23 @@ def predict(model: LinearModel, x: Real, P: Real) -> tuple[Real, Real]:
     return F @ x, F @ P @ F.T + model.process_noise
 
 
-def update(model: LinearModel, x: Real, P: Real, z: Real) -> tuple[Real, Real, Real, Real]:
-    """Return state and covariance after a measurement z (m,), its innovation (m,) and the innovation's covariance.
+def weigh(model: LinearModel, P: Real) -> tuple[Real, Real, Real]:
+    """Return the gain K, the covariance of the innovation S = C P Cᵀ + R, and the covariance after a measurement.
 
-    The covariance is (1 − K C) P (1 − K C)ᵀ + K R Kᵀ, Joseph's form, which stays symmetric and positive.
+    The last is (1 − K C) P (1 − K C)ᵀ + K R Kᵀ, Joseph's form, which stays symmetric and positive.
     """
     C, R = model.measurement, model.measurement_noise
-    innovation = z - C @ x
     S = C @ P @ C.T + R
-    K = np.linalg.solve(S, C @ P).T
-    kept = np.eye(len(x)) - K @ C
-    return x + K @ innovation, kept @ P @ kept.T + K @ R @ K.T, innovation, S
+    K = np.asarray(np.linalg.solve(S, C @ P).T, dtype=float)
+    kept = np.eye(len(P)) - K @ C
+    return K, S, kept @ P @ kept.T + K @ R @ K.T
+
+
+def update(model: LinearModel, x: Real, P: Real, z: Real) -> tuple[Real, Real, Real, Real]:
+    """Return state and covariance after a measurement z (m,), its innovation (m,) and the innovation's covariance."""
+    K, S, after = weigh(model, P)
+    innovation = z - model.measurement @ x
+    return x + K @ innovation, after, innovation, S
 
 
 @dataclass(frozen=True)
@@ -159,10 +167,18 @@ def run_filter(model: LinearModel, measurements: ArrayLike, start: ArrayLike, co
         raise CompensationError(f"the start needs {n} states and a {n} by {n} covariance, not {x.shape} and {P.shape}.")
     states, covariances = np.empty((len(z), n)), np.empty((len(z), n, n))
     innovations, spreads = np.empty((len(z), m)), np.empty((len(z), m, m))
+    F, C = model.transition, model.measurement
+    settled = False
     for i, row in enumerate(z):
-        x, P = predict(model, x, P)
-        x, P, innovations[i], spreads[i] = update(model, x, P, row)
-        states[i], covariances[i] = x, P
+        if not settled:
+            # The covariance does not depend on the data; once it repeats itself it is not computed again.
+            K, S, after = weigh(model, predict(model, x, P)[1])
+            settled = np.allclose(after, P, rtol=SETTLED, atol=0.0)
+            P = after
+        x = F @ x
+        innovation = row - C @ x
+        x = x + K @ innovation
+        states[i], covariances[i], innovations[i], spreads[i] = x, P, innovation, S
     return KalmanRun(states, covariances, innovations, spreads)
 
 
@@ -183,11 +199,10 @@ def settle(model: LinearModel) -> tuple[Real, Real, Real]:
         P = np.asarray(solve_discrete_are(model.transition.T, C.T, model.process_noise, R), dtype=float)
     except LinAlgError as error:
         raise CompensationError(_NOT_STEADY) from error
-    K = np.asarray(np.linalg.solve(C @ P @ C.T + R, C @ P).T, dtype=float)
-    kept = np.eye(len(P)) - K @ C
-    if np.max(np.abs(np.linalg.eigvals(kept @ model.transition))) > 1 - 1e-12:
+    K, _, after = weigh(model, P)
+    if np.max(np.abs(np.linalg.eigvals((np.eye(len(P)) - K @ C) @ model.transition))) > 1 - 1e-12:
         raise CompensationError(_NOT_STEADY)
-    return K, P, kept @ P @ kept.T + K @ R @ K.T
+    return K, P, after
 
 
 def expect_mean_nis(rows: int, degrees: int, probability: float = 0.95) -> tuple[float, float]:
