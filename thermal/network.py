@@ -138,8 +138,14 @@ class Network:
         return self.names.index(name)
 
     def capacities(self, temperature: Array) -> Array:
-        """Heat capacities (J/K) of the nodes at their temperatures (K)."""
-        return np.array([node.capacity_at(T) for node, T in zip(self.nodes, temperature, strict=False)])
+        """Heat capacities (J/K) of the nodes at their temperatures (K), shape (count, ...)."""
+        C = np.empty_like(temperature[: self.count])
+        for i, node in enumerate(self.nodes):
+            if callable(node.capacity):
+                C[i] = np.vectorize(node.capacity_at, otypes=[float])(temperature[i])
+            else:
+                C[i] = node.capacity
+        return C
 
     def outflow(self, temperature: Array) -> Array:
         """Heat leaving each node and boundary, L T + σ R T⁴ (W); `temperature` has shape (count, ...)."""

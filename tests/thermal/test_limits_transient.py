@@ -7,9 +7,10 @@ from hypothesis import strategies as st
 from scipy.constants import Stefan_Boltzmann
 
 from thermal.balance import check_energy
+from thermal.errors import ThermalError
 from thermal.network import Boundary, Conductor, Node, Radiator, Source, assemble, linearise
 from thermal.profile import Profile, constant, parse_profile
-from thermal.transient import integrate, lag, propagate, scan, simulate
+from thermal.transient import integrate, lag, propagate, scan, simulate, sweep
 
 LINEAR = (
     Boundary("chamber"),
@@ -165,3 +166,23 @@ def test_simulate_chooses_the_exact_way_where_there_is_one():
     linear, radiative = assemble(LINEAR), assemble(RADIATIVE)
     assert np.array_equal(simulate(linear, CHAMBER).at(t), propagate(linear, CHAMBER).at(t))
     assert np.array_equal(simulate(radiative, CHAMBER).at(t), integrate(radiative, CHAMBER).at(t))
+
+
+def test_sweeps_tend_to_the_integrated_radiation_with_the_fourth_power_of_the_rows():
+    parts = [part for part in RADIATIVE if part != LINEAR[3]]
+    network = assemble([*parts, Node("shell", lambda T: 2.0 * (1 + 2e-3 * (T - 293.15))), Source("shell", 0.01)])
+    errors = []
+    for step in (600.0, 300.0, 150.0):
+        t = np.arange(0.0, 7201.0, step)
+        corners = Profile(np.array([0.0, 1200.0, 7200.0]), np.array([293.15, 263.15, 273.15]))
+        rows = {"chamber": Profile(t, corners.at(t))}
+        exact = integrate(network, {"chamber": corners}, relative_tolerance=1e-11).at(t)
+        errors.append(np.abs(sweep(network, rows).at(t) - exact).max())
+    assert np.log2(errors[0] / errors[1]) == pytest.approx(4.0, abs=0.5)
+    assert np.log2(errors[1] / errors[2]) == pytest.approx(4.0, abs=0.5)
+    assert errors[2] < 1e-5
+
+
+def test_sweeps_refuse_a_jump():
+    with pytest.raises(ThermalError, match="a profile with jumps is integrated, not swept"):
+        sweep(assemble(RADIATIVE), CHAMBER)

@@ -1,0 +1,252 @@
+"""Thermal constants from a record of frequency and housing temperature, with honest intervals.
+
+f(t) = f₀ + a₁ x + a₂ x² + a₃ x³ + noise, x = T_r(t) − T_ref, T_r following the housing (`thermal.followers`) from an
+unknown initial state. The noise is white with a wandering level (`thermal.whitening`); the fit is generalised least
+squares with the noise re-estimated by restricted likelihood, and the intervals are those of Student's t.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from scipy.optimize import brentq
+from scipy.stats import f as fisher
+from scipy.stats import t as student
+
+from thermal.errors import ThermalError
+from thermal.fitting import Problem, Solution, solve
+from thermal.followers import Follower, make_lags
+from thermal.network import Array
+from thermal.run import Run, even_rows, row_step
+from thermal.whitening import Noise, estimate_noise
+
+ROWS = 2000  # most rows of a run that a fit uses
+PASSES = 3  # fits, each with the noise of the one before
+VAGUE = 0.5  # relative standard error above which a constant counts as not determined
+PART = 0.3  # smallest share with which a constant is named in an undetermined direction
+FARTHEST = 16.0  # standard errors to which a profile is followed
+EVIDENCE = 10.0  # how far the information criterion must fall before something is believed
+
+
+@dataclass(frozen=True)
+class FrequencyLaw:
+    """Coefficients of f(T) about a reference temperature (K); None is unknown and fitted.
+
+    Attributes
+    ----------
+    reference_temperature : float, K
+    slope, curvature, cubic : float or None, Hz/K, Hz/K², Hz/K³
+    """
+
+    reference_temperature: float
+    slope: float | None
+    curvature: float | None = 0.0
+    cubic: float | None = 0.0
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A constant with its interval; `value` is None where the record does not determine it.
+
+    `standard_error` is relative for a constant that is fitted in its logarithm.
+    """
+
+    value: float | None
+    low: float
+    high: float
+    standard_error: float
+
+
+@dataclass(frozen=True)
+class Direction:
+    """A combination of constants (relative changes, unit length) that the record leaves open."""
+
+    parts: dict[str, float]
+    standard_error: float
+
+    def __str__(self) -> str:
+        return " ".join(f"{share:+.2f}·{name}" for name, share in self.parts.items())
+
+
+@dataclass(frozen=True)
+class Identification:
+    """What a record says about the thermal constants.
+
+    Attributes
+    ----------
+    estimates : by name: the follower's constants, the free ones of "slope", "curvature", "cubic", and "offset" (f₀)
+    confidence : of the intervals
+    undetermined : directions that the record leaves open
+    departures : per run, the initial temperatures' distance (K) from the steady ones
+    noise : of the averaged rows (Hz)
+    residual : array, Hz, all runs in order
+    criterion : Bayesian information criterion, to compare followers on the same record
+    row_step : distance (s) of the averaged rows
+    warnings : what was missing in the record
+    """
+
+    estimates: dict[str, Estimate]
+    confidence: float
+    undetermined: tuple[Direction, ...]
+    departures: tuple[Array, ...]
+    noise: Noise
+    residual: Array
+    criterion: float
+    row_step: float
+    warnings: tuple[str, ...]
+    problem: Problem = field(repr=False)
+    solution: Solution = field(repr=False)
+
+
+def identify(
+    runs: Sequence[Run], follower: Follower, law: FrequencyLaw, confidence: float = 0.9
+) -> Identification:
+    """Fit the follower's constants and the unknown coefficients of the law to one run or several.
+
+    Raises
+    ------
+    ThermalError
+        For a record that is constant within its noise, or too short.
+    """
+    if not runs:
+        raise ThermalError("nothing is identified without a run.")
+    if not 0 < confidence < 1:
+        raise ThermalError(f"a confidence lies between 0 and 1, not at {confidence:g}.")
+    step = row_step(runs, ROWS)
+    even = tuple(even_rows(run, step) for run in runs)
+    coefficients = (law.slope, law.curvature, law.cubic)
+    problem = Problem(even, follower, law.reference_temperature, coefficients)
+    if problem.count >= problem.rows / 2:
+        raise ThermalError(
+            f"{problem.rows} rows are too few for {problem.count} unknowns; give a longer record or fix constants."
+        )
+    solution = solve(problem, problem.guess(), problem.first_noise())
+    for _ in range(PASSES - 1):
+        noise = estimate_noise(solution.residual, solution.slope, problem.breaks)
+        solution = solve(problem, solution.parameters, noise)
+    noise = estimate_noise(solution.residual, solution.slope, problem.breaks)
+    criterion = _refuse_constant(problem, solution, noise)
+    return Identification(
+        estimates=_estimates(problem, solution, confidence),
+        confidence=confidence,
+        undetermined=_undetermined(problem, solution),
+        departures=problem.departures(solution.parameters),
+        noise=noise,
+        residual=solution.residual,
+        criterion=criterion,
+        row_step=step,
+        warnings=tuple(warning for run in even for warning in run.warnings),
+        problem=problem,
+        solution=solution,
+    )
+
+
+def identify_lags(
+    runs: Sequence[Run], law: FrequencyLaw, most: int = 3, confidence: float = 0.9
+) -> Identification:
+    """Identify as many lags as the record supports, each further one paid for by the information criterion."""
+    best: Identification | None = None
+    for count in range(1, most + 1):
+        trial = _best_start(runs, law, count, confidence, best)
+        if best is not None and trial.criterion > best.criterion - EVIDENCE:
+            break
+        best = trial
+    assert best is not None
+    return best
+
+
+def _best_start(
+    runs: Sequence[Run], law: FrequencyLaw, count: int, confidence: float, fewer: Identification | None
+) -> Identification:
+    """Fit `count` lags from a few starts: the lags found so far and one more, shorter or longer."""
+    span = max(float(np.ptp(run.time)) for run in runs)
+    shortest, longest = 2 * row_step(runs, ROWS), 10 * span
+    found = [
+        estimate.value
+        for name, estimate in (fewer.estimates.items() if fewer else ())
+        if name.startswith("time_constant") and estimate.value is not None
+    ]
+    found = (found + [span / 6] * count)[: count - 1]
+    trials = []
+    for fraction in (0.005, 0.03, 0.15, 0.6):
+        starts = [float(np.clip(tau, 1.01 * shortest, 0.99 * longest)) for tau in (*found, fraction * span)]
+        trials.append(identify(runs, make_lags(*starts, shortest=shortest, longest=longest), law, confidence))
+    return min(trials, key=lambda trial: trial.criterion)
+
+
+def _refuse_constant(problem: Problem, solution: Solution, noise: Noise) -> float:
+    """Return the information criterion, or raise when an offset alone explains the record as well."""
+    flat = problem.frequency - problem.frequency.mean()
+    alone = estimate_noise(flat, np.ones((problem.rows, 1)), problem.breaks)
+
+    def information(noise: Noise, count: int) -> float:
+        variance = noise.innovation**2 * (problem.rows - count) / problem.rows
+        return float(problem.rows * np.log(variance) + count * np.log(problem.rows))
+
+    criterion = information(noise, solution.slope.shape[1])
+    if criterion > information(alone, 1) - EVIDENCE:
+        raise ThermalError(
+            f"nothing can be identified: the frequency ({np.ptp(problem.frequency):.3g} Hz from lowest to highest) "
+            "is constant within its noise; record a step, a ramp or a relaxation."
+        )
+    return criterion
+
+
+def _estimates(problem: Problem, solution: Solution, confidence: float) -> dict[str, Estimate]:
+    quantile = float(student.ppf((1 + confidence) / 2, problem.rows - problem.count))
+    errors = np.sqrt(np.diag(solution.covariance))
+    scales = problem.scales(solution.parameters)
+    estimates = {}
+    for k, name in enumerate(problem.names):
+        value, error = solution.parameters[k], errors[k]
+        low, high = value - quantile * error, value + quantile * error
+        if error > VAGUE * scales[k]:
+            estimates[name] = Estimate(None, 0.0 if problem.is_logarithmic(k) else -np.inf, np.inf, float(error))
+            continue
+        if problem.is_logarithmic(k):
+            value, low, high = np.exp([value, low, high])
+        estimates[name] = Estimate(float(value), float(low), float(high), float(error))
+    return estimates
+
+
+def _undetermined(problem: Problem, solution: Solution) -> tuple[Direction, ...]:
+    """Directions, in relative changes of the named constants, along which the record bounds nothing."""
+    named = len(problem.names) - 1  # the offset comes last and is no thermal constant
+    scales = problem.scales(solution.parameters)[:named]
+    spread, axes = np.linalg.eigh(solution.covariance[:named, :named] / np.outer(scales, scales))
+    directions = []
+    for variance, axis in zip(spread[::-1], axes.T[::-1], strict=True):
+        error = float(np.sqrt(max(variance, 0.0)))
+        if error > VAGUE:
+            parts = {name: float(a) for name, a in zip(problem.names, axis, strict=False) if abs(a) > PART}
+            directions.append(Direction(parts, error))
+    return tuple(directions)
+
+
+def profile_interval(result: Identification, name: str) -> tuple[float, float]:
+    """Interval of a constant from the profile of the fit: where refitting all others costs too much.
+
+    The whitened sum of squares may grow by the quantile of F(1, N − p) (Bates & Watts, Nonlinear Regression
+    Analysis, 1988, ch. 6). Unlike the intervals of `Identification.estimates` it needs no straight parabola, and an
+    end is 0 or infinite where the record never objects.
+    """
+    solution, problem = result.solution, result.problem
+    if name not in problem.names:
+        raise ThermalError(f"the fit has no constant '{name}'; it has {', '.join(problem.names)}.")
+    k = problem.names.index(name)
+    allowed = float(fisher.ppf(result.confidence, 1, problem.rows - problem.count))
+    best, error = solution.parameters[k], float(np.sqrt(solution.covariance[k, k]))
+    reference = solve(problem, solution.parameters, solution.noise, {k: best}).cost
+
+    def growth(distance: float) -> float:
+        fixed = solve(problem, solution.parameters, solution.noise, {k: best + distance * error})
+        return fixed.cost - reference - allowed
+
+    ends = []
+    for sign in (-1.0, 1.0):
+        reach = 2.0 * sign
+        while growth(reach) < 0 and abs(reach) < FARTHEST:
+            reach *= 2
+        ends.append(best + error * brentq(growth, 0.0, reach, xtol=1e-2) if growth(reach) > 0 else sign * np.inf)
+    low, high = np.exp(ends) if problem.is_logarithmic(k) else ends
+    return float(low), float(high)
