@@ -43,18 +43,18 @@ class Level:
 
 LEVELS: dict[str, tuple[Level, ...]] = {
     "solid": (
-        Level((3, 3, 3), 9, 6, 3),
-        Level((5, 5, 4), 12, 8, 5),
-        Level((7, 7, 6), 16, 10, 7),
-        Level((9, 9, 8), 20, 12, 9),
-        Level((11, 11, 10), 20, 14, 11, 2),
+        Level((3, 3, 3), 9, 5, 2),
+        Level((5, 5, 4), 12, 7, 4),
+        Level((7, 7, 6), 16, 9, 6),
+        Level((9, 9, 8), 20, 11, 9),
+        Level((11, 11, 10), 20, 13, 12, 2),
     ),
     "shell": (
-        Level((1, 1, 0), 8, 6, 3),
-        Level((1, 1, 0), 12, 8, 5),
-        Level((1, 1, 0), 16, 10, 7),
-        Level((1, 1, 0), 20, 12, 9),
-        Level((1, 1, 0), 20, 14, 11, 2),
+        Level((1, 1, 0), 8, 5, 2),
+        Level((1, 1, 0), 12, 7, 4),
+        Level((1, 1, 0), 16, 9, 6),
+        Level((1, 1, 0), 20, 11, 9),
+        Level((1, 1, 0), 20, 13, 12, 2),
     ),
 }
 
@@ -81,7 +81,7 @@ class System:
     constraint: csr_matrix
     rigid_motions: int
     n: int
-    _maps: list[tuple[Index, Array | None]] = field(default_factory=list, repr=False)
+    _maps: list["ToFree"] = field(default_factory=list, repr=False)
 
     def __post_init__(self) -> None:
         for group in self.groups:
@@ -92,7 +92,7 @@ class System:
     @cached_property
     def pattern(self) -> Pattern:
         """The elements' free unknowns."""
-        return find_pattern([free for free, _ in self._maps], self.constraint.shape[1])
+        return find_pattern([at.free for at in self._maps], self.constraint.shape[1])
 
     @cached_property
     def stations(self) -> list[tuple[Array, Array, Array]]:
@@ -109,8 +109,8 @@ class System:
                 integrate_stiffness(trace, along), integrate_stiffness(shear, along), integrate_mass(mass, along), strict=True
             )
         return [
-            (_restrict(trace, at), _restrict(shear, at), _restrict(mass, at))
-            for (trace, shear, mass), (_, at) in zip(found, self._maps, strict=True)
+            (at.restrict(trace), at.restrict(shear), at.restrict(mass))
+            for (trace, shear, mass), at in zip(found, self._maps, strict=True)
         ]
 
     def varying(self, lam: list[Array], G: list[Array], rho: list[Array]) -> tuple[list[Array], list[Array]]:
@@ -121,10 +121,9 @@ class System:
             there = lam[k][..., None, None] * trace + G[k][..., None, None] * shear
             K += list(integrate_stiffness(there, group.table.along))
             M += list(integrate_mass(rho[k][..., None, None] * mass, group.table.along))
-        maps = [at for _, at in self._maps]
         return (
-            [_restrict(matrix, at) for matrix, at in zip(K, maps, strict=True)],
-            [_restrict(matrix, at) for matrix, at in zip(M, maps, strict=True)],
+            [at.restrict(matrix) for matrix, at in zip(K, self._maps, strict=True)],
+            [at.restrict(matrix) for matrix, at in zip(M, self._maps, strict=True)],
         )
 
     def spread(self, free: Array) -> list[Array]:
@@ -132,16 +131,33 @@ class System:
         raw = self.constraint @ free
         return [group.signs * raw[group.unknowns] for group in self.groups]
 
-    def _free(self, members: Index, signs: Array) -> tuple[Index, Array | None]:
+    def _free(self, members: Index, signs: Array) -> "ToFree":
         rows = self.constraint[members]
-        if rows.nnz == len(members) and np.all(np.diff(rows.indptr) == 1) and np.all(rows.data * signs == 1):
-            return rows.indices.astype(np.intp), None
+        counts = np.diff(rows.indptr)
+        if np.all(counts <= 1) and len(np.unique(rows.indices)) == len(rows.indices):
+            kept = np.flatnonzero(counts)
+            return ToFree(rows.indices.astype(np.intp), kept, signs[kept] * rows.data)
         free = np.unique(rows.indices).astype(np.intp)
-        return free, signs[:, None] * rows[:, free].toarray()
+        return ToFree(free, None, signs[:, None] * rows[:, free].toarray())
 
 
-def _restrict(matrix: Array, to_free: Array | None) -> Array:
-    return matrix if to_free is None else np.asarray(to_free.T @ matrix @ to_free)
+@dataclass(frozen=True, eq=False)
+class ToFree:
+    """From an element's unknowns to free ones: a choice with signs, or (kept None) a full matrix of factors."""
+
+    free: Index
+    kept: Index | None
+    factors: Array
+
+    def restrict(self, matrix: Array) -> Array:
+        """The element's matrix on the free unknowns."""
+        if self.kept is None:
+            return np.asarray(self.factors.T @ matrix @ self.factors)
+        if len(self.kept) < len(matrix):
+            matrix = matrix[self.kept[:, None], self.kept]
+        if np.all(self.factors == 1):
+            return matrix
+        return matrix * self.factors * self.factors[:, None]
 
 
 @dataclass(frozen=True, eq=False)
@@ -152,7 +168,7 @@ class Layout:
     solids: tuple[tuple[Solid, tuple[tuple[int, int], ...]], ...]
 
 
-@lru_cache(maxsize=24)
+@lru_cache(maxsize=12)
 def build_system(resonator: Resonator, n: int, theory: Theory, level: Level) -> System:
     """Lay out, number and tabulate a resonator; cached, since only the material changes with temperature."""
     layout = lay_resonator(resonator, n, level)

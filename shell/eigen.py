@@ -10,6 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import blas, eigh, lapack
+from scipy.sparse import csr_matrix
+from scipy.sparse.csgraph import reverse_cuthill_mckee
 
 from shell.errors import ShellError
 from shell.quadrature import Array
@@ -19,70 +21,82 @@ Index = NDArray[np.intp]
 
 @dataclass(frozen=True, eq=False)
 class Pattern:
-    """Which unknowns each element has, split into its own (inner) and those it shares (outer)."""
+    """Which unknowns each element has, split into its own (inner) and those it shares (outer).
+
+    `skeleton` numbers the shared unknowns so that they couple in a narrow band; `shared` are their global numbers.
+    """
 
     unknowns: tuple[Index, ...]
     inner: tuple[Index, ...]
     outer: tuple[Index, ...]
     skeleton: tuple[Index, ...]
+    shared: Index
     size: int
-    skeleton_size: int
+    band: int
 
 
 def find_pattern(unknowns: list[Index], size: int) -> Pattern:
-    """Split the unknowns of every element; `skeleton` numbers the shared ones."""
+    """Split the unknowns of every element and order the shared ones (reverse Cuthill-McKee)."""
     uses = np.zeros(size, dtype=int)
     for members in unknowns:
         uses[members] += 1
-    if not np.all(uses):
-        raise AssertionError("an unknown belongs to no element")
-    shared = np.cumsum(uses > 1) - 1
+    shared = np.flatnonzero(uses > 1)
     inner = tuple(np.flatnonzero(uses[members] == 1) for members in unknowns)
     outer = tuple(np.flatnonzero(uses[members] > 1) for members in unknowns)
-    skeleton = tuple(shared[members[o]] for members, o in zip(unknowns, outer, strict=True))
-    return Pattern(tuple(unknowns), inner, outer, skeleton, size, int(np.sum(uses > 1)))
+    number = np.cumsum(uses > 1) - 1
+    where = [number[members[o]] for members, o in zip(unknowns, outer, strict=True)]
+    if len(shared):
+        owner = np.concatenate([np.full(len(w), k) for k, w in enumerate(where)])
+        element = csr_matrix((np.ones(len(owner)), (owner, np.concatenate(where))), shape=(len(unknowns), len(shared)))
+        order = reverse_cuthill_mckee((element.T @ element).tocsr(), symmetric_mode=True)
+        place = np.empty(len(shared), dtype=np.intp)
+        place[order] = np.arange(len(shared))
+        where, shared = [place[w] for w in where], shared[order]
+    band = max((int(np.ptp(w)) for w in where if len(w)), default=0)
+    return Pattern(tuple(unknowns), inner, outer, tuple(where), shared, size, band)
 
 
 class Factor:
-    """Cholesky factor of the assembled K: inner unknowns per element, then the skeleton."""
+    """Cholesky factor of the assembled K: inner unknowns per element, then the band of the shared ones."""
 
     def __init__(self, pattern: Pattern, stiffness: list[Array]) -> None:
         self.pattern = pattern
         self.own: list[Array] = []
         self.coupling: list[Array] = []
-        skeleton = np.zeros((pattern.skeleton_size, pattern.skeleton_size), order="F")
+        height = pattern.band + 1
+        band = np.zeros((height, len(pattern.shared)), order="F")
+        entries = band.reshape(-1, order="F")
         for K, inner, outer, where in zip(stiffness, pattern.inner, pattern.outer, pattern.skeleton, strict=True):
-            L = _cholesky(K[np.ix_(inner, inner)])
-            W = blas.dtrsm(1.0, L, K[np.ix_(inner, outer)], lower=1) if len(inner) and len(outer) else np.zeros((len(inner), len(outer)))
-            skeleton[np.ix_(where, where)] += K[np.ix_(outer, outer)] - W.T @ W
+            L = _cholesky(K[inner[:, None], inner])
+            W = np.zeros((len(inner), len(outer)))
+            if W.size:
+                W = blas.dtrsm(1.0, L, K[inner[:, None], outer], lower=1)
+            rows, columns = np.nonzero(where[:, None] >= where)
+            schur = K[outer[:, None], outer] - W.T @ W
+            entries[where[rows] - where[columns] + height * where[columns]] += schur[rows, columns]
             self.own.append(L)
             self.coupling.append(W)
-        self.skeleton = _cholesky(skeleton)
+        self.band = _cholesky_band(band)
 
     def solve(self, load: Array) -> Array:
         """K⁻¹ load for several columns."""
+        p = self.pattern
         x = np.empty_like(load)
-        right = np.zeros((self.pattern.skeleton_size, load.shape[1]))
+        right = load[p.shared]
         half = []
-        for L, W, members, inner, _, where in self._elements():
+        for L, W, members, inner, where in zip(self.own, self.coupling, p.unknowns, p.inner, p.skeleton, strict=True):
             y = blas.dtrsm(1.0, L, load[members[inner]], lower=1) if len(inner) else load[:0]
             right[where] -= W.T @ y
             half.append(y)
-        shared = np.empty(self.pattern.skeleton_size, dtype=np.intp)
-        for _, _, members, _, outer, where in self._elements():
-            shared[where] = members[outer]
-        right += load[shared]
-        if len(shared):
-            right = lapack.dpotrs(self.skeleton, right, lower=1)[0]
-            x[shared] = right
-        for y, (L, W, members, inner, _, where) in zip(half, self._elements(), strict=True):
+        if len(p.shared):
+            right = lapack.dpbtrs(self.band, right, lower=1)[0]
+            x[p.shared] = right
+        for y, L, W, members, inner, where in zip(
+            half, self.own, self.coupling, p.unknowns, p.inner, p.skeleton, strict=True
+        ):
             if len(inner):
                 x[members[inner]] = blas.dtrsm(1.0, L, y - W @ right[where], lower=1, trans_a=1)
         return x
-
-    def _elements(self):  # type: ignore[no-untyped-def]
-        p = self.pattern
-        return zip(self.own, self.coupling, p.unknowns, p.inner, p.outer, p.skeleton, strict=True)
 
 
 def apply_mass(pattern: Pattern, mass: list[Array], x: Array) -> Array:
@@ -131,8 +145,18 @@ def _symmetric(matrix: Array) -> Array:
 def _cholesky(matrix: Array) -> Array:
     if not matrix.size:
         return matrix
-    scale = 1 / np.sqrt(np.diagonal(matrix))
-    factor, fault = lapack.dpotrf(matrix * np.outer(scale, scale), lower=1, clean=1)
+    factor, fault = lapack.dpotrf(matrix.T, lower=1, clean=1, overwrite_a=1)
+    return np.asarray(_definite(factor, fault))
+
+
+def _cholesky_band(band: Array) -> Array:
+    if not band.size:
+        return band
+    factor, fault = lapack.dpbtrf(band, lower=1, overwrite_ab=1)
+    return np.asarray(_definite(factor, fault))
+
+
+def _definite(factor: Array, fault: int) -> Array:
     if fault:
-        raise ShellError("the stiffness lost its last digit: the shell is too thin for double precision (h/R below about 1e-6).")
-    return np.asarray(factor / scale[:, None], order="F")
+        raise ShellError("the stiffness lost its last digit: the shell is too thin for double precision.")
+    return factor

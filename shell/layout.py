@@ -1,7 +1,7 @@
 """Where the elements of a meridian break: joints, knots of the thickness, and the layers that edges and joints cause."""
 
-import itertools
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Literal
 
 import numpy as np
@@ -45,7 +45,7 @@ def lay_chain(resonator: Resonator, start: float, stop: float, ends: tuple[End, 
             firm = sorted([*firm, s])
     longest = LONGEST * resonator.size * min(1.0, 4 / max(n, 1))
     breaks: list[float] = [start]
-    for one, two in itertools.pairwise(firm):
+    for one, two in pairwise(firm):
         pieces = split * int(np.ceil((two - one) / longest - 1e-9))
         breaks += np.linspace(one, two, pieces + 1)[1:].tolist()
     bounds = np.array(resonator._starts)

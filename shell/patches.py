@@ -1,8 +1,8 @@
 """Curved quadrilaterals of the (r, z) plane and how they are cut into cells, finer towards a corner."""
 
-import itertools
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Literal
 
 import numpy as np
@@ -61,7 +61,7 @@ def layers(steps: tuple[float, ...]) -> tuple[Cell, ...]:
     """Cells between the falling steps 1, ..., > 0 of x, and the last down to 0, each over all of y."""
     bounds = (*steps, 0.0)
     return tuple(
-        ((inner, 0.0), (outer, 0.0), (inner, 1.0), (outer, 1.0)) for outer, inner in itertools.pairwise(bounds)
+        ((inner, 0.0), (outer, 0.0), (inner, 1.0), (outer, 1.0)) for outer, inner in pairwise(bounds)
     )
 
 
@@ -72,7 +72,7 @@ def rings(steps: tuple[float, ...]) -> tuple[Cell, ...]:
     """
     last = steps[-1]
     cells: list[Cell] = [((0.0, 0.0), (last, 0.0), (0.0, last), (last, last))]
-    for outer, inner in itertools.pairwise(steps):
+    for outer, inner in pairwise(steps):
         cells.append(((inner, 0.0), (outer, 0.0), (inner, inner), (outer, outer)))
         cells.append(((0.0, inner), (inner, inner), (0.0, outer), (outer, outer)))
     return tuple(cells)

@@ -10,9 +10,9 @@ The section is cut along the cross-section of the shell where the fillet (or the
 T2 and T1 are the fillet's ends on the dome and on the stem, M its middle; with a sharp corner they are one point.
 """
 
-import itertools
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import pairwise
 from math import atan2, ceil, hypot, log, pi
 
 import numpy as np
@@ -109,7 +109,7 @@ def _half_root(
         patches += _fillet(contact, stem.fillet, cross, roof, straight(foot, under), straight(under, over), over, steps)
     else:
         patches.append(Patch(cross, straight(under, over), straight(foot, under), roof, rings(steps), "root"))
-    return patches + _column(stem.radius, r_inner, level, contact.end, steps)
+    return patches + _column(stem.radius, r_inner, level, contact.end, steps, ring_count)
 
 
 def _fillet(
@@ -127,20 +127,30 @@ def _fillet(
     ]
 
 
-def _column(radius: float, r_inner: float, top: float, end: float, steps: tuple[float, ...]) -> list[Patch]:
-    """The stem itself, from its root to the clamped end, in two columns of growing cells."""
+def _column(
+    radius: float, r_inner: float, top: float, end: float, steps: tuple[float, ...], ring_count: int
+) -> list[Patch]:
+    """The stem itself, from its root to the clamped end, in an inner and an outer column of cells."""
     direction = 1.0 if end > top else -1.0
-    heights, step = [0.0], radius - r_inner
-    while heights[-1] < abs(end - top) - 1e-12:
-        heights.append(heights[-1] + step)
+    # cells grow from both ends of the column; the first is as tall as the outer column is wide
+    length = abs(end - top)
+    step = min(radius - r_inner, 0.4 * length)
+    low, high = [0.0], [length]
+    while high[-1] - low[-1] > 2.4 * step:
+        low.append(low[-1] + step)
+        high.append(high[-1] - step)
         step = min(2.5 * step, 1.5 * radius)
-    heights = heights[:-1] if len(heights) > 2 and abs(end - top) - heights[-2] < 0.3 * (heights[-1] - heights[-2]) else heights
-    heights[-1] = abs(end - top)
+    middle = np.linspace(low[-1], high[-1], 1 + ceil((high[-1] - low[-1]) / (1.5 * step)))
+    heights = [*low, *middle[1:-1].tolist(), *high[::-1]]
     levels = [top + direction * height for height in heights]
+    sharp = rings(shrinking(ring_count))
     patches = []
-    for k, (one, two) in enumerate(itertools.pairwise(levels)):
-        patches.append(_rectangle((radius, one), (r_inner, two), rings(steps) if k == 0 else whole()))
-        patches.append(_rectangle((0.0, one), (r_inner, two), whole()))
+    for k, (one, two) in enumerate(pairwise(levels)):
+        first, last = k == 0, k == len(levels) - 2
+        side = _rectangle((radius, one), (r_inner, two), rings(steps) if first else whole())
+        if last:  # the edge of the clamp is as singular as a sharp corner
+            side = _rectangle((radius, two), (r_inner, one), sharp)
+        patches += [side, _rectangle((0.0, one), (r_inner, two), whole())]
     return patches
 
 
