@@ -1,0 +1,133 @@
+"""The closed surface of a resonator: its outlines turned around the axis into triangles, with the mode on every vertex."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import pi
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shell.meridian import Resonator
+from shell.quadrature import Array
+from shell.shape import Outline, trace_outlines
+
+if TYPE_CHECKING:
+    from shell.modes import Mode
+
+Triangles = NDArray[np.int64]
+
+
+@dataclass(frozen=True, eq=False)
+class Surface:
+    """Triangles around the material, counterclockwise as seen from outside.
+
+    Attributes
+    ----------
+    points : (N, 3) array, m
+        Undeformed vertices; the axis of the resonator is z.
+    displacement : (N, 3) array
+        Shape of the mode, its largest displacement 1; zero without a mode.
+    energy : (N,) array, J/m³
+        Largest strain-energy density in a period per square metre of amplitude.
+    position : (N,) array
+        Place on the meridian, 0 ... 1.
+    triangles : (F, 3) array
+        Vertex numbers.
+    grids : tuple of (k, count) arrays
+        Vertex numbers of every outline, point by point (rows) and around (columns); on the axis a number repeats.
+    harmonic : int
+        n; column j lies at θ = 2 π j / count, and cos nθ = 0 falls on columns.
+    """
+
+    points: Array
+    displacement: Array
+    energy: Array
+    position: Array
+    triangles: Triangles
+    grids: tuple[Triangles, ...]
+    harmonic: int
+
+    @property
+    def size(self) -> float:
+        """Largest extent, m."""
+        return float(np.ptp(self.points, axis=0).max())
+
+    @property
+    def nodes(self) -> list[Triangles]:
+        """Vertex numbers along the 2n meridians on which u_r and u_z vanish, where the mode moves the shell at all."""
+        moved = np.linalg.norm(self.displacement, axis=1)
+        lines = []
+        for grid in self.grids:
+            quarter = grid.shape[1] // (4 * self.harmonic) if self.harmonic else 0
+            moving = moved[grid].max(axis=1) > 0.03
+            lines += [grid[moving, quarter * k] for k in range(1, 4 * self.harmonic, 2)]
+        return lines
+
+    @property
+    def antinodes(self) -> Triangles:
+        """Vertex numbers of the 2n places where the displacement in the meridional plane is largest."""
+        if not self.harmonic:
+            return np.zeros(0, dtype=np.int64)
+        at_zero = [np.hypot(self.displacement[grid[:, 0], 0], self.displacement[grid[:, 0], 2]) for grid in self.grids]
+        grid = max(zip(at_zero, self.grids, strict=True), key=lambda pair: float(pair[0].max()))
+        half = grid[1].shape[1] // (2 * self.harmonic)
+        return grid[1][int(grid[0].argmax()), ::half]
+
+
+def build_surface(
+    resonator: Resonator, mode: "Mode | None" = None, spacing: float | None = None, count: int | None = None
+) -> Surface:
+    """Turn the section of a resonator into its surface.
+
+    Parameters
+    ----------
+    resonator : geometry.
+    mode : solved for this resonator; None for the geometry alone.
+    spacing : distance of points along the outline, m; one fiftieth of the radius unless given.
+    count : points around; rounded up to a multiple of 4n, and 160 unless given.
+    """
+    n = mode.harmonic if mode else 0
+    around = 4 * max(n, 1) * int(np.ceil((count or 160) / (4 * max(n, 1))))
+    return revolve(trace_outlines(resonator, spacing or resonator.size / 50, mode), around, n)
+
+
+def revolve(outlines: Sequence[Outline], count: int, n: int) -> Surface:
+    """Turn outlines around the axis; points on the axis become one vertex each, so the surface is watertight."""
+    theta = 2 * pi * np.arange(count) / count
+    # for n = 0 the torsional displacement varies as 1, not as sin 0
+    cosine, sine = np.cos(n * theta), np.sin(n * theta) if n else np.ones(count)
+    points, moved, energy, position, triangles, grids = [], [], [], [], [], []
+    start = 0
+    for line in outlines:
+        on_axis = line.r == 0
+        widths = np.where(on_axis, 1, count)
+        first = start + np.concatenate([[0], np.cumsum(widths)[:-1]])
+        grid = first[:, None] + np.where(on_axis[:, None], 0, np.arange(count))
+        start += int(widths.sum())
+        kept = ~on_axis[:, None] | (np.arange(count) == 0)
+        u_r, u_t, u_z = line.displacement[:, :, None] * np.stack([cosine, sine, cosine])[:, None, :]
+        x = np.stack([line.r[:, None] * np.cos(theta), line.r[:, None] * np.sin(theta), line.z[:, None] + 0 * theta], axis=-1)
+        u = np.stack([u_r * np.cos(theta) - u_t * np.sin(theta), u_r * np.sin(theta) + u_t * np.cos(theta), u_z], axis=-1)
+        density = line.energy[0][:, None] * cosine**2 + line.energy[1][:, None] * sine**2
+        points.append(x[kept])
+        moved.append(u[kept])
+        energy.append(density[kept])
+        position.append(np.broadcast_to(line.position[:, None], kept.shape)[kept])
+        triangles.append(_triangulate(grid, closed=not line.on_axis))
+        grids.append(grid)
+    return Surface(
+        np.concatenate(points), np.concatenate(moved), np.concatenate(energy), np.concatenate(position),
+        np.concatenate(triangles), tuple(grids), n,
+    )
+
+
+def _triangulate(grid: Triangles, closed: bool) -> Triangles:
+    """Two triangles for every cell of the grid, without those that the axis makes vanish."""
+    here, there = (grid, np.roll(grid, -1, axis=0)) if closed else (grid[:-1], grid[1:])
+    here_on, there_on = np.roll(here, -1, axis=1), np.roll(there, -1, axis=1)
+    faces = np.concatenate(
+        [np.stack([here, here_on, there_on], axis=-1), np.stack([here, there_on, there], axis=-1)]
+    ).reshape(-1, 3)
+    real = (faces[:, 0] != faces[:, 1]) & (faces[:, 1] != faces[:, 2]) & (faces[:, 2] != faces[:, 0])
+    return faces[real]
