@@ -81,8 +81,15 @@ def compose_scene(surface: Surface, values: Array, legend: str, title: str = "")
     opens_up = bool(surface.points[rim, 2].mean() > surface.points[:, 2].mean()) if rim.any() else False
     swing = surface.displacement * EXAGGERATION * surface.size
     return Scene(
-        surface.points, swing, surface.triangles, np.asarray(values, dtype=float), legend, title, nodes,
-        surface.antinodes, opens_up,
+        surface.points,
+        swing,
+        surface.triangles,
+        np.asarray(values, dtype=float),
+        legend,
+        title,
+        nodes,
+        surface.antinodes,
+        opens_up,
     )
 
 
@@ -104,8 +111,13 @@ def render_png(scenes: Scene | Sequence[Scene], view: View = "oblique", width: i
 
 
 def render_animation(
-    scenes: Scene | Sequence[Scene], kind: Literal["webp", "gif"], view: View = "oblique", width: int = 640,
-    height: int = 520, frames: int = 24, period: float = 1.2,
+    scenes: Scene | Sequence[Scene],
+    kind: Literal["webp", "gif"],
+    view: View = "oblique",
+    width: int = 640,
+    height: int = 520,
+    frames: int = 24,
+    period: float = 1.2,
 ) -> bytes:
     """Return a looping WebP or GIF of one period of the swing, which lasts `period` seconds.
 
@@ -121,7 +133,13 @@ def render_animation(
     buffer = io.BytesIO()
     more: dict[str, Any] = {"quality": 80, "method": 4} if kind == "webp" else {"optimize": True}
     drawn[0].save(
-        buffer, kind.upper(), save_all=True, append_images=drawn[1:], duration=round(1000 * period / frames), loop=0, **more
+        buffer,
+        kind.upper(),
+        save_all=True,
+        append_images=drawn[1:],
+        duration=round(1000 * period / frames),
+        loop=0,
+        **more,
     )
     return buffer.getvalue()
 
@@ -132,7 +150,11 @@ def can_draw() -> tuple[bool, str]:
     faces = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]])
     none = np.zeros(0, dtype=np.int64)
     try:
-        render_png(Scene(corners, 0 * corners, faces, np.arange(4.0), "", "", none.reshape(0, 0), none, False), width=64, height=64)
+        render_png(
+            Scene(corners, 0 * corners, faces, np.arange(4.0), "", "", none.reshape(0, 0), none, False),
+            width=64,
+            height=64,
+        )
     except NoOpenGL as error:
         return False, str(error)
     return True, ""
@@ -173,7 +195,9 @@ def _draw_job(folder: str) -> None:
 
     with np.load(Path(folder, "job.npz")) as job:
         scenes = [
-            Scene(*(value.item() if (value := job[f"{field.name}_{k}"]).ndim == 0 else value for field in fields(Scene)))
+            Scene(
+                *(value.item() if (value := job[f"{field.name}_{k}"]).ndim == 0 else value for field in fields(Scene))
+            )
             for k in range(int(job["count"]))
         ]
         view, swings, window = str(job["view"]), job["swings"].tolist(), job["window"].tolist()
@@ -195,7 +219,9 @@ def _draw_job(folder: str) -> None:
     plotter.close()
 
 
-def _fill(plotter: Any, scene: Scene, limits: tuple[float, float], size: float, last: bool) -> list[tuple[Any, Array, Array]]:
+def _fill(
+    plotter: Any, scene: Scene, limits: tuple[float, float], size: float, last: bool
+) -> list[tuple[Any, Array, Array]]:
     """Put one resonator into the current part of the window; return what moves: mesh, rest position, displacement."""
     import pyvista as pv
 
@@ -208,11 +234,30 @@ def _fill(plotter: Any, scene: Scene, limits: tuple[float, float], size: float, 
         plotter.add_mesh(edges, color="#8a949e", line_width=1.2)
     body, origin = _split_sharp(scene, faces)
     body[scene.legend] = scene.values[origin]
-    bar = {"title": scene.legend, "color": "black", "fmt": "%.3g", "vertical": False, "title_font_size": 15,
-           "label_font_size": 14, "n_labels": 5, "width": 0.6, "position_x": 0.2, "position_y": 0.02, "height": 0.09}
+    bar = {
+        "title": scene.legend,
+        "color": "black",
+        "fmt": "%.3g",
+        "vertical": False,
+        "title_font_size": 15,
+        "label_font_size": 14,
+        "n_labels": 5,
+        "width": 0.6,
+        "position_x": 0.2,
+        "position_y": 0.02,
+        "height": 0.09,
+    }
     plotter.add_mesh(
-        body, scalars=scene.legend, cmap="cividis", clim=limits, smooth_shading=True, show_scalar_bar=bool(scene.legend),
-        scalar_bar_args=bar, ambient=0.38, diffuse=0.72, specular=0.1,
+        body,
+        scalars=scene.legend,
+        cmap="cividis",
+        clim=limits,
+        smooth_shading=True,
+        show_scalar_bar=bool(scene.legend),
+        scalar_bar_args=bar,
+        ambient=0.38,
+        diffuse=0.72,
+        specular=0.1,
     )
     moving = [(body, body.points.copy(), scene.displacement[origin])]
     for line in scene.nodes:
@@ -226,7 +271,12 @@ def _fill(plotter: Any, scene: Scene, limits: tuple[float, float], size: float, 
         plotter.add_mesh(marks, color=ANTINODE, point_size=13.0, render_points_as_spheres=True)
         moving.append((marks, scene.points[scene.antinodes], scene.displacement[scene.antinodes]))
         if last:
-            plotter.add_text("red lines: nodes   black dots: antinodes   grey: undeformed", position=(12, 92), font_size=8, color="#5b6470")
+            plotter.add_text(
+                "red lines: nodes   black dots: antinodes   grey: undeformed",
+                position=(12, 92),
+                font_size=8,
+                color="#5b6470",
+            )
     if scene.title:
         plotter.add_text(scene.title, position="upper_edge", font_size=10, color="black")
     return moving
@@ -238,7 +288,9 @@ def _split_sharp(scene: Scene, faces: Array) -> tuple[Any, NDArray[np.int64]]:
 
     body = pv.PolyData(scene.points.copy(), faces)
     body["origin"] = np.arange(len(scene.points))
-    split = body.compute_normals(split_vertices=True, feature_angle=35.0, auto_orient_normals=False, consistent_normals=False)
+    split = body.compute_normals(
+        split_vertices=True, feature_angle=35.0, auto_orient_normals=False, consistent_normals=False
+    )
     return split, np.asarray(split["origin"], dtype=np.int64)
 
 

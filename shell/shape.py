@@ -63,7 +63,9 @@ class Outline:
 
     def reversed(self) -> "Outline":
         """The same line run through the other way."""
-        return Outline(self.r[::-1], self.z[::-1], self.position[::-1], self.displacement[:, ::-1], self.energy[:, ::-1])
+        return Outline(
+            self.r[::-1], self.z[::-1], self.position[::-1], self.displacement[:, ::-1], self.energy[:, ::-1]
+        )
 
 
 def trace_outlines(resonator: Resonator, spacing: float, mode: "Mode | None" = None) -> tuple[Outline, ...]:
@@ -157,7 +159,11 @@ class _Sides:
         section = _sections(self.resonator, one, xi * INSIDE, np.ones_like(xi))
         u, v, w = (legendre(order, eta * INSIDE) for order in self.level.through)
         table = shell_table(
-            section, self.mode.harmonic, (u, v, w), (eta * INSIDE, np.ones_like(eta)), nodal(self.level.along, xi * INSIDE)
+            section,
+            self.mode.harmonic,
+            (u, v, w),
+            (eta * INSIDE, np.ones_like(eta)),
+            nodal(self.level.along, xi * INSIDE),
         )
         t_r, t_z = section.tangent_r[0][:, None], section.tangent_z[0][:, None]
         (along, around, normal), energy = self._fields(table, number, element)
@@ -180,8 +186,13 @@ class _Sides:
         )
         inside = _place(grid, along.values, across.values)
         table = block_table(
-            (inside[0], inside[1]), jacobian, np.ones((len(xi), len(eta))), self.mode.harmonic,
-            hierarchic(degree, eta * INSIDE), hierarchic(degree, xi * INSIDE), np.full(1, where),
+            (inside[0], inside[1]),
+            jacobian,
+            np.ones((len(xi), len(eta))),
+            self.mode.harmonic,
+            hierarchic(degree, eta * INSIDE),
+            hierarchic(degree, xi * INSIDE),
+            np.full(1, where),
         )
         displacement, energy = self._fields(table, len(self.layout.chains) + number, cell)
         return Outline(r, z, position, displacement.reshape(3, -1), energy.reshape(2, -1))
@@ -192,7 +203,9 @@ class _Sides:
         assert self.mode.solution is not None
         solution = self.mode.solution
         unknowns = solution.unknowns[number][[element]]
-        lam, G = (float(np.mean(values[element])) for values in (solution.constants[number].lam, solution.constants[number].G))
+        lam, G = (
+            float(np.mean(values[element])) for values in (solution.constants[number].lam, solution.constants[number].G)
+        )
         e = np.moveaxis(strains(table, unknowns)[0], 1, 0)
         sheared = G / 2 * energy_weights(table)[:, None, None] * e**2
         by_sine = sheared[list(SHEARED)].sum(axis=0)
@@ -223,7 +236,7 @@ def _points(length: float, spacing: float) -> Array:
 
 
 def _place(grid: Array, along: Array, across: Array) -> Array:
-    return np.einsum("ia,gcab,jb->gcij", along, grid, across)
+    return np.asarray(np.einsum("ia,gcab,jb->gcij", along, grid, across))
 
 
 def _bare(r: Array, z: Array, position: Array) -> Outline:
@@ -239,28 +252,34 @@ def _join(sides: list[Outline], margin: float) -> list[Outline]:
         if line.r[-1] < margin and line.r[0] >= margin:
             line = line.reversed()
         while True:
-            found = next((_attach(line, k, side, margin) for k, side in enumerate(sides) if _touches(line, side, margin)), None)
+            found = next(
+                (_attach(line, k, side, margin) for k, side in enumerate(sides) if _touches(line, side, margin)), None
+            )
             if found is None:
                 break
             line, k = found
             sides.pop(k)
         closed = np.hypot(line.r[0] - line.r[-1], line.z[0] - line.z[-1]) < margin
         if not closed and max(line.r[0], line.r[-1]) >= margin:
-            raise ShellError("the outline of the section has a gap; the elements of its solid parts do not meet the shell.")
+            raise ShellError(
+                "the outline of the section has a gap; the elements of its solid parts do not meet the shell."
+            )
         lines.append(line)
     return lines
 
 
 def _touches(line: Outline, side: Outline, margin: float) -> bool:
-    return min(np.hypot(side.r[k] - line.r[-1], side.z[k] - line.z[-1]) for k in (0, -1)) < margin
+    return bool(min(np.hypot(side.r[k] - line.r[-1], side.z[k] - line.z[-1]) for k in (0, -1)) < margin)
 
 
 def _attach(line: Outline, k: int, side: Outline, margin: float) -> tuple[Outline, int]:
     ahead = np.hypot(side.r[0] - line.r[-1], side.z[0] - line.z[-1]) < margin
     more = side if ahead else side.reversed()
     return Outline(
-        *(np.concatenate([getattr(line, name), getattr(more, name)[..., 1:]], axis=-1)
-          for name in ("r", "z", "position", "displacement", "energy"))
+        *(
+            np.concatenate([getattr(line, name), getattr(more, name)[..., 1:]], axis=-1)
+            for name in ("r", "z", "position", "displacement", "energy")
+        )
     ), k
 
 

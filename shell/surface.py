@@ -107,8 +107,12 @@ def revolve(outlines: Sequence[Outline], count: int, n: int) -> Surface:
         start += int(widths.sum())
         kept = ~on_axis[:, None] | (np.arange(count) == 0)
         u_r, u_t, u_z = line.displacement[:, :, None] * np.stack([cosine, sine, cosine])[:, None, :]
-        x = np.stack([line.r[:, None] * np.cos(theta), line.r[:, None] * np.sin(theta), line.z[:, None] + 0 * theta], axis=-1)
-        u = np.stack([u_r * np.cos(theta) - u_t * np.sin(theta), u_r * np.sin(theta) + u_t * np.cos(theta), u_z], axis=-1)
+        x = np.stack(
+            [line.r[:, None] * np.cos(theta), line.r[:, None] * np.sin(theta), line.z[:, None] + 0 * theta], axis=-1
+        )
+        u = np.stack(
+            [u_r * np.cos(theta) - u_t * np.sin(theta), u_r * np.sin(theta) + u_t * np.cos(theta), u_z], axis=-1
+        )
         density = line.energy[0][:, None] * cosine**2 + line.energy[1][:, None] * sine**2
         points.append(x[kept])
         moved.append(u[kept])
@@ -117,8 +121,13 @@ def revolve(outlines: Sequence[Outline], count: int, n: int) -> Surface:
         triangles.append(_triangulate(grid, closed=not line.on_axis))
         grids.append(grid)
     return Surface(
-        np.concatenate(points), np.concatenate(moved), np.concatenate(energy), np.concatenate(position),
-        np.concatenate(triangles), tuple(grids), n,
+        np.concatenate(points),
+        np.concatenate(moved),
+        np.concatenate(energy),
+        np.concatenate(position),
+        np.concatenate(triangles),
+        tuple(grids),
+        n,
     )
 
 
@@ -130,4 +139,4 @@ def _triangulate(grid: Triangles, closed: bool) -> Triangles:
         [np.stack([here, here_on, there_on], axis=-1), np.stack([here, there_on, there], axis=-1)]
     ).reshape(-1, 3)
     real = (faces[:, 0] != faces[:, 1]) & (faces[:, 1] != faces[:, 2]) & (faces[:, 2] != faces[:, 0])
-    return faces[real]
+    return np.asarray(faces[real])

@@ -1,27 +1,40 @@
-"""The mode shape of an instrument as a block of a report; where the machine cannot draw, the remedy instead."""
+"""The mode shapes of an instrument as blocks of a report: a view to turn, a picture where that cannot be, or the remedy."""
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from studies.reports.page import Block, Text, embed_png
+from studies.reports.page import Block, Text
 
 if TYPE_CHECKING:
     from studies.instrument.card import Instrument
 
 
-def mode_blocks(instrument: "Instrument", harmonic: int = 2) -> list[Block]:
-    """Return the picture of the lowest mode of a harmonic, or a sentence that says how to get it."""
-    from shell.modes import solve_modes
-    from shell.render import NoOpenGL, render_png
+def mode_blocks(instrument: "Instrument", harmonics: Sequence[int] = (2, 3)) -> list[Block]:
+    """Return the interactive view of the lowest mode of each harmonic, with the picture of the first one behind it."""
+    import numpy as np
 
-    elastic = instrument.material.elastic(instrument.reference_temperature)
-    mode = solve_modes(instrument.resonator, elastic, harmonic=harmonic)[0]
+    from shell.modes import solve_modes
+    from shell.render import NoOpenGL, compose_scene, render_png
+    from shell.surface import build_surface
+    from studies.reports.webgl import view_modes
+
+    temperature = instrument.reference_temperature
+    resonator, elastic = instrument.at(temperature)
+    modes = [solve_modes(resonator, elastic, n, tolerance=1e-4)[0] for n in harmonics]
+    first = modes[0]
+    title = f"{instrument.name}, n = {first.harmonic}, {first.frequency:.2f} Hz"
     caption = (
-        f"{instrument.name}, n = {harmonic}, {mode.frequency:.2f} Hz at"
-        f" {instrument.reference_temperature - 273.15:g} °C, from the solid solver; grey: undeformed. The displacement is"
-        " exaggerated, the rim is free."
+        f"{instrument.name} at {temperature - 273.15:g} °C: the lowest mode of each harmonic from the solid solver, with the"
+        " thickness, rim and stem of the card. The displacement is exaggerated."
     )
+    surface = build_surface(resonator, first)
+    moved = np.linalg.norm(surface.displacement, axis=1)
+    scene = compose_scene(surface, moved, "displacement (µm, for 1 µm at the antinode)", title)
+    blocks: list[Block] = []
     try:
-        png = render_png(mode.surface)
+        png = render_png(scene)
     except NoOpenGL as error:
-        return [Text(f"The picture of the mode is missing: {error}", "warning")]
-    return [embed_png(png, caption, f"The resonator with its rim bent into {2 * harmonic} lobes.")]
+        png = None
+        blocks.append(Text(f"The still picture of the mode is missing: {error}", "warning"))
+    alt = f"The resonator with its rim bent into {2 * first.harmonic} lobes, nodes between them."
+    return [view_modes(resonator, modes, title, png, alt, caption), *blocks]

@@ -1,0 +1,103 @@
+"""An interactive view of modes for a page: it swings, turns and pauses from one file without a network.
+
+The page carries only the outline of the section with the amplitudes of each mode; the browser turns it around the axis,
+so the normals of the swinging surface are exact and a mode takes about 20 kB. Where WebGL2 is missing the picture stays.
+"""
+
+import base64
+import hashlib
+from collections.abc import Sequence
+from importlib.resources import files
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from studies.reports.page import Embedded
+
+if TYPE_CHECKING:
+    from shell.meridian import Resonator
+    from shell.modes import Mode
+    from shell.shape import Outline
+
+KINK = np.radians(35.0)  # where the outline turns by more than this, the shading breaks
+
+
+def view_modes(
+    resonator: "Resonator", modes: "Sequence[Mode]", title: str, png: bytes | None, alt: str, caption: str = ""
+) -> Embedded:
+    """Return an interactive view of several modes of one resonator.
+
+    Parameters
+    ----------
+    resonator : the one that the modes were solved for.
+    modes : of theory solid or shell; the first one is shown first.
+    title : name of the resonator; escaped.
+    png : the picture that stands in where WebGL2 is missing and on paper; None where none could be drawn.
+    alt : what the picture shows, in words.
+    caption : below the view.
+    """
+    from jinja2 import Environment, StrictUndefined
+
+    size = resonator.size
+    described = [_describe(resonator, mode, size) for mode in modes]
+    start, rim = resonator.at([0.0]), resonator.at([resonator.length])
+    data = {
+        "modes": described,
+        "map": _colour_map(),
+        "middle": float(start.z[0] + rim.z[0]) / 2 / size,
+        "opens_up": bool(rim.z[0] > start.z[0]),
+    }
+    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
+    template = (files("studies.reports") / "templates" / "mode_view.html").read_text(encoding="utf-8")
+    html = environment.from_string(template).render(
+        id="mode-" + hashlib.sha256(repr(data).encode()).hexdigest()[:12],
+        title=title,
+        data=data,
+        alt=alt,
+        picture="data:image/png;base64," + base64.b64encode(png).decode() if png else "",
+        still="The interactive view needs a browser with scripts and WebGL2.",
+    )
+    return Embedded(html, caption)
+
+
+def _describe(resonator: "Resonator", mode: "Mode", size: float) -> dict[str, Any]:
+    from shell.shape import trace_outlines
+
+    outlines = trace_outlines(resonator, size / 40, mode)
+    runs = [run for line in outlines for run in _split_at_kinks(line)]
+    points = np.concatenate([_columns(line, members, size) for line, members in runs])
+    energy = np.concatenate([line.energy.max(axis=0) for line in outlines])
+    most = float(np.percentile(energy, 98))
+    return {
+        "label": f"n = {mode.harmonic}{f', {mode.label}' if mode.label else ''}: {mode.frequency:.2f} Hz",
+        "harmonic": mode.harmonic,
+        "runs": [len(members) for _, members in runs],
+        "points": base64.b64encode(points.astype("<f4").tobytes()).decode(),
+        "most": most,
+        "energy_legend": f"{most * 1e-12:.3g} J/m³ strain-energy density for 1 µm at the antinode",
+    }
+
+
+def _columns(line: "Outline", members: "np.ndarray[Any, np.dtype[np.int64]]", size: float) -> "np.ndarray[Any, Any]":
+    """One row for each point: r, z and their slopes, the displacement and its slope, the two parts of the energy."""
+    r, z = line.r[members] / size, line.z[members] / size
+    shift = line.displacement[:, members]
+    run = np.concatenate([[0.0], np.cumsum(np.hypot(np.diff(r), np.diff(z)))])
+    slopes = np.gradient(np.stack([r, z, *shift]), run, axis=1)
+    return np.column_stack([r, z, *slopes[:2], *shift, *slopes[2:], *line.energy[:, members]])
+
+
+def _split_at_kinks(line: "Outline") -> "list[tuple[Outline, np.ndarray[Any, np.dtype[np.int64]]]]":
+    """Runs of points without a kink; neighbouring runs share their end point."""
+    closing = np.arange(len(line.r)) if line.on_axis else np.append(np.arange(len(line.r)), 0)
+    heading = np.unwrap(np.arctan2(np.diff(line.z[closing]), np.diff(line.r[closing])))
+    breaks = 1 + np.flatnonzero(abs(np.diff(heading)) > KINK)
+    bounds = [0, *breaks.tolist(), len(closing) - 1]
+    return [(line, closing[a : b + 1]) for a, b in pairwise(bounds)]
+
+
+def _colour_map() -> list[list[float]]:
+    import matplotlib as mpl
+
+    return [[round(float(x), 4) for x in mpl.colormaps["cividis"](k / 15)[:3]] for k in range(16)]
