@@ -64,6 +64,8 @@ class Chain:
         N₁ (counts).
     scale : float
         S₁ (rad/s per count).
+    rough_covariance : array (2, 2)
+        Covariance of null and scale.
     bias : Curve
         N(T), rad/s over kelvin: eq. (34).
     scale_over_rate : Curve
@@ -78,6 +80,7 @@ class Chain:
 
     null: float
     scale: float
+    rough_covariance: Real
     bias: Curve
     scale_over_rate: Curve
     scale_over_temperature: Curve
@@ -225,7 +228,7 @@ def fit_chain(
     CompensationError
         When a run does not vary what its step needs, names the step.
     """
-    null, scale, _ = _step("rough null and scale (33)", fit_rough, rates if rough is None else rough)
+    null, scale, covariance = _step("rough null and scale (33)", fit_rough, rates if rough is None else rough)
     bias = _step("bias over temperature (34)", fit_bias, rest.temperature, scale * (rest.output - null))
     straight = scale * (rates.output - null) - bias.value(rates.temperature)
     over_rate = _step("scale over rate (35)", fit_scale_over_rate, straight, rates.rate)
@@ -235,7 +238,7 @@ def fit_chain(
     )
     sampling = require_regular(rest.time, "the FIR filter") if cutoff is not None else 0.0
     taps = np.empty(0) if cutoff is None else design_smoother(sampling, cutoff, order)
-    return Chain(null, scale, bias, over_rate, over_temperature, taps, sampling)
+    return Chain(null, scale, covariance, bias, over_rate, over_temperature, taps, sampling)
 
 
 def apply_chain(

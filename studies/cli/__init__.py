@@ -16,6 +16,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "fit cross-damping": ("studies.cli.fit_cross_damping:fit_cross_damping", "Cross-damping bias over temperature."),
     "derive": ("studies.cli.derive:derive", "The symbolic derivation, as equations, LaTeX or code."),
     "import": ("studies.cli.import_:import_", "Laboratory files into the record format."),
+    "fit scale": ("studies.cli.fit_scale:fit_scale", "Bias and scale of a bell-shaped gyro, step by step."),
     "cards": ("studies.cli.cards:cards", "The instrument cards that ship."),
     "materials": ("studies.cli.cards:materials", "The materials and their published laws."),
     "doctor": ("studies.cli.doctor:doctor", "Show what this environment has and what it lacks."),

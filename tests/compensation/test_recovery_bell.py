@@ -23,6 +23,7 @@ EVERYWHERE = (-1e9, 1e9)
 PRINTED = Chain(
     null=-703.3858,
     scale=0.0242 * DEG,
+    rough_covariance=np.zeros((2, 2)),
     bias=Curve(np.array([0.1673, -0.0056, 2.52e-5]) * DEG, NONE, 273.15, *EVERYWHERE),
     scale_over_rate=Curve(np.array([-0.12 * DEG, 0.99, 5.89e-6 / DEG]), NONE, 0.0, *EVERYWHERE),
     scale_over_temperature=Curve(np.array([0.9979, -1.83e-5, -1.26e-7]), NONE, 273.15, *EVERYWHERE),

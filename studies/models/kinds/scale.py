@@ -1,0 +1,198 @@
+"""Models of kind `scale`: the compensation chain (32)–(36) of the BVG paper, and its C code.
+
+The file has the parts "rough" (null, scale), "bias", "scale_over_rate" and "scale_over_temperature" (c0, c1, c2 in °C
+and °/s), and the settings `fir_taps` and `sampling_s` (empty and 0 without a filter) and `temperature_column`.
+"""
+
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from studies.errors import InputError
+from studies.models.c_source import head, polynomial
+from studies.models.file import Model, Part, Source, make_part
+from studies.record import COMPENSATED, Record
+
+if TYPE_CHECKING:
+    from compensation.bell import Chain, Curve
+
+CELSIUS_ZERO = 273.15
+DEG = math.radians(1.0)
+RAW = ("output_counts", "measured_rate_deg_per_s")
+"""Columns that can be the raw output; the first needs the rough scale, the second is a rate already."""
+RATE = "measured_rate_deg_per_s"
+
+
+def save_scale(
+    chain: "Chain", output: str, temperature_column: str, sources: tuple[Source, ...], made_by: str
+) -> Model:
+    """Return a fitted chain as a model that compensates the column `output`."""
+    raw = "counts" if output == "output_counts" else "deg/s"
+    covariance = np.diag([1.0, 1 / DEG]) @ chain.rough_covariance @ np.diag([1.0, 1 / DEG])
+    rough = make_part(
+        "rough", ("null", "scale"), (chain.null, chain.scale / DEG), (raw, f"deg/s per {raw}"), covariance
+    )
+    over_temperature = ("1/degC", "1/degC^2")
+    return Model(
+        kind="scale",
+        compensates=output,
+        parts=(
+            rough,
+            _save_curve("bias", chain.bias, 1.0, 0.0, ("deg/s", "deg/s/degC", "deg/s/degC^2")),
+            _save_curve("scale_over_rate", chain.scale_over_rate, 1.0, 1.0, ("deg/s", "1", "s/deg")),
+            _save_curve("scale_over_temperature", chain.scale_over_temperature, 0.0, 0.0, ("1", *over_temperature)),
+        ),
+        settings={
+            "temperature_column": temperature_column,
+            "sampling_s": chain.sampling,
+            "fir_taps": tuple(float(tap) for tap in chain.taps),
+        },
+        validity={
+            temperature_column: (
+                max(chain.bias.lowest, chain.scale_over_temperature.lowest) - CELSIUS_ZERO,
+                min(chain.bias.highest, chain.scale_over_temperature.highest) - CELSIUS_ZERO,
+            ),
+            RATE: (chain.scale_over_rate.lowest / DEG, chain.scale_over_rate.highest / DEG),
+        },
+        sources=sources,
+        made_by=made_by,
+    )
+
+
+def load_scale(model: Model) -> "Chain":
+    """Return the chain that a model file holds."""
+    from compensation.bell import Chain
+
+    rough, column = model.part("rough"), _temperature_column(model)
+    for name in (column, RATE):
+        if name not in model.validity:
+            raise InputError(f"{model.path or 'model'} [validity]: the range of '{name}' is missing; add it.")
+    low, high = (value + CELSIUS_ZERO for value in model.validity[column])
+    slow, fast = (value * DEG for value in model.validity[RATE])
+    taps = model.settings.get("fir_taps", ())
+    if isinstance(taps, str | float):
+        raise InputError(f"{model.path or 'model'} [settings]: fir_taps must be a list of numbers, [] for no filter.")
+    errors = np.array(rough.covariance) if rough.covariance else np.zeros((2, 2))
+    return Chain(
+        null=_coefficient(model, rough, "null"),
+        scale=_coefficient(model, rough, "scale") * DEG,
+        rough_covariance=np.diag([1.0, DEG]) @ errors @ np.diag([1.0, DEG]),
+        bias=_load_curve(model, "bias", 1.0, 0.0, CELSIUS_ZERO, (low, high)),
+        scale_over_rate=_load_curve(model, "scale_over_rate", 1.0, 1.0, 0.0, (slow, fast)),
+        scale_over_temperature=_load_curve(model, "scale_over_temperature", 0.0, 0.0, CELSIUS_ZERO, (low, high)),
+        taps=np.array(taps, dtype=float),
+        sampling=model.number("sampling_s"),
+    )
+
+
+def compensate(model: Model, record: Record, *, extrapolate: bool) -> dict[str, NDArray[np.float64]]:
+    """Return the compensated rate; without a filter, rows that lack an input stay empty."""
+    from compensation.bell import apply_chain
+
+    output, column = model.compensates, _temperature_column(model)
+    if output not in RAW:
+        raise InputError(f"{model.path or 'model'}: a scale model compensates {' or '.join(RAW)}.")
+    for name in (output, column):
+        if name not in record:
+            raise InputError(f"the column '{name}' is missing; this scale model needs it.")
+    complete = np.isfinite(record[output]) & np.isfinite(record[column])
+    chain = load_scale(model)
+    if len(chain.taps) and not np.all(complete):
+        row = int(np.flatnonzero(~complete)[0])
+        raise InputError(
+            f"{output} or {column} is empty in row {row + 1} of the table, but the FIR filter needs every sample;"
+            " fill the gap, or fit the chain without a filter (--no-filter)."
+        )
+    if np.count_nonzero(complete) < 2:
+        raise InputError(f"no two rows have both {output} and {column}; nothing can be compensated.")
+    model.check_range(column, record[column], extrapolate)
+    compensated = np.full(len(record), np.nan)
+    result = apply_chain(
+        chain,
+        record["time_s"][complete],
+        record[output][complete],
+        record[column][complete] + CELSIUS_ZERO,
+        extrapolate=extrapolate,
+    )
+    compensated[complete] = result.filtered / DEG
+    return {f"{COMPENSATED}{RATE}": compensated}
+
+
+def emit_c(model: Model) -> str:
+    """Return `hrg_rate(output, T)`, the static steps, and `hrg_smooth(&state, rate)`, the filter, in C99."""
+    rough = model.part("rough")
+    taps = load_scale(model).taps
+    smoother = ""
+    if len(taps):
+        values = ",\n    ".join(repr(float(tap)) for tap in taps)
+        smoother = f"""
+#define HRG_TAPS {len(taps)}
+static const double hrg_taps[HRG_TAPS] = {{
+    {values}
+}};
+typedef struct {{ double past[HRG_TAPS]; int filled; }} hrg_smoother;
+
+/* Filtered rate, one sample every {model.number("sampling_s"):g} s; set state.filled = 0 before the first. */
+double hrg_smooth(hrg_smoother *state, double rate) {{
+    double sum = 0.0;
+    for (int k = HRG_TAPS - 1; k > 0; --k) state->past[k] = state->filled ? state->past[k - 1] : rate;
+    state->past[0] = rate;
+    state->filled = 1;
+    for (int k = 0; k < HRG_TAPS; ++k) sum += hrg_taps[k] * state->past[k];
+    return sum;
+}}
+"""
+    curves = "\n\n".join(
+        polynomial(f"hrg_{name}", variable, model.part(name).values)
+        for name, variable in (
+            ("bias", "temperature_degC"),
+            ("scale_over_rate", "rate"),
+            ("scale_over_temperature", "temperature_degC"),
+        )
+    )
+    return f"""{head(model)}
+{curves}
+
+/* Compensated rate (deg/s) for the raw {model.compensates} and the temperature. */
+double hrg_rate(double output, double temperature_degC) {{
+    double rate = {rough["scale"]!r} * (output - ({rough["null"]!r})) - hrg_bias(temperature_degC);
+    return hrg_scale_over_rate(rate) * hrg_scale_over_temperature(temperature_degC);
+}}
+{smoother}"""
+
+
+def _save_curve(name: str, curve: "Curve", y: float, x: float, units: Sequence[str]) -> Part:
+    """A curve in degrees: y and x are the powers of an angle in its value and its variable."""
+    order = len(curve.coefficients) - 1
+    size = DEG ** (x * np.arange(order + 1) - y)
+    names = [f"c{i}" for i in range(order + 1)]
+    more = [f"{units[-1]} per power" for _ in range(order - 2)]
+    covariance = size[:, None] * curve.covariance * size
+    return make_part(name, names, size * curve.coefficients, [*units, *more][: order + 1], covariance)
+
+
+def _load_curve(model: Model, name: str, y: float, x: float, reference: float, limits: tuple[float, float]) -> "Curve":
+    from compensation.bell import Curve
+
+    part = model.part(name)
+    if part.names != tuple(f"c{i}" for i in range(len(part.values))):
+        raise InputError(f"{model.path or 'model'} [[part]] {name}: the coefficients must be c0, c1, …, in this order.")
+    size = DEG ** (y - x * np.arange(len(part.values)))
+    covariance = np.array(part.covariance) if part.covariance else np.zeros((len(part.values),) * 2)
+    return Curve(size * np.array(part.values), size[:, None] * covariance * size, reference, *limits)
+
+
+def _coefficient(model: Model, part: Part, name: str) -> float:
+    if name not in part.names:
+        raise InputError(f"{model.path or 'model'} [[part]] {part.name}: the coefficient '{name}' is missing.")
+    return part[name]
+
+
+def _temperature_column(model: Model) -> str:
+    column = model.settings.get("temperature_column")
+    if not isinstance(column, str):
+        raise InputError(f"{model.path or 'model'} [settings]: the key 'temperature_column' must name a column.")
+    return column

@@ -1,0 +1,183 @@
+"""The compensation chain of a bell-shaped gyro as a study: runs sorted by what they show, figures after every step."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from compensation.bell import Chain, Run, apply_chain, fit_chain, measure_linearity
+from compensation.stability import allan_deviation
+from studies.errors import InputError
+from studies.models.kinds.scale import RAW
+from studies.rest import CELSIUS_ZERO, LARGEST_REST, TEMPERATURES, choose_column
+
+if TYPE_CHECKING:
+    from studies.record import Record
+
+Real = NDArray[np.float64]
+DEG = float(np.pi / 180)
+STEPS = ("rough", "bias_compensated", "rate_compensated", "temperature_compensated", "filtered")
+SWEPT = 5.0
+"""Span of temperature (K) from which a run counts as one over temperature."""
+SHORT, LONG = 1.0, 100.0
+"""Averaging times (s) at which the random walk is read: a filter of 5 s changes the first, not the second."""
+BLOCKS = 5
+
+
+@dataclass(frozen=True)
+class StepFigures:
+    """One step of the chain judged.
+
+    `nonlinearity` (1); standard deviations `at_rest` and `turning` (°/s); at rest `bias_instability` (°/h), the lowest
+    Allan deviation over 0.664, and the random walk (°/√h) read at 1 s and at 100 s; None where a run is too short.
+    """
+
+    step: str
+    nonlinearity: float | None
+    at_rest: float
+    turning: float
+    bias_instability: float | None
+    random_walk_1s: float | None
+    random_walk_100s: float | None
+
+
+@dataclass(frozen=True)
+class ScaleStudy:
+    """The chain, its runs, its figures on them, and rms error (°/s) before and after on blocks left out of the fit."""
+
+    chain: Chain
+    runs: tuple[Run, Run, Run]
+    output: str
+    temperature_column: str
+    left_out: int
+    figures: list[StepFigures]
+    error_before: float
+    error_held_out: float
+
+
+def judge_steps(chain: Chain, rates: Run, rest: Run, turning: Run) -> list[StepFigures]:
+    """Return the figures of merit after each step, on any three runs."""
+    outputs = [
+        apply_chain(chain, run.time, run.output, run.temperature, extrapolate=True) for run in (rates, rest, turning)
+    ]
+    figures = []
+    for step in STEPS:
+        at_rates, at_rest, at_turning = (np.asarray(getattr(output, step), dtype=float) for output in outputs)
+        steady = settled_rows(rates.rate, len(chain.taps) if step == "filtered" else 0)
+        enough = len(np.unique(rates.rate[steady])) > 2
+        linearity = measure_linearity(rates.rate[steady], at_rates[steady]) if enough else None
+        wander, short, long = _read_allan((rest.time[-1] - rest.time[0]) / (len(rest.time) - 1), at_rest)
+        figures.append(
+            StepFigures(
+                step,
+                linearity.nonlinearity if linearity else None,
+                float(np.std(at_rest)) / DEG,
+                float(np.std(at_turning)) / DEG,
+                wander,
+                short,
+                long,
+            )
+        )
+    return figures
+
+
+def settled_rows(rate: Real, rows: int) -> NDArray[np.bool_]:
+    """Mark the rows at which the applied rate has been the same for `rows` rows, or since the start of the run."""
+    index = np.arange(len(rate))
+    begin = np.maximum.accumulate(np.where(np.r_[False, np.diff(rate) != 0], index, 0))
+    return np.asarray((index - begin >= rows) | (begin == 0), dtype=bool)
+
+
+def study_scale(records: "Sequence[Record]", cutoff: float | None, order: int) -> ScaleStudy:
+    """Sort the records, fit the chain, and judge it.
+
+    Raises
+    ------
+    InputError
+        A column is missing, or there is not one record each of rates, of rest and of turning over temperature.
+    """
+    output = choose_column(records, RAW, "a fit of the scale")
+    column = choose_column(records, TEMPERATURES, "a fit of the scale over temperature")
+    sorted_runs: dict[str, tuple[Run, str]] = {}
+    left_out = 0
+    for record in records:
+        run, missing = _read_run(record, output, column)
+        left_out += missing
+        kind = _classify(run, record.path)
+        if kind in sorted_runs:
+            raise InputError(f"{record.path} and {sorted_runs[kind][1]} are both runs {kind}; give one of each kind.")
+        sorted_runs[kind] = (run, record.path)
+    for kind, equation in KINDS.items():
+        if kind not in sorted_runs:
+            raise InputError(f"no record is a run {kind}, which {equation} needs; record one and give it too.")
+    rates, rest, turning = (sorted_runs[kind][0] for kind in KINDS)
+    chain = fit_chain(rates, rest, turning, cutoff=cutoff, order=order)
+    before, after = _hold_out((rates, rest, turning))
+    figures = judge_steps(chain, rates, rest, turning)
+    return ScaleStudy(chain, (rates, rest, turning), output, column, left_out, figures, before, after)
+
+
+KINDS = {
+    "of several rates at one temperature": "equation (35)",
+    "at rest over temperature": "equation (34)",
+    "at one rate over temperature": "equation (36)",
+}
+
+
+def _classify(run: Run, path: str) -> str:
+    several, at_rest, turning = KINDS
+    swept = float(np.ptp(run.temperature)) > SWEPT
+    if np.ptp(run.rate) > LARGEST_REST * DEG:
+        if swept:
+            raise InputError(f"{path}: both rate and temperature change; the chain needs them one at a time.")
+        return several
+    if not swept:
+        raise InputError(f"{path}: neither rate nor temperature changes; nothing can be learnt from this run.")
+    return at_rest if abs(np.mean(run.rate)) <= LARGEST_REST * DEG else turning
+
+
+def _read_run(record: "Record", output: str, column: str) -> tuple[Run, int]:
+    if "rate_deg_per_s" not in record:
+        raise InputError(f"{record.path}: the column 'rate_deg_per_s' is missing; add the applied rate, 0 at rest.")
+    columns = [record["time_s"], record[output], record[column], record["rate_deg_per_s"]]
+    complete = np.all([np.isfinite(values) for values in columns], axis=0)
+    if np.count_nonzero(complete) < 2:
+        raise InputError(f"{record.path}: no rows with {output}, {column} and rate_deg_per_s together.")
+    time, raw, temperature, rate = (values[complete] for values in columns)
+    return Run(time, raw, temperature + CELSIUS_ZERO, rate * DEG), int(np.count_nonzero(~complete))
+
+
+def _hold_out(runs: tuple[Run, Run, Run]) -> tuple[float, float]:
+    """Rms error (°/s) of the rough and of the compensated rate on fifths of every run that the fit has not seen."""
+    before, after = [], []
+    for block in range(BLOCKS):
+        seen, unseen = zip(*(_cut(run, block) for run in runs), strict=True)
+        chain = fit_chain(*seen, cutoff=None)
+        for run in unseen:
+            result = apply_chain(chain, run.time, run.output, run.temperature, extrapolate=True)
+            before.append(result.rough - run.rate)
+            after.append(result.temperature_compensated - run.rate)
+    errors = [float(np.sqrt(np.mean(np.concatenate(parts) ** 2))) / DEG for parts in (before, after)]
+    return errors[0], errors[1]
+
+
+def _cut(run: Run, block: int) -> tuple[Run, Run]:
+    """The run without one fifth, and that fifth."""
+    chosen = np.array_split(np.arange(len(run.time)), BLOCKS)[block]
+    inside = np.zeros(len(run.time), dtype=bool)
+    inside[chosen] = True
+    parts = [Run(run.time[rows], run.output[rows], run.temperature[rows], run.rate[rows]) for rows in (~inside, inside)]
+    return parts[0], parts[1]
+
+
+def _read_allan(step: float, rate: Real) -> tuple[float | None, float | None, float | None]:
+    if len(rate) * step < 10 * LONG:
+        return None, None, None
+    allan = allan_deviation(rate / DEG * 3600, step)
+    short, long = (
+        float(np.exp(np.interp(np.log(tau), np.log(allan.tau), np.log(allan.deviation)))) * np.sqrt(tau) / 60
+        for tau in (SHORT, LONG)
+    )
+    return allan.bias_instability[0], float(short), float(long)
