@@ -200,7 +200,7 @@ def solve(problem: Problem, start: Array, noise: Noise, fixed: dict[int, float] 
 
     inside = np.clip(parameters[free], low[free] + 1e-9, high[free] - 1e-9)
     result = least_squares(
-        residuals, inside, slopes, bounds=(low[free], high[free]), x_scale="jac", xtol=1e-9, ftol=1e-10, max_nfev=60
+        residuals, inside, slopes, bounds=(low[free], high[free]), x_scale="jac", xtol=1e-7, ftol=1e-9, max_nfev=60
     )
     if not np.isfinite(result.cost):
         raise ThermalError("the fit of the thermal constants broke down; start it nearer or fix a constant.")

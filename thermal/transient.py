@@ -18,7 +18,7 @@ from thermal.steady import check_boundary_names, find_steady_state
 
 BLOCK = 1 << 16  # rows evaluated at a time; bounds the memory of long outputs
 MOST_SWEEPS = 60
-SWEEP_TOLERANCE = 1e-9  # K
+SWEEP_TOLERANCE = 1e-7  # K
 MOST_RESTARTS = 200  # with more corners in its profiles than this, the integrator restarts at jumps only
 
 

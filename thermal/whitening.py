@@ -3,8 +3,8 @@
 White noise plus a first-order wander x' = ρ x + … is in its steady state the process (1 − ρB) r = (1 − θB) e with
 white e, B the shift by one row and 0 ≤ θ ≤ ρ ≤ 1: θ = ρ is white noise, θ = 0 the wander alone, ρ = 1 a random
 walk. The pair is estimated by restricted likelihood, which does not take the freedom of the fit for quietness.
-A record can rarely tell a slow wander from a random walk, and a wander that is taken for too fast makes intervals
-too short; so the slowest wander that the record does not contradict is used.
+A record says little about the slowest part of its noise, and a wander that is taken for too fast or too weak makes
+intervals too short; so the slowest, and then the strongest, that the record does not contradict is used.
 """
 
 from collections.abc import Callable
@@ -20,7 +20,8 @@ from thermal.run import Rows
 
 STARTS = ((7.0, 3.0), (3.0, 0.0))  # logits of ρ and of θ/ρ
 ENDS = (-14.0, 14.0)  # bounds of both logits
-SLACK = 2.71  # 90 % quantile of χ² with one degree of freedom
+SLOWER = 2.71  # growth of −2 ln L that is allowed for a slower wander: 90 % quantile of χ², one degree of freedom
+STRONGER = 1.0  # the same for a stronger one: one standard deviation
 HALVINGS = 9
 
 
@@ -60,31 +61,29 @@ def estimate_noise(residual: Array, slope: Array, breaks: Rows) -> Noise:
         (minimize(criterion, start, method="L-BFGS-B", bounds=[ENDS, ENDS]) for start in STARTS),
         key=lambda result: float(result.fun),
     )
-    noise = _unpack(_slowest_wander(criterion, best.x, float(best.fun) + SLACK))
+
+    def at_wander(wander: float) -> tuple[float, float]:
+        found = minimize_scalar(
+            lambda share: criterion(np.array([wander, share])), bounds=ENDS, method="bounded", options={"xatol": 0.02}
+        )
+        return float(found.fun), float(found.x)
+
+    wander = _farthest(lambda wander: at_wander(wander)[0], float(best.x[0]), ENDS[1], float(best.fun) + SLOWER)
+    value, share = at_wander(wander)
+    share = _farthest(lambda share: criterion(np.array([wander, share])), share, ENDS[0], value + STRONGER)
+    noise = _unpack(np.array([wander, share]))
     innovation = float(_diagonal(whiten(columns, breaks, noise))[-1]) / np.sqrt(free)
     return Noise(noise.wander, noise.smoothing, max(innovation, 1e-12))
 
 
-def _slowest_wander(criterion: Callable[[Array], float], best: Array, allowed: float) -> Array:
-    """Move from the best logits to the slowest wander whose criterion is still allowed."""
-
-    def refine(wander: float) -> tuple[float, Array]:
-        found = minimize_scalar(
-            lambda share: criterion(np.array([wander, share])), bounds=ENDS, method="bounded", options={"xatol": 0.02}
-        )
-        return float(found.fun), np.array([wander, found.x])
-
-    value, slowest = refine(ENDS[1])
-    if value <= allowed:
-        return slowest
-    beyond = ENDS[1]
+def _farthest(criterion: Callable[[float], float], start: float, end: float, allowed: float) -> float:
+    """Go from `start` towards `end` as far as the criterion is allowed."""
+    if criterion(end) <= allowed:
+        return end
     for _ in range(HALVINGS):
-        value, trial = refine((best[0] + beyond) / 2)
-        if value <= allowed:
-            best = trial
-        else:
-            beyond = trial[0]
-    return best
+        middle = (start + end) / 2
+        start, end = (middle, end) if criterion(middle) <= allowed else (start, middle)
+    return start
 
 
 def _diagonal(columns: Array) -> Array:
