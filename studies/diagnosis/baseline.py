@@ -16,7 +16,7 @@ import numpy as np
 
 from studies.diagnosis.campaign import Campaign
 from studies.diagnosis.effects import Effect, Span
-from studies.diagnosis.likelihood import LinearFit, NoiseBasis, fit_linear
+from studies.diagnosis.likelihood import KERNELS, LinearFit, NoiseBasis, fit_linear
 from studies.diagnosis.states import FloatArray, States, average, lag
 
 DELAY = 10.0
@@ -87,6 +87,7 @@ class Problem:
     thermometer: tuple[FloatArray, ...] | None = None
     law: Law | None = None
     delay_row: float | None = None
+    kernel: str = "walk"
 
     @property
     def rotated(self) -> FloatArray:
@@ -217,6 +218,28 @@ def pose(
     return calibrate(replace(
         problem, values=np.append(values, 0.0), basis=problem.basis.with_row(), delay_row=row,
     ), around=problem.tau)
+
+
+def restricted(problem: Problem, keep: Sequence[np.ndarray] | None = None, kernel: str | None = None) -> Problem:
+    """Return the problem on fewer rows, or with another kind of slow noise."""
+    keep = problem.present if keep is None else keep
+    kernel = problem.kernel if kernel is None else kernel
+    present = tuple(mask & kept for mask, kept in zip(problem.present, keep, strict=True))
+    chosen = np.concatenate([kept[mask] for mask, kept in zip(problem.present, keep, strict=True)])
+    values = problem.values[: chosen.size][chosen]
+    times = [average(s.time, problem.group)[m] for s, m in zip(problem.states, present, strict=True)]
+    basis = NoiseBasis.of([t for t in times if t.size], kernel)
+    if problem.delay_row is not None:
+        values, basis = np.append(values, 0.0), basis.with_row()
+    return replace(problem, present=present, values=values, basis=basis, kernel=kernel)
+
+
+def choose_kernel(problem: Problem, terms: Sequence[Term] = ()) -> Problem:
+    """Return the problem with the kind of slow noise that the data make most likely."""
+    tried = [restricted(problem, kernel=kernel) for kernel in KERNELS]
+    scores = [fit_at(other, other.tau, terms).score for other in tried]
+    best = int(np.argmin(scores))
+    return tried[best] if scores[best] < scores[KERNELS.index(problem.kernel)] - 1.0 else problem
 
 
 def white_level(problem: Problem) -> float:

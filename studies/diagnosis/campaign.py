@@ -70,8 +70,9 @@ class Campaign:
 def load_campaign(records: Sequence[Record], reference_degC: float | None = None) -> Campaign:
     """Check several records of one gyro and put them on one even grid.
 
-    A row is an outlier when it deviates from the running median of 11 rows by more than six robust standard
-    deviations (1.4826 times the median absolute deviation over the run); it is left out of fit and score alike.
+    A row is an outlier when it deviates from the running median of 11 rows, with and without the trend, by more than
+    six robust standard deviations (1.4826 times the median absolute deviation over the run); it is left out of fit
+    and score alike.
 
     Raises
     ------
@@ -236,7 +237,11 @@ def _remove_outliers(table: dict[str, FloatArray]) -> int:
 
 
 def find_outliers(values: FloatArray) -> np.ndarray:
-    """Return a mask of the rows that the stated rule calls outliers."""
+    """Return a mask of the rows that the stated rule calls outliers.
+
+    A row must stand out both as it is, so that the edge of a step does not, and beside the trend, so that the
+    scale of the noise is right where the response is steep.
+    """
     from scipy.ndimage import median_filter
 
     present = np.isfinite(values)
@@ -244,14 +249,19 @@ def find_outliers(values: FloatArray) -> np.ndarray:
     kept = values[present]
     if kept.size < 3 * OUTLIER_WINDOW:
         return mask
-    deviation = kept - median_filter(kept, OUTLIER_WINDOW, mode="nearest")
-    deviation -= np.median(deviation)
-    scale = 1.4826 * float(np.median(np.abs(deviation)))
+    rows = np.arange(kept.size)
+    blocks = np.array_split(rows, max(2, kept.size // OUTLIER_WINDOW))
+    trend = np.interp(rows, [block.mean() for block in blocks], [float(np.median(kept[block])) for block in blocks])
+    level = kept - trend
+    beside = level - median_filter(level, OUTLIER_WINDOW, mode="nearest")
+    plain = kept - median_filter(kept, OUTLIER_WINDOW, mode="nearest")
+    scale = 1.4826 * float(np.median(np.abs(beside)))
     if scale == 0.0:
-        scale = float(np.std(deviation))
-    levels = np.abs(np.diff(kept))
-    resolution = float(levels[levels > 0].min()) if (levels > 0).any() else 0.0
-    mask[present] = np.abs(deviation) > max(OUTLIER_LIMIT * scale, 1.5 * resolution)
+        scale = float(np.std(beside))
+    steps = np.abs(np.diff(kept))
+    resolution = float(steps[steps > 0].min()) if (steps > 0).any() else 0.0
+    limit = max(OUTLIER_LIMIT * scale, 1.5 * resolution)
+    mask[present] = (np.abs(beside) > limit) & (np.abs(plain) > limit)
     return mask
 
 

@@ -56,7 +56,7 @@ def _functions(
     rate = s.rate / max(float(np.abs(s.rate).max()), 1e-12)
     out: dict[str, FloatArray] = {}
     if wide > 0.5:
-        for name, count in (("temperature", 12), ("temperature, narrow", 40)):
+        for name, count in (("temperature", 12), ("temperature, narrow", 28)):
             centres = np.linspace(low, high, count)
             width = 1.1 * wide / (count - 1)
             out[name] = np.exp(-0.5 * ((s.resonator[:, None] - centres) / width) ** 2)
@@ -143,7 +143,7 @@ def _scaled(columns: FloatArray) -> FloatArray:
 
 def _near(share: float) -> FloatArray:
     near = int(np.argmin(np.abs(SHARES - share)))
-    return SHARES[max(0, near - 4) : near + 2]
+    return SHARES[max(0, near - 3) : near + 2]
 
 
 def strongest(evidence: dict[str, FloatArray], levels: dict[str, float]) -> Leftover:

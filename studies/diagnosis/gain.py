@@ -5,10 +5,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from studies.diagnosis.baseline import Problem, Term, View, baseline_columns, term_columns
+from studies.diagnosis.baseline import Problem, Term, View, baseline_columns, restricted, term_columns
 from studies.diagnosis.campaign import Campaign
 from studies.diagnosis.fit import Fit, fit_terms
-from studies.diagnosis.likelihood import NoiseBasis
 from studies.diagnosis.states import FloatArray, States
 
 BLOCKS = 5
@@ -85,18 +84,6 @@ def score(fit: Fit, campaign: Campaign) -> Score:
     return Score(training, _leave_one_block_out(fit, campaign))
 
 
-def _restricted(problem: Problem, keep: Sequence[np.ndarray]) -> Problem:
-    """Return the problem on fewer rows."""
-    present = tuple(mask & kept for mask, kept in zip(problem.present, keep, strict=True))
-    chosen = np.concatenate([kept[mask] for mask, kept in zip(problem.present, keep, strict=True)])
-    values = problem.values[: chosen.size][chosen]
-    times = [s.averaged(problem.group).time[m] for s, m in zip(problem.states, present, strict=True)]
-    basis = NoiseBasis.of([t for t in times if t.size])
-    if problem.delay_row is not None:
-        values, basis = np.append(values, 0.0), basis.with_row()
-    return replace(problem, present=present, values=values, basis=basis)
-
-
 def _leave_one_record_out(fit: Fit, campaign: Campaign) -> float | None:
     residuals = []
     for record in campaign.records:
@@ -104,7 +91,7 @@ def _leave_one_record_out(fit: Fit, campaign: Campaign) -> float | None:
                 for mask, run in zip(fit.problem.present, campaign.runs, strict=True)]
         if sum(int((m & k).sum()) for m, k in zip(fit.problem.present, keep, strict=True)) < 40:
             return None
-        trained = fit_terms(_restricted(fit.problem, keep), fit.terms, rounds=2)
+        trained = fit_terms(restricted(fit.problem, keep), fit.terms, rounds=2)
         for k, run in enumerate(campaign.runs):
             if run.record == record:
                 residuals.append(_refit_own(trained, campaign, k))
@@ -136,7 +123,7 @@ def _leave_one_block_out(fit: Fit, campaign: Campaign) -> float | None:
         keep = [(run.time < low - gap) | (run.time > high + gap) for run in campaign.runs]
         if sum(int((m & k).sum()) for m, k in zip(problem.present, keep, strict=True)) < 40:
             return None
-        trained = fit_terms(_restricted(problem, keep), fit.terms, rounds=2)
+        trained = fit_terms(restricted(problem, keep), fit.terms, rounds=2)
         for k, run in enumerate(campaign.runs):
             inside = (run.row_time >= low) & (run.row_time < high + (1e-9 if block < BLOCKS - 1 else 1.0))
             if inside.any():

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from studies.diagnosis.advice import suggest_next
-from studies.diagnosis.baseline import Law, Problem, pose, span_of
+from studies.diagnosis.baseline import Law, Problem, choose_kernel, pose, span_of
 from studies.diagnosis.campaign import FEWEST_BINS, Campaign
 from studies.diagnosis.discrepancy import Leftover, generic_bases, leftover_evidence, strongest
 from studies.diagnosis.effects import Effect
@@ -129,6 +129,15 @@ def inquire(
     campaign: Campaign, problem: Problem, draws: int, rng: np.random.Generator, effects: Sequence[Effect] | None
 ) -> Inquiry:
     """Select the effects of one response and ask the generic witness about the rest."""
+    problem = choose_kernel(problem)
+    inquiry = _inquire(campaign, problem, draws, rng, effects)
+    better = choose_kernel(inquiry.problem, inquiry.selection.fit.terms) if inquiry.selection.found else problem
+    return inquiry if better.kernel == problem.kernel else _inquire(campaign, better, draws, rng, effects)
+
+
+def _inquire(
+    campaign: Campaign, problem: Problem, draws: int, rng: np.random.Generator, effects: Sequence[Effect] | None
+) -> Inquiry:
     span = span_of(campaign, problem.tau if problem.lagged else 1000.0)
     usable = applicable(problem, effects)
     dictionary = build_dictionary(problem, span, usable)

@@ -1,9 +1,10 @@
-"""Coloured noise: white noise and a random walk of unknown share, in the basis where both are independent.
+"""Coloured noise: white noise and slow noise of unknown share, in the basis where both are independent.
 
 The noise of one run has the covariance σ² (1 + q K), K_ij = (min(t_i, t_j) + c t₈) / t₈ with t₈ = 8 h: white noise and a
 random walk that has already wandered when the run starts. K has the same eigenvectors for every q, so one
 rotation makes the rows independent and the share q is profiled by weights alone. It is the batch form of the
-steady-state Kalman filter (1 − L)/(1 − θL), exact at the start of each run and across missing rows.
+steady-state Kalman filter (1 − L)/(1 − θL), exact at the start of each run and across missing rows. Other kinds of
+slow noise (1/f, a relaxation) have another K and the same one parameter; the likelihood of the data chooses.
 """
 
 from collections.abc import Sequence
@@ -19,11 +20,21 @@ WALKED_BEFORE = 0.5
 SHARES = np.array([0.0, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0, 400.0, 2000.0, 2e4])
 
 
-@lru_cache(maxsize=64)
-def _eigenbasis(times: bytes) -> tuple[FloatArray, FloatArray]:
+KERNELS = ("walk", "flicker", "relaxing", "slowly relaxing")
+"""Kinds of coloured noise: random walk; 1/f; one relaxation of 10 min; one of 45 min."""
+
+
+@lru_cache(maxsize=256)
+def _eigenbasis(times: bytes, kernel: str) -> tuple[FloatArray, FloatArray]:
     t = np.frombuffer(times)
-    walk = (np.minimum(t[:, None], t[None, :]) - t[0]) / WALK_TIME + WALKED_BEFORE
-    values, vectors = np.linalg.eigh(walk)
+    apart = np.abs(t[:, None] - t[None, :])
+    if kernel == "walk":
+        colour = (np.minimum(t[:, None], t[None, :]) - t[0]) / WALK_TIME + WALKED_BEFORE
+    elif kernel == "flicker":
+        colour = np.mean([np.exp(-apart / (60.0 * 4.0**k)) for k in range(7)], axis=0)
+    else:
+        colour = np.exp(-apart / (600.0 if kernel == "relaxing" else 2700.0))
+    values, vectors = np.linalg.eigh(colour)
     return np.clip(values, 0.0, None), vectors
 
 
@@ -43,9 +54,9 @@ class NoiseBasis:
     walk: FloatArray
 
     @classmethod
-    def of(cls, times: Sequence[FloatArray]) -> "NoiseBasis":
-        """Build the basis from the times of the present rows, one array a run."""
-        parts = [_eigenbasis(np.ascontiguousarray(t - t[0] if t.size else t).tobytes()) for t in times]
+    def of(cls, times: Sequence[FloatArray], kernel: str = "walk") -> "NoiseBasis":
+        """Build the basis from the times of the present rows, one array a run, and the kind of noise."""
+        parts = [_eigenbasis(np.round(t - t[0], 3).tobytes(), kernel) for t in times]
         return cls(tuple(vectors for _, vectors in parts), np.concatenate([values for values, _ in parts]))
 
     def with_row(self) -> "NoiseBasis":

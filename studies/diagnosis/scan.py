@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -41,6 +42,11 @@ class Dictionary:
     second: FloatArray
     pairs: np.ndarray
     whole: np.ndarray
+
+    @cached_property
+    def squares(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Squares of the first and of the second columns, and the products of both."""
+        return self.first**2, self.second**2, self.first[self.pairs] * self.second
 
 
 @dataclass(frozen=True)
@@ -183,6 +189,7 @@ def _residuals(
     problem: Problem, dictionary: Dictionary, model: FloatArray, targets: FloatArray, share: float
 ) -> tuple[FloatArray, FloatArray]:
     """Sum of squares left after adding each candidate, whitened with one share: closed form for one or two columns."""
+    squares = dictionary.squares
     weight = problem.basis.weights(share)
     root = np.sqrt(weight)[:, None]
     ortho = orthonormal(model * root)
@@ -192,7 +199,7 @@ def _residuals(
     beside = np.concatenate([rest, ortho], axis=1) * root
     draws = targets.shape[1]
     first = dictionary.first @ beside
-    norm = (dictionary.first**2) @ weight
+    norm = squares[0] @ weight
     own = norm - (first[:, draws:] ** 2).sum(axis=1)
     seen = own > SURVIVES * norm
     safe = np.where(seen, own, 1.0)
@@ -202,8 +209,8 @@ def _residuals(
         return left, np.empty((0, draws))
     pairs = dictionary.pairs
     second = dictionary.second @ beside
-    norm2 = (dictionary.second**2) @ weight
-    cross = (dictionary.first[pairs] * dictionary.second) @ weight - (
+    norm2 = squares[1] @ weight
+    cross = squares[2] @ weight - (
         first[pairs, draws:] * second[:, draws:]
     ).sum(axis=1)
     own2 = norm2 - (second[:, draws:] ** 2).sum(axis=1) - cross**2 / safe[pairs] * seen[pairs]
