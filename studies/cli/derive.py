@@ -1,4 +1,10 @@
-"""`hrg derive`: the symbolic derivation of the HRG paper's equations (1)–(14), for people and for design code."""
+"""`hrg derive`: the symbolic derivation of the HRG paper's equations (1)–(14), for people and for design code.
+
+Schema hrg.derive/1: `harmonic`, `pole_angle_deg`, `rim_angle_deg`; `I`, `J` and `bryan_factor`, each with its
+`closed_form` (text) and `value`; `d_ln_f_d_rim_angle_per_rad`; `equations`, a list in the order of the derivation
+with `number` in the paper (null where it has none), `title`, and the equations of the step in `latex` and in
+`plain` text; with --code also `code` with its `language` and `text`.
+"""
 
 from typing import Any, Literal
 
@@ -43,7 +49,12 @@ def derive(
 
     if latex and code is not None:
         raise InputError("--latex and --code each print in another form; choose one of them.")
-    rayleigh_integrals(harmonic, radians(pole_angle_deg), radians(rim_angle_deg))  # refuses impossible shells
+    if not 0 <= pole_angle_deg < rim_angle_deg < 180:
+        raise InputError(
+            f"a dome from {pole_angle_deg:g} to {rim_angle_deg:g} degrees has no inextensional mode: the pole angle must "
+            "be 0 or more and below the rim angle, the rim angle below 180 degrees."
+        )
+    rayleigh_integrals(harmonic, radians(pole_angle_deg), radians(rim_angle_deg))  # refuses harmonics that cannot bend
     case = Case.from_degrees(harmonic, pole_angle_deg, rim_angle_deg)
     if json:
         text = {} if code is None else {"code": {"language": code, "text": emit_code(case, code)}}
