@@ -10,11 +10,11 @@ from typing import NamedTuple
 
 import sympy as sp
 
-from shell.derivation.coriolis import p, pattern_coefficients, q
+from shell.derivation.coriolis import p, pattern_coefficients, q, turning_kinetic_energy
 from shell.derivation.displacements import Displacement, U, V, W, integrate_around
 from shell.derivation.energies import surface_energy_of
 from shell.derivation.strains import SPHERE, Deformation, LayerStrains, Radii, derive_deformation, layer_strains
-from shell.derivation.symbols import E, Omega, h, n, nu, phi, r, rho, t, theta, z
+from shell.derivation.symbols import E, h, n, nu, phi, r, rho, t, theta, z
 
 R, L, S, R_b = sp.symbols("R L S R_b", positive=True)
 """Radius of hemisphere and cylinder, heights of cylinder and hyperbola, radius of the mouth (m)."""
@@ -163,11 +163,12 @@ def galerkin_model() -> GalerkinModel:
 
 
 @cache
-def equations_of_motion() -> tuple[sp.Eq, sp.Eq]:
-    """Return BVG paper eq. (20): m₀ p̈ − 2Ωb q̇ + c₀ p + c₁ q = 0 and m₀ q̈ + 2Ωb ṗ + c₀ q + c₁ p = 0."""
-    m_0, b, c_0, c_1 = sp.symbols("m_0 b c_0 c_1")
-    first, second = p(t), q(t)
-    return (
-        sp.Eq(m_0 * first.diff(t, 2) - 2 * Omega * b * second.diff(t) + c_0 * first + c_1 * second, 0),
-        sp.Eq(m_0 * second.diff(t, 2) + 2 * Omega * b * first.diff(t) + c_0 * second + c_1 * first, 0),
-    )
+def equations_of_motion() -> tuple[sp.Expr, sp.Expr]:
+    """Return the left-hand sides of BVG paper eq. (20), Lagrange's equations of p and q per unit of φ and over ρh.
+
+    M p̈ − 2ΩB q̇ + c₀ p and M q̈ + 2ΩB ṗ + c₀ q, with M and B of `pattern_coefficients`; c₁ = 0.
+    """
+    c_0 = sp.Symbol("c_0")
+    lagrangian = turning_kinetic_energy() - c_0 * (p(t) ** 2 + q(t) ** 2) / 2
+    equations = (sp.diff(lagrangian, y.diff(t)).diff(t) - sp.diff(lagrangian, y) for y in (p(t), q(t)))
+    return tuple(sp.expand(equation) for equation in equations)

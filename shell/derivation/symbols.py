@@ -33,8 +33,3 @@ def in_half_angle(expression: sp.Expr) -> sp.Expr:
             sp.cos(phi): (1 - tan_half**2) / (1 + tan_half**2),
         }
     )
-
-
-def is_zero(expression: sp.Expr) -> bool:
-    """Say whether an expression in φ vanishes identically, decided as a rational function of tan(φ/2)."""
-    return bool(sp.simplify(in_half_angle(sp.expand_trig(expression))) == 0)

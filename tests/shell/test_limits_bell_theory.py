@@ -16,10 +16,10 @@ from shell.bell_theory import (
     two_pattern_model,
 )
 from shell.derivation import bell as symbolic
-from shell.derivation.coriolis import two_patterns
+from shell.derivation.coriolis import p, pattern_coefficients, q, two_patterns
 from shell.derivation.displacements import Displacement, U, V, W
 from shell.derivation.strains import SPHERE, kirchhoff_displacement
-from shell.derivation.symbols import E, h, n, nu, phi, r, rho, theta, z
+from shell.derivation.symbols import E, Omega, h, n, nu, phi, r, rho, t, theta, z
 from shell.elastic import Elastic
 from shell.errors import ShellError
 from shell.meridian import bell, hemisphere
@@ -104,6 +104,18 @@ def test_coupling_c_1_comes_only_from_the_printed_parity_of_equation_16():
     printed = symbolic.coupling_stiffness(symbolic.printed_patterns())
     assert printed != 0
     assert printed.subs(U(phi), 0).doit() == 0
+
+
+def test_lagranges_equations_are_equation_20_without_c_1():
+    M, B = pattern_coefficients()
+    c_0 = sp.Symbol("c_0")
+    first, second = p(t), q(t)
+    expected = (
+        M * first.diff(t, 2) - 2 * Omega * B * second.diff(t) + c_0 * first,
+        M * second.diff(t, 2) + 2 * Omega * B * first.diff(t) + c_0 * second,
+    )
+    for derived, printed in zip(symbolic.equations_of_motion(), expected, strict=True):
+        assert sp.expand(derived - printed) == 0
 
 
 def test_numeric_coefficients_are_the_integrals_of_the_symbolic_ones():

@@ -7,10 +7,31 @@ import pytest
 import sympy as sp
 
 from shell.derivation import coriolis, displacements, energies, frequency, inextensional, strains
-from shell.derivation.symbols import C, E, Omega, h, is_zero, n, nu, omega, phi, phi_2, r, rho, t, tan_half, theta, z
+from shell.derivation.symbols import (
+    C,
+    E,
+    Omega,
+    h,
+    in_half_angle,
+    n,
+    nu,
+    omega,
+    phi,
+    phi_2,
+    r,
+    rho,
+    t,
+    tan_half,
+    theta,
+    z,
+)
 
 REFERENCE = Path(__file__).parents[1] / "reference" / "rayleigh_integrals_exact.csv"
 T = sp.tan(phi / 2)
+
+
+def vanishes(expression):
+    return sp.simplify(in_half_angle(sp.expand_trig(expression))) == 0
 
 
 def reference_rows():
@@ -116,13 +137,13 @@ def test_both_separated_solutions_satisfy_the_inextensional_conditions():
             displacements.U(phi): tangential,
         }
         for condition in inextensional.inextensional_conditions():
-            assert is_zero(condition.subs(shape).doit() / T**n)
+            assert vanishes(condition.subs(shape).doit() / T**n)
 
 
 def test_integrals_of_the_separated_equations_differentiate_back_to_their_rates():
     for logarithm, rate in zip(inextensional.integrate_separated(), inextensional.separated_rates(), strict=True):
         in_phi = logarithm.subs(tan_half, T)
-        assert is_zero(in_phi.diff(phi) - rate)
+        assert vanishes(in_phi.diff(phi) - rate)
 
 
 def test_only_one_solution_is_finite_at_the_pole():
