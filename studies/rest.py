@@ -30,6 +30,16 @@ class RestData:
     block_s: float
 
 
+def celsius_range(lowest: float, highest: float) -> tuple[float, float]:
+    """Return a fitted range (K) in °C so that the readings at its ends lie inside, whatever rounding kelvin brought."""
+    ends = []
+    for kelvin, outward in ((lowest, -1.0), (highest, 1.0)):
+        exact = kelvin - CELSIUS_ZERO
+        short = round(exact, 9)
+        ends.append(short if abs(short - exact) < 1e-11 else exact + outward * 1e-9)
+    return ends[0], ends[1]
+
+
 def choose_column(records: "Sequence[Record]", candidates: Sequence[str], purpose: str) -> str:
     """Return the first candidate that every record has.
 

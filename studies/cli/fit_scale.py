@@ -5,7 +5,7 @@ def fit_scale(
     *data: str,
     cutoff: float = 1.0,
     order: int = 50,
-    filter: bool = True,  # noqa: A002
+    no_filter: bool = False,
     save: str | None = None,
     report: str | None = None,
     json: bool = False,
@@ -24,8 +24,8 @@ def fit_scale(
         Cut-off of the FIR filter in Hz; below half the output rate.
     order : int
         Order of the FIR filter; the paper takes 50.
-    filter : bool
-        Put the FIR filter behind the chain.
+    no_filter : bool
+        Leave the FIR filter out: gaps are then allowed.
     save : str
         Write the model (TOML), for hrg compensate.
     report : str
@@ -49,7 +49,7 @@ def fit_scale(
             "name three records (CSV): several rates, at rest over temperature, one rate over temperature."
         )
     records = [read_record(path) for path in data]
-    study = study_scale(records, cutoff if filter else None, order)
+    study = study_scale(records, None if no_filter else cutoff, order)
     sources = tuple(source_of(record) for record in records)
     model = save_scale(study.chain, study.output, study.temperature_column, sources, "hrg-workbench, hrg fit scale")
     if save is not None:

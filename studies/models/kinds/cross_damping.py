@@ -14,6 +14,7 @@ from studies.errors import InputError
 from studies.models.c_source import head, polynomial
 from studies.models.file import Model, Part, Source, make_part
 from studies.record import COMPENSATED, Record
+from studies.rest import celsius_range
 
 if TYPE_CHECKING:
     from compensation.cross_damping import CrossDampingModel
@@ -41,7 +42,7 @@ def save_cross_damping(
             "g2": fit.g2,
             "temperature_column": temperature_column,
         },
-        validity={temperature_column: (fit.lowest - CELSIUS_ZERO, fit.highest - CELSIUS_ZERO)},
+        validity={temperature_column: celsius_range(fit.lowest, fit.highest)},
         sources=sources,
         made_by=made_by,
     )

@@ -15,6 +15,7 @@ from studies.errors import InputError
 from studies.models.c_source import head, polynomial
 from studies.models.file import Model, Part, Source, make_part
 from studies.record import COMPENSATED, Record
+from studies.rest import celsius_range
 
 if TYPE_CHECKING:
     from compensation.bell import Chain, Curve
@@ -51,9 +52,9 @@ def save_scale(
             "fir_taps": tuple(float(tap) for tap in chain.taps),
         },
         validity={
-            temperature_column: (
-                max(chain.bias.lowest, chain.scale_over_temperature.lowest) - CELSIUS_ZERO,
-                min(chain.bias.highest, chain.scale_over_temperature.highest) - CELSIUS_ZERO,
+            temperature_column: celsius_range(
+                max(chain.bias.lowest, chain.scale_over_temperature.lowest),
+                min(chain.bias.highest, chain.scale_over_temperature.highest),
             ),
             RATE: (chain.scale_over_rate.lowest / DEG, chain.scale_over_rate.highest / DEG),
         },

@@ -1,0 +1,159 @@
+"""`hrg fit scale` from files: planted chain recovered, model applied and emitted, bad files named; printed claims."""
+
+import ctypes
+import json
+import shutil
+import subprocess
+
+import numpy as np
+import pytest
+
+from compensation.bell import apply_chain
+from studies.cli import main
+from studies.errors import InputError
+from studies.models import compensate, emit_c, read_model
+from studies.models.kinds.scale import load_scale
+from studies.papers.bvg import DEG, examine_claims, read_printed_chain, reduce_white, simulate_runs
+from studies.record import read_record
+from studies.scale import settled_rows
+
+STRIDE = 20
+
+
+def write(path, run, missing=()):
+    """Every twentieth row of a run as a record of 10 Hz; the rows in `missing` lose their output."""
+    lines = ["time_s,housing_temperature_degC,output_counts,rate_deg_per_s"]
+    for i, row in enumerate(range(0, len(run.time), STRIDE)):
+        output = "" if i in missing else f"{run.output[row]:.6f}"
+        lines.append(f"{0.1 * i:.1f},{run.temperature[row] - 273.15:.6f},{output},{run.rate[row] / DEG:.9g}")
+    path.write_text("\n".join(lines) + "\n")
+    return str(path)
+
+
+@pytest.fixture
+def records(tmp_path):
+    runs = simulate_runs(np.random.default_rng(2))
+    return [write(tmp_path / f"{name}.csv", run) for name, run in zip(("rates", "rest", "turning"), runs, strict=True)]
+
+
+def test_planted_chain_is_recovered_in_any_order_of_files(records, capsys):
+    assert main(["fit", "scale", *records[::-1], "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["schema"] == "hrg.fit-scale/1"
+    gyro, parts = read_printed_chain(), found["parts"]
+    # The factors of the scale are shared between three steps; their product at 25 °C and their shape are planted.
+    at_25 = float(gyro.scale_over_temperature.value(298.15))
+    share = parts["rough"]["scale"]["value"] / 0.0242
+    assert parts["scale_over_rate"]["c1"]["value"] * share / at_25 == pytest.approx(0.99, abs=2e-4)
+    quadratic = parts["scale_over_rate"]["c2"]
+    off = quadratic["value"] * share**2 / at_25 - 5.89e-6
+    assert abs(off) < 4 * quadratic["standard_error"]
+    bias = parts["bias"]
+    for name, planted in (("c1", -0.0056), ("c2", 2.52e-5)):
+        assert abs(bias[name]["value"] - planted * share) < 4 * bias[name]["standard_error"]
+    assert found["error_held_out_deg_per_s"] < 0.5 * found["error_before_deg_per_s"]
+
+
+def test_saved_model_is_the_fitted_chain_and_compensates(records, tmp_path):
+    model_file, page = tmp_path / "model.toml", tmp_path / "page.html"
+    assert main(["fit", "scale", *records, "--save", str(model_file), "--report", str(page)]) == 0
+    assert page.stat().st_size > 10_000
+    model = read_model(model_file)
+    data = read_record(records[2])
+    column = compensate(model, data)["compensated_measured_rate_deg_per_s"]
+    assert np.mean(column[100:]) == pytest.approx(300, abs=0.1)
+    assert np.std(column[100:]) < 0.1
+    again = apply_chain(
+        load_scale(model), data["time_s"], data["output_counts"], data["housing_temperature_degC"] + 273.15
+    )
+    np.testing.assert_allclose(again.filtered / DEG, column, rtol=1e-12)
+    with pytest.raises(InputError, match="extrapolate"):
+        compensate(model, data.with_columns({"housing_temperature_degC": data["housing_temperature_degC"] + 20}))
+
+
+def test_gaps(records, tmp_path):
+    """With the filter a gap is refused; without it the row stays empty."""
+    models = [tmp_path / "with.toml", tmp_path / "without.toml"]
+    assert main(["fit", "scale", *records, "--save", str(models[0])]) == 0
+    assert main(["fit", "scale", *records, "--no-filter", "--save", str(models[1])]) == 0
+    holed = read_record(write(tmp_path / "holed.csv", simulate_runs(np.random.default_rng(3))[1], missing=(7,)))
+    with pytest.raises(InputError, match="row 8"):
+        compensate(read_model(models[0]), holed)
+    column = compensate(read_model(models[1]), holed)["compensated_measured_rate_deg_per_s"]
+    assert np.flatnonzero(np.isnan(column)).tolist() == [7]
+
+
+def test_emitted_c_agrees_with_python(records, tmp_path):
+    compiler = shutil.which("cc")
+    if compiler is None:
+        pytest.skip("no C compiler on this machine")
+    assert main(["fit", "scale", *records, "--save", str(tmp_path / "m.toml")]) == 0
+    model = read_model(tmp_path / "m.toml")
+    (tmp_path / "m.c").write_text(emit_c(model), encoding="utf-8")
+    flags = ["-std=c99", "-Wall", "-Wextra", "-Werror", "-pedantic", "-shared", "-fPIC"]
+    subprocess.run([compiler, *flags, "m.c", "-o", "m.so", "-lm"], cwd=tmp_path, check=True)
+    library = ctypes.CDLL(str(tmp_path / "m.so"))
+    library.hrg_rate.restype = library.hrg_smooth.restype = ctypes.c_double
+    library.hrg_rate.argtypes = [ctypes.c_double] * 2
+    library.hrg_smooth.argtypes = [ctypes.c_void_p, ctypes.c_double]
+    state = (ctypes.c_double * 60)()  # 51 doubles and one int, zero: not filled
+    data = read_record(records[1])
+    emitted = [
+        library.hrg_smooth(ctypes.byref(state), library.hrg_rate(output, temperature))
+        for output, temperature in zip(data["output_counts"], data["housing_temperature_degC"], strict=True)
+    ]
+    np.testing.assert_allclose(
+        emitted, compensate(model, data)["compensated_measured_rate_deg_per_s"], rtol=1e-9, atol=1e-12
+    )
+
+
+def test_printed_claims():
+    """Recomputed here from the printed coefficients by other means than the code's."""
+    claims = examine_claims()
+    T = np.linspace(-45, 55, 100_001)
+    assert claims.bias_deviation[0] == pytest.approx(np.std(2.52e-5 * T**2 - 0.0056 * T + 0.1673), rel=1e-3)
+    assert claims.bias_deviation[1] == pytest.approx(np.sqrt(0.1624**2 - 0.0619**2), rel=1e-12)
+    assert claims.scale_deviation[0] == pytest.approx(300 * np.std(-1.26e-7 * T**2 - 1.83e-5 * T), rel=1e-3)
+    # A parabola c x² over ±R departs from its line by 2/3 c R², at the ends.
+    assert claims.curvature_nonlinearity == pytest.approx(2 / 3 * 5.89e-6 * 360, rel=1e-3)
+    assert claims.mapped[0] == pytest.approx(5.89e-6 * 361.4**2 - 0.99 * 361.4 - 0.12, rel=1e-9)
+    assert claims.mapped[0] == pytest.approx(-357.1, abs=0.05)
+    assert claims.noise_deviation == pytest.approx(0.1466, abs=1e-4)
+    assert dict(claims.averaging)[100.0] == pytest.approx(1.0, abs=0.002)
+
+
+def test_filter_reduces_the_allan_deviation_as_predicted():
+    """The factor against the Allan deviation of filtered white noise."""
+    from compensation.bell import design_smoother, smooth
+    from compensation.stability import allan_deviation
+
+    taps = design_smoother(0.1, 0.5)
+    noise = np.random.default_rng(6).standard_normal(200_000)
+    before, after = allan_deviation(noise, 0.1), allan_deviation(smooth(noise, taps), 0.1)
+    for rows in (1, 8, 64):
+        k = int(np.argmin(np.abs(before.tau - 0.1 * rows)))
+        assert before.tau[k] == pytest.approx(0.1 * rows)
+        assert before.deviation[k] / after.deviation[k] == pytest.approx(reduce_white(taps, rows), rel=0.03)
+
+
+def test_settled_rows():
+    rate = np.array([0.0, 0, 0, 5, 5, 5, 5, 0, 0])
+    assert settled_rows(rate, 2).tolist() == [True, True, True, False, False, True, True, False, False]
+
+
+@pytest.mark.parametrize(
+    ("files", "words"),
+    [
+        ([0, 1], "at one rate over temperature"),
+        ([0, 1, 1], "both runs at rest"),
+        ([], "three records"),
+    ],
+)
+def test_missing_runs_are_named(records, files, words, capsys):
+    assert main(["fit", "scale", *(records[i] for i in files)]) == 2
+    assert words in capsys.readouterr().err
+
+
+def test_impossible_cut_off_is_refused(records, capsys):
+    assert main(["fit", "scale", *records, "--cutoff", "200"]) == 2
+    assert "200 Hz is impossible" in capsys.readouterr().err

@@ -1,0 +1,59 @@
+"""The CVG filtering paper's figures 3 and 5–7: what is printed of them, and what must hold of their twins."""
+
+import numpy as np
+import pytest
+
+from studies.papers import cvg_filters
+from studies.papers.cvg_filters import study_error_map, study_filters, study_wiener
+
+
+@pytest.fixture(scope="module")
+def study():
+    return study_filters()
+
+
+def test_wiener_filters_are_the_printed_ones():
+    """(35), (36) as printed, with k = 2π·500, ζ = 0.025, γ = 0.1, B = 2π·3."""
+    a, B, gamma = 2 * np.pi * 500 * 0.025, 2 * np.pi * 3, 0.1
+    root = np.sqrt(1 + gamma**2)
+    s = 1j * np.array([0.5, 20.0, 300.0])
+    white = (
+        B
+        * root
+        * (s + a)
+        / (gamma * s**2 + s * np.sqrt(gamma * (B**2 * gamma + a**2 * gamma + 2 * a * B * root)) + a * B * root)
+    )
+    high_pass = B * (s + a) / (s**2 * gamma + s * np.sqrt(a * gamma * (2 * B + a * gamma)) + B * a)
+    for case, printed in zip(study_wiener(), (white, high_pass), strict=True):
+        np.testing.assert_allclose(case.renormalised.filter(s), printed, rtol=1e-9)
+        assert case.optimum.error < case.renormalised.error < case.rate_variance
+
+
+def test_noise_left_by_the_wiener_filter_is_what_its_spectrum_says(study):
+    """Of one record of 1.5 s, so to 10 % only."""
+    assert study.figure5.noise_after == pytest.approx(np.sqrt(study.wiener[0].renormalised.noise), rel=0.1)
+    assert study.figure5.error_after < 0.5 * study.figure5.error_before
+
+
+def test_kalman_figures(study):
+    """Noise is removed; the rate estimate is closer to the pulse than the output, but only at the finest step."""
+    assert study.figure6.noise_before / study.figure6.noise_after > 10
+    assert study.figure7.error_after < study.figure7.output_error
+    coarse = [case for step, case in study.by_step if step > 4e-5]
+    assert all(case.lag_error > case.output_error for case in coarse)
+    assert study.mean_nis > study.nis_band[1]
+
+
+def test_error_map_is_darkest_in_the_middle():
+    error_map = study_error_map(11)
+    i, j = np.unravel_index(np.argmin(error_map.error), error_map.error.shape)
+    assert error_map.frequency_ratio[j] == pytest.approx(1)
+    assert error_map.damping_ratio[i] == pytest.approx(1)
+
+
+def test_chapters_can_be_drawn(study):
+    from studies.reports.filters import filter_chapters
+
+    chapters = filter_chapters(study, study_error_map(5))
+    assert [len(chapter.blocks) for chapter in chapters] == [2, 2, 3]
+    assert cvg_filters.KALMAN_STEP == study.by_step[-1][0]
