@@ -46,7 +46,7 @@ def draw_case(kind, count, rng):
     return design, family, pair, "", 3.0
 
 
-def run_case(kind, count, seed):
+def run_case(kind, count, seed, held_out=True):
     """Build and diagnose one case; return what was hidden and what was said."""
     rng = np.random.default_rng(seed)
     design, family, effects, alien, snr = draw_case(kind, count, rng)
@@ -54,7 +54,7 @@ def run_case(kind, count, seed):
     hidden = tuple(name.split("@")[0] for name in effects)
     chosen = [e for e in library().values() if kind != "without" or e.name not in hidden]
     begin = time.perf_counter()
-    found = investigate(load_campaign(records), effects=chosen).verdict
+    found = investigate(load_campaign(records), effects=chosen, held_out=held_out).verdict
     return {
         "kind": kind, "design": design, "family": family, "truth": hidden, "alien": alien, "snr": snr, "seed": seed,
         "count": count, "raw": effects, "channel": truth.channel, "seconds": time.perf_counter() - begin, "verdict": found.verdict,
@@ -167,6 +167,7 @@ def main():
     parser.add_argument("--minutes", type=float, default=5.0)
     parser.add_argument("--kinds", default="null,effect,effect,effect,alien,without,pair")
     parser.add_argument("--seed", type=int, default=None)
+    parser.add_argument("--names-only", action="store_true", help="leave out the held-out residuals")
     parser.add_argument("--report", type=Path)
     arguments = parser.parse_args()
     if arguments.report is None:
@@ -178,7 +179,7 @@ def main():
             for count in itertools.count(seed % 1000):
                 if time.time() > end:
                     break
-                case = run_case(kinds[count % len(kinds)], count // len(kinds), seed + count)
+                case = run_case(kinds[count % len(kinds)], count // len(kinds), seed + count, not arguments.names_only)
                 file.write(json.dumps(case, default=float) + "\n")
                 file.flush()
     cases = [json.loads(line) for line in arguments.cases.read_text().splitlines()]

@@ -117,9 +117,10 @@ def build(design, family, rng, effects=(), alien="", snr=0.0):
         [np.full(t.size, 1.0) if not plan["drives"] or plan["drives"][k] is None else plan["drives"][k] for k, t in enumerate(time)],
         angle, quad, rng, plan["volts"] is not None, plan["drives"] is not None, plan["angles"] is not None,
     )
-    noise = {
-        c: [device.sigma[c] * noises.draw(family, s, rng) for s in sample] for c in CHANNELS
-    }
+    noise = {}
+    for c in CHANNELS:
+        level = noises.draw_level(family, rng)
+        noise[c] = [device.sigma[c] * noises.draw(family, s, level, rng) for s in sample]
     offsets = rng.normal(0.0, 5.0 * device.sigma["bias_deg_per_h"], runs)
     pieces = [hidden.EFFECTS[name](world) for name in effects] + ([hidden.ALIENS[alien](world)] if alien else [])
     truth = Truth(design, family, tuple(effects), alien, snr)

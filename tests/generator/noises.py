@@ -5,7 +5,13 @@ import numpy as np
 FAMILIES = ("white", "walk", "flicker", "correlated", "outliers")
 
 
-def draw(family, time, rng):
+def draw_level(family, rng):
+    """How strong the coloured part is, over the white part: one number for a gyro."""
+    low, high = {"walk": (0.2, 2.0), "flicker": (0.05, 0.3), "correlated": (0.1, 0.5)}.get(family, (1.0, 1.0))
+    return float(np.exp(rng.uniform(np.log(low), np.log(high))))
+
+
+def draw(family, time, level, rng):
     """Noise of one run in units of its white part."""
     n = time.size
     white = rng.standard_normal(n)
@@ -14,16 +20,14 @@ def draw(family, time, rng):
     if family == "white":
         return white
     if family == "walk":
-        total = np.exp(rng.uniform(np.log(0.2), np.log(2.0)))
-        return white + total * np.cumsum(rng.standard_normal(n) * np.sqrt(dt / 3600.0 / hours))
+        return white + level * np.cumsum(rng.standard_normal(n) * np.sqrt(dt / 3600.0 / hours))
     if family == "flicker":
-        level = np.exp(rng.uniform(np.log(0.05), np.log(0.3)))
         out = white
         for tau in 30.0 * 4.0 ** np.arange(7):
             out = out + level * _ou(dt, tau, rng)
         return out
     if family == "correlated":
-        return white + rng.uniform(0.1, 0.5) * _ou(dt, 1500.0, rng)
+        return white + level * _ou(dt, 1500.0, rng)
     spikes = rng.random(n) < 0.004
     return white + spikes * rng.standard_normal(n) * 25.0
 
