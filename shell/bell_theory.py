@@ -175,9 +175,9 @@ def two_pattern_model(resonator: Resonator, elastic: Elastic, pattern: Pattern) 
         stretch += np.sum(_form(strain[:3], 0.0, 0.5) * area)
         motion += np.sum(squared * area)
     waist = pieces[0].points.r.max()
-    return TwoPatternModel(
-        mass, coupling, membrane + bending, membrane / (membrane + bending), float(waist * np.sqrt(stretch / motion))
-    )
+    energy = membrane + bending
+    strain_norm = waist * sqrt(stretch / motion)
+    return TwoPatternModel(float(mass), float(coupling), float(energy), float(membrane / energy), float(strain_norm))
 
 
 def rayleigh_functions(resonator: Resonator, pieces: Sequence[Piece]) -> list[Amplitudes]:
