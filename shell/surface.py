@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shell.meridian import Resonator
+from shell.outline import Outline, trace_outlines
 from shell.quadrature import Array
-from shell.shape import Outline, trace_outlines
 
 if TYPE_CHECKING:
     from shell.modes import Mode

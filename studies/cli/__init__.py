@@ -15,6 +15,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "fit frequency": ("studies.cli.fit_frequency:fit_frequency", "f(T) and its inverse from a steady-state table."),
     "fit cross-damping": ("studies.cli.fit_cross_damping:fit_cross_damping", "Cross-damping bias over temperature."),
     "derive": ("studies.cli.derive:derive", "The symbolic derivation, as equations, LaTeX or code."),
+    "render": ("studies.cli.render:render", "A mode shape as picture, animation, page or mesh."),
     "import": ("studies.cli.import_:import_", "Laboratory files into the record format."),
     "fit scale": ("studies.cli.fit_scale:fit_scale", "Bias and scale of a bell-shaped gyro, step by step."),
     "cards": ("studies.cli.cards:cards", "The instrument cards that ship."),

@@ -7,34 +7,33 @@ from studies.reports.page import Block, Text
 
 if TYPE_CHECKING:
     from studies.instrument.card import Instrument
+    from studies.reports.scenes import Shown
 
 
 def mode_blocks(instrument: "Instrument", harmonics: Sequence[int] = (2, 3)) -> list[Block]:
     """Return the interactive view of the lowest mode of each harmonic, with the picture of the first one behind it."""
-    import numpy as np
+    from studies.reports.scenes import show_mode
 
-    from shell.modes import solve_modes
-    from shell.render import NoOpenGL, compose_scene, render_png
-    from shell.surface import build_surface
+    return view_blocks([show_mode(instrument, n) for n in harmonics])
+
+
+def view_blocks(shown: "Sequence[Shown]") -> list[Block]:
+    """Return the interactive view of modes of one instrument at one temperature."""
+    from shell.render import NoOpenGL, render_png
     from studies.reports.webgl import view_modes
 
-    temperature = instrument.reference_temperature
-    resonator, elastic = instrument.at(temperature)
-    modes = [solve_modes(resonator, elastic, n, tolerance=1e-4)[0] for n in harmonics]
-    first = modes[0]
-    title = f"{instrument.name}, n = {first.harmonic}, {first.frequency:.2f} Hz"
+    first = shown[0]
     caption = (
-        f"{instrument.name} at {temperature - 273.15:g} °C: the lowest mode of each harmonic from the solid solver, with the"
-        " thickness, rim and stem of the card. The displacement is exaggerated."
+        f"{first.instrument.name} at {first.temperature - 273.15:g} °C: modes from the {first.mode.theory} solver, on the"
+        " solid of the card with its thickness, rim and stem. The displacement is exaggerated."
     )
-    surface = build_surface(resonator, first)
-    moved = np.linalg.norm(surface.displacement, axis=1)
-    scene = compose_scene(surface, moved, "displacement (µm, for 1 µm at the antinode)", title)
     blocks: list[Block] = []
     try:
-        png = render_png(scene)
+        png = render_png(first.scene())
     except NoOpenGL as error:
         png = None
         blocks.append(Text(f"The still picture of the mode is missing: {error}", "warning"))
-    alt = f"The resonator with its rim bent into {2 * first.harmonic} lobes, nodes between them."
-    return [view_modes(resonator, modes, title, png, alt, caption), *blocks]
+    lobes = 2 * first.mode.harmonic
+    alt = f"The resonator with its rim bent into {lobes} lobes, nodes between them."
+    view = view_modes(first.resonator, [one.mode for one in shown], first.title, png, alt, caption)
+    return [view, *blocks]

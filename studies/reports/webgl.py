@@ -18,7 +18,7 @@ from studies.reports.page import Embedded
 if TYPE_CHECKING:
     from shell.meridian import Resonator
     from shell.modes import Mode
-    from shell.shape import Outline
+    from shell.outline import Outline
 
 KINK = np.radians(35.0)  # where the outline turns by more than this, the shading breaks
 
@@ -62,7 +62,7 @@ def view_modes(
 
 
 def _describe(resonator: "Resonator", mode: "Mode", size: float) -> dict[str, Any]:
-    from shell.shape import trace_outlines
+    from shell.outline import trace_outlines
 
     outlines = trace_outlines(resonator, size / 40, mode)
     runs = [run for line in outlines for run in _split_at_kinks(line)]

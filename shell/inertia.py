@@ -1,0 +1,61 @@
+"""Mass, centre and inertia of a resonator from the solver's own volume elements."""
+
+from dataclasses import dataclass
+from itertools import pairwise
+from math import pi
+
+import numpy as np
+
+from shell.assembly import LEVELS, Group, Level, SolidPart, build_system
+from shell.meridian import Resonator
+from shell.quadrature import Array, gauss, nodal
+
+
+@dataclass(frozen=True)
+class MassProperties:
+    """What a body of revolution weighs.
+
+    volume : m³. mass : kg. center : height z of the centre of mass, m.
+    axial, transverse : moments of inertia about the axis and about a diameter through the centre of mass, kg m².
+    """
+
+    volume: float
+    mass: float
+    center: float
+    axial: float
+    transverse: float
+
+
+def weigh(resonator: Resonator, density: float) -> MassProperties:
+    """Integrate over the solver's elements: V = 2π ∫ r dr dz, I_axial = ∫ ρ r² dV, I_transverse = ∫ ρ (r²/2 + (z - z_c)²) dV.
+
+    Parameters
+    ----------
+    resonator : shell with roots, corners and stem.
+    density : kg/m³.
+    """
+    system = build_system(resonator, 2, "solid", LEVELS["solid"][0])
+    places = [_gauss_points(resonator, group, system.level) for group in system.groups]
+    r = np.concatenate([place[0].ravel() for place in places])
+    z = np.concatenate([place[1].ravel() for place in places])
+    dV = 2 * pi * np.concatenate([group.table.volume.ravel() for group in system.groups])
+    volume = float(dV.sum())
+    center = float((z * dV).sum()) / volume
+    axial = density * float((r**2 * dV).sum())
+    transverse = axial / 2 + density * float(((z - center) ** 2 * dV).sum())
+    return MassProperties(volume, density * volume, center, axial, transverse)
+
+
+def _gauss_points(resonator: Resonator, group: Group, level: Level) -> tuple[Array, Array]:
+    """Coordinates r and z (elements, stations, points) of the quadrature points of one group."""
+    if isinstance(group.place, SolidPart):
+        values = nodal(level.block, gauss(level.block + 2)[0]).values
+        r, z = np.einsum("ia,gcab,jb->gcij", values, group.place.mesh.grid, values)
+        return r, z
+    xi, eta = gauss(level.along + 2)[0], gauss(max(level.through) + 2)[0]
+    chain, found = group.place.chain, []
+    for (one, two), segment in zip(pairwise(chain.breaks), chain.segments, strict=True):
+        at = resonator.at((one + two) / 2 + (two - one) / 2 * xi, segment)
+        zeta = np.multiply.outer(at.thickness / 2, eta)
+        found.append((at.r[:, None] + zeta * at.normal_r[:, None], at.z[:, None] + zeta * at.normal_z[:, None]))
+    return np.array([r for r, _ in found]), np.array([z for _, z in found])

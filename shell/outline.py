@@ -1,0 +1,250 @@
+"""The outline of a resonator's cross-section, with what a mode does there: the start of every picture and mesh.
+
+The outline is made of the free sides of the solver's own elements: the two faces of the shell, its ends, and the sides
+of the solid cells of roots and corners that no other element shares. So it is the real solid: shell with its thickness,
+rim, corners, fillets and stem.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, fields, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from shell.assembly import LEVELS, SolidPart, System, _sections, build_system
+from shell.blocks import SIDES, Mesh
+from shell.errors import ShellError
+from shell.kernel import StrainTable, block_table, displacements, energy_weights, shell_table, strains
+from shell.layout import Chain
+from shell.meridian import Resonator
+from shell.quadrature import Array, hierarchic, legendre, nodal
+from shell.solution import Solution
+
+if TYPE_CHECKING:
+    from shell.modes import Mode
+
+INSIDE = 1 - 1e-7  # strains are taken this far inside an element, since 1/r is singular on the axis
+MOST_POINTS = 240  # on one side of one element
+SHEARED = (3, 5)  # strains that go as sin nθ; the others go as cos nθ
+
+
+@dataclass(frozen=True, eq=False)
+class Outline:
+    """One line around the material, which lies to its left as seen with r to the right and z up.
+
+    Attributes
+    ----------
+    r, z : (k,) array, m
+        Points; the last is joined to the first unless both lie on the axis.
+    position : (k,) array
+        Place on the meridian, 0 ... 1.
+    displacement : (3, k) array
+        Amplitudes u_r, u_θ, u_z of the mode; u_r and u_z go as cos nθ, u_θ as sin nθ. Zero without a mode.
+    energy : (2, k) array, J/m³
+        Strain-energy density, at its largest in time, for these amplitudes taken in metres: the parts that go as cos² nθ
+        and sin² nθ.
+    """
+
+    r: Array
+    z: Array
+    position: Array
+    displacement: Array
+    energy: Array
+
+    @property
+    def on_axis(self) -> bool:
+        """Whether the line runs from axis to axis instead of around."""
+        return bool(self.r[0] == 0 and self.r[-1] == 0)
+
+    @property
+    def area(self) -> float:
+        """Signed area that the line encloses (with the axis), m²; positive when it runs counterclockwise."""
+        r, z = np.append(self.r, self.r[0]), np.append(self.z, self.z[0])
+        return float(np.sum(r[:-1] * z[1:] - r[1:] * z[:-1]) / 2)
+
+    def reversed(self) -> "Outline":
+        """The same line run through the other way."""
+        return Outline(
+            self.r[::-1], self.z[::-1], self.position[::-1], self.displacement[:, ::-1], self.energy[:, ::-1]
+        )
+
+
+def trace_outlines(resonator: Resonator, spacing: float, mode: "Mode | None" = None) -> tuple[Outline, ...]:
+    """The outlines of a resonator's section, the outer one first; a closed shell has a second one around its cavity.
+
+    Parameters
+    ----------
+    resonator : the one that the mode was solved for.
+    spacing : wanted distance of the points, m; sides shorter than this still get their middle.
+    mode : what to carry along the outline; the amplitudes are scaled so that the largest displacement is 1.
+
+    Raises
+    ------
+    ShellError
+        The mode has no shape (Rayleigh's closed form) or belongs to another resonator.
+    """
+    if mode is not None and mode.solution is None:
+        raise ShellError(f"theory '{mode.theory}' gives no shape through the thickness: use theory solid or shell.")
+    if mode is not None and mode.resonator != resonator:
+        raise ShellError("the mode was solved for another resonator than the one to be shown.")
+    solution = mode.solution if mode is not None else None
+    system = solution.system if solution else build_system(resonator, 2, "solid", LEVELS["solid"][0])
+    lines = _join(list(_Sides(resonator, system, solution).all(spacing)), 1e-9 * resonator.size)
+    outlines = [_thin(line, 0.02 * spacing, resonator.size) for line in lines]
+    outlines.sort(key=lambda line: -abs(line.area))
+    turned = [line if (line.area > 0) == (k == 0) else line.reversed() for k, line in enumerate(outlines)]
+    largest = max(float(np.sqrt((line.displacement**2).sum(axis=0)).max()) for line in turned)
+    scale = 1 / largest if largest > 0 else 1.0
+    return tuple(
+        replace(line, displacement=line.displacement * scale, energy=line.energy * scale**2) for line in turned
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Sides:
+    """The free sides of all elements of a system, each sampled with its fields."""
+
+    resonator: Resonator
+    system: System
+    solution: Solution | None
+
+    def all(self, spacing: float) -> Iterator[Outline]:
+        for number, group in enumerate(self.system.groups):
+            if isinstance(group.place, SolidPart):
+                for cell, side in group.place.surface:
+                    yield self._solid_side(number, group.place.mesh, cell, side, spacing)
+            else:
+                for element in range(len(group.place.chain.segments)):
+                    yield from self._shell_sides(number, group.place.chain, element, spacing)
+
+    def _shell_sides(self, number: int, chain: Chain, element: int, spacing: float) -> Iterator[Outline]:
+        length = chain.breaks[element + 1] - chain.breaks[element]
+        thickness = float(self.resonator.at([chain.breaks[element]], chain.segments[element]).thickness[0])
+        along, across = _points(1.3 * length, spacing), _points(thickness, spacing)
+        for face in (-1.0, 1.0):
+            yield self._shell_side(number, chain, element, along, np.array([face]))
+        ends = ((0, 0, -1.0), (len(chain.segments) - 1, 1, 1.0))
+        for last, side, xi in ends:
+            if element == last and chain.ends[side] in ("free", "clamped"):
+                yield self._shell_side(number, chain, element, np.array([xi]), across)
+
+    def _shell_side(self, number: int, chain: Chain, element: int, xi: Array, eta: Array) -> Outline:
+        one = Chain(chain.breaks[element : element + 2], (chain.segments[element],), chain.ends)
+        place = self.resonator.at(sum(one.breaks) / 2 + (one.breaks[1] - one.breaks[0]) / 2 * xi, one.segments[0])
+        zeta = np.multiply.outer(place.thickness / 2, eta)
+        r = (place.r[:, None] + zeta * place.normal_r[:, None]).ravel()
+        z = (place.z[:, None] + zeta * place.normal_z[:, None]).ravel()
+        position = np.broadcast_to(place.position[:, None], zeta.shape).ravel()
+        if self.solution is None:
+            return _bare(r, z, position)
+        level = self.system.level
+        section = _sections(self.resonator, one, xi * INSIDE, np.ones_like(xi))
+        u, v, w = (legendre(order, eta * INSIDE) for order in level.through)
+        points = eta * INSIDE, np.ones_like(eta)
+        table = shell_table(section, self.system.n, (u, v, w), points, nodal(level.along, xi * INSIDE))
+        t_r, t_z = section.tangent_r[0][:, None], section.tangent_z[0][:, None]
+        (along, around, normal), energy = _fields(self.solution, table, number, element)
+        displacement = np.stack([t_r * along - t_z * normal, around, t_z * along + t_r * normal])
+        return Outline(r, z, position, displacement.reshape(3, -1), energy.reshape(2, -1))
+
+    def _solid_side(self, number: int, mesh: Mesh, cell: int, side: int, spacing: float) -> Outline:
+        corners = mesh.points[:, mesh.vertices[cell, list(SIDES[side])]]
+        run = _points(1.3 * float(np.hypot(*(corners[:, 0] - corners[:, 1]))), spacing)
+        fixed = np.array([-1.0 if side in (0, 2) else 1.0])
+        xi, eta = (run, fixed) if side < 2 else (fixed, run)
+        degree, grid = self.system.level.block, mesh.grid[:, [cell]]
+        r, z = _place(grid, nodal(degree, xi).values, nodal(degree, eta).values).reshape(2, -1)
+        where = self.system.groups[number].table.position[cell, 0]
+        if self.solution is None:
+            return _bare(r, z, np.full(r.shape, where))
+        along, across = nodal(degree, xi * INSIDE), nodal(degree, eta * INSIDE)
+        jacobian = np.stack(
+            [_place(grid, along.slopes, across.values), _place(grid, along.values, across.slopes)], axis=1
+        )
+        inside = _place(grid, along.values, across.values)
+        table = block_table(
+            (inside[0], inside[1]),
+            jacobian,
+            np.ones((len(xi), len(eta))),
+            self.system.n,
+            hierarchic(degree, eta * INSIDE),
+            hierarchic(degree, xi * INSIDE),
+            np.full(1, where),
+        )
+        displacement, energy = _fields(self.solution, table, number, cell)
+        return Outline(r, z, np.full(r.shape, where), displacement.reshape(3, -1), energy.reshape(2, -1))
+
+
+def _fields(solution: Solution, table: StrainTable, number: int, element: int) -> tuple[Array, Array]:
+    """Displacement (3, stations, points) and the two parts of the energy density (2, stations, points)."""
+    unknowns = solution.unknowns[number][[element]]
+    lam, G = (float(np.mean(values[element])) for values in solution.constants[number].lame)
+    e = np.moveaxis(strains(table, unknowns)[0], 1, 0)
+    sheared = G / 2 * energy_weights(table)[:, None, None] * e**2
+    by_sine = sheared[list(SHEARED)].sum(axis=0)
+    by_cosine = lam / 2 * e[:3].sum(axis=0) ** 2 + sheared.sum(axis=0) - by_sine
+    return np.moveaxis(displacements(table, unknowns)[0], 1, 0), np.stack([by_cosine, by_sine])
+
+
+def _points(length: float, spacing: float) -> Array:
+    return np.linspace(-1.0, 1.0, 1 + int(np.clip(np.ceil(length / spacing), 2, MOST_POINTS)))
+
+
+def _place(grid: Array, along: Array, across: Array) -> Array:
+    return np.asarray(np.einsum("ia,gcab,jb->gcij", along, grid, across))
+
+
+def _bare(r: Array, z: Array, position: Array) -> Outline:
+    return Outline(r, z, position, np.zeros((3, len(r))), np.zeros((2, len(r))))
+
+
+def _join(sides: list[Outline], margin: float) -> list[Outline]:
+    """Put the sides end to end: first the lines that start on the axis, then the ones that run around."""
+    lines = []
+    while sides:
+        first = next((k for k, side in enumerate(sides) if min(side.r[0], side.r[-1]) < margin), 0)
+        line = sides.pop(first)
+        if line.r[-1] < margin and line.r[0] >= margin:
+            line = line.reversed()
+        while sides:
+            # the nearest end, not any within the margin: sides at a sharp corner are very short
+            ends = [
+                (np.hypot(side.r[k] - line.r[-1], side.z[k] - line.z[-1]), j, k)
+                for j, side in enumerate(sides)
+                for k in (0, -1)
+            ]
+            gap, j, k = min(ends)
+            if gap > margin:
+                break
+            side = sides.pop(j)
+            line = _attach(line, side if k == 0 else side.reversed())
+        closed = np.hypot(line.r[0] - line.r[-1], line.z[0] - line.z[-1]) < margin
+        if not closed and max(line.r[0], line.r[-1]) >= margin:
+            raise ShellError(
+                "the outline of the section has a gap; the elements of its solid parts do not meet the shell."
+            )
+        lines.append(line)
+    return lines
+
+
+def _attach(line: Outline, more: Outline) -> Outline:
+    joined = {
+        field.name: np.concatenate([getattr(line, field.name), getattr(more, field.name)[..., 1:]], axis=-1)
+        for field in fields(Outline)
+    }
+    return Outline(**joined)
+
+
+def _thin(line: Outline, least: float, size: float) -> Outline:
+    """Put points on the axis exactly there; drop points nearer than `least` to the one before, and a repeated last one."""
+    r = np.where(line.r < 1e-7 * size, 0.0, line.r)
+    kept = [0]
+    last = len(r) - 1
+    for k in range(1, last):
+        if np.hypot(r[k] - r[kept[-1]], line.z[k] - line.z[kept[-1]]) > least:
+            kept.append(k)
+    if np.hypot(r[last] - r[kept[-1]], line.z[last] - line.z[kept[-1]]) <= least and len(kept) > 1:
+        kept.pop()
+    if r[0] == 0 and r[last] == 0:
+        kept.append(last)
+    return Outline(r[kept], line.z[kept], line.position[kept], line.displacement[:, kept], line.energy[:, kept])

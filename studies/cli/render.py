@@ -1,0 +1,177 @@
+"""`hrg render`: a mode shape as picture, animation, interactive page or mesh."""
+
+from typing import TYPE_CHECKING, Annotated, Literal
+
+from cyclopts import Parameter
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from studies.reports.scenes import Field, Shown
+
+KINDS = (".png", ".webp", ".gif", ".html", ".glb", ".stl", ".ply")
+MOST = 4  # resonators in one picture
+
+
+def render(
+    *card: str,
+    out: str,
+    harmonic: Annotated[tuple[int, ...], Parameter(consume_multiple=True)] = (2,),
+    index: int = 0,
+    temperature: Annotated[tuple[float, ...], Parameter(consume_multiple=True)] = (),
+    theory: Literal["solid", "shell"] = "solid",
+    colour: Literal["displacement", "energy", "temperature"] = "displacement",
+    field: str | None = None,
+    view: Literal["oblique", "axis", "side"] = "oblique",
+    swing_mm: float | None = None,
+    json: bool = False,
+) -> int:
+    """Show a mode shape: the real solid, its nodes (red) and antinodes (black dots), the undeformed shape in grey.
+
+    The ending of --out chooses: .png a picture, .webp or .gif a looping animation, .html an interactive page that works
+    offline, .glb a mesh in which the mode swings, .stl or .ply the solid for slicers, in mm.
+    Several cards, or one card at several temperatures, stand side by side in pictures and animations on one scale.
+    A PNG, WebP or GIF needs OpenGL; without it the exit status is 3 and the message says what to install.
+
+    Parameters
+    ----------
+    card : str
+        Cards by path, or the names of ones that ship (hrg cards).
+    out : str
+        File to write.
+    harmonic : tuple[int, ...]
+        Circumferential harmonic n; several only for .html, where one chooses among them.
+    index : int
+        0 for the lowest mode of its harmonic.
+    temperature : tuple[float, ...]
+        Temperature of the resonator in °C; the card's reference temperature unless given.
+    theory : str
+        solid (three-dimensional) or shell (Naghdi).
+    colour : str
+        What the colour shows: displacement, strain-energy density, or a temperature field.
+    field : str
+        Table with position (0 ... 1 along the meridian) and temperature_degC, for --colour temperature.
+    view : str
+        oblique into the open end, along the axis, or from the side.
+    swing_mm : float
+        Displacement at the antinode in mesh files; unless given, .stl and .ply are undeformed and .glb swings visibly.
+    json : bool
+        Print one JSON object (schema hrg.render/1) instead of a line.
+    """
+    from pathlib import Path
+
+    from studies.cli.output import print_json, say
+    from studies.errors import InputError
+    from studies.files.writing import written_whole
+    from studies.reports.scenes import read_field
+
+    kind = Path(out).suffix.lower()
+    if kind not in KINDS:
+        raise InputError(f"--out {out}: the ending must be one of {', '.join(KINDS)}.")
+    if len(harmonic) > 1 and kind != ".html":
+        raise InputError("several harmonics go together only in an .html page; make one file for each.")
+    if colour == "temperature" and field is None:
+        raise InputError("--colour temperature needs --field FIELD.csv (position,temperature_degC along the meridian).")
+    if Path(out).is_dir():
+        raise InputError(f"--out {out}: is a folder; give the name of a file.")
+    along = read_field(field) if field is not None else None
+    shown = _solve(card, harmonic, index, temperature, theory, kind)
+    if kind in (".png", ".webp", ".gif"):
+        data = _picture(shown, kind, colour, along, view)
+    elif kind == ".html":
+        data = _page(shown)
+    else:
+        data = _mesh(shown[0], kind, colour, along, swing_mm)
+    with written_whole(out) as file:
+        file.write(data)
+    if json:
+        modes = [
+            {
+                "card": one.instrument.name,
+                "temperature_degC": one.temperature - 273.15,
+                "harmonic": one.mode.harmonic,
+                "index": one.mode.index,
+                "frequency_Hz": one.mode.frequency,
+            }
+            for one in shown
+        ]
+        print_json({"schema": "hrg.render/1", "file": out, "bytes": len(data), "modes": modes})
+    else:
+        say(f"{out}: {'; '.join(one.title for one in shown)}.")
+    return 0
+
+
+def _solve(
+    cards: "Sequence[str]",
+    harmonics: "Sequence[int]",
+    index: int,
+    temperatures: "Sequence[float]",
+    theory: Literal["solid", "shell"],
+    kind: str,
+) -> "list[Shown]":
+    """Solve every mode that is to be shown: cards × temperatures × harmonics."""
+    from studies.errors import InputError
+    from studies.instrument.card import ZERO_CELSIUS, load_card
+    from studies.reports.scenes import show_mode
+
+    if not cards:
+        raise InputError("a card is missing: give its path or the name of one that ships ('hrg cards').")
+    if index < 0:
+        raise InputError(f"--index {index}: modes are counted from 0.")
+    count = len(cards) * max(len(temperatures), 1)
+    most = MOST if kind in (".png", ".webp", ".gif") else 1
+    if count > most:
+        raise InputError(f"{count} resonators are too many for one {kind} file, which shows {most} at most.")
+    wanted: list[float | None] = [*(T + ZERO_CELSIUS for T in temperatures)] or [None]
+    instruments = [load_card(card) for card in cards]
+    return [show_mode(one, n, index, T, theory) for one in instruments for T in wanted for n in harmonics]
+
+
+def _picture(
+    shown: "Sequence[Shown]",
+    kind: str,
+    colour: Literal["displacement", "energy", "temperature"],
+    field: "Field | None",
+    view: Literal["oblique", "axis", "side"],
+) -> bytes:
+    from shell.render import NoOpenGL, render_animation, render_png
+    from studies.errors import MissingEnvironment
+
+    scenes = [one.scene(colour, field) for one in shown]
+    try:
+        if kind == ".png":
+            return render_png(scenes, view)
+        return render_animation(scenes, "webp" if kind == ".webp" else "gif", view)
+    except NoOpenGL as error:
+        raise MissingEnvironment(f"{error} An .html page or a mesh needs none.") from None
+
+
+def _page(shown: "Sequence[Shown]") -> bytes:
+    from studies.reports.mode_picture import view_blocks
+    from studies.reports.page import Chapter, Table, render_page
+
+    first = shown[0]
+    rows = [
+        [str(one.mode.harmonic), str(one.mode.index), f"{one.mode.frequency:.4f}", f"{one.mode.bryan_factor:.5f}"]
+        for one in shown
+    ]
+    table = Table("Modes of this page", ["n", "Index", "Frequency (Hz)", "Bryan factor"], rows)
+    lead = f"Mode shapes of {first.instrument.name} at {first.temperature - 273.15:g} °C, {first.mode.theory} theory."
+    return render_page(first.instrument.name, lead, [Chapter("Mode shapes", [*view_blocks(shown), table])]).encode()
+
+
+def _mesh(
+    one: "Shown",
+    kind: str,
+    colour: Literal["displacement", "energy", "temperature"],
+    field: "Field | None",
+    swing_mm: float | None,
+) -> bytes:
+    from shell.mesh import encode_animation, encode_mesh
+    from shell.render import EXAGGERATION
+
+    colours = one.colours(colour, field)
+    if kind == ".glb":
+        visible = EXAGGERATION * one.surface.size
+        return encode_animation(one.surface, visible if swing_mm is None else swing_mm * 1e-3, colours)
+    return encode_mesh(one.surface, "stl" if kind == ".stl" else "ply", (swing_mm or 0.0) * 1e-3, colours)

@@ -1,0 +1,119 @@
+"""What a picture of an instrument's mode shows: the solved mode, its surface, and the quantity that colours it."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
+
+from studies.errors import InputError
+from studies.instrument.card import ZERO_CELSIUS, Instrument
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from shell.meridian import Resonator
+    from shell.modes import Mode
+    from shell.render import Scene
+    from shell.surface import Surface
+
+Colour = Literal["displacement", "energy", "temperature"]
+FIELD_COLUMNS = ("position", "temperature_degC")
+LEGENDS = {
+    "displacement": "displacement (µm, for 1 µm at the antinode)",
+    "energy": "strain-energy density (J/m³, for 1 µm at the antinode)",
+    "temperature": "temperature (°C)",
+}
+MICROMETRE = 1e-6
+
+
+@dataclass(frozen=True, eq=False)
+class Shown:
+    """A mode of an instrument at one temperature with the surface of the resonator."""
+
+    instrument: Instrument
+    temperature: float
+    resonator: "Resonator"
+    mode: "Mode"
+    surface: "Surface"
+
+    @property
+    def title(self) -> str:
+        """Name, harmonic, frequency and temperature in one line."""
+        kind = f" ({self.mode.label})" if self.mode.label else ""
+        celsius = self.temperature - ZERO_CELSIUS
+        return f"{self.instrument.name}, n = {self.mode.harmonic}{kind}, {self.mode.frequency:.2f} Hz at {celsius:g} °C"
+
+    def values(self, colour: Colour, field: "Field | None" = None) -> "NDArray[np.float64]":
+        """Return the coloured quantity on every vertex, in the unit of its legend."""
+        import numpy as np
+
+        if colour == "displacement":
+            return np.asarray(np.linalg.norm(self.surface.displacement, axis=1))
+        if colour == "energy":
+            return self.surface.energy * MICROMETRE**2
+        if field is None:
+            raise InputError("the colour 'temperature' needs a field along the meridian: give --field FIELD.csv.")
+        return np.interp(self.surface.position, field.position, field.temperature)
+
+    def scene(self, colour: Colour = "displacement", field: "Field | None" = None) -> "Scene":
+        """Return the scene for `shell.render`."""
+        from shell.render import compose_scene
+
+        return compose_scene(self.surface, self.values(colour, field), LEGENDS[colour], self.title)
+
+    def colours(self, colour: Colour = "displacement", field: "Field | None" = None) -> "NDArray[np.uint8]":
+        """Return the colour of every vertex (N, 4) as bytes, cividis between the smallest and the largest value."""
+        import matplotlib as mpl
+        import numpy as np
+
+        values = self.values(colour, field)
+        top = np.percentile(values, 99.5) if colour == "energy" else values.max()
+        span = (top - values.min()) or 1.0
+        scaled = np.clip((values - values.min()) / span, 0, 1)
+        return np.asarray(mpl.colormaps["cividis"](scaled, bytes=True), dtype=np.uint8)
+
+
+@dataclass(frozen=True, eq=False)
+class Field:
+    """A temperature (°C) along the meridian, position 0 ... 1, linear between the points."""
+
+    position: "NDArray[np.float64]"
+    temperature: "NDArray[np.float64]"
+
+
+def show_mode(
+    instrument: Instrument,
+    harmonic: int = 2,
+    index: int = 0,
+    temperature: float | None = None,
+    theory: Literal["solid", "shell"] = "solid",
+) -> Shown:
+    """Solve one mode of an instrument (temperature in K, its reference unless given) and build its surface."""
+    from shell.modes import solve_modes
+    from shell.surface import build_surface
+
+    T = instrument.reference_temperature if temperature is None else temperature
+    resonator, elastic = instrument.at(T)
+    mode = solve_modes(resonator, elastic, harmonic, index + 1, theory, tolerance=1e-4)[index]
+    return Shown(instrument, T, resonator, mode, build_surface(resonator, mode))
+
+
+def read_field(path: str | Path) -> Field:
+    """Read a temperature along the meridian: a table `position,temperature_degC` with rising positions.
+
+    Raises
+    ------
+    InputError
+        Not such a table.
+    """
+    import numpy as np
+
+    from studies.files.columns import read_columns
+
+    table = read_columns(path, FIELD_COLUMNS, required=FIELD_COLUMNS)
+    position, temperature = (table.values[name] for name in FIELD_COLUMNS)
+    if np.isnan(position).any() or np.isnan(temperature).any():
+        raise InputError(f"{path}: a temperature field needs every value.")
+    if (np.diff(position) <= 0).any() or position[0] < 0 or position[-1] > 1:
+        raise InputError(f"{path}: position must rise within 0 (start of the meridian) to 1 (rim).")
+    return Field(position, temperature)
