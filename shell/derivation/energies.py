@@ -74,7 +74,7 @@ def surface_energy_density() -> sp.Expr:
         for power, scale in ((1, membrane), (3, bending))
     ]
     shears = [DEFORMATION.epsilon_phitheta**2, DEFORMATION.tau**2]
-    stretching, curving = (sp.collect(bracket, shears, sp.factor) for bracket in brackets)
+    stretching, curving = (sp.collect(bracket, shears) for bracket in brackets)
     return membrane * stretching + bending * curving
 
 
