@@ -110,9 +110,7 @@ def rayleigh_bryan_factor(n: int, phi_1: float = 0.0, phi_2: float = pi / 2) -> 
     return shape.N / shape.J
 
 
-def rayleigh_log_derivatives(
-    n: int, nu: float, phi_1: float = 0.0, phi_2: float = pi / 2
-) -> RayleighLogDerivatives:
+def rayleigh_log_derivatives(n: int, nu: float, phi_1: float = 0.0, phi_2: float = pi / 2) -> RayleighLogDerivatives:
     """Return how the logarithm of the frequency (13) follows each of its arguments.
 
     d ln f = ½ d ln E − ½ d ln ρ − dν/(2(1+ν)) + d ln h − 2 d ln R + ½ [i(φ₂)/I − j(φ₂)/J] dφ₂, where i and j
@@ -196,9 +194,7 @@ def _coriolis(phi: float, n: int) -> float:
     return 2 * sin(phi) ** 3 * tan(phi / 2) ** (2 * n)
 
 
-def _require_physical(
-    E: NDArray[Any], nu: NDArray[Any], rho: NDArray[Any], h: NDArray[Any], R: NDArray[Any]
-) -> None:
+def _require_physical(E: NDArray[Any], nu: NDArray[Any], rho: NDArray[Any], h: NDArray[Any], R: NDArray[Any]) -> None:
     names = {"Young's modulus": E, "density": rho, "thickness": h, "radius": R}
     for name, value in names.items():
         if not np.all(np.isfinite(value) & (value > 0)):
