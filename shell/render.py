@@ -209,7 +209,7 @@ def _draw_job(folder: str) -> None:
     moving = []
     for k, scene in enumerate(scenes):
         plotter.subplot(0, k)
-        moving += _fill(plotter, scene, limits, size, last=k == len(scenes) - 1)
+        moving += _fill(plotter, scene, limits, size, first=k == 0)
         _aim(plotter, scene, view, size)
     for number, swing in enumerate(swings):
         for mesh, rest, displacement in moving:
@@ -220,7 +220,7 @@ def _draw_job(folder: str) -> None:
 
 
 def _fill(
-    plotter: Any, scene: Scene, limits: tuple[float, float], size: float, last: bool
+    plotter: Any, scene: Scene, limits: tuple[float, float], size: float, first: bool
 ) -> list[tuple[Any, Array, Array]]:
     """Put one resonator into the current part of the window; return what moves: mesh, rest position, displacement."""
     import pyvista as pv
@@ -245,7 +245,7 @@ def _fill(
         "width": 0.6,
         "position_x": 0.2,
         "position_y": 0.02,
-        "height": 0.09,
+        "height": 0.12,
     }
     plotter.add_mesh(
         body,
@@ -270,7 +270,7 @@ def _fill(
         marks = pv.PolyData(scene.points[scene.antinodes])
         plotter.add_mesh(marks, color=ANTINODE, point_size=13.0, render_points_as_spheres=True)
         moving.append((marks, scene.points[scene.antinodes], scene.displacement[scene.antinodes]))
-        if last:
+        if first:
             plotter.add_text(
                 "red lines: nodes   black dots: antinodes   grey: undeformed",
                 position=(12, 92),
