@@ -7,7 +7,7 @@ from typing import Literal
 import numpy as np
 from scipy.sparse import csr_matrix
 
-from shell.blocks import Rows, Solid, Tie, constrain, mesh_solid, number_unknowns, tabulate
+from shell.blocks import Mesh, Rows, Solid, Tie, constrain, mesh_solid, number_unknowns, surface_sides, tabulate
 from shell.corner import find_kinks, lay_clamped_face, lay_corner
 from shell.eigen import Index, Pattern, find_pattern
 from shell.errors import ShellError
@@ -23,7 +23,6 @@ from shell.kernel import (
 )
 from shell.layout import Chain, End, lay_chain
 from shell.meridian import Resonator
-from shell.patches import Part
 from shell.quadrature import Array, gauss, legendre, nodal
 from shell.root import lay_root
 
@@ -41,33 +40,45 @@ class Level:
     split: int = 1
 
 
+_SOLID = ((5, 4), (7, 6), (9, 8), (11, 10), (13, 12))  # degree of blocks, rings around sharp corners
 LEVELS: dict[str, tuple[Level, ...]] = {
-    "solid": (
-        Level((3, 3, 3), 9, 5, 2),
-        Level((5, 5, 4), 12, 7, 4),
-        Level((7, 7, 6), 16, 9, 6),
-        Level((9, 9, 8), 20, 11, 9),
-        Level((11, 11, 10), 20, 13, 12, 2),
+    "solid": tuple(
+        Level(through, along, *solid, split)
+        for through, along, solid, split in zip(
+            ((3, 3, 3), (5, 5, 4), (7, 7, 6), (9, 9, 8), (11, 11, 10)), (9, 12, 16, 20, 20), _SOLID, (1, 1, 1, 1, 2), strict=True
+        )
     ),
-    "shell": (
-        Level((1, 1, 0), 8, 5, 2),
-        Level((1, 1, 0), 12, 7, 4),
-        Level((1, 1, 0), 16, 9, 6),
-        Level((1, 1, 0), 20, 11, 9),
-        Level((1, 1, 0), 20, 13, 12, 2),
+    "shell": tuple(
+        Level((1, 1, 0), along, *solid, split)
+        for along, solid, split in zip((8, 12, 16, 20, 20), _SOLID, (1, 1, 1, 1, 2), strict=True)
     ),
 }
 
 
 @dataclass(frozen=True, eq=False)
+class ShellPart:
+    """Where the elements of a chain lie: the chain, its sections at the stations, its ends."""
+
+    chain: Chain
+    section: Section
+
+
+@dataclass(frozen=True, eq=False)
+class SolidPart:
+    """Where the cells of a solid part lie, and which of their sides (cell, side) are free or held surface."""
+
+    mesh: Mesh
+    surface: tuple[tuple[int, int], ...]
+
+
+@dataclass(frozen=True, eq=False)
 class Group:
-    """Elements of one kind: their strain table, their unknowns with orientation signs, and the part each belongs to."""
+    """Elements of one kind: their strain table, their unknowns with orientation signs, where they lie."""
 
     table: StrainTable
     unknowns: Index
     signs: Array
-    parts: tuple[Part, ...]
-    frame: tuple[Array, Array] | None = None  # t_r, t_z at the stations of a shell; None where the axes are r, θ, z
+    place: ShellPart | SolidPart
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,6 +92,7 @@ class System:
     constraint: csr_matrix
     rigid_motions: int
     n: int
+    level: Level
     _maps: list["ToFree"] = field(default_factory=list, repr=False)
 
     def __post_init__(self) -> None:
@@ -184,11 +196,13 @@ def build_system(resonator: Resonator, n: int, theory: Theory, level: Level) -> 
             rows.update(_end_rows(chain.ends[side], ends[k, side], n))
     for solid, tied in layout.solids:
         mesh = mesh_solid(solid, level.block)
-        rows.update(constrain(mesh, solid, tuple(ends[at] for at in tied), level.block, n, size))
+        ties = tuple(ends[at] for at in tied)
+        rows.update(constrain(mesh, solid, ties, level.block, n, size))
         numbers, signs, size = number_unknowns(mesh, level.block, size)
-        groups.append(Group(tabulate(mesh, solid, level.block, n), numbers, signs, mesh.parts))
+        place = SolidPart(mesh, surface_sides(mesh, ties))
+        groups.append(Group(tabulate(mesh, solid, level.block, n), numbers, signs, place))
     held = resonator.support != "free"
-    return System(tuple(groups), _constraint(rows, size), 0 if held or n > 1 else 2, n)
+    return System(tuple(groups), _constraint(rows, size), 0 if held or n > 1 else 2, n, level)
 
 
 def lay_resonator(resonator: Resonator, n: int, level: Level) -> Layout:
@@ -233,8 +247,7 @@ def _shell_group(resonator: Resonator, chain: Chain, n: int, level: Level, start
     elements, m = len(chain.segments), sum(orders) + 3
     nodes = p * np.arange(elements)[:, None] + np.arange(p + 1)
     unknowns = start + (nodes[:, :, None] * m + np.arange(m)).reshape(elements, -1)
-    parts: tuple[Part, ...] = ("shell",) * elements
-    group = Group(table, unknowns, np.ones(unknowns.shape), parts, (section.tangent_r, section.tangent_z))
+    group = Group(table, unknowns, np.ones(unknowns.shape), ShellPart(chain, section))
     return group, start + (elements * p + 1) * m
 
 
@@ -283,7 +296,7 @@ def _constraint(rows: Rows, size: int) -> csr_matrix:
     """The sparse matrix from free to raw unknowns; a row not listed is free."""
     free = np.array([k not in rows for k in range(size)])
     column = np.cumsum(free) - 1
-    entries = [(k, int(column[k]), 1.0) for k in np.flatnonzero(free)]
+    entries = [(int(k), int(column[k]), 1.0) for k in np.flatnonzero(free)]
     for k, row in rows.items():
         entries += [(k, int(column[master]), factor) for master, factor in row]
     i, j, value = (np.array(values) for values in zip(*entries, strict=True))

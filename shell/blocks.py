@@ -151,6 +151,19 @@ def constrain(mesh: Mesh, solid: Solid, ties: tuple[Tie, ...], degree: int, n: i
     return rows
 
 
+def surface_sides(mesh: Mesh, ties: tuple[Tie, ...]) -> tuple[tuple[int, int], ...]:
+    """The sides (cell, side) that no other cell shares, that are not tied and do not lie on the axis."""
+    size = float(np.ptp(mesh.points, axis=1).max())
+    uses = np.bincount(mesh.edges.ravel())
+    inside = [mesh.points[0] < 1e-9 * size]
+    inside += [np.isfinite(_thickness_coordinate(tie.place, mesh.points, size)) for tie in ties]
+    return tuple(
+        (int(cell), int(side))
+        for cell, side in zip(*np.nonzero(uses[mesh.edges] == 1), strict=True)
+        if not any(where[a] and where[b] for where in inside for a, b in [mesh.pairs[mesh.edges[cell, side]]])
+    )
+
+
 def _thickness_coordinate(place: MeridianPoints, points: Array, size: float) -> Array:
     """η in [-1, 1] of points on a cross-section, NaN elsewhere."""
     r, z = points[0] - place.r[0], points[1] - place.z[0]

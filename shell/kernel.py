@@ -159,6 +159,14 @@ def lame(E: Array, nu: Array, plane_stress: bool) -> tuple[Array, Array]:
     return E * nu / ((1 + nu) * (1 - 2 * nu)), G
 
 
+def lame_slopes(E: Array, nu: Array, plane_stress: bool) -> tuple[Array, Array]:
+    """Derivatives of `lame` by ν at constant E."""
+    by_nu = -E / (2 * (1 + nu) ** 2)
+    if plane_stress:
+        return E * (1 + nu**2) / (1 - nu**2) ** 2, by_nu
+    return E * (1 + 2 * nu**2) / ((1 + nu) * (1 - 2 * nu)) ** 2, by_nu
+
+
 def energy_weights(table: StrainTable) -> Array:
     """Weights g_c of the shear modulus: 2 U = ∫ λ (ε_1 + ε_2 + ε_3)² + G Σ g_c ε_c²."""
     k = table.transverse_shear
@@ -213,7 +221,7 @@ def displacements(table: StrainTable, unknowns: Array) -> Array:
     """Displacement (elements, stations, 3, points) of element unknowns (elements, size)."""
     elements = len(unknowns)
     amplitudes = np.einsum("ia,eam->eim", table.along[0], unknowns.reshape(elements, table.along.shape[2], -1))
-    return np.einsum("eicjm,eim->eicj", table.displacement, amplitudes)
+    return np.asarray(np.einsum("eicjm,eim->eicj", table.displacement, amplitudes))
 
 
 def _tall(per_station: Array) -> NDArray[np.float64]:
@@ -224,7 +232,9 @@ def _tall(per_station: Array) -> NDArray[np.float64]:
 def _jets(bases: tuple[Basis, Basis, Basis], counts: list[int]) -> tuple[list[Array], list[Array], list[Array]]:
     """The three displacements, their η- and their ξ-derivatives as rows (point, jet, amplitude)."""
     total, start = sum(counts), 0
-    value, d_eta, d_xi = [], [], []
+    value: list[Array] = []
+    d_eta: list[Array] = []
+    d_xi: list[Array] = []
     for basis, count in zip(bases, counts, strict=True):
         rows = [np.zeros((len(basis.values), 2, total)) for _ in range(3)]
         columns = slice(start, start + count)

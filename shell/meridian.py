@@ -144,7 +144,7 @@ class Resonator:
     def thickness_at(self, position: ArrayLike) -> Array:
         """Thickness h (m) at positions 0 ... 1 of the arc length."""
         where, value = np.array(self.thickness).T
-        return np.interp(np.asarray(position, dtype=float), where, value)
+        return np.asarray(np.interp(np.asarray(position, dtype=float), where, value))
 
     def at(self, arc_length: ArrayLike, segment: int | None = None) -> MeridianPoints:
         """The middle surface at given arc lengths (m); at a joint, `segment` says on which of the two curves."""
@@ -152,12 +152,11 @@ class Resonator:
         if segment is not None:
             return self._on_segment(s, segment)
         which = np.clip(np.searchsorted(np.array(self._starts), s, side="right") - 1, 0, len(self.segments) - 1)
-        pieces = [self._on_segment(s[which == k], k) for k in range(len(self.segments))]
-        joined = {}
-        for name in MeridianPoints.__dataclass_fields__:
-            joined[name] = np.empty_like(s)
-            for k, piece in enumerate(pieces):
-                joined[name][which == k] = getattr(piece, name)
+        joined = {name: np.empty_like(s) for name in MeridianPoints.__dataclass_fields__}
+        for k in np.unique(which):
+            piece = self._on_segment(s[which == k], int(k))
+            for name, values in joined.items():
+                values[which == k] = getattr(piece, name)
         return MeridianPoints(**joined)
 
     def sample(self, count: int) -> MeridianPoints:

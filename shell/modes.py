@@ -6,6 +6,7 @@
 import warnings
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import cached_property
 from math import pi, sqrt
 
 import numpy as np
@@ -16,10 +17,10 @@ from shell.curves import Arc
 from shell.eigen import lowest_vectors
 from shell.elastic import Elastic
 from shell.errors import ShellError
-from shell.kernel import lame
 from shell.meridian import Resonator
 from shell.quadrature import Array
-from shell.solution import Constants, Solution, total
+from shell.sampling import ShapePatch, sample_shape
+from shell.solution import AlongMeridian, Constants, EnergyFractions, Solution, total
 
 THEORIES = ("solid", "shell", "rayleigh")
 THICKEST_SHELL = 0.1  # h/R up to which shell theory has been held against the solid
@@ -75,6 +76,56 @@ class Mode:
     bryan_factor: float
     label: str = ""
     solution: Solution | None = field(default=None, repr=False, compare=False)
+    resonator: Resonator | None = field(default=None, repr=False, compare=False)
+
+    @cached_property
+    def sensitivities(self) -> "Sensitivities":
+        """Derivatives of ln f, by energies of the mode at the unchanged shape; closed form for "rayleigh"."""
+        if self.solution is None or self.resonator is None:
+            raise ShellError("Rayleigh's closed form has its own derivatives: shell.rayleigh.rayleigh_log_derivatives.")
+        thickness = _by_thickness(self.resonator, self.solution, self.theory)
+        return Sensitivities(0.5, self.solution.by_nu, -0.5, thickness, -1 - thickness)
+
+    @property
+    def energy_fractions(self) -> EnergyFractions:
+        """How the energy divides between bending, membrane, shear, root and stem."""
+        return self._solved().energy_fractions
+
+    @property
+    def along(self) -> AlongMeridian:
+        """What each place of the meridian contributes to d ln f: energy shares for fields along the meridian."""
+        return self._solved().along
+
+    @cached_property
+    def modal_mass(self) -> float:
+        """Modal mass ∫ ρ |u|² dV, kg, of the mode scaled to a largest displacement of 1."""
+        patches = self.shape()
+        largest = max(float(np.max(np.maximum(np.hypot(p.u_r, p.u_z), abs(p.u_theta)))) for p in patches)
+        return self._solved().mass / largest**2
+
+    def shape(self, points: int = 9) -> "tuple[ShapePatch, ...]":
+        """Displacement on the cross-section, stem included, as curved grids of `points` by `points`."""
+        assert self.resonator is not None
+        return sample_shape(self.resonator, self._solved(), points)
+
+    def _solved(self) -> Solution:
+        if self.solution is None:
+            raise ShellError("Rayleigh's closed form carries no shape or energies: use theory solid or shell.")
+        return self.solution
+
+
+@dataclass(frozen=True)
+class Sensitivities:
+    """Derivatives of ln f: by ln E, by ν (at constant E), by ln ρ, by ln h, and by the logarithm of all other lengths.
+
+    E + rho = 0 and thickness + radius = -1 hold exactly, by dimensions.
+    """
+
+    E: float
+    nu: float
+    rho: float
+    thickness: float
+    radius: float
 
 
 def solve_modes(
@@ -119,7 +170,7 @@ def solve_modes(
     if theory == "rayleigh":
         return _rayleigh(resonator, elastic, harmonic, count)
     levels = LEVELS[theory]
-    accuracy = max(1e-3 * tolerance, 1e-12)
+    accuracy = max(1e-6 * tolerance, 1e-13)
     solutions = _solve_level(resonator, elastic, harmonic, count, theory, levels[0], accuracy)
     for level in levels[1:]:
         finer = _solve_level(resonator, elastic, harmonic, count, theory, level, accuracy)
@@ -136,7 +187,7 @@ def solve_modes(
         )
     return tuple(
         Mode(harmonic, k, sqrt(solution.eigenvalue) / (2 * pi), theory, max(error, 1e-13), solution.bryan_factor,
-             _label(solution), solution)
+             _label(solution), solution, resonator)
         for k, (solution, error) in enumerate(zip(solutions, errors, strict=True))
     )
 
@@ -149,7 +200,7 @@ def _solve_level(
     constants = tuple(_constants(group.table.position, elastic, group.table.plane_stress) for group in system.groups)
     K, M = _matrices(system, elastic, constants)
     # a small shift factors the rigid motions and leaves the elastic modes in order
-    stiffness, density = (float(np.mean(values)) for values in (constants[0].G, constants[0].rho))
+    stiffness, density = (float(np.mean(values)) for values in (constants[0].lame[1], constants[0].rho))
     shift = 1e-2 * stiffness / density / resonator.size**2 if system.rigid_motions else 0.0
     vectors = lowest_vectors(system.pattern, K, M, count + system.rigid_motions, shift, accuracy)
     found = sorted((Solution(system, constants, vector) for vector in vectors.T), key=lambda solution: solution.eigenvalue)
@@ -160,9 +211,9 @@ def _matrices(
     system: System, elastic: Elastic | VaryingElastic, constants: tuple[Constants, ...]
 ) -> tuple[list[Array], list[Array]]:
     if isinstance(elastic, VaryingElastic):
-        return system.varying([c.lam for c in constants], [c.G for c in constants], [c.rho for c in constants])
+        return system.varying([c.lame[0] for c in constants], [c.lame[1] for c in constants], [c.rho for c in constants])
     uniform = [
-        (float(c.lam[0, 0]), float(c.G[0, 0]), float(c.rho[0, 0]))
+        (float(c.lame[0][0, 0]), float(c.lame[1][0, 0]), float(c.rho[0, 0]))
         for c, group in zip(constants, system.groups, strict=True)
         for _ in group.unknowns
     ]
@@ -176,7 +227,20 @@ def _constants(position: Array, elastic: Elastic | VaryingElastic, plane_stress:
         E, nu, rho = elastic.at(position)
     else:
         E, nu, rho = (np.broadcast_to(value, position.shape) for value in (elastic.E, elastic.nu, elastic.rho))
-    return Constants(*lame(E, nu, plane_stress), rho)
+    return Constants(E, nu, rho, plane_stress)
+
+
+def _by_thickness(resonator: Resonator, solution: Solution, theory: Theory) -> float:
+    """D ln f / d ln h of the whole profile: change of the Rayleigh quotient with the shape kept (it is stationary)."""
+    step = 2e-3 * min(value for _, value in resonator.thickness) / resonator.size  # its cube over (h/R)² is what is neglected
+    found: dict[float, float] = {0.0: solution.eigenvalue}
+    for change in (-step, step):
+        system = build_system.__wrapped__(resonator.thickened(1 + change), solution.system.n, theory, solution.system.level)
+        same = [a.unknowns.shape == b.unknowns.shape for a, b in zip(system.groups, solution.system.groups, strict=True)]
+        if all(same) and system.constraint.shape == solution.system.constraint.shape:
+            found[change] = Solution(system, solution.constants, solution.vector).eigenvalue
+    low, high = min(found), max(found)  # one-sided where one more cell fits on one side
+    return float(np.log(found[high] / found[low]) / (2 * np.log((1 + high) / (1 + low))))
 
 
 def _label(solution: Solution) -> str:

@@ -36,7 +36,7 @@ def lobatto(degree: int) -> Array:
 
 def legendre(degree: int, points: Array) -> Basis:
     """Legendre polynomials P_0 ... P_degree, the modes through the thickness."""
-    return Basis(series.legvander(points, degree), _derivative(degree, points))
+    return Basis(np.asarray(series.legvander(points, degree), dtype=float), _derivative(degree, points))
 
 
 def nodal(degree: int, points: Array) -> Basis:

@@ -2,21 +2,72 @@
 
 from dataclasses import dataclass
 from functools import cached_property
+from math import pi
 
 import numpy as np
 
-from shell.assembly import Group, System
-from shell.kernel import displacements, energy_weights, strains
-from shell.quadrature import Array
+from shell.assembly import Group, ShellPart, System
+from shell.kernel import displacements, energy_weights, lame, lame_slopes, shell_table, strains
+from shell.quadrature import Array, Basis, legendre
 
 
 @dataclass(frozen=True, eq=False)
 class Constants:
-    """Lamé's λ and G (Pa) and density ρ (kg/m³) at the stations of one group, arrays (elements, stations)."""
+    """E (Pa), ν and ρ (kg/m³) at the stations of one group, arrays (elements, stations), with Lamé's λ and G (Pa)."""
 
-    lam: Array
-    G: Array
+    E: Array
+    nu: Array
     rho: Array
+    plane_stress: bool
+
+    @cached_property
+    def lame(self) -> tuple[Array, Array]:
+        """λ (that of plane stress in shell theory) and G."""
+        return lame(self.E, self.nu, self.plane_stress)
+
+
+@dataclass(frozen=True)
+class EnergyFractions:
+    """Shares of the strain energy; they add up to 1.
+
+    bending, membrane, shear : of the shell: strains that vary through the thickness, their mean, transverse shear.
+    root : of the solid cap, root or corner.
+    stem : of the stem.
+    kinetic_stem : the stem's share of the kinetic energy (counted apart).
+    """
+
+    bending: float
+    membrane: float
+    shear: float
+    root: float
+    stem: float
+    kinetic_stem: float
+
+    @property
+    def shell(self) -> float:
+        """The shell's share of the strain energy."""
+        return self.bending + self.membrane + self.shear
+
+
+@dataclass(frozen=True, eq=False)
+class AlongMeridian:
+    """What each place of the meridian contributes to d ln f: arrays over stations, sorted by position.
+
+    For fields along the meridian, to first order,
+
+        d ln f = ½ Σ elastic d ln E - ½ Σ kinetic d ln ρ + Σ nu dν + Σ thickness d ln h,
+
+    each taken at `position` (0 ... 1 of the arc length). `elastic` and `kinetic` add up to 1; divided by `width`, the
+    station's share of the arc length, they are densities. A solid root is one station of width 0 where it joins the shell.
+    `thickness` is that of the shell alone.
+    """
+
+    position: Array
+    width: Array
+    elastic: Array
+    kinetic: Array
+    nu: Array
+    thickness: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,25 +94,19 @@ class Solution:
         return [displacements(group.table, q) for group, q in zip(self.system.groups, self.unknowns, strict=True)]
 
     @cached_property
-    def volumetric(self) -> list[Array]:
-        """λ part of twice the strain energy at every station: ∫ λ (ε_1 + ε_2 + ε_3)² over the points."""
+    def squares(self) -> list[tuple[Array, Array]]:
+        """∫ (ε_1 + ε_2 + ε_3)² and ∫ Σ g_c ε_c² over the points of every station: what λ and G multiply."""
         return [
-            c.lam * _integrate(e[:, :, :3].sum(axis=2) ** 2, group)
-            for group, c, e in zip(self.system.groups, self.constants, self.strain, strict=True)
-        ]
-
-    @cached_property
-    def deviatoric(self) -> list[Array]:
-        """G part of twice the strain energy at every station: ∫ G Σ g_c ε_c² over the points."""
-        return [
-            c.G * _integrate(np.einsum("c,eicj->eij", energy_weights(group.table), e**2), group)
-            for group, c, e in zip(self.system.groups, self.constants, self.strain, strict=True)
+            (_integrate(e[:, :, :3].sum(axis=2) ** 2, group), _integrate(np.einsum("c,eicj->eij", energy_weights(group.table), e**2), group))
+            for group, e in zip(self.system.groups, self.strain, strict=True)
         ]
 
     @cached_property
     def elastic(self) -> list[Array]:
         """Twice the strain energy of every station, a sum of squares and so free of cancellation."""
-        return [a + b for a, b in zip(self.volumetric, self.deviatoric, strict=True)]
+        return [
+            c.lame[0] * trace + c.lame[1] * shear for c, (trace, shear) in zip(self.constants, self.squares, strict=True)
+        ]
 
     @cached_property
     def kinetic(self) -> list[Array]:
@@ -77,22 +122,71 @@ class Solution:
         return total(self.elastic) / total(self.kinetic)
 
     @cached_property
+    def mass(self) -> float:
+        """∫ ρ |u|² dV of the eigenvector as it is scaled, kg m²."""
+        return total(self.kinetic) * pi * (2 if self.system.n == 0 else 1)
+
+    @cached_property
     def bryan_factor(self) -> float:
         """Angle by which the standing wave precesses per angle of rotation: -2 ∫ ρ u_r u_θ dV / (n ∫ ρ u² dV)."""
         if self.system.n == 0:
             return 0.0
         coupling = 0.0
         for group, c, d in zip(self.system.groups, self.constants, self.displacement, strict=True):
-            coupling += float(np.sum(c.rho * _integrate(self.radial(group, d) * d[:, :, 1], group)))
+            coupling += float(np.sum(c.rho * _integrate(_radial(group, d) * d[:, :, 1], group)))
         return -2 * coupling / (self.system.n * total(self.kinetic))
 
-    @staticmethod
-    def radial(group: Group, displacement: Array) -> Array:
-        """Displacement away from the axis, (elements, stations, points)."""
-        if group.frame is None:
-            return displacement[:, :, 0]
-        t_r, t_z = (axis[..., None] for axis in group.frame)
-        return np.asarray(t_r * displacement[:, :, 0] - t_z * displacement[:, :, 2])
+    @cached_property
+    def energy_fractions(self) -> EnergyFractions:
+        """How the energy divides between kinds of strain and parts."""
+        found = dict.fromkeys(("bending", "membrane", "shear", "root", "stem", "kinetic_stem"), 0.0)
+        for group, c, e, elastic, kinetic in zip(
+            self.system.groups, self.constants, self.strain, self.elastic, self.kinetic, strict=True
+        ):
+            if isinstance(group.place, ShellPart):
+                shear = total([c.lame[1] * group.table.transverse_shear * _integrate(e[:, :, 4] ** 2 + e[:, :, 5] ** 2, group)])
+                membrane = _membrane(group, c, e)
+                found["shear"] += shear
+                found["membrane"] += membrane
+                found["bending"] += total([elastic]) - shear - membrane
+            else:
+                in_stem = np.array([part == "stem" for part in group.place.mesh.parts])
+                found["stem"] += total([elastic[in_stem]])
+                found["root"] += total([elastic[~in_stem]])
+                found["kinetic_stem"] += total([kinetic[in_stem]]) * self.eigenvalue
+        whole = total(self.elastic)
+        return EnergyFractions(**{name: value / whole for name, value in found.items()})
+
+    @cached_property
+    def along(self) -> AlongMeridian:
+        """Contributions of the places of the meridian to d ln f."""
+        U, T = total(self.elastic), total(self.kinetic)
+        rows: list[list[Array]] = []
+        for group, c, elastic, kinetic, nu, q in zip(
+            self.system.groups, self.constants, self.elastic, self.kinetic, self._by_nu, self.unknowns, strict=True
+        ):
+            if isinstance(group.place, ShellPart):
+                width = group.place.section.weight * group.place.section.ds
+                thickness = _surface_density(self.system, group, c, q, self.eigenvalue) / (2 * U)
+                columns = [group.table.position, width, elastic / U, kinetic / T, nu / (2 * U), thickness]
+            else:
+                columns = [group.table.position[:1, :1], np.zeros(1), *(
+                    np.array([np.sum(values) / scale]) for values, scale in ((elastic, U), (kinetic, T), (nu, 2 * U))
+                ), np.zeros(1)]
+            rows.append([np.ravel(column) for column in columns])
+        table = np.concatenate([np.array(columns) for columns in rows], axis=1)
+        table[1] /= table[1].sum()
+        return AlongMeridian(*table[:, np.argsort(table[0], kind="stable")])
+
+    @cached_property
+    def by_nu(self) -> float:
+        """D ln f / dν at constant E."""
+        return total(self._by_nu) / (2 * total(self.elastic))
+
+    @cached_property
+    def _by_nu(self) -> list[Array]:
+        slopes = [lame_slopes(c.E, c.nu, c.plane_stress) for c in self.constants]
+        return [a * trace + b * shear for (a, b), (trace, shear) in zip(slopes, self.squares, strict=True)]
 
 
 def total(per_group: list[Array]) -> float:
@@ -101,4 +195,46 @@ def total(per_group: list[Array]) -> float:
 
 
 def _integrate(at_points: Array, group: Group) -> Array:
-    return np.einsum("eij,eij->ei", at_points, group.table.volume)
+    return np.asarray(np.einsum("eij,eij->ei", at_points, group.table.volume))
+
+
+def _radial(group: Group, displacement: Array) -> Array:
+    """Displacement away from the axis, (elements, stations, points)."""
+    if not isinstance(group.place, ShellPart):
+        return displacement[:, :, 0]
+    section = group.place.section
+    return np.asarray(
+        section.tangent_r[..., None] * displacement[:, :, 0] - section.tangent_z[..., None] * displacement[:, :, 2]
+    )
+
+
+def _membrane(group: Group, c: Constants, e: Array) -> float:
+    """Energy of the mean in-plane strains, in plane stress."""
+    weights = group.table.volume / group.table.volume.sum(axis=2, keepdims=True)
+    s, theta, twist = (np.einsum("eij,eij->ei", e[:, :, k], weights) for k in (0, 1, 3))
+    return float(np.sum(_plane_energy(c, s, theta, twist) * group.table.volume.sum(axis=2)))
+
+
+def _plane_energy(c: Constants, s: Array, theta: Array, twist: Array) -> Array:
+    lam, G = lame(c.E, c.nu, True)
+    return np.asarray(lam * (s + theta) ** 2 + G * (2 * s**2 + 2 * theta**2 + twist**2))
+
+
+def _surface_density(system: System, group: Group, c: Constants, q: Array, eigenvalue: float) -> Array:
+    """Change of (elastic - ω² kinetic) as both faces move outwards by h/2: energies at the faces (Hadamard's formula).
+
+    Of a solid the faces are free of traction, so their strain energy is that of plane stress; Naghdi's transverse shear
+    does not vanish there and counts.
+    """
+    assert isinstance(group.place, ShellPart)
+    faces = np.array([-1.0, 1.0])
+    u, v, w = (legendre(order, faces) for order in system.level.through)
+    along = Basis(*group.table.along)
+    table = shell_table(group.place.section, system.n, (u, v, w), (faces, np.ones(2)), along)
+    e, d = strains(table, q), displacements(table, q)
+    at_stations = Constants(c.E[..., None], c.nu[..., None], c.rho[..., None], True)
+    density = _plane_energy(at_stations, e[:, :, 0], e[:, :, 1], e[:, :, 3])
+    if table.plane_stress:
+        density += c.lame[1][..., None] * table.transverse_shear * (e[:, :, 4] ** 2 + e[:, :, 5] ** 2)
+    density -= eigenvalue * c.rho[..., None] * (d**2).sum(axis=2)
+    return np.asarray(np.einsum("eij,eij->ei", density, table.volume))
