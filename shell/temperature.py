@@ -77,11 +77,18 @@ def rayleigh_model(n: int, h: float, R: float, phi_1: float = 0.0, phi_2: float 
 
 
 def mode_model(resonator: "Resonator", harmonic: int = 2, theory: "Theory" = "solid") -> Model:
-    """Return f of the lowest mode of a harmonic from the shell-mode solver."""
+    """Return f of the lowest mode of a harmonic, by the solver or by Rayleigh's closed form."""
+    from shell.curves import Arc
     from shell.modes import solve_modes
+    from shell.rayleigh import rayleigh_log_derivatives
+
+    dome = resonator.segments[0]
 
     def model(elastic: Elastic) -> FrequencyGradient:
-        mode = solve_modes(resonator, elastic, harmonic=harmonic, count=1, theory=theory)[0]
+        mode = solve_modes(resonator, elastic, harmonic, theory=theory)[0]
+        if theory == "rayleigh" and isinstance(dome, Arc):
+            slopes = rayleigh_log_derivatives(harmonic, elastic.nu, dome.first_angle, dome.last_angle)
+            return FrequencyGradient(mode.frequency, slopes.nu, slopes.h)
         return FrequencyGradient(mode.frequency, mode.sensitivities.nu, mode.sensitivities.thickness)
 
     return model

@@ -1,8 +1,11 @@
 """`hrg modes`: frequencies, Bryan factors and sensitivities of a card's modes."""
 
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from cyclopts import Parameter
+
+if TYPE_CHECKING:
+    from shell.modes import Mode
 
 
 def modes(
@@ -37,6 +40,8 @@ def modes(
     json : bool
         Print one JSON object (schema hrg.modes/1) instead of a table.
     """
+    from dataclasses import asdict
+
     from shell.modes import solve_modes
     from studies.cli.output import print_json, print_table
     from studies.errors import InputError
@@ -63,8 +68,8 @@ def modes(
             if detailed:
                 entry |= {
                     "modal_mass_kg": m.modal_mass,
-                    "sensitivities": vars(m.sensitivities),
-                    "energy_fractions": vars(m.energy_fractions),
+                    "sensitivities": asdict(m.sensitivities),
+                    "energy_fractions": asdict(m.energy_fractions),
                 }
             entries.append(entry)
         print_json(
@@ -96,3 +101,29 @@ def modes(
     if sensitivities and detailed:
         _print_details(found)
     return 0
+
+
+def _print_details(found: "list[Mode]") -> None:
+    from studies.cli.output import print_table
+
+    names = ["n", "index"]
+    slopes = [
+        [
+            str(m.harmonic),
+            str(m.index),
+            *(f"{x:+.4f}" for x in (s.E, s.nu, s.rho, s.thickness, s.radius)),
+            f"{1e3 * m.modal_mass:.4f}",
+        ]
+        for m in found
+        for s in [m.sensitivities]
+    ]
+    columns = [*names, "ln E", "ν", "ln ρ", "ln h", "ln r", "modal mass (g)"]
+    note = "ν at constant E; ln r moves every length but the thickness. Modal mass for a largest displacement of 1."
+    print_table("Derivatives of ln f", columns, slopes, note)
+    shares = [
+        [str(m.harmonic), str(m.index), *(f"{100 * x:.3f}" for x in (e.bending, e.membrane, e.shear, e.root, e.stem))]
+        for m in found
+        for e in [m.energy_fractions]
+    ]
+    columns = [*names, "bending", "membrane", "transverse shear", "root", "stem"]
+    print_table("Shares of the strain energy (%)", columns, shares, "Root: the solid cap, fillet or corner.")
