@@ -204,7 +204,14 @@ def smooth(values: ArrayLike, taps: Real) -> Real:
 
 
 def fit_chain(
-    rates: Run, rest: Run, turning: Run, *, rough: Run | None = None, cutoff: float | None = 1.0, order: int = 50
+    rates: Run,
+    rest: Run,
+    turning: Run,
+    *,
+    rough: Run | None = None,
+    cutoff: float | None = 1.0,
+    order: int = 50,
+    sampling: float | None = None,
 ) -> Chain:
     """Fit all steps in the paper's order.
 
@@ -222,6 +229,8 @@ def fit_chain(
         Cut-off (Hz) of the FIR filter; None for no filter.
     order : int
         Its order.
+    sampling : float, optional
+        Step (s) of the output that it will filter; that of `rest` when left out.
 
     Raises
     ------
@@ -236,9 +245,10 @@ def fit_chain(
     over_temperature = _step(
         "scale over temperature (36)", fit_scale_over_temperature, turning.temperature, constant, turning.rate
     )
-    sampling = require_regular(rest.time, "the FIR filter") if cutoff is not None else 0.0
-    taps = np.empty(0) if cutoff is None else design_smoother(sampling, cutoff, order)
-    return Chain(null, scale, covariance, bias, over_rate, over_temperature, taps, sampling)
+    if cutoff is None:
+        return Chain(null, scale, covariance, bias, over_rate, over_temperature, np.empty(0), 0.0)
+    step = require_regular(rest.time, "the FIR filter") if sampling is None else sampling
+    return Chain(null, scale, covariance, bias, over_rate, over_temperature, design_smoother(step, cutoff, order), step)
 
 
 def apply_chain(

@@ -22,6 +22,23 @@ from compensation.transfer import TransferFunction
 Real = NDArray[np.float64]
 
 
+def relate_drive_to_primary(element: SensitiveElement) -> TransferFunction:
+    """A₁(s) / q₁₀(s) = 1 / ((s + jω)² + 2 ζ₁ k₁ (s + jω) + k₁²), in s²: first of eqs. (7); at s = 0 it is (8)."""
+    e = element
+    detuning = (e.k1 - e.omega) * (e.k1 + e.omega)
+    damping = e.zeta1 * e.k1
+    return TransferFunction((1.0,), (1.0, 2 * (damping + 1j * e.omega), detuning + 2j * e.omega * damping))
+
+
+def relate_primary_to_secondary(element: SensitiveElement, rate: float) -> TransferFunction:
+    """A₂(s) / A₁(s) = g₂ Ω (s + jω) / ((s + jω)² + 2 ζ₂ k₂ (s + jω) + k₂²) for a constant rate: second of eqs. (7).
+
+    It holds while the primary still builds up, where (9) and all that follows from it take A₁ as settled.
+    """
+    gain = element.g2 * rate
+    return TransferFunction((gain, 1j * gain * element.omega), expand_secondary(element))
+
+
 def relate_rate_to_secondary(element: SensitiveElement) -> TransferFunction:
     """W₂(s) = A₁ (s + j g₂ ω) / ((s + jω)² + 2 ζ₂ k₂ (s + jω) + k₂²), in m per rad/s: eq. (12).
 

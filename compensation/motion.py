@@ -71,10 +71,11 @@ def integrate_motion(
     *,
     zeta12: ArrayLike | None = None,
     zeta21: ArrayLike | None = None,
+    from_rest: bool = False,
     samples_per_cycle: int = 16,
     tolerance: float = 1e-10,
 ) -> Motion:
-    """Integrate equation (2) through every carrier cycle, from a settled primary and a resting secondary.
+    """Integrate equation (2) through every carrier cycle.
 
     Parameters
     ----------
@@ -84,6 +85,8 @@ def integrate_motion(
         Times (s) and angular rate (rad/s) there, linear in between.
     zeta12, zeta21 : array (N,), optional
         Cross-damping (1) at these times; zero when left out.
+    from_rest : bool
+        Start with both motions at rest, instead of a settled primary and a resting secondary.
     samples_per_cycle : int
         Density of the returned displacements, an even grid.
     tolerance : float
@@ -114,7 +117,7 @@ def integrate_motion(
         out[2] += q10 * np.sin(omega * at)
         return out
 
-    A1 = element.primary_amplitude * np.exp(1j * omega * t[0])
+    A1 = 0j if from_rest else element.primary_amplitude * np.exp(1j * omega * t[0])
     start = [A1.imag, 0.0, (1j * omega * A1).imag, 0.0]
     step = 2 * np.pi / omega / samples_per_cycle
     grid = t[0] + step * np.arange(int((t[-1] - t[0]) / step * (1 + 1e-12)) + 1)
@@ -125,7 +128,7 @@ def integrate_motion(
         method="DOP853",
         t_eval=grid,
         rtol=tolerance,
-        atol=tolerance * abs(A1) * np.array([1, 1, omega, omega]),
+        atol=tolerance * abs(element.primary_amplitude) * np.array([1, 1, omega, omega]),
         max_step=float(np.max(np.diff(t))),
     )
     if not solution.success:
@@ -140,6 +143,7 @@ def propagate_envelope(
     *,
     zeta12: ArrayLike | None = None,
     zeta21: ArrayLike | None = None,
+    from_rest: bool = False,
 ) -> Motion:
     """Propagate the complex amplitudes of equation (2), nothing neglected, from one sample to the next.
 
@@ -150,7 +154,7 @@ def propagate_envelope(
 
     Parameters
     ----------
-    element, time, rate, zeta12, zeta21
+    element, time, rate, zeta12, zeta21, from_rest
         As for `integrate_motion`.
 
     Returns
@@ -179,7 +183,7 @@ def propagate_envelope(
     kinds, kind = np.unique(exponents, axis=0, return_inverse=True)
     steps = expm(kinds)
     y = np.empty((len(t), 5), dtype=complex)
-    A1 = element.primary_amplitude
+    A1 = 0j if from_rest else element.primary_amplitude
     y[0] = [A1, 0, 1j * element.omega * A1, 0, 1]
     for n, k in enumerate(kind.ravel()):
         y[n + 1] = steps[k] @ y[n]

@@ -8,6 +8,9 @@ from typing import TYPE_CHECKING
 from studies.errors import InputError
 
 if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
     from compensation.cross_damping import RestRun
     from studies.record import Record
 
@@ -28,6 +31,21 @@ class RestData:
     temperature_column: str
     left_out: int
     block_s: float
+
+
+def drop_spikes(keep: "NDArray[np.bool_]", *columns: "NDArray[np.float64]") -> "NDArray[np.bool_]":
+    """Return the rows to keep without those in which a column is contradicted by its neighbours."""
+    import numpy as np
+
+    from compensation.decimation import NEIGHBOURS, find_spikes
+
+    rows = np.flatnonzero(keep)
+    if len(rows) < NEIGHBOURS:
+        return keep
+    spikes = np.any([find_spikes(column[rows]) for column in columns], axis=0)
+    cleaned = keep.copy()
+    cleaned[rows[spikes]] = False
+    return cleaned
 
 
 def celsius_range(lowest: float, highest: float) -> tuple[float, float]:
@@ -75,7 +93,7 @@ def gather_rest(records: "Sequence[Record]", outputs: "dict[str, float]") -> Res
         if "rate_deg_per_s" in record and np.nanmax(np.abs(record["rate_deg_per_s"]), initial=0.0) > LARGEST_REST:
             raise InputError(f"{record.path}: rate_deg_per_s is not zero; this fit needs the gyro at rest.")
         time, values, temperature = record["time_s"], record[output], record[column]
-        complete = np.isfinite(values) & np.isfinite(temperature)
+        complete = drop_spikes(np.isfinite(values) & np.isfinite(temperature), values, temperature)
         left_out += int(np.count_nonzero(~complete))
         if np.count_nonzero(complete) < 2:
             raise InputError(f"{record.path}: no rows with both {output} and {column}; the temperature is missing.")

@@ -1,17 +1,18 @@
 """The compensation chain of a bell-shaped gyro as a study: runs sorted by what they show, figures after every step."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from compensation.bell import Chain, Run, apply_chain, fit_chain, measure_linearity
+from compensation.samples import is_regular
 from compensation.stability import allan_deviation
 from studies.errors import InputError
 from studies.models.kinds.scale import RAW
-from studies.rest import CELSIUS_ZERO, LARGEST_REST, TEMPERATURES, choose_column
+from studies.rest import CELSIUS_ZERO, LARGEST_REST, TEMPERATURES, choose_column, drop_spikes
 
 if TYPE_CHECKING:
     from studies.record import Record
@@ -58,12 +59,13 @@ class ScaleStudy:
 
 
 def judge_steps(chain: Chain, rates: Run, rest: Run, turning: Run) -> list[StepFigures]:
-    """Return the figures of merit after each step, on any three runs."""
-    outputs = [
-        apply_chain(chain, run.time, run.output, run.temperature, extrapolate=True) for run in (rates, rest, turning)
-    ]
+    """Return the figures of merit after each step, on any three runs; after the filter only where rows are even."""
+    runs = (rates, rest, turning)
+    even = all(is_regular(run.time) for run in runs)
+    static = chain if even else replace(chain, taps=np.empty(0))
+    outputs = [apply_chain(static, run.time, run.output, run.temperature, extrapolate=True) for run in runs]
     figures = []
-    for step in STEPS:
+    for step in STEPS if even else STEPS[:-1]:
         at_rates, at_rest, at_turning = (np.asarray(getattr(output, step), dtype=float) for output in outputs)
         steady = settled_rows(rates.rate, len(chain.taps) if step == "filtered" else 0)
         enough = len(np.unique(rates.rate[steady])) > 2
@@ -113,7 +115,8 @@ def study_scale(records: "Sequence[Record]", cutoff: float | None, order: int) -
         if kind not in sorted_runs:
             raise InputError(f"no record is a run {kind}, which {equation} needs; record one and give it too.")
     rates, rest, turning = (sorted_runs[kind][0] for kind in KINDS)
-    chain = fit_chain(rates, rest, turning, cutoff=cutoff, order=order)
+    sampling = float(np.median(np.diff(rest.time)))
+    chain = fit_chain(rates, rest, turning, cutoff=cutoff, order=order, sampling=sampling)
     before, after = _hold_out((rates, rest, turning))
     figures = judge_steps(chain, rates, rest, turning)
     return ScaleStudy(chain, (rates, rest, turning), output, column, left_out, figures, before, after)
@@ -143,6 +146,7 @@ def _read_run(record: "Record", output: str, column: str) -> tuple[Run, int]:
         raise InputError(f"{record.path}: the column 'rate_deg_per_s' is missing; add the applied rate, 0 at rest.")
     columns = [record["time_s"], record[output], record[column], record["rate_deg_per_s"]]
     complete = np.all([np.isfinite(values) for values in columns], axis=0)
+    complete = drop_spikes(complete, record[output], record[column])
     if np.count_nonzero(complete) < 2:
         raise InputError(f"{record.path}: no rows with {output}, {column} and rate_deg_per_s together.")
     time, raw, temperature, rate = (values[complete] for values in columns)

@@ -83,7 +83,7 @@ def fit_cross_damping(
         write_model(model, save)
         say(f"model: {save}")
     if gathered.left_out:
-        say(f"{gathered.left_out} rows without output or temperature were left out.")
+        say(f"{gathered.left_out} rows with an empty cell or an outlier were left out.")
     if gathered.block_s:
         say(f"long records were averaged over {gathered.block_s:g} s before the fit.")
     if report is not None:

@@ -56,7 +56,7 @@ def fit_scale(
         write_model(model, save)
         say(f"model: {save}")
     if study.left_out:
-        say(f"{study.left_out} rows with an empty cell were left out.")
+        say(f"{study.left_out} rows with an empty cell or an outlier were left out.")
     if report is not None:
         write_text(report, page.scale_page(study, ", ".join(data)))
         say(f"report: {report}")

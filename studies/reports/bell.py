@@ -1,6 +1,7 @@
 """Chapters and page of the four-step chain of a bell-shaped gyro, and the BVG paper's claims beside it."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -49,6 +50,7 @@ def bell_chapters(twin: "BellTwin") -> list[Chapter]:
                 steps_table(twin.held_out, "Runs that the fit has not seen"),
                 steps_table(twin.fitted, "Runs that were fitted"),
                 draw_steps(twin.chain, twin.runs),
+                draw_allan(twin.chain, twin.runs[1]),
             ],
         ),
         Chapter("BVG: what the printed coefficients can explain", claim_blocks(twin.claims)),
@@ -62,7 +64,7 @@ TWIN = (
 
 
 def _facts(study: "ScaleStudy") -> Facts:
-    last = study.figures[-2]
+    last = next(f for f in study.figures if f.step == "temperature_compensated")
     first = study.figures[0]
     linear = "—"
     if first.nonlinearity is not None and last.nonlinearity is not None:
@@ -204,7 +206,9 @@ def draw_steps(chain: "Chain", runs: "tuple[Run, Run, Run]") -> Picture:
             (axes[1], rates, rates.rate / DEG, "applied rate (°/s)"),
             (axes[2], turning, turning.temperature - 273.15, "temperature (°C)"),
         ):
-            result = apply_chain(chain, run.time, run.output, run.temperature, extrapolate=True)
+            result = apply_chain(
+                replace(chain, taps=np.empty(0)), run.time, run.output, run.temperature, extrapolate=True
+            )
             rows = np.unique(np.linspace(0, len(run.time) - 1, MOST_POINTS).astype(int))
             for values, colour, name in (
                 (result.rough, style.ORANGE, "rough"),
@@ -224,3 +228,30 @@ def draw_steps(chain: "Chain", runs: "tuple[Run, Run, Run]") -> Picture:
         "Error of the rate after the rough step and after all steps, before the filter.",
         "Three panels of rate error, before and after compensation.",
     )
+
+
+def draw_allan(chain: "Chain", rest: "Run") -> Picture:
+    """Draw the Allan deviation at rest after the rough step, after the chain, and after the filter (figure 19)."""
+    from compensation.bell import apply_chain
+    from compensation.stability import allan_deviation
+
+    result = apply_chain(chain, rest.time, rest.output, rest.temperature, extrapolate=True)
+    step = float(rest.time[1] - rest.time[0])
+    with style.figure(height=3.4) as (made, axes):
+        for values, colour, name in (
+            (result.rough, style.ORANGE, "rough"),
+            (result.temperature_compensated, style.BLUE, "compensated"),
+            (result.filtered, style.GREEN, f"and filtered, {len(chain.taps)} taps"),
+        ):
+            allan = allan_deviation(values / DEG * 3600, step)
+            axes.loglog(allan.tau, allan.deviation, color=colour, label=name)
+            axes.fill_between(allan.tau, allan.low, allan.high, color=colour, alpha=0.2)
+        axes.axvline(step * len(chain.taps), color=style.BLACK, linewidth=0.8, linestyle=":")
+        axes.set_xlabel("averaging time τ (s)")
+        axes.set_ylabel("Allan deviation (°/h)")
+        axes.legend()
+    caption = (
+        "Allan deviation at rest while the temperature rises, with its 68 % band. The dotted line is the length of the filter: to its"
+        " right filtered and unfiltered are the same, so a random walk read there cannot have become smaller. This is a run that was fitted: the fit itself lowers the longest times."
+    )
+    return draw(made, caption, "Allan deviation over averaging time, three curves.")

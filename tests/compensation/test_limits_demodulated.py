@@ -9,6 +9,8 @@ from compensation.demodulated import (
     find_slow_pole,
     map_integral_error,
     measure_rate,
+    relate_drive_to_primary,
+    relate_primary_to_secondary,
     relate_rate_to_measured_rate,
     relate_rate_to_secondary,
     relate_rate_to_slow_secondary,
@@ -108,6 +110,28 @@ def test_slow_form_errs_in_proportion_to_damping_and_tuned_amplitude_to_its_squa
     np.testing.assert_allclose(np.array(slow[:-1]) / slow[1:], 2, rtol=0.1)
     np.testing.assert_allclose(np.array(tuned[:-1]) / tuned[1:], 4, rtol=0.25)
     assert tuned[0] < 4e-4
+
+
+def test_start_from_rest():
+    """Eqs. (7): the primary builds up, and the secondary with it; against the integrated carrier and the envelope."""
+    time = np.linspace(0, 0.12, 1201)
+    rate = np.full(1201, 0.3)
+    primary = relate_drive_to_primary(MISTUNED)
+    assert primary.steady_gain * MISTUNED.q10 == pytest.approx(MISTUNED.primary_amplitude, rel=1e-12)
+    drive = np.full(1201, MISTUNED.q10)
+    both = primary * relate_primary_to_secondary(MISTUNED, 0.3)
+    envelope = propagate_envelope(MISTUNED, time, rate, from_rest=True)
+    for found, expected in (
+        (envelope.primary, primary.simulate(time, drive)),
+        (envelope.secondary, both.simulate(time, drive)),
+    ):
+        # What (4) leaves out, the reaction on the primary, is of order (Ω/kζ)² = 2e-5.
+        assert np.max(np.abs(found - expected)) < 5e-5 * np.max(np.abs(expected))
+    motion = integrate_motion(MISTUNED, time, rate, from_rest=True, samples_per_cycle=96)
+    carrier = (envelope.secondary * np.exp(1j * MISTUNED.omega * time)).imag
+    inside = time <= motion.time[-1]
+    error = np.abs(CubicSpline(motion.time, motion.secondary)(time) - carrier)[inside]
+    assert np.max(error) < 1e-6 * np.max(np.abs(motion.secondary))
 
 
 def test_poles():

@@ -4,6 +4,7 @@ import ctypes
 import json
 import shutil
 import subprocess
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -81,6 +82,26 @@ def test_gaps(records, tmp_path):
         compensate(read_model(models[0]), holed)
     column = compensate(read_model(models[1]), holed)["compensated_measured_rate_deg_per_s"]
     assert np.flatnonzero(np.isnan(column)).tolist() == [7]
+
+
+def test_outliers_and_gaps_in_the_calibration_are_left_out(records, tmp_path, capsys):
+    assert main(["fit", "scale", *records, "--json"]) == 0
+    clean = json.loads(capsys.readouterr().out)
+    lines = Path(records[1]).read_text().splitlines()
+    for row in (50, 700, 2000):
+        cells = lines[row].split(",")
+        lines[row] = ",".join([cells[0], cells[1], "99999", cells[3]])
+    lines[900] = ",".join([*lines[900].split(",")[:2], "", "0"])
+    holed = tmp_path / "holed.csv"
+    holed.write_text("\n".join(lines) + "\n")
+    page = tmp_path / "page.html"
+    assert main(["fit", "scale", records[0], str(holed), records[2], "--report", str(page), "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["rows_left_out"] == 4
+    assert len(found["steps"]) == 4
+    for name, coefficient in found["parts"]["bias"].items():
+        before = clean["parts"]["bias"][name]
+        assert abs(coefficient["value"] - before["value"]) < 0.5 * before["standard_error"]
 
 
 def test_emitted_c_agrees_with_python(records, tmp_path):
