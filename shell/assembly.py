@@ -8,7 +8,7 @@ import numpy as np
 from scipy.sparse import csr_matrix
 
 from shell.blocks import Mesh, Rows, Solid, Tie, constrain, mesh_solid, number_unknowns, surface_sides, tabulate
-from shell.corner import find_kinks, lay_clamped_face, lay_corner
+from shell.corner import find_kinks, lay_clamped_edge, lay_clamped_face, lay_corner
 from shell.eigen import Index, Pattern, find_pattern
 from shell.errors import ShellError
 from shell.kernel import (
@@ -208,27 +208,38 @@ def build_system(resonator: Resonator, n: int, theory: Theory, level: Level) -> 
 def lay_resonator(resonator: Resonator, n: int, level: Level) -> Layout:
     """Divide the section: a solid root or clamped face first, then chains of shell with a solid corner at every kink."""
     start, first = 0.0, _free_or_pole(resonator.starts_on_axis)
+    stop, last = resonator.length, _free_or_pole(resonator.ends_on_axis)
     solids: list[tuple[Solid, tuple[tuple[int, int], ...]]] = []
-    if resonator.support == "clamped-pole":
-        first = "clamped"
-    elif resonator.support == "stem":
-        solid, start = lay_root(resonator, level.rings)
-        solids.append((solid, ((0, 0),)))
-        first = "tied"
+    kinks = find_kinks(resonator)
+    whole_section = max(level.through) > 1  # a Naghdi shell is clamped as a line and has no singular corners there
+    if resonator.support == "stem":
+        root, start = lay_root(resonator, level.rings)
     elif resonator.support == "clamped-face":
-        solid, start = lay_clamped_face(resonator, level.rings)
-        solids.append((solid, ((0, 0),)))
+        root, start = lay_clamped_face(resonator, level.rings)
+    elif resonator.support == "clamped-pole" and whole_section:
+        root, start = lay_clamped_edge(resonator, False, level.rings)
+    if start:
+        solids.append((root, ((0, 0),)))
         first = "tied"
+    elif resonator.support == "clamped-pole":
+        first = "clamped"
+    if resonator.support == "clamped-rim":
+        last = "clamped"
+        if whole_section:
+            rim, stop = lay_clamped_edge(resonator, True, level.rings)
+            solids.append((rim, ((len(kinks), 1),)))
+            last = "tied"
     chains: list[Chain] = []
-    for joint in find_kinks(resonator):
-        corner, (stop, restart) = lay_corner(resonator, joint, level.rings)
-        if not stop > start:
+    for joint in kinks:
+        corner, (before, after) = lay_corner(resonator, joint, level.rings)
+        if not before > start:
             raise ShellError("two solid corners or clamps of the meridian overlap: lengthen the segment between them.")
-        chains.append(lay_chain(resonator, start, stop, (first, "tied"), n, level.split))
+        chains.append(lay_chain(resonator, start, before, (first, "tied"), n, level.split))
         solids.append((corner, ((len(chains) - 1, 1), (len(chains), 0))))
-        start, first = restart, "tied"
-    last: End = "clamped" if resonator.support == "clamped-rim" else _free_or_pole(resonator.ends_on_axis)
-    chains.append(lay_chain(resonator, start, resonator.length, (first, last), n, level.split))
+        start, first = after, "tied"
+    if not stop > start:
+        raise ShellError("the clamps or corners of the meridian overlap: lengthen its last segment.")
+    chains.append(lay_chain(resonator, start, stop, (first, last), n, level.split))
     return Layout(tuple(chains), tuple(solids))
 
 

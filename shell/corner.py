@@ -1,4 +1,4 @@
-"""Solid corners where the meridian kinks, and the ring around a clamped face, where stress is singular."""
+"""Solid regions where stress is singular: corners where the meridian kinks, clamped edges and faces."""
 
 from math import hypot
 
@@ -72,6 +72,23 @@ def lay_clamped_face(resonator: Resonator, ring_count: int) -> tuple[Solid, floa
     return Solid(tuple(patches), held, c / resonator.length), c + width
 
 
+def lay_clamped_edge(resonator: Resonator, last: bool, ring_count: int) -> tuple[Solid, float]:
+    """Patches of a strip along a clamped edge, refined towards both of its corners, and where the shell meets it."""
+    segment = len(resonator.segments) - 1 if last else 0
+    edge = resonator.length if last else 0.0
+    end = _strip_end(resonator, segment, edge, -1 if last else 1)
+    place = resonator.at([edge], segment)
+    cells = rings(shrinking(ring_count))
+    halves = tuple(_strip(resonator, segment, edge, end, eta, cells, 0.0) for eta in (-1.0, 1.0))
+    (r_edge, z_edge), (t_r, t_z), h = _face(place, 0.0), _tangent(place), float(place.thickness[0])
+
+    def held(r: float, z: float) -> bool:
+        off, along = (r - r_edge) * t_r + (z - z_edge) * t_z, hypot(r - r_edge, z - z_edge)
+        return abs(off) < 1e-9 * h and along < 0.51 * h
+
+    return Solid(halves, held, edge / resonator.length), end
+
+
 def _turn(before: MeridianPoints, after: MeridianPoints) -> float:
     """Angle from one tangent to the next, positive towards the normal n = (-t_z, t_r)."""
     along = before.tangent_r * after.tangent_r + before.tangent_z * after.tangent_z
@@ -103,7 +120,12 @@ def _strip_end(resonator: Resonator, segment: int, s: float, direction: int) -> 
     return s + direction * min(COLLAR * h, room)
 
 
-def _strip(resonator: Resonator, segment: int, s: float, end: float, inner: float, cells: tuple[Cell, ...]) -> Patch:
+def _strip(
+    resonator: Resonator, segment: int, s: float, end: float, near: float, cells: tuple[Cell, ...], far: float | None = None
+) -> Patch:
+    """The shell from s to `end`, from the face η = near to η = far (the other face if not given)."""
+    far = -near if far is None else far
+
     def side(eta: float) -> Path:
         def path(x: Array) -> tuple[Array, Array]:
             points = resonator.at(np.ravel(s + (end - s) * x), segment)
@@ -113,8 +135,8 @@ def _strip(resonator: Resonator, segment: int, s: float, end: float, inner: floa
         return path
 
     start, stop = resonator.at([s], segment), resonator.at([end], segment)
-    return Patch(straight(_face(start, inner), _face(start, -inner)), straight(_face(stop, inner), _face(stop, -inner)),
-                 side(inner), side(-inner), cells, "corner")
+    return Patch(straight(_face(start, near), _face(start, far)), straight(_face(stop, near), _face(stop, far)),
+                 side(near), side(far), cells, "corner")
 
 
 def _face(points: MeridianPoints, eta: float) -> Spot:
