@@ -1,0 +1,208 @@
+"""Bias of the gyro as a function of its own frequency and of how fast that changes, HRG paper eqs. (19)–(22).
+
+B = B₀ + k₁ f + k₂ f² + k₃ f³ + k₄ ḟ + k₅ ḟ² + k₆ ḟ³ + k₇ f ḟ + k₈ f² ḟ + k₉ f ḟ², f the *change* of frequency (Hz),
+ḟ its rate (Hz/s), B in the unit of the bias column.
+Which terms are taken is decided in `compensation.bias_selection`.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from compensation.coloured import coloured_covariance, fit_coloured
+from compensation.decimation import average_blocks
+from compensation.derivative import differentiate
+from compensation.errors import CompensationError
+from compensation.regression import fit_linear
+from compensation.stepwise import Selection
+
+Array = NDArray[np.float64]
+# Powers of f and ḟ in the terms of HRG paper eq. (21), in its order k₁ … k₉.
+TERMS: dict[str, tuple[int, int]] = {
+    "f": (1, 0), "f^2": (2, 0), "f^3": (3, 0), "fdot": (0, 1), "fdot^2": (0, 2), "fdot^3": (0, 3),
+    "f*fdot": (1, 1), "f^2*fdot": (2, 1), "f*fdot^2": (1, 2),
+}  # fmt: skip
+PARENTS = {
+    name: [other for other, (c, d) in TERMS.items() if (c, d) in ((a - 1, b), (a, b - 1))]
+    for name, (a, b) in TERMS.items()
+}
+SELECTED_BY_THE_PAPER = ("f", "f^2", "f^3", "fdot", "fdot^2", "f*fdot")
+
+
+@dataclass(frozen=True)
+class BiasRun:
+    """One run, decimated: mean `time` (s), `frequency` (Hz), its `rate` (Hz/s) and `bias` of each block (b,).
+
+    `width` of a block (s); `lag` of the rate (s); `window` over which it was taken (s); rows that were left out:
+    `missing` values, `spikes`.
+    """
+
+    time: Array
+    frequency: Array
+    rate: Array
+    bias: Array
+    width: float
+    window: float
+    lag: float
+    missing: int
+    spikes: int
+
+
+    def part(self, rows: slice) -> "BiasRun":
+        """Return some consecutive rows as a run of its own."""
+        cut = {name: getattr(self, name)[rows] for name in ("time", "frequency", "rate", "bias")}
+        return replace(self, **cut)
+
+
+@dataclass(frozen=True)
+class BiasFit:
+    """A bias model fitted to runs.
+
+    `coefficients` of ("constant", *terms) and their `covariance`, which respects the autocorrelation;
+    `naive_errors`, the standard errors that take rows for independent; `theta` of the noise (1 white, 0 random walk);
+    `selection` the path; `held_out` the held-out standard deviation of each model on it, constant alone first
+    (empty for the paper's method, which does not look).
+    """
+
+    reference_frequency: float
+    terms: tuple[str, ...]
+    coefficients: Array
+    covariance: Array
+    naive_errors: Array
+    theta: float
+    selection: Selection | None
+    held_out: tuple[float, ...]
+    frequency_range: tuple[float, float]
+    rate_range: tuple[float, float]
+
+    @property
+    def standard_errors(self) -> Array:
+        """Standard errors of ("constant", *terms) that respect the autocorrelation."""
+        return np.sqrt(np.diag(self.covariance))
+
+    def predict(self, frequency: ArrayLike, rate: ArrayLike) -> Array:
+        """Return the bias that the model expects at a frequency (Hz) and its rate (Hz/s)."""
+        columns = term_columns(frequency, rate, self.reference_frequency, self.terms)
+        return np.asarray(self.coefficients[0] + columns @ self.coefficients[1:])
+
+
+def prepare_run(
+    time: ArrayLike,
+    frequency: ArrayLike,
+    bias: ArrayLike,
+    width: float = 100.0,
+    window: float = 300.0,
+    *,
+    causal: bool = False,
+) -> BiasRun:
+    """Decimate one run and add the rate of its frequency.
+
+    Parameters
+    ----------
+    time, frequency, bias : array, shape (m,)
+        Time (s), frequency (Hz) and zero-rate output; NaN where missing.
+    width : float
+        Length of the blocks that are averaged, s; never less than the sampling interval.
+    window : float
+        Length of the window over which the rate is taken, s.
+    causal : bool
+        The rate uses past samples only, as firmware must, and lags by window/2.
+
+    Raises
+    ------
+    CompensationError
+        Too little data, frequencies that cannot be, time that does not increase, a window that is too short.
+    """
+    t = np.asarray(time, dtype=np.float64)
+    if np.any(np.asarray(frequency, dtype=np.float64) <= 0):
+        raise CompensationError("a frequency must be positive; check the unit of the column.")
+    width = max(width, float(np.median(np.diff(t)))) if t.size > 1 else width
+    blocks = average_blocks(t, {"frequency": frequency, "bias": bias}, width)
+    f = blocks.columns["frequency"]
+    derivative = differentiate(blocks.time, f, max(window, 3 * width), causal=causal)
+    ok = derivative.complete
+    return BiasRun(
+        time=blocks.time[ok],
+        frequency=f[ok],
+        rate=derivative.slope[ok],
+        bias=blocks.columns["bias"][ok],
+        width=width,
+        window=max(window, 3 * width),
+        lag=derivative.lag,
+        missing=blocks.missing,
+        spikes=blocks.spikes,
+    )
+
+
+def term_columns(
+    frequency: ArrayLike, rate: ArrayLike, reference_frequency: float, terms: Sequence[str]
+) -> Array:
+    """Return one column per term of HRG paper eq. (21), shape (m, len(terms))."""
+    f = np.asarray(frequency, dtype=np.float64) - reference_frequency
+    rate = np.asarray(rate, dtype=np.float64)
+    columns = [f ** TERMS[name][0] * rate ** TERMS[name][1] for name in terms]
+    return np.column_stack(columns) if columns else np.empty((f.size, 0))
+
+
+class Design:
+    """Several runs below each other: `constants` (m, runs), the nine `candidates` (m, 9), `bias` (m,), `rows` per run."""
+
+    def __init__(self, runs: Sequence[BiasRun], reference: float) -> None:
+        sizes = [run.time.size for run in runs]
+        ends = np.cumsum(sizes)
+        self.reference = reference
+        self.rows = [slice(end - size, end) for end, size in zip(ends, sizes, strict=True)]
+        self.frequency = np.concatenate([run.frequency for run in runs])
+        self.rate = np.concatenate([run.rate for run in runs])
+        self.bias = np.concatenate([run.bias for run in runs])
+        self.constants = np.zeros((self.bias.size, len(runs)))
+        for k, rows in enumerate(self.rows):
+            self.constants[rows, k] = 1.0
+        if np.ptp(self.frequency) <= 1e-12 * np.max(self.frequency):
+            raise CompensationError(
+                f"the frequency is constant ({self.frequency[0]:g} Hz): nothing can be learnt from it; record a run in "
+                "which the temperature changes."
+            )
+        if self.bias.size <= len(runs) + len(TERMS):
+            raise CompensationError(
+                f"{len(TERMS)} candidate terms and {len(runs)} constants need more than {len(runs) + len(TERMS)} averages, "
+                f"not {self.bias.size}; record longer or average over less than {runs[0].width:g} s."
+            )
+        self.candidates = term_columns(self.frequency, self.rate, reference, tuple(TERMS))
+
+
+def fit_terms(
+    design: Design,
+    terms: tuple[str, ...],
+    theta: float | None = None,
+    selection: Selection | None = None,
+    scores: tuple[float, ...] = (),
+) -> BiasFit:
+    """Fit the given terms by least squares, with errors for independent rows and for remembering ones.
+
+    `theta` of the noise is estimated with these terms unless it is given.
+    """
+    X = np.column_stack([design.constants, design.candidates[:, [list(TERMS).index(name) for name in terms]]])
+    count = design.constants.shape[1]
+    names = [*(f"constant of run {k + 1}" for k in range(count)), *terms]
+    fit = fit_linear(X, design.bias, names, constant=False)
+    noise = fit_coloured(X, design.bias, names, design.rows, theta)
+    coloured = coloured_covariance(fit, noise, design.rows)
+    # B₀ is the mean of the runs' constants.
+    M = np.zeros((1 + len(terms), len(names)))
+    M[0, :count] = 1.0 / count
+    M[1:, count:] = np.eye(len(terms))
+    return BiasFit(
+        reference_frequency=design.reference,
+        terms=terms,
+        coefficients=M @ fit.coefficients,
+        covariance=M @ coloured @ M.T,
+        naive_errors=np.sqrt(np.diag(M @ fit.covariance @ M.T)),
+        theta=noise.theta,
+        selection=selection,
+        held_out=scores,
+        frequency_range=(float(design.frequency.min()), float(design.frequency.max())),
+        rate_range=(float(design.rate.min()), float(design.rate.max())),
+    )

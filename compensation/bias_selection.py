@@ -1,0 +1,227 @@
+"""Which terms of HRG paper eq. (21) a bias model keeps, and what it is worth on data that it has not seen.
+
+Two ways of selecting stand side by side; the coefficients of the chosen terms are those of least squares in both:
+
+`paper`    F-tests that take the rows for independent, entry 0.05 and removal 0.10;
+`guarded`  the errors may remember (white noise plus random walk), the entry level is shared among the candidates that
+           compete, so that noise alone brings a term in at most one time in twenty; given several runs, the model on
+           the path that best predicts a run from the others is kept, if any does better than a constant.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from compensation.bias import PARENTS, TERMS, BiasFit, BiasRun, Design, fit_terms
+from compensation.coloured import estimate_theta, whiten
+from compensation.errors import CompensationError
+from compensation.stepwise import select_stepwise
+
+Array = NDArray[np.float64]
+Method = Literal["paper", "guarded"]
+ENTER, REMOVE = 0.05, 0.10
+# Bias stability is the standard deviation of averages over this many seconds; the paper does not state its own.
+AVERAGING = 100.0
+BLOCKS = 5
+# The noise is taken at one standard deviation towards the random walk, which keeps the rate of false terms near 5 %.
+CAUTION = 1.0
+
+
+class NothingInRange(CompensationError):
+    """A held-out part lies wholly outside the range of frequency and rate that the rest has seen."""
+
+
+@dataclass(frozen=True)
+class HeldOut:
+    """What models are worth on rows that they have not seen: standard deviations of 100 s averages, pooled.
+
+    `before` without and `after` with compensation, both about the held-out piece's own mean; `coverage` the part of
+    the rows that lies inside the range of the rest; `by_runs` whole runs were held out, else blocks; `terms` those
+    selected each time.
+    """
+
+    before: float
+    after: float
+    coverage: float
+    by_runs: bool
+    terms: tuple[tuple[str, ...], ...]
+
+    @property
+    def gain(self) -> float:
+        """How many times smaller the held-out bias is with compensation."""
+        return self.before / self.after
+
+
+@dataclass(frozen=True)
+class _Fold:
+    held_out: BiasRun
+    rest: list[BiasRun]
+
+
+def fit_bias(runs: Sequence[BiasRun], method: Method = "guarded", reference_frequency: float | None = None) -> BiasFit:
+    """Select and fit the bias model on one run or several, HRG paper eqs. (21), (22).
+
+    Parameters
+    ----------
+    runs : sequence of BiasRun
+        Every run has its own constant (turn-on bias); B₀ is their mean.
+    method : "paper" or "guarded"
+        See the head of this module.
+    reference_frequency : float, optional
+        The frequency from which changes are counted; the first of the first run unless given.
+
+    Raises
+    ------
+    CompensationError
+        Fewer rows than terms, or a frequency that does not change.
+    """
+    return _select(runs, method, reference_frequency, by_runs=len(runs) > 1)
+
+
+def score_held_out(runs: Sequence[BiasRun], method: Method = "guarded") -> HeldOut:
+    """Predict every run from a model selected and fitted without it; with one run, every fifth of it.
+
+    The blocks of a single run are held out with a gap of one thermal constant, std(f) / rms(ḟ), on either side. The
+    held-out piece's own constant is refitted, nothing else; rows outside the range that the rest has seen are not
+    predicted, as the model refuses to be used there, and `coverage` tells how many were left.
+
+    Raises
+    ------
+    NothingInRange
+        Nothing of any held-out piece lies inside the range of the rest.
+    """
+    by_runs = len(runs) > 1
+    folds = _folds(runs, by_runs)
+    fits = [_select(fold.rest, method, None, by_runs=by_runs and len(runs) > 2) for fold in folds]
+    return _pool(folds, fits, by_runs=by_runs)
+
+
+def _select(pieces: Sequence[BiasRun], method: Method, reference_frequency: float | None, *, by_runs: bool) -> BiasFit:
+    reference = float(pieces[0].frequency[0]) if reference_frequency is None else reference_frequency
+    design = Design(pieces, reference)
+    names = tuple(TERMS)
+    everything = np.column_stack([design.constants, design.candidates])
+    theta = estimate_theta(everything, design.bias, design.rows, CAUTION)
+    if method == "paper":
+        selection = select_stepwise(design.constants, design.candidates, design.bias, names, PARENTS, ENTER, REMOVE)
+        return fit_terms(design, selection.terms, selection=selection)
+    constants, candidates, bias = (
+        whiten(part, theta, design.rows) for part in (design.constants, design.candidates, design.bias)
+    )
+    selection = select_stepwise(constants, candidates, bias, names, PARENTS, ENTER, REMOVE, shared=True)
+    path = [(), *(step.terms for step in selection.steps)]
+    if not by_runs or len(path) == 1:
+        return fit_terms(design, selection.terms, selection=selection)
+    try:
+        scores = _score_path(pieces, path, theta, reference)
+    except NothingInRange:  # no run can be predicted from the others: the tests alone decide
+        return fit_terms(design, selection.terms, selection=selection)
+    best = path[int(np.argmin(scores))]
+    return fit_terms(design, tuple(sorted(best, key=names.index)), selection=selection, scores=scores)
+
+
+def _score_path(
+    runs: Sequence[BiasRun], path: Sequence[tuple[str, ...]], theta: float, reference: float
+) -> tuple[float, ...]:
+    """Held-out standard deviation of each model on the path, over that of the constant alone, run by run."""
+    folds = _folds(runs, True)
+    designs = [Design(fold.rest, reference) for fold in folds]
+    scores = []
+    for terms in path:
+        fits = [fit_terms(design, terms, theta) for design in designs]
+        scores.append(1.0 / _pool(folds, fits, by_runs=True).gain)
+    return tuple(scores)
+
+
+def _folds(pieces: Sequence[BiasRun], by_runs: bool) -> list[_Fold]:
+    if by_runs:
+        return [_Fold(run, [other for other in pieces if other is not run]) for run in pieces]
+    length = max(1, sum(piece.time.size for piece in pieces) // BLOCKS)
+    folds = []
+    for piece in pieces:
+        gap = thermal_constant(pieces)
+        cuts = np.linspace(0, piece.time.size, max(1, round(piece.time.size / length)) + 1).astype(int)
+        for begin, end in pairwise(cuts.tolist()):
+            before = int(np.searchsorted(piece.time, piece.time[begin] - gap))
+            after = int(np.searchsorted(piece.time, piece.time[end - 1] + gap, side="right"))
+            around = [piece.part(slice(0, before)), piece.part(slice(after, None))]
+            rest = [part for part in around if part.time.size > 2 * len(TERMS)]
+            rest += [other for other in pieces if other is not piece]
+            if rest and sum(part.time.size for part in rest) > 4 * len(TERMS):
+                folds.append(_Fold(piece.part(slice(begin, end)), rest))
+    if not folds:
+        raise CompensationError(
+            "the run is too short to hold a part of it out: less than its thermal constant would be left; record longer, "
+            "or give several runs."
+        )
+    return folds
+
+
+def thermal_constant(pieces: Sequence[BiasRun]) -> float:
+    """Return std(f) / rms(ḟ), the time in which the frequency changes by its own spread (s)."""
+    frequency = np.concatenate([piece.frequency for piece in pieces])
+    rate = np.concatenate([piece.rate for piece in pieces])
+    return float(np.std(frequency) / np.sqrt(np.mean(rate**2)))
+
+
+def score_runs(fit: BiasFit, runs: Sequence[BiasRun], *, extrapolate: bool = False) -> HeldOut:
+    """Apply a fitted model to runs that it has not seen; each run's own mean is taken out, nothing else.
+
+    Rows outside the range that the fit has seen are left out, unless `extrapolate`.
+
+    Raises
+    ------
+    NothingInRange
+        Nothing of the runs lies inside the range of frequency and rate that the fit has seen.
+    """
+    return _pool([_Fold(run, []) for run in runs], [fit] * len(runs), by_runs=True, everywhere=extrapolate)
+
+
+def bias_stability(run: BiasRun, bias: Array | None = None) -> float:
+    """Return the standard deviation of 100 s averages of the run's bias, or of another column of its rows."""
+    return float(np.std(_averages(run.bias if bias is None else bias, run), ddof=1))
+
+
+def _pool(
+    folds: Sequence[_Fold], fits: Sequence[BiasFit], *, by_runs: bool, everywhere: bool = False
+) -> HeldOut:
+    raw: list[Array] = []
+    compensated: list[Array] = []
+    for fold, fit in zip(folds, fits, strict=True):
+        run = fold.held_out
+        inside = within(run.frequency, fit.frequency_range) & within(run.rate, fit.rate_range) | everywhere
+        left = run.bias - fit.predict(run.frequency, run.rate)
+        averages = [_averages(values[inside], run) for values in (run.bias, left)]
+        if averages[0].size > 2:
+            raw.append(averages[0] - averages[0].mean())
+            compensated.append(averages[1] - averages[1].mean())
+    if not raw:
+        raise NothingInRange(
+            "no held-out part lies inside the range of frequency and rate of the rest; record a second run over the "
+            "same temperatures."
+        )
+    before, after = np.concatenate(raw), np.concatenate(compensated)
+    possible = sum(_averages(fold.held_out.bias, fold.held_out).size for fold in folds)
+    return HeldOut(
+        before=float(np.sqrt(np.mean(before**2))),
+        after=float(np.sqrt(np.mean(after**2))),
+        coverage=before.size / possible,
+        by_runs=by_runs,
+        terms=tuple(fit.terms for fit in fits),
+    )
+
+
+def within(values: Array, limits: tuple[float, float]) -> NDArray[np.bool_]:
+    """Tell which values lie inside the limits."""
+    return np.asarray((values >= limits[0]) & (values <= limits[1]))
+
+
+def _averages(values: Array, run: BiasRun) -> Array:
+    """Average consecutive rows over AVERAGING seconds."""
+    count = max(1, round(AVERAGING / run.width))
+    whole = values.size // count * count
+    return np.asarray(values[:whole].reshape(-1, count).mean(axis=1)) if whole else values[:0]

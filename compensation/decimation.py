@@ -1,0 +1,111 @@
+"""Decimation of a record by block averages, with spikes and missing samples left out and counted.
+
+A block average is the anti-alias filter of stability analysis: its response sin(πfτ)/(πfτ) vanishes at every
+multiple of the output rate, and the averages of white noise stay white. Sampling may be irregular.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy import ndimage
+
+from compensation.errors import CompensationError
+
+Array = NDArray[np.float64]
+NEIGHBOURS = 7
+SPIKE = 8.0
+
+
+@dataclass(frozen=True)
+class Blocks:
+    """Block averages: `time` (b,) mean time of each block, `columns` name → (b,), `counts` samples used (b,).
+
+    `missing` rows with an empty value, `spikes` rows with a value that its neighbours contradict; blocks with
+    fewer than half the usual number of samples are left out.
+    """
+
+    time: Array
+    columns: Mapping[str, Array]
+    counts: NDArray[np.intp]
+    width: float
+    missing: int
+    spikes: int
+
+
+def average_blocks(time: ArrayLike, columns: Mapping[str, ArrayLike], width: float) -> Blocks:
+    """Average every column over consecutive blocks of `width` seconds.
+
+    Parameters
+    ----------
+    time : array, shape (m,)
+        Strictly increasing, s; any sampling.
+    columns : mapping of name to array, shape (m,)
+        NaN marks a missing value; a row that lacks one column is left out of all.
+    width : float
+        Length of a block, s.
+
+    Raises
+    ------
+    CompensationError
+        Time that does not increase, lengths that disagree, a width that is not positive, or no usable row.
+    """
+    t = np.asarray(time, dtype=np.float64)
+    arrays = {name: np.asarray(column, dtype=np.float64) for name, column in columns.items()}
+    check_time(t)
+    for name, column in arrays.items():
+        if column.shape != t.shape:
+            raise CompensationError(f"'{name}' has {column.size} values for {t.size} times; they must be equally many.")
+    if not width > 0:
+        raise CompensationError(f"the length of a block must be positive, not {width:g} s.")
+    present = np.all([np.isfinite(column) for column in arrays.values()], axis=0)
+    if np.count_nonzero(present) < NEIGHBOURS:
+        raise CompensationError(
+            f"only {np.count_nonzero(present)} rows have a value in each of {', '.join(arrays)}; record more."
+        )
+    keep = present.copy()
+    for column in arrays.values():
+        keep[present] &= ~find_spikes(column[present])
+    used = t[keep]
+    edges = np.searchsorted(used, used[0] + width * np.arange(np.floor((used[-1] - used[0]) / width) + 2))
+    counts = np.diff(edges)
+    full = counts >= max(1.0, 0.5 * float(np.median(counts[counts > 0])))
+    starts, counts = edges[:-1][full], counts[full]
+
+    def mean(column: Array) -> Array:
+        # Sums of differences from one value keep the digits that running sums of large values lose.
+        total = np.concatenate([[0.0], np.cumsum(column[keep] - column[keep][0])])
+        return np.asarray((total[starts + counts] - total[starts]) / counts + column[keep][0])
+
+    return Blocks(
+        time=mean(t),
+        columns={name: mean(column) for name, column in arrays.items()},
+        counts=counts,
+        width=float(width),
+        missing=int(np.count_nonzero(~present)),
+        spikes=int(np.count_nonzero(present & ~keep)),
+    )
+
+
+def find_spikes(values: Array) -> NDArray[np.bool_]:
+    """Mark samples farther than 8 robust standard deviations from the median of their 7 neighbours.
+
+    The standard deviation is 1.4826 times the median absolute deviation from those medians, so a trend of any
+    steepness is no spike; where rounding makes it zero, the smallest deviation takes its place.
+    """
+    distance = np.abs(values - ndimage.median_filter(values, NEIGHBOURS, mode="nearest"))
+    spread = 1.4826 * float(np.median(distance))
+    if spread == 0:
+        positive = distance[distance > 0]
+        spread = float(positive.min()) if positive.size else 1.0
+    return np.asarray(distance > SPIKE * spread)
+
+
+def check_time(time: Array) -> None:
+    """Raise a CompensationError unless time is finite and strictly increasing."""
+    if time.ndim != 1 or time.size < 2 or not np.all(np.isfinite(time)):
+        raise CompensationError("time must be a column of at least two finite values.")
+    backwards = np.flatnonzero(np.diff(time) <= 0)
+    if backwards.size:
+        raise CompensationError(f"time does not increase after row {backwards[0] + 1}; sort the rows by time.")

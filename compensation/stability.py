@@ -1,0 +1,215 @@
+"""Allan deviation of a rate output with confidence, and the noise coefficients N, B, K read off it by a fit.
+
+σ²(τ) = N²/τ + (2 ln 2/π) B² + K² τ/3: angle random walk N, bias instability B (flat part over √(2 ln 2/π) = 0.664)
+and rate random walk K, IEEE Std 952. With the output in °/h and τ in s, N is in °/h·√s (divide by 60 for °/√h) and
+K in °/h/√s (multiply by 60 for °/h/√h). Equivalent degrees of freedom after Riley, NIST SP 1065, section 5.4.1.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy import optimize, stats
+
+from compensation.errors import CompensationError
+
+Array = NDArray[np.float64]
+FLAT = math.sqrt(2 * math.log(2) / math.pi)  # 0.664, Allan deviation of flicker noise with B = 1
+Noise = Literal["phase", "white", "flicker", "random walk"]
+# Slope of log σ against log τ: quantisation, angle random walk, bias instability, rate random walk.
+SLOPES: dict[Noise, float] = {"phase": -1.0, "white": -0.5, "flicker": 0.0, "random walk": 0.5}
+
+
+@dataclass(frozen=True)
+class AllanDeviation:
+    """Overlapping Allan deviation: `tau` (s), `deviation`, equivalent `degrees_of_freedom`, `low` and `high`, all (k,).
+
+    `noise` is the kind of noise that dominates at each τ, from the local slope; `confidence` is that of the band.
+    """
+
+    tau: Array
+    deviation: Array
+    degrees_of_freedom: Array
+    noise: tuple[Noise, ...]
+    low: Array
+    high: Array
+    confidence: float
+
+    @property
+    def bias_instability(self) -> tuple[float, float, float]:
+        """Lowest point of the curve over 0.664, with the ends of its confidence band (the classical reading)."""
+        k = int(np.argmin(self.deviation))
+        return float(self.deviation[k] / FLAT), float(self.low[k] / FLAT), float(self.high[k] / FLAT)
+
+
+@dataclass(frozen=True)
+class NoiseCoefficients:
+    """N, B, K of σ²(τ) = N²/τ + 0.664² B² + K² τ/3 and their standard uncertainties.
+
+    A coefficient that the data do not show is 0, and its uncertainty is then the size that one standard deviation
+    of the fit could hide. `misfit` is the rms of (measured/fitted variance − 1) over its expectation √(2/EDF):
+    about 1 when the three kinds of noise explain the curve.
+    """
+
+    N: float
+    B: float
+    K: float
+    N_uncertainty: float
+    B_uncertainty: float
+    K_uncertainty: float
+    misfit: float
+
+    def deviation(self, tau: ArrayLike) -> Array:
+        """Return the Allan deviation of these three noises at τ (s)."""
+        return np.asarray(np.sqrt(_basis(np.asarray(tau, dtype=np.float64)) @ [self.N**2, self.B**2, self.K**2]))
+
+
+def allan_deviation(
+    rate: ArrayLike,
+    step: float,
+    points_per_octave: int = 3,
+    confidence: float = 0.683,
+    factors: Sequence[int] | None = None,
+) -> AllanDeviation:
+    """Compute the overlapping Allan deviation of equally spaced rate samples.
+
+    σ²(m τ₀) = Σ (x_{i+2m} − 2 x_{i+m} + x_i)² / (2 (m τ₀)² (n + 1 − 2m)), x the running integral of the rate.
+
+    Parameters
+    ----------
+    rate : array, shape (n,)
+        Rate or bias, each the mean over one step.
+    step : float
+        τ₀, s.
+    points_per_octave : int
+        How densely τ is chosen; the longest is a third of the record.
+    confidence : float
+        Of the band between `low` and `high`, from χ² with the equivalent degrees of freedom.
+    factors : sequence of int, optional
+        The averaging factors m themselves, where particular ones are wanted.
+
+    Raises
+    ------
+    CompensationError
+        Fewer than 9 samples, missing values, a constant record or a step that is not positive.
+    """
+    y = np.asarray(rate, dtype=np.float64)
+    if y.ndim != 1 or y.size < 9:
+        raise CompensationError(f"an Allan deviation needs at least 9 samples in a row, not {y.size}; record longer.")
+    if not np.all(np.isfinite(y)):
+        raise CompensationError(
+            f"the output has {np.count_nonzero(~np.isfinite(y))} missing values; an Allan deviation needs an unbroken "
+            "series: average over blocks first, or cut the record at its gaps."
+        )
+    if not step > 0:
+        raise CompensationError(f"the sampling step must be positive, not {step:g} s.")
+    if np.ptp(y) == 0:
+        raise CompensationError(f"the output is constant ({y[0]:g}); check the column.")
+    if factors is None:
+        longest = y.size // 3
+        count = int(points_per_octave * math.log2(longest)) + 1
+        spaced = np.unique(np.round(2.0 ** (np.arange(count + 1) / points_per_octave)).astype(int))
+        factors = spaced[spaced <= longest].tolist()
+    x = np.concatenate([[0.0], np.cumsum(y - y.mean())]) * step
+    deviation = np.array([_overlapping(x, m, step) for m in factors])
+    tau = np.asarray(factors, dtype=np.float64) * step
+    noise = _identify(tau, deviation)
+    edf = np.array([equivalent_freedom(kind, x.size, m) for kind, m in zip(noise, factors, strict=True)])
+    tail = (1 - confidence) / 2
+    return AllanDeviation(
+        tau=tau,
+        deviation=deviation,
+        degrees_of_freedom=edf,
+        noise=noise,
+        low=deviation * np.sqrt(edf / stats.chi2.isf(tail, edf)),
+        high=deviation * np.sqrt(edf / stats.chi2.ppf(tail, edf)),
+        confidence=confidence,
+    )
+
+
+def equivalent_freedom(noise: Noise, n: int, m: int) -> float:
+    """Return the equivalent degrees of freedom of σ²(m τ₀) from n phase points, NIST SP 1065, table 5."""
+    if noise == "phase":
+        return (n + 1) * (n - 2 * m) / (2 * (n - m))
+    if noise == "white":
+        return (3 * (n - 1) / (2 * m) - 2 * (n - 2) / n) * 4 * m**2 / (4 * m**2 + 5)
+    if noise == "flicker":
+        return 2 * (n - 2) ** 2 / (2.3 * n - 4.9) if m == 1 else 5 * n**2 / (4 * m * (n + 3 * m))
+    return (n - 2) / m * ((n - 1) ** 2 - 3 * m * (n - 1) + 4 * m**2) / (n - 3) ** 2
+
+
+def fit_noise(allan: AllanDeviation) -> NoiseCoefficients:
+    """Fit N, B, K to an Allan deviation.
+
+    Least squares on σ²/σ²_fit with weights EDF/2, non-negative and reweighted until it settles. The uncertainties know
+    that points of the curve share their samples, and grow with the misfit where three kinds of noise do not suffice.
+
+    Raises
+    ------
+    CompensationError
+        Fewer than five values of τ.
+    """
+    if allan.tau.size < 5:
+        raise CompensationError(f"fitting N, B and K needs at least five values of τ, not {allan.tau.size}; record longer.")
+    A, variance = _basis(allan.tau), allan.deviation**2
+    fitted, c = variance, np.zeros(3)
+    for _ in range(50):
+        weight = np.sqrt(allan.degrees_of_freedom / 2) / fitted
+        size = np.linalg.norm(A * weight[:, None], axis=0)
+        new = optimize.nnls(A * weight[:, None] / size, variance * weight)[0] / size
+        settled = np.allclose(new, c, rtol=1e-9, atol=0.0)
+        c, fitted = new, A @ new
+        if settled:
+            break
+    Q, R = np.linalg.qr(A * weight[:, None])
+    deviates = (variance / fitted - 1) * np.sqrt(allan.degrees_of_freedom / 2)
+    misfit = float(np.sqrt(np.mean(deviates**2)))
+    root = np.linalg.solve(R, Q.T)
+    errors = max(1.0, misfit) * np.sqrt(np.diag(root @ _correlation(allan, c) @ root.T))
+    values = np.sqrt(c)
+    # u(√c) = u(c) / (2 √c); where that linearisation fails, √u(c) bounds what may be hidden.
+    uncertainties = np.minimum(errors / np.maximum(2 * values, 1e-300), np.sqrt(errors))
+    N, B, K = values.tolist()
+    N_uncertainty, B_uncertainty, K_uncertainty = uncertainties.tolist()
+    return NoiseCoefficients(N, B, K, N_uncertainty, B_uncertainty, K_uncertainty, misfit)
+
+
+def _correlation(allan: AllanDeviation, c: Array) -> Array:
+    """Correlation between the points of the curve, which share their samples, under the fitted noise.
+
+    cov(σ²_i, σ²_j) ∝ ∫ S² |H_i|² |H_j|² df with |H|² = 2 sin⁴(πfτ)/(πfτ)² and S = 2 N² + B²/(πf) + 2 K²/(2πf)².
+    """
+    f = np.geomspace(0.02 / allan.tau[-1], 0.5 / allan.tau[0], 8000)
+    S = 2 * c[0] + c[1] / (np.pi * f) + 2 * c[2] / (2 * np.pi * f) ** 2
+    angle = np.pi * np.outer(allan.tau, f)
+    response = 2 * np.sin(angle) ** 4 / angle**2 * S * np.sqrt(np.gradient(f))
+    covariance = response @ response.T
+    return np.asarray(covariance / np.sqrt(np.outer(np.diag(covariance), np.diag(covariance))))
+
+
+def _basis(tau: Array) -> Array:
+    return np.stack([1 / tau, np.full_like(tau, FLAT**2), tau / 3], axis=-1)
+
+
+def _overlapping(x: Array, m: int, step: float) -> float:
+    second = x[2 * m :] - 2 * x[m:-m] + x[: -2 * m]
+    return math.sqrt(float(second @ second) / (2 * second.size)) / (m * step)
+
+
+def _identify(tau: Array, deviation: Array) -> tuple[Noise, ...]:
+    """Name the noise whose slope is nearest to the local slope of the curve over about an octave either side.
+
+    Quantisation (phase noise) can only rule from the shortest τ on: later, a slope of −1 is chance, and its many degrees
+    of freedom would give that chance a weight.
+    """
+    u, v = np.log2(tau), np.log2(np.maximum(deviation, 1e-300))
+    kinds: list[Noise] = []
+    for centre in u:
+        near = np.abs(u - centre) <= 1.0
+        slope = float(np.polyfit(u[near], v[near], 1)[0]) if np.count_nonzero(near) > 1 else -0.5
+        nearest = min(SLOPES, key=lambda kind: abs(SLOPES[kind] - slope))
+        kinds.append("white" if nearest == "phase" and any(kind != "phase" for kind in kinds) else nearest)
+    return tuple(kinds)

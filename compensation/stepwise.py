@@ -1,0 +1,184 @@
+"""Forward and backward selection of regression terms, with every step on record.
+
+HRG paper section 4.1: the term with the strongest evidence enters while its p-value is below the entry level, and
+leaves when a later one makes its p-value rise above the removal level. As in the best-known tools the levels are
+0.05 and 0.10, and a term enters only after the lower-order terms that it contains, so that the chosen model does not
+depend on the zero from which frequency is counted. p-values after a search are optimistic: judge on held-out data.
+"""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import linalg, stats
+
+from compensation.errors import CompensationError
+
+Array = NDArray[np.float64]
+# A candidate of which less than this part is not already in the model cannot be told apart from it.
+OWN_PART = 1e-7
+
+
+@dataclass(frozen=True)
+class Step:
+    """One step: the `term` that was added (or removed), its F and p, and the model that this leaves.
+
+    `criterion` is BIC = m ln(SSE/m) + p ln m; smaller is better.
+    """
+
+    added: bool
+    term: str
+    F: float
+    p_value: float
+    sum_of_squares: float
+    criterion: float
+    terms: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Selection:
+    """The path of a stepwise selection, its final `terms`, and why candidates were `refused` from the start."""
+
+    start: Step
+    steps: tuple[Step, ...]
+    terms: tuple[str, ...]
+    refused: Mapping[str, str]
+
+
+def select_stepwise(
+    forced: Array,
+    candidates: Array,
+    y: Array,
+    names: Sequence[str],
+    parents: Mapping[str, Sequence[str]] | None = None,
+    enter: float = 0.05,
+    remove: float = 0.10,
+    *,
+    shared: bool = False,
+) -> Selection:
+    """Select among candidate columns by partial F-tests.
+
+    Parameters
+    ----------
+    forced : array, shape (m, q)
+        Columns that are always in the model: the constant, or one per run.
+    candidates : array, shape (m, k)
+        Columns that may enter.
+    y : array, shape (m,)
+    names : sequence of k names
+    parents : mapping of name to names
+        Terms that must be in the model before this one enters, and while it stays.
+    enter, remove : float
+        Levels of the p-values.
+    shared : bool
+        The entry level is divided by the number of candidates that compete at the step, so that the chance of any
+        term entering where there is nothing is at most `enter`.
+
+    Raises
+    ------
+    CompensationError
+        Levels that could cycle, or fewer rows than all candidates together need.
+    """
+    if not 0 < enter <= remove < 1:
+        raise CompensationError(f"levels must satisfy 0 < entry ≤ removal < 1, not {enter:g} and {remove:g}.")
+    m, q = forced.shape
+    if m < q + len(names) + 1:
+        raise CompensationError(
+            f"{len(names)} candidate terms and {q} constants need at least {q + len(names) + 1} rows, not {m}; "
+            "record longer or average less."
+        )
+    search = _Search(forced, candidates, y, tuple(names), parents or {})
+    refused = {name: why for name in names if (why := search.refusal(name))}
+    chosen: list[str] = []
+    steps: list[Step] = []
+    for _ in range(10 * len(names)):
+        step = search.addition(chosen, refused, enter, shared) or search.removal(chosen, remove)
+        if step is None:
+            break
+        steps.append(step)
+        chosen = list(step.terms)
+        while (step := search.removal(chosen, remove)) is not None:
+            steps.append(step)
+            chosen = list(step.terms)
+    start = search.step(True, "", math.nan, math.nan, [])
+    return Selection(start, tuple(steps), tuple(sorted(chosen, key=list(names).index)), refused)
+
+
+class _Search:
+    """Sums of squares of any subset of columns, from one triangular factor of all of them."""
+
+    def __init__(
+        self, forced: Array, candidates: Array, y: Array, names: tuple[str, ...], parents: Mapping[str, Sequence[str]]
+    ) -> None:
+        Z = np.column_stack([forced, candidates, y])
+        self.lengths = np.linalg.norm(candidates, axis=0)
+        self.R: Array = np.asarray(linalg.qr(Z, mode="r")[0][: Z.shape[1]], dtype=np.float64)
+        self.rows, self.forced = forced.shape
+        self.names = names
+        self.parents = parents
+
+    def refusal(self, name: str) -> str:
+        """Say why a candidate can never enter: empty when it can."""
+        k = self.names.index(name)
+        own = self._own_part([], name)
+        if self.lengths[k] == 0 or own < OWN_PART:
+            return "constant"
+        return ""
+
+    def sum_of_squares(self, chosen: Sequence[str]) -> float:
+        """Residual sum of squares of y on the forced columns and the chosen ones."""
+        rest = self._residual(chosen, self.R[:, -1])
+        return float(rest @ rest)
+
+    def addition(
+        self, chosen: Sequence[str], refused: Mapping[str, str], level: float, shared: bool
+    ) -> Step | None:
+        """Return the step that adds the candidate with the largest F, if its p-value is below the level."""
+        ready = [
+            name
+            for name in self.names
+            if name not in chosen
+            and name not in refused
+            and all(parent in chosen or parent in refused for parent in self.parents.get(name, ()))
+            and self._own_part(chosen, name) > OWN_PART
+        ]
+        tests = [(*self._test(chosen, [*chosen, name]), name) for name in ready]
+        if not tests:
+            return None
+        F, p, name = max(tests)
+        allowed = level / len(ready) if shared else level
+        return self.step(True, name, F, p, [*chosen, name]) if p < allowed else None
+
+    def removal(self, chosen: Sequence[str], level: float) -> Step | None:
+        """Return the step that removes the term with the smallest F, if its p-value is above the level."""
+        free = [n for n in chosen if not any(n in self.parents.get(other, ()) for other in chosen)]
+        tests = [(*self._test([c for c in chosen if c != name], chosen), name) for name in free]
+        if not tests:
+            return None
+        F, p, name = min(tests)
+        return self.step(False, name, F, p, [c for c in chosen if c != name]) if p > level else None
+
+    def step(self, added: bool, term: str, F: float, p: float, terms: Sequence[str]) -> Step:
+        """Describe the model that a step leaves."""
+        sse = self.sum_of_squares(terms)
+        size = self.forced + len(terms)
+        criterion = self.rows * math.log(max(sse, 1e-300) / self.rows) + size * math.log(self.rows)
+        return Step(added, term, F, p, sse, criterion, tuple(terms))
+
+    def _test(self, small: Sequence[str], large: Sequence[str]) -> tuple[float, float]:
+        without, within = self.sum_of_squares(small), self.sum_of_squares(large)
+        freedom = self.rows - self.forced - len(large)
+        F = max(without - within, 0.0) / max(within / freedom, 1e-300)
+        return F, float(stats.f.sf(F, 1, freedom))
+
+    def _own_part(self, chosen: Sequence[str], name: str) -> float:
+        k = self.names.index(name)
+        rest = self._residual(chosen, self.R[:, self.forced + k])
+        return float(np.linalg.norm(rest) / max(self.lengths[k], 1e-300))
+
+    def _residual(self, chosen: Sequence[str], target: Array) -> Array:
+        index = [*range(self.forced), *(self.forced + self.names.index(name) for name in chosen)]
+        Q = linalg.qr(self.R[:, index], mode="economic")[0]
+        return np.asarray(target - Q @ (Q.T @ target))
