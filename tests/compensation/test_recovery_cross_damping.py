@@ -58,8 +58,8 @@ def test_constant_cross_damping_looks_like_a_rate():
 
 
 def test_integrated_motion_with_varying_cross_damping_follows_the_slow_model():
-    """Equations (2), carrier resolved and demodulated, against (8): the difference is of order ζ, and is stated."""
-    errors = []
+    """Equations (2), carrier resolved and demodulated, against (9): 0.23 ζ in the amplitude, 2.6 ζ² in phase."""
+    errors, in_phase = [], []
     for zeta in (0.02, 0.01):
         e = tune(2 * np.pi * 500, zeta)
         tau = 1 / (e.k1 * zeta)
@@ -70,11 +70,12 @@ def test_integrated_motion_with_varying_cross_damping_follows_the_slow_model():
         measured = amplitude / relate_rate_to_secondary(e).steady_gain
         expected = np.interp(at, time, simulate_bias(time, zeta12, e.k1, zeta))
         errors.append(np.max(np.abs(measured - expected)) / np.max(expected))
+        in_phase.append(np.max(np.abs(measured.real - expected)) / np.max(expected))
         exact = relate_cross_damping_to_secondary(e).simulate(time, zeta12)
         envelope = propagate_envelope(e, time, np.zeros(401), zeta12=zeta12).secondary
         assert np.max(np.abs(envelope - exact)) < 2e-4 * np.max(np.abs(exact))
-    assert errors[0] < 0.02
-    assert errors[0] / errors[1] == pytest.approx(2, rel=0.25)
+    np.testing.assert_allclose(errors, [0.23 * 0.02, 0.23 * 0.01], rtol=0.05)
+    np.testing.assert_allclose(in_phase, [2.7 * 0.02**2, 2.7 * 0.01**2], rtol=0.05)
 
 
 def record(generator, *, noise, hours=6.0, step=10.0, size=40.0):
