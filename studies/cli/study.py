@@ -1,0 +1,234 @@
+"""`hrg study`: run, status, report and export of parametric studies."""
+
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from studies.sweeps.results import Results
+    from studies.sweeps.run import Estimate
+
+
+def run(
+    spec: str,
+    *,
+    out: str | None = None,
+    workers: int | None = None,
+    scheduler: str | None = None,
+    card: str | None = None,
+    allow_python: bool = False,
+    dry_run: bool = False,
+    quiet: bool = False,
+    json: bool = False,
+) -> int:
+    """Run a parametric study, or resume it; what is computed is never computed twice nor lost.
+
+    Exit status 4 means that it is finished and some cases failed: their reasons are in the results.
+
+    Parameters
+    ----------
+    spec : str
+        Path of a spec, or the name of one that ships: frequency-over-temperature, dimension-tolerance, dimension-influence.
+        A spec is a TOML file. At its top: schema = "hrg.study/1", name, card (a shipped one, or a path beside the spec).
+        [sampling]: method = grid, list, latin-hypercube, sobol, sensitivity or one-at-a-time; cases, seed, batch, solver.
+        [[parameter]]: name (a key of the card such as resonator.thickness_mm, or temperature_degC, or user.NAME for a
+        function of yours) with tolerance, or low and high, or values; nominal, count, distribution = uniform, normal (with
+        standard_deviation), triangular or log-uniform. [[quantity]]: name = bryan-factor, compensation-residual, frequency,
+        mode-separation, python or tcf, with harmonic, index, theory, temperature_degC, label and keys of its own.
+        [[requirement]]: column with within (of target), or low, high. [[search]]: kind = worst-case with column, or
+        inversion with vary and targets. Example and details: python -m pydoc studies.sweeps.spec.
+    out : str
+        Folder for the study's store; needed except with --dry-run. Running again with the same folder resumes.
+    workers : int
+        Processes on this machine; one for each core unless given.
+    scheduler : str
+        Address of a Dask scheduler (tcp://HOST:8786), to compute on its workers instead.
+    card : str
+        Another card than the one that the spec names.
+    allow_python : bool
+        Run the Python functions that the spec names. Read them first.
+    dry_run : bool
+        Say how many cases, how long and how much memory; keep nothing.
+    quiet : bool
+        Show no progress.
+    json : bool
+        Print one JSON object (schema hrg.study-status/1; with --dry-run hrg.study-estimate/1).
+    """
+    import os
+
+    for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
+        os.environ.setdefault(name, "1")  # before numpy is imported: the same digits here as in a worker
+
+    from studies.cli.output import print_json, say
+    from studies.errors import InputError
+    from studies.sweeps.run import check_functions, estimate_study, run_study
+    from studies.sweeps.spec import read_study
+
+    if workers is not None and workers < 1:
+        raise InputError(f"--workers {workers}: at least one is needed.")
+    if workers is not None and scheduler is not None:
+        raise InputError("--workers and --scheduler: give one of them.")
+    if dry_run:
+        study = read_study(spec, card)
+        check_functions(study, allow_python)
+        estimate = estimate_study(study, workers)
+        print_json(_estimate_json(estimate)) if json else print(_estimate_words(estimate))
+        return 0
+    if out is None:
+        raise InputError("--out is missing: name the folder that shall keep the study.")
+    try:
+        results = run_study(
+            spec,
+            out,
+            card=card,
+            workers=workers,
+            scheduler=scheduler,
+            allow_python=allow_python,
+            show_progress=not quiet,
+        )
+    except KeyboardInterrupt:
+        say(f"hrg: interrupted; what was computed is kept in {out}. Run the same command again to resume.")
+        return 130
+    if json:
+        print_json(_status(results, out, running=False))
+    else:
+        failed = results.store.counts().get("failed", 0)
+        print(f"{results.total} cases computed, {failed} failed. Next: hrg study report {out}, hrg study export {out}.")
+        _print_reasons(results)
+    return 4 if results.store.counts().get("failed", 0) else 0
+
+
+def status(folder: str, *, json: bool = False) -> int:
+    """Show how far a study is, what failed and why; also while it runs.
+
+    Parameters
+    ----------
+    folder : str
+        Folder of the study (hrg study run --out).
+    json : bool
+        Print one JSON object (schema hrg.study-status/1).
+    """
+    from studies.cli.output import print_json, print_table
+    from studies.sweeps.results import open_results
+    from studies.sweeps.store import is_running
+
+    results = open_results(folder)
+    found = _status(results, folder, is_running(folder))
+    if json:
+        print_json(found)
+        return 0
+    rows = [
+        [key.replace("_", " "), _words(found[key])]
+        for key in ("state", "cases", "done", "failed", "seconds_each", "runs")
+    ]
+    print_table(results.study.name, ["", ""], rows, results.study.note.strip("-"))
+    _print_reasons(results)
+    return 0
+
+
+def report(folder: str, *, out: str | None = None, json: bool = False) -> int:
+    """Write one self-contained HTML page: what was asked, results, pictures, sensitivities, yield, provenance.
+
+    Parameters
+    ----------
+    folder : str
+        Folder of the study (hrg study run --out).
+    out : str
+        The page; report.html in the folder unless given.
+    json : bool
+        Print one JSON object (schema hrg.study-report/1) with the numbers behind the page.
+    """
+    from pathlib import Path
+
+    from studies.cli.output import print_json
+    from studies.files.writing import write_text
+    from studies.reports.sweep import summarise, sweep_page
+    from studies.sweeps.results import open_results
+
+    results = open_results(folder)
+    page = Path(out) if out else Path(folder) / "report.html"
+    write_text(page, sweep_page(results))
+    if json:
+        print_json({**summarise(results), "report": str(page)})
+    else:
+        print(f"report: {page}")
+    return 0
+
+
+def export(folder: str, *, out: str | None = None, json: bool = False) -> int:
+    """Write the results as CSV, and the unit of every column as JSON beside it.
+
+    Parameters
+    ----------
+    folder : str
+        Folder of the study (hrg study run --out).
+    out : str
+        The CSV file; results.csv in the folder unless given.
+    json : bool
+        Print one JSON object (schema hrg.study-export/1) that names the files and the columns.
+    """
+    from pathlib import Path
+
+    from studies.cli.output import print_json
+    from studies.sweeps.export import export_results
+    from studies.sweeps.results import open_results
+
+    results = open_results(folder)
+    path = Path(out) if out else Path(folder) / "results.csv"
+    units = export_results(results, path)
+    if json:
+        payload = {
+            "schema": "hrg.study-export/1",
+            "table": str(path),
+            "units_file": str(units),
+            "rows": len(results.cases),
+        }
+        print_json({**payload, "columns": results.table().attrs["units"]})
+    else:
+        print(f"{len(results.cases)} cases: {path}; units: {units}")
+    return 0
+
+
+def _status(results: "Results", folder: str, running: bool) -> dict[str, Any]:
+    counts = results.store.counts()
+    done = sum(counts.values())
+    finished = done == results.total
+    return {
+        "schema": "hrg.study-status/1",
+        "study": results.study.name,
+        "folder": folder,
+        "state": "running" if running else "finished" if finished else "unfinished",
+        "cases": results.total,
+        "done": done,
+        "failed": counts.get("failed", 0),
+        "reasons": [{"reason": reason, "cases": count} for reason, count in results.store.reasons()],
+        "seconds_each": results.store.seconds() / done if done else None,
+        "runs": len(results.store.runs()),
+    }
+
+
+def _print_reasons(results: "Results") -> None:
+    from studies.cli.output import print_table
+
+    reasons = results.store.reasons(8)
+    if reasons:
+        print_table("Failed cases", ["cases", "reason"], [[str(count), reason] for reason, count in reasons])
+
+
+def _estimate_json(estimate: "Estimate") -> dict[str, Any]:
+    return {"schema": "hrg.study-estimate/1", **vars(estimate)}
+
+
+def _estimate_words(estimate: "Estimate") -> str:
+    return (
+        f"{estimate.cases} cases in {estimate.batches} batches; the nominal design takes {estimate.seconds_each:.3g} s, all about"
+        f" {_duration(estimate.seconds)}; memory about {estimate.memory_MB:.0f} MB. Nothing was kept."
+    )
+
+
+def _duration(seconds: float) -> str:
+    if seconds < 120:
+        return f"{seconds:.3g} s"
+    return f"{seconds / 60:.3g} min" if seconds < 7200 else f"{seconds / 3600:.3g} h"
+
+
+def _words(value: object) -> str:
+    return f"{value:.3g}" if isinstance(value, float) else str(value)

@@ -1,0 +1,52 @@
+"""One design of a study: the instrument with its parameters set, and the modes that its quantities share."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+from studies.instrument.card import ZERO_CELSIUS, Instrument
+
+if TYPE_CHECKING:
+    from shell.assembly import Theory
+    from shell.modes import Mode
+    from studies.sweeps.quantity import Options
+
+
+@dataclass
+class Case:
+    """A design to be evaluated.
+
+    Attributes
+    ----------
+    instrument : the card with this design's parameters.
+    parameters : every parameter of the study by name, in the unit of its name.
+    remarks : warnings of the solver, kept beside the results.
+    """
+
+    instrument: Instrument
+    parameters: Mapping[str, Any]
+    remarks: list[str] = field(default_factory=list)
+    _solved: dict[tuple[int, str, float], "tuple[Mode, ...]"] = field(default_factory=dict, repr=False)
+
+    def temperature(self, options: "Options") -> float:
+        """Return the temperature in K that a quantity asks for, the study's, or the card's reference."""
+        given = options.get("temperature_degC")
+        if given is None:
+            given = self.parameters.get("temperature_degC")
+        return self.instrument.reference_temperature if given is None else float(given) + ZERO_CELSIUS
+
+    def modes(self, harmonic: int, count: int, theory: "Theory", temperature: float) -> "tuple[Mode, ...]":
+        """Return at least the `count` lowest modes at a uniform temperature (K), solved once for all quantities."""
+        from shell.modes import solve_modes
+
+        key = (harmonic, theory, temperature)
+        if len(self._solved.get(key, ())) < count:
+            resonator, elastic = self.instrument.at(temperature)
+            self._solved[key] = solve_modes(resonator, elastic, harmonic, count, theory)
+        return self._solved[key]
+
+    def mode(self, options: "Options") -> "Mode":
+        """Return the mode that `harmonic`, `index`, `theory` and the temperature name."""
+        index = options.get("index", 0)
+        found = self.modes(options["harmonic"], index + 1, options["theory"], self.temperature(options))
+        return found[index]

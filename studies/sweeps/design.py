@@ -1,0 +1,191 @@
+"""The designs of a study: grids, lists, Latin hypercubes, Sobol sequences, Saltelli's and one-at-a-time designs."""
+
+from dataclasses import dataclass
+from hashlib import blake2b
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from studies.errors import InputError
+from studies.sweeps.spec import MOST_CASES
+
+if TYPE_CHECKING:
+    from studies.sweeps.spec import Parameter, Study
+
+Array = NDArray[np.float64]
+LEVELS = (-1.0, -0.5, 0.5, 1.0)  # of one parameter at a time, in half ranges about the nominal value
+
+
+@dataclass(frozen=True)
+class Design:
+    """The designs, in order.
+
+    Attributes
+    ----------
+    values : array (cases, parameters)
+        In the unit of each name; texts as their place in the parameter's `values`.
+    unique : array of int
+        Places of the designs that differ from all before them: only these are computed.
+    inverse : array (cases,) of int
+        For every design its place in `unique`.
+    """
+
+    values: Array
+    unique: NDArray[np.intp]
+    inverse: NDArray[np.intp]
+
+    @property
+    def digest(self) -> str:
+        """A hash of all values, to notice a sampler that gives other designs than it did before."""
+        return blake2b(np.ascontiguousarray(self.values, dtype="<f8").tobytes(), digest_size=16).hexdigest()
+
+
+def draw(study: "Study") -> Design:
+    """Return the designs that a study asks for; the same for the same spec and seed.
+
+    Raises
+    ------
+    InputError
+        More designs than a study can hold.
+    """
+    if not study.parameters:
+        return _unique(np.empty((1, 0)))
+    values = SAMPLERS[study.sampling.method](study)
+    return _unique(np.ascontiguousarray(values, dtype=float))
+
+
+def count_cases(study: "Study") -> int:
+    """Return how many designs a study has, without drawing them."""
+    method, d = study.sampling.method, len(study.parameters)
+    if not d:
+        return 1
+    if method == "grid":
+        return int(np.prod([len(p.values) or p.count or 1 for p in study.parameters], dtype=float))
+    if method == "list":
+        return len(study.parameters[0].values)
+    if method == "one-at-a-time":
+        return 1 + len(LEVELS) * d
+    return study.sampling.cases * (d + 2 if method == "sensitivity" else 1)
+
+
+def decode_row(study: "Study", row: list[float]) -> dict[str, Any]:
+    """Return the parameters of one design by name: texts for their places."""
+    return {
+        p.name: p.values[int(value)] if isinstance(p.nominal, str) else value
+        for p, value in zip(study.parameters, row, strict=True)
+    }
+
+
+def nominal_design(study: "Study") -> dict[str, Any]:
+    """Return the parameters of the nominal design by name."""
+    return {p.name: p.nominal for p in study.parameters}
+
+
+def _grid(study: "Study") -> Array:
+    if count_cases(study) > MOST_CASES:
+        raise InputError(
+            f"the grid has {count_cases(study)} cases, more than {MOST_CASES}; take fewer values or a sample."
+        )
+    axes = [_axis(p) if p.values else _spread(p) for p in study.parameters]
+    return np.stack([x.ravel() for x in np.meshgrid(*axes, indexing="ij")], axis=1)
+
+
+def _axis(parameter: "Parameter") -> Array:
+    if isinstance(parameter.nominal, str):
+        return np.arange(len(parameter.values), dtype=float)
+    return np.array(parameter.values, dtype=float)
+
+
+def _spread(parameter: "Parameter") -> Array:
+    if parameter.distribution == "log-uniform":
+        return np.geomspace(parameter.low, parameter.high, parameter.count or 2)
+    return np.linspace(parameter.low, parameter.high, parameter.count or 2)
+
+
+def _listed(study: "Study") -> Array:
+    lengths = {p.name: len(p.values) for p in study.parameters}
+    if len(set(lengths.values())) > 1:
+        words = ", ".join(f"{name}: {length}" for name, length in lengths.items())
+        raise InputError(f"method = 'list' needs equally many values of every parameter, not {words}.")
+    return np.stack([_axis(p) for p in study.parameters], axis=1)
+
+
+def _hypercube(study: "Study") -> Array:
+    from scipy.stats import qmc
+
+    rng = np.random.default_rng(study.sampling.seed)
+    return _scale(study, qmc.LatinHypercube(len(study.parameters), rng=rng).random(study.sampling.cases))
+
+
+def _sobol(study: "Study") -> Array:
+    return _scale(study, _sobol_points(len(study.parameters), study))
+
+
+def _saltelli(study: "Study") -> Array:
+    """Rows of A, then B, then for each parameter A with that parameter's column from B (Saltelli 2010)."""
+    d = len(study.parameters)
+    points = _scale(study, _sobol_points(2 * d, study).reshape(-1, 2, d).reshape(-1, d)).reshape(-1, 2, d)
+    A, B = points[:, 0], points[:, 1]
+    mixed = [np.where(np.arange(d) == k, B, A) for k in range(d)]
+    return np.concatenate([A, B, *mixed])
+
+
+def _sobol_points(dimensions: int, study: "Study") -> Array:
+    from scipy.stats import qmc
+
+    engine = qmc.Sobol(dimensions, rng=np.random.default_rng(study.sampling.seed))
+    return np.asarray(engine.random_base2(study.sampling.cases.bit_length() - 1))
+
+
+def _one_at_a_time(study: "Study") -> Array:
+    middle = np.array([float(p.nominal) for p in study.parameters])
+    rows = [middle]
+    for k, parameter in enumerate(study.parameters):
+        for level in LEVELS:
+            row = middle.copy()
+            end = parameter.high if level > 0 else parameter.low
+            row[k] = middle[k] + abs(level) * (end - middle[k])
+            rows.append(row)
+    return np.array(rows)
+
+
+def _scale(study: "Study", unit: Array) -> Array:
+    """Map points of the unit cube, row by row, through the inverse distribution of every parameter."""
+    return np.stack([_quantile(p, unit[:, k]) for k, p in enumerate(study.parameters)], axis=1)
+
+
+def _quantile(parameter: "Parameter", p: Array) -> Array:
+    from scipy import stats
+
+    low, high, middle = parameter.low, parameter.high, float(parameter.nominal)
+    if parameter.distribution == "uniform":
+        return low + p * (high - low)
+    if parameter.distribution == "log-uniform":
+        return np.asarray(np.exp(np.log(low) + p * np.log(high / low)))
+    if parameter.distribution == "triangular":
+        return np.asarray(stats.triang.ppf(p, (middle - low) / (high - low), low, high - low))
+    deviation = float(parameter.standard_deviation or 0.0)
+    if parameter.bounded:
+        return np.asarray(
+            stats.truncnorm.ppf(p, (low - middle) / deviation, (high - middle) / deviation, middle, deviation)
+        )
+    return np.asarray(stats.norm.ppf(p, middle, deviation))
+
+
+def _unique(values: Array) -> Design:
+    _, first, inverse = np.unique(values, axis=0, return_index=True, return_inverse=True)
+    order = np.argsort(first)
+    place = np.empty_like(order)
+    place[order] = np.arange(len(order))
+    return Design(values, first[order], place[inverse.ravel()])
+
+
+SAMPLERS = {
+    "grid": _grid,
+    "list": _listed,
+    "latin-hypercube": _hypercube,
+    "sobol": _sobol,
+    "sensitivity": _saltelli,
+    "one-at-a-time": _one_at_a_time,
+}

@@ -1,0 +1,190 @@
+"""Run a study from spec to store: check, resume, compute, search."""
+
+import os
+from collections.abc import Mapping
+from contextlib import nullcontext
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from studies.errors import InputError
+from studies.sweeps.canonical import PHYSICS_VERSION, digest, spell_material
+from studies.sweeps.design import Design, count_cases, draw, nominal_design
+from studies.sweeps.engine import compute, missing_batches
+from studies.sweeps.evaluate import Plan, evaluate_case
+from studies.sweeps.progress import Silent, shown_progress
+from studies.sweeps.provenance import describe_environment
+from studies.sweeps.results import Results, open_results
+from studies.sweeps.search import run_searches
+from studies.sweeps.spec import FREE, Study, read_study
+from studies.sweeps.store import Store, claim_store, memory_store
+from studies.sweeps.workers import Pool, Workers
+
+
+def run_study(
+    source: str | Path | Mapping[str, Any],
+    out: str | Path | None = None,
+    *,
+    card: str | None = None,
+    workers: int | None = None,
+    scheduler: str | None = None,
+    allow_python: bool = False,
+    show_progress: bool = False,
+) -> Results:
+    """Run a study, or resume it where an earlier run stopped, and return its results.
+
+    >>> results = run_study("tolerance.toml", "tolerance")          # doctest: +SKIP
+    >>> table = results.table()                                     # doctest: +SKIP
+    >>> table.attrs["units"]["frequency_n2_Hz"]                     # doctest: +SKIP
+    'Hz'
+
+    Parameters
+    ----------
+    source : path, name or mapping
+        The spec (`studies.sweeps.spec`).
+    out : path, optional
+        Folder of the store; without it the results live in memory only.
+    card : str, optional
+        Another card than the spec's.
+    workers : int, optional
+        Processes on this machine; one for every core unless given.
+    scheduler : str, optional
+        Address of a Dask scheduler, instead of processes here.
+    allow_python : bool
+        Run the user functions that the spec names.
+    show_progress : bool
+        Show progress on standard error.
+
+    Raises
+    ------
+    InputError
+        An unusable spec, another study's store, a damaged store, a second runner.
+    MissingEnvironment
+        The disk is full or cannot be written, the scheduler cannot be reached or was lost.
+    """
+    study = read_study(source, card)
+    sources = check_functions(study, allow_python)
+    design = draw(study)
+    identity = identify(study, design, sources)
+    store = memory_store() if out is None else claim_store(out)
+    try:
+        _describe(store, study, design, identity)
+        _run(store, study, design, identity["base"], workers, scheduler, show_progress)
+    except BaseException:
+        store.close()
+        raise
+    if out is None:
+        return Results(study, store)
+    store.close()
+    return open_results(out)
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """What a study would take: designs, batches, seconds of one design, of all, memory in MB."""
+
+    cases: int
+    batches: int
+    seconds_each: float
+    seconds: float
+    memory_MB: float
+
+
+def estimate_study(study: Study, workers: int | None = None) -> Estimate:
+    """Solve the nominal design twice here, keep nothing, and say what the whole study would take on these workers."""
+    import resource
+
+    plan, parameters = Plan.of(study), nominal_design(study)
+    evaluate_case(plan, parameters)  # the first time imports and builds what later cases share
+    each = evaluate_case(plan, parameters).seconds
+    cases, count = count_cases(study), workers or cores()
+    resident = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+    row = 8 * (len(study.parameters) + 2 * len(study.columns)) + 200
+    return Estimate(
+        cases, -(-cases // study.sampling.batch), each, each * cases / count, resident * (1 + count) + row * cases / 1e6
+    )
+
+
+def cores() -> int:
+    """Return the number of cores that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def check_functions(study: Study, allowed: bool) -> dict[str, str]:
+    """Return the hash of every user function's file; InputError when they are not enabled or cannot be imported."""
+    if not study.functions:
+        return {}
+    if not allowed:
+        raise InputError(
+            f"the study runs Python code of its own ({', '.join(Path(f).name for f in study.functions)}); read it, and allow it"
+            " with --allow-python."
+        )
+    from studies.sweeps.child import check_function
+
+    return {Path(function).name: check_function(function) for function in study.functions}
+
+
+def identify(study: Study, design: Design, sources: Mapping[str, str]) -> dict[str, Any]:
+    """Return everything that the results depend on; `base` is its hash, part of the key of every case."""
+    physics = {
+        "card": {key: study.instrument.content[key] for key in ("resonator", "material")},
+        "reference_temperature": study.instrument.reference_temperature,
+        "material_laws": digest(spell_material(study.instrument.material)),
+        "quantity": study.content["quantity"],
+        "functions": dict(sources),
+        "solver": study.sampling.solver,
+        "physics_version": PHYSICS_VERSION,
+    }
+    spec = {key: value for key, value in study.content.items() if key not in (*FREE, "card", "quantity")}
+    return {**physics, "base": digest(physics), "spec": spec, "design": design.digest}
+
+
+def _describe(store: Store, study: Study, design: Design, identity: Mapping[str, Any]) -> None:
+    store.check_same(identity)
+    instrument = study.instrument
+    store.describe(
+        {
+            "identity": identity,
+            "spec": study.content,
+            "spec_text": study.text,
+            "instrument": {
+                "name": instrument.name,
+                "reference_temperature": instrument.reference_temperature,
+                "content": instrument.content,
+                "path": instrument.path,
+            },
+            "folder": study.folder,
+            "cases": len(design.unique),
+            "repeats": design.inverse.tolist() if len(design.unique) < len(design.values) else [],
+        }
+    )
+
+
+def _run(
+    store: Store, study: Study, design: Design, base: str, workers: int | None, scheduler: str | None, show: bool
+) -> None:
+    batches = missing_batches(study, design, base, store)
+    counts = store.counts()
+    done = sum(counts.values())
+    store.begin_run(describe_environment())
+    outcome = "stopped"
+    crew = _hire(workers, scheduler)
+    try:
+        with shown_progress(len(design.unique), done) if show else nullcontext(Silent()) as progress:
+            compute(Plan.of(study), batches, crew, store, progress)
+        run_searches(study, base, crew, store)
+        outcome = "finished"
+    except KeyboardInterrupt:
+        outcome = "interrupted"
+        raise
+    finally:
+        crew.close()
+        store.end_run(outcome)
+
+
+def _hire(workers: int | None, scheduler: str | None) -> Workers:
+    if scheduler is not None:
+        from studies.sweeps.cluster import Cluster
+
+        return Cluster(scheduler)
+    return Pool(workers or cores())

@@ -1,0 +1,180 @@
+"""Searches beyond the sampled designs: the worst case over a box, and the design that has wanted values.
+
+Every design that a search looks at is kept in the store under its key, and the search takes the same path every time:
+resumed, it walks over what is already there.
+"""
+
+from collections import deque
+from collections.abc import Mapping, Sequence
+from itertools import product
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from studies.sweeps.design import nominal_design
+from studies.sweeps.engine import Batch, compute, make_item
+from studies.sweeps.evaluate import Plan
+from studies.sweeps.progress import Silent
+
+if TYPE_CHECKING:
+    from studies.sweeps.spec import Parameter, Search, Study
+    from studies.sweeps.store import Store, Stored
+    from studies.sweeps.workers import Workers
+
+Array = NDArray[np.float64]
+STEP = 1e-2  # of a range, for differences: large against the solver's noise
+MOST_CORNERS = 6  # parameters up to which every corner of the box is computed
+
+
+class SearchFailed(RuntimeError):
+    """A design that the search needs could not be computed."""
+
+
+class Explorer:
+    """Designs of a study by their parameters, computed when the store lacks them."""
+
+    def __init__(self, study: "Study", base: str, workers: "Workers", store: "Store") -> None:
+        self.study, self.base, self.workers, self.store = study, base, workers, store
+        self.plan = Plan.of(study)
+        self.columns = [column.name for column in study.columns]
+
+    def cases(self, designs: Sequence[Mapping[str, Any]]) -> "list[Stored]":
+        """Return designs as the store has them, after computing those that lack."""
+        items = [make_item(self.base, None, dict(design)) for design in designs]
+        lacking: deque[Batch] = deque()
+        for item in {item.key: item for item in items}.values():
+            if self.store.find(item.key) is None:
+                lacking.append([item])
+        compute(self.plan, lacking, self.workers, self.store, Silent())
+        found = [self.store.find(item.key) for item in items]
+        return [case for case in found if case is not None]
+
+    def values(self, designs: Sequence[Mapping[str, Any]], columns: Sequence[str]) -> Array:
+        """Return columns of designs, shape (designs, columns); SearchFailed names a design that cannot be computed."""
+        places = [self.columns.index(column) for column in columns]
+        cases = self.cases(designs)
+        values = np.array([[case.values[place] for place in places] for case in cases])
+        for case, row in zip(cases, values, strict=True):
+            if not np.isfinite(row).all():
+                raise SearchFailed(f"at {dict(case.parameters)}: {case.remark}")
+        return values
+
+
+def run_searches(study: "Study", base: str, workers: "Workers", store: "Store") -> None:
+    """Compute the nominal design and every search of a study, and keep what they find."""
+    explorer = Explorer(study, base, workers, store)
+    explorer.cases([nominal_design(study)])
+    for search in study.searches:
+        try:
+            found = SEARCHES[search.kind](explorer, search)
+        except SearchFailed as error:
+            found = {"failed": str(error)}
+        store.keep_finding(name_search(search), {"kind": search.kind, **found})
+
+
+def name_search(search: "Search") -> str:
+    """Return the name under which a search's outcome is kept."""
+    targets = ", ".join(f"{column} = {value:.10g}" for column, value in search.targets.items())
+    if search.kind == "inversion":
+        return f"{targets} by {', '.join(search.vary)}"
+    return f"extremes of {search.column}"
+
+
+def find_worst_case(explorer: Explorer, search: "Search") -> dict[str, Any]:
+    """Find the extremes of a column over the box of all numeric parameters.
+
+    From the best corner (or, with many parameters, the best of single excursions) a bounded quasi-Newton search goes on,
+    so that an extreme inside the box or on an edge is found as well.
+    """
+    from scipy.optimize import minimize
+
+    study = explorer.study
+    free = [p for p in study.parameters if not isinstance(p.nominal, str)]
+    starts = _starts(free)
+    at_starts = explorer.values([_place(study, free, x) for x in starts], [search.column])[:, 0]
+    found: dict[str, Any] = {"column": search.column, "designs": len(starts)}
+    for name, sign in (("least", 1.0), ("greatest", -1.0)):
+        best = int(np.argmin(sign * at_starts))
+        scale = float(np.ptp(at_starts)) or 1.0
+
+        def value(x: Array, sign: float = sign, scale: float = scale) -> float:
+            return float(sign * explorer.values([_place(study, free, x)], [search.column])[0, 0] / scale)
+
+        box = [(0.0, 1.0)] * len(free)
+        outcome = minimize(value, starts[best], method="L-BFGS-B", bounds=box, options={"eps": STEP, "maxfun": 200})
+        x = outcome.x if outcome.fun < sign * at_starts[best] / scale else starts[best]
+        design = _place(study, free, x)
+        found[name] = {"value": float(explorer.values([design], [search.column])[0, 0]), "parameters": design}
+    return found
+
+
+def invert(explorer: Explorer, search: "Search") -> dict[str, Any]:
+    """Find the parameters that give target values, by bounded least squares on relative deviations.
+
+    The unit of each deviation is what the column changes over the box, so that Hz and ppm/°C weigh alike.
+    """
+    from scipy.optimize import least_squares
+
+    study, columns = explorer.study, list(search.targets)
+    free = [p for p in study.parameters if p.name in search.vary]
+    wanted = np.array([search.targets[column] for column in columns])
+    middle = np.array([_share(p, float(p.nominal)) for p in free])
+    steps = [middle, *(_moved(middle, k) for k in range(len(free)))]
+    first = explorer.values([_place(study, free, x) for x in steps], columns)
+    scale = np.maximum(np.abs(first[1:] - first[0]).max(axis=0) / STEP, 1e-12 * np.abs(wanted) + 1e-300)
+
+    def deviation(x: Array) -> Array:
+        return np.asarray((explorer.values([_place(study, free, x)], columns)[0] - wanted) / scale)
+
+    def slopes(x: Array) -> Array:
+        designs = [_place(study, free, x), *(_place(study, free, _moved(x, k)) for k in range(len(free)))]
+        values = explorer.values(designs, columns)
+        moved = np.array([_moved(x, k)[k] - x[k] for k in range(len(free))])
+        return np.asarray(((values[1:] - values[0]) / moved[:, None] / scale).T)
+
+    outcome = least_squares(
+        deviation, np.clip(middle, 1e-6, 1 - 1e-6), slopes, bounds=(0.0, 1.0), xtol=1e-12, max_nfev=40
+    )
+    design = _place(study, free, outcome.x)
+    values = explorer.values([design], columns)[0]
+    errors = np.array([explorer.cases([design])[0].errors[explorer.columns.index(column)] for column in columns])
+    allowed = np.fmax(np.nan_to_num(errors), 1e-6 * np.abs(wanted))
+    singular = np.linalg.svd(slopes(outcome.x), compute_uv=False)
+    return {
+        "parameters": design,
+        "targets": dict(search.targets),
+        "values": dict(zip(columns, values.tolist(), strict=True)),
+        "reached": bool((np.abs(values - wanted) <= allowed).all()),
+        "at_limit": [p.name for p, share in zip(free, outcome.x, strict=True) if not 1e-4 < share < 1 - 1e-4],
+        "condition": float(singular[0] / singular[-1]) if singular[-1] > 0 else None,
+    }
+
+
+SEARCHES = {"worst-case": find_worst_case, "inversion": invert}
+
+
+def _starts(free: "Sequence[Parameter]") -> Array:
+    """Return the middle and the corners of the unit box; with many parameters the middles of its faces instead."""
+    d = len(free)
+    middle = np.array([_share(p, float(p.nominal)) for p in free])
+    if d <= MOST_CORNERS:
+        return np.array([middle, *(np.array(corner) for corner in product((0.0, 1.0), repeat=d))])
+    faces = [np.where(np.arange(d) == k, end, middle) for k in range(d) for end in (0.0, 1.0)]
+    return np.array([middle, *faces])
+
+
+def _place(study: "Study", free: "Sequence[Parameter]", x: Array) -> dict[str, Any]:
+    """Return the design at shares 0 ... 1 of the free parameters' ranges, the others nominal."""
+    moved = {p.name: float(p.low + share * (p.high - p.low)) for p, share in zip(free, x, strict=True)}
+    return {**nominal_design(study), **moved}
+
+
+def _share(parameter: "Parameter", value: float) -> float:
+    return (value - parameter.low) / (parameter.high - parameter.low)
+
+
+def _moved(x: Array, k: int) -> Array:
+    """Return x with one share moved by a step, inwards at the upper end."""
+    step = STEP if x[k] + STEP <= 1 else -STEP
+    return np.asarray(np.where(np.arange(len(x)) == k, x[k] + step, x))

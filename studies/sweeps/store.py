@@ -1,0 +1,332 @@
+"""The store of a study: one SQLite file in its folder, one writer, whole batches or nothing.
+
+Every case has a key, the hash of card, material, quantities, physics version and parameters. What is committed survives
+kill -9 at any moment. A second runner on the same folder is refused by a lock that ends with its process.
+"""
+
+import fcntl
+import json
+import os
+import sqlite3
+import struct
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+from types import TracebackType
+from typing import IO, TYPE_CHECKING, Any, Self
+
+from studies.errors import InputError, MissingEnvironment
+from studies.sweeps.canonical import find_changes, spell
+
+if TYPE_CHECKING:
+    from studies.sweeps.evaluate import Row
+
+FILE = "study.sqlite"
+LOCK = "lock"
+LAYOUT = 1  # of the tables; sqlite's user_version
+SHOWN_CHANGES = 6
+TABLES = """
+CREATE TABLE study (
+  id INTEGER PRIMARY KEY CHECK (id = 1), created_utc TEXT NOT NULL, identity TEXT NOT NULL, spec TEXT NOT NULL,
+  spec_text TEXT NOT NULL, instrument TEXT NOT NULL, folder TEXT NOT NULL, cases INTEGER NOT NULL,
+  repeats TEXT NOT NULL);
+CREATE TABLE run (
+  id INTEGER PRIMARY KEY, started_utc TEXT NOT NULL, finished_utc TEXT, outcome TEXT, provenance TEXT NOT NULL);
+CREATE TABLE run_case (
+  key BLOB PRIMARY KEY, position INTEGER UNIQUE, parameters TEXT NOT NULL,
+  status TEXT NOT NULL CHECK (status IN ('ok', 'failed')), remark TEXT NOT NULL, numbers BLOB NOT NULL,
+  seconds REAL NOT NULL, run INTEGER NOT NULL REFERENCES run (id)) WITHOUT ROWID;
+CREATE TABLE finding (name TEXT PRIMARY KEY, content TEXT NOT NULL);
+"""
+
+
+@dataclass(frozen=True)
+class Stored:
+    """One computed case as the store has it; `position` is its place among the unique designs, None in a search."""
+
+    key: bytes
+    position: int | None
+    parameters: Mapping[str, Any]
+    status: str
+    remark: str
+    values: tuple[float, ...]
+    errors: tuple[float, ...]
+    seconds: float
+
+
+class Store:
+    """An open store; a context manager that closes it and frees its lock."""
+
+    def __init__(self, connection: sqlite3.Connection, path: Path, lock: IO[str] | None = None) -> None:
+        self.connection = connection
+        self.path = path
+        self.lock = lock
+        self.run = 0
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Close the file and free the lock."""
+        self.connection.close()
+        if self.lock is not None:
+            self.lock.close()
+
+    def begin_run(self, provenance: Mapping[str, Any]) -> None:
+        """Note that a run starts, and on what."""
+        with self._writing():
+            cursor = self.connection.execute(
+                "INSERT INTO run (started_utc, provenance) VALUES (?, ?)", (_now(), spell(provenance))
+            )
+        self.run = int(cursor.lastrowid or 0)
+
+    def end_run(self, outcome: str) -> None:
+        """Note how the run ended."""
+        with self._writing():
+            self.connection.execute(
+                "UPDATE run SET finished_utc = ?, outcome = ? WHERE id = ?", (_now(), outcome, self.run)
+            )
+
+    def add(self, cases: "Iterable[tuple[bytes, int | None, str, Row]]") -> None:
+        """Keep computed cases (key, position, spelled parameters, row) in one transaction."""
+        rows = [
+            (key, place, parameters, row.status, row.remark, _pack(row.values, row.errors), row.seconds, self.run)
+            for key, place, parameters, row in cases
+        ]
+        with self._writing():
+            self.connection.executemany("INSERT OR IGNORE INTO run_case VALUES (?, ?, ?, ?, ?, ?, ?, ?)", rows)
+
+    def keep_finding(self, name: str, content: Mapping[str, Any]) -> None:
+        """Keep the outcome of a search under its name."""
+        with self._writing():
+            self.connection.execute("INSERT OR REPLACE INTO finding VALUES (?, ?)", (name, spell(content)))
+
+    def findings(self) -> dict[str, Any]:
+        """Return the outcomes of searches by name."""
+        return {name: json.loads(content) for name, content in self._read("SELECT name, content FROM finding")}
+
+    def done(self) -> dict[int, bytes]:
+        """Return the key of every computed position."""
+        return dict(self._read("SELECT position, key FROM run_case WHERE position IS NOT NULL"))
+
+    def find(self, key: bytes) -> Stored | None:
+        """Return one case by its key."""
+        found = list(self._cases("WHERE key = ?", (key,)))
+        return found[0] if found else None
+
+    def cases(self) -> Iterator[Stored]:
+        """Give the sampled cases in order of their position."""
+        return self._cases("WHERE position IS NOT NULL ORDER BY position")
+
+    def counts(self) -> dict[str, int]:
+        """Return how many sampled cases there are of each status."""
+        return dict(self._read("SELECT status, count(*) FROM run_case WHERE position IS NOT NULL GROUP BY status"))
+
+    def reasons(self, most: int = 20) -> list[tuple[str, int]]:
+        """Return the reasons of failures, the most frequent first."""
+        return self._read(
+            "SELECT remark, count(*) FROM run_case WHERE status = 'failed' AND position IS NOT NULL"
+            f" GROUP BY remark ORDER BY 2 DESC, 1 LIMIT {most:d}"
+        )
+
+    def seconds(self) -> float:
+        """Return the total computing time of the sampled cases."""
+        return float(self._read("SELECT total(seconds) FROM run_case WHERE position IS NOT NULL")[0][0])
+
+    def about(self) -> dict[str, Any]:
+        """Return what the study is: identity, spec, instrument, number of cases, when it was made."""
+        columns = ("created_utc", "identity", "spec", "spec_text", "instrument", "folder", "cases", "repeats")
+        row = self._read(f"SELECT {', '.join(columns)} FROM study")[0]
+        about = dict(zip(columns, row, strict=True))
+        return about | {key: json.loads(about[key]) for key in ("identity", "spec", "instrument", "repeats")}
+
+    def runs(self) -> list[dict[str, Any]]:
+        """Return the runs so far."""
+        rows = self._read("SELECT id, started_utc, finished_utc, outcome, provenance FROM run ORDER BY id")
+        keys = ("id", "started_utc", "finished_utc", "outcome", "provenance")
+        return [dict(zip(keys, row, strict=True)) | {"provenance": json.loads(row[4])} for row in rows]
+
+    def describe(self, about: Mapping[str, Any]) -> None:
+        """Write what the study is; a later run may change only what no result depends on."""
+        values = [about[key] if key in ("spec_text", "folder", "cases") else spell(about[key]) for key in _ABOUT]
+        with self._writing():
+            self.connection.execute(
+                f"INSERT INTO study (id, created_utc, {', '.join(_ABOUT)}) VALUES (1, ?, ?, ?, ?, ?, ?, ?, ?)"
+                f" ON CONFLICT (id) DO UPDATE SET {', '.join(f'{key} = excluded.{key}' for key in _ABOUT)}",
+                [_now(), *values],
+            )
+
+    def check_same(self, identity: Mapping[str, Any]) -> None:
+        """Refuse to go on when the results so far belong to something else; InputError says what changed."""
+        old = self._read("SELECT identity FROM study")
+        changes = list(find_changes(json.loads(old[0][0]), identity)) if old else []
+        if changes:
+            shown = "; ".join(changes[:SHOWN_CHANGES])
+            more = f"; and {len(changes) - SHOWN_CHANGES} more" if len(changes) > SHOWN_CHANGES else ""
+            raise InputError(
+                f"{self.path.parent}: holds results of a study that differs: {shown}{more}. Take another folder with"
+                " --out, or undo the change."
+            )
+
+    def _cases(self, where: str, values: Sequence[Any] = ()) -> Iterator[Stored]:
+        columns = "key, position, parameters, status, remark, numbers, seconds"
+        for key, position, parameters, status, remark, numbers, seconds in self._read(
+            f"SELECT {columns} FROM run_case {where}", values
+        ):
+            both = struct.unpack(f"<{len(numbers) // 8}d", numbers)
+            half = len(both) // 2
+            yield Stored(key, position, json.loads(parameters), status, remark, both[:half], both[half:], seconds)
+
+    def _read(self, query: str, values: Sequence[Any] = ()) -> list[Any]:
+        try:
+            return self.connection.execute(query, values).fetchall()
+        except sqlite3.DatabaseError as error:
+            raise _damaged(self.path, error) from error
+
+    @contextmanager
+    def _writing(self) -> Iterator[None]:
+        try:
+            with self.connection:
+                yield
+        except sqlite3.OperationalError as error:
+            raise MissingEnvironment(
+                f"{self.path}: cannot be written ({error}); everything computed before is kept. Make room on the disk or give"
+                " the folder its rights back, then run the same command again to resume."
+            ) from error
+        except sqlite3.DatabaseError as error:
+            raise _damaged(self.path, error) from error
+
+
+_ABOUT = ("identity", "spec", "spec_text", "instrument", "folder", "cases", "repeats")
+
+
+def open_store(folder: str | Path) -> Store:
+    """Open the store of a study for reading, also while it is being written.
+
+    Raises
+    ------
+    InputError
+        There is no study in the folder, or its store is damaged.
+    """
+    path = Path(folder) / FILE
+    if not path.is_file():
+        raise InputError(f"{folder}: there is no study in it (no {FILE}); give the folder of 'hrg study run --out'.")
+    return Store(_connect(path), path)
+
+
+def claim_store(folder: str | Path) -> Store:
+    """Open or make the store of a study for writing, and lock its folder.
+
+    Raises
+    ------
+    InputError
+        Another run works in the folder, or the store there is damaged.
+    MissingEnvironment
+        The folder cannot be written.
+    """
+    path = Path(folder) / FILE
+    try:
+        Path(folder).mkdir(parents=True, exist_ok=True)
+        lock = (Path(folder) / LOCK).open("a+")
+    except OSError as error:
+        raise MissingEnvironment(
+            f"{folder}: cannot be written ({error.strerror}); choose another place with --out."
+        ) from error
+    try:
+        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        lock.seek(0)
+        owner = lock.read().strip() or "another process"
+        lock.close()
+        raise InputError(
+            f"{folder}: {owner} is running this study; wait for it, or take another folder with --out."
+        ) from None
+    try:
+        lock.truncate(0)
+        lock.write(f"process {os.getpid()}, since {_now()},")
+        lock.flush()
+        store = Store(_connect(path), path, lock)
+        with store._writing():
+            store.connection.execute("PRAGMA journal_mode = WAL")
+            store.connection.execute("PRAGMA synchronous = NORMAL")
+        _make_tables(store)
+    except OSError as error:
+        lock.close()
+        raise MissingEnvironment(f"{folder}: cannot be written ({error.strerror}); make room and run again.") from error
+    except BaseException:
+        lock.close()
+        raise
+    return store
+
+
+def is_running(folder: str | Path) -> bool:
+    """Return whether a run holds the folder's lock."""
+    try:
+        with (Path(folder) / LOCK).open() as lock:
+            fcntl.flock(lock, fcntl.LOCK_SH | fcntl.LOCK_NB)
+    except FileNotFoundError:
+        return False
+    except BlockingIOError:
+        return True
+    return False
+
+
+def memory_store() -> Store:
+    """Return a store that lives as long as the program."""
+    store = Store(sqlite3.connect(":memory:"), Path(":memory:") / FILE)
+    _make_tables(store)
+    return store
+
+
+def _connect(path: Path) -> sqlite3.Connection:
+    connection = sqlite3.connect(path, timeout=30.0)
+    try:
+        connection.execute("PRAGMA cache_size = -65536")
+        complaints = connection.execute("PRAGMA quick_check(1)").fetchone()[0]
+        layout = connection.execute("PRAGMA user_version").fetchone()[0]
+    except sqlite3.OperationalError as error:
+        connection.close()
+        raise MissingEnvironment(f"{path}: cannot be opened ({error}); check its rights and the disk.") from error
+    except sqlite3.DatabaseError as error:
+        connection.close()
+        raise _damaged(path, error) from error
+    if complaints != "ok":
+        connection.close()
+        raise _damaged(path, complaints)
+    if layout not in (0, LAYOUT):
+        connection.close()
+        raise InputError(
+            f"{path}: was written by a later version of the workbench (layout {layout}); read it with that one."
+        )
+    return connection
+
+
+def _make_tables(store: Store) -> None:
+    if store.connection.execute("PRAGMA user_version").fetchone()[0] == LAYOUT:
+        return
+    with store._writing():
+        store.connection.execute("BEGIN IMMEDIATE")
+        for statement in TABLES.split(";")[:-1]:
+            store.connection.execute(statement)
+        store.connection.execute(f"PRAGMA user_version = {LAYOUT}")
+
+
+def _damaged(path: Path, reason: object) -> InputError:
+    return InputError(
+        f"{path}: the store is damaged ({reason}). Put a copy back in its place, or move it away and run the study again."
+    )
+
+
+def _pack(values: Sequence[float], errors: Sequence[float]) -> bytes:
+    return struct.pack(f"<{2 * len(values)}d", *values, *errors)
+
+
+def _now() -> str:
+    return datetime.now(UTC).isoformat(timespec="seconds")

@@ -1,0 +1,140 @@
+"""Who evaluates the batches of a study: this process, a pool of processes, or a Dask cluster, behind one interface."""
+
+import contextlib
+import multiprocessing
+import os
+import signal
+import sys
+from collections.abc import Callable, Iterator
+from concurrent.futures import Executor, Future, ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
+from typing import Any, Protocol
+
+THREADS = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1")
+PR_SET_PDEATHSIG = 1
+
+
+class Workers(Protocol):
+    """What the engine needs: how many there are, a way to submit, restart and close.
+
+    `lost`: errors which mean that the worker of that task was lost; `gone`: that all are gone for good.
+    """
+
+    count: int
+    lost: tuple[type[BaseException], ...]
+    gone: tuple[type[BaseException], ...]
+
+    def submit(self, function: Callable[..., Any], *arguments: Any) -> "Future[Any]":
+        """Start a call somewhere."""
+        ...
+
+    def restart(self) -> bool:
+        """Be usable again after a worker was lost; True when every other running task was lost with it."""
+        ...
+
+    def close(self) -> None:
+        """End every worker at once; what they were doing is lost."""
+        ...
+
+
+class Here:
+    """The process itself: for vectorised quantities, where starting others would take longer than the work."""
+
+    count = 1
+    lost: tuple[type[BaseException], ...] = ()
+    gone: tuple[type[BaseException], ...] = ()
+
+    def submit(self, function: Callable[..., Any], *arguments: Any) -> "Future[Any]":
+        """Call now."""
+        done: Future[Any] = Future()
+        done.set_result(function(*arguments))
+        return done
+
+    def restart(self) -> bool:
+        """Nothing can be lost."""
+        return False
+
+    def close(self) -> None:
+        """Nothing to end."""
+
+
+class Pool:
+    """Processes on this machine, each with one thread; they end when this process ends, however it ends."""
+
+    lost: tuple[type[BaseException], ...] = (BrokenProcessPool,)
+    gone: tuple[type[BaseException], ...] = ()
+
+    def __init__(self, count: int) -> None:
+        self.count = count
+        self._start()
+
+    def submit(self, function: Callable[..., Any], *arguments: Any) -> "Future[Any]":
+        """Queue a call; processes start as calls need them."""
+        before = set(multiprocessing.active_children())
+        with _environment(THREADS):  # must stand before numpy is imported in a new process
+            future = self._executor.submit(function, *arguments)
+        self._processes |= set(multiprocessing.active_children()) - before
+        return future
+
+    def restart(self) -> bool:
+        """End what is left and start anew: one lost process breaks the whole pool."""
+        self.close()
+        self._start()
+        return True
+
+    def close(self) -> None:
+        """Kill the processes."""
+        self._executor.shutdown(wait=False, cancel_futures=True)
+        for process in self._processes:
+            process.kill()
+        for process in self._processes:
+            process.join()
+
+    def _start(self) -> None:
+        self._processes: set[Any] = set()
+        context = multiprocessing.get_context("spawn")
+        self._executor: Executor = ProcessPoolExecutor(
+            self.count, mp_context=context, initializer=become_worker, initargs=(os.getpid(),)
+        )
+
+
+def become_worker(parent: int) -> None:
+    """Prepare a pool process: it ends with its parent, and leaves Ctrl-C to it."""
+    die_with_parent(parent)
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
+def die_with_parent(parent: int) -> None:
+    """Ask the system to kill this process when its parent ends, even by kill -9."""
+    if sys.platform == "linux":
+        import ctypes
+
+        ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
+    else:
+        import threading
+
+        threading.Thread(target=_watch_parent, args=(parent,), daemon=True).start()
+    if os.getppid() != parent:  # it ended before we asked
+        os._exit(1)
+
+
+def _watch_parent(parent: int) -> None:
+    import time
+
+    while os.getppid() == parent:
+        time.sleep(1.0)
+    os._exit(1)
+
+
+@contextlib.contextmanager
+def _environment(changes: dict[str, str]) -> Iterator[None]:
+    before = {name: os.environ.get(name) for name in changes}
+    os.environ.update(changes)
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            if value is None:
+                del os.environ[name]
+            else:
+                os.environ[name] = value
