@@ -93,11 +93,18 @@ def trace_outlines(resonator: Resonator, spacing: float, mode: "Mode | None" = N
     outlines = [_thin(line, 0.02 * spacing, resonator.size) for line in lines]
     outlines.sort(key=lambda line: -abs(line.area))
     turned = [line if (line.area > 0) == (k == 0) else line.reversed() for k, line in enumerate(outlines)]
-    largest = max(float(np.sqrt((line.displacement**2).sum(axis=0)).max()) for line in turned)
+    largest = max(_largest(line.displacement, system.n) for line in turned)
     scale = 1 / largest if largest > 0 else 1.0
     return tuple(
         replace(line, displacement=line.displacement * scale, energy=line.energy * scale**2) for line in turned
     )
+
+
+def _largest(displacement: Array, n: int) -> float:
+    """Largest displacement anywhere around: at θ = 0 in the meridional plane, at a quarter wave around; all at once for n = 0."""
+    u_r, u_t, u_z = displacement
+    in_plane = np.hypot(u_r, u_z)
+    return float(np.max(np.hypot(in_plane, u_t) if n == 0 else np.maximum(in_plane, abs(u_t))))
 
 
 @dataclass(frozen=True, eq=False)

@@ -26,6 +26,7 @@ REMEDY = (
     " 'apt install libegl1 libgl1-mesa-dri' brings a software renderer."
 )
 EXAGGERATION = 0.12  # largest displacement in a picture over the size of the resonator
+ROOM = 0.72  # share of the picture's height for the resonator; the rest is for title and legend
 PER_FRAME = 15.0  # seconds that one frame may take before the drawing is given up
 NODE, ANTINODE = "#d81b60", "#1b1f24"
 
@@ -204,13 +205,13 @@ def _draw_job(folder: str) -> None:
     plotter = pv.Plotter(
         off_screen=True, shape=(1, len(scenes)), window_size=[window[0] * len(scenes), window[1]], border=False
     )
-    size = max(float(np.ptp(scene.points, axis=0).max()) for scene in scenes)
+    half_height = max(_half_height(scene, view, window[0] / window[1]) for scene in scenes)
     limits = _common_limits([scene.values for scene in scenes])
     moving = []
     for k, scene in enumerate(scenes):
         plotter.subplot(0, k)
-        moving += _fill(plotter, scene, limits, size, first=k == 0)
-        _aim(plotter, scene, view, size)
+        moving += _fill(plotter, scene, limits, first=k == 0)
+        _aim(plotter, scene, view, half_height)
     for number, swing in enumerate(swings):
         for mesh, rest, displacement in moving:
             mesh.points = rest + swing * displacement
@@ -219,9 +220,7 @@ def _draw_job(folder: str) -> None:
     plotter.close()
 
 
-def _fill(
-    plotter: Any, scene: Scene, limits: tuple[float, float], size: float, first: bool
-) -> list[tuple[Any, Array, Array]]:
+def _fill(plotter: Any, scene: Scene, limits: tuple[float, float], first: bool) -> list[tuple[Any, Array, Array]]:
     """Put one resonator into the current part of the window; return what moves: mesh, rest position, displacement."""
     import pyvista as pv
 
@@ -235,7 +234,7 @@ def _fill(
     body, origin = _split_sharp(scene, faces)
     body[scene.legend] = scene.values[origin]
     bar = {
-        "title": scene.legend,
+        "title": scene.legend + "\n",
         "color": "black",
         "fmt": "%.3g",
         "vertical": False,
@@ -244,7 +243,7 @@ def _fill(
         "n_labels": 5,
         "width": 0.6,
         "position_x": 0.2,
-        "position_y": 0.02,
+        "position_y": 0.05,
         "height": 0.12,
     }
     plotter.add_mesh(
@@ -273,7 +272,7 @@ def _fill(
         if first:
             plotter.add_text(
                 "red lines: nodes   black dots: antinodes   grey: undeformed",
-                position=(12, 92),
+                position=(12, 6),
                 font_size=8,
                 color="#5b6470",
             )
@@ -294,23 +293,37 @@ def _split_sharp(scene: Scene, faces: Array) -> tuple[Any, NDArray[np.int64]]:
     return split, np.asarray(split["origin"], dtype=np.int64)
 
 
-def _aim(plotter: Any, scene: Scene, view: str, size: float) -> None:
-    """Look from the same direction at every resonator: from its open end, the axis upright."""
-    low, high = scene.points.min(axis=0), scene.points.max(axis=0)
-    middle = (low + high) / 2
-    upwards = -0.1 * size  # room for the legend below
+def _axes(scene: Scene, view: str) -> tuple[Array, Array, Array]:
+    """Unit vectors towards the eye, upwards and to the right on the screen: from the open end, the axis upright."""
     side = 1.0 if scene.opens_up else -1.0
-    direction, up = {
-        "oblique": ((0.62, -0.62, 0.62 * side), (0, 0, 1)),
-        "axis": ((0, 0, side), (0, 1, 0)),
-        "side": ((0, -1, 0), (0, 0, 1)),
+    eye, up = {
+        "oblique": ((1.0, -1.0, 0.9 * side), (0.0, 0.0, 1.0)),
+        "axis": ((0.0, 0.0, side), (0.0, 1.0, 0.0)),
+        "side": ((0.0, -1.0, 0.0), (0.0, 0.0, 1.0)),
     }[view]
+    away = np.array(eye) / np.linalg.norm(eye)
+    upwards = np.array(up) - away * (away @ np.array(up))
+    upwards /= np.linalg.norm(upwards)
+    return away, upwards, np.cross(upwards, away)
+
+
+def _half_height(scene: Scene, view: str, aspect: float) -> float:
+    """Half the height of the picture, m, in which the swinging resonator fits above the legend."""
+    _, up, right = _axes(scene, view)
+    corners = np.concatenate([scene.points + sign * scene.displacement for sign in (-1, 1)])
+    high, wide = np.ptp(corners @ up), np.ptp(corners @ right)
+    return float(max(high / (2 * ROOM), 1.08 * wide / (2 * aspect)))
+
+
+def _aim(plotter: Any, scene: Scene, view: str, half_height: float) -> None:
+    """Look at the resonator from the view's direction, without perspective; it stands in the upper part of the picture."""
+    away, up, right = _axes(scene, view)
+    corners = np.concatenate([scene.points + sign * scene.displacement for sign in (-1, 1)])
+    middle = sum((corners @ axis).max() / 2 * axis + (corners @ axis).min() / 2 * axis for axis in (away, up, right))
+    target = middle - (1 - ROOM - 0.04) * half_height * up
     plotter.enable_parallel_projection()
-    away = np.array(direction)
-    screen_up = np.array(up) - away * (away @ np.array(up)) / (away @ away)
-    target = middle + upwards * screen_up / np.linalg.norm(screen_up)
-    plotter.camera_position = [tuple(target + 4 * size * away), tuple(target), up]
-    plotter.camera.parallel_scale = 0.68 * size
+    plotter.camera_position = [tuple(target + 20 * half_height * away), tuple(target), tuple(up)]
+    plotter.camera.parallel_scale = half_height
     plotter.reset_camera_clipping_range()
 
 

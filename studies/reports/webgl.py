@@ -41,11 +41,13 @@ def view_modes(
 
     size = resonator.size
     described = [_describe(resonator, mode, size) for mode in modes]
+    middle, reach = _bounds(resonator)
     start, rim = resonator.at([0.0]), resonator.at([resonator.length])
     data = {
         "modes": described,
         "map": _colour_map(),
-        "middle": float(start.z[0] + rim.z[0]) / 2 / size,
+        "middle": middle / size,
+        "reach": reach / size,
         "opens_up": bool(rim.z[0] > start.z[0]),
     }
     environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
@@ -95,6 +97,15 @@ def _split_at_kinks(line: "Outline") -> "list[tuple[Outline, np.ndarray[Any, np.
     breaks = 1 + np.flatnonzero(abs(np.diff(heading)) > KINK)
     bounds = [0, *breaks.tolist(), len(closing) - 1]
     return [(line, closing[a : b + 1]) for a, b in pairwise(bounds)]
+
+
+def _bounds(resonator: "Resonator") -> tuple[float, float]:
+    """Height of the middle of the resonator and the radius of the sphere around it, m."""
+    from shell.outline import trace_outlines
+
+    line = trace_outlines(resonator, resonator.size / 40)[0]
+    middle = float(line.z.max() + line.z.min()) / 2
+    return middle, float(np.hypot(line.r, line.z - middle).max())
 
 
 def _colour_map() -> list[list[float]]:
