@@ -26,6 +26,8 @@ Fitted = TypeVar("Fitted")
 CELSIUS_ZERO = 273.15
 MARGIN = 0.01
 """Part of a fitted range by which noise may lead out of it before that counts as extrapolation."""
+PLATEAU = 1e-3
+"""Part of the largest applied rate within which two rates are the same."""
 
 
 @dataclass(frozen=True)
@@ -305,6 +307,13 @@ def invert_chain(chain: Chain, rate: ArrayLike, temperature: ArrayLike) -> Real:
     return counts
 
 
+def same_rate(rate: ArrayLike) -> Real:
+    """Return the applied rates rounded to a thousandth of the largest, so that a rate table's jitter is one rate."""
+    x = np.asarray(rate, dtype=float)
+    grain = PLATEAU * float(np.max(np.abs(x), initial=0.0)) or 1.0
+    return np.asarray(np.round(x / grain) * grain, dtype=float)
+
+
 @dataclass(frozen=True)
 class Linearity:
     """The line through measured over applied rate, and the largest departure from it.
@@ -331,7 +340,8 @@ def measure_linearity(applied: ArrayLike, measured: ArrayLike) -> Linearity:
         With fewer than three different applied rates.
     """
     x, y = read_columns(applied=applied, measured=measured)
-    rates, kind = np.unique(x, return_inverse=True)
+    _, kind = np.unique(same_rate(x), return_inverse=True)
+    rates = np.bincount(kind, x) / np.bincount(kind)
     if len(rates) < 3:
         raise CompensationError(f"nonlinearity needs three applied rates or more, not {len(rates)}.")
     means = np.bincount(kind, y) / np.bincount(kind)

@@ -15,6 +15,8 @@ from compensation.errors import CompensationError
 from compensation.samples import check_time, is_regular
 
 Complex = NDArray[np.complex128]
+SAME_STEP = 1e-9
+"""Part of the usual step by which two steps may differ and still share one matrix exponential."""
 
 
 @dataclass(frozen=True)
@@ -156,6 +158,8 @@ class TransferFunction:
         A, B, C, D = self.realise()
         x0 = np.zeros(len(B), dtype=complex)
         if settled:
+            if self.denominator[-1] == 0:
+                raise CompensationError("a transfer function with a pole at s = 0 has no settled start.")
             x0 = np.linalg.solve(A, -B * u[0]).astype(complex)
         x = _march_evenly(A, B, t, u, x0) if is_regular(t) else _march(A, B, t, u, x0)
         y = C @ x + D * u
@@ -197,7 +201,8 @@ def _march_evenly(A: Complex, B: Complex, t: NDArray[np.float64], u: NDArray[Any
 
 def _march(A: Complex, B: Complex, t: NDArray[np.float64], u: NDArray[Any], x0: Complex) -> Complex:
     """States on any grid, step by step; equal steps share one matrix exponential."""
-    steps, kind = np.unique(np.diff(t), return_inverse=True)
+    grain = SAME_STEP * float(np.median(np.diff(t)))
+    steps, kind = np.unique(np.maximum(np.round(np.diff(t) / grain), 1) * grain, return_inverse=True)
     transition, held, ramp = _step(A, B, steps)
     x = np.empty((len(B), len(t)), dtype=complex)
     x[:, 0] = x0

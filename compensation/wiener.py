@@ -45,7 +45,8 @@ class Spectrum:
             object.__setattr__(self, name, tuple(coefficients.tolist()))
         corner = np.abs(np.r_[1.0, np.roots(self.numerator), np.roots(self.denominator)])
         corner = corner[corner > 0]
-        if np.any(self.density(np.geomspace(corner.min() / 100, corner.max() * 100, 999)) < 0):
+        frequency = np.geomspace(corner.min() / 100, corner.max() * 100, 999)
+        if np.any(_sign(self.numerator, frequency) * _sign(self.denominator, frequency) < 0):
             raise CompensationError("the spectral density is negative at some frequency; check its signs (s² = −ω²).")
 
     def density(self, frequency: ArrayLike) -> Real:
@@ -99,8 +100,8 @@ def factorise(even: ArrayLike) -> Real:
     """
     p = np.trim_zeros(np.asarray(even, dtype=float), "f")
     squares = np.roots(p[::2])
-    size = float(np.max(np.abs(squares), initial=0.0))
-    on_axis = (squares.real <= 1e-13 * size) & (np.abs(squares.imag) <= 1e-9 * np.abs(squares))
+    # A double root on the axis comes out of the root finder as a pair that is 1e-8 apart.
+    on_axis = (squares.real <= 0) & (np.abs(squares.imag) <= 1e-6 * np.abs(squares))
     if np.any(on_axis):
         at = float(np.sqrt(np.abs(squares[on_axis][0])))
         raise CompensationError(
@@ -230,6 +231,13 @@ def derive_wiener_filter(noise: Literal["white", "high-pass"]) -> WienerDerivati
     residue = sympy.simplify(B**2 * a / Delta.subs(s, -s).subs(s, -B))
     optimum = residue * (s + a) / Delta
     return WienerDerivation(Delta, optimum, sympy.simplify(optimum / optimum.subs(s, 0)))
+
+
+def _sign(polynomial: tuple[float, ...], frequency: Real) -> Real:
+    """Sign of an even polynomial at jω; 0 where rounding decides it."""
+    terms = np.array(polynomial)[:, None] * (1j * frequency) ** np.arange(len(polynomial) - 1, -1, -1)[:, None]
+    value = np.sum(terms.real, axis=0)
+    return np.where(np.abs(value) > 1e-12 * np.sum(np.abs(terms), axis=0), np.sign(value), 0.0)
 
 
 def _multiply(*polynomials: Real) -> Real:

@@ -18,8 +18,8 @@ TEMPERATURES = ("housing_temperature_degC", "resonator_temperature_degC", "chamb
 CELSIUS_ZERO = 273.15
 MOST_ROWS = 20_000
 """Rows beyond which a run is averaged in blocks before a fit: temperature is slow, and noise averages."""
-LARGEST_REST = 1e-3
-"""Applied rate in °/s that still counts as rest (a quarter of the earth's)."""
+LARGEST_REST = 0.01
+"""Applied rate in °/s that still counts as rest: somewhat more than the earth's, 0.0042 °/s."""
 
 
 @dataclass(frozen=True)

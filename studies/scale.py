@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from compensation.bell import Chain, Run, apply_chain, fit_chain, measure_linearity
+from compensation.bell import Chain, Run, apply_chain, fit_chain, measure_linearity, same_rate
 from compensation.samples import is_regular
 from compensation.stability import allan_deviation
 from studies.errors import InputError
@@ -22,6 +22,8 @@ DEG = float(np.pi / 180)
 STEPS = ("rough", "bias_compensated", "rate_compensated", "temperature_compensated", "filtered")
 SWEPT = 5.0
 """Span of temperature (K) from which a run counts as one over temperature."""
+STEADY = 0.01
+"""Part of the rate by which a rate table may waver and still turn at one rate."""
 SHORT, LONG = 1.0, 100.0
 """Averaging times (s) at which the random walk is read: a filter of 5 s changes the first, not the second."""
 BLOCKS = 5
@@ -68,7 +70,7 @@ def judge_steps(chain: Chain, rates: Run, rest: Run, turning: Run) -> list[StepF
     for step in STEPS if even else STEPS[:-1]:
         at_rates, at_rest, at_turning = (np.asarray(getattr(output, step), dtype=float) for output in outputs)
         steady = settled_rows(rates.rate, len(chain.taps) if step == "filtered" else 0)
-        enough = len(np.unique(rates.rate[steady])) > 2
+        enough = len(np.unique(same_rate(rates.rate)[steady])) > 2
         linearity = measure_linearity(rates.rate[steady], at_rates[steady]) if enough else None
         wander, short, long = _read_allan((rest.time[-1] - rest.time[0]) / (len(rest.time) - 1), at_rest)
         figures.append(
@@ -88,7 +90,7 @@ def judge_steps(chain: Chain, rates: Run, rest: Run, turning: Run) -> list[StepF
 def settled_rows(rate: Real, rows: int) -> NDArray[np.bool_]:
     """Mark the rows at which the applied rate has been the same for `rows` rows, or since the start of the run."""
     index = np.arange(len(rate))
-    begin = np.maximum.accumulate(np.where(np.r_[False, np.diff(rate) != 0], index, 0))
+    begin = np.maximum.accumulate(np.where(np.r_[False, np.diff(same_rate(rate)) != 0], index, 0))
     return np.asarray((index - begin >= rows) | (begin == 0), dtype=bool)
 
 
@@ -132,7 +134,7 @@ KINDS = {
 def _classify(run: Run, path: str) -> str:
     several, at_rest, turning = KINDS
     swept = float(np.ptp(run.temperature)) > SWEPT
-    if np.ptp(run.rate) > LARGEST_REST * DEG:
+    if np.ptp(run.rate) > max(LARGEST_REST * DEG, STEADY * np.max(np.abs(run.rate))):
         if swept:
             raise InputError(f"{path}: both rate and temperature change; the chain needs them one at a time.")
         return several

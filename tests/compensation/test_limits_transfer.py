@@ -84,6 +84,7 @@ def test_a_pure_number_is_a_transfer_function():
         (lambda: TransferFunction((np.nan,), (1.0,)), "not finite"),
         (lambda: TransferFunction((1.0, 0.0), (1.0,)).simulate([0, 1], [0, 1]), "not causal"),
         (lambda: TransferFunction((1.0,), (1.0, 0.0)).steady_gain, "pole at s = 0"),
+        (lambda: TransferFunction((1.0,), (1.0, 0.0)).simulate([0, 1], [1, 1], settled=True), "settled start"),
         (lambda: TURNING.simulate([0, 2, 1], [0, 0, 0]), "row 2 to row 3"),
         (lambda: TURNING.simulate([0, 1], [0, np.nan]), "finite"),
     ],

@@ -105,6 +105,29 @@ def test_error_is_the_integral_of_the_spectral_density():
     assert result.noise == pytest.approx(passed, rel=1e-4)
 
 
+def test_error_of_a_simulated_gyro_is_the_computed_one():
+    """A rate of spectrum (27) and white noise in time, through (25) and the filter: variance of 40 s to 10 %."""
+    from scipy.signal import lfilter
+
+    step, rows = 2e-4, 200_000
+    generator = np.random.default_rng(12)
+    gyro, rate, noise = relate_rate_to_measured_rate(K, ZETA), rate_spectrum(1, B), white_spectrum(GAMMA, 1)
+    best = design_wiener_filter(gyro, rate, noise)
+    kept = math.exp(-B * step)
+    Omega = lfilter([math.sqrt(rate.variance * (1 - kept**2))], [1, -kept], generator.standard_normal(rows))
+    time = step * np.arange(rows)
+    added = GAMMA / math.sqrt(step) * generator.standard_normal(rows)
+    read = best.filter.simulate(time, gyro.simulate(time, Omega) + added)
+    assert np.mean((read - Omega)[1000:] ** 2) == pytest.approx(best.error, rel=0.1)
+
+
+def test_corners_far_apart_and_axis_roots():
+    far = np.poly([-1e-6, -1e3])
+    np.testing.assert_allclose(np.sort(np.roots(factorise(np.polymul(far, reflect(far))))), [-1e3, -1e-6], rtol=1e-6)
+    with pytest.raises(CompensationError, match="at 2 rad/s"):
+        factorise([1.0, 0.0, 8.0, 0.0, 16.0])
+
+
 def test_wiener_without_gyro_dynamics_is_the_textbook_first_order_filter():
     """Gauss–Markov signal in white noise: G = (β − B) / (s + β), β = B √(1 + 1/γ²)."""
     best = design_wiener_filter(TransferFunction((1.0,), (1.0,)), rate_spectrum(2.0, 3.0), white_spectrum(0.5, 2.0))

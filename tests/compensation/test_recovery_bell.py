@@ -157,6 +157,14 @@ def test_nonlinearity_of_a_parabola():
     assert result.slope == pytest.approx(1.0, rel=1e-12)
 
 
+def test_jitter_of_the_rate_table_does_not_split_a_plateau():
+    x = np.repeat(np.linspace(-2, 2, 41), 50)
+    jitter = 2e-4 * np.random.default_rng(1).uniform(-1, 1, len(x))
+    noise = 0.1 * np.random.default_rng(2).standard_normal(len(x))
+    even = measure_linearity(x, x + noise).nonlinearity
+    assert measure_linearity(x + jitter, x + noise).nonlinearity == pytest.approx(even, rel=0.02)
+
+
 def replace(run, **columns):
     return Run(**{name: columns.get(name, getattr(run, name)) for name in ("time", "output", "temperature", "rate")})
 
