@@ -12,6 +12,8 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "reproduce": ("studies.cli.reproduce:reproduce", "The HRG paper's tables and figures from its own data."),
     "modes": ("studies.cli.modes:modes", "Frequencies, Bryan factors and sensitivities of the modes."),
     "tcf": ("studies.cli.tcf:tcf", "Frequency against temperature and its parts."),
+    "simulate": ("studies.cli.simulate:simulate", "A virtual run of a card through a chamber profile."),
+    "thermal": ("studies.cli.thermal:thermal", "Temperatures of the heat path for a chamber profile."),
     "fit frequency": ("studies.cli.fit_frequency:fit_frequency", "f(T) and its inverse from a steady-state table."),
     "fit cross-damping": ("studies.cli.fit_cross_damping:fit_cross_damping", "Cross-damping bias over temperature."),
     "derive": ("studies.cli.derive:derive", "The symbolic derivation, as equations, LaTeX or code."),

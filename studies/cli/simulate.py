@@ -1,0 +1,86 @@
+"""`hrg simulate`: a virtual run in the record format."""
+
+from typing import Literal
+
+
+def simulate(
+    card: str,
+    profile: str,
+    *,
+    out: str,
+    rate: float = 1.0,
+    seed: int = 0,
+    noiseless: bool = False,
+    theory: Literal["solid", "shell"] = "solid",
+    json: bool = False,
+) -> int:
+    """Run a virtual gyro through a chamber profile and write the record.
+
+    The card's optional tables [thermal], [loss], [bias], [noise] and [[effect]] say what the gyro is like; all have
+    defaults (studies/simulation).
+
+    Parameters
+    ----------
+    card : str
+        Path of a card, or the name of one that ships (hrg cards).
+    profile : str
+        A CSV file (time_s,chamber_temperature_degC, linear between its rows), or words in quotes with temperatures in °C,
+        durations as 5h, 30min or 90s, and rates in K/min: "soak T DURATION", "step FROM TO DURATION",
+        "ramp FROM TO RATE", "staircase FROM TO STEP HOLD", "cycle START FIRST SECOND RATE HOLD COUNT", joined by "then";
+        for example "step 20 -10 5h then ramp -10 40 1". The gyro has settled at its first temperature.
+    out : str
+        The record to write.
+    rate : float
+        Rows per second.
+    seed : int
+        Seed of the noise.
+    noiseless : bool
+        Leave out noise, sensor lag and rounding.
+    theory : str
+        Of the shell: solid (three-dimensional) or shell (Naghdi).
+    json : bool
+        Print one JSON object (schema hrg.simulate/1) instead of a sentence.
+    """
+    import numpy as np
+
+    from studies.cli.output import print_json, say
+    from studies.errors import InputError
+    from studies.instrument.card import load_card
+    from studies.record import write_record
+    from studies.simulation.chamber import load_profile
+    from studies.simulation.virtual_gyro import simulate_run
+
+    if seed < 0:
+        raise InputError(f"--seed {seed}: a seed is a whole number from 0 up.")
+    instrument = load_card(card)
+    run = simulate_run(instrument, load_profile(profile), rate, seed, not noiseless, theory)
+    rows = len(run.record)
+
+    def progress(written: int) -> None:
+        if written % 500_000 == 0:
+            say(f"written {written} of {rows} rows ({100 * written / rows:.0f} %)")
+
+    write_record(run.record, out, progress)
+    model = run.frequency_model
+    summary = {
+        "schema": "hrg.simulate/1",
+        "card": instrument.name,
+        "out": out,
+        "rows": rows,
+        "columns": list(run.record.columns),
+        "rate_Hz": rate,
+        "seed": None if noiseless else seed,
+        "frequency_Hz": {"first": run.record["frequency_Hz"][0], "last": run.record["frequency_Hz"][-1]},
+        "solver_relative_error": model.solver_error,
+        "interpolation_relative_error": model.interpolation_error,
+    }
+    if json:
+        print_json(summary)
+        return 0
+    span = float(np.ptp(run.record["resonator_temperature_degC"]))
+    print(
+        f"{out}: {rows} rows over {run.record['time_s'][-1] - run.record['time_s'][0]:g} s; the resonator's temperature"
+        f" covers {span:.2f} °C; the frequency model lies within {model.interpolation_error:.0e} of the solver, the"
+        f" solver within {model.solver_error:.0e} of its theory."
+    )
+    return 0

@@ -1,0 +1,109 @@
+"""`hrg thermal`: temperatures of the heat path for a chamber profile."""
+
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from thermal.network import Network
+
+
+def thermal(card: str, profile: str, *, rows: int = 13, json: bool = False) -> int:
+    """Show time constants, what decides them, and the temperatures of housing, base, stem and shell in time.
+
+    The heat path is the card's table [thermal] with its defaults (studies/simulation/heat_path.py).
+
+    Parameters
+    ----------
+    card : str
+        Path of a card, or the name of one that ships (hrg cards).
+    profile : str
+        A CSV file (time_s,chamber_temperature_degC, linear between its rows), or words in quotes with temperatures in °C,
+        durations as 5h, 30min or 90s, and rates in K/min: "soak T DURATION", "step FROM TO DURATION",
+        "ramp FROM TO RATE", "staircase FROM TO STEP HOLD", "cycle START FIRST SECOND RATE HOLD COUNT", joined by "then";
+        for example "step 20 -10 5h then ramp -10 40 1". The gyro has settled at its first temperature.
+    rows : int
+        Rows of the table, evenly spaced in time.
+    json : bool
+        Print one JSON object (schema hrg.thermal/1) instead of tables.
+    """
+    import numpy as np
+
+    from studies.cli.output import print_json, print_table
+    from studies.errors import InputError
+    from studies.instrument.card import load_card
+    from studies.simulation.chamber import ZERO_CELSIUS, check_profile, load_profile
+    from studies.simulation.heat_path import build_network, build_shell_and_stem, cut_shell
+    from thermal.balance import check_energy
+    from thermal.relaxation import find_relaxation
+    from thermal.resonator import shell_weights
+    from thermal.transient import simulate
+
+    if rows < 2:
+        raise InputError(f"--rows {rows}: a table in time needs at least two rows.")
+    instrument = load_card(card)
+    chamber = load_profile(profile)
+    check_profile(chamber, instrument)
+    network, T0 = build_network(instrument), instrument.reference_temperature
+    alone = find_relaxation(build_shell_and_stem(instrument), T0)
+    whole = find_relaxation(network, T0)
+    transient = simulate(network, {"chamber": chamber})
+    time = np.linspace(chamber.start, chamber.end, rows)
+    shown = ["housing", "base", "stem"]
+    mean = shell_weights(transient.nodes, cut_shell(instrument).volume)
+    picks = [[float(node == name) for node in transient.nodes] for name in shown]
+    rim = [float(node == transient.nodes[-1]) for node in transient.nodes]
+    T = transient.observe(time, np.array([*picks, mean, rim])) - ZERO_CELSIUS
+    names = [*shown, "shell", "rim"]
+    energy = check_energy(network, {"chamber": chamber}, transient)
+    influence = _influence(network, T0)
+    if json:
+        print_json(
+            {
+                "schema": "hrg.thermal/1",
+                "card": instrument.name,
+                "radiation": not network.is_linear,
+                "time_constants_s": whole.time_constants,
+                "shell_and_stem_time_constants_s": alone.time_constants,
+                "slowest_time_constant_sensitivity": influence,
+                "energy_balance_error": energy.error,
+                "time_s": time,
+                "chamber_temperature_degC": chamber.at(time) - ZERO_CELSIUS,
+                "temperature_degC": {name: T[:, k] for k, name in enumerate(names)},
+            }
+        )
+        return 0
+    print_table(
+        f"{instrument.name}: time constants at {T0 - ZERO_CELSIUS:g} °C (s)",
+        ["network", "slowest", "second", "third"],
+        [
+            [label, *(f"{tau:.0f}" for tau in (*modes.time_constants[:3], *[np.nan] * 3)[:3])]
+            for label, modes in (("whole heat path", whole), ("shell and stem alone", alone))
+        ],
+    )
+    print_table(
+        "What decides the slowest one",
+        ["constant", "relative change per relative change"],
+        [[name, f"{value:+.3f}"] for name, value in list(influence.items())[:6]],
+    )
+    print_table(
+        "Temperatures (°C)" + (", with radiation" if not network.is_linear else ", linearised"),
+        ["time (s)", "chamber", *names],
+        [
+            [f"{t:.0f}", f"{c:.3f}", *(f"{value:.3f}" for value in row)]
+            for t, c, row in zip(time, chamber.at(time) - ZERO_CELSIUS, T, strict=True)
+        ],
+        f"Energy balance closed to {energy.error:.0e} of the heat that flowed; 'shell' is its mean.",
+    )
+    return 0
+
+
+def _influence(network: "Network", T0: float) -> "dict[str, Any]":
+    """Sensitivity of the slowest time constant, the shell's cells taken together, largest first."""
+    import re
+
+    from thermal.relaxation import time_constant_sensitivities
+
+    found: dict[str, float] = {}
+    for name, values in time_constant_sensitivities(network, T0).items():
+        key = re.sub(r"shell-\d+", "shell", name)
+        found[key] = found.get(key, 0.0) + float(values[0])
+    return dict(sorted(found.items(), key=lambda item: -abs(item[1])))

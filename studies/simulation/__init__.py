@@ -1,0 +1,1 @@
+"""The virtual gyro: a card and a chamber profile become a record."""

@@ -1,0 +1,231 @@
+"""A card and a chamber profile become a record: temperatures, frequency, zero-rate output, loss, noise."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from studies.errors import InputError, naming
+from studies.record import Record
+from studies.simulation.bias import read_bias, read_loss
+from studies.simulation.chamber import ZERO_CELSIUS, check_profile
+from studies.simulation.frequency import FrequencyModel, Theory, build_frequency_model
+from studies.simulation.heat_path import build_network, cut_shell, root_to_end
+from studies.simulation.noise import SILENT, bias_noise, frequency_noise, quantise, read_noise, white_noise
+from thermal.network import Boundary, Network, Part, assemble
+from thermal.profile import Profile
+from thermal.relaxation import find_relaxation
+from thermal.resonator import shell_weights
+from thermal.transient import Transient, lag, simulate
+
+if TYPE_CHECKING:
+    from studies.instrument.card import Instrument
+
+Array = NDArray[np.float64]
+MOST_ROWS = 40_000_000
+DIGITS = {
+    # decimals that are recorded, far below any noise
+    "time_s": 9,
+    "chamber_temperature_degC": 6,
+    "housing_temperature_degC": 6,
+    "resonator_temperature_degC": 6,
+    "frequency_Hz": 8,
+    "bias_deg_per_h": 6,
+    "inverse_q": 16,
+}
+MARGIN = 10.0  # K beyond the profile in which the frequency stays known: effects and self-heating
+
+
+@dataclass(frozen=True)
+class VirtualRun:
+    """A simulated run: its record, and what it was made of."""
+
+    record: Record
+    network: Network
+    transient: Transient
+    frequency_model: FrequencyModel
+
+
+@dataclass(frozen=True)
+class _Noiseless:
+    """Columns before noise: s, K, K, Hz, deg/h, 1."""
+
+    time: Array
+    housing: Array
+    resonator: Array
+    frequency: Array
+    bias: Array
+    inverse_q: Array
+
+
+def simulate_run(
+    instrument: "Instrument",
+    profile: Profile,
+    rate: float = 1.0,
+    seed: int = 0,
+    noise: bool = True,
+    theory: Theory = "solid",
+    frequency_model: FrequencyModel | None = None,
+) -> VirtualRun:
+    """Run a virtual gyro through a chamber profile.
+
+    Parameters
+    ----------
+    instrument : Instrument
+        With optional tables `[thermal]`, `[loss]`, `[bias]`, `[noise]` and `[[effect]]`.
+    profile : Profile
+        Chamber temperature (K); the gyro has settled at its first value.
+    rate : float
+        Rows per second.
+    seed : int
+        Of the noise.
+    noise : bool
+        False records what is true, without noise, sensor lag or rounding.
+    theory : str
+        Of the shell: "solid" or "shell".
+    frequency_model : FrequencyModel, optional
+        One that was built before for the same instrument.
+
+    Raises
+    ------
+    InputError, ThermalError, ShellError
+        An unusable table or effect; a profile that leaves the range of the material.
+    """
+    check_profile(profile, instrument)
+    time = _rows(profile, rate)
+    levels = read_noise(instrument.table("noise"), f"{instrument.path} [noise]") if noise else dict(SILENT)
+    network = build_network(instrument)
+    transient = simulate(network, {"chamber": profile})
+    low, high = float(profile.value.min()) - MARGIN, float(profile.value.max()) + MARGIN
+    model = frequency_model or build_frequency_model(instrument, low, high, theory)
+    true = _respond(instrument, transient, model, time)
+    generator = np.random.default_rng(seed)
+    columns = _observe(true, levels, rate, generator)
+    columns = {"time_s": time, "chamber_temperature_degC": profile.at(time) - ZERO_CELSIUS, **columns}
+    for name, values in columns.items():
+        np.round(values, DIGITS[name], out=values)
+    resolution = {
+        "frequency_Hz": levels["frequency_resolution_Hz"],
+        "bias_deg_per_h": levels["bias_resolution_deg_per_h"],
+        "housing_temperature_degC": levels["housing_resolution_degC"],
+    }
+    record = Record(
+        columns,
+        instrument=instrument.name,
+        source=f"simulated, rate {rate:g} Hz, " + (f"seed {seed}" if noise else "without noise"),
+        resolution={name: step for name, step in resolution.items() if step > 0},
+    )
+    return VirtualRun(record, network, transient, model)
+
+
+def cell_weights(instrument: "Instrument", model: FrequencyModel) -> Array:
+    """Contribution to d ln f/dT (1/K) of each cell of the shell, from its root to its free end."""
+    cells, (s, _, _) = cut_shell(instrument), root_to_end(instrument)
+    edges = (s[0] + cells.edge) / instrument.resonator.length
+    if instrument.resonator.support == "clamped-rim":
+        return model.weights(1 - edges[::-1])[::-1]
+    return model.weights(edges)
+
+
+def _respond(instrument: "Instrument", transient: Transient, model: FrequencyModel, time: Array) -> _Noiseless:
+    housing_row = np.array([[float(node == "housing") for node in transient.nodes]])
+    shell_row = shell_weights(transient.nodes, cell_weights(instrument, model))
+    T = transient.observe(time, np.vstack([housing_row, shell_row]))
+    housing, resonator = np.ascontiguousarray(T[:, 0]), np.ascontiguousarray(T[:, 1])
+    changes = _apply_effects(instrument, transient, time, housing, resonator)
+    resonator = resonator + changes.get("resonator_temperature", 0.0)
+    reference = instrument.reference_temperature
+    thermal_frequency = model.frequency(resonator)
+    frequency = thermal_frequency + changes.get("frequency_Hz", 0.0)
+    loss = read_loss(instrument.table("loss"), f"{instrument.path} [loss]")
+    inverse_q = loss.at(resonator - reference) + changes.get("inverse_q", 0.0)
+    if not (inverse_q > 0).all():
+        raise InputError(f"{instrument.path} [loss]: 1/Q becomes negative in this profile; correct its slope or curvature.")
+    change = frequency - float(model.frequency(np.array([reference]))[0]) if _covers(model, reference) else (
+        frequency - frequency[0]
+    )
+    bias_model = read_bias(instrument.table("bias"), f"{instrument.path} [bias]")
+    bias = bias_model.at(change, np.gradient(change, time[1] - time[0]), frequency, inverse_q, model.bryan_factor)
+    return _Noiseless(time, housing, resonator, frequency, bias + changes.get("bias_deg_per_h", 0.0), inverse_q)
+
+
+def _observe(true: _Noiseless, levels: Mapping[str, float], rate: float, generator: np.random.Generator) -> dict[str, Array]:
+    """Return the columns as they are read: sensor lag, noise, rounding. The resonator's temperature stays true."""
+    count = len(true.time)
+    sensed = lag(true.time, true.housing, levels["housing_lag_s"]) if levels["housing_lag_s"] > 0 else true.housing
+    sensed = sensed + white_noise(count, rate, levels["housing_white_K"], generator) - ZERO_CELSIUS
+    frequency = true.frequency + frequency_noise(levels).draw(count, rate, generator)
+    bias = true.bias + bias_noise(levels).draw(count, rate, generator)
+    loss = true.inverse_q * (1 + white_noise(count, rate, levels["inverse_q_white"], generator))
+    return {
+        "housing_temperature_degC": quantise(sensed, levels["housing_resolution_degC"]),
+        "resonator_temperature_degC": true.resonator - ZERO_CELSIUS,
+        "frequency_Hz": quantise(frequency, levels["frequency_resolution_Hz"]),
+        "bias_deg_per_h": quantise(bias, levels["bias_resolution_deg_per_h"]),
+        "inverse_q": loss,
+    }
+
+
+def _apply_effects(
+    instrument: "Instrument", transient: Transient, time: Array, housing: Array, resonator: Array
+) -> dict[str, Array]:
+    """Sum what the card's `[[effect]]` tables add to the resonator's temperature (K) and to the responses."""
+    if not instrument.effects:
+        return {}
+    from studies.diagnosis.effects import apply_effect
+    from studies.diagnosis.states import States
+
+    reference = instrument.reference_temperature
+    states = States(
+        run=0, time=time - time[0], campaign_time=time - time[0], housing=housing, resonator=resonator,
+        tau=slowest_lag(instrument), reference=reference,
+    )
+    changes: dict[str, Array] = {}
+    for number, effect in enumerate(instrument.effects, 1):
+        where = f"{instrument.path} [[effect]] number {number}"
+        response, parameters = _read_effect(effect, where)
+        with naming(where):
+            target, change = apply_effect(effect["name"], parameters, states, response)
+        changes[target] = changes.get(target, np.zeros_like(time)) + change
+    return changes
+
+
+def slowest_lag(instrument: "Instrument") -> float:
+    """Slowest time constant (s) of the resonator behind its housing."""
+    network = build_network(instrument)
+    parts: list[Part] = [Boundary("housing")]
+    parts += [node for node in network.nodes if node.name != "housing"]
+    parts += [link for link in network.conductors if "chamber" not in (link.one, link.other)]
+    parts += network.radiators
+    return float(find_relaxation(assemble(parts), instrument.reference_temperature).time_constants[0])
+
+
+def _read_effect(effect: Mapping[str, Any], where: str) -> tuple[str, dict[str, float]]:
+    from studies.diagnosis.effects import find_effect
+    from studies.files.toml import check_number
+
+    with naming(where):
+        known = find_effect(effect["name"])
+    response = effect.get("response", known.responses[0])
+    if not isinstance(response, str):
+        raise InputError(f"{where}: response must be text in quotes, not {response!r}.")
+    return response, {
+        key: check_number(value, f"{where}: {key}") for key, value in effect.items() if key not in ("name", "response")
+    }
+
+
+def _rows(profile: Profile, rate: float) -> Array:
+    if not (np.isfinite(rate) and rate > 0):
+        raise InputError(f"--rate {rate:g}: the rate must be positive (rows per second).")
+    count = int(np.floor((profile.end - profile.start) * rate * (1 + 1e-12))) + 1
+    if count > MOST_ROWS:
+        raise InputError(f"--rate {rate:g} makes {count} rows; choose a lower rate (at most {MOST_ROWS} rows).")
+    if count < 2:
+        raise InputError(f"--rate {rate:g} makes a single row; choose a higher rate.")
+    return np.minimum(profile.start + np.arange(count) / rate, profile.end)
+
+
+def _covers(model: FrequencyModel, temperature: float) -> bool:
+    return model.lowest <= temperature <= model.highest
