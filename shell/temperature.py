@@ -94,6 +94,25 @@ def mode_model(resonator: "Resonator", harmonic: int = 2, theory: "Theory" = "so
     return model
 
 
+def over_poisson_ratio(model: Model, lowest: float, highest: float, nodes: int = 4) -> Model:
+    """Return a model that solves at a few Poisson ratios only and interpolates between them.
+
+    By dimensions f = √(E/ρ) Φ(nu): E and ρ need no solve, and Φ is smooth over the small change of nu with temperature.
+    """
+    from scipy.interpolate import BarycentricInterpolator
+
+    x = np.cos((2 * np.arange(nodes) + 1) * np.pi / (2 * nodes))
+    ratios = (lowest + highest) / 2 + (highest - lowest) / 2 * x
+    solved = [model(Elastic(1.0, float(nu), 1.0)) for nu in ratios]
+    table = BarycentricInterpolator(ratios, np.array([(np.log(s.frequency), s.nu, s.h) for s in solved]))
+
+    def interpolated(elastic: Elastic) -> FrequencyGradient:
+        log_shape, by_nu, by_h = table(elastic.nu)
+        return FrequencyGradient(float(np.exp(log_shape) * np.sqrt(elastic.E / elastic.rho)), float(by_nu), float(by_h))
+
+    return interpolated
+
+
 def frequency_over_temperature(
     model: Model, material: Material, reference: float, temperatures: ArrayLike
 ) -> NDArray[np.float64]:
@@ -115,6 +134,7 @@ def frequency_over_temperature(
         A temperature outside the material's range.
     """
     T = material.check(np.atleast_1d(temperatures))
+    model = _spread(model, material, T)
     undeformed = np.array([model(material.elastic(float(x))).frequency for x in T])
     return np.asarray(undeformed / material.growth(T, reference))
 
@@ -123,7 +143,19 @@ def temperature_coefficients(
     model: Model, material: Material, reference: float, temperatures: ArrayLike
 ) -> list[TemperatureCoefficient]:
     """Return the slope of the frequency, its five parts and its uncertainty at each temperature (K)."""
-    return [_coefficient(model, material, reference, float(x)) for x in material.check(np.atleast_1d(temperatures))]
+    T = material.check(np.atleast_1d(temperatures))
+    model = _spread(model, material, T)
+    return [_coefficient(model, material, reference, float(x)) for x in T]
+
+
+def _spread(model: Model, material: Material, T: NDArray[np.float64]) -> Model:
+    """Interpolate over the Poisson ratios of many temperatures; a few, or one ratio, are solved as they are."""
+    nu = material.value("poisson_ratio", T)
+    if T.size < 4:
+        return model
+    if np.ptp(nu) == 0:
+        return over_poisson_ratio(model, float(nu[0]), float(nu[0]), nodes=1)
+    return over_poisson_ratio(model, float(nu.min()), float(nu.max()))
 
 
 def _coefficient(model: Model, material: Material, reference: float, T: float) -> TemperatureCoefficient:

@@ -3,8 +3,16 @@
 import numpy as np
 import pytest
 
+from shell.elastic import Elastic
 from shell.materials import constant_material, find_material
-from shell.temperature import frequency_over_temperature, rayleigh_model, temperature_coefficients
+from shell.meridian import hemisphere
+from shell.temperature import (
+    frequency_over_temperature,
+    mode_model,
+    over_poisson_ratio,
+    rayleigh_model,
+    temperature_coefficients,
+)
 
 MODEL = rayleigh_model(2, 0.9e-3, 15e-3)
 
@@ -48,3 +56,12 @@ def test_uncertainty_agrees_with_a_monte_carlo_over_the_law():
             drawn = drawn.with_number(name, number, value + u * rng.normal())
         slopes.append(0.5 * drawn.log_slope("shear_modulus", 293.15) + 0.5 * float(drawn.value("expansion", 293.15)))
     assert np.std(slopes) == pytest.approx(c.uncertainty, rel=0.12)
+
+
+@pytest.mark.parametrize("model", [MODEL, mode_model(hemisphere(15e-3, 0.9e-3))], ids=["rayleigh", "solid"])
+def test_interpolation_over_poisson_ratio_equals_direct_solves(model):
+    table = over_poisson_ratio(model, 0.163, 0.171)
+    for nu in (0.163, 0.1642, 0.169, 0.171):
+        direct, quick = model(Elastic(72e9, nu, 2203.0)), table(Elastic(72e9, nu, 2203.0))
+        assert quick.frequency == pytest.approx(direct.frequency, rel=1e-7)
+        assert (quick.nu, quick.h) == pytest.approx((direct.nu, direct.h), abs=1e-5)
