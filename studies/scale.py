@@ -7,7 +7,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from compensation.bell import Chain, Run, apply_chain, fit_chain, measure_linearity, same_rate
+from compensation.bell import Chain, apply_chain
+from compensation.bell_calibration import Run, fit_chain
+from compensation.linearity import measure_linearity, same_rate
 from compensation.samples import is_regular
 from compensation.stability import allan_deviation
 from studies.errors import InputError

@@ -10,16 +10,10 @@ from importlib.resources import files
 import numpy as np
 from numpy.typing import NDArray
 
-from compensation.bell import (
-    CELSIUS_ZERO,
-    Chain,
-    Curve,
-    Run,
-    design_smoother,
-    fit_chain,
-    invert_chain,
-    measure_linearity,
-)
+from compensation.bell import CELSIUS_ZERO, Chain, Curve, invert_chain
+from compensation.bell_calibration import Run, fit_chain
+from compensation.fir import design_smoother
+from compensation.linearity import measure_linearity
 from studies.scale import StepFigures, judge_steps
 
 Real = NDArray[np.float64]

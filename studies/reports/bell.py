@@ -10,7 +10,8 @@ from studies.reports import style
 from studies.reports.page import Block, Chapter, Facts, Picture, Table, Text, draw, render_page
 
 if TYPE_CHECKING:
-    from compensation.bell import Chain, Curve, Run
+    from compensation.bell import Chain, Curve
+    from compensation.bell_calibration import Run
     from studies.papers.bvg import BellTwin, Claims
     from studies.scale import ScaleStudy, StepFigures
 

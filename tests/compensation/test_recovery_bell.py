@@ -3,19 +3,11 @@
 import numpy as np
 import pytest
 
-from compensation.bell import (
-    Chain,
-    Curve,
-    Run,
-    apply_chain,
-    design_smoother,
-    fit_chain,
-    fit_rough,
-    invert_chain,
-    measure_linearity,
-    smooth,
-)
+from compensation.bell import Chain, Curve, apply_chain, invert_chain
+from compensation.bell_calibration import Run, fit_chain, fit_rough
 from compensation.errors import CompensationError
+from compensation.fir import design_smoother, smooth
+from compensation.linearity import measure_linearity
 
 DEG = np.pi / 180
 NONE = np.zeros((3, 3))
@@ -118,7 +110,7 @@ def test_intervals_cover():
 
 def _fit_clean(chain, clean):
     """What each step would be on noise-free records after the same earlier steps."""
-    from compensation.bell import fit_bias, fit_scale_over_rate, fit_scale_over_temperature
+    from compensation.bell_calibration import fit_bias, fit_scale_over_rate, fit_scale_over_temperature
 
     rates, rest, turning = clean
     bias = fit_bias(rest.temperature, chain.scale * (rest.output - chain.null))

@@ -145,7 +145,7 @@ def test_printed_claims():
 
 def test_filter_reduces_the_allan_deviation_as_predicted():
     """The factor against the Allan deviation of filtered white noise."""
-    from compensation.bell import design_smoother, smooth
+    from compensation.fir import design_smoother, smooth
     from compensation.stability import allan_deviation
 
     taps = design_smoother(0.1, 0.5)

@@ -1,0 +1,47 @@
+"""Low-pass FIR filter of an even output, as a gyro's firmware computes it."""
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from compensation.errors import CompensationError
+
+Real = NDArray[np.float64]
+
+
+def design_smoother(sampling: float, cutoff: float, order: int = 50) -> Real:
+    """Return the taps of a low-pass FIR filter (Hamming window) with unit gain at rest.
+
+    Parameters
+    ----------
+    sampling : float
+        Step (s) of the output; 0.1 s in the paper.
+    cutoff : float
+        Frequency (Hz) of half the amplitude.
+    order : int
+        Number of taps less one; 50 in the paper.
+
+    Raises
+    ------
+    CompensationError
+        When the cut-off is not below half the sampling rate, as with the paper's 200 Hz at 10 Hz output.
+    """
+    from scipy.signal import firwin
+
+    if order < 1 or sampling <= 0:
+        raise CompensationError("a FIR filter needs an order of 1 or more and a positive sampling step.")
+    if not 0 < cutoff < 0.5 / sampling:
+        raise CompensationError(
+            f"a cut-off of {cutoff:g} Hz is impossible at an output every {sampling:g} s: it must lie below {0.5 / sampling:g} Hz."
+        )
+    return np.asarray(firwin(order + 1, cutoff, fs=1 / sampling), dtype=float)
+
+
+def smooth(values: ArrayLike, taps: Real) -> Real:
+    """Return the causal FIR output, settled on the first value at the start, as firmware computes it."""
+    from scipy.signal import lfilter
+
+    x = np.asarray(values, dtype=float)
+    if not len(taps):
+        return x
+    before = np.full(len(taps) - 1, x[0])
+    return np.asarray(lfilter(taps, [1.0], np.r_[before, x])[len(before) :], dtype=float)
