@@ -1,0 +1,158 @@
+"""Pictures: what is drawn is counted in the pixels; without OpenGL there is a sentence, never a crash."""
+
+import io
+import subprocess
+import sys
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from PIL import Image
+
+import shell.render
+from shell.elastic import Elastic
+from shell.errors import ShellError
+from shell.meridian import Stem, hemisphere
+from shell.modes import solve_modes
+from shell.render import NoOpenGL, can_draw, compose_scene, render_animation, render_png
+from shell.surface import build_surface
+
+RESONATOR = hemisphere(15e-3, 0.9e-3, support="stem", stem=Stem(2.5e-3, -5e-3, 0.5e-3))
+SILICA = Elastic(72.7e9, 0.17, 2203.0)
+DRAWS, REMEDY = can_draw()
+needs_opengl = pytest.mark.skipif(not DRAWS, reason=REMEDY)
+
+
+def scene_of(n):
+    mode = solve_modes(RESONATOR, SILICA, n, tolerance=1e-3)[0]
+    surface = build_surface(RESONATOR, mode, spacing=0.8e-3, count=96)
+    return compose_scene(surface, np.linalg.norm(surface.displacement, axis=1), "displacement (µm)", f"n = {n}")
+
+
+def pixels(png):
+    return np.asarray(Image.open(io.BytesIO(png)).convert("RGB")).astype(int)
+
+
+def is_node(rgb):
+    red, green, blue = np.moveaxis(rgb, -1, 0)
+    return (red > 90) & (red > 2.2 * green) & (red > 1.5 * blue)
+
+
+def is_body(rgb):
+    return (rgb[..., 2] - rgb[..., 0] > 25) & (rgb[..., 0] < 110)  # the dark blue of the value 0
+
+
+def polar(mask, centre):
+    rows, columns = np.nonzero(mask)
+    return np.hypot(columns - centre[0], centre[1] - rows), np.arctan2(centre[1] - rows, columns - centre[0])
+
+
+def count_clusters(angles, gap=0.15):
+    """Number of groups of angles on the circle that are apart by more than `gap`."""
+    ordered = np.sort(angles)
+    steps = np.diff(np.append(ordered, ordered[0] + 2 * np.pi))
+    return int((steps > gap).sum())
+
+
+@pytest.fixture(scope="module")
+def drawn():
+    """The axial view of n = 2 and 3, each swinging and at rest."""
+    found = {}
+    for n in (2, 3):
+        scene = scene_of(n)
+        scene = replace(scene, title="", antinodes=scene.antinodes[:0], values=0 * scene.values)
+        rest = replace(scene, displacement=0 * scene.displacement, nodes=scene.nodes[:0])
+        both = pixels(render_png([scene, rest], "axis", 500, 500))
+        found[n] = both[:400, :500], both[:400, 500:]  # without the legend below
+    return found
+
+
+@needs_opengl
+@pytest.mark.parametrize("n", [2, 3])
+def test_nodal_lines_in_the_picture_are_2n(drawn, n):
+    swinging, rest = drawn[n]
+    rows, columns = np.nonzero(is_body(rest))
+    centre = (columns.min() + columns.max()) / 2, (rows.min() + rows.max()) / 2
+    radius = (columns.max() - columns.min()) / 2
+    away, angle = polar(is_node(swinging), centre)
+    ring = (away > 0.5 * radius) & (away < 1.05 * radius)
+    assert count_clusters(angle[ring]) == 2 * n
+
+
+@needs_opengl
+@pytest.mark.parametrize("n", [2, 3])
+def test_the_drawn_rim_crosses_the_circle_at_rest_2n_times(drawn, n):
+    swinging, rest = drawn[n]
+    rows, columns = np.nonzero(is_body(rest))
+    centre = (columns.min() + columns.max()) / 2, (rows.min() + rows.max()) / 2
+    radius = (columns.max() - columns.min()) / 2
+    away, angle = polar(is_body(swinging) | is_node(swinging), centre)
+    sector = ((angle + np.pi) / (2 * np.pi) * 72).astype(int) % 72
+    outermost = np.array([away[sector == k].max() for k in range(72)])
+    beyond = outermost - radius
+    told = np.sign(beyond[abs(beyond) > 4])  # pixels; sectors near a crossing say nothing
+    assert int((told != np.roll(told, 1)).sum()) == 2 * n
+
+
+@needs_opengl
+def test_the_rim_shows_the_thickness_and_the_stem(drawn):
+    _, rest = drawn[2]
+    rows, columns = np.nonzero(is_body(rest))
+    radius = (columns.max() - columns.min()) / 2
+    # axial view at rest: outer rim at R + h/2; the picture's scale follows from it
+    pixel = (15e-3 + 0.45e-3) / radius
+    row = rest[int((rows.min() + rows.max()) / 2)]
+    bright = row.sum(axis=-1)
+    edges = np.flatnonzero(abs(np.diff(bright)) > 25)
+    centre = (columns.min() + columns.max()) / 2
+    distance = abs(edges - centre) * pixel
+    for expected in (14.55e-3, 2.5e-3):  # inner edge of the rim, side of the stem
+        assert abs(distance - expected).min() < 2 * pixel
+
+
+@needs_opengl
+def test_animations_loop_and_move():
+    scene = scene_of(2)
+    data = render_animation(scene, "gif", width=160, height=140, frames=4)
+    picture = Image.open(io.BytesIO(data))
+    frames = []
+    for k in range(picture.n_frames):
+        picture.seek(k)
+        frames.append(np.asarray(picture.convert("RGB")).astype(int))
+    assert (picture.n_frames, picture.info["loop"]) == (4, 0)
+    assert abs(frames[0] - frames[2]).max() > 50
+    assert Image.open(io.BytesIO(render_animation(scene, "webp", width=80, height=80, frames=2))).n_frames == 2
+
+
+def test_an_unknown_view_is_refused():
+    with pytest.raises(ShellError, match="oblique, axis, side"):
+        render_png(scene_of(2), "above")
+
+
+@pytest.mark.parametrize("status", [-11, 139, 1])
+def test_a_child_that_dies_gives_the_remedy(monkeypatch, status):
+    def die(command, **_):
+        return subprocess.CompletedProcess(command, status)
+
+    monkeypatch.setattr(subprocess, "run", die)
+    drawn, remedy = can_draw()
+    assert not drawn
+    assert "apt install libegl1" in remedy
+
+
+def test_a_child_that_hangs_is_stopped(monkeypatch):
+    def hang(command, timeout, **_):
+        raise subprocess.TimeoutExpired(command, timeout)
+
+    monkeypatch.setattr(subprocess, "run", hang)
+    with pytest.raises(NoOpenGL, match="stopped"):
+        render_png(scene_of(2))
+
+
+def test_a_real_child_that_is_killed_does_not_take_us_along(monkeypatch, tmp_path):
+    killer = tmp_path / "killer"
+    killer.write_text("#!/bin/sh\nkill -SEGV $$\n")
+    killer.chmod(0o755)
+    monkeypatch.setattr(shell.render.sys, "executable", str(killer))
+    assert can_draw()[0] is False
+    assert sys.executable == str(killer)
