@@ -13,7 +13,7 @@ from studies.record import Record
 TEMPERATURES = ("housing_temperature_degC", "chamber_temperature_degC", "resonator_temperature_degC")
 COMMANDS = ("drive_amplitude_V", "electrode_bias_V", "quadrature_V", "pattern_angle_deg")
 OUTLIER_WINDOW, OUTLIER_LIMIT = 11, 6.0
-MOST_BINS = 960
+MOST_BINS = 800
 FINEST = 12
 FEWEST_BINS = 24
 LONGEST_GAP = 900.0

@@ -20,7 +20,7 @@ from studies.diagnosis.verdict import Cause, ResponseResult, Verdict, equivalent
 
 THRESHOLD = 17.0
 LEFT_OVER_THRESHOLD = 17.0
-LEFT_OVER_SHARE = 0.05
+LEFT_OVER_SHARE = 0.015
 NARROW_RANGE = 1.0
 
 

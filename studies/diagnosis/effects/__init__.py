@@ -148,12 +148,13 @@ def apply_effect(
     target : str
         "resonator_temperature" or the response.
     change : (N,) array
-        What must be added to the target, K or the response's unit.
+        What must be added to the target, K or the response's unit. Zero where the effect's drive (amplitude, voltage,
+        quadrature, azimuth) is not part of the run: it then stays where it was calibrated.
 
     Raises
     ------
     InputError
-        If a parameter is unknown or missing, the response is not one of the effect's, or a drive is not given.
+        If a parameter is unknown or missing, or the response is not one of the effect's.
     """
     effect = find_effect(name)
     if response not in effect.responses:
@@ -166,11 +167,10 @@ def apply_effect(
     missing = [p.name for p in effect.shape if p.name not in parameters and not p.steady]
     if missing:
         raise InputError(f"effect '{name}' needs the parameter '{missing[0]}'")
-    for drive in effect.needs:
-        if getattr(states, drive) is None:
-            raise InputError(f"effect '{name}' needs the drive '{drive}', which this run does not have")
+    target = "resonator_temperature" if effect.acts_on == "temperature" else response
+    if any(getattr(states, drive) is None for drive in effect.needs):
+        return target, np.zeros_like(states.time)
     shape = [float(parameters.get(p.name, p.low)) for p in effect.shape]
     columns = effect.columns(states, shape, response)
     weights = np.array([float(parameters.get(key, 0.0)) for key in names[: columns.shape[1]]])
-    target = "resonator_temperature" if effect.acts_on == "temperature" else response
     return target, np.asarray(columns @ weights)

@@ -22,7 +22,7 @@ def grid(span: Span, response: str) -> list[tuple[float, ...]]:
     forms = [(float(1.0 / f), 1.0) for f in in_run]
     if span.runs > 1:
         across = np.arange(
-            slowest, min(fastest, slowest + 500 * 0.4 / span.campaign_length), 0.4 / span.campaign_length
+            slowest, min(fastest, slowest + 300 * 0.4 / span.campaign_length), 0.4 / span.campaign_length
         )
         forms += [(float(1.0 / f), 0.0) for f in across]
     return forms

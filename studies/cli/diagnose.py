@@ -1,0 +1,116 @@
+"""`hrg diagnose`: what the simulation gets wrong, why, and what the repair is worth."""
+
+
+def diagnose(
+    *runs: str,
+    card: str | None = None,
+    save: str | None = None,
+    report: str | None = None,
+    plan: list[str] | None = None,
+    calibrate: bool = False,
+    draws: int = 300,
+    seed: int = 0,
+    json: bool = False,
+) -> int:
+    """Name the physical effect that a campaign shows and the simulation lacks, or say that it cannot be told.
+
+    Give the records of one gyro (several runs are better than one), or a steady-state table.
+
+    Parameters
+    ----------
+    runs : str
+        Records (CSV with time_s), or one table with temperature_degC,frequency_Hz.
+    card : str
+        The instrument's card: its material law is the simulation.
+    save : str
+        Write the extended model as a card (TOML); needs --card.
+    report : str
+        Write a page (HTML).
+    plan : list[str]
+        Chamber profiles of a planned campaign, in words or as files: predict which effects it could tell apart.
+    calibrate : bool
+        Draw the null of this campaign for the thresholds, instead of the shipped, conservative ones (slower).
+    draws : int
+        Number of draws for --calibrate, and of each predicted case for --plan.
+    seed : int
+        Of the draws.
+    json : bool
+        Print one JSON object (schema hrg.diagnosis/1, with --plan hrg.plan/1) instead of text.
+    """
+    from studies.cli.output import print_json, print_table, say
+    from studies.errors import InputError
+    from studies.files.columns import read_header
+    from studies.files.writing import write_text
+
+    if plan:
+        from studies.diagnosis.plan import plan_campaign, plan_table
+
+        if runs:
+            raise InputError("--plan looks at a campaign before it is run; leave the records out.")
+        outcome = plan_campaign(plan, seed=seed, cases=max(4, min(draws, 2000)), card=card)
+        if json:
+            print_json(outcome.as_dict())
+            return 0
+        block = plan_table(outcome)
+        print_table(block.caption, block.columns, block.rows, block.note)
+        return 0
+    if not runs:
+        raise InputError("give the records of one gyro: hrg diagnose RUN.csv [RUN.csv ...].")
+    if draws < 20:
+        raise InputError(f"--draws {draws}: a threshold needs 20 draws or more.")
+    if save is not None and card is None:
+        raise InputError("--save writes an extended card, so it needs --card CARD to extend.")
+
+    import numpy as np
+
+    from studies.reports import diagnosis as page
+
+    tables = [path for path in runs if "time_s" not in (names := read_header(path)) and "temperature_degC" in names]
+    if tables:
+        from studies.diagnosis.table import diagnose_table
+
+        if len(runs) > 1:
+            raise InputError(f"{tables[0]}: a steady-state table is diagnosed alone; leave the other files out.")
+        if save is not None:
+            raise InputError(f"{tables[0]}: a steady-state table does not decide on a model, so --save has nothing to write.")
+        found = diagnose_table(tables[0], card)
+        if report is not None:
+            write_text(report, page.table_page(found, tables[0]))
+            say(f"report: {report}")
+        if json:
+            print_json(found.as_dict())
+            return 0
+        print(page.table_text(found))
+        return 0
+
+    from studies.diagnosis.campaign import load_campaign
+    from studies.diagnosis.extension import extend, law_of
+    from studies.diagnosis.investigate import investigate
+    from studies.instrument.card import load_card, save_card
+    from studies.record import read_record
+
+    instrument = None if card is None else load_card(card)
+    reference = None if instrument is None else instrument.reference_temperature - 273.15
+    campaign = load_campaign([read_record(path) for path in runs], reference)
+    diagnosis = investigate(
+        campaign, None if instrument is None else law_of(instrument), draws if calibrate else 0,
+        np.random.default_rng(seed),
+    )
+    if save is not None and instrument is not None:
+        save_card(extend(instrument, diagnosis), save)
+        say(f"extended model: {save}")
+    if report is not None:
+        write_text(report, page.diagnosis_page(diagnosis))
+        say(f"report: {report}")
+    if json:
+        print_json({**diagnosis.verdict.as_dict(), "extended_model": save})
+        return 0
+    print(page.headline(diagnosis.verdict))
+    for block in (page.cause_table(diagnosis.verdict), page.response_table(diagnosis.verdict)):
+        if block.rows:
+            print_table(block.caption, block.columns, block.rows, block.note)
+    for note in diagnosis.verdict.notes:
+        print(f"Note: {note}")
+    if diagnosis.verdict.next_experiment:
+        print(f"Next: {diagnosis.verdict.next_experiment}")
+    return 0
