@@ -9,6 +9,7 @@ from studies.papers import hrg
 from studies.reports import style
 from studies.reports.frequency import coefficients_table, error_figure, fit_figure, order_chapter
 from studies.reports.page import Block, Chapter, Facts, Picture, Table, Text, draw, render_page
+from studies.reports.theories import theories_chapter
 
 if TYPE_CHECKING:
     from studies.papers.hrg import FrequencyStudy, PhysicsComparison
@@ -39,7 +40,8 @@ def reproduce_page(
         order_chapter(study),
         Chapter("What first principles predict", _physics(physics, study)),
         Chapter("Where measurement and physics differ", _difference(study, physics)),
-        Chapter("The n = 2 mode", list(mode)),
+        Chapter("The mode", list(mode)),
+        theories_chapter(),
         *more,
     ]
     return render_page("Temperature and frequency of a hemispherical resonator", lead, chapters, SOURCES)
@@ -118,7 +120,10 @@ def _facts(study: "FrequencyStudy", physics: "PhysicsComparison") -> Facts:
 def _short(study: "FrequencyStudy", physics: "PhysicsComparison") -> list[Text]:
     better = study.next_fit
     assert better is not None
+    at = physics.at_20
     ratio = physics.curvature_measured / physics.curvature_law
+    away = (1e6 * at.total - float(study.fit.slope_ppm(20.0))) / (1e6 * at.uncertainty)
+    slopes = [value for _, value, _ in physics.laws]
     return [
         Text(
             "The paper's tables are reproduced to the last printed digit or one unit of it. Its conclusion that higher orders have"
@@ -127,7 +132,9 @@ def _short(study: "FrequencyStudy", physics: "PhysicsComparison") -> list[Text]:
             f" {study.fit.leave_one_out_rms / better.leave_one_out_rms:.1f} times better."
         ),
         Text(
-            "Physics gives the slope, within what the literature knows of fused silica. It does not give the curvature: the table"
+            f"Physics gives the size of the slope: the prediction at 20 °C lies {abs(away):.1f} standard deviations"
+            f" {'above' if away > 0 else 'below'} the measurement, and the published laws of fused silica themselves span"
+            f" {min(slopes):.0f} to {max(slopes):.0f} ppm/°C. It does not give the curvature: the table"
             f" bends {ratio:.1f} times as much as the law, and its slope rises again above 25 °C, which no published silica law does."
             " Seven points, each approached once, cannot say whether that is the glass, the thermometer, the mounting or"
             " the soak: a staircase up and down with a second thermometer would.",
