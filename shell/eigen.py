@@ -123,17 +123,18 @@ def lowest_vectors(
     if shift:
         stiffness = [K + shift * M for K, M in zip(stiffness, mass, strict=True)]
     factor = Factor(pattern, stiffness)
-    width = min(count + 3, pattern.size)
+    width = min(2 * count + 3, pattern.size)  # the more vectors beyond `count`, the faster they converge
     x = np.random.default_rng(5).standard_normal((pattern.size, width))
     before, change = np.full(count, np.inf), np.inf
-    for _ in range(60):
-        loaded = apply_mass(pattern, mass, x)
+    loaded = apply_mass(pattern, mass, x)
+    for _ in range(300):
         y = factor.solve(loaded)
-        values, turn = eigh(_symmetric(y.T @ loaded), _symmetric(y.T @ apply_mass(pattern, mass, y)), check_finite=False)
-        x = y @ turn
+        heavy = apply_mass(pattern, mass, y)
+        values, turn = eigh(_symmetric(y.T @ loaded), _symmetric(y.T @ heavy), check_finite=False)
+        x, loaded = y @ turn, heavy @ turn
         last, change = change, float(np.max(abs(values[:count] / before - 1)))
         before = values[:count]
-        if change < accuracy or (change < 1e-7 and change > last / 2):
+        if change < accuracy or (change < 1e-8 and change > last):
             break
     return np.asarray(x[:, :count])
 

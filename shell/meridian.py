@@ -5,6 +5,7 @@ points outwards on a dome; the curvature κ of the meridian is positive where n 
 """
 
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from math import hypot, isfinite, pi
 from typing import Literal, TypeAlias
 
@@ -115,16 +116,10 @@ class Resonator:
         """Arc length of the whole meridian, m."""
         return self._starts[-1]
 
-    @property
+    @cached_property
     def size(self) -> float:
         """Largest distance from the axis, m: the radius that h/R refers to."""
         return float(np.max(self.sample(201).r))
-
-    @property
-    def mean_thickness(self) -> float:
-        """Thickness averaged along the meridian, m."""
-        position, value = np.array(self.thickness).T
-        return float(np.trapezoid(value, position))
 
     @property
     def joints(self) -> tuple[float, ...]:
@@ -140,11 +135,6 @@ class Resonator:
     def ends_on_axis(self) -> bool:
         """Whether the meridian ends at a pole (a closed shell)."""
         return self.segments[-1].end_points[1][0] <= 1e-9 * self.length
-
-    def thickness_at(self, position: ArrayLike) -> Array:
-        """Thickness h (m) at positions 0 ... 1 of the arc length."""
-        where, value = np.array(self.thickness).T
-        return np.asarray(np.interp(np.asarray(position, dtype=float), where, value))
 
     def at(self, arc_length: ArrayLike, segment: int | None = None) -> MeridianPoints:
         """The middle surface at given arc lengths (m); at a joint, `segment` says on which of the two curves."""

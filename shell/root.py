@@ -52,11 +52,11 @@ def lay_root(resonator: Resonator, ring_count: int) -> tuple[Solid, float]:
     collar = widest + COLLAR * h + min(stem.fillet, h)
     if collar > widest + 0.5 * (resonator.length - widest):
         raise ShellError("the stem leaves no room for the shell: make the stem or its fillet smaller, or the shell thinner.")
-    inset = min(0.5 * stem.radius, 2 * h + stem.fillet)
+    radii = _columns(stem.radius, min(0.5 * stem.radius, 2 * h + stem.fillet))
     patches: list[Patch] = []
     for contact in contacts:
         far = 0.0 if len(contacts) == 2 else -float(contact.face)
-        patches += _half_root(resonator, stem, contact, far, widest, collar, stem.radius - inset, ring_count)
+        patches += _half_root(resonator, stem, contact, far, widest, collar, radii, ring_count)
     ends = [contact.end for contact in contacts]
 
     def held(r: float, z: float) -> bool:
@@ -86,30 +86,33 @@ def _touch(resonator: Resonator, stem: Stem, face: int, end: float) -> Contact:
 
 
 def _half_root(
-    resonator: Resonator, stem: Stem, contact: Contact, far: float, s_far: float, collar: float, r_inner: float, ring_count: int
+    resonator: Resonator, stem: Stem, contact: Contact, far: float, s_far: float, collar: float, radii: list[float],
+    ring_count: int,
 ) -> list[Patch]:
     """The patches between one face of the dome and `far` (η of the opposite face, or 0: the middle surface)."""
     near_face, far_face = _offset(resonator, contact.face), _offset(resonator, far)
-    s_x = float(brentq(lambda s: far_face(np.array([s]))[0][0] - r_inner, 0.0, s_far, xtol=1e-15 * s_far))
-    over = _point(far_face, s_x)  # X
+    above = [_at_radius(far_face, r, s_far) for r in radii[1:]]  # arc lengths of X and of the points further in
+    over = _point(far_face, above[0])  # X
     corner = _point(far_face, s_far)  # O
     level = contact.on_stem[1]
-    under: Spot = (r_inner, level)  # X1
+    under: Spot = (radii[1], level)  # X1
     foot: Spot = (stem.radius, level)  # T1
     steps = _steps(stem.fillet, min(hypot(foot[0] - under[0], 0.0), _distance(contact.on_dome, corner)), ring_count)
     rim_near, rim_far = _point(near_face, collar), _point(far_face, collar)
-    cross, roof = straight(contact.on_dome, corner), _along(far_face, s_far, s_x)
+    cross, roof = straight(contact.on_dome, corner), _along(far_face, s_far, above[0])
     patches = [
         Patch(cross, straight(rim_near, rim_far), _along(near_face, contact.s, collar), _along(far_face, s_far, collar),
               rings(steps), "root"),
-        Patch(straight((0.0, level), under), _along(far_face, 0.0, s_x), straight((0.0, level), _point(far_face, 0.0)),
-              straight(under, over), whole(), "root"),
     ]
+    for (r_out, s_out), (r_in, s_in) in pairwise(zip(radii[1:], above, strict=True)):
+        left, right = (straight((r, level), _point(far_face, s)) for r, s in ((r_in, s_in), (r_out, s_out)))
+        floor = straight((r_in, level), (r_out, level))
+        patches.append(Patch(floor, _along(far_face, s_in, s_out), left, right, whole(), "root"))
     if stem.fillet:
         patches += _fillet(contact, stem.fillet, cross, roof, straight(foot, under), straight(under, over), over, steps)
     else:
         patches.append(Patch(cross, straight(under, over), straight(foot, under), roof, rings(steps), "root"))
-    return patches + _column(stem.radius, r_inner, level, contact.end, steps, ring_count)
+    return patches + _stem(radii, level, contact.end, steps, ring_count)
 
 
 def _fillet(
@@ -127,30 +130,34 @@ def _fillet(
     ]
 
 
-def _column(
-    radius: float, r_inner: float, top: float, end: float, steps: tuple[float, ...], ring_count: int
-) -> list[Patch]:
-    """The stem itself, from its root to the clamped end, in an inner and an outer column of cells."""
-    direction = 1.0 if end > top else -1.0
-    # cells grow from both ends of the column; the first is as tall as the outer column is wide
-    length = abs(end - top)
-    step = min(radius - r_inner, 0.4 * length)
+def _columns(radius: float, inset: float) -> list[float]:
+    """Radii that bound the columns of the stem, from its side to the axis, wider the further in."""
+    radii, step = [radius, radius - inset], 3 * inset
+    while radii[-1] > 1.5 * step:
+        radii.append(radii[-1] - step)
+        step *= 3
+    return [*radii, 0.0]
+
+
+def _stem(radii: list[float], top: float, end: float, steps: tuple[float, ...], ring_count: int) -> list[Patch]:
+    """The stem itself, from its root to the clamped end, in columns between the radii."""
+    direction, length = (1.0 if end > top else -1.0), abs(end - top)
+    # cells grow from both ends; the first is as tall as the outer column is wide
+    step = min(radii[0] - radii[1], 0.4 * length)
     low, high = [0.0], [length]
     while high[-1] - low[-1] > 2.4 * step:
         low.append(low[-1] + step)
         high.append(high[-1] - step)
-        step = min(2.5 * step, 1.5 * radius)
+        step = min(2.5 * step, 1.5 * radii[0])
     middle = np.linspace(low[-1], high[-1], 1 + ceil((high[-1] - low[-1]) / (1.5 * step)))
-    heights = [*low, *middle[1:-1].tolist(), *high[::-1]]
-    levels = [top + direction * height for height in heights]
+    levels = [top + direction * height for height in (*low, *middle[1:-1].tolist(), *high[::-1])]
     sharp = rings(shrinking(ring_count))
     patches = []
     for k, (one, two) in enumerate(pairwise(levels)):
-        first, last = k == 0, k == len(levels) - 2
-        side = _rectangle((radius, one), (r_inner, two), rings(steps) if first else whole())
-        if last:  # the edge of the clamp is as singular as a sharp corner
-            side = _rectangle((radius, two), (r_inner, one), sharp)
-        patches += [side, _rectangle((0.0, one), (r_inner, two), whole())]
+        side = _rectangle((radii[0], one), (radii[1], two), rings(steps) if k == 0 else whole())
+        if k == len(levels) - 2:  # the edge of the clamp is as singular as a sharp corner
+            side = _rectangle((radii[0], two), (radii[1], one), sharp)
+        patches += [side, *(_rectangle((r_out, one), (r_in, two), whole()) for r_out, r_in in pairwise(radii[1:]))]
     return patches
 
 
@@ -177,6 +184,13 @@ def _offset(resonator: Resonator, eta: float) -> Callable[[Array], Planar]:
         return (points.r + zeta * points.normal_r).reshape(shape), (points.z + zeta * points.normal_z).reshape(shape)
 
     return surface
+
+
+def _at_radius(surface: Callable[[Array], Planar], r: float, s_most: float) -> float:
+    """Arc length at which a surface is r away from the axis."""
+    if r == 0:
+        return 0.0
+    return float(brentq(lambda s: float(surface(np.array([s]))[0][0]) - r, 0.0, s_most, xtol=1e-15 * s_most))
 
 
 def _face_normal(resonator: Resonator, face: int, s: float) -> Spot:
