@@ -12,8 +12,8 @@ import trimesh
 from shell.elastic import Elastic
 from shell.errors import ShellError
 from shell.inertia import weigh
-from shell.mesh import build_mesh, encode_animation, encode_mesh
 from shell.meridian import Stem, bell, cylinder, hemisphere
+from shell.mesh import build_mesh, encode_animation, encode_mesh
 from shell.modes import solve_modes
 from shell.surface import build_surface
 
