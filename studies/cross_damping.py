@@ -25,6 +25,11 @@ class CrossDampingStudy:
     held_out: Improvement
 
     @property
+    def is_useful(self) -> bool:
+        """Whether the compensation improves data that the fit has not seen."""
+        return self.held_out.ratio > 1.0
+
+    @property
     def memory(self) -> float:
         """Largest part of the compensation (rad/s) that is due to the dynamics of eq. (9)."""
         return max(self.model.memory(run.time, run.temperature) for run in self.runs)

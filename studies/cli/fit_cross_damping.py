@@ -106,6 +106,7 @@ def fit_cross_damping(
                 "held_out": {"before": study.held_out.before / unit, "after": study.held_out.after / unit},
                 "improvement_training": study.training.ratio,
                 "improvement_held_out": study.held_out.ratio,
+                "useful": study.is_useful,
                 "dynamic_part": study.memory / unit,
                 "rows_left_out": gathered.left_out,
             }
@@ -113,6 +114,8 @@ def fit_cross_damping(
         return 0
     for block in (page.coefficients_table(study), page.improvement_table(study, gathered)):
         print_table(block.caption, block.columns, block.rows, block.note)
+    if not study.is_useful:
+        print(page.USELESS)
     return 0
 
 

@@ -1,6 +1,6 @@
 """Chapters and page of the four-step chain of a bell-shaped gyro, and the BVG paper's claims beside it."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -88,29 +88,21 @@ def steps_table(figures: "Sequence[StepFigures]", caption: str) -> Table:
     """Return the figures of merit after every step."""
 
     def show(value: float | None, form: str) -> str:
-        return "—" if value is None else format(value, form)
+        return "" if value is None else format(value, form)
 
-    rows = [
-        [
-            NAMES[f.step],
-            "—" if f.nonlinearity is None else f"{100 * f.nonlinearity:.4f}",
-            f"{f.at_rest:.4f}",
-            f"{f.turning:.4f}",
-            show(f.bias_instability, ".2f"),
-            show(f.random_walk_1s, ".3f"),
-            show(f.random_walk_100s, ".3f"),
-        ]
-        for f in figures
+    kinds: list[tuple[str, Callable[[StepFigures], str]]] = [
+        ("After", lambda f: NAMES[f.step]),
+        ("Nonlinearity (%)", lambda f: show(f.nonlinearity and 100 * f.nonlinearity, ".4f")),
+        ("σ at rest (°/s)", lambda f: f"{f.at_rest:.4f}"),
+        ("σ turning (°/s)", lambda f: f"{f.turning:.4f}"),
+        ("Bias instability (°/h)", lambda f: show(f.bias_instability, ".2f")),
+        ("Random walk at 1 s (°/√h)", lambda f: show(f.random_walk_1s, ".3f")),
+        ("at 100 s (°/√h)", lambda f: show(f.random_walk_100s, ".3f")),
     ]
-    columns = [
-        "After",
-        "Nonlinearity (%)",
-        "σ at rest (°/s)",
-        "σ turning (°/s)",
-        "Bias instability (°/h)",
-        "Random walk at 1 s (°/√h)",
-        "at 100 s",
-    ]
+    # A column is left out where the runs are too short for it.
+    shown = [(name, cell) for name, cell in kinds if any(cell(f) for f in figures)]
+    columns = [name for name, _ in shown]
+    rows = [[cell(f) for _, cell in shown] for f in figures]
     note = (
         "σ: standard deviation over the temperature run. Bias instability: lowest Allan deviation over 0.664. A filter lowers the random"
         " walk read at 1 s; at 100 s it cannot."
@@ -128,8 +120,8 @@ def coefficients_table(chain: "Chain", output: str) -> Table:
     ]
     curves: list[tuple[str, Curve, float, float, tuple[str, ...]]] = [
         ("bias (34)", chain.bias, 1.0, 0.0, ("°/s", "°/s/°C", "°/s/°C²")),
-        ("scale over rate (35)", chain.scale_over_rate, 1.0, 1.0, ("°/s", "1", "s/°")),
-        ("scale over temperature (36)", chain.scale_over_temperature, 0.0, 0.0, ("1", "1/°C", "1/°C²")),
+        ("scale over rate (35)", chain.scale_over_rate, 1.0, 1.0, ("°/s", "ratio", "s/°")),
+        ("scale over temperature (36)", chain.scale_over_temperature, 0.0, 0.0, ("ratio", "per °C", "per °C²")),
     ]
     for name, curve, y, x, units in curves:
         size = DEG ** (x * np.arange(len(curve.coefficients)) - y)

@@ -26,7 +26,7 @@ def cross_damping_page(study: "CrossDampingStudy", data: "RestData", source: str
         f" polynomial of order {len(study.model.coefficients) - 1} for eq. (10)."
     )
     chapters = [
-        Chapter("In short", [_facts(study, data)]),
+        Chapter("In short", [_facts(study, data), *([] if study.is_useful else [Text(USELESS, "warning")])]),
         Chapter("Output before and after", [output_figure(study, data.output), improvement_table(study, data)]),
         Chapter(
             "Cross-damping over temperature", [curve_figure(study), coefficients_table(study), Text(SCALE, "note")]
@@ -35,6 +35,10 @@ def cross_damping_page(study: "CrossDampingStudy", data: "RestData", source: str
     return render_page("Cross-damping over temperature", lead, chapters, SOURCES)
 
 
+USELESS = (
+    "On data left out of the fit the compensation does not improve the output: this record shows no cross-damping that varies"
+    " with temperature, beyond its noise."
+)
 SCALE = (
     "The output shows only 2k/g₂ · ζ₁₂, so the size of ζ₁₂ is as good as the natural frequency given, and a constant bias of"
     " any other origin counts into ζ₀."
@@ -105,7 +109,7 @@ def coefficients_table(study: "CrossDampingStudy") -> Table:
             f"zeta_{i}",
             f"{value:.5e}",
             f"{error:.1e}",
-            ("1", "1/°C")[i] if i < 2 else f"1/°C^{i}",
+            ("ratio", "per °C")[i] if i < 2 else f"per °C^{i}",
             f"{value / model.coefficients[0]:+.4e}",
         ]
         for i, (value, error) in enumerate(zip(model.coefficients, np.sqrt(np.diag(model.covariance)), strict=True))

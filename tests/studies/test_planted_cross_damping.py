@@ -8,7 +8,9 @@ import subprocess
 import numpy as np
 import pytest
 
+from compensation.cross_damping import RestRun
 from studies.cli import main
+from studies.cross_damping import study_cross_damping
 from studies.errors import InputError
 from studies.models import compensate, emit_c, read_model
 from studies.papers.cvg_cross_damping import (
@@ -16,6 +18,7 @@ from studies.papers.cvg_cross_damping import (
     FREQUENCY,
     QUALITY,
     count_bias_of_printed_values,
+    make_profile,
     read_shape,
     reproduce_cross_damping,
     simulate_rest,
@@ -89,6 +92,24 @@ def test_emitted_c_agrees_with_python(record, tmp_path):
     applied = data["bias_deg_per_h"] - compensate(model, data)["compensated_bias_deg_per_h"]
     # The firmware holds the temperature over a step where Python draws a line: up to τ dT/dt apart, here 0.6 s of 1 K/min.
     np.testing.assert_allclose(emitted, applied, atol=2e-3 * np.ptp(applied))
+
+
+def test_pure_noise_gains_nothing(tmp_path, capsys):
+    """White noise, and a wandering bias, over a temperature cycle: no gain on data left out."""
+    time, temperature = make_profile()
+    generator, ratios = np.random.default_rng(7), []
+    for walk in (0.0, 0.05):
+        for _ in range(20):
+            white = generator.standard_normal(len(time))
+            rate = DEG_PER_H * (white + walk * np.cumsum(generator.standard_normal(len(time))))
+            study = study_cross_damping([RestRun(time, rate, temperature)], k=3e4, zeta=5e-5)
+            ratios.append(study.held_out.ratio)
+    assert np.median(ratios[:20]) < 1
+    assert np.median(ratios[20:]) < 1
+    assert np.max(ratios[:20]) < 1.01
+    noise = write(tmp_path / "noise.csv", RestRun(time, DEG_PER_H * generator.standard_normal(len(time)), temperature))
+    assert main(["fit", "cross-damping", noise, *GIVEN]) == 0
+    assert "does not improve" in capsys.readouterr().out
 
 
 def test_paper_twin():
