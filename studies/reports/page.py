@@ -21,7 +21,7 @@ PACKAGES = ("numpy", "scipy", "sympy", "pandas", "pyvista", "trimesh")
 
 @dataclass(frozen=True)
 class Text:
-    """A paragraph; `kind` is plain, lead, note or warning."""
+    """A paragraph; `kind` is plain, lead, note, warning, or source for text that keeps its lines."""
 
     text: str
     kind: str = "plain"
@@ -30,12 +30,13 @@ class Text:
 
 @dataclass(frozen=True)
 class Table:
-    """A table of cells that are already text; `columns` carry quantity and unit."""
+    """A table of cells that are already text; `columns` carry quantity and unit; `sortable` by a click on a heading."""
 
     caption: str
     columns: Sequence[str]
     rows: Sequence[Sequence[str]]
     note: str = ""
+    sortable: bool = False
     block: str = field(default="table", init=False)
 
 

@@ -1,0 +1,138 @@
+"""Figures of a study: how results are spread, how they follow the parameters, and which parameter matters."""
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from studies.reports import style
+from studies.reports.page import Picture, draw
+
+if TYPE_CHECKING:
+    from studies.sweeps.quantity import Column
+    from studies.sweeps.results import Results
+    from studies.sweeps.sensitivity import LocalSlope, SobolIndices
+    from studies.sweeps.tolerance import Limits
+
+MOST_POINTS = 4000  # drawn in a scatter; more only make the page heavy
+COLOURS = (style.BLUE, style.VERMILION, style.GREEN, style.PURPLE, style.ORANGE, style.SKY)
+
+
+def label(name: str, unit: str) -> str:
+    """Return a parameter's name without the unit that it carries, and the unit in brackets."""
+    words = name.removeprefix("resonator.").removeprefix("material.").removeprefix("user.")
+    for suffix in ("_mm", "_GPa", "_kg_m3", "_degC", "_deg", "_s"):
+        words = words.removesuffix(suffix)
+    return words.replace("_", " ").replace(".", " ") + ("" if unit == "1" else f" ({unit})")
+
+
+def column_label(column: "Column") -> str:
+    """Return what a column is, with its unit in brackets."""
+    return column.label + ("" if column.unit == "1" else f" ({column.unit})")
+
+
+def spread_figure(results: "Results", column: "Column", limits: "list[Limits]") -> Picture:
+    """Draw the histogram of a column, with the nominal design and the limits asked for."""
+    y = results.column(column.name)
+    y = y[np.isfinite(y)]
+    with style.figure(height=2.6) as (made, axes):
+        axes.hist(y, bins=min(60, max(5, int(np.sqrt(len(y))))), color=style.SKY, edgecolor="white", linewidth=0.4)
+        if results.nominal is not None:
+            place = [c.name for c in results.study.columns].index(column.name)
+            axes.axvline(results.nominal.values[place], color=style.BLACK, linewidth=1.2, label="nominal design")
+        ends = {end for limit in limits if limit.column == column.name for end in (limit.low, limit.high)}
+        for number, end in enumerate(sorted(end for end in ends if np.isfinite(end))):
+            axes.axvline(end, color=style.VERMILION, linestyle="--", label=None if number else "required")
+        axes.set_xlabel(column_label(column))
+        axes.set_ylabel("designs")
+        axes.ticklabel_format(axis="x", useOffset=False)
+        if axes.get_legend_handles_labels()[0]:
+            axes.legend(fontsize=8)
+    return draw(made, f"Spread of {column.label} over {len(y)} designs.", f"Histogram of {column.label}.")
+
+
+def response_figure(results: "Results", column: "Column") -> Picture | None:
+    """Draw a column against the parameters: a map for a grid of two, else one panel for each of the first six."""
+    numeric = [p for p in results.study.parameters if not isinstance(p.nominal, str)]
+    if not numeric or not np.isfinite(results.column(column.name)).any():
+        return None
+    if results.study.sampling.method == "grid" and len(numeric) == 2 == len(results.study.parameters):
+        return _map(results, column)
+    shown = numeric[:6]
+    columns = min(len(shown), 3)
+    rows = -(-len(shown) // columns)
+    y = results.column(column.name)
+    few = np.linspace(0, len(y) - 1, min(len(y), MOST_POINTS)).astype(int)
+    with style.figure(rows, columns, height=2.6 * rows, sharey=True, squeeze=False) as (made, axes):
+        for panel, parameter in zip(axes.flat, shown, strict=False):
+            x = results.parameter(parameter.name).astype(float)
+            line = len(numeric) == 1
+            order = np.argsort(x[few])
+            panel.plot(
+                x[few][order], y[few][order], "o-" if line else ".", markersize=4 if line else 2.5, color=style.BLUE,
+                rasterized=len(few) > 500,
+            )  # fmt: skip
+            panel.set_xlabel(label(parameter.name, parameter.unit), fontsize=9)
+            panel.tick_params(labelsize=8)
+            panel.ticklabel_format(useOffset=False)
+        for panel in axes.flat[len(shown) :]:
+            panel.set_visible(False)
+        for panel in axes[:, 0]:
+            panel.set_ylabel(column_label(column), fontsize=9)
+    words = f"How {column.label} follows the parameters."
+    return draw(made, words, f"{column.label} over each parameter.")
+
+
+def _map(results: "Results", column: "Column") -> Picture:
+    one, other = results.study.parameters
+    x, y = (np.unique(results.parameter(p.name).astype(float)) for p in (one, other))
+    z = np.full((len(y), len(x)), np.nan)
+    rows = np.searchsorted(y, results.parameter(other.name).astype(float))
+    places = np.searchsorted(x, results.parameter(one.name).astype(float))
+    z[rows, places] = results.column(column.name)
+    steps_x, steps_y = (max(1, len(axis) // 200) for axis in (x, y))
+    x, y, z = x[::steps_x], y[::steps_y], z[::steps_y, ::steps_x]
+    with style.figure(height=4.0) as (made, axes):
+        picture: Any = axes.pcolormesh(x, y, z, cmap="cividis", shading="nearest", rasterized=True)
+        if min(z.shape) > 1 and np.isfinite(z).all() and np.ptp(z) > 0:
+            lines = axes.contour(x, y, z, colors="white", linewidths=0.8)
+            axes.clabel(lines, fontsize=8, fmt="%.6g")
+        axes.set_xlabel(label(one.name, one.unit))
+        axes.set_ylabel(label(other.name, other.unit))
+        made.colorbar(picture, label=column_label(column), format="%.6g")
+    caption = f"Map of {column.label}; empty where a design failed."
+    return draw(made, caption, f"Map of {column.label} over two parameters.")
+
+
+def sobol_figure(indices: "SobolIndices", column: "Column") -> Picture:
+    """Draw first-order and total indices with their intervals."""
+    at = np.arange(len(indices.parameters))
+    with style.figure(height=1.2 + 0.45 * len(at)) as (made, axes):
+        for shift, name, colour, values, low, high in (
+            (-0.18, "alone (first order)", style.BLUE, indices.first, indices.first_low, indices.first_high),
+            (0.18, "with all interactions (total)", style.ORANGE, indices.total, indices.total_low, indices.total_high),
+        ):
+            reach = np.maximum([values - low, high - values], 0)
+            axes.barh(at + shift, values, 0.32, color=colour, label=name)
+            axes.errorbar(values, at + shift, xerr=reach, fmt="none", color=style.BLACK, linewidth=1, capsize=2)
+        axes.set_yticks(at, [label(name, "1") for name in indices.parameters])
+        axes.invert_yaxis()
+        axes.set_xlabel(f"share of the variance of {column.label}")
+        axes.legend(fontsize=8, loc="lower right")
+    return draw(made, "Sobol indices with 95 % intervals.", "Bars of first-order and total indices for each parameter.")
+
+
+def tornado_figure(slopes: "list[LocalSlope]", column: "Column") -> Picture:
+    """Draw what each parameter alone does to a column between the ends of its range."""
+    ordered = sorted(slopes, key=lambda slope: abs(slope.swing))
+    at = np.arange(len(ordered))
+    with style.figure(height=1.2 + 0.4 * len(at)) as (made, axes):
+        for end, colour, words in (("at_low", style.SKY, "lower end"), ("at_high", style.BLUE, "upper end")):
+            change = [getattr(slope, end) - slope.nominal for slope in ordered]
+            axes.barh(at, change, 0.6, color=colour, label=words)
+        axes.axvline(0, color=style.BLACK, linewidth=0.8)
+        axes.set_yticks(at, [label(slope.parameter, "1") for slope in ordered])
+        unit = "" if column.unit == "1" else f" ({column.unit})"
+        axes.set_xlabel(f"change of {column.label}{unit}")
+        axes.legend(fontsize=8)
+    caption = "Change from the nominal design at the ends of each parameter's range."
+    return draw(made, caption, "Tornado diagram: bars to both sides of the nominal design.")
