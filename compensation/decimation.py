@@ -4,12 +4,11 @@ A block average is the anti-alias filter of stability analysis: its response sin
 multiple of the output rate, and the averages of white noise stay white. Sampling may be irregular.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy import ndimage
 
 from compensation.errors import CompensationError
 
@@ -89,17 +88,26 @@ def average_blocks(time: ArrayLike, columns: Mapping[str, ArrayLike], width: flo
 
 
 def find_spikes(values: Array) -> NDArray[np.bool_]:
-    """Mark samples farther than 8 robust standard deviations from the median of their 7 neighbours.
+    """Mark samples that stand out from their neighbours by more than 8 robust standard deviations.
 
-    The standard deviation is 1.4826 times the median absolute deviation from those medians, so a trend of any
-    steepness is no spike; where rounding makes it zero, the smallest deviation takes its place.
+    What the neighbours say is the median of (y_{i−k} + y_{i+k})/2, k = 1, 2, 3, which follows any straight trend. The
+    distance from it must exceed 8 times 1.4826 times the median distance of the whole series, and 8 times the distance
+    that is usual next to the sample, so that bends, gaps and jumps are no spikes.
     """
-    distance = np.abs(values - ndimage.median_filter(values, NEIGHBOURS, mode="nearest"))
-    spread = 1.4826 * float(np.median(distance))
-    if spread == 0:
-        positive = distance[distance > 0]
-        spread = float(positive.min()) if positive.size else 1.0
-    return np.asarray(distance > SPIKE * spread)
+    distance = np.abs(values - _median_of_pairs(values, lambda before, after: (before + after) / 2))
+    nearby = _median_of_pairs(distance, np.maximum)
+    positive = distance[distance > 0]
+    # Rounded readings may have no spread at all: then the smallest distance takes its place.
+    spread = max(1.4826 * float(np.median(distance)), float(positive.min()) if positive.size else 1.0)
+    return np.asarray(distance > SPIKE * np.maximum(spread, nearby))
+
+
+def _median_of_pairs(values: Array, join: Callable[[Array, Array], Array]) -> Array:
+    """Return the median over k = 1, 2, 3 of join(y_{i−k}, y_{i+k}), the series continued straight at its ends."""
+    reach = NEIGHBOURS // 2
+    padded = np.pad(values, reach, mode="reflect", reflect_type="odd")
+    low, middle, high = (join(padded[reach - k : -reach - k], padded[reach + k : padded.size - reach + k]) for k in (1, 2, 3))
+    return np.asarray(np.maximum(np.minimum(low, middle), np.minimum(np.maximum(low, middle), high)))
 
 
 def check_time(time: Array) -> None:

@@ -6,7 +6,7 @@ import pytest
 from compensation.bias import TERMS, prepare_run, term_columns
 from compensation.bias_selection import NothingInRange, bias_stability, fit_bias, score_held_out, score_runs
 from compensation.coloured import estimate_theta, fit_coloured
-from compensation.decimation import average_blocks
+from compensation.decimation import average_blocks, find_spikes
 from compensation.derivative import differentiate
 from compensation.errors import CompensationError
 from compensation.regression import fit_linear
@@ -70,11 +70,11 @@ def test_held_out_runs_gain_when_there_is_something_to_gain():
     runs = [make_run(rng) for _ in range(3)]
     score = score_held_out(runs)
     assert score.by_runs
-    assert score.gain > 5
+    assert score.gain > 4.3  # white noise alone would leave 4.6
     assert score.coverage > 0.5
     fit = fit_bias(runs[:2])
-    assert score_runs(fit, runs[2:]).gain > 5
-    assert bias_stability(runs[0]) > 5 * bias_stability(runs[0], runs[0].bias - fit.predict(runs[0].frequency, runs[0].rate))
+    assert score_runs(fit, runs[2:]).gain > 4.3
+    assert bias_stability(runs[0]) > 4.3 * bias_stability(runs[0], runs[0].bias - fit.predict(runs[0].frequency, runs[0].rate))
 
 
 def test_one_run_is_held_out_in_blocks_and_says_how_little_that_covers():
@@ -85,8 +85,7 @@ def test_one_run_is_held_out_in_blocks_and_says_how_little_that_covers():
     assert not cycled.by_runs
     assert cycled.coverage > 0.6
     assert cycled.gain > 3
-    with pytest.raises(NothingInRange, match="second run"):  # a monotonic run leaves nothing that the rest has seen
-        score_held_out([make_run(rng)])
+    assert score_held_out([make_run(rng)]).coverage < 0.5  # a monotonic run leaves little that the rest has seen
 
 
 def test_a_cooling_run_says_nothing_of_a_warming_one():
@@ -192,6 +191,18 @@ def test_blocks_leave_out_spikes_and_missing_values_and_count_them():
     assert (blocks.spikes, blocks.missing) == (2, 1)
     assert blocks.counts.sum() == 1997
     assert blocks.columns["y"] == pytest.approx(5 + 0.01 * blocks.time, abs=5 * 0.1 / np.sqrt(200))
+
+
+@pytest.mark.parametrize("noise", [0.0, 1e-3, 1.0])
+def test_a_trend_of_any_steepness_is_no_spike(noise):
+    t = np.arange(3000.0)
+    y = 17 * np.exp(-t / 200) + noise * np.random.default_rng(1).normal(size=t.size)
+    y[[1000, 2000]] += 100.0
+    marked = np.flatnonzero(find_spikes(y))
+    assert {1000, 2000} <= set(marked)
+    assert marked.size <= 6
+    if noise:
+        assert not find_spikes(np.round(y[1001:2000], 2)).any()
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,168 @@
+"""A bias calibration from record files: both ways of selecting terms, held-out scores, Allan deviations.
+
+This is what `hrg fit bias` computes and its page shows.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from compensation.bias import BiasFit, BiasRun, prepare_run
+from compensation.bias_selection import HeldOut, Method, NothingInRange, bias_stability, fit_bias, score_held_out
+from compensation.decimation import average_blocks, find_spikes
+from compensation.stability import AllanDeviation, NoiseCoefficients, allan_deviation, fit_noise
+from studies.errors import InputError, naming
+from studies.models import Model, compensate, source_of
+from studies.models.kinds.bias import OUTPUTS, save_bias
+from studies.record import COMPENSATED, Record
+
+Array = NDArray[np.float64]
+METHODS: tuple[Method, ...] = ("guarded", "paper")
+LARGEST_REST = 1e-3  # °/s of applied rate that still counts as rest
+
+
+@dataclass(frozen=True)
+class Judged:
+    """One method's fit: stability (before, after) on the runs it was fitted to, and its held-out score, if any."""
+
+    method: Method
+    fit: BiasFit
+    training: tuple[float, float]
+    held_out: HeldOut | None
+
+    @property
+    def training_gain(self) -> float:
+        """Improvement on the data that were fitted."""
+        return self.training[0] / self.training[1]
+
+
+@dataclass(frozen=True)
+class Spectrum:
+    """Allan deviation of an output with the noise coefficients read off it."""
+
+    allan: AllanDeviation
+    noise: NoiseCoefficients
+
+
+@dataclass(frozen=True)
+class BiasStudy:
+    """Everything about one calibration: runs, both methods, `model` of the chosen one, Allan before and after.
+
+    `allan_step` (s) of the series behind the Allan deviations; `no_held_out` why there is no held-out score.
+    """
+
+    output: str
+    runs: tuple[BiasRun, ...]
+    judged: tuple[Judged, ...]
+    model: Model
+    before: Spectrum
+    after: Spectrum
+    allan_step: float
+    no_held_out: str
+
+    def by(self, method: Method) -> Judged:
+        """Return what one method made of the runs."""
+        return next(j for j in self.judged if j.method == method)
+
+
+def study_bias(
+    records: Sequence[Record],
+    method: Method = "guarded",
+    width: float = 100.0,
+    window: float = 300.0,
+    *,
+    causal: bool = False,
+    progress: Callable[[str], None] = lambda _: None,
+) -> BiasStudy:
+    """Fit the bias model to records of a gyro at rest while its temperature changes.
+
+    Parameters
+    ----------
+    records : sequence of Record
+        Runs with time_s, frequency_Hz and bias_deg_per_h (or measured_rate_deg_per_s) at zero rate.
+    method : "guarded" or "paper"
+        Whose terms `model` takes; both are computed.
+    width, window : float
+        Averaging before the fit and window of the frequency's rate, s.
+    causal : bool
+        The rate uses past samples only.
+    progress : callable
+        Told in words what is being done.
+
+    Raises
+    ------
+    InputError
+        A record that lacks a column or was not at rest; the message names the file.
+    """
+    output = find_output(records)
+    runs = []
+    for record in records:
+        progress(f"averaging {record.path or 'record'} ({len(record):,} rows) over {width:g} s")
+        columns = record["time_s"], record["frequency_Hz"], record[output]
+        with naming(record.path or "record"):
+            runs.append(prepare_run(*columns, width, window, causal=causal))
+    judged, why = [], ""
+    for name in METHODS:
+        progress(f"selecting terms stepwise ({name})")
+        fit = fit_bias(runs, name)
+        try:
+            held_out = score_held_out(runs, name)
+        except NothingInRange as error:
+            held_out, why = None, str(error)
+        judged.append(Judged(name, fit, _training(runs, fit), held_out))
+    fit = next(j.fit for j in judged if j.method == method)
+    model = save_bias(fit, runs[0], output, tuple(source_of(r) for r in records), f"hrg fit bias --method {method}")
+    progress("Allan deviation before and after")
+    longest = max(records, key=len)
+    after = compensate(model, longest, extrapolate=True)[f"{COMPENSATED}{output}"]
+    step, series = unbroken(longest["time_s"], {"before": longest[output], "after": after})
+    spectra = [Spectrum(allan, fit_noise(allan)) for allan in (allan_deviation(y, step) for y in series.values())]
+    return BiasStudy(output, tuple(runs), tuple(judged), model, spectra[0], spectra[1], step, why)
+
+
+def find_output(records: Sequence[Record]) -> str:
+    """Return the zero-rate output column that all records have.
+
+    Raises
+    ------
+    InputError
+        No such column in all of them, no frequency, or a record that was not at rest.
+    """
+    for record in records:
+        where = record.path or "record"
+        if "frequency_Hz" not in record:
+            raise InputError(f"{where}: the column 'frequency_Hz' is missing; the bias model is a function of it.")
+        if "rate_deg_per_s" in record and np.nanmax(np.abs(record["rate_deg_per_s"])) > LARGEST_REST:
+            raise InputError(f"{where}: rate_deg_per_s is not zero; a bias is fitted to runs at rest ('hrg fit scale' else).")
+    for name in OUTPUTS:
+        if all(name in record for record in records):
+            return name
+    raise InputError(f"{records[0].path or 'record'}: a column {' or '.join(OUTPUTS)} is missing, or not in all records.")
+
+
+def unbroken(time: Array, columns: dict[str, Array]) -> tuple[float, dict[str, Array]]:
+    """Return an equally spaced series for Allan deviations and its step (s).
+
+    The samples themselves where they are regular, complete and free of spikes; else averages of ten samples, over the
+    longest stretch without a gap.
+    """
+    steps = np.diff(time)
+    step = float(np.median(steps))
+    regular = bool(np.all(np.abs(steps - step) < 0.01 * step))
+    if regular and all(np.all(np.isfinite(y)) and not np.any(find_spikes(y)) for y in columns.values()):
+        return step, columns
+    blocks = average_blocks(time, columns, 10 * step)
+    breaks = np.flatnonzero(np.abs(np.diff(blocks.time) - blocks.width) > 0.5 * blocks.width) + 1
+    ends = np.concatenate([[0], breaks, [blocks.time.size]])
+    longest = int(np.argmax(np.diff(ends)))
+    stretch = slice(int(ends[longest]), int(ends[longest + 1]))
+    return blocks.width, {name: y[stretch] for name, y in blocks.columns.items()}
+
+
+def _training(runs: Sequence[BiasRun], fit: BiasFit) -> tuple[float, float]:
+    """Bias stability before and after on the fitted runs, root mean square over the runs."""
+    before = [bias_stability(run) for run in runs]
+    after = [bias_stability(run, run.bias - fit.predict(run.frequency, run.rate)) for run in runs]
+    return float(np.sqrt(np.mean(np.square(before)))), float(np.sqrt(np.mean(np.square(after))))

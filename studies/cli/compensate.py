@@ -1,0 +1,89 @@
+"""`hrg compensate`: apply a saved model to a record, or turn it into C for firmware."""
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+AVERAGE = 100.0  # s
+
+
+def compensate(
+    model: str,
+    run: str | None = None,
+    /,
+    *,
+    out: str | None = None,
+    extrapolate: bool = False,
+    emit: str | None = None,
+    json: bool = False,
+) -> int:
+    """Write a record again with compensated_… columns, from a model that one of the hrg fit commands saved.
+
+    The model refuses values that its fit has not seen.
+
+    Parameters
+    ----------
+    model : str
+        A model file (TOML) written with --save.
+    run : str
+        The record (CSV) to compensate.
+    out : str
+        Where the record with the added columns goes.
+    extrapolate : bool
+        Apply the model outside the range of its fit too.
+    emit : str
+        Write the model as C99 source for firmware.
+    json : bool
+        Print one JSON object (schema hrg.compensate/1) instead of text.
+    """
+    import numpy as np
+
+    from studies import models
+    from studies.cli.output import print_json, say
+    from studies.errors import InputError
+    from studies.files.writing import write_text
+    from studies.record import COMPENSATED, read_record, write_record
+
+    loaded = models.read_model(model)
+    if (run is None) != (out is None):
+        raise InputError("a record needs --out for the result, and --out needs a record: hrg compensate MODEL RUN --out FILE.")
+    if run is None and emit is None:
+        raise InputError("nothing to do: give a record and --out FILE, or --emit FILE.c.")
+    if emit is not None:
+        write_text(emit, models.emit_c(loaded))
+        say(f"C source: {emit}")
+    columns = {}
+    if run is not None and out is not None:
+        say(f"reading {run}")
+        record = read_record(run)
+        result = models.compensate(loaded, record, extrapolate=extrapolate)
+        say(f"writing {len(result):,} rows")
+        write_record(result, out)
+        for name in result.columns:
+            if name.startswith(COMPENSATED) and name not in record:
+                before, after = record[name.removeprefix(COMPENSATED)], result[name]
+                columns[name] = {
+                    "stability_before": _stability(record["time_s"], before),
+                    "stability_after": _stability(record["time_s"], after),
+                    "rows_not_compensated": int(np.count_nonzero(np.isnan(after) & ~np.isnan(before))),
+                }
+    if json:
+        print_json({"schema": "hrg.compensate/1", "model": model, "kind": loaded.kind, "run": run, "out": out, "columns": columns})
+        return 0
+    for name, facts in columns.items():
+        print(
+            f"{out}: {name}; standard deviation of {AVERAGE:g} s averages {facts['stability_before']:.4g} -> "
+            f"{facts['stability_after']:.4g}"
+        )
+        if facts["rows_not_compensated"]:
+            print(f"{facts['rows_not_compensated']} rows stay empty: an input of the model is missing there.")
+    return 0
+
+
+def _stability(time: "NDArray[np.float64]", values: "NDArray[np.float64]") -> float:
+    """Return the standard deviation of block averages; missing values are left out."""
+    from compensation.decimation import average_blocks
+
+    return float(average_blocks(time, {"output": values}, AVERAGE).columns["output"].std())

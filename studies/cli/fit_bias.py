@@ -1,0 +1,135 @@
+"""`hrg fit bias`: the zero-rate output as a function of the gyro's own frequency and its rate."""
+
+from typing import TYPE_CHECKING, Any, Literal
+
+if TYPE_CHECKING:
+    from studies.bias import BiasStudy, Judged, Spectrum
+
+
+def fit_bias(
+    *data: str,
+    method: Literal["guarded", "paper"] = "guarded",
+    average: float = 100.0,
+    window: float = 300.0,
+    causal: bool = False,
+    save: str | None = None,
+    emit: str | None = None,
+    report: str | None = None,
+    json: bool = False,
+) -> int:
+    """Fit the bias over the change of frequency and its rate, stepwise (HRG paper, equations 19 to 22).
+
+    The records are of a gyro at rest while its temperature changes: time_s, frequency_Hz, and bias_deg_per_h or
+    measured_rate_deg_per_s. Terms are selected in two ways, shown side by side: as the paper does, and guarded against
+    noise that remembers. Give several runs, cooling and warming: then whole runs are held out.
+
+    Parameters
+    ----------
+    data : str
+        One or more records (CSV).
+    method : str
+        Which selection the saved model takes.
+    average : float
+        Seconds that are averaged into one row before the fit.
+    window : float
+        Seconds over which the rate of the frequency is taken.
+    causal : bool
+        Take the rate from past samples only, as firmware must; it lags by half the window.
+    save : str
+        Write the model (TOML), for hrg compensate.
+    emit : str
+        Write the model as C99 source for firmware.
+    report : str
+        Write a page (HTML).
+    json : bool
+        Print one JSON object (schema hrg.fit-bias/1) instead of tables.
+    """
+    from studies.bias import study_bias
+    from studies.cli.output import print_json, print_table, say
+    from studies.errors import InputError
+    from studies.files.writing import write_text
+    from studies.models import emit_c, write_model
+    from studies.record import read_record
+    from studies.reports import bias as page
+
+    if not data:
+        raise InputError("name at least one record (CSV) of a gyro at rest while its temperature changes.")
+    records = []
+    for path in data:
+        say(f"reading {path}")
+        records.append(read_record(path))
+    study = study_bias(records, method, average, window, causal=causal, progress=say)
+    if save is not None:
+        write_model(study.model, save)
+        say(f"model: {save}")
+    if emit is not None:
+        write_text(emit, emit_c(study.model))
+        say(f"C source: {emit}")
+    if report is not None:
+        write_text(report, page.bias_page(study, ", ".join(data), method))
+        say(f"report: {report}")
+    if json:
+        print_json(_payload(study, method, data))
+        return 0
+    tables = (
+        page.path_table(study.by(method), study.output),
+        page.coefficients_table(study.by(method), study.output),
+        page.gain_table(study),
+        page.noise_table(study),
+    )
+    for block in tables:
+        print_table(block.caption, block.columns, block.rows, block.note)
+    print(page.verdict(study, method))
+    return 0
+
+
+def _payload(study: "BiasStudy", method: str, data: tuple[str, ...]) -> dict[str, Any]:
+    return {
+        "schema": "hrg.fit-bias/1",
+        "data": data,
+        "output": study.output,
+        "method": method,
+        "rows": [int(run.time.size) for run in study.runs],
+        "missing": sum(run.missing for run in study.runs),
+        "spikes": sum(run.spikes for run in study.runs),
+        "rate_lag_s": study.runs[0].lag,
+        "methods": {judged.method: _judged(judged) for judged in study.judged},
+        "allan": {"step_s": study.allan_step, "before": _spectrum(study.before), "after": _spectrum(study.after)},
+    }
+
+
+def _judged(judged: "Judged") -> dict[str, Any]:
+    fit, held_out = judged.fit, judged.held_out
+    steps = fit.selection.steps if fit.selection else ()
+    return {
+        "reference_frequency_Hz": fit.reference_frequency,
+        "terms": ["constant", *fit.terms],
+        "coefficients": fit.coefficients,
+        "standard_errors": fit.standard_errors,
+        "naive_standard_errors": fit.naive_errors,
+        "theta": fit.theta,
+        "path": [
+            {"added": step.added, "term": step.term, "F": step.F, "p_value": step.p_value, "bic": step.criterion}
+            for step in steps
+        ],
+        "training": {"before": judged.training[0], "after": judged.training[1], "gain": judged.training_gain},
+        "held_out": None
+        if held_out is None
+        else {
+            "before": held_out.before,
+            "after": held_out.after,
+            "gain": held_out.gain,
+            "coverage": held_out.coverage,
+            "of": "runs" if held_out.by_runs else "blocks",
+        },
+    }
+
+
+def _spectrum(spectrum: "Spectrum") -> dict[str, Any]:
+    noise, allan = spectrum.noise, spectrum.allan
+    return {
+        "tau_s": allan.tau, "deviation": allan.deviation, "low": allan.low, "high": allan.high,
+        "confidence": allan.confidence, "bias_instability": allan.bias_instability[0],
+        "N": noise.N, "N_uncertainty": noise.N_uncertainty, "B": noise.B, "B_uncertainty": noise.B_uncertainty,
+        "K": noise.K, "K_uncertainty": noise.K_uncertainty, "misfit": noise.misfit,
+    }  # fmt: skip

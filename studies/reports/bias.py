@@ -1,0 +1,258 @@
+"""The page of a bias calibration: the path of the selection, coefficients with both errors, gains, Allan deviation."""
+
+import math
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+
+from compensation.bias import SELECTED_BY_THE_PAPER, TERMS
+from compensation.stability import FLAT
+from studies.models.kinds.bias import OUTPUTS, unit_of_term
+from studies.reports import style
+from studies.reports.page import Block, Chapter, Facts, Picture, Table, Text, draw, render_page
+
+if TYPE_CHECKING:
+    from studies.bias import BiasStudy, Judged, Spectrum
+
+SOURCES = (
+    "Wang X. et al., Sensors 2012, 12, 6434 (the HRG paper), eqs. (19)–(22).",
+    "Riley W. J., Handbook of Frequency Stability Analysis, NIST SP 1065 (Allan deviation, degrees of freedom).",
+    "IEEE Std 952 (coefficients N, B, K).",
+)
+SYMBOLS = {
+    "f": "f", "f^2": "f²", "f^3": "f³", "fdot": "ḟ", "fdot^2": "ḟ²", "fdot^3": "ḟ³", "f*fdot": "f·ḟ",
+    "f^2*fdot": "f²·ḟ", "f*fdot^2": "f·ḟ²",
+}  # fmt: skip
+METHOD = {"guarded": "guarded", "paper": "as the paper does"}
+Method = Literal["guarded", "paper"]
+
+
+def bias_page(study: "BiasStudy", source: str, method: Method) -> str:
+    """Return the page for a user's records."""
+    lead = (
+        f"The zero-rate output of {source} as a function of the gyro's own frequency and its rate, selected stepwise from the"
+        " nine terms of the HRG paper's equation (21)."
+    )
+    other: Method = "paper" if method == "guarded" else "guarded"
+    judged = study.by(method)
+    chapters = [
+        Chapter("In short", [_facts(study, method), Text(verdict(study, method))]),
+        Chapter("Before and after", [runs_figure(study, method), gain_table(study)]),
+        Chapter(
+            "The selection, step by step",
+            [path_table(judged, study.output), path_table(study.by(other), study.output), Text(PATH_NOTE, "note")],
+        ),
+        Chapter("Coefficients", [coefficients_table(judged, study.output), Text(how_rows_were_made(study), "note")]),
+        Chapter("Stability", [allan_figure(study), noise_table(study), Text(WHERE_READ, "note")]),
+    ]
+    return render_page("Bias over frequency and its rate", lead, chapters, SOURCES)
+
+
+PATH_NOTE = (
+    "The paper's way takes every average for independent of the others. Drift and flicker make neighbours alike, so it finds"
+    " terms in noise alone; the guarded way estimates how long the noise remembers and shares the entry level among the"
+    " candidates that compete. A term enters only after the lower-order terms that it contains."
+)
+WHERE_READ = (
+    "N is read where the curve falls like τ^(−1/2) and is by definition its value at τ = 1 s on that line; K where it rises like"
+    f" τ^(+1/2), at τ = 3 s on that line; B is the flat part over {FLAT:.3f}. All three are fitted to the whole curve, so that none"
+    " hangs on one point."
+)
+
+
+def verdict(study: "BiasStudy", method: Method) -> str:
+    """Say in two or three sentences what the model is worth."""
+    judged = study.by(method)
+    if not judged.fit.terms:
+        return (
+            "No term is supported by these data: the bias is as well described by a constant. Nothing is gained by"
+            " compensation, and the saved model only takes the mean out."
+        )
+    if judged.held_out is None:
+        return f"Improvement on the fitted data {judged.training_gain:.2f} times. What it is worth elsewhere is unknown: {study.no_held_out}"
+    held = judged.held_out
+    what = "runs" if held.by_runs else "blocks of the same run"
+    sentence = (
+        f"Improvement {judged.training_gain:.2f} times on the data that were fitted and {held.gain:.2f} times on held-out {what}"
+        f" ({held.coverage:.0%} of the rows lie where the rest has seen frequency and rate)."
+    )
+    if held.gain <= 1:
+        sentence += " Held out, it makes things worse: do not use it before a further run says otherwise."
+    elif not held.by_runs:
+        sentence += " One run cannot show more: record a second one, warming if this one cooled."
+    return sentence
+
+
+def how_rows_were_made(study: "BiasStudy") -> str:
+    """Say how the rows of the fit came about."""
+    run = study.runs[0]
+    left_out = sum(r.missing for r in study.runs), sum(r.spikes for r in study.runs)
+    rows = ", ".join(str(r.time.size) for r in study.runs)
+    return (
+        f"Each row is the average over {run.width:g} s ({rows} rows); {left_out[0]} samples with missing values and {left_out[1]}"
+        f" spikes were left out. The rate is the slope of the line through {run.window:g} s of averages; its lag is {run.lag:g} s."
+        " Changes of frequency are counted from"
+        f" {study.by('guarded').fit.reference_frequency:.4f} Hz. Bias stability is the standard deviation of 100 s averages."
+    )
+
+
+def path_table(judged: "Judged", output: str) -> Table:
+    """Return the steps of a selection: term, F, p, criterion, residual."""
+    selection = judged.fit.selection
+    rows = []
+    steps = () if selection is None else (selection.start, *selection.steps)
+    held_out = judged.fit.held_out or (math.nan,) * len(steps)
+    count = sum(1 for _ in judged.fit.selection.steps) if judged.fit.selection else 0
+    for k, (step, score) in enumerate(zip(steps, held_out, strict=True)):
+        action = "start" if k == 0 else f"{'+' if step.added else '−'} {SYMBOLS[step.term]}"
+        rows.append(
+            [
+                str(k),
+                action,
+                "" if math.isnan(step.F) else f"{step.F:.2f}",
+                "" if math.isnan(step.p_value) else f"{step.p_value:.1e}",
+                f"{step.criterion:.2f}",
+                "" if math.isnan(score) else f"{score:.3f}",
+                ", ".join(SYMBOLS[name] for name in sorted(step.terms, key=list(TERMS).index)) or "constant only",
+            ]
+        )
+    refused = {} if selection is None else selection.refused
+    notes = [f"Left out from the start: {', '.join(f'{SYMBOLS[n]} ({why})' for n, why in refused.items())}."] if refused else []
+    if not count:
+        notes.append("No candidate passes the entry level.")
+    elif judged.fit.held_out:
+        notes.append("The model with the smallest held-out figure is kept.")
+    columns = ["Step", "Term", "F", "p", "BIC", "Held out", "Model"]
+    return Table(f"Selection, {METHOD[judged.method]}", columns, rows, " ".join(notes))
+
+
+def coefficients_table(judged: "Judged", output: str) -> Table:
+    """Return the coefficients with the naive error and the one that respects the autocorrelation."""
+    fit, unit = judged.fit, OUTPUTS[output].replace("deg", "°")
+    rows = []
+    for name, value, error, naive in zip(
+        ("constant", *fit.terms), fit.coefficients, fit.standard_errors, fit.naive_errors, strict=True
+    ):
+        number = list(TERMS).index(name) + 1 if name in TERMS else 0
+        a, b = TERMS.get(name, (0, 0))
+        printed = "" if name == "constant" else ("yes" if name in SELECTED_BY_THE_PAPER else "no")
+        rows.append(
+            [
+                f"k{number}" if number else "B0",
+                SYMBOLS.get(name, "constant"),
+                f"{value:.5g}",
+                f"{error:.2g}",
+                f"{naive:.2g}",
+                unit_of_term(unit, a, b).replace("*", "·") if name in TERMS else unit,
+                printed,
+            ]
+        )
+    columns = ["", "Term", "Value", "Standard error", "if rows were independent", "Unit", "in eq. (22)"]
+    low, high = fit.frequency_range
+    note = (
+        f"Valid from {low:.4f} to {high:.4f} Hz and from {fit.rate_range[0]:.2e} to {fit.rate_range[1]:.2e} Hz/s."
+        f" The noise remembers with θ = {fit.theta:.3f} (1: white, 0: random walk). Beside a drifting bias the"
+        " least-squares coefficients are less certain than the guarded selection, which weighs the drift down."
+    )
+    return Table(f"Coefficients, {METHOD[judged.method]}", columns, rows, note)
+
+
+def gain_table(study: "BiasStudy") -> Table:
+    """Return bias stability before and after, on the fitted and on held-out data, for both ways of selecting."""
+    unit = OUTPUTS[study.output].replace("deg", "°")
+    rows = []
+    for judged in study.judged:
+        terms = ", ".join(SYMBOLS[name] for name in judged.fit.terms) or "none"
+        before, after = judged.training
+        rows.append([METHOD[judged.method], terms, "fitted data", f"{before:.4g}", f"{after:.4g}", f"{judged.training_gain:.2f}", "100 %"])
+        held = judged.held_out
+        if held is not None:
+            of = "held-out runs" if held.by_runs else "held-out blocks"
+            rows.append(
+                [METHOD[judged.method], "selected anew", of, f"{held.before:.4g}", f"{held.after:.4g}", f"{held.gain:.2f}", f"{held.coverage:.0%}"]
+            )
+    columns = ["Selection", "Terms", "On", f"Before ({unit})", f"After ({unit})", "Times better", "Rows in range"]
+    note = "Standard deviation of 100 s averages about each piece's own mean."
+    if study.no_held_out:
+        note += f" No held-out figure: {study.no_held_out}"
+    return Table("Bias stability", columns, rows, note)
+
+
+def noise_table(study: "BiasStudy") -> Table:
+    """Return N, B, K and the flat minimum before and after, on the longest run."""
+    hours = study.output == "bias_deg_per_h"
+    n_scale, k_scale, n_unit, k_unit = (1 / 60, 60.0, "°/√h", "°/h/√h") if hours else (1.0, 1.0, "°/√s", "°/s/√s")
+    unit = OUTPUTS[study.output].replace("deg", "°")
+
+    def row(label: str, spectrum: "Spectrum") -> list[str]:
+        noise, (flat, low, high) = spectrum.noise, spectrum.allan.bias_instability
+        cells = [
+            _measured(noise.N * n_scale, noise.N_uncertainty * n_scale),
+            _measured(noise.B, noise.B_uncertainty),
+            _measured(noise.K * k_scale, noise.K_uncertainty * k_scale),
+        ]
+        return [label, *cells, f"{flat:.3g} ({low:.3g}…{high:.3g})", f"{noise.misfit:.1f}"]
+
+    columns = ["", f"N ({n_unit})", f"B ({unit})", f"K ({k_unit})", f"lowest point / 0.664 ({unit})", "Misfit"]
+    note = (
+        f"Longest run, samples of {study.allan_step:g} s. A misfit well above 1 says that more than white noise, flicker and random"
+        " walk is there, such as drift with temperature; the uncertainties are widened by it."
+    )
+    return Table("Noise coefficients", columns, [row("before", study.before), row("after", study.after)], note)
+
+
+def runs_figure(study: "BiasStudy", method: Method) -> Picture:
+    """Draw the averages before and after, and the model, for the first runs: like the paper's figure 6."""
+    unit = OUTPUTS[study.output].replace("deg", "°")
+    fit, shown = study.by(method).fit, study.runs[:3]
+    with style.figure(2, len(shown), height=4.6, squeeze=False, sharex="col", sharey="row") as (figure, axes):
+        for k, run in enumerate(shown):
+            predicted = fit.predict(run.frequency, run.rate)
+            hours = run.time / 3600
+            offset = np.mean(run.bias - predicted)
+            axes[0, k].plot(hours, run.bias, ".", color=style.SKY, markersize=3, label="output")
+            axes[0, k].plot(hours, predicted + offset, color=style.VERMILION, label="model")
+            axes[1, k].plot(hours, run.bias - predicted - offset, ".", color=style.BLUE, markersize=3)
+            axes[1, k].set_xlabel("Time (h)")
+            axes[0, k].set_title(f"run {k + 1}", fontsize=10)
+        axes[0, 0].set_ylabel(f"Output ({unit})")
+        axes[1, 0].set_ylabel(f"Compensated ({unit})")
+        axes[0, 0].legend()
+        caption = "Averages of the output with the model (above) and what is left (below), as in the paper's figure 6."
+        return draw(figure, caption, "Zero-rate output over time before and after compensation.")
+
+
+def allan_figure(study: "BiasStudy") -> Picture:
+    """Draw the Allan deviation before and after with its confidence band and fitted noise."""
+    unit = OUTPUTS[study.output].replace("deg", "°")
+    with style.figure(height=3.8) as (figure, axes):
+        for spectrum, colour, label in ((study.before, style.ORANGE, "before"), (study.after, style.BLUE, "after")):
+            allan = spectrum.allan
+            axes.fill_between(allan.tau, allan.low, allan.high, color=colour, alpha=0.25, linewidth=0)
+            axes.loglog(allan.tau, allan.deviation, color=colour, label=label)
+            axes.loglog(allan.tau, spectrum.noise.deviation(allan.tau), "--", color=colour, linewidth=1)
+        axes.set_xlabel("Averaging time τ (s)")
+        axes.set_ylabel(f"Allan deviation ({unit})")
+        axes.legend()
+        caption = "Overlapping Allan deviation, 68.3 % band; dashed: fitted N, B, K."
+        return draw(figure, caption, "Allan deviation before and after compensation.")
+
+
+def _facts(study: "BiasStudy", method: Method) -> Block:
+    judged = study.by(method)
+    unit = OUTPUTS[study.output].replace("deg", "°")
+    held = judged.held_out
+    facts = [
+        ("On the fitted data", f"{judged.training_gain:.2f} times", f"{judged.training[0]:.3g} → {judged.training[1]:.3g} {unit}"),
+        (
+            "Held out",
+            "unknown" if held is None else f"{held.gain:.2f} times",
+            "needs a second run" if held is None else f"{held.before:.3g} → {held.after:.3g} {unit}",
+        ),
+        ("Terms", str(len(judged.fit.terms)), f"of {len(TERMS)} candidates; the paper keeps {len(SELECTED_BY_THE_PAPER)}"),
+    ]
+    return Facts(facts)
+
+
+def _measured(value: float, uncertainty: float) -> str:
+    return f"{value:.3g} ± {uncertainty:.1g}" if value > 0 else f"not seen (< {2 * uncertainty:.1g})"
