@@ -18,6 +18,7 @@ TEMPERATURES = ("housing_temperature_degC", "resonator_temperature_degC", "chamb
 CELSIUS_ZERO = 273.15
 MOST_ROWS = 20_000
 """Rows beyond which a run is averaged in blocks before a fit: temperature is slow, and noise averages."""
+LEAST_SPIKE = 1e-3
 LARGEST_REST = 0.01
 """Applied rate in °/s that still counts as rest: somewhat more than the earth's, 0.0042 °/s."""
 
@@ -34,15 +35,23 @@ class RestData:
 
 
 def drop_spikes(keep: "NDArray[np.bool_]", *columns: "NDArray[np.float64]") -> "NDArray[np.bool_]":
-    """Return the rows to keep without those in which a column is contradicted by its neighbours."""
+    """Return the rows to keep without those in which a column is contradicted by its neighbours.
+
+    A smooth column has no noise to measure a spike by; there, one must stand out by a thousandth of the column's span.
+    """
     import numpy as np
+    from scipy.ndimage import median_filter
 
     from compensation.decimation import NEIGHBOURS, find_spikes
+
+    def mark(values: "NDArray[np.float64]") -> "NDArray[np.bool_]":
+        distance = np.abs(values - median_filter(values, NEIGHBOURS, mode="nearest"))
+        return np.asarray(find_spikes(values) & (distance > LEAST_SPIKE * np.ptp(values)))
 
     rows = np.flatnonzero(keep)
     if len(rows) < NEIGHBOURS:
         return keep
-    spikes = np.any([find_spikes(column[rows]) for column in columns], axis=0)
+    spikes = np.any([mark(column[rows]) for column in columns], axis=0)
     cleaned = keep.copy()
     cleaned[rows[spikes]] = False
     return cleaned

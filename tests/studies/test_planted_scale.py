@@ -16,6 +16,7 @@ from studies.models import compensate, emit_c, read_model
 from studies.models.kinds.scale import load_scale
 from studies.papers.bvg import DEG, examine_claims, read_printed_chain, reduce_white, simulate_runs
 from studies.record import read_record
+from studies.rest import drop_spikes
 from studies.scale import settled_rows
 
 STRIDE = 20
@@ -155,6 +156,15 @@ def test_filter_reduces_the_allan_deviation_as_predicted():
         k = int(np.argmin(np.abs(before.tau - 0.1 * rows)))
         assert before.tau[k] == pytest.approx(0.1 * rows)
         assert before.deviation[k] / after.deviation[k] == pytest.approx(reduce_white(taps, rows), rel=0.03)
+
+
+def test_smooth_columns_have_no_spikes():
+    """Neither a ramp that was rounded nor its rounding noise is an outlier; a wrong reading is."""
+    ramp = np.round(np.linspace(-45, 55, 1000), 3)
+    keep = np.ones(1000, dtype=bool)
+    assert np.all(drop_spikes(keep, ramp + 273.15 - 273.15, np.full(1000, 3.0)))
+    ramp[[5, 700]] += [3.0, -1.0]
+    assert np.flatnonzero(~drop_spikes(keep, ramp)).tolist() == [5, 700]
 
 
 def test_settled_rows():
