@@ -153,12 +153,21 @@ def cell_names(count: int) -> list[str]:
     return [f"shell-{k + 1}" for k in range(count)]
 
 
-def energy_weights(cells: MeridianCells, density: Along) -> Array:
-    """Integrate a density of frequency sensitivity d ln f/dT (1/(K m), callable of arc length) over each cell.
+def energy_weights(cells: MeridianCells, place: ArrayLike, share: ArrayLike) -> Array:
+    """Give the contributions of places of the meridian to d ln f/dT to the cells, the field linear between middles.
 
-    The change of frequency of a temperature field is then Σ weights (T − T_ref) = δ ln f, in 1/K times K.
+    The change of frequency of a temperature field is then Σ weights (T − T_ref) = δ ln f. Before the first middle and
+    beyond the last the field is even.
+
+    Parameters
+    ----------
+    place : array (M,), arc length from the root, m
+    share : array (M,), 1/K
     """
-    return _integrate(density, cells.edge[:-1], cells.edge[1:])
+    place = np.asarray(place, dtype=float)
+    hats = np.array([np.interp(place, cells.middle, unit) for unit in np.eye(cells.count)])
+    weights: Array = hats @ np.asarray(share, dtype=float)
+    return weights
 
 
 def energy_weighted_temperature(weights: Array, field: Array) -> Array:

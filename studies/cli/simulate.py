@@ -55,6 +55,8 @@ def simulate(
     instrument = load_card(card)
     run = simulate_run(instrument, load_profile(profile), rate, seed, not noiseless, theory)
     rows = len(run.record)
+    for warning in run.warnings:
+        say(f"warning: {warning}")
 
     def progress(written: int) -> None:
         if written % 500_000 == 0:

@@ -80,13 +80,17 @@ class SettlingStudy:
 
 
 def identify_mount(instrument: "Instrument") -> float:
-    """Find the mount's conductance (W/K) that leaves 5 % at 9 000 s, the mean of the two steps of Figure 3."""
+    """Find the mount's conductance (W/K) that leaves 5 % at 9 000 s, the mean of the two steps of Figure 3.
+
+    What is left is that of the temperature which the frequency sees.
+    """
+    weights = cell_weights(instrument, _model(instrument))
 
     def remaining(conductance: float) -> float:
         table = {**instrument.table("thermal"), "mount_conductance_W_per_K": conductance}
         changed = instrument.with_table("thermal", table)
         network = build_network(changed, radiation=True)
-        row = _mean_row(network, changed)
+        row = shell_weights(tuple(node.name for node in network.nodes), weights)
         room = ROOM_degC + ZERO_CELSIUS
         left = [step_remaining(network, room, T + ZERO_CELSIUS, row, [FAST])[0] for T in STEPS_degC]
         return float(np.mean(left))
@@ -98,16 +102,14 @@ def study_settling(instrument: "Instrument", hours: tuple[float, ...] = (4.0, 4.
     """Compute Figure 3 and the soak errors of Table 1 in the radiative and the linear network."""
     from studies.papers.hrg import printed_table1
 
-    model = build_frequency_model(
-        instrument, POINTS_degC.min() + ZERO_CELSIUS - 5, POINTS_degC.max() + ZERO_CELSIUS + 5
-    )
-    row_source = cell_weights(instrument, model)
+    model = _model(instrument)
+    weights = cell_weights(instrument, model)
     networks = dict(zip(NETWORKS, _networks(instrument), strict=True))
     curves = [
-        _curve(name, network, row_source, model, target) for target in STEPS_degC for name, network in networks.items()
+        _curve(name, network, weights, model, target) for target in STEPS_degC for name, network in networks.items()
     ]
     soaks = [
-        _soak(name, networks[name], row_source, model, hour) for hour in hours for name in ("radiative", "linear")
+        _soak(name, networks[name], weights, model, hour) for hour in hours for name in ("radiative", "linear")
     ]
     T, f = printed_table1()
     settled = model.frequency(POINTS_degC + ZERO_CELSIUS)
@@ -152,7 +154,6 @@ def _slope_and_curvature(T: Array, f: Array) -> tuple[float, float]:
     return float(1e6 * c[1]), float(2e6 * c[2])
 
 
-def _mean_row(network: Network, instrument: "Instrument") -> Array:
-    from studies.simulation.heat_path import cut_shell
-
-    return shell_weights(tuple(node.name for node in network.nodes), cut_shell(instrument).volume)
+def _model(instrument: "Instrument") -> FrequencyModel:
+    low, high = POINTS_degC[[0, -1]] + ZERO_CELSIUS
+    return build_frequency_model(instrument, low - 5, high + 5)

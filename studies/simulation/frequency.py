@@ -39,7 +39,7 @@ class FrequencyModel:
     lowest, highest : float, K
     polynomial : ln f over temperature, between these
     bryan_factor : float
-    along : density of the sensitivity: position 0 … 1 of the meridian, and contribution to d ln f/dT (1/K)
+    along : position (0 … 1 of the meridian) of the mode's stations, and what each contributes to d ln f/dT (1/K)
     solver_error, interpolation_error : float
         Relative, of the solver against its theory and of this model against the solver.
     """
@@ -61,16 +61,6 @@ class FrequencyModel:
                 f"known from {self.lowest - 273.15:.2f} to {self.highest - 273.15:.2f} °C only."
             )
         return np.asarray(np.exp(self.polynomial(T)))
-
-    def weights(self, edges: Array) -> Array:
-        """Contribution to d ln f/dT (1/K) of cells of the meridian between `edges` (position 0 … 1, rising).
-
-        What lies before the first edge counts to the first cell, and beyond the last to the last.
-        """
-        position, share = self.along
-        within = np.interp(edges, position, share)
-        within[0], within[-1] = share[0], share[-1]
-        return np.diff(within)
 
 
 def build_frequency_model(
@@ -121,7 +111,7 @@ def _shape_factor(
 
 
 def _sensitivity(instrument: "Instrument", along: "AlongMeridian") -> tuple[Array, Array]:
-    """Return edges of the mode's stations (position 0 … 1) and the running sum of d ln f/dT (1/K) up to each."""
+    """Return position and contribution to d ln f/dT (1/K) of every station of the mode."""
     material, T0 = instrument.material, instrument.reference_temperature
     alpha = float(material.value("expansion", T0))
     share = (
@@ -129,5 +119,4 @@ def _sensitivity(instrument: "Instrument", along: "AlongMeridian") -> tuple[Arra
         - 0.5 * along.kinetic * material.log_slope("density", T0)
         + along.nu * material.slope("poisson_ratio", T0)
     )
-    edges = np.concatenate([[0.0], np.cumsum(along.width)])
-    return edges, np.concatenate([[0.0], np.cumsum(share)])
+    return along.position, share

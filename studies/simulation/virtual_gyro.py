@@ -14,6 +14,7 @@ from studies.simulation.chamber import ZERO_CELSIUS, check_profile
 from studies.simulation.frequency import FrequencyModel, Theory, build_frequency_model
 from studies.simulation.heat_path import build_network, cut_shell, root_to_end
 from studies.simulation.noise import SILENT, bias_noise, frequency_noise, quantise, read_noise, white_noise
+from thermal.meridian import energy_weights
 from thermal.network import Boundary, Network, Part, assemble
 from thermal.profile import Profile
 from thermal.relaxation import find_relaxation
@@ -46,6 +47,7 @@ class VirtualRun:
     network: Network
     transient: Transient
     frequency_model: FrequencyModel
+    warnings: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -117,16 +119,15 @@ def simulate_run(
         source=f"simulated, rate {rate:g} Hz, " + (f"seed {seed}" if noise else "without noise"),
         resolution={name: step for name, step in resolution.items() if step > 0},
     )
-    return VirtualRun(record, network, transient, model)
+    return VirtualRun(record, network, transient, model, _idle_effects(instrument))
 
 
 def cell_weights(instrument: "Instrument", model: FrequencyModel) -> Array:
     """Contribution to d ln f/dT (1/K) of each cell of the shell, from its root to its free end."""
-    cells, (s, _, _) = cut_shell(instrument), root_to_end(instrument)
-    edges = (s[0] + cells.edge) / instrument.resonator.length
-    if instrument.resonator.support == "clamped-rim":
-        return model.weights(1 - edges[::-1])[::-1]
-    return model.weights(edges)
+    (s, _, _), length = root_to_end(instrument), instrument.resonator.length
+    position, share = model.along
+    from_start = length * (1 - position if instrument.resonator.support == "clamped-rim" else position)
+    return energy_weights(cut_shell(instrument), from_start - s[0], share)
 
 
 def _respond(instrument: "Instrument", transient: Transient, model: FrequencyModel, time: Array) -> _Noiseless:
@@ -190,6 +191,20 @@ def _apply_effects(
             target, change = apply_effect(effect["name"], parameters, states, response)
         changes[target] = changes.get(target, np.zeros_like(time)) + change
     return changes
+
+
+def _idle_effects(instrument: "Instrument") -> tuple[str, ...]:
+    """Name the effects whose drive (amplitude, voltage, quadrature, azimuth) a virtual run does not move."""
+    if not instrument.effects:
+        return ()
+    from studies.diagnosis.effects import find_effect
+
+    return tuple(
+        f"the effect '{effect['name']}' adds nothing: a virtual run does not move its drive"
+        f" ({', '.join(find_effect(effect['name']).needs)})."
+        for effect in instrument.effects
+        if find_effect(effect["name"]).needs
+    )
 
 
 def slowest_lag(instrument: "Instrument") -> float:

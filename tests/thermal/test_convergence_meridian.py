@@ -107,15 +107,21 @@ def test_a_slow_ramp_leaves_the_parabola_of_even_heating_along_a_tube():
     assert behind == pytest.approx(expected, abs=2e-4 * expected.max())
 
 
-def test_energy_weights_integrate_the_density_and_weigh_the_field():
-    cells = dome(30)
-    length = cells.edge[-1]
-    weights = energy_weights(cells, lambda s: 8e-5 * 3 * s**2 / length**3)
-    assert weights.sum() == pytest.approx(8e-5, rel=1e-12)
-    field = 293.15 + np.outer([0.0, 1.0], cells.middle)
-    mean = energy_weighted_temperature(weights, field)
-    assert mean[0] == pytest.approx(293.15)
-    assert mean[1] - 293.15 == pytest.approx(0.75 * length, rel=1e-3)
+def test_energy_weights_keep_their_sum_and_take_the_mean_of_the_field():
+    """Shares of a density s² at Gauss points: the mean of cos(π s/L) is −2/π² · 3 = −0.60793, to second order."""
+    x, w = np.polynomial.legendre.leggauss(40)
+    errors = []
+    for count in (15, 30, 60):
+        cells = cut_meridian(0.02, lambda s: 0.01 + s, lambda s: np.full_like(s, 1e-3), count)
+        place, share = 0.01 * (x + 1), 8e-5 * 1.5 * w * ((x + 1) / 2) ** 2
+        weights = energy_weights(cells, place, share)
+        assert weights.sum() == pytest.approx(8e-5, rel=1e-12)
+        field = 293.15 + np.outer([0.0, 1.0], np.cos(np.pi * cells.middle / 0.02))
+        mean = energy_weighted_temperature(weights, field)
+        assert mean[0] == pytest.approx(293.15)
+        errors.append(abs(mean[1] - 293.15 + 6 / np.pi**2))
+    assert np.log2(errors[0] / errors[1]) == pytest.approx(2.0, abs=0.3)
+    assert errors[2] < 2e-3
 
 
 def test_impossible_meridians_are_refused():

@@ -1,0 +1,254 @@
+"""The virtual gyro against its parts: shell solver, heat path, bias formula, record contract."""
+
+import numpy as np
+import pytest
+
+from shell.modes import VaryingElastic, solve_modes
+from shell.temperature import mode_model, temperature_coefficients
+from studies.errors import InputError
+from studies.instrument.card import load_card
+from studies.record import read_record, write_record
+from studies.simulation.bias import read_bias, read_loss
+from studies.simulation.chamber import load_profile
+from studies.simulation.frequency import build_frequency_model
+from studies.simulation.heat_path import build_heat_path, build_network, build_shell_and_stem, cut_shell
+from studies.simulation.virtual_gyro import cell_weights, simulate_run, slowest_lag
+from thermal.errors import ThermalError
+from thermal.relaxation import find_relaxation
+
+CARD = """
+schema = "hrg.card/1"
+name = "open-dome"
+[resonator]
+shape = "hemisphere"
+radius_mm = 15.0
+thickness_mm = 0.9
+pole_angle_deg = 10.0
+support = "clamped-pole"
+[material]
+name = "fused-silica"
+"""
+
+
+@pytest.fixture(scope="module")
+def card(tmp_path_factory):
+    path = tmp_path_factory.mktemp("cards") / "open-dome.toml"
+    path.write_text(CARD, encoding="utf-8")
+    return load_card(path)
+
+
+@pytest.fixture(scope="module")
+def model(card):
+    return build_frequency_model(card, 233.15, 333.15, theory="shell")
+
+
+def run(card, model, words="step 20 -10 5h", **options):
+    return simulate_run(card, load_profile(words), frequency_model=model, **options)
+
+
+def test_the_frequency_model_is_the_solver_between_its_nodes(card, model):
+    for T in (240.0, 281.0, 321.0):
+        resonator, elastic = card.at(T)
+        (mode,) = solve_modes(resonator, elastic, theory="shell")
+        assert model.frequency(np.array([T]))[0] == pytest.approx(mode.frequency, rel=2e-9)
+    assert model.interpolation_error < 2e-9
+
+
+def test_the_weights_of_the_cells_add_up_to_the_slope(card, model):
+    (slope,) = temperature_coefficients(mode_model(card.resonator, 2, "shell"), card.material, 293.15, [293.15])
+    assert cell_weights(card, model).sum() == pytest.approx(slope.total, rel=1e-12)
+    centre = np.log(model.frequency(np.array([293.1, 293.2])))
+    assert np.diff(centre)[0] / 0.1 == pytest.approx(slope.total, rel=1e-6)
+
+
+def test_a_field_along_the_meridian_shifts_the_mode_as_its_weights_say(card, model):
+    """A field of ±2 K, once through the weights and once through a solve with E, ν, ρ along the meridian.
+
+    The solve leaves the geometry as it is; the expansion, 0.51 of 79 ppm/°C, is added with the elastic energy's shares.
+    """
+    material, T0 = card.material, 293.15
+
+    def solve(size):
+        def field(position):
+            return T0 - size * np.cos(np.pi * np.asarray(position))
+
+        elastic = VaryingElastic(
+            lambda p: material.value("youngs_modulus", field(p)),
+            lambda p: material.value("poisson_ratio", field(p)),
+            lambda p: material.value("density", field(p)),
+        )
+        return np.log(solve_modes(card.resonator, elastic, theory="shell", tolerance=1e-7)[0].frequency)
+
+    (mode,) = solve_modes(card.resonator, material.elastic(T0), theory="shell", tolerance=1e-7)
+    alpha = float(material.value("expansion", T0))
+    growth = alpha * float(mode.along.elastic @ (-2.0 * np.cos(np.pi * mode.along.position)))
+    by_solver = (solve(2.0) - solve(-2.0)) / 2 - growth
+    cells = cut_shell(card)
+    field = -2.0 * np.cos(np.pi * cells.middle / cells.edge[-1])
+    assert cell_weights(card, model) @ field == pytest.approx(by_solver, rel=2e-3)
+    assert abs(by_solver) > 5e-5
+
+
+def test_the_default_bias_is_that_of_one_per_cent_anisotropy():
+    """Field notes, insight 8: 2.6 °/h peak for 1 % at Q = 1e7, f = 4428 Hz, k = 0.277."""
+    bias = read_bias({}, "card [bias]")
+    f, q, still = np.array([4428.0]), np.array([1e-7]), np.zeros(1)
+    assert bias.at(still, still, f, q, 0.277) == pytest.approx([2.6], abs=0.05)
+    turned = read_bias({"pattern_angle_deg": 45.0}, "card [bias]")
+    assert turned.at(still, still, f, q, 0.277) == pytest.approx([0.0], abs=1e-12)
+
+
+def test_the_papers_terms_add_up():
+    table = {"damping_anisotropy": 0.0, "offset_deg_per_h": 1.0, "k2_deg_per_h_per_Hz2": 0.5, "k7_deg_per_h_s_per_Hz2": 4.0}
+    bias = read_bias(table, "card [bias]")
+    change, rate = np.array([2.0, -2.0]), np.array([0.25, 0.25])
+    found = bias.at(change, rate, np.full(2, 4432.0), np.full(2, 1e-7), 0.277)
+    assert found == pytest.approx([1 + 2 + 2, 1 + 2 - 2])
+
+
+def test_loss_is_quadratic_in_the_excess():
+    loss = read_loss({"inverse_q": 2e-7, "slope_per_K": 0.01, "curvature_per_K2": 1e-4}, "card [loss]")
+    assert loss.at(np.array([-10.0, 0.0, 10.0])) == pytest.approx([2e-7 * 0.91, 2e-7, 2e-7 * 1.11])
+
+
+def test_a_soak_stays_where_it_is(card, model):
+    record = run(card, model, "soak 0 2h", noise=False).record
+    for name in ("housing_temperature_degC", "resonator_temperature_degC"):
+        assert record[name] == pytest.approx(np.zeros(7201), abs=1e-6)
+    assert np.ptp(record["frequency_Hz"]) < 1e-6
+
+
+def test_after_a_long_soak_the_frequency_is_that_of_the_chamber(card, model):
+    record = run(card, model, "step 20 -10 20h", rate=0.1, noise=False).record
+    assert record["frequency_Hz"][-1] == pytest.approx(model.frequency(np.array([263.15]))[0], abs=1e-5)
+    assert record["chamber_temperature_degC"][0] == -10.0
+    assert record["resonator_temperature_degC"][0] == pytest.approx(20.0, abs=1e-5)
+
+
+def test_the_same_seed_makes_the_same_record_and_another_another(card, model):
+    one, again, other = (run(card, model, "soak 20 1h", seed=seed).record for seed in (1, 1, 2))
+    assert np.array_equal(one["frequency_Hz"], again["frequency_Hz"])
+    assert not np.array_equal(one["frequency_Hz"], other["frequency_Hz"])
+
+
+def test_the_record_keeps_the_contract_and_is_read_back(card, model, tmp_path):
+    made = run(card.with_table("noise", {"frequency_resolution_Hz": 0.01}), model, rate=0.5).record
+    write_record(made, tmp_path / "run.csv")
+    read = read_record(tmp_path / "run.csv")
+    assert list(read.columns) == [
+        "time_s", "chamber_temperature_degC", "housing_temperature_degC", "resonator_temperature_degC",
+        "frequency_Hz", "bias_deg_per_h", "inverse_q",
+    ]  # fmt: skip
+    assert len(read) == 9001
+    assert read.instrument == "open-dome"
+    assert read.resolution == {"frequency_Hz": 0.01}
+    assert read["frequency_Hz"] == pytest.approx(made["frequency_Hz"], abs=1e-9)
+    assert read["frequency_Hz"] * 100 == pytest.approx(np.round(read["frequency_Hz"] * 100), abs=1e-6)
+
+
+def test_a_profile_from_a_file_is_the_profile_from_words(card, model, tmp_path):
+    path = tmp_path / "chamber.csv"
+    path.write_text("time_s,chamber_temperature_degC\n0,20\n1200,40\n4800,40\n", encoding="utf-8")
+    file = run(card, model, str(path), noise=False).record
+    words = run(card, model, "ramp 20 40 1 then soak 40 1h", noise=False).record
+    assert file["resonator_temperature_degC"] == pytest.approx(words["resonator_temperature_degC"], abs=1e-6)
+
+
+def test_a_measured_profile_of_many_rows_is_the_same_as_its_corners(card, model, tmp_path):
+    t = np.arange(0.0, 4801.0, 5.0)
+    T = np.interp(t, [0.0, 1200.0, 4800.0], [20.0, 40.0, 40.0])
+    rows = "".join(f"{a:g},{b:.10g}\n" for a, b in zip(t, T, strict=True))
+    path = tmp_path / "chamber.csv"
+    path.write_text("time_s,chamber_temperature_degC\n" + rows, encoding="utf-8")
+    many = run(card, model, str(path), noise=False).record
+    few = run(card, model, "ramp 20 40 1 then soak 40 1h", noise=False).record
+    assert many["resonator_temperature_degC"] == pytest.approx(few["resonator_temperature_degC"], abs=1e-5)
+
+
+def test_an_effect_of_the_card_is_added(card, model):
+    lagging = card.with_table("effect", [{"name": "second-lag", "weight": 0.2, "second_time_constant_s": 20000.0}])
+    plain, slow = (run(c, model, noise=False).record for c in (card, lagging))
+    assert slow["frequency_Hz"][9000] > plain["frequency_Hz"][9000] + 0.05
+    jump = [{"name": "rate-bias", "coefficient_deg_per_h_per_K_per_s": 100.0}]
+    rated = run(card.with_table("effect", jump), model, noise=False).record
+    rate = np.gradient(plain["resonator_temperature_degC"])
+    assert rated["bias_deg_per_h"] - plain["bias_deg_per_h"] == pytest.approx(100 * rate, abs=2e-3)
+
+
+def test_an_effect_whose_drive_stays_is_named(card, model):
+    softened = card.with_table("effect", [{"name": "electrostatic-softening", "softening_Hz_per_V2": 1e-4}])
+    made = run(softened, model, "soak 20 1h", noise=False)
+    assert made.record["frequency_Hz"] == pytest.approx(run(card, model, "soak 20 1h", noise=False).record["frequency_Hz"])
+    assert made.warnings == (
+        "the effect 'electrostatic-softening' adds nothing: a virtual run does not move its drive (voltage_squared).",
+    )
+
+
+def test_drive_power_warms_the_shell(card):
+    heated = build_network(card.with_table("thermal", {"drive_power_mW": 1.0}), radiation=False)
+    resistance = find_relaxation(heated, 293.15)
+    assert len(heated.sources) == 24
+    assert sum(source.power for source in heated.sources) == pytest.approx(1e-3)
+    assert slowest_lag(card) < resistance.time_constants[0] * 1.01
+
+
+def test_the_heat_path_follows_geometry_material_and_table(card):
+    path = build_heat_path(card)
+    ring = 2 * np.pi * 0.015**2 * np.cos(np.radians(10.0))
+    assert path.cells.area.sum() == pytest.approx(ring, rel=1e-5)
+    assert path.volumetric_capacity == pytest.approx(2203 * 740.0, rel=1e-4)
+    film, bare = (
+        find_relaxation(build_shell_and_stem(card.with_table("thermal", {"film_emissivity": e})), 293.15)
+        for e in (0.03, 0.8)
+    )
+    assert film.time_constants[0] > 5 * bare.time_constants[0]
+    one = card.with_table("thermal", {"cells": 1})
+    assert slowest_lag(one) == pytest.approx(slowest_lag(card), rel=0.01)
+
+
+def test_every_shipped_shape_has_a_heat_path(card):
+    for name in ("hrg-30mm", "cvg-25mm", "bvg-bell"):
+        shipped = load_card(name)
+        given = {"conductivity_W_per_m_K": 1.4, "heat_capacity_J_per_kg_K": 740.0}
+        network = build_network(shipped.with_table("thermal", given))
+        assert 10 < find_relaxation(network, 293.15).time_constants[0] < 1e5
+    rim = card.content["resonator"] | {"support": "clamped-rim"}
+    turned = cut_shell(card.with_table("resonator", rim))
+    assert turned.volume[0] == pytest.approx(cut_shell(card).volume[-1], rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("table", "content", "words"),
+    [
+        ("thermal", {"film_emisivity": 0.1}, "unknown key 'film_emisivity'; did you mean 'film_emissivity'"),
+        ("thermal", {"film_emissivity": 2.0}, "film_emissivity must be at most 1"),
+        ("thermal", {"base_heat_capacity_J_per_K": -1.0}, "must be above 0"),
+        ("thermal", {"radiation": "yes"}, "radiation must be true or false"),
+        ("noise", {"frequency_white": 1.0}, "unknown key 'frequency_white'"),
+        ("noise", {"housing_lag_s": -1.0}, "housing_lag_s must be at least 0"),
+        ("bias", {"k1": 1.0}, "unknown key 'k1'"),
+        ("loss", {"inverse_q": 0.0}, "inverse_q must be above 0"),
+        ("loss", {"slope_per_K": 0.2}, "1/Q becomes negative"),
+        ("effect", [{"name": "second-leg", "weight": 0.1}], "no effect is called 'second-leg'; did you mean 'second-lag'"),
+        ("effect", [{"name": "second-lag", "weight": 0.1}], "needs the parameter 'second_time_constant_s'"),
+        ("effect", [{"name": "second-lag", "weight": "much"}], "weight must be a finite number"),
+    ],
+)
+def test_unusable_tables_are_refused_by_key(card, model, table, content, words):
+    with pytest.raises(InputError, match=words):
+        run(card.with_table(table, content), model)
+
+
+def test_unusable_runs_are_refused(card, model, tmp_path):
+    with pytest.raises(ThermalError, match=r"reaches -80 °C at 0 s, outside the range of fused-silica"):
+        run(card, model, "step 20 -80 1h")
+    with pytest.raises(InputError, match="the rate must be positive"):
+        run(card, model, rate=0.0)
+    with pytest.raises(InputError, match="choose a lower rate"):
+        run(card, model, rate=1e6)
+    with pytest.raises(InputError, match="choose a higher rate"):
+        run(card, model, rate=1e-6)
+    with pytest.raises(InputError, match="there is no such file"):
+        load_profile(str(tmp_path / "absent.csv"))
+    with pytest.raises(ThermalError, match="'jump' is no profile"):
+        load_profile("jump 20 30")
