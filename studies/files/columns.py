@@ -111,8 +111,17 @@ def _split_head(path: str | Path, data: bytes) -> tuple[tuple[str, ...], list[st
         if line.startswith("#"):
             comments.append(line[1:].strip())
         elif line.strip():
-            return tuple(comments), next(csv.reader([line])), number, position
+            return tuple(comments), _split_header(path, line, number), number, position
     raise InputError(f"{path}: there are only comments; a header line and rows of numbers are missing.")
+
+
+def _split_header(path: str | Path, line: str, number: int) -> list[str]:
+    if "\r" in line:
+        raise InputError(f"{path}, line {number}: lines end with a bare carriage return; save the file with line feeds.")
+    try:
+        return next(csv.reader([line]))
+    except csv.Error as error:
+        raise InputError(f"{path}, line {number}: the header cannot be read ({error}).") from None
 
 
 def _check_names(

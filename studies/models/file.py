@@ -114,6 +114,18 @@ class Model:
             raise InputError(f"{where}: the key '{key}' is missing; add it.")
         return check_number(self.settings[key], f"{where}: {key}")
 
+    def range_of(self, variable: str) -> tuple[float, float]:
+        """Return the lowest and highest value of a variable that the fit has seen.
+
+        Raises
+        ------
+        InputError
+            The model does not say.
+        """
+        if variable not in self.validity:
+            raise InputError(f"{self.path or 'model'} [validity]: the range of '{variable}' is missing; add it.")
+        return self.validity[variable]
+
     def check_range(self, variable: str, values: "NDArray[np.float64]", extrapolate: bool) -> None:
         """Refuse values of a variable that the fit has not seen, unless told to extrapolate.
 
@@ -126,9 +138,7 @@ class Model:
         """
         import numpy as np
 
-        if variable not in self.validity:
-            raise InputError(f"{self.path or 'model'} [validity]: the range of '{variable}' is missing; add it.")
-        low, high = self.validity[variable]
+        low, high = self.range_of(variable)
         outside = (values < low) | (values > high)
         if not extrapolate and np.any(outside):
             lowest, highest = np.nanmin(values), np.nanmax(values)

@@ -75,7 +75,7 @@ def emit_c(model: Model) -> str:
     window, lag = model.number("rate_window_s"), model.number("rate_lag_s")
     products = [f"({value!r})" + _product(*TERMS[name]) for name, value in zip(terms, coefficients[1:].tolist(), strict=True)]
     total = "\n        + ".join([f"({coefficients[0].item()!r})", *products])
-    (f_low, f_high), (r_low, r_high) = model.validity["frequency_Hz"], model.validity["frequency_rate_Hz_per_s"]
+    (f_low, f_high), (r_low, r_high) = model.range_of("frequency_Hz"), model.range_of("frequency_rate_Hz_per_s")
     return f"""{head(model)}
 /* Slope (Hz/s) of the line through n frequencies, step seconds apart, oldest first; the fit used {window:g} s
    {f"up to the present sample, so that the rate lags by {lag:g} s" if lag else "centred on the sample: delay the rest by half of it"}. */

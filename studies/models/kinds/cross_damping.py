@@ -55,7 +55,7 @@ def load_cross_damping(model: Model) -> "CrossDampingModel":
     part, column = _part(model), _temperature_column(model)
     if column not in model.validity:
         raise InputError(f"{model.path or 'model'} [validity]: the range of '{column}' is missing; add it.")
-    low, high = model.validity[column]
+    low, high = model.range_of(column)
     return CrossDampingModel(
         coefficients=np.array(part.values),
         covariance=np.array(part.covariance) if part.covariance else np.full((len(part.values),) * 2, np.nan),

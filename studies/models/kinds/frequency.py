@@ -51,7 +51,7 @@ def compensate(model: Model, record: Record, *, extrapolate: bool) -> dict[str, 
 
 def emit_c(model: Model) -> str:
     """Return `hrg_frequency(T)` and `hrg_temperature(f, &ok)`, the inverse by bracketed bisection, in C99."""
-    low, high = model.validity[VARIABLE]
+    low, high = model.range_of(VARIABLE)
     reference = model.number("reference_temperature_degC")
     return f"""{head(model)}
 {polynomial("hrg_frequency_about", "shift", model.part("frequency").values)}

@@ -71,8 +71,8 @@ def load_scale(model: Model) -> "Chain":
     for name in (column, RATE):
         if name not in model.validity:
             raise InputError(f"{model.path or 'model'} [validity]: the range of '{name}' is missing; add it.")
-    low, high = (value + CELSIUS_ZERO for value in model.validity[column])
-    slow, fast = (value * DEG for value in model.validity[RATE])
+    low, high = (value + CELSIUS_ZERO for value in model.range_of(column))
+    slow, fast = (value * DEG for value in model.range_of(RATE))
     taps = model.settings.get("fir_taps", ())
     if isinstance(taps, str | float):
         raise InputError(f"{model.path or 'model'} [settings]: fir_taps must be a list of numbers, [] for no filter.")
