@@ -24,6 +24,7 @@ from studies.papers.cvg_cross_damping import (
     simulate_rest,
 )
 from studies.record import read_record
+from studies.reports.cross_damping import twin_chapters
 
 GIVEN = ["--frequency", str(FREQUENCY), "--quality", str(QUALITY)]
 
@@ -121,6 +122,8 @@ def test_paper_twin():
     assert np.all(np.diff(twin.table, axis=0) < 0.05)
     assert np.all(np.diff(twin.table, axis=1) < 0)
     assert count_bias_of_printed_values() > 10  # rad/s: shape only
+    (chapter,) = twin_chapters(twin)
+    assert len(chapter.blocks) == 4
 
 
 @pytest.mark.parametrize(

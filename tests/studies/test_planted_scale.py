@@ -14,8 +14,9 @@ from studies.cli import main
 from studies.errors import InputError
 from studies.models import compensate, emit_c, read_model
 from studies.models.kinds.scale import load_scale
-from studies.papers.bvg import DEG, examine_claims, read_printed_chain, reduce_white, simulate_runs
+from studies.papers.bvg import DEG, examine_claims, read_printed_chain, reduce_white, reproduce_bell, simulate_runs
 from studies.record import read_record
+from studies.reports.bell import bell_chapters
 from studies.rest import drop_spikes
 from studies.scale import settled_rows
 
@@ -142,6 +143,22 @@ def test_printed_claims():
     assert claims.mapped[0] == pytest.approx(-357.1, abs=0.05)
     assert claims.noise_deviation == pytest.approx(0.1466, abs=1e-4)
     assert dict(claims.averaging)[100.0] == pytest.approx(1.0, abs=0.002)
+
+
+def test_paper_twin():
+    """Each step does what it can on runs not seen, and the filter leaves the random walk at long times alone."""
+    twin = reproduce_bell(seed=1)
+    steps = {figures.step: figures for figures in twin.held_out}
+    rough, straight, linear, steady, filtered = steps.values()
+    assert straight.at_rest < 0.8 * rough.at_rest
+    assert linear.nonlinearity < 0.1 * straight.nonlinearity
+    assert steady.turning < 0.8 * linear.turning
+    assert rough.nonlinearity == pytest.approx(twin.claims.curvature_nonlinearity, rel=0.1)
+    # White noise of 2.78 °/√h at 10 Hz is what remains before the filter, the wander adds little.
+    assert steady.at_rest == pytest.approx(twin.claims.noise_deviation, rel=0.05)
+    assert steady.random_walk_1s / filtered.random_walk_1s == pytest.approx(dict(twin.claims.averaging)[1.0], rel=0.02)
+    assert steady.random_walk_100s / filtered.random_walk_100s == pytest.approx(1.0, abs=0.01)
+    assert [len(chapter.blocks) for chapter in bell_chapters(twin)] == [5, 1]
 
 
 def test_filter_reduces_the_allan_deviation_as_predicted():
