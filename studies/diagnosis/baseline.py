@@ -42,10 +42,15 @@ class Term:
 
 @dataclass(frozen=True)
 class View:
-    """One run on the fine grid and on the coarse one."""
+    """One run on the fine grid and on the coarse one: as the lag gives it, and as static effects see it.
+
+    What a static effect sees is corrected by what a fit knows better: initial state, delay, thermal effects.
+    """
 
     fine: States
     coarse: States
+    seen_fine: States
+    seen: States
     group: int
 
 
@@ -88,6 +93,7 @@ class Problem:
     law: Law | None = None
     delay_row: float | None = None
     kernel: str = "walk"
+    correction: tuple[FloatArray, ...] | None = None
 
     @property
     def rotated(self) -> FloatArray:
@@ -103,8 +109,16 @@ class Problem:
 
     def views(self, tau: float) -> list["View"]:
         """Return every run on the fine and on the coarse grid, the resonator lagged by `tau` in lagged problems."""
-        fine = [s.with_lag(tau) for s in self.states] if self.lagged else self.states
-        return [View(s, s.averaged(self.group), self.group) for s in fine]
+        out = []
+        for k, own in enumerate(self.states):
+            fine = own.with_lag(tau) if self.lagged else own
+            coarse = fine.averaged(self.group)
+            seen_fine, seen = fine, coarse
+            if self.correction is not None:
+                seen_fine = replace(fine, resonator=fine.resonator + self.correction[k])
+                seen = replace(coarse, resonator=coarse.resonator + average(self.correction[k], self.group))
+            out.append(View(fine, coarse, seen_fine, seen, self.group))
+        return out
 
     def baseline(self, views: Sequence["View"]) -> FloatArray:
         """Return the columns of the baseline, (M, p)."""
@@ -132,12 +146,14 @@ class Problem:
 
 def term_columns(problem: Problem, term: Term, view: "View") -> FloatArray:
     """Return the columns of an effect for one run in units of the response over those of its coefficients."""
+    thermal = term.effect.acts_on == "temperature"
     if term.effect.fine:
-        columns = average(term.effect.columns(view.fine, term.shape, problem.response), view.group)
+        fine = view.fine if thermal else view.seen_fine
+        columns = average(term.effect.columns(fine, term.shape, problem.response), view.group)
     else:
-        columns = term.effect.columns(view.coarse, term.shape, problem.response)
+        columns = term.effect.columns(view.coarse if thermal else view.seen, term.shape, problem.response)
     columns = columns[:, : term.count]
-    if term.effect.acts_on == "temperature":
+    if thermal:
         columns = columns * (1.0 + 2.0 * problem.bend * view.coarse.excess)[:, None]
     return columns
 

@@ -50,7 +50,7 @@ def generic_bases(problem: Problem) -> dict[str, FloatArray]:
 def _functions(
     problem: Problem, view: View, low: float, high: float, number: int, runs: int
 ) -> dict[str, FloatArray]:
-    s = view.coarse
+    s = view.seen
     x = s.excess / 30.0
     wide = max(high - low, 1e-6)
     rate = s.rate / max(float(np.abs(s.rate).max()), 1e-12)
@@ -67,10 +67,12 @@ def _functions(
             + [(_coarse_lag(view, 3.0 * max(s.tau, 60.0)) - s.resonator) * x], axis=1,
         )
     duration = max(float(s.time[-1] - s.time[0]), 1.0)
+    longest = max(duration, *(float(np.ptp(other.time)) for other in problem.states))
     waves = np.cos(np.pi * np.arange(1, 13) * ((s.time - s.time[0]) / duration)[:, None])
     own = np.zeros((s.time.size, 12 * runs))
     own[:, 12 * number : 12 * (number + 1)] = waves
     out["time"] = own
+    out["time since the start of each run"] = np.cos(np.pi * np.arange(1, 25) * ((s.time - s.time[0]) / longest)[:, None])
     drives = []
     for square in (s.voltage_squared, s.amplitude_squared):
         if square is not None:
@@ -144,6 +146,27 @@ def _scaled(columns: FloatArray) -> FloatArray:
 def _near(share: float) -> FloatArray:
     near = int(np.argmin(np.abs(SHARES - share)))
     return SHARES[max(0, near - 3) : near + 2]
+
+
+def brief_events(fit: Fit) -> float:
+    """Return how far the innovations are from Gaussian: evidence of bursts that no smooth function follows.
+
+    The excess kurtosis of the innovations (residuals whitened in their order of time), scaled so that 17 stands for
+    an excess of 1.2, about seven standard deviations of a Gaussian record of 800 rows.
+    """
+    problem = fit.problem
+    rest = problem.basis.rotate(problem.values - fit.columns() @ fit.linear.coefficients)
+    begin, parts = 0, []
+    for vectors in problem.basis.vectors:
+        size = vectors.shape[0]
+        if size > 8:
+            spread = 1.0 + fit.linear.share * problem.basis.walk[begin : begin + size]
+            covariance = (vectors * spread) @ vectors.T
+            parts.append(np.linalg.solve(np.linalg.cholesky(covariance), vectors @ rest[begin : begin + size]))
+        begin += size
+    innovations = np.concatenate(parts)
+    innovations = innovations / max(float(innovations.std()), 1e-300)
+    return float(17.0 * (np.mean(innovations**4) - 3.0) / 1.2 * min(1.0, np.sqrt(innovations.size / 800.0)))
 
 
 def strongest(evidence: dict[str, FloatArray], levels: dict[str, float]) -> Leftover:

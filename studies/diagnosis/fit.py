@@ -113,7 +113,7 @@ def _knobs(fit: Fit) -> list[_Knob]:
             if parameter.logarithmic:
                 small, far = (3e-4, 0.03) if term.name == "periodic" else (0.01, 0.5)
             else:
-                small, far = 0.02, 2.0
+                small, far = 0.02, 2.0 if parameter.high > 2.0 else 0.2
             knobs.append(_Knob(index, number, parameter.logarithmic, parameter.low, parameter.high, small, far))
     return knobs
 

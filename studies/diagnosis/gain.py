@@ -33,7 +33,10 @@ def row_model(problem: Problem, terms: Sequence[Term], campaign: Campaign, k: in
     """Return the columns of baseline and terms on the own rows of run `k`."""
     run = campaign.runs[k]
     fine = problem.states[k].with_lag(problem.tau) if problem.lagged else problem.states[k]
-    view = View(fine, fine, 1)
+    seen = fine
+    if problem.correction is not None:
+        seen = replace(fine, resonator=fine.resonator + problem.correction[k])
+    view = View(fine, fine, seen, seen, 1)
     thermometer = None
     if problem.thermometer is not None:
         thermometer = [np.interp(fine.time, run.time, values) if j == k else np.zeros(1)

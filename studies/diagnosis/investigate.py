@@ -8,7 +8,7 @@ import numpy as np
 from studies.diagnosis.advice import suggest_next
 from studies.diagnosis.baseline import Law, Problem, choose_kernel, pose, span_of
 from studies.diagnosis.campaign import FEWEST_BINS, Campaign
-from studies.diagnosis.discrepancy import Leftover, generic_bases, leftover_evidence, strongest
+from studies.diagnosis.discrepancy import Leftover, brief_events, generic_bases, leftover_evidence, strongest
 from studies.diagnosis.effects import Effect
 from studies.diagnosis.fit import intervals
 from studies.diagnosis.gain import Score, rms, row_residuals, score
@@ -113,7 +113,7 @@ def _best_thermometer(
     """Take the frequency with or without its non-thermal terms, whichever the response follows."""
     fit = frequency.selection.fit
     clean = read_thermometer(campaign, fit)
-    raw = read_thermometer(campaign, fit, corrected=False)
+    raw = read_thermometer(campaign, fit, clean=False)
     if clean is None or raw is None or not any(t.effect.acts_on == "response" for t in fit.terms):
         return corrected, clean
     other = _pose_one(campaign, response, {}, raw, None)
@@ -140,7 +140,7 @@ def _inquire(
 ) -> Inquiry:
     span = span_of(campaign, problem.tau if problem.lagged else 1000.0)
     usable = applicable(problem, effects)
-    dictionary = build_dictionary(problem, span, usable)
+    dictionary = None
     from studies.diagnosis.fit import fit_terms
 
     plain = fit_terms(problem, ())
@@ -148,6 +148,7 @@ def _inquire(
     bases = generic_bases(problem)
     generic_levels: dict[str, float] = {}
     if draws:
+        dictionary = build_dictionary(problem, span, usable)
         levels = bootstrap_levels(problem, dictionary, scan_model(plain), draws, rng)
         noise = draw_null(problem, scan_model(plain), min(draws, 100), rng)
         generic_levels = {
@@ -155,6 +156,8 @@ def _inquire(
         }
     selection = select(problem, span, levels, THRESHOLD, effects, dictionary)
     leftover = strongest(leftover_evidence(selection.fit, bases), generic_levels)
+    if (bursts := brief_events(selection.fit)) > leftover.evidence:
+        leftover = Leftover("time, brief events", bursts)
     return Inquiry(problem, selection, leftover, levels)
 
 
@@ -179,7 +182,7 @@ def merge_causes(inquiries: Mapping[str, Inquiry], campaign: Campaign) -> tuple[
     causes.sort(key=lambda cause: -cause.evidence)
     kept: list[Cause] = []
     for cause in causes:
-        if any(_same_cause(cause, other) for other in kept):
+        if any(_same_cause(cause, other) or _same_set(cause, other) for other in kept):
             continue
         kept.append(cause)
     return tuple(kept)
@@ -194,6 +197,11 @@ def _cause(inquiry: Inquiry, found: Found, response: str) -> Cause:
         probability_of(found, equivalent, inquiry.selection.threshold, has_leftover(inquiry)), equivalent,
         intervals(winner.fit, index), winner.evidence,
     )
+
+
+def _same_set(one: Cause, two: Cause) -> bool:
+    """Two members of one inseparable set in one response are two forms of one answer."""
+    return one.response == two.response and one.effect in two.equivalent and two.effect in one.equivalent
 
 
 def _same_cause(one: Cause, two: Cause) -> bool:

@@ -10,6 +10,7 @@ from studies.diagnosis.effects import Effect, Span
 from studies.diagnosis.fit import Fit, fit_terms
 from studies.diagnosis.scan import Candidate, Dictionary, applicable, build_dictionary, scan
 from studies.diagnosis.states import FloatArray
+from studies.diagnosis.thermometer import corrected
 
 MOST_TERMS = 4
 CONTENDERS = 5
@@ -85,8 +86,8 @@ def select(
         Signatures at the problem's lag, when they are known already.
     """
     usable = applicable(problem, effects)
-    plain = fit = fit_terms(problem, ())
-    if dictionary is None or abs(np.log(plain.problem.tau / problem.tau)) > 0.02:
+    plain = fit = corrected(fit_terms(problem, ()))
+    if dictionary is None or problem.response == "frequency_Hz":
         dictionary = build_dictionary(plain.problem, replace(span, tau=plain.problem.tau), usable)
     built_at = plain.problem.tau
     while len(fit.terms) < MOST_TERMS:
@@ -96,7 +97,7 @@ def select(
         rivals = compete(fit, dictionary, levels, threshold)
         if not rivals or rivals[0].evidence < threshold:
             break
-        fit = rivals[0].fit
+        fit = corrected(rivals[0].fit)
     return _settle(plain, fit, dictionary, levels, threshold)
 
 

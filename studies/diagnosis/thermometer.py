@@ -10,7 +10,7 @@ import numpy as np
 
 from studies.diagnosis.baseline import term_columns
 from studies.diagnosis.campaign import Campaign
-from studies.diagnosis.fit import Fit
+from studies.diagnosis.fit import Fit, fit_terms
 from studies.diagnosis.states import FloatArray, States
 
 
@@ -33,7 +33,7 @@ class Thermometer:
     states: tuple[States, ...]
 
 
-def read_thermometer(campaign: Campaign, fit: Fit, corrected: bool = True) -> Thermometer | None:
+def read_thermometer(campaign: Campaign, fit: Fit, clean: bool = True) -> Thermometer | None:
     """Turn the fitted frequency of a campaign into a thermometer.
 
     Parameters
@@ -41,7 +41,7 @@ def read_thermometer(campaign: Campaign, fit: Fit, corrected: bool = True) -> Th
     campaign : Campaign
     fit : Fit
         Of the frequency.
-    corrected : bool
+    clean : bool
         Take the non-thermal terms out.
 
     Returns
@@ -55,6 +55,7 @@ def read_thermometer(campaign: Campaign, fit: Fit, corrected: bool = True) -> Th
         return None
     views = problem.views(problem.tau)
     model = [fit_part for fit_part in np.split(problem.model(problem.tau, fit.terms) @ coefficients, _ends(fit))]
+    warmer = thermal_correction(fit)
     changes, excesses, states = [], [], []
     for k, (run, view) in enumerate(zip(campaign.runs, views, strict=True)):
         measured = run.responses["frequency_Hz"].copy()
@@ -65,23 +66,47 @@ def read_thermometer(campaign: Campaign, fit: Fit, corrected: bool = True) -> Th
             rest = measured - whole
             smooth = slope * view.coarse.excess + coefficients[2] * view.coarse.excess**2 + coefficients[0]
             measured[gaps] = smooth[gaps] + (np.nanmedian(rest) if np.isfinite(rest).any() else 0.0)
-        warmer = np.zeros_like(view.fine.resonator)
         for index, term in enumerate(fit.terms):
             part = fit.coefficients_of(index)
-            if term.effect.acts_on == "temperature":
-                warmer += term.effect.columns(view.fine, term.shape, problem.response)[:, : term.count] @ part / slope
-            elif corrected:
+            if clean and term.effect.acts_on == "response":
                 measured = measured - term_columns(problem, term, view) @ part
-        start = float(coefficients[3 + k] / slope) if 3 + k < coefficients.size else 0.0
-        warmer += start * np.exp(-(view.fine.time - view.fine.time[0]) / problem.tau)
         change = (measured - coefficients[0]) / slope
         x = change
         for _ in range(6):
             x = change - problem.bend * x**2
         changes.append(change)
         excesses.append(x)
-        states.append(replace(view.fine, resonator=view.fine.resonator + warmer))
+        states.append(replace(view.fine, resonator=view.fine.resonator + warmer[k]))
     return Thermometer(tuple(changes), tuple(excesses), tuple(states))
+
+
+def thermal_correction(fit: Fit) -> tuple[FloatArray, ...]:
+    """Return what a fit adds to the lagged temperature, K on the fine grid: initial state, delay, thermal effects."""
+    problem, coefficients = fit.problem, fit.linear.coefficients
+    slope = float(coefficients[1])
+    out = []
+    for k, view in enumerate(problem.views(problem.tau)):
+        fine = view.fine
+        warmer = np.zeros_like(fine.resonator)
+        if slope != 0.0:
+            for index, term in enumerate(fit.terms):
+                if term.effect.acts_on == "temperature":
+                    columns = term.effect.columns(fine, term.shape, problem.response)[:, : term.count]
+                    warmer += columns @ fit.coefficients_of(index) / slope
+            warmer += coefficients[3 + k] / slope * np.exp(-(fine.time - fine.time[0]) / problem.tau)
+            if problem.delay_row is not None:
+                delay = float(coefficients[3 + len(problem.states)] / slope)
+                warmer -= delay * (fine.housing - fine.resonator) / problem.tau
+        out.append(warmer)
+    return tuple(out)
+
+
+def corrected(fit: Fit) -> Fit:
+    """Return the fit with the temperature that static effects see brought up to date."""
+    if fit.problem.response != "frequency_Hz":
+        return fit
+    problem = replace(fit.problem, correction=thermal_correction(fit))
+    return fit_terms(problem, fit.terms, rounds=3 if fit.terms else 0)
 
 
 def _ends(fit: Fit) -> list[int]:

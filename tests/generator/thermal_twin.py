@@ -87,7 +87,7 @@ def follow(drive, constant):
     return chamber_to_housing(drive, constant, drive[0])
 
 
-def preisach(temperature, half_width, rng, relays=160):
+def preisach(temperature, half_width, rng, relays=1200):
     """Mean of relays with scattered half widths and centres, every 30 s: a smooth rate-independent loop, in K."""
     every = 6
     sampled = temperature[::every]

@@ -35,8 +35,9 @@ EFFECT = Effect(
     coefficients=("pull_{unit}",),
     shape=(
         Parameter("temperature_degC", -150.0, 250.0, "where the modes cross", False),
-        Parameter("width_K", 0.05, 6.0, "half width of the crossing"),
+        Parameter("width_K", 0.05, 2.5, "half width of the crossing"),
     ),
     columns=columns,
     grid=grid,
+    fine=True,
 )

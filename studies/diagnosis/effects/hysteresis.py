@@ -9,15 +9,16 @@ from studies.diagnosis.states import FloatArray, States, play
 
 
 def columns(states: States, shape: Sequence[float], response: str) -> FloatArray:
-    """Play operator of the resonator temperature less the temperature itself, K."""
-    radius, start = shape
-    return (play(states.resonator, radius, start) - states.resonator)[:, None]
+    """Mean of three plays of scattered half widths (a small Preisach model) less the temperature itself, K."""
+    radius, scatter, start = shape
+    radii = [radius * max(1.0 + scatter * part, 0.05) for part in (-1.2247, 0.0, 1.2247)]
+    return (np.mean([play(states.resonator, r, start) for r in radii], axis=0) - states.resonator)[:, None]
 
 
 def grid(span: Span, response: str) -> list[tuple[float, ...]]:
     """Loop half widths from half a percent to a third of the covered range; three initial memories."""
     radii = span.temperature_range * np.geomspace(0.006, 0.35, 9)
-    return [(float(radius), start) for radius in radii for start in (0.0, -1.0, 1.0)]
+    return [(float(radius), 0.12, start) for radius in radii for start in (0.0, -1.0, 1.0)]
 
 
 EFFECT = Effect(
@@ -29,6 +30,7 @@ EFFECT = Effect(
     coefficients=("loop_{unit}_per_K",),
     shape=(
         Parameter("half_width_K", 0.02, 40.0, "half width of the loop in temperature"),
+        Parameter("width_scatter", 0.0, 0.7, "scatter of the half widths over their mean", False),
         Parameter("initial_memory", -1.0, 1.0, "where in its band each run starts", False, True),
     ),
     columns=columns,

@@ -35,8 +35,9 @@ EFFECT = Effect(
     coefficients=("peak_{unit}",),
     shape=(
         Parameter("temperature_degC", -150.0, 250.0, "where the peak is", False),
-        Parameter("width_K", 1.5, 60.0, "width of the peak"),
+        Parameter("width_K", 2.5, 60.0, "width of the peak"),
     ),
     columns=columns,
     grid=grid,
+    fine=True,
 )
