@@ -19,6 +19,9 @@ def correlated_covariance(fit: LinearFit, time: Real | None = None) -> Real:
     """Return the covariance (p, p) of the coefficients for errors that are white noise plus a random walk.
 
     The mixture is estimated from the same rows (see `coloured`); with white errors this is the usual σ² (XᵀX)⁻¹.
+    Counted over seeds, 95 % intervals of the bell chain hold the truth in 95 % of records with white errors, in 86 to
+    93 % with a plain random walk added, and in 70 to 90 % with one so weak that 600 rows do not show it: repeat a
+    calibration to know how much a bias wanders from run to run.
 
     Parameters
     ----------

@@ -16,7 +16,7 @@ def design_smoother(sampling: float, cutoff: float, order: int = 50) -> Real:
     sampling : float
         Step (s) of the output; 0.1 s in the paper.
     cutoff : float
-        Frequency (Hz) of half the amplitude.
+        Nominal cut-off (Hz): half the amplitude there, as long as it is above about two over the filter's length.
     order : int
         Number of taps less one; 50 in the paper.
 

@@ -5,12 +5,14 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from compensation.cross_damping import CrossDampingModel, RestRun, fit_cross_damping
+from compensation.errors import CompensationError
 from compensation.improvement import Improvement, compare_outputs, hold_out
 
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
+LEAST_ROWS = 50
 BLOCKS = 5
 """Parts into which a single run is cut, each to be predicted from the others."""
 
@@ -48,6 +50,10 @@ def study_cross_damping(
         return fit(chosen).compensate(run.time, run.rate, run.temperature, extrapolate=True)
 
     model = fit(runs)
+    if len(runs) == 1 and len(runs[0].time) < LEAST_ROWS:
+        raise CompensationError(
+            f"{len(runs[0].time)} rows are too few to judge the fit on data left out; record {LEAST_ROWS} or more."
+        )
     after = np.concatenate([model.compensate(run.time, run.rate, run.temperature) for run in runs])
     training = compare_outputs(np.concatenate([run.rate for run in runs]), after)
     pieces = runs if len(runs) > 1 else split_run(runs[0], BLOCKS)
