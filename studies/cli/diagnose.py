@@ -27,7 +27,8 @@ def diagnose(
     report : str
         Write a page (HTML).
     plan : list[str]
-        Chamber profiles of a planned campaign, in words or as files: predict which effects it could tell apart.
+        Chamber profiles of a planned campaign, in words or as files, one a run: predict which effects it could tell
+        apart. Further profiles may follow without --plan.
     calibrate : bool
         Draw the null of this campaign for the thresholds, instead of the shipped, conservative ones (slower).
     draws : int
@@ -45,9 +46,7 @@ def diagnose(
     if plan:
         from studies.diagnosis.plan import plan_campaign, plan_table
 
-        if runs:
-            raise InputError("--plan looks at a campaign before it is run; leave the records out.")
-        outcome = plan_campaign(plan, seed=seed, cases=max(4, min(draws, 2000)), card=card)
+        outcome = plan_campaign([*plan, *runs], seed=seed, cases=max(4, min(draws, 2000)), card=card)
         if json:
             print_json(outcome.as_dict())
             return 0
