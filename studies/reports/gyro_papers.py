@@ -1,0 +1,79 @@
+"""The chapters on the two CVG papers and the BVG paper for the page of `hrg reproduce`, and their numbers."""
+
+import dataclasses
+from typing import TYPE_CHECKING, Any
+
+from studies.reports import bell, cross_damping, filters
+
+if TYPE_CHECKING:
+    from studies.papers.bvg import BellTwin
+    from studies.papers.cvg_cross_damping import CrossDampingTwin
+    from studies.papers.cvg_filters import FilterStudy
+    from studies.reports.page import Chapter
+
+SOURCES = (*cross_damping.SOURCES, *filters.SOURCES, *bell.SOURCES)
+MAP_POINTS = 31
+
+
+def reproduce_gyro_papers(seeds: int = 20) -> "tuple[list[Chapter], dict[str, Any]]":
+    """Run the virtual gyros of the three papers; return their chapters and the numbers for summary.json.
+
+    Parameters
+    ----------
+    seeds : int
+        Virtual runs for the spread of the cross-damping improvement.
+    """
+    from studies.papers.bvg import reproduce_bell
+    from studies.papers.cvg_cross_damping import reproduce_cross_damping
+    from studies.papers.cvg_filters import study_error_map, study_filters
+
+    damping, study, chain = reproduce_cross_damping(seeds), study_filters(), reproduce_bell()
+    chapters = [
+        *cross_damping.twin_chapters(damping),
+        *filters.filter_chapters(study, study_error_map(MAP_POINTS)),
+        *bell.bell_chapters(chain),
+    ]
+    summary = {
+        "cvg_cross_damping": _summarise_damping(damping),
+        "cvg_filters": _summarise_filters(study),
+        "bvg": _summarise_bell(chain),
+    }
+    return chapters, summary
+
+
+def _summarise_damping(twin: "CrossDampingTwin") -> dict[str, Any]:
+    return {
+        "improvement_printed": 8.0,
+        "improvement_training": twin.study.training.ratio,
+        "improvement_held_out": twin.improvement.ratio,
+        "improvement_over_seeds_5_50_95": twin.spread,
+        "by_lag_s": twin.lags,
+        "by_random_walk_deg_per_sqrt_h": twin.noises,
+        "improvement_by_lag_and_random_walk": twin.table,
+    }
+
+
+def _summarise_filters(study: "FilterStudy") -> dict[str, Any]:
+    return {
+        "wiener": [
+            {
+                "noise": case.name,
+                "error_of_optimum": case.optimum.error / case.rate_variance,
+                "error_as_printed": case.renormalised.error / case.rate_variance,
+            }
+            for case in study.wiener
+        ],
+        "figure5_noise_reduction": study.figure5.noise_before / study.figure5.noise_after,
+        "figure6_noise_reduction": study.figure6.noise_before / study.figure6.noise_after,
+        "figure7_rms_error_rad_per_s": study.figure7.error_after,
+        "kalman_mean_nis": study.mean_nis,
+        "kalman_nis_band": study.nis_band,
+    }
+
+
+def _summarise_bell(twin: "BellTwin") -> dict[str, Any]:
+    return {
+        "claims": dataclasses.asdict(twin.claims),
+        "fitted": [dataclasses.asdict(step) for step in twin.fitted],
+        "held_out": [dataclasses.asdict(step) for step in twin.held_out],
+    }
