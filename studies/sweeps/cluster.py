@@ -55,7 +55,7 @@ class Cluster:
 
     def close(self) -> None:
         """Take back what is queued and leave the cluster."""
-        self.executor.shutdown(wait=False, cancel_futures=True)
+        self.executor.shutdown(wait=False)
         self.client.close(timeout=5)
 
     def _check_versions(self) -> None:

@@ -96,14 +96,20 @@ def find_worst_case(explorer: Explorer, search: "Search") -> dict[str, Any]:
     found: dict[str, Any] = {"column": search.column, "designs": len(starts)}
     for name, sign in (("least", 1.0), ("greatest", -1.0)):
         best = int(np.argmin(sign * at_starts))
-        scale = float(np.ptp(at_starts)) or 1.0
+        scale = sign / (float(np.ptp(at_starts)) or 1.0)
 
-        def value(x: Array, sign: float = sign, scale: float = scale) -> float:
-            return float(sign * explorer.values([_place(study, free, x)], [search.column])[0, 0] / scale)
+        def value(x: Array, scale: float = scale) -> float:
+            return float(scale * explorer.values([_place(study, free, x)], [search.column])[0, 0])
+
+        def slope(x: Array, scale: float = scale) -> Array:
+            pairs = [_around(x, k) for k in range(len(free))]
+            values = explorer.values([_place(study, free, end) for pair in pairs for end in pair], [search.column])
+            apart = np.array([np.abs(one - other).max() for one, other in pairs])
+            return np.asarray(scale * (values[1::2, 0] - values[::2, 0]) / apart)
 
         box = [(0.0, 1.0)] * len(free)
-        outcome = minimize(value, starts[best], method="L-BFGS-B", bounds=box, options={"eps": STEP, "maxfun": 200})
-        x = outcome.x if outcome.fun < sign * at_starts[best] / scale else starts[best]
+        outcome = minimize(value, starts[best], jac=slope, method="L-BFGS-B", bounds=box, options={"maxfun": 200})
+        x = outcome.x if outcome.fun < scale * at_starts[best] else starts[best]
         design = _place(study, free, x)
         found[name] = {"value": float(explorer.values([design], [search.column])[0, 0]), "parameters": design}
     return found
@@ -172,6 +178,13 @@ def _place(study: "Study", free: "Sequence[Parameter]", x: Array) -> dict[str, A
 
 def _share(parameter: "Parameter", value: float) -> float:
     return (value - parameter.low) / (parameter.high - parameter.low)
+
+
+def _around(x: Array, k: int) -> tuple[Array, Array]:
+    """Return x with one share a step lower and a step higher, within the box."""
+    lower, upper = x.copy(), x.copy()
+    lower[k], upper[k] = max(x[k] - STEP, 0.0), min(x[k] + STEP, 1.0)
+    return lower, upper
 
 
 def _moved(x: Array, k: int) -> Array:

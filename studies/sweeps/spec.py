@@ -288,7 +288,9 @@ def _parameter(part: Section, instrument: Instrument, method: str) -> Parameter:
     deviation = part.number("standard_deviation", above=0.0) if distribution == "normal" else None
     if distribution != "normal" and "standard_deviation" in part:
         raise InputError(f"{where}: standard_deviation goes with distribution = 'normal'.")
-    middle = part.number("nominal", (part.number("low") + part.number("high")) / 2 if found is None else found)
+    if found is None and "nominal" not in part:
+        found = (part.number("low") + part.number("high")) / 2
+    middle = part.number("nominal", found)
     low, high = _ends(part, where, middle, deviation)
     if distribution == "log-uniform" and low <= 0:
         raise InputError(f"{where}: a log-uniform parameter must be positive, not from {low:g}.")

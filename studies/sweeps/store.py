@@ -166,7 +166,7 @@ class Store:
     def check_same(self, identity: Mapping[str, Any]) -> None:
         """Refuse to go on when the results so far belong to something else; InputError says what changed."""
         old = self._read("SELECT identity FROM study")
-        changes = list(find_changes(json.loads(old[0][0]), identity)) if old else []
+        changes = list(find_changes({**json.loads(old[0][0]), "base": identity["base"]}, identity)) if old else []
         if changes:
             shown = "; ".join(changes[:SHOWN_CHANGES])
             more = f"; and {len(changes) - SHOWN_CHANGES} more" if len(changes) > SHOWN_CHANGES else ""

@@ -1,0 +1,198 @@
+"""Which parameter matters: Sobol indices, local slopes, linear shares; each with an interval, none with invented values.
+
+A case that failed has no value, and nothing is put in its place: where a design needs every case, the analysis refuses
+and lists those that lack.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from studies.errors import InputError
+
+if TYPE_CHECKING:
+    from studies.sweeps.results import Results
+    from studies.sweeps.spec import Parameter
+
+Array = NDArray[np.float64]
+RESAMPLES = 1000
+SHOWN = 10
+
+
+@dataclass(frozen=True)
+class SobolIndices:
+    """First-order and total indices of every parameter with 95 % bootstrap intervals, arrays (parameters,).
+
+    `variance` is that of the column; where it is zero, so are all indices.
+    """
+
+    parameters: tuple[str, ...]
+    first: Array
+    first_low: Array
+    first_high: Array
+    total: Array
+    total_low: Array
+    total_high: Array
+    variance: float
+
+
+@dataclass(frozen=True)
+class LocalSlope:
+    """Slope of a column by one parameter at the nominal design, its interval, and the column at both ends."""
+
+    parameter: str
+    slope: float
+    uncertainty: float
+    at_low: float
+    at_high: float
+    nominal: float
+
+    @property
+    def swing(self) -> float:
+        """Change of the column from one end to the other."""
+        return self.at_high - self.at_low
+
+
+@dataclass(frozen=True)
+class LinearShares:
+    """Least squares of a column on all parameters: slopes with 95 % intervals, share of the variance, R²."""
+
+    parameters: tuple[str, ...]
+    slope: Array
+    half_width: Array
+    share: Array
+    r_squared: float
+
+
+def sobol_indices(results: "Results", column: str) -> SobolIndices:
+    """Return the Sobol indices of a column from a study with method = "sensitivity" (Saltelli 2010, table 2 b and f).
+
+    Raises
+    ------
+    InputError
+        The study has another design, or cases without a value: they are listed.
+    """
+    study = results.study
+    if study.sampling.method != "sensitivity":
+        raise InputError(
+            f"Sobol indices need a study with method = 'sensitivity', not '{study.sampling.method}'; change [sampling]."
+        )
+    y = _complete(results, column)
+    n, d = study.sampling.cases, len(study.parameters)
+    A, B, AB = y[:n], y[n : 2 * n], y[2 * n :].reshape(d, n)
+    variance = float(np.var(y[: 2 * n]))
+    if variance == 0:
+        nothing = np.zeros(d)
+        return SobolIndices(study.names, *(nothing,) * 6, variance)
+    draws = np.random.default_rng(study.sampling.seed).integers(0, n, (RESAMPLES, n))
+    first, total = _indices(A, B, AB)
+    spread = np.array([_indices(A[i], B[i], AB[:, i]) for i in draws])
+    low, high = np.quantile(spread, [0.025, 0.975], axis=0)
+    return SobolIndices(study.names, first, low[0], high[0], total, low[1], high[1], variance)
+
+
+def _indices(A: Array, B: Array, AB: Array) -> tuple[Array, Array]:
+    """S_i = ⟨f_B (f_ABi − f_A)⟩ / V and T_i = ½ ⟨(f_A − f_ABi)²⟩ / V, about the mean, as `scipy.stats.sobol_indices`."""
+    both = np.concatenate([A, B])
+    mean, variance = both.mean(), both.var()
+    if variance == 0:
+        return np.zeros(len(AB)), np.zeros(len(AB))
+    first = ((B - mean) * (AB - A)).mean(axis=1) / variance
+    total = 0.5 * ((A - AB) ** 2).mean(axis=1) / variance
+    return first, total
+
+
+def local_slopes(results: "Results", column: str) -> list[LocalSlope]:
+    """Return the slopes of a column at the nominal design from a study with method = "one-at-a-time".
+
+    The slope is that of the polynomial through a parameter's levels; its uncertainty is the distance to the
+    polynomial through the inner levels, plus the numerical error of the values over the distance of the inner levels.
+
+    Raises
+    ------
+    InputError
+        The study has another design, or cases without a value: they are listed.
+    """
+    study = results.study
+    if study.sampling.method != "one-at-a-time":
+        raise InputError(
+            f"local slopes need a study with method = 'one-at-a-time', not '{study.sampling.method}'; change [sampling]."
+        )
+    y = _complete(results, column)
+    place = [c.name for c in study.columns].index(column)
+    error = float(np.nan_to_num(results.errors[:, place]).max(initial=0.0))
+    slopes = []
+    for k, parameter in enumerate(study.parameters):
+        rows = [0, *range(1 + 4 * k, 5 + 4 * k)]
+        x = results.parameter(parameter.name)[rows].astype(float)
+        slopes.append(_slope(parameter, x, y[rows], error))
+    return slopes
+
+
+def _slope(parameter: "Parameter", x: Array, y: Array, error: float) -> LocalSlope:
+    fine = _derivative(x, y)
+    inner = [0, 2, 3]
+    rough = _derivative(x[inner], y[inner])
+    uncertainty = abs(fine - rough) + error / float(np.ptp(x[inner]))
+    return LocalSlope(parameter.name, fine, uncertainty, float(y[1]), float(y[4]), float(y[0]))
+
+
+def _derivative(x: Array, y: Array) -> float:
+    """Derivative at x[0] of the polynomial through the distinct points."""
+    _, places = np.unique(x, return_index=True)
+    polynomial = np.polynomial.Polynomial.fit(x[places], y[places] - y[0], len(places) - 1)
+    return float(polynomial.deriv()(x[0]))
+
+
+def linear_shares(results: "Results", column: str) -> LinearShares | None:
+    """Return the linear influence of every numeric parameter over a sample, from the cases that have a value.
+
+    None where there are too few cases, or where the column does not vary.
+    """
+    from scipy.stats import t
+
+    study = results.study
+    numeric = [p.name for p in study.parameters if not isinstance(p.nominal, str)]
+    X = np.column_stack([results.parameter(name).astype(float) for name in numeric]) if numeric else np.empty((0, 0))
+    y = results.column(column)
+    there = np.isfinite(y)
+    X, y = X[there], y[there]
+    free = len(y) - len(numeric) - 1
+    if not numeric or free < 2 or np.ptp(y) == 0 or not (np.ptp(X, axis=0) > 0).all():
+        return None
+    scaled = (X - X.mean(axis=0)) / X.std(axis=0)
+    slopes = np.linalg.lstsq(scaled, y - y.mean(), rcond=None)[0]
+    residual = y - y.mean() - scaled @ slopes
+    deviation = np.sqrt(residual @ residual / free * np.diag(np.linalg.pinv(scaled.T @ scaled)))
+    half = t.ppf(0.975, free) * deviation
+    spread = X.std(axis=0)
+    share = slopes**2 / y.var()
+    return LinearShares(tuple(numeric), slopes / spread, half / spread, share, float(1 - residual.var() / y.var()))
+
+
+def _complete(results: "Results", column: str) -> Array:
+    """Return a column of which every case is there, or refuse with the list."""
+    if len(results.cases) < _expected(results):
+        raise InputError(
+            f"{_expected(results) - len(results.cases)} cases are not computed yet; run the study again to resume it."
+        )
+    y = results.column(column)
+    lacking = np.flatnonzero(~np.isfinite(y))
+    if lacking.size:
+        raise InputError(
+            f"{lacking.size} of {len(y)} cases have no {column}, and none is invented: {_list(results, lacking.tolist())}."
+            " Mend the ranges, or the function, and run a new study."
+        )
+    return y
+
+
+def _expected(results: "Results") -> int:
+    return len(results.about["repeats"]) or results.total
+
+
+def _list(results: "Results", places: Sequence[int]) -> str:
+    words = [f"case {place} ({results.cases[place].remark})" for place in places[:SHOWN]]
+    return "; ".join(words) + (f"; and {len(places) - SHOWN} more" if len(places) > SHOWN else "")

@@ -1,0 +1,127 @@
+"""How many designs meet their requirements, with an interval, and how far the tolerances may reach."""
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from studies.errors import InputError
+
+if TYPE_CHECKING:
+    from studies.sweeps.results import Results
+    from studies.sweeps.spec import Requirement
+
+RANDOM = ("latin-hypercube", "sobol", "sensitivity")
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What a requirement asks of a column; an end that is open is infinite."""
+
+    column: str
+    low: float
+    high: float
+
+
+@dataclass(frozen=True)
+class Yield:
+    """The share of designs that meet requirements.
+
+    Attributes
+    ----------
+    cases, passed, unknown : numbers of designs; `unknown` are those without a value.
+    low, high : a 95 % interval (Wilson) in which every unknown design counts once as failing and once as passing; None
+        where the designs are no sample, such as a grid.
+    """
+
+    limits: tuple[Limits, ...]
+    cases: int
+    passed: int
+    unknown: int
+    low: float | None
+    high: float | None
+
+    @property
+    def share(self) -> float:
+        """Passed over those that have a value."""
+        return self.passed / max(self.cases - self.unknown, 1)
+
+
+@dataclass(frozen=True)
+class Reach:
+    """How far tolerances may reach: the largest part of the box about the nominal design without a design that fails.
+
+    `part` is relative to the asked ranges; None where no sampled design fails.
+    """
+
+    part: float | None
+    inside: int
+
+
+def resolve_limits(results: "Results", requirement: "Requirement") -> Limits:
+    """Return the limits of a requirement; without a target they lie about the nominal design's value."""
+    if requirement.within is None:
+        low = -np.inf if requirement.low is None else requirement.low
+        return Limits(requirement.column, low, np.inf if requirement.high is None else requirement.high)
+    target = requirement.target
+    if target is None:
+        place = [column.name for column in results.study.columns].index(requirement.column)
+        target = results.nominal.values[place] if results.nominal is not None else np.nan
+    if not np.isfinite(target):
+        raise InputError(f"the nominal design has no {requirement.column}; give the requirement a target.")
+    return Limits(requirement.column, target - requirement.within, target + requirement.within)
+
+
+def find_yield(results: "Results", requirements: "tuple[Requirement, ...]") -> Yield:
+    """Return the share of sampled designs that meet all the requirements."""
+    from scipy.stats import binomtest
+
+    limits = tuple(resolve_limits(results, requirement) for requirement in requirements)
+    good, unknown = _judge(results, limits)
+    rows = _sample_rows(results)
+    good, unknown = good[rows], unknown[rows]
+    n, passed, open_ = len(good), int(good.sum()), int(unknown.sum())
+    if results.study.sampling.method not in RANDOM or n == 0:
+        return Yield(limits, n, passed, open_, None, None)
+    low = binomtest(passed, n).proportion_ci(0.95, "wilson").low
+    high = binomtest(passed + open_, n).proportion_ci(0.95, "wilson").high
+    return Yield(limits, n, passed, open_, float(low), float(high))
+
+
+def find_reach(results: "Results", requirements: "tuple[Requirement, ...]") -> Reach:
+    """Return the largest box about the nominal design, in parts of the asked ranges, inside which no sampled design fails.
+
+    A design that has no value counts as failing.
+    """
+    limits = tuple(resolve_limits(results, requirement) for requirement in requirements)
+    good, _ = _judge(results, limits)
+    distance = np.zeros(len(good))
+    for p in results.study.parameters:
+        if isinstance(p.nominal, str):
+            continue
+        x = results.parameter(p.name).astype(float)
+        above, below = max(p.high - p.nominal, 1e-300), max(p.nominal - p.low, 1e-300)
+        distance = np.maximum(distance, np.where(x > p.nominal, (x - p.nominal) / above, (p.nominal - x) / below))
+    if good.all():
+        return Reach(None, len(good))
+    part = float(distance[~good].min())
+    return Reach(part, int((distance < part).sum()))
+
+
+def _judge(results: "Results", limits: tuple[Limits, ...]) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Return which cases meet all limits, and of which that is unknown: no known value fails, but one lacks."""
+    values = np.array([results.column(limit.column) for limit in limits])
+    known = np.isfinite(values)
+    low, high = (np.array([getattr(limit, end) for limit in limits])[:, None] for end in ("low", "high"))
+    inside = known & (values >= low) & (values <= high)
+    good = inside.all(axis=0)
+    fails = (known & ~inside).any(axis=0)
+    return good, ~good & ~fails
+
+
+def _sample_rows(results: "Results") -> slice:
+    """Return the rows that are independent draws: of Saltelli's design the first two blocks."""
+    if results.study.sampling.method == "sensitivity":
+        return slice(0, 2 * results.study.sampling.cases)
+    return slice(None)

@@ -1,0 +1,123 @@
+"""Contract of results: the same with any workers, on a cluster, in any order; tables with units; a self-contained page."""
+
+import socket
+import subprocess
+import sys
+import time
+from dataclasses import replace
+
+import pytest
+
+from studies.errors import MissingEnvironment
+from studies.reports.sweep import sweep_page
+from studies.sweeps.run import run_study
+from tests.studies.sweeps.processes import environment, rows_of, spec_of, words_of
+
+SPEC = {
+    "card": "hrg-30mm",
+    "sampling": {"method": "sobol", "cases": 8, "seed": 1, "batch": 2},
+    "parameter": [{"name": "resonator.thickness_mm", "tolerance": 0.005}],
+    "quantity": [{"name": "frequency", "theory": "shell"}, {"name": "bryan-factor", "theory": "shell"}],
+    "requirement": [{"column": "frequency_n2_Hz", "within": 20.0}],
+}
+
+
+@pytest.fixture(scope="module")
+def results():
+    return run_study(SPEC, workers=1)
+
+
+def test_table_carries_units(results):
+    table = results.table()
+    assert list(table.columns) == [
+        "resonator.thickness_mm", "frequency_n2_Hz", "frequency_n2_Hz_error", "bryan_factor_n2", "status", "remark",
+    ]  # fmt: skip
+    assert table.attrs["units"]["frequency_n2_Hz"] == "Hz"
+    assert len(table) == 8
+
+
+def test_values_are_those_of_the_solver(results):
+    from shell.modes import solve_modes
+    from studies.sweeps.parameters import set_parameters
+
+    case = results.cases[3]
+    instrument = set_parameters(results.study.instrument, case.parameters)
+    (mode,) = solve_modes(*instrument.at(instrument.reference_temperature), 2, 1, "shell")
+    assert case.values[0] == pytest.approx(mode.frequency, rel=1e-12)
+    assert case.values[1] == pytest.approx(mode.bryan_factor, rel=1e-10)
+
+
+def test_two_workers_give_the_same_bits(results):
+    again = run_study(SPEC, workers=2)
+    assert again.values.tobytes() == results.values.tobytes()
+    assert [case.key for case in again.cases] == [case.key for case in results.cases]
+
+
+def test_page_is_self_contained_and_escapes(results, monkeypatch):
+    monkeypatch.setattr("studies.reports.mode_picture.mode_blocks", lambda *_: [])  # pictures have their own tests
+    hostile = replace(results, study=replace(results.study, name="<script>alert(1)</script>"))
+    page = sweep_page(hostile)
+    assert "<script>alert" not in page
+    assert "https://" not in page.split("<footer")[0]
+    for part in ("Which parameter matters", "Tolerances", "Provenance", "sortable", "resonator.thickness_mm"):
+        assert part in page
+
+
+def free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
+
+
+@pytest.fixture
+def cluster():
+    pytest.importorskip("distributed", reason="the extra 'cluster' (dask[distributed]) is not installed")
+    address = f"tcp://127.0.0.1:{free_port()}"
+    quiet = {"DASK_DISTRIBUTED__LOGGING__DISTRIBUTED": "error"}
+    scheduler_words = ["scheduler", "--host", "127.0.0.1", "--port", address.rpartition(":")[2], "--no-dashboard"]
+    worker_words = ["worker", address, "--nworkers", "2", "--nthreads", "1", "--no-dashboard"]
+    processes = [
+        subprocess.Popen([sys.executable, "-m", "dask", *words], env=environment(**quiet), stderr=subprocess.DEVNULL, stdout=subprocess.DEVNULL)
+        for words in (scheduler_words, worker_words)
+    ]  # fmt: skip
+    yield address, processes[0]
+    for process in reversed(processes):
+        process.terminate()
+    for process in processes:
+        process.wait(30)
+
+
+def test_two_dask_workers_give_the_same_bits_and_a_lost_scheduler_is_resumable(cluster, results, tmp_path, functions):
+    address, scheduler = cluster
+    spec = tmp_path / "study.toml"
+    spec.write_text(
+        spec_of("slow", 'method = "latin-hypercube"\ncases = 3000\nbatch = 4', 'name = "user.x"\nlow = 0\nhigh = 1')
+    )
+    again = run_study(SPEC, scheduler=address)
+    assert again.values.tobytes() == results.values.tobytes()
+    words = words_of(
+        "study", "run", str(spec), "--out", str(tmp_path / "out"), "--scheduler", address, "--allow-python"
+    )
+    run = subprocess.Popen(
+        words, stderr=subprocess.PIPE, text=True, env=environment(HRG_TEST_LOG=str(tmp_path / "log"))
+    )
+    until = time.monotonic() + 60
+    while run.poll() is None and time.monotonic() < until and not rows_of(tmp_path / "out"):
+        time.sleep(0.1)
+    scheduler.kill()
+    _, said = run.communicate(timeout=60)
+    assert run.returncode == 3, said
+    assert "resume" in said
+    assert 0 < len(rows_of(tmp_path / "out")) < 3000
+
+
+def test_no_scheduler_is_said(tmp_path):
+    pytest.importorskip("distributed", reason="the extra 'cluster' (dask[distributed]) is not installed")
+    from studies.sweeps import cluster as module
+
+    patience, module.PATIENCE = module.PATIENCE, 1.0
+    try:
+        with pytest.raises(MissingEnvironment, match="no scheduler"):
+            run_study(SPEC, scheduler=f"tcp://127.0.0.1:{free_port()}")
+    finally:
+        module.PATIENCE = patience

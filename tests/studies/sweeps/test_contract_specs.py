@@ -1,0 +1,103 @@
+"""Contract of study specs: every mistake is named with its place and the nearest known word."""
+
+import copy
+
+import pytest
+
+from studies.errors import InputError
+from studies.sweeps.spec import read_study, shipped_specs
+
+GOOD = {
+    "card": "hrg-30mm",
+    "sampling": {"method": "sobol", "cases": 8},
+    "parameter": [
+        {"name": "resonator.thickness_mm", "tolerance": 0.005},
+        {"name": "resonator.radius_mm", "low": 14.9, "high": 15.1},
+    ],
+    "quantity": [{"name": "frequency", "theory": "shell"}],
+}
+
+
+def changed(path, value):
+    spec = copy.deepcopy(GOOD)
+    *way, last = path
+    place = spec
+    for step in way:
+        place = place[step]
+    if value is None:
+        del place[last]
+    else:
+        place[last] = value
+    return spec
+
+
+def test_good_spec_is_read():
+    study = read_study(GOOD)
+    nominal = study.instrument.content["resonator"]["thickness_mm"]
+    assert study.parameters[0].low == pytest.approx(nominal - 0.005)
+    assert [column.name for column in study.columns] == ["frequency_n2_Hz"]
+    assert study.parameters[0].unit == "mm"
+
+
+@pytest.mark.parametrize("name", sorted(shipped_specs()))
+def test_shipped_specs_are_read(name):
+    assert read_study(name).asked
+
+
+@pytest.mark.parametrize(
+    ("path", "value", "parts"),
+    [
+        (("sampling", "method"), "sobbol", ("sobol",)),
+        (("sampling", "cases"), 100, ("power of two", "64 or 128")),
+        (("sampling", "cases"), None, ("cases",)),
+        (("sampling", "seed"), -1, ("seed",)),
+        (("sampling", "batches"), 3, ("batch",)),
+        (("parameter", 0, "name"), "resonator.thicknes_mm", ("resonator.thickness_mm",)),
+        (("parameter", 0, "name"), "resonator.stem", ("resonator.stem.radius_mm",)),
+        (("parameter", 0, "name"), "material.name", ("values",)),
+        (("parameter", 0, "name"), "resonator.radius_mm", ("twice",)),
+        (("parameter", 0, "tolerance"), -1.0, ("above 0",)),
+        (("parameter", 0, "tolerance"), 2.0, ("resonator.thickness_mm = -", "not valid")),
+        (("parameter", 0, "tolerance"), 1.0, ("thickness",)),
+        (("parameter", 0, "distribution"), "gauss", ("distribution",)),
+        (("parameter", 0, "standard_deviation"), 0.1, ("normal",)),
+        (("parameter", 0, "low"), 0.1, ("not both",)),
+        (("parameter", 1, "low"), 15.2, ("below high",)),
+        (("parameter", 1, "low"), 15.05, ("nominal", "outside")),
+        (("parameter", 1, "count"), 5, ("grid",)),
+        (("parameter", 1), {"name": "resonator.radius_mm", "values": [15.0]}, ("grid", "list")),
+        (("parameter", 1), {"name": "resonator.pole_angle_deg"}, ("nominal",)),
+        (("parameter", 1), {"name": "temperature_degC", "low": -300, "high": 20}, ("outside the range",)),
+        (("quantity", 0, "name"), "frequencies", ("frequency",)),
+        (("quantity", 0, "theory"), "solit", ("solid",)),
+        (("quantity", 0, "harmonic"), -2, ("harmonic",)),
+        (("quantity", 0, "temprature_degC"), 20, ("temperature_degC",)),
+        (("quantity", 0, "temperature_degC"), 2000, ("outside the range",)),
+        (("quantity",), [], ("at least one",)),
+        (("quantity",), [{"name": "frequency"}, {"name": "frequency", "theory": "shell"}], ("label", "twice")),
+        (("quantity",), [{"name": "compensation-residual", "points": 4}], ("points",)),
+        (("quantity",), [{"name": "python", "function": "nonsense"}], ("file.py:name",)),
+        (("requirement",), [{"column": "frequency_n3_Hz", "within": 1}], ("frequency_n2_Hz",)),
+        (("requirement",), [{"column": "frequency_n2_Hz"}], ("within",)),
+        (("requirement",), [{"column": "frequency_n2_Hz", "within": 1, "low": 2}], ("within",)),
+        (("search",), [{"kind": "best"}], ("kind",)),
+        (("search",), [{"kind": "inversion", "vary": ["x"], "targets": {"frequency_n2_Hz": 1}}], ("'x'",)),
+        (("search",), [{"kind": "inversion", "vary": ["resonator.radius_mm"], "targets": {"f": 1}}], ("'f'",)),
+        (("card",), "hrg-30m", ("hrg-30mm",)),
+        (("cards",), "x", ("card",)),
+        (("schema",), "hrg.study/2", ("hrg.study/1",)),
+    ],
+)
+def test_mistakes_are_named(path, value, parts):
+    with pytest.raises(InputError) as caught:
+        read_study(changed(path, value))
+    assert all(part in str(caught.value) for part in parts), str(caught.value)
+    assert len(str(caught.value)) < 700
+
+
+def test_range_beyond_shell_theory_is_refused_and_solid_is_not():
+    spec = changed(("parameter", 0), {"name": "resonator.thickness_mm", "low": 0.8, "high": 1.6})
+    with pytest.raises(InputError, match="solid"):
+        read_study(spec)
+    spec["quantity"][0]["theory"] = "solid"
+    assert read_study(spec)

@@ -1,0 +1,161 @@
+"""Planted truths: Ishigami's indices, an additive law, no influence, slopes, yield, worst case, inversion, refusals."""
+
+import math
+
+import numpy as np
+import pytest
+
+from studies.errors import InputError
+from studies.sweeps.run import run_study
+from studies.sweeps.search import name_search
+from studies.sweeps.sensitivity import linear_shares, local_slopes, sobol_indices
+from studies.sweeps.tolerance import find_reach, find_yield
+
+
+def study(folder, function, sampling, *parameters, **more):
+    quantity = {"name": "python", "function": f"{folder / 'functions.py'}:{function}", "time_limit_s": 5.0}
+    spec = {"card": "hrg-30mm", "sampling": sampling, "parameter": list(parameters), "quantity": [quantity], **more}
+    return run_study(spec, workers=1, allow_python=True)
+
+
+def box(*names, low=-math.pi, high=math.pi):
+    return [{"name": f"user.{name}", "low": low, "high": high} for name in names]
+
+
+@pytest.fixture(scope="module")
+def ishigami(tmp_path_factory):
+    from tests.studies.sweeps.processes import FUNCTIONS
+
+    folder = tmp_path_factory.mktemp("ishigami")
+    (folder / "functions.py").write_text(FUNCTIONS)
+    sampling = {"method": "sensitivity", "cases": 1024, "seed": 4}
+    return study(folder, "ishigami", sampling, *box("x1", "x2", "x3", "nothing"))
+
+
+def test_sobol_indices_of_ishigami(ishigami):
+    """Ishigami & Homma 1990, a = 7, b = 0.1: the closed form of the variances."""
+    found = sobol_indices(ishigami, "ishigami")
+    a, b, pi = 7.0, 0.1, math.pi
+    v1, v2 = 0.5 * (1 + b * pi**4 / 5) ** 2, a**2 / 8
+    v13 = b**2 * pi**8 * (1 / 18 - 1 / 50)
+    v = v1 + v2 + v13
+    first, total = np.array([v1, v2, 0, 0]) / v, np.array([v1 + v13, v2, v13, 0]) / v
+    assert found.variance == pytest.approx(v, rel=0.03)
+    assert np.abs(found.first - first).max() < 0.03
+    assert np.abs(found.total - total).max() < 0.03
+    for low, true, high in zip(found.first_low, first, found.first_high, strict=True):
+        assert low <= true <= high
+    for low, true, high in zip(found.total_low, total, found.total_high, strict=True):
+        assert low <= true <= high
+    assert found.total_high - found.total_low == pytest.approx([0.17, 0.08, 0.06, 0], abs=0.05)
+
+
+def test_sobol_indices_equal_scipy(ishigami):
+    from scipy.stats import sobol_indices as oracle
+
+    y, n = ishigami.column("ishigami"), 1024
+    given = {"f_A": y[None, :n], "f_B": y[None, n : 2 * n], "f_AB": y[2 * n :].reshape(4, 1, n)}
+    expected, found = oracle(func=given, n=n), sobol_indices(ishigami, "ishigami")
+    assert found.first == pytest.approx(expected.first_order, abs=1e-12)
+    assert found.total == pytest.approx(expected.total_order, abs=1e-12)
+
+
+def test_no_influence_is_exactly_none(ishigami):
+    found = sobol_indices(ishigami, "ishigami")
+    assert (found.first[3], found.total[3], found.total_low[3], found.total_high[3]) == (0, 0, 0, 0)
+    linear = linear_shares(ishigami, "ishigami")
+    assert linear is not None
+    assert abs(linear.slope[3]) < linear.half_width[3]
+
+
+def test_constant_column_has_no_influence_at_all(tmp_path, functions):
+    results = study(tmp_path, "constant", {"method": "sensitivity", "cases": 4}, *box("x", "y"))
+    found = sobol_indices(results, "constant")
+    assert found.variance == 0
+    assert not found.total.any()
+    assert linear_shares(results, "constant") is None
+
+
+def test_sobol_refuses_failed_cases_and_lists_them(tmp_path, functions):
+    functions.write_text(
+        "def fail(i, p):\n    if p['user.x'] > 0.9:\n        raise ValueError('too far')\n    return p['user.x']\n"
+    )
+    results = study(tmp_path, "fail", {"method": "sensitivity", "cases": 16, "seed": 1}, *box("x", "y", low=0, high=1))
+    assert results.failed
+    with pytest.raises(InputError, match="none is invented") as caught:
+        sobol_indices(results, "fail")
+    assert "too far" in str(caught.value)
+    table = results.table()
+    assert table["fail"].isna().sum() == len(results.failed) == (table["status"] == "failed").sum()
+
+
+def test_slopes_and_tornado_of_a_cubic_law(tmp_path, functions):
+    functions.write_text("def law(i, p):\n    return p['user.x'] ** 3 + 2 * p['user.y']\n")
+    parameters = [{"name": "user.x", "nominal": 1.0, "low": 0.8, "high": 1.4}, *box("y", "nothing", low=0, high=2)]
+    x, y, nothing = local_slopes(study(tmp_path, "law", {"method": "one-at-a-time"}, *parameters), "law")
+    assert x.slope == pytest.approx(3, rel=1e-12)
+    assert y.slope == pytest.approx(2, rel=1e-12)
+    assert y.uncertainty < 1e-12
+    assert x.uncertainty > 1e-3  # the inner levels alone see a parabola
+    assert y.swing == pytest.approx(4)
+    assert abs(nothing.slope) <= nothing.uncertainty + 1e-15
+
+
+def test_yield_and_reach_of_a_disc(tmp_path, functions):
+    limit = 0.5
+    sampling = {"method": "sobol", "cases": 1024, "seed": 2}
+    parameters = [
+        {"name": "user.x", "nominal": 0.3, "tolerance": 1.0},
+        {"name": "user.y", "nominal": -0.2, "tolerance": 1.0},
+    ]
+    requirement = [{"column": "bowl", "high": limit}]
+    results = study(tmp_path, "bowl", sampling, *parameters, requirement=requirement)
+    found = find_yield(results, results.study.requirements)
+    truth = math.pi * limit / 4  # area of the disc over the area of the box
+    assert found.low <= truth <= found.high
+    assert found.share == pytest.approx(truth, abs=0.02)
+    reach = find_reach(results, results.study.requirements)
+    # the largest square inside a disc of radius sqrt(1/2) has the half side 1/2
+    assert 0.5 <= reach.part < 0.56
+
+
+def test_yield_counts_unknown_designs_both_ways(tmp_path, functions):
+    functions.write_text(
+        "def half(i, p):\n    if p['user.x'] > 0.75:\n        raise ValueError('x')\n    return p['user.x']\n"
+    )
+    sampling = {"method": "latin-hypercube", "cases": 40, "seed": 2}
+    requirement = [{"column": "half", "high": 0.5}]
+    results = study(tmp_path, "half", sampling, *box("x", low=0, high=1), requirement=requirement)
+    found = find_yield(results, results.study.requirements)
+    assert (found.passed, found.unknown, found.cases) == (20, 10, 40)
+    assert found.share == pytest.approx(2 / 3)
+    assert found.low < 0.5
+    assert found.high > 0.75
+
+
+def test_worst_case_and_inversion(tmp_path, functions):
+    functions.write_text(
+        "def bowl(i, p):\n    return (p['user.x'] - 0.3) ** 2 + (p['user.y'] + 0.2) ** 2\n"
+        "def tilt(i, p):\n    return 2 * p['user.x'] + p['user.y'] ** 3\n"
+    )
+    names = [f"{functions}:{name}" for name in ("bowl", "tilt")]
+    spec = {
+        "card": "hrg-30mm",
+        "sampling": {"method": "grid"},
+        "parameter": [{**p, "count": 2} for p in box("x", "y", low=-1, high=1)],
+        "quantity": [{"name": "python", "function": name} for name in names],
+        "search": [
+            {"kind": "worst-case", "column": "bowl"},
+            {"kind": "inversion", "vary": ["user.x", "user.y"], "targets": {"tilt": 0.425, "bowl": 0.4925}},
+            {"kind": "inversion", "vary": ["user.x"], "targets": {"tilt": 7.0}},
+        ],
+    }
+    results = run_study(spec, workers=1, allow_python=True)
+    worst, inverse, impossible = (results.store.findings()[name_search(search)] for search in results.study.searches)
+    assert worst["least"]["value"] == pytest.approx(0, abs=1e-4)  # inside the box, where no corner is
+    assert worst["greatest"]["value"] == pytest.approx(1.3**2 + 1.2**2, rel=1e-12)
+    assert worst["greatest"]["parameters"] == {"user.x": -1.0, "user.y": 1.0}
+    assert inverse["reached"]
+    assert inverse["values"] == pytest.approx({"tilt": 0.425, "bowl": 0.4925}, rel=1e-6)
+    assert not impossible["reached"]
+    assert impossible["at_limit"] == ["user.x"]

@@ -1,0 +1,253 @@
+"""Studies survive what happens to them: kill -9, Ctrl-C, a second runner, changes, damage, a full disk (real processes)."""
+
+import contextlib
+import json
+import signal
+import subprocess
+import sys
+import time
+from collections import Counter
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from studies.errors import InputError
+from studies.sweeps.export import export_results
+from studies.sweeps.results import open_results
+from studies.sweeps.run import run_study
+from tests.studies.sweeps.processes import environment, rows_of, spec_of, words_of
+
+X = 'name = "user.x"\nlow = 0.0\nhigh = 1.0'
+
+
+def write_slow(folder: Path, cases: int) -> Path:
+    spec = folder / "slow.toml"
+    spec.write_text(spec_of("slow", f'method = "latin-hypercube"\ncases = {cases}\nseed = 7\nbatch = 4', X))
+    return spec
+
+
+def wait_for(condition, seconds=60.0):
+    until = time.monotonic() + seconds
+    while not condition():
+        assert time.monotonic() < until, "waited in vain"
+        time.sleep(0.02)
+
+
+def children_of(pid: int) -> set[int]:
+    found = set()
+    for line in subprocess.run(
+        ["ps", "-eo", "pid=,ppid="], capture_output=True, text=True, check=True
+    ).stdout.splitlines():
+        child, parent = map(int, line.split())
+        if parent == pid:
+            found |= {child} | children_of(child)
+    return found
+
+
+def alive(pids: set[int]) -> set[int]:
+    """Return which of the processes still run; one that waits to be reaped has ended."""
+    left = set()
+    for pid in pids:
+        try:
+            state = Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()[0]
+        except FileNotFoundError:
+            continue
+        left |= {pid} if state != "Z" else set()
+    return left
+
+
+def test_many_kills_lose_nothing_kept_and_leave_no_process(tmp_path, functions, start, hrg):
+    slow, log = write_slow(tmp_path, 240), tmp_path / "log"
+    log.touch()
+    command = ["study", "run", slow, "--out", tmp_path / "out", "--workers", 2, "--allow-python"]
+    rng = np.random.default_rng(11)
+    kept: dict[int, bytes] = {}
+    kills = 0
+    while kills < 5:
+        process = start(*command, HRG_TEST_LOG=str(log))
+        goal = len(kept) + int(rng.integers(1, 30))
+        wait_for(
+            lambda process=process, goal=goal: len(rows_of(tmp_path / "out")) >= goal or process.poll() is not None
+        )
+        assert process.poll() is None, process.communicate()
+        family = children_of(process.pid)
+        time.sleep(float(rng.uniform(0, 0.1)))
+        process.send_signal(signal.SIGKILL)
+        process.wait()
+        kills += 1
+        wait_for(lambda family=family: not alive(family), 10)
+        now = {place: numbers for place, _, numbers in rows_of(tmp_path / "out")}
+        assert kept.items() <= now.items(), "a kept case was lost or changed"
+        kept = now
+    assert 0 < len(kept) < 240
+    before = Counter(log.read_text().split())
+    done = hrg(*command, HRG_TEST_LOG=log)
+    assert done.returncode == 0, done.stderr
+    after = Counter(log.read_text().split())
+    # what was in the store when the last run began is not computed again
+    assert len(rows_of(tmp_path / "out")) == 240
+    assert sum((after - before).values()) == 240 - len(kept) + 1  # and the nominal design
+    # each kill lost at most the tasks that were out: two for each of two workers, of at most four batches of four cases
+    assert sum(after.values()) - 241 <= kills * 4 * 16
+    whole = hrg("study", "run", slow, "--out", tmp_path / "whole", "--workers", 1, "--allow-python", HRG_TEST_LOG=log)
+    assert whole.returncode == 0, whole.stderr
+    for folder in ("out", "whole"):
+        with contextlib.closing(open_results(tmp_path / folder)) as results:
+            export_results(results, tmp_path / folder / "results.csv")
+    assert (tmp_path / "out" / "results.csv").read_bytes() == (tmp_path / "whole" / "results.csv").read_bytes()
+
+
+def test_second_runner_is_refused_and_interrupt_is_resumable(tmp_path, functions, start, hrg):
+    slow, log = write_slow(tmp_path, 4000), tmp_path / "log"
+    command = ["study", "run", slow, "--out", tmp_path / "out", "--workers", 2, "--allow-python"]
+    first = start(*command, HRG_TEST_LOG=str(log))
+    wait_for(lambda: len(rows_of(tmp_path / "out")) > 3)
+    second = hrg(*command, HRG_TEST_LOG=log)
+    assert second.returncode == 2
+    assert f"process {first.pid}" in second.stderr
+    state = json.loads(hrg("study", "status", tmp_path / "out", "--json").stdout)
+    assert state["state"] == "running"
+    family = children_of(first.pid)
+    first.send_signal(signal.SIGINT)
+    _, said = first.communicate(timeout=30)
+    assert first.returncode == 130
+    assert "resume" in said
+    assert "Traceback" not in said
+    wait_for(lambda: not alive(family), 10)
+    state = json.loads(hrg("study", "status", tmp_path / "out", "--json").stdout)
+    assert state["state"] == "unfinished"
+    assert 0 < state["done"] < 4000
+
+
+def test_failures_keep_their_reason_and_do_not_stop_the_rest(tmp_path, functions, hrg):
+    spec = tmp_path / "moody.toml"
+    values = 'name = "user.x"\nvalues = [0, 1, 2, 3, 4, 5, 6]'
+    spec.write_text(spec_of("moody", 'method = "grid"', values))
+    done = hrg("study", "run", spec, "--out", tmp_path / "out", "--workers", 2, "--allow-python", "--json")
+    assert done.returncode == 4, done.stderr
+    found = json.loads(done.stdout)
+    assert (found["cases"], found["done"], found["failed"]) == (7, 7, 5)
+    reasons = " ".join(entry["reason"] for entry in found["reasons"])
+    for part in ("one is not welcome", "time limit of 1 s", "ended its process", "not a finite number", "not a number"):
+        assert part in reasons
+    assert [status for _, status, _ in sorted(rows_of(tmp_path / "out"))] == ["ok", *["failed"] * 5, "ok"]
+    again = hrg("study", "run", spec, "--out", tmp_path / "out", "--allow-python")
+    assert again.returncode == 4
+    page = hrg("study", "report", tmp_path / "out")
+    assert page.returncode == 0, page.stderr
+    assert "one is not welcome" in (tmp_path / "out" / "report.html").read_text()
+
+
+def test_a_design_that_kills_its_worker_is_found_and_the_rest_is_computed(tmp_path, functions, hrg):
+    spec = tmp_path / "murder.toml"
+    spec.write_text(
+        spec_of("murderer", 'method = "grid"\nbatch = 4', 'name = "user.x"\nvalues = [0, 1, 2, 3, 4, 5, 6, 7]')
+    )
+    done = hrg("study", "run", spec, "--out", tmp_path / "out", "--workers", 2, "--allow-python", "--json")
+    assert done.returncode == 4, done.stderr
+    found = json.loads(done.stdout)
+    assert (found["done"], found["failed"]) == (8, 1)
+    assert "worker process ended" in found["reasons"][0]["reason"]
+    assert [place for place, status, _ in rows_of(tmp_path / "out") if status == "failed"] == [3]
+
+
+def test_python_needs_to_be_allowed_and_must_exist(tmp_path, functions, hrg):
+    spec = tmp_path / "square.toml"
+    spec.write_text(spec_of("square", 'method = "grid"', 'name = "user.x"\nvalues = [1, 2]'))
+    refused = hrg("study", "run", spec, "--out", tmp_path / "out")
+    assert refused.returncode == 2
+    assert "--allow-python" in refused.stderr
+    assert not (tmp_path / "out").exists()
+    spec.write_text(spec.read_text().replace("functions.py:square", "functions.py:cube"))
+    missing = hrg("study", "run", spec, "--out", tmp_path / "out", "--allow-python")
+    assert missing.returncode == 2
+    assert "cube" in missing.stderr
+
+
+def test_changed_spec_card_or_function_is_refused_with_what_changed(tmp_path, functions, hrg):
+    spec = tmp_path / "square.toml"
+    text = spec_of("square", 'method = "grid"', 'name = "user.x"\nvalues = [1, 2]')
+    spec.write_text(text)
+    command = ["study", "run", spec, "--out", tmp_path / "out", "--workers", 1, "--allow-python"]
+    assert hrg(*command).returncode == 0
+    for old, new, part in (
+        ("[1, 2]", "[1, 3]", "parameter[1].values[2]: 2 -> 3"),
+        ('"hrg-30mm"', '"cvg-25mm"', "card.material.name"),
+        ("time_limit_s = 1.0", "time_limit_s = 3.0", "time_limit_s: 1.0 -> 3.0"),
+    ):
+        spec.write_text(text.replace(old, new))
+        refused = hrg(*command)
+        assert refused.returncode == 2
+        assert part in refused.stderr, refused.stderr
+    spec.write_text(text + '\n[[requirement]]\ncolumn = "square"\nhigh = 2.0\n')
+    assert hrg(*command).returncode == 0  # asks nothing new of the solver
+    functions.write_text(functions.read_text() + "\n# another function\n")
+    refused = hrg(*command)
+    assert refused.returncode == 2
+    assert "functions" in refused.stderr
+
+
+@pytest.mark.parametrize("damage", ["garbage", "torn"])
+def test_damaged_store_is_named_and_kept(tmp_path, functions, hrg, damage):
+    spec = tmp_path / "square.toml"
+    spec.write_text(spec_of("square", 'method = "grid"', 'name = "user.x"\nlow = 0\nhigh = 1\ncount = 400'))
+    run_study(spec, tmp_path / "out", workers=1, allow_python=True).close()
+    path = tmp_path / "out" / "study.sqlite"
+    content = path.read_bytes()
+    path.write_bytes(
+        b"this is no database" * 400 if damage == "garbage" else content[: len(content) // 2 // 4096 * 4096]
+    )
+    for use in (lambda: open_results(tmp_path / "out"), lambda: run_study(spec, tmp_path / "out", allow_python=True)):
+        with pytest.raises(InputError, match="damaged"):
+            use()
+    assert path.exists()
+
+
+def test_full_disk_keeps_what_was_written_and_says_so(tmp_path, functions, hrg):
+    spec = tmp_path / "square.toml"
+    spec.write_text(
+        spec_of("square", 'method = "grid"\nbatch = 50', 'name = "user.x"\nlow = 0\nhigh = 1\ncount = 3000')
+    )
+    words = words_of("study", "run", str(spec), "--out", str(tmp_path / "out"), "--workers", "1", "--allow-python")
+    limit = "import resource, os, sys; resource.setrlimit(resource.RLIMIT_FSIZE, (200_000, 200_000)); os.execv(sys.argv[1], sys.argv[1:])"
+    done = subprocess.run(
+        [sys.executable, "-c", limit, *words],
+        capture_output=True,
+        text=True,
+        env=environment(),
+        timeout=120,
+        check=False,
+    )
+    assert done.returncode == 3, done.stderr
+    assert "run the same command again" in done.stderr
+    assert "Traceback" not in done.stderr
+    kept = len(rows_of(tmp_path / "out"))
+    assert 0 < kept < 3000
+    assert hrg(*words[3:]).returncode == 0
+    assert len(rows_of(tmp_path / "out")) == 3000
+
+
+def test_folder_that_cannot_be_made_and_folder_without_study(tmp_path, functions, hrg):
+    spec = tmp_path / "square.toml"
+    spec.write_text(spec_of("square", 'method = "grid"', 'name = "user.x"\nvalues = [1]'))
+    (tmp_path / "file").write_text("")
+    done = hrg("study", "run", spec, "--out", tmp_path / "file" / "out", "--allow-python")
+    assert done.returncode == 3
+    assert "cannot be written" in done.stderr
+    done = hrg("study", "status", tmp_path)
+    assert done.returncode == 2
+    assert "no study" in done.stderr
+    done = hrg("study", "run", spec, "--allow-python")
+    assert done.returncode == 2
+    assert "--out" in done.stderr
+
+
+def test_dry_run_says_cases_time_and_memory_and_keeps_nothing(tmp_path, hrg):
+    done = hrg("study", "run", "frequency-over-temperature", "--dry-run", "--json")
+    assert done.returncode == 0, done.stderr
+    found = json.loads(done.stdout)
+    assert (found["schema"], found["cases"]) == ("hrg.study-estimate/1", 7)
+    assert found["seconds"] > 0
+    assert found["memory_MB"] > 10
+    assert not list(tmp_path.iterdir())
