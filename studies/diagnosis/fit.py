@@ -76,8 +76,8 @@ def fit_terms(problem: Problem, terms: Sequence[Term], rounds: int = ROUNDS) -> 
     fit = _evaluate(problem, terms, target, SHARES)
     if not rounds:
         return fit
-    terms = _place_jumps(fit, target)
-    fit = _evaluate(problem, terms, target, SHARES)
+    if rounds == ROUNDS:
+        fit = _evaluate(problem, _place_jumps(_flip(fit, target), target), target, SHARES)
     knobs = _knobs(fit)
     for _ in range(rounds if knobs else 0):
         better = _gauss_newton(fit, knobs, target)
@@ -165,6 +165,23 @@ def jacobian_of(fit: Fit, knobs: Sequence[_Knob] | None = None) -> FloatArray:
             sides.append(problem.model(problem.tau, terms) @ fit.linear.coefficients)
         out[:, k] = (sides[0] - sides[1]) / (2.0 * knob.nudge)
     return out
+
+
+def _flip(fit: Fit, target: FloatArray) -> Fit:
+    """Try the other values of switches (restart, lasting, memory): a scan under much slow noise cannot tell them."""
+    for index, term in enumerate(fit.terms):
+        for number, parameter in enumerate(term.effect.shape):
+            if not parameter.steady or parameter.name in ("run", "share_of_form"):
+                continue
+            if term.name == "ageing" and fit.problem.response != "bias_deg_per_h":
+                continue
+            for value in {parameter.low, 0.0, parameter.high} - {term.shape[number]}:
+                shape = (*term.shape[:number], value, *term.shape[number + 1 :])
+                terms = (*fit.terms[:index], replace(term, shape=shape), *fit.terms[index + 1 :])
+                tried = _evaluate(fit.problem, terms, target, SHARES)
+                if tried.score < fit.score:
+                    fit, term = tried, terms[index]
+    return fit
 
 
 def _place_jumps(fit: Fit, target: FloatArray) -> tuple[Term, ...]:

@@ -8,6 +8,7 @@ import numpy as np
 from studies.diagnosis.baseline import Problem, Term, View, baseline_columns, restricted, term_columns
 from studies.diagnosis.campaign import Campaign
 from studies.diagnosis.fit import Fit, fit_terms
+from studies.diagnosis.likelihood import orthonormal
 from studies.diagnosis.states import FloatArray, States
 
 BLOCKS = 5
@@ -94,11 +95,26 @@ def _leave_one_record_out(fit: Fit, campaign: Campaign) -> float | None:
                 for mask, run in zip(fit.problem.present, campaign.runs, strict=True)]
         if sum(int((m & k).sum()) for m, k in zip(fit.problem.present, keep, strict=True)) < 40:
             return None
-        trained = fit_terms(restricted(fit.problem, keep), fit.terms, rounds=2)
+        trained = _train(restricted(fit.problem, keep), fit.terms)
         for k, run in enumerate(campaign.runs):
             if run.record == record:
                 residuals.append(_refit_own(trained, campaign, k))
     return rms(residuals)
+
+
+def _train(problem: Problem, terms: Sequence[Term]) -> Fit:
+    """Fit the rows that are left; an effect of which they know nothing (a jump in the run left out) stays at zero."""
+    views = problem.views(problem.tau)
+    columns = problem.baseline(views)
+    known: list[Term] = []
+    for term in terms:
+        own = problem.term(term, views)
+        ortho = orthonormal(columns / np.maximum(np.linalg.norm(columns, axis=0), 1e-300))
+        left = own - ortho @ (ortho.T @ own)
+        if (np.linalg.norm(left, axis=0) > 1e-6 * np.linalg.norm(own, axis=0)).all():
+            known.append(term)
+            columns = np.concatenate([columns, own], axis=1)
+    return fit_terms(problem, known, rounds=2)
 
 
 def _refit_own(trained: Fit, campaign: Campaign, k: int) -> FloatArray:
@@ -126,7 +142,7 @@ def _leave_one_block_out(fit: Fit, campaign: Campaign) -> float | None:
         keep = [(run.time < low - gap) | (run.time > high + gap) for run in campaign.runs]
         if sum(int((m & k).sum()) for m, k in zip(problem.present, keep, strict=True)) < 40:
             return None
-        trained = fit_terms(restricted(problem, keep), fit.terms, rounds=2)
+        trained = _train(restricted(problem, keep), fit.terms)
         for k, run in enumerate(campaign.runs):
             inside = (run.row_time >= low) & (run.row_time < high + (1e-9 if block < BLOCKS - 1 else 1.0))
             if inside.any():
