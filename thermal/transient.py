@@ -17,6 +17,7 @@ from thermal.relaxation import find_relaxation
 from thermal.steady import check_boundary_names, find_steady_state
 
 BLOCK = 1 << 16  # rows evaluated at a time; bounds the memory of long outputs
+MOST_ROWS = 200_000  # of a profile
 MOST_SWEEPS = 60
 SWEEP_TOLERANCE = 1e-7  # K
 MOST_RESTARTS = 200  # with more corners in its profiles than this, the integrator restarts at jumps only
@@ -228,9 +229,13 @@ def _with_simpson_mean(knots: Array, values: Array) -> Profile:
 def simulate(
     network: Network, boundaries: Mapping[str, Profile], initial: ArrayLike | None = None
 ) -> Transient:
-    """Propagate exactly where the network is linear, integrate where it is not."""
-    solver = propagate if network.is_linear else integrate
-    return solver(network, boundaries, initial)
+    """Propagate exactly where the network is linear, else sweep measured profiles and integrate those of few corners."""
+    if network.is_linear:
+        return propagate(network, boundaries, initial)
+    jumps = any(profile.jumps.size for profile in boundaries.values())
+    if len(_corners(network, boundaries)) > MOST_RESTARTS and not jumps:
+        return sweep(network, boundaries, initial)
+    return integrate(network, boundaries, initial)
 
 
 def lag(time: ArrayLike, temperature: ArrayLike, time_constant: float, initial: float | None = None) -> Array:
@@ -286,7 +291,10 @@ def _corners(network: Network, boundaries: Mapping[str, Profile]) -> Array:
     for name, profile in boundaries.items():
         if not (profile.value > 0).all():
             raise ThermalError(f"the profile of '{name}' reaches 0 K; temperatures here are in kelvin.")
-    return np.unique(np.concatenate([profile.time for profile in profiles]))
+    knots = np.unique(np.concatenate([profile.time for profile in profiles]))
+    if len(knots) > MOST_ROWS:
+        raise ThermalError(f"the profile has {len(knots)} rows; average it to at most {MOST_ROWS} rows.")
+    return knots
 
 
 def _forcing(network: Network, boundaries: Mapping[str, Profile], time: Array) -> tuple[Array, Array]:

@@ -16,6 +16,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "thermal": ("studies.cli.thermal:thermal", "Temperatures of the heat path for a chamber profile."),
     "fit frequency": ("studies.cli.fit_frequency:fit_frequency", "f(T) and its inverse from a steady-state table."),
     "fit bias": ("studies.cli.fit_bias:fit_bias", "Bias over frequency and its rate, selected stepwise."),
+    "fit thermal": ("studies.cli.fit_thermal:fit_thermal", "Lags of the resonator behind its housing, from records."),
     "fit cross-damping": ("studies.cli.fit_cross_damping:fit_cross_damping", "Cross-damping bias over temperature."),
     "diagnose": ("studies.cli.diagnose:diagnose", "What the simulation gets wrong, why, and what the repair is worth."),
     "derive": ("studies.cli.derive:derive", "The symbolic derivation, as equations, LaTeX or code."),

@@ -88,6 +88,13 @@ def test_transients_refuse_what_they_lack():
         propagate(assemble([*ROOM, LINK, Source("shell", constant(1.0, 60.0))]), {"chamber": hour})
 
 
+def test_a_profile_of_millions_of_rows_is_refused():
+    network = assemble([*ROOM, LINK])
+    t = np.arange(250_000.0)
+    with pytest.raises(ThermalError, match="250000 rows; average it to at most 200000"):
+        propagate(network, {"chamber": Profile(t, np.full(t.size, 300.0))})
+
+
 def test_other_impossible_numbers_are_refused():
     with pytest.raises(ThermalError, match="above 0 K"):
         find_steady_state(assemble([*ROOM, LINK]), {"chamber": -20.0})

@@ -166,6 +166,9 @@ def test_simulate_chooses_the_exact_way_where_there_is_one():
     linear, radiative = assemble(LINEAR), assemble(RADIATIVE)
     assert np.array_equal(simulate(linear, CHAMBER).at(t), propagate(linear, CHAMBER).at(t))
     assert np.array_equal(simulate(radiative, CHAMBER).at(t), integrate(radiative, CHAMBER).at(t))
+    rows = np.linspace(0.0, 7200.0, 721)
+    measured = {"chamber": Profile(rows, 293.15 + np.sin(rows / 500.0))}
+    assert np.array_equal(simulate(radiative, measured).at(t), sweep(radiative, measured).at(t))
 
 
 def test_sweeps_tend_to_the_integrated_radiation_with_the_fourth_power_of_the_rows():

@@ -1,0 +1,78 @@
+"""`hrg fit thermal`: time constants of the resonator behind its housing, from records."""
+
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from thermal.identification import Identification
+
+UNITS = {"offset": "Hz", "slope": "Hz/K", "curvature": "Hz/K²", "cubic": "Hz/K³"}
+
+
+def fit_thermal(
+    *data: str, card: str | None = None, lags: int | None = None, confidence: float = 0.9, json: bool = False
+) -> int:
+    """Identify how the resonator lags behind its housing, with intervals, and say what the records cannot tell.
+
+    The records need time_s, frequency_Hz and housing_temperature_degC (or chamber_temperature_degC). The initial state of
+    every run is unknown and fitted; the noise may wander. Several lags act side by side and their weights add up to 1: a
+    negative weight is a lag in series.
+
+    Parameters
+    ----------
+    data : str
+        One or more records (CSV): steps, ramps or cycles.
+    card : str
+        A card whose law gives the bend of the frequency over temperature; without it a curvature is fitted.
+    lags : int
+        Number of lags; as many as the records support unless given.
+    confidence : float
+        Of the intervals.
+    json : bool
+        Print one JSON object (schema hrg.fit-thermal/1) instead of a table.
+    """
+    from studies.cli.output import print_json, print_table, say
+    from studies.errors import InputError
+    from studies.instrument.card import load_card
+    from studies.record import read_record
+    from studies.thermal_constants import fit_thermal_constants
+
+    if not data:
+        raise InputError("name at least one record (CSV) with a step, a ramp or a cycle of temperature.")
+    if not 0 < confidence < 1:
+        raise InputError(f"--confidence {confidence:g}: a confidence lies between 0 and 1, such as 0.9.")
+    records = [read_record(path) for path in data]
+    found = fit_thermal_constants(records, load_card(card) if card else None, lags, confidence)
+    for warning in found.warnings:
+        say(f"warning: {warning}")
+    if json:
+        print_json(_payload(found, list(data)))
+        return 0
+    rows = []
+    for name, estimate in found.estimates.items():
+        unit = UNITS.get(name, "s" if name.startswith("time_constant") else "")
+        if estimate.value is None:
+            rows.append([name, "not determined", "", "", unit])
+        else:
+            rows.append([name, *(f"{x:.7g}" for x in (estimate.value, estimate.low, estimate.high)), unit])
+    note = f"Intervals of {100 * confidence:g} %; rows of {found.row_step:g} s; residual {found.residual.std():.2g} Hz."
+    print_table("Thermal constants", ["constant", "value", "low", "high", "unit"], rows, note)
+    for direction in found.undetermined:
+        print(f"the records leave this combination open: {direction}")
+    return 0
+
+
+def _payload(found: "Identification", data: list[str]) -> "dict[str, Any]":
+    return {
+        "schema": "hrg.fit-thermal/1",
+        "data": data,
+        "confidence": found.confidence,
+        "estimates": {
+            name: {"value": e.value, "low": e.low, "high": e.high, "determined": e.value is not None}
+            for name, e in found.estimates.items()
+        },
+        "undetermined": [direction.parts for direction in found.undetermined],
+        "initial_departure_K": [departure.tolist() for departure in found.departures],
+        "residual_rms_Hz": float(found.residual.std()),
+        "row_step_s": found.row_step,
+        "warnings": list(found.warnings),
+    }

@@ -1,0 +1,78 @@
+"""Thermal constants of a resonator from records of its frequency and its housing's temperature."""
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from studies.errors import InputError, naming
+from studies.record import Record
+from thermal.followers import make_lags
+from thermal.identification import FrequencyLaw, Identification, identify, identify_lags
+from thermal.run import Run
+
+if TYPE_CHECKING:
+    from studies.instrument.card import Instrument
+
+ZERO_CELSIUS = 273.15
+SENSORS = ("housing_temperature_degC", "chamber_temperature_degC")
+
+
+def fit_thermal_constants(
+    records: Sequence[Record], instrument: "Instrument | None" = None, lags: int | None = None, confidence: float = 0.9
+) -> Identification:
+    """Identify the lags of the resonator behind its housing, each run with an initial state of its own.
+
+    Parameters
+    ----------
+    records : sequence of Record
+        Runs with `frequency_Hz` and the temperature of the housing, else of the chamber.
+    instrument : Instrument, optional
+        Gives curvature and cubic of the frequency over temperature; without it the curvature is fitted and the
+        cubic is zero. The slope is always fitted.
+    lags : int, optional
+        Number of lags; as many as the record supports, up to three, when absent.
+    confidence : float
+        Of the intervals.
+
+    Raises
+    ------
+    InputError
+        A record without the columns, or from which nothing can be identified.
+    """
+    if lags is not None and not 1 <= lags <= 5:
+        raise InputError(f"--lags {lags}: the number of lags lies between 1 and 5.")
+    runs = [_run(record) for record in records]
+    law = _law(runs, instrument)
+    with naming(", ".join(record.path or "record" for record in records)):
+        if lags is None:
+            return identify_lags(runs, law, confidence=confidence)
+        span = max(float(np.ptp(run.time)) for run in runs)
+        starts = span / 6 * 0.3 ** np.arange(lags)
+        return identify(runs, make_lags(*starts, longest=10 * span), law, confidence)
+
+
+def _run(record: Record) -> Run:
+    sensor = next((name for name in SENSORS if name in record), None)
+    if sensor is None or "frequency_Hz" not in record:
+        raise InputError(
+            f"{record.path}: thermal constants need frequency_Hz and {SENSORS[0]} (or {SENSORS[1]});"
+            f" it has {', '.join(record.columns)}."
+        )
+    with naming(record.path):
+        return Run(record["time_s"], record["frequency_Hz"], record[sensor] + ZERO_CELSIUS)
+
+
+def _law(runs: Sequence[Run], instrument: "Instrument | None") -> FrequencyLaw:
+    """A free slope about the middle of what the housing covers, with the card's bend or a free curvature."""
+    ends = np.array([f(run.housing_temperature) for run in runs for f in (np.nanmin, np.nanmax)])
+    low, high = float(ends.min()), float(ends.max())
+    middle = (low + high) / 2
+    if instrument is None:
+        return FrequencyLaw(middle, slope=None, curvature=None)
+    from studies.simulation.frequency import build_frequency_model
+
+    model = build_frequency_model(instrument, low - 10, high + 10)
+    T = np.linspace(model.lowest, model.highest, 61)
+    cubic = np.polynomial.Polynomial.fit(T - middle, model.frequency(T), 3).convert().coef
+    return FrequencyLaw(middle, slope=None, curvature=float(cubic[2]), cubic=float(cubic[3]))
