@@ -20,6 +20,7 @@ from studies.record import COMPENSATED, Record
 
 Array = NDArray[np.float64]
 METHODS: tuple[Method, ...] = ("guarded", "paper")
+LOWEST_FREQUENCY = 100.0  # Hz
 LARGEST_REST = 1e-3  # °/s of applied rate that still counts as rest
 
 
@@ -134,6 +135,9 @@ def find_output(records: Sequence[Record]) -> str:
         where = record.path or "record"
         if "frequency_Hz" not in record:
             raise InputError(f"{where}: the column 'frequency_Hz' is missing; the bias model is a function of it.")
+        typical = float(np.nanmedian(record["frequency_Hz"])) if np.isfinite(record["frequency_Hz"]).any() else LOWEST_FREQUENCY
+        if 0 < typical < LOWEST_FREQUENCY:
+            raise InputError(f"{where}: frequency_Hz around {typical:g} cannot be a resonator's; is it in kHz? Multiply it by 1000.")
         if "rate_deg_per_s" in record and np.nanmax(np.abs(record["rate_deg_per_s"])) > LARGEST_REST:
             raise InputError(f"{where}: rate_deg_per_s is not zero; a bias is fitted to runs at rest ('hrg fit scale' else).")
     for name in OUTPUTS:

@@ -59,8 +59,7 @@ def compensate(
         say(f"reading {run}")
         record = read_record(run)
         result = models.compensate(loaded, record, extrapolate=extrapolate)
-        say(f"writing {len(result):,} rows")
-        write_record(result, out)
+        write_record(result, out, lambda rows: say(f"written {rows:,} of {len(result):,} rows") if rows % 500_000 == 0 else None)
         for name in result.columns:
             if name.startswith(COMPENSATED) and name not in record:
                 before, after = record[name.removeprefix(COMPENSATED)], result[name]

@@ -110,7 +110,7 @@ def path_table(judged: "Judged", output: str) -> Table:
                 str(k),
                 action,
                 "" if math.isnan(step.F) else f"{step.F:.2f}",
-                "" if math.isnan(step.p_value) else f"{step.p_value:.1e}",
+                "" if math.isnan(step.p_value) else _probability(step.p_value),
                 f"{step.criterion:.2f}",
                 "" if math.isnan(score) else f"{score:.3f}",
                 ", ".join(SYMBOLS[name] for name in sorted(step.terms, key=list(TERMS).index)) or "constant only",
@@ -252,6 +252,10 @@ def _facts(study: "BiasStudy", method: Method) -> Block:
         ("Terms", str(len(judged.fit.terms)), f"of {len(TERMS)} candidates; the paper keeps {len(SELECTED_BY_THE_PAPER)}"),
     ]
     return Facts(facts)
+
+
+def _probability(p: float) -> str:
+    return f"{p:.1e}" if p >= 1e-99 else "< 1e-99"
 
 
 def _measured(value: float, uncertainty: float) -> str:

@@ -41,8 +41,9 @@ def main() -> None:
     command = [sys.executable, "-c", "from studies.cli import run; run()", "fit", "bias", str(path), "--save", str(folder / "m.toml")]
     subprocess.run(command, check=True)
     elapsed = time.perf_counter() - begin
-    memory = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss / 1e6
-    print(f"hrg fit bias: {elapsed:.1f} s (goal 15), {memory:.2f} GB (goal 2)")
+    usage = resource.getrusage(resource.RUSAGE_CHILDREN)
+    busy = usage.ru_utime + usage.ru_stime
+    print(f"hrg fit bias: {elapsed:.1f} s (goal 15), {busy:.1f} s of processor, {usage.ru_maxrss / 1e6:.2f} GB (goal 2)")
 
 
 if __name__ == "__main__":

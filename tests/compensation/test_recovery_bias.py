@@ -224,6 +224,17 @@ def test_unusable_runs_are_refused(change, message):
         prepare_run(**arguments)
 
 
+def test_irregular_sampling_gives_the_same_coefficients():
+    rng = np.random.default_rng(9)
+    t = np.sort(rng.uniform(0.0, 18000.0, 6000))
+    change = -17.0 * (1 - (3000 * np.exp(-t / 3000) - 900 * np.exp(-t / 900)) / 2100)
+    rate = -17.0 * (np.exp(-t / 3000) - np.exp(-t / 900)) / 2100
+    bias = 1 + 0.3 * change - 500 * rate + 0.3 * rng.normal(size=t.size)
+    fit = fit_bias([prepare_run(t, 4433.0 + change + 0.003 * rng.normal(size=t.size), bias)], reference_frequency=4433.0)
+    assert fit.terms == ("f", "fdot")
+    assert np.all(np.abs(fit.coefficients - [1.0, 0.3, -500.0]) < 4 * fit.standard_errors)
+
+
 def test_a_constant_frequency_and_a_short_run_are_refused():
     rng = np.random.default_rng(4)
     still = prepare_run(TIME, np.full(TIME.size, 4433.0), rng.normal(size=TIME.size))
