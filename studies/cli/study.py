@@ -32,7 +32,7 @@ def run(
         [[parameter]]: name (a key of the card such as resonator.thickness_mm, or temperature_degC, or user.NAME for a
         function of yours) with tolerance, or low and high, or values; nominal, count, distribution = uniform, normal (with
         standard_deviation), triangular or log-uniform. [[quantity]]: name = bryan-factor, compensation-residual, frequency,
-        mode-separation, python or tcf, with harmonic, index, theory, temperature_degC, label and keys of its own.
+        mode-separation, python, tcf or thermal-time-constants, with harmonic, index, theory, temperature_degC, label and keys of its own.
         [[requirement]]: column with within (of target), or low, high. [[search]]: kind = worst-case with column, or
         inversion with vary and targets. Example and details: python -m pydoc studies.sweeps.spec.
     out : str
@@ -119,7 +119,7 @@ def status(folder: str, *, json: bool = False) -> int:
         [key.replace("_", " "), _words(found[key])]
         for key in ("state", "cases", "done", "failed", "seconds_each", "runs")
     ]
-    print_table(results.study.name, ["", ""], rows, results.study.note.strip("-"))
+    print_table(results.study.name, ["what", "value"], rows, results.study.note.strip("-"))
     _print_reasons(results)
     return 0
 

@@ -6,6 +6,7 @@ import numpy as np
 
 from studies.reports import style
 from studies.reports.page import Picture, draw
+from studies.sweeps.parameters import UNITS
 
 if TYPE_CHECKING:
     from studies.sweeps.quantity import Column
@@ -18,11 +19,11 @@ COLOURS = (style.BLUE, style.VERMILION, style.GREEN, style.PURPLE, style.ORANGE,
 
 
 def label(name: str, unit: str) -> str:
-    """Return a parameter's name without the unit that it carries, and the unit in brackets."""
-    words = name.removeprefix("resonator.").removeprefix("material.").removeprefix("user.")
-    for suffix in ("_mm", "_GPa", "_kg_m3", "_degC", "_deg", "_s"):
-        words = words.removesuffix(suffix)
-    return words.replace("_", " ").replace(".", " ") + ("" if unit == "1" else f" ({unit})")
+    """Return a parameter's name without its table and the unit that it carries, and the unit in brackets."""
+    words = name.split(".", 1)[-1]
+    suffix = next((suffix for suffix in UNITS if words.endswith(suffix)), "")
+    plain = words.removesuffix(suffix).replace("_", " ").replace(".", " ")
+    return plain + ("" if unit == "1" else f" ({unit})")
 
 
 def column_label(column: "Column") -> str:

@@ -1,7 +1,7 @@
 """Parameters of a study: keys of a card by their path, the temperature, or free numbers for a user's function.
 
-`resonator.thickness_mm`, `resonator.stem.radius_mm`, `material.youngs_modulus_GPa`, `material.law` name keys of the
-card; a whole number is a place in a list (`resonator.thickness_mm.1.1`). `temperature_degC` is the temperature of
+`resonator.thickness_mm`, `resonator.stem.radius_mm`, `material.youngs_modulus_GPa`, `material.law`,
+`thermal.film_emissivity` name keys of the card; a whole number is a place in a list (`resonator.thickness_mm.1.1`). `temperature_degC` is the temperature of
 quantities that give none of their own. `user.anything` reaches only user functions.
 """
 
@@ -14,7 +14,11 @@ from studies.instrument.card import MATERIAL_KEYS, Instrument
 from studies.instrument.resonator import SHAPES, STEM_KEYS
 
 TEMPERATURE = "temperature_degC"
-UNITS = {"_degC": "°C", "_GPa": "GPa", "_kg_m3": "kg/m³", "_mm": "mm", "_deg": "°", "_s": "s"}
+UNITS = {
+    "_degC": "°C", "_GPa": "GPa", "_kg_m3": "kg/m³", "_mm": "mm", "_deg": "°", "_cm2": "cm²", "_mW": "mW", "_s": "s",
+    "_W_per_m_K": "W/(m K)", "_J_per_kg_K": "J/(kg K)", "_J_per_K": "J/K", "_W_per_K": "W/K",
+}  # fmt: skip
+TABLES = ("resonator", "material", "thermal")
 MATERIAL_VALUES = {
     # key of the card: (property of the material, its unit here in SI)
     "youngs_modulus_GPa": ("youngs_modulus", 1e9),
@@ -87,11 +91,11 @@ def _replaced(table: Any, path: Sequence[str], value: Any) -> Any:
 
 
 def _paths(table: Any, before: str = "") -> Iterator[str]:
-    """Give the path of every number and text of the card's resonator and material."""
+    """Give the path of every number and text of the card's resonator, material and thermal tables."""
     items = enumerate(table) if isinstance(table, list) else table.items()
     for key, value in items:
         path = f"{before}{key}"
-        if not before and key not in ("resonator", "material"):
+        if not before and key not in TABLES:
             continue
         if isinstance(value, Mapping | list):
             yield from _paths(value, path + ".")
@@ -101,7 +105,12 @@ def _paths(table: Any, before: str = "") -> Iterator[str]:
 
 def _open_keys(content: Mapping[str, Any]) -> list[str]:
     """Return the keys that a card of this shape may have besides those that it has."""
+    from studies.simulation.heat_path import KEYS as THERMAL_KEYS
+
     shape = SHAPES[content["resonator"]["shape"]][0]
     stem = [f"resonator.stem.{key}" for key in STEM_KEYS] if "stem" in content["resonator"] else []
     plain = [f"resonator.{key}" for key in shape if key not in ("stem", "segment")]
-    return [*plain, *stem, *(f"material.{key}" for key in MATERIAL_KEYS)]
+    others = [
+        f"{table}.{key}" for table, keys in (("material", MATERIAL_KEYS), ("thermal", THERMAL_KEYS)) for key in keys
+    ]
+    return [*plain, *stem, *others]

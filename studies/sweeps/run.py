@@ -127,7 +127,9 @@ def check_functions(study: Study, allowed: bool) -> dict[str, str]:
 def identify(study: Study, design: Design, sources: Mapping[str, str]) -> dict[str, Any]:
     """Return everything that the results depend on; `base` is its hash, part of the key of every case."""
     physics = {
-        "card": {key: study.instrument.content[key] for key in ("resonator", "material")},
+        "card": {
+            key: value for key, value in study.instrument.content.items() if key not in ("schema", "name", "note")
+        },
         "reference_temperature": study.instrument.reference_temperature,
         "material_laws": digest(spell_material(study.instrument.material)),
         "quantity": study.content["quantity"],
