@@ -99,7 +99,7 @@ def gather_rest(records: "Sequence[Record]", outputs: "dict[str, float]") -> Res
     column = choose_column(records, TEMPERATURES, "a fit over temperature")
     runs, left_out, widest = [], 0, 0.0
     for record in records:
-        if "rate_deg_per_s" in record and np.nanmax(np.abs(record["rate_deg_per_s"]), initial=0.0) > LARGEST_REST:
+        if "rate_deg_per_s" in record and np.any(np.abs(record["rate_deg_per_s"]) > LARGEST_REST):
             raise InputError(f"{record.path}: rate_deg_per_s is not zero; this fit needs the gyro at rest.")
         time, values, temperature = record["time_s"], record[output], record[column]
         complete = drop_spikes(np.isfinite(values) & np.isfinite(temperature), values, temperature)

@@ -9,12 +9,13 @@ from numpy.typing import NDArray
 
 from compensation.bell import Chain, apply_chain
 from compensation.bell_calibration import Run, fit_chain
+from compensation.decimation import average_blocks
 from compensation.linearity import measure_linearity, same_rate
 from compensation.samples import is_regular
 from compensation.stability import allan_deviation
 from studies.errors import InputError
 from studies.models.kinds.scale import RAW
-from studies.rest import CELSIUS_ZERO, LARGEST_REST, TEMPERATURES, choose_column, drop_spikes
+from studies.rest import CELSIUS_ZERO, LARGEST_REST, MOST_ROWS, TEMPERATURES, choose_column, drop_spikes
 
 if TYPE_CHECKING:
     from studies.record import Record
@@ -50,7 +51,10 @@ class StepFigures:
 
 @dataclass(frozen=True)
 class ScaleStudy:
-    """The chain, its runs, its figures on them, and rms error (°/s) before and after on blocks left out of the fit."""
+    """The chain, its runs, its figures on them, and rms error (°/s) before and after on blocks left out of the fit.
+
+    `averaged` tells that a run was long and the fit, and this error, are of its block averages.
+    """
 
     chain: Chain
     runs: tuple[Run, Run, Run]
@@ -60,6 +64,7 @@ class ScaleStudy:
     figures: list[StepFigures]
     error_before: float
     error_held_out: float
+    averaged: bool
 
 
 def judge_steps(chain: Chain, rates: Run, rest: Run, turning: Run) -> list[StepFigures]:
@@ -120,10 +125,13 @@ def study_scale(records: "Sequence[Record]", cutoff: float | None, order: int) -
             raise InputError(f"no record is a run {kind}, which {equation} needs; record one and give it too.")
     rates, rest, turning = (sorted_runs[kind][0] for kind in KINDS)
     sampling = float(np.median(np.diff(rest.time)))
-    chain = fit_chain(rates, rest, turning, cutoff=cutoff, order=order, sampling=sampling)
-    before, after = _hold_out((rates, rest, turning))
+    runs = (rates, rest, turning)
+    thin = (_thin(rates), _thin(rest), _thin(turning))
+    chain = fit_chain(*thin, cutoff=cutoff, order=order, sampling=sampling)
+    before, after = _hold_out(thin)
     figures = judge_steps(chain, rates, rest, turning)
-    return ScaleStudy(chain, (rates, rest, turning), output, column, left_out, figures, before, after)
+    averaged = any(len(less.time) < len(run.time) for less, run in zip(thin, runs, strict=True))
+    return ScaleStudy(chain, runs, output, column, left_out, figures, before, after, averaged)
 
 
 KINDS = {
@@ -155,6 +163,25 @@ def _read_run(record: "Record", output: str, column: str) -> tuple[Run, int]:
         raise InputError(f"{record.path}: no rows with {output}, {column} and rate_deg_per_s together.")
     time, raw, temperature, rate = (values[complete] for values in columns)
     return Run(time, raw, temperature + CELSIUS_ZERO, rate * DEG), int(np.count_nonzero(~complete))
+
+
+def _thin(run: Run) -> Run:
+    """Return a long run as block averages for the fit, without the blocks in which the applied rate changes."""
+    if len(run.time) <= MOST_ROWS:
+        return run
+    width = (run.time[-1] - run.time[0]) / MOST_ROWS
+    level = same_rate(run.rate)
+    columns = {
+        "output": run.output,
+        "temperature": run.temperature,
+        "rate": run.rate,
+        "level": level,
+        "square": level**2,
+    }
+    blocks = average_blocks(run.time, columns, width)
+    mean = blocks.columns
+    steady = mean["square"] - mean["level"] ** 2 <= 1e-9 * np.max(level**2, initial=1e-30)
+    return Run(*(values[steady] for values in (blocks.time, mean["output"], mean["temperature"], mean["rate"])))
 
 
 def _hold_out(runs: tuple[Run, Run, Run]) -> tuple[float, float]:

@@ -59,16 +59,16 @@ def fit_cross_damping(
         raise InputError("name at least one record (CSV) of a gyro at rest.")
     records = [read_record(path) for path in data]
     carrier = frequency if frequency is not None else _median(records, "frequency_Hz", "--frequency")
-    Q = quality if quality is not None else 1 / _median(records, "inverse_q", "--quality")
-    if not (math.isfinite(Q) and Q > 1 and carrier > 0):
+    loss = 1 / quality if quality else _median(records, "inverse_q", "--quality")
+    if not (0 < loss < 1 and carrier > 0):
         raise InputError(
-            f"a frequency of {carrier:g} Hz with Q = {Q:g} is no resonator; both must be positive, Q above 1."
+            f"a frequency of {carrier:g} Hz with 1/Q = {loss:g} is no resonator; give --frequency and --quality."
         )
     gathered = gather_rest(records, OUTPUTS)
     study = study_cross_damping(
         gathered.runs,
         k=2 * math.pi * carrier,
-        zeta=1 / (2 * Q),
+        zeta=loss / 2,
         calibration_temperature=calibration_temperature + 273.15,
         order=order,
     )
@@ -98,7 +98,7 @@ def fit_cross_damping(
                 "output": gathered.output,
                 "temperature": gathered.temperature_column,
                 "frequency_Hz": carrier,
-                "quality": Q,
+                "quality": 1 / loss,
                 "calibration_temperature_degC": calibration_temperature,
                 "coefficients": study.model.coefficients,
                 "standard_errors": np.sqrt(np.diag(study.model.covariance)),

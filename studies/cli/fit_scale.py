@@ -57,6 +57,8 @@ def fit_scale(
         say(f"model: {save}")
     if study.left_out:
         say(f"{study.left_out} rows with an empty cell or an outlier were left out.")
+    if study.averaged:
+        say("long runs were averaged in blocks for the fit; the held-out error is that of the blocks.")
     if report is not None:
         write_text(report, page.scale_page(study, ", ".join(data)))
         say(f"report: {report}")

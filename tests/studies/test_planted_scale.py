@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from compensation.bell import apply_chain
+from compensation.bell_calibration import fit_chain
 from studies.cli import main
 from studies.errors import InputError
 from studies.models import compensate, emit_c, read_model
@@ -21,6 +22,18 @@ from studies.rest import drop_spikes
 from studies.scale import settled_rows
 
 STRIDE = 20
+KEYS = {
+    "schema",
+    "records",
+    "output",
+    "temperature",
+    "parts",
+    "steps",
+    "error_before_deg_per_s",
+    "error_held_out_deg_per_s",
+    "filter_delay_s",
+    "rows_left_out",
+}
 
 
 def write(path, run, missing=()):
@@ -43,6 +56,8 @@ def test_planted_chain_is_recovered_in_any_order_of_files(records, capsys):
     assert main(["fit", "scale", *records[::-1], "--json"]) == 0
     found = json.loads(capsys.readouterr().out)
     assert found["schema"] == "hrg.fit-scale/1"
+    assert set(found) == KEYS
+    assert set(found["parts"]) == {"rough", "bias", "scale_over_rate", "scale_over_temperature"}
     gyro, parts = read_printed_chain(), found["parts"]
     # The factors of the scale are shared between three steps; their product at 25 °C and their shape are planted.
     at_25 = float(gyro.scale_over_temperature.value(298.15))
@@ -182,6 +197,23 @@ def test_smooth_columns_have_no_spikes():
     assert np.all(drop_spikes(keep, ramp + 273.15 - 273.15, np.full(1000, 3.0)))
     ramp[[5, 700]] += [3.0, -1.0]
     assert np.flatnonzero(~drop_spikes(keep, ramp)).tolist() == [5, 700]
+
+
+def test_long_runs_are_averaged_for_the_fit(monkeypatch):
+    """Block averages give the same chain as the rows, and no block mixes two applied rates."""
+    from studies import scale
+
+    rates, rest, turning = simulate_runs(np.random.default_rng(5))
+    whole = fit_chain(rates, rest, turning, cutoff=None)
+    monkeypatch.setattr(scale, "MOST_ROWS", 2000)
+    thin = [scale._thin(run) for run in (rates, rest, turning)]
+    assert all(1900 < len(run.time) <= 2001 for run in thin)
+    assert len(np.unique(np.round(thin[0].rate / DEG, 6))) == 19
+    averaged = fit_chain(*thin, cutoff=None)
+    for name in ("bias", "scale_over_rate", "scale_over_temperature"):
+        one, other = getattr(whole, name), getattr(averaged, name)
+        error = np.sqrt(np.diag(one.covariance))
+        assert np.all(np.abs(one.coefficients - other.coefficients) < 0.5 * error)
 
 
 def test_settled_rows():
