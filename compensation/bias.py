@@ -1,8 +1,7 @@
 """Bias of the gyro as a function of its own frequency and of how fast that changes, HRG paper eqs. (19)–(22).
 
 B = B₀ + k₁ f + k₂ f² + k₃ f³ + k₄ ḟ + k₅ ḟ² + k₆ ḟ³ + k₇ f ḟ + k₈ f² ḟ + k₉ f ḟ², f the *change* of frequency (Hz),
-ḟ its rate (Hz/s), B in the unit of the bias column.
-Which terms are taken is decided in `compensation.bias_selection`.
+ḟ its rate (Hz/s), B in the unit of the bias column. Which terms are taken is decided in `compensation.bias_selection`.
 """
 
 from collections.abc import Sequence
@@ -48,7 +47,6 @@ class BiasRun:
     lag: float
     missing: int
     spikes: int
-
 
     def part(self, rows: slice) -> "BiasRun":
         """Return some consecutive rows as a run of its own."""

@@ -4,7 +4,7 @@ Two ways of selecting stand side by side; the coefficients of the chosen terms a
 
 `paper`    F-tests that take the rows for independent, entry 0.05 and removal 0.10;
 `guarded`  the errors may remember (white noise plus random walk), the entry level is shared among the candidates that
-           compete, so that noise alone brings a term in at most one time in twenty; given several runs, the model on
+           compete, so that noise alone brings a term in about one time in twenty; given several runs, the model on
            the path that best predicts a run from the others is kept, if any does better than a constant.
 """
 
@@ -31,8 +31,8 @@ BLOCKS = 5
 CAUTION = 1.0
 
 
-class NothingInRange(CompensationError):
-    """A held-out part lies wholly outside the range of frequency and rate that the rest has seen."""
+class NoHeldOut(CompensationError):
+    """Nothing can be held out: the rest carries no fit, or has not seen its frequencies and rates."""
 
 
 @dataclass(frozen=True)
@@ -91,12 +91,17 @@ def score_held_out(runs: Sequence[BiasRun], method: Method = "guarded") -> HeldO
 
     Raises
     ------
-    NothingInRange
-        Nothing of any held-out piece lies inside the range of the rest.
+    NoHeldOut
+        The run is too short, or nothing of any held-out piece lies inside the range of the rest.
     """
     by_runs = len(runs) > 1
-    folds = _folds(runs, by_runs)
-    fits = [_select(fold.rest, method, None, by_runs=by_runs and len(runs) > 2) for fold in folds]
+    folds, fits = [], []
+    for fold in _folds(runs, by_runs):
+        try:
+            fits.append(_select(fold.rest, method, None, by_runs=by_runs and len(runs) > 2))
+            folds.append(fold)
+        except CompensationError:  # what is left without this part carries no fit
+            continue
     return _pool(folds, fits, by_runs=by_runs)
 
 
@@ -118,7 +123,7 @@ def _select(pieces: Sequence[BiasRun], method: Method, reference_frequency: floa
         return fit_terms(design, selection.terms, selection=selection)
     try:
         scores = _score_path(pieces, path, theta, reference)
-    except NothingInRange:  # no run can be predicted from the others: the tests alone decide
+    except CompensationError:  # no run can be predicted from the others: the tests alone decide
         return fit_terms(design, selection.terms, selection=selection)
     best = path[int(np.argmin(scores))]
     return fit_terms(design, tuple(sorted(best, key=names.index)), selection=selection, scores=scores)
@@ -141,9 +146,9 @@ def _folds(pieces: Sequence[BiasRun], by_runs: bool) -> list[_Fold]:
     if by_runs:
         return [_Fold(run, [other for other in pieces if other is not run]) for run in pieces]
     length = max(1, sum(piece.time.size for piece in pieces) // BLOCKS)
+    gap = thermal_constant(pieces)
     folds = []
     for piece in pieces:
-        gap = thermal_constant(pieces)
         cuts = np.linspace(0, piece.time.size, max(1, round(piece.time.size / length)) + 1).astype(int)
         for begin, end in pairwise(cuts.tolist()):
             before = int(np.searchsorted(piece.time, piece.time[begin] - gap))
@@ -154,10 +159,7 @@ def _folds(pieces: Sequence[BiasRun], by_runs: bool) -> list[_Fold]:
             if rest and sum(part.time.size for part in rest) > 4 * len(TERMS):
                 folds.append(_Fold(piece.part(slice(begin, end)), rest))
     if not folds:
-        raise CompensationError(
-            "the run is too short to hold a part of it out: less than its thermal constant would be left; record longer, "
-            "or give several runs."
-        )
+        raise NoHeldOut("the run is too short to hold a part of it out; record longer, or give several runs.")
     return folds
 
 
@@ -175,7 +177,7 @@ def score_runs(fit: BiasFit, runs: Sequence[BiasRun], *, extrapolate: bool = Fal
 
     Raises
     ------
-    NothingInRange
+    NoHeldOut
         Nothing of the runs lies inside the range of frequency and rate that the fit has seen.
     """
     return _pool([_Fold(run, []) for run in runs], [fit] * len(runs), by_runs=True, everywhere=extrapolate)
@@ -200,7 +202,7 @@ def _pool(
             raw.append(averages[0] - averages[0].mean())
             compensated.append(averages[1] - averages[1].mean())
     if not raw:
-        raise NothingInRange(
+        raise NoHeldOut(
             "no held-out part lies inside the range of frequency and rate of the rest; record a second run over the "
             "same temperatures."
         )

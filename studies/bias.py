@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from compensation.bias import BiasFit, BiasRun, prepare_run
-from compensation.bias_selection import HeldOut, Method, NothingInRange, bias_stability, fit_bias, score_held_out
+from compensation.bias_selection import HeldOut, Method, NoHeldOut, bias_stability, fit_bias, score_held_out
 from compensation.decimation import average_blocks, find_spikes
 from compensation.stability import AllanDeviation, NoiseCoefficients, allan_deviation, fit_noise
 from studies.errors import InputError, naming
@@ -110,7 +110,7 @@ def study_bias(
         fit = fit_bias(runs, name)
         try:
             held_out = score_held_out(runs, name)
-        except NothingInRange as error:
+        except NoHeldOut as error:
             held_out, why = None, str(error)
         judged.append(Judged(name, fit, _training(runs, fit), held_out))
     fit = next(j.fit for j in judged if j.method == method)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from compensation.bias import TERMS, prepare_run, term_columns
-from compensation.bias_selection import NothingInRange, bias_stability, fit_bias, score_held_out, score_runs
+from compensation.bias_selection import NoHeldOut, bias_stability, fit_bias, score_held_out, score_runs
 from compensation.coloured import estimate_theta, fit_coloured
 from compensation.decimation import average_blocks, find_spikes
 from compensation.derivative import differentiate
@@ -88,11 +88,19 @@ def test_one_run_is_held_out_in_blocks_and_says_how_little_that_covers():
     assert score_held_out([make_run(rng)]).coverage < 0.5  # a monotonic run leaves little that the rest has seen
 
 
+def test_a_run_too_short_to_hold_out_says_so():
+    rng = np.random.default_rng(8)
+    run = prepare_run(TIME[:320], profile(rng)[:320], rng.normal(size=320))
+    assert fit_bias([run]).terms == ()
+    with pytest.raises(NoHeldOut, match="record longer"):
+        score_held_out([run])
+
+
 def test_a_cooling_run_says_nothing_of_a_warming_one():
     rng = np.random.default_rng(5)
     fit = fit_bias([make_run(rng)])
     warming = make_run(rng, amplitude=17.0)
-    with pytest.raises(NothingInRange, match="second run"):
+    with pytest.raises(NoHeldOut, match="second run"):
         score_runs(fit, [warming])
     assert score_runs(fit, [warming], extrapolate=True).coverage == 1.0
 
