@@ -1,0 +1,330 @@
+"""Mutated files: cards, records, tables, profiles, maps, raw files, models and studies, thousands of them, never harm.
+
+The mutations follow the grammar of the formats (keys, values, cells, headers, notation), so most of them get past the
+parser. Whatever a reader is given, it accepts it or raises one of the errors that a user can mend; nothing is evaluated,
+nothing hangs, and no text of a file stands unescaped in a page.
+"""
+
+import signal
+import tomllib
+import traceback
+import warnings
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+import pytest
+import tomli_w
+
+from compensation.frequency import fit_frequency
+from studies.cli import main
+from studies.errors import UNUSABLE_INPUT, MissingEnvironment
+from studies.importing.draft import draft_map
+from studies.importing.join import import_record
+from studies.importing.mapping import load_map
+from studies.instrument.card import load_card, shipped_cards
+from studies.models import Source, compensate, emit_c, read_model, write_model
+from studies.models.kinds.frequency import save_frequency
+from studies.record import read_frequency_table, read_profile, read_record
+from studies.sweeps.spec import read_study, shipped_specs
+
+ALLOWED = (*UNUSABLE_INPUT, MissingEnvironment)
+CASES = 250  # mutated files of each format
+LONGEST = 20  # seconds until a reader counts as hanging
+PAYLOAD = "<script>alert(1)</script>"
+T = np.array([-20.0, -10, 0, 10, 20, 30, 40])
+F = np.array([4417.02, 4421.09, 4424.89, 4428.55, 4432.06, 4435.55, 4439.19])
+
+
+def odd_values(rng, flag):
+    """Values that a key of a TOML file may wrongly hold."""
+    values = [
+        "", PAYLOAD, f"__import__('pathlib').Path({str(flag)!r}).touch()", f"!!python/object/apply:os.system ['touch {flag}']",
+        "../../etc/passwd", "a" * 5000, "Ω‮\x07\x1b[31m", "{{ 7 * 7 }}", "${HOME}", "%n%s%x", "nan", "1e400", "1_000", "١٢",
+        0, -1, 1, -0.0, 1e-320, 1e308, -1e308, float("nan"), float("inf"), 10**30, 2**63, True, False,
+        [], [[]], [1, "x"], [[0.0, 1.0]], [[1.0, 1.0], [0.0, 1.0]], [[0.0, 1.0], [1.0, -1.0]], {}, {"a": {"b": {}}}, [{}],
+    ]  # fmt: skip
+    return values[rng.integers(len(values))]
+
+
+def places(content, path=()):
+    """Every key or list place of a TOML document."""
+    pairs = content.items() if isinstance(content, dict) else enumerate(content)
+    for key, value in pairs:
+        yield (*path, key)
+        if isinstance(value, dict | list):
+            yield from places(value, (*path, key))
+
+
+def mutate_content(content, rng, flag):
+    """Change one to three places of a parsed document: value, type, name, presence, scale."""
+    content = tomllib.loads(tomli_w.dumps(content))
+    for _ in range(rng.integers(1, 4)):
+        every = list(places(content))
+        if not every:
+            break
+        *path, key = every[rng.integers(len(every))]
+        parent = content
+        for step in path:
+            parent = parent[step]
+        kind = rng.integers(7)
+        if kind <= 2:
+            parent[key] = odd_values(rng, flag)
+        elif kind == 3 and isinstance(parent[key], int | float):
+            parent[key] = parent[key] * float(10.0 ** rng.integers(-12, 12)) * rng.choice([-1, 1])
+        elif kind == 4:
+            parent.pop(key)
+        elif kind == 5 and isinstance(parent, dict):
+            parent[str(key) + rng.choice(["x", "_mm", " ", ".", "​"])] = parent.pop(key)
+        elif isinstance(parent, dict):
+            parent[rng.choice(["extra", "schema", "__class__", "name", PAYLOAD])] = odd_values(rng, flag)
+    return content
+
+
+def mutate_text(text, rng):
+    """Change the notation: lines, brackets, quotes, encodings, ends."""
+    lines = text.split("\n")
+    k = int(rng.integers(len(lines)))
+    kind = rng.integers(12)
+    if kind == 0:
+        del lines[k]
+    elif kind == 1:
+        lines.insert(k, lines[int(rng.integers(len(lines)))])
+    elif kind == 2:
+        lines[k] = lines[k][: len(lines[k]) // 2]
+    elif kind == 3:
+        lines[k] += rng.choice(['"', "[", "]", "=", "#", "\t", "\\", "'''", "{"])
+    elif kind == 4:
+        lines = lines[:k]
+    elif kind == 5:
+        lines.insert(k, "a = " + "[" * 3000)
+    elif kind == 6:
+        lines.insert(k, rng.choice(["\x00", "\x0c", "\ufeff", "\u2028", "=cmd|' /C calc'!A0", PAYLOAD]))
+    joined = rng.choice(["\n", "\n", "\n", "\r\n", "\r"]).join(lines)
+    encoding = rng.choice(["utf-8", "utf-8", "utf-8", "utf-8-sig", "utf-16", "latin-1"])
+    data = joined.encode(encoding, errors="replace")
+    if kind == 7 and data:
+        at = int(rng.integers(len(data)))
+        data = data[:at] + bytes(rng.integers(0, 256, 3, dtype=np.uint8)) + data[at + 3 :]
+    return data
+
+
+def mutate_table(text, rng, flag):
+    """Change cells, columns, names and notation of a table of numbers."""
+    lines = text.split("\n")
+    first = next(k for k, line in enumerate(lines) if not line.startswith("#"))
+    for _ in range(rng.integers(1, 4)):
+        row = int(rng.integers(first, len(lines)))
+        cells = lines[row].split(",")
+        k = int(rng.integers(len(cells)))
+        kind = rng.integers(9)
+        if kind <= 2:
+            odd = ["", " ", "nan", "inf", "-inf", "1e400", "1_0", "0x10", "1,5", "--", "١٢", '"', '"1', "=1+1", PAYLOAD, "1e-320",
+                   "1" * 400, f"__import__('pathlib').Path({str(flag)!r}).touch()", "-0", "+3", "1e5", "True", "300", "-300"]  # fmt: skip
+            cells[k] = odd[rng.integers(len(odd))]
+        elif kind == 3:
+            cells.insert(k, "1")
+        elif kind == 4:
+            cells.pop(k)
+        elif kind == 5:
+            cells[k], cells[0] = cells[0], cells[k]
+        elif kind == 6:
+            lines.insert(row, lines[row])
+        elif kind == 7:
+            lines.insert(
+                row, rng.choice(["", "# late", "# start: yesterday", "# resolution frequency_Hz: -1", ",,,,", ";;"])
+            )
+        lines[row] = rng.choice([",", ",", ",", ",", ";", "\t"]).join(cells)
+    return "\n".join(lines)
+
+
+@contextmanager
+def limited(seconds):
+    """Turn a hang into a failure."""
+
+    def stop(*_):
+        raise AssertionError(f"still running after {seconds} s")
+
+    before = signal.signal(signal.SIGALRM, stop)
+    signal.alarm(seconds)
+    try:
+        yield
+    finally:
+        signal.alarm(0)
+        signal.signal(signal.SIGALRM, before)
+
+
+def check(read, path, case, harmed):
+    """Read a mutated file: accepted, or an error of the allowed kinds with a message; anything else is kept in `harmed`."""
+    try:
+        with limited(LONGEST), warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            read(path)
+    except ALLOWED as error:
+        if not str(error).strip():
+            harmed.setdefault("an error without a message", case)
+        return 0
+    except (SystemExit, Exception) as error:
+        place = traceback.extract_tb(error.__traceback__)[-1]
+        fault = f"{type(error).__name__}: {str(error)[:120]} ({Path(place.filename).name}:{place.lineno})"
+        harmed.setdefault(fault, f"{case}: {path.read_bytes()[:300]!r}")
+        return 0
+    return 1
+
+
+def record_text():
+    t = np.arange(0, 60, 2.0)
+    rows = [f"{s:.1f},{20 + 0.1 * s:.3f},{4430 + 0.03 * s:.4f},{0.2 * s:.3f}" for s in t]
+    head = "# instrument: unit 7\n# start: 2026-01-31T12:00:00\n# resolution frequency_Hz: 0.0001\n"
+    return head + "time_s,housing_temperature_degC,frequency_Hz,bias_deg_per_h\n" + "\n".join(rows) + "\n"
+
+
+def table_text():
+    return "temperature_degC,frequency_Hz\n" + "\n".join(f"{a:g},{b:.2f}" for a, b in zip(T, F, strict=True)) + "\n"
+
+
+def raw_text():
+    rows = [f"31.01.2026;12:00:{k:02d};{20 + 0.1 * k:.2f};{4430 + k / 100:.3f}".replace(".", ",", 0) for k in range(30)]
+    return "Messung 7\nDatum;Zeit;T Kammer [°C];Frequenz [Hz]\n" + "\n".join(rows) + "\n"
+
+
+def read_all_of_a_model(path):
+    model = read_model(path)
+    emit_c(model)
+    record = path.parent / "record.csv"
+    record.write_text(record_text())
+    compensate(model, read_record(record), extrapolate=True)
+
+
+def documents(tmp_path):
+    """Valid TOML documents of every format, by name, with their reader."""
+    found = [(f"card {name}", path.read_text(), load_card) for name, path in shipped_cards().items()]
+    model = tmp_path / "model.toml"
+    write_model(save_frequency(fit_frequency(T, F), (Source("a.csv", "ab12", 7),), "test"), model)
+    found.append(("model", model.read_text(), read_all_of_a_model))
+    raw = tmp_path / "raw.csv"
+    raw.write_text(raw_text(), encoding="utf-8")
+    text = draft_map([str(raw)]).text
+    found.append(("map", text, lambda path: import_record([str(raw)], load_map(path))))
+    found += [(f"study {name}", path.read_text(), read_study) for name, path in shipped_specs().items()]
+    return found
+
+
+TABLES = {
+    "record": (record_text, read_record),
+    "steady-state table": (table_text, read_frequency_table),
+    "profile": (lambda: "time_s,chamber_temperature_degC\n0,20\n60,20\n600,-10\n", read_profile),
+    "raw file": (raw_text, lambda path: draft_map([str(path)])),
+}
+
+
+def test_mutated_toml_files_never_harm(tmp_path):
+    flag = tmp_path / "evaluated"
+    accepted, harmed = {}, {}
+    for name, text, read in documents(tmp_path):
+        read_ok = tmp_path / "valid.toml"
+        read_ok.write_text(text)
+        if name != "map":
+            assert check(read, read_ok, f"{name}, unchanged", harmed), harmed
+        rng = np.random.default_rng(sum(name.encode()))
+        content = tomllib.loads(text)
+        count = 0
+        for case in range(CASES if "study" not in name and "card" not in name else CASES // 4):
+            path = tmp_path / "mutated.toml"
+            changed = tomli_w.dumps(mutate_content(content, rng, flag)) if rng.random() < 0.75 else text
+            path.write_bytes(mutate_text(changed, rng) if rng.random() < 0.35 or changed == text else changed.encode())
+            count += check(read, path, f"{name} {case}", harmed)
+        accepted[name] = count
+    assert not harmed
+    assert not flag.exists()
+    assert all(accepted.values())  # some mutations are harmless
+
+
+@pytest.mark.parametrize("name", TABLES)
+def test_mutated_tables_never_harm(tmp_path, name):
+    write, read = TABLES[name]
+    flag, path = tmp_path / "evaluated", tmp_path / "mutated.csv"
+    rng = np.random.default_rng(sum(name.encode()))
+    accepted, harmed = 0, {}
+    for case in range(CASES):
+        text = mutate_table(write(), rng, flag)
+        path.write_bytes(mutate_text(text, rng) if rng.random() < 0.4 else text.encode())
+        accepted += check(read, path, f"{name} {case}", harmed)
+    assert not harmed
+    assert not flag.exists()
+    assert 0 < accepted < CASES  # some mutations are harmless, some are refused
+
+
+def test_a_drafted_map_of_a_mutated_file_is_valid_toml(tmp_path):
+    """Names and cells of a hostile file cannot break out of the map that is drafted from it."""
+    rng = np.random.default_rng(5)
+    path, out = tmp_path / "raw.csv", tmp_path / "map.toml"
+    drafted, harmed = 0, {}
+    for case in range(CASES):
+        text = mutate_table(raw_text().replace(";", ","), rng, tmp_path / "evaluated")
+        text = text.replace(
+            "Frequenz", str(rng.choice(['Freq"uenz', "Freq\\uenz", "Freq]uenz\x07", "Freq\x1b#", "Frequenz = 1"]))
+        )
+        path.write_text(text, encoding="utf-8")
+        try:
+            out.write_text(draft_map([str(path)]).text, encoding="utf-8")
+        except ALLOWED:
+            continue
+        tomllib.loads(out.read_text(encoding="utf-8"))
+        check(load_map, out, f"drafted map {case}", harmed)
+        drafted += 1
+    assert not harmed
+    assert drafted > CASES / 4
+
+
+def test_mutated_cards_through_the_whole_solver(tmp_path, capsys):
+    """Cards with changed dimensions, solved by the command line: a result or one plain sentence."""
+    rng = np.random.default_rng(11)
+    content = tomllib.loads(shipped_cards()["free-dome"].read_text())
+    statuses = []
+    for _ in range(12):
+        changed = tomllib.loads(tomli_w.dumps(content))
+        table = changed["resonator"]
+        for key in rng.choice([k for k, v in table.items() if isinstance(v, float)], 2):
+            table[key] = float(table[key] * rng.choice([1e-3, 0.1, 0.7, 0.9, 1.1, 1.5, 3.0]))
+        path = tmp_path / "card.toml"
+        path.write_text(tomli_w.dumps(changed))
+        with limited(LONGEST), warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            statuses.append(main(["modes", str(path), "--theory", "shell", "--tolerance", "0.01"]))
+        told = capsys.readouterr()
+        assert statuses[-1] in (0, 2), told.err
+        assert "Traceback" not in told.err
+        assert "nan" not in told.out.lower()
+    assert len(set(statuses)) == 2
+
+
+def test_text_of_files_is_escaped_in_pages(tmp_path, capsys, monkeypatch):
+    """A hostile card's and record's texts stand as text in every page that is made from them."""
+    monkeypatch.setattr("shell.render._run_child", lambda *_: None)  # no pictures: they hold no text
+    hostile = 'x</script><script>alert(1)</script><img src=x onerror="alert(2)">{{7*7}}'
+    content = tomllib.loads(shipped_cards()["free-dome"].read_text())
+    harmless_page, harmless_report, plain = (
+        tmp_path / "plain.html",
+        tmp_path / "plain-report.html",
+        tmp_path / "plain.csv",
+    )
+    assert main(["render", "free-dome", "--out", str(harmless_page), "--theory", "shell"]) == 0
+    plain.write_text(table_text())
+    assert main(["fit", "frequency", str(plain), "--report", str(harmless_report)]) == 0
+    content["name"], content["note"] = hostile, hostile
+    card, page = tmp_path / "card.toml", tmp_path / "page.html"
+    card.write_text(tomli_w.dumps(content))
+    assert main(["render", str(card), "--out", str(page), "--theory", "shell"]) == 0
+    table, report = tmp_path / "<img src=x onerror=alert(3)>.csv", tmp_path / "report.html"
+    table.write_text(table_text())
+    assert main(["fit", "frequency", str(table), "--report", str(report)]) == 0
+    capsys.readouterr()
+    for path, own in ((page, harmless_page), (report, harmless_report)):
+        text = path.read_text()
+        for needle in ("<script>alert", "<img src=x", "onerror=alert(3)>"):
+            assert needle not in text
+        # the only elements are the workbench's own: as many as in the page of a harmless card or table
+        for tag in ("<script", "<img", "</script"):
+            assert text.count(tag) == own.read_text().count(tag)
+    assert "&lt;script&gt;alert(1)" in page.read_text()

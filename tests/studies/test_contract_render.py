@@ -1,0 +1,122 @@
+"""`hrg render`: every kind of file, side by side, colours with units, and the exits that a user can mend."""
+
+import json
+
+import numpy as np
+import pytest
+import trimesh
+
+from studies.cli import main
+from studies.errors import InputError
+from studies.instrument.card import load_card
+from studies.reports.mode_picture import mode_blocks
+from studies.reports.page import Embedded, Text
+from studies.reports.scenes import read_field, show_mode
+
+
+def hrg_render(*words):
+    return main(["render", *(str(word) for word in words)])
+
+
+@pytest.fixture
+def no_opengl(monkeypatch):
+    """A machine whose child process cannot draw."""
+    monkeypatch.setattr("shell.render._run_child", lambda *_: None)
+
+
+@pytest.mark.parametrize(
+    ("words", "part"),
+    [
+        (["free-dome", "--out", "mode.bmp"], "the ending must be one of .png"),
+        (["free-dome", "--out", "mode"], "the ending"),
+        (["--out", "mode.png"], "a card is missing"),
+        (["free-dom", "--out", "mode.png"], "did you mean 'free-dome'"),
+        (["free-dome", "--harmonic", "2", "3", "--out", "mode.png"], "only in an .html page"),
+        (["free-dome", "--index", "-1", "--out", "mode.stl"], "counted from 0"),
+        (["free-dome", "--colour", "temperature", "--out", "mode.ply"], "--field"),
+        (["free-dome", "--colour", "rainbow", "--out", "mode.ply"], "rainbow"),
+        (["free-dome", "cvg-25mm", "--out", "mode.stl"], "1 at most"),
+        (["free-dome", "--temperature", "1", "2", "3", "4", "5", "--out", "mode.png"], "4 at most"),
+        (["free-dome", "--temperature", "900", "--theory", "shell", "--out", "mode.stl"], "outside the range"),
+    ],
+)
+def test_unusable_arguments_name_the_mend(tmp_path, monkeypatch, capsys, words, part):
+    monkeypatch.chdir(tmp_path)
+    assert hrg_render(*words) == 2
+    told = capsys.readouterr()
+    assert part in told.err
+    assert told.out == ""
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("ending", ["png", "webp", "gif"])
+def test_without_opengl_a_picture_is_status_3_and_nothing_is_left(tmp_path, capsys, no_opengl, ending):
+    assert hrg_render("free-dome", "--theory", "shell", "--out", tmp_path / f"mode.{ending}") == 3
+    assert "apt install libegl1" in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_without_opengl_the_page_is_interactive_still_and_says_what_is_missing(tmp_path, no_opengl):
+    page = tmp_path / "mode.html"
+    assert hrg_render("free-dome", "--theory", "shell", "--harmonic", "2", "3", "--out", page) == 0
+    text = page.read_text()
+    assert "webgl2" in text
+    assert "apt install libegl1" in text
+    blocks = mode_blocks(load_card("free-dome"))
+    assert [type(block) for block in blocks] == [Embedded, Text]
+
+
+def test_a_mesh_for_slicers_is_the_undeformed_solid_in_mm(tmp_path, capsys):
+    out = tmp_path / "dome.stl"
+    assert hrg_render("free-dome", "--theory", "shell", "--out", out, "--json") == 0
+    told = json.loads(capsys.readouterr().out)
+    assert (told["schema"], told["bytes"]) == ("hrg.render/1", out.stat().st_size)
+    assert told["modes"][0]["harmonic"] == 2
+    mesh = trimesh.load(out)
+    outer, inner = 15.45, 14.55
+    assert mesh.is_watertight
+    assert mesh.volume == pytest.approx(2 * np.pi / 3 * (outer**3 - inner**3), rel=3e-3)
+    assert mesh.extents == pytest.approx([2 * outer, 2 * outer, outer], rel=1e-3)
+
+
+def test_the_deformed_mesh_reaches_out_by_the_swing(tmp_path):
+    still, moved = tmp_path / "still.ply", tmp_path / "moved.ply"
+    assert hrg_render("free-dome", "--theory", "shell", "--out", still) == 0
+    assert hrg_render("free-dome", "--theory", "shell", "--swing-mm", "0.8", "--out", moved) == 0
+    far = np.linalg.norm(trimesh.load(moved).vertices - trimesh.load(still).vertices, axis=1)
+    assert far.max() == pytest.approx(0.8, rel=1e-3)
+
+
+def test_a_temperature_field_colours_the_meridian(tmp_path):
+    path = tmp_path / "field.csv"
+    path.write_text("position,temperature_degC\n0,20\n1,30\n")
+    shown = show_mode(load_card("free-dome"), theory="shell")
+    values = shown.values("temperature", read_field(path))
+    assert (values.min(), values.max()) == (20.0, 30.0)
+    rim = shown.surface.position == 1
+    assert np.all(values[rim] == 30)
+    path.write_text("position,temperature_degC\n0.5,20\n0.2,30\n")
+    with pytest.raises(InputError, match="must rise"):
+        read_field(path)
+
+
+def test_the_strain_energy_of_the_picture_is_that_of_the_solver():
+    """At 1 m amplitude the surface's density times the thickness, taken over the shell, is near the mode's energy."""
+    shown = show_mode(load_card("free-dome"))
+    mode, surface = shown.mode, shown.surface
+    outer = surface.grids[0]
+    density = surface.energy[outer]
+    assert (density >= 0).all()
+    # energy of a swing of 1 m: ½ ω² modal mass; the density at the faces is the largest through the thickness
+    energy = 0.5 * (2 * np.pi * mode.frequency) ** 2 * mode.modal_mass
+    volume = 2 * np.pi / 3 * (15.45e-3**3 - 14.55e-3**3)
+    areas = np.linalg.norm(
+        np.cross(
+            surface.points[surface.triangles[:, 1]] - surface.points[surface.triangles[:, 0]],
+            surface.points[surface.triangles[:, 2]] - surface.points[surface.triangles[:, 0]],
+        ),
+        axis=1,
+    )
+    mean = float((surface.energy[surface.triangles].mean(axis=1) * areas).sum() / areas.sum())
+    # pure bending: the mean through the thickness is a third of the faces'; membrane strain makes it more
+    assert 1.0 < mean * volume / energy < 3.2
