@@ -62,6 +62,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         suppress_keyboard_interrupt=False,
         default_parameter=Parameter(negative=""),
     )
+    app.register_install_completion_command(help="Install completion for the shell in use (bash, zsh or fish).")
     groups: dict[str, App] = {}
     for name, (target, help_line) in COMMANDS.items():
         *group, command = name.split(" ")
