@@ -84,6 +84,12 @@ def fit_bias(
 
 
 def _payload(study: "BiasStudy", method: str, data: tuple[str, ...]) -> dict[str, Any]:
+    """Return the object of schema hrg.fit-bias/1.
+
+    `methods.guarded` and `methods.paper` hold coefficients in the unit of `output` per powers of Hz and Hz/s, the
+    selection's `path`, and stability `before` and `after` with their ratio, on the fitted data and held out (null
+    when nothing can be held out). `allan` is of the longest run, N in unit·√s, B in unit, K in unit/√s.
+    """
     return {
         "schema": "hrg.fit-bias/1",
         "data": data,

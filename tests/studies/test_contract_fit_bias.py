@@ -106,6 +106,39 @@ def test_json_is_one_object_with_both_methods(calibrated, capsys):
     assert payload["allan"]["before"]["N"] == pytest.approx(0.4 * np.sqrt(5.0), rel=0.05)
 
 
+def test_golden_keys_of_the_schema(calibrated, capsys):
+    """The keys that scripts rely on; regenerate by reading `_payload` when the schema's number changes."""
+    assert main(["fit", "bias", str(calibrated / "run0.csv"), "--json"]) == 0
+    payload = json.loads(capsys.readouterr().out)
+    top = {"schema", "data", "output", "method", "rows", "missing", "spikes", "rate_lag_s", "methods", "allan"}
+    assert set(payload) == top
+    judged = payload["methods"]["guarded"]
+    assert set(judged) == {
+        "reference_frequency_Hz", "terms", "coefficients", "standard_errors", "naive_standard_errors", "theta", "path",
+        "training", "held_out",
+    }  # fmt: skip
+    assert set(judged["path"][0]) == {"added", "term", "F", "p_value", "bic"}
+    assert set(judged["training"]) == {"before", "after", "gain"}
+    assert set(payload["allan"]) == {"step_s", "before", "after"}
+
+
+def test_a_rate_output_is_fitted_in_its_own_unit(tmp_path, capsys):
+    def spoil(columns):
+        columns["measured_rate_deg_per_s"] = columns.pop("bias_deg_per_h") / 3600
+        columns["measured_rate_deg_per_s"][100:110] = np.nan
+
+    record = make_record(6, spoil=spoil)
+    write_record(record, tmp_path / "run.csv")
+    model, out = str(tmp_path / "m.toml"), tmp_path / "o.csv"
+    assert main(["fit", "bias", str(tmp_path / "run.csv"), "--save", model]) == 0
+    part = read_model(model).part("bias")
+    assert part["f"] == pytest.approx(0.3 / 3600, rel=0.05)
+    assert part.units[1] == "deg/s/Hz"
+    assert main(["compensate", model, str(tmp_path / "run.csv"), "--out", str(out), "--json"]) == 0
+    after = read_record(out)["compensated_measured_rate_deg_per_s"]
+    assert np.flatnonzero(np.isnan(after)).tolist() == list(range(100, 110))
+
+
 def test_the_page_is_whole_and_escapes_names(calibrated, tmp_path):
     page = (calibrated / "page.html").read_text(encoding="utf-8")
     assert page.count("<svg") + page.count("data:image") >= 2
