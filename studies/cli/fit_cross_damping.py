@@ -1,9 +1,11 @@
 """`hrg fit cross-damping`: the bias of a CVG from cross-damping over temperature."""
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from studies.cross_damping import CrossDampingStudy
     from studies.record import Record
+    from studies.rest import RestData
 
 
 def fit_cross_damping(
@@ -42,8 +44,6 @@ def fit_cross_damping(
         Print one JSON object (schema hrg.fit-cross-damping/1) instead of tables.
     """
     import math
-
-    import numpy as np
 
     from studies.cli.output import print_json, print_table, say
     from studies.cross_damping import study_cross_damping
@@ -89,34 +89,41 @@ def fit_cross_damping(
     if report is not None:
         write_text(report, page.cross_damping_page(study, gathered, ", ".join(data)))
         say(f"report: {report}")
-    unit = OUTPUTS[gathered.output]
     if json:
-        print_json(
-            {
-                "schema": "hrg.fit-cross-damping/1",
-                "records": list(data),
-                "output": gathered.output,
-                "temperature": gathered.temperature_column,
-                "frequency_Hz": carrier,
-                "quality": 1 / loss,
-                "calibration_temperature_degC": calibration_temperature,
-                "coefficients": study.model.coefficients,
-                "standard_errors": np.sqrt(np.diag(study.model.covariance)),
-                "training": {"before": study.training.before / unit, "after": study.training.after / unit},
-                "held_out": {"before": study.held_out.before / unit, "after": study.held_out.after / unit},
-                "improvement_training": study.training.ratio,
-                "improvement_held_out": study.held_out.ratio,
-                "useful": study.is_useful,
-                "dynamic_part": study.memory / unit,
-                "rows_left_out": gathered.left_out,
-            }
-        )
+        print_json({"schema": "hrg.fit-cross-damping/1", "records": list(data), **_summarise(study, gathered)})
         return 0
     for block in (page.coefficients_table(study), page.improvement_table(study, gathered)):
         print_table(block.caption, block.columns, block.rows, block.note)
     if not study.is_useful:
         print(page.USELESS)
     return 0
+
+
+def _summarise(study: "CrossDampingStudy", data: "RestData") -> dict[str, Any]:
+    """Numbers of the fit; before, after and dynamic_part in the unit of the output column."""
+    import math
+
+    import numpy as np
+
+    from studies.models.kinds.cross_damping import OUTPUTS
+
+    unit, model = OUTPUTS[data.output], study.model
+    return {
+        "output": data.output,
+        "temperature": data.temperature_column,
+        "frequency_Hz": model.k / (2 * math.pi),
+        "quality": 1 / (2 * model.zeta),
+        "calibration_temperature_degC": round(model.calibration_temperature - 273.15, 9),
+        "coefficients": model.coefficients,
+        "standard_errors": np.sqrt(np.diag(model.covariance)),
+        "training": {"before": study.training.before / unit, "after": study.training.after / unit},
+        "held_out": {"before": study.held_out.before / unit, "after": study.held_out.after / unit},
+        "improvement_training": study.training.ratio,
+        "improvement_held_out": study.held_out.ratio,
+        "useful": study.is_useful,
+        "dynamic_part": study.memory / unit,
+        "rows_left_out": data.left_out,
+    }
 
 
 def _median(records: "list[Record]", column: str, option: str) -> float:
