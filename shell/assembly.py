@@ -1,5 +1,6 @@
 """From a resonator to element matrices: unknowns, poles, clamps, and the ties between shell and solid blocks."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
 from typing import Literal
@@ -79,6 +80,30 @@ class Group:
     unknowns: Index
     signs: Array
     place: ShellPart | SolidPart
+    anchors: tuple[tuple[int, int], ...] = ()
+
+    def matrices(self, integrate: Callable[[Array, Array], Array], stations: Array) -> Array:
+        """Element matrices from station matrices, in the unknowns that are solved for.
+
+        In the small element at a free edge these are the value at its inner node and differences from it: `anchors` are
+        such (element, node). Else the layer's stiff shear would drown the bending as (R/h)³ instead of (R/h)².
+        """
+        found = integrate(stations, self.table.along)
+        for element, node in self.anchors:
+            along = self.table.along.copy()
+            along[0, :, node], along[1, :, node] = 1.0, 0.0
+            found[element] = integrate(stations[[element]], along)[0]
+        return found
+
+    def spread(self, raw: Array) -> Array:
+        """Unknowns (elements, size) of the plain basis."""
+        unknowns = self.signs * raw[self.unknowns]
+        for element, node in self.anchors:
+            amplitudes = unknowns[element].reshape(self.table.along.shape[2], -1)
+            inner = amplitudes[node].copy()
+            amplitudes += inner
+            amplitudes[node] = inner
+        return unknowns
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,9 +141,9 @@ class System:
         """Element matrices on free unknowns per unit λ, G and ρ, the same material everywhere."""
         found: list[tuple[Array, Array, Array]] = []
         for group, (trace, shear, mass) in zip(self.groups, self.stations, strict=True):
-            along = group.table.along
             found += zip(
-                integrate_stiffness(trace, along), integrate_stiffness(shear, along), integrate_mass(mass, along), strict=True
+                group.matrices(integrate_stiffness, trace), group.matrices(integrate_stiffness, shear),
+                group.matrices(integrate_mass, mass), strict=True,
             )
         return [
             (at.restrict(trace), at.restrict(shear), at.restrict(mass))
@@ -131,8 +156,8 @@ class System:
         M: list[Array] = []
         for k, (group, (trace, shear, mass)) in enumerate(zip(self.groups, self.stations, strict=True)):
             there = lam[k][..., None, None] * trace + G[k][..., None, None] * shear
-            K += list(integrate_stiffness(there, group.table.along))
-            M += list(integrate_mass(rho[k][..., None, None] * mass, group.table.along))
+            K += list(group.matrices(integrate_stiffness, there))
+            M += list(group.matrices(integrate_mass, rho[k][..., None, None] * mass))
         return (
             [at.restrict(matrix) for matrix, at in zip(K, self._maps, strict=True)],
             [at.restrict(matrix) for matrix, at in zip(M, self._maps, strict=True)],
@@ -141,7 +166,7 @@ class System:
     def spread(self, free: Array) -> list[Array]:
         """Element unknowns (elements, size) of every group from the free unknowns of one vector."""
         raw = self.constraint @ free
-        return [group.signs * raw[group.unknowns] for group in self.groups]
+        return [group.spread(raw) for group in self.groups]
 
     def _free(self, members: Index, signs: Array) -> "ToFree":
         rows = self.constraint[members]
@@ -258,7 +283,9 @@ def _shell_group(resonator: Resonator, chain: Chain, n: int, level: Level, start
     elements, m = len(chain.segments), sum(orders) + 3
     nodes = p * np.arange(elements)[:, None] + np.arange(p + 1)
     unknowns = start + (nodes[:, :, None] * m + np.arange(m)).reshape(elements, -1)
-    group = Group(table, unknowns, np.ones(unknowns.shape), ShellPart(chain, section))
+    edges = ((0, p), (elements - 1, 0)) if elements > 1 else ()
+    anchors = tuple(edge for edge, end in zip(edges, chain.ends, strict=False) if end == "free")
+    group = Group(table, unknowns, np.ones(unknowns.shape), ShellPart(chain, section), anchors)
     return group, start + (elements * p + 1) * m
 
 

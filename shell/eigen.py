@@ -17,6 +17,7 @@ from shell.errors import ShellError
 from shell.quadrature import Array
 
 Index = NDArray[np.intp]
+TOO_THIN = "the stiffness lost its last digit in double precision: the shell is too thin (h/R far below 1e-4)."
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,13 +131,22 @@ def lowest_vectors(
     for _ in range(300):
         y = factor.solve(loaded)
         heavy = apply_mass(pattern, mass, y)
-        values, turn = eigh(_symmetric(y.T @ loaded), _symmetric(y.T @ heavy), check_finite=False)
+        values, turn = _project(y.T @ loaded, y.T @ heavy)
         x, loaded = y @ turn, heavy @ turn
         last, change = change, float(np.max(abs(values[:count] / before - 1)))
         before = values[:count]
         if change < accuracy or (change < 1e-8 and change > last):
             break
     return np.asarray(x[:, :count])
+
+
+def _project(K: Array, M: Array) -> tuple[Array, Array]:
+    """Ritz values and vectors of the subspace."""
+    try:
+        values, vectors = eigh(_symmetric(K), _symmetric(M), check_finite=False)
+    except np.linalg.LinAlgError:
+        raise ShellError(TOO_THIN) from None
+    return values, vectors
 
 
 def _symmetric(matrix: Array) -> Array:
@@ -159,5 +169,5 @@ def _cholesky_band(band: Array) -> Array:
 
 def _definite(factor: Array, fault: int) -> Array:
     if fault:
-        raise ShellError("the stiffness lost its last digit: the shell is too thin for double precision.")
+        raise ShellError(TOO_THIN)
     return factor

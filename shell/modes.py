@@ -24,7 +24,7 @@ from shell.solution import AlongMeridian, Constants, EnergyFractions, Solution, 
 
 THEORIES = ("solid", "shell", "rayleigh")
 THICKEST_SHELL = 0.1  # h/R up to which shell theory has been held against the solid
-THINNEST = 1e-5  # h/R below which double precision loses the digits
+THINNEST = 5e-5  # h/R below which double precision loses the digits
 
 
 class TheoryRangeWarning(UserWarning):
@@ -105,8 +105,9 @@ class Mode:
 
     def shape(self, points: int = 9) -> "tuple[ShapePatch, ...]":
         """Displacement on the cross-section, stem included, as curved grids of `points` by `points`."""
+        solution = self._solved()
         assert self.resonator is not None
-        return sample_shape(self.resonator, self._solved(), points)
+        return sample_shape(self.resonator, solution, points)
 
     def _solved(self) -> Solution:
         if self.solution is None:

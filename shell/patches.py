@@ -57,11 +57,11 @@ def whole() -> tuple[Cell, ...]:
     return (((0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (1.0, 1.0)),)
 
 
-def layers(steps: tuple[float, ...]) -> tuple[Cell, ...]:
-    """Cells between the falling steps 1, ..., > 0 of x, and the last down to 0, each over all of y."""
-    bounds = (*steps, 0.0)
+def layers(steps: tuple[float, ...], cuts: tuple[float, ...] = (1.0,)) -> tuple[Cell, ...]:
+    """Cells between the falling steps 1, ..., > 0 of x, and the last down to 0; `cuts` does the same for y."""
     return tuple(
-        ((inner, 0.0), (outer, 0.0), (inner, 1.0), (outer, 1.0)) for outer, inner in pairwise(bounds)
+        ((inner, low), (outer, low), (inner, high), (outer, high))
+        for outer, inner in pairwise((*steps, 0.0)) for high, low in pairwise((*cuts, 0.0))
     )
 
 

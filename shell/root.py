@@ -109,23 +109,25 @@ def _half_root(
         floor = straight((r_in, level), (r_out, level))
         patches.append(Patch(floor, _along(far_face, s_in, s_out), left, right, whole(), "root"))
     if stem.fillet:
-        patches += _fillet(contact, stem.fillet, cross, roof, straight(foot, under), straight(under, over), over, steps)
+        patches += _fillet(contact, stem.fillet, cross, roof, straight(foot, under), straight(under, over), corner, over, steps)
     else:
         patches.append(Patch(cross, straight(under, over), straight(foot, under), roof, rings(steps), "root"))
     return patches + _stem(radii, level, contact.end, steps, ring_count)
 
 
 def _fillet(
-    contact: Contact, radius: float, cross: Path, roof: Path, floor: Path, wall: Path, over: Spot, steps: tuple[float, ...]
+    contact: Contact, radius: float, cross: Path, roof: Path, floor: Path, wall: Path, corner: Spot, over: Spot, steps: tuple[float, ...]
 ) -> list[Patch]:
     """Two patches that meet on the line from the middle of the fillet to X."""
     (r, z), on_dome, on_stem = contact.center, contact.on_dome, contact.on_stem
     first = atan2(on_dome[1] - z, on_dome[0] - r)
     turn = (atan2(on_stem[1] - z, on_stem[0] - r) - first + pi) % (2 * pi) - pi
     middle = first + turn / 2
+    # beside a thin shell the wedge under the fillet is long: its cells grow away from the shell
+    cuts = shrinking(max(0, ceil(log(abs(turn) / 2 * radius / (2 * _distance(on_dome, corner))) / log(3))), 1 / 3)
     center_line = straight((r + radius * np.cos(middle), z + radius * np.sin(middle)), over)
     return [
-        Patch(cross, center_line, circular((r, z), radius, first, middle), roof, layers(steps), "root"),
+        Patch(cross, center_line, circular((r, z), radius, first, middle), roof, layers(steps, cuts), "root"),
         Patch(floor, center_line, circular((r, z), radius, first + turn, middle), wall, layers(steps), "root"),
     ]
 

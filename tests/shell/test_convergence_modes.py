@@ -1,0 +1,96 @@
+"""How the solver's error falls with its orders, and whether its own estimate tells that error."""
+
+from dataclasses import replace
+from math import log10, pi, sqrt
+
+import numpy as np
+import pytest
+
+from shell.assembly import LEVELS, Level, Theory, build_system
+from shell.eigen import lowest_vectors
+from shell.elastic import Elastic
+from shell.kernel import lame
+from shell.meridian import Resonator, Stem, bell, cylinder, hemisphere
+from shell.modes import solve_modes
+from shell.solution import Constants, Solution
+
+SILICA = Elastic(72.7e9, 0.17, 2203.0)
+
+
+def random_design(rng: np.random.Generator) -> tuple[Resonator, Elastic, int]:
+    """Any shape and support, h/R from 0.002 to 0.12."""
+    R = 10 ** rng.uniform(-2.3, -1.3)
+    h = R * 10 ** rng.uniform(-2.7, -0.92)
+    kind, n = rng.integers(13), int(rng.integers(1, 5))
+    if kind < 3:
+        resonator = hemisphere(R, h, rim_angle=rng.uniform(1, 2.6))
+    elif kind < 6:
+        resonator = hemisphere(R, [(0, h), (0.5, h * rng.uniform(0.7, 1.3)), (1, h * rng.uniform(0.7, 1.3))])
+    elif kind == 6:
+        resonator = hemisphere(R, h, pole_angle=rng.uniform(0.2, 0.6), support="clamped-pole")
+    elif kind == 7:
+        resonator = hemisphere(R, h, pole_angle=rng.uniform(0.2, 0.6), support="clamped-rim")
+    elif kind < 10:
+        resonator = cylinder(R, h, R * rng.uniform(0.5, 3))
+    elif kind < 12:
+        resonator = bell(R, h, R * rng.uniform(0.2, 1), R * rng.uniform(0.2, 0.8), R * rng.uniform(1.05, 1.5))
+    else:
+        stem = Stem(R * rng.uniform(0.12, 0.3), R * rng.uniform(-0.5, 0.4), fillet=R * rng.uniform(0.01, 0.03))
+        resonator = hemisphere(R, h, support="stem", stem=stem)
+    return resonator, Elastic(7e10, rng.uniform(0, 0.4), 2500.0), n
+
+
+def test_error_estimate_is_true_for_random_designs() -> None:
+    """The estimate of 50 random designs lies between 0.1 and 10 times the distance from a level two steps finer."""
+    rng = np.random.default_rng(20)
+    ratios = []
+    for _ in range(50):
+        resonator, elastic, n = random_design(rng)
+        (mode,) = solve_modes(resonator, elastic, n)
+        assert mode.solution is not None
+        finer = LEVELS["solid"][LEVELS["solid"].index(mode.solution.system.level) + 2]
+        error = mode.frequency / frequency(resonator, elastic, n, "solid", finer) - 1
+        assert mode.relative_error_estimate <= 1e-5
+        ratios.append(mode.relative_error_estimate / max(abs(error), 1e-10))  # rounding
+    assert min(ratios) > 0.1
+    assert max(ratios) < 10
+
+
+def frequency(resonator: Resonator, elastic: Elastic, n: int, theory: Theory, level: Level) -> float:
+    """Lowest frequency at one level."""
+    system = build_system(resonator, n, theory, level)
+    lam, G = lame(np.array(elastic.E), np.array(elastic.nu), theory == "shell")
+    lam_solid, _ = lame(np.array(elastic.E), np.array(elastic.nu), False)
+    fields = tuple(
+        Constants(*(np.full(group.table.position.shape, value) for value in (elastic.E, elastic.nu, elastic.rho)), group.table.plane_stress)
+        for group in system.groups
+    )
+    moduli = [lam if group.table.plane_stress else lam_solid for group in system.groups for _ in group.unknowns]
+    K = [first * trace + G * shear for first, (trace, shear, _) in zip(moduli, system.units, strict=True)]
+    M = [elastic.rho * mass for _, _, mass in system.units]
+    shift = 1e-2 * float(G) / elastic.rho / resonator.size**2 if system.rigid_motions else 0.0
+    vectors = lowest_vectors(system.pattern, K, M, 1 + system.rigid_motions, shift, 1e-11)
+    return sorted(sqrt(Solution(system, fields, vector).eigenvalue) / (2 * pi) for vector in vectors.T)[-1]
+
+
+@pytest.mark.parametrize("thickness", [0.9e-3, 0.15e-3])
+def test_convergence_along_the_meridian_is_exponential(thickness: float) -> None:
+    """Each step of two orders gains the same factor, at least three, until rounding."""
+    dome = hemisphere(15e-3, thickness)
+
+    def at(along: int) -> float:
+        return frequency(dome, SILICA, 2, "shell", replace(LEVELS["shell"][0], along=along))
+
+    best = at(20)
+    errors = np.array([abs(at(p) / best - 1) for p in (5, 7, 9, 11)])
+    assert np.all(errors[1:] < errors[:-1] / 3)
+    assert errors[-1] < 1e-7
+    assert np.polyfit((5, 7, 9, 11), np.log10(errors), 1)[0] < -log10(3) / 2
+
+
+def test_thin_shells_keep_their_digits() -> None:
+    """At h/R = 1e-4 the levels agree to 1e-6 although λ_min/λ_max is 1e-8 and less; shell and solid agree."""
+    thin = hemisphere(15e-3, 1.5e-6)
+    solid, shell = (solve_modes(thin, SILICA, theory=theory, tolerance=1e-6)[0] for theory in ("solid", "shell"))
+    assert max(solid.relative_error_estimate, shell.relative_error_estimate) < 1e-6
+    assert solid.frequency == pytest.approx(shell.frequency, rel=1e-6)
