@@ -7,7 +7,7 @@ import numpy as np
 
 from studies.errors import InputError, naming
 from studies.record import Record
-from thermal.followers import make_lags
+from thermal.followers import make_series
 from thermal.identification import FrequencyLaw, Identification, identify, identify_lags
 from thermal.run import Run
 
@@ -49,7 +49,7 @@ def fit_thermal_constants(
             return identify_lags(runs, law, confidence=confidence)
         span = max(float(np.ptp(run.time)) for run in runs)
         starts = span / 6 * 0.3 ** np.arange(lags)
-        return identify(runs, make_lags(*starts, longest=10 * span), law, confidence)
+        return identify(runs, make_series(*starts, longest=10 * span), law, confidence)
 
 
 def _run(record: Record) -> Run:

@@ -19,6 +19,7 @@ USUAL_SLOPE = 8e-5  # 1/K, relative; where the record itself gives no first gues
 WIDTH = 30.0  # K, over which curvature and cubic are compared with the slope
 REST = 0.1  # K, change of the housing below which it tells nothing about the law
 PRIOR = 20.0  # K, weak prior of the initial departures, which keeps those of the fastest nodes finite
+FARTHEST_START = 100.0  # K, bound of the initial departures
 STEP = 1e-4  # central differences, in logarithms or weights
 STEP_K = 1e-2  # central differences of departures, K
 
@@ -230,6 +231,7 @@ def _bounds(problem: Problem) -> tuple[Array, Array]:
     for k, constant in enumerate(problem.follower.constants):
         ends = np.array([constant.low, constant.high])
         low[k], high[k] = np.log(ends) if constant.is_positive else ends
+    low[len(problem.names) :], high[len(problem.names) :] = -FARTHEST_START, FARTHEST_START
     return low, high
 
 

@@ -5,7 +5,7 @@ unknown initial state. The noise is white with a wandering level (`thermal.white
 squares with the noise re-estimated by restricted likelihood, and the intervals are those of Student's t.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -15,15 +15,16 @@ from scipy.stats import t as student
 
 from thermal.errors import ThermalError
 from thermal.fitting import Problem, Solution, solve
-from thermal.followers import Follower, make_lags
+from thermal.followers import Follower, make_series
 from thermal.network import Array
 from thermal.run import Run, even_rows, row_step
 from thermal.whitening import Noise, estimate_noise
 
 ROWS = 2000  # most rows of a run that a fit uses
-PASSES = 3  # fits, each with the noise of the one before
+PASSES = 2  # fits, each with the noise of the one before; the first under white noise
 VAGUE = 0.5  # relative standard error above which a constant counts as not determined
 PART = 0.3  # smallest share with which a constant is named in an undetermined direction
+FRACTIONS = (0.004, 0.03, 0.2)  # of the longest run, at which a further lag is tried
 FARTHEST = 16.0  # standard errors to which a profile is followed
 EVIDENCE = 10.0  # how far the information criterion must fall before something is believed
 
@@ -142,12 +143,23 @@ def identify(
 
 
 def identify_lags(
-    runs: Sequence[Run], law: FrequencyLaw, most: int = 3, confidence: float = 0.9
+    runs: Sequence[Run],
+    law: FrequencyLaw,
+    most: int = 3,
+    confidence: float = 0.9,
+    make: Callable[..., Follower] = make_series,
 ) -> Identification:
-    """Identify as many lags as the record supports, each further one paid for by the information criterion."""
+    """Identify as many lags as the record supports, each further one paid for by the information criterion.
+
+    Parameters
+    ----------
+    make : callable
+        From starting time constants (s) and the bounds `shortest` and `longest` to a follower: `make_series` for lags in
+        series with radiation, `make_lags` for lags side by side.
+    """
     best: Identification | None = None
     for count in range(1, most + 1):
-        trial = _best_start(runs, law, count, confidence, best)
+        trial = identify(runs, _best_start(runs, law, count, make, best), law, confidence)
         if best is not None and trial.criterion > best.criterion - EVIDENCE:
             break
         best = trial
@@ -156,22 +168,31 @@ def identify_lags(
 
 
 def _best_start(
-    runs: Sequence[Run], law: FrequencyLaw, count: int, confidence: float, fewer: Identification | None
-) -> Identification:
-    """Fit `count` lags from a few starts: the lags found so far and one more, shorter or longer."""
+    runs: Sequence[Run], law: FrequencyLaw, count: int, make: Callable[..., Follower], fewer: Identification | None
+) -> Follower:
+    """Return the follower whose fit under white noise is closest: the lags found so far and one more."""
+    if not runs:
+        raise ThermalError("nothing is identified without a run.")
+    step = row_step(runs, ROWS)
+    even = tuple(even_rows(run, step) for run in runs)
     span = max(float(np.ptp(run.time)) for run in runs)
-    shortest, longest = 2 * row_step(runs, ROWS), 10 * span
+    shortest, longest = step, 10 * span
     found = [
-        estimate.value
+        estimate.value if estimate.value is not None else span / 6
         for name, estimate in (fewer.estimates.items() if fewer else ())
-        if name.startswith("time_constant") and estimate.value is not None
+        if name.startswith("time_constant")
     ]
-    found = (found + [span / 6] * count)[: count - 1]
-    trials = []
-    for fraction in (0.005, 0.03, 0.15, 0.6):
+    trials: list[tuple[float, Follower]] = []
+    for fraction in FRACTIONS:
         starts = [float(np.clip(tau, 1.01 * shortest, 0.99 * longest)) for tau in (*found, fraction * span)]
-        trials.append(identify(runs, make_lags(*starts, shortest=shortest, longest=longest), law, confidence))
-    return min(trials, key=lambda trial: trial.criterion)
+        follower = make(*starts, shortest=shortest, longest=longest)
+        problem = Problem(even, follower, law.reference_temperature, (law.slope, law.curvature, law.cubic))
+        solution = solve(problem, problem.guess(), problem.first_noise())
+        values = problem.constants(solution.parameters)
+        fitted = [float(np.clip(values[f"time_constant_{j}"], *np.array([1.01, 0.99]) * [shortest, longest]))
+                  for j in range(1, count + 1)]
+        trials.append((solution.cost, make(*fitted, shortest=shortest, longest=longest)))
+    return min(trials, key=lambda trial: trial[0])[1]
 
 
 def _refuse_constant(problem: Problem, solution: Solution, noise: Noise) -> float:

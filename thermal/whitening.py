@@ -22,7 +22,7 @@ STARTS = ((7.0, 3.0), (3.0, 0.0))  # logits of ρ and of θ/ρ
 ENDS = (-14.0, 14.0)  # bounds of both logits
 SLOWER = 2.71  # growth of −2 ln L that is allowed for a slower wander: 90 % quantile of χ², one degree of freedom
 STRONGER = 1.0  # the same for a stronger one: one standard deviation
-HALVINGS = 9
+HALVINGS = 8
 
 
 @dataclass(frozen=True)
@@ -64,7 +64,7 @@ def estimate_noise(residual: Array, slope: Array, breaks: Rows) -> Noise:
 
     def at_wander(wander: float) -> tuple[float, float]:
         found = minimize_scalar(
-            lambda share: criterion(np.array([wander, share])), bounds=ENDS, method="bounded", options={"xatol": 0.02}
+            lambda share: criterion(np.array([wander, share])), bounds=ENDS, method="bounded", options={"xatol": 0.1}
         )
         return float(found.fun), float(found.x)
 

@@ -1,0 +1,56 @@
+"""hrg fit thermal finds the lags that a record was made with, and refuses a record that has none."""
+
+import json
+
+import numpy as np
+import pytest
+
+from studies.cli import main
+from studies.errors import InputError
+from studies.record import Record, write_record
+from studies.thermal_constants import fit_thermal_constants
+from thermal.profile import parse_profile
+from thermal.transient import lag
+
+
+def record(words, **columns):
+    profile = parse_profile(words)
+    t = np.arange(0.0, profile.end, 60.0)
+    rng = np.random.default_rng(1)
+    before = np.concatenate([[-60.0], t])
+    housing = lag(before, np.concatenate([profile.value[:1], profile.at(t)]), 600.0)[1:] - 273.15
+    resonator = lag(t, housing, 1800.0)
+    f = 4432.0 + 0.37 * (resonator - 20) - 1e-3 * (resonator - 20) ** 2 + 2e-3 * rng.normal(size=t.size)
+    return Record({"time_s": t, "housing_temperature_degC": housing, "frequency_Hz": f} | columns, path="run.csv")
+
+
+def test_one_lag_without_radiation_is_found_with_its_interval(tmp_path, capsys):
+    path = tmp_path / "run.csv"
+    write_record(record("step 20 -20 4h then step -20 40 4h"), path)
+    assert main(["fit", "thermal", str(path), "--lags", "1", "--json"]) == 0
+    answer = json.loads(capsys.readouterr().out)
+    assert answer["schema"] == "hrg.fit-thermal/1"
+    tau, share = answer["estimates"]["time_constant_1"], answer["estimates"]["radiated_share"]
+    assert tau["low"] < 1800.0 < tau["high"]
+    assert tau["value"] == pytest.approx(1800.0, rel=0.01)
+    assert share["low"] < 0.0 < share["high"]
+    assert answer["undetermined"] == []
+    assert main(["fit", "thermal", str(path), "--lags", "1"]) == 0
+    assert "time_constant_1" in capsys.readouterr().out
+
+
+def test_unusable_records_are_refused(tmp_path, capsys):
+    path = tmp_path / "still.csv"
+    write_record(record("soak 20 5h"), path)
+    assert main(["fit", "thermal", str(path), "--lags", "1"]) == 2
+    answer = capsys.readouterr()
+    assert "still.csv: nothing can be identified" in answer.err
+    assert answer.out == ""
+    assert main(["fit", "thermal"]) == 2
+    assert "name at least one record" in capsys.readouterr().err
+    assert main(["fit", "thermal", str(path), "--confidence", "90"]) == 2
+    assert "--confidence 90" in capsys.readouterr().err
+    with pytest.raises(InputError, match=r"run.csv: thermal constants need frequency_Hz and housing_temperature_degC"):
+        fit_thermal_constants([Record({"time_s": np.arange(9.0), "frequency_Hz": np.ones(9)}, path="run.csv")])
+    with pytest.raises(InputError, match="--lags 9"):
+        fit_thermal_constants([record("soak 20 5h")], lags=9)
