@@ -60,8 +60,8 @@ class BiasFit:
 
     `coefficients` of ("constant", *terms) and their `covariance`, which respects the autocorrelation;
     `naive_errors`, the standard errors that take rows for independent; `theta` of the noise (1 white, 0 random walk);
-    `selection` the path; `held_out` the held-out standard deviation of each model on it, constant alone first
-    (empty for the paper's method, which does not look).
+    `selection` the path; `held_out` the held-out standard deviation of each model on it, constant alone first, where
+    the terms were chosen by it (else empty).
     """
 
     reference_frequency: float

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from compensation.bias import PARENTS, TERMS, BiasFit, BiasRun, Design, fit_terms
 from compensation.coloured import estimate_theta, whiten
 from compensation.errors import CompensationError
-from compensation.stepwise import select_stepwise
+from compensation.stepwise import Selection, select_stepwise
 
 Array = NDArray[np.float64]
 Method = Literal["paper", "guarded"]
@@ -118,28 +118,14 @@ def _select(pieces: Sequence[BiasRun], method: Method, reference_frequency: floa
         whiten(part, theta, design.rows) for part in (design.constants, design.candidates, design.bias)
     )
     selection = select_stepwise(constants, candidates, bias, names, PARENTS, ENTER, REMOVE, shared=True)
-    path = [(), *(step.terms for step in selection.steps)]
-    if not by_runs or len(path) == 1:
+    if not by_runs or not selection.steps:
         return fit_terms(design, selection.terms, selection=selection)
     try:
-        scores = _score_path(pieces, path, theta, reference)
+        scores = score_path(pieces, selection)
     except CompensationError:  # no run can be predicted from the others: the tests alone decide
         return fit_terms(design, selection.terms, selection=selection)
-    best = path[int(np.argmin(scores))]
+    best = (selection.start, *selection.steps)[int(np.argmin(scores))].terms
     return fit_terms(design, tuple(sorted(best, key=names.index)), selection=selection, scores=scores)
-
-
-def _score_path(
-    runs: Sequence[BiasRun], path: Sequence[tuple[str, ...]], theta: float, reference: float
-) -> tuple[float, ...]:
-    """Held-out standard deviation of each model on the path, over that of the constant alone, run by run."""
-    folds = _folds(runs, True)
-    designs = [Design(fold.rest, reference) for fold in folds]
-    scores = []
-    for terms in path:
-        fits = [fit_terms(design, terms, theta) for design in designs]
-        scores.append(1.0 / _pool(folds, fits, by_runs=True).gain)
-    return tuple(scores)
 
 
 def _folds(pieces: Sequence[BiasRun], by_runs: bool) -> list[_Fold]:
@@ -168,6 +154,26 @@ def thermal_constant(pieces: Sequence[BiasRun]) -> float:
     frequency = np.concatenate([piece.frequency for piece in pieces])
     rate = np.concatenate([piece.rate for piece in pieces])
     return float(np.std(frequency) / np.sqrt(np.mean(rate**2)))
+
+
+def score_path(runs: Sequence[BiasRun], selection: Selection) -> tuple[float, ...]:
+    """Return the held-out standard deviation of each model on a selection's path, over that of the constant alone.
+
+    Whole runs are held out, or blocks of a single one, as in `score_held_out`, but the terms stay those of the path.
+
+    Raises
+    ------
+    CompensationError
+        Nothing can be held out, or what is left carries no fit.
+    """
+    by_runs = len(runs) > 1
+    folds = _folds(runs, by_runs)
+    designs = [Design(fold.rest, float(runs[0].frequency[0])) for fold in folds]
+    scores = []
+    for step in (selection.start, *selection.steps):
+        fits = [fit_terms(design, step.terms, theta=1.0) for design in designs]  # θ matters to no prediction
+        scores.append(1.0 / _pool(folds, fits, by_runs=by_runs).gain)
+    return tuple(scores)
 
 
 def score_runs(fit: BiasFit, runs: Sequence[BiasRun], *, extrapolate: bool = False) -> HeldOut:

@@ -10,8 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from compensation.bias import BiasFit, BiasRun, prepare_run
-from compensation.bias_selection import HeldOut, Method, NoHeldOut, bias_stability, fit_bias, score_held_out
+from compensation.bias_selection import HeldOut, Method, NoHeldOut, bias_stability, fit_bias, score_held_out, score_path
 from compensation.decimation import average_blocks, find_spikes
+from compensation.errors import CompensationError
 from compensation.stability import AllanDeviation, NoiseCoefficients, allan_deviation, fit_noise
 from studies.errors import InputError, naming
 from studies.models import Model, compensate, source_of
@@ -26,12 +27,16 @@ LARGEST_REST = 1e-3  # °/s of applied rate that still counts as rest
 
 @dataclass(frozen=True)
 class Judged:
-    """One method's fit: stability (before, after) on the runs it was fitted to, and its held-out score, if any."""
+    """One method's fit: stability (before, after) on the runs it was fitted to, and its held-out score, if any.
+
+    `path_scores`: held-out standard deviation of each model on the selection's path over that of a constant, if any.
+    """
 
     method: Method
     fit: BiasFit
     training: tuple[float, float]
     held_out: HeldOut | None
+    path_scores: tuple[float, ...]
 
     @property
     def training_gain(self) -> float:
@@ -112,7 +117,7 @@ def study_bias(
             held_out = score_held_out(runs, name)
         except NoHeldOut as error:
             held_out, why = None, str(error)
-        judged.append(Judged(name, fit, _training(runs, fit), held_out))
+        judged.append(Judged(name, fit, _training(runs, fit), held_out, _score_path(runs, fit)))
     fit = next(j.fit for j in judged if j.method == method)
     model = save_bias(fit, runs[0], output, tuple(source_of(r) for r in records), f"hrg fit bias --method {method}")
     progress("Allan deviation before and after")
@@ -163,6 +168,13 @@ def unbroken(time: Array, columns: dict[str, Array]) -> tuple[float, dict[str, A
     longest = int(np.argmax(np.diff(ends)))
     stretch = slice(int(ends[longest]), int(ends[longest + 1]))
     return blocks.width, {name: y[stretch] for name, y in blocks.columns.items()}
+
+
+def _score_path(runs: Sequence[BiasRun], fit: BiasFit) -> tuple[float, ...]:
+    try:
+        return fit.held_out or (score_path(runs, fit.selection) if fit.selection else ())
+    except CompensationError:  # nothing can be held out, which `no_held_out` tells
+        return ()
 
 
 def _training(runs: Sequence[BiasRun], fit: BiasFit) -> tuple[float, float]:

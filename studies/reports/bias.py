@@ -76,7 +76,7 @@ def verdict(study: "BiasStudy", method: Method) -> str:
         f"Improvement {judged.training_gain:.2f} times on the data that were fitted and {held.gain:.2f} times on held-out {what}"
         f" ({held.coverage:.0%} of the rows lie where the rest has seen frequency and rate)."
     )
-    if held.gain <= 1:
+    if held.by_runs and held.gain <= 1:
         sentence += " Held out, it makes things worse: do not use it before a further run says otherwise."
     elif not held.by_runs:
         sentence += " One run cannot show more: record a second one, warming if this one cooled."
@@ -101,8 +101,7 @@ def path_table(judged: "Judged", output: str) -> Table:
     selection = judged.fit.selection
     rows = []
     steps = () if selection is None else (selection.start, *selection.steps)
-    held_out = judged.fit.held_out or (math.nan,) * len(steps)
-    count = sum(1 for _ in judged.fit.selection.steps) if judged.fit.selection else 0
+    held_out = judged.path_scores or (math.nan,) * len(steps)
     for k, (step, score) in enumerate(zip(steps, held_out, strict=True)):
         action = "start" if k == 0 else f"{'+' if step.added else '−'} {SYMBOLS[step.term]}"
         rows.append(
@@ -118,10 +117,12 @@ def path_table(judged: "Judged", output: str) -> Table:
         )
     refused = {} if selection is None else selection.refused
     notes = [f"Left out from the start: {', '.join(f'{SYMBOLS[n]} ({why})' for n, why in refused.items())}."] if refused else []
-    if not count:
+    if len(steps) < 2:
         notes.append("No candidate passes the entry level.")
     elif judged.fit.held_out:
         notes.append("The model with the smallest held-out figure is kept.")
+    elif judged.path_scores:
+        notes.append("The held-out figures (over that of a constant) are shown; the tests decide.")
     columns = ["Step", "Term", "F", "p", "BIC", "Held out", "Model"]
     return Table(f"Selection, {METHOD[judged.method]}", columns, rows, " ".join(notes))
 
@@ -151,9 +152,10 @@ def coefficients_table(judged: "Judged", output: str) -> Table:
     low, high = fit.frequency_range
     note = (
         f"Valid from {low:.4f} to {high:.4f} Hz and from {fit.rate_range[0]:.2e} to {fit.rate_range[1]:.2e} Hz/s."
-        f" The noise remembers with θ = {fit.theta:.3f} (1: white, 0: random walk). Beside a drifting bias the"
-        " least-squares coefficients are less certain than the guarded selection, which weighs the drift down."
+        f" The noise remembers with θ = {fit.theta:.3f} (1: white, 0: random walk)."
     )
+    if judged.method == "guarded" and fit.theta < 0.99:
+        note += " The selection weighs the drift of the bias down; these least-squares coefficients cannot, hence their errors."
     return Table(f"Coefficients, {METHOD[judged.method]}", columns, rows, note)
 
 
