@@ -2,7 +2,8 @@
 
 y = X b + ε, HRG paper eqs. (19), (20). Columns are shifted by their mean and scaled to unit length, the
 system is solved by Householder QR with column pivoting, and refined with
-residuals in extended precision. Symbols: X design, Q R its factors, b coefficients, e residuals.
+residuals in extended precision (where the machine has none beyond double, the hardest of NIST's data, Wampler5, keeps 8
+digits instead of more than 9). Symbols: X design, Q R its factors, b coefficients, e residuals.
 """
 
 import math

@@ -51,7 +51,7 @@ def bias_page(study: "BiasStudy", source: str, method: Method) -> str:
 PATH_NOTE = (
     "The paper's way takes every average for independent of the others. Drift and flicker make neighbours alike, so it finds"
     " terms in noise alone; the guarded way estimates how long the noise remembers and shares the entry level among the"
-    " candidates that compete. A term enters only after the lower-order terms that it contains."
+    " candidates that compete. A term enters only after the lower-order terms that it contains. BIC compares steps of one path."
 )
 WHERE_READ = (
     "N is read where the curve falls like τ^(−1/2) and is by definition its value at τ = 1 s on that line; K where it rises like"
