@@ -179,11 +179,11 @@ def export(folder: str, *, out: str | None = None, json: bool = False) -> int:
             "schema": "hrg.study-export/1",
             "table": str(path),
             "units_file": str(units),
-            "rows": len(results.cases),
+            "rows": len(results),
         }
         print_json({**payload, "columns": results.table().attrs["units"]})
     else:
-        print(f"{len(results.cases)} cases: {path}; units: {units}")
+        print(f"{len(results)} cases: {path}; units: {units}")
     return 0
 
 

@@ -34,7 +34,7 @@ METHODS = {
 def sweep_page(results: "Results") -> str:
     """Return the page of a study as HTML."""
     study = results.study
-    done = len(results.cases)
+    done = len(results)
     lead = f"{done} designs by {METHODS[study.sampling.method]} about the card {study.instrument.name}."
     if study.note != "-":
         lead = f"{study.note} {lead}"
@@ -57,14 +57,14 @@ def summarise(results: "Results") -> dict[str, Any]:
     found: dict[str, Any] = {
         "schema": "hrg.study-report/1",
         "study": results.study.name,
-        "cases": len(results.cases),
+        "cases": len(results),
         "failed": len(results.failed),
         "columns": {c.name: {"unit": c.unit, **_numbers(results, c)} for c in results.study.columns},
         "searches": results.store.findings(),
     }
     for key, analyse in (("sobol", sobol_indices), ("slopes", local_slopes), ("linear", linear_shares)):
         found[key] = {c.name: _data(analyse, results, c.name) for c in results.study.columns}
-    if results.study.requirements and results.cases:
+    if results.study.requirements and len(results):
         whole = find_yield(results, results.study.requirements)
         found["yield"] = {k: v for k, v in vars(whole).items() if k != "limits"} | {"share": whole.share}
     return found
@@ -105,21 +105,20 @@ def _numbers(results: "Results", column: "Column") -> dict[str, float | None]:
 
 
 def _short(results: "Results") -> list[Block]:
-    facts = [("Designs", str(len(results.cases)), f"{len(results.failed)} failed, of {results.total} asked for")]
+    facts = [("Designs", str(len(results)), f"{len(results.failed)} failed, of {results.total} asked for")]
     for column in _main(results)[:2]:
         n = _numbers(results, column)
         unit = "" if column.unit == "1" else f" {column.unit}"
-        facts.append(
-            (column.label, f"{_g(n['least'])} … {_g(n['greatest'])}{unit}", f"nominal {_g(n['nominal'])}{unit}")
-        )
-    if results.study.requirements and results.cases:
+        least, greatest, nominal = (f"{_short_g(n[key])}" for key in ("least", "greatest", "nominal"))
+        facts.append((column.label, f"{least} … {greatest}{unit}", f"nominal {nominal}{unit}"))
+    if results.study.requirements and len(results):
         found = find_yield(results, results.study.requirements)
         words = (
             "of the designs" if found.low is None else f"95 % interval {_percent(found.low)} … {_percent(found.high)}"
         )
         facts.append(("Meet every requirement", _percent(found.share), words))
     blocks: list[Block] = [Facts(facts)]
-    if len(results.cases) < results.total and not results.about["repeats"]:
+    if len(results) < results.total and not results.about["repeats"]:
         blocks.append(Text("The study is not finished: run it again to resume, then make this page anew.", "warning"))
     return blocks
 
@@ -148,7 +147,7 @@ def _asked(results: "Results") -> list[Block]:
 
 
 def _failures(results: "Results") -> list[Chapter]:
-    if not results.failed:
+    if not results.failed.size:
         return []
     rows = [[str(count), reason] for reason, count in results.store.reasons()]
     examples = [
@@ -183,18 +182,18 @@ def _statistics(results: "Results") -> Table:
 
 
 def _designs(results: "Results") -> Table:
-    columns = results.study.columns
-    places = list(range(len(results.cases)))
+    columns = _main(results)
+    places = list(range(len(results)))
     note = "A click on a heading sorts."
     if len(places) > MOST_ROWS:
         order = np.argsort(results.column(columns[0].name), kind="stable")
         order = order[np.isfinite(results.column(columns[0].name)[order])]
         places = [*order[:ENDS].tolist(), *order[-ENDS:].tolist()]
-        note += f" Of {len(results.cases)} designs the {ENDS} with the least and greatest {columns[0].label}; export has all."
+        note += f" Of {len(results)} designs the {ENDS} with the least and greatest {columns[0].label}; export has all."
     rows = []
     for place in places:
-        case = results.cases[place]
-        rows.append([str(place), *(_g(case.parameters[name]) for name in results.study.names), *map(_g, case.values)])
+        numbers = (results.column(column.name)[place] for column in columns)
+        rows.append([str(place), *map(_g, results.design(place).values()), *map(_g, numbers)])
     heads = [figures.label(p.name, p.unit) for p in results.study.parameters]
     return Table("Designs", ["Case", *heads, *map(figures.column_label, columns)], rows, note, sortable=True)
 
@@ -251,7 +250,7 @@ def _slopes(results: "Results", column: "Column") -> list[Block]:
     units = {p.name: p.unit for p in results.study.parameters}
     rows = []
     for slope in found:
-        unit = column.unit if units[slope.parameter] == "1" else f"{column.unit} per {units[slope.parameter]}"
+        unit = _slope_unit(column.unit, units[slope.parameter])
         rows.append([slope.parameter, f"{slope.slope:.6g}", f"{slope.uncertainty:.2g}", unit, f"{slope.swing:.6g}"])
     heads = ["Parameter", "Slope", "±", "Unit", f"Swing over the range ({column.unit})"]
     note = "± holds the curvature beyond the outer levels and the solver's error; a slope within it is none."
@@ -265,15 +264,16 @@ def _shares(results: "Results", column: "Column") -> list[Block]:
     found = linear_shares(results, column.name)
     if found is None:
         return []
+    units = {p.name: p.unit for p in results.study.parameters}
     rows = [
-        [name, f"{slope:.6g}", f"{half:.2g}", _percent(share)]
+        [name, f"{slope:.6g}", f"{half:.2g}", _slope_unit(column.unit, units[name]), _percent(share)]
         for name, slope, half, share in zip(found.parameters, found.slope, found.half_width, found.share, strict=True)
     ]
     note = f"A linear law explains {_percent(found.r_squared)} of the variance; ± is half a 95 % interval, a slope within it is none."
     return [
         Table(
             f"Linear influence on {column.label}",
-            ["Parameter", "Slope", "±", "Share of the variance"],
+            ["Parameter", "Slope", "±", "Unit", "Share of the variance"],
             rows,
             note,
             True,
@@ -281,9 +281,13 @@ def _shares(results: "Results", column: "Column") -> list[Block]:
     ]
 
 
+def _slope_unit(column: str, parameter: str) -> str:
+    return column if parameter == "1" else f"{column} per {parameter}"
+
+
 def _tolerances(results: "Results") -> list[Chapter]:
     study = results.study
-    if not study.requirements or not results.cases:
+    if not study.requirements or not len(results):
         return []
     try:
         rows = []
@@ -367,7 +371,7 @@ def _over_temperature(results: "Results") -> list[Block]:
 
     study = results.study
     columns = [column for column in study.columns if column.stem.startswith("frequency")]
-    if study.names != (TEMPERATURE,) or not columns or len(results.cases) < 5 or results.failed:
+    if study.names != (TEMPERATURE,) or not columns or len(results) < 5 or results.failed.size:
         return []
     T, f = results.parameter(TEMPERATURE).astype(float), results.column(columns[0].name)
     try:
@@ -389,8 +393,8 @@ def _shapes(results: "Results") -> list[Chapter]:
     designs = {"Nominal design": nominal_design(study)}
     y = results.column(column.name)
     if np.isfinite(y).any() and any(name.startswith("resonator.") for name in study.names):
-        designs[f"Least {column.label}"] = dict(results.cases[int(np.nanargmin(y))].parameters)
-        designs[f"Greatest {column.label}"] = dict(results.cases[int(np.nanargmax(y))].parameters)
+        designs[f"Least {column.label}"] = results.design(int(np.nanargmin(y)))
+        designs[f"Greatest {column.label}"] = results.design(int(np.nanargmax(y)))
     blocks: list[Block] = []
     for title, design in designs.items():
         words = ", ".join(f"{name} = {_g(value)}" for name, value in design.items())
@@ -462,6 +466,10 @@ def _g(value: Any) -> str:
     if isinstance(value, str):
         return value
     return "" if value is None or np.isnan(value) else f"{value:.8g}"
+
+
+def _short_g(value: float | None) -> str:
+    return "" if value is None or np.isnan(value) else f"{value:.6g}"
 
 
 def _percent(share: float | None) -> str:

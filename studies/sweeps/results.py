@@ -1,5 +1,6 @@
 """The results of a study: a table with units, columns as arrays, failures, outcomes of searches."""
 
+import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -22,6 +23,22 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
+class _Loaded:
+    parameters: Mapping[str, NDArray[Any]]
+    numbers: Array
+    failed: NDArray[np.bool_]
+    remarks: list[str]
+
+    def take(self, places: list[int]) -> "_Loaded":
+        return _Loaded(
+            {name: values[places] for name, values in self.parameters.items()},
+            self.numbers[places],
+            self.failed[places],
+            [self.remarks[place] for place in places],
+        )
+
+
+@dataclass(frozen=True)
 class Results:
     """What a store holds of a study; cases stand in the order of the spec's design."""
 
@@ -38,25 +55,29 @@ class Results:
         """Number of different designs that the study has."""
         return int(self.about["cases"])
 
-    @cached_property
-    def cases(self) -> list[Stored]:
-        """The computed cases, a design that the spec repeats as often as it does."""
-        cases = list(self.store.cases())
-        repeats = self.about["repeats"]
-        if not repeats:
-            return cases
-        by_place = {case.position: case for case in cases}
-        return [by_place[place] for place in repeats if place in by_place]
+    def __len__(self) -> int:
+        """Return the number of computed cases, a design that the spec repeats as often as it does."""
+        return len(self._loaded.remarks)
 
-    @cached_property
+    @property
     def values(self) -> Array:
         """All results, shape (cases, columns); NaN where a quantity failed."""
-        return np.array([case.values for case in self.cases]).reshape(len(self.cases), len(self.study.columns))
+        return self._loaded.numbers[:, : len(self.study.columns)]
 
-    @cached_property
+    @property
     def errors(self) -> Array:
         """Estimates of the numerical error, shape and units as `values`; NaN where there is none."""
-        return np.array([case.errors for case in self.cases]).reshape(self.values.shape)
+        return self._loaded.numbers[:, len(self.study.columns) :]
+
+    @property
+    def remarks(self) -> list[str]:
+        """For every case why it failed, or what the solver warned of; mostly empty."""
+        return self._loaded.remarks
+
+    @property
+    def failed(self) -> NDArray[np.intp]:
+        """The places of the cases that failed."""
+        return np.flatnonzero(self._loaded.failed)
 
     def column(self, name: str) -> Array:
         """Return one column of results."""
@@ -64,12 +85,33 @@ class Results:
 
     def parameter(self, name: str) -> NDArray[Any]:
         """Return one parameter of every case."""
-        return np.array([case.parameters[name] for case in self.cases])
+        return self._loaded.parameters[name]
 
-    @property
-    def failed(self) -> list[Stored]:
-        """The cases that failed, with their reasons."""
-        return [case for case in self.cases if case.status == "failed"]
+    def design(self, place: int) -> dict[str, Any]:
+        """Return the parameters of one case by name."""
+        return {name: self.parameter(name)[place].item() for name in self.study.names}
+
+    @cached_property
+    def _loaded(self) -> "_Loaded":
+        """Read the store into columns: a million cases as rows of Python objects would fill the memory."""
+        names = self.study.names
+        columns: dict[str, list[Any]] = {name: [] for name in names}
+        numbers, failed, remarks, place_of = bytearray(), bytearray(), [], {}
+        for place, (position, parameters, status, remark, packed) in enumerate(self.store.rows()):
+            place_of[position] = place
+            for name, value in json.loads(parameters).items():
+                columns[name].append(value)
+            numbers += packed
+            failed.append(status == "failed")
+            remarks.append(remark)
+        loaded = _Loaded(
+            {name: np.array(columns[name]) for name in names},
+            np.frombuffer(numbers, "<f8").reshape(len(remarks), 2 * len(self.study.columns)),
+            np.frombuffer(failed, np.bool_),
+            remarks,
+        )
+        repeats = [place_of[position] for position in self.about["repeats"] if position in place_of]
+        return loaded.take(repeats) if repeats else loaded
 
     @cached_property
     def nominal(self) -> Stored | None:
@@ -88,8 +130,8 @@ class Results:
             if np.isfinite(self.errors[:, place]).any():
                 columns[f"{column.name}_error"] = self.errors[:, place]
                 units[f"{column.name}_error"] = column.unit
-        columns["status"] = [case.status for case in self.cases]
-        columns["remark"] = [case.remark for case in self.cases]
+        columns["status"] = np.where(self._loaded.failed, "failed", "ok")
+        columns["remark"] = self.remarks
         table = pd.DataFrame(columns)
         table.attrs = {"study": self.study.name, "units": units}
         return table

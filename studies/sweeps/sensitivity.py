@@ -175,9 +175,9 @@ def linear_shares(results: "Results", column: str) -> LinearShares | None:
 
 def _complete(results: "Results", column: str) -> Array:
     """Return a column of which every case is there, or refuse with the list."""
-    if len(results.cases) < _expected(results):
+    if len(results) < _expected(results):
         raise InputError(
-            f"{_expected(results) - len(results.cases)} cases are not computed yet; run the study again to resume it."
+            f"{_expected(results) - len(results)} cases are not computed yet; run the study again to resume it."
         )
     y = results.column(column)
     lacking = np.flatnonzero(~np.isfinite(y))
@@ -194,5 +194,5 @@ def _expected(results: "Results") -> int:
 
 
 def _list(results: "Results", places: Sequence[int]) -> str:
-    words = [f"case {place} ({results.cases[place].remark})" for place in places[:SHOWN]]
+    words = [f"case {place} ({results.remarks[place]})" for place in places[:SHOWN]]
     return "; ".join(words) + (f"; and {len(places) - SHOWN} more" if len(places) > SHOWN else "")

@@ -118,12 +118,22 @@ class Store:
 
     def find(self, key: bytes) -> Stored | None:
         """Return one case by its key."""
-        found = list(self._cases("WHERE key = ?", (key,)))
-        return found[0] if found else None
+        columns = "key, position, parameters, status, remark, numbers, seconds"
+        for row in self._read(f"SELECT {columns} FROM run_case WHERE key = ?", (key,)):
+            both = struct.unpack(f"<{len(row[5]) // 8}d", row[5])
+            half = len(both) // 2
+            return Stored(row[0], row[1], json.loads(row[2]), row[3], row[4], both[:half], both[half:], row[6])
+        return None
 
-    def cases(self) -> Iterator[Stored]:
-        """Give the sampled cases in order of their position."""
-        return self._cases("WHERE position IS NOT NULL ORDER BY position")
+    def rows(self) -> Iterator[tuple[int, str, str, str, bytes]]:
+        """Give position, spelled parameters, status, remark and packed numbers of the sampled cases, by position."""
+        columns = "position, parameters, status, remark, numbers"
+        try:
+            yield from self.connection.execute(
+                f"SELECT {columns} FROM run_case WHERE position IS NOT NULL ORDER BY position"
+            )
+        except sqlite3.DatabaseError as error:
+            raise _damaged(self.path, error) from error
 
     def counts(self) -> dict[str, int]:
         """Return how many sampled cases there are of each status."""
@@ -174,15 +184,6 @@ class Store:
                 f"{self.path.parent}: holds results of a study that differs: {shown}{more}. Take another folder with"
                 " --out, or undo the change."
             )
-
-    def _cases(self, where: str, values: Sequence[Any] = ()) -> Iterator[Stored]:
-        columns = "key, position, parameters, status, remark, numbers, seconds"
-        for key, position, parameters, status, remark, numbers, seconds in self._read(
-            f"SELECT {columns} FROM run_case {where}", values
-        ):
-            both = struct.unpack(f"<{len(numbers) // 8}d", numbers)
-            half = len(both) // 2
-            yield Stored(key, position, json.loads(parameters), status, remark, both[:half], both[half:], seconds)
 
     def _read(self, query: str, values: Sequence[Any] = ()) -> list[Any]:
         try:

@@ -81,7 +81,7 @@ def test_sobol_refuses_failed_cases_and_lists_them(tmp_path, functions):
         "def fail(i, p):\n    if p['user.x'] > 0.9:\n        raise ValueError('too far')\n    return p['user.x']\n"
     )
     results = study(tmp_path, "fail", {"method": "sensitivity", "cases": 16, "seed": 1}, *box("x", "y", low=0, high=1))
-    assert results.failed
+    assert results.failed.size
     with pytest.raises(InputError, match="none is invented") as caught:
         sobol_indices(results, "fail")
     assert "too far" in str(caught.value)
