@@ -8,9 +8,13 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
+    from studies.reports.reproduce import Reproduction
+
+GYROS = 12
+
 
 def reproduce(*, out: str = "report", json: bool = False) -> int:
-    """Recompute the HRG paper's Table 1, Table 2 and figures 4 and 5, beside what first principles predict.
+    """Recompute the papers' tables and figures from their data and from virtual gyros, beside what first principles predict.
 
     Writes report.html, summary.json, table1.csv and table2.csv.
 
@@ -21,9 +25,7 @@ def reproduce(*, out: str = "report", json: bool = False) -> int:
     json : bool
         Print the content of summary.json on standard output.
     """
-    from pathlib import Path
-
-    from studies.cli.output import dump_json, print_json, say
+    from studies.cli.output import dump_json, print_json
     from studies.files.writing import check_folder, write_text
     from studies.instrument.card import load_card
     from studies.papers import hrg
@@ -31,32 +33,52 @@ def reproduce(*, out: str = "report", json: bool = False) -> int:
     from studies.reports.reproduce import reproduce_page, summarise
 
     folder = check_folder(out)
-    T, f = hrg.printed_table1()
-    study = hrg.study_table(T, f, resolution=hrg.RESOLUTION)
-    say("solving the shell modes of the card over temperature ...")
-    instrument = load_card(hrg.CARD)
-    physics = hrg.compare_physics(study, instrument)
-    summary = summarise(study, physics)
-    say("drawing the page ...")
-    page = reproduce_page(study, physics, [], mode_blocks(instrument))
-    write_text(
-        folder / "table1.csv", _csv(("temperature_degC", "frequency_Hz", "cubic_Hz"), (T, f, study.fit.frequency(T)))
-    )
+    parts = _reproduce()
+    study, summary = parts.study, summarise(parts)
+    T, f = study.temperature_degC, study.frequency
+    page = reproduce_page(parts, mode_blocks(load_card(hrg.CARD)))
+    names = ("temperature_degC", "frequency_Hz", "cubic_Hz")
+    write_text(folder / "table1.csv", _csv(names, (T, f, study.fit.frequency(T))))
     names = ("frequency_Hz", "actual_temperature_degC", "calculated_temperature_degC", "error_degC")
     write_text(folder / "table2.csv", _csv(names, (f, T, study.calculated_degC, study.error_degC)))
     write_text(folder / "summary.json", dump_json(summary))
     write_text(folder / "report.html", page)
     if json:
         print_json(summary)
-    else:
-        sensitivity = summary["sensitivity_ppm_per_degC"]
-        print(
-            f"slope at 20 °C: measured {sensitivity['measured']:.1f}, predicted {sensitivity['simulated']:.1f}"
-            f" ± {sensitivity['uncertainty']:.1f} ppm/°C; Table 2 reproduced, largest error"
-            f" {max(abs(study.error_degC)):.3f} °C."
-        )
-        print(f"report: {Path(folder, 'report.html')}")
+        return 0
+    sensitivity = summary["sensitivity_ppm_per_degC"]
+    print(
+        f"slope at 20 °C: measured {sensitivity['measured']:.1f}, predicted {sensitivity['simulated']:.1f}"
+        f" ± {sensitivity['uncertainty']:.1f} ppm/°C; Table 2 reproduced, largest error"
+        f" {max(abs(study.error_degC)):.3f} °C."
+    )
+    print(f"report: {folder / 'report.html'}")
     return 0
+
+
+def _reproduce() -> "Reproduction":
+    """Compute every part of the page, telling which one is under way."""
+    from studies.cli.output import say
+    from studies.diagnosis.table import diagnose_table
+    from studies.instrument.card import load_card
+    from studies.papers import bias_twin, hrg
+    from studies.papers.settling import study_settling
+    from studies.reports.gyro_papers import reproduce_gyro_papers
+    from studies.reports.reproduce import Reproduction
+
+    say("1/5 the card's modes over temperature, and a first diagnosis of Table 1 ...")
+    instrument = load_card(hrg.CARD)
+    study = hrg.study_table(*hrg.printed_table1(), resolution=hrg.RESOLUTION)
+    physics = hrg.compare_physics(study, instrument)
+    diagnosis = diagnose_table(str(hrg.table1_path()))
+    say("2/5 the resonator settling after a step (figure 3) ...")
+    settling = study_settling(instrument)
+    say(f"3/5 {GYROS} virtual gyros, cooled and compensated (figure 6) ...")
+    twins = [bias_twin.study_twin(seed) for seed in range(GYROS)]
+    say("4/5 the CVG and BVG papers ...")
+    chapters, summary = reproduce_gyro_papers(GYROS)
+    say("5/5 drawing the page ...")
+    return Reproduction(study, physics, diagnosis, settling, twins, chapters, summary)
 
 
 def _csv(names: "Sequence[str]", columns: "Sequence[NDArray[np.float64]]") -> str:

@@ -59,14 +59,12 @@ class PhysicsComparison:
     """What the material's published laws predict for a card, beside the measured table.
 
     `coefficients` of the default law at the local temperatures and, last, at 20 °C; `laws` (name, slope at 20 °C, its
-    uncertainty in ppm/°C) of every published law; `imposed_residual` (Hz) when the default law's shape is
-    imposed on the table with two free numbers; curvatures in ppm/°C², twice the quadratic coefficient of ln f.
+    uncertainty in ppm/°C) of every published law; curvatures in ppm/°C², twice the quadratic coefficient of ln f.
     """
 
     instrument: "Instrument"
     coefficients: "Sequence[TemperatureCoefficient]"
     laws: Sequence[tuple[str, float, float]]
-    imposed_residual: Array
     curvature_measured: float
     curvature_law: float
 
@@ -80,8 +78,13 @@ def printed_table1() -> tuple[Array, Array]:
     """Return temperatures (°C) and frequencies (Hz) of the paper's Table 1."""
     from studies.record import read_frequency_table
 
-    table = read_frequency_table(_data("hrg_table1.csv"))
+    table = read_frequency_table(table1_path())
     return table.values["temperature_degC"], table.values["frequency_Hz"]
+
+
+def table1_path() -> Path:
+    """Return the file of the paper's Table 1."""
+    return _data("hrg_table1.csv")
 
 
 def printed_table2() -> tuple[Array, Array]:
@@ -140,13 +143,11 @@ def compare_physics(study: FrequencyStudy, instrument: "Instrument") -> PhysicsC
         c = temperature_coefficients(model, law, T0, 20.0 + ZERO_CELSIUS)[0]
         laws.append((law.law, 1e6 * c.total, 1e6 * c.uncertainty))
     predicted = frequency_over_temperature(model, material, T0, study.temperature_degC + ZERO_CELSIUS)
-    free = np.column_stack([np.ones_like(predicted), predicted])
-    residual = study.frequency - free @ np.linalg.lstsq(free, study.frequency, rcond=None)[0]
     curvature = [
         2e6 * np.polynomial.Polynomial.fit(study.temperature_degC, np.log(f), 2).convert().coef[2]
         for f in (study.frequency, predicted)
     ]
-    return PhysicsComparison(instrument, coefficients, laws, residual, *curvature)
+    return PhysicsComparison(instrument, coefficients, laws, *curvature)
 
 
 def _data(name: str) -> Path:

@@ -266,6 +266,27 @@ def table_text(found: "TableDiagnosis") -> str:
 
 def table_page(found: "TableDiagnosis", path: str) -> str:
     """Return the page of a steady-state table as HTML."""
+    return render_page(f"Diagnosis of {path}", headline(found.verdict), table_chapters(found))
+
+
+def table_chapters(found: "TableDiagnosis") -> list[Chapter]:
+    """Return the chapters of a steady-state table: the answer, and who else could have given it."""
+    facts = [
+        ("verdict", found.verdict.verdict, WORDS[found.verdict.verdict]),
+        ("law imposed", f"{number(found.law_rms)} Hz", "rms left, degrees of freedom counted by points"),
+        ("curvature", f"{number(found.curvature_ratio)} times", "the measured one over the law's"),
+    ]
+    rows = [[name, number(ssq), number(loo), number(score)] for name, ssq, loo, score in found.candidates]
+    columns = ("candidate", "sum of squares / Hz²", "leave-one-out / Hz", "evidence")
+    candidates = Table("Candidates on top of the baseline", columns, rows)
+    return [
+        Chapter("The answer", [Facts(facts), table_residuals(found), *(Text(s) for s in found.sentences)]),
+        Chapter("Candidates", [candidates]),
+    ]
+
+
+def table_residuals(found: "TableDiagnosis") -> Picture:
+    """Draw what the law, the baseline and the strongest candidate leave of a steady-state table."""
     with figure(1, 1, height=3.2) as (canvas, axis):
         axis.plot(found.temperature, found.law_residual, "o-", color=VERMILION, label="law imposed, f₀ and slope free")
         axis.plot(found.temperature, found.baseline_residual, "s-", color=ORANGE, label="baseline: curvature free")
@@ -273,29 +294,6 @@ def table_page(found: "TableDiagnosis", path: str) -> str:
         axis.set_xlabel("temperature / °C")
         axis.set_ylabel("measured − model / Hz")
         axis.legend()
-        picture = draw(
+        return draw(
             canvas, "What each model leaves of the measured table.", "Residuals of three models over temperature."
         )
-    rows = [[name, number(ssq), number(loo), number(score)] for name, ssq, loo, score in found.candidates]
-    facts = [
-        ("verdict", found.verdict.verdict, WORDS[found.verdict.verdict]),
-        ("law imposed", f"{number(found.law_rms)} Hz", "rms left, degrees of freedom counted by points"),
-        ("curvature", f"{number(found.curvature_ratio)} times", "the measured one over the law's"),
-    ]
-    return render_page(
-        f"Diagnosis of {path}",
-        headline(found.verdict),
-        [
-            Chapter("The answer", [Facts(facts), picture, *(Text(s) for s in found.sentences)]),
-            Chapter(
-                "Candidates",
-                [
-                    Table(
-                        "Candidates on top of the baseline",
-                        ("candidate", "sum of squares / Hz²", "leave-one-out / Hz", "evidence"),
-                        rows,
-                    )
-                ],
-            ),
-        ],
-    )

@@ -1,18 +1,41 @@
 """The page of `hrg reproduce`: the HRG paper from its own data, first principles beside it, and where they differ."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from compensation.frequency import fit_frequency
 from studies.papers import hrg
-from studies.reports import style
+from studies.papers.settling import NETWORKS, ROOM_degC
+from studies.reports import gyro_papers, style
+from studies.reports.bias_twin import twin_chapters
+from studies.reports.diagnosis import headline, table_chapters
 from studies.reports.frequency import coefficients_table, error_figure, fit_figure, order_chapter
 from studies.reports.page import Block, Chapter, Facts, Picture, Table, Text, draw, render_page
+from studies.reports.settling import settling_chapter
 from studies.reports.theories import theories_chapter
 
 if TYPE_CHECKING:
+    from studies.diagnosis.table import TableDiagnosis
+    from studies.papers.bias_twin import TwinFit
     from studies.papers.hrg import FrequencyStudy, PhysicsComparison
+    from studies.papers.settling import SettlingStudy
+
+
+@dataclass(frozen=True)
+class Reproduction:
+    """Everything that the page shows: the table, physics, its diagnosis, settling, bias twins, the other papers."""
+
+    study: "FrequencyStudy"
+    physics: "PhysicsComparison"
+    diagnosis: "TableDiagnosis"
+    settling: "SettlingStudy"
+    twins: "Sequence[tuple[TwinFit, ...]]"
+    gyro_chapters: Sequence[Chapter]
+    gyro_summary: dict[str, Any]
+
 
 SOURCES = (
     "Wang X. et al., Sensors 2012, 12, 6434–6446, doi:10.3390/s120506434: Table 1, Table 2, equations (8)–(18).",
@@ -22,33 +45,34 @@ SOURCES = (
 )
 
 
-def reproduce_page(
-    study: "FrequencyStudy", physics: "PhysicsComparison", more: Sequence[Chapter], mode: Sequence[Block]
-) -> str:
-    """Return the whole page; `more` are chapters that other parts add, `mode` shows the mode shape."""
+def reproduce_page(parts: "Reproduction", mode: Sequence[Block]) -> str:
+    """Return the whole page; `mode` shows the mode shape."""
+    study, physics = parts.study, parts.physics
     lead = (
-        "Table 1, Table 2 and figures 4 and 5 of the HRG paper recomputed from its measured data, what first-principles"
-        " physics predicts for the same resonator, and where the two differ."
+        "The HRG paper's Table 1, Table 2 and figures 3 to 6 recomputed from its measured data and from virtual gyros, what"
+        " first-principles physics predicts, and where the two differ; then the two CVG papers and the BVG paper."
     )
+    figure_4 = "Table 1 and figure 4: frequency over temperature"
     chapters = [
-        Chapter("In short", [_facts(study, physics), *_short(study, physics)]),
-        Chapter(
-            "Table 1 and figure 4: frequency over temperature",
-            [_table1(study), coefficients_table(study), fit_figure(study)],
-        ),
+        Chapter("In short", [_facts(parts), *_short(parts)]),
+        _first_diagnosis(parts),
+        Chapter(figure_4, [_table1(study), coefficients_table(study), fit_figure(study)]),
         Chapter("Table 2 and figure 5(a): temperature from frequency", [_table2(study), error_figure(study)]),
         order_chapter(study),
         Chapter("What first principles predict", _physics(physics, study)),
-        Chapter("Where measurement and physics differ", _difference(study, physics)),
         Chapter("The mode", list(mode)),
         theories_chapter(),
-        *more,
+        settling_chapter(parts.settling),
+        Chapter("Figure 5(b): temperature from the frequency of a step", [_step_inverse(parts.settling)]),
+        *twin_chapters(parts.twins),
+        *parts.gyro_chapters,
     ]
-    return render_page("Temperature and frequency of a hemispherical resonator", lead, chapters, SOURCES)
+    return render_page("Four gyro papers, reproduced", lead, chapters, (*SOURCES, *gyro_papers.SOURCES))
 
 
-def summarise(study: "FrequencyStudy", physics: "PhysicsComparison") -> dict[str, Any]:
+def summarise(parts: "Reproduction") -> dict[str, Any]:
     """Return the numbers of the page, schema `hrg.reproduce/1`."""
+    study, physics = parts.study, parts.physics
     fit, better = study.fit, study.next_fit
     assert better is not None
     at = physics.at_20
@@ -81,16 +105,18 @@ def summarise(study: "FrequencyStudy", physics: "PhysicsComparison") -> dict[str
             "laws": {name: {"value": value, "uncertainty": u} for name, value, u in physics.laws},
         },
         "law_imposed": {
-            "residual_rms_Hz": float(np.sqrt(np.mean(physics.imposed_residual**2))),
+            "residual_rms_Hz": parts.diagnosis.law_rms,
             "curvature_measured_ppm_per_degC2": physics.curvature_measured,
             "curvature_law_ppm_per_degC2": physics.curvature_law,
         },
+        "diagnosis_of_table1": parts.diagnosis.as_dict(),
         "card": physics.instrument.name,
+        **parts.gyro_summary,
     }
 
 
-def _facts(study: "FrequencyStudy", physics: "PhysicsComparison") -> Facts:
-    at = physics.at_20
+def _facts(parts: "Reproduction") -> Facts:
+    study, at = parts.study, parts.physics.at_20
     return Facts(
         [
             (
@@ -110,14 +136,15 @@ def _facts(study: "FrequencyStudy", physics: "PhysicsComparison") -> Facts:
             ),
             (
                 "Left when the law is imposed",
-                f"{1e3 * np.sqrt(np.mean(physics.imposed_residual**2)):.0f} mHz rms",
+                f"{1e3 * parts.diagnosis.law_rms:.0f} mHz rms",
                 "readings are rounded to 10 mHz",
             ),
         ]
     )
 
 
-def _short(study: "FrequencyStudy", physics: "PhysicsComparison") -> list[Text]:
+def _short(parts: "Reproduction") -> list[Text]:
+    study, physics = parts.study, parts.physics
     better = study.next_fit
     assert better is not None
     at = physics.at_20
@@ -236,24 +263,39 @@ def _slope_figure(physics: "PhysicsComparison", study: "FrequencyStudy") -> Pict
     return draw(made, caption, "Predicted and measured slopes over temperature.")
 
 
-def _difference(study: "FrequencyStudy", physics: "PhysicsComparison") -> list[Block]:
-    residual = physics.imposed_residual
-    slope = float(study.fit.slope(20.0))
-    rms = float(np.sqrt(np.mean(residual**2)))
-    with style.figure(height=2.8) as (made, axes):
-        axes.axhline(0, color=style.BLACK, linewidth=0.8)
-        axes.plot(study.temperature_degC, 1e3 * residual, "o-", color=style.VERMILION)
-        axes.set_xlabel("temperature (°C)")
-        axes.set_ylabel("measured − law (mHz)")
+def _first_diagnosis(parts: "Reproduction") -> Chapter:
+    """Return what `hrg diagnose` says of Table 1."""
+    answer, candidates = table_chapters(parts.diagnosis)
+    verdict = Text(headline(parts.diagnosis.verdict), "warning")
+    shown = [block for block in answer.blocks if not isinstance(block, Facts)]
+    return Chapter("Where measurement and physics differ: a first diagnosis", [verdict, *shown, *candidates.blocks])
+
+
+def _step_inverse(settling: "SettlingStudy") -> Picture:
+    """Draw the temperature that a cubic calculates from the frequency of the virtual step to -10 °C (figure 5b)."""
+    curve = next(c for c in settling.curves if c.target_degC < ROOM_degC and c.network == NETWORKS[0])
+    true = curve.target_degC + curve.remaining * (ROOM_degC - curve.target_degC)
+    points = np.linspace(0, len(true) - 1, 9).astype(int)
+    inside = slice(points[0], points[-1] + 1)
+    fit = fit_frequency(true[points], curve.frequency[points])
+    calculated = fit.temperature(curve.frequency[inside])
+    hours = curve.time[inside] / 3600
+    with style.figure(2, height=4.2, sharex=True, height_ratios=(3, 1.2)) as (made, (upper, lower)):
+        upper.plot(hours, calculated, color=style.BLUE, label="calculated from the frequency")
+        upper.set_ylabel("temperature (°C)")
+        other = upper.twinx()
+        other.plot(hours, curve.frequency[inside], "--", color=style.VERMILION, label="frequency")
+        other.set_ylabel("frequency (Hz)")
+        other.ticklabel_format(axis="y", useOffset=False)
+        other.grid(visible=False)
+        handles = [*upper.get_lines(), *other.get_lines()]
+        upper.legend(handles, [line.get_label() for line in handles])
+        lower.axhline(0, color=style.BLACK, linewidth=0.8)
+        lower.plot(hours, 1e3 * (calculated - true[inside]), color=style.BLUE)
+        lower.set_ylabel("error (mK)")
+        lower.set_xlabel("time (h)")
     caption = (
-        f"What is left of Table 1 when the law's shape is imposed with two free numbers: {1e3 * rms:.0f} mHz rms, that is"
-        f" {rms / slope:.2f} °C rms, where rounding alone would leave 3 mHz."
+        "A virtual step from 20 to -10 °C, since the paper's record is not printed: the temperature that a cubic through nine"
+        " of its points calculates from the frequency, and its error against the temperature that the mode sees."
     )
-    return [
-        draw(made, caption, "A smooth, curved residual of about 0.2 Hz."),
-        Table(
-            "Curvature of ln f",
-            ["", "ppm/°C²"],
-            [["measured", f"{physics.curvature_measured:.3f}"], ["default law", f"{physics.curvature_law:.3f}"]],
-        ),
-    ]
+    return draw(made, caption, "Temperature and frequency fall together; the error stays within millikelvins.")
