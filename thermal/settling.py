@@ -9,7 +9,7 @@ from scipy.optimize import brentq
 from thermal.errors import ThermalError
 from thermal.network import Array, Network
 from thermal.profile import Profile
-from thermal.transient import simulate
+from thermal.radiative import simulate
 
 DECADES = (-6.0, 3.0)  # search range of a conductance, log10 of W/K
 

@@ -33,9 +33,9 @@ def thermal(card: str, profile: str, *, rows: int = 13, json: bool = False) -> i
     from studies.simulation.chamber import ZERO_CELSIUS, check_profile, load_profile
     from studies.simulation.heat_path import build_network, build_shell_and_stem, cut_shell
     from thermal.balance import check_energy
+    from thermal.radiative import simulate
     from thermal.relaxation import find_relaxation
     from thermal.resonator import shell_weights
-    from thermal.transient import simulate
 
     if rows < 2:
         raise InputError(f"--rows {rows}: a table in time needs at least two rows.")

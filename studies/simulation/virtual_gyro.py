@@ -14,12 +14,14 @@ from studies.simulation.chamber import ZERO_CELSIUS, check_profile
 from studies.simulation.frequency import FrequencyModel, Theory, build_frequency_model
 from studies.simulation.heat_path import build_network, cut_shell, root_to_end
 from studies.simulation.noise import SILENT, bias_noise, frequency_noise, quantise, read_noise, white_noise
+from thermal.lag import lag
 from thermal.meridian import energy_weights
 from thermal.network import Boundary, Network, Part, assemble
 from thermal.profile import Profile
+from thermal.radiative import simulate
 from thermal.relaxation import find_relaxation
 from thermal.resonator import shell_weights
-from thermal.transient import Transient, lag, simulate
+from thermal.transient import Transient
 
 if TYPE_CHECKING:
     from studies.instrument.card import Instrument

@@ -9,8 +9,8 @@ from studies.cli import main
 from studies.errors import InputError
 from studies.record import Record, write_record
 from studies.thermal_constants import fit_thermal_constants
+from thermal.lag import lag
 from thermal.profile import parse_profile
-from thermal.transient import lag
 
 
 def record(words, **columns):

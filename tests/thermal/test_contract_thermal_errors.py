@@ -4,10 +4,12 @@ import numpy as np
 import pytest
 
 from thermal.errors import ThermalError
+from thermal.lag import lag
 from thermal.network import Boundary, Conductor, Node, Radiator, Source, assemble, effective_emissivity, linearise
 from thermal.profile import Profile, constant, parse_profile
+from thermal.radiative import integrate
 from thermal.steady import find_steady_state
-from thermal.transient import integrate, lag, propagate
+from thermal.transient import propagate
 
 ROOM = (Boundary("chamber"), Node("shell", 2.0))
 LINK = Conductor("chamber", "shell", 1e-3)

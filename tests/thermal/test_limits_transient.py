@@ -8,9 +8,11 @@ from scipy.constants import Stefan_Boltzmann
 
 from thermal.balance import check_energy
 from thermal.errors import ThermalError
+from thermal.lag import lag, scan
 from thermal.network import Boundary, Conductor, Node, Radiator, Source, assemble, linearise
 from thermal.profile import Profile, constant, parse_profile
-from thermal.transient import integrate, lag, propagate, scan, simulate, sweep
+from thermal.radiative import integrate, simulate, sweep
+from thermal.transient import propagate
 
 LINEAR = (
     Boundary("chamber"),

@@ -12,10 +12,11 @@ from scipy.signal import lfilter
 from thermal.errors import ThermalError
 from thermal.followers import Constant, NetworkFollower, make_lags
 from thermal.identification import FrequencyLaw, identify, identify_lags, profile_interval
+from thermal.lag import lag
 from thermal.network import Boundary, Conductor, Node, Radiator, assemble
 from thermal.profile import Profile, parse_profile
+from thermal.radiative import integrate
 from thermal.run import Run
-from thermal.transient import integrate, lag
 from thermal.whitening import estimate_noise
 
 ROOM = 293.15
