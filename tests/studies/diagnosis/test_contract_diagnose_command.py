@@ -1,0 +1,176 @@
+"""`hrg diagnose`: the JSON of the contract, and what it says of unusable or undecidable input."""
+
+import json
+
+import numpy as np
+import pytest
+
+from studies.cli import main
+from studies.record import Record, write_record
+from tests.generator.device import build
+
+VERDICTS = ("unexplained", "not-identifiable", "explained", "adequate")
+
+
+@pytest.fixture(scope="module")
+def campaign(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("campaign")
+    records, _ = build("three", "white", np.random.default_rng(11), ("rate-bias",), snr=3.0)
+    paths = []
+    for k, record in enumerate(records):
+        paths.append(str(folder / f"run{k + 1}.csv"))
+        write_record(record, paths[-1])
+    return records, paths
+
+
+def run(capsys, *words):
+    status = main(["diagnose", *map(str, words)])
+    out, err = capsys.readouterr()
+    return status, out, err
+
+
+def test_json_keeps_the_contract(campaign, capsys, tmp_path):
+    _, paths = campaign
+    page = tmp_path / "page.html"
+    status, out, _ = run(capsys, *paths, "--json", "--report", page)
+    found = json.loads(out)
+    assert status == 0
+    assert found["schema"] == "hrg.diagnosis/1"
+    assert found["verdict"] in VERDICTS
+    assert set(found) >= {"causes", "responses", "next_experiment", "extended_model"}
+    assert set(found["responses"]) == {"frequency_Hz", "bias_deg_per_h", "inverse_q"}
+    cause = found["causes"][0]
+    assert cause["effect"] == "rate-bias"
+    assert cause["response"] == "bias_deg_per_h"
+    assert 0.0 <= cause["probability"] <= 1.0
+    for parameter in cause["parameters"].values():
+        assert parameter["low"] <= parameter["value"] <= parameter["high"]
+    evidences = [c["evidence"] for c in found["causes"]]
+    assert evidences == sorted(evidences, reverse=True)
+    for result in found["responses"].values():
+        assert result["verdict"] in VERDICTS
+        assert set(result) >= {"noise", "baseline", "extended", "gain", "left_over"}
+        if result["verdict"] == "adequate":
+            assert result["extended"] is None
+            assert result["gain"] is None
+    bias = found["responses"]["bias_deg_per_h"]
+    assert bias["gain"] == pytest.approx(bias["baseline"]["held_out_rms"] / bias["extended"]["held_out_rms"])
+    worst = min(VERDICTS.index(r["verdict"]) for r in found["responses"].values())
+    assert found["verdict"] == VERDICTS[worst]
+    text = page.read_text()
+    assert "rate-bias" in text
+    assert "data:image/svg+xml" in text
+
+
+def save(tmp_path, columns, name="run.csv", **notes):
+    path = tmp_path / name
+    write_record(Record({key: np.asarray(value, dtype=float) for key, value in columns.items()}, **notes), path)
+    return path
+
+
+def columns_of(record):
+    return {key: values.copy() for key, values in record.columns.items()}
+
+
+def test_two_gyros_are_refused(campaign, capsys, tmp_path):
+    records, _ = campaign
+    other = columns_of(records[1])
+    other["frequency_Hz"] *= 1.2
+    status, out, err = run(capsys, save(tmp_path, columns_of(records[0]), "a.csv"), save(tmp_path, other, "b.csv"), "--json")
+    assert status == 2
+    assert out == ""
+    assert "different gyros" in err
+    status, _, err = run(capsys, save(tmp_path, columns_of(records[0]), "a.csv", instrument="one"),
+                         save(tmp_path, columns_of(records[1]), "b.csv", instrument="two"))
+    assert status == 2
+    assert "'two'" in err
+
+
+@pytest.mark.parametrize(("column", "factor", "words"), [
+    ("frequency_Hz", 1e-3, "another unit"), ("inverse_q", 1e9, "inverse_q"), ("bias_deg_per_h", 1000.0, "another unit"),
+])
+def test_units_off_by_a_thousand_are_named(campaign, capsys, tmp_path, column, factor, words):
+    records, _ = campaign
+    wrong = columns_of(records[1])
+    wrong[column] *= factor
+    status, _, err = run(capsys, save(tmp_path, columns_of(records[0]), "a.csv"), save(tmp_path, wrong, "b.csv"))
+    assert status == 2
+    assert words in err
+    assert "b.csv" in err
+
+
+def test_missing_columns_are_named(campaign, capsys, tmp_path):
+    records, _ = campaign
+    cold = columns_of(records[0])
+    del cold["housing_temperature_degC"]
+    status, _, err = run(capsys, save(tmp_path, cold))
+    assert status == 2
+    assert "housing_temperature_degC" in err
+    dumb = {key: records[0].columns[key] for key in ("time_s", "housing_temperature_degC")}
+    status, _, err = run(capsys, save(tmp_path, dumb))
+    assert status == 2
+    assert "frequency_Hz" in err
+    status, _, err = run(capsys)
+    assert status == 2
+    status, _, err = run(capsys, save(tmp_path, columns_of(records[0])), "--save", tmp_path / "x.toml")
+    assert status == 2
+    assert "--card" in err
+
+
+def verdict_of(capsys, *words):
+    status, out, err = run(capsys, *words, "--json")
+    assert status == 0, err
+    return json.loads(out)
+
+
+def test_ten_samples_decide_nothing(campaign, capsys, tmp_path):
+    records, _ = campaign
+    few = {key: values[:10] for key, values in records[0].columns.items()}
+    found = verdict_of(capsys, save(tmp_path, few))
+    assert found["verdict"] == "not-identifiable"
+    assert found["causes"] == []
+    assert "values" in found["responses"]["frequency_Hz"]["remark"]
+
+
+def test_constant_and_missing_channels_are_said(campaign, capsys, tmp_path):
+    records, _ = campaign
+    dead = columns_of(records[0])
+    dead["frequency_Hz"][:] = 5000.0
+    dead["inverse_q"][:] = np.nan
+    found = verdict_of(capsys, save(tmp_path, dead))
+    assert found["responses"]["frequency_Hz"]["remark"] == "constant"
+    assert found["responses"]["inverse_q"]["remark"] == "every value is missing"
+    assert found["responses"]["bias_deg_per_h"]["noise"] is not None
+
+
+def test_one_run_with_an_hour_gap_and_a_repeated_file(campaign, capsys, tmp_path):
+    records, _ = campaign
+    time = records[0].columns["time_s"]
+    kept = (time < 9000) | (time > 12600)
+    gappy = {key: values[kept] for key, values in records[0].columns.items()}
+    found = verdict_of(capsys, save(tmp_path, gappy, "a.csv"), save(tmp_path, gappy, "b.csv"))
+    assert any("repeats" in note for note in found["notes"])
+    assert any("gaps" in note for note in found["notes"])
+    assert found["verdict"] in VERDICTS
+
+
+def test_constant_temperature_is_not_identifiable(capsys, tmp_path):
+    rng = np.random.default_rng(5)
+    time = np.arange(0.0, 20000.0, 20.0)
+    found = verdict_of(capsys, save(tmp_path, {
+        "time_s": time, "housing_temperature_degC": 20.0 + 0.003 * rng.standard_normal(time.size),
+        "frequency_Hz": 5000.0 + 0.01 * rng.standard_normal(time.size),
+    }))
+    assert found["verdict"] == "not-identifiable"
+    assert found["causes"] == []
+    assert "K only" in found["responses"]["frequency_Hz"]["remark"]
+
+
+def test_plan_predicts_and_names_what_cannot_show(capsys):
+    status, out, _ = run(capsys, "--plan", "cycle 20 -15 40 0.5 20min 1", "--draws", "20", "--json")
+    assert status == 0
+    plan = json.loads(out)
+    assert plan["schema"] == "hrg.plan/1"
+    assert "electrostatic-softening" in plan["invisible"]
+    assert plan["confusion"]["rate-bias"]
+    assert all(abs(sum(said.values()) - 1.0) < 1e-9 for said in plan["confusion"].values())

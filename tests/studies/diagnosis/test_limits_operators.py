@@ -1,0 +1,64 @@
+"""Operators with memory and the coloured likelihood against closed forms."""
+
+import numpy as np
+import pytest
+
+from studies.diagnosis.likelihood import KERNELS, NoiseBasis, fit_linear
+from studies.diagnosis.states import average, lag, play
+
+
+@pytest.mark.parametrize("tau", [40.0, 900.0, 2e4])
+def test_lag_of_ramp_and_sine_are_exact(tau):
+    t = np.arange(0.0, 30000.0, 10.0)
+    ramp = lag(0.002 * t, 10.0, tau)
+    assert np.allclose(ramp, 0.002 * (t - tau * (1.0 - np.exp(-t / tau))), atol=1e-9)
+    omega = 2 * np.pi / 7200.0
+    exact = (np.sin(omega * t) - omega * tau * (np.cos(omega * t) - np.exp(-t / tau))) / (1 + (omega * tau) ** 2)
+    # a sine is not linear between samples: the error is that of the interpolation, (ω h)²/12
+    assert np.max(np.abs(lag(np.sin(omega * t), 10.0, tau) - exact)) < (omega * 10.0) ** 2 / 8 + 1e-12
+
+
+def test_play_is_rate_independent_and_remembers_its_return_points():
+    drive = np.interp(np.linspace(0, 1, 4001), [0, 0.2, 0.5, 0.6, 0.7, 1.0], [0, 10, -8, 2, -3, 12])
+    out = play(drive, 2.5)
+    assert np.max(np.abs(out - drive)) <= 2.5 + 1e-12
+    even = np.linspace(0, 1, 4001)
+    hurried = play(np.interp(even**1.7, even, drive), 2.5)
+    assert np.max(np.abs(np.interp(even ** (1 / 1.7), even, hurried) - out)) < 0.05
+    # on the long way down the state is half a loop above; the minor loop 2 -> -3 -> 12 closes where it began
+    down = 800 + int(np.argmin(np.abs(drive[800:2000])))
+    assert out[down] == pytest.approx(2.5, abs=0.02)
+    opened = 2000 + int(np.argmax(drive[2000:2600]))
+    closed = 2900 + int(np.argmin(np.abs(drive[2900:] - drive[opened])))
+    assert out[closed] == pytest.approx(out[opened], abs=0.02)
+
+
+@pytest.mark.parametrize("kernel", KERNELS)
+def test_profiled_likelihood_is_that_of_the_full_covariance(kernel):
+    rng = np.random.default_rng(4)
+    t = np.sort(rng.choice(np.arange(0.0, 28800.0, 144.0), 90, replace=False))
+    columns = np.stack([np.ones(90), t / 1e4, np.sin(t / 3000.0)], axis=1)
+    y = columns @ [1.0, 0.5, -0.3] + rng.standard_normal(90) + np.cumsum(rng.standard_normal(90)) * 0.1
+    basis = NoiseBasis.of([t], kernel)
+    share = 3.0
+    fit = fit_linear(basis, basis.rotate(y), basis.rotate(columns), [share])
+    covariance = basis.vectors[0] @ np.diag(1.0 + share * basis.walk) @ basis.vectors[0].T
+    inverse = np.linalg.inv(covariance)
+    exact = np.linalg.solve(columns.T @ inverse @ columns, columns.T @ inverse @ y)
+    rest = y - columns @ exact
+    assert np.allclose(fit.coefficients, exact, rtol=1e-6)
+    expected = 90 * np.log(rest @ inverse @ rest) + np.linalg.slogdet(covariance)[1]
+    assert fit.score == pytest.approx(expected, abs=1e-6)
+    variance = rest @ inverse @ rest / 87
+    assert np.allclose(fit.covariance, variance * np.linalg.inv(columns.T @ inverse @ columns), rtol=1e-5)
+
+
+def test_walk_kernel_is_brownian_with_a_past():
+    t = np.array([0.0, 7200.0, 28800.0])
+    basis = NoiseBasis.of([t])
+    covariance = basis.vectors[0] @ np.diag(basis.walk) @ basis.vectors[0].T
+    assert np.allclose(covariance, [[0.5, 0.5, 0.5], [0.5, 0.75, 0.75], [0.5, 0.75, 1.5]])
+
+
+def test_average_leaves_out_an_incomplete_group():
+    assert np.allclose(average(np.arange(7.0), 3), [1.0, 4.0])

@@ -1,0 +1,92 @@
+"""Effects hidden by an independent generator must be found; nothing must be found where nothing is hidden.
+
+Seeds are drawn anew at every run and printed; the large campaign is tests/benchmarks/bench_diagnosis.py.
+"""
+
+import ast
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from studies.diagnosis.campaign import load_campaign
+from studies.diagnosis.effects import library
+from studies.diagnosis.investigate import investigate
+from tests.generator.device import build
+
+FRESH = int(np.random.SeedSequence().entropy % 2**31)
+
+
+def diagnose(design, family, effects=(), alien="", snr=3.0, salt=0, effects_of=None):
+    seed = FRESH + salt
+    print(f"seed {seed}: {design}, {family}, {effects or alien or 'nothing'}, SNR {snr:g}")
+    records, truth = build(design, family, np.random.default_rng(seed), effects, alien, snr)
+    return investigate(load_campaign(records), held_out=False, effects=effects_of).verdict, truth
+
+
+def names_of(cause):
+    return {cause.effect, *cause.equivalent}
+
+
+# one positive of every kind of mechanism: memory, event, static, instant drive, line, loss; each with its null and alien
+POSITIVES = [
+    ("rich", "walk", "hysteresis", "bias_deg_per_h"),
+    ("rich", "white", "second-lag", "frequency_Hz"),
+    ("cycles", "flicker", "jump", "frequency_Hz"),
+    ("plain", "walk", "rate-bias", "bias_deg_per_h"),
+    ("three", "correlated", "electrostatic-softening", "frequency_Hz"),
+    ("plain", "outliers", "loss-peak", "inverse_q"),
+]
+ALIEN = ["rate-square@bias", "volt-temperature", "fringes@bias", "chirp@bias", "kink@bias", "volts@loss"]
+
+
+@pytest.mark.parametrize(("design", "family", "name", "response"), POSITIVES)
+def test_hidden_effect_is_named(design, family, name, response):
+    verdict, truth = diagnose(design, family, (name,), salt=hash(name) % 1000)
+    assert verdict.causes, truth
+    assert name in names_of(verdict.causes[0]), (verdict.causes, truth)
+    assert verdict.causes[0].response == response
+    assert verdict.responses[response].verdict in ("explained", "not-identifiable"), (verdict.responses[response], truth)
+
+
+def test_null_campaigns_are_adequate():
+    """One null for each positive; at a true rate of 1 % two alarms in six would come once in 700 runs."""
+    said = [
+        diagnose(design, family, salt=2000 + k)[0] for k, (design, family, *_) in enumerate(POSITIVES)
+    ]
+    assert sum(v.verdict != "adequate" for v in said) <= 1, [(v.verdict, v.causes) for v in said]
+
+
+def test_aliens_are_not_explained():
+    """One alien for each positive: structure that no file of the library knows must not be called explained."""
+    said = [diagnose("rich", family, alien=alien, salt=3000 + k)[0]
+            for k, (alien, (_, family, *_)) in enumerate(zip(ALIEN, POSITIVES, strict=True))]
+    assert sum(v.verdict == "unexplained" for v in said) >= 4, [(a, v.verdict, v.causes) for a, v in zip(ALIEN, said, strict=True)]
+
+
+def test_effect_without_its_file_is_not_explained_by_another():
+    effects = [e for e in library().values() if e.name != "quadrature-leakage"]
+    verdict, _ = diagnose("rich", "white", ("quadrature-leakage",), salt=4000, effects_of=effects)
+    assert verdict.verdict == "unexplained", verdict.causes
+
+
+def test_two_effects_are_both_found():
+    verdict, truth = diagnose("rich", "white", ("hysteresis", "amplitude-frequency"), salt=5000)
+    found = set().union(*(names_of(cause) for cause in verdict.causes))
+    assert {"hysteresis", "amplitude-frequency"} <= found, (verdict.causes, truth)
+
+
+def test_inseparable_pair_is_answered_as_a_set():
+    """A drifting clock and an ageing frequency are the same data without a reference clock."""
+    verdict, _ = diagnose("plain", "white", ("clock-drift",), salt=6000)
+    assert names_of(verdict.causes[0]) >= {"ageing", "clock-drift"}
+    assert verdict.verdict == "not-identifiable"
+
+
+def test_generator_knows_nothing_of_the_diagnosis():
+    for path in (Path(__file__).resolve().parents[2] / "generator").glob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text())):
+            modules = [node.module or ""] if isinstance(node, ast.ImportFrom) else (
+                [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
+            )
+            assert not any(module.startswith("studies.diagnosis") for module in modules), path

@@ -1,0 +1,44 @@
+"""The HRG paper's Table 1 as a steady-state table: what it decides and what it cannot."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import studies.papers
+from studies.diagnosis.table import diagnose_table
+
+TABLE = str(Path(studies.papers.__file__).parent / "hrg_table1.csv")
+
+
+def test_table1_is_not_identifiable_and_says_what_is_known():
+    found = diagnose_table(TABLE)
+    assert found.verdict.verdict == "not-identifiable"
+    cause = found.verdict.causes[0]
+    members = {cause.effect, *cause.equivalent}
+    assert members >= {"curvature", "thermometer-scale", "mounting-stress"}
+    # theory sheet: the law leaves about 0.148 Hz rms; its curvature is a third of the measured -0.23 ppm/K²
+    assert found.law_rms == pytest.approx(0.148, abs=0.006)
+    assert 2.5 < found.curvature_ratio < 3.5
+    text = " ".join(found.sentences)
+    assert "F(1, 2) = 105" in text
+    quartic = next(c for c in found.candidates if c[0] == "curvature, third and fourth order")
+    assert quartic[1] == pytest.approx(4.03e-5, rel=0.02)
+    assert quartic[2] == pytest.approx(0.0216, abs=2e-4)
+
+
+def test_exact_quadratic_table_is_adequate(tmp_path):
+    T = np.arange(-20.0, 41.0, 10.0)
+    rng = np.random.default_rng(8)
+    path = tmp_path / "t.csv"
+    f = 4425.0 + 0.37 * T - 4e-4 * T**2 + rng.normal(0.0, 0.003, T.size)
+    path.write_text("temperature_degC,frequency_Hz\n" + "".join(f"{t:g},{v:.2f}\n" for t, v in zip(T, f, strict=True)))
+    assert diagnose_table(str(path)).verdict.verdict == "adequate"
+
+
+def test_three_points_decide_nothing(tmp_path):
+    path = tmp_path / "t.csv"
+    path.write_text("temperature_degC,frequency_Hz\n0,4424.90\n20,4432.07\n40,4439.20\n")
+    found = diagnose_table(str(path))
+    assert found.verdict.verdict == "not-identifiable"
+    assert not found.verdict.causes
