@@ -1,4 +1,9 @@
-"""`hrg fit thermal`: time constants of the resonator behind its housing, from records."""
+"""`hrg fit thermal`: time constants of the resonator behind its housing, from records.
+
+With --json one object, schema `hrg.fit-thermal/1`: `data`, `confidence`, `estimates` (by name: `value`, null where not
+`determined`, `low`, `high`), `undetermined` (combinations of relative changes that the records leave open),
+`initial_departure_K` per run, `residual_rms_Hz`, `row_step_s` of the averaged rows, `warnings`.
+"""
 
 from typing import TYPE_CHECKING, Any
 
@@ -14,8 +19,8 @@ def fit_thermal(
     """Identify how the resonator lags behind its housing, with intervals, and say what the records cannot tell.
 
     The records need time_s, frequency_Hz and housing_temperature_degC (or chamber_temperature_degC). The initial state of
-    every run is unknown and fitted; the noise may wander. Several lags act side by side and their weights add up to 1: a
-    negative weight is a lag in series.
+    every run is unknown and fitted; the noise may wander. The lags are in series, and radiation makes a share of their
+    conductance at 20 °C. Intervals hold for a gyro that is such a chain; a residual above the noise says that it is not.
 
     Parameters
     ----------

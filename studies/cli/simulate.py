@@ -1,4 +1,9 @@
-"""`hrg simulate`: a virtual run in the record format."""
+"""`hrg simulate`: a virtual run in the record format.
+
+With --json one object, schema `hrg.simulate/1`: `card`, `out`, `rows`, `columns`, `rate_Hz`, `seed` (null without noise),
+`frequency_Hz` (`first`, `last`), `solver_relative_error` (of the shell solver against its theory),
+`interpolation_relative_error` (of the frequency model against the solver), `warnings`.
+"""
 
 from typing import Literal
 
@@ -75,6 +80,7 @@ def simulate(
         "frequency_Hz": {"first": run.record["frequency_Hz"][0], "last": run.record["frequency_Hz"][-1]},
         "solver_relative_error": model.solver_error,
         "interpolation_relative_error": model.interpolation_error,
+        "warnings": list(run.warnings),
     }
     if json:
         print_json(summary)

@@ -161,6 +161,10 @@ def _drive(table: Section, path: HeatPath) -> list[Part]:
 def _material_value(instrument: "Instrument", table: Section, key: str, name: str) -> float:
     if key in table:
         return table.number(key, above=0.0)
+    if name not in instrument.material.properties:
+        raise InputError(
+            f"{table.where}: no source states the {name.replace('_', ' ')} of {instrument.material.name}; add the key '{key}'."
+        )
     return float(instrument.material.value(name, instrument.reference_temperature))
 
 

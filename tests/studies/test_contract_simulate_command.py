@@ -13,6 +13,10 @@ def test_simulate_writes_a_record_and_one_json_object(tmp_path, capsys):
     assert main(["simulate", "hrg-30mm", "step 20 -10 1h", "--out", str(out), "--theory", "shell", "--rate", "0.1", "--json"]) == 0
     answer = json.loads(capsys.readouterr().out)
     assert answer["schema"] == "hrg.simulate/1"
+    assert list(answer) == [
+        "schema", "card", "out", "rows", "columns", "rate_Hz", "seed", "frequency_Hz", "solver_relative_error",
+        "interpolation_relative_error", "warnings",
+    ]  # fmt: skip
     assert answer["rows"] == 361
     assert answer["interpolation_relative_error"] < 1e-7
     record = read_record(out)

@@ -239,6 +239,11 @@ def test_unusable_tables_are_refused_by_key(card, model, table, content, words):
         run(card.with_table(table, content), model)
 
 
+def test_a_material_without_heat_capacity_is_asked_for_by_its_key():
+    with pytest.raises(InputError, match="of 3j53; add the key 'heat_capacity_J_per_kg_K'"):
+        build_network(load_card("bvg-bell"))
+
+
 def test_unusable_runs_are_refused(card, model, tmp_path):
     with pytest.raises(ThermalError, match=r"reaches -80 °C at 0 s, outside the range of fused-silica"):
         run(card, model, "step 20 -80 1h")

@@ -30,6 +30,10 @@ def test_one_lag_without_radiation_is_found_with_its_interval(tmp_path, capsys):
     assert main(["fit", "thermal", str(path), "--lags", "1", "--json"]) == 0
     answer = json.loads(capsys.readouterr().out)
     assert answer["schema"] == "hrg.fit-thermal/1"
+    assert list(answer) == [
+        "schema", "data", "confidence", "estimates", "undetermined", "initial_departure_K", "residual_rms_Hz", "row_step_s",
+        "warnings",
+    ]  # fmt: skip
     tau, share = answer["estimates"]["time_constant_1"], answer["estimates"]["radiated_share"]
     assert tau["low"] < 1800.0 < tau["high"]
     assert tau["value"] == pytest.approx(1800.0, rel=0.01)
