@@ -41,6 +41,7 @@ class Level:
     split: int = 1
 
 
+SMALL = 0.5  # length over radius of a small element
 _SOLID = ((5, 4), (7, 6), (9, 8), (11, 10), (13, 12))  # degree of blocks, rings around sharp corners
 LEVELS: dict[str, tuple[Level, ...]] = {
     "solid": tuple(
@@ -85,8 +86,8 @@ class Group:
     def matrices(self, integrate: Callable[[Array, Array], Array], stations: Array) -> Array:
         """Element matrices from station matrices, in the unknowns that are solved for.
 
-        In the small element at a free edge these are the value at its inner node and differences from it: `anchors` are
-        such (element, node). Else the layer's stiff shear would drown the bending as (R/h)³ instead of (R/h)².
+        In the small elements at a free edge these are the values at the inner node and differences from them: `anchors`
+        are such (element, node). Else the layers' stiff shear would drown the bending as (R/h)³ instead of (R/h)².
         """
         found = integrate(stations, self.table.along)
         for element, node in self.anchors:
@@ -214,8 +215,9 @@ def build_system(resonator: Resonator, n: int, theory: Theory, level: Level) -> 
     ends: dict[tuple[int, int], Tie] = {}
     size = 0
     for k, chain in enumerate(layout.chains):
-        group, size = _shell_group(resonator, chain, n, level, size)
+        group, inner_rows, size = _shell_group(resonator, chain, n, level, size)
         groups.append(group)
+        rows.update(inner_rows)
         for side in (0, 1):
             ends[k, side] = _chain_end(resonator, chain, group, side, level.through)
             rows.update(_end_rows(chain.ends[side], ends[k, side], n))
@@ -272,8 +274,8 @@ def _free_or_pole(on_axis: bool) -> End:
     return "pole" if on_axis else "free"
 
 
-def _shell_group(resonator: Resonator, chain: Chain, n: int, level: Level, start: int) -> tuple[Group, int]:
-    """Tabulate one chain and number its unknowns, (node, amplitude) from `start`."""
+def _shell_group(resonator: Resonator, chain: Chain, n: int, level: Level, start: int) -> tuple[Group, Rows, int]:
+    """Tabulate one chain and number its unknowns, (node, amplitude) from `start`; see `_anchor` for the rows."""
     p, orders = level.along, level.through
     xi, weights = gauss(p + 2)
     eta = gauss(max(orders) + 2)
@@ -283,10 +285,42 @@ def _shell_group(resonator: Resonator, chain: Chain, n: int, level: Level, start
     elements, m = len(chain.segments), sum(orders) + 3
     nodes = p * np.arange(elements)[:, None] + np.arange(p + 1)
     unknowns = start + (nodes[:, :, None] * m + np.arange(m)).reshape(elements, -1)
-    edges = ((0, p), (elements - 1, 0)) if elements > 1 else ()
-    anchors = tuple(edge for edge, end in zip(edges, chain.ends, strict=False) if end == "free")
+    anchors, rows = _anchor(resonator, chain, unknowns, m, start + (elements * p + 1) * m)
     group = Group(table, unknowns, np.ones(unknowns.shape), ShellPart(chain, section), anchors)
-    return group, start + (elements * p + 1) * m
+    return group, rows, start + (elements * p + 1) * m + len(rows)
+
+
+def _anchor(
+    resonator: Resonator, chain: Chain, unknowns: Index, m: int, fresh: int
+) -> tuple[tuple[tuple[int, int], ...], Rows]:
+    """Choose the small elements at free edges that are solved in differences from their inner node.
+
+    From the inside out, the inner node of the next one is the sum of the differences so far: it gets numbers of its own
+    (from `fresh`, changed in `unknowns`) and rows that say so.
+    """
+    elements = len(chain.segments)
+    small = np.diff(chain.breaks) < SMALL * resonator.size
+    anchors: list[tuple[int, int]] = []
+    rows: Rows = {}
+    for end, outwards in zip(chain.ends, (-1, 1), strict=True):
+        if end != "free":
+            continue
+        edge = 0 if outwards < 0 else elements - 1
+        most = elements // 2 if chain.ends == ("free", "free") else elements - 1
+        run = [edge - outwards * k for k in range(most)]
+        run = run[: next((k for k, element in enumerate(run) if not small[element]), most)]
+        inner, outer = (slice(-m, None), slice(0, m)) if outwards < 0 else (slice(0, m), slice(-m, None))
+        above: list[list[tuple[int, float]]] | None = None
+        for element in reversed(run):
+            anchors.append((element, 0 if outwards > 0 else unknowns.shape[1] // m - 1))
+            if above is not None:
+                unknowns[element, inner] = np.arange(fresh, fresh + m)
+                rows.update(zip(range(fresh, fresh + m), above, strict=True))
+                fresh += m
+            else:
+                above = [[(int(k), 1.0)] for k in unknowns[element, inner]]
+            above = [[*row, (int(k), 1.0)] for row, k in zip(above, unknowns[element, outer], strict=True)]
+    return tuple(anchors), rows
 
 
 def _chain_end(resonator: Resonator, chain: Chain, group: Group, side: int, orders: Orders) -> Tie:

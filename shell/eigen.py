@@ -17,7 +17,7 @@ from shell.errors import ShellError
 from shell.quadrature import Array
 
 Index = NDArray[np.intp]
-TOO_THIN = "the stiffness lost its last digit in double precision: the shell is too thin (h/R far below 1e-4)."
+TOO_THIN = "the stiffness lost its last digit in double precision: the shell is too thin (h/R far below 1e-6)."
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,6 +127,8 @@ def lowest_vectors(
     width = min(2 * count + 3, pattern.size)  # the more vectors beyond `count`, the faster they converge
     x = np.random.default_rng(5).standard_normal((pattern.size, width))
     before, change = np.full(count, np.inf), np.inf
+    # of a thin shell one solve leaves little but the lowest mode in every column: make them independent again
+    x = _orthonormalise(pattern, mass, factor.solve(apply_mass(pattern, mass, x)))
     loaded = apply_mass(pattern, mass, x)
     for _ in range(300):
         y = factor.solve(loaded)
@@ -138,6 +140,20 @@ def lowest_vectors(
         if change < accuracy or (change < 1e-8 and change > last):
             break
     return np.asarray(x[:, :count])
+
+
+def _orthonormalise(pattern: Pattern, mass: list[Array], x: Array) -> Array:
+    """Gram-Schmidt, twice, in the inner product of M."""
+    done = np.empty((len(x), 0))
+    heavy = np.empty((len(x), 0))
+    for column in x.T:
+        for _ in range(2):
+            column = column - done @ (heavy.T @ column)
+            loaded = apply_mass(pattern, mass, column[:, None])
+            column /= np.sqrt(column @ loaded[:, 0])
+        done = np.column_stack([done, column])
+        heavy = np.column_stack([heavy, apply_mass(pattern, mass, column[:, None])])
+    return done
 
 
 def _project(K: Array, M: Array) -> tuple[Array, Array]:

@@ -24,7 +24,7 @@ from shell.solution import AlongMeridian, Constants, EnergyFractions, Solution, 
 
 THEORIES = ("solid", "shell", "rayleigh")
 THICKEST_SHELL = 0.1  # h/R up to which shell theory has been held against the solid
-THINNEST = 5e-5  # h/R below which double precision loses the digits
+THINNEST = 1e-6  # h/R below which double precision loses the digits
 
 
 class TheoryRangeWarning(UserWarning):
