@@ -1,0 +1,234 @@
+"""Train the reduced model of one box of designs: snapshots, sizes, features, and the error that it states."""
+
+from dataclasses import dataclass, replace
+from itertools import product
+
+import numpy as np
+
+from shell.errors import ShellError
+from shell.frozen import FrozenShell
+from shell.kernel import lame
+from shell.quadrature import Array
+from shell.reduced import (
+    CHUNK,
+    MOST_FEATURES,
+    Features,
+    Projected,
+    ReducedModel,
+    Snapshots,
+    pencils,
+    rayleigh_ritz,
+    solve_all,
+    span,
+)
+
+SIZES = (2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 16, 18, 20, 22, 24)
+LEARNED, CHECKS, FEATURE_DESIGNS = 48, 64, 320  # inside, and again as many on the faces
+SAFETY = 1.5  # on the largest ratio of true to estimated error among the checks
+ROOM = 0.75  # share of the tolerance that the estimate may take on designs of the training; the rest is for others
+
+
+@dataclass(frozen=True, eq=False)
+class Box:
+    """Designs h(s) = thickness (base(s) + Σ a_k shape_k(s)) with |a_k| <= amplitude, and a range of ν.
+
+    base, shapes : at the stations, (elements, stations) and (shapes, elements, stations).
+    """
+
+    thickness: tuple[float, float]
+    amplitude: float
+    nu: tuple[float, float]
+    base: Array
+    shapes: Array
+
+    @property
+    def dimensions(self) -> int:
+        """Thickness, amplitudes, ν."""
+        return len(self.shapes) + 2
+
+    def designs(self, unit: Array) -> tuple[Array, Array, Array]:
+        """Thickness, amplitudes (designs, shapes) and ν of points of the cube -1 ... 1."""
+        (thin, thick), (low, high) = self.thickness, self.nu
+        thickness = (thin + thick) / 2 + (thick - thin) / 2 * unit[:, 0]
+        return thickness, self.amplitude * unit[:, 1:-1], (low + high) / 2 + (high - low) / 2 * unit[:, -1]
+
+    def profile(self, thickness: Array, amplitudes: Array) -> Array:
+        """Thickness at the stations, (designs, elements, stations)."""
+        return thickness[:, None, None] * (self.base + np.tensordot(amplitudes, self.shapes, 1))
+
+
+def train(shell: FrozenShell, box: Box, tolerance: float) -> ReducedModel:
+    """The smallest reduced model whose stated error of the frequency stays below `tolerance` on its check designs.
+
+    Raises
+    ------
+    ShellError
+        When no size of the basis reaches the tolerance.
+    """
+    rng = np.random.default_rng(2026)  # the designs of the training belong to the method
+    d = box.dimensions
+    learned = _solve(
+        shell, box, np.vstack([np.zeros((1, d)), _corners(d), _inside(rng, LEARNED, d), _on_faces(rng, LEARNED, d)])
+    )
+    checks = _solve(shell, box, np.vstack([_inside(rng, CHECKS, d), _on_faces(rng, CHECKS, d)]))
+    basis = span(shell, learned[1], SIZES[-1] + _tests(SIZES[-1]))
+    projected = Projected.on(shell, basis)
+    size = _choose_size(projected, (learned[1], checks[1]), tolerance, basis.shape[1])
+    tests = min(_tests(size), basis.shape[1] - size)
+    model = _fit(shell, box, Projected.on(shell, basis[:, : size + tests]), size, tests, tolerance, rng)
+    return _state_error(model, shell, box, (learned, checks))
+
+
+def _corners(d: int) -> Array:
+    return np.array(list(product((-1.0, 1.0), repeat=d)))
+
+
+def _inside(rng: np.random.Generator, count: int, d: int) -> Array:
+    return rng.uniform(-1, 1, (count, d))
+
+
+def _on_faces(rng: np.random.Generator, count: int, d: int) -> Array:
+    return np.clip(rng.uniform(-2, 2, (count, d)), -1, 1)
+
+
+def _solve(shell: FrozenShell, box: Box, unit: Array) -> tuple[Array, Snapshots]:
+    thickness, amplitudes, nu = box.designs(unit)
+    return unit, solve_all(shell, box.profile(thickness, amplitudes), nu)
+
+
+def _tests(size: int) -> int:
+    return min(max(size, 8), 14)
+
+
+def _choose_size(projected: Projected, solved: tuple[Snapshots, ...], tolerance: float, most: int) -> int:
+    """The fewest vectors with which the estimate leaves some room below the tolerance."""
+    parts = [projected.at(one.h) for one in solved]
+    operators = [pencils(part, one.nu, projected.shell.plane_stress) for part, one in zip(parts, solved, strict=True)]
+    for size in SIZES:
+        tests = min(_tests(size), most - size)
+        if tests < 2:
+            break
+        worst, ratio = 0.0, 0.0
+        for (K, M), one in zip(operators, solved, strict=True):
+            mu, delta, _ = rayleigh_ritz(K, M, size, tests)
+            error = abs(mu * (1 - delta) / _scaled(one, projected.shell) - 1)
+            large = delta > 0.1 * np.max(delta)
+            ratio = max(ratio, float(np.max(error[large] / delta[large])))
+            worst = max(worst, float(np.max(delta)))
+        if SAFETY * ratio * worst / 2 < ROOM * tolerance:
+            return size
+    raise ShellError(
+        f"no reduced basis of up to {SIZES[-1]} vectors reaches {tolerance:g} in this box: narrow its ranges or allow a larger tolerance."
+    )
+
+
+def _scaled(one: Snapshots, shell: FrozenShell) -> Array:
+    """ω² per unit G instead of E."""
+    return one.eigenvalues / lame(np.ones_like(one.nu), one.nu, shell.plane_stress)[1]
+
+
+def _fit(
+    shell: FrozenShell, box: Box, projected: Projected, r: int, w: int, tolerance: float, rng: np.random.Generator
+) -> ReducedModel:
+    """Choose the features and fit every reduced entry that is needed to them."""
+    d = box.dimensions
+    unit = np.vstack([_corners(d), _inside(rng, FEATURE_DESIGNS, d), _on_faces(rng, FEATURE_DESIGNS, d)])
+    thickness, amplitudes, nu = box.designs(unit)
+    trace, shear, mass = projected.at(box.profile(thickness, amplitudes))
+    K, M = pencils((trace, shear, mass), nu, shell.plane_stress)
+    mu, _, c = rayleigh_ritz(K, M, r, w)
+    rows = _entries(r, w)
+    # what an error of an entry does to μ: its coefficients; a residual counts as the root of the tolerance
+    weight = np.concatenate([np.max(abs(c), axis=0), np.full(w, np.sqrt(tolerance))])
+    # and no entry may be wrong by more than 0.005, or the reduced stiffness would lose its definiteness
+    pair = np.maximum(weight[rows[0]] * weight[rows[1]], 4 * tolerance)
+    typical = float(np.mean(mu))
+    targets = np.concatenate([(kind[:, *rows] * pair) for kind in (trace, shear, typical * mass)], axis=1)
+    reference = float(np.sqrt(box.thickness[0] * box.thickness[1]))
+    powers = tuple(range(1, 2 * max(shell.system.level.through) + 2, 2))
+    features = _choose_features(box, powers, thickness / reference, amplitudes, targets, 0.02 * tolerance)
+    g = features.evaluate(thickness / reference, amplitudes.T)
+    fit = np.linalg.pinv(g.T, rcond=1e-13)
+    by_trace, by_shear, by_mass = ((fit @ kind[:, *rows]).T for kind in (trace, shear, mass))
+    ratio = np.divide(*lame(np.ones_like(nu), nu, shell.plane_stress))
+    start = np.linalg.lstsq(np.concatenate([g, ratio * g]).T, c / c[:, :1], rcond=1e-10)[0].T
+    return ReducedModel(features, np.hstack([by_shear, by_trace]), by_mass, start, r, w, reference, 1.0, 0.0)
+
+
+def _entries(r: int, w: int) -> tuple[Array, Array]:
+    """Row and column of every entry of the reduced matrices that is used, in the order of `ReducedModel`."""
+    packed = [(i, j) for j in range(r) for i in range(j, r)]
+    residual = [(r + k, v) for v in range(r) for k in range(w)]
+    diagonal = [(r + k, r + k) for k in range(w)]
+    i, j = np.array(packed + residual + diagonal).T
+    return i, j
+
+
+def _choose_features(
+    box: Box, powers: tuple[int, ...], relative: Array, amplitudes: Array, targets: Array, accuracy: float
+) -> Features:
+    """Greedily take the power of the thickness at a station that explains most of what is left of the targets."""
+    base, slopes = box.base.ravel(), box.shapes.reshape(len(box.shapes), box.base.size).T
+    h = relative[:, None] * (base + amplitudes @ slopes.T)
+    candidates = np.concatenate([h**power for power in powers], axis=1)
+    left_over = candidates / np.linalg.norm(candidates, axis=0)
+    u, scale, _ = np.linalg.svd(targets, full_matrices=False)
+    targets = u * scale
+    chosen: list[int] = []
+    for _ in range(MOST_FEATURES):
+        sizes = np.linalg.norm(left_over, axis=0)
+        usable = sizes > 1e-9
+        gain = np.where(usable, np.linalg.norm(left_over.T @ targets, axis=1) / np.where(usable, sizes, 1), 0)
+        best = int(np.argmax(gain))
+        if not usable[best]:
+            break
+        chosen.append(best)
+        direction = left_over[:, best] / sizes[best]
+        targets = targets - np.outer(direction, direction @ targets)
+        left_over = left_over - np.outer(direction, direction @ left_over)
+        if np.max(np.linalg.norm(targets, axis=1)) < accuracy:
+            break
+    stations = np.array(sorted({one % len(base) for one in chosen}))
+    row = {station: k for k, station in enumerate(stations.tolist())}
+    places = tuple(
+        np.array(sorted(row[one % len(base)] for one in chosen if one // len(base) == k), dtype=np.intp)
+        for k in range(len(powers))
+    )
+    return Features(base[stations], slopes[stations], places)
+
+
+def _state_error(
+    model: ReducedModel, shell: FrozenShell, box: Box, solved: tuple[tuple[Array, Snapshots], ...]
+) -> ReducedModel:
+    """Hold the model against every design that was solved in full, and state slope and floor of its error."""
+    errors: list[Array] = []
+    deltas: list[Array] = []
+    for unit, one in solved:
+        thickness, amplitudes, nu = box.designs(unit)
+        value, delta = evaluate_many(model, thickness, amplitudes, nu, shell.plane_stress)
+        errors.append(abs(value / _scaled(one, shell) - 1))
+        deltas.append(delta)
+    error, delta = np.concatenate(errors), np.concatenate(deltas)
+    large = delta > 0.1 * np.max(delta)
+    slope = SAFETY * float(np.max(error[large] / delta[large]))
+    floor = SAFETY * float(max(np.max(error - slope * delta), np.max(error[delta <= np.median(delta)])))
+    return replace(model, slope=slope, floor=max(floor, 1e-12))
+
+
+def evaluate_many(
+    model: ReducedModel, thickness: Array, amplitudes: Array, nu: Array, plane_stress: bool
+) -> tuple[Array, Array]:
+    """ω² ρ/G and its error estimate for any number of designs, in chunks of fixed size."""
+    value, error = np.empty(len(thickness)), np.empty(len(thickness))
+    ratio = np.divide(*lame(np.ones_like(nu), nu, plane_stress))
+    for first in range(0, len(thickness), CHUNK):
+        there = slice(first, first + CHUNK)
+        short = CHUNK - len(thickness[there])
+        padded = (
+            np.pad(thickness[there], (0, short), mode="edge"),
+            np.pad(amplitudes[there], ((0, short), (0, 0)), mode="edge"),
+            np.pad(ratio[there], (0, short), mode="edge"),
+        )
+        values, errors = model.evaluate(padded[0], np.ascontiguousarray(padded[1].T), padded[2])
+        value[there], error[there] = values[: CHUNK - short], errors[: CHUNK - short]
+    return value, error
