@@ -38,6 +38,12 @@ def diagnose(
     json : bool
         Print one JSON object (schema hrg.diagnosis/1, with --plan hrg.plan/1) instead of text.
     """
+    import os
+
+    # many small matrices: threads of the linear algebra would wait for each other longer than they compute
+    for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
+        os.environ.setdefault(name, "1")
+
     from studies.cli.output import print_json, print_table, say
     from studies.errors import InputError
     from studies.files.columns import read_header

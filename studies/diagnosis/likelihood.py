@@ -111,33 +111,34 @@ class LinearFit:
 def fit_linear(
     basis: NoiseBasis, target: FloatArray, columns: FloatArray, shares: Sequence[float] | FloatArray = SHARES
 ) -> LinearFit:
-    """Fit rotated `target` by rotated `columns`, the share of the random walk profiled over `shares`."""
-    rows, count = columns.shape
+    """Fit rotated `target` by rotated `columns`, the share of the slow noise profiled over `shares`.
+
+    One singular value decomposition makes the columns orthonormal; every share then costs a small Cholesky solve of
+    the residual, which is free of the large constant parts and so keeps its digits.
+    """
+    rows = columns.shape[0]
     scale = np.linalg.norm(columns, axis=0)
     scale[scale == 0.0] = 1.0
-    unit = columns / scale
-    best: tuple[float, float, float] | None = None
-    for share in shares:
-        root = np.sqrt(basis.weights(share))
-        rss = _residual(unit * root[:, None], target * root)
-        score = rows * np.log(max(rss, 1e-300)) + basis.log_determinant(share)
-        if best is None or score < best[0]:
-            best = (float(score), float(share), rss)
-    assert best is not None
-    root = np.sqrt(basis.weights(best[1]))
-    u, s, vt = np.linalg.svd(unit * root[:, None], full_matrices=False)
+    u, s, vt = np.linalg.svd(columns / scale, full_matrices=False)
     kept = s > 1e-10 * s[0]
-    inverse = np.where(kept, 1.0 / np.where(kept, s, 1.0), 0.0)
-    coefficients = (vt.T * inverse) @ (u.T @ (target * root)) / scale
-    freedom = max(rows - int(kept.sum()), 1)
-    variance = best[2] / freedom
-    covariance = variance * ((vt.T * inverse**2) @ vt) / np.outer(scale, scale)
-    return LinearFit(best[0], best[1], variance, np.asarray(coefficients), np.asarray(covariance))
-
-
-def _residual(columns: FloatArray, target: FloatArray) -> float:
-    ortho = orthonormal(columns)
-    return float(np.sum((target - ortho @ (ortho.T @ target)) ** 2))
+    u, back = u[:, kept], (vt[kept].T / s[kept]) / scale[:, None]
+    first = u.T @ target
+    rest = target - u @ first
+    best: tuple[float, float, float, FloatArray, FloatArray] | None = None
+    for share in shares:
+        weights = basis.weights(share)
+        weighted = u * weights[:, None]
+        gram, moment = weighted.T @ u, weighted.T @ rest
+        part = np.linalg.solve(gram, moment)
+        rss = max(float(weights @ rest**2 - moment @ part), 1e-300)
+        score = rows * np.log(rss) + basis.log_determinant(share)
+        if best is None or score < best[0]:
+            best = (float(score), float(share), rss, part, gram)
+    assert best is not None
+    score, share, rss, part, gram = best
+    variance = rss / max(rows - int(kept.sum()), 1)
+    covariance = variance * (back @ np.linalg.solve(gram, back.T))
+    return LinearFit(score, share, variance, np.asarray(back @ (first + part)), np.asarray(covariance))
 
 
 def orthonormal(columns: FloatArray) -> FloatArray:
