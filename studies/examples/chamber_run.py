@@ -1,0 +1,29 @@
+"""A run in the chamber before the device exists: after a step, how long until the frequency has settled?"""
+
+import numpy as np
+
+from studies.instrument.card import load_card
+from studies.record import Record
+from studies.simulation.chamber import load_profile
+from studies.simulation.virtual_gyro import simulate_run
+
+CHAMBER = "step 20 -10 5h"
+
+
+def run_chamber() -> Record:
+    """Simulate the record of the step, without noise, one row in ten seconds; `write_record` saves it."""
+    return simulate_run(load_card("hrg-30mm"), load_profile(CHAMBER), 0.1, noise=False, theory="shell").record
+
+
+def settling_time(record: Record, share: float) -> float:
+    """Return the time (s) from which the frequency stays within a share of its whole change."""
+    f = record["frequency_Hz"]
+    outside = abs(f - f[-1]) > share * abs(f[0] - f[-1])
+    return float(record["time_s"][np.flatnonzero(outside)[-1] + 1])
+
+
+if __name__ == "__main__":
+    run = run_chamber()
+    print(f"{CHAMBER}: from {run['frequency_Hz'][0]:.3f} to {run['frequency_Hz'][-1]:.3f} Hz")
+    for left in (0.05, 0.01):
+        print(f"  within {left:.0%} of the change after {settling_time(run, left) / 60:.0f} min")

@@ -1,0 +1,34 @@
+"""A tolerance study: how far thickness and radius of a production run spread its frequency, and the share within limits."""
+
+from studies.sweeps.results import Results
+from studies.sweeps.run import run_study
+from studies.sweeps.tolerance import Yield, find_yield
+
+SPEC = {
+    "name": "a production run of domes",
+    "card": "free-dome",
+    "sampling": {"method": "sobol", "cases": 64, "seed": 1},
+    "parameter": [
+        {"name": "resonator.thickness_mm", "tolerance": 0.005},
+        {"name": "resonator.radius_mm", "tolerance": 0.005},
+    ],
+    "quantity": [{"name": "frequency", "harmonic": 2, "theory": "shell"}],
+    "requirement": [{"column": "frequency_n2_Hz", "within": 25.0}],
+}
+
+
+def study_tolerances() -> tuple[Results, Yield]:
+    """Run the study in memory, on one process, and judge it; give `out=` a folder to keep and resume it."""
+    results = run_study(SPEC, workers=1)
+    return results, find_yield(results, results.study.requirements)
+
+
+if __name__ == "__main__":
+    found, share = study_tolerances()
+    f = found.column("frequency_n2_Hz")
+    print(
+        f"{len(f)} designs, {len(found.failed)} failed: {f.mean():.1f} Hz on average, from {f.min():.1f} to {f.max():.1f} Hz"
+    )
+    print(
+        f"within limits: {share.passed} of {share.cases}; the true share lies between {share.low:.1%} and {share.high:.1%}"
+    )
