@@ -6,6 +6,8 @@ if TYPE_CHECKING:
     from studies.sweeps.results import Results
     from studies.sweeps.run import Estimate
 
+SOLVERS = {"full": "each solved in full", "family": "through reduced bases"}
+
 
 def run(
     spec: str,
@@ -219,8 +221,9 @@ def _estimate_json(estimate: "Estimate") -> dict[str, Any]:
 
 def _estimate_words(estimate: "Estimate") -> str:
     return (
-        f"{estimate.cases} cases in {estimate.batches} batches; the nominal design takes {estimate.seconds_each:.3g} s, all about"
-        f" {_duration(estimate.seconds)}; memory about {estimate.memory_MB:.0f} MB. Nothing was kept."
+        f"{estimate.cases} cases in {estimate.batches} batches, {SOLVERS[estimate.solver]}; one takes"
+        f" {estimate.seconds_each:.3g} s, all about {_duration(estimate.seconds)}; memory about {estimate.memory_MB:.0f} MB."
+        " Nothing was kept."
     )
 
 

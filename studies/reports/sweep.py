@@ -142,7 +142,8 @@ def _asked(results: "Results") -> list[Block]:
     ]
     words = f"Sampled by {METHODS[sampling.method]}"
     words += f", seed {sampling.seed}" if sampling.method in ("latin-hypercube", "sobol", "sensitivity") else ""
-    solver = "every design solved in full" if sampling.solver == "full" else "reduced basis with error estimate"
+    full = results.about["identity"]["solver"] == "full"
+    solver = "every design solved in full" if full else "through reduced bases, with an error estimate for every design"
     return [parameters, Table("Quantities", ["Column", "What", "Options"], rows), Text(f"{words}; {solver}.")]
 
 

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from studies.sweeps.workers import Workers
 
 TASK_SECONDS = 1.0  # a task should last so long: long against its cost, short against what kill -9 may lose
+BATCH, BATCH_VECTORISED = 8, 1024  # cases, where the spec says nothing
 MOST_TASKS = 2  # queued for each worker, so that millions of cases do not swamp a scheduler
 
 
@@ -72,19 +73,16 @@ class Batches:
         return [make_item(self.base, place, values) for place, values in zip(places, named, strict=True)]
 
 
-def missing_batches(study: "Study", design: "Design", base: str, store: "Store") -> Batches:
-    """Return, in order, the batches of which the store lacks a case.
-
-    A reduced basis evaluates a batch as one, so it comes back whole; otherwise only the cases that lack.
-    """
+def missing_batches(study: "Study", design: "Design", base: str, store: "Store", vectorised: bool) -> Batches:
+    """Return, in order, the cases that the store lacks, in the batches that the spec fixes."""
     done = store.done()
-    size, whole = study.sampling.batch, study.sampling.solver == "family"
+    size = study.sampling.batch or (BATCH_VECTORISED if vectorised else BATCH)
     places: deque[list[int]] = deque()
     for first in range(0, len(design.unique), size):
         batch = list(range(first, min(first + size, len(design.unique))))
         lacking = [place for place in batch if place not in done]
         if lacking:
-            places.append(batch if whole else lacking)
+            places.append(lacking)
     return Batches(study, design, base, places)
 
 

@@ -15,6 +15,7 @@ from studies.sweeps.parameters import set_parameters
 from studies.sweeps.quantities import library
 
 if TYPE_CHECKING:
+    from studies.sweeps.families import Families
     from studies.sweeps.quantity import Number
     from studies.sweeps.spec import Study
 
@@ -33,20 +34,23 @@ class Row(NamedTuple):
 
 @dataclass(frozen=True)
 class Plan:
-    """What a worker must know of a study; small, so that it travels with every task."""
+    """What a worker must know of a study; without families small, so that it travels with every task."""
 
     instrument: Instrument
     asked: tuple[tuple[str, Mapping[str, Any], int], ...]
+    families: "Families | None" = None
 
     @classmethod
-    def of(cls, study: "Study") -> "Plan":
+    def of(cls, study: "Study", families: "Families | None" = None) -> "Plan":
         """Return the plan of a study."""
         asked = tuple((one.quantity.name, one.options, len(one.columns)) for one in study.asked)
-        return cls(study.instrument, asked)
+        return cls(study.instrument, asked, families)
 
 
 def evaluate_task(plan: Plan, batches: Sequence[Batch]) -> list[list[Row]]:
     """Evaluate several batches of parameters by name; called in a worker."""
+    if plan.families is not None:
+        return [plan.families.evaluate(batch) for batch in batches]
     return [[evaluate_case(plan, parameters) for parameters in batch] for batch in batches]
 
 

@@ -1,6 +1,7 @@
 """Run a study from spec to store: check, resume, compute, search."""
 
 import os
+import time
 from collections.abc import Mapping
 from contextlib import nullcontext
 from dataclasses import dataclass
@@ -9,16 +10,19 @@ from typing import Any
 
 from studies.errors import InputError
 from studies.sweeps.canonical import PHYSICS_VERSION, digest, spell_material
-from studies.sweeps.design import Design, count_cases, draw, nominal_design
-from studies.sweeps.engine import compute, missing_batches
-from studies.sweeps.evaluate import Plan, evaluate_case
+from studies.sweeps.design import Design, draw, nominal_design
+from studies.sweeps.engine import BATCH, BATCH_VECTORISED, compute, missing_batches
+from studies.sweeps.evaluate import Plan, evaluate_task
+from studies.sweeps.families import Families, choose_solver
 from studies.sweeps.progress import Silent, shown_progress
 from studies.sweeps.provenance import describe_environment
 from studies.sweeps.results import Results, open_results
 from studies.sweeps.search import run_searches
 from studies.sweeps.spec import FREE, Study, read_study
 from studies.sweeps.store import Store, claim_store, memory_store
-from studies.sweeps.workers import Pool, Workers
+from studies.sweeps.workers import Here, Pool, Workers
+
+STORE_SECONDS = 3e-5  # for one case to be hashed, committed and counted
 
 
 def run_study(
@@ -65,11 +69,21 @@ def run_study(
     study = read_study(source, card)
     sources = check_functions(study, allow_python)
     design = draw(study)
-    identity = identify(study, design, sources)
+    families = choose_solver(study, design)
+    identity = identify(study, design, sources, families)
     store = memory_store() if out is None else claim_store(out)
     try:
         _describe(store, study, design, identity)
-        _run(store, study, design, identity["base"], workers, scheduler, show_progress)
+        crew = Here() if families else None
+        _run(
+            store,
+            study,
+            design,
+            identity["base"],
+            Plan.of(study, families),
+            crew or _hire(workers, scheduler),
+            show_progress,
+        )
     except BaseException:
         store.close()
         raise
@@ -81,27 +95,44 @@ def run_study(
 
 @dataclass(frozen=True)
 class Estimate:
-    """What a study would take: designs, batches, seconds of one design, of all, memory in MB."""
+    """What a study would take: designs, batches, seconds of one design, of all, memory in MB; how designs are solved."""
 
     cases: int
     batches: int
     seconds_each: float
     seconds: float
     memory_MB: float
+    solver: str
 
 
 def estimate_study(study: Study, workers: int | None = None) -> Estimate:
-    """Solve the nominal design twice here, keep nothing, and say what the whole study would take on these workers."""
+    """Evaluate the nominal design here, keep nothing, and say what the whole study would take on these workers."""
     import resource
 
-    plan, parameters = Plan.of(study), nominal_design(study)
-    evaluate_case(plan, parameters)  # the first time imports and builds what later cases share
-    each = evaluate_case(plan, parameters).seconds
-    cases, count = count_cases(study), workers or cores()
+    began = time.perf_counter()
+    design, parameters = draw(study), nominal_design(study)
+    families = choose_solver(study, design)
+    plan = Plan.of(study, families)
+    if families is None:
+        count, size, trials = workers or cores(), BATCH, 1
+        evaluate_task(plan, [[parameters]])  # the first time imports and builds what later cases share
+    else:
+        count, size, trials = 1, BATCH_VECTORISED, 1000
+    training = time.perf_counter() - began if families else 0.0
+    began = time.perf_counter()
+    evaluate_task(plan, [[parameters] * trials])
+    each = (time.perf_counter() - began) / trials + STORE_SECONDS
+    cases = len(design.unique)
     resident = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+    processes = 1 if families else 1 + count
     row = 8 * (len(study.parameters) + 2 * len(study.columns)) + 200
     return Estimate(
-        cases, -(-cases // study.sampling.batch), each, each * cases / count, resident * (1 + count) + row * cases / 1e6
+        cases=cases,
+        batches=-(-cases // (study.sampling.batch or size)),
+        seconds_each=each,
+        seconds=training + each * cases / count,
+        memory_MB=resident * processes + row * cases / 1e6,
+        solver="family" if families else "full",
     )
 
 
@@ -124,7 +155,7 @@ def check_functions(study: Study, allowed: bool) -> dict[str, str]:
     return {Path(function).name: check_function(function) for function in study.functions}
 
 
-def identify(study: Study, design: Design, sources: Mapping[str, str]) -> dict[str, Any]:
+def identify(study: Study, design: Design, sources: Mapping[str, str], families: Families | None) -> dict[str, Any]:
     """Return everything that the results depend on; `base` is its hash, part of the key of every case."""
     physics = {
         "card": {
@@ -134,7 +165,7 @@ def identify(study: Study, design: Design, sources: Mapping[str, str]) -> dict[s
         "material_laws": digest(spell_material(study.instrument.material)),
         "quantity": study.content["quantity"],
         "functions": dict(sources),
-        "solver": study.sampling.solver,
+        "solver": _describe_families(families) if families else "full",
         "physics_version": PHYSICS_VERSION,
     }
     spec = {key: value for key, value in study.content.items() if key not in (*FREE, "card", "quantity")}
@@ -162,19 +193,19 @@ def _describe(store: Store, study: Study, design: Design, identity: Mapping[str,
     )
 
 
-def _run(
-    store: Store, study: Study, design: Design, base: str, workers: int | None, scheduler: str | None, show: bool
-) -> None:
-    batches = missing_batches(study, design, base, store)
-    counts = store.counts()
-    done = sum(counts.values())
-    store.begin_run(describe_environment())
+def _describe_families(families: Families) -> list[Any]:
+    return [[*key, family.thickness, family.nu, family.tolerance] for key, family in families.members.items()]
+
+
+def _run(store: Store, study: Study, design: Design, base: str, plan: Plan, crew: Workers, show_progress: bool) -> None:
     outcome = "stopped"
-    crew = _hire(workers, scheduler)
+    store.begin_run(describe_environment())
     try:
-        with shown_progress(len(design.unique), done) if show else nullcontext(Silent()) as progress:
-            compute(Plan.of(study), batches, crew, store, progress)
-        run_searches(study, base, crew, store)
+        batches = missing_batches(study, design, base, store, plan.families is not None)
+        done = sum(store.counts().values())
+        with shown_progress(len(design.unique), done) if show_progress else nullcontext(Silent()) as progress:
+            compute(plan, batches, crew, store, progress)
+        run_searches(study, base, plan, crew, store)
         outcome = "finished"
     except KeyboardInterrupt:
         outcome = "interrupted"

@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 
 from studies.sweeps.design import nominal_design
 from studies.sweeps.engine import Batch, compute, make_item
-from studies.sweeps.evaluate import Plan
 from studies.sweeps.progress import Silent
 
 if TYPE_CHECKING:
+    from studies.sweeps.evaluate import Plan
     from studies.sweeps.spec import Parameter, Search, Study
     from studies.sweeps.store import Store, Stored
     from studies.sweeps.workers import Workers
@@ -34,9 +34,8 @@ class SearchFailed(RuntimeError):
 class Explorer:
     """Designs of a study by their parameters, computed when the store lacks them."""
 
-    def __init__(self, study: "Study", base: str, workers: "Workers", store: "Store") -> None:
-        self.study, self.base, self.workers, self.store = study, base, workers, store
-        self.plan = Plan.of(study)
+    def __init__(self, study: "Study", base: str, plan: "Plan", workers: "Workers", store: "Store") -> None:
+        self.study, self.base, self.plan, self.workers, self.store = study, base, plan, workers, store
         self.columns = [column.name for column in study.columns]
 
     def cases(self, designs: Sequence[Mapping[str, Any]]) -> "list[Stored]":
@@ -61,9 +60,9 @@ class Explorer:
         return values
 
 
-def run_searches(study: "Study", base: str, workers: "Workers", store: "Store") -> None:
+def run_searches(study: "Study", base: str, plan: "Plan", workers: "Workers", store: "Store") -> None:
     """Compute the nominal design and every search of a study, and keep what they find."""
-    explorer = Explorer(study, base, workers, store)
+    explorer = Explorer(study, base, plan, workers, store)
     explorer.cases([nominal_design(study)])
     for search in study.searches:
         try:

@@ -9,8 +9,8 @@ card = "hrg-30mm"                  # a shipped card, or the path of one beside t
 method = "sobol"                   # grid | list | latin-hypercube | sobol | sensitivity | one-at-a-time
 cases = 1024                       # not for grid, list and one-at-a-time; a power of two for sobol and sensitivity
 seed = 1
-# batch = 8                        # cases that are computed and kept together
-# solver = "full"                  # full: every design by the solver; family: a reduced basis with an error estimate
+# batch = 8                        # cases that are computed and kept together; 1024 with families
+# solver = "auto"                  # family: reduced bases with error estimates; full: every design by the solver
 
 [[parameter]]
 name = "resonator.thickness_mm"    # a key of the card; or temperature_degC; or user.NAME for a function of yours
@@ -65,7 +65,7 @@ from studies.sweeps.quantity import Column, Quantity
 SCHEMA = "hrg.study/1"
 METHODS = ("grid", "list", "latin-hypercube", "sobol", "sensitivity", "one-at-a-time")
 DISTRIBUTIONS = ("uniform", "normal", "triangular", "log-uniform")
-SOLVERS = ("full", "family")
+SOLVERS = ("auto", "full", "family")
 KEYS = ("schema", "name", "note", "card", "sampling", "parameter", "quantity", "requirement", "search")
 PARAMETER_KEYS = (
     "name", "low", "high", "tolerance", "values", "count", "distribution", "standard_deviation", "nominal",
@@ -113,7 +113,7 @@ class Sampling:
     method: str
     cases: int
     seed: int
-    batch: int
+    batch: int | None
     solver: str
 
 
@@ -267,9 +267,8 @@ def _sampling(top: Section) -> Sampling:
         raise InputError(
             f"{part.where}: with method = '{method}' cases must be a power of two, such as {power // 2} or {power}, not {cases}."
         )
-    solver = part.text("solver", "full", SOLVERS)
-    batch = _whole(part, "batch", 8 if solver == "full" else 1024, 1, 1_000_000)
-    return Sampling(method, cases, _whole(part, "seed", 0, 0, 2**63), batch, solver)
+    batch = _whole(part, "batch", 0, 1, 1_000_000) if "batch" in part else None
+    return Sampling(method, cases, _whole(part, "seed", 0, 0, 2**63), batch, part.text("solver", "auto", SOLVERS))
 
 
 def _parameter(part: Section, instrument: Instrument, method: str) -> Parameter:
