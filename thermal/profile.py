@@ -23,6 +23,7 @@ from scipy.constants import zero_Celsius
 from thermal.errors import ThermalError
 
 Points = list[tuple[float, float]]
+MOST_REPEATS = 10_000
 UNITS = {"s": 1.0, "min": 60.0, "h": 3600.0}
 
 
@@ -165,9 +166,10 @@ def _ramp(before: float, after: float, rate: float) -> Points:
 
 
 def _staircase(before: float, after: float, step: float, hold: float) -> Points:
-    count = round(abs(after - before) / step)
+    count = round(min(abs(after - before) / step, 1e9))
     if count == 0 or not math.isclose(count * step, abs(after - before), rel_tol=1e-9):
         raise ThermalError(f"steps of {step:g} K do not lead from {before:g} to {after:g} °C.")
+    _check_repeats(count, "steps")
     levels = np.linspace(before, after, count + 1)
     return [(hold * (k + end), float(level)) for k, level in enumerate(levels) for end in (0, 1)]
 
@@ -175,6 +177,7 @@ def _staircase(before: float, after: float, step: float, hold: float) -> Points:
 def _cycle(start: float, first: float, second: float, rate: float, hold: float, count: float) -> Points:
     if count != int(count):
         raise ThermalError(f"a cycle is repeated a whole number of times, not {count:g}.")
+    _check_repeats(count, "cycles")
     points = [(0.0, start)]
     stops = [(first, hold), (second, hold)] * int(count) + [(start, 0.0)]
     for level, wait in stops:
@@ -183,6 +186,11 @@ def _cycle(start: float, first: float, second: float, rate: float, hold: float, 
         for moment in (arrival, arrival + wait):
             _append(points, moment, level)
     return points
+
+
+def _check_repeats(count: float, what: str) -> None:
+    if count > MOST_REPEATS:
+        raise ThermalError(f"a profile has at most {MOST_REPEATS} {what}, not {count:.0f}.")
 
 
 FORMS: dict[str, tuple[tuple[str, ...], Callable[..., Points]]] = {

@@ -10,13 +10,14 @@ from numpy.typing import ArrayLike
 from scipy.integrate import OdeSolution, solve_ivp
 
 from thermal.errors import ThermalError
-from thermal.forcing import boundary_forcing, find_corners, initial_state, source_powers
+from thermal.forcing import MOST_ROWS, boundary_forcing, find_corners, initial_state, source_powers
 from thermal.network import Array, Network, Source, linearise
 from thermal.profile import Profile
 from thermal.transient import Transient, propagate
 
 MOST_SWEEPS = 60
 SWEEP_TOLERANCE = 1e-7  # K
+LONGEST_ROW = 60.0  # s, between which what radiation adds is a parabola
 MOST_RESTARTS = 200  # with more corners in its profiles than this, the integrator restarts at jumps only
 
 
@@ -101,10 +102,10 @@ def sweep(
     What departs from the linearised network, (q − L T − σ R T⁴) C₀/C(T) minus its linear part, is taken from the
     last sweep as a power that is linear between the rows, with its mean between them by Simpson's rule, and the
     linear network is propagated exactly; each sweep contracts the error by about the relative change of T³. The
-    error is of fourth order in the distance of the rows: this is for measured profiles, while `integrate` keeps a
-    tolerance with profiles of few corners.
+    error is of fourth order in the distance of the rows, at most 60 s: this is for profiles of many rows, such as
+    measured ones, while `integrate` keeps a tolerance with few corners.
     """
-    knots = find_corners(network, boundaries)
+    knots = _subdivide(find_corners(network, boundaries))
     if any(profile.jumps.size for profile in boundaries.values()):
         raise ThermalError("a profile with jumps is integrated, not swept; a measured one has no jumps.")
     half_rows = np.insert(knots, slice(1, None), (knots[1:] + knots[:-1]) / 2)
@@ -127,6 +128,17 @@ def sweep(
         if np.abs(T - last).max() < SWEEP_TOLERANCE:
             return transient
     raise ThermalError("the radiation is too strong to be swept; integrate the network instead.")
+
+
+def _subdivide(knots: Array) -> Array:
+    """Divide long rows evenly until none is longer than `LONGEST_ROW`."""
+    parts = np.ceil(np.diff(knots) / LONGEST_ROW)
+    if parts.sum() > MOST_ROWS:
+        raise ThermalError(f"the profile is too long to be swept ({knots[-1] - knots[0]:.3g} s); shorten it.")
+    counts = parts.astype(np.intp)
+    within = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
+    finer: Array = np.repeat(knots[:-1], counts) + within * np.repeat(np.diff(knots) / counts, counts)
+    return np.append(finer, knots[-1])
 
 
 def _with_simpson_mean(knots: Array, values: Array) -> Profile:

@@ -60,6 +60,8 @@ def test_the_value_at_a_jump_is_the_one_after_it():
         ("ramp 20 40 0", "RATE must be positive"),
         ("staircase -20 40 7 1h", "steps of 7 K do not lead from -20 to 40"),
         ("cycle 20 0 40 1 1h 1.5", "whole number of times"),
+        ("cycle 20 0 40 1 1h 1e12", "at most 10000 cycles"),
+        ("staircase 0 40 0.001 1h", "at most 10000 steps"),
         ("soak -300 1h", "below absolute zero"),
         ("soak 20 1h then", "empty part"),
         ("soak 20 1h, soak 30 1h", "'1h,' stands where|values, but the form"),

@@ -6,6 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.constants import Stefan_Boltzmann
 
+from thermal import radiative
 from thermal.balance import check_energy
 from thermal.errors import ThermalError
 from thermal.lag import lag, scan
@@ -173,7 +174,8 @@ def test_simulate_chooses_the_exact_way_where_there_is_one():
     assert np.array_equal(simulate(radiative, measured).at(t), sweep(radiative, measured).at(t))
 
 
-def test_sweeps_tend_to_the_integrated_radiation_with_the_fourth_power_of_the_rows():
+def test_sweeps_tend_to_the_integrated_radiation_with_the_fourth_power_of_the_rows(monkeypatch):
+    monkeypatch.setattr(radiative, "LONGEST_ROW", 1e4)
     parts = [part for part in RADIATIVE if part != LINEAR[3]]
     network = assemble([*parts, Node("shell", lambda T: 2.0 * (1 + 2e-3 * (T - 293.15))), Source("shell", 0.01)])
     errors = []
@@ -186,6 +188,15 @@ def test_sweeps_tend_to_the_integrated_radiation_with_the_fourth_power_of_the_ro
     assert np.log2(errors[0] / errors[1]) == pytest.approx(4.0, abs=0.5)
     assert np.log2(errors[1] / errors[2]) == pytest.approx(4.0, abs=0.5)
     assert errors[2] < 1e-5
+
+
+def test_many_cycles_with_long_ramps_are_simulated_as_exactly_as_few():
+    network = assemble(RADIATIVE)
+    few = parse_profile("cycle 20 -20 60 1 1h 2")
+    many = parse_profile("cycle 20 -20 60 1 1h 60")
+    t = np.linspace(0.0, few.time[-2], 200)  # the last ramp of the short one leads home
+    exact = integrate(network, {"chamber": few}, relative_tolerance=1e-10).at(t)
+    assert simulate(network, {"chamber": many}).at(t) == pytest.approx(exact, abs=1e-5)
 
 
 def test_sweeps_refuse_a_jump():
