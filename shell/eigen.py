@@ -127,8 +127,8 @@ def lowest_vectors(
     width = min(2 * count + 3, pattern.size)  # the more vectors beyond `count`, the faster they converge
     x = np.random.default_rng(5).standard_normal((pattern.size, width))
     before, change = np.full(count, np.inf), np.inf
-    # of a thin shell one solve leaves little but the lowest mode in every column: make them independent again
-    x = _orthonormalise(pattern, mass, factor.solve(apply_mass(pattern, mass, x)))
+    # one solve leaves little but the inextensional modes of a thin shell (two at most) in every column
+    x = _set_apart(pattern, mass, factor.solve(apply_mass(pattern, mass, x)))
     loaded = apply_mass(pattern, mass, x)
     for _ in range(300):
         y = factor.solve(loaded)
@@ -142,18 +142,15 @@ def lowest_vectors(
     return np.asarray(x[:, :count])
 
 
-def _orthonormalise(pattern: Pattern, mass: list[Array], x: Array) -> Array:
-    """Gram-Schmidt, twice, in the inner product of M."""
-    done = np.empty((len(x), 0))
-    heavy = np.empty((len(x), 0))
-    for column in x.T:
+def _set_apart(pattern: Pattern, mass: list[Array], x: Array) -> Array:
+    """Remove the first two columns from all later ones (Gram-Schmidt, twice, in the inner product of M)."""
+    for k in range(min(2, x.shape[1])):
+        heavy = apply_mass(pattern, mass, x[:, [k]])
+        norm = float(np.sqrt(x[:, k] @ heavy[:, 0]))
+        lead, heavy = x[:, [k]] / norm, heavy / norm
         for _ in range(2):
-            column = column - done @ (heavy.T @ column)
-            loaded = apply_mass(pattern, mass, column[:, None])
-            column /= np.sqrt(column @ loaded[:, 0])
-        done = np.column_stack([done, column])
-        heavy = np.column_stack([heavy, apply_mass(pattern, mass, column[:, None])])
-    return done
+            x[:, k + 1 :] -= lead @ (heavy.T @ x[:, k + 1 :])
+    return x
 
 
 def _project(K: Array, M: Array) -> tuple[Array, Array]:
