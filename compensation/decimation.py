@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from compensation.errors import CompensationError
+from compensation.samples import check_time
 
 Array = NDArray[np.float64]
 NEIGHBOURS = 7
@@ -95,6 +96,8 @@ def find_spikes(values: Array) -> NDArray[np.bool_]:
     that is usual next to the sample, so that bends, gaps and jumps are no spikes.
     """
     distance = np.abs(values - _median_of_pairs(values, lambda before, after: (before + after) / 2))
+    # A straight ramp is left with the rounding of its own arithmetic, which is no spread.
+    distance[distance < 64 * np.finfo(float).eps * np.max(np.abs(values))] = 0.0
     nearby = _median_of_pairs(distance, np.maximum)
     positive = distance[distance > 0]
     # Rounded readings may have no spread at all: then the smallest distance takes its place.
@@ -106,14 +109,7 @@ def _median_of_pairs(values: Array, join: Callable[[Array, Array], Array]) -> Ar
     """Return the median over k = 1, 2, 3 of join(y_{i−k}, y_{i+k}), the series continued straight at its ends."""
     reach = NEIGHBOURS // 2
     padded = np.pad(values, reach, mode="reflect", reflect_type="odd")
-    low, middle, high = (join(padded[reach - k : -reach - k], padded[reach + k : padded.size - reach + k]) for k in (1, 2, 3))
+    low, middle, high = (
+        join(padded[reach - k : -reach - k], padded[reach + k : padded.size - reach + k]) for k in (1, 2, 3)
+    )
     return np.asarray(np.maximum(np.minimum(low, middle), np.minimum(np.maximum(low, middle), high)))
-
-
-def check_time(time: Array) -> None:
-    """Raise a CompensationError unless time is finite and strictly increasing."""
-    if time.ndim != 1 or time.size < 2 or not np.all(np.isfinite(time)):
-        raise CompensationError("time must be a column of at least two finite values.")
-    backwards = np.flatnonzero(np.diff(time) <= 0)
-    if backwards.size:
-        raise CompensationError(f"time does not increase after row {backwards[0] + 1}; sort the rows by time.")

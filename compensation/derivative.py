@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from compensation.decimation import check_time
 from compensation.errors import CompensationError
+from compensation.samples import check_time
 
 Array = NDArray[np.float64]
 

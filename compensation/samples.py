@@ -33,12 +33,15 @@ def read_columns(**columns: ArrayLike) -> list[NDArray[np.float64]]:
 
 
 def check_time(time: NDArray[np.float64]) -> None:
-    """Raise unless `time` (s) has two rows or more and increases strictly."""
+    """Raise unless `time` (s) has two rows or more, all finite, and increases strictly."""
     if len(time) < 2:
         raise CompensationError(f"'time' has {len(time)} rows; a time series needs two or more.")
+    if not np.all(np.isfinite(time)):
+        row = int(np.flatnonzero(~np.isfinite(time))[0])
+        raise CompensationError(f"'time' is missing or infinite in row {row + 1}; every row needs its time.")
     back = np.flatnonzero(np.diff(time) <= 0)
     if len(back):
-        raise CompensationError(f"'time' does not increase from row {back[0] + 1} to row {back[0] + 2}.")
+        raise CompensationError(f"'time' does not increase from row {back[0] + 1} to row {back[0] + 2}; sort the rows by time.")
 
 
 def is_regular(time: NDArray[np.float64]) -> bool:

@@ -48,7 +48,9 @@ def compensate(
 
     loaded = models.read_model(model)
     if (run is None) != (out is None):
-        raise InputError("a record needs --out for the result, and --out needs a record: hrg compensate MODEL RUN --out FILE.")
+        raise InputError(
+            "a record needs --out for the result, and --out needs a record: hrg compensate MODEL RUN --out FILE."
+        )
     if run is None and emit is None:
         raise InputError("nothing to do: give a record and --out FILE, or --emit FILE.c.")
     if emit is not None:
@@ -59,23 +61,35 @@ def compensate(
         say(f"reading {run}")
         record = read_record(run)
         result = models.compensate(loaded, record, extrapolate=extrapolate)
-        write_record(result, out, lambda rows: say(f"written {rows:,} of {len(result):,} rows") if rows % 500_000 == 0 else None)
+        write_record(
+            result, out, lambda rows: say(f"written {rows:,} of {len(result):,} rows") if rows % 500_000 == 0 else None
+        )
         for name in result.columns:
             if name.startswith(COMPENSATED) and name not in record:
-                before, after = record[name.removeprefix(COMPENSATED)], result[name]
+                original, after = name.removeprefix(COMPENSATED), result[name]
+                # A rate made from raw counts has no uncompensated column of its own in the record.
+                before = record.columns.get(original)
+                missing = np.isnan(after) if before is None else np.isnan(after) & ~np.isnan(before)
                 columns[name] = {
-                    "stability_before": _stability(record["time_s"], before),
+                    "stability_before": None if before is None else _stability(record["time_s"], before),
                     "stability_after": _stability(record["time_s"], after),
-                    "rows_not_compensated": int(np.count_nonzero(np.isnan(after) & ~np.isnan(before))),
+                    "rows_not_compensated": int(np.count_nonzero(missing)),
                 }
     if json:
-        print_json({"schema": "hrg.compensate/1", "model": model, "kind": loaded.kind, "run": run, "out": out, "columns": columns})
+        print_json(
+            {
+                "schema": "hrg.compensate/1",
+                "model": model,
+                "kind": loaded.kind,
+                "run": run,
+                "out": out,
+                "columns": columns,
+            }
+        )
         return 0
     for name, facts in columns.items():
-        print(
-            f"{out}: {name}; standard deviation of {AVERAGE:g} s averages {facts['stability_before']:.4g} -> "
-            f"{facts['stability_after']:.4g}"
-        )
+        before = "" if facts["stability_before"] is None else f"{facts['stability_before']:.4g} -> "
+        print(f"{out}: {name}; standard deviation of {AVERAGE:g} s averages {before}{facts['stability_after']:.4g}")
         if facts["rows_not_compensated"]:
             print(f"{facts['rows_not_compensated']} rows stay empty: an input of the model is missing there.")
     return 0

@@ -148,7 +148,6 @@ def _short(parts: "Reproduction") -> list[Text]:
     better = study.next_fit
     assert better is not None
     at = physics.at_20
-    ratio = physics.curvature_measured / physics.curvature_law
     away = (1e6 * at.total - float(study.fit.slope_ppm(20.0))) / (1e6 * at.uncertainty)
     slopes = [value for _, value, _ in physics.laws]
     return [
@@ -162,7 +161,7 @@ def _short(parts: "Reproduction") -> list[Text]:
             f"Physics gives the size of the slope: the prediction at 20 °C lies {abs(away):.1f} standard deviations"
             f" {'above' if away > 0 else 'below'} the measurement, and the published laws of fused silica themselves span"
             f" {min(slopes):.0f} to {max(slopes):.0f} ppm/°C. It does not give the curvature: the table"
-            f" bends {ratio:.1f} times as much as the law, and its slope rises again above 25 °C, which no published silica law does."
+            f" bends {parts.diagnosis.curvature_ratio:.1f} times as much as the law, and its slope rises again above 25 °C, which no published silica law does."
             " Seven points, each approached once, cannot say whether that is the glass, the thermometer, the mounting or"
             " the soak: a staircase up and down with a second thermometer would.",
             "note",
@@ -298,4 +297,4 @@ def _step_inverse(settling: "SettlingStudy") -> Picture:
         "A virtual step from 20 to -10 °C, since the paper's record is not printed: the temperature that a cubic through nine"
         " of its points calculates from the frequency, and its error against the temperature that the mode sees."
     )
-    return draw(made, caption, "Temperature and frequency fall together; the error stays within millikelvins.")
+    return draw(made, caption, "Temperature and frequency fall together; the error stays far below a millikelvin.")

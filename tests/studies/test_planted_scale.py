@@ -237,3 +237,16 @@ def test_missing_runs_are_named(records, files, words, capsys):
 def test_impossible_cut_off_is_refused(records, capsys):
     assert main(["fit", "scale", *records, "--cutoff", "200"]) == 2
     assert "200 Hz is impossible" in capsys.readouterr().err
+
+
+def test_the_command_compensates_a_record_of_raw_counts(records, tmp_path, capsys):
+    """The rate is made from counts, so there is no uncompensated column to compare with."""
+    model, out = tmp_path / "model.toml", tmp_path / "out.csv"
+    assert main(["fit", "scale", *records, "--save", str(model)]) == 0
+    capsys.readouterr()
+    assert main(["compensate", str(model), records[2], "--out", str(out), "--json"]) == 0
+    column = json.loads(capsys.readouterr().out)["columns"]["compensated_measured_rate_deg_per_s"]
+    assert column["stability_before"] is None
+    assert column["rows_not_compensated"] == 0
+    assert column["stability_after"] > 0
+    assert "compensated_measured_rate_deg_per_s" in read_record(out)
