@@ -72,7 +72,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 groups[group[0]] = App(name=group[0], help=GROUPS[group[0]])
                 app.command(groups[group[0]])
             parent = groups[group[0]]
-        parent.command(target, name=command, help=help_line)
+        # the line stands in lists of commands; a command's own help page shows its whole docstring
+        alone = words[: len(group) + 1] == name.split(" ")
+        parent.command(target, name=command, **({} if alone else {"help": help_line}))
     try:
         status = app(words)
     except CycloptsError as error:

@@ -16,7 +16,7 @@ def import_(
 
     First 'hrg import RAW --draft MAP.toml', then read and correct the map, then 'hrg import RAW --map MAP.toml --out RUN.csv'.
     Several raw files, such as two loggers, are joined on their clocks onto the times of the first.
-    What was changed is listed in the header of the record.
+    What was changed is listed in the header of the record. All keys of a map: python -m pydoc studies.importing.mapping.
 
     Parameters
     ----------

@@ -16,9 +16,9 @@ MOST = 4  # resonators in one picture
 def render(
     *card: str,
     out: str,
-    harmonic: Annotated[tuple[int, ...], Parameter(consume_multiple=True)] = (2,),
+    harmonic: Annotated[tuple[int, ...], Parameter(consume_multiple=True, show_default=False)] = (2,),
     index: int = 0,
-    temperature: Annotated[tuple[float, ...], Parameter(consume_multiple=True)] = (),
+    temperature: Annotated[tuple[float, ...], Parameter(consume_multiple=True, show_default=False)] = (),
     theory: Literal["solid", "shell"] = "solid",
     colour: Literal["displacement", "energy", "temperature"] = "displacement",
     field: str | None = None,
@@ -40,7 +40,7 @@ def render(
     out : str
         File to write.
     harmonic : tuple[int, ...]
-        Circumferential harmonic n; several only for .html, where one chooses among them.
+        Circumferential harmonic n, 2 unless given; several only for .html, where one chooses among them.
     index : int
         0 for the lowest mode of its harmonic.
     temperature : tuple[float, ...]

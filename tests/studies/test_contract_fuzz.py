@@ -255,6 +255,24 @@ def test_mutated_tables_never_harm(tmp_path, name):
     assert 0 < accepted < CASES  # some mutations are harmless, some are refused
 
 
+def test_mutated_raw_files_through_a_map_never_harm(tmp_path):
+    raw, path, harmed = tmp_path / "raw.csv", tmp_path / "map.toml", {}
+    raw.write_text(raw_text(), encoding="utf-8")
+    path.write_text(draft_map([str(raw)]).text, encoding="utf-8")
+    fixed, rng = load_map(path), np.random.default_rng(17)
+    accepted = 0
+    for case in range(CASES):
+        text = mutate_table(
+            raw_text().replace(";", "\x1f").replace(",", ".").replace("\x1f", ","), rng, tmp_path / "evaluated"
+        )
+        text = text.replace(",", ";")
+        raw.write_bytes(mutate_text(text, rng) if rng.random() < 0.4 else text.encode())
+        accepted += check(lambda file: import_record([str(file)], fixed), raw, f"raw file {case}", harmed)
+    assert not harmed
+    assert not (tmp_path / "evaluated").exists()
+    assert 0 < accepted < CASES
+
+
 def test_a_drafted_map_of_a_mutated_file_is_valid_toml(tmp_path):
     """Names and cells of a hostile file cannot break out of the map that is drafted from it."""
     rng = np.random.default_rng(5)
