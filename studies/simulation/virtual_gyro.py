@@ -102,7 +102,8 @@ def simulate_run(
     levels = read_noise(instrument.table("noise"), f"{instrument.path} [noise]") if noise else dict(SILENT)
     network = build_network(instrument)
     transient = simulate(network, {"chamber": profile})
-    low, high = float(profile.value.min()) - MARGIN, float(profile.value.max()) + MARGIN
+    reached = np.append(profile.value, instrument.reference_temperature)
+    low, high = float(reached.min()) - MARGIN, float(reached.max()) + MARGIN
     model = frequency_model or build_frequency_model(instrument, low, high, theory)
     true = _respond(instrument, transient, model, time)
     generator = np.random.default_rng(seed)
@@ -146,9 +147,7 @@ def _respond(instrument: "Instrument", transient: Transient, model: FrequencyMod
     inverse_q = loss.at(resonator - reference) + changes.get("inverse_q", 0.0)
     if not (inverse_q > 0).all():
         raise InputError(f"{instrument.path} [loss]: 1/Q becomes negative in this profile; correct its slope or curvature.")
-    change = frequency - float(model.frequency(np.array([reference]))[0]) if _covers(model, reference) else (
-        frequency - frequency[0]
-    )
+    change = frequency - float(model.frequency(np.array([reference]))[0])
     bias_model = read_bias(instrument.table("bias"), f"{instrument.path} [bias]")
     bias = bias_model.at(change, np.gradient(change, time[1] - time[0]), frequency, inverse_q, model.bryan_factor)
     return _Noiseless(time, housing, resonator, frequency, bias + changes.get("bias_deg_per_h", 0.0), inverse_q)
@@ -242,7 +241,3 @@ def _rows(profile: Profile, rate: float) -> Array:
     if count < 2:
         raise InputError(f"--rate {rate:g} makes a single row; choose a higher rate.")
     return np.minimum(profile.start + np.arange(count) / rate, profile.end)
-
-
-def _covers(model: FrequencyModel, temperature: float) -> bool:
-    return model.lowest <= temperature <= model.highest

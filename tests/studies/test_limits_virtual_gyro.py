@@ -106,6 +106,13 @@ def test_the_papers_terms_add_up():
     assert found == pytest.approx([1 + 2 + 2, 1 + 2 - 2])
 
 
+def test_the_change_of_frequency_counts_from_the_reference_temperature_even_when_it_is_never_reached(card):
+    polynomial = card.with_table("bias", {"damping_anisotropy": 0.0, "k1_deg_per_h_per_Hz": 2.0})
+    record = simulate_run(polynomial, load_profile("soak -40 1h"), noise=False, theory="shell").record
+    f20 = solve_modes(*card.at(293.15), theory="shell")[0].frequency
+    assert record["bias_deg_per_h"] == pytest.approx(2 * (record["frequency_Hz"] - f20), abs=1e-4)
+
+
 def test_loss_is_quadratic_in_the_excess():
     loss = read_loss({"inverse_q": 2e-7, "slope_per_K": 0.01, "curvature_per_K2": 1e-4}, "card [loss]")
     assert loss.at(np.array([-10.0, 0.0, 10.0])) == pytest.approx([2e-7 * 0.91, 2e-7, 2e-7 * 1.11])
