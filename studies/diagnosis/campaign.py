@@ -174,7 +174,7 @@ def _columns(record: Record, source: str) -> dict[str, FloatArray]:
         if name in record and np.isfinite(record[name]).any():
             table[name] = np.asarray(record[name], dtype=float).copy()
     if "bias_deg_per_h" not in table and "measured_rate_deg_per_s" in record:
-        applied = record["rate_deg_per_s"] if "rate_deg_per_s" in record else 0.0
+        applied = record.columns.get("rate_deg_per_s", 0.0)
         table["bias_deg_per_h"] = 3600.0 * (record["measured_rate_deg_per_s"] - applied)
     if "reference_frequency_Hz" in record and np.isfinite(record["reference_frequency_Hz"]).any():
         table["reference_frequency_Hz"] = np.asarray(record["reference_frequency_Hz"], dtype=float).copy()

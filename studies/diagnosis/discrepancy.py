@@ -5,7 +5,6 @@ added to the fitted model; its evidence is twice the log-likelihood ratio at the
 random walk profiled in both. It names no cause: it says that the library has none, and in which input to look.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -36,10 +35,10 @@ def generic_bases(problem: Problem) -> dict[str, FloatArray]:
         for name, columns in _functions(problem, view, low, high, number, len(views)).items():
             parts.setdefault(name, []).append(columns)
     out = {}
-    for name, columns in parts.items():
-        if len(columns) != len(views):
+    for name, pieces in parts.items():
+        if len(pieces) != len(views):
             continue
-        stacked = problem.stack(columns)
+        stacked = problem.stack(pieces)
         size = np.sqrt(np.mean(stacked**2, axis=0))
         kept = size > 0
         if kept.any():

@@ -128,7 +128,7 @@ def _predict_response(
         net = best_gains(dictionary, *scan_gains(problem, dictionary, model, draws))[0] - levels[:, None]
         best = np.argmax(net, axis=0)
         said = [dictionary.effects[k] if net[k, j] > THRESHOLD else NOTHING for j, k in enumerate(best)]
-        confusion[key] = {name: said.count(name) / len(said) for name in sorted(set(said), key=said.count, reverse=True)}
+        confusion[key] = {name: float(said.count(name)) / len(said) for name in sorted(set(said), key=said.count, reverse=True)}
 
 
 def _signals(
@@ -148,7 +148,7 @@ def _signals(
         scale = np.linalg.norm(used, axis=0)
         signal = problem.basis.rotate(used / np.where(scale > 0, scale, 1.0)) @ rng.standard_normal(used.shape[1])
         left = signal - ortho @ (ortho.T @ signal)
-        share = float(np.linalg.norm(left) / max(np.linalg.norm(signal), 1e-300))
+        share = float(np.linalg.norm(left)) / max(float(np.linalg.norm(signal)), 1e-300)
         shares.append(share)
         if share > 3e-3:
             out.append(left)

@@ -80,7 +80,13 @@ def _varies(problem: Problem, drive: str) -> bool:
 def build_dictionary(problem: Problem, span: Span, effects: Sequence[Effect]) -> Dictionary:
     """Compute and rotate the signature of every effect at every shape of its grid."""
     views = problem.views(problem.tau)
-    names, owner, shapes, firsts, seconds, pairs, whole = [], [], [], [], [], [], []
+    names: list[str] = []
+    owner: list[int] = []
+    shapes: list[tuple[float, ...]] = []
+    firsts: list[FloatArray] = []
+    seconds: list[FloatArray] = []
+    pairs: list[int] = []
+    whole: list[bool] = []
     steps: list[FloatArray] = []
     for effect in effects:
         index = len(names)

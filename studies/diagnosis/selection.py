@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from studies.diagnosis.baseline import Problem, Term
+from studies.diagnosis.baseline import Problem
 from studies.diagnosis.effects import Effect, Span
 from studies.diagnosis.fit import Fit, fit_terms
 from studies.diagnosis.scan import Candidate, Dictionary, applicable, build_dictionary, scan

@@ -9,7 +9,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import chi2, f as f_distribution
+from scipy.stats import chi2
+from scipy.stats import f as f_distribution
 
 from studies.diagnosis.baseline import Law
 from studies.diagnosis.extension import law_of

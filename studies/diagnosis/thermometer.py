@@ -54,7 +54,7 @@ def read_thermometer(campaign: Campaign, fit: Fit, clean: bool = True) -> Thermo
     if slope == 0.0 or abs(slope) < 3.0 * np.sqrt(fit.linear.covariance[1, 1]):
         return None
     views = problem.views(problem.tau)
-    model = [fit_part for fit_part in np.split(problem.model(problem.tau, fit.terms) @ coefficients, _ends(fit))]
+    model = list(np.split(problem.model(problem.tau, fit.terms) @ coefficients, _ends(fit)))
     warmer = thermal_correction(fit)
     changes, excesses, states = [], [], []
     for k, (run, view) in enumerate(zip(campaign.runs, views, strict=True)):

@@ -117,13 +117,10 @@ def diagnosis_page(diagnosis: Diagnosis) -> str:
             ],
         ),
     ]
-    for response in diagnosis.inquiries:
-        chapters.append(
-            Chapter(
-                f"Residual of the {NAMES[response]}",
-                [residual_views(diagnosis, response), *_rivals(diagnosis, response)],
-            )
-        )
+    chapters += [
+        Chapter(f"Residual of the {NAMES[response]}", [residual_views(diagnosis, response), *_rivals(diagnosis, response)])
+        for response in diagnosis.inquiries
+    ]
     chapters.append(Chapter("How it was found", [Text(METHOD)]))
     return render_page("Diagnosis of a campaign", headline(verdict), chapters)
 
@@ -193,7 +190,7 @@ def before_and_after(diagnosis: Diagnosis, response: str) -> Picture:
         )
 
 
-def _thinned(time: np.ndarray, values: np.ndarray, most: int = 1500) -> tuple[np.ndarray, np.ndarray]:
+def _thinned(time: np.ndarray, values: np.ndarray, most: int = 500) -> tuple[np.ndarray, np.ndarray]:
     step = max(1, time.size // most)
     return time[::step], values[::step]
 
@@ -223,8 +220,8 @@ def residual_views(diagnosis: Diagnosis, response: str) -> Picture:
     with figure(rows, columns, height=2.5 * rows, sharey=True) as (canvas, axes):
         flat = list(np.ravel(axes))
         for axis, (label, values) in zip(flat, inputs.items(), strict=False):
-            axis.plot(values[heating], rest[heating], ".", color=VERMILION, markersize=2, label="heating")
-            axis.plot(values[~heating], rest[~heating], ".", color=BLUE, markersize=2, label="cooling")
+            axis.plot(values[heating], rest[heating], ".", color=VERMILION, markersize=2, label="heating", rasterized=True)
+            axis.plot(values[~heating], rest[~heating], ".", color=BLUE, markersize=2, label="cooling", rasterized=True)
             axis.set_xlabel(label)
         axis = flat[len(inputs)]
         axis.boxplot([rest[runs == k] for k in np.unique(runs)], showfliers=False)

@@ -163,12 +163,12 @@ def _responses(pieces, sizes, world, design, device, starts):
     for piece, size in zip(pieces, sizes, strict=True):
         if piece.heat:
             heat = piece.heat(heat, size)
-    temperature, tilt, housing = world.temperature, world.tilt, world.housing
+    temperature, _tilt, housing = world.temperature, world.tilt, world.housing
     if any(piece.heat for piece in pieces):
-        housing, temperature, tilt = run_heat(design, device, world.rng, heat, starts)
+        housing, temperature, _tilt = run_heat(design, device, world.rng, heat, starts)
     sensed = housing
     out = {c: [] for c in CHANNELS}
-    for k, t in enumerate(temperature):
+    for t in temperature:
         x = t - 20.0
         thermal = device.slope * x + device.bend * x**2
         u = thermal / device.slope

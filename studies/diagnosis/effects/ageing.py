@@ -9,7 +9,7 @@ from studies.diagnosis.states import FloatArray, States
 
 
 def columns(states: States, shape: Sequence[float], response: str) -> FloatArray:
-    """c log(1 + t/t₀), t from the start of the campaign or, after a restart, of the run."""
+    """C log(1 + t/t₀), t from the start of the campaign or, after a restart, of the run."""
     onset, restarts = shape
     time = states.time if restarts else states.campaign_time
     return np.log1p(time / onset)[:, None]
@@ -17,7 +17,7 @@ def columns(states: States, shape: Sequence[float], response: str) -> FloatArray
 
 def grid(span: Span, response: str) -> list[tuple[float, ...]]:
     """Onsets from minutes to far beyond the campaign (a straight line)."""
-    forms = [(float(onset), 0.0) for onset in np.geomspace(300.0, 30.0 * span.campaign_length, 10)]
+    forms: list[tuple[float, ...]] = [(float(onset), 0.0) for onset in np.geomspace(300.0, 30.0 * span.campaign_length, 10)]
     if response == "bias_deg_per_h":
         forms += [(float(onset), 1.0) for onset in np.geomspace(300.0, 10.0 * span.longest_run, 6)]
     return forms

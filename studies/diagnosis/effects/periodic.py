@@ -9,7 +9,7 @@ from studies.diagnosis.states import FloatArray, States
 
 
 def columns(states: States, shape: Sequence[float], response: str) -> FloatArray:
-    """a sin(2πt/P) + b cos(2πt/P), t from the start of the campaign or, after a restart, of the run."""
+    """A sin(2πt/P) + b cos(2πt/P), t from the start of the campaign or, after a restart, of the run."""
     period, restarts = shape
     phase = 2.0 * np.pi * (states.time if restarts else states.campaign_time) / period
     return np.stack([np.sin(phase), np.cos(phase)], axis=1)
@@ -19,7 +19,7 @@ def grid(span: Span, response: str) -> list[tuple[float, ...]]:
     """Periods from four steps of the grid to two thirds of a run, spaced finer than a phase slip of 1/4 turn."""
     slowest, fastest = 1.0 / (0.5 * span.longest_run), 1.0 / (5.0 * span.step)
     in_run = np.arange(slowest, fastest, 0.35 / span.longest_run)
-    forms = [(float(1.0 / f), 1.0) for f in in_run]
+    forms: list[tuple[float, ...]] = [(float(1.0 / f), 1.0) for f in in_run]
     if span.runs > 1:
         across = np.arange(
             slowest, min(fastest, slowest + 300 * 0.4 / span.campaign_length), 0.4 / span.campaign_length
