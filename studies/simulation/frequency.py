@@ -6,7 +6,8 @@ it is smooth in ν. For a field along the meridian, to first order in its uneven
     δ ln f = ∫ (½ e E'/E − ½ k ρ'/ρ + n ν' − e α) (T(s) − T_ref) ds,
 
 e, k, n the mode's densities of elastic and kinetic energy and of ∂ ln f/∂ν (`shell.modes.Mode.along`). The expansion is
-spread like the elastic energy; it is 0.5 of 80 ppm/°C in silica.
+spread like the elastic energy; it is 0.5 of 80 ppm/°C in silica. T_ref is the mean weighed with the elastic energy,
+the resonator's temperature: then nothing is divided by the whole slope, which vanishes in an Elinvar alloy.
 """
 
 from collections.abc import Callable
@@ -39,7 +40,9 @@ class FrequencyModel:
     lowest, highest : float, K
     polynomial : ln f over temperature, between these
     bryan_factor : float
-    along : position (0 … 1 of the meridian) of the mode's stations, and what each contributes to d ln f/dT (1/K)
+    position, elastic, sensitivity : arrays
+        The mode's stations (0 … 1 of the meridian), their shares of the elastic energy, and what each contributes to
+        d ln f/dT (1/K).
     solver_error, interpolation_error : float
         Relative, of the solver against its theory and of this model against the solver.
     """
@@ -48,7 +51,9 @@ class FrequencyModel:
     highest: float
     polynomial: Chebyshev
     bryan_factor: float
-    along: tuple[Array, Array]
+    position: Array
+    elastic: Array
+    sensitivity: Array
     solver_error: float
     interpolation_error: float
 
@@ -80,7 +85,15 @@ def build_frequency_model(
     between = np.linspace(lowest, highest, 5 * DEGREE)
     interpolation += float(np.abs(polynomial(between) - logarithm(between)).max())
     return FrequencyModel(
-        lowest, highest, polynomial, mode.bryan_factor, _sensitivity(instrument, mode.along), error, interpolation
+        lowest=lowest,
+        highest=highest,
+        polynomial=polynomial,
+        bryan_factor=mode.bryan_factor,
+        position=mode.along.position,
+        elastic=mode.along.elastic,
+        sensitivity=_sensitivity(instrument, mode.along),
+        solver_error=error,
+        interpolation_error=interpolation,
     )
 
 
@@ -110,13 +123,12 @@ def _shape_factor(
     return parabola, error, mode, unseen
 
 
-def _sensitivity(instrument: "Instrument", along: "AlongMeridian") -> tuple[Array, Array]:
-    """Return position and contribution to d ln f/dT (1/K) of every station of the mode."""
+def _sensitivity(instrument: "Instrument", along: "AlongMeridian") -> Array:
+    """Return what every station of the mode contributes to d ln f/dT (1/K)."""
     material, T0 = instrument.material, instrument.reference_temperature
     alpha = float(material.value("expansion", T0))
-    share = (
+    return np.asarray(
         along.elastic * (0.5 * material.log_slope("youngs_modulus", T0) - alpha)
         - 0.5 * along.kinetic * material.log_slope("density", T0)
         + along.nu * material.slope("poisson_ratio", T0)
     )
-    return along.position, share

@@ -15,12 +15,11 @@ from studies.simulation.frequency import FrequencyModel, Theory, build_frequency
 from studies.simulation.heat_path import build_network, cut_shell, root_to_end
 from studies.simulation.noise import SILENT, bias_noise, frequency_noise, quantise, read_noise, white_noise
 from thermal.lag import lag
-from thermal.meridian import energy_weights
+from thermal.meridian import cell_names, energy_weights
 from thermal.network import Boundary, Network, Part, assemble
 from thermal.profile import Profile
 from thermal.radiative import simulate
 from thermal.relaxation import find_relaxation
-from thermal.resonator import shell_weights
 from thermal.transient import Transient
 
 if TYPE_CHECKING:
@@ -126,23 +125,40 @@ def simulate_run(
 
 
 def cell_weights(instrument: "Instrument", model: FrequencyModel) -> Array:
+    """Share of the mode's elastic energy in each cell of the shell, from its root to its free end; they add up to 1."""
+    weights = _to_cells(instrument, model, model.elastic)
+    return np.asarray(weights / weights.sum())
+
+
+def cell_sensitivities(instrument: "Instrument", model: FrequencyModel) -> Array:
     """Contribution to d ln f/dT (1/K) of each cell of the shell, from its root to its free end."""
+    return _to_cells(instrument, model, model.sensitivity)
+
+
+def _to_cells(instrument: "Instrument", model: FrequencyModel, share: Array) -> Array:
     (s, _, _), length = root_to_end(instrument), instrument.resonator.length
-    position, share = model.along
-    from_start = length * (1 - position if instrument.resonator.support == "clamped-rim" else position)
+    from_start = length * (1 - model.position if instrument.resonator.support == "clamped-rim" else model.position)
     return energy_weights(cut_shell(instrument), from_start - s[0], share)
 
 
+def _observed_rows(instrument: "Instrument", transient: Transient, model: FrequencyModel) -> Array:
+    """Sums over the nodes: the housing, the resonator's mean, and δ ln f of what departs from the mean."""
+    mean, sensitivity = cell_weights(instrument, model), cell_sensitivities(instrument, model)
+    rows = np.zeros((3, len(transient.nodes)))
+    cells = [transient.nodes.index(name) for name in cell_names(len(mean))]
+    rows[0, transient.nodes.index("housing")] = 1.0
+    rows[1, cells] = mean
+    rows[2, cells] = sensitivity - sensitivity.sum() * mean
+    return rows
+
+
 def _respond(instrument: "Instrument", transient: Transient, model: FrequencyModel, time: Array) -> _Noiseless:
-    housing_row = np.array([[float(node == "housing") for node in transient.nodes]])
-    shell_row = shell_weights(transient.nodes, cell_weights(instrument, model))
-    T = transient.observe(time, np.vstack([housing_row, shell_row]))
+    T = transient.observe(time, _observed_rows(instrument, transient, model))
     housing, resonator = np.ascontiguousarray(T[:, 0]), np.ascontiguousarray(T[:, 1])
     changes = _apply_effects(instrument, transient, time, housing, resonator)
     resonator = resonator + changes.get("resonator_temperature", 0.0)
     reference = instrument.reference_temperature
-    thermal_frequency = model.frequency(resonator)
-    frequency = thermal_frequency + changes.get("frequency_Hz", 0.0)
+    frequency = model.frequency(resonator) * np.exp(T[:, 2]) + changes.get("frequency_Hz", 0.0)
     loss = read_loss(instrument.table("loss"), f"{instrument.path} [loss]")
     inverse_q = loss.at(resonator - reference) + changes.get("inverse_q", 0.0)
     if not (inverse_q > 0).all():

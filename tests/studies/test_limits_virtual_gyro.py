@@ -12,7 +12,7 @@ from studies.simulation.bias import read_bias, read_loss
 from studies.simulation.chamber import load_profile
 from studies.simulation.frequency import build_frequency_model
 from studies.simulation.heat_path import build_heat_path, build_network, build_shell_and_stem, cut_shell
-from studies.simulation.virtual_gyro import cell_weights, simulate_run, slowest_lag
+from studies.simulation.virtual_gyro import cell_sensitivities, cell_weights, simulate_run, slowest_lag
 from thermal.errors import ThermalError
 from thermal.relaxation import find_relaxation
 
@@ -56,7 +56,8 @@ def test_the_frequency_model_is_the_solver_between_its_nodes(card, model):
 
 def test_the_weights_of_the_cells_add_up_to_the_slope(card, model):
     (slope,) = temperature_coefficients(mode_model(card.resonator, 2, "shell"), card.material, 293.15, [293.15])
-    assert cell_weights(card, model).sum() == pytest.approx(slope.total, rel=1e-12)
+    assert cell_sensitivities(card, model).sum() == pytest.approx(slope.total, rel=1e-12)
+    assert cell_weights(card, model).sum() == pytest.approx(1.0, rel=1e-12)
     centre = np.log(model.frequency(np.array([293.1, 293.2])))
     assert np.diff(centre)[0] / 0.1 == pytest.approx(slope.total, rel=1e-6)
 
@@ -85,8 +86,23 @@ def test_a_field_along_the_meridian_shifts_the_mode_as_its_weights_say(card, mod
     by_solver = (solve(2.0) - solve(-2.0)) / 2 - growth
     cells = cut_shell(card)
     field = -2.0 * np.cos(np.pi * cells.middle / cells.edge[-1])
-    assert cell_weights(card, model) @ field == pytest.approx(by_solver, rel=2e-3)
+    assert cell_sensitivities(card, model) @ field == pytest.approx(by_solver, rel=2e-3)
     assert abs(by_solver) > 5e-5
+
+
+def test_an_elinvar_whose_slope_vanishes_keeps_a_sound_resonator_temperature():
+    """The cylinder of 3J53: the slope is a small difference, and the mean temperature must not be divided by it."""
+    cylinder = load_card("cvg-25mm")
+    given = {"conductivity_W_per_m_K": 12.0, "heat_capacity_J_per_kg_K": 500.0}
+    made = simulate_run(
+        cylinder.with_table("thermal", given), load_profile("step 20 0 2h"), 0.1, noise=False, theory="shell"
+    )
+    T = made.record["resonator_temperature_degC"]
+    assert T.min() >= 0.0
+    assert T.max() <= 20.0
+    assert np.diff(T).max() < 1e-6
+    settled = made.frequency_model.frequency(T + 273.15)
+    assert made.record["frequency_Hz"] == pytest.approx(settled, rel=2e-6)
 
 
 def test_the_default_bias_is_that_of_one_per_cent_anisotropy():
