@@ -1,0 +1,94 @@
+"""Studies through reduced bases: every design within its stated error of the full solve, alone or among others."""
+
+import pytest
+
+from studies.errors import InputError
+from studies.sweeps.design import draw
+from studies.sweeps.evaluate import Plan, evaluate_case
+from studies.sweeps.families import choose_solver
+from studies.sweeps.run import estimate_study, run_study
+from studies.sweeps.spec import read_study
+
+CARD = """schema = "hrg.card/1"
+name = "free-dome"
+[resonator]
+shape = "hemisphere"
+radius_mm = 15.0
+thickness_mm = 0.9
+[material]
+name = "fused-silica"
+"""
+
+
+@pytest.fixture(scope="module")
+def spec(tmp_path_factory):
+    card = tmp_path_factory.mktemp("card") / "free.toml"
+    card.write_text(CARD)
+    return {
+        "card": str(card),
+        "sampling": {"method": "latin-hypercube", "cases": 300, "seed": 3},
+        "parameter": [
+            {"name": "resonator.thickness_mm", "low": 0.85, "high": 0.95},
+            {"name": "resonator.radius_mm", "low": 14.5, "high": 15.5},
+            {"name": "temperature_degC", "low": -40, "high": 60},
+        ],
+        "quantity": [{"name": "frequency", "theory": "shell"}, {"name": "tcf", "theory": "shell"}],
+    }
+
+
+@pytest.fixture(scope="module")
+def results(spec):
+    return run_study(spec)
+
+
+def test_designs_lie_within_their_stated_error_of_the_full_solve(results):
+    plan = Plan.of(results.study)
+    assert results.about["identity"]["solver"] != "full"
+    for place in (0, 100, 299):
+        full = evaluate_case(plan, results.design(place))
+        allowed = results.errors[place, 0] + full.errors[0]
+        assert abs(results.values[place, 0] - full.values[0]) < allowed
+        assert allowed < 2e-5 * full.values[0]
+        # the full solve's TCF states no error; its slopes at the default tolerance are known to 5e-5, times alpha 0.55 ppm/°C
+        for k in range(1, 7):
+            assert abs(results.values[place, k] - full.values[k]) <= results.errors[place, k] + 3e-5
+            assert results.errors[place, k] < 0.01
+
+
+def test_a_design_is_the_same_alone_and_among_others(spec, results):
+    families = choose_solver(results.study, draw(results.study))
+    row = families.evaluate([results.design(7)])[0]
+    assert row.values == tuple(results.values[7])
+    smaller = run_study({**spec, "sampling": {**spec["sampling"], "batch": 7}})
+    assert smaller.values.tobytes() == results.values.tobytes()
+
+
+def test_a_design_that_cannot_be_computed_fails_alone(results):
+    families = choose_solver(results.study, draw(results.study))
+    outside = {**results.design(0), "resonator.thickness_mm": 2.0}
+    rows = families.evaluate([results.design(0), outside, results.design(1)])
+    assert [row.status for row in rows] == ["ok", "failed", "ok"]
+    assert rows[1].remark
+
+
+@pytest.mark.parametrize(
+    ("change", "reason"),
+    [
+        ({"card": "hrg-30mm"}, "full"),
+        ({"quantity": [{"name": "bryan-factor"}]}, "bryan_factor_n2"),
+        ({"parameter": [{"name": "resonator.rim_angle_deg", "nominal": 89, "low": 88, "high": 90}]}, "rim_angle_deg"),
+    ],
+)
+def test_where_families_do_not_go_auto_solves_in_full_and_family_is_refused(spec, change, reason):
+    changed = {**spec, **change}
+    study = read_study(changed)
+    assert choose_solver(study, draw(study)) is None
+    study = read_study({**changed, "sampling": {**spec["sampling"], "solver": "family"}})
+    with pytest.raises(InputError, match="does not go"):
+        choose_solver(study, draw(study))
+
+
+def test_dry_run_knows_the_solver(spec):
+    estimate = estimate_study(read_study(spec))
+    assert (estimate.solver, estimate.cases) == ("family", 300)
+    assert estimate.seconds_each < 0.01
