@@ -1,6 +1,6 @@
 """From a resonator to element matrices: unknowns, poles, clamps, and the ties between shell and solid blocks."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
 from typing import Literal
@@ -41,6 +41,7 @@ class Level:
     split: int = 1
 
 
+PORTION = 16  # elements integrated at a time
 SMALL = 0.5  # length over radius of a small element
 _SOLID = ((5, 4), (7, 6), (9, 8), (11, 10), (13, 12))  # degree of blocks, rings around sharp corners
 LEVELS: dict[str, tuple[Level, ...]] = {
@@ -83,17 +84,18 @@ class Group:
     place: ShellPart | SolidPart
     anchors: tuple[tuple[int, int], ...] = ()
 
-    def matrices(self, integrate: Callable[[Array, Array], Array], stations: Array) -> Array:
-        """Element matrices from station matrices, in the unknowns that are solved for.
+    def matrices(self, integrate: Callable[[Array, Array], Array], stations: Array, first: int) -> Array:
+        """Element matrices of the elements from `first` on from their station matrices, in the unknowns that are solved for.
 
         In the small elements at a free edge these are the values at the inner node and differences from them: `anchors`
         are such (element, node). Else the layers' stiff shear would drown the bending as (R/h)³ instead of (R/h)².
         """
         found = integrate(stations, self.table.along)
         for element, node in self.anchors:
-            along = self.table.along.copy()
-            along[0, :, node], along[1, :, node] = 1.0, 0.0
-            found[element] = integrate(stations[[element]], along)[0]
+            if first <= element < first + len(stations):
+                along = self.table.along.copy()
+                along[0, :, node], along[1, :, node] = 1.0, 0.0
+                found[element - first] = integrate(stations[[element - first]], along)[0]
         return found
 
     def spread(self, raw: Array) -> Array:
@@ -132,37 +134,51 @@ class System:
         """The elements' free unknowns."""
         return find_pattern([at.free for at in self._maps], self.constraint.shape[1])
 
-    @cached_property
-    def stations(self) -> list[tuple[Array, Array, Array]]:
-        """Station matrices per unit λ, G and ρ of every group."""
-        return [(*station_stiffness(group.table), station_mass(group.table)) for group in self.groups]
+    @property
+    def is_small(self) -> bool:
+        """Whether the matrices are worth keeping: below 24 MB."""
+        return sum(len(at.free) ** 2 for at in self._maps) < 1e6
 
     @cached_property
     def units(self) -> list[tuple[Array, Array, Array]]:
         """Element matrices on free unknowns per unit λ, G and ρ, the same material everywhere."""
         found: list[tuple[Array, Array, Array]] = []
-        for group, (trace, shear, mass) in zip(self.groups, self.stations, strict=True):
-            found += zip(
-                group.matrices(integrate_stiffness, trace), group.matrices(integrate_stiffness, shear),
-                group.matrices(integrate_mass, mass), strict=True,
+        for group, first, part, maps in self._portions():
+            trace, shear = station_stiffness(part)
+            matrices = (
+                group.matrices(integrate_stiffness, trace, first), group.matrices(integrate_stiffness, shear, first),
+                group.matrices(integrate_mass, station_mass(part), first),
             )
-        return [
-            (at.restrict(trace), at.restrict(shear), at.restrict(mass))
-            for (trace, shear, mass), at in zip(found, self._maps, strict=True)
-        ]
+            found += [
+                (at.restrict(one), at.restrict(two), at.restrict(three))
+                for one, two, three, at in zip(*matrices, maps, strict=True)
+            ]
+        return found
 
     def varying(self, lam: list[Array], G: list[Array], rho: list[Array]) -> tuple[list[Array], list[Array]]:
         """Stiffness and mass of every element with λ, G, ρ given at the stations of every group."""
         K: list[Array] = []
         M: list[Array] = []
-        for k, (group, (trace, shear, mass)) in enumerate(zip(self.groups, self.stations, strict=True)):
-            there = lam[k][..., None, None] * trace + G[k][..., None, None] * shear
-            K += list(group.matrices(integrate_stiffness, there))
-            M += list(group.matrices(integrate_mass, rho[k][..., None, None] * mass))
-        return (
-            [at.restrict(matrix) for matrix, at in zip(K, self._maps, strict=True)],
-            [at.restrict(matrix) for matrix, at in zip(M, self._maps, strict=True)],
-        )
+        fields = iter([(a[k : k + PORTION], b[k : k + PORTION], c[k : k + PORTION])
+                       for a, b, c in zip(lam, G, rho, strict=True) for k in range(0, len(a), PORTION)])
+        for group, first, part, maps in self._portions():
+            trace, shear = station_stiffness(part)
+            lam_there, G_there, rho_there = (field[..., None, None] for field in next(fields))
+            stiffness = group.matrices(integrate_stiffness, lam_there * trace + G_there * shear, first)
+            mass = group.matrices(integrate_mass, rho_there * station_mass(part), first)
+            K += [at.restrict(matrix) for matrix, at in zip(stiffness, maps, strict=True)]
+            M += [at.restrict(matrix) for matrix, at in zip(mass, maps, strict=True)]
+        return K, M
+
+    def _portions(self) -> Iterator[tuple[Group, int, StrainTable, list["ToFree"]]]:
+        """A few elements at a time, so that the passing arrays stay small."""
+        done = 0
+        for group in self.groups:
+            for k in range(0, len(group.unknowns), PORTION):
+                part = group.table.part(slice(k, k + PORTION))
+                count = len(part.volume)
+                yield group, k, part, self._maps[done : done + count]
+                done += count
 
     def spread(self, free: Array) -> list[Array]:
         """Element unknowns (elements, size) of every group from the free unknowns of one vector."""
@@ -206,7 +222,7 @@ class Layout:
     solids: tuple[tuple[Solid, tuple[tuple[int, int], ...]], ...]
 
 
-@lru_cache(maxsize=12)
+@lru_cache(maxsize=6)
 def build_system(resonator: Resonator, n: int, theory: Theory, level: Level) -> System:
     """Lay out, number and tabulate a resonator; cached, since only the material changes with temperature."""
     layout = lay_resonator(resonator, n, level)

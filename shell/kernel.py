@@ -10,7 +10,7 @@ Components of strain, in order: three normal strains, then the engineering shear
 (s, θ, ζ) in the shell and (r, θ, z) in a block.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,10 +40,10 @@ class StrainTable:
     transverse_shear: float = 1.0
     plane_stress: bool = False
 
-    @property
-    def size(self) -> int:
-        """Unknowns of one element."""
-        return int(self.along.shape[2] * self.strain.shape[5])
+    def part(self, elements: slice) -> "StrainTable":
+        """The table of some of the elements."""
+        cut = {name: getattr(self, name)[elements] for name in ("strain", "displacement", "volume", "position")}
+        return replace(self, **cut)
 
 
 @dataclass(frozen=True, eq=False)

@@ -211,7 +211,7 @@ def _solve_level(
 def _matrices(
     system: System, elastic: Elastic | VaryingElastic, constants: tuple[Constants, ...]
 ) -> tuple[list[Array], list[Array]]:
-    if isinstance(elastic, VaryingElastic):
+    if isinstance(elastic, VaryingElastic) or not system.is_small:
         return system.varying([c.lame[0] for c in constants], [c.lame[1] for c in constants], [c.rho for c in constants])
     uniform = [
         (float(c.lame[0][0, 0]), float(c.lame[1][0, 0]), float(c.rho[0, 0]))
