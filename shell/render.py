@@ -26,7 +26,7 @@ REMEDY = (
     " 'apt install libegl1 libgl1-mesa-dri' brings a software renderer."
 )
 EXAGGERATION = 0.12  # largest displacement in a picture over the size of the resonator
-ROOM = 0.72  # share of the picture's height for the resonator; the rest is for title and legend
+ROOM = 0.68  # share of the picture's height for the resonator; the rest is for title and legend
 PER_FRAME = 15.0  # seconds that one frame may take before the drawing is given up
 NODE, ANTINODE = "#d81b60", "#1b1f24"
 
@@ -320,7 +320,7 @@ def _aim(plotter: Any, scene: Scene, view: str, half_height: float) -> None:
     away, up, right = _axes(scene, view)
     corners = np.concatenate([scene.points + sign * scene.displacement for sign in (-1, 1)])
     middle = sum((corners @ axis).max() / 2 * axis + (corners @ axis).min() / 2 * axis for axis in (away, up, right))
-    target = middle - (1 - ROOM - 0.04) * half_height * up
+    target = middle - (1 - ROOM - 0.12) * half_height * up
     plotter.enable_parallel_projection()
     plotter.camera_position = [tuple(target + 20 * half_height * away), tuple(target), tuple(up)]
     plotter.camera.parallel_scale = half_height
