@@ -54,14 +54,25 @@ def test_soak_flattens_the_slope_a_little_and_bends_the_wrong_way(study):
     """Theory sheet: in a linear network soak hides in the slope; radiation bends opposite to the measured excess."""
     missing = study.measured_curvature - study.law_curvature
     assert missing < -0.1
-    for soak in study.soaks:
+    from_room = [soak for soak in study.soaks if soak.protocol == "from room"]
+    for soak in from_room:
         assert -0.5 < soak.slope < -0.05
         assert abs(soak.slope) < 0.06 * abs(study.measured_slope - study.law_slope)
-    radiative = [soak.curvature for soak in study.soaks if soak.network == "radiative"]
-    linear = [soak.curvature for soak in study.soaks if soak.network == "linear"]
+    radiative = [soak.curvature for soak in from_room if soak.network == "radiative"]
+    linear = [soak.curvature for soak in from_room if soak.network == "linear"]
     assert all(value > 0 for value in radiative)
     assert max(radiative) < 0.15 * abs(missing)
     assert all(abs(a) < 0.1 * b for a, b in zip(linear, radiative, strict=True))
+
+
+def test_points_taken_upwards_hide_the_soak_in_the_offset(study):
+    """Every point but the settled first one reads low by the same share of 10 °C in the linear network."""
+    for soak in (s for s in study.soaks if s.protocol == "upwards" and s.network == "linear"):
+        assert soak.error[0] == pytest.approx(0.0, abs=1e-6)
+        assert (soak.error[2:] < 0).all()
+        assert soak.error[2:] == pytest.approx(soak.error[-1], rel=0.1)
+        from_room = next(s for s in study.soaks if (s.protocol, s.network, s.hours) == ("from room", "linear", soak.hours))
+        assert abs(soak.slope) < 0.3 * abs(from_room.slope)
 
 
 def test_the_chapter_says_so(study):
