@@ -250,6 +250,11 @@ def restricted(problem: Problem, keep: Sequence[np.ndarray] | None = None, kerne
     return replace(problem, present=present, values=values, basis=basis, kernel=kernel)
 
 
+def choose_kernel_score(problem: Problem) -> float:
+    """Return the score of the baseline under the kind of slow noise that suits it best."""
+    return min(fit_at(restricted(problem, kernel=kernel), problem.tau).score for kernel in KERNELS)
+
+
 def choose_kernel(problem: Problem, terms: Sequence[Term] = ()) -> Problem:
     """Return the problem with the kind of slow noise that the data make most likely."""
     tried = [restricted(problem, kernel=kernel) for kernel in KERNELS]

@@ -370,8 +370,8 @@ def _states(
     def command(name: str) -> FloatArray | None:
         if name not in table or not (known := np.isfinite(table[name])).any():
             return None
-        index = np.searchsorted(time[known], grid + 1e-9, side="right") - 1
-        return np.asarray(table[name][known][np.clip(index, 0, None)])
+        middle = 0.5 * (time[known][1:] + time[known][:-1])
+        return np.asarray(table[name][known][np.searchsorted(middle, grid)])
 
     amplitude, voltage, angle = map(command, ("drive_amplitude_V", "electrode_bias_V", "pattern_angle_deg"))
     return States(

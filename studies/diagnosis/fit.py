@@ -227,9 +227,10 @@ def intervals(fit: Fit, index: int) -> dict[str, Interval]:
         parameter = term.effect.shape[knob.number]
         value, wide = term.shape[knob.number], float(deviation[count + k])
         if parameter.logarithmic:
-            out[parameter.name] = Interval(value, value * float(np.exp(-min(wide, 20.0))), value * float(np.exp(min(wide, 20.0))))
+            factor = float(np.exp(min(wide, 20.0)))
+            out[parameter.name] = Interval(value, max(value / factor, parameter.low), min(value * factor, parameter.high))
         else:
-            out[parameter.name] = Interval(value, value - wide, value + wide)
+            out[parameter.name] = Interval(value, max(value - wide, parameter.low), min(value + wide, parameter.high))
     for number, parameter in enumerate(term.effect.shape):
         if parameter.name not in out:
             half = 0.5 * problem.states[0].step * problem.group if parameter.name == "time_s" else 0.0

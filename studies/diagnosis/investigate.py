@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from studies.diagnosis.advice import suggest_next
-from studies.diagnosis.baseline import Law, Problem, choose_kernel, pose, span_of
+from studies.diagnosis.baseline import Law, Problem, choose_kernel, choose_kernel_score, pose, span_of
 from studies.diagnosis.campaign import FEWEST_BINS, Campaign
 from studies.diagnosis.discrepancy import Leftover, brief_events, generic_bases, leftover_evidence, strongest
 from studies.diagnosis.effects import Effect
@@ -15,13 +15,15 @@ from studies.diagnosis.gain import Score, rms, row_residuals, score
 from studies.diagnosis.null import bootstrap_levels, draw_null, levels_of, shipped_levels
 from studies.diagnosis.scan import applicable, build_dictionary
 from studies.diagnosis.selection import Found, Selection, scan_model, select
-from studies.diagnosis.thermometer import Thermometer, read_thermometer
+from studies.diagnosis.thermometer import Thermometer, read_thermometer, smooth_thermometer
 from studies.diagnosis.verdict import Cause, ResponseResult, Verdict, equivalent_to, overall, probability_of
 
 THRESHOLD = 17.0
 LEFT_OVER_THRESHOLD = 17.0
 LEFT_OVER_SHARE = 0.015
 NARROW_RANGE = 1.0
+PREFERENCE = 6.0
+"""How much likelier another thermometer than the corrected frequency must be."""
 
 
 @dataclass(frozen=True)
@@ -108,21 +110,25 @@ def _pose_one(
 
 
 def _best_thermometer(
-    campaign: Campaign, response: str, frequency: Inquiry, corrected: Problem
+    campaign: Campaign, response: str, frequency: Inquiry, clean_problem: Problem
 ) -> tuple[Problem, Thermometer | None]:
-    """Take the frequency with or without its non-thermal terms, whichever the response follows."""
+    """Take the frequency without or with its non-thermal terms, or its fitted model: whichever the response follows.
+
+    Noise of the frequency that is no temperature would otherwise enter the response through the polynomial.
+    """
     fit = frequency.selection.fit
     clean = read_thermometer(campaign, fit)
-    raw = read_thermometer(campaign, fit, clean=False)
-    if clean is None or raw is None or not any(t.effect.acts_on == "response" for t in fit.terms):
-        return corrected, clean
-    other = _pose_one(campaign, response, {}, raw, None)
-    assert other is not None
-    from studies.diagnosis.fit import fit_terms
-
-    if fit_terms(other, ()).score < fit_terms(corrected, ()).score - 6.0:
-        return other, clean
-    return corrected, clean
+    if clean is None:
+        return clean_problem, clean
+    others = [smooth_thermometer(campaign, clean, fit.problem.bend)]
+    if any(term.effect.acts_on == "response" for term in fit.terms):
+        others.append(read_thermometer(campaign, fit, clean=False) or clean)
+    best, least = clean_problem, choose_kernel_score(clean_problem) - PREFERENCE
+    for other in others:
+        problem = _pose_one(campaign, response, {}, other, None)
+        if problem is not None and (tried := choose_kernel_score(problem)) < least:
+            best, least = problem, tried
+    return best, clean
 
 
 def inquire(

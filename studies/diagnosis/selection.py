@@ -5,9 +5,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from studies.diagnosis.baseline import Problem
+from studies.diagnosis.baseline import Problem, fit_at, restricted
 from studies.diagnosis.effects import Effect, Span
 from studies.diagnosis.fit import Fit, fit_terms
+from studies.diagnosis.likelihood import KERNELS
 from studies.diagnosis.scan import Candidate, Dictionary, applicable, build_dictionary, scan
 from studies.diagnosis.states import FloatArray
 from studies.diagnosis.thermometer import corrected
@@ -131,10 +132,10 @@ def _settle(
         for index, term in enumerate(fit.terms):
             others = fit.terms[:index] + fit.terms[index + 1 :]
             without = fit_terms(fit.problem, others) if others else plain
-            evidence = without.score - fit.score - levels[term.name]
+            evidence = _least_score(without) - fit.score - levels[term.name]
             found.append((evidence, index, without))
         weakest = min(found, key=lambda item: item[0])
-        if weakest[0] >= threshold or len(fit.terms) == 1:
+        if weakest[0] >= threshold:
             break
         fit = weakest[2]
     else:
@@ -144,7 +145,17 @@ def _settle(
         name = fit.terms[index].name
         candidates = scan(without.problem, dictionary, scan_model(without))
         nets = sorted(candidates, key=lambda c: levels[c.term.name] - c.gain)
-        rivals = [r for r in polish_contenders(without, nets, levels) if r.name != name]
+        easier = without.score - _least_score(without)
+        rivals = [
+            replace(r, evidence=r.evidence - easier) for r in polish_contenders(without, nets, levels) if r.name != name
+        ]
         rivals.insert(0, Rival(name, evidence, fit))
         places.append(Found(index, name, evidence, tuple(sorted(rivals, key=lambda r: -r.evidence))))
     return Selection(plain, fit, tuple(sorted(places, key=lambda f: -f.evidence)), levels, threshold)
+
+
+def _least_score(fit: Fit) -> float:
+    """Return the score of a fit under the kind of slow noise that suits it best: the null may choose its noise too."""
+    problem = fit.problem
+    others = (restricted(problem, kernel=kernel) for kernel in KERNELS if kernel != problem.kernel)
+    return min(fit.score, *(fit_at(other, other.tau, fit.terms).score for other in others))

@@ -11,7 +11,7 @@ import numpy as np
 from studies.diagnosis.baseline import term_columns
 from studies.diagnosis.campaign import Campaign
 from studies.diagnosis.fit import Fit, fit_terms
-from studies.diagnosis.states import FloatArray, States
+from studies.diagnosis.states import FloatArray, States, average
 
 
 @dataclass(frozen=True)
@@ -78,6 +78,12 @@ def read_thermometer(campaign: Campaign, fit: Fit, clean: bool = True) -> Thermo
         excesses.append(x)
         states.append(replace(view.fine, resonator=view.fine.resonator + warmer[k]))
     return Thermometer(tuple(changes), tuple(excesses), tuple(states))
+
+
+def smooth_thermometer(campaign: Campaign, thermometer: Thermometer, bend: float) -> Thermometer:
+    """Return the thermometer with the fitted model in the place of the measured frequency: no noise, no surprise."""
+    excess = tuple(average(s.excess, campaign.group) for s in thermometer.states)
+    return replace(thermometer, change=tuple(x + bend * x**2 for x in excess), excess=excess)
 
 
 def thermal_correction(fit: Fit) -> tuple[FloatArray, ...]:

@@ -130,4 +130,4 @@ def probability_of(found: Found, equivalent: Sequence[str], threshold: float, le
     weight = np.exp((evidence - evidence.max()) / (2.0 * TEMPER))
     inside = sum(w for w, rival in zip(weight, found.rivals, strict=False) if rival.name in names)
     claim = float(inside / weight.sum()) * (1.0 - DOUBT)
-    return claim * (0.4 if leftover else 1.0)
+    return claim * (0.15 if leftover else 1.0)
