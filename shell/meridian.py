@@ -6,6 +6,7 @@ points outwards on a dome; the curvature κ of the meridian is positive where n 
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from itertools import pairwise
 from math import hypot, isfinite, pi
 from typing import Literal, TypeAlias
 
@@ -307,7 +308,10 @@ def meridian(segments: list[Line | Arc] | tuple[Line | Arc, ...], thickness: Pro
 def _profile(thickness: Profile) -> tuple[tuple[float, float], ...]:
     if isinstance(thickness, (int, float)):
         return (0.0, float(thickness)), (1.0, float(thickness))
-    return tuple((float(position), float(value)) for position, value in thickness)
+    profile = tuple((float(position), float(value)) for position, value in thickness)
+    if any(second[0] <= first[0] for first, second in pairwise(profile)):
+        raise ShellError("the positions of a thickness profile must rise from 0 (start) to 1 (rim), none of them twice.")
+    return profile
 
 
 def _known(support: Support) -> Support:

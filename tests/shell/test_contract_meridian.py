@@ -100,6 +100,7 @@ def stemmed(**stem: object) -> Resonator:
     (lambda: hemisphere(15e-3, 0.0), "thickness must be positive"),
     (lambda: hemisphere(15e-3, [(0, 1e-3), (1, -1e-3)]), "thickness must be positive"),
     (lambda: hemisphere(15e-3, [(0, 1e-3), (0.9, 1e-3)]), "rise from 0"),
+    (lambda: hemisphere(15e-3, [(0, 1e-3), (0.5, 1e-3), (0.5, 2e-3), (1, 2e-3)]), "none of them twice"),
     (lambda: hemisphere(15e-3, 35e-3), "overlap"),
     (lambda: hemisphere(15e-3, 1e-3, rim_angle=0.2, pole_angle=0.3), "pole angle < rim angle"),
     (lambda: hemisphere(15e-3, 1e-3, support="glued"), "support is one of"),

@@ -1,0 +1,49 @@
+"""Time of one mode by the shell-mode solver: run by hand, OPENBLAS_NUM_THREADS=1 python tests/benchmarks/bench_modes.py.
+
+"cached" keeps the operators of the geometry (a new material or temperature); "cold" starts from the dimensions.
+"""
+
+from collections.abc import Callable
+from time import perf_counter
+
+from shell.assembly import build_system
+from shell.elastic import Elastic
+from shell.meridian import Resonator, Stem, cylinder, hemisphere
+from shell.modes import solve_modes
+
+SILICA = Elastic(72.7e9, 0.17, 2203.0)
+CASES = {
+    "free hemisphere": hemisphere(15e-3, 0.9e-3),
+    "stem with fillet": hemisphere(15e-3, 0.9e-3, support="stem", stem=Stem(2.5e-3, -5e-3, fillet=0.5e-3)),
+    "sharp stem": hemisphere(15e-3, 0.9e-3, support="stem", stem=Stem(2.5e-3, -5e-3)),
+    "clamped cup": cylinder(12.5e-3, 0.6e-3, 18e-3, bottom_thickness=1e-3, clamp_radius=3e-3),
+}
+
+
+def fastest(run: Callable[[], object], times: int) -> float:
+    """Shortest of several runs, ms."""
+    best = float("inf")
+    for _ in range(times):
+        start = perf_counter()
+        run()
+        best = min(best, perf_counter() - start)
+    return 1e3 * best
+
+
+def cold(resonator: Resonator, theory: str) -> None:
+    build_system.cache_clear()
+    solve_modes(resonator, SILICA, theory=theory)  # type: ignore[arg-type]
+
+
+def main() -> None:
+    print(f"{'case':18}{'theory':8}{'frequency Hz':>14}{'estimate':>10}{'cached ms':>11}{'cold ms':>9}")
+    for name, resonator in CASES.items():
+        for theory in ("shell", "solid"):
+            (mode,) = solve_modes(resonator, SILICA, theory=theory)  # type: ignore[arg-type]
+            cached = fastest(lambda r=resonator, t=theory: solve_modes(r, SILICA, theory=t), 10)  # type: ignore[misc]
+            fresh = fastest(lambda r=resonator, t=theory: cold(r, t), 5)  # type: ignore[misc]
+            print(f"{name:18}{theory:8}{mode.frequency:14.4f}{mode.relative_error_estimate:10.1e}{cached:11.2f}{fresh:9.1f}")
+
+
+if __name__ == "__main__":
+    main()
