@@ -30,6 +30,7 @@ Array = NDArray[np.float64]
 Designs = Sequence[Mapping[str, Any]]
 QUANTITIES = ("frequency", "tcf")
 FEWEST = 64  # cases from which training a basis costs less than solving each design
+TOLERANCE = 1e-6  # of the basis against the full solve; hardly slower to train than a coarse one, and slopes need it
 STEP_H = 2e-3  # relative step of the thickness, and step of ν, for the slopes that the TCF needs
 STEP_NU = 2e-3
 STEEPEST = 10.0  # change of the discretisation's error per e-fold of h, or unit of ν, over itself; 2 to 3 were seen
@@ -120,7 +121,12 @@ def build_families(study: "Study", design: "Design") -> "Families | str":
         if key not in members:
             try:
                 members[key] = build_family(
-                    study.instrument.resonator, thickness=thickness, nu=nu, harmonic=key[0], theory=options["theory"]
+                    study.instrument.resonator,
+                    thickness=thickness,
+                    nu=nu,
+                    harmonic=key[0],
+                    theory=options["theory"],
+                    tolerance=TOLERANCE,
                 )
             except UNUSABLE_INPUT as error:
                 return str(error).rstrip(".")

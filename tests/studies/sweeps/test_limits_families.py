@@ -52,7 +52,7 @@ def test_designs_lie_within_their_stated_error_of_the_full_solve(results):
         # the full solve's TCF states no error; its slopes at the default tolerance are known to 5e-5, times alpha 0.55 ppm/°C
         for k in range(1, 7):
             assert abs(results.values[place, k] - full.values[k]) <= results.errors[place, k] + 3e-5
-            assert results.errors[place, k] < 0.01
+            assert results.errors[place, k] < 0.02
 
 
 def test_a_design_is_the_same_alone_and_among_others(spec, results):
