@@ -1,7 +1,7 @@
 """The diagnosis of a campaign, from records to verdict."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -20,7 +20,11 @@ from studies.diagnosis.verdict import Cause, ResponseResult, Verdict, equivalent
 
 THRESHOLD = 17.0
 LEFT_OVER_THRESHOLD = 17.0
-LEFT_OVER_SHARE = 0.015
+LEFT_OVER_SHARE = 0.02
+FURTHER = 120.0
+"""Evidence at which a further cause beside the strongest deserves two thirds of its claim (measured on the generator)."""
+LEAK = 0.01
+"""Part of the evidence in the frequency that a cause in another response must have: its thermometer is not exact."""
 NARROW_RANGE = 1.0
 PREFERENCE = 6.0
 """How much likelier another thermometer than the corrected frequency must be."""
@@ -74,7 +78,7 @@ def investigate(
             continue
         if response != "frequency_Hz" and "frequency_Hz" in inquiries:
             problem, thermometer = _best_thermometer(campaign, response, inquiries["frequency_Hz"], problem)
-        inquiries[response] = inquire(campaign, problem, draws, rng, effects)
+        inquiries[response] = inquire(campaign, problem, draws, rng, effects, THRESHOLD + LEAK * _explained(inquiries))
         if response == "frequency_Hz":
             thermometer = read_thermometer(campaign, inquiries[response].selection.fit)
     causes = merge_causes(inquiries, campaign)
@@ -132,17 +136,19 @@ def _best_thermometer(
 
 
 def inquire(
-    campaign: Campaign, problem: Problem, draws: int, rng: np.random.Generator, effects: Sequence[Effect] | None
+    campaign: Campaign, problem: Problem, draws: int, rng: np.random.Generator, effects: Sequence[Effect] | None,
+    threshold: float = THRESHOLD,
 ) -> Inquiry:
     """Select the effects of one response and ask the generic witness about the rest."""
     problem = choose_kernel(problem)
-    inquiry = _inquire(campaign, problem, draws, rng, effects)
+    inquiry = _inquire(campaign, problem, draws, rng, effects, threshold)
     better = choose_kernel(inquiry.problem, inquiry.selection.fit.terms) if inquiry.selection.found else problem
-    return inquiry if better.kernel == problem.kernel else _inquire(campaign, better, draws, rng, effects)
+    return inquiry if better.kernel == problem.kernel else _inquire(campaign, better, draws, rng, effects, threshold)
 
 
 def _inquire(
-    campaign: Campaign, problem: Problem, draws: int, rng: np.random.Generator, effects: Sequence[Effect] | None
+    campaign: Campaign, problem: Problem, draws: int, rng: np.random.Generator, effects: Sequence[Effect] | None,
+    threshold: float,
 ) -> Inquiry:
     span = span_of(campaign, problem.tau if problem.lagged else 1000.0)
     usable = applicable(problem, effects)
@@ -160,11 +166,16 @@ def _inquire(
         generic_levels = {
             name: float(levels_of(values[None, :])[0]) for name, values in leftover_evidence(plain, bases, noise).items()
         }
-    selection = select(problem, span, levels, THRESHOLD, effects, dictionary)
+    selection = select(problem, span, levels, threshold, effects, dictionary)
     leftover = strongest(leftover_evidence(selection.fit, bases), generic_levels)
     if (bursts := brief_events(selection.fit)) > leftover.evidence:
         leftover = Leftover("time, brief events", bursts)
     return Inquiry(problem, selection, leftover, levels)
+
+
+def _explained(inquiries: Mapping[str, Inquiry]) -> float:
+    frequency = inquiries.get("frequency_Hz")
+    return 0.0 if frequency is None else frequency.selection.plain.score - frequency.selection.fit.score
 
 
 def has_leftover(inquiry: Inquiry) -> bool:
@@ -191,7 +202,10 @@ def merge_causes(inquiries: Mapping[str, Inquiry], campaign: Campaign) -> tuple[
         if any(_same_cause(cause, other) or _same_set(cause, other) for other in kept):
             continue
         kept.append(cause)
-    return tuple(kept)
+    return tuple(
+        cause if rank == 0 else replace(cause, probability=cause.probability * (1.0 - np.exp(-cause.evidence / FURTHER)))
+        for rank, cause in enumerate(kept)
+    )
 
 
 def _cause(inquiry: Inquiry, found: Found, response: str) -> Cause:

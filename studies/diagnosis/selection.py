@@ -15,6 +15,9 @@ from studies.diagnosis.thermometer import corrected
 
 MOST_TERMS = 4
 CONTENDERS = 5
+BESIDE = 0.06
+"""A further effect must have this part of the evidence explained before it: no formula of an effect is exact, and what
+its imperfect shape leaves would otherwise be named."""
 
 
 @dataclass(frozen=True)
@@ -96,7 +99,7 @@ def select(
             dictionary = build_dictionary(fit.problem, replace(span, tau=fit.problem.tau), usable)
             built_at = fit.problem.tau
         rivals = compete(fit, dictionary, levels, threshold)
-        if not rivals or rivals[0].evidence < threshold:
+        if not rivals or rivals[0].evidence < threshold + BESIDE * (plain.score - fit.score):
             break
         fit = corrected(rivals[0].fit)
     return _settle(plain, fit, dictionary, levels, threshold)
@@ -135,7 +138,8 @@ def _settle(
             evidence = _least_score(without) - fit.score - levels[term.name]
             found.append((evidence, index, without))
         weakest = min(found, key=lambda item: item[0])
-        if weakest[0] >= threshold:
+        strongest = max(item[0] for item in found)
+        if weakest[0] >= threshold + (BESIDE * strongest if len(found) > 1 else 0.0):
             break
         fit = weakest[2]
     else:

@@ -14,8 +14,8 @@ def columns(states: States, shape: Sequence[float], response: str) -> FloatArray
 
 
 def grid(span: Span, response: str) -> list[tuple[float, ...]]:
-    """Relaxation times from a minute to well beyond a run."""
-    return [(float(tau),) for tau in np.geomspace(0.15 * span.tau, 4.0 * span.longest_run, 7)]
+    """Relaxation times from half the thermal one (a shorter one would be the rate) to well beyond a run."""
+    return [(float(tau),) for tau in np.geomspace(max(0.5 * span.tau, 600.0), max(4.0 * span.longest_run, 4000.0), 6)]
 
 
 EFFECT = Effect(
@@ -25,7 +25,7 @@ EFFECT = Effect(
     isolate="soak for days after a large step and watch f against an independent thermometer on the resonator",
     responses=("frequency_Hz", "bias_deg_per_h"),
     coefficients=("stress_{unit}_per_K",),
-    shape=(Parameter("relaxation_time_s", 20.0, 1e6, "time in which the stress relaxes"),),
+    shape=(Parameter("relaxation_time_s", 600.0, 1e6, "time in which the stress relaxes"),),
     columns=columns,
     grid=grid,
     fine=True,
