@@ -1,17 +1,13 @@
 """A first map for raw files: notation, time, columns and units guessed from names and cells, and every guess marked."""
 
-import csv
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
-from studies.errors import InputError
+from studies.importing.look import as_number, is_stamp, look_at
 from studies.importing.mapping import SCHEMA
-from studies.importing.raw import EXCEL, SEPARATORS, decode, read_bytes, read_sheet
 from studies.importing.units import units_of
 
-SEEN = 2000  # lines that are looked at
 STAMPS = (
     "%Y-%m-%d %H:%M:%S",
     "%Y-%m-%d %H:%M:%S.%f",
@@ -83,19 +79,6 @@ class Draft:
     left_over: tuple[str, ...]
 
 
-@dataclass(frozen=True)
-class Look:
-    """What a first look at one raw file finds."""
-
-    encoding: str
-    separator: str
-    rows: list[list[str]]
-    header: int
-    data: int
-    decimal: str
-    excel: bool
-
-
 def draft_map(paths: Sequence[str]) -> Draft:
     """Draft the map of one or more raw files.
 
@@ -122,7 +105,7 @@ def draft_map(paths: Sequence[str]) -> Draft:
 
 
 def _draft_file(path: str, taken: Sequence[str]) -> tuple[list[str], list[str], list[str]]:
-    look = _look_at(path)
+    look = look_at(path)
     names = [" ".join(cell.split()) or f"column {k}" for k, cell in enumerate(look.rows[look.header], 1)]
     names = [f"{name} #{k}" if name in names[: k - 1] else name for k, name in enumerate(names, 1)]
     units = look.rows[look.header + 1] if look.data > look.header + 1 else [""] * len(names)
@@ -155,7 +138,7 @@ def _draft_file(path: str, taken: Sequence[str]) -> tuple[list[str], list[str], 
         if name in time:
             continue
         target = _find_target(hints[name], [*taken, *found])
-        if target is None or not any(_as_number(cell, look.decimal) is not None for cell in cells[name]):
+        if target is None or not any(as_number(cell, look.decimal) is not None for cell in cells[name]):
             others.append(name)
             lines += ["", f"# no meaning found for the column {_quote(name)}"]
             continue
@@ -163,7 +146,7 @@ def _draft_file(path: str, taken: Sequence[str]) -> tuple[list[str], list[str], 
         lines += [
             "",
             *_draft_column(
-                name, target, hints[name], [n for c in cells[name] if (n := _as_number(c, look.decimal)) is not None]
+                name, target, hints[name], [n for c in cells[name] if (n := as_number(c, look.decimal)) is not None]
             ),
         ]
     return lines, found, others
@@ -188,93 +171,12 @@ _SETTING_WORDS = {
 }
 
 
-def _look_at(path: str) -> Look:
-    excel = Path(path).suffix.lower() in EXCEL
-    if excel:
-        rows, encoding, separator = read_sheet(path, None)[:SEEN], "utf-8", ","
-    else:
-        data = read_bytes(path)
-        encoding = _find_encoding(path, data)
-        lines = decode(path, data, encoding).split("\n", SEEN)[:SEEN]
-        separator = _find_separator(lines)
-        rows = [_split(line, separator) for line in lines]
-    decimal = "," if not excel and separator != "," and _has_decimal_commas(rows) else "."
-    numeric = [sum(_as_number(cell, decimal) is not None or _is_stamp(cell) for cell in row) for row in rows]
-    width = max(
-        (len(row) for row, count in zip(rows, numeric, strict=True) if 2 * count >= len(row) and count), default=0
-    )
-    first = next((k for k, count in enumerate(numeric) if count and 2 * count >= width), None)
-    header = None
-    if first is not None:
-        named = [k for k in range(first) if sum(bool(cell.strip()) for cell in rows[k]) >= max(1, width - 1)]
-        # of two lines with a cell for every column the second one holds the units
-        header = named[-2] if len(named) > 1 and _is_unit_line(rows[named[-1]]) else named[-1] if named else None
-    if first is None or header is None:
-        raise InputError(
-            f"{path}: no table with a line of names above rows of numbers was found; write the map by hand."
-        )
-    return Look(encoding, separator, rows, header, first, decimal, excel)
-
-
-def _is_unit_line(row: Sequence[str]) -> bool:
-    """Tell whether the cells look like units: short, or in brackets."""
-    cells = [cell.strip() for cell in row if cell.strip()]
-    units = r"[\[(].*[\])]|°?[CFK]|m?s|min|h|[kM]?Hz|[mkuµ]?V|(m?deg|°)/(s|h)|counts?|-|1|rad(/s)?"
-    return bool(cells) and all(re.fullmatch(units, cell) for cell in cells)
-
-
-def _find_encoding(path: str, data: bytes) -> str:
-    if data[:2] in (b"\xff\xfe", b"\xfe\xff"):
-        return "utf-16"
-    for encoding in ("utf-8", "cp1252"):
-        try:
-            decode(path, data, encoding)
-        except InputError:
-            continue
-        return encoding
-    return "latin-1"
-
-
-def _find_separator(lines: Sequence[str]) -> str:
-    """Return the separator that splits most lines into the same number of cells."""
-    filled = [line for line in lines if line.strip()]
-    best, score = ",", (0.0, 0)
-    for name in (";", "tab", ",", "space"):
-        widths = [len(_split(line, name)) for line in filled]
-        usual = max(set(widths), key=widths.count) if widths else 1
-        if usual > 1 and (found := (round(widths.count(usual) / len(widths), 1), name in (";", "tab"))) > score:
-            best, score = name, found
-    return best
-
-
-def _split(line: str, separator: str) -> list[str]:
-    if separator == "space":
-        return line.split()
-    try:
-        return next(csv.reader([line], delimiter=SEPARATORS[separator]), [])
-    except csv.Error:
-        return [line]
-
-
-def _has_decimal_commas(rows: Sequence[Sequence[str]]) -> bool:
-    return any(re.fullmatch(r"\s*[+-]?\d+,\d+([eE][+-]?\d+)?\s*", cell) for row in rows for cell in row)
-
-
-def _as_number(cell: str, decimal: str) -> float | None:
-    text = cell.strip().replace(decimal, ".")
-    return float(text) if re.fullmatch(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d{1,2})?", text) else None
-
-
-def _is_stamp(cell: str) -> bool:
-    return bool(re.match(r"\s*(\d{1,4}[-/.]\d{1,2}[-/.]\d{1,4}|\d{1,2}:\d{2})", cell))
-
-
 def _find_time(
     names: Sequence[str], cells: dict[str, list[str]], hints: dict[str, str], decimal: str
 ) -> tuple[list[str], str, str]:
     """Return the time columns, their format, and what is doubtful about it."""
     named = [name for name in names if re.search(TIME_WORDS, name.lower())]
-    stamps = [name for name in names if cells[name] and all(_is_stamp(cell) for cell in cells[name] if cell)]
+    stamps = [name for name in names if cells[name] and all(is_stamp(cell) for cell in cells[name] if cell)]
     stamped = [name for name in (named or stamps) if name in stamps][:2]
     if stamped:
         for columns in [stamped, stamped[:1], stamped[1:]] if len(stamped) > 1 else [stamped]:
@@ -284,7 +186,7 @@ def _find_time(
         return stamped[:1], "iso", "no known form fits; write the pattern"
     time = named[0] if named else names[0]
     unsure = "" if named else "no column is named time; the first was taken"
-    numbers = [n for cell in cells[time] if (n := _as_number(cell, decimal)) is not None]
+    numbers = [n for cell in cells[time] if (n := as_number(cell, decimal)) is not None]
     first = numbers[0] if numbers else 0.0
     if 1e9 < first < 4e9:
         return [time], "unix-s", unsure
@@ -333,7 +235,7 @@ def _find_markers(names: Sequence[str], cells: dict[str, list[str]], time: Seque
     """Return texts that stand in columns of numbers."""
     markers: list[str] = []
     for name in names:
-        words = [cell for cell in cells[name] if cell and _as_number(cell, decimal) is None]
+        words = [cell for cell in cells[name] if cell and as_number(cell, decimal) is None]
         if name not in time and 0 < 2 * len(words) < len(cells[name]):
             markers += [word for word in dict.fromkeys(words) if word not in markers]
     return markers[:20]

@@ -37,7 +37,7 @@ async function visit() {
   seen.requests = performance.getEntriesByType("resource").filter(entry => !entry.name.startsWith("data:")).map(entry => entry.name);
   if (!seen.live) { document.title = JSON.stringify({...seen, reason: find(".reason").textContent}); return; }
   if (root.dataset.state === "paused") find(".pause").click();
-  const before = +root.dataset.frames; 
+  const before = +root.dataset.frames;
   for (let k = 0; k < 40 && root.dataset.frames - before < 3; k++) await wait(0.1);
   seen.swings = root.dataset.frames - before;
   find(".pause").click(); await wait(0.2);

@@ -1,0 +1,160 @@
+"""Drawing by pyvista: the part of `shell.render` that runs in the child process."""
+
+from dataclasses import fields
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shell.quadrature import Array
+from shell.render import Scene
+
+ROOM = 0.68  # share of the picture's height for the resonator; the rest is for title and legend
+NODE, ANTINODE = "#d81b60", "#1b1f24"
+
+
+def draw_job(folder: str) -> None:
+    """Draw a job; runs in the child process."""
+    import pyvista as pv
+
+    with np.load(Path(folder, "job.npz")) as job:
+        scenes = [
+            Scene(
+                *(value.item() if (value := job[f"{field.name}_{k}"]).ndim == 0 else value for field in fields(Scene))
+            )
+            for k in range(int(job["count"]))
+        ]
+        view, swings, window = str(job["view"]), job["swings"].tolist(), job["window"].tolist()
+    plotter = pv.Plotter(
+        off_screen=True, shape=(1, len(scenes)), window_size=[window[0] * len(scenes), window[1]], border=False
+    )
+    half_height = max(_half_height(scene, view, window[0] / window[1]) for scene in scenes)
+    limits = _common_limits([scene.values for scene in scenes])
+    moving = []
+    for k, scene in enumerate(scenes):
+        plotter.subplot(0, k)
+        moving += _fill(plotter, scene, limits, first=k == 0)
+        _aim(plotter, scene, view, half_height)
+    for number, swing in enumerate(swings):
+        for mesh, rest, displacement in moving:
+            mesh.points = rest + swing * displacement
+        plotter.render()
+        plotter.screenshot(Path(folder, f"{number}.png"))
+    plotter.close()
+
+
+def _fill(plotter: Any, scene: Scene, limits: tuple[float, float], first: bool) -> list[tuple[Any, Array, Array]]:
+    """Put one resonator into the current part of the window; return what moves: mesh, rest position, displacement."""
+    import pyvista as pv
+
+    plotter.set_background("white")
+    faces = np.column_stack([np.full(len(scene.triangles), 3), scene.triangles]).ravel()
+    ghost = pv.PolyData(scene.points.copy(), faces)
+    plotter.add_mesh(ghost, color="#8a949e", opacity=0.13)
+    edges = ghost.extract_feature_edges(60.0, boundary_edges=False, manifold_edges=False, non_manifold_edges=False)
+    if edges.n_cells:
+        plotter.add_mesh(edges, color="#8a949e", line_width=1.2)
+    body, origin = _split_sharp(scene, faces)
+    body[scene.legend] = scene.values[origin]
+    bar = {
+        "title": scene.legend + "\n",
+        "color": "black",
+        "fmt": "%.3g",
+        "vertical": False,
+        "title_font_size": 15,
+        "label_font_size": 14,
+        "n_labels": 5,
+        "width": 0.6,
+        "position_x": 0.2,
+        "position_y": 0.05,
+        "height": 0.12,
+    }
+    plotter.add_mesh(
+        body,
+        scalars=scene.legend,
+        cmap="cividis",
+        clim=limits,
+        smooth_shading=True,
+        show_scalar_bar=bool(scene.legend),
+        scalar_bar_args=bar,
+        ambient=0.38,
+        diffuse=0.72,
+        specular=0.1,
+    )
+    moving = [(body, body.points.copy(), scene.displacement[origin])]
+    for line in scene.nodes:
+        members = line[line >= 0]
+        if len(members) > 1:
+            curve = pv.lines_from_points(scene.points[members])
+            plotter.add_mesh(curve, color=NODE, line_width=3.0, render_lines_as_tubes=True)
+            moving.append((curve, scene.points[members], scene.displacement[members]))
+    if len(scene.antinodes):
+        marks = pv.PolyData(scene.points[scene.antinodes])
+        plotter.add_mesh(marks, color=ANTINODE, point_size=13.0, render_points_as_spheres=True)
+        moving.append((marks, scene.points[scene.antinodes], scene.displacement[scene.antinodes]))
+        if first:
+            plotter.add_text(
+                "red lines: nodes   black dots: antinodes   grey: undeformed",
+                position=(12, 6),
+                font_size=8,
+                color="#5b6470",
+            )
+    if scene.title:
+        plotter.add_text(scene.title, position="upper_edge", font_size=10, color="black")
+    return moving
+
+
+def _split_sharp(scene: Scene, faces: Array) -> tuple[Any, NDArray[np.int64]]:
+    """A mesh whose vertices are doubled along sharp edges, for shading, and the vertex that each one came from."""
+    import pyvista as pv
+
+    body = pv.PolyData(scene.points.copy(), faces)
+    body["origin"] = np.arange(len(scene.points))
+    split = body.compute_normals(
+        split_vertices=True, feature_angle=35.0, auto_orient_normals=False, consistent_normals=False
+    )
+    return split, np.asarray(split["origin"], dtype=np.int64)
+
+
+def _axes(scene: Scene, view: str) -> tuple[Array, Array, Array]:
+    """Unit vectors towards the eye, upwards and to the right on the screen: from the open end, the axis upright."""
+    side = 1.0 if scene.opens_up else -1.0
+    eye, up = {
+        "oblique": ((1.0, -1.0, 0.9 * side), (0.0, 0.0, 1.0)),
+        "axis": ((0.0, 0.0, side), (0.0, 1.0, 0.0)),
+        "side": ((0.0, -1.0, 0.0), (0.0, 0.0, 1.0)),
+    }[view]
+    away = np.array(eye) / np.linalg.norm(eye)
+    upwards = np.array(up) - away * (away @ np.array(up))
+    upwards /= np.linalg.norm(upwards)
+    return away, upwards, np.cross(upwards, away)
+
+
+def _half_height(scene: Scene, view: str, aspect: float) -> float:
+    """Half the height of the picture, m, in which the swinging resonator fits above the legend."""
+    _, up, right = _axes(scene, view)
+    corners = np.concatenate([scene.points + sign * scene.displacement for sign in (-1, 1)])
+    high, wide = np.ptp(corners @ up), np.ptp(corners @ right)
+    return float(max(high / (2 * ROOM), 1.08 * wide / (2 * aspect)))
+
+
+def _aim(plotter: Any, scene: Scene, view: str, half_height: float) -> None:
+    """Look at the resonator from the view's direction, without perspective; it stands in the upper part of the picture."""
+    away, up, right = _axes(scene, view)
+    corners = np.concatenate([scene.points + sign * scene.displacement for sign in (-1, 1)])
+    middle = sum((corners @ axis).max() / 2 * axis + (corners @ axis).min() / 2 * axis for axis in (away, up, right))
+    target = middle - (1 - ROOM - 0.12) * half_height * up
+    plotter.enable_parallel_projection()
+    plotter.camera_position = [tuple(target + 20 * half_height * away), tuple(target), tuple(up)]
+    plotter.camera.parallel_scale = half_height
+    plotter.reset_camera_clipping_range()
+
+
+def _common_limits(values: list[Array]) -> tuple[float, float]:
+    """One colour scale for all scenes; a few values at a sharp corner (theory: infinite) do not set it."""
+    every = np.concatenate(values)
+    usual, top = float(np.percentile(every, 99.5)), float(every.max())
+    top = usual if top > 4 * usual > 0 else top
+    low = float(min(every.min(), 0.0 if every.min() < 0.5 * top else every.min()))
+    return low, top if top > low else low + 1.0

@@ -1,0 +1,115 @@
+"""A first look at a raw file: its encoding, separator, decimal sign, and where the table begins."""
+
+import csv
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from studies.errors import InputError
+from studies.importing.raw import EXCEL, SEPARATORS, decode, read_bytes, read_sheet
+
+SEEN = 2000  # lines that are looked at
+
+
+@dataclass(frozen=True)
+class Look:
+    """What a first look at one raw file finds."""
+
+    encoding: str
+    separator: str
+    rows: list[list[str]]
+    header: int
+    data: int
+    decimal: str
+    excel: bool
+
+
+def look_at(path: str) -> Look:
+    """Find encoding, separator, decimal sign, header and first row of a raw file.
+
+    Raises
+    ------
+    InputError
+        No line of names above rows of numbers was found.
+    """
+    excel = Path(path).suffix.lower() in EXCEL
+    if excel:
+        rows, encoding, separator = read_sheet(path, None)[:SEEN], "utf-8", ","
+    else:
+        data = read_bytes(path)
+        encoding = _find_encoding(path, data)
+        lines = decode(path, data, encoding).split("\n", SEEN)[:SEEN]
+        separator = _find_separator(lines)
+        rows = [_split(line, separator) for line in lines]
+    decimal = "," if not excel and separator != "," and _has_decimal_commas(rows) else "."
+    numeric = [sum(as_number(cell, decimal) is not None or is_stamp(cell) for cell in row) for row in rows]
+    width = max(
+        (len(row) for row, count in zip(rows, numeric, strict=True) if 2 * count >= len(row) and count), default=0
+    )
+    first = next((k for k, count in enumerate(numeric) if count and 2 * count >= width), None)
+    header = None
+    if first is not None:
+        named = [k for k in range(first) if sum(bool(cell.strip()) for cell in rows[k]) >= max(1, width - 1)]
+        # of two lines with a cell for every column the second one holds the units
+        header = named[-2] if len(named) > 1 and _is_unit_line(rows[named[-1]]) else named[-1] if named else None
+    if first is None or header is None:
+        raise InputError(
+            f"{path}: no table with a line of names above rows of numbers was found; write the map by hand."
+        )
+    return Look(encoding, separator, rows, header, first, decimal, excel)
+
+
+def _is_unit_line(row: Sequence[str]) -> bool:
+    """Tell whether the cells look like units: short, or in brackets."""
+    cells = [cell.strip() for cell in row if cell.strip()]
+    units = r"[\[(].*[\])]|°?[CFK]|m?s|min|h|[kM]?Hz|[mkuµ]?V|(m?deg|°)/(s|h)|counts?|-|1|rad(/s)?"
+    return bool(cells) and all(re.fullmatch(units, cell) for cell in cells)
+
+
+def _find_encoding(path: str, data: bytes) -> str:
+    if data[:2] in (b"\xff\xfe", b"\xfe\xff"):
+        return "utf-16"
+    for encoding in ("utf-8", "cp1252"):
+        try:
+            decode(path, data, encoding)
+        except InputError:
+            continue
+        return encoding
+    return "latin-1"
+
+
+def _find_separator(lines: Sequence[str]) -> str:
+    """Return the separator that splits most lines into the same number of cells."""
+    filled = [line for line in lines if line.strip()]
+    best, score = ",", (0.0, 0)
+    for name in (";", "tab", ",", "space"):
+        widths = [len(_split(line, name)) for line in filled]
+        usual = max(set(widths), key=widths.count) if widths else 1
+        if usual > 1 and (found := (round(widths.count(usual) / len(widths), 1), name in (";", "tab"))) > score:
+            best, score = name, found
+    return best
+
+
+def _split(line: str, separator: str) -> list[str]:
+    if separator == "space":
+        return line.split()
+    try:
+        return next(csv.reader([line], delimiter=SEPARATORS[separator]), [])
+    except csv.Error:
+        return [line]
+
+
+def _has_decimal_commas(rows: Sequence[Sequence[str]]) -> bool:
+    return any(re.fullmatch(r"\s*[+-]?\d+,\d+([eE][+-]?\d+)?\s*", cell) for row in rows for cell in row)
+
+
+def as_number(cell: str, decimal: str) -> float | None:
+    """Return the number that a cell holds, None where it holds something else."""
+    text = cell.strip().replace(decimal, ".")
+    return float(text) if re.fullmatch(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d{1,2})?", text) else None
+
+
+def is_stamp(cell: str) -> bool:
+    """Tell whether a cell looks like a date or a time of day."""
+    return bool(re.match(r"\s*(\d{1,4}[-/.]\d{1,2}[-/.]\d{1,4}|\d{1,2}:\d{2})", cell))
