@@ -67,6 +67,15 @@ def test_impossible_thickness_is_refused(tmp_path, thickness):
         load_card(path)
 
 
+def test_thickness_may_vary_along_the_meridian(tmp_path):
+    path = tmp_path / "card.toml"
+    profile = "thickness_mm = [[0, 0.95], [0.5, 0.9], [1, 0.85]]"
+    lines = [profile if line.startswith("thickness_mm") else line for line in HRG.splitlines()]
+    path.write_text("\n".join(lines), encoding="utf-8")
+    resonator = load_card(path).resonator
+    assert resonator.thickness_at([0.0, 0.25, 1.0]) == pytest.approx([0.95e-3, 0.925e-3, 0.85e-3])
+
+
 def test_unknown_bare_name_suggests_a_shipped_card():
     with pytest.raises(InputError, match="hrg-30mm"):
         load_card("hrg-30m")
