@@ -153,8 +153,10 @@ class Store:
     def about(self) -> dict[str, Any]:
         """Return what the study is: identity, spec, instrument, number of cases, when it was made."""
         columns = ("created_utc", "identity", "spec", "spec_text", "instrument", "folder", "cases", "repeats")
-        row = self._read(f"SELECT {', '.join(columns)} FROM study")[0]
-        about = dict(zip(columns, row, strict=True))
+        rows = self._read(f"SELECT {', '.join(columns)} FROM study")
+        if not rows:
+            raise InputError(f"{self.path.parent}: its study has not begun yet; run it again.")
+        about = dict(zip(columns, rows[0], strict=True))
         return about | {key: json.loads(about[key]) for key in ("identity", "spec", "instrument", "repeats")}
 
     def runs(self) -> list[dict[str, Any]]:
@@ -219,7 +221,11 @@ def open_store(folder: str | Path) -> Store:
     path = Path(folder) / FILE
     if not path.is_file():
         raise InputError(f"{folder}: there is no study in it (no {FILE}); give the folder of 'hrg study run --out'.")
-    return Store(_connect(path), path)
+    connection = _connect(path)
+    if connection.execute("PRAGMA user_version").fetchone()[0] == 0:
+        connection.close()
+        raise InputError(f"{folder}: its study has not begun yet; run it again.")
+    return Store(connection, path)
 
 
 def claim_store(folder: str | Path) -> Store:

@@ -10,6 +10,7 @@ import pytest
 
 from studies.errors import MissingEnvironment
 from studies.reports.sweep import sweep_page
+from studies.sweeps.progress import Lines
 from studies.sweeps.run import run_study
 from tests.studies.sweeps.processes import environment, rows_of, spec_of, words_of
 
@@ -60,6 +61,36 @@ def test_page_is_self_contained_and_escapes(results, monkeypatch):
     assert "https://" not in page.split("<footer")[0]
     for part in ("Which parameter matters", "Tolerances", "Provenance", "sortable", "resonator.thickness_mm"):
         assert part in page
+
+
+def test_page_of_a_study_of_which_nothing_is_computed_yet(results, monkeypatch):
+    from studies.sweeps.results import Results
+    from studies.sweeps.store import memory_store
+
+    monkeypatch.setattr("studies.reports.mode_picture.mode_blocks", lambda *_: [])
+    empty = memory_store()
+    empty.describe(results.store.about() | {"cases": 8})
+    page = sweep_page(Results(results.study, empty))
+    assert "not finished" in page
+    assert len(Results(results.study, empty).table()) == 0
+
+
+def test_template_over_temperature_gives_table_1_and_2_for_any_card(tmp_path, monkeypatch):
+    monkeypatch.setattr("studies.reports.mode_picture.mode_blocks", lambda *_: [])
+    found = run_study("frequency-over-temperature", tmp_path / "out", card="cvg-25mm", workers=1)
+    assert found.study.instrument.name == "cvg-25mm"
+    assert found.parameter("temperature_degC").tolist() == [-20, -10, 0, 10, 20, 30, 40]
+    page = sweep_page(found)
+    assert "Temperature from frequency" in page
+    assert "Coefficients about T0" in page
+    found.close()
+
+
+def test_progress_says_rate_and_remaining_time():
+    lines = Lines(total=10_000, done=250)
+    lines.advance(1000, 3)
+    text = lines.line(lines.began + 10)
+    assert text == "[ 1250/10000] 12.5 % failed=3 rate=100/s eta=00:01:27"
 
 
 def free_port() -> int:
