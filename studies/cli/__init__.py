@@ -4,8 +4,13 @@ Exit status: 0 done, 1 a fault of the program, 2 unusable input or arguments, 3 
 4 a study finished with failed cases, 130 interrupted and resumable.
 """
 
+import os
 import sys
 from collections.abc import Sequence
+
+# The solver's matrices are small: threads cost more than they bring. Read by the libraries when numpy is first imported.
+for _name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):
+    os.environ.setdefault(_name, "1")
 
 COMMANDS: dict[str, tuple[str, str]] = {
     # name: (module:function, one line of help)
