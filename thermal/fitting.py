@@ -158,8 +158,7 @@ class Problem:
         T = self.follower.follow(
             self.constants(parameters), self.departures(parameters)[i], run.time, run.housing_temperature
         )
-        excess: Array = T[run.rows] - self.reference_temperature
-        return excess
+        return np.interp(run.frequency_time, run.time, T) - self.reference_temperature
 
 
 @dataclass(frozen=True)

@@ -54,7 +54,7 @@ class EvenRun:
     ----------
     time, housing_temperature : arrays (M,), s and K, even and without holes
     rows : array (K,), the rows at which the frequency is known
-    frequency : array (K,), Hz
+    frequency_time, frequency : arrays (K,), mean time (s) and mean (Hz) of the samples of these rows
     breaks : array, places in `rows` at which a new stretch begins after a hole
     warnings : what was missing
     """
@@ -62,6 +62,7 @@ class EvenRun:
     time: Array
     housing_temperature: Array
     rows: Rows
+    frequency_time: Array
     frequency: Array
     breaks: Rows
     warnings: tuple[str, ...]
@@ -71,8 +72,10 @@ def row_step(runs: Sequence[Run], most: int) -> float:
     """Distance (s) of even rows that suits all runs: at most `most` of them, none finer than the finest run."""
     if min(len(run.time) for run in runs) < 2:
         raise ThermalError("a run of one row identifies nothing.")
-    return max(min(float(np.median(np.diff(run.time))) for run in runs),
-               max(float(np.ptp(run.time)) for run in runs) / (most - 1))
+    finest = min(float(np.median(np.diff(run.time))) for run in runs)
+    wanted = max(float(np.ptp(run.time)) for run in runs) / (most - 1)
+    # A whole number of samples in every row: with one sample more here than there the rows' mean times would jitter.
+    return finest * max(1.0, float(np.ceil(wanted / finest - 1e-9)))
 
 
 def even_rows(run: Run, step: float) -> EvenRun:
@@ -80,7 +83,8 @@ def even_rows(run: Run, step: float) -> EvenRun:
 
     Averaging commutes with linear lags, so only the law's curvature sees the width of a row, in second order.
     """
-    row = np.rint((run.time - run.time[0]) / step).astype(np.intp)
+    half_sample = min(float(np.median(np.diff(run.time))), step) / 2
+    row = ((run.time - run.time[0] + half_sample) // step).astype(np.intp)
     count = int(row[-1]) + 1
     if count < LEAST_ROWS:
         raise ThermalError(f"a run needs at least {LEAST_ROWS} rows to identify anything, not {count}.")
@@ -94,10 +98,13 @@ def even_rows(run: Run, step: float) -> EvenRun:
     _, T = _average(row[known_T], run.housing_temperature[known_T], count)
     places, f = _average(row[known_f], run.frequency[known_f], count)
     T_known = np.flatnonzero(np.isfinite(T))
+    f_time = _average(row[known_f], run.time[known_f], count)[1]
+    T_time = _average(row[known_T], run.time[known_T], count)[1]
     return EvenRun(
         time=time,
-        housing_temperature=np.interp(np.arange(count), T_known, T[T_known]),
+        housing_temperature=np.interp(time, T_time[T_known], T[T_known]),
         rows=places,
+        frequency_time=f_time[places],
         frequency=f[places],
         breaks=np.flatnonzero(np.diff(places) > 1) + 1,
         warnings=(

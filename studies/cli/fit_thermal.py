@@ -49,6 +49,12 @@ def fit_thermal(
     found = fit_thermal_constants(records, load_card(card) if card else None, lags, confidence)
     for warning in found.warnings:
         say(f"warning: {warning}")
+    white, wandering = found.noise.innovation, float(found.residual.std())
+    if wandering > 3 * white:
+        say(
+            f"note: the residual ({wandering:.2g} Hz) is {wandering / white:.1f} times its white part: the noise wanders, or"
+            " the gyro is more than this chain of lags; then the constants are effective ones, outside their intervals."
+        )
     if json:
         print_json(_payload(found, list(data)))
         return 0

@@ -16,7 +16,7 @@ from thermal.lag import lag
 from thermal.network import Boundary, Conductor, Node, Radiator, assemble
 from thermal.profile import Profile, parse_profile
 from thermal.radiative import integrate
-from thermal.run import Run
+from thermal.run import Run, even_rows, row_step
 from thermal.whitening import estimate_noise
 
 ROOM = 293.15
@@ -199,6 +199,19 @@ def test_a_fast_record_is_averaged_first():
     assert len(fit.residual) <= 2001
     assert fit.row_step > 10
     assert covers(fit.estimates["time_constant_1"], 1800.0)
+
+
+def test_rows_hold_a_whole_number_of_samples_and_know_their_mean_time():
+    run = one_lag(np.random.default_rng(12), step=10.0)
+    assert row_step([run], 2000) == 20.0
+    even = even_rows(run, 20.0)
+    assert np.diff(even.time) == pytest.approx(np.full(even.time.size - 1, 20.0))
+    assert even.frequency_time[:-1] == pytest.approx(even.time[even.rows[:-1]])
+    keep = np.random.default_rng(13).random(run.time.size) > 0.3  # irregular sampling
+    sparse = Run(run.time[keep], run.frequency[keep], run.housing_temperature[keep])
+    fit = identify([sparse], make_lags(1000.0), FREE_LAW)
+    assert covers(fit.estimates["time_constant_1"], 1800.0)
+    assert fit.residual.std() < 4e-3
 
 
 def test_the_profile_of_a_well_determined_constant_is_the_parabola_of_its_standard_error():
