@@ -27,6 +27,7 @@ from shell.reduced import ReducedModel
 from shell.training import Box, evaluate_many, train
 
 Range = tuple[float, float]
+MOST_SHAPES = 6  # the training takes every corner of the box
 ROUNDING = 1e-11  # relative error of a full solve's iteration and rounding
 
 
@@ -202,7 +203,8 @@ def build_family(
     ShellError
         On ranges that make no sense, or when no reduced basis reaches the tolerance.
     """
-    _check_request(resonator, thickness, nu, amplitude, harmonic, theory, min(tolerance, theory_tolerance))
+    thickness, nu = _widen(thickness, 0.005 * thickness[1]), _widen(nu, 0.002)
+    _check_request(resonator, thickness, nu, amplitude, len(shapes), harmonic, theory, min(tolerance, theory_tolerance))
     profiles = Profiles.of(resonator, shapes)
     own = max(value for _, value in resonator.thickness)
     request = (harmonic, theory, thickness, nu, amplitude, len(shapes), own, resonator.size, tolerance)
@@ -214,7 +216,7 @@ def build_family(
                 f"{reason}, so every design is solved in full: give the shapes as (position, value) pairs."
             )
         return Family(profiles, *request, tolerance, (), reason)
-    ratio = 1.6 if tolerance >= 1e-5 else 1.3  # of a cell: the narrower, the smaller its basis
+    ratio = 1.6 if tolerance >= 1e-5 else 1.25  # of a cell: the narrower, the smaller its basis
     count = max(1, ceil(log(thickness[1] / thickness[0]) / log(ratio)))
     edges = [thickness[0], *np.geomspace(*thickness, count + 1)[1:-1].tolist(), thickness[1]]
     spans = list(pairwise(edges))
@@ -265,8 +267,22 @@ def _choose_level(
     raise ShellError(f"{tolerance:g} is out of reach of the discretisation: allow a larger tolerance.")
 
 
+def _widen(span: Range, least: float) -> Range:
+    """A range too narrow to learn from becomes ±least."""
+    low, high = span
+    middle = (low + high) / 2
+    return (middle - least, middle + least) if 0 <= high - low < 2 * least else span
+
+
 def _check_request(
-    resonator: Resonator, thickness: Range, nu: Range, amplitude: float, harmonic: int, theory: str, tolerance: float
+    resonator: Resonator,
+    thickness: Range,
+    nu: Range,
+    amplitude: float,
+    count: int,
+    harmonic: int,
+    theory: str,
+    tolerance: float,
 ) -> None:
     if theory not in LEVELS:
         raise ShellError(f"the theory of a family is one of {', '.join(LEVELS)}, not {theory!r}.")
@@ -280,7 +296,11 @@ def _check_request(
         )
     if not -1 < nu[0] <= nu[1] < 0.5:
         raise ShellError(f"the range of Poisson's ratio must rise within -1 ... 0.5, not {nu[0]:g} to {nu[1]:g}.")
-    if not 0 <= amplitude < 1:
-        raise ShellError(f"the amplitude of the shapes is a fraction of the thickness below 1, not {amplitude:g}.")
+    if count > MOST_SHAPES:
+        raise ShellError(f"a family has at most {MOST_SHAPES} shapes, not {count}: study them in groups.")
+    if not 0 < amplitude < 1:
+        raise ShellError(
+            f"the amplitude of the shapes is a fraction of the thickness between 0 and 1, not {amplitude:g}."
+        )
     if not 0 < tolerance < 1:
         raise ShellError(f"the tolerance is a relative error between 0 and 1, not {tolerance:g}.")

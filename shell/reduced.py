@@ -81,7 +81,8 @@ class ReducedModel:
         K, M = self.stiffness @ both, self.mass @ g
         packed = r * (r + 1) // 2
         c = self.start @ both
-        L = factor(K[:packed], r)
+        with np.errstate(invalid="ignore", divide="ignore"):  # an indefinite stiffness gives no number
+            L = factor(K[:packed], r)
         for _ in range(ITERATIONS):
             loaded = multiply(M[:packed], c, r)
             c = substitute(L, loaded)
