@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shell.quadrature import Array
-from shell.render import Scene
+from shell.scene import Scene
 
 ROOM = 0.68  # share of the picture's height for the resonator; the rest is for title and legend
 NODE, ANTINODE = "#d81b60", "#1b1f24"

@@ -9,23 +9,20 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import fields
 from math import pi
 from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from shell.errors import ShellError
-from shell.quadrature import Array
-from shell.surface import Surface
+from shell.scene import Scene
 
 REMEDY = (
     "no OpenGL on this machine, so no picture could be drawn. On Debian or Ubuntu"
     " 'apt install libegl1 libgl1-mesa-dri' brings a software renderer."
 )
-EXAGGERATION = 0.12  # largest displacement in a picture over the size of the resonator
 PER_FRAME = 15.0  # seconds that one frame may take before the drawing is given up
 
 View = Literal["oblique", "axis", "side"]
@@ -34,62 +31,6 @@ VIEWS = ("oblique", "axis", "side")
 
 class NoOpenGL(RuntimeError):
     """The machine cannot draw; the message says how to mend it."""
-
-
-@dataclass(frozen=True, eq=False)
-class Scene:
-    """One resonator in a picture.
-
-    Attributes
-    ----------
-    points, displacement : (N, 3) arrays, m
-        Vertices and what is added to them at the largest swing, already exaggerated.
-    triangles : (F, 3) array
-    values : (N,) array
-        What the colour shows.
-    legend : str
-        Quantity and unit of the values.
-    title : str
-        A line above the resonator.
-    nodes : (L, k) array
-        Vertex numbers along each nodal line, -1 after its end.
-    antinodes : (A,) array
-        Vertex numbers.
-    opens_up : bool
-        Whether the open end is at the larger z, from where it is then seen.
-    """
-
-    points: Array
-    displacement: Array
-    triangles: NDArray[np.int64]
-    values: Array
-    legend: str
-    title: str
-    nodes: NDArray[np.int64]
-    antinodes: NDArray[np.int64]
-    opens_up: bool
-
-
-def compose_scene(surface: Surface, values: Array, legend: str, title: str = "") -> Scene:
-    """Compose a picture of a mode: nodal meridians and antinodes marked, the swing exaggerated to a visible size."""
-    lines = surface.nodes
-    nodes = np.full((len(lines), max(map(len, lines), default=0)), -1, dtype=np.int64)
-    for k, line in enumerate(lines):
-        nodes[k, : len(line)] = line
-    rim = surface.position > 0.98
-    opens_up = bool(surface.points[rim, 2].mean() > surface.points[:, 2].mean()) if rim.any() else False
-    swing = surface.displacement * EXAGGERATION * surface.size
-    return Scene(
-        surface.points,
-        swing,
-        surface.triangles,
-        np.asarray(values, dtype=float),
-        legend,
-        title,
-        nodes,
-        surface.antinodes,
-        opens_up,
-    )
 
 
 def render_png(scenes: Scene | Sequence[Scene], view: View = "oblique", width: int = 900, height: int = 700) -> bytes:

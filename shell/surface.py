@@ -69,10 +69,9 @@ class Surface:
         """Vertex numbers of the 2n places where the displacement in the meridional plane is largest."""
         if not self.harmonic:
             return np.zeros(0, dtype=np.int64)
-        at_zero = [np.hypot(self.displacement[grid[:, 0], 0], self.displacement[grid[:, 0], 2]) for grid in self.grids]
-        grid = max(zip(at_zero, self.grids, strict=True), key=lambda pair: float(pair[0].max()))
-        half = grid[1].shape[1] // (2 * self.harmonic)
-        return grid[1][int(grid[0].argmax()), ::half]
+        outer = self.grids[0]
+        at_zero = np.hypot(self.displacement[outer[:, 0], 0], self.displacement[outer[:, 0], 2])
+        return outer[int(at_zero.argmax()), :: outer.shape[1] // (2 * self.harmonic)]
 
 
 def build_surface(

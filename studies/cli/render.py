@@ -168,7 +168,7 @@ def _mesh(
     swing_mm: float | None,
 ) -> bytes:
     from shell.mesh import encode_animation, encode_mesh
-    from shell.render import EXAGGERATION
+    from shell.scene import EXAGGERATION
 
     colours = one.colours(colour, field)
     if kind == ".glb":

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
     from shell.meridian import Resonator
     from shell.modes import Mode
-    from shell.render import Scene
+    from shell.scene import Scene
     from shell.surface import Surface
 
 Colour = Literal["displacement", "energy", "temperature"]
@@ -57,7 +57,7 @@ class Shown:
 
     def scene(self, colour: Colour = "displacement", field: "Field | None" = None) -> "Scene":
         """Return the scene for `shell.render`."""
-        from shell.render import compose_scene
+        from shell.scene import compose_scene
 
         return compose_scene(self.surface, self.values(colour, field), LEGENDS[colour], self.title)
 

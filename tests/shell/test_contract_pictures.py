@@ -15,7 +15,8 @@ from shell.elastic import Elastic
 from shell.errors import ShellError
 from shell.meridian import Stem, hemisphere
 from shell.modes import solve_modes
-from shell.render import NoOpenGL, can_draw, compose_scene, render_animation, render_png
+from shell.render import NoOpenGL, can_draw, render_animation, render_png
+from shell.scene import compose_scene
 from shell.surface import build_surface
 
 RESONATOR = hemisphere(15e-3, 0.9e-3, support="stem", stem=Stem(2.5e-3, -5e-3, 0.5e-3))

@@ -1,0 +1,67 @@
+"""What one resonator in a picture is made of."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shell.quadrature import Array
+from shell.surface import Surface
+
+EXAGGERATION = 0.12  # largest displacement in a picture over the size of the resonator
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """One resonator in a picture.
+
+    Attributes
+    ----------
+    points, displacement : (N, 3) arrays, m
+        Vertices and what is added to them at the largest swing, already exaggerated.
+    triangles : (F, 3) array
+    values : (N,) array
+        What the colour shows.
+    legend : str
+        Quantity and unit of the values.
+    title : str
+        A line above the resonator.
+    nodes : (L, k) array
+        Vertex numbers along each nodal line, -1 after its end.
+    antinodes : (A,) array
+        Vertex numbers.
+    opens_up : bool
+        Whether the open end is at the larger z, from where it is then seen.
+    """
+
+    points: Array
+    displacement: Array
+    triangles: NDArray[np.int64]
+    values: Array
+    legend: str
+    title: str
+    nodes: NDArray[np.int64]
+    antinodes: NDArray[np.int64]
+    opens_up: bool
+
+
+def compose_scene(surface: Surface, values: Array, legend: str, title: str = "") -> Scene:
+    """Compose a picture of a mode: nodal meridians and antinodes marked, the swing exaggerated to a visible size."""
+    lines = surface.nodes
+    nodes = np.full((len(lines), max(map(len, lines), default=0)), -1, dtype=np.int64)
+    for k, line in enumerate(lines):
+        nodes[k, : len(line)] = line
+    rim = surface.position > 0.98
+    opens_up = bool(surface.points[rim, 2].mean() > surface.points[:, 2].mean()) if rim.any() else False
+    swing = surface.displacement * EXAGGERATION * surface.size
+    return Scene(
+        surface.points,
+        swing,
+        surface.triangles,
+        np.asarray(values, dtype=float),
+        legend,
+        title,
+        nodes,
+        surface.antinodes,
+        opens_up,
+    )
