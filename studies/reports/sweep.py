@@ -17,7 +17,7 @@ from studies.sweeps.tolerance import find_reach, find_yield, resolve_limits
 if TYPE_CHECKING:
     from studies.sweeps.quantity import Column
     from studies.sweeps.results import Results
-    from studies.sweeps.spec import Parameter
+    from studies.sweeps.definition import Parameter
 
 MOST_ROWS = 300
 ENDS = 20  # designs shown from each end when there are more than MOST_ROWS

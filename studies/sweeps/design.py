@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from studies.errors import InputError
-from studies.sweeps.spec import MOST_CASES
+from studies.sweeps.definition import MOST_CASES
 
 if TYPE_CHECKING:
-    from studies.sweeps.spec import Parameter, Study
+    from studies.sweeps.definition import Parameter, Study
 
 Array = NDArray[np.float64]
 LEVELS = (-1.0, -0.5, 0.5, 1.0)  # of one parameter at a time, in half ranges about the nominal value

@@ -18,9 +18,9 @@ from studies.sweeps.design import decode_row
 from studies.sweeps.evaluate import Plan, Row, evaluate_task, lost_row
 
 if TYPE_CHECKING:
+    from studies.sweeps.definition import Study
     from studies.sweeps.design import Design
     from studies.sweeps.progress import Progress
-    from studies.sweeps.spec import Study
     from studies.sweeps.store import Store
     from studies.sweeps.workers import Workers
 

@@ -15,9 +15,9 @@ from studies.sweeps.parameters import set_parameters
 from studies.sweeps.quantities import library
 
 if TYPE_CHECKING:
+    from studies.sweeps.definition import Study
     from studies.sweeps.families import Families
     from studies.sweeps.quantity import Number
-    from studies.sweeps.spec import Study
 
 Batch = Sequence[Mapping[str, Any]]
 

@@ -21,10 +21,10 @@ from studies.sweeps.parameters import TEMPERATURE, set_parameters
 
 if TYPE_CHECKING:
     from shell.materials import Material
+    from studies.sweeps.definition import Study
     from studies.sweeps.design import Design
     from studies.sweeps.evaluate import Row
     from studies.sweeps.quantity import Options
-    from studies.sweeps.spec import Study
 
 Array = NDArray[np.float64]
 Designs = Sequence[Mapping[str, Any]]

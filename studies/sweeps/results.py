@@ -11,9 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from studies.instrument.card import Instrument
+from studies.sweeps.definition import Study
 from studies.sweeps.design import nominal_design
 from studies.sweeps.engine import make_item
-from studies.sweeps.spec import Study, check_study
+from studies.sweeps.spec import check_study
 from studies.sweeps.store import Store, Stored, open_store
 
 if TYPE_CHECKING:

@@ -10,6 +10,7 @@ from typing import Any
 
 from studies.errors import InputError
 from studies.sweeps.canonical import PHYSICS_VERSION, digest, spell_material
+from studies.sweeps.definition import FREE, Study
 from studies.sweeps.design import Design, draw, nominal_design
 from studies.sweeps.engine import BATCH, BATCH_VECTORISED, compute, missing_batches
 from studies.sweeps.evaluate import Plan, evaluate_task
@@ -18,7 +19,7 @@ from studies.sweeps.progress import Silent, shown_progress
 from studies.sweeps.provenance import describe_environment
 from studies.sweeps.results import Results, open_results
 from studies.sweeps.search import run_searches
-from studies.sweeps.spec import FREE, Study, read_study
+from studies.sweeps.spec import read_study
 from studies.sweeps.store import Store, claim_store, memory_store
 from studies.sweeps.workers import Here, Pool, Workers
 

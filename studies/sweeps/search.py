@@ -17,8 +17,8 @@ from studies.sweeps.engine import Batch, compute, make_item
 from studies.sweeps.progress import Silent
 
 if TYPE_CHECKING:
+    from studies.sweeps.definition import Parameter, Search, Study
     from studies.sweeps.evaluate import Plan
-    from studies.sweeps.spec import Parameter, Search, Study
     from studies.sweeps.store import Store, Stored
     from studies.sweeps.workers import Workers
 

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from studies.errors import InputError
 
 if TYPE_CHECKING:
+    from studies.sweeps.definition import Parameter
     from studies.sweeps.results import Results
-    from studies.sweeps.spec import Parameter
 
 Array = NDArray[np.float64]
 RESAMPLES = 1000

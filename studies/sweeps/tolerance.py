@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 from studies.errors import InputError
 
 if TYPE_CHECKING:
+    from studies.sweeps.definition import Requirement
     from studies.sweeps.results import Results
-    from studies.sweeps.spec import Requirement
 
 RANDOM = ("latin-hypercube", "sobol", "sensitivity")
 

@@ -9,7 +9,7 @@ from studies.instrument.card import ZERO_CELSIUS
 from studies.sweeps.parameters import TEMPERATURE, set_parameters
 
 if TYPE_CHECKING:
-    from studies.sweeps.spec import Parameter, Study
+    from studies.sweeps.definition import Parameter, Study
 
 MOST_CORNERS = 6  # parameters up to which all corners of the box are looked at
 
