@@ -18,6 +18,8 @@ if TYPE_CHECKING:
     from studies.instrument.card import Instrument
 
 EVENTS = ("jump",)
+WELL_CONDUCTING = 2000.0
+"""Conductivity that makes shell, stem and base one lump behind the mount, W/(m K)."""
 
 
 def law_of(instrument: "Instrument") -> Law:
@@ -120,7 +122,8 @@ def _calibrate_lag(instrument: "Instrument", tau: float) -> "Instrument":
     from studies.simulation.heat_path import IDENTIFIED_MOUNT
     from studies.simulation.virtual_gyro import slowest_lag
 
-    thermal = dict(instrument.table("thermal"))
+    # one lag and nothing else: what the gyro has beyond it is an effect, and must not be counted twice
+    thermal = {**instrument.table("thermal"), "conductivity_W_per_m_K": WELL_CONDUCTING, "radiation": False, "cells": 1}
     conductance = float(thermal.get("mount_conductance_W_per_K", IDENTIFIED_MOUNT))
     exchange = float(thermal.get("mount_exchange_cm2", 10.0))
 

@@ -9,7 +9,7 @@ simulation.
 import importlib
 import pkgutil
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 
 import numpy as np
@@ -174,3 +174,30 @@ def apply_effect(
     columns = effect.columns(states, shape, response)
     weights = np.array([float(parameters.get(key, 0.0)) for key in names[: columns.shape[1]]])
     return target, np.asarray(columns @ weights)
+
+
+def apply_effects(
+    entries: Sequence[tuple[str, str, Mapping[str, float]]], states: States
+) -> dict[str, FloatArray]:
+    """Run several effects forward, those on the temperature first: the others see the temperature that they leave.
+
+    Parameters
+    ----------
+    entries : sequence of (name, response, parameters)
+        As `[[effect]]` tables give them.
+    states : States
+        The run, on an even time grid.
+
+    Returns
+    -------
+    changes : dict
+        What must be added to "resonator_temperature" (K) and to each response.
+    """
+    changes: dict[str, FloatArray] = {}
+    for thermal in (True, False):
+        warmed = replace(states, resonator=states.resonator + changes.get("resonator_temperature", 0.0))
+        for name, response, parameters in entries:
+            if (find_effect(name).acts_on == "temperature") is thermal:
+                target, change = apply_effect(name, parameters, states if thermal else warmed, response)
+                changes[target] = changes.get(target, np.zeros_like(states.time)) + change
+    return changes

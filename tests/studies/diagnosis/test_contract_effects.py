@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from studies.diagnosis.effects import Span, apply_effect, find_effect, library
+from studies.diagnosis.effects import Span, apply_effect, apply_effects, find_effect, library
 from studies.diagnosis.states import States, lag
 from studies.errors import InputError
 
@@ -107,3 +107,16 @@ def test_radiation_settles_on_the_nonlinear_balance():
         y[k] = y[k - 1] + 5.0 / 6.0 * (k1 + 2 * k2 + 2 * k3 + k4)
     wanted = np.interp(states.time, fine, y) - states.resonator
     assert np.max(np.abs(change - wanted)) < 0.02 * np.max(np.abs(wanted))
+
+
+def test_static_effects_see_the_temperature_that_thermal_effects_leave():
+    from dataclasses import replace
+
+    states = make_states()
+    warm = ("self-heating", "frequency_Hz", {"heating_K_per_V2": 3.0})
+    rate = ("rate-bias", "bias_deg_per_h", {"coefficient_deg_per_h_per_K_per_s": 100.0})
+    changes = apply_effects([rate, warm], states)
+    _, warmer = apply_effect(warm[0], warm[2], states)
+    assert np.allclose(changes["resonator_temperature"], warmer)
+    seen = replace(states, resonator=states.resonator + warmer)
+    assert np.allclose(changes["bias_deg_per_h"], apply_effect(rate[0], rate[2], seen, rate[1])[1])
