@@ -84,9 +84,12 @@ class FrozenShell:
         lam, G = (float(x) for x in lame(np.float64(1.0), np.float64(nu), self.plane_stress))
         weights = self.interpolate(h)
         trace, shear, mass = (np.einsum("cej,cejab->ejab", weights, kind) for kind in self.matrices)
-        maps, along = self.system._maps, self.group.table.along
-        K = [at.restrict(k) for at, k in zip(maps, integrate_stiffness(lam * trace + G * shear, along), strict=True)]
-        M = [at.restrict(m) for at, m in zip(maps, integrate_mass(mass, along), strict=True)]
+        maps, matrices = self.system._maps, self.group.matrices
+        K = [
+            at.restrict(k)
+            for at, k in zip(maps, matrices(integrate_stiffness, lam * trace + G * shear, 0), strict=True)
+        ]
+        M = [at.restrict(m) for at, m in zip(maps, matrices(integrate_mass, mass, 0), strict=True)]
         vector = lowest_vectors(self.system.pattern, K, M, 1, 0.0, accuracy)
         trace, shear, mass = (np.einsum("cej,cej->", weights, kind[..., 0, 0]) for kind in self.energies(vector))
         return float((lam * trace + G * shear) / mass), vector[:, 0]
@@ -108,8 +111,7 @@ class FrozenShell:
 
     def _energies(self, table: StrainTable, vectors: Array) -> tuple[Array, Array, Array]:
         """The same at one node, from strains: sums of squares, free of cancellation."""
-        raw = self.system.constraint @ vectors
-        spread = [self.group.signs * vector[self.group.unknowns] for vector in raw.T]
+        spread = [self.system.spread(vector)[0] for vector in vectors.T]
         strain = np.stack([strains(table, q) for q in spread], axis=-1)
         moved = np.stack([displacements(table, q) for q in spread], axis=-1)
         root = np.sqrt(table.volume)
