@@ -1,0 +1,176 @@
+"""Chapters on what a study means: which parameter matters, the yield, worst cases and designs by inversion."""
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+from studies.errors import InputError
+from studies.reports import sweep_figures as figures
+from studies.reports.page import Block, Chapter, Table, Text
+from studies.reports.sweep_cells import main_columns, number, percent
+from studies.sweeps.search import name_search
+from studies.sweeps.sensitivity import linear_shares, local_slopes, sobol_indices
+from studies.sweeps.tolerance import find_reach, find_yield, resolve_limits
+
+if TYPE_CHECKING:
+    from studies.sweeps.definition import Parameter
+    from studies.sweeps.quantity import Column
+    from studies.sweeps.results import Results
+
+
+def influence_chapters(results: "Results") -> list[Chapter]:
+    """Return which parameter matters: Sobol indices, slopes or linear shares, whichever the design allows."""
+    blocks: list[Block] = []
+    method = results.study.sampling.method
+    for column in main_columns(results):
+        try:
+            if method == "sensitivity":
+                blocks += _sobol(results, column)
+            elif method == "one-at-a-time":
+                blocks += _slopes(results, column)
+            elif method in ("latin-hypercube", "sobol"):
+                blocks += _shares(results, column)
+        except InputError as error:
+            blocks.append(Text(str(error), "warning"))
+    return [Chapter("Which parameter matters", blocks)] if blocks else []
+
+
+def _sobol(results: "Results", column: "Column") -> list[Block]:
+    found = sobol_indices(results, column.name)
+    if found.variance == 0:
+        return [Text(f"{column.label} is the same for every design: no parameter has any influence on it.", "note")]
+    rows = []
+    for k, name in enumerate(found.parameters):
+        first = [f"{found.first[k]:.4f}", f"{found.first_low[k]:.4f} … {found.first_high[k]:.4f}"]
+        rows.append([name, *first, f"{found.total[k]:.4f}", f"{found.total_low[k]:.4f} … {found.total_high[k]:.4f}"])
+    heads = ["Parameter", "First order", "95 % interval", "Total", "95 % interval"]
+    table = Table(
+        f"Sobol indices of {column.label}",
+        heads,
+        rows,
+        "A parameter whose total interval holds zero has no influence that shows.",
+        True,
+    )
+    return [table, figures.sobol_figure(found, column)]
+
+
+def _slopes(results: "Results", column: "Column") -> list[Block]:
+    found = local_slopes(results, column.name)
+    units = {p.name: p.unit for p in results.study.parameters}
+    rows = []
+    for slope in found:
+        unit = _slope_unit(column.unit, units[slope.parameter])
+        rows.append([slope.parameter, f"{slope.slope:.6g}", f"{slope.uncertainty:.2g}", unit, f"{slope.swing:.6g}"])
+    heads = ["Parameter", "Slope", "±", "Unit", f"Swing over the range ({column.unit})"]
+    note = "± holds the curvature beyond the outer levels and the solver's error; a slope within it is none."
+    return [
+        Table(f"Slopes of {column.label} at the nominal design", heads, rows, note, True),
+        figures.tornado_figure(found, column),
+    ]
+
+
+def _shares(results: "Results", column: "Column") -> list[Block]:
+    found = linear_shares(results, column.name)
+    if found is None:
+        return []
+    units = {p.name: p.unit for p in results.study.parameters}
+    rows = [
+        [name, f"{slope:.6g}", f"{half:.2g}", _slope_unit(column.unit, units[name]), percent(share)]
+        for name, slope, half, share in zip(found.parameters, found.slope, found.half_width, found.share, strict=True)
+    ]
+    note = f"A linear law explains {percent(found.r_squared)} of the variance; ± is half a 95 % interval, a slope within it is none."
+    return [
+        Table(
+            f"Linear influence on {column.label}",
+            ["Parameter", "Slope", "±", "Unit", "Share of the variance"],
+            rows,
+            note,
+            True,
+        )
+    ]
+
+
+def _slope_unit(column: str, parameter: str) -> str:
+    return column if parameter == "1" else f"{column} per {parameter}"
+
+
+def tolerance_chapters(results: "Results") -> list[Chapter]:
+    """Return the yield under the requirements, and how far the tolerances may reach."""
+    study = results.study
+    if not study.requirements or not len(results):
+        return []
+    try:
+        rows = []
+        for requirement in study.requirements:
+            limits = resolve_limits(results, requirement)
+            rows.append(
+                [limits.column, number(limits.low), number(limits.high), *_yield_cells(results, (requirement,))]
+            )
+        rows.append(["all together", "", "", *_yield_cells(results, study.requirements)])
+        reach = find_reach(results, study.requirements)
+    except InputError as error:
+        return [Chapter("Tolerances", [Text(str(error), "warning")])]
+    note = "A design without a value counts as failing for the lower end of the interval and as passing for the upper."
+    heads = ["Requirement", "From", "To", "Designs that meet it", "95 % interval", "Without a value"]
+    if reach.part is None:
+        words = "No sampled design fails: the tolerances may be wider than the ranges that were asked for."
+    else:
+        words = (
+            f"The largest box about the nominal design without a failing one reaches {100 * reach.part:.3g} % of every range"
+            f" ({reach.inside} designs inside): "
+            + ", ".join(_reach(p, reach.part) for p in study.parameters if not isinstance(p.nominal, str))
+            + ". It rests on the sampled designs alone; a worst-case search tests it."
+        )
+    return [Chapter("Tolerances", [Table("Yield", heads, rows, note), Text(words, "note")])]
+
+
+def _yield_cells(results: "Results", requirements: Any) -> list[str]:
+    found = find_yield(results, requirements)
+    between = "" if found.low is None else f"{percent(found.low)} … {percent(found.high)}"
+    return [percent(found.share), between, str(found.unknown)]
+
+
+def _reach(parameter: "Parameter", part: float) -> str:
+    nominal = float(parameter.nominal)
+    low, high = (nominal + part * (end - nominal) for end in (parameter.low, parameter.high))
+    return f"{figures.label(parameter.name, parameter.unit)} {low:.8g} … {high:.8g}"
+
+
+def search_chapters(results: "Results") -> list[Chapter]:
+    """Return what the worst-case searches and inversions found."""
+    findings = results.store.findings()
+    blocks: list[Block] = []
+    for search in results.study.searches:
+        found = findings.get(name_search(search))
+        if found is None:
+            blocks.append(
+                Text(f"The search for {name_search(search)} has not been made yet: run the study again.", "warning")
+            )
+        elif "failed" in found:
+            blocks.append(Text(f"The search for {name_search(search)} failed: {found['failed']}", "warning"))
+        else:
+            blocks += _worst_case(results, found) if search.kind == "worst-case" else _inversion(results, found)
+    return [Chapter("Searches", blocks)] if blocks else []
+
+
+def _worst_case(results: "Results", found: Mapping[str, Any]) -> list[Block]:
+    names = results.study.names
+    rows = [
+        [end, number(found[end]["value"]), *(number(found[end]["parameters"][name]) for name in names)]
+        for end in ("least", "greatest")
+    ]
+    heads = ["", found["column"], *(figures.label(p.name, p.unit) for p in results.study.parameters)]
+    note = "From the worst corner of the box, a bounded quasi-Newton search; text parameters stay nominal."
+    return [Table(f"Worst cases of {found['column']} over the box", heads, rows, note)]
+
+
+def _inversion(results: "Results", found: Mapping[str, Any]) -> list[Block]:
+    rows = [[column, number(wanted), number(found["values"][column])] for column, wanted in found["targets"].items()]
+    design = ", ".join(f"{name} = {number(value)}" for name, value in found["parameters"].items())
+    if found["reached"]:
+        words, kind = f"The targets are met with {design}.", "note"
+    else:
+        limits = f" It lies on the limits of {', '.join(found['at_limit'])}." if found["at_limit"] else ""
+        words, kind = f"No design in the ranges meets the targets; the nearest has {design}.{limits}", "warning"
+    if found["condition"] and found["condition"] > 1e3:
+        words += f" The targets hardly tell the parameters apart (condition {found['condition']:.1e})."
+    return [Table("Design by inversion", ["Column", "Wanted", "Found"], rows), Text(words, kind)]
