@@ -1,0 +1,61 @@
+"""The README tells the truth: its two commands are there for scripts, and every other command in it runs."""
+
+import re
+import shlex
+import shutil
+from pathlib import Path
+
+import pytest
+
+from studies.cli import main
+
+ROOT = Path(__file__).parents[1]
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+BLOCKS = re.findall(r"^```(\w*)\n(.*?)^```", README, flags=re.MULTILINE | re.DOTALL)
+COMMANDS = [line for kind, text in BLOCKS[1:] if kind == "sh" for line in text.splitlines()]
+LOGGER = (
+    "Date;Time;Frequenz [Hz];T Gehaeuse [°C]\n"
+    + "\n".join(f"21.11.2026;10:{m:02d}:{s:02d};4432,{10 + s};20,{m}" for m in range(3) for s in range(0, 60, 5))
+    + "\n"
+)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """A working folder as the README's reader has it: the card saved, a logger's file at hand."""
+    made = tmp_path_factory.mktemp("first-hour")
+    (card,) = (text for kind, text in BLOCKS if kind == "toml")
+    (made / "my-gyro.toml").write_text(card, encoding="utf-8")
+    (made / "logger.csv").write_text(LOGGER, encoding="utf-8")
+    shutil.copytree(ROOT / "studies" / "papers", made / "studies" / "papers")
+    return made
+
+
+def test_the_first_block_holds_the_two_commands():
+    kind, text = BLOCKS[0]
+    lines = text.splitlines()
+    assert kind == "sh"
+    assert len(lines) == 2
+    assert lines[0].startswith("python -m pip install .")
+    assert "hrg reproduce" in lines[0]
+    assert lines[1].endswith("python -m pytest")
+
+
+def test_commands_of_the_first_hour_run_in_order(folder, monkeypatch, capsys):
+    monkeypatch.chdir(folder)
+    assert len(COMMANDS) > 20
+    for line in COMMANDS:
+        program, *words = shlex.split(line)
+        assert program == "hrg"
+        status = main(words)
+        told = capsys.readouterr().err
+        if status == 3 and "OpenGL" in told:
+            continue
+        assert status == 0, f"{line}: {told}"
+
+
+def test_the_python_block_runs():
+    (code,) = (text for kind, text in BLOCKS if kind == "python")
+    found: dict[str, object] = {}
+    exec(compile(code, "README.md", "exec"), found)  # the project's own text
+    assert found["mode"].frequency == pytest.approx(4596.39, abs=0.05)  # type: ignore[attr-defined]
