@@ -57,8 +57,8 @@ class PolynomialFit:
         c = self.regression.coefficients
         derivative = np.arange(1, c.size) * c[1:]
         # A leading coefficient that is only rounding would throw the true roots away.
-        derivative = np.polynomial.polynomial.polytrim(derivative, 1e-12 * float(np.abs(derivative).max()))
-        roots = np.polynomial.polynomial.polyroots(derivative)
+        trimmed = np.polynomial.polynomial.polytrim(derivative, 1e-12 * float(np.abs(derivative).max()))
+        roots = np.polynomial.polynomial.polyroots(trimmed)
         real = roots[np.abs(roots.imag) < 1e-9].real * self.half_span + self.centre
         return np.sort(real[(real >= low) & (real <= high)])
 
@@ -100,9 +100,7 @@ def fit_polynomial(
         raise CompensationError(f"a polynomial fit needs an order of 1 or more, not {order}.")
     x, y = np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64)
     if x.ndim != 1 or x.shape != y.shape:
-        raise CompensationError(
-            f"'{name}' and its observations must be equally long, not {x.shape} and {y.shape}."
-        )
+        raise CompensationError(f"'{name}' and its observations must be equally long, not {x.shape} and {y.shape}.")
     if not np.all(np.isfinite(x)):
         raise CompensationError(f"'{name}' has missing or infinite values; remove those rows.")
     distinct = np.unique(x).size

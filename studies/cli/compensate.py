@@ -88,8 +88,8 @@ def compensate(
         )
         return 0
     for name, facts in columns.items():
-        before = "" if facts["stability_before"] is None else f"{facts['stability_before']:.4g} -> "
-        print(f"{out}: {name}; standard deviation of {AVERAGE:g} s averages {before}{facts['stability_after']:.4g}")
+        from_what = "" if facts["stability_before"] is None else f"{facts['stability_before']:.4g} -> "
+        print(f"{out}: {name}; standard deviation of {AVERAGE:g} s averages {from_what}{facts['stability_after']:.4g}")
         if facts["rows_not_compensated"]:
             print(f"{facts['rows_not_compensated']} rows stay empty: an input of the model is missing there.")
     return 0

@@ -3,7 +3,7 @@
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping
 
     import numpy as np
     from numpy.typing import NDArray
@@ -37,10 +37,15 @@ def reproduce(*, out: str = "report", json: bool = False) -> int:
     study, summary = parts.study, summarise(parts)
     T, f = study.temperature_degC, study.frequency
     page = reproduce_page(parts, mode_blocks(load_card(hrg.CARD)))
-    names = ("temperature_degC", "frequency_Hz", "cubic_Hz")
-    write_text(folder / "table1.csv", _csv(names, (T, f, study.fit.frequency(T))))
-    names = ("frequency_Hz", "actual_temperature_degC", "calculated_temperature_degC", "error_degC")
-    write_text(folder / "table2.csv", _csv(names, (f, T, study.calculated_degC, study.error_degC)))
+    columns = {"temperature_degC": T, "frequency_Hz": f, "cubic_Hz": study.fit.frequency(T)}
+    write_text(folder / "table1.csv", _csv(columns))
+    columns = {
+        "frequency_Hz": f,
+        "actual_temperature_degC": T,
+        "calculated_temperature_degC": study.calculated_degC,
+        "error_degC": study.error_degC,
+    }
+    write_text(folder / "table2.csv", _csv(columns))
     write_text(folder / "summary.json", dump_json(summary))
     write_text(folder / "report.html", page)
     if json:
@@ -81,6 +86,6 @@ def _reproduce() -> "Reproduction":
     return Reproduction(study, physics, diagnosis, settling, twins, chapters, summary)
 
 
-def _csv(names: "Sequence[str]", columns: "Sequence[NDArray[np.float64]]") -> str:
-    rows = "\n".join(",".join(f"{float(x):.10g}" for x in row) for row in zip(*columns, strict=True))
-    return f"{','.join(names)}\n{rows}\n"
+def _csv(columns: "Mapping[str, NDArray[np.float64]]") -> str:
+    rows = "\n".join(",".join(f"{float(x):.10g}" for x in row) for row in zip(*columns.values(), strict=True))
+    return f"{','.join(columns)}\n{rows}\n"

@@ -29,12 +29,12 @@ class TheoryComparison:
     @property
     def excess(self) -> float:
         """Rayleigh's relative excess over the solid."""
-        return self.rayleigh / self.solid - 1
+        return float(self.rayleigh / self.solid - 1)
 
     @property
     def coefficient(self) -> float:
         """The excess over √(h/R), which tends to a constant."""
-        return self.excess / self.ratio**0.5
+        return float(self.excess / self.ratio**0.5)
 
 
 def compare_theories(ratios: Sequence[float] = RATIOS, n: int = 2) -> list[TheoryComparison]:
@@ -53,7 +53,7 @@ def compare_theories(ratios: Sequence[float] = RATIOS, n: int = 2) -> list[Theor
 def thin_limit(thinner: TheoryComparison, thicker: TheoryComparison) -> float:
     """Extrapolate the coefficient to vanishing thickness, where it is linear in √(h/R)."""
     a, b = thinner.ratio**0.5, thicker.ratio**0.5
-    return (thinner.coefficient * b - thicker.coefficient * a) / (b - a)
+    return float((thinner.coefficient * b - thicker.coefficient * a) / (b - a))
 
 
 def slopes_by_theory(ratio: float = 0.06, temperature: float = 293.15) -> dict[str, float]:
