@@ -35,6 +35,8 @@ class Run:
         Means of the responses over the steps; NaN where there is no row.
     row_time, row_responses : (M,) arrays
         The record's own rows, outliers as NaN.
+    clock_error : (N,) array or None
+        Frequency by the gyro's clock minus that by a reference clock, where both were recorded, Hz.
     """
 
     record: int
@@ -44,6 +46,7 @@ class Run:
     responses: dict[str, FloatArray]
     row_time: FloatArray
     row_responses: dict[str, FloatArray]
+    clock_error: FloatArray | None = None
 
 
 @dataclass(frozen=True)
@@ -332,9 +335,12 @@ def _grid_run(
         name: _bin(rows[name], rows["time_s"], slot // group, coarse) if name in rows else np.full(count, np.nan)
         for name in responses
     }
+    clock_error = None
+    if "reference_frequency_Hz" in rows and "frequency_Hz" in rows:
+        clock_error = _bin(rows["frequency_Hz"] - rows["reference_frequency_Hz"], rows["time_s"], slot // group, coarse)
     return Run(
         record, label, _states(run, fine, offset, reference, rows, slot), coarse, binned, time,
-        {name: table.get(name, np.full(time.shape, np.nan)) for name in responses},
+        {name: table.get(name, np.full(time.shape, np.nan)) for name in responses}, clock_error,
     )
 
 

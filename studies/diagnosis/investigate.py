@@ -26,6 +26,7 @@ FURTHER = 120.0
 LEAK = 0.01
 """Part of the evidence in the frequency that a cause in another response must have: its thermometer is not exact."""
 NARROW_RANGE = 1.0
+CLOCK_PAIR = ("clock-drift", "ageing")
 PREFERENCE = 6.0
 """How much likelier another thermometer than the corrected frequency must be."""
 
@@ -188,10 +189,11 @@ def has_leftover(inquiry: Inquiry) -> bool:
 def merge_causes(inquiries: Mapping[str, Inquiry], campaign: Campaign) -> tuple[Cause, ...]:
     """List the causes, one entry a physical cause, under the response where its evidence is largest."""
     causes: list[Cause] = []
+    drifts = clock_drifts(campaign)
     for response, inquiry in inquiries.items():
         seen: set[str] = set()
         for found in inquiry.selection.found:
-            cause = _cause(inquiry, found, response)
+            cause = _cause(inquiry, found, response, drifts if response == "frequency_Hz" else None)
             if cause.effect in seen:
                 continue
             seen.add(cause.effect)
@@ -208,15 +210,32 @@ def merge_causes(inquiries: Mapping[str, Inquiry], campaign: Campaign) -> tuple[
     )
 
 
-def _cause(inquiry: Inquiry, found: Found, response: str) -> Cause:
+def _cause(inquiry: Inquiry, found: Found, response: str, drifts: bool | None = None) -> Cause:
     winner = found.rivals[0]
-    equivalent = equivalent_to(found, response)
+    equivalent = equivalent_to(found, response, drifts)
+    if drifts is not None and winner.name in CLOCK_PAIR:
+        named = next((r for r in found.rivals if r.name == CLOCK_PAIR[0 if drifts else 1]), None)
+        winner = winner if named is None else named
     index = found.index if winner.name == found.name else len(winner.fit.terms) - 1
     return Cause(
         winner.name, response,
         probability_of(found, equivalent, inquiry.selection.threshold, has_leftover(inquiry)), equivalent,
         intervals(winner.fit, index), winner.evidence,
     )
+
+
+def clock_drifts(campaign: Campaign) -> bool | None:
+    """Whether the gyro's clock drifts against the reference clock; None where no reference was recorded."""
+    if any(run.clock_error is None for run in campaign.runs):
+        return None
+    error = np.concatenate([run.clock_error for run in campaign.runs if run.clock_error is not None])
+    time = np.concatenate([run.states.campaign_time.reshape(-1, campaign.group).mean(axis=1) for run in campaign.runs])
+    known = np.isfinite(error)
+    line = np.polyfit(time[known], error[known], 1)
+    rest = error[known] - np.polyval(line, time[known])
+    # neighbouring rows share slow noise: count one independent row in ten
+    spread = np.sqrt(10.0 * np.mean(rest**2) / known.sum()) / max(float(np.std(time[known])), 1e-300)
+    return bool(abs(line[0]) > 4.0 * spread)
 
 
 def _same_set(one: Cause, two: Cause) -> bool:
@@ -253,7 +272,8 @@ def _result(
     if left:
         verdict = "unexplained"
     elif selection.found:
-        ambiguous = any(equivalent_to(found, response) for found in selection.found)
+        drifts = clock_drifts(campaign) if response == "frequency_Hz" else None
+        ambiguous = any(equivalent_to(found, response, drifts) for found in selection.found)
         verdict = "not-identifiable" if ambiguous else "explained"
     else:
         verdict = "adequate"

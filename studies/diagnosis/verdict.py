@@ -105,15 +105,26 @@ def overall(verdicts: Sequence[str]) -> str:
     return next((v for v in VERDICTS if v in verdicts), "not-identifiable")
 
 
-def equivalent_to(found: Found, response: str, reference_clock: bool = False) -> tuple[str, ...]:
-    """Return the other members of the set that the data cannot separate from a selected effect."""
+def equivalent_to(found: Found, response: str, clock_drifts: bool | None = None) -> tuple[str, ...]:
+    """Return the other members of the set that the data cannot separate from a selected effect.
+
+    Parameters
+    ----------
+    found : Found
+    response : str
+    clock_drifts : bool, optional
+        What a reference clock says: it tells a drifting clock from an ageing frequency.
+    """
     best = found.rivals[0].evidence if found.rivals else found.evidence
     members = {
         rival.name for rival in found.rivals
         if np.exp((rival.evidence - best) / (2.0 * TEMPER)) >= MEMBER
     }
-    if not reference_clock:
+    clock = {"clock-drift", "ageing"}
+    if clock_drifts is None or found.rivals[0].name not in clock:
         members |= set((find_effect(found.rivals[0].name).equivalents or {}).get(response, ()))
+    else:
+        members -= clock
     members.discard(found.rivals[0].name)
     return tuple(sorted(members))
 

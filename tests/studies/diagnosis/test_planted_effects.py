@@ -90,3 +90,23 @@ def test_generator_knows_nothing_of_the_diagnosis():
                 [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
             )
             assert not any(module.startswith("studies.diagnosis") for module in modules), path
+
+
+@pytest.mark.parametrize("hidden", ["clock-drift", "ageing"])
+def test_reference_clock_tells_a_drifting_clock_from_ageing(hidden):
+    seed = FRESH + 7000
+    print(f"seed {seed}: {hidden} with a reference clock")
+    rng = np.random.default_rng(seed)
+    records, _ = build("plain", "white", rng, ("clock-drift",), snr=3.0)
+    quiet, _ = build("plain", "white", np.random.default_rng(seed), (), snr=0.0)
+    with_reference = []
+    for record, other in zip(records, quiet, strict=True):
+        measured = record.columns["frequency_Hz"]
+        # the counters share the gyro's own noise; a clock's drift is in one of them only
+        true = other.columns["frequency_Hz"] if hidden == "clock-drift" else measured
+        noise = rng.normal(0.0, 1e-3, measured.size)
+        with_reference.append(record.with_columns({"reference_frequency_Hz": true + noise}))
+    verdict = investigate(load_campaign(with_reference), held_out=False).verdict
+    assert verdict.causes[0].effect == hidden
+    assert verdict.causes[0].equivalent == ()
+    assert verdict.responses["frequency_Hz"].verdict == "explained"
