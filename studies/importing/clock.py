@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from studies.errors import InputError
+from studies.importing.mapping import NUMERIC_TIMES, SECONDS, FileMap
 from studies.importing.raw import RawTable, shorten
 
 if TYPE_CHECKING:
@@ -12,13 +13,8 @@ if TYPE_CHECKING:
     import pandas as pd
     from numpy.typing import NDArray
 
-    from studies.importing.mapping import FileMap
-
     Array = NDArray[np.float64]
 
-SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "min": 60.0, "h": 3600.0, "days": 86400.0}
-NUMERIC = (*SECONDS, "unix-s", "unix-ms", "excel-days")
-FORMATS = (*NUMERIC, "iso")
 _EXCEL_EPOCH = datetime.datetime(1899, 12, 30)
 _UNIX_EPOCH = datetime.datetime(1970, 1, 1, tzinfo=datetime.UTC)
 _HALF_DAY = 43200.0
@@ -40,7 +36,7 @@ def read_times(table: RawTable, file: "FileMap") -> Times:
     """
     form = file.time_format
     origin, notes = file.start, []
-    if form in NUMERIC and len(file.time) > 1:
+    if form in NUMERIC_TIMES and len(file.time) > 1:
         raise InputError(
             f"{table.path}: time_format = '{form}' is a number in one column, but 'time' names {len(file.time)}."
         )

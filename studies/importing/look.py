@@ -7,7 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from studies.errors import InputError
-from studies.importing.raw import EXCEL, SEPARATORS, decode, read_bytes, read_sheet
+from studies.importing.mapping import SEPARATORS
+from studies.importing.raw import EXCEL, decode, read_bytes, read_sheet
 
 SEEN = 2000  # lines that are looked at
 

@@ -15,7 +15,7 @@ last_line = 9000                 # optional: what follows is not data
 sheet = "Sheet1"                 # Excel workbooks only
 missing = ["---", "OVL"]         # cells that mean "no value", besides empty ones
 time = "Zeit"                    # the column with the time; ["Datum", "Zeit"] joins two with a blank
-time_format = "s"                # see studies.importing.clock.FORMATS, or a pattern such as "%d.%m.%Y %H:%M:%S"
+time_format = "s"                # s, ms, us, min, h, days, unix-s, unix-ms, excel-days, iso, or a pattern such as "%d.%m.%Y %H:%M:%S"
 start = 2026-01-31T12:00:00      # optional: when a clock that counts from 0 was started
 clock_offset_s = 0.0             # added to this file's times: positive when its clock is behind
 clock_rate_ppm = 0.0             # by how much its clock runs fast
@@ -42,11 +42,13 @@ from typing import Literal, cast
 
 from studies.errors import InputError, nearest
 from studies.files.toml import Section, read_toml
-from studies.importing.clock import FORMATS
-from studies.importing.raw import SEPARATORS
 from studies.importing.units import SETTINGS, TARGETS, Unit, units_of
 
 SCHEMA = "hrg.map/1"
+SEPARATORS = {";": ";", ",": ",", "tab": "\t", "space": r"\s+"}
+SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "min": 60.0, "h": 3600.0, "days": 86400.0}
+NUMERIC_TIMES = (*SECONDS, "unix-s", "unix-ms", "excel-days")
+TIME_FORMATS = (*NUMERIC_TIMES, "iso")
 ENCODINGS = ("utf-8", "utf-16", "cp1252", "latin-1")
 FILE_KEYS = (
     "separator",
@@ -212,9 +214,9 @@ def _read_time(section: Section) -> tuple[str, ...]:
 
 def _read_time_format(section: Section) -> str:
     found = section.text("time_format")
-    if "%" not in found and found not in FORMATS:
+    if "%" not in found and found not in TIME_FORMATS:
         raise InputError(
-            f"{section.where}: time_format = '{found}' is unknown{nearest(found, FORMATS)} A pattern needs %, such as"
+            f"{section.where}: time_format = '{found}' is unknown{nearest(found, TIME_FORMATS)} A pattern needs %, such as"
             " '%d.%m.%Y %H:%M:%S'."
         )
     return found

@@ -11,15 +11,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from studies.errors import InputError, MissingEnvironment, nearest
+from studies.importing.mapping import SEPARATORS, FileMap
 
 if TYPE_CHECKING:
     import numpy as np
     import pandas as pd
     from numpy.typing import NDArray
 
-    from studies.importing.mapping import FileMap
-
-SEPARATORS = {";": ";", ",": ",", "tab": "\t", "space": r"\s+"}
 EXCEL = (".xlsx", ".xlsm")
 OVERFLOW = "(beyond the header)"
 
