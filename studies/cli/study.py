@@ -40,7 +40,7 @@ def run(
     out : str
         Folder for the study's store; needed except with --dry-run. Running again with the same folder resumes.
     workers : int
-        Processes on this machine; one for each core unless given.
+        Processes on this machine; one for each core unless given. None are started where reduced bases do it here.
     scheduler : str
         Address of a Dask scheduler (tcp://HOST:8786), to compute on its workers instead.
     card : str

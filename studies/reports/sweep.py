@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from studies.sweeps.definition import Parameter
     from studies.sweeps.quantity import Column
     from studies.sweeps.results import Results
+    from studies.sweeps.tolerance import Yield
 
 MOST_ROWS = 300
 ENDS = 20  # designs shown from each end when there are more than MOST_ROWS
@@ -65,8 +66,8 @@ def summarise(results: "Results") -> dict[str, Any]:
     }
     for key, analyse in (("sobol", sobol_indices), ("slopes", local_slopes), ("linear", linear_shares)):
         found[key] = {c.name: _data(analyse, results, c.name) for c in results.study.columns}
-    if results.study.requirements and len(results):
-        whole = find_yield(results, results.study.requirements)
+    whole = _yield(results)
+    if whole is not None:
         found["yield"] = {k: v for k, v in vars(whole).items() if k != "limits"} | {"share": whole.share}
     return found
 
@@ -86,23 +87,19 @@ def _numbers(results: "Results", column: "Column") -> dict[str, float | None]:
     nominal = results.nominal.values[place] if results.nominal is not None else np.nan
     errors = results.errors[:, place]
     error = float(np.nanmax(errors)) if np.isfinite(errors).any() else np.nan
-    if not y.size:
-        return {
-            "nominal": nominal,
-            "mean": np.nan,
-            "deviation": np.nan,
-            "least": np.nan,
-            "greatest": np.nan,
-            "error": error,
-        }
-    return {
-        "nominal": nominal,
-        "mean": float(y.mean()),
-        "deviation": float(y.std()),
-        "least": float(y.min()),
-        "greatest": float(y.max()),
-        "error": error,
-    }
+    numbers: dict[str, Any] = {"mean": np.mean, "deviation": np.std, "least": np.min, "greatest": np.max}
+    over_all = {name: float(function(y)) if y.size else np.nan for name, function in numbers.items()}
+    return {"nominal": nominal, **over_all, "error": error}
+
+
+def _yield(results: "Results") -> "Yield | None":
+    """Return the yield under all requirements; None without any, and where the nominal design that they need is missing."""
+    if not results.study.requirements or not len(results):
+        return None
+    try:
+        return find_yield(results, results.study.requirements)
+    except InputError:  # the chapter on tolerances says why
+        return None
 
 
 def _short(results: "Results") -> list[Block]:
@@ -112,8 +109,8 @@ def _short(results: "Results") -> list[Block]:
         unit = "" if column.unit == "1" else f" {column.unit}"
         least, greatest, nominal = (f"{short(n[key])}" for key in ("least", "greatest", "nominal"))
         facts.append((column.label, f"{least} … {greatest}{unit}", f"nominal {nominal}{unit}"))
-    if results.study.requirements and len(results):
-        found = find_yield(results, results.study.requirements)
+    found = _yield(results)
+    if found is not None:
         words = "of the designs" if found.low is None else f"95 % interval {percent(found.low)} … {percent(found.high)}"
         facts.append(("Meet every requirement", percent(found.share), words))
     blocks: list[Block] = [Facts(facts)]
@@ -151,8 +148,8 @@ def _failures(results: "Results") -> list[Chapter]:
         return []
     rows = [[str(count), reason] for reason, count in results.store.reasons()]
     examples = [
-        [number(case.parameters[name]) for name in results.study.names] + [case.remark]
-        for case in results.failed[:MOST_ROWS]
+        [*map(number, results.design(place).values()), results.remarks[place]]
+        for place in results.failed[:MOST_ROWS].tolist()
     ]
     words = "These designs have no value and nothing was put in its place: every number on this page leaves them out."
     heads = [figures.label(p.name, p.unit) for p in results.study.parameters]
@@ -203,6 +200,8 @@ def _designs(results: "Results") -> Table:
 
 
 def _pictures(results: "Results") -> list[Block]:
+    if results.study.sampling.method == "one-at-a-time":
+        return []  # the tornado says it better
     limits = _limits(results)
     blocks: list[Block] = []
     for column in main_columns(results):

@@ -134,6 +134,6 @@ def tornado_figure(slopes: "list[LocalSlope]", column: "Column") -> Picture:
         axes.set_yticks(at, [label(slope.parameter, "1") for slope in ordered])
         unit = "" if column.unit == "1" else f" ({column.unit})"
         axes.set_xlabel(f"change of {column.label}{unit}")
-        axes.legend(fontsize=8)
+        axes.legend(fontsize=8, loc="lower right")
     caption = "Change from the nominal design at the ends of each parameter's range."
     return draw(made, caption, "Tornado diagram: bars to both sides of the nominal design.")

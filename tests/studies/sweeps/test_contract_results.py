@@ -141,6 +141,12 @@ def test_two_dask_workers_give_the_same_bits_and_a_lost_scheduler_is_resumable(c
     assert 0 < len(rows_of(tmp_path / "out")) < 3000
 
 
+def test_missing_dask_is_said(monkeypatch):
+    monkeypatch.setitem(sys.modules, "dask", None)
+    with pytest.raises(MissingEnvironment, match=r"hrg-workbench\[cluster\]"):
+        run_study(SPEC, scheduler="tcp://127.0.0.1:1")
+
+
 def test_no_scheduler_is_said(tmp_path):
     pytest.importorskip("distributed", reason="the extra 'cluster' (dask[distributed]) is not installed")
     from studies.sweeps import cluster as module
