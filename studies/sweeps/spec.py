@@ -151,7 +151,7 @@ def find_spec(source: str | Path) -> Path:
     if str(source) in shipped:
         return shipped[str(source)]
     raise InputError(
-        f"there is no shipped study '{source}'{nearest(str(source), shipped)} A study of your own: give its path."
+        f"there is no shipped study '{source}' (a study of your own: give its path){nearest(str(source), shipped)}"
     )
 
 
