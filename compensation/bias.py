@@ -111,16 +111,32 @@ def prepare_run(
     Raises
     ------
     CompensationError
-        Too little data, frequencies that cannot be, time that does not increase, a window that is too short.
+        Too little data, frequencies that cannot be, a constant bias, time that does not increase, a window that is too short.
     """
     t = np.asarray(time, dtype=np.float64)
     if np.any(np.asarray(frequency, dtype=np.float64) <= 0):
         raise CompensationError("a frequency must be positive; check the unit of the column.")
+    for name, seconds in (("averaging", width), ("window of the rate", window)):
+        if not (np.isfinite(seconds) and seconds > 0):
+            raise CompensationError(f"the {name} must be a positive number of seconds, not {seconds:g}.")
     width = max(width, float(np.median(np.diff(t)))) if t.size > 1 else width
     blocks = average_blocks(t, {"frequency": frequency, "bias": bias}, width)
     f = blocks.columns["frequency"]
+    if f.size < 3:
+        raise CompensationError(
+            f"averaging over {width:g} s leaves {f.size} rows, and three are the least; record longer or average less."
+        )
+    if np.ptp(blocks.columns["bias"]) <= 1e-13 * np.max(np.abs(blocks.columns["bias"])):
+        raise CompensationError(
+            f"the bias is constant ({blocks.columns['bias'][0]:g}): nothing can be learnt from it; check the column."
+        )
     derivative = differentiate(blocks.time, f, max(window, 3 * width), causal=causal)
     ok = derivative.complete
+    if np.count_nonzero(ok) < 3:
+        raise CompensationError(
+            f"no stretch of the run fills the window of {max(window, 3 * width):g} s over which the rate is taken; "
+            "shorten the window or record longer."
+        )
     return BiasRun(
         time=blocks.time[ok],
         frequency=f[ok],
@@ -134,9 +150,7 @@ def prepare_run(
     )
 
 
-def term_columns(
-    frequency: ArrayLike, rate: ArrayLike, reference_frequency: float, terms: Sequence[str]
-) -> Array:
+def term_columns(frequency: ArrayLike, rate: ArrayLike, reference_frequency: float, terms: Sequence[str]) -> Array:
     """Return one column per term of HRG paper eq. (21), shape (m, len(terms))."""
     f = np.asarray(frequency, dtype=np.float64) - reference_frequency
     rate = np.asarray(rate, dtype=np.float64)

@@ -194,9 +194,7 @@ def bias_stability(run: BiasRun, bias: Array | None = None) -> float:
     return float(np.std(_averages(run.bias if bias is None else bias, run), ddof=1))
 
 
-def _pool(
-    folds: Sequence[_Fold], fits: Sequence[BiasFit], *, by_runs: bool, everywhere: bool = False
-) -> HeldOut:
+def _pool(folds: Sequence[_Fold], fits: Sequence[BiasFit], *, by_runs: bool, everywhere: bool = False) -> HeldOut:
     raw: list[Array] = []
     compensated: list[Array] = []
     for fold, fit in zip(folds, fits, strict=True):

@@ -64,8 +64,10 @@ def relate_cross_damping_to_rate_when_tuned(k: float, zeta: float, g2: float = 2
     g2 : float
         Coriolis coefficient (1); 2 for a cylinder.
     """
-    if not (k > 0 and zeta > 0 and g2 != 0):
-        raise CompensationError("eq. (9) needs a positive natural frequency and damping, and g2 other than zero.")
+    if not (0 < k < 1e12 and 0 < zeta < 1 and g2 != 0):
+        raise CompensationError(
+            "eq. (9) needs a positive natural frequency that a resonator can have, damping between 0 and 1, and g2 not zero."
+        )
     return TransferFunction((2 * k**2 * zeta / g2,), (1.0, k * zeta))
 
 
@@ -225,6 +227,10 @@ def fit_cross_damping(
         np.concatenate([getattr(run, name) for run in runs]) for name in ("time", "rate", "temperature")
     )
     refuse_constant_columns(temperature[:, None], ["temperature"])
+    if len(rate) < order + 2:
+        raise CompensationError(
+            f"order {order} needs at least {order + 2} rows, not {len(rate)}; lower it or record more."
+        )
     size = float(np.max(np.abs(temperature - calibration_temperature)))
     powers = [
         np.concatenate(

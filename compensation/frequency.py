@@ -18,6 +18,7 @@ from compensation.polynomial import PolynomialFit, fit_polynomial
 from compensation.regression import FTest, compare_nested
 
 Array = NDArray[np.float64]
+FARTHEST_REFERENCE = 1e4  # °C
 
 
 @dataclass(frozen=True)
@@ -98,8 +99,10 @@ class FrequencyFit:
 
     def slope_ppm(self, temperature_degC: ArrayLike, *, extrapolate: bool = False) -> Array:
         """Return (df/dT) / f in ppm/°C, the TCF of HRG paper eq. (15)."""
-        return 1e6 * self.slope(temperature_degC, extrapolate=extrapolate) / self.frequency(
-            temperature_degC, extrapolate=extrapolate
+        return (
+            1e6
+            * self.slope(temperature_degC, extrapolate=extrapolate)
+            / self.frequency(temperature_degC, extrapolate=extrapolate)
         )
 
     def frequency_uncertainty(self, temperature_degC: ArrayLike) -> Array:
@@ -215,6 +218,12 @@ def fit_frequency(
     T, f = np.asarray(temperature_degC, dtype=np.float64), np.asarray(frequency, dtype=np.float64)
     if resolution is not None and not (np.isfinite(resolution) and resolution > 0):
         raise CompensationError(f"the resolution of the readings must be positive, not {resolution:g} Hz.")
+    if not abs(reference_temperature_degC) <= FARTHEST_REFERENCE:
+        raise CompensationError(
+            f"a reference temperature of {reference_temperature_degC:g} °C is none; take one near those measured."
+        )
+    if resolution is not None and f.size and not np.finfo(float).eps * np.max(f) <= resolution < np.max(f):
+        raise CompensationError(f"readings of up to {np.max(f):g} Hz cannot have a resolution of {resolution:g} Hz.")
     rounding = 0.0 if resolution is None else resolution**2 / 12
     polynomial = fit_polynomial(T, f, order, "temperature_degC", least_variance=rounding)
     if np.any(f <= 0):
@@ -258,8 +267,7 @@ def compare_orders(
         for order in range(1, highest + 1)
     )
     tests = tuple(
-        compare_nested(small.polynomial.regression, large.polynomial.regression)
-        for small, large in pairwise(fits)
+        compare_nested(small.polynomial.regression, large.polynomial.regression) for small, large in pairwise(fits)
     )
     needed = [test.p_value < level for test in tests]
     recommended = needed.index(False) + 1 if False in needed else highest

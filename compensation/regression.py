@@ -200,7 +200,9 @@ def compare_nested(small: LinearFit, large: LinearFit) -> FTest:
     if extra < 1 or small.rows != large.rows:
         raise CompensationError("the F-test compares a model with a larger one fitted to the same rows.")
     reduction = (small.sum_of_squares - large.sum_of_squares) / extra
-    statistic = max(reduction, 0.0) / (large.sum_of_squares / large.degrees_of_freedom)
+    left = large.sum_of_squares / large.degrees_of_freedom
+    # Rounded readings can lie on a curve exactly; then any reduction is infinitely significant.
+    statistic = max(reduction, 0.0) / left if left else math.inf if reduction > 0 else 0.0
     p_value = float(stats.f.sf(statistic, extra, large.degrees_of_freedom))
     return FTest(statistic, extra, large.degrees_of_freedom, p_value)
 
@@ -233,7 +235,7 @@ def _factor(Z: Array, names: Sequence[str], tolerance: float) -> tuple[Array, Ar
         others = [f"'{names[order[j]]}'" for j in range(rank) if abs(share[j]) > 1e-6]
         raise CompensationError(
             f"column '{names[order[rank]]}' is a linear combination of {', '.join(others)}: "
-            "their coefficients cannot be told apart; leave one of them out."
+            "their coefficients cannot be told apart; leave one of them out, or lower the order if they are powers."
         )
     return np.asarray(Q, dtype=np.float64), np.asarray(R, dtype=np.float64), np.asarray(order, dtype=np.intp)
 

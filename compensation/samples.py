@@ -41,7 +41,9 @@ def check_time(time: NDArray[np.float64]) -> None:
         raise CompensationError(f"'time' is missing or infinite in row {row + 1}; every row needs its time.")
     back = np.flatnonzero(np.diff(time) <= 0)
     if len(back):
-        raise CompensationError(f"'time' does not increase from row {back[0] + 1} to row {back[0] + 2}; sort the rows by time.")
+        raise CompensationError(
+            f"'time' does not increase from row {back[0] + 1} to row {back[0] + 2}; sort the rows by time."
+        )
 
 
 def is_regular(time: NDArray[np.float64]) -> bool:

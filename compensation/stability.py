@@ -153,7 +153,9 @@ def fit_noise(allan: AllanDeviation) -> NoiseCoefficients:
         Fewer than five values of τ.
     """
     if allan.tau.size < 5:
-        raise CompensationError(f"fitting N, B and K needs at least five values of τ, not {allan.tau.size}; record longer.")
+        raise CompensationError(
+            f"fitting N, B and K needs at least five values of τ, not {allan.tau.size}; record longer."
+        )
     A, variance = _basis(allan.tau), allan.deviation**2
     fitted, c = variance, np.zeros(3)
     for _ in range(50):

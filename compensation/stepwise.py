@@ -132,9 +132,7 @@ class _Search:
         rest = self._residual(chosen, self.R[:, -1])
         return float(rest @ rest)
 
-    def addition(
-        self, chosen: Sequence[str], refused: Mapping[str, str], level: float, shared: bool
-    ) -> Step | None:
+    def addition(self, chosen: Sequence[str], refused: Mapping[str, str], level: float, shared: bool) -> Step | None:
         """Return the step that adds the candidate with the largest F, if its p-value is below the level."""
         ready = [
             name

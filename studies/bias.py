@@ -18,11 +18,11 @@ from studies.errors import InputError, naming
 from studies.models import Model, compensate, source_of
 from studies.models.kinds.bias import OUTPUTS, save_bias
 from studies.record import COMPENSATED, Record
+from studies.rest import LARGEST_REST
 
 Array = NDArray[np.float64]
 METHODS: tuple[Method, ...] = ("guarded", "paper")
 LOWEST_FREQUENCY = 100.0  # Hz
-LARGEST_REST = 1e-3  # °/s of applied rate that still counts as rest
 
 
 @dataclass(frozen=True)
@@ -112,7 +112,8 @@ def study_bias(
     judged, why = [], ""
     for name in METHODS:
         progress(f"selecting terms stepwise ({name})")
-        fit = fit_bias(runs, name)
+        with naming(", ".join(record.path or "record" for record in records)):
+            fit = fit_bias(runs, name)
         try:
             held_out = score_held_out(runs, name)
         except NoHeldOut as error:
@@ -140,15 +141,25 @@ def find_output(records: Sequence[Record]) -> str:
         where = record.path or "record"
         if "frequency_Hz" not in record:
             raise InputError(f"{where}: the column 'frequency_Hz' is missing; the bias model is a function of it.")
-        typical = float(np.nanmedian(record["frequency_Hz"])) if np.isfinite(record["frequency_Hz"]).any() else LOWEST_FREQUENCY
+        typical = (
+            float(np.nanmedian(record["frequency_Hz"]))
+            if np.isfinite(record["frequency_Hz"]).any()
+            else LOWEST_FREQUENCY
+        )
         if 0 < typical < LOWEST_FREQUENCY:
-            raise InputError(f"{where}: frequency_Hz around {typical:g} cannot be a resonator's; is it in kHz? Multiply it by 1000.")
-        if "rate_deg_per_s" in record and np.nanmax(np.abs(record["rate_deg_per_s"])) > LARGEST_REST:
-            raise InputError(f"{where}: rate_deg_per_s is not zero; a bias is fitted to runs at rest ('hrg fit scale' else).")
+            raise InputError(
+                f"{where}: frequency_Hz around {typical:g} cannot be a resonator's; is it in kHz? Multiply it by 1000."
+            )
+        if "rate_deg_per_s" in record and np.any(np.abs(record["rate_deg_per_s"]) > LARGEST_REST):
+            raise InputError(
+                f"{where}: rate_deg_per_s is not zero; a bias is fitted to runs at rest ('hrg fit scale' else)."
+            )
     for name in OUTPUTS:
         if all(name in record for record in records):
             return name
-    raise InputError(f"{records[0].path or 'record'}: a column {' or '.join(OUTPUTS)} is missing, or not in all records.")
+    raise InputError(
+        f"{records[0].path or 'record'}: a column {' or '.join(OUTPUTS)} is missing, or not in all records."
+    )
 
 
 def unbroken(time: Array, columns: dict[str, Array]) -> tuple[float, dict[str, Array]]:

@@ -56,6 +56,10 @@ def study_cross_damping(
         )
     after = np.concatenate([model.compensate(run.time, run.rate, run.temperature) for run in runs])
     training = compare_outputs(np.concatenate([run.rate for run in runs]), after)
+    if training.before == 0 or training.after == 0:
+        raise CompensationError(
+            "the output is constant: there is no error that varies with temperature; check the column."
+        )
     pieces = runs if len(runs) > 1 else split_run(runs[0], BLOCKS)
     return CrossDampingStudy(model, tuple(runs), training, hold_out(pieces, lambda run: run.rate, compensate))
 

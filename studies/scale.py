@@ -13,7 +13,7 @@ from compensation.decimation import average_blocks
 from compensation.linearity import measure_linearity, same_rate
 from compensation.samples import is_regular
 from compensation.stability import allan_deviation
-from studies.errors import InputError
+from studies.errors import InputError, naming
 from studies.models.kinds.scale import RAW
 from studies.rest import CELSIUS_ZERO, LARGEST_REST, MOST_ROWS, TEMPERATURES, choose_column, drop_spikes
 
@@ -126,10 +126,16 @@ def study_scale(records: "Sequence[Record]", cutoff: float | None, order: int) -
     rates, rest, turning = (sorted_runs[kind][0] for kind in KINDS)
     sampling = float(np.median(np.diff(rest.time)))
     runs = (rates, rest, turning)
+    shortest = min(len(run.time) for run in runs)
+    if cutoff is not None and order >= shortest:
+        raise InputError(
+            f"a FIR filter of order {order} is longer than a run of {shortest} rows; take a lower --order."
+        )
     thin = (_thin(rates), _thin(rest), _thin(turning))
-    chain = fit_chain(*thin, cutoff=cutoff, order=order, sampling=sampling)
-    before, after = _hold_out(thin)
-    figures = judge_steps(chain, rates, rest, turning)
+    with naming(", ".join(path for _, path in sorted_runs.values())):
+        chain = fit_chain(*thin, cutoff=cutoff, order=order, sampling=sampling)
+        before, after = _hold_out(thin)
+        figures = judge_steps(chain, rates, rest, turning)
     averaged = any(len(less.time) < len(run.time) for less, run in zip(thin, runs, strict=True))
     return ScaleStudy(chain, runs, output, column, left_out, figures, before, after, averaged)
 

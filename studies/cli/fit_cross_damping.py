@@ -47,7 +47,7 @@ def fit_cross_damping(
 
     from studies.cli.output import print_json, print_table, say
     from studies.cross_damping import study_cross_damping
-    from studies.errors import InputError
+    from studies.errors import InputError, naming
     from studies.files.writing import write_text
     from studies.models import source_of, write_model
     from studies.models.kinds.cross_damping import OUTPUTS, save_cross_damping
@@ -59,19 +59,22 @@ def fit_cross_damping(
         raise InputError("name at least one record (CSV) of a gyro at rest.")
     records = [read_record(path) for path in data]
     carrier = frequency if frequency is not None else _median(records, "frequency_Hz", "--frequency")
-    loss = 1 / quality if quality else _median(records, "inverse_q", "--quality")
-    if not (0 < loss < 1 and carrier > 0):
+    quality = quality if quality is not None else _quality(records)
+    if not (0 < carrier < 1e9 and 1 < quality < 1e12):
         raise InputError(
-            f"a frequency of {carrier:g} Hz with 1/Q = {loss:g} is no resonator; give --frequency and --quality."
+            f"a frequency of {carrier:g} Hz with Q = {quality:g} is no resonator; give --frequency and --quality."
         )
+    if not abs(calibration_temperature) <= 1000:
+        raise InputError(f"--calibration-temperature {calibration_temperature:g} °C is none; take one of the record.")
     gathered = gather_rest(records, OUTPUTS)
-    study = study_cross_damping(
-        gathered.runs,
-        k=2 * math.pi * carrier,
-        zeta=loss / 2,
-        calibration_temperature=calibration_temperature + 273.15,
-        order=order,
-    )
+    with naming(", ".join(data)):
+        study = study_cross_damping(
+            gathered.runs,
+            k=2 * math.pi * carrier,
+            zeta=1 / (2 * quality),
+            calibration_temperature=calibration_temperature + 273.15,
+            order=order,
+        )
     model = save_cross_damping(
         study.model,
         gathered.output,
@@ -124,6 +127,12 @@ def _summarise(study: "CrossDampingStudy", data: "RestData") -> dict[str, Any]:
         "dynamic_part": study.memory / unit,
         "rows_left_out": data.left_out,
     }
+
+
+def _quality(records: "list[Record]") -> float:
+    """Quality factor from the median 1/Q of the records."""
+    loss = _median(records, "inverse_q", "--quality")
+    return 1 / loss if loss else float("inf")
 
 
 def _median(records: "list[Record]", column: str, option: str) -> float:

@@ -20,6 +20,8 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
+LARGEST = 1e20
+"""No reading of an instrument, time or count is larger; what is larger would overflow in its powers."""
 # Anything but plain decimal numbers, commas and line ends: 'nan', quotes, comments, blanks.
 _UNUSUAL = re.compile(rb"[^0-9eE+.,\r\n-]")
 
@@ -68,7 +70,9 @@ def read_columns(
     values = _parse_fast(data, body_start, names)
     if values is None:
         values = _parse_by_line(path, data[body_start:].decode(), names, header_line + 1)
-    return Columns(str(path), values, comments, hashlib.sha256(data).hexdigest(), header_line + 1)
+    columns = Columns(str(path), values, comments, hashlib.sha256(data).hexdigest(), header_line + 1)
+    _check_size(columns)
+    return columns
 
 
 def read_header(path: str | Path) -> list[str]:
@@ -117,7 +121,9 @@ def _split_head(path: str | Path, data: bytes) -> tuple[tuple[str, ...], list[st
 
 def _split_header(path: str | Path, line: str, number: int) -> list[str]:
     if "\r" in line:
-        raise InputError(f"{path}, line {number}: lines end with a bare carriage return; save the file with line feeds.")
+        raise InputError(
+            f"{path}, line {number}: lines end with a bare carriage return; save the file with line feeds."
+        )
     try:
         return next(csv.reader([line]))
     except csv.Error as error:
@@ -200,6 +206,18 @@ def _parse_by_line(path: str | Path, body: str, names: list[str], first_line: in
         raise InputError(f"{path}, line {first_line + reader.line_num - 1}: {error}.") from None
     table = np.array(rows, dtype=float).reshape(-1, len(names))
     return {name: np.ascontiguousarray(table[:, k]) for k, name in enumerate(names)}
+
+
+def _check_size(columns: Columns) -> None:
+    import numpy as np
+
+    for name, values in columns.values.items():
+        large = np.flatnonzero(np.abs(values) > LARGEST)
+        if len(large):
+            row = int(large[0])
+            raise InputError(
+                f"{columns.path}, line {columns.line(row)}: {name} = {values[row]:g} cannot be a reading; correct it."
+            )
 
 
 def _number(path: str | Path, line: int, name: str, cell: str) -> float:

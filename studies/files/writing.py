@@ -40,7 +40,7 @@ def written_whole(path: str | Path) -> Iterator[IO[bytes]]:
         os.replace(temporary, target)
     except OSError as error:
         reason = error.strerror or str(error)
-        raise InputError(f"{target}: cannot be written ({reason}); choose another place with --out.") from error
+        raise InputError(f"{target}: cannot be written ({reason}); choose another place.") from error
     finally:
         if temporary is not None:
             temporary.unlink(missing_ok=True)
@@ -54,7 +54,7 @@ def check_folder(path: str | Path) -> Path:
         with tempfile.TemporaryFile(dir=folder):
             return folder
     except OSError as error:
-        raise InputError(f"{folder}: cannot be written ({error.strerror}); choose another place with --out.") from error
+        raise InputError(f"{folder}: cannot be written ({error.strerror}); choose another place.") from error
 
 
 def write_text(path: str | Path, text: str) -> None:

@@ -18,6 +18,9 @@ from importlib import import_module
 from pkgutil import iter_modules
 from typing import Any
 
+from numpy import isinf
+
+from compensation.errors import CompensationError
 from studies.errors import InputError, nearest
 from studies.models import kinds
 from studies.models.file import Model, Part, Source, format_model, make_part, read_model, write_model
@@ -52,10 +55,13 @@ def compensate(model: Model, record: Record, *, extrapolate: bool = False) -> Re
     """
     try:
         columns = _module(model).compensate(model, record, extrapolate=extrapolate)
-    except InputError as error:
-        where = f"{record.path}: " if record.path and record.path not in str(error) else ""
+    except (InputError, CompensationError) as error:
+        named = any(path and path in str(error) for path in (record.path, model.path))
+        where = f"{record.path}: " if record.path and not named else ""
         raise InputError(f"{where}{error}") from error
-    for name in columns:
+    for name, values in columns.items():
+        if isinf(values).any():
+            raise InputError(f"{model.path or 'model'}: its coefficients make '{name}' infinite; correct them.")
         if not name.startswith(COMPENSATED):
             raise ValueError(f"{model.kind} writes '{name}', which is no {COMPENSATED}… column")
         if name in record:

@@ -101,8 +101,8 @@ class Model:
                 return part
         raise InputError(f"{self.path or 'model'}: a model of kind '{self.kind}' needs a [[part]] named '{name}'.")
 
-    def number(self, key: str) -> float:
-        """Return a setting that must be a finite number.
+    def number(self, key: str, *, above: float | None = None, least: float | None = None) -> float:
+        """Return a setting that must be a finite number within its bounds.
 
         Raises
         ------
@@ -112,7 +112,7 @@ class Model:
         where = f"{self.path or 'model'} [settings]"
         if key not in self.settings:
             raise InputError(f"{where}: the key '{key}' is missing; add it.")
-        return check_number(self.settings[key], f"{where}: {key}")
+        return check_number(self.settings[key], f"{where}: {key}", above=above, least=least)
 
     def range_of(self, variable: str) -> tuple[float, float]:
         """Return the lowest and highest value of a variable that the fit has seen.
@@ -185,9 +185,7 @@ def format_model(model: Model) -> str:
             lines += ["", f"[{title}]", *(f"{key} = {_value(value)}" for key, value in table.items())]
     for part in model.parts:
         lines += ["", "[[part]]", f"name = {_text(part.name)}", "coefficients = ["]
-        for name, value, unit, error in zip(
-            part.names, part.values, part.units, part.standard_errors, strict=True
-        ):
+        for name, value, unit, error in zip(part.names, part.values, part.units, part.standard_errors, strict=True):
             entry = f"    {{name = {_text(name)}, value = {value!r}, unit = {_text(unit)}}},"
             lines.append(entry if math.isnan(error) else f"{entry:<72}  # ± {error:.2g}")
         rows = ",\n    ".join(_value(row) for row in part.covariance)
@@ -270,9 +268,7 @@ def _read_part(section: Section) -> Part:
     )
     if not shaped or len(covariance) not in (0, len(names)):
         raise InputError(f"{section.where}: covariance must be {len(names)} lists of {len(names)} numbers, or [].")
-    rows = tuple(
-        tuple(check_number(v, f"{section.where}: covariance") for v in row) for row in covariance
-    )
+    rows = tuple(tuple(check_number(v, f"{section.where}: covariance") for v in row) for row in covariance)
     if any(row[k] < 0 for k, row in enumerate(rows)):
         raise InputError(f"{section.where}: covariance has a negative variance on its diagonal.")
     return Part(

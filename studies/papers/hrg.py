@@ -118,14 +118,17 @@ def study_table(
         calculated_degC=fit.temperature(f),
         local_degC=at,
         local_slope_ppm=slopes,
-        local_uncertainty_ppm=float(1e6 * np.max(rounding / np.diff(T) / f[:-1])),
+        local_uncertainty_ppm=float(1e6 * np.max(rounding / np.diff(np.unique(T))) / f.min()),
     )
 
 
 def local_slopes(temperature_degC: Array, frequency: Array) -> tuple[Array, Array]:
-    """Return the mid temperatures (°C) and the slopes over the local frequency (ppm/°C) between neighbours."""
-    ascending = np.argsort(temperature_degC)
-    T, f = temperature_degC[ascending], frequency[ascending]
+    """Return the mid temperatures (°C) and the slopes over the local frequency (ppm/°C) between neighbours.
+
+    Readings at one temperature count as one, their mean.
+    """
+    T, reading = np.unique(temperature_degC, return_inverse=True)
+    f = np.bincount(reading, frequency) / np.bincount(reading)
     return (T[1:] + T[:-1]) / 2, 2e6 * np.diff(f) / np.diff(T) / (f[1:] + f[:-1])
 
 

@@ -116,7 +116,11 @@ def path_table(judged: "Judged", output: str) -> Table:
             ]
         )
     refused = {} if selection is None else selection.refused
-    notes = [f"Left out from the start: {', '.join(f'{SYMBOLS[n]} ({why})' for n, why in refused.items())}."] if refused else []
+    notes = (
+        [f"Left out from the start: {', '.join(f'{SYMBOLS[n]} ({why})' for n, why in refused.items())}."]
+        if refused
+        else []
+    )
     if len(steps) < 2:
         notes.append("No candidate passes the entry level.")
     elif judged.fit.held_out:
@@ -166,12 +170,30 @@ def gain_table(study: "BiasStudy") -> Table:
     for judged in study.judged:
         terms = ", ".join(SYMBOLS[name] for name in judged.fit.terms) or "none"
         before, after = judged.training
-        rows.append([METHOD[judged.method], terms, "fitted data", f"{before:.4g}", f"{after:.4g}", f"{judged.training_gain:.2f}", "100 %"])
+        rows.append(
+            [
+                METHOD[judged.method],
+                terms,
+                "fitted data",
+                f"{before:.4g}",
+                f"{after:.4g}",
+                f"{judged.training_gain:.2f}",
+                "100 %",
+            ]
+        )
         held = judged.held_out
         if held is not None:
             of = "held-out runs" if held.by_runs else "held-out blocks"
             rows.append(
-                [METHOD[judged.method], "selected anew", of, f"{held.before:.4g}", f"{held.after:.4g}", f"{held.gain:.2f}", f"{held.coverage:.0%}"]
+                [
+                    METHOD[judged.method],
+                    "selected anew",
+                    of,
+                    f"{held.before:.4g}",
+                    f"{held.after:.4g}",
+                    f"{held.gain:.2f}",
+                    f"{held.coverage:.0%}",
+                ]
             )
     columns = ["Selection", "Terms", "On", f"Before ({unit})", f"After ({unit})", "Times better", "Rows in range"]
     note = "Standard deviation of 100 s averages about each piece's own mean."
@@ -245,13 +267,21 @@ def _facts(study: "BiasStudy", method: Method) -> Block:
     unit = OUTPUTS[study.output].replace("deg", "°")
     held = judged.held_out
     facts = [
-        ("On the fitted data", f"{judged.training_gain:.2f} times", f"{judged.training[0]:.3g} → {judged.training[1]:.3g} {unit}"),
+        (
+            "On the fitted data",
+            f"{judged.training_gain:.2f} times",
+            f"{judged.training[0]:.3g} → {judged.training[1]:.3g} {unit}",
+        ),
         (
             "Held out",
             "unknown" if held is None else f"{held.gain:.2f} times",
             "needs a second run" if held is None else f"{held.before:.3g} → {held.after:.3g} {unit}",
         ),
-        ("Terms", str(len(judged.fit.terms)), f"of {len(TERMS)} candidates; the paper keeps {len(SELECTED_BY_THE_PAPER)}"),
+        (
+            "Terms",
+            str(len(judged.fit.terms)),
+            f"of {len(TERMS)} candidates; the paper keeps {len(SELECTED_BY_THE_PAPER)}",
+        ),
     ]
     return Facts(facts)
 

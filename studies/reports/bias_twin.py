@@ -26,7 +26,12 @@ def twin_chapters(twins: Twins) -> list[Chapter]:
         f" the models of one cooling run made {warming.worse:.0%} of the gyros worse than no compensation. Three runs, up and"
         " down, and a selection that knows that noise remembers, mend that."
     )
-    return [Chapter("Figure 6: bias compensated, on data that the fit has not seen", [Text(told), twin_table(twins), twin_figure(twins), terms_table(twins)])]
+    return [
+        Chapter(
+            "Figure 6: bias compensated, on data that the fit has not seen",
+            [Text(told), twin_table(twins), twin_figure(twins), terms_table(twins)],
+        )
+    ]
 
 
 def twin_table(twins: Twins) -> Table:
@@ -68,12 +73,18 @@ def twin_figure(twins: Twins) -> Picture:
     paper = _fits(twins, "paper", 1)
     with style.figure(height=3.6) as (figure, axes):
         training = [fit.training_gain for fit in paper]
-        axes.loglog(training, [fit.cooling.gain for fit in paper], "o", color=style.BLUE, markersize=5, label="new cooling run")
-        axes.loglog(training, [fit.warming.gain for fit in paper], "x", color=style.VERMILION, markersize=6, label="warming run")
+        axes.loglog(
+            training, [fit.cooling.gain for fit in paper], "o", color=style.BLUE, markersize=5, label="new cooling run"
+        )
+        axes.loglog(
+            training, [fit.warming.gain for fit in paper], "x", color=style.VERMILION, markersize=6, label="warming run"
+        )
         ends = [0.1, 1.2 * max(training)]
         axes.plot(ends, ends, color=style.BLACK, linewidth=0.8)
         axes.axhline(1.0, color=style.BLACK, linewidth=0.8, linestyle=":")
-        axes.axvline(PAPER_BEFORE / PAPER_AFTER, color=style.ORANGE, linestyle="--", label="the paper's 5.15 on its run")
+        axes.axvline(
+            PAPER_BEFORE / PAPER_AFTER, color=style.ORANGE, linestyle="--", label="the paper's 5.15 on its run"
+        )
         axes.set_xlim(0.9, ends[1])
         axes.set_xlabel("Times better on the training run")
         axes.set_ylabel("Times better, held out")

@@ -49,9 +49,7 @@ def test_a_falling_curve_is_inverted_too():
 
 def test_a_straight_line_with_noise_asks_for_no_second_order():
     rng = np.random.default_rng(8)
-    asked = [
-        compare_orders(T, 4425 + 0.37 * T + 0.02 * rng.normal(size=T.size)).recommended > 1 for _ in range(300)
-    ]
+    asked = [compare_orders(T, 4425 + 0.37 * T + 0.02 * rng.normal(size=T.size)).recommended > 1 for _ in range(300)]
     assert abs(np.mean(asked) - 0.05) < 3 * np.sqrt(0.05 * 0.95 / 300)
 
 

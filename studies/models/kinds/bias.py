@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from compensation.bias import TERMS, term_columns
 from compensation.decimation import average_blocks
 from compensation.derivative import differentiate
+from compensation.samples import check_time
 from studies.errors import InputError, nearest
 from studies.models.c_source import head
 from studies.models.file import Model, Source, make_part
@@ -28,9 +29,7 @@ WIDENED = 0.05
 BLOCK = 10.0  # s over which the frequency is averaged before it is used
 
 
-def save_bias(
-    fit: "BiasFit", run: "BiasRun", output: str, sources: tuple[Source, ...], made_by: str
-) -> Model:
+def save_bias(fit: "BiasFit", run: "BiasRun", output: str, sources: tuple[Source, ...], made_by: str) -> Model:
     """Return a fitted bias model; `run` tells how the rate was taken, `output` the column that was fitted."""
     units = [OUTPUTS[output], *(unit_of_term(OUTPUTS[output], *TERMS[name]) for name in fit.terms)]
     return Model(
@@ -55,7 +54,8 @@ def compensate(model: Model, record: Record, *, extrapolate: bool) -> dict[str, 
     """Take the predicted bias out of the output; rows farther than a window from any frequency reading stay NaN."""
     terms, coefficients = _terms(model)
     f, time, output = record["frequency_Hz"], record["time_s"], record[model.compensates]
-    window, lag = model.number("rate_window_s"), model.number("rate_lag_s")
+    window, lag = model.number("rate_window_s", above=0), model.number("rate_lag_s", least=0)
+    check_time(time)
     blocks = average_blocks(time, {"frequency_Hz": f}, min(max(BLOCK, float(np.median(np.diff(time)))), window / 2))
     smooth = blocks.columns["frequency_Hz"]
     rate = differentiate(blocks.time, smooth, window, causal=lag > 0).slope
@@ -72,8 +72,10 @@ def compensate(model: Model, record: Record, *, extrapolate: bool) -> dict[str, 
 def emit_c(model: Model) -> str:
     """Return `hrg_rate`, `hrg_bias` and `hrg_compensate` in C99."""
     terms, coefficients = _terms(model)
-    window, lag = model.number("rate_window_s"), model.number("rate_lag_s")
-    products = [f"({value!r})" + _product(*TERMS[name]) for name, value in zip(terms, coefficients[1:].tolist(), strict=True)]
+    window, lag = model.number("rate_window_s", above=0), model.number("rate_lag_s", least=0)
+    products = [
+        f"({value!r})" + _product(*TERMS[name]) for name, value in zip(terms, coefficients[1:].tolist(), strict=True)
+    ]
     total = "\n        + ".join([f"({coefficients[0].item()!r})", *products])
     (f_low, f_high), (r_low, r_high) = model.range_of("frequency_Hz"), model.range_of("frequency_rate_Hz_per_s")
     return f"""{head(model)}
@@ -104,7 +106,9 @@ double hrg_compensate(double output, double frequency, double rate, int *ok) {{
 def _terms(model: Model) -> tuple[tuple[str, ...], Array]:
     part = model.part("bias")
     if model.compensates not in OUTPUTS:
-        raise InputError(f"{model.path or 'model'}: compensates = '{model.compensates}'{nearest(model.compensates, OUTPUTS)}")
+        raise InputError(
+            f"{model.path or 'model'}: compensates = '{model.compensates}'{nearest(model.compensates, OUTPUTS)}"
+        )
     if part.names[0] != "constant":
         raise InputError(f"{model.path or 'model'}: the first coefficient must be 'constant', not '{part.names[0]}'.")
     for name in part.names[1:]:

@@ -60,9 +60,9 @@ def load_cross_damping(model: Model) -> "CrossDampingModel":
         coefficients=np.array(part.values),
         covariance=np.array(part.covariance) if part.covariance else np.full((len(part.values),) * 2, np.nan),
         calibration_temperature=model.number("calibration_temperature_degC") + CELSIUS_ZERO,
-        k=2 * math.pi * model.number("frequency_Hz"),
-        zeta=model.number("relative_damping"),
-        g2=model.number("g2"),
+        k=2 * math.pi * model.number("frequency_Hz", above=0),
+        zeta=model.number("relative_damping", above=0),
+        g2=model.number("g2", above=0),
         lowest=low + CELSIUS_ZERO,
         highest=high + CELSIUS_ZERO,
         noise=math.nan,
@@ -96,8 +96,8 @@ def emit_c(model: Model) -> str:
     unit = OUTPUTS.get(model.compensates)
     if unit is None:
         raise InputError(f"{model.path or 'model'}: a cross-damping model compensates {' or '.join(OUTPUTS)}.")
-    pole = 2 * math.pi * model.number("frequency_Hz") * model.number("relative_damping")
-    gain = 2 * (2 * math.pi * model.number("frequency_Hz")) / model.number("g2") / unit
+    pole = 2 * math.pi * model.number("frequency_Hz", above=0) * model.number("relative_damping", above=0)
+    gain = 2 * (2 * math.pi * model.number("frequency_Hz", above=0)) / model.number("g2", above=0) / unit
     return f"""{head(model)}
 {polynomial("hrg_cross_damping", "shift", part.values)}
 

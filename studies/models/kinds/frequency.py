@@ -40,6 +40,8 @@ def compensate(model: Model, record: Record, *, extrapolate: bool) -> dict[str, 
     The curve is a settled one: while the housing's temperature moves, the resonator lags behind it and the
     difference stays in the result.
     """
+    if model.compensates != "frequency_Hz":
+        raise InputError(f"{model.path or 'model'}: a frequency model compensates frequency_Hz.")
     if "housing_temperature_degC" not in record:
         raise InputError("the column 'housing_temperature_degC' is missing; a frequency model needs the temperature.")
     T = record["housing_temperature_degC"]

@@ -85,7 +85,7 @@ def load_scale(model: Model) -> "Chain":
         scale_over_rate=_load_curve(model, "scale_over_rate", 1.0, 1.0, 0.0, (slow, fast)),
         scale_over_temperature=_load_curve(model, "scale_over_temperature", 0.0, 0.0, CELSIUS_ZERO, (low, high)),
         taps=np.array(taps, dtype=float),
-        sampling=model.number("sampling_s"),
+        sampling=model.number("sampling_s", least=0),
     )
 
 
@@ -136,7 +136,7 @@ static const double hrg_taps[HRG_TAPS] = {{
 }};
 typedef struct {{ double past[HRG_TAPS]; int filled; }} hrg_smoother;
 
-/* Filtered rate, one sample every {model.number("sampling_s"):g} s; set state.filled = 0 before the first. */
+/* Filtered rate, one sample every {model.number("sampling_s", least=0):g} s; set state.filled = 0 before the first. */
 double hrg_smooth(hrg_smoother *state, double rate) {{
     double sum = 0.0;
     for (int k = HRG_TAPS - 1; k > 0; --k) state->past[k] = state->filled ? state->past[k - 1] : rate;
