@@ -50,7 +50,7 @@ class ReducedModel:
 
     stiffness : rows for the packed lower triangle of Vᵀ K V, Wᵀ K V (v by v) and diag Wᵀ K W; columns for [g, τ g] with
         τ = λ/G, per unit G.
-    mass : the same rows of M, columns for g, per unit density.
+    mass : the same rows of M, columns for the leading part of g, per unit density.
     start : V-coefficients of the mode, the first being 1, as a linear function of [g, τ g].
     reference : thickness that features are measured in, m.
     slope, floor : the stated relative error of ω² is slope δ/μ + floor, from designs solved in full.
@@ -78,7 +78,7 @@ class ReducedModel:
         r, w = self.size, self.tests
         g = self.features.evaluate(thickness / self.reference, amplitudes)
         both = np.concatenate([g, ratio * g])
-        K, M = self.stiffness @ both, self.mass @ g
+        K, M = self.stiffness @ both, self.mass @ g[: self.mass.shape[1]]
         packed = r * (r + 1) // 2
         c = self.start @ both
         with np.errstate(invalid="ignore", divide="ignore"):  # an indefinite stiffness gives no number

@@ -105,7 +105,7 @@ def _solve(shell: FrozenShell, box: Box, unit: Array) -> tuple[Array, Snapshots]
 
 
 def _tests(size: int) -> int:
-    return min(max(size, 8), 14)
+    return min(max(size // 2, 8), 12)
 
 
 def _choose_size(projected: Projected, solved: tuple[Snapshots, ...], tolerance: float, most: int) -> int:
@@ -156,10 +156,20 @@ def _fit(
     features = _choose_features(box, powers, thickness / reference, amplitudes, targets, accuracy * tolerance)
     g = features.evaluate(thickness / reference, amplitudes.T)
     fit = np.linalg.pinv(g.T, rcond=1e-13)
-    by_trace, by_shear, by_mass = ((fit @ kind[:, *rows]).T for kind in (trace, shear, mass))
+    by_trace, by_shear = ((fit @ kind[:, *rows]).T for kind in (trace, shear))
+    by_mass = _fit_mass(mass[:, *rows], g, features, typical * pair, accuracy * tolerance)
     ratio = np.divide(*lame(np.ones_like(nu), nu, shell.plane_stress))
     start = np.linalg.lstsq(np.concatenate([g, ratio * g]).T, c / c[:, :1], rcond=1e-10)[0].T
     return ReducedModel(features, np.hstack([by_shear, by_trace]), by_mass, start, r, w, reference, 1.0, 0.0)
+
+
+def _fit_mass(entries: Array, g: Array, features: Features, weight: Array, accuracy: float) -> Array:
+    """Fit the mass to as few of the leading powers as suffice: the lowest two, mostly."""
+    for used in np.cumsum([len(rows) for rows in features.places]):
+        found = np.linalg.pinv(g[:used].T, rcond=1e-13) @ entries
+        if np.max(np.linalg.norm((g[:used].T @ found - entries) * weight, axis=1)) < accuracy:
+            break
+    return np.asarray(found.T)
 
 
 def _entries(r: int, w: int) -> tuple[Array, Array]:
