@@ -120,6 +120,9 @@ def load_campaign(records: Sequence[Record], reference_degC: float | None = None
             )
             if run is not None:
                 runs.append(run)
+    if not runs:
+        skipped |= dict.fromkeys(responses, "too few rows in every run")
+        responses = ()
     if len(runs) > len(records):
         notes.append("long gaps split a record: each stretch has its own unknown thermal state.")
     for drive in ("amplitude_squared", "voltage_squared", "quadrature", "pattern_angle"):
@@ -217,7 +220,8 @@ def _check_device(records: Sequence[Record], tables: Sequence[dict[str, FloatArr
     spreads = []
     for record, table in zip(records, tables, strict=True):
         if "bias_deg_per_h" in table and np.isfinite(table["bias_deg_per_h"]).sum() > FEWEST_BINS:
-            noise = float(np.nanmedian(np.abs(np.diff(table["bias_deg_per_h"]))))
+            known = table["bias_deg_per_h"][np.isfinite(table["bias_deg_per_h"])]
+            noise = float(np.median(np.abs(np.diff(known))))
             if noise > 0:
                 spreads.append((noise, record.path))
     if spreads and max(spreads)[0] > 150.0 * min(spreads)[0]:

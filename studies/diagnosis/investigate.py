@@ -19,7 +19,8 @@ from studies.diagnosis.thermometer import Thermometer, read_thermometer, smooth_
 from studies.diagnosis.verdict import Cause, ResponseResult, Verdict, equivalent_to, overall, probability_of
 
 THRESHOLD = 17.0
-LEFT_OVER_THRESHOLD = 17.0
+SPARSE = 60.0
+"""Sampling, s, beyond which thresholds of the frequency grow: the housing between two rows is anyone's guess."""
 LEFT_OVER_SHARE = 0.02
 FURTHER = 120.0
 """Evidence at which a further cause beside the strongest deserves two thirds of its claim (measured on the generator)."""
@@ -79,7 +80,10 @@ def investigate(
             continue
         if response != "frequency_Hz" and "frequency_Hz" in inquiries:
             problem, thermometer = _best_thermometer(campaign, response, inquiries["frequency_Hz"], problem)
-        inquiries[response] = inquire(campaign, problem, draws, rng, effects, THRESHOLD + LEAK * _explained(inquiries))
+        threshold = THRESHOLD + LEAK * _explained(inquiries)
+        if response == "frequency_Hz":
+            threshold *= max(1.0, campaign.runs[0].states.step / SPARSE)
+        inquiries[response] = inquire(campaign, problem, draws, rng, effects, threshold)
         if response == "frequency_Hz":
             thermometer = read_thermometer(campaign, inquiries[response].selection.fit)
     causes = merge_causes(inquiries, campaign)
@@ -183,7 +187,7 @@ def has_leftover(inquiry: Inquiry) -> bool:
     """Whether structure is left: the generic evidence passes its threshold and is not a trifle beside what was explained."""
     selection = inquiry.selection
     explained = max(selection.plain.score - selection.fit.score, 0.0)
-    return inquiry.leftover.evidence > max(LEFT_OVER_THRESHOLD, LEFT_OVER_SHARE * explained)
+    return inquiry.leftover.evidence > max(selection.threshold, LEFT_OVER_SHARE * explained)
 
 
 def merge_causes(inquiries: Mapping[str, Inquiry], campaign: Campaign) -> tuple[Cause, ...]:
@@ -205,7 +209,7 @@ def merge_causes(inquiries: Mapping[str, Inquiry], campaign: Campaign) -> tuple[
             continue
         kept.append(cause)
     return tuple(
-        cause if rank == 0 else replace(cause, probability=cause.probability * (1.0 - np.exp(-cause.evidence / FURTHER)))
+        cause if rank == 0 else replace(cause, probability=cause.probability * float(1.0 - np.exp(-cause.evidence / FURTHER)))
         for rank, cause in enumerate(kept)
     )
 
@@ -226,7 +230,7 @@ def _cause(inquiry: Inquiry, found: Found, response: str, drifts: bool | None = 
 
 def clock_drifts(campaign: Campaign) -> bool | None:
     """Whether the gyro's clock drifts against the reference clock; None where no reference was recorded."""
-    if any(run.clock_error is None for run in campaign.runs):
+    if not campaign.runs or any(run.clock_error is None for run in campaign.runs):
         return None
     error = np.concatenate([run.clock_error for run in campaign.runs if run.clock_error is not None])
     time = np.concatenate([run.states.campaign_time.reshape(-1, campaign.group).mean(axis=1) for run in campaign.runs])

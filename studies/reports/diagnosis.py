@@ -223,6 +223,7 @@ def residual_views(diagnosis: Diagnosis, response: str) -> Picture:
             axis.plot(values[heating], rest[heating], ".", color=VERMILION, markersize=2, label="heating", rasterized=True)
             axis.plot(values[~heating], rest[~heating], ".", color=BLUE, markersize=2, label="cooling", rasterized=True)
             axis.set_xlabel(label)
+            axis.locator_params(axis="x", nbins=5)
         axis = flat[len(inputs)]
         axis.boxplot([rest[runs == k] for k in np.unique(runs)], showfliers=False)
         axis.set_xlabel("run")

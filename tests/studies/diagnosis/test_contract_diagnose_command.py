@@ -174,3 +174,15 @@ def test_plan_predicts_and_names_what_cannot_show(capsys):
     assert "electrostatic-softening" in plan["invisible"]
     assert plan["confusion"]["rate-bias"]
     assert all(abs(sum(said.values()) - 1.0) < 1e-9 for said in plan["confusion"].values())
+
+
+def test_every_second_value_missing_and_two_rows(campaign, capsys, tmp_path):
+    records, _ = campaign
+    half = columns_of(records[0])
+    half["bias_deg_per_h"][::2] = np.nan
+    found = verdict_of(capsys, save(tmp_path, half, "half.csv"))
+    assert found["responses"]["bias_deg_per_h"]["noise"] > 0
+    two = {key: values[:2] for key, values in records[0].columns.items()}
+    found = verdict_of(capsys, save(tmp_path, two, "two.csv"))
+    assert found["verdict"] == "not-identifiable"
+    assert found["responses"]["frequency_Hz"]["remark"] == "only 2 values"
