@@ -48,7 +48,9 @@ def _parabola(T: NDArray[np.float64], p: Mapping[str, Any]) -> NDArray[np.float6
 def _table(T: NDArray[np.float64], p: Mapping[str, Any]) -> NDArray[np.float64]:
     from scipy.interpolate import PchipInterpolator
 
-    values = PchipInterpolator(p["temperature_degC"], p["values"], extrapolate=False)(T - ZERO_CELSIUS)
+    at = p["temperature_degC"]
+    # The law's range is checked in kelvin; rounding on the way back must not lead out of the table.
+    values = PchipInterpolator(at, p["values"])(np.clip(T - ZERO_CELSIUS, at[0], at[-1]))
     return np.asarray(p.get("value", 1.0) * values)
 
 
@@ -59,6 +61,10 @@ FORMS: dict[str, tuple[Callable[[NDArray[np.float64], Mapping[str, Any]], NDArra
     "parabola": (_parabola, ("value", "at_degC", "rise", "maximum_degC")),
     "table": (_table, ("temperature_degC", "values")),
 }
+
+
+LISTS = ("temperature_degC", "values")
+"""Numbers of a form that are lists."""
 
 
 @dataclass(frozen=True)
@@ -263,7 +269,7 @@ def _read_material(where: str, name: str, entry: Any) -> Mapping[str, Material]:
     if not isinstance(laws, dict) or not laws:
         raise ShellError(f"{where}: laws must be tables [{name}.laws.law].")
     default = entry.get("default", next(iter(laws)))
-    if default not in laws:
+    if not isinstance(default, str) or default not in laws:
         raise ShellError(f"{where}: default = '{default}' is not one of its laws{_nearest(str(default), laws)}")
     ordered = [default, *(law for law in laws if law != default)]
     return {law: _read_law(f"{where} law '{law}'", name, law, laws[law]) for law in ordered}
@@ -285,14 +291,16 @@ def _read_law(where: str, name: str, law: str, entry: Any) -> Material:
 
 def _read_property(where: str, name: str, entry: Any, span: list[float]) -> Property:
     _check_keys(where, entry, None, required=("form",))
-    if entry["form"] not in FORMS:
+    if not isinstance(entry["form"], str) or entry["form"] not in FORMS:
         raise ShellError(f"{where}: unknown form '{entry['form']}'{_nearest(str(entry['form']), FORMS)}")
     needed = FORMS[entry["form"]][1] + (("at_degC",) if name == "density" else ())
     _check_keys(where, entry, ("form", "source", "uncertainty", "at_degC", *needed), required=needed)
     numbers = {key: value for key, value in entry.items() if key not in ("form", "source", "uncertainty")}
     for key, value in numbers.items():
-        listed = value if isinstance(value, list) else [value]
-        if not all(_is_number(x) for x in listed):
+        if key in LISTS:
+            if not isinstance(value, list) or not all(_is_number(x) for x in value):
+                raise ShellError(f"{where}: {key} must be a list of numbers, not {value!r}.")
+        elif not _is_number(value):
             raise ShellError(f"{where}: {key} must be a number, not {value!r}.")
     if entry["form"] == "table":
         at, values = np.array(numbers["temperature_degC"]), numbers["values"]
@@ -302,8 +310,10 @@ def _read_property(where: str, name: str, entry: Any, span: list[float]) -> Prop
             )
         if at[0] > span[0] or at[-1] < span[1]:
             raise ShellError(f"{where}: the table covers {at[0]:g} to {at[-1]:g} °C, less than the law's range_degC.")
+    if entry["form"] == "parabola" and numbers["maximum_degC"] == numbers["at_degC"]:
+        raise ShellError(f"{where}: maximum_degC must differ from at_degC, between which the property rises.")
     uncertainty = entry.get("uncertainty", {})
-    _check_keys(f"{where} uncertainty", uncertainty, needed)
+    _check_keys(f"{where} uncertainty", uncertainty, tuple(key for key in needed if key not in LISTS))
     if not all(_is_number(x) and x >= 0 for x in uncertainty.values()):
         raise ShellError(f"{where}: uncertainties must be numbers, zero or more.")
     result = Property(entry["form"], numbers, uncertainty, str(entry.get("source", "")))
@@ -315,8 +325,12 @@ def _check_sign(where: str, name: str, found: Property, span: list[float]) -> No
     values = found(np.linspace(span[0], span[1], 101) + ZERO_CELSIUS)
     if name == "poisson_ratio" and not ((values > -1) & (values < 0.5)).all():
         raise ShellError(f"{where}: leaves the range -1 to 0.5 within range_degC.")
-    if name not in ("poisson_ratio", "expansion") and not (values > 0).all():
-        raise ShellError(f"{where}: is not positive everywhere within range_degC.")
+    if name == "expansion" and not (np.abs(values) < 0.01).all():
+        raise ShellError(f"{where}: no solid expands by 1 % per kelvin; give it in 1/K.")
+    if name not in ("poisson_ratio", "expansion") and not ((values > 1e-30) & (values < 1e30)).all():
+        raise ShellError(
+            f"{where}: must be positive, and no larger than SI units make it, everywhere within range_degC."
+        )
 
 
 def _check_keys(where: str, entry: Any, known: tuple[str, ...] | None, required: tuple[str, ...] = ()) -> None:

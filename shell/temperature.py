@@ -9,7 +9,7 @@ with ∂ ln f/∂ ln h + ∂ ln f/∂ ln r = −1 and h'/h = r'/r = alpha.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -154,7 +154,8 @@ def _spread(model: Model, material: Material, T: NDArray[np.float64]) -> Model:
     if T.size < 4:
         return model
     if np.ptp(nu) == 0:
-        return over_poisson_ratio(model, float(nu[0]), float(nu[0]), nodes=1)
+        solved = model(Elastic(1.0, float(nu[0]), 1.0))
+        return lambda elastic: replace(solved, frequency=solved.frequency * float(np.sqrt(elastic.E / elastic.rho)))
     return over_poisson_ratio(model, float(nu.min()), float(nu.max()))
 
 

@@ -7,6 +7,8 @@ from cyclopts import Parameter
 if TYPE_CHECKING:
     from shell.temperature import TemperatureCoefficient
 
+MOST_POINTS = 10_000
+
 
 def tcf(
     card: str,
@@ -51,6 +53,10 @@ def tcf(
     if not step > 0 or not to_degC >= from_degC:
         raise InputError(
             f"--from {from_degC:g} --to {to_degC:g} --step {step:g}: the step must be positive and --to not below --from."
+        )
+    if not (to_degC - from_degC) / step < MOST_POINTS:
+        raise InputError(
+            f"--from {from_degC:g} --to {to_degC:g} --step {step:g}: more than {MOST_POINTS} temperatures; take a longer step."
         )
     instrument = load_card(card)
     at = np.arange(from_degC, to_degC + 1e-9 * step, step)

@@ -75,6 +75,10 @@ def test_rounding_alone_passes_its_own_test():
         (np.arange(6.0), np.arange(6.0) - 2, {}, "must be positive"),
         (np.arange(6.0), np.arange(6.0) + 4400, {"order": 0}, "order of 1 or more"),
         (np.arange(6.0), np.arange(6.0) + 4400, {"resolution": 0.0}, "resolution"),
+        (np.arange(6.0), np.arange(6.0) + 4400, {"resolution": 1e300}, "cannot have a resolution"),
+        (np.arange(6.0), np.arange(6.0) + 4400, {"resolution": 1e-300}, "cannot have a resolution"),
+        (np.arange(6.0), np.arange(6.0) + 4400, {"reference_temperature_degC": float("nan")}, "reference temperature"),
+        (np.arange(6.0), np.arange(6.0) + 4400, {"reference_temperature_degC": 1e300}, "reference temperature"),
         (np.arange(6.0), np.arange(5.0) + 4400, {}, "equally long"),
     ],
 )

@@ -104,6 +104,18 @@ def test_expansion_conserves_mass():
             ["covers"],
         ),
         ('schema = "hrg.materials/1"\n[x', ["TOML"]),
+        *(
+            (f'schema = "hrg.materials/1"\n[x.laws.a]\nsource="s"\nrange_degC=[0, 9]\nyoungs_modulus={{{law}}}', words)
+            for law, words in (
+                ('form="table",temperature_degC=[0,9],values=3', ["values", "list"]),
+                ('form="table",temperature_degC=3,values=[1,2]', ["temperature_degC", "list"]),
+                ('form="constant",value=[1,2]', ["value", "number"]),
+                ('form=["constant"],value=1', ["form"]),
+                ('form="constant",value=1e300', ["positive"]),
+                ('form="parabola",value=1,at_degC=5,rise=0.1,maximum_degC=5', ["maximum_degC", "differ"]),
+                ('form="table",temperature_degC=[0,9],values=[1,2],uncertainty={values=1}', ["uncertainty", "values"]),
+            )
+        ),
     ],
 )
 def test_broken_material_file_is_refused(tmp_path, broken, words):
@@ -130,3 +142,14 @@ def test_constant_material_does_not_change():
     law = constant_material("m", 70e9, 0.3, 2700.0)
     assert law.elastic(250.0) == law.elastic(350.0)
     assert all(name in law.properties for name in ELASTIC[1:])
+
+
+@pytest.mark.parametrize("lowest", [-79.8, -60.0, -45.3])
+def test_a_table_holds_at_the_very_ends_of_its_range(tmp_path, lowest):
+    path = tmp_path / "mine.toml"
+    path.write_text(
+        f'schema = "hrg.materials/1"\n[glass.laws.data]\nsource = "mine"\nrange_degC = [{lowest}, 50]\n'
+        f'youngs_modulus = {{form = "table", temperature_degC = [{lowest}, 50], values = [70e9, 71e9]}}\n'
+    )
+    law = find_material("glass", path=path)
+    np.testing.assert_allclose(law.value("youngs_modulus", np.array([law.lowest, law.highest])), [70e9, 71e9])

@@ -65,3 +65,16 @@ def test_interpolation_over_poisson_ratio_equals_direct_solves(model):
         direct, quick = model(Elastic(72e9, nu, 2203.0)), table(Elastic(72e9, nu, 2203.0))
         assert quick.frequency == pytest.approx(direct.frequency, rel=1e-7)
         assert (quick.nu, quick.h) == pytest.approx((direct.nu, direct.h), abs=1e-5)
+
+
+def test_a_constant_poisson_ratio_needs_one_solve():
+    material = constant_material("m", 72e9, 0.17, 2203.0)
+    solves = []
+
+    def model(elastic):
+        solves.append(elastic)
+        return MODEL(elastic)
+
+    found = frequency_over_temperature(model, material, 293.15, np.linspace(260.0, 320.0, 9))
+    np.testing.assert_allclose(found, MODEL(material.elastic(293.15)).frequency, rtol=1e-12)
+    assert len(solves) == 1

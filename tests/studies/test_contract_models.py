@@ -4,6 +4,7 @@ import ctypes
 import shutil
 import subprocess
 import tomllib
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -67,7 +68,9 @@ def test_frequency_c_code_agrees_with_the_fit(model, tmp_path):
 def test_compensation_takes_the_curve_out_and_refuses_to_extrapolate(model):
     fit = fit_frequency(T, F)
     time, housing = np.arange(5.0), np.array([-10.0, 0.0, 10.0, np.nan, 30.0])
-    record = Record({"time_s": time, "housing_temperature_degC": housing, "frequency_Hz": fit.frequency(20.0) + 0 * time})
+    record = Record(
+        {"time_s": time, "housing_temperature_degC": housing, "frequency_Hz": fit.frequency(20.0) + 0 * time}
+    )
     out = compensate(model, record)["compensated_frequency_Hz"]
     expected = fit.frequency(20.0) - fit.frequency(np.nan_to_num(housing)) + fit.coefficients[0]
     assert out[[0, 1, 2, 4]] == pytest.approx(expected[[0, 1, 2, 4]], abs=1e-9)
@@ -87,7 +90,7 @@ def test_compensation_takes_the_curve_out_and_refuses_to_extrapolate(model):
         ("kind =", "kinds =", "unknown key 'kinds'.*did you mean 'kind'"),
         ("coefficients = [", "coefficients = [3,", "array of tables"),
         ('name = "a1"', 'name = "f0"', "same name"),
-        ("frequency_Hz\"", "frequency_Hz", "not valid TOML"),
+        ('frequency_Hz"', "frequency_Hz", "not valid TOML"),
         ("temperature_degC = [-20.0, 40.0]", "temperature_degC = [40.0, -20.0]", "must be below"),
         ("reference_temperature_degC = 0.0", "reference_temperature_degC = nan", "finite number"),
         ("rows = 7", 'rows = "7"', "finite number"),
@@ -112,3 +115,23 @@ def test_an_unknown_kind_and_a_wrong_covariance_are_refused(model, tmp_path):
     (tmp_path / "m.toml").write_text(content[:start] + "covariance = [[1.0]]\n", encoding="utf-8")
     with pytest.raises(InputError, match="covariance must be 4 lists of 4 numbers"):
         read_model(tmp_path / "m.toml")
+
+
+def test_coefficients_that_overflow_are_refused(model):
+    part = model.parts[0]
+    broken = replace(model, parts=(replace(part, values=(part.values[0], *[1e308] * (len(part.values) - 1))),))
+    record = Record(
+        {
+            "time_s": np.arange(3.0),
+            "housing_temperature_degC": np.array([-20.0, 10.0, 40.0]),
+            "frequency_Hz": np.full(3, 4430.0),
+        }
+    )
+    with np.errstate(over="ignore", invalid="ignore"), pytest.raises(InputError, match="infinite"):
+        compensate(broken, record)
+
+
+def test_a_frequency_model_of_another_column_is_refused(model):
+    record = Record({"time_s": np.arange(3.0), "frequency_Hz": np.full(3, 4430.0)})
+    with pytest.raises(InputError, match="compensates frequency_Hz"):
+        compensate(replace(model, compensates="bias_deg_per_h"), record)
