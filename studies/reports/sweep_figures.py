@@ -73,6 +73,7 @@ def response_figure(results: "Results", column: "Column") -> Picture | None:
                 rasterized=len(few) > 500,
             )  # fmt: skip
             panel.set_xlabel(label(parameter.name, parameter.unit), fontsize=9)
+            panel.locator_params(axis="x", nbins=4)
             panel.tick_params(labelsize=8)
             panel.ticklabel_format(useOffset=False)
         for panel in axes.flat[len(shown) :]:

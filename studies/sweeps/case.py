@@ -9,7 +9,8 @@ from studies.instrument.card import ZERO_CELSIUS, Instrument
 if TYPE_CHECKING:
     from shell.assembly import Theory
     from shell.modes import Mode
-    from studies.sweeps.quantity import Options
+
+Options = Mapping[str, Any]
 
 
 @dataclass
@@ -28,7 +29,7 @@ class Case:
     remarks: list[str] = field(default_factory=list)
     _solved: dict[tuple[int, str, float], "tuple[Mode, ...]"] = field(default_factory=dict, repr=False)
 
-    def temperature(self, options: "Options") -> float:
+    def temperature(self, options: Options) -> float:
         """Return the temperature in K that a quantity asks for, the study's, or the card's reference."""
         given = options.get("temperature_degC")
         if given is None:

@@ -15,7 +15,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from studies.errors import MissingEnvironment
 from studies.sweeps.canonical import case_key, spell
 from studies.sweeps.design import decode_row
-from studies.sweeps.evaluate import Plan, Row, evaluate_task, lost_row
+from studies.sweeps.evaluate import Plan, evaluate_task, lost_row
+from studies.sweeps.row import Row
 
 if TYPE_CHECKING:
     from studies.sweeps.definition import Study

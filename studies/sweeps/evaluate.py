@@ -5,7 +5,7 @@ import time
 import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 from studies.errors import UNUSABLE_INPUT
 from studies.instrument.card import Instrument
@@ -13,6 +13,7 @@ from studies.sweeps.case import Case
 from studies.sweeps.child import FunctionFailed
 from studies.sweeps.parameters import set_parameters
 from studies.sweeps.quantities import library
+from studies.sweeps.row import Row
 
 if TYPE_CHECKING:
     from studies.sweeps.definition import Study
@@ -20,16 +21,6 @@ if TYPE_CHECKING:
     from studies.sweeps.quantity import Number
 
 Batch = Sequence[Mapping[str, Any]]
-
-
-class Row(NamedTuple):
-    """What became of a case: `remark` is the reason of a failure, or a warning of the solver."""
-
-    status: str
-    remark: str
-    values: tuple[float, ...]
-    errors: tuple[float, ...]
-    seconds: float
 
 
 @dataclass(frozen=True)

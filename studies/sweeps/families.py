@@ -18,13 +18,13 @@ from shell.family import Family, build_family
 from studies.errors import UNUSABLE_INPUT, InputError
 from studies.instrument.card import ZERO_CELSIUS, Instrument
 from studies.sweeps.parameters import TEMPERATURE, set_parameters
+from studies.sweeps.row import Row
 
 if TYPE_CHECKING:
     from shell.materials import Material
+    from studies.sweeps.case import Options
     from studies.sweeps.definition import Study
     from studies.sweeps.design import Design
-    from studies.sweeps.evaluate import Row
-    from studies.sweeps.quantity import Options
 
 Array = NDArray[np.float64]
 Designs = Sequence[Mapping[str, Any]]
@@ -46,10 +46,8 @@ class Families:
     asked: tuple[tuple[str, "Options", int], ...]
     members: Mapping[tuple[int, str], Family]
 
-    def evaluate(self, designs: Designs) -> "list[Row]":
+    def evaluate(self, designs: Designs) -> list[Row]:
         """Evaluate a batch; where it contains a design that cannot be computed, each design for itself."""
-        from studies.sweeps.evaluate import Row
-
         began = time.perf_counter()
         try:
             found = [FAST[name](self, options, designs) for name, options, _ in self.asked]

@@ -3,15 +3,12 @@
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from math import nan
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 from studies.errors import InputError
 from studies.files.toml import Section, check_number
+from studies.sweeps.case import Case, Options
 
-if TYPE_CHECKING:
-    from studies.sweeps.case import Case
-
-Options = Mapping[str, Any]
 SUFFIXES = {"Hz": "_Hz", "ppm/°C": "_ppm_per_degC", "°C": "_degC", "s": "_s", "1": ""}
 
 

@@ -21,7 +21,7 @@ from studies.errors import InputError, MissingEnvironment
 from studies.sweeps.canonical import find_changes, spell
 
 if TYPE_CHECKING:
-    from studies.sweeps.evaluate import Row
+    from studies.sweeps.row import Row
 
 FILE = "study.sqlite"
 LOCK = "lock"

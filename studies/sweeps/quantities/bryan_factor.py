@@ -1,6 +1,6 @@
 """The Bryan (precession) factor of a mode: pattern rotation over rotation of the case."""
 
-from studies.sweeps.case import Case
+from studies.sweeps.case import Case, Options
 from studies.sweeps.quantity import (
     HARMONIC,
     INDEX,
@@ -8,7 +8,6 @@ from studies.sweeps.quantity import (
     THEORY,
     Column,
     Number,
-    Options,
     Quantity,
     mode_stem,
     mode_words,

@@ -3,8 +3,8 @@
 import numpy as np
 
 from studies.errors import InputError
-from studies.sweeps.case import Case
-from studies.sweeps.quantity import HARMONIC, THEORY, Column, Number, Options, Quantity, mode_stem, number, whole
+from studies.sweeps.case import Case, Options
+from studies.sweeps.quantity import HARMONIC, THEORY, Column, Number, Quantity, mode_stem, number, whole
 
 
 def _columns(options: Options) -> tuple[Column, ...]:

@@ -1,13 +1,12 @@
 """How far the nearest other mode is from a mode, in Hz: parasitic modes close by couple under vibration."""
 
-from studies.sweeps.case import Case
+from studies.sweeps.case import Case, Options
 from studies.sweeps.quantity import (
     HARMONIC,
     TEMPERATURE,
     THEORY,
     Column,
     Number,
-    Options,
     Quantity,
     mode_stem,
     whole,

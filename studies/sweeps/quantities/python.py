@@ -6,8 +6,8 @@ It is named by module path, `function = "package.module:name"` or `"file.py:name
 
 from studies.errors import InputError
 from studies.files.toml import Section
-from studies.sweeps.case import Case
-from studies.sweeps.quantity import Column, Number, Option, Options, Quantity, number
+from studies.sweeps.case import Case, Options
+from studies.sweeps.quantity import Column, Number, Option, Quantity, number
 
 
 def _text(default: str | None, meaning: str) -> Option:

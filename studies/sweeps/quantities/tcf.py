@@ -1,7 +1,7 @@
 """The temperature coefficient of frequency, d ln f/dT, and its parts from E, ν, ρ, h and r (HRG paper eq. 15)."""
 
-from studies.sweeps.case import Case
-from studies.sweeps.quantity import HARMONIC, TEMPERATURE, THEORY, Column, Number, Options, Quantity, mode_stem
+from studies.sweeps.case import Case, Options
+from studies.sweeps.quantity import HARMONIC, TEMPERATURE, THEORY, Column, Number, Quantity, mode_stem
 
 PARTS = ("E", "nu", "rho", "h", "r")
 

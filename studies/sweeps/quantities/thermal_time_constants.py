@@ -1,7 +1,7 @@
 """The slowest time constants of the heat path from the chamber to the shell, and of shell and stem alone."""
 
-from studies.sweeps.case import Case
-from studies.sweeps.quantity import TEMPERATURE, Column, Number, Options, Quantity, whole
+from studies.sweeps.case import Case, Options
+from studies.sweeps.quantity import TEMPERATURE, Column, Number, Quantity, whole
 
 
 def _columns(options: Options) -> tuple[Column, ...]:

@@ -1,0 +1,62 @@
+"""Contract of the house: `studies` joins three packages that know nothing of each other, and no imports run in a circle."""
+
+import ast
+from graphlib import TopologicalSorter
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+PHYSICS = ("shell", "thermal", "compensation")
+LAZY = {"pyvista", "trimesh", "matplotlib", "dask", "distributed", "vtk"}
+
+
+def modules():
+    """Return module name -> path of every file of the four packages."""
+    found = {}
+    for package in (*PHYSICS, "studies"):
+        for path in (ROOT / package).rglob("*.py"):
+            parts = path.relative_to(ROOT).with_suffix("").parts
+            found[".".join(parts[:-1] if parts[-1] == "__init__" else parts)] = path
+    return found
+
+
+MODULES = modules()
+
+
+def imports(path, *, top_only=False):
+    """Return the modules that a file imports, anywhere in it or at its top level, each as deep as it is a file."""
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    nodes = tree.body if top_only else ast.walk(tree)
+    names = set()
+    for node in nodes:
+        if isinstance(node, ast.Import):
+            names |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom) and node.module:
+            names |= {
+                f"{node.module}.{alias.name}" if f"{node.module}.{alias.name}" in MODULES else node.module
+                for alias in node.names
+            }
+    return names
+
+
+@pytest.mark.parametrize("package", PHYSICS)
+def test_physics_knows_only_itself(package):
+    others = {*PHYSICS, "studies"} - {package}
+    for name, path in MODULES.items():
+        if name.split(".")[0] == package:
+            assert not {i for i in imports(path) if i.split(".")[0] in others}, name
+
+
+def test_no_imports_run_in_a_circle():
+    """Also those that only the type checker follows; `TopologicalSorter` raises CycleError with the circle."""
+    graph = {name: {i for i in imports(path) if i in MODULES and i != name} for name, path in MODULES.items()}
+    order = list(TopologicalSorter(graph).static_order())
+    assert len(order) == len(MODULES)
+
+
+@pytest.mark.parametrize("name", sorted(n for n in MODULES if not n.startswith("studies.examples")))
+def test_heavy_packages_are_imported_where_they_are_needed(name):
+    lazy = LAZY if name.startswith("shell.derivation") else LAZY | {"sympy"}
+    found = {i.split(".")[0] for i in imports(MODULES[name], top_only=True)}
+    assert not found & lazy
