@@ -81,7 +81,7 @@ class FrozenShell:
 
     def solve(self, h: Array, nu: float, accuracy: float = 1e-12) -> tuple[float, Array]:
         """The lowest ω² for E = ρ = 1 (1/m²) and its vector, with h (m) given at the stations."""
-        lam, G = (float(x) for x in lame(np.float64(1.0), np.float64(nu), self.plane_stress))
+        lam, G = (float(x) for x in lame(np.array(1.0), np.array(nu), self.plane_stress))
         weights = self.interpolate(h)
         trace, shear, mass = (np.einsum("cej,cejab->ejab", weights, kind) for kind in self.matrices)
         maps, matrices = self.system._maps, self.group.matrices
@@ -96,7 +96,7 @@ class FrozenShell:
 
     def strain_energy(self, vectors: Array, h: Array, nu: float) -> Array:
         """Twice the strain energy of pairs of vectors (r, r), for E = 1 and thickness h at the stations."""
-        lam, G = lame(np.float64(1.0), np.float64(nu), self.plane_stress)
+        lam, G = lame(np.array(1.0), np.array(nu), self.plane_stress)
         total = np.zeros((vectors.shape[1],) * 2)
         for weights, table in zip(self.interpolate(h), self.tables, strict=True):
             trace, shear, _ = self._energies(table, vectors)

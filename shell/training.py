@@ -28,7 +28,7 @@ SAFETY = 1.5  # on the largest ratio of true to estimated error among the checks
 TOO_WIDE = (
     "no reduced basis of up to {} vectors reaches {:g} in this box: narrow its ranges or allow a larger tolerance."
 )
-ROOM = 0.75  # share of the tolerance that the estimate may take on designs of the training; the rest is for others
+ROOM = 0.9  # share of the tolerance that the estimate may take on designs of the training; the rest is for others
 
 
 @dataclass(frozen=True, eq=False)
