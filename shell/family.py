@@ -216,7 +216,7 @@ def build_family(
                 f"{reason}, so every design is solved in full: give the shapes as (position, value) pairs."
             )
         return Family(profiles, *request, tolerance, (), reason)
-    ratio = 1.35 if tolerance >= 1e-5 else 1.15  # of a cell: the narrower, the smaller its basis
+    ratio = 1.6 if tolerance >= 1e-5 else 1.15  # of a cell: the narrower, the smaller its basis
     count = max(1, ceil(log(thickness[1] / thickness[0]) / log(ratio)))
     edges = [thickness[0], *np.geomspace(*thickness, count + 1)[1:-1].tolist(), thickness[1]]
     spans = list(pairwise(edges))
