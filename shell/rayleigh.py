@@ -173,12 +173,17 @@ def rayleigh_integrals(n: int, phi_1: float = 0.0, phi_2: float = pi / 2) -> Ray
             f"Polar angles must satisfy 0 <= phi_1 < phi_2 < pi, not phi_1 = {phi_1:g}, phi_2 = {phi_2:g} rad; "
             "a closed sphere has no inextensional mode."
         )
-    values = [
-        quad(integrand, phi_1, phi_2, args=(n,), epsabs=0, epsrel=1e-13, limit=200)[0]
-        for integrand in (_bending, _mass, _coriolis)
-    ]
-    if not min(values) > 0:
-        raise ShellError(f"The cap up to phi_2 = {phi_2:g} rad is too small for harmonic {n}: its mode vanishes.")
+    values = []
+    for integrand in (_bending, _mass, _coriolis):
+        # full_output reports trouble in the result instead of as a warning; the error estimate is judged here.
+        value, error, *_ = quad(integrand, phi_1, phi_2, args=(n,), epsabs=0, epsrel=1e-13, limit=200, full_output=1)
+        if not value > 0:
+            raise ShellError(f"The cap up to phi_2 = {phi_2:g} rad is too small for harmonic {n}: its mode vanishes.")
+        if not error < 1e-9 * value:
+            raise ShellError(
+                f"A rim at phi_2 = {phi_2:.9g} rad nearly closes the sphere: the mode's integrals diverge."
+            )
+        values.append(value)
     return RayleighIntegrals(*values)
 
 

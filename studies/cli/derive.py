@@ -54,8 +54,15 @@ def derive(
             f"a dome from {pole_angle_deg:g} to {rim_angle_deg:g} degrees has no inextensional mode: the pole angle must "
             "be 0 or more and below the rim angle, the rim angle below 180 degrees."
         )
-    rayleigh_integrals(harmonic, radians(pole_angle_deg), radians(rim_angle_deg))  # refuses harmonics that cannot bend
+    shape = rayleigh_integrals(harmonic, radians(pole_angle_deg), radians(rim_angle_deg))
     case = Case.from_degrees(harmonic, pole_angle_deg, rim_angle_deg)
+    # On a cap of a thousandth of a degree a hundred digits do not suffice to evaluate the closed forms.
+    for closed, integral in ((case.bending, shape.I), (case.mass, shape.J)):
+        if abs(complex(closed.evalf(20)) / integral - 1) > 1e-9:
+            raise InputError(
+                f"from {pole_angle_deg:g} to {rim_angle_deg:g} degrees the closed forms of harmonic {harmonic} cancel"
+                " to nothing; take a wider cap."
+            )
     if json:
         text = {} if code is None else {"code": {"language": code, "text": emit_code(case, code)}}
         print_json(_payload(case, pole_angle_deg, rim_angle_deg) | text)

@@ -172,6 +172,9 @@ def test_json_carries_the_published_integrals(capsys):
     [
         ["--harmonic", "1"],
         ["--rim-angle-deg", "180"],
+        ["--rim-angle-deg", "179.99999"],
+        ["--rim-angle-deg", "1e-9"],
+        ["--harmonic", "12", "--rim-angle-deg", "0.001"],
         ["--pole-angle-deg", "95"],
         ["--code", "fortran"],
         ["--latex", "--code", "c"],
