@@ -19,6 +19,7 @@ from shell.errors import ShellError
 Profile: TypeAlias = float | list[tuple[float, float]] | tuple[tuple[float, float], ...]
 Support: TypeAlias = Literal["free", "clamped-pole", "clamped-rim", "stem", "clamped-face"]
 SUPPORTS = ("free", "clamped-pole", "clamped-rim", "stem")
+LONGEST_STEM = 100.0  # stem lengths over its radius that are meshed as a solid
 
 
 @dataclass(frozen=True)
@@ -390,6 +391,11 @@ def _check_stem(resonator: Resonator, stem: Stem) -> None:
                 f"(radius {r.max():g} m)."
             )
         at_root = float(np.interp(stem.radius + stem.fillet, r[: r.argmax() + 1], z[: r.argmax() + 1]))
+        if abs(end - at_root) > LONGEST_STEM * stem.radius:
+            raise ShellError(
+                f"the stem is {abs(end - at_root) / stem.radius:.0f} times as long as its radius; it is solved as a solid up to "
+                f"{LONGEST_STEM:g} times: shorten it, since n >= 2 does not reach its far end, or make it thicker."
+            )
         if not face * (end - at_root) > stem.fillet + 0.1 * stem.radius:
             raise ShellError(
                 f"the {'outer' if face > 0 else 'inner'} stem ends at {end:g} m, not clear of its root at {at_root:g} m."

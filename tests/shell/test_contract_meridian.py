@@ -111,6 +111,7 @@ def stemmed(**stem: object) -> Resonator:
     (lambda: stemmed(radius=14.9e-3, ends=-5e-3), "larger than the dome"),
     (lambda: stemmed(radius=2.5e-3, ends=14.2e-3), "not clear of its root"),
     (lambda: stemmed(radius=2.5e-3, ends=-5e-3, side="outer"), "not clear of its root"),
+    (lambda: stemmed(radius=0.05e-3, ends=-5e-3), "times as long as its radius"),
     (lambda: stemmed(radius=0.0, ends=-5e-3), "stem radius must be positive"),
     (lambda: stemmed(radius=2.5e-3, ends=-5e-3, fillet=-1e-3), "fillet"),
     (lambda: stemmed(radius=2.5e-3, ends=-5e-3, side="both"), "two ends"),
