@@ -48,7 +48,11 @@ LEVELS: dict[str, tuple[Level, ...]] = {
     "solid": tuple(
         Level(through, along, *solid, split)
         for through, along, solid, split in zip(
-            ((3, 3, 3), (5, 5, 4), (7, 7, 6), (9, 9, 8), (11, 11, 10)), (9, 12, 16, 20, 20), _SOLID, (1, 1, 1, 1, 2), strict=True
+            ((3, 3, 3), (5, 5, 4), (7, 7, 6), (9, 9, 8), (11, 11, 10)),
+            (9, 12, 16, 20, 20),
+            _SOLID,
+            (1, 1, 1, 1, 2),
+            strict=True,
         )
     ),
     "shell": tuple(
@@ -146,7 +150,8 @@ class System:
         for group, first, part, maps in self._portions():
             trace, shear = station_stiffness(part)
             matrices = (
-                group.matrices(integrate_stiffness, trace, first), group.matrices(integrate_stiffness, shear, first),
+                group.matrices(integrate_stiffness, trace, first),
+                group.matrices(integrate_stiffness, shear, first),
                 group.matrices(integrate_mass, station_mass(part), first),
             )
             found += [
@@ -159,8 +164,13 @@ class System:
         """Stiffness and mass of every element with λ, G, ρ given at the stations of every group."""
         K: list[Array] = []
         M: list[Array] = []
-        fields = iter([(a[k : k + PORTION], b[k : k + PORTION], c[k : k + PORTION])
-                       for a, b, c in zip(lam, G, rho, strict=True) for k in range(0, len(a), PORTION)])
+        fields = iter(
+            [
+                (a[k : k + PORTION], b[k : k + PORTION], c[k : k + PORTION])
+                for a, b, c in zip(lam, G, rho, strict=True)
+                for k in range(0, len(a), PORTION)
+            ]
+        )
         for group, first, part, maps in self._portions():
             trace, shear = station_stiffness(part)
             lam_there, G_there, rho_there = (field[..., None, None] for field in next(fields))
@@ -366,7 +376,8 @@ def _sections(resonator: Resonator, chain: Chain, xi: Array, weights: Array) -> 
     shape = (len(halves), len(xi))
     return Section(
         **{name: np.array(values) for name, values in gathered.items()},
-        ds=np.broadcast_to(halves[:, None], shape), weight=np.broadcast_to(weights, shape),
+        ds=np.broadcast_to(halves[:, None], shape),
+        weight=np.broadcast_to(weights, shape),
     )
 
 

@@ -45,8 +45,14 @@ def lay_corner(resonator: Resonator, joint: int, ring_count: int) -> tuple[Solid
     meeting, feet = _face(before, inner), (_face(before, -inner), _face(after, -inner))
     outer = _cross(feet[0], _tangent(before), feet[1], _tangent(after))
     cells = rings(shrinking(ring_count))
-    kite = Patch(straight(meeting, feet[0]), straight(feet[1], outer), straight(meeting, feet[1]), straight(feet[0], outer),
-                 cells, "corner")
+    kite = Patch(
+        straight(meeting, feet[0]),
+        straight(feet[1], outer),
+        straight(meeting, feet[1]),
+        straight(feet[0], outer),
+        cells,
+        "corner",
+    )
     ends = (_strip_end(resonator, joint, s_1, -1), _strip_end(resonator, joint + 1, s_2, 1))
     strips = (
         _strip(resonator, joint, s_1, ends[0], inner, cells),
@@ -108,7 +114,9 @@ def _meet(resonator: Resonator, joint: int, inner: float) -> tuple[float, float]
     found = root(gap, [s - h / 2, s + h / 2], tol=1e-14)
     s_1, s_2 = (float(x) for x in found.x)
     if hypot(*gap(found.x)) > 1e-9 * h or not resonator._starts[joint] < s_1 <= s <= s_2 < resonator._starts[joint + 2]:
-        raise ShellError(f"the corner between segments {joint + 1} and {joint + 2} is too sharp or its segments too short for the thickness.")
+        raise ShellError(
+            f"the corner between segments {joint + 1} and {joint + 2} is too sharp or its segments too short for the thickness."
+        )
     return s_1, s_2
 
 
@@ -121,7 +129,13 @@ def _strip_end(resonator: Resonator, segment: int, s: float, direction: int) -> 
 
 
 def _strip(
-    resonator: Resonator, segment: int, s: float, end: float, near: float, cells: tuple[Cell, ...], far: float | None = None
+    resonator: Resonator,
+    segment: int,
+    s: float,
+    end: float,
+    near: float,
+    cells: tuple[Cell, ...],
+    far: float | None = None,
 ) -> Patch:
     """The shell from s to `end`, from the face η = near to η = far (the other face if not given)."""
     far = -near if far is None else far
@@ -130,13 +144,21 @@ def _strip(
         def path(x: Array) -> tuple[Array, Array]:
             points = resonator.at(np.ravel(s + (end - s) * x), segment)
             zeta = eta * points.thickness / 2
-            return (points.r + zeta * points.normal_r).reshape(np.shape(x)), (points.z + zeta * points.normal_z).reshape(np.shape(x))
+            return (points.r + zeta * points.normal_r).reshape(np.shape(x)), (
+                points.z + zeta * points.normal_z
+            ).reshape(np.shape(x))
 
         return path
 
     start, stop = resonator.at([s], segment), resonator.at([end], segment)
-    return Patch(straight(_face(start, near), _face(start, far)), straight(_face(stop, near), _face(stop, far)),
-                 side(near), side(far), cells, "corner")
+    return Patch(
+        straight(_face(start, near), _face(start, far)),
+        straight(_face(stop, near), _face(stop, far)),
+        side(near),
+        side(far),
+        cells,
+        "corner",
+    )
 
 
 def _face(points: MeridianPoints, eta: float) -> Spot:
@@ -157,5 +179,11 @@ def _cross(one: Spot, along_one: Spot, two: Spot, along_two: Spot) -> Spot:
 
 def _box(corner: Spot, opposite: Spot, cells: tuple[Cell, ...], part: Part = "root") -> Patch:
     (r0, z0), (r1, z1) = corner, opposite
-    return Patch(straight((r0, z0), (r1, z0)), straight((r0, z1), (r1, z1)), straight((r0, z0), (r0, z1)),
-                 straight((r1, z0), (r1, z1)), cells, part)
+    return Patch(
+        straight((r0, z0), (r1, z0)),
+        straight((r0, z1), (r1, z1)),
+        straight((r0, z0), (r0, z1)),
+        straight((r1, z0), (r1, z1)),
+        cells,
+        part,
+    )

@@ -108,7 +108,9 @@ class Arc(Curve):
         offsets = [(point[0] - center[0], point[1] - center[1]) for point in (start, end)]
         radii = [hypot(*offset) for offset in offsets]
         if abs(radii[0] - radii[1]) > 1e-6 * max(radii):
-            raise ShellError(f"the arc's ends are {radii[0]:g} m and {radii[1]:g} m from its centre: they must be equal.")
+            raise ShellError(
+                f"the arc's ends are {radii[0]:g} m and {radii[1]:g} m from its centre: they must be equal."
+            )
         first, last = (atan2(*offset) for offset in offsets)
         turn = (last - first + pi) % (2 * pi) - pi
         if abs(turn) < 1e-9 or abs(abs(turn) - pi) < 1e-9:
@@ -121,7 +123,12 @@ class Arc(Curve):
         psi = self.first_angle + turn * x
         sine, cosine = self.radius * np.sin(psi), self.radius * np.cos(psi)
         return Jet(
-            self.center[0] + sine, self.center[1] + cosine, turn * cosine, -turn * sine, -(turn**2) * sine, -(turn**2) * cosine
+            self.center[0] + sine,
+            self.center[1] + cosine,
+            turn * cosine,
+            -turn * sine,
+            -(turn**2) * sine,
+            -(turn**2) * cosine,
         )
 
     def at_length(self, s: Array) -> Jet:

@@ -61,7 +61,9 @@ class Section:
     position: Array
 
 
-def shell_table(section: Section, n: int, through: tuple[Basis, Basis, Basis], eta: tuple[Array, Array], along: Basis) -> StrainTable:
+def shell_table(
+    section: Section, n: int, through: tuple[Basis, Basis, Basis], eta: tuple[Array, Array], along: Basis
+) -> StrainTable:
     """Strains of a shell of revolution in its own frame, without approximation in z/R.
 
     With ζ = η h/2, A = 1 + κ ζ and ρ = r + ζ n_r (the radius of the point), subscripts for derivatives:
@@ -105,8 +107,13 @@ def shell_table(section: Section, n: int, through: tuple[Basis, Basis, Basis], e
     displacement = np.broadcast_to(np.stack([f[:, 0] for f in value]), (*section.r.shape, 3, len(points), sum(counts)))
     naghdi = counts[2] == 1
     return StrainTable(
-        strain, displacement, volume, np.stack([along.values, along.slopes]), section.position,
-        SHEAR_CORRECTION if naghdi else 1.0, naghdi,
+        strain,
+        displacement,
+        volume,
+        np.stack([along.values, along.slopes]),
+        section.position,
+        SHEAR_CORRECTION if naghdi else 1.0,
+        naghdi,
     )
 
 
@@ -129,9 +136,7 @@ def block_table(
     r = corners[0][..., None, None]
     (r_xi, r_eta), (z_xi, z_eta) = jacobian
     det = r_xi * z_eta - r_eta * z_xi
-    xi_r, xi_z, eta_r, eta_z = (
-        _flat / det for _flat in (z_eta, -r_eta, -z_xi, r_xi)
-    )
+    xi_r, xi_z, eta_r, eta_z = (_flat / det for _flat in (z_eta, -r_eta, -z_xi, r_xi))
     count = across.values.shape[1]
     (a, b, c), d_eta, d_xi = _jets((across, across, across), [count] * 3)
 
@@ -140,13 +145,9 @@ def block_table(
 
     a_r, b_r, c_r = gradient(xi_r, eta_r)
     a_z, b_z, c_z = gradient(xi_z, eta_z)
-    strain = np.stack(
-        [a_r, (n * b + a) / r, c_z, b_r - (n * a + b) / r, a_z + c_r, b_z - n * c / r], axis=2
-    )
+    strain = np.stack([a_r, (n * b + a) / r, c_z, b_r - (n * a + b) / r, a_z + c_r, b_z - n * c / r], axis=2)
     volume = abs(det) * corners[0] * weights
-    displacement = np.broadcast_to(
-        np.stack([f[:, 0] for f in (a, b, c)]), (*r.shape[:2], 3, r.shape[2], 3 * count)
-    )
+    displacement = np.broadcast_to(np.stack([f[:, 0] for f in (a, b, c)]), (*r.shape[:2], 3, r.shape[2], 3 * count))
     stations = np.broadcast_to(position[:, None], r.shape[:2])
     return StrainTable(strain, displacement, volume, np.stack([along.values, along.slopes]), stations)
 

@@ -54,7 +54,7 @@ class Stem:
         """The face it stands on (-1 inner, +1 outer) and the height of the clamped end, for each root."""
         if isinstance(self.ends, tuple):
             return (-1, self.ends[0]), (1, self.ends[1])
-        return ((1 if self.side == "outer" else -1), self.ends),
+        return (((1 if self.side == "outer" else -1), self.ends),)
 
 
 @dataclass(frozen=True)
@@ -159,7 +159,9 @@ class Resonator:
         """The same resonator with every length multiplied by `factor`: free uniform thermal expansion."""
         stem = self.stem and Stem(
             self.stem.radius * factor,
-            tuple(end * factor for end in self.stem.ends) if isinstance(self.stem.ends, tuple) else self.stem.ends * factor,  # type: ignore[arg-type]
+            tuple(end * factor for end in self.stem.ends)
+            if isinstance(self.stem.ends, tuple)
+            else self.stem.ends * factor,  # type: ignore[arg-type]
             self.stem.fillet * factor,
             self.stem.side,
         )
@@ -250,7 +252,9 @@ def cylinder(
     wall = _profile(thickness)
     if bottom_thickness is None:
         if clamp_radius:
-            raise ShellError("an open tube has no bottom to clamp: leave out the clamp radius or give a bottom thickness.")
+            raise ShellError(
+                "an open tube has no bottom to clamp: leave out the clamp radius or give a bottom thickness."
+            )
         return Resonator((Line((radius, 0.0), (radius, height)),), wall)
     _require_positive(bottom_thickness=bottom_thickness)
     if not height > bottom_thickness:
@@ -260,8 +264,11 @@ def cylinder(
     middle = bottom_thickness / 2
     length = radius + height - middle
     foot = radius / length
-    profile = ((0.0, bottom_thickness), (foot, bottom_thickness),
-               *((foot + (1 - foot) * position, value) for position, value in wall))
+    profile = (
+        (0.0, bottom_thickness),
+        (foot, bottom_thickness),
+        *((foot + (1 - foot) * position, value) for position, value in wall),
+    )
     plate, tube = Line((0.0, middle), (radius, middle)), Line((radius, middle), (radius, height))
     return Resonator((plate, tube), profile, "clamped-face" if clamp_radius else "free", None, clamp_radius)
 
@@ -299,7 +306,9 @@ def bell(
     return Resonator(segments, _profile(thickness), _known(support), stem)
 
 
-def meridian(segments: list[Line | Arc] | tuple[Line | Arc, ...], thickness: Profile, support: Support = "free") -> Resonator:
+def meridian(
+    segments: list[Line | Arc] | tuple[Line | Arc, ...], thickness: Profile, support: Support = "free"
+) -> Resonator:
     """Any chain of lines and arcs; `support` holds its first point ("clamped-pole") or its last ("clamped-rim")."""
     if support == "stem":
         raise ShellError("a stem stands on a dome: use the shape hemisphere or bell, or another support.")
@@ -311,7 +320,9 @@ def _profile(thickness: Profile) -> tuple[tuple[float, float], ...]:
         return (0.0, float(thickness)), (1.0, float(thickness))
     profile = tuple((float(position), float(value)) for position, value in thickness)
     if any(second[0] <= first[0] for first, second in pairwise(profile)):
-        raise ShellError("the positions of a thickness profile must rise from 0 (start) to 1 (rim), none of them twice.")
+        raise ShellError(
+            "the positions of a thickness profile must rise from 0 (start) to 1 (rim), none of them twice."
+        )
     return profile
 
 
@@ -337,7 +348,9 @@ def _check_chain(resonator: Resonator) -> None:
             raise ShellError(
                 f"segment {k + 1} of the meridian starts at ({r2:g}, {z2:g}) m, but segment {k} ends at ({r1:g}, {z1:g}) m."
             )
-    inside = np.concatenate([segment.at_length(np.linspace(0, segment.length, 201)[1:-1]).r for segment in resonator.segments])
+    inside = np.concatenate(
+        [segment.at_length(np.linspace(0, segment.length, 201)[1:-1]).r for segment in resonator.segments]
+    )
     joints = [segment.end_points[0][0] for segment in resonator.segments[1:]]
     if min(inside) <= 0 or min(joints, default=1.0) <= tolerance:
         raise ShellError("the meridian touches or crosses the axis between its ends: the shell would overlap itself.")
@@ -366,7 +379,9 @@ def _check_support(resonator: Resonator) -> None:
     if resonator.support == "clamped-pole" and resonator.starts_on_axis:
         raise ShellError("a closed pole has no edge to clamp: open it (a pole angle above 0) or use a stem.")
     if resonator.support == "clamped-rim" and resonator.ends_on_axis:
-        raise ShellError("a closed shell has no rim to clamp: end the meridian before the axis or choose another support.")
+        raise ShellError(
+            "a closed shell has no rim to clamp: end the meridian before the axis or choose another support."
+        )
     if (resonator.support == "stem") != (resonator.stem is not None):
         raise ShellError("a stem belongs to the support 'stem', and the support 'stem' needs a stem.")
     for start, on_axis in ((True, resonator.starts_on_axis), (False, resonator.ends_on_axis)):

@@ -175,26 +175,40 @@ def solve_modes(
     solutions = _solve_level(resonator, elastic, harmonic, count, theory, levels[0], accuracy)
     for level in levels[1:]:
         finer = _solve_level(resonator, elastic, harmonic, count, theory, level, accuracy)
-        errors = [
-            abs(sqrt(one.eigenvalue / two.eigenvalue) - 1) for one, two in zip(solutions, finer, strict=True)
-        ]
+        errors = [abs(sqrt(one.eigenvalue / two.eigenvalue) - 1) for one, two in zip(solutions, finer, strict=True)]
         if max(errors) <= tolerance or level is levels[-1]:
             break
         solutions = finer
     if max(errors) > tolerance:
         warnings.warn(
             f"the frequency is known to {max(errors):.1g}, {max(errors) / tolerance:.2g} times the tolerance asked for.",
-            TheoryRangeWarning, stacklevel=2,
+            TheoryRangeWarning,
+            stacklevel=2,
         )
     return tuple(
-        Mode(harmonic, k, sqrt(solution.eigenvalue) / (2 * pi), theory, max(error, 1e-13), solution.bryan_factor,
-             _label(solution), solution, resonator)
+        Mode(
+            harmonic,
+            k,
+            sqrt(solution.eigenvalue) / (2 * pi),
+            theory,
+            max(error, 1e-13),
+            solution.bryan_factor,
+            _label(solution),
+            solution,
+            resonator,
+        )
         for k, (solution, error) in enumerate(zip(solutions, errors, strict=True))
     )
 
 
 def _solve_level(
-    resonator: Resonator, elastic: Elastic | VaryingElastic, n: int, count: int, theory: Theory, level: Level, accuracy: float
+    resonator: Resonator,
+    elastic: Elastic | VaryingElastic,
+    n: int,
+    count: int,
+    theory: Theory,
+    level: Level,
+    accuracy: float,
 ) -> list[Solution]:
     """The `count` lowest elastic modes at one level, sorted by their Rayleigh quotient."""
     system = build_system(resonator, n, theory, level)
@@ -204,7 +218,9 @@ def _solve_level(
     stiffness, density = (float(np.mean(values)) for values in (constants[0].lame[1], constants[0].rho))
     shift = 1e-2 * stiffness / density / resonator.size**2 if system.rigid_motions else 0.0
     vectors = lowest_vectors(system.pattern, K, M, count + system.rigid_motions, shift, accuracy)
-    found = sorted((Solution(system, constants, vector) for vector in vectors.T), key=lambda solution: solution.eigenvalue)
+    found = sorted(
+        (Solution(system, constants, vector) for vector in vectors.T), key=lambda solution: solution.eigenvalue
+    )
     return found[system.rigid_motions :]
 
 
@@ -212,7 +228,9 @@ def _matrices(
     system: System, elastic: Elastic | VaryingElastic, constants: tuple[Constants, ...]
 ) -> tuple[list[Array], list[Array]]:
     if isinstance(elastic, VaryingElastic) or not system.is_small:
-        return system.varying([c.lame[0] for c in constants], [c.lame[1] for c in constants], [c.rho for c in constants])
+        return system.varying(
+            [c.lame[0] for c in constants], [c.lame[1] for c in constants], [c.rho for c in constants]
+        )
     uniform = [
         (float(c.lame[0][0, 0]), float(c.lame[1][0, 0]), float(c.rho[0, 0]))
         for c, group in zip(constants, system.groups, strict=True)
@@ -233,11 +251,17 @@ def _constants(position: Array, elastic: Elastic | VaryingElastic, plane_stress:
 
 def _by_thickness(resonator: Resonator, solution: Solution, theory: Theory) -> float:
     """D ln f / d ln h of the whole profile: change of the Rayleigh quotient with the shape kept (it is stationary)."""
-    step = 2e-3 * min(value for _, value in resonator.thickness) / resonator.size  # its cube over (h/R)² is what is neglected
+    step = (
+        2e-3 * min(value for _, value in resonator.thickness) / resonator.size
+    )  # its cube over (h/R)² is what is neglected
     found: dict[float, float] = {0.0: solution.eigenvalue}
     for change in (-step, step):
-        system = build_system.__wrapped__(resonator.thickened(1 + change), solution.system.n, theory, solution.system.level)
-        same = [a.unknowns.shape == b.unknowns.shape for a, b in zip(system.groups, solution.system.groups, strict=True)]
+        system = build_system.__wrapped__(
+            resonator.thickened(1 + change), solution.system.n, theory, solution.system.level
+        )
+        same = [
+            a.unknowns.shape == b.unknowns.shape for a, b in zip(system.groups, solution.system.groups, strict=True)
+        ]
         if all(same) and system.constraint.shape == solution.system.constraint.shape:
             found[change] = Solution(system, solution.constants, solution.vector).eigenvalue
     low, high = min(found), max(found)  # one-sided where one more cell fits on one side
@@ -271,13 +295,15 @@ def _check_range(resonator: Resonator, theory: Theory) -> None:
         warnings.warn(
             f"h/R = {ratio:.3g} is {ratio / THICKEST_SHELL:.2g} times the thickest ({THICKEST_SHELL:g}) for which the "
             f"{theory} theory is meant: use the solid theory.",
-            TheoryRangeWarning, stacklevel=3,
+            TheoryRangeWarning,
+            stacklevel=3,
         )
     thinnest = min(value for _, value in resonator.thickness) / resonator.size
     if theory != "rayleigh" and thinnest < THINNEST:
         warnings.warn(
             f"h/R = {thinnest:.3g} is {THINNEST / thinnest:.2g} times thinner than double precision resolves ({THINNEST:g}).",
-            TheoryRangeWarning, stacklevel=3,
+            TheoryRangeWarning,
+            stacklevel=3,
         )
 
 
@@ -288,11 +314,17 @@ def _rayleigh(resonator: Resonator, elastic: Elastic | VaryingElastic, n: int, c
     dome = resonator.segments[0]
     thicknesses = {value for _, value in resonator.thickness}
     if len(resonator.segments) != 1 or not isinstance(dome, Arc) or dome.center != (0.0, 0.0) or len(thicknesses) != 1:
-        raise ShellError("Rayleigh's closed form holds for a hemisphere of constant thickness: use theory solid or shell.")
+        raise ShellError(
+            "Rayleigh's closed form holds for a hemisphere of constant thickness: use theory solid or shell."
+        )
     if resonator.support != "free" or n < 2 or count != 1 or not isinstance(elastic, Elastic):
-        raise ShellError("Rayleigh's closed form is one mode for each n >= 2 of a free shell of one material: use theory solid or shell.")
+        raise ShellError(
+            "Rayleigh's closed form is one mode for each n >= 2 of a free shell of one material: use theory solid or shell."
+        )
     h = thicknesses.pop()
-    f = float(rayleigh_frequency(n, elastic.E, elastic.nu, elastic.rho, h, dome.radius, dome.first_angle, dome.last_angle))
+    f = float(
+        rayleigh_frequency(n, elastic.E, elastic.nu, elastic.rho, h, dome.radius, dome.first_angle, dome.last_angle)
+    )
     (bent,) = solve_modes(resonator, elastic, n, theory="shell")
     bryan = rayleigh_bryan_factor(n, dome.first_angle, dome.last_angle)
     return (Mode(n, 0, f, "rayleigh", abs(f / bent.frequency - 1), bryan),)

@@ -38,16 +38,26 @@ class Patch:
         corners = {(0, 0): self.bottom(zero), (1, 0): self.bottom(one), (0, 1): self.top(zero), (1, 1): self.top(one)}
         bottom, top, left, right = self.bottom(x), self.top(x), self.left(y), self.right(y)
         r, z = (
-            (1 - y) * bottom[k] + y * top[k] + (1 - x) * left[k] + x * right[k]
-            - (1 - x) * (1 - y) * corners[0, 0][k] - x * (1 - y) * corners[1, 0][k]
-            - (1 - x) * y * corners[0, 1][k] - x * y * corners[1, 1][k]
+            (1 - y) * bottom[k]
+            + y * top[k]
+            + (1 - x) * left[k]
+            + x * right[k]
+            - (1 - x) * (1 - y) * corners[0, 0][k]
+            - x * (1 - y) * corners[1, 0][k]
+            - (1 - x) * y * corners[0, 1][k]
+            - x * y * corners[1, 1][k]
             for k in (0, 1)
         )
         return r, z
 
     def place_cell(self, cell: Cell, xi: Array, eta: Array) -> Planar:
         """Points of one cell at ξ, η in [-1, 1]."""
-        weights = [(1 - xi) * (1 - eta) / 4, (1 + xi) * (1 - eta) / 4, (1 - xi) * (1 + eta) / 4, (1 + xi) * (1 + eta) / 4]
+        weights = [
+            (1 - xi) * (1 - eta) / 4,
+            (1 + xi) * (1 - eta) / 4,
+            (1 - xi) * (1 + eta) / 4,
+            (1 + xi) * (1 + eta) / 4,
+        ]
         x, y = (sum(weight * point[k] for weight, point in zip(weights, cell, strict=True)) for k in (0, 1))
         return self.place(np.asarray(x), np.asarray(y))
 
@@ -61,7 +71,8 @@ def layers(steps: tuple[float, ...], cuts: tuple[float, ...] = (1.0,)) -> tuple[
     """Cells between the falling steps 1, ..., > 0 of x, and the last down to 0; `cuts` does the same for y."""
     return tuple(
         ((inner, low), (outer, low), (inner, high), (outer, high))
-        for outer, inner in pairwise((*steps, 0.0)) for high, low in pairwise((*cuts, 0.0))
+        for outer, inner in pairwise((*steps, 0.0))
+        for high, low in pairwise((*cuts, 0.0))
     )
 
 

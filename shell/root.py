@@ -51,7 +51,9 @@ def lay_root(resonator: Resonator, ring_count: int) -> tuple[Solid, float]:
     widest = max(contact.s for contact in contacts)
     collar = widest + COLLAR * h + min(stem.fillet, h)
     if collar > widest + 0.5 * (resonator.length - widest):
-        raise ShellError("the stem leaves no room for the shell: make the stem or its fillet smaller, or the shell thinner.")
+        raise ShellError(
+            "the stem leaves no room for the shell: make the stem or its fillet smaller, or the shell thinner."
+        )
     radii = _columns(stem.radius, min(0.5 * stem.radius, 2 * h + stem.fillet))
     patches: list[Patch] = []
     for contact in contacts:
@@ -79,14 +81,24 @@ def _touch(resonator: Resonator, stem: Stem, face: int, end: float) -> Contact:
     beyond = np.flatnonzero([center(float(s))[0] > reach for s in trial])
     if not len(beyond):
         raise ShellError("the stem with its fillet is larger than the dome it stands on.")
-    s = float(brentq(lambda x: center(float(x))[0] - reach, trial[beyond[0] - 1], trial[beyond[0]], xtol=1e-15 * dome, rtol=1e-15))
+    s = float(
+        brentq(
+            lambda x: center(float(x))[0] - reach, trial[beyond[0] - 1], trial[beyond[0]], xtol=1e-15 * dome, rtol=1e-15
+        )
+    )
     middle = center(s)
     on_dome = tuple(float(x[0]) for x in _offset(resonator, face)(np.array([s])))
     return Contact(face, end, s, middle, (on_dome[0], on_dome[1]), (stem.radius, middle[1]))
 
 
 def _half_root(
-    resonator: Resonator, stem: Stem, contact: Contact, far: float, s_far: float, collar: float, radii: list[float],
+    resonator: Resonator,
+    stem: Stem,
+    contact: Contact,
+    far: float,
+    s_far: float,
+    collar: float,
+    radii: list[float],
     ring_count: int,
 ) -> list[Patch]:
     """The patches between one face of the dome and `far` (η of the opposite face, or 0: the middle surface)."""
@@ -101,22 +113,38 @@ def _half_root(
     rim_near, rim_far = _point(near_face, collar), _point(far_face, collar)
     cross, roof = straight(contact.on_dome, corner), _along(far_face, s_far, above[0])
     patches = [
-        Patch(cross, straight(rim_near, rim_far), _along(near_face, contact.s, collar), _along(far_face, s_far, collar),
-              rings(steps), "root"),
+        Patch(
+            cross,
+            straight(rim_near, rim_far),
+            _along(near_face, contact.s, collar),
+            _along(far_face, s_far, collar),
+            rings(steps),
+            "root",
+        ),
     ]
     for (r_out, s_out), (r_in, s_in) in pairwise(zip(radii[1:], above, strict=True)):
         left, right = (straight((r, level), _point(far_face, s)) for r, s in ((r_in, s_in), (r_out, s_out)))
         floor = straight((r_in, level), (r_out, level))
         patches.append(Patch(floor, _along(far_face, s_in, s_out), left, right, whole(), "root"))
     if stem.fillet:
-        patches += _fillet(contact, stem.fillet, cross, roof, straight(foot, under), straight(under, over), corner, over, steps)
+        patches += _fillet(
+            contact, stem.fillet, cross, roof, straight(foot, under), straight(under, over), corner, over, steps
+        )
     else:
         patches.append(Patch(cross, straight(under, over), straight(foot, under), roof, rings(steps), "root"))
     return patches + _stem(radii, level, contact.end, steps, ring_count)
 
 
 def _fillet(
-    contact: Contact, radius: float, cross: Path, roof: Path, floor: Path, wall: Path, corner: Spot, over: Spot, steps: tuple[float, ...]
+    contact: Contact,
+    radius: float,
+    cross: Path,
+    roof: Path,
+    floor: Path,
+    wall: Path,
+    corner: Spot,
+    over: Spot,
+    steps: tuple[float, ...],
 ) -> list[Patch]:
     """Two patches that meet on the line from the middle of the fillet to X."""
     (r, z), on_dome, on_stem = contact.center, contact.on_dome, contact.on_stem
@@ -165,8 +193,14 @@ def _stem(radii: list[float], top: float, end: float, steps: tuple[float, ...], 
 
 def _rectangle(corner: Spot, opposite: Spot, cells: tuple) -> Patch:  # type: ignore[type-arg]
     (r0, z0), (r1, z1) = corner, opposite
-    return Patch(straight((r0, z0), (r1, z0)), straight((r0, z1), (r1, z1)), straight((r0, z0), (r0, z1)),
-                 straight((r1, z0), (r1, z1)), cells, "stem")
+    return Patch(
+        straight((r0, z0), (r1, z0)),
+        straight((r0, z1), (r1, z1)),
+        straight((r0, z0), (r0, z1)),
+        straight((r1, z0), (r1, z1)),
+        cells,
+        "stem",
+    )
 
 
 def _steps(fillet: float, reach: float, ring_count: int) -> tuple[float, ...]:

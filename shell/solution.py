@@ -97,7 +97,10 @@ class Solution:
     def squares(self) -> list[tuple[Array, Array]]:
         """∫ (ε_1 + ε_2 + ε_3)² and ∫ Σ g_c ε_c² over the points of every station: what λ and G multiply."""
         return [
-            (_integrate(e[:, :, :3].sum(axis=2) ** 2, group), _integrate(np.einsum("c,eicj->eij", energy_weights(group.table), e**2), group))
+            (
+                _integrate(e[:, :, :3].sum(axis=2) ** 2, group),
+                _integrate(np.einsum("c,eicj->eij", energy_weights(group.table), e**2), group),
+            )
             for group, e in zip(self.system.groups, self.strain, strict=True)
         ]
 
@@ -105,7 +108,8 @@ class Solution:
     def elastic(self) -> list[Array]:
         """Twice the strain energy of every station, a sum of squares and so free of cancellation."""
         return [
-            c.lame[0] * trace + c.lame[1] * shear for c, (trace, shear) in zip(self.constants, self.squares, strict=True)
+            c.lame[0] * trace + c.lame[1] * shear
+            for c, (trace, shear) in zip(self.constants, self.squares, strict=True)
         ]
 
     @cached_property
@@ -144,7 +148,9 @@ class Solution:
             self.system.groups, self.constants, self.strain, self.elastic, self.kinetic, strict=True
         ):
             if isinstance(group.place, ShellPart):
-                shear = total([c.lame[1] * group.table.transverse_shear * _integrate(e[:, :, 4] ** 2 + e[:, :, 5] ** 2, group)])
+                shear = total(
+                    [c.lame[1] * group.table.transverse_shear * _integrate(e[:, :, 4] ** 2 + e[:, :, 5] ** 2, group)]
+                )
                 membrane = _membrane(group, c, e)
                 found["shear"] += shear
                 found["membrane"] += membrane
@@ -170,9 +176,15 @@ class Solution:
                 thickness = _surface_density(self.system, group, c, q, self.eigenvalue) / (2 * U)
                 columns = [group.table.position, width, elastic / U, kinetic / T, nu / (2 * U), thickness]
             else:
-                columns = [group.table.position[:1, :1], np.zeros(1), *(
-                    np.array([np.sum(values) / scale]) for values, scale in ((elastic, U), (kinetic, T), (nu, 2 * U))
-                ), np.zeros(1)]
+                columns = [
+                    group.table.position[:1, :1],
+                    np.zeros(1),
+                    *(
+                        np.array([np.sum(values) / scale])
+                        for values, scale in ((elastic, U), (kinetic, T), (nu, 2 * U))
+                    ),
+                    np.zeros(1),
+                ]
             rows.append([np.ravel(column) for column in columns])
         table = np.concatenate([np.array(columns) for columns in rows], axis=1)
         table[1] /= table[1].sum()

@@ -120,7 +120,9 @@ def study_bias(
             held_out, why = None, str(error)
         judged.append(Judged(name, fit, _training(runs, fit), held_out, _score_path(runs, fit)))
     fit = next(j.fit for j in judged if j.method == method)
-    model = save_bias(fit, runs[0], output, tuple(source_of(r) for r in records), f"hrg fit bias --method {method}")
+    model = save_bias(
+        fit, runs[0], output, tuple(source_of(r) for r in records), f"hrg-workbench, hrg fit bias --method {method}"
+    )
     progress("Allan deviation before and after")
     longest = max(records, key=len)
     after = compensate(model, longest, extrapolate=True)[f"{COMPENSATED}{output}"]

@@ -135,9 +135,7 @@ class Problem:
     def _difference(self, parameters: Array, k: int, step: float, runs: Sequence[int]) -> Array:
         unit = np.zeros_like(parameters)
         unit[k] = step
-        up, down = (
-            np.concatenate([self._model_run(parameters + sign * unit, i) for i in runs]) for sign in (1, -1)
-        )
+        up, down = (np.concatenate([self._model_run(parameters + sign * unit, i) for i in runs]) for sign in (1, -1))
         difference: Array = (up - down) / (2 * step)
         return difference
 

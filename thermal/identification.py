@@ -99,9 +99,7 @@ class Identification:
     solution: Solution = field(repr=False)
 
 
-def identify(
-    runs: Sequence[Run], follower: Follower, law: FrequencyLaw, confidence: float = 0.9
-) -> Identification:
+def identify(runs: Sequence[Run], follower: Follower, law: FrequencyLaw, confidence: float = 0.9) -> Identification:
     """Fit the follower's constants and the unknown coefficients of the law to one run or several.
 
     Raises
@@ -189,8 +187,10 @@ def _best_start(
         problem = Problem(even, follower, law.reference_temperature, (law.slope, law.curvature, law.cubic))
         solution = solve(problem, problem.guess(), problem.first_noise())
         values = problem.constants(solution.parameters)
-        fitted = [float(np.clip(values[f"time_constant_{j}"], *np.array([1.01, 0.99]) * [shortest, longest]))
-                  for j in range(1, count + 1)]
+        fitted = [
+            float(np.clip(values[f"time_constant_{j}"], *np.array([1.01, 0.99]) * [shortest, longest]))
+            for j in range(1, count + 1)
+        ]
         trials.append((solution.cost, make(*fitted, shortest=shortest, longest=longest)))
     return min(trials, key=lambda trial: trial[0])[1]
 

@@ -71,9 +71,7 @@ def cut_meridian(length: float, radius: Along, thickness: Along, count: int) -> 
         middle=middle,
         area=_integrate(lambda s: 2 * np.pi * radius(s), edge[:-1], edge[1:]),
         volume=_integrate(section, edge[:-1], edge[1:]),
-        shape_resistance=_integrate(
-            lambda s: 1 / section(s), np.concatenate([edge[:1], middle[:-1]]), middle
-        ),
+        shape_resistance=_integrate(lambda s: 1 / section(s), np.concatenate([edge[:1], middle[:-1]]), middle),
     )
 
 
@@ -84,9 +82,7 @@ def cut_meridian_table(s: ArrayLike, radius: ArrayLike, thickness: ArrayLike, co
         raise ThermalError("the arc length of a meridian must start at 0 and increase.")
     if s.shape != radius.shape or s.shape != thickness.shape:
         raise ThermalError("arc length, radius and thickness of a meridian need the same number of rows.")
-    return cut_meridian(
-        float(s[-1]), lambda x: np.interp(x, s, radius), lambda x: np.interp(x, s, thickness), count
-    )
+    return cut_meridian(float(s[-1]), lambda x: np.interp(x, s, radius), lambda x: np.interp(x, s, thickness), count)
 
 
 def lump(cells: MeridianCells) -> MeridianCells:
@@ -133,8 +129,7 @@ def describe_meridian(
     """
     names = cell_names(cells.count)
     parts: list[Part] = [
-        Node(name, scale(volumetric_capacity, float(volume)))
-        for name, volume in zip(names, cells.volume, strict=True)
+        Node(name, scale(volumetric_capacity, float(volume))) for name, volume in zip(names, cells.volume, strict=True)
     ]
     resistance = cells.shape_resistance / conductivity
     resistance[0] += root_resistance
@@ -142,8 +137,7 @@ def describe_meridian(
     parts += [Conductor(one, other, 1 / float(R)) for one, other, R in ends]
     if exchange:
         parts += [
-            Radiator(name, surroundings, exchange * float(area))
-            for name, area in zip(names, cells.area, strict=True)
+            Radiator(name, surroundings, exchange * float(area)) for name, area in zip(names, cells.area, strict=True)
         ]
     return parts
 

@@ -36,9 +36,7 @@ class Node:
         value = float(self.capacity(temperature)) if callable(self.capacity) else float(self.capacity)
         if not (math.isfinite(value) and value > 0):
             where = f" (at {temperature:.1f} K)" if callable(self.capacity) else ""
-            raise ThermalError(
-                f"the heat capacity of node '{self.name}' must be positive, not {value:g} J/K{where}."
-            )
+            raise ThermalError(f"the heat capacity of node '{self.name}' must be positive, not {value:g} J/K{where}.")
         return value
 
 
@@ -228,9 +226,7 @@ def _check_names(network: Network) -> None:
         for end in (part.one, part.other):
             if end not in names:
                 kind = type(part).__name__.lower()
-                raise ThermalError(
-                    f"the {kind} '{part.name}' ends at '{end}', which is no node{_nearest(end, names)}"
-                )
+                raise ThermalError(f"the {kind} '{part.name}' ends at '{end}', which is no node{_nearest(end, names)}")
         if part.one == part.other:
             raise ThermalError(f"the link '{part.name}' joins a node to itself.")
     inner = [node.name for node in network.nodes]

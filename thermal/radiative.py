@@ -21,9 +21,7 @@ LONGEST_ROW = 60.0  # s, between which what radiation adds is a parabola
 MOST_RESTARTS = 200  # with more corners in its profiles than this, the integrator restarts at jumps only
 
 
-def simulate(
-    network: Network, boundaries: Mapping[str, Profile], initial: ArrayLike | None = None
-) -> Transient:
+def simulate(network: Network, boundaries: Mapping[str, Profile], initial: ArrayLike | None = None) -> Transient:
     """Propagate exactly where the network is linear, else sweep measured profiles and integrate those of few corners."""
     if network.is_linear:
         return propagate(network, boundaries, initial)
@@ -76,8 +74,15 @@ def integrate(
             return matrix
 
         solution = solve_ivp(
-            rate, (start, end), T, method="Radau", jac=jacobian, dense_output=True,
-            rtol=relative_tolerance, atol=1e-3 * relative_tolerance, max_step=longest,
+            rate,
+            (start, end),
+            T,
+            method="Radau",
+            jac=jacobian,
+            dense_output=True,
+            rtol=relative_tolerance,
+            atol=1e-3 * relative_tolerance,
+            max_step=longest,
         )
         if not solution.success:
             raise ThermalError(f"the integration stopped at {solution.t[-1]:g} s: {solution.message}")
@@ -94,9 +99,7 @@ def integrate(
     return Transient(tuple(node.name for node in network.nodes), np.concatenate(times), evaluate)
 
 
-def sweep(
-    network: Network, boundaries: Mapping[str, Profile], initial: ArrayLike | None = None
-) -> Transient:
+def sweep(network: Network, boundaries: Mapping[str, Profile], initial: ArrayLike | None = None) -> Transient:
     """Follow profiles of many rows through a network with radiation, by waveform relaxation.
 
     What departs from the linearised network, (q − L T − σ R T⁴) C₀/C(T) minus its linear part, is taken from the

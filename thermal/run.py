@@ -132,5 +132,3 @@ def _describe_holes(places: Rows, time: Array, what: str, mend: str) -> Sequence
         f"the {what} has {holes.size} hole(s), the longest of {widths[k]:.6g} s after "
         f"{time[places[holes[k]]]:.6g} s; {mend}.",
     )
-
-

@@ -14,9 +14,7 @@ from thermal.radiative import simulate
 DECADES = (-6.0, 3.0)  # search range of a conductance, log10 of W/K
 
 
-def step_remaining(
-    network: Network, before: float, after: float, weights: Array, time: ArrayLike
-) -> Array:
+def step_remaining(network: Network, before: float, after: float, weights: Array, time: ArrayLike) -> Array:
     """Share of a step of all boundaries from `before` to `after` (K) that a mean temperature still lacks.
 
     Parameters

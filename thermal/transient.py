@@ -69,9 +69,7 @@ class Transient:
         return sums
 
 
-def propagate(
-    network: Network, boundaries: Mapping[str, Profile], initial: ArrayLike | None = None
-) -> Transient:
+def propagate(network: Network, boundaries: Mapping[str, Profile], initial: ArrayLike | None = None) -> Transient:
     """Propagate a linear network exactly through piecewise linear boundaries and powers.
 
     In modal coordinates x = shapesᵀ C T every mode obeys dx/dt = −λ x + u, u linear between the corners of the

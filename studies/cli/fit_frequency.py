@@ -49,7 +49,7 @@ def fit_frequency(
         from studies.models.kinds.frequency import save_frequency
 
         source = Source(Path(table).name, data.sha256, len(f))
-        write_model(save_frequency(study.fit, (source,), "hrg fit frequency"), save)
+        write_model(save_frequency(study.fit, (source,), "hrg-workbench, hrg fit frequency"), save)
         say(f"model: {save}")
     if report is not None:
         write_text(report, page.frequency_page(study, table))

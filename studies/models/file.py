@@ -3,7 +3,7 @@
     schema = "hrg.model/1"
     kind = "bias"                       # the module of studies.models that applies it
     compensates = "bias_deg_per_h"      # the column of a record that gets a compensated copy
-    made_by = "hrg-workbench 0.1.0, hrg fit bias"
+    made_by = "hrg-workbench, hrg fit bias --method guarded"
 
     [settings]                          # what the formula needs beside coefficients: numbers, texts, lists of numbers
     reference_frequency_Hz = 4432.07

@@ -42,8 +42,10 @@ def reproduce_gyro_papers(seeds: int = 20) -> "tuple[list[Chapter], dict[str, An
 
 
 def _summarise_damping(twin: "CrossDampingTwin") -> dict[str, Any]:
+    from studies.papers.cvg_cross_damping import PRINTED_IMPROVEMENT
+
     return {
-        "improvement_printed": 8.0,
+        "improvement_printed": PRINTED_IMPROVEMENT,
         "improvement_training": twin.study.training.ratio,
         "improvement_held_out": twin.improvement.ratio,
         "improvement_over_seeds_5_50_95": twin.spread,

@@ -67,9 +67,7 @@ def read_noise(table: Mapping[str, Any], where: str) -> dict[str, float]:
 
 def frequency_noise(levels: Mapping[str, float]) -> NoiseLevels:
     """Noise of the frequency, Hz."""
-    return NoiseLevels(
-        levels["frequency_white_Hz"], levels["frequency_flicker_Hz"], levels["frequency_walk_Hz"]
-    )
+    return NoiseLevels(levels["frequency_white_Hz"], levels["frequency_flicker_Hz"], levels["frequency_walk_Hz"])
 
 
 def bias_noise(levels: Mapping[str, float]) -> NoiseLevels:

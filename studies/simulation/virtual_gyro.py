@@ -162,14 +162,18 @@ def _respond(instrument: "Instrument", transient: Transient, model: FrequencyMod
     loss = read_loss(instrument.table("loss"), f"{instrument.path} [loss]")
     inverse_q = loss.at(resonator - reference) + changes.get("inverse_q", 0.0)
     if not (inverse_q > 0).all():
-        raise InputError(f"{instrument.path} [loss]: 1/Q becomes negative in this profile; correct its slope or curvature.")
+        raise InputError(
+            f"{instrument.path} [loss]: 1/Q becomes negative in this profile; correct its slope or curvature."
+        )
     change = frequency - float(model.frequency(np.array([reference]))[0])
     bias_model = read_bias(instrument.table("bias"), f"{instrument.path} [bias]")
     bias = bias_model.at(change, np.gradient(change, time[1] - time[0]), frequency, inverse_q, model.bryan_factor)
     return _Noiseless(time, housing, resonator, frequency, bias + changes.get("bias_deg_per_h", 0.0), inverse_q)
 
 
-def _observe(true: _Noiseless, levels: Mapping[str, float], rate: float, generator: np.random.Generator) -> dict[str, Array]:
+def _observe(
+    true: _Noiseless, levels: Mapping[str, float], rate: float, generator: np.random.Generator
+) -> dict[str, Array]:
     """Return the columns as they are read: sensor lag, noise, rounding. The resonator's temperature stays true."""
     count = len(true.time)
     sensed = lag(true.time, true.housing, levels["housing_lag_s"]) if levels["housing_lag_s"] > 0 else true.housing
@@ -197,8 +201,13 @@ def _apply_effects(
 
     reference = instrument.reference_temperature
     states = States(
-        run=0, time=time - time[0], campaign_time=time - time[0], housing=housing, resonator=resonator,
-        tau=slowest_lag(instrument), reference=reference,
+        run=0,
+        time=time - time[0],
+        campaign_time=time - time[0],
+        housing=housing,
+        resonator=resonator,
+        tau=slowest_lag(instrument),
+        reference=reference,
     )
     changes: dict[str, Array] = {}
     for number, effect in enumerate(instrument.effects, 1):

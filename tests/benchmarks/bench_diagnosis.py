@@ -56,12 +56,25 @@ def run_case(kind, count, seed, held_out=True):
     begin = time.perf_counter()
     found = investigate(load_campaign(records), effects=chosen, held_out=held_out).verdict
     return {
-        "kind": kind, "design": design, "family": family, "truth": hidden, "alien": alien, "snr": snr, "seed": seed,
-        "count": count, "raw": effects, "channel": truth.channel, "seconds": time.perf_counter() - begin, "verdict": found.verdict,
+        "kind": kind,
+        "design": design,
+        "family": family,
+        "truth": hidden,
+        "alien": alien,
+        "snr": snr,
+        "seed": seed,
+        "count": count,
+        "raw": effects,
+        "channel": truth.channel,
+        "seconds": time.perf_counter() - begin,
+        "verdict": found.verdict,
         "causes": [[c.effect, list(c.equivalent), c.response, c.probability, c.evidence] for c in found.causes],
-        "responses": {k: [r.verdict, r.noise, r.baseline, r.extended, r.left_over_input, r.left_over_evidence]
-                      for k, r in found.responses.items()},
-        "noise": truth.noise, "size": {k: v.get("size") for k, v in truth.parameters.items()},
+        "responses": {
+            k: [r.verdict, r.noise, r.baseline, r.extended, r.left_over_input, r.left_over_evidence]
+            for k, r in found.responses.items()
+        },
+        "noise": truth.noise,
+        "size": {k: v.get("size") for k, v in truth.parameters.items()},
     }
 
 
@@ -86,10 +99,12 @@ def summarise(cases):
     singles = [c for c in cases if c["kind"] == "effect"]
     for snr in (3.0, 1.0, 0.3):
         mine = [c for c in singles if c["snr"] == snr]
-        lines.append(f"- SNR {snr:g}: {rate(sum(first_right(c) for c in mine), len(mine))}; "
-                     f"nothing named {rate(sum(not c['causes'] for c in mine), len(mine))}; "
-                     f"unexplained {rate(sum(c['verdict'] == 'unexplained' for c in mine), len(mine))}; "
-                     f"more than one cause {rate(sum(len(c['causes']) > 1 for c in mine), len(mine))}")
+        lines.append(
+            f"- SNR {snr:g}: {rate(sum(first_right(c) for c in mine), len(mine))}; "
+            f"nothing named {rate(sum(not c['causes'] for c in mine), len(mine))}; "
+            f"unexplained {rate(sum(c['verdict'] == 'unexplained' for c in mine), len(mine))}; "
+            f"more than one cause {rate(sum(len(c['causes']) > 1 for c in mine), len(mine))}"
+        )
     lines += ["", "| effect | SNR 3 | 1 | 0.3 | mistaken for (SNR 1 and 3) |", "| --- | --- | --- | --- | --- |"]
     for name in sorted({c["truth"][0] for c in singles}):
         row = []
@@ -99,41 +114,68 @@ def summarise(cases):
         wrong = {}
         for c in singles:
             if c["truth"][0] == name and c["snr"] >= 1 and not first_right(c):
-                said = c["causes"][0][0] if c["causes"] else ("unexplained" if c["verdict"] == "unexplained" else "nothing")
+                said = (
+                    c["causes"][0][0]
+                    if c["causes"]
+                    else ("unexplained" if c["verdict"] == "unexplained" else "nothing")
+                )
                 wrong[said] = wrong.get(said, 0) + 1
         lines.append(f"| {name} | {' | '.join(row)} | {', '.join(f'{k} {v}' for k, v in sorted(wrong.items()))} |")
     lines += ["", "## Held-out residual over the noise (right name)", ""]
     for snr in (3.0, 1.0, 0.3):
         ratios = [r for c in singles if c["snr"] == snr and first_right(c) and (r := floor_ratio(c)) is not None]
         if ratios:
-            lines.append(f"- SNR {snr:g}: median {np.median(ratios):.3f}, within 10 % {rate(int(sum(r < 1.1 for r in ratios)), len(ratios))}, "
-                         f"within 5 % {rate(int(sum(r < 1.05 for r in ratios)), len(ratios))}")
+            lines.append(
+                f"- SNR {snr:g}: median {np.median(ratios):.3f}, within 10 % {rate(int(sum(r < 1.1 for r in ratios)), len(ratios))}, "
+                f"within 5 % {rate(int(sum(r < 1.05 for r in ratios)), len(ratios))}"
+            )
     lines += ["", "## Aliens at SNR 3", ""]
     for kind in ("alien", "without"):
         mine = [c for c in cases if c["kind"] == kind]
-        lines.append(f"- {kind}: unexplained {rate(sum(c['verdict'] == 'unexplained' for c in mine), len(mine))}; "
-                     f"wrong name alone {rate(sum(bool(c['causes']) and c['verdict'] != 'unexplained' for c in mine), len(mine))}")
+        lines.append(
+            f"- {kind}: unexplained {rate(sum(c['verdict'] == 'unexplained' for c in mine), len(mine))}; "
+            f"wrong name alone {rate(sum(bool(c['causes']) and c['verdict'] != 'unexplained' for c in mine), len(mine))}"
+        )
         for name in sorted({c["alien"] or c["truth"][0] for c in mine}):
             of = [c for c in mine if (c["alien"] or c["truth"][0]) == name]
             said = {}
             for c in of:
-                word = "unexplained" if c["verdict"] == "unexplained" else (c["causes"][0][0] if c["causes"] else "nothing")
+                word = (
+                    "unexplained"
+                    if c["verdict"] == "unexplained"
+                    else (c["causes"][0][0] if c["causes"] else "nothing")
+                )
                 said[word] = said.get(word, 0) + 1
             lines.append(f"  - {name}: {', '.join(f'{k} {v}' for k, v in sorted(said.items()))}")
     pairs = [c for c in cases if c["kind"] == "pair"]
-    lines += ["", "## Two effects at SNR 3", "", f"- exact set: {rate(sum(map(exact_set, pairs)), len(pairs))}; "
-              f"both found: {rate(sum(all(any(t in [x[0], *x[1]] for x in c['causes']) for t in c['truth']) for c in pairs), len(pairs))}"]
+    lines += [
+        "",
+        "## Two effects at SNR 3",
+        "",
+        f"- exact set: {rate(sum(map(exact_set, pairs)), len(pairs))}; "
+        f"both found: {rate(sum(all(any(t in [x[0], *x[1]] for x in c['causes']) for t in c['truth']) for c in pairs), len(pairs))}",
+    ]
     lines += ["", "## Reliability of the stated probability", ""]
-    claims = [(x[3], any(t in [x[0], *x[1]] for t in c["truth"])) for c in cases if c["kind"] in ("effect", "pair", "null", "alien") for x in c["causes"]]
+    claims = [
+        (x[3], any(t in [x[0], *x[1]] for t in c["truth"]))
+        for c in cases
+        if c["kind"] in ("effect", "pair", "null", "alien")
+        for x in c["causes"]
+    ]
     error = 0.0
     for low, high in itertools.pairwise([0.0, 0.3, 0.6, 0.8, 0.9, 0.96, 1.001]):
         inside = [hit for p, hit in claims if low <= p < high]
         mean = np.mean([p for p, _ in claims if low <= p < high]) if inside else 0.0
         if inside:
             error += len(inside) / len(claims) * abs(mean - np.mean(inside))
-            lines.append(f"- claimed {low:.2f}-{min(high, 1):.2f}: mean {mean:.3f}, right {rate(int(sum(inside)), len(inside))}")
-    lines += [f"- calibration error {error:.3f} on {len(claims)} claims", "",
-              f"Median time {np.median([c['seconds'] for c in cases]):.2f} s, longest {max(c['seconds'] for c in cases):.2f} s."]
+            lines.append(
+                f"- claimed {low:.2f}-{min(high, 1):.2f}: mean {mean:.3f}, right {rate(int(sum(inside)), len(inside))}"
+            )
+    lines += [
+        f"- calibration error {error:.3f} on {len(claims)} claims",
+        "",
+        f"Median time {np.median([c['seconds'] for c in cases]):.2f} s, longest {max(c['seconds'] for c in cases):.2f} s.",
+    ]
     return "\n".join(lines) + "\n"
 
 

@@ -38,12 +38,23 @@ def main() -> None:
         write_long_record(path)
     print(f"{path}: {path.stat().st_size / 1e6:.0f} MB, {ROWS:,} rows")
     begin = time.perf_counter()
-    command = [sys.executable, "-c", "from studies.cli import run; run()", "fit", "bias", str(path), "--save", str(folder / "m.toml")]
+    command = [
+        sys.executable,
+        "-c",
+        "from studies.cli import run; run()",
+        "fit",
+        "bias",
+        str(path),
+        "--save",
+        str(folder / "m.toml"),
+    ]
     subprocess.run(command, check=True)
     elapsed = time.perf_counter() - begin
     usage = resource.getrusage(resource.RUSAGE_CHILDREN)
     busy = usage.ru_utime + usage.ru_stime
-    print(f"hrg fit bias: {elapsed:.1f} s (goal 15), {busy:.1f} s of processor, {usage.ru_maxrss / 1e6:.2f} GB (goal 2)")
+    print(
+        f"hrg fit bias: {elapsed:.1f} s (goal 15), {busy:.1f} s of processor, {usage.ru_maxrss / 1e6:.2f} GB (goal 2)"
+    )
 
 
 if __name__ == "__main__":

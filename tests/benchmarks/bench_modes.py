@@ -42,7 +42,9 @@ def main() -> None:
             (mode,) = solve_modes(resonator, SILICA, theory=theory)  # type: ignore[arg-type]
             cached = fastest(lambda r=resonator, t=theory: solve_modes(r, SILICA, theory=t), 10)  # type: ignore[misc]
             fresh = fastest(lambda r=resonator, t=theory: cold(r, t), 5)  # type: ignore[misc]
-            print(f"{name:18}{theory:8}{mode.frequency:14.4f}{mode.relative_error_estimate:10.1e}{cached:11.2f}{fresh:9.1f}")
+            print(
+                f"{name:18}{theory:8}{mode.frequency:14.4f}{mode.relative_error_estimate:10.1e}{cached:11.2f}{fresh:9.1f}"
+            )
 
 
 if __name__ == "__main__":

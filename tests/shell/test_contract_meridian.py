@@ -72,7 +72,9 @@ def test_cup_has_its_faces_where_the_card_says() -> None:
 
 
 def test_scaling_scales_every_length() -> None:
-    resonator = hemisphere(15e-3, [(0, 1e-3), (1, 0.5e-3)], support="stem", stem=Stem(2.5e-3, (-5e-3, 20e-3), 0.5e-3, "both"))
+    resonator = hemisphere(
+        15e-3, [(0, 1e-3), (1, 0.5e-3)], support="stem", stem=Stem(2.5e-3, (-5e-3, 20e-3), 0.5e-3, "both")
+    )
     twice = resonator.scaled(2.0)
     assert (twice.length, twice.size) == pytest.approx((2 * resonator.length, 2 * resonator.size))
     assert twice.stem == Stem(5e-3, (-10e-3, 40e-3), 1e-3, "both")
@@ -95,39 +97,45 @@ def stemmed(**stem: object) -> Resonator:
     return hemisphere(15e-3, 0.9e-3, support="stem", stem=Stem(**stem))  # type: ignore[arg-type]
 
 
-@pytest.mark.parametrize(("build", "message"), [
-    (lambda: hemisphere(-1.0, 1e-3), "radius must be positive"),
-    (lambda: hemisphere(15e-3, 0.0), "thickness must be positive"),
-    (lambda: hemisphere(15e-3, [(0, 1e-3), (1, -1e-3)]), "thickness must be positive"),
-    (lambda: hemisphere(15e-3, [(0, 1e-3), (0.9, 1e-3)]), "rise from 0"),
-    (lambda: hemisphere(15e-3, [(0, 1e-3), (0.5, 1e-3), (0.5, 2e-3), (1, 2e-3)]), "none of them twice"),
-    (lambda: hemisphere(15e-3, 35e-3), "overlap"),
-    (lambda: hemisphere(15e-3, 1e-3, rim_angle=0.2, pole_angle=0.3), "pole angle < rim angle"),
-    (lambda: hemisphere(15e-3, 1e-3, support="glued"), "support is one of"),
-    (lambda: hemisphere(15e-3, 1e-3, support="clamped-pole"), "no edge to clamp"),
-    (lambda: hemisphere(15e-3, 1e-3, rim_angle=pi, support="clamped-rim"), "no rim"),
-    (lambda: hemisphere(15e-3, 1e-3, support="stem"), "needs a stem"),
-    (lambda: hemisphere(15e-3, 1e-3, pole_angle=0.2, support="stem", stem=Stem(2e-3, -5e-3)), "closed pole"),
-    (lambda: stemmed(radius=14.9e-3, ends=-5e-3), "larger than the dome"),
-    (lambda: stemmed(radius=2.5e-3, ends=14.2e-3), "not clear of its root"),
-    (lambda: stemmed(radius=2.5e-3, ends=-5e-3, side="outer"), "not clear of its root"),
-    (lambda: stemmed(radius=0.05e-3, ends=-5e-3), "times as long as its radius"),
-    (lambda: stemmed(radius=0.0, ends=-5e-3), "stem radius must be positive"),
-    (lambda: stemmed(radius=2.5e-3, ends=-5e-3, fillet=-1e-3), "fillet"),
-    (lambda: stemmed(radius=2.5e-3, ends=-5e-3, side="both"), "two ends"),
-    (lambda: stemmed(radius=2.5e-3, ends=-5e-3, side="left"), "inner, outer or both"),
-    (lambda: cylinder(12e-3, 1e-3, 20e-3, clamp_radius=3e-3), "no bottom"),
-    (lambda: cylinder(12e-3, 1e-3, 0.5e-3, bottom_thickness=1e-3), "must exceed"),
-    (lambda: cylinder(12e-3, 1e-3, 20e-3, bottom_thickness=1e-3, clamp_radius=12e-3), "within the cup"),
-    (lambda: cylinder(1e-3, 3e-3, 20e-3), "overlap"),
-    (lambda: bell(12e-3, 1e-3, 8e-3, 5e-3, 11e-3), "mouth radius"),
-    (lambda: meridian([], 1e-3), "at least one segment"),
-    (lambda: meridian([Line((1e-2, 0), (1e-2, 1e-2)), Line((1.1e-2, 1e-2), (1e-2, 2e-2))], 1e-3), "segment 2 .* starts at"),
-    (lambda: meridian([Line((0.0, 0.0), (1e-2, 1e-2))], 1e-4), "at an angle"),
-    (lambda: meridian([Line((1e-2, 0), (-1e-2, 0))], 1e-3), "crosses the axis"),
-    (lambda: Line((1.0, 2.0), (1.0, 2.0)), "no length"),
-    (lambda: Arc.through((0.0, 1.0), (2.0, 0.0), (0.0, 0.0)), "from its centre"),
-])
+@pytest.mark.parametrize(
+    ("build", "message"),
+    [
+        (lambda: hemisphere(-1.0, 1e-3), "radius must be positive"),
+        (lambda: hemisphere(15e-3, 0.0), "thickness must be positive"),
+        (lambda: hemisphere(15e-3, [(0, 1e-3), (1, -1e-3)]), "thickness must be positive"),
+        (lambda: hemisphere(15e-3, [(0, 1e-3), (0.9, 1e-3)]), "rise from 0"),
+        (lambda: hemisphere(15e-3, [(0, 1e-3), (0.5, 1e-3), (0.5, 2e-3), (1, 2e-3)]), "none of them twice"),
+        (lambda: hemisphere(15e-3, 35e-3), "overlap"),
+        (lambda: hemisphere(15e-3, 1e-3, rim_angle=0.2, pole_angle=0.3), "pole angle < rim angle"),
+        (lambda: hemisphere(15e-3, 1e-3, support="glued"), "support is one of"),
+        (lambda: hemisphere(15e-3, 1e-3, support="clamped-pole"), "no edge to clamp"),
+        (lambda: hemisphere(15e-3, 1e-3, rim_angle=pi, support="clamped-rim"), "no rim"),
+        (lambda: hemisphere(15e-3, 1e-3, support="stem"), "needs a stem"),
+        (lambda: hemisphere(15e-3, 1e-3, pole_angle=0.2, support="stem", stem=Stem(2e-3, -5e-3)), "closed pole"),
+        (lambda: stemmed(radius=14.9e-3, ends=-5e-3), "larger than the dome"),
+        (lambda: stemmed(radius=2.5e-3, ends=14.2e-3), "not clear of its root"),
+        (lambda: stemmed(radius=2.5e-3, ends=-5e-3, side="outer"), "not clear of its root"),
+        (lambda: stemmed(radius=0.05e-3, ends=-5e-3), "times as long as its radius"),
+        (lambda: stemmed(radius=0.0, ends=-5e-3), "stem radius must be positive"),
+        (lambda: stemmed(radius=2.5e-3, ends=-5e-3, fillet=-1e-3), "fillet"),
+        (lambda: stemmed(radius=2.5e-3, ends=-5e-3, side="both"), "two ends"),
+        (lambda: stemmed(radius=2.5e-3, ends=-5e-3, side="left"), "inner, outer or both"),
+        (lambda: cylinder(12e-3, 1e-3, 20e-3, clamp_radius=3e-3), "no bottom"),
+        (lambda: cylinder(12e-3, 1e-3, 0.5e-3, bottom_thickness=1e-3), "must exceed"),
+        (lambda: cylinder(12e-3, 1e-3, 20e-3, bottom_thickness=1e-3, clamp_radius=12e-3), "within the cup"),
+        (lambda: cylinder(1e-3, 3e-3, 20e-3), "overlap"),
+        (lambda: bell(12e-3, 1e-3, 8e-3, 5e-3, 11e-3), "mouth radius"),
+        (lambda: meridian([], 1e-3), "at least one segment"),
+        (
+            lambda: meridian([Line((1e-2, 0), (1e-2, 1e-2)), Line((1.1e-2, 1e-2), (1e-2, 2e-2))], 1e-3),
+            "segment 2 .* starts at",
+        ),
+        (lambda: meridian([Line((0.0, 0.0), (1e-2, 1e-2))], 1e-4), "at an angle"),
+        (lambda: meridian([Line((1e-2, 0), (-1e-2, 0))], 1e-3), "crosses the axis"),
+        (lambda: Line((1.0, 2.0), (1.0, 2.0)), "no length"),
+        (lambda: Arc.through((0.0, 1.0), (2.0, 0.0), (0.0, 0.0)), "from its centre"),
+    ],
+)
 def test_impossible_geometry_is_refused(build: object, message: str) -> None:
     with pytest.raises(ShellError, match=message):
         build()  # type: ignore[operator]

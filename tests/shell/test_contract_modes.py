@@ -50,24 +50,32 @@ def test_shares_add_up(resonator: Resonator, theory: str) -> None:
 
 
 @pytest.mark.parametrize("n", [0, 1, 2])
-@pytest.mark.parametrize("resonator", [
-    STEMMED, cylinder(12.5e-3, 0.6e-3, 18e-3, bottom_thickness=1e-3, clamp_radius=3e-3),
-    hemisphere(15e-3, 0.9e-3, support="stem", stem=Stem(2.5e-3, (-5e-3, 20e-3), side="both")),
-    hemisphere(15e-3, 0.9e-3, pole_angle=0.3, support="clamped-pole"),
-], ids=["stem", "cup", "both stems", "clamped"])
+@pytest.mark.parametrize(
+    "resonator",
+    [
+        STEMMED,
+        cylinder(12.5e-3, 0.6e-3, 18e-3, bottom_thickness=1e-3, clamp_radius=3e-3),
+        hemisphere(15e-3, 0.9e-3, support="stem", stem=Stem(2.5e-3, (-5e-3, 20e-3), side="both")),
+        hemisphere(15e-3, 0.9e-3, pole_angle=0.3, support="clamped-pole"),
+    ],
+    ids=["stem", "cup", "both stems", "clamped"],
+)
 def test_shape_is_continuous_and_vanishes_where_held(resonator: Resonator, n: int) -> None:
     """Points that several elements share have one displacement."""
     (mode,) = solve_modes(resonator, SILICA, n, tolerance=1e-3)
-    fields = np.concatenate([
-        np.array([patch.r, patch.z, patch.u_r, patch.u_theta, patch.u_z]).reshape(5, -1) for patch in mode.shape(5)
-    ], axis=1)
+    fields = np.concatenate(
+        [np.array([patch.r, patch.z, patch.u_r, patch.u_theta, patch.u_z]).reshape(5, -1) for patch in mode.shape(5)],
+        axis=1,
+    )
     order = np.lexsort(np.round(fields[:2] / resonator.size, 9))
     places, moved = fields[:2, order], fields[2:, order]
     same = np.hypot(*np.diff(places, axis=1)) < 1e-8 * resonator.size
     assert same.sum() > 50
     assert abs(np.diff(moved, axis=1)[:, same]).max() < 1e-6 * abs(moved).max()
     if resonator.stem:
-        held = np.isin(np.round(places[1], 9), np.round([end for _, end in resonator.stem.roots], 9)) & (places[0] <= 2.5e-3)
+        held = np.isin(np.round(places[1], 9), np.round([end for _, end in resonator.stem.roots], 9)) & (
+            places[0] <= 2.5e-3
+        )
         assert held.sum() > 20
         assert abs(moved[:, held]).max() == 0
 
@@ -93,10 +101,15 @@ def test_a_tolerance_out_of_reach_is_said() -> None:
         solve_modes(hemisphere(15e-3, 15e-6), SILICA, theory="shell", tolerance=1e-14)
 
 
-@pytest.mark.parametrize(("options", "message"), [
-    ({"harmonic": -1}, "harmonic"), ({"count": 0}, "at least one mode"), ({"theory": "beam"}, "solid, shell, rayleigh"),
-    ({"tolerance": 0.0}, "tolerance"),
-])
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"harmonic": -1}, "harmonic"),
+        ({"count": 0}, "at least one mode"),
+        ({"theory": "beam"}, "solid, shell, rayleigh"),
+        ({"tolerance": 0.0}, "tolerance"),
+    ],
+)
 def test_arguments_that_make_no_sense(options: dict[str, object], message: str) -> None:
     with pytest.raises(ShellError, match=message):
         solve_modes(DOME, SILICA, **options)  # type: ignore[arg-type]

@@ -62,7 +62,10 @@ def frequency(resonator: Resonator, elastic: Elastic, n: int, theory: Theory, le
     lam, G = lame(np.array(elastic.E), np.array(elastic.nu), theory == "shell")
     lam_solid, _ = lame(np.array(elastic.E), np.array(elastic.nu), False)
     fields = tuple(
-        Constants(*(np.full(group.table.position.shape, value) for value in (elastic.E, elastic.nu, elastic.rho)), group.table.plane_stress)
+        Constants(
+            *(np.full(group.table.position.shape, value) for value in (elastic.E, elastic.nu, elastic.rho)),
+            group.table.plane_stress,
+        )
         for group in system.groups
     )
     moduli = [lam if group.table.plane_stress else lam_solid for group in system.groups for _ in group.unknowns]

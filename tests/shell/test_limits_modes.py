@@ -42,10 +42,17 @@ def test_torsion_of_a_free_tube_is_exact(theory: str) -> None:
 
 @pytest.mark.parametrize("theory", THEORIES)
 @pytest.mark.parametrize("n", [0, 1])
-@pytest.mark.parametrize("resonator", [
-    DOME, hemisphere(15e-3, 0.03e-3), cylinder(12e-3, 1e-3, 30e-3), bell(12e-3, 0.8e-3, 8e-3, 5e-3, 14e-3),
-    cylinder(12.5e-3, 0.6e-3, 18e-3, bottom_thickness=1e-3),
-], ids=["dome", "thin dome", "tube", "bell", "cup"])
+@pytest.mark.parametrize(
+    "resonator",
+    [
+        DOME,
+        hemisphere(15e-3, 0.03e-3),
+        cylinder(12e-3, 1e-3, 30e-3),
+        bell(12e-3, 0.8e-3, 8e-3, 5e-3, 14e-3),
+        cylinder(12.5e-3, 0.6e-3, 18e-3, bottom_thickness=1e-3),
+    ],
+    ids=["dome", "thin dome", "tube", "bell", "cup"],
+)
 def test_rigid_motions_are_never_modes(resonator: Resonator, n: int, theory: str) -> None:
     """No elastic mode with n < 2 of these shapes lies below a hundredth of the ring frequency of their radius."""
     ring = sqrt(SILICA.E / SILICA.rho) / (2 * pi * resonator.size)
@@ -77,6 +84,7 @@ def test_chain_of_lines_is_the_cup() -> None:
 
 def test_small_kinks_tend_to_the_smooth_curve() -> None:
     """A polygon with n chords differs from its arc by the square of the chord."""
+
     def polygon(chords: int) -> Resonator:
         # circumscribed so that radius and length agree to second order
         angles = np.linspace(0.3, pi / 2, chords + 1)
@@ -141,10 +149,14 @@ def test_rayleigh_theory_says_how_far_off_it_is() -> None:
     assert mode.frequency == pytest.approx(5114.354, rel=1e-6)
 
 
-@pytest.mark.parametrize(("resonator", "bryan"), [
-    (hemisphere(15e-3, 0.015e-3), 0.27699),  # inextensional hemisphere, HRG paper eqs. (9), (12)
-    (cylinder(15e-3, 0.015e-3, 1e-3), 0.4),  # a ring: 2 / (n² + 1)
-], ids=["hemisphere", "ring"])
+@pytest.mark.parametrize(
+    ("resonator", "bryan"),
+    [
+        (hemisphere(15e-3, 0.015e-3), 0.27699),  # inextensional hemisphere, HRG paper eqs. (9), (12)
+        (cylinder(15e-3, 0.015e-3, 1e-3), 0.4),  # a ring: 2 / (n² + 1)
+    ],
+    ids=["hemisphere", "ring"],
+)
 def test_bryan_factor_of_the_thin_limit(resonator: Resonator, bryan: float) -> None:
     (mode,) = solve_modes(resonator, SILICA, theory="shell", tolerance=1e-4)
     assert mode.bryan_factor == pytest.approx(bryan, abs=2e-3)
@@ -164,11 +176,15 @@ def test_fields_along_the_meridian_enter_through_the_energy_shares(resonator: Re
     along, size = mode.along, 1e-4
     bumps = (lambda s: np.sin(3 * s), lambda s: s**2, lambda s: 1 - s)
     varied = VaryingElastic(
-        lambda s: SILICA.E * (1 + size * bumps[0](s)), lambda s: SILICA.nu + size * bumps[1](s), lambda s: SILICA.rho * (1 + size * bumps[2](s))
+        lambda s: SILICA.E * (1 + size * bumps[0](s)),
+        lambda s: SILICA.nu + size * bumps[1](s),
+        lambda s: SILICA.rho * (1 + size * bumps[2](s)),
     )
     E, nu, rho = (size * bump(along.position) for bump in bumps)
     expected = np.sum(along.elastic * E + 2 * along.nu * nu - along.kinetic * rho) / 2
-    assert log(lowest(resonator, elastic=varied, theory=theory) / mode.frequency) == pytest.approx(expected, abs=3e-4 * size)
+    assert log(lowest(resonator, elastic=varied, theory=theory) / mode.frequency) == pytest.approx(
+        expected, abs=3e-4 * size
+    )
 
 
 @pytest.mark.parametrize("theory", THEORIES)
@@ -185,9 +201,16 @@ def test_thickness_along_the_meridian_enters_through_its_shares(theory: str) -> 
 
 
 @pytest.mark.parametrize("theory", THEORIES)
-@pytest.mark.parametrize("resonator", [
-    DOME, STEMMED, hemisphere(15e-3, 0.05e-3), cylinder(12.5e-3, 0.6e-3, 18e-3, bottom_thickness=1e-3, clamp_radius=3e-3),
-], ids=["free", "stem", "thin", "cup"])
+@pytest.mark.parametrize(
+    "resonator",
+    [
+        DOME,
+        STEMMED,
+        hemisphere(15e-3, 0.05e-3),
+        cylinder(12.5e-3, 0.6e-3, 18e-3, bottom_thickness=1e-3, clamp_radius=3e-3),
+    ],
+    ids=["free", "stem", "thin", "cup"],
+)
 def test_sensitivities_are_the_differences(resonator: Resonator, theory: str) -> None:
     (mode,) = solve_modes(resonator, SILICA, theory=theory)
     slopes = mode.sensitivities
@@ -197,7 +220,9 @@ def test_sensitivities_are_the_differences(resonator: Resonator, theory: str) ->
         ends = []
         for sign in (1, -1):
             elastic = Elastic(SILICA.E, SILICA.nu + sign * step * moved.get("nu", 0), SILICA.rho)
-            ends.append(lowest(resonator.thickened(1 + sign * step * moved.get("h", 0)), elastic=elastic, theory=theory))
+            ends.append(
+                lowest(resonator.thickened(1 + sign * step * moved.get("h", 0)), elastic=elastic, theory=theory)
+            )
         return log(ends[0] / ends[1]) / (2 * step)
 
     assert slopes.nu == pytest.approx(change(nu=1), abs=1e-5)

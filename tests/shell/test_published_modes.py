@@ -33,7 +33,9 @@ def case(name: str, thickness: float) -> tuple[Resonator, Elastic]:
     return cylinder(12.5e-3, thickness, 18e-3, bottom_thickness=1e-3, clamp_radius=3e-3), STEEL
 
 
-@pytest.mark.parametrize("row", rows("reference_frequencies.csv"), ids=lambda row: f"{row['case']} n={row['harmonic']} {row['mode']}")
+@pytest.mark.parametrize(
+    "row", rows("reference_frequencies.csv"), ids=lambda row: f"{row['case']} n={row['harmonic']} {row['mode']}"
+)
 def test_solid_frequencies_of_two_spectral_codes(row: dict[str, str]) -> None:
     resonator, elastic = case(row["case"], float(row["thickness_mm"]) * 1e-3)
     corner = row["case"] in ("stem", "cylinder")
@@ -63,7 +65,8 @@ def test_shell_theory_is_close_to_the_solid(thickness: float, within: float) -> 
 def test_default_setting_is_within_1e_5(name: str, harmonic: int) -> None:
     thickness = "0.6" if name == "cylinder" else "0.9"
     (row,) = (
-        row for row in rows("reference_frequencies.csv")
+        row
+        for row in rows("reference_frequencies.csv")
         if (row["case"], row["harmonic"], row["thickness_mm"]) == (name, str(harmonic), thickness)
     )
     (mode,) = solve_modes(*case(name, float(thickness) * 1e-3), harmonic)
@@ -76,7 +79,11 @@ def tube_modes(n: int) -> tuple[Mode, ...]:
 
 
 def published(source: str) -> list[object]:
-    return [pytest.param(row, id=f"{row['case']} n={row['n']} {row['mode']}") for row in rows("shell_published.csv") if row["source"] in source.split(",")]
+    return [
+        pytest.param(row, id=f"{row['case']} n={row['n']} {row['mode']}")
+        for row in rows("shell_published.csv")
+        if row["source"] in source.split(",")
+    ]
 
 
 @pytest.mark.parametrize("row", published("Gladwell-Vijay,Ladefoged,exact"))
@@ -137,7 +144,9 @@ def clamped_zone(n: int, first: float, last: float, h: float, nu: float) -> floa
 
     graded = np.array([0.0, 0.18**2, 0.18, 1.0])
     through = np.concatenate([graded - 1, (1 - graded)[::-1][1:]]) * h / 2
-    along = np.concatenate([first + graded * 2 * h, np.linspace(first + 2 * h, last - 2 * h, 7)[1:], [last - h / 2, last]])
+    along = np.concatenate(
+        [first + graded * 2 * h, np.linspace(first + 2 * h, last - 2 * h, 7)[1:], [last - h / 2, last]]
+    )
     basis = Basis(MeshQuad.init_tensor(along, 1 + through), ElementVector(ElementQuadP(3), 3), intorder=10)
     lam, G = nu / ((1 + nu) * (1 - 2 * nu)), 1 / (2 * (1 + nu))
 
@@ -145,15 +154,22 @@ def clamped_zone(n: int, first: float, last: float, h: float, nu: float) -> floa
         phi, r = w.x
         sine, cot, d = np.sin(phi), 1 / np.tan(phi), u.grad
         return (
-            d[0][1], (d[1][0] + u[0]) / r, (n * u[2] / sine + u[1] * cot + u[0]) / r,
-            (d[0][0] - u[1]) / r + d[1][1], d[2][1] - u[2] / r - n * u[0] / (r * sine),
+            d[0][1],
+            (d[1][0] + u[0]) / r,
+            (n * u[2] / sine + u[1] * cot + u[0]) / r,
+            (d[0][0] - u[1]) / r + d[1][1],
+            d[2][1] - u[2] / r - n * u[0] / (r * sine),
             d[2][0] / r - u[2] * cot / r - n * u[1] / (r * sine),
         )
 
     @BilinearForm  # type: ignore[untyped-decorator]
     def stiffness(u, v, w):  # type: ignore[no-untyped-def]
         e, t = strain(u, w), strain(v, w)
-        energy = lam * sum(e[:3]) * sum(t[:3]) + 2 * G * sum(e[k] * t[k] for k in range(3)) + G * sum(e[k] * t[k] for k in range(3, 6))
+        energy = (
+            lam * sum(e[:3]) * sum(t[:3])
+            + 2 * G * sum(e[k] * t[k] for k in range(3))
+            + G * sum(e[k] * t[k] for k in range(3, 6))
+        )
         return energy * w.x[1] ** 2 * np.sin(w.x[0])
 
     @BilinearForm  # type: ignore[untyped-decorator]

@@ -57,7 +57,9 @@ def test_the_saved_model_holds_the_planted_coefficients(calibrated):
 
 def test_a_compensated_record_is_flat_and_complete(calibrated, tmp_path, capsys):
     out = tmp_path / "out.csv"
-    assert main(["compensate", str(calibrated / "m.toml"), str(calibrated / "run1.csv"), "--out", str(out), "--json"]) == 0
+    assert (
+        main(["compensate", str(calibrated / "m.toml"), str(calibrated / "run1.csv"), "--out", str(out), "--json"]) == 0
+    )
     payload = json.loads(capsys.readouterr().out)
     column = payload["columns"]["compensated_bias_deg_per_h"]
     assert column["rows_not_compensated"] == 0

@@ -10,7 +10,23 @@ from studies.record import read_record
 
 def test_simulate_writes_a_record_and_one_json_object(tmp_path, capsys):
     out = tmp_path / "run.csv"
-    assert main(["simulate", "hrg-30mm", "step 20 -10 1h", "--out", str(out), "--theory", "shell", "--rate", "0.1", "--json"]) == 0
+    assert (
+        main(
+            [
+                "simulate",
+                "hrg-30mm",
+                "step 20 -10 1h",
+                "--out",
+                str(out),
+                "--theory",
+                "shell",
+                "--rate",
+                "0.1",
+                "--json",
+            ]
+        )
+        == 0
+    )
     answer = json.loads(capsys.readouterr().out)
     assert answer["schema"] == "hrg.simulate/1"
     assert list(answer) == [

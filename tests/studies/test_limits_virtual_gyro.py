@@ -115,7 +115,12 @@ def test_the_default_bias_is_that_of_one_per_cent_anisotropy():
 
 
 def test_the_papers_terms_add_up():
-    table = {"damping_anisotropy": 0.0, "offset_deg_per_h": 1.0, "k2_deg_per_h_per_Hz2": 0.5, "k7_deg_per_h_s_per_Hz2": 4.0}
+    table = {
+        "damping_anisotropy": 0.0,
+        "offset_deg_per_h": 1.0,
+        "k2_deg_per_h_per_Hz2": 0.5,
+        "k7_deg_per_h_s_per_Hz2": 4.0,
+    }
     bias = read_bias(table, "card [bias]")
     change, rate = np.array([2.0, -2.0]), np.array([0.25, 0.25])
     found = bias.at(change, rate, np.full(2, 4432.0), np.full(2, 1e-7), 0.277)
@@ -201,7 +206,9 @@ def test_an_effect_of_the_card_is_added(card, model):
 def test_an_effect_whose_drive_stays_is_named(card, model):
     softened = card.with_table("effect", [{"name": "electrostatic-softening", "softening_Hz_per_V2": 1e-4}])
     made = run(softened, model, "soak 20 1h", noise=False)
-    assert made.record["frequency_Hz"] == pytest.approx(run(card, model, "soak 20 1h", noise=False).record["frequency_Hz"])
+    assert made.record["frequency_Hz"] == pytest.approx(
+        run(card, model, "soak 20 1h", noise=False).record["frequency_Hz"]
+    )
     assert made.warnings == (
         "the effect 'electrostatic-softening' adds nothing: a virtual run does not move its drive (voltage_squared).",
     )
@@ -252,7 +259,11 @@ def test_every_shipped_shape_has_a_heat_path(card):
         ("bias", {"k1": 1.0}, "unknown key 'k1'"),
         ("loss", {"inverse_q": 0.0}, "inverse_q must be above 0"),
         ("loss", {"slope_per_K": 0.2}, "1/Q becomes negative"),
-        ("effect", [{"name": "second-leg", "weight": 0.1}], "no effect is called 'second-leg'; did you mean 'second-lag'"),
+        (
+            "effect",
+            [{"name": "second-leg", "weight": 0.1}],
+            "no effect is called 'second-leg'; did you mean 'second-lag'",
+        ),
         ("effect", [{"name": "second-lag", "weight": 0.1}], "needs the parameter 'second_time_constant_s'"),
         ("effect", [{"name": "second-lag", "weight": "much"}], "weight must be a finite number"),
     ],

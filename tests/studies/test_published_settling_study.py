@@ -71,7 +71,9 @@ def test_points_taken_upwards_hide_the_soak_in_the_offset(study):
         assert soak.error[0] == pytest.approx(0.0, abs=1e-6)
         assert (soak.error[2:] < 0).all()
         assert soak.error[2:] == pytest.approx(soak.error[-1], rel=0.1)
-        from_room = next(s for s in study.soaks if (s.protocol, s.network, s.hours) == ("from room", "linear", soak.hours))
+        from_room = next(
+            s for s in study.soaks if (s.protocol, s.network, s.hours) == ("from room", "linear", soak.hours)
+        )
         assert abs(soak.slope) < 0.3 * abs(from_room.slope)
 
 

@@ -100,9 +100,7 @@ def scaled(network: Network, key: str, factor: float) -> Network:
             replace(r, exchange_area=r.exchange_area * factor) if (kind, name) == ("exchange", r.name) else r
             for r in network.radiators
         ),
-        sources=tuple(
-            replace(s, power=s.power * factor) if key == f"power {s.node}" else s for s in network.sources
-        ),
+        sources=tuple(replace(s, power=s.power * factor) if key == f"power {s.node}" else s for s in network.sources),
     )
 
 

@@ -14,9 +14,7 @@ from thermal.settling import identify_conductance, step_remaining
 
 R, H, ROOT = 0.015, 0.86e-3, np.arcsin(2.5 / 15)
 PATH = HeatPath(
-    cells=cut_meridian(
-        R * (np.pi / 2 - ROOT), lambda s: R * np.sin(ROOT + s / R), lambda s: np.full_like(s, H), 16
-    ),
+    cells=cut_meridian(R * (np.pi / 2 - ROOT), lambda s: R * np.sin(ROOT + s / R), lambda s: np.full_like(s, H), 16),
     volumetric_capacity=2203 * 740.0,
     conductivity=1.38,
     stem_radius=2.5e-3,

@@ -58,7 +58,9 @@ def covers(estimate, truth):
 )
 def test_ninety_percent_intervals_cover_about_nine_in_ten(noise):
     """Of 40 seeds, 31 or fewer hits have a probability of 1.5 % if the coverage is 90 %; counted large in the benchmark."""
-    fits = [identify([one_lag(np.random.default_rng(seed), **noise)], make_lags(1000.0), FREE_LAW) for seed in range(40)]
+    fits = [
+        identify([one_lag(np.random.default_rng(seed), **noise)], make_lags(1000.0), FREE_LAW) for seed in range(40)
+    ]
     assert sum(covers(fit.estimates["time_constant_1"], 1800.0) for fit in fits) > 31
     assert sum(covers(fit.estimates["curvature"], CURVATURE) for fit in fits) > 31
     relative = np.array([np.log(fit.estimates["time_constant_1"].value / 1800.0) for fit in fits])
@@ -96,10 +98,21 @@ def test_lags_in_series_and_their_radiated_share_are_found():
     )
     T_r = integrate(network, {"housing": Profile(t, T_h)}, relative_tolerance=1e-9).node("shell", t)
     fit = identify_lags([record(np.random.default_rng(11), t, T_h, T_r, sensor=0.0)], FREE_LAW)
-    assert sorted(fit.estimates) == ["curvature", "offset", "radiated_share", "slope", "time_constant_1", "time_constant_2"]
+    assert sorted(fit.estimates) == [
+        "curvature",
+        "offset",
+        "radiated_share",
+        "slope",
+        "time_constant_1",
+        "time_constant_2",
+    ]
     for name, truth in (("time_constant_1", 1500.0), ("time_constant_2", 400.0), ("radiated_share", 0.4)):
         estimate = fit.estimates[name]
-        assert estimate.low - 2 * (estimate.high - estimate.low) < truth < estimate.high + 2 * (estimate.high - estimate.low)
+        assert (
+            estimate.low - 2 * (estimate.high - estimate.low)
+            < truth
+            < estimate.high + 2 * (estimate.high - estimate.low)
+        )
         assert estimate.value == pytest.approx(truth, rel=0.02)
 
 
@@ -158,7 +171,9 @@ def test_a_relaxation_tells_the_time_constant_and_not_the_law():
     assert covers(fit.estimates["time_constant_1"], 1800.0)
     assert fit.estimates["slope"].value is None
     assert any("slope" in direction.parts for direction in fit.undetermined)
-    given = identify([one_lag(rng, "soak 20 5h", departure=5.0)], make_lags(900.0), FrequencyLaw(ROOM, SLOPE, CURVATURE))
+    given = identify(
+        [one_lag(rng, "soak 20 5h", departure=5.0)], make_lags(900.0), FrequencyLaw(ROOM, SLOPE, CURVATURE)
+    )
     assert given.undetermined == ()
     assert given.departures[0][0] == pytest.approx(5.0, abs=0.05)
 

@@ -14,12 +14,11 @@ from studies.errors import InputError
 from studies.models.c_source import head, polynomial
 from studies.models.file import Model, Part, Source, make_part
 from studies.record import COMPENSATED, Record
-from studies.rest import celsius_range
+from studies.rest import CELSIUS_ZERO, celsius_range
 
 if TYPE_CHECKING:
     from compensation.cross_damping import CrossDampingModel
 
-CELSIUS_ZERO = 273.15
 OUTPUTS = {"bias_deg_per_h": math.radians(1 / 3600), "measured_rate_deg_per_s": math.radians(1.0)}
 """Columns that a cross-damping model can compensate, with the size of their unit in rad/s."""
 

@@ -15,12 +15,11 @@ from studies.errors import InputError
 from studies.models.c_source import head, polynomial
 from studies.models.file import Model, Part, Source, make_part
 from studies.record import COMPENSATED, Record
-from studies.rest import celsius_range
+from studies.rest import CELSIUS_ZERO, celsius_range
 
 if TYPE_CHECKING:
     from compensation.bell import Chain, Curve
 
-CELSIUS_ZERO = 273.15
 DEG = math.radians(1.0)
 RAW = ("output_counts", "measured_rate_deg_per_s")
 """Columns that can be the raw output; the first needs the rough scale, the second is a rate already."""
