@@ -256,9 +256,9 @@ def find_outliers(values: FloatArray) -> np.ndarray:
     kept = values[present]
     if kept.size < 3 * OUTLIER_WINDOW:
         return mask
-    rows = np.arange(kept.size)
-    blocks = np.array_split(rows, max(2, kept.size // OUTLIER_WINDOW))
-    trend = np.interp(rows, [block.mean() for block in blocks], [float(np.median(kept[block])) for block in blocks])
+    blocks = kept[: kept.size // OUTLIER_WINDOW * OUTLIER_WINDOW].reshape(-1, OUTLIER_WINDOW)
+    centres = (np.arange(len(blocks)) + 0.5) * OUTLIER_WINDOW - 0.5
+    trend = np.interp(np.arange(kept.size), centres, np.median(blocks, axis=1))
     level = kept - trend
     beside = level - median_filter(level, OUTLIER_WINDOW, mode="nearest")
     plain = kept - median_filter(kept, OUTLIER_WINDOW, mode="nearest")

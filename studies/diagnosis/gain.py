@@ -25,13 +25,14 @@ class Score:
 def row_residuals(fit: Fit, campaign: Campaign) -> list[FloatArray]:
     """Return the residual of every run on its own rows; NaN where a row is missing or an outlier."""
     return [
-        run.row_responses[fit.problem.response] - row_model(fit.problem, fit.terms, campaign, k) @ fit.linear.coefficients
+        run.row_responses[fit.problem.response]
+        - on_rows(campaign, k, fine_model(fit.problem, fit.terms, campaign, k) @ fit.linear.coefficients)
         for k, run in enumerate(campaign.runs)
     ]
 
 
-def row_model(problem: Problem, terms: Sequence[Term], campaign: Campaign, k: int) -> FloatArray:
-    """Return the columns of baseline and terms on the own rows of run `k`."""
+def fine_model(problem: Problem, terms: Sequence[Term], campaign: Campaign, k: int) -> FloatArray:
+    """Return the columns of baseline and terms of run `k` on its fine grid."""
     run = campaign.runs[k]
     fine = problem.states[k].with_lag(problem.tau) if problem.lagged else problem.states[k]
     seen = fine
@@ -40,15 +41,19 @@ def row_model(problem: Problem, terms: Sequence[Term], campaign: Campaign, k: in
     view = View(fine, fine, seen, seen, 1)
     thermometer = None
     if problem.thermometer is not None:
-        thermometer = [np.interp(fine.time, run.time, values) if j == k else np.zeros(1)
-                       for j, values in enumerate(problem.thermometer)]
-    dummies = [fine if j == k else _short(s) for j, s in enumerate(problem.states)]
-    base = baseline_columns(problem, dummies, thermometer)[k]
-    columns = np.concatenate([base, *(term_columns(problem, term, view) for term in terms)], axis=1)
-    place = np.clip((run.row_time - fine.time[0]) / fine.step, 0.0, fine.time.size - 1.0)
-    below = np.minimum(place.astype(int), fine.time.size - 2) if fine.time.size > 1 else place.astype(int)
-    part = (place - below)[:, None]
-    return np.asarray((1.0 - part) * columns[below] + part * columns[np.minimum(below + 1, fine.time.size - 1)])
+        thermometer = [
+            np.interp(fine.time, run.time, values) if j == k else np.zeros(1)
+            for j, values in enumerate(problem.thermometer)
+        ]
+    others = [fine if j == k else _short(s) for j, s in enumerate(problem.states)]
+    base = baseline_columns(problem, others, thermometer)[k]
+    return np.concatenate([base, *(term_columns(problem, term, view) for term in terms)], axis=1)
+
+
+def on_rows(campaign: Campaign, k: int, values: FloatArray) -> FloatArray:
+    """Interpolate values of run `k` from its fine grid onto its own rows."""
+    run = campaign.runs[k]
+    return np.interp(run.row_time, run.states.time, values)
 
 
 def _short(states: States) -> States:
@@ -118,14 +123,15 @@ def _train(problem: Problem, terms: Sequence[Term]) -> Fit:
 
 
 def _refit_own(trained: Fit, campaign: Campaign, k: int) -> FloatArray:
-    columns = row_model(trained.problem, trained.terms, campaign, k)
+    columns = fine_model(trained.problem, trained.terms, campaign, k)
     own = own_columns(trained.problem, k)
     coefficients = trained.linear.coefficients.copy()
     coefficients[own] = 0.0
-    rest = campaign.runs[k].row_responses[trained.problem.response] - columns @ coefficients
+    rest = campaign.runs[k].row_responses[trained.problem.response] - on_rows(campaign, k, columns @ coefficients)
     known = np.isfinite(rest)
     if own and known.sum() > len(own):
-        rest = rest - columns[:, own] @ np.linalg.lstsq(columns[known][:, own], rest[known], rcond=None)[0]
+        free = np.stack([on_rows(campaign, k, columns[:, index]) for index in own], axis=1)
+        rest = rest - free @ np.linalg.lstsq(free[known], rest[known], rcond=None)[0]
     return np.asarray(rest)
 
 
@@ -146,6 +152,5 @@ def _leave_one_block_out(fit: Fit, campaign: Campaign) -> float | None:
         for k, run in enumerate(campaign.runs):
             inside = (run.row_time >= low) & (run.row_time < high + (1e-9 if block < BLOCKS - 1 else 1.0))
             if inside.any():
-                columns = row_model(trained.problem, trained.terms, campaign, k)[inside]
-                residuals.append(run.row_responses[problem.response][inside] - columns @ trained.linear.coefficients)
+                residuals.append(row_residuals(trained, campaign)[k][inside])
     return rms(residuals)
