@@ -18,7 +18,7 @@ from studies.diagnosis.selection import Found, Selection, scan_model, select
 from studies.diagnosis.thermometer import Thermometer, read_thermometer, smooth_thermometer
 from studies.diagnosis.verdict import Cause, ResponseResult, Verdict, equivalent_to, overall, probability_of
 
-THRESHOLD = 17.0
+THRESHOLD = 20.0
 SPARSE = 60.0
 """Sampling, s, beyond which thresholds of the frequency grow: the housing between two rows is anyone's guess."""
 LEFT_OVER_SHARE = 0.02
