@@ -77,7 +77,9 @@ def diagnose(
         if len(runs) > 1:
             raise InputError(f"{tables[0]}: a steady-state table is diagnosed alone; leave the other files out.")
         if save is not None:
-            raise InputError(f"{tables[0]}: a steady-state table does not decide on a model, so --save has nothing to write.")
+            raise InputError(
+                f"{tables[0]}: a steady-state table does not decide on a model, so --save has nothing to write."
+            )
         found = diagnose_table(tables[0], card)
         if report is not None:
             write_text(report, page.table_page(found, tables[0]))
@@ -98,7 +100,9 @@ def diagnose(
     reference = None if instrument is None else instrument.reference_temperature - 273.15
     campaign = load_campaign([read_record(path) for path in runs], reference)
     diagnosis = investigate(
-        campaign, None if instrument is None else law_of(instrument), draws if calibrate else 0,
+        campaign,
+        None if instrument is None else law_of(instrument),
+        draws if calibrate else 0,
         np.random.default_rng(seed),
     )
     if save is not None and instrument is not None:

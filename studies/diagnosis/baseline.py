@@ -194,8 +194,12 @@ def _law_slope(law: Law, states: States) -> FloatArray:
 
 
 def pose(
-    campaign: Campaign, response: str, thermometer: Sequence[FloatArray] | None = None,
-    states: Sequence[States] | None = None, law: Law | None = None, keep: Sequence[int] | None = None,
+    campaign: Campaign,
+    response: str,
+    thermometer: Sequence[FloatArray] | None = None,
+    states: Sequence[States] | None = None,
+    law: Law | None = None,
+    keep: Sequence[int] | None = None,
 ) -> Problem:
     """Set up the problem of one response.
 
@@ -213,16 +217,22 @@ def pose(
         Use these runs only; the others count as missing.
     """
     chosen = range(len(campaign.runs)) if keep is None else keep
-    present = tuple(
-        np.isfinite(run.responses[response]) & (k in chosen) for k, run in enumerate(campaign.runs)
-    )
+    present = tuple(np.isfinite(run.responses[response]) & (k in chosen) for k, run in enumerate(campaign.runs))
     values = np.concatenate([run.responses[response][m] for run, m in zip(campaign.runs, present, strict=True)])
     times = [run.time[m] for run, m in zip(campaign.runs, present, strict=True) if m.any()]
     chosen_states = tuple(run.states for run in campaign.runs) if states is None else tuple(states)
     lagged = response == "frequency_Hz" or thermometer is None
     problem = Problem(
-        response, chosen_states, campaign.group, present, values, NoiseBasis.of(times), chosen_states[0].tau, lagged,
-        thermometer=None if lagged else tuple(thermometer or ()), law=law,
+        response,
+        chosen_states,
+        campaign.group,
+        present,
+        values,
+        NoiseBasis.of(times),
+        chosen_states[0].tau,
+        lagged,
+        thermometer=None if lagged else tuple(thermometer or ()),
+        law=law,
     )
     if not lagged:
         return problem
@@ -231,9 +241,15 @@ def pose(
         return problem
     slope = fit_at(problem, problem.tau).coefficients[1]
     row = white_level(problem) / max(abs(float(slope)) * DELAY, 1e-300)
-    return calibrate(replace(
-        problem, values=np.append(values, 0.0), basis=problem.basis.with_row(), delay_row=row,
-    ), around=problem.tau)
+    return calibrate(
+        replace(
+            problem,
+            values=np.append(values, 0.0),
+            basis=problem.basis.with_row(),
+            delay_row=row,
+        ),
+        around=problem.tau,
+    )
 
 
 def restricted(problem: Problem, keep: Sequence[np.ndarray] | None = None, kernel: str | None = None) -> Problem:
@@ -322,11 +338,19 @@ def span_of(campaign: Campaign, tau: float) -> Span:
     """Return the ranges that the campaign covers."""
     temperature = np.concatenate([run.states.housing for run in campaign.runs])
     lagged = np.concatenate([lag(run.states.housing, run.states.step, tau) for run in campaign.runs])
-    return Span(
-        float(lagged.min()), float(lagged.max()),
-        max(float(np.ptp(run.states.time)) for run in campaign.runs),
-        max(float(run.states.campaign_time[-1]) for run in campaign.runs), campaign.step, tau, len(campaign.runs),
-        tuple(run.time for run in campaign.runs),
-    ) if np.ptp(temperature) > 0 else Span(
-        float(temperature.min()), float(temperature.max()) + 1e-3, 1.0, 1.0, campaign.step, tau, len(campaign.runs)
+    return (
+        Span(
+            float(lagged.min()),
+            float(lagged.max()),
+            max(float(np.ptp(run.states.time)) for run in campaign.runs),
+            max(float(run.states.campaign_time[-1]) for run in campaign.runs),
+            campaign.step,
+            tau,
+            len(campaign.runs),
+            tuple(run.time for run in campaign.runs),
+        )
+        if np.ptp(temperature) > 0
+        else Span(
+            float(temperature.min()), float(temperature.max()) + 1e-3, 1.0, 1.0, campaign.step, tau, len(campaign.runs)
+        )
     )

@@ -131,7 +131,9 @@ def load_campaign(records: Sequence[Record], reference_degC: float | None = None
         ):
             notes.append(f"{drive} is not in every record and is left out.")
             runs = [_without(run, drive) for run in runs]
-    return Campaign(tuple(runs), step, group, responses, float(reference), source, timed, tuple(notes), skipped, outliers)
+    return Campaign(
+        tuple(runs), step, group, responses, float(reference), source, timed, tuple(notes), skipped, outliers
+    )
 
 
 def _without(run: Run, drive: str) -> Run:
@@ -323,8 +325,15 @@ def _stretches(table: dict[str, FloatArray]) -> list[tuple[int, int]]:
 
 
 def _grid_run(
-    record: int, run: int, label: str, table: dict[str, FloatArray], step: float, group: int, offset: float,
-    reference: float, responses: Sequence[str],
+    record: int,
+    run: int,
+    label: str,
+    table: dict[str, FloatArray],
+    step: float,
+    group: int,
+    offset: float,
+    reference: float,
+    responses: Sequence[str],
 ) -> Run | None:
     time = table["time_s"]
     count = int((time[-1] - time[0]) / step + 0.5) // group
@@ -343,8 +352,14 @@ def _grid_run(
     if "reference_frequency_Hz" in rows and "frequency_Hz" in rows:
         clock_error = _bin(rows["frequency_Hz"] - rows["reference_frequency_Hz"], rows["time_s"], slot // group, coarse)
     return Run(
-        record, label, _states(run, fine, offset, reference, rows, slot), coarse, binned, time,
-        {name: table.get(name, np.full(time.shape, np.nan)) for name in responses}, clock_error,
+        record,
+        label,
+        _states(run, fine, offset, reference, rows, slot),
+        coarse,
+        binned,
+        time,
+        {name: table.get(name, np.full(time.shape, np.nan)) for name in responses},
+        clock_error,
     )
 
 
@@ -385,8 +400,15 @@ def _states(
 
     amplitude, voltage, angle = map(command, ("drive_amplitude_V", "electrode_bias_V", "pattern_angle_deg"))
     return States(
-        run=run, time=grid, campaign_time=grid + offset, housing=housing, resonator=housing, tau=1.0,
-        reference=reference, amplitude_squared=None if amplitude is None else amplitude**2,
-        voltage_squared=None if voltage is None else voltage**2, quadrature=command("quadrature_V"),
+        run=run,
+        time=grid,
+        campaign_time=grid + offset,
+        housing=housing,
+        resonator=housing,
+        tau=1.0,
+        reference=reference,
+        amplitude_squared=None if amplitude is None else amplitude**2,
+        voltage_squared=None if voltage is None else voltage**2,
+        quadrature=command("quadrature_V"),
         pattern_angle=None if angle is None else np.radians(angle),
     )

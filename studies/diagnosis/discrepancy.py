@@ -46,9 +46,7 @@ def generic_bases(problem: Problem) -> dict[str, FloatArray]:
     return out
 
 
-def _functions(
-    problem: Problem, view: View, low: float, high: float, number: int, runs: int
-) -> dict[str, FloatArray]:
+def _functions(problem: Problem, view: View, low: float, high: float, number: int, runs: int) -> dict[str, FloatArray]:
     s = view.seen
     x = s.excess / 30.0
     wide = max(high - low, 1e-6)
@@ -59,11 +57,17 @@ def _functions(
             centres = np.linspace(low, high, count)
             width = 1.1 * wide / (count - 1)
             out[name] = np.exp(-0.5 * ((s.resonator[:, None] - centres) / width) ** 2)
-        out["rate"] = np.stack([rate, np.abs(rate), rate * np.abs(rate), rate * x, rate * x**2, np.abs(rate) * x], axis=1)
+        out["rate"] = np.stack(
+            [rate, np.abs(rate), rate * np.abs(rate), rate * x, rate * x**2, np.abs(rate) * x], axis=1
+        )
         out["history"] = np.stack(
-            [view_lag for factor in (0.1, 0.3, 0.6, 2.0, 4.0, 10.0)
-             for view_lag in [_coarse_lag(view, factor * max(s.tau, 60.0)) - s.resonator]]
-            + [(_coarse_lag(view, 3.0 * max(s.tau, 60.0)) - s.resonator) * x], axis=1,
+            [
+                view_lag
+                for factor in (0.1, 0.3, 0.6, 2.0, 4.0, 10.0)
+                for view_lag in [_coarse_lag(view, factor * max(s.tau, 60.0)) - s.resonator]
+            ]
+            + [(_coarse_lag(view, 3.0 * max(s.tau, 60.0)) - s.resonator) * x],
+            axis=1,
         )
     duration = max(float(s.time[-1] - s.time[0]), 1.0)
     longest = max(duration, *(float(np.ptp(other.time)) for other in problem.states))
@@ -71,14 +75,20 @@ def _functions(
     own = np.zeros((s.time.size, 12 * runs))
     own[:, 12 * number : 12 * (number + 1)] = waves
     out["time"] = own
-    out["time since the start of each run"] = np.cos(np.pi * np.arange(1, 25) * ((s.time - s.time[0]) / longest)[:, None])
+    out["time since the start of each run"] = np.cos(
+        np.pi * np.arange(1, 25) * ((s.time - s.time[0]) / longest)[:, None]
+    )
     drives = []
     for square in (s.voltage_squared, s.amplitude_squared):
         if square is not None:
             unit = square / max(float(square.max()), 1e-300)
             drives += [unit, unit * x, unit * x**2, np.sqrt(unit), unit**2, unit * rate]
     if s.voltage_squared is not None and s.amplitude_squared is not None:
-        drives.append(s.voltage_squared * s.amplitude_squared / max(float((s.voltage_squared * s.amplitude_squared).max()), 1e-300))
+        drives.append(
+            s.voltage_squared
+            * s.amplitude_squared
+            / max(float((s.voltage_squared * s.amplitude_squared).max()), 1e-300)
+        )
     if s.quadrature is not None:
         unit = s.quadrature / max(float(np.abs(s.quadrature).max()), 1e-300)
         drives += [unit, unit**2, unit * x]
@@ -178,5 +188,3 @@ def strongest(evidence: dict[str, FloatArray], levels: dict[str, float]) -> Left
 
 LEVEL = 1.0
 """Null level of a generic basis without a calibration of its own: the amplitude pays most of its way."""
-
-

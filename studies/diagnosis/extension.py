@@ -109,7 +109,9 @@ def _calibrate_frequency(instrument: "Instrument", fit: Fit) -> "tuple[Instrumen
     own = np.sqrt(factor) * (model.frequency(T) - model.frequency(np.array([reference])))
     slope, curvature = np.linalg.lstsq(np.stack([x, x**2], axis=1), measured - own, rcond=None)[0]
     calibration = {
-        "name": "calibration", "response": "frequency_Hz", "slope_Hz_per_K": float(slope),
+        "name": "calibration",
+        "response": "frequency_Hz",
+        "slope_Hz_per_K": float(slope),
         "curvature_Hz_per_K2": float(curvature),
     }
     return _calibrate_lag(extended, fit.problem.tau), calibration
@@ -129,9 +131,14 @@ def _calibrate_lag(instrument: "Instrument", tau: float) -> "Instrument":
 
     def scaled(log_factor: float) -> "Instrument":
         factor = float(np.exp(log_factor))
-        return instrument.with_table("thermal", {
-            **thermal, "mount_conductance_W_per_K": conductance * factor, "mount_exchange_cm2": exchange * factor,
-        })
+        return instrument.with_table(
+            "thermal",
+            {
+                **thermal,
+                "mount_conductance_W_per_K": conductance * factor,
+                "mount_exchange_cm2": exchange * factor,
+            },
+        )
 
     def miss(log_factor: float) -> float:
         return float(np.log(slowest_lag(scaled(log_factor)) / tau))

@@ -99,7 +99,9 @@ def _with_bend(problem: Problem, terms: Sequence[Term]) -> Problem:
     return replace(problem, bend=float(np.clip(coefficients[2] / coefficients[1], -0.02, 0.02)))
 
 
-def _evaluate(problem: Problem, terms: tuple[Term, ...], target: FloatArray, shares: Sequence[float] | FloatArray) -> Fit:
+def _evaluate(
+    problem: Problem, terms: tuple[Term, ...], target: FloatArray, shares: Sequence[float] | FloatArray
+) -> Fit:
     columns = problem.basis.rotate(problem.model(problem.tau, terms))
     return Fit(problem, terms, fit_linear(problem.basis, target, columns, shares))
 
@@ -228,7 +230,9 @@ def intervals(fit: Fit, index: int) -> dict[str, Interval]:
         value, wide = term.shape[knob.number], float(deviation[count + k])
         if parameter.logarithmic:
             factor = float(np.exp(min(wide, 20.0)))
-            out[parameter.name] = Interval(value, max(value / factor, parameter.low), min(value * factor, parameter.high))
+            out[parameter.name] = Interval(
+                value, max(value / factor, parameter.low), min(value * factor, parameter.high)
+            )
         else:
             out[parameter.name] = Interval(value, max(value - wide, parameter.low), min(value + wide, parameter.high))
     for number, parameter in enumerate(term.effect.shape):

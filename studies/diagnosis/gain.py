@@ -57,8 +57,13 @@ def on_rows(campaign: Campaign, k: int, values: FloatArray) -> FloatArray:
 
 
 def _short(states: States) -> States:
-    return replace(states, time=states.time[:1], campaign_time=states.campaign_time[:1],
-                   housing=states.housing[:1], resonator=states.resonator[:1])
+    return replace(
+        states,
+        time=states.time[:1],
+        campaign_time=states.campaign_time[:1],
+        housing=states.housing[:1],
+        resonator=states.resonator[:1],
+    )
 
 
 def own_columns(problem: Problem, k: int) -> list[int]:
@@ -96,8 +101,10 @@ def score(fit: Fit, campaign: Campaign) -> Score:
 def _leave_one_record_out(fit: Fit, campaign: Campaign) -> float | None:
     residuals = []
     for record in campaign.records:
-        keep = [np.full(mask.shape, run.record != record)
-                for mask, run in zip(fit.problem.present, campaign.runs, strict=True)]
+        keep = [
+            np.full(mask.shape, run.record != record)
+            for mask, run in zip(fit.problem.present, campaign.runs, strict=True)
+        ]
         if sum(int((m & k).sum()) for m, k in zip(fit.problem.present, keep, strict=True)) < 40:
             return None
         trained = _train(restricted(fit.problem, keep), fit.terms)

@@ -52,8 +52,12 @@ class Diagnosis:
 
 
 def investigate(
-    campaign: Campaign, law: Law | None = None, draws: int = 0, rng: np.random.Generator | None = None,
-    effects: Sequence[Effect] | None = None, held_out: bool = True,
+    campaign: Campaign,
+    law: Law | None = None,
+    draws: int = 0,
+    rng: np.random.Generator | None = None,
+    effects: Sequence[Effect] | None = None,
+    held_out: bool = True,
 ) -> Diagnosis:
     """Find what the baseline leaves, name it, and measure what the extension is worth.
 
@@ -97,9 +101,7 @@ def investigate(
         results[response] = _too_little(reason)
     verdict = overall([result.verdict for result in results.values()])
     advice = suggest_next(campaign, verdict, causes, results)
-    return Diagnosis(
-        Verdict(verdict, causes, results, advice, campaign.notes), campaign, inquiries
-    )
+    return Diagnosis(Verdict(verdict, causes, results, advice, campaign.notes), campaign, inquiries)
 
 
 def _too_little(reason: str) -> ResponseResult:
@@ -107,7 +109,11 @@ def _too_little(reason: str) -> ResponseResult:
 
 
 def _pose_one(
-    campaign: Campaign, response: str, inquiries: Mapping[str, Inquiry], thermometer: Thermometer | None, law: Law | None
+    campaign: Campaign,
+    response: str,
+    inquiries: Mapping[str, Inquiry],
+    thermometer: Thermometer | None,
+    law: Law | None,
 ) -> Problem | None:
     rows = sum(int(np.isfinite(run.responses[response]).sum()) for run in campaign.runs)
     if rows < FEWEST_BINS + 2 * len(campaign.runs):
@@ -141,7 +147,11 @@ def _best_thermometer(
 
 
 def inquire(
-    campaign: Campaign, problem: Problem, draws: int, rng: np.random.Generator, effects: Sequence[Effect] | None,
+    campaign: Campaign,
+    problem: Problem,
+    draws: int,
+    rng: np.random.Generator,
+    effects: Sequence[Effect] | None,
     threshold: float = THRESHOLD,
 ) -> Inquiry:
     """Select the effects of one response and ask the generic witness about the rest."""
@@ -152,7 +162,11 @@ def inquire(
 
 
 def _inquire(
-    campaign: Campaign, problem: Problem, draws: int, rng: np.random.Generator, effects: Sequence[Effect] | None,
+    campaign: Campaign,
+    problem: Problem,
+    draws: int,
+    rng: np.random.Generator,
+    effects: Sequence[Effect] | None,
     threshold: float,
 ) -> Inquiry:
     span = span_of(campaign, problem.tau if problem.lagged else 1000.0)
@@ -169,7 +183,8 @@ def _inquire(
         levels = bootstrap_levels(problem, dictionary, scan_model(plain), draws, rng)
         noise = draw_null(problem, scan_model(plain), min(draws, 100), rng)
         generic_levels = {
-            name: float(levels_of(values[None, :])[0]) for name, values in leftover_evidence(plain, bases, noise).items()
+            name: float(levels_of(values[None, :])[0])
+            for name, values in leftover_evidence(plain, bases, noise).items()
         }
     selection = select(problem, span, levels, threshold, effects, dictionary)
     leftover = strongest(leftover_evidence(selection.fit, bases), generic_levels)
@@ -209,7 +224,9 @@ def merge_causes(inquiries: Mapping[str, Inquiry], campaign: Campaign) -> tuple[
             continue
         kept.append(cause)
     return tuple(
-        cause if rank == 0 else replace(cause, probability=cause.probability * float(1.0 - np.exp(-cause.evidence / FURTHER)))
+        cause
+        if rank == 0
+        else replace(cause, probability=cause.probability * float(1.0 - np.exp(-cause.evidence / FURTHER)))
         for rank, cause in enumerate(kept)
     )
 
@@ -222,9 +239,12 @@ def _cause(inquiry: Inquiry, found: Found, response: str, drifts: bool | None = 
         winner = winner if named is None else named
     index = found.index if winner.name == found.name else len(winner.fit.terms) - 1
     return Cause(
-        winner.name, response,
-        probability_of(found, equivalent, inquiry.selection.threshold, has_leftover(inquiry)), equivalent,
-        intervals(winner.fit, index), winner.evidence,
+        winner.name,
+        response,
+        probability_of(found, equivalent, inquiry.selection.threshold, has_leftover(inquiry)),
+        equivalent,
+        intervals(winner.fit, index),
+        winner.evidence,
     )
 
 
@@ -260,17 +280,15 @@ def _same_cause(one: Cause, two: Cause) -> bool:
     return True
 
 
-def _result(
-    campaign: Campaign, inquiry: Inquiry, causes: Sequence[Cause], held_out: bool
-) -> ResponseResult:
+def _result(campaign: Campaign, inquiry: Inquiry, causes: Sequence[Cause], held_out: bool) -> ResponseResult:
     selection = inquiry.selection
     response = inquiry.problem.response
     left = has_leftover(inquiry)
     base = score(selection.plain, campaign) if held_out else Score(rms(row_residuals(selection.plain, campaign)), None)
     extended = None
     if selection.found:
-        extended = score(selection.fit, campaign) if held_out else Score(
-            rms(row_residuals(selection.fit, campaign)), None
+        extended = (
+            score(selection.fit, campaign) if held_out else Score(rms(row_residuals(selection.fit, campaign)), None)
         )
     remark = ""
     if left:
@@ -286,9 +304,12 @@ def _result(
             verdict, remark = "not-identifiable", f"the temperature varies by {np.ptp(temperature):.2g} K only"
     noise = (extended or base).residual_rms
     return ResponseResult(
-        verdict, noise, (base.residual_rms, base.held_out_rms),
+        verdict,
+        noise,
+        (base.residual_rms, base.held_out_rms),
         None if extended is None else (extended.residual_rms, extended.held_out_rms),
-        "structure" if left else "none", inquiry.leftover.input if left else "", inquiry.leftover.evidence, remark,
+        "structure" if left else "none",
+        inquiry.leftover.input if left else "",
+        inquiry.leftover.evidence,
+        remark,
     )
-
-

@@ -17,10 +17,26 @@ from studies.diagnosis.states import FloatArray
 TAIL = 0.12
 
 SHIPPED: dict[str, float] = {
-    "activity-dip": 8.0, "ageing": 5.0, "amplitude-frequency": 2.0, "axis-rotation": 5.0, "clock-drift": 2.0,
-    "cross-damping": 2.5, "curvature": 2.5, "electrostatic-softening": 2.0, "hysteresis": 6.0, "jump": 15.0,
-    "leak": 2.0, "loss-peak": 5.0, "mounting-stress": 4.0, "periodic": 15.0, "quadrature-leakage": 2.5,
-    "radiation": 2.0, "rate-bias": 2.5, "second-lag": 3.5, "self-heating": 2.0, "thermometer-scale": 2.5,
+    "activity-dip": 8.0,
+    "ageing": 5.0,
+    "amplitude-frequency": 2.0,
+    "axis-rotation": 5.0,
+    "clock-drift": 2.0,
+    "cross-damping": 2.5,
+    "curvature": 2.5,
+    "electrostatic-softening": 2.0,
+    "hysteresis": 6.0,
+    "jump": 15.0,
+    "leak": 2.0,
+    "loss-peak": 5.0,
+    "mounting-stress": 4.0,
+    "periodic": 15.0,
+    "quadrature-leakage": 2.5,
+    "radiation": 2.0,
+    "rate-bias": 2.5,
+    "second-lag": 3.5,
+    "self-heating": 2.0,
+    "thermometer-scale": 2.5,
 }
 
 

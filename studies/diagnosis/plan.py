@@ -52,8 +52,14 @@ class Plan:
 
     def as_dict(self) -> dict[str, Any]:
         """Return the object of `hrg diagnose --plan --json`."""
-        return {"schema": "hrg.plan/1", "snr": self.snr, "cases": self.cases, "confusion": self.confusion,
-                "survives_baseline": self.survives, "invisible": self.invisible}
+        return {
+            "schema": "hrg.plan/1",
+            "snr": self.snr,
+            "cases": self.cases,
+            "confusion": self.confusion,
+            "survives_baseline": self.survives,
+            "invisible": self.invisible,
+        }
 
 
 def plan_campaign(
@@ -95,14 +101,21 @@ def predict(campaign: Campaign, snr: float, cases: int, rng: np.random.Generator
         _predict_response(campaign, fit.problem, scan_model(fit), snr, cases, rng, confusion, survives)
     invisible = {
         name: "its drive is not part of the plan" if effect.needs else "no temperature varies"
-        for name, effect in library().items() if name not in confusion and name != "calibration"
+        for name, effect in library().items()
+        if name not in confusion and name != "calibration"
     }
     return Plan(snr, cases, confusion, survives, invisible)
 
 
 def _predict_response(
-    campaign: Campaign, problem: Problem, model: FloatArray, snr: float, cases: int, rng: np.random.Generator,
-    confusion: dict[str, dict[str, float]], survives: dict[str, float],
+    campaign: Campaign,
+    problem: Problem,
+    model: FloatArray,
+    snr: float,
+    cases: int,
+    rng: np.random.Generator,
+    confusion: dict[str, dict[str, float]],
+    survives: dict[str, float],
 ) -> None:
     span = span_of(campaign, problem.tau if problem.lagged else RESONATOR_LAG)
     effects = [e for e in applicable(problem) if e.name != "calibration"]
@@ -128,7 +141,9 @@ def _predict_response(
         net = best_gains(dictionary, *scan_gains(problem, dictionary, model, draws))[0] - levels[:, None]
         best = np.argmax(net, axis=0)
         said = [dictionary.effects[k] if net[k, j] > THRESHOLD else NOTHING for j, k in enumerate(best)]
-        confusion[key] = {name: float(said.count(name)) / len(said) for name in sorted(set(said), key=said.count, reverse=True)}
+        confusion[key] = {
+            name: float(said.count(name)) / len(said) for name in sorted(set(said), key=said.count, reverse=True)
+        }
 
 
 def _signals(
@@ -157,8 +172,10 @@ def _signals(
 
 
 def _jitter(value: float, parameter: Parameter, rng: np.random.Generator) -> float:
-    moved = value * float(np.exp(0.2 * rng.standard_normal())) if parameter.logarithmic else (
-        value + 0.02 * (parameter.high - parameter.low) * float(rng.uniform(-0.1, 0.1))
+    moved = (
+        value * float(np.exp(0.2 * rng.standard_normal()))
+        if parameter.logarithmic
+        else (value + 0.02 * (parameter.high - parameter.low) * float(rng.uniform(-0.1, 0.1)))
     )
     return float(np.clip(moved, parameter.low, parameter.high))
 
@@ -181,12 +198,18 @@ def imagine(profiles: Sequence[str], rng: np.random.Generator, card: str | None 
         housing = lag(np.asarray(profile.at(time)), step, HOUSING_LAG)
         x = lag(housing, step, tau) - 293.15
         level = {name: value * rng.standard_normal(time.size) for name, value in NOISE.items()}
-        records.append(Record({
-            "time_s": time - time[0], "housing_temperature_degC": housing - 273.15 + 0.003 * rng.standard_normal(time.size),
-            "frequency_Hz": 5000.0 + 0.4 * x - 4e-4 * x**2 + level["frequency_Hz"],
-            "bias_deg_per_h": 0.1 * x + level["bias_deg_per_h"],
-            "inverse_q": 1e-7 * (1.0 + 1e-3 * x) + level["inverse_q"],
-        }, path=f"planned run {number + 1}"))
+        records.append(
+            Record(
+                {
+                    "time_s": time - time[0],
+                    "housing_temperature_degC": housing - 273.15 + 0.003 * rng.standard_normal(time.size),
+                    "frequency_Hz": 5000.0 + 0.4 * x - 4e-4 * x**2 + level["frequency_Hz"],
+                    "bias_deg_per_h": 0.1 * x + level["bias_deg_per_h"],
+                    "inverse_q": 1e-7 * (1.0 + 1e-3 * x) + level["inverse_q"],
+                },
+                path=f"planned run {number + 1}",
+            )
+        )
     return replace(load_campaign(records), notes=())
 
 
@@ -195,12 +218,16 @@ def plan_table(plan: Plan) -> Table:
     rows = []
     for name, said in sorted(plan.confusion.items(), key=lambda item: -item[1].get(item[0].split(" ")[0], 0.0)):
         own = said.get(name.split(" ")[0], 0.0)
-        others = ", ".join(f"{other} {100 * share:.0f} %" for other, share in said.items()
-                           if other != name.split(" ")[0] and share >= 0.02)
+        others = ", ".join(
+            f"{other} {100 * share:.0f} %"
+            for other, share in said.items()
+            if other != name.split(" ")[0] and share >= 0.02
+        )
         rows.append([name, f"{100 * own:.0f}", f"{100 * plan.survives[name]:.0f}", others or "—"])
     rows += [[name, "0", "0", why] for name, why in plan.invisible.items()]
     return Table(
         f"What this campaign could tell apart, effects at SNR {plan.snr:g}, {plan.cases} cases each",
-        ("effect", "named rightly / %", "survives baseline / %", "named otherwise"), rows,
+        ("effect", "named rightly / %", "survives baseline / %", "named otherwise"),
+        rows,
         "Named rightly: share of hidden cases in which the diagnosis names the effect.",
     )

@@ -62,7 +62,8 @@ def applicable(problem: Problem, effects: Sequence[Effect] | None = None) -> lis
     """Return the effects that act on the response and whose drives are measured and vary."""
     chosen = list(library().values()) if effects is None else list(effects)
     return [
-        effect for effect in chosen
+        effect
+        for effect in chosen
         if problem.response in effect.responses
         and all(_varies(problem, drive) for drive in effect.needs)
         and (effect.acts_on != "temperature" or problem.response == "frequency_Hz")
@@ -116,8 +117,15 @@ def build_dictionary(problem: Problem, span: Span, effects: Sequence[Effect]) ->
     if steps:
         first[~filled] = np.concatenate(steps, axis=1).T
     second = problem.basis.rotate(np.stack(seconds, axis=1)).T if seconds else np.zeros((0, rows))
-    return Dictionary(tuple(names), np.array(owner), tuple(shapes), first, np.ascontiguousarray(second),
-                      np.array(pairs, dtype=int), np.array(whole, dtype=bool))
+    return Dictionary(
+        tuple(names),
+        np.array(owner),
+        tuple(shapes),
+        first,
+        np.ascontiguousarray(second),
+        np.array(pairs, dtype=int),
+        np.array(whole, dtype=bool),
+    )
 
 
 def _steps(problem: Problem, span: Span) -> tuple[list[tuple[float, ...]], FloatArray]:
@@ -216,9 +224,7 @@ def _residuals(
     pairs = dictionary.pairs
     second = dictionary.second @ beside
     norm2 = squares[1] @ weight
-    cross = squares[2] @ weight - (
-        first[pairs, draws:] * second[:, draws:]
-    ).sum(axis=1)
+    cross = squares[2] @ weight - (first[pairs, draws:] * second[:, draws:]).sum(axis=1)
     own2 = norm2 - (second[:, draws:] ** 2).sum(axis=1) - cross**2 / safe[pairs] * seen[pairs]
     seen2 = own2 > SURVIVES * norm2
     projected = second[:, :draws] - (cross / safe[pairs] * seen[pairs])[:, None] * first[pairs, :draws]
@@ -226,7 +232,9 @@ def _residuals(
     return left, np.maximum(total - two, 1e-9 * total)
 
 
-def best_gains(dictionary: Dictionary, single: FloatArray, double: FloatArray) -> tuple[FloatArray, np.ndarray, np.ndarray]:
+def best_gains(
+    dictionary: Dictionary, single: FloatArray, double: FloatArray
+) -> tuple[FloatArray, np.ndarray, np.ndarray]:
     """Return, for each effect and draw, the best gain, the candidate that has it, and its number of columns.
 
     A second column of a nested effect must pay for itself: it counts only with PAIR_PRICE taken off.

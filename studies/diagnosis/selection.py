@@ -71,8 +71,12 @@ def scan_model(fit: Fit) -> FloatArray:
 
 
 def select(
-    problem: Problem, span: Span, levels: Mapping[str, float], threshold: float,
-    effects: Sequence[Effect] | None = None, dictionary: Dictionary | None = None,
+    problem: Problem,
+    span: Span,
+    levels: Mapping[str, float],
+    threshold: float,
+    effects: Sequence[Effect] | None = None,
+    dictionary: Dictionary | None = None,
 ) -> Selection:
     """Select the effects that one response needs.
 
@@ -126,9 +130,7 @@ def polish_contenders(fit: Fit, nets: Sequence[Candidate], levels: Mapping[str, 
     return sorted(rivals, key=lambda rival: -rival.evidence)
 
 
-def _settle(
-    plain: Fit, fit: Fit, dictionary: Dictionary, levels: Mapping[str, float], threshold: float
-) -> Selection:
+def _settle(plain: Fit, fit: Fit, dictionary: Dictionary, levels: Mapping[str, float], threshold: float) -> Selection:
     """Drop effects that the others made superfluous, and let every effect defend its place against its rivals."""
     while fit.terms:
         found = []

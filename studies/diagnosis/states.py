@@ -71,10 +71,15 @@ class States:
             return None if values is None else average(values, group)
 
         return replace(
-            self, time=average(self.time, group), campaign_time=average(self.campaign_time, group),
-            housing=average(self.housing, group), resonator=average(self.resonator, group),
-            amplitude_squared=mean(self.amplitude_squared), voltage_squared=mean(self.voltage_squared),
-            quadrature=mean(self.quadrature), pattern_angle=mean(self.pattern_angle),
+            self,
+            time=average(self.time, group),
+            campaign_time=average(self.campaign_time, group),
+            housing=average(self.housing, group),
+            resonator=average(self.resonator, group),
+            amplitude_squared=mean(self.amplitude_squared),
+            voltage_squared=mean(self.voltage_squared),
+            quadrature=mean(self.quadrature),
+            pattern_angle=mean(self.pattern_angle),
         )
 
     def with_lag(self, tau: float) -> "States":

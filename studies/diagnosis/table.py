@@ -64,7 +64,9 @@ class TableDiagnosis:
     def as_dict(self) -> dict[str, object]:
         """Return the object of `hrg diagnose --json`."""
         return {
-            **self.verdict.as_dict(), "law_imposed_rms_Hz": self.law_rms, "curvature_over_law": self.curvature_ratio,
+            **self.verdict.as_dict(),
+            "law_imposed_rms_Hz": self.law_rms,
+            "curvature_over_law": self.curvature_ratio,
             "candidates": [
                 {"form": form, "sum_of_squares_Hz2": ssq, "leave_one_out_Hz": loo, "evidence": score}
                 for form, ssq, loo, score in self.candidates
@@ -88,13 +90,27 @@ def steady_candidates(T: FloatArray) -> list[Candidate]:
         Candidate("curvature", "curvature, third and fourth order", power(3, 4), [(0.0, 0.0)], 2),
         Candidate("thermometer-scale", "thermometer, error of second and third order", power(3), [(0.0, 0.0)], 1),
         Candidate("thermometer-scale", "thermometer, error up to fourth order", power(3, 4), [(0.0, 0.0)], 2),
-        Candidate("mounting-stress", "mounting stress above a bond temperature",
-                  lambda x, a, _b: np.maximum(x - a, 0.0)[:, None], corners, 2),
-        Candidate("activity-dip", "one spurious mode", lambda x, a, b: (((x - a) / b) / (1 + ((x - a) / b) ** 2))[:, None],
-                  dips, 3),
-        Candidate("radiation", "incomplete soak with a time constant that depends on temperature",
-                  lambda x, a, b: ((x - a) * np.exp(-b * ((x + 273.15) / 293.15) ** 3))[:, None],
-                  [(20.0, b) for b in (3.0, 4.0, 5.0, 6.0, 8.0)], 2),
+        Candidate(
+            "mounting-stress",
+            "mounting stress above a bond temperature",
+            lambda x, a, _b: np.maximum(x - a, 0.0)[:, None],
+            corners,
+            2,
+        ),
+        Candidate(
+            "activity-dip",
+            "one spurious mode",
+            lambda x, a, b: (((x - a) / b) / (1 + ((x - a) / b) ** 2))[:, None],
+            dips,
+            3,
+        ),
+        Candidate(
+            "radiation",
+            "incomplete soak with a time constant that depends on temperature",
+            lambda x, a, b: ((x - a) * np.exp(-b * ((x + 273.15) / 293.15) ** 3))[:, None],
+            [(20.0, b) for b in (3.0, 4.0, 5.0, 6.0, 8.0)],
+            2,
+        ),
     ]
 
 
@@ -122,9 +138,20 @@ def study_steady_table(T: FloatArray, f: FloatArray, resolution: float, law: Law
     law_rms = float(np.sqrt(np.mean(law_left**2)))
     if distinct < FEWEST_POINTS:
         remark = f"{distinct} temperatures; a baseline of three numbers needs five or more to be tested"
-        result = ResponseResult("not-identifiable", None, (float(np.sqrt(np.mean(left**2))), None), None, "none", remark=remark)
-        return TableDiagnosis(Verdict("not-identifiable", (), {"frequency_Hz": result}, _NEXT), T, law_left, left, left,
-                              law_rms, ratio, (), (remark + ".",))
+        result = ResponseResult(
+            "not-identifiable", None, (float(np.sqrt(np.mean(left**2))), None), None, "none", remark=remark
+        )
+        return TableDiagnosis(
+            Verdict("not-identifiable", (), {"frequency_Hz": result}, _NEXT),
+            T,
+            law_left,
+            left,
+            left,
+            law_rms,
+            ratio,
+            (),
+            (remark + ".",),
+        )
     rounding = resolution / np.sqrt(12.0)
     scored = sorted((_score(c, T, f, base, left, rounding) for c in steady_candidates(T)), key=lambda s: -s.evidence)
     best = scored[0]
@@ -135,18 +162,33 @@ def study_steady_table(T: FloatArray, f: FloatArray, resolution: float, law: Law
     ext_rms = float(np.sqrt(np.mean(best.residual**2)))
     sentences = _sentences(T, f, law_rms, law_left, ratio, left, base_loo, rounding)
     if not counts:
-        result = ResponseResult("adequate", float(np.sqrt(np.mean(left**2))),
-                                (float(np.sqrt(np.mean(left**2))), base_loo), None, "none")
+        result = ResponseResult(
+            "adequate", float(np.sqrt(np.mean(left**2))), (float(np.sqrt(np.mean(left**2))), base_loo), None, "none"
+        )
         verdict = Verdict("adequate", (), {"frequency_Hz": result}, None)
         residual = left
     else:
-        result = ResponseResult("not-identifiable", max(ext_rms, rounding), (float(np.sqrt(np.mean(left**2))), base_loo),
-                                (ext_rms, best.loo), "none")
+        result = ResponseResult(
+            "not-identifiable",
+            max(ext_rms, rounding),
+            (float(np.sqrt(np.mean(left**2))), base_loo),
+            (ext_rms, best.loo),
+            "none",
+        )
         verdict = Verdict("not-identifiable", (_cause(scored, best),), {"frequency_Hz": result}, _NEXT)
         residual = best.residual
         sentences += [_set_sentence(scored, best)]
-    return TableDiagnosis(verdict, T, law_left, left, residual, law_rms, ratio,
-                          [(s.candidate.form, s.ssq, s.loo, s.evidence) for s in scored], sentences)
+    return TableDiagnosis(
+        verdict,
+        T,
+        law_left,
+        left,
+        residual,
+        law_rms,
+        ratio,
+        [(s.candidate.form, s.ssq, s.loo, s.evidence) for s in scored],
+        sentences,
+    )
 
 
 _NEXT = (
@@ -189,29 +231,50 @@ def _score(c: Candidate, T: FloatArray, f: FloatArray, base: FloatArray, left: F
     solution = np.linalg.lstsq(columns, f, rcond=None)[0]
     spread = np.sqrt(max(ssq / max(freedom, 1), rounding**2))
     errors = 1.645 * spread * np.sqrt(np.diag(np.linalg.pinv(columns.T @ columns)))
-    return _Scored(c, ssq, _leave_one_out(columns, f), float(evidence), chance, rest, shape, solution[-count:], errors[-count:])
+    return _Scored(
+        c, ssq, _leave_one_out(columns, f), float(evidence), chance, rest, shape, solution[-count:], errors[-count:]
+    )
 
 
 def _cause(scored: Sequence[_Scored], best: _Scored) -> Cause:
     members = {s.candidate.effect for s in scored if s.evidence > best.evidence - INSEPARABLE and s.evidence > 0}
     members |= {"curvature", "thermometer-scale"} if members & {"curvature", "thermometer-scale"} else set()
-    weight = {name: max(np.exp(0.25 * (s.evidence - best.evidence)) for s in scored if s.candidate.effect == name)
-              for name in {s.candidate.effect for s in scored}}
+    weight = {
+        name: max(np.exp(0.25 * (s.evidence - best.evidence)) for s in scored if s.candidate.effect == name)
+        for name in {s.candidate.effect for s in scored}
+    }
     inside = sum(weight[name] for name in members)
     return Cause(
-        best.candidate.effect, "frequency_Hz", float(0.9 * inside / sum(weight.values())),
+        best.candidate.effect,
+        "frequency_Hz",
+        float(0.9 * inside / sum(weight.values())),
         tuple(sorted(members - {best.candidate.effect})),
-        {name: Interval(float(v), float(v - e), float(v + e)) for name, v, e in zip(
-            ("cubic_Hz_per_10K3", "quartic_Hz_per_10K4"), best.coefficients, best.errors, strict=False)}
+        {
+            name: Interval(float(v), float(v - e), float(v + e))
+            for name, v, e in zip(
+                ("cubic_Hz_per_10K3", "quartic_Hz_per_10K4"), best.coefficients, best.errors, strict=False
+            )
+        }
         if best.candidate.effect in ("curvature", "thermometer-scale")
-        else {"size_Hz": Interval(float(best.coefficients[0]), float(best.coefficients[0] - best.errors[0]),
-                                  float(best.coefficients[0] + best.errors[0]))},
+        else {
+            "size_Hz": Interval(
+                float(best.coefficients[0]),
+                float(best.coefficients[0] - best.errors[0]),
+                float(best.coefficients[0] + best.errors[0]),
+            )
+        },
         best.evidence,
     )
 
 
 def _sentences(
-    T: FloatArray, f: FloatArray, law_rms: float, law_left: FloatArray, ratio: float, left: FloatArray, base_loo: float,
+    T: FloatArray,
+    f: FloatArray,
+    law_rms: float,
+    law_left: FloatArray,
+    ratio: float,
+    left: FloatArray,
+    base_loo: float,
     rounding: float,
 ) -> list[str]:
     slope = float(np.polyfit(T, f, 1)[0])
@@ -225,16 +288,22 @@ def _sentences(
     lowest = int(np.argmin(local))
     if 0 < lowest < local.size - 1:
         middle = 0.5 * (T[lowest] + T[lowest + 1])
-        out.append(f"The local slope falls to {local[lowest]:.1f} ppm/°C near {middle:.0f} °C and rises again to "
-                   f"{local[-1]:.1f}: the silica law has no such turn.")
+        out.append(
+            f"The local slope falls to {local[lowest]:.1f} ppm/°C near {middle:.0f} °C and rises again to "
+            f"{local[-1]:.1f}: the silica law has no such turn."
+        )
     if T.size >= 7:
         cubic, quartic = (float(np.sum((f - np.polyval(np.polyfit(T, f, p), T)) ** 2)) for p in (3, 4))
         freedom = T.size - 5
         ratio_f = (cubic - quartic) / (quartic / freedom)
-        out.append(f"Cubic against quartic: {cubic:.3g} and {quartic:.3g} Hz², F(1, {freedom}) = {ratio_f:.0f}, chance "
-                   f"{float(f_distribution.sf(ratio_f, 1, freedom)):.2g}; the cubic is not the end.")
-    out.append(f"{T.size} points approached from one side cannot show hysteresis, ageing or a linear scale error, and leave an "
-               "unsettled soak in the slope.")
+        out.append(
+            f"Cubic against quartic: {cubic:.3g} and {quartic:.3g} Hz², F(1, {freedom}) = {ratio_f:.0f}, chance "
+            f"{float(f_distribution.sf(ratio_f, 1, freedom)):.2g}; the cubic is not the end."
+        )
+    out.append(
+        f"{T.size} points approached from one side cannot show hysteresis, ageing or a linear scale error, and leave an "
+        "unsettled soak in the slope."
+    )
     return out
 
 

@@ -116,6 +116,6 @@ def corrected(fit: Fit) -> Fit:
 
 
 def _ends(fit: Fit) -> list[int]:
-    return [int(end) for end in np.cumsum([mask.sum() for mask in fit.problem.present])][: len(fit.problem.present)][:-1] + (
-        [int(sum(mask.sum() for mask in fit.problem.present))] if fit.problem.delay_row is not None else []
-    )
+    return [int(end) for end in np.cumsum([mask.sum() for mask in fit.problem.present])][: len(fit.problem.present)][
+        :-1
+    ] + ([int(sum(mask.sum() for mask in fit.problem.present))] if fit.problem.delay_row is not None else [])

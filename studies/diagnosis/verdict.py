@@ -33,10 +33,13 @@ class Cause:
     def as_dict(self) -> dict[str, Any]:
         """Return the entry of the contract."""
         return {
-            "effect": self.effect, "response": self.response, "probability": round(self.probability, 4),
+            "effect": self.effect,
+            "response": self.response,
+            "probability": round(self.probability, 4),
             "equivalent": list(self.equivalent),
             "parameters": {k: {"value": p.value, "low": p.low, "high": p.high} for k, p in self.parameters.items()},
-            "evidence": self.evidence, "summary": find_effect(self.effect).summary,
+            "evidence": self.evidence,
+            "summary": find_effect(self.effect).summary,
         }
 
 
@@ -62,12 +65,17 @@ class ResponseResult:
 
     def as_dict(self) -> dict[str, Any]:
         """Return the entry of the contract."""
+
         def pair(values: tuple[float | None, float | None] | None) -> dict[str, float | None] | None:
             return None if values is None else {"residual_rms": values[0], "held_out_rms": values[1]}
 
         out: dict[str, Any] = {
-            "verdict": self.verdict, "noise": self.noise, "baseline": pair(self.baseline),
-            "extended": pair(self.extended), "gain": self.gain, "left_over": self.left_over,
+            "verdict": self.verdict,
+            "noise": self.noise,
+            "baseline": pair(self.baseline),
+            "extended": pair(self.extended),
+            "gain": self.gain,
+            "left_over": self.left_over,
             "left_over_evidence": self.left_over_evidence,
         }
         if self.left_over_input:
@@ -92,10 +100,12 @@ class Verdict:
     def as_dict(self) -> dict[str, Any]:
         """Return the object of `hrg diagnose --json`."""
         return {
-            "schema": "hrg.diagnosis/1", "verdict": self.verdict,
+            "schema": "hrg.diagnosis/1",
+            "verdict": self.verdict,
             "causes": [cause.as_dict() for cause in self.causes],
             "responses": {name: result.as_dict() for name, result in self.responses.items()},
-            "next_experiment": self.next_experiment, "extended_model": self.extended_model,
+            "next_experiment": self.next_experiment,
+            "extended_model": self.extended_model,
             "notes": list(self.notes),
         }
 
@@ -116,10 +126,7 @@ def equivalent_to(found: Found, response: str, clock_drifts: bool | None = None)
         What a reference clock says: it tells a drifting clock from an ageing frequency.
     """
     best = found.rivals[0].evidence if found.rivals else found.evidence
-    members = {
-        rival.name for rival in found.rivals
-        if np.exp((rival.evidence - best) / (2.0 * TEMPER)) >= MEMBER
-    }
+    members = {rival.name for rival in found.rivals if np.exp((rival.evidence - best) / (2.0 * TEMPER)) >= MEMBER}
     clock = {"clock-drift", "ageing"}
     if clock_drifts is None or found.rivals[0].name not in clock:
         members |= set((find_effect(found.rivals[0].name).equivalents or {}).get(response, ()))

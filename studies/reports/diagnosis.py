@@ -118,7 +118,9 @@ def diagnosis_page(diagnosis: Diagnosis) -> str:
         ),
     ]
     chapters += [
-        Chapter(f"Residual of the {NAMES[response]}", [residual_views(diagnosis, response), *_rivals(diagnosis, response)])
+        Chapter(
+            f"Residual of the {NAMES[response]}", [residual_views(diagnosis, response), *_rivals(diagnosis, response)]
+        )
         for response in diagnosis.inquiries
     ]
     chapters.append(Chapter("How it was found", [Text(METHOD)]))
@@ -220,7 +222,9 @@ def residual_views(diagnosis: Diagnosis, response: str) -> Picture:
     with figure(rows, columns, height=2.5 * rows, sharey=True) as (canvas, axes):
         flat = list(np.ravel(axes))
         for axis, (label, values) in zip(flat, inputs.items(), strict=False):
-            axis.plot(values[heating], rest[heating], ".", color=VERMILION, markersize=2, label="heating", rasterized=True)
+            axis.plot(
+                values[heating], rest[heating], ".", color=VERMILION, markersize=2, label="heating", rasterized=True
+            )
             axis.plot(values[~heating], rest[~heating], ".", color=BLUE, markersize=2, label="cooling", rasterized=True)
             axis.set_xlabel(label)
             axis.locator_params(axis="x", nbins=5)

@@ -158,14 +158,16 @@ def _respond(instrument: "Instrument", transient: Transient, model: FrequencyMod
     changes = _apply_effects(instrument, transient, time, housing, resonator)
     resonator = resonator + changes.get("resonator_temperature", 0.0)
     reference = instrument.reference_temperature
-    frequency = model.frequency(resonator) * np.exp(T[:, 2]) + changes.get("frequency_Hz", 0.0)
+    # The bias follows the temperature, for which the thermal frequency stands; a spring or a clock moves only the reading.
+    thermal = model.frequency(resonator) * np.exp(T[:, 2])
+    frequency = thermal + changes.get("frequency_Hz", 0.0)
     loss = read_loss(instrument.table("loss"), f"{instrument.path} [loss]")
     inverse_q = loss.at(resonator - reference) + changes.get("inverse_q", 0.0)
     if not (inverse_q > 0).all():
         raise InputError(
             f"{instrument.path} [loss]: 1/Q becomes negative in this profile; correct its slope or curvature."
         )
-    change = frequency - float(model.frequency(np.array([reference]))[0])
+    change = thermal - float(model.frequency(np.array([reference]))[0])
     bias_model = read_bias(instrument.table("bias"), f"{instrument.path} [bias]")
     bias = bias_model.at(change, np.gradient(change, time[1] - time[0]), frequency, inverse_q, model.bryan_factor)
     return _Noiseless(time, housing, resonator, frequency, bias + changes.get("bias_deg_per_h", 0.0), inverse_q)
@@ -196,7 +198,7 @@ def _apply_effects(
     """Sum what the card's `[[effect]]` tables add to the resonator's temperature (K) and to the responses."""
     if not instrument.effects:
         return {}
-    from studies.diagnosis.effects import apply_effect
+    from studies.diagnosis.effects import apply_effects
     from studies.diagnosis.states import States
 
     reference = instrument.reference_temperature
@@ -209,14 +211,12 @@ def _apply_effects(
         tau=slowest_lag(instrument),
         reference=reference,
     )
-    changes: dict[str, Array] = {}
+    entries = []
     for number, effect in enumerate(instrument.effects, 1):
-        where = f"{instrument.path} [[effect]] number {number}"
-        response, parameters = _read_effect(effect, where)
-        with naming(where):
-            target, change = apply_effect(effect["name"], parameters, states, response)
-        changes[target] = changes.get(target, np.zeros_like(time)) + change
-    return changes
+        response, parameters = _read_effect(effect, f"{instrument.path} [[effect]] number {number}")
+        entries.append((effect["name"], response, parameters))
+    with naming(f"{instrument.path} [[effect]]"):
+        return apply_effects(entries, states)
 
 
 def _idle_effects(instrument: "Instrument") -> tuple[str, ...]:

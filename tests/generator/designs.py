@@ -53,16 +53,46 @@ DRIVES = [schedule([1.0], 8), schedule([1.0, 1.3, 0.8, 1.2, 1.0, 0.7], 1.3), sch
 ANGLES = [0.0, 11.0, 27.0, 40.0]
 
 DESIGNS = {
-    "rich": {"chambers": [stairs(), ramps(), cycle(), wander()], "volts": VOLTS, "drives": DRIVES, "angles": ANGLES,
-                 "gaps": [0.0, 12.0, 16.0, 30.0]},
-    "plain": {"chambers": [stairs(), ramps(), cycle(), wander()], "volts": None, "drives": None, "angles": None,
-                  "gaps": [0.0, 12.0, 16.0, 30.0]},
-    "cycles": {"chambers": [cycle(), cycle(), cycle(period=3.0), cycle()], "volts": VOLTS, "drives": DRIVES, "angles": None,
-                   "gaps": [0.0, 4.0, 4.0, 4.0]},
-    "monotone": {"chambers": [up_stairs(), up_stairs(last=30.0), up_stairs(first=-10.0), up_stairs()], "volts": VOLTS,
-                     "drives": DRIVES, "angles": None, "gaps": [0.0, 16.0, 16.0, 16.0]},
-    "steps": {"chambers": [paper_step(-10), paper_step(40), paper_step(0), paper_step(-20)], "volts": None, "drives": None,
-                  "angles": None, "gaps": [0.0, 16.0, 16.0, 16.0]},
-    "three": {"chambers": [ramps(), cycle(period=3.2), stairs()], "volts": [VOLTS[1], VOLTS[0], None],
-                  "drives": [None, DRIVES[1], DRIVES[2]], "angles": [0.0, 15.0, 32.0], "gaps": [0.0, 40.0, 10.0]},
+    "rich": {
+        "chambers": [stairs(), ramps(), cycle(), wander()],
+        "volts": VOLTS,
+        "drives": DRIVES,
+        "angles": ANGLES,
+        "gaps": [0.0, 12.0, 16.0, 30.0],
+    },
+    "plain": {
+        "chambers": [stairs(), ramps(), cycle(), wander()],
+        "volts": None,
+        "drives": None,
+        "angles": None,
+        "gaps": [0.0, 12.0, 16.0, 30.0],
+    },
+    "cycles": {
+        "chambers": [cycle(), cycle(), cycle(period=3.0), cycle()],
+        "volts": VOLTS,
+        "drives": DRIVES,
+        "angles": None,
+        "gaps": [0.0, 4.0, 4.0, 4.0],
+    },
+    "monotone": {
+        "chambers": [up_stairs(), up_stairs(last=30.0), up_stairs(first=-10.0), up_stairs()],
+        "volts": VOLTS,
+        "drives": DRIVES,
+        "angles": None,
+        "gaps": [0.0, 16.0, 16.0, 16.0],
+    },
+    "steps": {
+        "chambers": [paper_step(-10), paper_step(40), paper_step(0), paper_step(-20)],
+        "volts": None,
+        "drives": None,
+        "angles": None,
+        "gaps": [0.0, 16.0, 16.0, 16.0],
+    },
+    "three": {
+        "chambers": [ramps(), cycle(period=3.2), stairs()],
+        "volts": [VOLTS[1], VOLTS[0], None],
+        "drives": [None, DRIVES[1], DRIVES[2]],
+        "angles": [0.0, 15.0, 32.0],
+        "gaps": [0.0, 40.0, 10.0],
+    },
 }

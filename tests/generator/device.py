@@ -51,12 +51,20 @@ class Device:
         bias1 = rng.choice([-1, 1]) * rng.uniform(0.05, 0.4)
         q0 = 10 ** rng.uniform(-7.3, -6.3)
         return cls(
-            f0, slope, -f0 * rng.uniform(0.05e-6, 0.12e-6), float(np.exp(rng.uniform(np.log(1200), np.log(4500)))),
-            rng.uniform(300, 900), (bias1, bias1 * rng.uniform(-0.01, 0.01), bias1 * rng.uniform(-1e-4, 1e-4)),
+            f0,
+            slope,
+            -f0 * rng.uniform(0.05e-6, 0.12e-6),
+            float(np.exp(rng.uniform(np.log(1200), np.log(4500)))),
+            rng.uniform(300, 900),
+            (bias1, bias1 * rng.uniform(-0.01, 0.01), bias1 * rng.uniform(-1e-4, 1e-4)),
             (q0, q0 * rng.uniform(-2e-3, 4e-3), q0 * rng.uniform(-2e-5, 4e-5)),
-            {"frequency_Hz": rng.uniform(0.004, 0.02), "bias_deg_per_h": rng.uniform(0.05, 0.3),
-             "inverse_q": q0 * rng.uniform(0.003, 0.02)},
-            rng.uniform(2.0, 8.0), rng.uniform(1.0, 4.0),
+            {
+                "frequency_Hz": rng.uniform(0.004, 0.02),
+                "bias_deg_per_h": rng.uniform(0.05, 0.3),
+                "inverse_q": q0 * rng.uniform(0.003, 0.02),
+            },
+            rng.uniform(2.0, 8.0),
+            rng.uniform(1.0, 4.0),
         )
 
 
@@ -107,15 +115,33 @@ def build(design, family, rng, effects=(), alien="", snr=0.0):
     housing, plain, tilt = run_heat(design, device, rng, None, starts)
     time = [STEP * np.arange(c.size) for c in plan["chambers"]]
     begin = np.cumsum([plan["gaps"][k] * 3600.0 + (time[k - 1][-1] if k else 0.0) for k in range(runs)])
-    sample = [np.sort(np.arange(0.0, t[-1] - 5, 10.0) + rng.uniform(-2, 2, int(np.ceil((t[-1] - 5) / 10.0)))) for t in time]
+    sample = [
+        np.sort(np.arange(0.0, t[-1] - 5, 10.0) + rng.uniform(-2, 2, int(np.ceil((t[-1] - 5) / 10.0)))) for t in time
+    ]
     sample = [s[(rng.random(s.size) > 0.01) & (s >= 0)] for s in sample]
     angle = [np.full(t.size, np.radians(plan["angles"][k])) if plan["angles"] else None for k, t in enumerate(time)]
     quad = [hidden.quadrature(t, p, rng) for t, p in zip(time, plain, strict=True)]
     world = World(
-        device, time, [t + b for t, b in zip(time, begin, strict=True)], housing, plain, tilt,
-        [np.full(t.size, 80.0) if not plan["volts"] or plan["volts"][k] is None else plan["volts"][k] for k, t in enumerate(time)],
-        [np.full(t.size, 1.0) if not plan["drives"] or plan["drives"][k] is None else plan["drives"][k] for k, t in enumerate(time)],
-        angle, quad, rng, plan["volts"] is not None, plan["drives"] is not None, plan["angles"] is not None,
+        device,
+        time,
+        [t + b for t, b in zip(time, begin, strict=True)],
+        housing,
+        plain,
+        tilt,
+        [
+            np.full(t.size, 80.0) if not plan["volts"] or plan["volts"][k] is None else plan["volts"][k]
+            for k, t in enumerate(time)
+        ],
+        [
+            np.full(t.size, 1.0) if not plan["drives"] or plan["drives"][k] is None else plan["drives"][k]
+            for k, t in enumerate(time)
+        ],
+        angle,
+        quad,
+        rng,
+        plan["volts"] is not None,
+        plan["drives"] is not None,
+        plan["angles"] is not None,
     )
     noise = {}
     for c in CHANNELS:

@@ -36,13 +36,26 @@ def _sign(rng):
 def second_lag(w):
     ratio = w.rng.uniform(2.5, 7.0) if w.rng.random() < 0.7 else w.rng.uniform(0.12, 0.3)
     tau = w.device.contact * ratio
-    return Piece("second-lag", "frequency_Hz", heat=lambda h, s: replace(h, side=(min(abs(s), 0.6), tau)), start=0.05,
-                 most=0.6, linear=False, parameters={"time": tau})
+    return Piece(
+        "second-lag",
+        "frequency_Hz",
+        heat=lambda h, s: replace(h, side=(min(abs(s), 0.6), tau)),
+        start=0.05,
+        most=0.6,
+        linear=False,
+        parameters={"time": tau},
+    )
 
 
 def radiation(w):
-    return Piece("radiation", "frequency_Hz", heat=lambda h, s: replace(h, radiated=min(abs(s), 1.0)), start=0.1, most=1.0,
-                 linear=False)
+    return Piece(
+        "radiation",
+        "frequency_Hz",
+        heat=lambda h, s: replace(h, radiated=min(abs(s), 1.0)),
+        start=0.1,
+        most=1.0,
+        linear=False,
+    )
 
 
 def self_heating(w):
@@ -51,14 +64,24 @@ def self_heating(w):
 
 def thermometer_scale(w):
     skew = w.rng.uniform(-0.5, 0.5)
-    return Piece("thermometer-scale", "frequency_Hz",
-                 sensor=lambda t, s: t + s * (((t - 12) / 30) ** 3 + skew * ((t - 12) / 30) ** 2), start=0.05, linear=False)
+    return Piece(
+        "thermometer-scale",
+        "frequency_Hz",
+        sensor=lambda t, s: t + s * (((t - 12) / 30) ** 3 + skew * ((t - 12) / 30) ** 2),
+        start=0.05,
+        linear=False,
+    )
 
 
 def _loop(w, channel):
     width = w.rng.uniform(0.8, 6.0)
-    return Piece("hysteresis", channel, {channel: [preisach(t, width, w.rng) for t in w.temperature]},
-                 start=_sign(w.rng) * 0.1, parameters={"width": width})
+    return Piece(
+        "hysteresis",
+        channel,
+        {channel: [preisach(t, width, w.rng) for t in w.temperature]},
+        start=_sign(w.rng) * 0.1,
+        parameters={"width": width},
+    )
 
 
 def hysteresis(w):
@@ -66,8 +89,12 @@ def hysteresis(w):
 
 
 def rate_bias(w):
-    return Piece("rate-bias", "bias_deg_per_h",
-                 {"bias_deg_per_h": [np.gradient(t, STEP) * 1e3 for t in w.temperature]}, start=_sign(w.rng) * 0.1)
+    return Piece(
+        "rate-bias",
+        "bias_deg_per_h",
+        {"bias_deg_per_h": [np.gradient(t, STEP) * 1e3 for t in w.temperature]},
+        start=_sign(w.rng) * 0.1,
+    )
 
 
 def _ageing(w, channel):
@@ -75,8 +102,13 @@ def _ageing(w, channel):
     onset = float(np.exp(w.rng.uniform(np.log(1800), np.log(total / 2))))
     kind = w.rng.choice(["log", "exp"])
     shape = (lambda t: np.log1p(t / onset)) if kind == "log" else (lambda t: 1 - np.exp(-t / (3 * onset)))
-    return Piece("ageing", channel, {channel: [shape(t) for t in w.campaign]}, start=_sign(w.rng) * 0.01,
-                 parameters={"onset": onset, "kind": str(kind)})
+    return Piece(
+        "ageing",
+        channel,
+        {channel: [shape(t) for t in w.campaign]},
+        start=_sign(w.rng) * 0.01,
+        parameters={"onset": onset, "kind": str(kind)},
+    )
 
 
 def ageing(w):
@@ -85,8 +117,13 @@ def ageing(w):
 
 def ageing_bias(w):
     onset = float(np.exp(w.rng.uniform(np.log(600), np.log(8000))))
-    return Piece("ageing", "bias_deg_per_h", {"bias_deg_per_h": [np.log1p(t / onset) for t in w.campaign]},
-                 start=_sign(w.rng) * 0.01, parameters={"onset": onset})
+    return Piece(
+        "ageing",
+        "bias_deg_per_h",
+        {"bias_deg_per_h": [np.log1p(t / onset) for t in w.campaign]},
+        start=_sign(w.rng) * 0.01,
+        parameters={"onset": onset},
+    )
 
 
 def clock_drift(w):
@@ -126,40 +163,64 @@ def activity_dip(w):
         loss.append(-shift.imag)
     scale = w.device.sigma["inverse_q"] / w.device.sigma["frequency_Hz"]
     scale *= -np.sign(sum(float(np.sum(q)) for q in loss)) * -1.0
-    return Piece("activity-dip", "frequency_Hz",
-                 {"frequency_Hz": frequency, "inverse_q": [scale * q for q in loss]}, start=0.1,
-                 parameters={"centre": centre, "width": width})
+    return Piece(
+        "activity-dip",
+        "frequency_Hz",
+        {"frequency_Hz": frequency, "inverse_q": [scale * q for q in loss]},
+        start=0.1,
+        parameters={"centre": centre, "width": width},
+    )
 
 
 def softening(w):
-    return Piece("electrostatic-softening", "frequency_Hz",
-                 {"frequency_Hz": [w.device.f0 * (np.sqrt(1 - 2e-9 * v**2) - 1) for v in w.volts]})
+    return Piece(
+        "electrostatic-softening",
+        "frequency_Hz",
+        {"frequency_Hz": [w.device.f0 * (np.sqrt(1 - 2e-9 * v**2) - 1) for v in w.volts]},
+    )
 
 
 def amplitude_frequency(w):
-    return Piece("amplitude-frequency", "frequency_Hz",
-                 {"frequency_Hz": [w.device.f0 * 1e-7 * a**2 for a in w.drive]}, start=_sign(w.rng))
+    return Piece(
+        "amplitude-frequency",
+        "frequency_Hz",
+        {"frequency_Hz": [w.device.f0 * 1e-7 * a**2 for a in w.drive]},
+        start=_sign(w.rng),
+    )
 
 
 def curvature(w):
     quartic = w.rng.uniform(-0.2, 0.2)
-    return Piece("curvature", "frequency_Hz",
-                 {"frequency_Hz": [((t - 20) / 30) ** 3 + quartic * ((t - 20) / 30) ** 4 for t in w.temperature]},
-                 start=_sign(w.rng) * 0.01)
+    return Piece(
+        "curvature",
+        "frequency_Hz",
+        {"frequency_Hz": [((t - 20) / 30) ** 3 + quartic * ((t - 20) / 30) ** 4 for t in w.temperature]},
+        start=_sign(w.rng) * 0.01,
+    )
 
 
 def cross_damping(w):
     fifth = w.rng.uniform(-0.2, 0.2)
-    return Piece("cross-damping", "bias_deg_per_h",
-                 {"bias_deg_per_h": [((t - 20) / 30) ** 4 + fifth * ((t - 20) / 30) ** 5 for t in w.temperature]},
-                 start=_sign(w.rng))
+    return Piece(
+        "cross-damping",
+        "bias_deg_per_h",
+        {"bias_deg_per_h": [((t - 20) / 30) ** 4 + fifth * ((t - 20) / 30) ** 5 for t in w.temperature]},
+        start=_sign(w.rng),
+    )
 
 
 def leak(w):
     life = 40 * w.campaign[-1][-1]
-    return Piece("leak", "inverse_q", {"inverse_q": [
-        w.device.loss[0] * (1 - np.exp(-c / life)) * np.sqrt((t + 273.15) / 293.15)
-        for c, t in zip(w.campaign, w.temperature, strict=True)]})
+    return Piece(
+        "leak",
+        "inverse_q",
+        {
+            "inverse_q": [
+                w.device.loss[0] * (1 - np.exp(-c / life)) * np.sqrt((t + 273.15) / 293.15)
+                for c, t in zip(w.campaign, w.temperature, strict=True)
+            ]
+        },
+    )
 
 
 def loss_peak(w):
@@ -177,8 +238,13 @@ def _line(w, channel):
     period = float(np.exp(w.rng.uniform(np.log(900), np.log(9000))))
     phase = w.rng.uniform(0, 2 * np.pi)
     use = w.campaign if w.rng.random() < 0.5 else w.time
-    return Piece("periodic", channel, {channel: [np.sin(2 * np.pi * t / period + phase) for t in use]}, start=0.01,
-                 parameters={"period": period})
+    return Piece(
+        "periodic",
+        channel,
+        {channel: [np.sin(2 * np.pi * t / period + phase) for t in use]},
+        start=0.01,
+        parameters={"period": period},
+    )
 
 
 def periodic(w):
@@ -187,15 +253,29 @@ def periodic(w):
 
 def quadrature_leakage(w):
     slope = w.rng.uniform(-0.01, 0.01)
-    return Piece("quadrature-leakage", "bias_deg_per_h", {"bias_deg_per_h": [
-        q * np.sin(0.3 + slope * (t - 20)) for q, t in zip(w.quadrature, w.temperature, strict=True)]})
+    return Piece(
+        "quadrature-leakage",
+        "bias_deg_per_h",
+        {
+            "bias_deg_per_h": [
+                q * np.sin(0.3 + slope * (t - 20)) for q, t in zip(w.quadrature, w.temperature, strict=True)
+            ]
+        },
+    )
 
 
 def axis_rotation(w):
     turn = np.radians(_sign(w.rng) * w.rng.uniform(0.08, 0.5))
     start = w.rng.uniform(0, np.pi / 2)
-    return Piece("axis-rotation", "bias_deg_per_h", {"bias_deg_per_h": [
-        np.sin(4 * (a - start - turn * (t - 20))) for a, t in zip(w.angle, w.temperature, strict=True)]})
+    return Piece(
+        "axis-rotation",
+        "bias_deg_per_h",
+        {
+            "bias_deg_per_h": [
+                np.sin(4 * (a - start - turn * (t - 20))) for a, t in zip(w.angle, w.temperature, strict=True)
+            ]
+        },
+    )
 
 
 def mounting_stress(w):
@@ -204,17 +284,34 @@ def mounting_stress(w):
     for t in w.temperature:
         strain = follow(t, relax)
         out.append(t - strain)
-    return Piece("mounting-stress", "frequency_Hz", {"frequency_Hz": out}, start=_sign(w.rng) * 1e-3,
-                 parameters={"relax": relax})
+    return Piece(
+        "mounting-stress", "frequency_Hz", {"frequency_Hz": out}, start=_sign(w.rng) * 1e-3, parameters={"relax": relax}
+    )
 
 
 EFFECTS = {
-    "second-lag": second_lag, "rate-bias": rate_bias, "hysteresis": hysteresis, "ageing": ageing, "jump": jump,
-    "activity-dip": activity_dip, "electrostatic-softening": softening, "amplitude-frequency": amplitude_frequency,
-    "curvature": curvature, "cross-damping": cross_damping, "self-heating": self_heating, "loss-peak": loss_peak,
-    "leak": leak, "periodic": periodic, "radiation": radiation, "clock-drift": clock_drift,
-    "quadrature-leakage": quadrature_leakage, "axis-rotation": axis_rotation, "thermometer-scale": thermometer_scale,
-    "mounting-stress": mounting_stress, "ageing@bias": ageing_bias, "jump@bias": jump_bias,
+    "second-lag": second_lag,
+    "rate-bias": rate_bias,
+    "hysteresis": hysteresis,
+    "ageing": ageing,
+    "jump": jump,
+    "activity-dip": activity_dip,
+    "electrostatic-softening": softening,
+    "amplitude-frequency": amplitude_frequency,
+    "curvature": curvature,
+    "cross-damping": cross_damping,
+    "self-heating": self_heating,
+    "loss-peak": loss_peak,
+    "leak": leak,
+    "periodic": periodic,
+    "radiation": radiation,
+    "clock-drift": clock_drift,
+    "quadrature-leakage": quadrature_leakage,
+    "axis-rotation": axis_rotation,
+    "thermometer-scale": thermometer_scale,
+    "mounting-stress": mounting_stress,
+    "ageing@bias": ageing_bias,
+    "jump@bias": jump_bias,
 }
 
 
@@ -261,8 +358,12 @@ def _amplitude_temperature(w):
 
 
 def _bursts(w):
-    return [np.convolve((w.rng.random(t.size) < 8 / t.size) * w.rng.normal(0, 1, t.size),
-                        np.exp(-np.arange(400) / 80.0))[: t.size] for t in w.time]
+    return [
+        np.convolve((w.rng.random(t.size) < 8 / t.size) * w.rng.normal(0, 1, t.size), np.exp(-np.arange(400) / 80.0))[
+            : t.size
+        ]
+        for t in w.time
+    ]
 
 
 def _drift(w):

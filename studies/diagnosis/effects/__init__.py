@@ -176,9 +176,7 @@ def apply_effect(
     return target, np.asarray(columns @ weights)
 
 
-def apply_effects(
-    entries: Sequence[tuple[str, str, Mapping[str, float]]], states: States
-) -> dict[str, FloatArray]:
+def apply_effects(entries: Sequence[tuple[str, str, Mapping[str, float]]], states: States) -> dict[str, FloatArray]:
     """Run several effects forward, those on the temperature first: the others see the temperature that they leave.
 
     Parameters

@@ -17,7 +17,9 @@ def columns(states: States, shape: Sequence[float], response: str) -> FloatArray
 
 def grid(span: Span, response: str) -> list[tuple[float, ...]]:
     """Onsets from minutes to far beyond the campaign (a straight line)."""
-    forms: list[tuple[float, ...]] = [(float(onset), 0.0) for onset in np.geomspace(300.0, 30.0 * span.campaign_length, 10)]
+    forms: list[tuple[float, ...]] = [
+        (float(onset), 0.0) for onset in np.geomspace(300.0, 30.0 * span.campaign_length, 10)
+    ]
     if response == "bias_deg_per_h":
         forms += [(float(onset), 1.0) for onset in np.geomspace(300.0, 10.0 * span.longest_run, 6)]
     return forms

@@ -76,19 +76,29 @@ def test_two_gyros_are_refused(campaign, capsys, tmp_path):
     records, _ = campaign
     other = columns_of(records[1])
     other["frequency_Hz"] *= 1.2
-    status, out, err = run(capsys, save(tmp_path, columns_of(records[0]), "a.csv"), save(tmp_path, other, "b.csv"), "--json")
+    status, out, err = run(
+        capsys, save(tmp_path, columns_of(records[0]), "a.csv"), save(tmp_path, other, "b.csv"), "--json"
+    )
     assert status == 2
     assert out == ""
     assert "different gyros" in err
-    status, _, err = run(capsys, save(tmp_path, columns_of(records[0]), "a.csv", instrument="one"),
-                         save(tmp_path, columns_of(records[1]), "b.csv", instrument="two"))
+    status, _, err = run(
+        capsys,
+        save(tmp_path, columns_of(records[0]), "a.csv", instrument="one"),
+        save(tmp_path, columns_of(records[1]), "b.csv", instrument="two"),
+    )
     assert status == 2
     assert "'two'" in err
 
 
-@pytest.mark.parametrize(("column", "factor", "words"), [
-    ("frequency_Hz", 1e-3, "another unit"), ("inverse_q", 1e9, "inverse_q"), ("bias_deg_per_h", 1000.0, "another unit"),
-])
+@pytest.mark.parametrize(
+    ("column", "factor", "words"),
+    [
+        ("frequency_Hz", 1e-3, "another unit"),
+        ("inverse_q", 1e9, "inverse_q"),
+        ("bias_deg_per_h", 1000.0, "another unit"),
+    ],
+)
 def test_units_off_by_a_thousand_are_named(campaign, capsys, tmp_path, column, factor, words):
     records, _ = campaign
     wrong = columns_of(records[1])
@@ -157,10 +167,17 @@ def test_one_run_with_an_hour_gap_and_a_repeated_file(campaign, capsys, tmp_path
 def test_constant_temperature_is_not_identifiable(capsys, tmp_path):
     rng = np.random.default_rng(5)
     time = np.arange(0.0, 20000.0, 20.0)
-    found = verdict_of(capsys, save(tmp_path, {
-        "time_s": time, "housing_temperature_degC": 20.0 + 0.003 * rng.standard_normal(time.size),
-        "frequency_Hz": 5000.0 + 0.01 * rng.standard_normal(time.size),
-    }))
+    found = verdict_of(
+        capsys,
+        save(
+            tmp_path,
+            {
+                "time_s": time,
+                "housing_temperature_degC": 20.0 + 0.003 * rng.standard_normal(time.size),
+                "frequency_Hz": 5000.0 + 0.01 * rng.standard_normal(time.size),
+            },
+        ),
+    )
     assert found["verdict"] == "not-identifiable"
     assert found["causes"] == []
     assert "K only" in found["responses"]["frequency_Hz"]["remark"]

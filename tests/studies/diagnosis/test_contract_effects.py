@@ -8,9 +8,26 @@ from studies.diagnosis.states import States, lag
 from studies.errors import InputError
 
 NAMES = {
-    "second-lag", "rate-bias", "hysteresis", "ageing", "jump", "activity-dip", "electrostatic-softening",
-    "amplitude-frequency", "curvature", "cross-damping", "self-heating", "loss-peak", "leak", "periodic", "radiation",
-    "clock-drift", "quadrature-leakage", "axis-rotation", "thermometer-scale", "mounting-stress",
+    "second-lag",
+    "rate-bias",
+    "hysteresis",
+    "ageing",
+    "jump",
+    "activity-dip",
+    "electrostatic-softening",
+    "amplitude-frequency",
+    "curvature",
+    "cross-damping",
+    "self-heating",
+    "loss-peak",
+    "leak",
+    "periodic",
+    "radiation",
+    "clock-drift",
+    "quadrature-leakage",
+    "axis-rotation",
+    "thermometer-scale",
+    "mounting-stress",
 }
 
 
@@ -18,9 +35,17 @@ def make_states(run=0):
     time = np.arange(0.0, 20000.0, 60.0)
     housing = 293.15 + 20.0 * np.sin(time / 3000.0) + 5.0 * np.sin(time / 700.0)
     return States(
-        run, time, time + 86400.0 * run, housing, lag(housing, 60.0, 1500.0), 1500.0, 293.15,
-        amplitude_squared=1.0 + 0.2 * (time > 9000), voltage_squared=6400.0 + 3000.0 * (time > 12000),
-        quadrature=np.cos(time / 5000.0), pattern_angle=np.full(time.shape, 0.3) + 0.4 * (time > 10000),
+        run,
+        time,
+        time + 86400.0 * run,
+        housing,
+        lag(housing, 60.0, 1500.0),
+        1500.0,
+        293.15,
+        amplitude_squared=1.0 + 0.2 * (time > 9000),
+        voltage_squared=6400.0 + 3000.0 * (time > 12000),
+        quadrature=np.cos(time / 5000.0),
+        pattern_angle=np.full(time.shape, 0.3) + 0.4 * (time > 10000),
     )
 
 

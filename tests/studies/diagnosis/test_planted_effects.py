@@ -46,22 +46,27 @@ def test_hidden_effect_is_named(design, family, name, response):
     assert verdict.causes, truth
     assert name in names_of(verdict.causes[0]), (verdict.causes, truth)
     assert verdict.causes[0].response == response
-    assert verdict.responses[response].verdict in ("explained", "not-identifiable"), (verdict.responses[response], truth)
+    assert verdict.responses[response].verdict in ("explained", "not-identifiable"), (
+        verdict.responses[response],
+        truth,
+    )
 
 
 def test_null_campaigns_are_adequate():
     """One null for each positive; at a true rate of 1 % two alarms in six would come once in 700 runs."""
-    said = [
-        diagnose(design, family, salt=2000 + k)[0] for k, (design, family, *_) in enumerate(POSITIVES)
-    ]
+    said = [diagnose(design, family, salt=2000 + k)[0] for k, (design, family, *_) in enumerate(POSITIVES)]
     assert sum(v.verdict != "adequate" for v in said) <= 1, [(v.verdict, v.causes) for v in said]
 
 
 def test_aliens_are_not_explained():
     """One alien for each positive: structure that no file of the library knows must not be called explained."""
-    said = [diagnose("rich", family, alien=alien, salt=3000 + k)[0]
-            for k, (alien, (_, family, *_)) in enumerate(zip(ALIEN, POSITIVES, strict=True))]
-    assert sum(v.verdict == "unexplained" for v in said) >= 4, [(a, v.verdict, v.causes) for a, v in zip(ALIEN, said, strict=True)]
+    said = [
+        diagnose("rich", family, alien=alien, salt=3000 + k)[0]
+        for k, (alien, (_, family, *_)) in enumerate(zip(ALIEN, POSITIVES, strict=True))
+    ]
+    assert sum(v.verdict == "unexplained" for v in said) >= 4, [
+        (a, v.verdict, v.causes) for a, v in zip(ALIEN, said, strict=True)
+    ]
 
 
 def test_effect_without_its_file_is_not_explained_by_another():
@@ -86,8 +91,10 @@ def test_inseparable_pair_is_answered_as_a_set():
 def test_generator_knows_nothing_of_the_diagnosis():
     for path in (Path(__file__).resolve().parents[2] / "generator").glob("*.py"):
         for node in ast.walk(ast.parse(path.read_text())):
-            modules = [node.module or ""] if isinstance(node, ast.ImportFrom) else (
-                [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
+            modules = (
+                [node.module or ""]
+                if isinstance(node, ast.ImportFrom)
+                else ([alias.name for alias in node.names] if isinstance(node, ast.Import) else [])
             )
             assert not any(module.startswith("studies.diagnosis") for module in modules), path
 
