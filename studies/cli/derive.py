@@ -8,6 +8,8 @@ with `number` in the paper (null where it has none), `title`, and the equations 
 
 from typing import Any, Literal
 
+MOST_HARMONIC = 100  # the closed forms of higher ones take minutes
+
 
 def derive(
     *,
@@ -53,6 +55,10 @@ def derive(
         raise InputError(
             f"a dome from {pole_angle_deg:g} to {rim_angle_deg:g} degrees has no inextensional mode: the pole angle must "
             "be 0 or more and below the rim angle, the rim angle below 180 degrees."
+        )
+    if harmonic > MOST_HARMONIC:
+        raise InputError(
+            f"--harmonic {harmonic}: closed forms are derived up to n = {MOST_HARMONIC}; choose a lower one."
         )
     shape = rayleigh_integrals(harmonic, radians(pole_angle_deg), radians(rim_angle_deg))
     case = Case.from_degrees(harmonic, pole_angle_deg, rim_angle_deg)

@@ -78,7 +78,7 @@ def load_scale(model: Model) -> "Chain":
     errors = np.array(rough.covariance) if rough.covariance else np.zeros((2, 2))
     return Chain(
         null=_coefficient(model, rough, "null"),
-        scale=_coefficient(model, rough, "scale") * DEG,
+        scale=_rough_scale(model, rough) * DEG,
         rough_covariance=np.diag([1.0, DEG]) @ errors @ np.diag([1.0, DEG]),
         bias=_load_curve(model, "bias", 1.0, 0.0, CELSIUS_ZERO, (low, high)),
         scale_over_rate=_load_curve(model, "scale_over_rate", 1.0, 1.0, 0.0, (slow, fast)),
@@ -183,6 +183,13 @@ def _load_curve(model: Model, name: str, y: float, x: float, reference: float, l
     size = DEG ** (y - x * np.arange(len(part.values)))
     covariance = np.array(part.covariance) if part.covariance else np.zeros((len(part.values),) * 2)
     return Curve(size * np.array(part.values), size[:, None] * covariance * size, reference, *limits)
+
+
+def _rough_scale(model: Model, rough: Part) -> float:
+    scale = _coefficient(model, rough, "scale")
+    if scale == 0:
+        raise InputError(f"{model.path}: [[part]] rough: scale is 0, so that the output would not count; correct it.")
+    return scale
 
 
 def _coefficient(model: Model, part: Part, name: str) -> float:
