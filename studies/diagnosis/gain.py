@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from studies.diagnosis.baseline import Problem, Term, View, baseline_columns, restricted, term_columns
 from studies.diagnosis.campaign import Campaign
@@ -155,9 +156,22 @@ def _leave_one_block_out(fit: Fit, campaign: Campaign) -> float | None:
         keep = [(run.time < low - gap) | (run.time > high + gap) for run in campaign.runs]
         if sum(int((m & k).sum()) for m, k in zip(problem.present, keep, strict=True)) < 40:
             return None
-        trained = _train(restricted(problem, keep), fit.terms)
+        trained = _without_unseen(_train(restricted(problem, keep), fit.terms), campaign, keep)
         for k, run in enumerate(campaign.runs):
             inside = (run.row_time >= low) & (run.row_time < high + (1e-9 if block < BLOCKS - 1 else 1.0))
             if inside.any():
                 residuals.append(row_residuals(trained, campaign)[k][inside])
     return rms(residuals)
+
+
+def _without_unseen(trained: Fit, campaign: Campaign, keep: Sequence[NDArray[np.bool_]]) -> Fit:
+    """Set the initial thermal states of which the rows that are left know nothing to zero: e^(−t/τ) is over by then."""
+    coefficients = trained.linear.coefficients.copy()
+    for k, kept in enumerate(keep):
+        columns = fine_model(trained.problem, trained.terms, campaign, k)
+        left = np.interp(trained.problem.states[k].time, campaign.runs[k].time, kept.astype(float)) > 0.5
+        own = own_columns(trained.problem, k)[-1:] if trained.problem.lagged else []
+        for index in own:
+            if np.linalg.norm(columns[left, index]) < 1e-6 * np.linalg.norm(columns[:, index]):
+                coefficients[index] = 0.0
+    return replace(trained, linear=replace(trained.linear, coefficients=coefficients))
