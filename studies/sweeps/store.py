@@ -178,7 +178,8 @@ class Store:
     def check_same(self, identity: Mapping[str, Any]) -> None:
         """Refuse to go on when the results so far belong to something else; InputError says what changed."""
         old = self._read("SELECT identity FROM study")
-        changes = list(find_changes({**json.loads(old[0][0]), "base": identity["base"]}, identity)) if old else []
+        now = json.loads(spell(identity))  # as it would be read back: tuples have become lists
+        changes = list(find_changes({**json.loads(old[0][0]), "base": now["base"]}, now)) if old else []
         if changes:
             shown = "; ".join(changes[:SHOWN_CHANGES])
             more = f"; and {len(changes) - SHOWN_CHANGES} more" if len(changes) > SHOWN_CHANGES else ""

@@ -5,7 +5,7 @@ import pytest
 from studies.errors import InputError
 from studies.sweeps.design import draw
 from studies.sweeps.evaluate import Plan, evaluate_case
-from studies.sweeps.families import choose_solver
+from studies.sweeps.families import Families, choose_solver
 from studies.sweeps.run import estimate_study, run_study
 from studies.sweeps.spec import read_study
 
@@ -92,3 +92,11 @@ def test_dry_run_knows_the_solver(spec):
     estimate = estimate_study(read_study(spec))
     assert (estimate.solver, estimate.cases) == ("family", 300)
     assert estimate.seconds_each < 0.01
+
+
+def test_running_again_resumes_and_computes_nothing(spec, results, tmp_path, monkeypatch):
+    """The ranges of a family belong to the identity of a study, and are the same when they are read back."""
+    run_study(spec, tmp_path)
+    monkeypatch.setattr(Families, "evaluate", lambda *_: pytest.fail("a design was computed again"))
+    again = run_study(spec, tmp_path)
+    assert (again.values == results.values).all()
