@@ -27,8 +27,6 @@ def reproduce(*, out: str = "report", json: bool = False) -> int:
     """
     from studies.cli.output import dump_json, print_json
     from studies.files.writing import check_folder, write_text
-    from studies.instrument.card import load_card
-    from studies.papers import hrg
     from studies.reports.mode_picture import mode_blocks
     from studies.reports.reproduce import reproduce_page, summarise
 
@@ -36,7 +34,7 @@ def reproduce(*, out: str = "report", json: bool = False) -> int:
     parts = _reproduce()
     study, summary = parts.study, summarise(parts)
     T, f = study.temperature_degC, study.frequency
-    page = reproduce_page(parts, mode_blocks(load_card(hrg.CARD)))
+    page = reproduce_page(parts, mode_blocks(parts.physics.instrument))
     columns = {"temperature_degC": T, "frequency_Hz": f, "cubic_Hz": study.fit.frequency(T)}
     write_text(folder / "table1.csv", _csv(columns))
     columns = {

@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from studies.errors import InputError, nearest
+from studies.files.reading import read_bytes
 
 if TYPE_CHECKING:
     import numpy as np
@@ -62,7 +63,7 @@ def read_columns(
     InputError
         Anything that is not such a table: the message names file, line or column, and the mend.
     """
-    data = _read_bytes(path)
+    data = _read_text_bytes(path)
     comments, header, header_line, body_start = _split_head(path, data)
     names = _check_names(path, header, header_line, known, required, prefixes)
     if body_start >= len(data) or not data[body_start:].strip():
@@ -77,21 +78,13 @@ def read_columns(
 
 def read_header(path: str | Path) -> list[str]:
     """Return the column names of a table without reading its numbers."""
-    _, header, _, _ = _split_head(path, _read_bytes(path))
+    _, header, _, _ = _split_head(path, _read_text_bytes(path))
     return [name.strip() for name in header]
 
 
-def _read_bytes(path: str | Path) -> bytes:
+def _read_text_bytes(path: str | Path) -> bytes:
     """Read the file and make sure that it is UTF-8 text with something in it."""
-    try:
-        data = Path(path).read_bytes()
-    except IsADirectoryError:
-        raise InputError(f"{path}: is a folder; give the name of a file.") from None
-    except FileNotFoundError:
-        raise InputError(f"{path}: there is no such file.") from None
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read ({error.strerror}).") from error
-    data = data.removeprefix(codecs.BOM_UTF8)
+    data = read_bytes(path).removeprefix(codecs.BOM_UTF8)
     if b"\0" in data:
         raise InputError(f"{path}: not a text table (it holds zero bytes); export it as CSV in UTF-8.")
     if not data.isascii():

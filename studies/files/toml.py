@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from studies.errors import InputError, nearest
+from studies.files.reading import read_bytes
 
 
 def read_toml(path: str | Path, schema: str | None = None) -> dict[str, Any]:
@@ -18,13 +19,7 @@ def read_toml(path: str | Path, schema: str | None = None) -> dict[str, Any]:
         No such file, not UTF-8, a syntax error (with its line), or another schema.
     """
     try:
-        content = tomllib.loads(Path(path).read_bytes().decode("utf-8-sig"))
-    except FileNotFoundError:
-        raise InputError(f"{path}: there is no such file.") from None
-    except IsADirectoryError:
-        raise InputError(f"{path}: is a folder; give the name of a TOML file.") from None
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read ({error.strerror}).") from error
+        content = tomllib.loads(read_bytes(path).decode("utf-8-sig"))
     except UnicodeDecodeError:
         raise InputError(f"{path}: not UTF-8 text; save the file as UTF-8.") from None
     except tomllib.TOMLDecodeError as error:

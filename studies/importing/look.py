@@ -8,7 +8,7 @@ from pathlib import Path
 
 from studies.errors import InputError
 from studies.importing.mapping import SEPARATORS
-from studies.importing.raw import EXCEL, decode, read_bytes, read_sheet
+from studies.importing.raw import EXCEL, decode, read_filled, read_sheet
 
 SEEN = 2000  # lines that are looked at
 
@@ -38,7 +38,7 @@ def look_at(path: str) -> Look:
     if excel:
         rows, encoding, separator = read_sheet(path, None)[:SEEN], "utf-8", ","
     else:
-        data = read_bytes(path)
+        data = read_filled(path)
         encoding = _find_encoding(path, data)
         lines = decode(path, data, encoding).split("\n", SEEN)[:SEEN]
         separator = _find_separator(lines)

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from studies.errors import InputError, MissingEnvironment, nearest
+from studies.files.reading import read_bytes
 from studies.importing.mapping import SEPARATORS, FileMap
 
 if TYPE_CHECKING:
@@ -87,7 +88,7 @@ def read_raw(path: str | Path, file: "FileMap") -> RawTable:
     """
     import pandas as pd
 
-    data = read_bytes(path)
+    data = read_filled(path)
     decimal = file.decimal
     if Path(path).suffix.lower() in EXCEL:
         lines = read_sheet(path, file.sheet)
@@ -106,16 +107,9 @@ def read_raw(path: str | Path, file: "FileMap") -> RawTable:
     return RawTable(str(path), cells, file.data_line, hashlib.sha256(data).hexdigest(), decimal, file.missing)
 
 
-def read_bytes(path: str | Path) -> bytes:
+def read_filled(path: str | Path) -> bytes:
     """Read a file that must exist and hold something."""
-    try:
-        data = Path(path).read_bytes()
-    except FileNotFoundError:
-        raise InputError(f"{path}: there is no such file.") from None
-    except IsADirectoryError:
-        raise InputError(f"{path}: is a folder; give the name of a file.") from None
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read ({error.strerror}).") from error
+    data = read_bytes(path)
     if not data.strip():
         raise InputError(f"{path}: the file is empty.")
     return data

@@ -12,7 +12,8 @@ from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from studies.errors import InputError, naming, nearest
+from studies.errors import InputError, naming
+from studies.files.reading import find_shipped, list_shipped
 from studies.files.toml import Section, check_number, read_toml
 from studies.files.writing import write_text
 
@@ -101,7 +102,7 @@ def load_card(card: str | Path) -> Instrument:
     InputError
         No such card, an unknown key, a value of the wrong type or out of its range.
     """
-    path = find_card(card)
+    path = find_shipped(card, shipped_cards(), "card")
     content = read_toml(path, SCHEMA)
     top = Section(content, str(path), KEYS)
     reference = top.number("reference_temperature_degC", 20.0, least=-200.0, most=200.0) + ZERO_CELSIUS
@@ -133,23 +134,9 @@ def save_card(instrument: Instrument, path: str | Path) -> None:
     write_text(path, tomli_w.dumps(content))
 
 
-def find_card(card: str | Path) -> Path:
-    """Return the path of a card given by path or by the name of a shipped one."""
-    path = Path(card)
-    if path.suffix == ".toml" or path.exists() or len(path.parts) > 1:
-        return path
-    shipped = shipped_cards()
-    if str(card) in shipped:
-        return shipped[str(card)]
-    raise InputError(
-        f"there is no shipped card '{card}'{nearest(str(card), shipped)} A card of your own: give its path."
-    )
-
-
 def shipped_cards() -> dict[str, Path]:
     """Return name -> path of the cards that ship with the package."""
-    folder = Path(str(files("studies"))) / "cards"
-    return {path.stem: path for path in sorted(folder.glob("*.toml"))}
+    return list_shipped(Path(str(files("studies"))) / "cards")
 
 
 def _build_material(table: Mapping[str, Any], path: str, reference: float) -> "Material":

@@ -4,7 +4,6 @@ The paper prints the shape of ζ₁₂(T), two figures without their data and "a
 printed shape and typical values for all else; none of them was chosen to arrive at 8.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib.resources import files
 
@@ -129,9 +128,3 @@ def _improve(seed: int, lag: float, random_walk: float) -> Improvement:
 def count_bias_of_printed_values(carrier: float = FREQUENCY) -> float:
     """Return the bias (rad/s) that the printed ζ₀ would mean as it stands, 2k/g₂ ζ₀: why it is shape only."""
     return float(2 * np.pi * carrier * read_shape()[0])
-
-
-def span_of_shape(temperatures_degC: Sequence[float]) -> Real:
-    """Return ζ₁₂(T)/ζ₁₂(0) of the printed cubic at temperatures in °C."""
-    shape = read_shape()
-    return evaluate_cross_damping(shape / shape[0], np.asarray(temperatures_degC) + 273.15 - CALIBRATION)

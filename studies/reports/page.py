@@ -99,11 +99,6 @@ def draw(figure: "Figure", caption: str, alt: str) -> Picture:
     return Picture(_data_uri("image/svg+xml", buffer.getvalue()), caption, alt)
 
 
-def embed_png(png: bytes, caption: str, alt: str) -> Picture:
-    """Embed a PNG picture."""
-    return Picture(_data_uri("image/png", png), caption, alt)
-
-
 def _data_uri(kind: str, data: bytes) -> str:
     return f"data:{kind};base64,{base64.b64encode(data).decode()}"
 

@@ -54,7 +54,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from studies.errors import InputError, nearest
+from studies.errors import InputError
+from studies.files.reading import find_shipped, list_shipped
 from studies.files.toml import Section, read_toml
 from studies.instrument.card import Instrument, load_card
 from studies.sweeps.definition import Study
@@ -94,7 +95,7 @@ def read_study(source: str | Path | Mapping[str, Any], card: str | None = None) 
         if content.setdefault("schema", SCHEMA) != SCHEMA:
             raise InputError(f'study: schema must be "{SCHEMA}", not {content["schema"]!r}.')
     else:
-        path = find_spec(source)
+        path = find_shipped(source, shipped_specs(), "study")
         content, where, folder = read_toml(path, SCHEMA), str(path), path.parent
         text = path.read_text(encoding="utf-8-sig")
     if card is not None:
@@ -142,19 +143,6 @@ def check_study(content: Mapping[str, Any], instrument: Instrument, where: str, 
     return study
 
 
-def find_spec(source: str | Path) -> Path:
-    """Return the path of a spec given by path or by the name of a shipped one."""
-    path = Path(source)
-    if path.suffix == ".toml" or path.exists() or len(path.parts) > 1:
-        return path
-    shipped = shipped_specs()
-    if str(source) in shipped:
-        return shipped[str(source)]
-    raise InputError(
-        f"there is no shipped study '{source}' (a study of your own: give its path){nearest(str(source), shipped)}"
-    )
-
-
 def shipped_specs() -> dict[str, Path]:
     """Return name -> path of the specs that ship with the package."""
-    return {path.stem: path for path in sorted((Path(__file__).parent / "templates").glob("*.toml"))}
+    return list_shipped(Path(__file__).parent / "templates")
