@@ -1,7 +1,7 @@
 """From a resonator to element matrices: unknowns, poles, clamps, and the ties between shell and solid blocks."""
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from typing import Literal
 
@@ -125,23 +125,33 @@ class System:
     rigid_motions: int
     n: int
     level: Level
-    _maps: list["ToFree"] = field(default_factory=list, repr=False)
 
-    def __post_init__(self) -> None:
-        for group in self.groups:
-            self._maps.extend(
-                self._free(members, signs) for members, signs in zip(group.unknowns, group.signs, strict=True)
-            )
-
-    @cached_property
+    @property
     def pattern(self) -> Pattern:
         """The elements' free unknowns."""
-        return find_pattern([at.free for at in self._maps], self.constraint.shape[1])
+        return self._elements[0]
+
+    @property
+    def maps(self) -> list["ToFree"]:
+        """From the unknowns of every element to its free ones, in the order of `pattern`."""
+        return self._elements[1]
+
+    _maps = maps
+
+    @cached_property
+    def _elements(self) -> tuple[Pattern, list["ToFree"]]:
+        maps = [
+            self._free(members, signs)
+            for group in self.groups
+            for members, signs in zip(group.unknowns, group.signs, strict=True)
+        ]
+        pattern = find_pattern([at.free for at in maps], self.constraint.shape[1])
+        return pattern, [at.reordered(order) for at, order in zip(maps, pattern.order, strict=True)]
 
     @property
     def is_small(self) -> bool:
         """Whether the matrices are worth keeping: below 24 MB."""
-        return sum(len(at.free) ** 2 for at in self._maps) < 1e6
+        return sum(len(at.free) ** 2 for at in self.maps) < 1e6
 
     @cached_property
     def units(self) -> list[tuple[Array, Array, Array]]:
@@ -187,7 +197,7 @@ class System:
             for k in range(0, len(group.unknowns), PORTION):
                 part = group.table.part(slice(k, k + PORTION))
                 count = len(part.volume)
-                yield group, k, part, self._maps[done : done + count]
+                yield group, k, part, self.maps[done : done + count]
                 done += count
 
     def spread(self, free: Array) -> list[Array]:
@@ -213,12 +223,17 @@ class ToFree:
     kept: Index | None
     factors: Array
 
+    def reordered(self, order: Index) -> "ToFree":
+        """The same with the free unknowns in another order."""
+        if self.kept is None:
+            return ToFree(self.free[order], None, self.factors[:, order])
+        return ToFree(self.free[order], self.kept[order], self.factors[order])
+
     def restrict(self, matrix: Array) -> Array:
         """The element's matrix on the free unknowns."""
         if self.kept is None:
             return np.asarray(self.factors.T @ matrix @ self.factors)
-        if len(self.kept) < len(matrix):
-            matrix = matrix[self.kept[:, None], self.kept]
+        matrix = matrix[self.kept[:, None], self.kept]
         if np.all(self.factors == 1):
             return matrix
         return matrix * self.factors * self.factors[:, None]

@@ -1,15 +1,16 @@
 """Lowest eigenpairs of K x = λ M x by Cholesky, element by element, and inverse iteration of a small subspace.
 
 λ_min/λ_max of a thin shell is about (h/R)², so dense eigensolvers lose the digits that matter. Here K is only ever
-inverted: unknowns that live in one element are eliminated there, the rest by one dense Cholesky factor, and the
+inverted: unknowns that live in one element are eliminated there, the rest by one band Cholesky factor, and the
 subspace is projected with Yᵀ K Y = Yᵀ M X, free of cancellation. The frequency itself is taken elsewhere, from strains.
 """
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import blas, eigh, lapack
+from scipy.linalg import blas, lapack
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import reverse_cuthill_mckee
 
@@ -22,15 +23,20 @@ TOO_THIN = "the stiffness lost its last digit in double precision: the shell is 
 
 @dataclass(frozen=True, eq=False)
 class Pattern:
-    """Which unknowns each element has, split into its own (inner) and those it shares (outer).
+    """Which unknowns each element has: first the ones of its own, then those it shares with others.
 
-    `skeleton` numbers the shared unknowns so that they couple in a narrow band; `shared` are their global numbers.
+    order : how the unknowns of each element, as they were given, are rearranged to that end.
+    own : how many of them are its own.
+    skeleton : numbers of the shared ones in an order in which they couple in a narrow band.
+    entries : where the lower triangle of what each element leaves on its shared unknowns (flat) goes in the band (flat).
+    shared : global numbers of the shared unknowns, in that order.
     """
 
     unknowns: tuple[Index, ...]
-    inner: tuple[Index, ...]
-    outer: tuple[Index, ...]
+    order: tuple[Index, ...]
+    own: tuple[int, ...]
     skeleton: tuple[Index, ...]
+    entries: tuple[tuple[Index, Index], ...]
     shared: Index
     size: int
     band: int
@@ -38,43 +44,44 @@ class Pattern:
 
 def find_pattern(unknowns: list[Index], size: int) -> Pattern:
     """Split the unknowns of every element and order the shared ones (reverse Cuthill-McKee)."""
-    uses = np.zeros(size, dtype=int)
-    for members in unknowns:
-        uses[members] += 1
-    shared = np.flatnonzero(uses > 1)
-    inner = tuple(np.flatnonzero(uses[members] == 1) for members in unknowns)
-    outer = tuple(np.flatnonzero(uses[members] > 1) for members in unknowns)
-    number = np.cumsum(uses > 1) - 1
-    where = [number[members[o]] for members, o in zip(unknowns, outer, strict=True)]
+    uses = np.bincount(np.concatenate(unknowns), minlength=size)
+    is_shared = uses > 1
+    order = tuple(np.argsort(is_shared[members], kind="stable") for members in unknowns)
+    unknowns = [members[first] for members, first in zip(unknowns, order, strict=True)]
+    own = tuple(int(np.sum(uses[members] == 1)) for members in unknowns)
+    shared = np.flatnonzero(is_shared)
+    number = np.cumsum(is_shared) - 1
+    where = [number[members[k:]] for members, k in zip(unknowns, own, strict=True)]
     if len(shared):
-        owner = np.concatenate([np.full(len(w), k) for k, w in enumerate(where)])
+        owner = np.repeat(np.arange(len(where)), [len(w) for w in where])
         element = csr_matrix((np.ones(len(owner)), (owner, np.concatenate(where))), shape=(len(unknowns), len(shared)))
-        order = reverse_cuthill_mckee((element.T @ element).tocsr(), symmetric_mode=True)
+        chain = reverse_cuthill_mckee((element.T @ element).tocsr(), symmetric_mode=True)
         place = np.empty(len(shared), dtype=np.intp)
-        place[order] = np.arange(len(shared))
-        where, shared = [place[w] for w in where], shared[order]
+        place[chain] = np.arange(len(shared))
+        where, shared = [place[w] for w in where], shared[chain]
     band = max((int(np.ptp(w)) for w in where if len(w)), default=0)
-    return Pattern(tuple(unknowns), inner, outer, tuple(where), shared, size, band)
+    entries = []
+    for w in where:
+        rows, columns = np.nonzero(w[:, None] >= w)
+        entries.append((w[rows] - w[columns] + (band + 1) * w[columns], rows * len(w) + columns))
+    return Pattern(tuple(unknowns), order, own, tuple(where), tuple(entries), shared, size, band)
 
 
 class Factor:
-    """Cholesky factor of the assembled K: inner unknowns per element, then the band of the shared ones."""
+    """Cholesky factor of the assembled K: own unknowns element by element, then the band of the shared ones."""
 
     def __init__(self, pattern: Pattern, stiffness: list[Array]) -> None:
         self.pattern = pattern
         self.own: list[Array] = []
         self.coupling: list[Array] = []
-        height = pattern.band + 1
-        band = np.zeros((height, len(pattern.shared)), order="F")
-        entries = band.reshape(-1, order="F")
-        for K, inner, outer, where in zip(stiffness, pattern.inner, pattern.outer, pattern.skeleton, strict=True):
-            L = _cholesky(K[inner[:, None], inner])
-            W = np.zeros((len(inner), len(outer)))
+        band = np.zeros((pattern.band + 1, len(pattern.shared)), order="F")
+        flat = band.reshape(-1, order="F")
+        for K, own, (target, source) in zip(stiffness, pattern.own, pattern.entries, strict=True):
+            L = _cholesky(K[:own, :own])
+            W = np.zeros((own, len(K) - own))
             if W.size:
-                W = blas.dtrsm(1.0, L, K[inner[:, None], outer], lower=1)
-            rows, columns = np.nonzero(where[:, None] >= where)
-            schur = K[outer[:, None], outer] - W.T @ W
-            entries[where[rows] - where[columns] + height * where[columns]] += schur[rows, columns]
+                W = blas.dtrsm(1.0, L, K[own:, :own].T, lower=1)
+            flat[target] += (K[own:, own:] - W.T @ W).ravel()[source]
             self.own.append(L)
             self.coupling.append(W)
         self.band = _cholesky_band(band)
@@ -85,18 +92,18 @@ class Factor:
         x = np.empty_like(load)
         right = load[p.shared]
         half = []
-        for L, W, members, inner, where in zip(self.own, self.coupling, p.unknowns, p.inner, p.skeleton, strict=True):
-            y = blas.dtrsm(1.0, L, load[members[inner]], lower=1) if len(inner) else load[:0]
+        for L, W, members, own, where in zip(self.own, self.coupling, p.unknowns, p.own, p.skeleton, strict=True):
+            y = blas.dtrsm(1.0, L, load[members[:own]], lower=1) if own else load[:0]
             right[where] -= W.T @ y
             half.append(y)
         if len(p.shared):
             right = lapack.dpbtrs(self.band, right, lower=1)[0]
             x[p.shared] = right
-        for y, L, W, members, inner, where in zip(
-            half, self.own, self.coupling, p.unknowns, p.inner, p.skeleton, strict=True
+        for y, L, W, members, own, where in zip(
+            half, self.own, self.coupling, p.unknowns, p.own, p.skeleton, strict=True
         ):
-            if len(inner):
-                x[members[inner]] = blas.dtrsm(1.0, L, y - W @ right[where], lower=1, trans_a=1)
+            if own:
+                x[members[:own]] = blas.dtrsm(1.0, L, y - W @ right[where], lower=1, trans_a=1)
         return x
 
 
@@ -119,57 +126,76 @@ def lowest_vectors(
     stiffness, mass : their matrices, in the pattern's order.
     count : how many.
     shift : added to K as shift M so that rigid motions can be factored, 1/s².
-    accuracy : relative change of the Ritz values at which the iteration stops.
+    accuracy : relative error of the Ritz values at which the iteration stops.
     """
-    if shift:
-        stiffness = [K + shift * M for K, M in zip(stiffness, mass, strict=True)]
-    factor = Factor(pattern, stiffness)
-    width = min(2 * count + 3, pattern.size)  # the more vectors beyond `count`, the faster they converge
-    x = np.random.default_rng(5).standard_normal((pattern.size, width))
-    before, change = np.full(count, np.inf), np.inf
-    # one solve leaves little but the inextensional modes of a thin shell (two at most) in every column
-    x = _set_apart(pattern, mass, factor.solve(apply_mass(pattern, mass, x)))
-    loaded = apply_mass(pattern, mass, x)
-    for _ in range(300):
-        y = factor.solve(loaded)
-        heavy = apply_mass(pattern, mass, y)
+    return Iteration(pattern, stiffness, mass, shift).converge(None, count, accuracy)[:, :count]
+
+
+class Iteration:
+    """Inverse iteration of a subspace with K + shift M."""
+
+    def __init__(self, pattern: Pattern, stiffness: list[Array], mass: list[Array], shift: float) -> None:
+        if shift:
+            stiffness = [K + shift * M for K, M in zip(stiffness, mass, strict=True)]
+        self.pattern, self.mass = pattern, mass
+        self.factor = Factor(pattern, stiffness)
+
+    def step(self, loaded: Array) -> tuple[Array, Array, Array]:
+        """From M X the Ritz values of K⁻¹ M X, the Ritz vectors as columns, and M times these."""
+        y = self.factor.solve(loaded)
+        heavy = apply_mass(self.pattern, self.mass, y)
         values, turn = _project(y.T @ loaded, y.T @ heavy)
-        x, loaded = y @ turn, heavy @ turn
-        last, change = change, float(np.max(abs(values[:count] / before - 1)))
-        before = values[:count]
-        if change < accuracy or (change < 1e-8 and change > last):
-            break
-    return np.asarray(x[:, :count])
+        return values, y @ turn, heavy @ turn
+
+    def improve(self, x: Array) -> Array:
+        """One step from the vectors x, which are near the wanted ones."""
+        return self.step(apply_mass(self.pattern, self.mass, x))[1]
+
+    def converge(self, start: Array | None, count: int, accuracy: float) -> Array:
+        """A subspace, sorted by Ritz values, of which the first `count` have converged; `start` is one that is near."""
+        if start is None:
+            # the more vectors beyond `count`, the faster they converge
+            x = _random(self.pattern.size, min(2 * count + 3, self.pattern.size))
+            # one solve leaves little but the inextensional modes of a thin shell (two at most) in every column
+            start = self._set_apart(self.factor.solve(apply_mass(self.pattern, self.mass, x)))
+        loaded = apply_mass(self.pattern, self.mass, start)
+        before, change = np.full(count, np.inf), np.inf
+        for _ in range(300):
+            values, x, loaded = self.step(loaded)
+            last, change = change, float(np.max(abs(values[:count] / before - 1)))
+            before = values[:count]
+            # a step takes the errors down at least by this; the factor allows for Ritz values that are not yet true
+            gain = min(1.0, 100 * float(values[count - 1] / values[-1]) ** 2)
+            if change * gain < accuracy or (change < 1e-8 and change > last):
+                break
+        return x
+
+    def _set_apart(self, x: Array) -> Array:
+        """A basis of the columns that is orthonormal in the inner product of M."""
+        reflectors, tau, _, _ = lapack.dgeqrf(x)
+        x = lapack.dorgqr(reflectors, tau)[0]
+        L = _cholesky(x.T @ apply_mass(self.pattern, self.mass, x))
+        return np.asarray(blas.dtrsm(1.0, L, x, side=1, lower=1, trans_a=1))
 
 
-def _set_apart(pattern: Pattern, mass: list[Array], x: Array) -> Array:
-    """Remove the first two columns from all later ones (Gram-Schmidt, twice, in the inner product of M)."""
-    for k in range(min(2, x.shape[1])):
-        heavy = apply_mass(pattern, mass, x[:, [k]])
-        norm = float(np.sqrt(x[:, k] @ heavy[:, 0]))
-        lead, heavy = x[:, [k]] / norm, heavy / norm
-        for _ in range(2):
-            x[:, k + 1 :] -= lead @ (heavy.T @ x[:, k + 1 :])
-    return x
+@lru_cache(maxsize=16)
+def _random(size: int, width: int) -> Array:
+    """A start with a share of every mode, always the same."""
+    return np.random.default_rng(5).standard_normal((size, width))
 
 
 def _project(K: Array, M: Array) -> tuple[Array, Array]:
     """Ritz values and vectors of the subspace."""
-    try:
-        values, vectors = eigh(_symmetric(K), _symmetric(M), check_finite=False)
-    except np.linalg.LinAlgError:
-        raise ShellError(TOO_THIN) from None
+    values, vectors, fault = lapack.dsygvd((K + K.T) / 2, (M + M.T) / 2)
+    if fault:
+        raise ShellError(TOO_THIN)
     return values, vectors
-
-
-def _symmetric(matrix: Array) -> Array:
-    return (matrix + matrix.T) / 2
 
 
 def _cholesky(matrix: Array) -> Array:
     if not matrix.size:
         return matrix
-    factor, fault = lapack.dpotrf(matrix.T, lower=1, clean=1, overwrite_a=1)
+    factor, fault = lapack.dpotrf(matrix.T, lower=1, clean=0)
     return np.asarray(_definite(factor, fault))
 
 
