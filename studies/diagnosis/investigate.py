@@ -100,8 +100,9 @@ def investigate(
     for response, reason in campaign.skipped.items():
         results[response] = _too_little(reason)
     verdict = overall([result.verdict for result in results.values()])
-    advice = suggest_next(campaign, verdict, causes, results)
-    return Diagnosis(Verdict(verdict, causes, results, advice, campaign.notes), campaign, inquiries)
+    selections = {response: inquiry.selection for response, inquiry in inquiries.items()}
+    advice, run = suggest_next(campaign, verdict, causes, results, selections)
+    return Diagnosis(Verdict(verdict, causes, results, advice, campaign.notes, next_run=run), campaign, inquiries)
 
 
 def _too_little(reason: str) -> ResponseResult:

@@ -8,6 +8,7 @@ import numpy as np
 
 from studies.diagnosis.effects import find_effect
 from studies.diagnosis.fit import Interval
+from studies.diagnosis.next_run import NextRun
 from studies.diagnosis.selection import Found
 
 VERDICTS = ("unexplained", "not-identifiable", "explained", "adequate")
@@ -96,6 +97,7 @@ class Verdict:
     notes: tuple[str, ...] = ()
     extended_model: str | None = None
     details: Mapping[str, Any] = field(default_factory=dict)
+    next_run: NextRun | None = None
 
     def as_dict(self) -> dict[str, Any]:
         """Return the object of `hrg diagnose --json`."""
@@ -105,6 +107,7 @@ class Verdict:
             "causes": [cause.as_dict() for cause in self.causes],
             "responses": {name: result.as_dict() for name, result in self.responses.items()},
             "next_experiment": self.next_experiment,
+            "next_run": None if self.next_run is None else self.next_run.as_dict(),
             "extended_model": self.extended_model,
             "notes": list(self.notes),
         }

@@ -1,7 +1,7 @@
 """A virtual gyro in a chamber, with one hidden effect, or an alien one, or none. Knows nothing of the diagnosis."""
 
 import datetime
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy.optimize import minimize_scalar
@@ -27,6 +27,7 @@ class Truth:
     parameters: dict = field(default_factory=dict)
     noise: dict = field(default_factory=dict)
     structural: dict = field(default_factory=dict)
+    twin: object = None
 
 
 @dataclass
@@ -88,10 +89,37 @@ class World:
     has_angle: bool
 
 
-def run_heat(design, device, rng, heat=None, starts=None):
+class Memory:
+    """A random generator that remembers what it drew and first says again what it is told."""
+
+    def __init__(self, rng, said=()):
+        self.rng, self.said, self.drawn = rng, list(said), []
+
+    def __getattr__(self, name):
+        def draw(*arguments, **options):
+            value = self.said.pop(0) if self.said else getattr(self.rng, name)(*arguments, **options)
+            self.drawn.append(value)
+            return value
+
+        return draw
+
+
+@dataclass
+class Twin:
+    """A gyro whose campaign can go on: everything that its first runs have fixed."""
+
+    world: World
+    hidden: tuple
+    sizes: list
+    drawn: list
+    family: str
+    levels: dict
+    begin: list
+
+
+def run_heat(plan, device, rng, heat=None, starts=None):
     """Chamber to housing to resonator, every run."""
     heat = heat or Heat(device.contact, device.spread)
-    plan = DESIGNS[design]
     housing, mean, tilt = [], [], []
     for k, chamber in enumerate(plan["chambers"]):
         shell = chamber_to_housing(chamber, device.housing, chamber[0])
@@ -107,18 +135,19 @@ def run_heat(design, device, rng, heat=None, starts=None):
 
 
 def build(design, family, rng, effects=(), alien="", snr=0.0):
-    """Return (records, truth): a campaign with the named effects at the stated SNR each."""
+    """Return (records, truth): a campaign with the named effects at the stated SNR each.
+
+    `design` is a name, or a design of its own.
+    """
     device = Device.draw(rng)
-    plan = DESIGNS[design]
+    plan = design if isinstance(design, dict) else DESIGNS[design]
     runs = len(plan["chambers"])
     starts = rng.normal(0.0, 0.3, runs)
-    housing, plain, tilt = run_heat(design, device, rng, None, starts)
+    housing, plain, tilt = run_heat(plan, device, rng, None, starts)
     time = [STEP * np.arange(c.size) for c in plan["chambers"]]
     begin = np.cumsum([plan["gaps"][k] * 3600.0 + (time[k - 1][-1] if k else 0.0) for k in range(runs)])
-    sample = [
-        np.sort(np.arange(0.0, t[-1] - 5, 10.0) + rng.uniform(-2, 2, int(np.ceil((t[-1] - 5) / 10.0)))) for t in time
-    ]
-    sample = [s[(rng.random(s.size) > 0.01) & (s >= 0)] for s in sample]
+    sample = [_jittered(t, rng) for t in time]
+    sample = [_incomplete(s, rng) for s in sample]
     angle = [np.full(t.size, np.radians(plan["angles"][k])) if plan["angles"] else None for k, t in enumerate(time)]
     quad = [hidden.quadrature(t, p, rng) for t, p in zip(time, plain, strict=True)]
     world = World(
@@ -138,52 +167,112 @@ def build(design, family, rng, effects=(), alien="", snr=0.0):
         ],
         angle,
         quad,
-        rng,
+        Memory(rng),
         plan["volts"] is not None,
         plan["drives"] is not None,
         plan["angles"] is not None,
     )
-    noise = {}
+    noise, levels = {}, {}
     for c in CHANNELS:
-        level = noises.draw_level(family, rng)
-        noise[c] = [device.sigma[c] * noises.draw(family, s, level, rng) for s in sample]
+        levels[c] = noises.draw_level(family, rng)
+        noise[c] = [device.sigma[c] * noises.draw(family, s, levels[c], rng) for s in sample]
     offsets = rng.normal(0.0, 5.0 * device.sigma["bias_deg_per_h"], runs)
     pieces = [hidden.EFFECTS[name](world) for name in effects] + ([hidden.ALIENS[alien](world)] if alien else [])
-    truth = Truth(design, family, tuple(effects), alien, snr)
+    truth = Truth("own" if isinstance(design, dict) else design, family, tuple(effects), alien, snr)
     sizes = []
     for piece in pieces:
-        size = _size(piece, world, design, device, starts, sample, noise, snr)
+        size = _size(piece, world, plan, device, starts, sample, noise, snr)
         sizes.append(size)
         truth.parameters[piece.name] = {**piece.parameters, "size": size}
         truth.channel = piece.channel
-    responses, sensed = _responses(pieces, sizes, world, design, device, starts)
+    responses, sensed = _responses(pieces, sizes, world, plan, device, starts)
     records = []
     for k in range(runs):
-        s = sample[k]
-        columns = {"time_s": s}
-        reading = follow(sensed[k], device.sensor)
-        columns["housing_temperature_degC"] = (
-            0.08 + 1.0006 * np.interp(s, time[k], reading) + rng.normal(0.0, 0.003, s.size)
-        )
-        for c in CHANNELS:
-            columns[c] = np.interp(s, time[k], responses[c][k]) + noise[c][k]
-        columns["bias_deg_per_h"] += offsets[k]
-        pick = np.minimum(np.searchsorted(time[k], s, side="right") - 1, time[k].size - 1)
-        if world.has_volts:
-            columns["electrode_bias_V"] = world.volts[k][pick]
-        if world.has_drive:
-            columns["drive_amplitude_V"] = world.drive[k][pick]
-        if world.has_angle:
-            columns["pattern_angle_deg"] = np.degrees(world.angle[k][pick])
-        columns["quadrature_V"] = np.interp(s, time[k], quad[k])
-        moment = datetime.datetime(2026, 1, 5, tzinfo=datetime.UTC) + datetime.timedelta(seconds=float(begin[k]))
-        records.append(Record(columns, path=f"run{k + 1}.csv", start=moment))
+        own = {c: noise[c][k] for c in CHANNELS}
+        path = f"run{k + 1}.csv"
+        records.append(_record(world, k, sample[k], responses, sensed, own, offsets[k], begin[k], rng, path))
+    truth.twin = Twin(world, (tuple(effects), alien), sizes, world.rng.drawn, family, levels, list(begin))
     for c in CHANNELS:
         truth.noise[c] = float(np.sqrt(np.mean(np.concatenate(noise[c]) ** 2)))
     return records, truth
 
 
-def _responses(pieces, sizes, world, design, device, starts):
+def add_run(twin, chamber, rng, volts=None, drive=None, angle=None, gap=16.0):
+    """Return the record of one more run of the same gyro with the same hidden effect, `gap` hours after the last.
+
+    `chamber`, °C, and the drives are on the 5 s grid; a drive that is None stays at its nominal value.
+    """
+    world, device = twin.world, twin.world.device
+    last = len(world.time) - 1
+    time = STEP * np.arange(chamber.size)
+    begin = twin.begin[last] + world.time[last][-1] + 3600.0 * gap
+    start = [float(rng.normal(0.0, 0.3))]
+    plan = {"chambers": [chamber], "drives": [drive] if world.has_drive else None}
+    housing, plain, tilt = run_heat(plan, device, rng, None, start)
+    run = {
+        "time": time,
+        "campaign": time + begin,
+        "housing": housing[0],
+        "temperature": plain[0],
+        "tilt": tilt[0],
+        "volts": np.full(time.size, 80.0) if volts is None else volts,
+        "drive": np.full(time.size, 1.0) if drive is None else drive,
+        "angle": np.full(time.size, np.radians(angle or 0.0)) if world.has_angle else None,
+        "quadrature": hidden.quadrature(time, plain[0], rng),
+    }
+    s = _incomplete(_jittered(time, rng), rng)
+    noise = {c: device.sigma[c] * noises.draw(twin.family, s, twin.levels[c], rng) for c in CHANNELS}
+    offset = rng.normal(0.0, 5.0 * device.sigma["bias_deg_per_h"])
+    # effects scale some of their numbers by the last run of the campaign: the old last one stays the last
+    asked = replace(
+        world,
+        rng=Memory(rng, twin.drawn),
+        **{name: [*getattr(world, name), part, getattr(world, name)[last]] for name, part in run.items()},
+    )
+    effects, alien = twin.hidden
+    pieces = [hidden.EFFECTS[name](asked) for name in effects] + ([hidden.ALIENS[alien](asked)] if alien else [])
+    pieces = [
+        replace(piece, signals={c: [signal[last + 1]] for c, signal in (piece.signals or {}).items()})
+        for piece in pieces
+    ]
+    alone = replace(world, **{name: [part] for name, part in run.items()})
+    responses, sensed = _responses(pieces, twin.sizes, alone, plan, device, start)
+    twin.world = replace(world, **{name: [*getattr(world, name), part] for name, part in run.items()})
+    twin.begin = [*twin.begin, begin]
+    return _record(alone, 0, s, responses, sensed, noise, offset, begin, rng, f"run{last + 2}.csv")
+
+
+def _jittered(time, rng):
+    return np.sort(np.arange(0.0, time[-1] - 5, 10.0) + rng.uniform(-2, 2, int(np.ceil((time[-1] - 5) / 10.0))))
+
+
+def _incomplete(sample, rng):
+    return sample[(rng.random(sample.size) > 0.01) & (sample >= 0)]
+
+
+def _record(world, k, s, responses, sensed, noise, offset, begin, rng, path):
+    """One run as it is recorded."""
+    columns = {"time_s": s}
+    reading = follow(sensed[k], world.device.sensor)
+    columns["housing_temperature_degC"] = (
+        0.08 + 1.0006 * np.interp(s, world.time[k], reading) + rng.normal(0.0, 0.003, s.size)
+    )
+    for c in CHANNELS:
+        columns[c] = np.interp(s, world.time[k], responses[c][k]) + noise[c]
+    columns["bias_deg_per_h"] += offset
+    pick = np.minimum(np.searchsorted(world.time[k], s, side="right") - 1, world.time[k].size - 1)
+    if world.has_volts:
+        columns["electrode_bias_V"] = world.volts[k][pick]
+    if world.has_drive:
+        columns["drive_amplitude_V"] = world.drive[k][pick]
+    if world.has_angle:
+        columns["pattern_angle_deg"] = np.degrees(world.angle[k][pick])
+    columns["quadrature_V"] = np.interp(s, world.time[k], world.quadrature[k])
+    moment = datetime.datetime(2026, 1, 5, tzinfo=datetime.UTC) + datetime.timedelta(seconds=float(begin))
+    return Record(columns, path=path, start=moment)
+
+
+def _responses(pieces, sizes, world, plan, device, starts):
     """True responses of every run, and what the housing sensor is about to read."""
     heat = Heat(device.contact, device.spread)
     for piece, size in zip(pieces, sizes, strict=True):
@@ -191,7 +280,7 @@ def _responses(pieces, sizes, world, design, device, starts):
             heat = piece.heat(heat, size)
     temperature, _tilt, housing = world.temperature, world.tilt, world.housing
     if any(piece.heat for piece in pieces):
-        housing, temperature, _tilt = run_heat(design, device, world.rng, heat, starts)
+        housing, temperature, _tilt = run_heat(plan, device, world.rng, heat, starts)
     sensed = housing
     out = {c: [] for c in CHANNELS}
     for t in temperature:
@@ -210,12 +299,12 @@ def _responses(pieces, sizes, world, design, device, starts):
     return out, sensed
 
 
-def _size(piece, world, design, device, starts, sample, noise, snr):
+def _size(piece, world, plan, device, starts, sample, noise, snr):
     """Size that gives the wanted SNR: what the refitted baseline leaves of the effect over what it leaves of the noise."""
     channel = piece.channel
     size = piece.start
     for _ in range(3):
-        with_it, sensed = _responses([piece], [size], world, design, device, starts)
+        with_it, sensed = _responses([piece], [size], world, plan, device, starts)
         left = _baseline_residual(world, with_it, sensed, sample, channel, device)
         size *= float(np.clip(snr * _noise_rms(noise[channel], sample, channel) / max(left, 1e-300), 1e-4, 1e4))
         size = float(np.clip(size, -piece.most, piece.most))
