@@ -90,15 +90,17 @@ class World:
 
 
 class Memory:
-    """A random generator that remembers what it drew and first says again what it is told."""
+    """A random generator that remembers what it drew, by method, and first says again what it is told."""
 
-    def __init__(self, rng, said=()):
-        self.rng, self.said, self.drawn = rng, list(said), []
+    def __init__(self, rng, said=None):
+        self.rng, self.drawn = rng, {}
+        self.said = {name: list(values) for name, values in (said or {}).items()}
 
     def __getattr__(self, name):
         def draw(*arguments, **options):
-            value = self.said.pop(0) if self.said else getattr(self.rng, name)(*arguments, **options)
-            self.drawn.append(value)
+            told = self.said.get(name)
+            value = told.pop(0) if told else getattr(self.rng, name)(*arguments, **options)
+            self.drawn.setdefault(name, []).append(value)
             return value
 
         return draw
@@ -111,7 +113,7 @@ class Twin:
     world: World
     hidden: tuple
     sizes: list
-    drawn: list
+    drawn: dict
     family: str
     levels: dict
     begin: list
