@@ -42,6 +42,7 @@ class Level:
 
 
 PORTION = 16  # elements integrated at a time
+TINY = 160  # unknowns of a dense matrix
 SMALL = 0.5  # length over radius of a small element
 _SOLID = ((5, 4), (7, 6), (9, 8), (11, 10), (13, 12))  # degree of blocks, rings around sharp corners
 LEVELS: dict[str, tuple[Level, ...]] = {
@@ -104,13 +105,23 @@ class Group:
 
     def spread(self, raw: Array) -> Array:
         """Unknowns (elements, size) of the plain basis."""
-        unknowns = self.signs * raw[self.unknowns]
+        unknowns = raw[self.unknowns]
+        if isinstance(self.place, SolidPart):
+            unknowns *= self.signs.reshape(self.signs.shape + (1,) * (raw.ndim - 1))
         for element, node in self.anchors:
             amplitudes = unknowns[element].reshape(self.table.along.shape[2], -1)
             inner = amplitudes[node].copy()
             amplitudes += inner
             amplitudes[node] = inner
-        return unknowns
+        return np.asarray(unknowns)
+
+    def gather(self, amplitudes: Array, raw: Array) -> None:
+        """The way back for a shell: write `amplitudes` (elements, functions, amplitudes, columns) to the raw unknowns."""
+        for element, node in self.anchors:
+            inner = amplitudes[element, node].copy()
+            amplitudes[element] -= inner
+            amplitudes[element, node] = inner
+        raw[self.unknowns] = amplitudes.reshape(*self.unknowns.shape, -1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,6 +136,12 @@ class System:
     rigid_motions: int
     n: int
     level: Level
+
+    @cached_property
+    def free(self) -> Index:
+        """The raw unknown that each free one is: the first of those that follow it."""
+        columns = self.constraint.tocsc()
+        return np.asarray(columns.indices[columns.indptr[:-1]], dtype=np.intp)
 
     @property
     def pattern(self) -> Pattern:
@@ -153,10 +170,15 @@ class System:
         """Whether the matrices are worth keeping: below 24 MB."""
         return sum(len(at.free) ** 2 for at in self.maps) < 1e6
 
+    @property
+    def is_tiny(self) -> bool:
+        """Whether one dense matrix costs less than the elements one by one."""
+        return len(self.groups) == 1 and self.constraint.shape[1] <= TINY
+
     @cached_property
-    def units(self) -> list[tuple[Array, Array, Array]]:
-        """Element matrices on free unknowns per unit λ, G and ρ, the same material everywhere."""
-        found: list[tuple[Array, Array, Array]] = []
+    def units(self) -> list[Array]:
+        """Element matrices on free unknowns per unit λ, G and ρ, (3, size, size) each, the same material everywhere."""
+        found: list[Array] = []
         for group, first, part, maps in self._portions():
             trace, shear = station_stiffness(part)
             matrices = (
@@ -165,10 +187,18 @@ class System:
                 group.matrices(integrate_mass, station_mass(part), first),
             )
             found += [
-                (at.restrict(one), at.restrict(two), at.restrict(three))
-                for one, two, three, at in zip(*matrices, maps, strict=True)
+                np.array([at.restrict(kind) for kind in kinds]) for *kinds, at in zip(*matrices, maps, strict=True)
             ]
         return found
+
+    @cached_property
+    def whole(self) -> tuple[Pattern, list[Array]]:
+        """The units of all elements as of one, of a small shell without solid parts: fewer and larger products."""
+        size = self.pattern.size
+        merged = np.zeros((3, size, size))
+        for members, kinds in zip(self.pattern.unknowns, self.units, strict=True):
+            merged[:, members[:, None], members] += kinds
+        return find_pattern([np.arange(size)], size), [merged]
 
     def varying(self, lam: list[Array], G: list[Array], rho: list[Array]) -> tuple[list[Array], list[Array]]:
         """Stiffness and mass of every element with λ, G, ρ given at the stations of every group."""

@@ -30,6 +30,7 @@ class Pattern:
     skeleton : numbers of the shared ones in an order in which they couple in a narrow band.
     entries : where the lower triangle of what each element leaves on its shared unknowns (flat) goes in the band (flat).
     shared : global numbers of the shared unknowns, in that order.
+    is_whole : whether there is one element, with all unknowns in their order.
     """
 
     unknowns: tuple[Index, ...]
@@ -40,6 +41,7 @@ class Pattern:
     shared: Index
     size: int
     band: int
+    is_whole: bool
 
 
 def find_pattern(unknowns: list[Index], size: int) -> Pattern:
@@ -60,11 +62,12 @@ def find_pattern(unknowns: list[Index], size: int) -> Pattern:
         place[chain] = np.arange(len(shared))
         where, shared = [place[w] for w in where], shared[chain]
     band = max((int(np.ptp(w)) for w in where if len(w)), default=0)
+    is_whole = len(unknowns) == 1 and np.array_equal(unknowns[0], np.arange(size))
     entries = []
     for w in where:
         rows, columns = np.nonzero(w[:, None] >= w)
         entries.append((w[rows] - w[columns] + (band + 1) * w[columns], rows * len(w) + columns))
-    return Pattern(tuple(unknowns), order, own, tuple(where), tuple(entries), shared, size, band)
+    return Pattern(tuple(unknowns), order, own, tuple(where), tuple(entries), shared, size, band, is_whole)
 
 
 class Factor:
@@ -81,7 +84,8 @@ class Factor:
             W = np.zeros((own, len(K) - own))
             if W.size:
                 W = blas.dtrsm(1.0, L, K[own:, :own].T, lower=1)
-            flat[target] += (K[own:, own:] - W.T @ W).ravel()[source]
+            if len(source):
+                flat[target] += (K[own:, own:] - W.T @ W).ravel()[source]
             self.own.append(L)
             self.coupling.append(W)
         self.band = _cholesky_band(band)
@@ -89,6 +93,8 @@ class Factor:
     def solve(self, load: Array) -> Array:
         """K⁻¹ load for several columns."""
         p = self.pattern
+        if p.is_whole:
+            return np.asarray(lapack.dpotrs(self.own[0], load, lower=1)[0])
         x = np.empty_like(load)
         right = load[p.shared]
         half = []
@@ -109,6 +115,8 @@ class Factor:
 
 def apply_mass(pattern: Pattern, mass: list[Array], x: Array) -> Array:
     """M x for several columns, element by element."""
+    if pattern.is_whole:
+        return np.asarray(mass[0] @ x)
     y = np.zeros_like(x)
     for M, members in zip(mass, pattern.unknowns, strict=True):
         y[members] += M @ x[members]
@@ -142,14 +150,18 @@ class Iteration:
 
     def step(self, loaded: Array) -> tuple[Array, Array, Array]:
         """From M X the Ritz values of K⁻¹ M X, the Ritz vectors as columns, and M times these."""
+        return self._rotate(self.factor.solve(loaded), loaded)
+
+    def begin(self, x: Array) -> tuple[Array, tuple[Array, Array, Array]]:
+        """The Ritz values of vectors x that are near the wanted ones, and the first step from them."""
+        loaded = apply_mass(self.pattern, self.mass, x)
         y = self.factor.solve(loaded)
+        return _project(x.T @ loaded, y.T @ loaded)[0], self._rotate(y, loaded)
+
+    def _rotate(self, y: Array, loaded: Array) -> tuple[Array, Array, Array]:
         heavy = apply_mass(self.pattern, self.mass, y)
         values, turn = _project(y.T @ loaded, y.T @ heavy)
         return values, y @ turn, heavy @ turn
-
-    def improve(self, x: Array) -> Array:
-        """One step from the vectors x, which are near the wanted ones."""
-        return self.step(apply_mass(self.pattern, self.mass, x))[1]
 
     def converge(self, start: Array | None, count: int, accuracy: float) -> Array:
         """A subspace, sorted by Ritz values, of which the first `count` have converged; `start` is one that is near."""

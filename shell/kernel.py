@@ -213,16 +213,15 @@ def strains(table: StrainTable, unknowns: Array) -> Array:
     """Strain (elements, stations, 6, points) of element unknowns (elements, size)."""
     elements, stations, _, points = table.strain.shape[:4]
     amplitudes = unknowns.reshape(elements, table.along.shape[2], -1)
-    jets = np.einsum("dia,eam->eidm", table.along, amplitudes).reshape(elements, stations, -1, 1)
+    jets = np.moveaxis(table.along @ amplitudes[:, None], 1, 2).reshape(elements, stations, -1, 1)
     flat = table.strain.reshape(elements, stations, 6 * points, -1)
     return np.asarray((flat @ jets).reshape(elements, stations, 6, points))
 
 
 def displacements(table: StrainTable, unknowns: Array) -> Array:
     """Displacement (elements, stations, 3, points) of element unknowns (elements, size)."""
-    elements = len(unknowns)
-    amplitudes = np.einsum("ia,eam->eim", table.along[0], unknowns.reshape(elements, table.along.shape[2], -1))
-    return np.asarray(np.einsum("eicjm,eim->eicj", table.displacement, amplitudes))
+    amplitudes = table.along[0] @ unknowns.reshape(len(unknowns), table.along.shape[2], -1)
+    return np.asarray((table.displacement @ amplitudes[:, :, None, :, None])[..., 0])
 
 
 def _tall(per_station: Array) -> NDArray[np.float64]:

@@ -4,23 +4,20 @@
 """
 
 import warnings
-from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
 from math import pi, sqrt
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from shell.assembly import LEVELS, Level, System, Theory, build_system
+from shell.assembly import Theory, build_system
 from shell.curves import Arc
-from shell.eigen import lowest_vectors
-from shell.elastic import Elastic
+from shell.elastic import Elastic, VaryingElastic
 from shell.errors import ShellError
 from shell.meridian import Resonator
-from shell.quadrature import Array
+from shell.refinement import refine
 from shell.sampling import ShapePatch, sample_shape
-from shell.solution import AlongMeridian, Constants, EnergyFractions, Solution, total
+from shell.solution import AlongMeridian, EnergyFractions, Solution, total
 
 THEORIES = ("solid", "shell", "rayleigh")
 THICKEST_SHELL = 0.1  # h/R up to which shell theory has been held against the solid
@@ -29,28 +26,6 @@ THINNEST = 1e-6  # h/R below which double precision loses the digits
 
 class TheoryRangeWarning(UserWarning):
     """The design lies outside the range in which the chosen theory can be trusted."""
-
-
-@dataclass(frozen=True)
-class VaryingElastic:
-    """E (Pa), ν and ρ (kg/m³) along the meridian: numbers or functions of the position 0 ... 1 of the arc length.
-
-    A solid root takes the values of the place where it joins the shell.
-    """
-
-    E: float | Callable[[Array], ArrayLike]
-    nu: float | Callable[[Array], ArrayLike]
-    rho: float | Callable[[Array], ArrayLike]
-
-    def at(self, position: Array) -> tuple[Array, Array, Array]:
-        """E, ν, ρ at positions; raises ShellError where a value is impossible."""
-        E, nu, rho = (
-            np.broadcast_to(np.asarray(value(position) if callable(value) else value, dtype=float), position.shape)
-            for value in (self.E, self.nu, self.rho)
-        )
-        if not (np.all(E > 0) and np.all(rho > 0) and np.all((nu > -1) & (nu < 0.5))):
-            raise ShellError("along the meridian E and the density must be positive and Poisson's ratio in -1 ... 0.5.")
-        return E, nu, rho
 
 
 @dataclass(frozen=True)
@@ -170,15 +145,7 @@ def solve_modes(
     _check_range(resonator, theory)
     if theory == "rayleigh":
         return _rayleigh(resonator, elastic, harmonic, count)
-    levels = LEVELS[theory]
-    accuracy = max(1e-6 * tolerance, 1e-13)
-    solutions = _solve_level(resonator, elastic, harmonic, count, theory, levels[0], accuracy)
-    for level in levels[1:]:
-        finer = _solve_level(resonator, elastic, harmonic, count, theory, level, accuracy)
-        errors = [abs(sqrt(one.eigenvalue / two.eigenvalue) - 1) for one, two in zip(solutions, finer, strict=True)]
-        if max(errors) <= tolerance or level is levels[-1]:
-            break
-        solutions = finer
+    solutions, errors = refine(resonator, elastic, harmonic, count, theory, tolerance)
     if max(errors) > tolerance:
         warnings.warn(
             f"the frequency is known to {max(errors):.1g}, {max(errors) / tolerance:.2g} times the tolerance asked for.",
@@ -199,54 +166,6 @@ def solve_modes(
         )
         for k, (solution, error) in enumerate(zip(solutions, errors, strict=True))
     )
-
-
-def _solve_level(
-    resonator: Resonator,
-    elastic: Elastic | VaryingElastic,
-    n: int,
-    count: int,
-    theory: Theory,
-    level: Level,
-    accuracy: float,
-) -> list[Solution]:
-    """The `count` lowest elastic modes at one level, sorted by their Rayleigh quotient."""
-    system = build_system(resonator, n, theory, level)
-    constants = tuple(_constants(group.table.position, elastic, group.table.plane_stress) for group in system.groups)
-    K, M = _matrices(system, elastic, constants)
-    # a small shift factors the rigid motions and leaves the elastic modes in order
-    stiffness, density = (float(np.mean(values)) for values in (constants[0].lame[1], constants[0].rho))
-    shift = 1e-2 * stiffness / density / resonator.size**2 if system.rigid_motions else 0.0
-    vectors = lowest_vectors(system.pattern, K, M, count + system.rigid_motions, shift, accuracy)
-    found = sorted(
-        (Solution(system, constants, vector) for vector in vectors.T), key=lambda solution: solution.eigenvalue
-    )
-    return found[system.rigid_motions :]
-
-
-def _matrices(
-    system: System, elastic: Elastic | VaryingElastic, constants: tuple[Constants, ...]
-) -> tuple[list[Array], list[Array]]:
-    if isinstance(elastic, VaryingElastic) or not system.is_small:
-        return system.varying(
-            [c.lame[0] for c in constants], [c.lame[1] for c in constants], [c.rho for c in constants]
-        )
-    uniform = [
-        (float(c.lame[0][0, 0]), float(c.lame[1][0, 0]), float(c.rho[0, 0]))
-        for c, group in zip(constants, system.groups, strict=True)
-        for _ in group.unknowns
-    ]
-    K = [lam * trace + G * shear for (lam, G, _), (trace, shear, _) in zip(uniform, system.units, strict=True)]
-    M = [rho * mass for (_, _, rho), (_, _, mass) in zip(uniform, system.units, strict=True)]
-    return K, M
-
-
-def _constants(position: Array, elastic: Elastic | VaryingElastic, plane_stress: bool) -> Constants:
-    if isinstance(elastic, VaryingElastic):
-        E, nu, rho = elastic.at(position)
-    else:
-        E, nu, rho = (np.broadcast_to(value, position.shape) for value in (elastic.E, elastic.nu, elastic.rho))
-    return Constants(E, nu, rho, plane_stress)
 
 
 def _by_thickness(resonator: Resonator, solution: Solution, theory: Theory) -> float:

@@ -25,6 +25,11 @@ class Constants:
         """λ (that of plane stress in shell theory) and G."""
         return lame(self.E, self.nu, self.plane_stress)
 
+    @property
+    def wave_speed_squared(self) -> float:
+        """Mean G over mean ρ, m²/s²."""
+        return float(np.mean(self.lame[1]) / np.mean(self.rho))
+
 
 @dataclass(frozen=True)
 class EnergyFractions:
@@ -98,8 +103,8 @@ class Solution:
         """∫ (ε_1 + ε_2 + ε_3)² and ∫ Σ g_c ε_c² over the points of every station: what λ and G multiply."""
         return [
             (
-                _integrate(e[:, :, :3].sum(axis=2) ** 2, group),
-                _integrate(np.einsum("c,eicj->eij", energy_weights(group.table), e**2), group),
+                _integrate(np.add.reduce(e[:, :, :3], axis=2) ** 2, group),
+                _integrate(energy_weights(group.table) @ (e * e), group),
             )
             for group, e in zip(self.system.groups, self.strain, strict=True)
         ]
@@ -116,7 +121,7 @@ class Solution:
     def kinetic(self) -> list[Array]:
         """Twice the kinetic energy of every station over ω²."""
         return [
-            c.rho * _integrate((d**2).sum(axis=2), group)
+            c.rho * _integrate(np.add.reduce(d * d, axis=2), group)
             for group, c, d in zip(self.system.groups, self.constants, self.displacement, strict=True)
         ]
 
@@ -207,7 +212,7 @@ def total(per_group: list[Array]) -> float:
 
 
 def _integrate(at_points: Array, group: Group) -> Array:
-    return np.asarray(np.einsum("eij,eij->ei", at_points, group.table.volume))
+    return np.asarray(np.add.reduce(at_points * group.table.volume, axis=-1))
 
 
 def _radial(group: Group, displacement: Array) -> Array:

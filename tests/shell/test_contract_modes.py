@@ -6,10 +6,10 @@ from math import pi
 import numpy as np
 import pytest
 
-from shell.elastic import Elastic
+from shell.elastic import Elastic, VaryingElastic
 from shell.errors import ShellError
 from shell.meridian import Resonator, Stem, cylinder, hemisphere
-from shell.modes import TheoryRangeWarning, VaryingElastic, solve_modes
+from shell.modes import TheoryRangeWarning, solve_modes
 
 SILICA = Elastic(72.7e9, 0.17, 2203.0)
 DOME = hemisphere(radius=15e-3, thickness=0.9e-3)

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from shell.curves import Arc, Line
-from shell.elastic import Elastic
+from shell.elastic import Elastic, VaryingElastic
 from shell.meridian import Resonator, Stem, bell, cylinder, hemisphere, meridian
-from shell.modes import VaryingElastic, solve_modes
+from shell.modes import solve_modes
 from shell.rayleigh import rayleigh_frequency
 
 SILICA = Elastic(72.7e9, 0.17, 2203.0)

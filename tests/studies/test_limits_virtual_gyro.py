@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from shell.modes import VaryingElastic, solve_modes
+from shell.elastic import VaryingElastic
+from shell.modes import solve_modes
 from shell.temperature import mode_model, temperature_coefficients
 from studies.errors import InputError
 from studies.instrument.card import load_card
