@@ -1,32 +1,34 @@
 """Before any data: which effects could a planned campaign tell apart?
 
-A campaign without effects is simulated through the planned chamber profiles with nominal physics and noise. Every effect is
-then hidden in it many times, with random shapes and the stated SNR (rms of what the refitted baseline cannot absorb over
-the rms of the noise), and the scan of the diagnosis names what it sees. Drives that are not planned cannot show.
+A gyro without effects goes through the planned chamber profiles with nominal physics. Every effect is hidden in it many
+times, with random shapes, under white and slow noise of random kind and strength, at the stated SNR (rms of what the
+refitted baseline cannot absorb over the rms of the noise after the same projection). The scan of the diagnosis looks at
+every case; where it leaves a choice, the contenders of a sample of the cases are fitted as on real data, and the answer
+counts by the rules of the diagnosis: named rightly means that the set it names holds the truth.
+Drives that are not planned cannot show.
 """
 
+from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from studies.diagnosis.baseline import Problem, Term, pose, span_of
+from studies.diagnosis.baseline import pose
 from studies.diagnosis.campaign import Campaign, load_campaign
-from studies.diagnosis.effects import Effect, Parameter, library
+from studies.diagnosis.effects import library
 from studies.diagnosis.fit import fit_terms
-from studies.diagnosis.likelihood import fit_linear, orthonormal
-from studies.diagnosis.null import draw_null, levels_of
-from studies.diagnosis.scan import applicable, best_gains, build_dictionary, scan_gains
-from studies.diagnosis.selection import scan_model
-from studies.diagnosis.states import FloatArray, lag
+from studies.diagnosis.rehearsal import NOTHING, UNEXPLAINED, Answer, hide, rehearse, set_stage
+from studies.diagnosis.states import lag
 from studies.diagnosis.thermometer import read_thermometer
 from studies.record import Record
 from studies.reports.page import Table
 
 HOUSING_LAG, RESONATOR_LAG = 600.0, 2500.0
 NOISE = {"frequency_Hz": 0.01, "bias_deg_per_h": 0.1, "inverse_q": 1e-9}
-NOTHING = "nothing"
+POLISHED = 12
+"""Cases of each effect in which the contenders are fitted."""
 
 
 @dataclass(frozen=True)
@@ -40,6 +42,9 @@ class Plan:
     cases : int
         Cases of each effect.
     confusion : mapping effect -> mapping said -> share
+        Said is the effect itself where the answer, alone or as a set, holds it.
+    sets : mapping effect -> mapping other -> share
+        Shares of the cases in which the answer is a set that holds the effect and the other.
     survives : mapping effect -> share of the signature's rms that the baseline cannot absorb
     invisible : mapping effect -> why it cannot show
     """
@@ -47,8 +52,16 @@ class Plan:
     snr: float
     cases: int
     confusion: dict[str, dict[str, float]]
+    sets: dict[str, dict[str, float]]
     survives: dict[str, float]
     invisible: dict[str, str]
+
+    def outcome(self, key: str) -> dict[str, float]:
+        """Return the shares of named, nothing, unexplained and wrong of one effect; they sum to one."""
+        said = self.confusion[key]
+        known = {"named": effect_of(key), NOTHING: NOTHING, UNEXPLAINED: UNEXPLAINED}
+        shares = {word: said.get(name, 0.0) for word, name in known.items()}
+        return {**shares, "wrong": max(1.0 - sum(shares.values()), 0.0)}
 
     def as_dict(self) -> dict[str, Any]:
         """Return the object of `hrg diagnose --plan --json`."""
@@ -57,9 +70,16 @@ class Plan:
             "snr": self.snr,
             "cases": self.cases,
             "confusion": self.confusion,
+            "as_set_with": self.sets,
+            "outcome": {key: self.outcome(key) for key in self.confusion},
             "survives_baseline": self.survives,
             "invisible": self.invisible,
         }
+
+
+def effect_of(key: str) -> str:
+    """Return the effect of a key such as `ageing (bias_deg_per_h)`."""
+    return key.split(" ")[0]
 
 
 def plan_campaign(
@@ -84,9 +104,25 @@ def plan_campaign(
     return predict(campaign, snr, cases, rng)
 
 
-def predict(campaign: Campaign, snr: float, cases: int, rng: np.random.Generator) -> Plan:
-    """Predict the confusion for the temperatures and drives of a campaign, planned or recorded."""
+def predict(campaign: Campaign, snr: float, cases: int, rng: np.random.Generator, polished: int = POLISHED) -> Plan:
+    """Predict the confusion for the temperatures and drives of a campaign, planned or recorded.
+
+    Parameters
+    ----------
+    campaign : Campaign
+    snr : float
+        Of every hidden effect.
+    cases : int
+        Cases of each effect that are scanned.
+    rng : numpy Generator
+        Seeded by the caller.
+    polished : int
+        Most cases of each effect in which the contenders are fitted; they stand for the others that need it.
+    """
+    from studies.diagnosis.investigate import SPARSE, THRESHOLD
+
     confusion: dict[str, dict[str, float]] = {}
+    sets: dict[str, dict[str, float]] = {}
     survives: dict[str, float] = {}
     thermometer = None
     for response in campaign.responses:
@@ -98,86 +134,45 @@ def predict(campaign: Campaign, snr: float, cases: int, rng: np.random.Generator
         fit = fit_terms(problem, ())
         if response == "frequency_Hz":
             thermometer = read_thermometer(campaign, fit)
-        _predict_response(campaign, fit.problem, scan_model(fit), snr, cases, rng, confusion, survives)
+        threshold = THRESHOLD
+        if response == "frequency_Hz":
+            threshold *= max(1.0, campaign.runs[0].states.step / SPARSE)
+        stage = set_stage(campaign, fit, threshold, problem.tau if problem.lagged else RESONATOR_LAG)
+        hidden = []
+        for effect in stage.effects:
+            key = effect.name if effect.responses[0] == response else f"{effect.name} ({response})"
+            own = hide(stage, effect, snr, cases, rng)
+            survives[key] = own.survives
+            if own.noise.shape[1]:
+                hidden.append((key, own))
+        if hidden:
+            said = rehearse(stage, [own for _, own in hidden], polished, rng)
+            for (key, own), answers in zip(hidden, said, strict=True):
+                confusion[key], sets[key] = _shares(own.effect.name, answers)
     invisible = {
         name: "its drive is not part of the plan" if effect.needs else "no temperature varies"
         for name, effect in library().items()
         if name not in confusion and name != "calibration"
     }
-    return Plan(snr, cases, confusion, survives, invisible)
+    return Plan(snr, cases, confusion, sets, survives, invisible)
 
 
-def _predict_response(
-    campaign: Campaign,
-    problem: Problem,
-    model: FloatArray,
-    snr: float,
-    cases: int,
-    rng: np.random.Generator,
-    confusion: dict[str, dict[str, float]],
-    survives: dict[str, float],
-) -> None:
-    span = span_of(campaign, problem.tau if problem.lagged else RESONATOR_LAG)
-    effects = [e for e in applicable(problem) if e.name != "calibration"]
-    dictionary = build_dictionary(problem, span, effects)
-    noise = draw_null(problem, model, 200, rng)
-    gains, _, _ = best_gains(dictionary, *scan_gains(problem, dictionary, model, noise))
-    levels = levels_of(gains)
-    from studies.diagnosis.investigate import THRESHOLD
-
-    fit = fit_linear(problem.basis, problem.rotated, model)
-    ortho = orthonormal(model)
-    for effect in effects:
-        key = effect.name if effect.responses[0] == problem.response else f"{effect.name} ({problem.response})"
-        signals, kept = _signals(problem, effect, span, ortho, cases, rng)
-        if signals.shape[1] == 0:
-            survives[key] = 0.0
-            continue
-        survives[key] = kept
-        # the noise of a row of the record: the coarse step averages `rows` of them
-        rows = max(campaign.group, 1)
-        size = snr * np.sqrt(fit.variance * rows) * np.sqrt(problem.values.size) / np.linalg.norm(signals, axis=0)
-        draws = signals * size + draw_null(problem, model, signals.shape[1], rng)
-        net = best_gains(dictionary, *scan_gains(problem, dictionary, model, draws))[0] - levels[:, None]
-        best = np.argmax(net, axis=0)
-        said = [dictionary.effects[k] if net[k, j] > THRESHOLD else NOTHING for j, k in enumerate(best)]
-        confusion[key] = {
-            name: float(said.count(name)) / len(said) for name in sorted(set(said), key=said.count, reverse=True)
-        }
+def _shares(truth: str, answers: Sequence[tuple[Answer, float]]) -> tuple[dict[str, float], dict[str, float]]:
+    """Return what is said, the truth where the set holds it, and with whom it stands in a set: shares of all cases."""
+    said: dict[str, float] = defaultdict(float)
+    beside: dict[str, float] = defaultdict(float)
+    total = sum(weight for _, weight in answers)
+    for members, weight in answers:
+        said[truth if truth in members else members[0]] += weight / total
+        if truth in members:
+            for other in members:
+                if other != truth:
+                    beside[other] += weight / total
+    return _sorted(said), _sorted(beside)
 
 
-def _signals(
-    problem: Problem, effect: Effect, span: Any, ortho: FloatArray, cases: int, rng: np.random.Generator
-) -> tuple[FloatArray, float]:
-    """Rotated signatures of random shapes after the baseline took its part, and the median share that survives."""
-    grid = list(effect.grid(span, problem.response))
-    views = problem.views(problem.tau)
-    out, shares = [], []
-    for _ in range(cases):
-        shape = list(grid[int(rng.integers(len(grid)))])
-        for k, parameter in enumerate(effect.shape):
-            if not parameter.steady and effect.name != "jump":
-                shape[k] = _jitter(shape[k], parameter, rng)
-        columns = problem.term(Term(effect, tuple(shape), 2), views)
-        used = columns[:, :1] if effect.nested and rng.random() < 0.5 else columns
-        scale = np.linalg.norm(used, axis=0)
-        signal = problem.basis.rotate(used / np.where(scale > 0, scale, 1.0)) @ rng.standard_normal(used.shape[1])
-        left = signal - ortho @ (ortho.T @ signal)
-        share = float(np.linalg.norm(left)) / max(float(np.linalg.norm(signal)), 1e-300)
-        shares.append(share)
-        if share > 3e-3:
-            out.append(left)
-    stacked = np.stack(out, axis=1) if out else np.empty((problem.values.size, 0))
-    return stacked, float(np.median(shares)) if shares else 0.0
-
-
-def _jitter(value: float, parameter: Parameter, rng: np.random.Generator) -> float:
-    moved = (
-        value * float(np.exp(0.2 * rng.standard_normal()))
-        if parameter.logarithmic
-        else (value + 0.02 * (parameter.high - parameter.low) * float(rng.uniform(-0.1, 0.1)))
-    )
-    return float(np.clip(moved, parameter.low, parameter.high))
+def _sorted(shares: dict[str, float]) -> dict[str, float]:
+    return dict(sorted(shares.items(), key=lambda item: -item[1]))
 
 
 def imagine(profiles: Sequence[str], rng: np.random.Generator, card: str | None = None) -> Campaign:
@@ -215,19 +210,37 @@ def imagine(profiles: Sequence[str], rng: np.random.Generator, card: str | None 
 
 def plan_table(plan: Plan) -> Table:
     """Return the prediction as a table."""
+
+    def listed(shares: dict[str, float], but: tuple[str, ...]) -> str:
+        words = (f"{name} {100 * share:.0f} %" for name, share in shares.items() if name not in but and share >= 0.02)
+        return ", ".join(words) or "—"
+
     rows = []
-    for name, said in sorted(plan.confusion.items(), key=lambda item: -item[1].get(item[0].split(" ")[0], 0.0)):
-        own = said.get(name.split(" ")[0], 0.0)
-        others = ", ".join(
-            f"{other} {100 * share:.0f} %"
-            for other, share in said.items()
-            if other != name.split(" ")[0] and share >= 0.02
+    for name in sorted(plan.confusion, key=lambda name: -plan.outcome(name)["named"]):
+        own, outcome = effect_of(name), plan.outcome(name)
+        rows.append(
+            [
+                name,
+                f"{100 * outcome['named']:.0f}",
+                listed(plan.sets[name], ()),
+                f"{100 * outcome[NOTHING]:.0f}",
+                f"{100 * outcome[UNEXPLAINED]:.0f}",
+                listed(plan.confusion[name], (own, NOTHING, UNEXPLAINED)),
+                f"{100 * plan.survives[name]:.0f}",
+            ]
         )
-        rows.append([name, f"{100 * own:.0f}", f"{100 * plan.survives[name]:.0f}", others or "—"])
-    rows += [[name, "0", "0", why] for name, why in plan.invisible.items()]
+    rows += [[name, "0", "—", "100", "0", why, "0"] for name, why in plan.invisible.items()]
     return Table(
         f"What this campaign could tell apart, effects at SNR {plan.snr:g}, {plan.cases} cases each",
-        ("effect", "named rightly / %", "survives baseline / %", "named otherwise"),
+        (
+            "effect",
+            "named rightly / %",
+            "as a set with",
+            "nothing / %",
+            "unexplained / %",
+            "wrongly",
+            "survives baseline / %",
+        ),
         rows,
-        "Named rightly: share of hidden cases in which the diagnosis names the effect.",
+        "Named rightly: share of hidden cases in which the answer, alone or as a set, holds the effect.",
     )
