@@ -99,7 +99,10 @@ def _told(scored: Sequence[Scored], begin: str, campaign: Campaign) -> Advice:
 
 def _name(scored: Scored) -> str:
     programme = scored.programme
-    drives = "; ".join(f"{column} at {steps}" for column, steps in programme.drives.items())
+    drives = ", ".join(
+        f"{column} stepped between {min(steps.levels):g} and {max(steps.levels):g}"
+        for column, steps in programme.drives.items()
+    )
     profile = f"a {programme.profile}" if programme.repeats else f"`{programme.profile}`"
     return f"{profile} with {drives}" if drives else profile
 

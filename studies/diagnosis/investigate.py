@@ -8,6 +8,7 @@ import numpy as np
 from studies.diagnosis.advice import suggest_next
 from studies.diagnosis.baseline import Law, Problem, choose_kernel, choose_kernel_score, pose, span_of
 from studies.diagnosis.campaign import FEWEST_BINS, Campaign
+from studies.diagnosis.consistency import consistency
 from studies.diagnosis.discrepancy import Leftover, brief_events, generic_bases, leftover_evidence, strongest
 from studies.diagnosis.effects import Effect
 from studies.diagnosis.fit import intervals
@@ -246,6 +247,7 @@ def _cause(inquiry: Inquiry, found: Found, response: str, drifts: bool | None = 
         equivalent,
         intervals(winner.fit, index),
         winner.evidence,
+        consistency(winner.fit, index),
     )
 
 

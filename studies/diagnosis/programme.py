@@ -98,7 +98,7 @@ def words_of(low: float, high: float, duration: float) -> dict[str, str]:
         f"ramp {top} {bottom} {fast} then soak {bottom} {time(0.12)} then ramp {bottom} {top} {fast} then soak {top} {time(0.08)}",
         "slow cycle": cycle(1),
         "fast cycles": cycle(3),
-        "steps and soaks": f"soak {bottom} {time(0.2)} then soak {top} {time(0.4)} then soak {bottom} {time(0.4)}",
+        "steps and soaks": f"soak {bottom} {time(0.23)} then soak {top} {time(0.42)} then soak {bottom} {time(0.35)}",
         "cold step and hot step": f"soak {middle} {time(0.1)} then soak {bottom} {time(0.3)} then soak {middle} {time(0.3)}"
         f" then soak {top} {time(0.3)}",
         "random steps": " then ".join(jumps),

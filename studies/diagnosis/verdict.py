@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from studies.diagnosis.consistency import Agreement
 from studies.diagnosis.effects import find_effect
 from studies.diagnosis.fit import Interval
 from studies.diagnosis.next_run import NextRun
@@ -30,6 +31,7 @@ class Cause:
     equivalent: tuple[str, ...]
     parameters: Mapping[str, Interval]
     evidence: float
+    agreement: Agreement = field(default_factory=Agreement)
 
     def as_dict(self) -> dict[str, Any]:
         """Return the entry of the contract."""
@@ -40,6 +42,7 @@ class Cause:
             "equivalent": list(self.equivalent),
             "parameters": {k: {"value": p.value, "low": p.low, "high": p.high} for k, p in self.parameters.items()},
             "evidence": self.evidence,
+            "consistency": self.agreement.p,
             "summary": find_effect(self.effect).summary,
         }
 

@@ -6,6 +6,7 @@ import numpy as np
 
 from studies.diagnosis.gain import row_residuals
 from studies.diagnosis.investigate import Diagnosis
+from studies.diagnosis.next_run import NextRun
 from studies.diagnosis.verdict import Cause, Verdict
 from studies.reports.page import Block, Chapter, Facts, Picture, Table, Text, draw, render_page
 from studies.reports.style import BLACK, BLUE, ORANGE, VERMILION, figure
@@ -105,6 +106,8 @@ def diagnosis_page(diagnosis: Diagnosis) -> str:
         first.append(before_and_after(diagnosis, main))
     if verdict.next_experiment:
         first.append(Text(f"Next experiment: {verdict.next_experiment}", "note"))
+    if verdict.next_run is not None:
+        first.append(next_run_picture(verdict.next_run))
     chapters = [
         Chapter("The answer", first),
         Chapter(
@@ -113,6 +116,7 @@ def diagnosis_page(diagnosis: Diagnosis) -> str:
                 *([cause_table(verdict)] if verdict.causes else []),
                 response_table(verdict),
                 *(Text(f"{cause.effect}: {_summary(cause)}") for cause in verdict.causes),
+                *(Text(f"{cause.effect}: {agreement_words(cause)}") for cause in verdict.causes),
                 *(Text(note, "note") for note in verdict.notes),
             ],
         ),
@@ -143,6 +147,46 @@ def _summary(cause: Cause) -> str:
     return f"{effect.summary}. To isolate it: {effect.isolate}. Source: {effect.source}."
 
 
+def agreement_words(cause: Cause) -> str:
+    """Return whether all parts of the record agree about a cause's coefficient."""
+    agreement = cause.agreement
+    if not agreement.by_split:
+        return "no two parts of the record both measure its coefficient."
+    if agreement.p < DISAGREE:
+        return f"{SPLITS[agreement.split]} disagree about its coefficient (p = {agreement.p:.1g})."
+    said = ", ".join(SPLITS[name] for name in agreement.by_split)
+    return f"its coefficient is the same in {said} (p = {agreement.p:.2f})."
+
+
+DISAGREE = 1e-3
+SPLITS = {
+    "hot and cold": "the hot and the cold half",
+    "heating and cooling": "heating and cooling",
+    "early and late": "the early and the late half of the runs",
+    "run and run": "the runs",
+}
+
+
+def next_run_picture(run: NextRun) -> Picture:
+    """Draw the suggested run: the chamber's temperature, and the drives that step."""
+    rows = 1 + len(run.drives)
+    heights = [2.0] + [0.7] * len(run.drives)
+    with figure(rows, 1, height=1.1 + sum(heights), sharex=True, squeeze=False, height_ratios=heights) as (
+        canvas,
+        axes,
+    ):
+        axes[0, 0].plot(run.time_h, run.temperature_degC, color=VERMILION)
+        axes[0, 0].set_ylabel("chamber / °C")
+        for axis, (column, steps) in zip(axes[1:, 0], run.drives.items(), strict=True):
+            begin = np.arange(len(steps.levels) + 1) * steps.hold_min / 60.0
+            axis.stairs(steps.levels, begin, baseline=None, color=BLUE)
+            axis.set_ylabel(column, rotation=0, ha="right", va="center", fontsize=8)
+            axis.locator_params(axis="y", nbins=3)
+            axis.margins(y=0.2)
+        axes[-1, 0].set_xlabel("time / h")
+        return draw(canvas, f"Suggested next run: {run.profile}.", f"Chamber profile of the next run: {run.profile}.")
+
+
 def _facts(verdict: Verdict) -> list[tuple[str, str, str]]:
     facts = [("verdict", verdict.verdict, WORDS[verdict.verdict])]
     if verdict.causes:
@@ -166,14 +210,15 @@ def _main_response(verdict: Verdict) -> str | None:
 
 
 def before_and_after(diagnosis: Diagnosis, response: str) -> Picture:
-    """Draw the residual over the campaign before and after the extension, with the noise as a band."""
+    """Draw the residual over the campaign before and, if anything is named, after the extension; the noise as a band."""
     selection = diagnosis.inquiries[response].selection
     noise = diagnosis.verdict.responses[response].noise or 0.0
-    with figure(2, 1, height=4.6, sharex=True, sharey=True) as (canvas, axes):
-        for axis, fit, title, colour in (
-            (axes[0], selection.plain, "before: the simulation with its baseline", VERMILION),
-            (axes[1], selection.fit, "after: with the named causes", BLUE),
-        ):
+    strips = [(selection.plain, "before: the simulation with its baseline", VERMILION)]
+    if selection.found:
+        strips.append((selection.fit, "after: with the named causes", BLUE))
+    with figure(len(strips), 1, height=2.3 * len(strips), sharex=True, sharey=True, squeeze=False) as (canvas, grid):
+        axes = grid[:, 0]
+        for axis, (fit, title, colour) in zip(axes, strips, strict=True):
             begin = 0.0
             for run, rest in zip(diagnosis.campaign.runs, row_residuals(fit, diagnosis.campaign), strict=True):
                 time, values = _thinned(run.row_time, rest)
@@ -184,11 +229,12 @@ def before_and_after(diagnosis: Diagnosis, response: str) -> Picture:
             axis.set_title(title, loc="left", fontsize=10)
             axis.set_ylabel(f"residual / {UNITS[response]}")
         axes[0].legend(loc="upper right")
-        axes[1].set_xlabel("time, runs one after the other / h")
+        axes[-1].set_xlabel("time, runs one after the other / h")
+        after = " and after" if selection.found else ""
         return draw(
             canvas,
-            f"Residual of the {NAMES[response]} before and after.",
-            f"Two strips of the {NAMES[response]} residual over time; the lower one, after the extension, has rms {number(noise)}.",
+            f"Residual of the {NAMES[response]} before{after} the extension.",
+            f"The {NAMES[response]} residual over time before{after} the extension; the last strip has rms {number(noise)}.",
         )
 
 

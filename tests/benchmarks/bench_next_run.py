@@ -9,6 +9,7 @@ of a drive are hidden only where that drive steps. A suggestion of no run leaves
 """
 
 import argparse
+import copy
 import itertools
 import json
 import sys
@@ -33,7 +34,8 @@ from thermal.profile import parse_profile
 STARTS = (stairs, ramps, cycle, wander, up_stairs, lambda: paper_step(-10))
 VOLTS = schedule([80, 80, 110, 80, 60, 100, 80, 120], 1.0)
 AMPLITUDES = schedule([1.0, 1.3, 0.8, 1.2, 1.0, 0.7], 1.3)
-ARMS = ("suggested", "repeat", "random")
+ARMS = {"suggested": 2, "repeat": 1, "random": 1}
+"""Further runs of each arm."""
 EFFECTS_OF_A_DRIVE = {"electrostatic-softening": "volts", "amplitude-frequency": "drives", "self-heating": "drives"}
 
 
@@ -80,20 +82,16 @@ def run_of(twin, profile, drives, rng, plan):
     return add_run(twin, chamber, rng, steps("electrode_bias_V"), steps("drive_amplitude_V"))
 
 
-def run_case(seed, snr, runs=2, with_all=True):
+def run_case(seed, snr, with_all=True):
     """Build one case and continue it by every arm; return what was hidden and what was said."""
     rng = np.random.default_rng(seed)
     plan, name = first_run(rng)
     family = FAMILIES[int(rng.integers(len(FAMILIES)))]
-
-    def fresh():
-        return build(plan, family, np.random.default_rng(seed + 1), (name,), "", snr)
-
-    records, _ = fresh()
-    campaign, before, suggestion = answer(records)
+    first, truth = build(plan, family, np.random.default_rng(seed + 1), (name,), "", snr)
+    campaign, before, suggestion = answer(first)
     case = {"seed": seed, "snr": snr, "effect": name, "family": family, "before": before, "after": {}, "profiles": {}}
-    for arm in ARMS:
-        records, truth = fresh()
+    for place, (arm, runs) in enumerate(ARMS.items()):
+        records, twin = list(first), copy.copy(truth.twin)
         chance = np.random.default_rng(seed + 2)
         now, next_run, known = before, suggestion, campaign
         case["after"][arm], case["profiles"][arm] = [], []
@@ -107,15 +105,15 @@ def run_case(seed, snr, runs=2, with_all=True):
                 profile, drives = pick.profile, pick.drives
             case["profiles"][arm].append(profile)
             if profile is not None:
-                stream = np.random.default_rng([seed, number, ARMS.index(arm)])
-                records.append(run_of(truth.twin, profile, drives, stream, plan))
+                stream = np.random.default_rng([seed, number, place])
+                records.append(run_of(twin, profile, drives, stream, plan))
                 known, now, next_run = answer(records)
             case["after"][arm].append(now)
     if with_all:
-        records, truth = fresh()
+        records, twin = list(first), copy.copy(truth.twin)
         for number, programme in enumerate(candidates(campaign, tuple(DRIVES))):
             stream = np.random.default_rng([seed, number, 99])
-            records.append(run_of(truth.twin, programme.profile, programme.drives, stream, plan))
+            records.append(run_of(twin, programme.profile, programme.drives, stream, plan))
         case["after"]["all"] = [answer(records)[1]]
         case["profiles"]["all"] = [len(records) - 1]
     return case
@@ -155,8 +153,7 @@ def summarise(cases):
             "| --- | --- | --- | --- | --- |",
         ]
         columns = [("none", lambda c: c["before"])]
-        for arm in ARMS:
-            runs = max(len(c["after"][arm]) for c in mine)
+        for arm, runs in ARMS.items():
             columns += [(f"{k + 1} {arm}", lambda c, arm=arm, k=k: c["after"][arm][k]) for k in range(runs)]
         columns.append(("all of the family", lambda c: c["after"].get("all", [None])[0]))
         for title, pick in columns:
@@ -187,7 +184,7 @@ def main():
     parser.add_argument("--snr", type=float, default=1.5)
     parser.add_argument("--seed", type=int, default=None)
     parser.add_argument("--report", type=Path)
-    parser.add_argument("--without-all", action="store_true", help="leave out the campaign of the whole family")
+    parser.add_argument("--all-every", type=int, default=4, help="run the whole family in one case of so many")
     arguments = parser.parse_args()
     if arguments.report is None:
         seed = int(np.random.SeedSequence().entropy % 2**31) if arguments.seed is None else arguments.seed
@@ -197,7 +194,7 @@ def main():
             for count in itertools.count():
                 if time.time() > end:
                     break
-                case = run_case(seed + 10 * count, arguments.snr, with_all=not arguments.without_all)
+                case = run_case(seed + 10 * count, arguments.snr, with_all=count % arguments.all_every == 0)
                 file.write(json.dumps(case, default=float) + "\n")
                 file.flush()
     cases = [json.loads(line) for line in arguments.cases.read_text().splitlines()]
