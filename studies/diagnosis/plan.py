@@ -101,7 +101,7 @@ def plan_campaign(
     """
     rng = np.random.default_rng(seed)
     campaign = imagine(profiles, rng, card)
-    return predict(campaign, snr, cases, rng)
+    return predict(campaign, snr, cases, rng, min(POLISHED, max(cases // 8, 3)))
 
 
 def predict(campaign: Campaign, snr: float, cases: int, rng: np.random.Generator, polished: int = POLISHED) -> Plan:

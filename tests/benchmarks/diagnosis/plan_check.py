@@ -35,10 +35,16 @@ def check_plan(path, draws):
         records, _ = build(design, "white", np.random.default_rng(20))
         campaign = load_campaign(records)
         for snr in sorted({c["snr"] for c in cases if c["design"] == design}):
-            plan = predict(campaign, snr, draws, np.random.default_rng(21))
+            plan = predict(campaign, snr, draws, np.random.default_rng(21), max(draws // 8, 3))
             out["plans"][f"{design} {snr:g}"] = plan.as_dict()
     predictions_file(path).write_text(json.dumps(out, indent=1))
     return compare_in_words(cases, out["plans"])
+
+
+def read_predictions(path):
+    """Return the predictions kept beside a file of cases, or None."""
+    target = predictions_file(path)
+    return json.loads(target.read_text()) if target.exists() else None
 
 
 def planned_cases(cases):
@@ -80,7 +86,7 @@ def agreement(rows):
     enough = [row for row in rows if row[4] >= FEWEST]
     near = sum(abs(p - m) <= WITHIN for _, _, p, m, _ in enough)
     excused = sum(abs(p - m) > WITHIN and not outside_band(p, round(m * n), n, WITHIN) for _, _, p, m, n in enough)
-    own = [row for row in enough if row[1] == row[0].split("@")[0]]
+    own = [row for row in enough if row[1] == row[0].split(" ")[0].split("@")[0]]
     ranks = {
         "all entries": spearmanr([r[2] for r in enough], [r[3] for r in enough]).statistic
         if len(enough) > 2

@@ -1,0 +1,86 @@
+"""The benchmark counts as it says: hand-made cases, and a regression whose terms are planted."""
+
+import numpy as np
+import pytest
+
+from tests.benchmarks.diagnosis.baselines import as_cases, merge, stepwise_terms
+from tests.benchmarks.diagnosis.plan_check import agreement, compare
+from tests.benchmarks.diagnosis.scoring import band, confusion, exact_set, first_right, reliability, said
+
+
+def case(truth, *causes, verdict="explained", **more):
+    listed = [[name, list(others), "frequency_Hz", 0.9, 50.0] for name, *others in causes]
+    own = {"kind": "effect", "count": 1, "seed": 2, "design": "rich", "snr": 1.0, "channel": "frequency_Hz"}
+    return {**own, "truth": truth, "raw": truth, "alien": "", "causes": listed, "verdict": verdict, **more}
+
+
+def test_the_truth_in_the_strongest_set_is_right():
+    assert first_right(case(["ageing"], ("clock-drift", "ageing")))
+    assert not first_right(case(["ageing"], ("jump",), ("ageing",)))
+    assert not first_right(case(["ageing"]))
+
+
+def test_exact_needs_every_effect_once_and_nothing_else():
+    assert exact_set(case(["jump", "ageing"], ("clock-drift", "ageing"), ("jump",)))
+    assert not exact_set(case(["jump", "ageing"], ("jump",)))
+    assert not exact_set(case(["jump", "ageing"], ("jump",), ("ageing",), ("periodic",)))
+
+
+def test_a_confusion_counts_sets_as_the_truth_and_keeps_silence_apart():
+    cases = [
+        case(["ageing"], ("clock-drift", "ageing")),
+        case(["ageing"], ("jump",)),
+        case(["ageing"], verdict="adequate"),
+        case(["ageing"], verdict="unexplained"),
+    ]
+    assert [said(c) for c in cases] == ["ageing", "jump", "nothing", "unexplained"]
+    assert confusion(cases)["ageing"] == {"ageing": 1, "jump": 1, "nothing": 1, "unexplained": 1}
+
+
+def test_the_band_is_wilsons():
+    # Wilson's interval at z = 1.645 solves (p − x)² = z² p (1 − p) / n
+    low, high = band(9, 12)
+    for p in (low, high):
+        assert (p - 0.75) ** 2 == pytest.approx(1.645**2 * p * (1 - p) / 12)
+
+
+def test_reliability_of_claims_that_are_right_as_often_as_they_say():
+    rows, error = reliability([(0.7, k < 7) for k in range(10)])
+    assert rows == [(0.6, 0.8, pytest.approx(0.7), 7, 10)]
+    assert error == pytest.approx(0.0)
+
+
+def test_predicted_and_measured_confusion_are_pooled_over_the_same_cases():
+    plans = {
+        "rich 1": {"confusion": {"jump": {"jump": 1.0}}},
+        "plain 1": {"confusion": {"jump": {"jump": 0.5, "nothing": 0.5}}},
+    }
+    cases = [case(["jump"], ("jump",)) for _ in range(10)]
+    cases += [case(["jump"], ("jump",) if k < 2 else ("ageing",), design="plain") for k in range(10)]
+    rows = {(truth, word): (p, m, n) for truth, word, p, m, n in compare(cases, plans)}
+    assert rows["jump", "jump"] == (pytest.approx(0.75), pytest.approx(0.6), 20)
+    assert rows["jump", "nothing"] == (pytest.approx(0.25), 0, 20)
+    assert rows["jump", "ageing"] == (0, pytest.approx(0.4), 20)
+    assert agreement(compare(cases, plans))["near"] == 0
+
+
+def test_an_effect_that_the_plan_calls_invisible_is_predicted_as_nothing():
+    rows = compare([case(["self-heating"])], {"rich 1": {"confusion": {}}})
+    assert rows[0][:3] == ("self-heating", "nothing", 1.0)
+
+
+def test_stepwise_regression_keeps_the_planted_terms_only():
+    rng = np.random.default_rng(7)
+    terms = {name: rng.standard_normal(400) for name in "abcdef"}
+    fixed = np.ones((400, 1))
+    target = 3.0 + 2.0 * terms["b"] - 0.5 * terms["e"] + 0.1 * rng.standard_normal(400)
+    assert [name for name, _ in stepwise_terms(target, fixed, terms, p_enter=1e-6)] == ["b", "e"]
+
+
+def test_baselines_get_the_inseparable_twin_and_one_entry_an_effect():
+    causes = merge([("ageing", "frequency_Hz", 5.0), ("clock-drift", "frequency_Hz", 9.0), ("jump", "inverse_q", 1.0)])
+    assert [(name, others) for name, others, *_ in causes] == [("clock-drift", ["ageing"]), ("jump", [])]
+    answers = {"effect/1/2": {"lasso": {"causes": causes, "seconds": 0.1}}}
+    answered = as_cases([case(["ageing"]), case(["jump"], seed=3)], answers, "lasso")
+    assert len(answered) == 1
+    assert first_right(answered[0])
