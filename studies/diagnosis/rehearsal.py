@@ -178,7 +178,11 @@ def draw_noise(stage: Stage, cases: int, rng: np.random.Generator) -> tuple[Floa
     for number in range(len(KERNELS) + 1):
         mine = np.flatnonzero(turn == number)
         basis = stage.sides[KERNELS[number - 1]].fit.problem.basis
-        ratio = np.exp(rng.uniform(*np.log(SLOW_NOISE), mine.size)) if number else np.zeros(mine.size)
+        ratio = (
+            np.exp(rng.uniform(np.log(SLOW_NOISE[0]), np.log(SLOW_NOISE[1]), mine.size))
+            if number
+            else np.zeros(mine.size)
+        )
         share = ratio**2 * stage.rows / float(basis.walk.mean())
         variance = stage.white * (1.0 + share * basis.walk[:, None])
         kept = 1.0 - (basis.rotate(stage.absorbs) ** 2).sum(axis=1)
