@@ -122,7 +122,7 @@ class Problem:
 
     def baseline(self, views: Sequence["View"]) -> FloatArray:
         """Return the columns of the baseline, (M, p)."""
-        columns = self.stack(baseline_columns(self, [view.coarse for view in views], self.thermometer))
+        columns = self.stack(baseline_columns(self, [(v.coarse, v.seen) for v in views], self.thermometer))
         if self.delay_row is not None:
             columns[-1, -1] = self.delay_row
         return columns
@@ -147,38 +147,53 @@ class Problem:
 def term_columns(problem: Problem, term: Term, view: "View") -> FloatArray:
     """Return the columns of an effect for one run in units of the response over those of its coefficients."""
     thermal = term.effect.acts_on == "temperature"
+    plain = thermal and not term.effect.sees_heat
     if term.effect.fine:
-        fine = view.fine if thermal else view.seen_fine
+        fine = view.fine if plain else view.seen_fine
         columns = average(term.effect.columns(fine, term.shape, problem.response), view.group)
     else:
-        columns = term.effect.columns(view.coarse if thermal else view.seen, term.shape, problem.response)
+        columns = term.effect.columns(view.coarse if plain else view.seen, term.shape, problem.response)
     columns = columns[:, : term.count]
     if thermal:
-        columns = columns * (1.0 + 2.0 * problem.bend * view.coarse.excess)[:, None]
+        columns = columns * steepness(problem, view.seen)[:, None]
     return columns
 
 
+def steepness(problem: Problem, seen: States) -> FloatArray:
+    """Change of the frequency for a change of the resonator's temperature, over its slope at the reference."""
+    own = np.ones_like(seen.time) if problem.law is None else law_slope(problem.law, seen)
+    return np.asarray(own + 2.0 * problem.bend * seen.excess)
+
+
 def baseline_columns(
-    problem: Problem, states: Sequence[States], thermometer: Sequence[FloatArray] | None
+    problem: Problem, states: Sequence[tuple[States, States]], thermometer: Sequence[FloatArray] | None
 ) -> list[FloatArray]:
-    """Return the columns of the baseline, one array a run."""
+    """Return the columns of the baseline, one array a run, from its states as the lag gives them and as they are seen.
+
+    The frequency law g is expanded about the temperature that is seen, x + c: with δ what start, delay and effects add
+    to x, g(x + δ) = [g(x + c) − g′(x + c) c] + g′(x + c) δ, which is exact once c has become δ.
+    """
     runs = len(states)
     out = []
-    for k, s in enumerate(states):
+    for k, (s, seen) in enumerate(states):
         x = thermometer[k] if thermometer is not None else s.excess
         own = np.zeros((x.size, runs))
         if problem.response == "bias_deg_per_h":
             own[:, k] = 1.0
             columns = [x / 10.0, (x / 10.0) ** 2, (x / 10.0) ** 3]
+        elif problem.response == "frequency_Hz":
+            change = seen.excess - x
+            slope = x if problem.law is None else scaled_law(problem.law, seen) - law_slope(problem.law, seen) * change
+            columns = [np.ones_like(x), slope, x**2 - change**2]
         else:
-            slope = x if problem.law is None or problem.response != "frequency_Hz" else _law_slope(problem.law, s)
-            columns = [np.ones_like(x), slope, x**2]
+            columns = [np.ones_like(x), x, x**2]
         if problem.lagged:
+            steep = steepness(problem, seen) if problem.response == "frequency_Hz" else np.ones_like(x)
             start = np.zeros((x.size, runs))
-            start[:, k] = np.exp(-(s.time - s.time[0]) / s.tau) * (1.0 + 2.0 * problem.bend * x)
+            start[:, k] = np.exp(-(s.time - s.time[0]) / s.tau) * steep
             own = np.concatenate([own, start], axis=1) if problem.response == "bias_deg_per_h" else start
             if problem.delay_row is not None:
-                delay = -(s.housing - s.resonator) / s.tau * (1.0 + 2.0 * problem.bend * x)
+                delay = -(s.housing - s.resonator) / s.tau * steep
                 own = np.concatenate([own, delay[:, None]], axis=1)
         elif problem.response != "bias_deg_per_h":
             own = own[:, :0]
@@ -186,11 +201,17 @@ def baseline_columns(
     return out
 
 
-def _law_slope(law: Law, states: States) -> FloatArray:
+def scaled_law(law: Law, states: States) -> FloatArray:
     """The material law scaled to a unit slope at the reference, K."""
     around = np.array([states.reference - 0.5, states.reference + 0.5])
     slope = float(np.diff(law(around))[0])
     return np.asarray((law(states.resonator) - law(np.array([states.reference]))[0]) / slope)
+
+
+def law_slope(law: Law, states: States) -> FloatArray:
+    """Slope of the scaled material law, 1 at the reference."""
+    ahead, behind = (replace(states, resonator=states.resonator + side) for side in (0.5, -0.5))
+    return np.asarray(scaled_law(law, ahead) - scaled_law(law, behind))
 
 
 def pose(

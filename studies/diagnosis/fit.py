@@ -9,7 +9,9 @@ from studies.diagnosis.baseline import Problem, Term
 from studies.diagnosis.likelihood import SHARES, LinearFit, fit_linear
 from studies.diagnosis.states import FloatArray
 
-ROUNDS = 7
+ROUNDS = 12
+TWO_LAGS = ("second-lag", "mounting-stress")
+"""Effects that divide one thermal constant in two."""
 QUIET = 0.02
 """A round that gains less than this in minus twice the log-likelihood is the last."""
 
@@ -78,6 +80,7 @@ def fit_terms(problem: Problem, terms: Sequence[Term], rounds: int = ROUNDS) -> 
         return fit
     if rounds == ROUNDS:
         fit = _evaluate(problem, _place_jumps(_flip(fit, target), target), target, SHARES)
+        fit = _spread_lags(fit, target)
     knobs = _knobs(fit)
     for _ in range(rounds if knobs else 0):
         better = _gauss_newton(fit, knobs, target)
@@ -186,6 +189,25 @@ def _flip(fit: Fit, target: FloatArray) -> Fit:
     return fit
 
 
+def _spread_lags(fit: Fit, target: FloatArray) -> Fit:
+    """Start two time constants from the best of a grid: their likelihood has several summits, one for each order."""
+    problem = fit.problem
+    if not problem.lagged or not fit.terms or fit.terms[-1].name not in TWO_LAGS:
+        return fit
+    *others, last = fit.terms
+    span = problem.states[0].step * problem.group
+    for first in problem.tau * np.array([0.35, 0.6, 1.0, 1.6]):
+        for second in first * np.array([0.1, 0.25, 0.5, 1.6, 3.0, 7.0, 20.0]):
+            parameter = last.effect.shape[0]
+            if not max(parameter.low, span / 2) < second < parameter.high:
+                continue
+            term = replace(last, shape=(float(second), *last.shape[1:]))
+            tried = _evaluate(replace(problem, tau=float(first)), (*others, term), target, SHARES[::3])
+            if tried.score < fit.score:
+                fit = tried
+    return fit
+
+
 def _place_jumps(fit: Fit, target: FloatArray) -> tuple[Term, ...]:
     """Move each jump between the steps of the grid, by the share of the step that lies behind it."""
     terms = fit.terms
@@ -246,4 +268,6 @@ def intervals(fit: Fit, index: int) -> dict[str, Interval]:
         value = float(fit.linear.coefficients[begin + k] / scale)
         wide = float(deviation[begin + k] / abs(scale))
         out[name] = Interval(value, value - wide, value + wide)
+    if term.effect.sees_heat:
+        out["share_of_form"] = out["radiated_share"]
     return out

@@ -46,7 +46,7 @@ def fine_model(problem: Problem, terms: Sequence[Term], campaign: Campaign, k: i
             np.interp(fine.time, run.time, values) if j == k else np.zeros(1)
             for j, values in enumerate(problem.thermometer)
         ]
-    others = [fine if j == k else _short(s) for j, s in enumerate(problem.states)]
+    others = [(fine, seen) if j == k else (_short(s), _short(s)) for j, s in enumerate(problem.states)]
     base = baseline_columns(problem, others, thermometer)[k]
     return np.concatenate([base, *(term_columns(problem, term, view) for term in terms)], axis=1)
 

@@ -15,6 +15,9 @@ from studies.diagnosis.thermometer import corrected
 
 MOST_TERMS = 4
 CONTENDERS = 5
+STARTS, SECOND_START, CLEAR = 2, 0.5, 5.0
+"""Where the first evidence is `CLEAR` times the threshold, the second of the contenders is tried as a start too, if it
+has half that evidence: two effects together may look like a third one alone."""
 BESIDE = 0.06
 """A further effect must have this part of the evidence explained before it: no formula of an effect is exact, and what
 its imperfect shape leaves would otherwise be named."""
@@ -94,19 +97,51 @@ def select(
         Signatures at the problem's lag, when they are known already.
     """
     usable = applicable(problem, effects)
-    plain = fit = corrected(fit_terms(problem, ()))
+    plain = corrected(fit_terms(problem, ()))
     if dictionary is None or problem.response == "frequency_Hz":
         dictionary = build_dictionary(plain.problem, replace(span, tau=plain.problem.tau), usable)
-    built_at = plain.problem.tau
-    while len(fit.terms) < MOST_TERMS:
-        if abs(np.log(fit.problem.tau / built_at)) > 0.02:
-            dictionary = build_dictionary(fit.problem, replace(span, tau=fit.problem.tau), usable)
-            built_at = fit.problem.tau
-        rivals = compete(fit, dictionary, levels, threshold)
-        if not rivals or rivals[0].evidence < threshold + BESIDE * (plain.score - fit.score):
+    first = _Path(plain, dictionary)
+    starts = compete(first.fit, first.dictionary, levels, threshold)
+    if not starts or starts[0].evidence < threshold:
+        return Selection(plain, plain, (), levels, threshold)
+    grown = []
+    for start in starts[:STARTS]:
+        if start.evidence < max(SECOND_START * starts[0].evidence, threshold):
             break
-        fit = corrected(rivals[0].fit)
-    return _settle(plain, fit, dictionary, levels, threshold)
+        path = _Path(corrected(start.fit), dictionary)
+        path.grow(plain, replace(span, tau=plain.problem.tau), usable, levels, threshold)
+        grown.append(path)
+        if starts[0].evidence < CLEAR * threshold:
+            break
+    best = min(grown, key=lambda path: path.cost(levels, threshold))
+    return _settle(plain, best.fit, best.dictionary, levels, threshold)
+
+
+class _Path:
+    """One order in which effects are added, from its first one on."""
+
+    def __init__(self, fit: Fit, dictionary: Dictionary) -> None:
+        self.fit, self.dictionary = fit, dictionary
+        self.built_at = fit.problem.tau if not fit.terms else 0.0
+
+    def grow(
+        self, plain: Fit, span: Span, usable: Sequence[Effect], levels: Mapping[str, float], threshold: float
+    ) -> None:
+        """Add the effect with the strongest evidence until none is left beyond chance."""
+        self.built_at = plain.problem.tau
+        while len(self.fit.terms) < MOST_TERMS:
+            tau = self.fit.problem.tau
+            if abs(np.log(tau / self.built_at)) > 0.02:
+                self.dictionary = build_dictionary(self.fit.problem, replace(span, tau=tau), usable)
+                self.built_at = tau
+            rivals = compete(self.fit, self.dictionary, levels, threshold)
+            if not rivals or rivals[0].evidence < threshold + BESIDE * (plain.score - self.fit.score):
+                break
+            self.fit = corrected(rivals[0].fit)
+
+    def cost(self, levels: Mapping[str, float], threshold: float) -> float:
+        """Minus twice the log-likelihood, and what every effect must bring to be named."""
+        return self.fit.score + sum(levels[term.name] + threshold for term in self.fit.terms)
 
 
 def compete(fit: Fit, dictionary: Dictionary, levels: Mapping[str, float], threshold: float) -> list[Rival]:

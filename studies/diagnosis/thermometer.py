@@ -8,10 +8,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from studies.diagnosis.baseline import term_columns
+from studies.diagnosis.baseline import Term, steepness, term_columns
 from studies.diagnosis.campaign import Campaign
 from studies.diagnosis.fit import Fit, fit_terms
 from studies.diagnosis.states import FloatArray, States, average
+
+
+UPDATES, SETTLED = 5, 0.5
+"""At most so many updates of the corrected temperature, until minus twice the log-likelihood changes by less."""
 
 
 @dataclass(frozen=True)
@@ -56,6 +60,7 @@ def read_thermometer(campaign: Campaign, fit: Fit, clean: bool = True) -> Thermo
     views = problem.views(problem.tau)
     model = list(np.split(problem.model(problem.tau, fit.terms) @ coefficients, _ends(fit)))
     warmer = thermal_correction(fit)
+    slow = slow_residual(fit)
     changes, excesses, states = [], [], []
     for k, (run, view) in enumerate(zip(campaign.runs, views, strict=True)):
         measured = run.responses["frequency_Hz"].copy()
@@ -64,7 +69,7 @@ def read_thermometer(campaign: Campaign, fit: Fit, clean: bool = True) -> Thermo
             whole = np.full(measured.shape, np.nan)
             whole[~gaps] = model[k]
             rest = measured - whole
-            smooth = slope * view.coarse.excess + coefficients[2] * view.coarse.excess**2 + coefficients[0]
+            smooth = slope * view.seen.excess + coefficients[2] * view.seen.excess**2 + coefficients[0]
             measured[gaps] = smooth[gaps] + (np.nanmedian(rest) if np.isfinite(rest).any() else 0.0)
         for index, term in enumerate(fit.terms):
             part = fit.coefficients_of(index)
@@ -76,7 +81,8 @@ def read_thermometer(campaign: Campaign, fit: Fit, clean: bool = True) -> Thermo
             x = change - problem.bend * x**2
         changes.append(change)
         excesses.append(x)
-        states.append(replace(view.fine, resonator=view.fine.resonator + warmer[k]))
+        missed = np.interp(view.fine.time, run.time, slow[k] / (slope * steepness(problem, view.seen)))
+        states.append(replace(view.fine, resonator=view.fine.resonator + warmer[k] + missed))
     return Thermometer(tuple(changes), tuple(excesses), tuple(states))
 
 
@@ -84,6 +90,30 @@ def smooth_thermometer(campaign: Campaign, thermometer: Thermometer, bend: float
     """Return the thermometer with the fitted model in the place of the measured frequency: no noise, no surprise."""
     excess = tuple(average(s.excess, campaign.group) for s in thermometer.states)
     return replace(thermometer, change=tuple(x + bend * x**2 for x in excess), excess=excess)
+
+
+def slow_residual(fit: Fit) -> tuple[FloatArray, ...]:
+    """Return the slow part of what a fit leaves, Hz on the coarse grid, as its own noise model divides it from the white.
+
+    Most of it is temperature that the heat path does not know. Row i of the rotated residual has the variance
+    σ² (1 + q walk_i), of which q walk_i is slow.
+    """
+    problem = fit.problem
+    rest = problem.values - fit.columns() @ fit.linear.coefficients
+    out, begin, block = [], 0, 0
+    for mask, states in zip(problem.present, problem.states, strict=True):
+        grid = average(states.time, problem.group)
+        end = begin + int(mask.sum())
+        if end > begin:
+            vectors = problem.basis.vectors[block]
+            slow = fit.linear.share * problem.basis.walk[begin:end]
+            smooth = vectors @ (slow / (1.0 + slow) * (vectors.T @ rest[begin:end]))
+            out.append(np.interp(grid, grid[mask], smooth))
+            block += 1
+        else:
+            out.append(np.zeros_like(grid))
+        begin = end
+    return tuple(out)
 
 
 def thermal_correction(fit: Fit) -> tuple[FloatArray, ...]:
@@ -97,7 +127,8 @@ def thermal_correction(fit: Fit) -> tuple[FloatArray, ...]:
         if slope != 0.0:
             for index, term in enumerate(fit.terms):
                 if term.effect.acts_on == "temperature":
-                    columns = term.effect.columns(fine, term.shape, problem.response)[:, : term.count]
+                    states = view.seen_fine if term.effect.sees_heat else fine
+                    columns = term.effect.columns(states, term.shape, problem.response)[:, : term.count]
                     warmer += columns @ fit.coefficients_of(index) / slope
             warmer += coefficients[3 + k] / slope * np.exp(-(fine.time - fine.time[0]) / problem.tau)
             if problem.delay_row is not None:
@@ -108,11 +139,20 @@ def thermal_correction(fit: Fit) -> tuple[FloatArray, ...]:
 
 
 def corrected(fit: Fit) -> Fit:
-    """Return the fit with the temperature that static effects see brought up to date."""
+    """Return the fit with the temperature that static effects and radiation see brought up to date."""
     if fit.problem.response != "frequency_Hz":
         return fit
-    problem = replace(fit.problem, correction=thermal_correction(fit))
-    return fit_terms(problem, fit.terms, rounds=3 if fit.terms else 0)
+    for _ in range(UPDATES):
+        problem = replace(fit.problem, correction=thermal_correction(fit))
+        before, fit = fit, fit_terms(problem, _with_heat(fit), rounds=3 if fit.terms else 0)
+        if not fit.terms or abs(before.score - fit.score) < SETTLED:
+            break
+    return fit
+
+
+def _with_heat(fit: Fit) -> tuple[Term, ...]:
+    """The terms, now that the corrected temperature holds what is radiated too."""
+    return tuple(replace(t, shape=(0.0, *t.shape[1:])) if t.effect.sees_heat else t for t in fit.terms)
 
 
 def _ends(fit: Fit) -> list[int]:

@@ -80,6 +80,8 @@ class Effect:
         Whether the first column alone is a simpler form of the effect.
     fine : bool
         Whether its columns need the fine grid (lags of fast drives) before they are averaged.
+    sees_heat : bool
+        Whether an effect on the temperature depends on what the others have made of it.
     """
 
     name: str
@@ -96,6 +98,7 @@ class Effect:
     equivalents: Mapping[str, tuple[str, ...]] | None = None
     nested: bool = False
     fine: bool = False
+    sees_heat: bool = False
 
     def coefficient_names(self, response: str, count: int | None = None) -> tuple[str, ...]:
         """Return the names of the coefficients with the unit of `response` filled in."""
@@ -192,10 +195,12 @@ def apply_effects(entries: Sequence[tuple[str, str, Mapping[str, float]]], state
         What must be added to "resonator_temperature" (K) and to each response.
     """
     changes: dict[str, FloatArray] = {}
-    for thermal in (True, False):
-        warmed = replace(states, resonator=states.resonator + changes.get("resonator_temperature", 0.0))
+    warmed = states
+    for stage in range(3):  # on the temperature; on the temperature that these leave; on the responses
         for name, response, parameters in entries:
-            if (find_effect(name).acts_on == "temperature") is thermal:
-                target, change = apply_effect(name, parameters, states if thermal else warmed, response)
+            effect = find_effect(name)
+            if stage == (2 if effect.acts_on != "temperature" else int(effect.sees_heat)):
+                target, change = apply_effect(name, parameters, warmed if stage else states, response)
                 changes[target] = changes.get(target, np.zeros_like(states.time)) + change
+        warmed = replace(states, resonator=states.resonator + changes.get("resonator_temperature", 0.0))
     return changes

@@ -9,21 +9,22 @@ from studies.diagnosis.states import FloatArray, States, lag
 
 
 def columns(states: States, shape: Sequence[float], response: str) -> FloatArray:
-    """Solve τ T_r′ = (1 − ρ + ρ g)(T_h − T_r) and return the change over ρ.
+    """Heat ρ (g − 1)(T_h − T_r) reaches the resonator through its lag τ: the change of T_r over ρ.
 
-    g = (T_h + T_r)(T_h² + T_r²)/(4 T₀³) for exchange between housing and resonator, or (T_r/T₀)³ for τ(T_r).
+    g = (T_h + T_r)(T_h² + T_r²)/(4 T₀³) for exchange between housing and resonator, or (T_r/T₀)³ for g(T_r). Where T_r is
+    known without radiation only, `share_of_form` is the ρ at which it is solved for; at 0, T_r is right as it stands.
     """
     share, exchange = shape
     housing, step, tau = states.housing, states.step, states.tau
-    plain = lag(housing, step, tau)
-    state = plain
-    for _ in range(4):  # the conductance of the previous pass makes each pass a linear lag
+    change = np.zeros_like(housing)
+    for _ in range(5 if share else 1):
+        state = states.resonator + share * change
         if exchange:
             conductance = (housing + state) * (housing**2 + state**2) / (4.0 * states.reference**3)
         else:
             conductance = (state / states.reference) ** 3
-        state = plain + _lag_with_feed(share * (conductance - 1.0) * (housing - state), step, tau)
-    return ((state - plain) / share)[:, None]
+        change = _lag_with_feed((conductance - 1.0) * (housing - state), step, tau)
+    return change[:, None]
 
 
 def _lag_with_feed(feed: FloatArray, step: float, tau: float) -> FloatArray:
@@ -45,10 +46,11 @@ EFFECT = Effect(
     acts_on="temperature",
     coefficients=("radiated_share",),
     shape=(
-        Parameter("share_of_form", 0.02, 1.0, "share at which the form is computed", steady=True),
+        Parameter("share_of_form", 0.0, 1.0, "share at which the form is computed", steady=True),
         Parameter("exchange", 0.0, 1.0, "1: exchange with the housing, 0: by the resonator alone", False, True),
     ),
     columns=columns,
     grid=grid,
     fine=True,
+    sees_heat=True,
 )
