@@ -11,9 +11,12 @@ import numpy as np
 
 from studies.diagnosis.baseline import Problem, View
 from studies.diagnosis.fit import Fit, jacobian_of
+from studies.diagnosis.innovations import find_innovations
 from studies.diagnosis.likelihood import SHARES, orthonormal
 from studies.diagnosis.states import FloatArray, lag
 
+SHARP = 4.0
+"""Second difference of a model, over the noise of a row, at which the rows around it are no witnesses."""
 AMPLITUDES = np.geomspace(1e-4, 1e3, 15)
 
 
@@ -161,19 +164,23 @@ def brief_events(fit: Fit) -> float:
     """Return how far the innovations are from Gaussian: evidence of bursts that no smooth function follows.
 
     The excess kurtosis of the innovations (residuals whitened in their order of time), scaled so that 17 stands for
-    an excess of 1.2, about seven standard deviations of a Gaussian record of 800 rows.
+    an excess of 1.2, about seven standard deviations of a Gaussian record of 800 rows. Rows where the model itself bends
+    sharply (a step of a voltage within one step of the grid) are left out: nobody knows them well.
     """
-    problem = fit.problem
-    rest = problem.basis.rotate(problem.values - fit.columns() @ fit.linear.coefficients)
+    model = fit.columns() @ fit.linear.coefficients
+    edge = SHARP * np.sqrt(fit.linear.variance)
     begin, parts = 0, []
-    for vectors in problem.basis.vectors:
-        size = vectors.shape[0]
-        if size > 8:
-            spread = 1.0 + fit.linear.share * problem.basis.walk[begin : begin + size]
-            covariance = (vectors * spread) @ vectors.T
-            parts.append(np.linalg.solve(np.linalg.cholesky(covariance), vectors @ rest[begin : begin + size]))
-        begin += size
-    innovations = np.concatenate(parts)
+    for innovations in find_innovations(fit):
+        end = begin + innovations.size
+        if innovations.size > 8:
+            bend = np.zeros(innovations.size + 4)
+            bend[3:-3] = np.abs(np.diff(model[begin:end], 2))
+            beside = np.max(np.stack([bend[k : k + innovations.size] for k in range(5)]), axis=0)
+            parts.append(innovations[beside < edge])
+        begin = end
+    innovations = np.concatenate(parts) if parts else np.empty(0)
+    if innovations.size < 50:
+        return 0.0
     innovations = innovations / max(float(innovations.std()), 1e-300)
     return float(17.0 * (np.mean(innovations**4) - 3.0) / 1.2 * min(1.0, np.sqrt(innovations.size / 800.0)))
 

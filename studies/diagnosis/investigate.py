@@ -11,11 +11,12 @@ from studies.diagnosis.campaign import FEWEST_BINS, Campaign
 from studies.diagnosis.consistency import consistency
 from studies.diagnosis.discrepancy import Leftover, brief_events, generic_bases, leftover_evidence, strongest
 from studies.diagnosis.effects import Effect
-from studies.diagnosis.fit import intervals
+from studies.diagnosis.fit import fit_terms, intervals
 from studies.diagnosis.gain import Score, rms, row_residuals, score
+from studies.diagnosis.innovations import find_lines
 from studies.diagnosis.null import bootstrap_levels, draw_null, levels_of, shipped_levels
-from studies.diagnosis.scan import applicable, build_dictionary
-from studies.diagnosis.selection import Found, Selection, scan_model, select
+from studies.diagnosis.scan import applicable, build_bank
+from studies.diagnosis.selection import Found, Selection, scan_model, scan_models, select
 from studies.diagnosis.thermometer import Thermometer, read_thermometer, smooth_thermometer
 from studies.diagnosis.verdict import Cause, ResponseResult, Verdict, equivalent_to, overall, probability_of
 
@@ -25,7 +26,7 @@ SPARSE = 60.0
 LEFT_OVER_SHARE = 0.02
 FURTHER = 120.0
 """Evidence at which a further cause beside the strongest deserves two thirds of its claim (measured on the generator)."""
-LEAK = 0.01
+LEAK = 0.002
 """Part of the evidence in the frequency that a cause in another response must have: its thermometer is not exact."""
 NARROW_RANGE = 1.0
 CLOCK_PAIR = ("clock-drift", "ageing")
@@ -158,37 +159,22 @@ def inquire(
 ) -> Inquiry:
     """Select the effects of one response and ask the generic witness about the rest."""
     problem = choose_kernel(problem)
-    inquiry = _inquire(campaign, problem, draws, rng, effects, threshold)
-    better = choose_kernel(inquiry.problem, inquiry.selection.fit.terms) if inquiry.selection.found else problem
-    return inquiry if better.kernel == problem.kernel else _inquire(campaign, better, draws, rng, effects, threshold)
-
-
-def _inquire(
-    campaign: Campaign,
-    problem: Problem,
-    draws: int,
-    rng: np.random.Generator,
-    effects: Sequence[Effect] | None,
-    threshold: float,
-) -> Inquiry:
     span = span_of(campaign, problem.tau if problem.lagged else 1000.0)
     usable = applicable(problem, effects)
-    dictionary = None
-    from studies.diagnosis.fit import fit_terms
-
+    bank = None
     plain = fit_terms(problem, ())
     levels = shipped_levels([effect.name for effect in usable])
     bases = generic_bases(problem)
     generic_levels: dict[str, float] = {}
     if draws:
-        dictionary = build_dictionary(problem, span, usable)
-        levels = bootstrap_levels(problem, dictionary, scan_model(plain), draws, rng)
+        bank = build_bank(problem, replace(span, lines=find_lines(plain)), usable)
+        levels = bootstrap_levels(problem, bank, scan_models(plain, bank), draws, rng)
         noise = draw_null(problem, scan_model(plain), min(draws, 100), rng)
         generic_levels = {
             name: float(levels_of(values[None, :])[0])
             for name, values in leftover_evidence(plain, bases, noise).items()
         }
-    selection = select(problem, span, levels, threshold, effects, dictionary)
+    selection = select(problem, span, levels, threshold, effects, bank)
     leftover = strongest(leftover_evidence(selection.fit, bases), generic_levels)
     if (bursts := brief_events(selection.fit)) > leftover.evidence:
         leftover = Leftover("time, brief events", bursts)

@@ -73,6 +73,16 @@ class NoiseBasis:
             begin = end
         return out
 
+    def unrotate(self, rotated: FloatArray) -> FloatArray:
+        """Return stacked rows from rotated ones: the inverse of `rotate`."""
+        out = np.empty_like(rotated)
+        begin = 0
+        for vectors in self.vectors:
+            end = begin + vectors.shape[0]
+            out[begin:end] = vectors @ rotated[begin:end]
+            begin = end
+        return out
+
     def steps(self, run: int) -> FloatArray:
         """Rotated unit steps of one run: column k is 0 up to row k and 1 after it."""
         vectors = self.vectors[run]

@@ -10,8 +10,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from studies.diagnosis.baseline import Problem
-from studies.diagnosis.likelihood import fit_linear
-from studies.diagnosis.scan import Dictionary, best_gains, scan_gains
+from studies.diagnosis.likelihood import KERNELS, fit_linear
+from studies.diagnosis.scan import Bank, scan_bank
 from studies.diagnosis.states import FloatArray
 
 TAIL = 0.12
@@ -48,21 +48,24 @@ def draw_null(problem: Problem, model: FloatArray, draws: int, rng: np.random.Ge
 
 
 def bootstrap_levels(
-    problem: Problem, dictionary: Dictionary, model: FloatArray, draws: int, rng: np.random.Generator
+    problem: Problem, bank: Bank, models: Sequence[FloatArray], draws: int, rng: np.random.Generator
 ) -> dict[str, float]:
     """Return 2 ln N of every effect from draws of this campaign's null.
 
     Parameters
     ----------
-    problem, dictionary, model
-        As for the scan.
+    problem : Problem
+        With the kind of noise that suits the null best.
+    bank, models
+        As for `scan_bank`.
     draws : int
         Number of draws.
     rng : numpy Generator
         Seeded by the caller.
     """
-    gains, _, _ = best_gains(dictionary, *scan_gains(problem, dictionary, model, draw_null(problem, model, draws, rng)))
-    return dict(zip(dictionary.effects, levels_of(gains), strict=True))
+    drawn = problem.basis.unrotate(draw_null(problem, models[KERNELS.index(problem.kernel)], draws, rng))
+    gains, _, _, _ = scan_bank(bank, models, [other.basis.rotate(drawn) for other in bank.problems])
+    return dict(zip(bank.dictionaries[0].effects, levels_of(gains), strict=True))
 
 
 def levels_of(gains: FloatArray) -> FloatArray:

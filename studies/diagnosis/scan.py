@@ -6,9 +6,9 @@ from functools import cached_property
 
 import numpy as np
 
-from studies.diagnosis.baseline import Problem, Term
+from studies.diagnosis.baseline import Problem, Term, restricted
 from studies.diagnosis.effects import Effect, Span, library
-from studies.diagnosis.likelihood import SHARES, orthonormal, profile_shares
+from studies.diagnosis.likelihood import KERNELS, SHARES, orthonormal, profile_shares
 from studies.diagnosis.states import FloatArray
 
 SURVIVES = 1e-5
@@ -51,11 +51,11 @@ class Dictionary:
 
 @dataclass(frozen=True)
 class Candidate:
-    """The best signature of one effect in a scan: twice its log-likelihood ratio, and what survives the model."""
+    """The best signature of one effect in a scan: twice its log-likelihood ratio, and the noise beside which it has it."""
 
     term: Term
     gain: float
-    survives: float
+    kernel: str
 
 
 def applicable(problem: Problem, effects: Sequence[Effect] | None = None) -> list[Effect]:
@@ -78,27 +78,54 @@ def _varies(problem: Problem, drive: str) -> bool:
     return bool(np.ptp(values) > 1e-6 * max(float(np.abs(values).max()), 1e-300))
 
 
+@dataclass(frozen=True)
+class Bank:
+    """The dictionary under every kind of slow noise: an effect may show only beside noise of another kind than seems
+    likely without it.
+    """
+
+    problems: tuple[Problem, ...]
+    dictionaries: tuple[Dictionary, ...]
+
+
+def build_bank(problem: Problem, span: Span, effects: Sequence[Effect]) -> Bank:
+    """Compute the signature of every effect at every shape of its grid, and rotate it into the basis of every noise."""
+    signatures = _signatures(problem, span, effects)
+    problems = tuple(problem if kernel == problem.kernel else restricted(problem, kernel=kernel) for kernel in KERNELS)
+    return Bank(problems, tuple(_rotated(signatures, one, span) for one in problems))
+
+
 def build_dictionary(problem: Problem, span: Span, effects: Sequence[Effect]) -> Dictionary:
     """Compute and rotate the signature of every effect at every shape of its grid."""
+    return _rotated(_signatures(problem, span, effects), problem, span)
+
+
+@dataclass(frozen=True)
+class _Signatures:
+    """Columns of every candidate before rotation; those of the effect `jumps` are made when they are rotated."""
+
+    effects: tuple[str, ...]
+    owner: tuple[int, ...]
+    shapes: tuple[tuple[float, ...], ...]
+    first: FloatArray
+    second: FloatArray
+    pairs: tuple[int, ...]
+    whole: tuple[bool, ...]
+    jumps: int | None
+
+
+def _signatures(problem: Problem, span: Span, effects: Sequence[Effect]) -> _Signatures:
     views = problem.views(problem.tau)
-    names: list[str] = []
     owner: list[int] = []
     shapes: list[tuple[float, ...]] = []
     firsts: list[FloatArray] = []
     seconds: list[FloatArray] = []
     pairs: list[int] = []
     whole: list[bool] = []
-    steps: list[FloatArray] = []
-    for effect in effects:
-        index = len(names)
-        names.append(effect.name)
+    jumps: int | None = None
+    for index, effect in enumerate(effects):
         if effect.name == "jump":
-            step_shapes, columns = _steps(problem, span)
-            steps.append(columns)
-            owner += [index] * len(step_shapes)
-            shapes += step_shapes
-            whole += [True] * len(step_shapes)
-            firsts += [np.empty(0)] * len(step_shapes)
+            jumps = index
             continue
         for shape in effect.grid(span, problem.response):
             columns = problem.term(Term(effect, tuple(shape), 2), views)
@@ -109,22 +136,30 @@ def build_dictionary(problem: Problem, span: Span, effects: Sequence[Effect]) ->
             shapes.append(tuple(shape))
             whole.append(effect.nested or columns.shape[1] == 1)
             firsts.append(columns[:, 0])
-    rows = problem.values.size
-    first = np.zeros((len(owner), rows))
-    filled = np.array([column.size > 0 for column in firsts], dtype=bool)
-    if filled.any():
-        first[filled] = problem.basis.rotate(np.stack([c for c in firsts if c.size], axis=1)).T
-    if steps:
-        first[~filled] = np.concatenate(steps, axis=1).T
-    second = problem.basis.rotate(np.stack(seconds, axis=1)).T if seconds else np.zeros((0, rows))
-    return Dictionary(
-        tuple(names),
-        np.array(owner),
+    empty = np.empty((problem.values.size, 0))
+    return _Signatures(
+        tuple(effect.name for effect in effects),
+        tuple(owner),
         tuple(shapes),
-        first,
-        np.ascontiguousarray(second),
-        np.array(pairs, dtype=int),
-        np.array(whole, dtype=bool),
+        np.stack(firsts, axis=1) if firsts else empty,
+        np.stack(seconds, axis=1) if seconds else empty,
+        tuple(pairs),
+        tuple(whole),
+        jumps,
+    )
+
+
+def _rotated(signatures: _Signatures, problem: Problem, span: Span) -> Dictionary:
+    shapes, steps = _steps(problem, span) if signatures.jumps is not None else ([], np.empty((problem.values.size, 0)))
+    first = np.concatenate([problem.basis.rotate(signatures.first), steps], axis=1)
+    return Dictionary(
+        signatures.effects,
+        np.array([*signatures.owner, *[signatures.jumps] * len(shapes)], dtype=int),
+        (*signatures.shapes, *shapes),
+        np.ascontiguousarray(first.T),
+        np.ascontiguousarray(problem.basis.rotate(signatures.second).T),
+        np.array(signatures.pairs, dtype=int),
+        np.array([*signatures.whole, *[True] * len(shapes)], dtype=bool),
     )
 
 
@@ -179,6 +214,45 @@ def scan_gains(
     single, double : (G, B) and (P, B) arrays
         Twice the log-likelihood ratio, the noise's share profiled in both hypotheses.
     """
+    floor, single, double = _scores(problem, dictionary, model, targets)
+    return floor - single, floor - double
+
+
+def scan_bank(
+    bank: Bank, models: Sequence[FloatArray], targets: Sequence[FloatArray]
+) -> tuple[FloatArray, np.ndarray, np.ndarray, np.ndarray]:
+    """Return, for each effect and draw, the best gain under any noise over the model under the noise that suits it best.
+
+    Parameters
+    ----------
+    bank : Bank
+    models, targets : sequences of arrays
+        As for `scan_gains`, one for each noise of the bank.
+
+    Returns
+    -------
+    gains, candidates, columns, noises : (E, B) arrays
+        Gain; which candidate has it, with how many columns, under which noise.
+    """
+    found = [
+        _scores(problem, dictionary, model, target)
+        for problem, dictionary, model, target in zip(bank.problems, bank.dictionaries, models, targets, strict=True)
+    ]
+    floor = np.min([scores[0] for scores in found], axis=0)
+    best = [
+        best_gains(dictionary, floor - single, floor - double)
+        for dictionary, (_, single, double) in zip(bank.dictionaries, found, strict=True)
+    ]
+    gains = np.stack([one[0] for one in best])
+    noises = np.argmax(gains, axis=0)
+    picked = [np.take_along_axis(np.stack(parts), noises[None], axis=0)[0] for parts in zip(*best, strict=True)]
+    return picked[0], picked[1], picked[2], noises
+
+
+def _scores(
+    problem: Problem, dictionary: Dictionary, model: FloatArray, targets: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Minus twice the log-likelihood of the model (B,) and of every candidate on top of it, (G, B) and (P, B)."""
     rows = targets.shape[0]
     null = np.empty((len(SHARES), targets.shape[1]))
     for k, share in enumerate(SHARES):
@@ -195,8 +269,7 @@ def scan_gains(
         log_determinant = problem.basis.log_determinant(share)
         np.minimum(single, rows * np.log(one) + log_determinant, out=single)
         np.minimum(double, rows * np.log(two) + log_determinant, out=double)
-    floor = null.min(axis=0)
-    return floor - single, floor - double
+    return null.min(axis=0), single, double
 
 
 def _residuals(
@@ -264,14 +337,25 @@ def best_gains(
 PAIR_PRICE = 4.0
 
 
-def scan(problem: Problem, dictionary: Dictionary, model: FloatArray) -> list[Candidate]:
-    """Return the best candidate of every effect on the data, the strongest gain first."""
-    single, double = scan_gains(problem, dictionary, model, problem.rotated[:, None])
-    gains, where, number = best_gains(dictionary, single, double)
+def scan(bank: Bank, models: Sequence[FloatArray]) -> list[Candidate]:
+    """Return the best candidate of every effect on the data, the strongest gain first.
+
+    Parameters
+    ----------
+    bank : Bank
+    models : sequence of (M, p) arrays
+        Rotated columns of the present model, one for each noise of the bank.
+    """
+    gains, where, number, noises = scan_bank(bank, models, [problem.rotated[:, None] for problem in bank.problems])
     effects = library()
+    first = bank.dictionaries[0]
     found = [
-        Candidate(Term(effects[name], dictionary.shapes[where[k, 0]], int(number[k, 0])), float(gains[k, 0]), 0.0)
-        for k, name in enumerate(dictionary.effects)
-        if (dictionary.owner == k).any()
+        Candidate(
+            Term(effects[name], first.shapes[where[k, 0]], int(number[k, 0])),
+            float(gains[k, 0]),
+            bank.problems[noises[k, 0]].kernel,
+        )
+        for k, name in enumerate(first.effects)
+        if (first.owner == k).any()
     ]
     return sorted(found, key=lambda candidate: -candidate.gain)

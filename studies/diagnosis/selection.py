@@ -8,8 +8,9 @@ import numpy as np
 from studies.diagnosis.baseline import Problem, fit_at, restricted
 from studies.diagnosis.effects import Effect, Span
 from studies.diagnosis.fit import Fit, fit_terms
+from studies.diagnosis.innovations import find_lines
 from studies.diagnosis.likelihood import KERNELS
-from studies.diagnosis.scan import Candidate, Dictionary, applicable, build_dictionary, scan
+from studies.diagnosis.scan import Bank, Candidate, applicable, build_bank, scan
 from studies.diagnosis.states import FloatArray
 from studies.diagnosis.thermometer import corrected
 
@@ -67,10 +68,19 @@ class Selection:
 
 def scan_model(fit: Fit) -> FloatArray:
     """Return the rotated columns of a fit with the derivative of the lag, against which candidates are scored."""
+    return fit.problem.basis.rotate(_model_columns(fit))
+
+
+def _model_columns(fit: Fit) -> FloatArray:
     problem = fit.problem
-    columns = fit.columns()
     lag = problem.lag_column(problem.tau, fit.terms, fit.linear.coefficients)
-    return problem.basis.rotate(np.concatenate([columns, lag], axis=1))
+    return np.concatenate([fit.columns(), lag], axis=1)
+
+
+def scan_models(fit: Fit, bank: Bank) -> list[FloatArray]:
+    """Return the same for every noise of a bank."""
+    columns = _model_columns(fit)
+    return [problem.basis.rotate(columns) for problem in bank.problems]
 
 
 def select(
@@ -79,7 +89,7 @@ def select(
     levels: Mapping[str, float],
     threshold: float,
     effects: Sequence[Effect] | None = None,
-    dictionary: Dictionary | None = None,
+    bank: Bank | None = None,
 ) -> Selection:
     """Select the effects that one response needs.
 
@@ -93,48 +103,48 @@ def select(
         Evidence beyond the level at which an effect counts.
     effects : sequence of Effect, optional
         A smaller library.
-    dictionary : Dictionary, optional
+    bank : Bank, optional
         Signatures at the problem's lag, when they are known already.
     """
     usable = applicable(problem, effects)
     plain = corrected(fit_terms(problem, ()))
-    if dictionary is None or problem.response == "frequency_Hz":
-        dictionary = build_dictionary(plain.problem, replace(span, tau=plain.problem.tau), usable)
-    first = _Path(plain, dictionary)
-    starts = compete(first.fit, first.dictionary, levels, threshold)
+    span = replace(span, tau=plain.problem.tau, lines=find_lines(plain))
+    if bank is None or problem.response == "frequency_Hz":
+        bank = build_bank(plain.problem, span, usable)
+    starts = compete(plain, bank, levels, threshold)
     if not starts or starts[0].evidence < threshold:
         return Selection(plain, plain, (), levels, threshold)
     grown = []
     for start in starts[:STARTS]:
         if start.evidence < max(SECOND_START * starts[0].evidence, threshold):
             break
-        path = _Path(corrected(start.fit), dictionary)
-        path.grow(plain, replace(span, tau=plain.problem.tau), usable, levels, threshold)
+        path = _Path(corrected(start.fit), bank)
+        path.grow(plain, span, usable, levels, threshold)
         grown.append(path)
         if starts[0].evidence < CLEAR * threshold:
             break
     best = min(grown, key=lambda path: path.cost(levels, threshold))
-    return _settle(plain, best.fit, best.dictionary, levels, threshold)
+    return _settle(plain, best.fit, best.bank, levels, threshold)
 
 
 class _Path:
     """One order in which effects are added, from its first one on."""
 
-    def __init__(self, fit: Fit, dictionary: Dictionary) -> None:
-        self.fit, self.dictionary = fit, dictionary
+    def __init__(self, fit: Fit, bank: Bank) -> None:
+        self.fit, self.bank = fit, bank
         self.built_at = fit.problem.tau if not fit.terms else 0.0
 
     def grow(
         self, plain: Fit, span: Span, usable: Sequence[Effect], levels: Mapping[str, float], threshold: float
     ) -> None:
         """Add the effect with the strongest evidence until none is left beyond chance."""
-        self.built_at = plain.problem.tau
+        built_at = plain.problem.tau
         while len(self.fit.terms) < MOST_TERMS:
             tau = self.fit.problem.tau
-            if abs(np.log(tau / self.built_at)) > 0.02:
-                self.dictionary = build_dictionary(self.fit.problem, replace(span, tau=tau), usable)
-                self.built_at = tau
-            rivals = compete(self.fit, self.dictionary, levels, threshold)
+            if abs(np.log(tau / built_at)) > 0.02:
+                self.bank = build_bank(self.fit.problem, replace(span, tau=tau), usable)
+                built_at = tau
+            rivals = compete(self.fit, self.bank, levels, threshold)
             if not rivals or rivals[0].evidence < threshold + BESIDE * (plain.score - self.fit.score):
                 break
             self.fit = corrected(rivals[0].fit)
@@ -144,9 +154,9 @@ class _Path:
         return self.fit.score + sum(levels[term.name] + threshold for term in self.fit.terms)
 
 
-def compete(fit: Fit, dictionary: Dictionary, levels: Mapping[str, float], threshold: float) -> list[Rival]:
+def compete(fit: Fit, bank: Bank, levels: Mapping[str, float], threshold: float) -> list[Rival]:
     """Return what each contending effect would add to a fit, after polishing, strongest first."""
-    candidates = scan(fit.problem, dictionary, scan_model(fit))
+    candidates = scan(bank, scan_models(fit, bank))
     nets = sorted(candidates, key=lambda c: levels[c.term.name] - c.gain)
     if not nets or nets[0].gain - levels[nets[0].term.name] < 0.6 * threshold:
         return []
@@ -154,18 +164,20 @@ def compete(fit: Fit, dictionary: Dictionary, levels: Mapping[str, float], thres
 
 
 def polish_contenders(fit: Fit, nets: Sequence[Candidate], levels: Mapping[str, float]) -> list[Rival]:
-    """Polish the most promising candidates on top of a fit."""
+    """Polish the most promising candidates on top of a fit, each beside the noise that suits it."""
     top = nets[0].gain - levels[nets[0].term.name]
+    least = _least_score(fit)
     rivals = []
     for candidate in nets[:CONTENDERS]:
         if candidate.gain - levels[candidate.term.name] < 0.5 * top - 8.0:
             continue
-        polished = fit_terms(fit.problem, (*fit.terms, candidate.term))
-        rivals.append(Rival(candidate.term.name, fit.score - polished.score - levels[candidate.term.name], polished))
+        problem = restricted(fit.problem, kernel=candidate.kernel)
+        polished = fit_terms(problem, (*fit.terms, candidate.term))
+        rivals.append(Rival(candidate.term.name, least - polished.score - levels[candidate.term.name], polished))
     return sorted(rivals, key=lambda rival: -rival.evidence)
 
 
-def _settle(plain: Fit, fit: Fit, dictionary: Dictionary, levels: Mapping[str, float], threshold: float) -> Selection:
+def _settle(plain: Fit, fit: Fit, bank: Bank, levels: Mapping[str, float], threshold: float) -> Selection:
     """Drop effects that the others made superfluous, and let every effect defend its place against its rivals."""
     while fit.terms:
         found = []
@@ -180,16 +192,13 @@ def _settle(plain: Fit, fit: Fit, dictionary: Dictionary, levels: Mapping[str, f
             break
         fit = weakest[2]
     else:
-        return Selection(plain, fit, (), levels, threshold)
+        return Selection(plain, plain, (), levels, threshold)
     places = []
     for evidence, index, without in found:
         name = fit.terms[index].name
-        candidates = scan(without.problem, dictionary, scan_model(without))
+        candidates = scan(bank, scan_models(without, bank))
         nets = sorted(candidates, key=lambda c: levels[c.term.name] - c.gain)
-        easier = without.score - _least_score(without)
-        rivals = [
-            replace(r, evidence=r.evidence - easier) for r in polish_contenders(without, nets, levels) if r.name != name
-        ]
+        rivals = [r for r in polish_contenders(without, nets, levels) if r.name != name]
         rivals.insert(0, Rival(name, evidence, fit))
         places.append(Found(index, name, evidence, tuple(sorted(rivals, key=lambda r: -r.evidence))))
     return Selection(plain, fit, tuple(sorted(places, key=lambda f: -f.evidence)), levels, threshold)

@@ -13,7 +13,6 @@ from studies.diagnosis.campaign import Campaign
 from studies.diagnosis.fit import Fit, fit_terms
 from studies.diagnosis.states import FloatArray, States, average
 
-
 UPDATES, SETTLED = 5, 0.5
 """At most so many updates of the corrected temperature, until minus twice the log-likelihood changes by less."""
 

@@ -35,7 +35,7 @@ class Parameter:
 
 @dataclass(frozen=True)
 class Span:
-    """What a campaign covers: the ranges from which shape parameters are drawn."""
+    """What a campaign covers: the ranges from which shape parameters are drawn; `lines` are frequencies, Hz, that stand out."""
 
     temperature_low: float
     temperature_high: float
@@ -45,6 +45,7 @@ class Span:
     tau: float
     runs: int
     bins: tuple[FloatArray, ...] = ()
+    lines: tuple[float, ...] = ()
 
     @property
     def temperature_range(self) -> float:

@@ -24,8 +24,15 @@ def grid(span: Span, response: str) -> list[tuple[float, ...]]:
         across = np.arange(
             slowest, min(fastest, slowest + 300 * 0.4 / span.campaign_length), 0.4 / span.campaign_length
         )
+        across = np.concatenate([across, *(_around(line, span) for line in span.lines)])
         forms += [(float(1.0 / f), 0.0) for f in across]
     return forms
+
+
+def _around(line: float, span: Span) -> FloatArray:
+    """Frequencies with one phase through all runs, as far from a line as one run leaves it uncertain."""
+    wide, fine = 0.6 / span.longest_run, 0.4 / span.campaign_length
+    return np.linspace(line - wide, line + wide, min(2 * int(wide / fine) + 1, 400))
 
 
 EFFECT = Effect(

@@ -1,0 +1,45 @@
+"""Residuals in their order of time, freed of what the noise before them foretells, and the lines in their spectrum."""
+
+import numpy as np
+
+from studies.diagnosis.fit import Fit
+from studies.diagnosis.states import FloatArray, average
+
+OVERSAMPLED = 4
+MOST_LINES = 2
+
+
+def find_innovations(fit: Fit) -> list[FloatArray]:
+    """Return the innovations of every run that has rows: independent and of one variance when the noise model is right."""
+    problem = fit.problem
+    rest = problem.basis.rotate(problem.values - fit.columns() @ fit.linear.coefficients)
+    begin, out = 0, []
+    for vectors in problem.basis.vectors[: len(problem.basis.vectors) - (problem.delay_row is not None)]:
+        end = begin + vectors.shape[0]
+        spread = 1.0 + fit.linear.share * problem.basis.walk[begin:end]
+        covariance = (vectors * spread) @ vectors.T
+        out.append(np.linalg.solve(np.linalg.cholesky(covariance), vectors @ rest[begin:end]))
+        begin = end
+    return out
+
+
+def find_lines(fit: Fit) -> tuple[float, ...]:
+    """Return the frequencies (Hz) whose power, summed over the runs whatever their phases, stands out most."""
+    problem = fit.problem
+    runs = [mask for mask in problem.present if mask.any()]
+    states = [s for s, mask in zip(problem.states, problem.present, strict=True) if mask.any()]
+    longest = max(float(np.ptp(s.time)) for s in states)
+    step = states[0].step * problem.group
+    frequencies = np.arange(1.0, longest / (5.0 * step), 1.0 / OVERSAMPLED) / longest
+    if frequencies.size < 3 * OVERSAMPLED:
+        return ()
+    power = np.zeros(frequencies.size)
+    for innovations, mask, own in zip(find_innovations(fit), runs, states, strict=True):
+        phases = np.exp(2j * np.pi * frequencies[:, None] * average(own.time, problem.group)[mask])
+        power += np.abs(phases @ innovations) ** 2
+    lines: list[float] = []
+    for _ in range(MOST_LINES):
+        peak = int(np.argmax(power))
+        lines.append(float(frequencies[peak]))
+        power[max(0, peak - OVERSAMPLED) : peak + OVERSAMPLED + 1] = 0.0
+    return tuple(lines)
