@@ -17,7 +17,7 @@ from studies.diagnosis.effects import Effect, Parameter, Span, find_effect
 from studies.diagnosis.fit import Fit, fit_terms
 from studies.diagnosis.likelihood import KERNELS, SHARES, NoiseBasis, orthonormal
 from studies.diagnosis.null import shipped_levels
-from studies.diagnosis.scan import Candidate, Dictionary, applicable, best_gains, build_dictionary, scan_gains
+from studies.diagnosis.scan import Bank, Candidate, Dictionary, applicable, build_dictionary, scan_bank
 from studies.diagnosis.selection import Found, polish_contenders, scan_model
 from studies.diagnosis.states import FloatArray
 from studies.diagnosis.thermometer import corrected
@@ -224,11 +224,14 @@ def rehearse(
     names = stage.sides[KERNELS[0]].dictionary.effects
     levels = shipped_levels(names)
     offset = np.array([levels[name] for name in names])[:, None]
+    sides = list(stage.sides.values())
+    bank = Bank(tuple(side.fit.problem for side in sides), tuple(side.dictionary for side in sides))
     for kernel, _, members in _groups(kinds):
         side = stage.sides[kernel]
-        targets = side.fit.problem.basis.rotate(data[:, members])
-        gains, where, number = best_gains(
-            side.dictionary, *scan_gains(side.fit.problem, side.dictionary, side.model, targets)
+        gains, where, number, noises = scan_bank(
+            bank,
+            [side.model for side in sides],
+            [side.fit.problem.basis.rotate(data[:, members]) for side in sides],
         )
         nets = gains - offset
         top = nets.max(axis=0)
@@ -245,7 +248,7 @@ def rehearse(
                     Candidate(
                         Term(find_effect(names[k]), side.dictionary.shapes[where[k, j]], int(number[k, j])),
                         float(gains[k, j]),
-                        0.0,
+                        bank.problems[noises[k, j]].kernel,
                     )
                     for k in np.argsort(-nets[:, j])
                 ]

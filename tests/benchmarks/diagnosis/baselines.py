@@ -25,7 +25,7 @@ from studies.diagnosis.campaign import load_campaign
 from studies.diagnosis.effects import find_effect
 from studies.diagnosis.fit import fit_terms
 from studies.diagnosis.likelihood import NoiseBasis
-from studies.diagnosis.scan import applicable, build_dictionary, scan, scan_gains
+from studies.diagnosis.scan import Bank, applicable, build_dictionary, scan, scan_gains
 from studies.diagnosis.selection import scan_model
 from studies.diagnosis.thermometer import read_thermometer
 from tests.benchmarks.diagnosis.cases import key_of, read_cases, rebuild, usable
@@ -362,11 +362,10 @@ def white_bic(campaign, problem, effects):
     dictionary = build_dictionary(
         fit.problem, span, [e for e in applicable(problem, effects) if e.name != "calibration"]
     )
+    bank = Bank((fit.problem,), (dictionary,))
     found = []
     while len(fit.terms) < MOST_TERMS:
-        candidates = sorted(
-            scan(fit.problem, dictionary, scan_model(fit)), key=lambda c: price(c.term, problem) - c.gain
-        )
+        candidates = sorted(scan(bank, [scan_model(fit)]), key=lambda c: price(c.term, problem) - c.gain)
         tried = [fit_terms(fit.problem, (*fit.terms, c.term)) for c in candidates[:CONTENDERS]]
         gains = [fit.score - t.score - price(t.terms[-1], problem) for t in tried]
         if not gains or max(gains) <= 0.0:
