@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from studies.diagnosis.baseline import Problem, fit_at, restricted
+from studies.diagnosis.baseline import Problem, choose_kernel, fit_at, restricted
 from studies.diagnosis.effects import Effect, Span
 from studies.diagnosis.fit import Fit, fit_terms
 from studies.diagnosis.innovations import find_lines
@@ -124,7 +124,13 @@ def select(
         if starts[0].evidence < CLEAR * threshold:
             break
     best = min(grown, key=lambda path: path.cost(levels, threshold))
-    return _settle(plain, best.fit, best.bank, levels, threshold)
+    return _settle(plain, _beside_best_noise(best.fit), best.bank, levels, threshold)
+
+
+def _beside_best_noise(fit: Fit) -> Fit:
+    """Return the fit beside the noise that suits it best."""
+    problem = choose_kernel(fit.problem, fit.terms)
+    return fit if problem.kernel == fit.problem.kernel else corrected(fit_terms(problem, fit.terms))
 
 
 class _Path:
