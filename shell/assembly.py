@@ -8,16 +8,17 @@ from typing import Literal
 import numpy as np
 from scipy.sparse import csr_matrix
 
-from shell.blocks import Mesh, Rows, Solid, Tie, constrain, mesh_solid, number_unknowns, surface_sides, tabulate
+from shell.blocks import Mesh, Solid, Tie, constrain, mesh_solid, number_unknowns, surface_sides, tabulate
+from shell.constraints import Index, Rows
 from shell.corner import find_kinks, lay_clamped_edge, lay_clamped_face, lay_corner
-from shell.eigen import Index, Pattern, find_pattern
+from shell.eigen import Pattern, find_pattern
 from shell.errors import ShellError
 from shell.kernel import (
     Orders,
     Section,
     StrainTable,
-    integrate_mass,
-    integrate_stiffness,
+    pair_mass,
+    pair_stiffness,
     shell_table,
     station_mass,
     station_stiffness,
@@ -44,7 +45,7 @@ class Level:
 PORTION = 16  # elements integrated at a time
 TINY = 160  # unknowns of a dense matrix
 SMALL = 0.5  # length over radius of a small element
-_SOLID = ((5, 4), (7, 6), (9, 8), (11, 10), (13, 12))  # degree of blocks, rings around sharp corners
+_SOLID = ((5, 3), (6, 5), (8, 7), (10, 9), (12, 11))  # degree of blocks, rings around sharp corners
 LEVELS: dict[str, tuple[Level, ...]] = {
     "solid": tuple(
         Level(through, along, *solid, split)
@@ -90,7 +91,7 @@ class Group:
     anchors: tuple[tuple[int, int], ...] = ()
 
     def matrices(self, integrate: Callable[[Array, Array], Array], stations: Array, first: int) -> Array:
-        """Element matrices of the elements from `first` on from their station matrices, in the unknowns that are solved for.
+        """Integrals over the elements from `first` on of their station matrices, in the unknowns that are solved for.
 
         In the small elements at a free edge these are the values at the inner node and differences from them: `anchors`
         are such (element, node). Else the layers' stiff shear would drown the bending as (R/h)³ instead of (R/h)².
@@ -157,11 +158,17 @@ class System:
 
     @cached_property
     def _elements(self) -> tuple[Pattern, list["ToFree"]]:
-        maps = [
-            self._free(members, signs)
-            for group in self.groups
-            for members, signs in zip(group.unknowns, group.signs, strict=True)
-        ]
+        counts = np.diff(self.constraint.indptr)
+        column = np.full(len(counts), -1, dtype=np.intp)
+        column[counts == 1] = self.constraint.indices[self.constraint.indptr[:-1][counts == 1]]
+        follows = counts > 0
+        follows[self.free] = False
+        maps: list[ToFree] = []
+        for group in self.groups:
+            columns, tied = column[group.unknowns], np.any(follows[group.unknowns], axis=1)
+            for members, own, signs, general in zip(group.unknowns, columns, group.signs, tied, strict=True):
+                kept = np.flatnonzero(own >= 0)
+                maps.append(self._free(members, signs) if general else ToFree(own[kept], kept, signs[kept]))
         pattern = find_pattern([at.free for at in maps], self.constraint.shape[1])
         return pattern, [at.reordered(order) for at, order in zip(maps, pattern.order, strict=True)]
 
@@ -181,14 +188,12 @@ class System:
         found: list[Array] = []
         for group, first, part, maps in self._portions():
             trace, shear = station_stiffness(part)
-            matrices = (
-                group.matrices(integrate_stiffness, trace, first),
-                group.matrices(integrate_stiffness, shear, first),
-                group.matrices(integrate_mass, station_mass(part), first),
+            kinds = (
+                group.matrices(pair_stiffness, trace, first),
+                group.matrices(pair_stiffness, shear, first),
+                group.matrices(pair_mass, station_mass(part), first),
             )
-            found += [
-                np.array([at.restrict(kind) for kind in kinds]) for *kinds, at in zip(*matrices, maps, strict=True)
-            ]
+            found += [at.collect(element) for *element, at in zip(*kinds, maps, strict=True)]
         return found
 
     @cached_property
@@ -212,12 +217,15 @@ class System:
             ]
         )
         for group, first, part, maps in self._portions():
-            trace, shear = station_stiffness(part)
             lam_there, G_there, rho_there = (field[..., None, None] for field in next(fields))
-            stiffness = group.matrices(integrate_stiffness, lam_there * trace + G_there * shear, first)
-            mass = group.matrices(integrate_mass, rho_there * station_mass(part), first)
-            K += [at.restrict(matrix) for matrix, at in zip(stiffness, maps, strict=True)]
-            M += [at.restrict(matrix) for matrix, at in zip(mass, maps, strict=True)]
+            trace, shear = station_stiffness(part)
+            trace *= lam_there
+            trace += G_there * shear
+            stiffness = group.matrices(pair_stiffness, trace, first)
+            mass = group.matrices(pair_mass, rho_there * station_mass(part), first)
+            for k, m, at in zip(stiffness, mass, maps, strict=True):
+                K.append(at.collect([k])[0])
+                M.append(at.collect([m])[0])
         return K, M
 
     def _portions(self) -> Iterator[tuple[Group, int, StrainTable, list["ToFree"]]]:
@@ -237,10 +245,6 @@ class System:
 
     def _free(self, members: Index, signs: Array) -> "ToFree":
         rows = self.constraint[members]
-        counts = np.diff(rows.indptr)
-        if np.all(counts <= 1) and len(np.unique(rows.indices)) == len(rows.indices):
-            kept = np.flatnonzero(counts)
-            return ToFree(rows.indices.astype(np.intp), kept, signs[kept] * rows.data)
         free = np.unique(rows.indices).astype(np.intp)
         return ToFree(free, None, signs[:, None] * rows[:, free].toarray())
 
@@ -263,10 +267,27 @@ class ToFree:
         """The element's matrix on the free unknowns."""
         if self.kept is None:
             return np.asarray(self.factors.T @ matrix @ self.factors)
-        matrix = matrix[self.kept[:, None], self.kept]
-        if np.all(self.factors == 1):
-            return matrix
-        return matrix * self.factors * self.factors[:, None]
+        return self._signed(matrix[self.kept[:, None], self.kept])
+
+    def collect(self, pairs: list[Array]) -> Array:
+        """Some matrices on the free unknowns from their integrals (functions², amplitudes²), (kinds, free, free)."""
+        functions, m = (round(x**0.5) for x in pairs[0].shape)
+        local = np.arange(functions * m) if self.kept is None else self.kept
+        function, amplitude = np.divmod(local, m)
+        rows, columns = (function * functions * m + amplitude) * m, function * m * m + amplitude
+        where = rows[:, None] + columns
+        found = np.empty((len(pairs), *where.shape))
+        for matrix, integrals in zip(found, pairs, strict=True):
+            integrals.ravel().take(where, out=matrix, mode="clip")  # this mode takes without a copy
+        if self.kept is None:
+            return np.asarray(self.factors.T @ found @ self.factors)
+        return self._signed(found)
+
+    def _signed(self, matrices: Array) -> Array:
+        if np.any(self.factors < 0):
+            matrices *= self.factors
+            matrices *= self.factors[:, None]
+        return matrices
 
 
 @dataclass(frozen=True, eq=False)
@@ -282,25 +303,25 @@ def build_system(resonator: Resonator, n: int, theory: Theory, level: Level) -> 
     """Lay out, number and tabulate a resonator; cached, since only the material changes with temperature."""
     layout = lay_resonator(resonator, n, level)
     groups: list[Group] = []
-    rows: Rows = {}
+    rows = Rows()
     ends: dict[tuple[int, int], Tie] = {}
     size = 0
     for k, chain in enumerate(layout.chains):
         group, inner_rows, size = _shell_group(resonator, chain, n, level, size)
         groups.append(group)
-        rows.update(inner_rows)
+        rows.extend(inner_rows)
         for side in (0, 1):
             ends[k, side] = _chain_end(resonator, chain, group, side, level.through)
-            rows.update(_end_rows(chain.ends[side], ends[k, side], n))
+            _hold_end(rows, chain.ends[side], ends[k, side], n)
     for solid, tied in layout.solids:
         mesh = mesh_solid(solid, level.block)
         ties = tuple(ends[at] for at in tied)
-        rows.update(constrain(mesh, solid, ties, level.block, n, size))
+        rows.extend(constrain(mesh, solid, ties, level.block, n, size))
         numbers, signs, size = number_unknowns(mesh, level.block, size)
         place = SolidPart(mesh, surface_sides(mesh, ties))
         groups.append(Group(tabulate(mesh, solid, level.block, n), numbers, signs, place))
     held = resonator.support != "free"
-    return System(tuple(groups), _constraint(rows, size), 0 if held or n > 1 else 2, n, level)
+    return System(tuple(groups), rows.matrix(size), 0 if held or n > 1 else 2, n, level)
 
 
 def lay_resonator(resonator: Resonator, n: int, level: Level) -> Layout:
@@ -311,7 +332,7 @@ def lay_resonator(resonator: Resonator, n: int, level: Level) -> Layout:
     kinks = find_kinks(resonator)
     whole_section = max(level.through) > 1  # a Naghdi shell is clamped as a line and has no singular corners there
     if resonator.support == "stem":
-        root, start = lay_root(resonator, level.rings)
+        root, start = lay_root(resonator, level.rings, n)
     elif resonator.support == "clamped-face":
         root, start = lay_clamped_face(resonator, level.rings)
     elif resonator.support == "clamped-pole" and whole_section:
@@ -356,23 +377,23 @@ def _shell_group(resonator: Resonator, chain: Chain, n: int, level: Level, start
     elements, m = len(chain.segments), sum(orders) + 3
     nodes = p * np.arange(elements)[:, None] + np.arange(p + 1)
     unknowns = start + (nodes[:, :, None] * m + np.arange(m)).reshape(elements, -1)
-    anchors, rows = _anchor(resonator, chain, unknowns, m, start + (elements * p + 1) * m)
+    anchors, rows, fresh = _anchor(resonator, chain, unknowns, m, start + (elements * p + 1) * m)
     group = Group(table, unknowns, np.ones(unknowns.shape), ShellPart(chain, section), anchors)
-    return group, rows, start + (elements * p + 1) * m + len(rows)
+    return group, rows, fresh
 
 
 def _anchor(
     resonator: Resonator, chain: Chain, unknowns: Index, m: int, fresh: int
-) -> tuple[tuple[tuple[int, int], ...], Rows]:
+) -> tuple[tuple[tuple[int, int], ...], Rows, int]:
     """Choose the small elements at free edges that are solved in differences from their inner node.
 
     From the inside out, the inner node of the next one is the sum of the differences so far: it gets numbers of its own
-    (from `fresh`, changed in `unknowns`) and rows that say so.
+    (from `fresh` on, changed in `unknowns`) and rows that say so. Returns the elements, the rows, and the next number.
     """
     elements = len(chain.segments)
     small = np.diff(chain.breaks) < SMALL * resonator.size
     anchors: list[tuple[int, int]] = []
-    rows: Rows = {}
+    rows = Rows()
     for end, outwards in zip(chain.ends, (-1, 1), strict=True):
         if end != "free":
             continue
@@ -381,17 +402,18 @@ def _anchor(
         run = [edge - outwards * k for k in range(most)]
         run = run[: next((k for k, element in enumerate(run) if not small[element]), most)]
         inner, outer = (slice(-m, None), slice(0, m)) if outwards < 0 else (slice(0, m), slice(-m, None))
-        above: list[list[tuple[int, float]]] | None = None
+        above: list[Index] = []  # what the outer end of the element before is the sum of
         for element in reversed(run):
             anchors.append((element, 0 if outwards > 0 else unknowns.shape[1] // m - 1))
-            if above is not None:
+            if above:
                 unknowns[element, inner] = np.arange(fresh, fresh + m)
-                rows.update(zip(range(fresh, fresh + m), above, strict=True))
+                for term in above:
+                    rows.follow(unknowns[element, inner].copy(), term, np.ones(m))
                 fresh += m
             else:
-                above = [[(int(k), 1.0)] for k in unknowns[element, inner]]
-            above = [[*row, (int(k), 1.0)] for row, k in zip(above, unknowns[element, outer], strict=True)]
-    return tuple(anchors), rows
+                above = [unknowns[element, inner].copy()]
+            above.append(unknowns[element, outer].copy())
+    return tuple(anchors), rows, fresh
 
 
 def _chain_end(resonator: Resonator, chain: Chain, group: Group, side: int, orders: Orders) -> Tie:
@@ -402,12 +424,16 @@ def _chain_end(resonator: Resonator, chain: Chain, group: Group, side: int, orde
     return Tie(place, orders, tuple(int(k) for k in members))
 
 
-def _end_rows(end: End, tie: Tie, n: int) -> Rows:
-    if end == "clamped":
-        return {k: [] for k in tie.unknowns}
-    if end == "pole":
-        return _pole_rows(tie.unknowns, tie.orders, n, round(float(tie.place.tangent_r[0])))
-    return {}
+def _hold_end(rows: Rows, end: End, tie: Tie, n: int) -> None:
+    """Hold a clamped edge, or keep a pole regular: n = 0 only w; n = 1 the translation v = -t_r u; n > 1 nothing."""
+    u, v, w = np.split(np.array(tie.unknowns), np.cumsum([tie.orders[0] + 1, tie.orders[1] + 1]))
+    if end == "clamped" or (end == "pole" and n > 1):
+        rows.hold(np.array(tie.unknowns))
+    elif end == "pole" and n == 0:
+        rows.hold(np.concatenate([u, v]))
+    elif end == "pole":
+        rows.hold(w)
+        rows.follow(v, u, np.full(len(u), -float(np.round(tie.place.tangent_r[0]))))
 
 
 def _sections(resonator: Resonator, chain: Chain, xi: Array, weights: Array) -> Section:
@@ -426,22 +452,5 @@ def _sections(resonator: Resonator, chain: Chain, xi: Array, weights: Array) -> 
     )
 
 
-def _pole_rows(at: tuple[int, ...], orders: Orders, n: int, t_r: int) -> Rows:
-    """What stays regular on the axis: n = 0 only w; n = 1 the translation v = -t_r u; n > 1 nothing."""
-    u, v, w = np.split(np.array(at), np.cumsum([orders[0] + 1, orders[1] + 1]))
-    if n == 0:
-        return {int(k): [] for k in (*u, *v)}
-    if n == 1:
-        return {int(k): [] for k in w} | {int(b): [(int(a), -float(t_r))] for a, b in zip(u, v, strict=True)}
-    return {k: [] for k in at}
-
-
 def _constraint(rows: Rows, size: int) -> csr_matrix:
-    """The sparse matrix from free to raw unknowns; a row not listed is free."""
-    free = np.array([k not in rows for k in range(size)])
-    column = np.cumsum(free) - 1
-    entries = [(int(k), int(column[k]), 1.0) for k in np.flatnonzero(free)]
-    for k, row in rows.items():
-        entries += [(k, int(column[master]), factor) for master, factor in row]
-    i, j, value = (np.array(values) for values in zip(*entries, strict=True))
-    return csr_matrix((value, (i, j)), shape=(size, int(free.sum())))
+    return rows.matrix(size)

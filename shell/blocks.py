@@ -4,13 +4,13 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
+from shell.constraints import Index, Rows
 from shell.kernel import Orders, StrainTable, block_table
 from shell.meridian import MeridianPoints
-from shell.patches import Cell, Part, Patch
+from shell.patches import Part, Patch
 from shell.quadrature import Array, gauss, hierarchic, interpolate_hierarchic, legendre, lobatto, nodal
-
-Rows = dict[int, list[tuple[int, float]]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,15 +39,15 @@ class Mesh:
     vertices : (cells, 4) numbers, order (ξ, η) = (-1, -1), (1, -1), (-1, 1), (1, 1).
     edges : (cells, 4) numbers, the sides η = -1, η = 1 (along ξ), ξ = -1, ξ = 1 (along η).
     reversed_ : (cells, 4), whether the cell runs along the edge against its own direction.
-    points : vertex coordinates; `pairs` : the two vertices of each edge, in its direction.
+    points : vertex coordinates; `pairs` : the two vertices of each edge, in its direction, (edges, 2).
     """
 
     grid: Array
-    vertices: np.ndarray
-    edges: np.ndarray
-    reversed_: np.ndarray
+    vertices: Index
+    edges: Index
+    reversed_: NDArray[np.bool_]
     points: Array
-    pairs: list[tuple[int, int]]
+    pairs: Index
     parts: tuple[Part, ...]
 
 
@@ -58,24 +58,20 @@ def mesh_solid(solid: Solid, degree: int) -> Mesh:
     """Place the cells, identify the corners that coincide and the edges between them."""
     nodes = lobatto(degree)
     xi, eta = (axis.ravel() for axis in np.meshgrid(nodes, nodes, indexing="ij"))
-    cells: list[tuple[Patch, Cell]] = [(patch, cell) for patch in solid.patches for cell in patch.cells]
-    placed = np.array([patch.place_cell(cell, xi, eta) for patch, cell in cells])
-    grid = placed.transpose(1, 0, 2).reshape(2, len(cells), degree + 1, degree + 1)
+    placed = np.concatenate([np.array(patch.place_cells(xi, eta)) for patch in solid.patches], axis=1)
+    grid = placed.reshape(2, -1, degree + 1, degree + 1)
     corners = np.stack([grid[:, :, 0, 0], grid[:, :, -1, 0], grid[:, :, 0, -1], grid[:, :, -1, -1]], axis=2)
-    flat = corners.reshape(2, -1)
-    lengths = [np.hypot(*(corners[:, :, a] - corners[:, :, b])).min() for a, b in SIDES]
-    apart = np.hypot(*(flat[:, :, None] - flat[:, None, :])) > 1e-3 * min(lengths)
-    first = np.argmin(apart, axis=1)
-    kept, numbers = np.unique(first, return_inverse=True)
+    r, z = corners.reshape(2, -1)
+    shortest = min(np.hypot(*(corners[:, :, a] - corners[:, :, b])).min() for a, b in SIDES)
+    apart = abs(r[:, None] - r) + abs(z[:, None] - z) > 1e-3 * shortest
+    kept, numbers = np.unique(np.argmin(apart, axis=1), return_inverse=True)
     vertices = numbers.reshape(-1, 4)
-    known: dict[tuple[int, int], int] = {}
-    edges, against = np.zeros_like(vertices), np.zeros(vertices.shape, dtype=bool)
-    for cell_number, corner_numbers in enumerate(vertices):
-        for side, (a, b) in enumerate(SIDES):
-            ends = int(corner_numbers[a]), int(corner_numbers[b])
-            edges[cell_number, side] = known.setdefault((min(ends), max(ends)), len(known))
-            against[cell_number, side] = ends[0] > ends[1]
-    return Mesh(grid, vertices, edges, against, flat[:, kept], list(known), tuple(patch.part for patch, _ in cells))
+    first, last = vertices[:, SIDES].transpose(2, 0, 1)
+    low, high = np.minimum(first, last), np.maximum(first, last)
+    codes, edges = np.unique(low * len(kept) + high, return_inverse=True)
+    pairs = np.stack(np.divmod(codes, len(kept)), axis=1)
+    parts = tuple(patch.part for patch in solid.patches for _ in patch.cells)
+    return Mesh(grid, vertices, edges.reshape(-1, 4), first > last, np.array([r, z])[:, kept], pairs, parts)
 
 
 def tabulate(mesh: Mesh, solid: Solid, degree: int, n: int) -> StrainTable:
@@ -91,7 +87,7 @@ def tabulate(mesh: Mesh, solid: Solid, degree: int, n: int) -> StrainTable:
     return block_table((r, z), jacobian, np.outer(weights, weights), n, basis, basis, position)
 
 
-def number_unknowns(mesh: Mesh, degree: int, start: int) -> tuple[np.ndarray, Array, int]:
+def number_unknowns(mesh: Mesh, degree: int, start: int) -> tuple[Index, Array, int]:
     """Global numbers and signs (cells, size) of the hierarchic unknowns: vertices, edges, then insides.
 
     Unknowns of an element are ordered (ξ-function, component, η-function). An edge taken backwards changes the sign of
@@ -122,46 +118,41 @@ def number_unknowns(mesh: Mesh, degree: int, start: int) -> tuple[np.ndarray, Ar
 def constrain(mesh: Mesh, solid: Solid, ties: tuple[Tie, ...], degree: int, n: int, start: int) -> Rows:
     """Constraints of vertices and edges: the axis, what is held, and what follows a cross-section of the shell."""
     inside = degree - 1
-    edge_start = start + 3 * mesh.points.shape[1]
-    rows: Rows = {}
+    count = mesh.points.shape[1]
+    a, b = mesh.pairs.T
     size = float(np.ptp(mesh.points, axis=1).max())
     on_axis = mesh.points[0] < 1e-9 * size
     held = np.array([solid.held(float(r), float(z)) for r, z in mesh.points.T])
-    across = [_thickness_coordinate(tie.place, mesh.points, size) for tie in ties]
-    for vertex in range(mesh.points.shape[1]):
-        own = [[start + 3 * vertex + c] for c in range(3)]
-        if held[vertex]:
-            rows.update({k[0]: [] for k in own})
-        elif on_axis[vertex]:
-            rows.update(_axis_rows(own, n))
-        for tie, eta in zip(ties, across, strict=True):
-            if np.isfinite(eta[vertex]):
-                rows.update(_tied_rows(own, tie, legendre(max(tie.orders), eta[[vertex]]).values))
-    for edge, (a, b) in enumerate(mesh.pairs):
-        own = [[edge_start + 3 * inside * edge + c * inside + k for k in range(inside)] for c in range(3)]
-        if held[a] and held[b]:
-            rows.update({k: [] for component in own for k in component})
-        elif on_axis[a] and on_axis[b]:
-            rows.update(_axis_rows(own, n))
-        for tie, eta in zip(ties, across, strict=True):
-            if np.isfinite(eta[a]) and np.isfinite(eta[b]):
-                at = (eta[a] + eta[b]) / 2 + (eta[b] - eta[a]) / 2 * lobatto(degree)
-                modes = interpolate_hierarchic(degree, legendre(max(tie.orders), at).values)
-                rows.update(_tied_rows(own, tie, modes[2:]))
+    at_vertices = start + np.arange(3 * count).reshape(count, 3, 1)
+    at_edges = start + 3 * count + np.arange(3 * inside * len(a)).reshape(-1, 3, inside)
+    rows = Rows()
+    for own, is_held, axial in (
+        (at_vertices, held, on_axis),
+        (at_edges, held[a] & held[b], on_axis[a] & on_axis[b]),
+    ):
+        rows.hold(own[is_held])
+        _regular_on_axis(rows, own[axial & ~is_held], n)
+    for tie in ties:
+        eta = _thickness_coordinate(tie.place, mesh.points, size)
+        there = np.isfinite(eta)
+        _follow(rows, at_vertices[there], tie, legendre(max(tie.orders), eta[there]).values[:, None])
+        along = there[a] & there[b]
+        at = (eta[a] + eta[b])[along, None] / 2 + (eta[b] - eta[a])[along, None] / 2 * lobatto(degree)
+        modes = legendre(max(tie.orders), at.ravel()).values.reshape(*at.shape, -1)
+        _follow(rows, at_edges[along], tie, interpolate_hierarchic(degree, modes)[:, 2:])
     return rows
 
 
 def surface_sides(mesh: Mesh, ties: tuple[Tie, ...]) -> tuple[tuple[int, int], ...]:
     """The sides (cell, side) that no other cell shares, that are not tied and do not lie on the axis."""
     size = float(np.ptp(mesh.points, axis=1).max())
-    uses = np.bincount(mesh.edges.ravel())
+    a, b = mesh.pairs.T
+    outside = np.bincount(mesh.edges.ravel()) == 1
     inside = [mesh.points[0] < 1e-9 * size]
     inside += [np.isfinite(_thickness_coordinate(tie.place, mesh.points, size)) for tie in ties]
-    return tuple(
-        (int(cell), int(side))
-        for cell, side in zip(*np.nonzero(uses[mesh.edges] == 1), strict=True)
-        if not any(where[a] and where[b] for where in inside for a, b in [mesh.pairs[mesh.edges[cell, side]]])
-    )
+    for where in inside:
+        outside &= ~(where[a] & where[b])
+    return tuple(zip(*(index.tolist() for index in np.nonzero(outside[mesh.edges])), strict=True))
 
 
 def _thickness_coordinate(place: MeridianPoints, points: Array, size: float) -> Array:
@@ -173,31 +164,33 @@ def _thickness_coordinate(place: MeridianPoints, points: Array, size: float) -> 
     return np.where((abs(off) < 1e-8 * min(size, h)) & (abs(eta) < 1 + 1e-6), eta, np.nan)
 
 
-def _axis_rows(own: list[list[int]], n: int) -> Rows:
+def _regular_on_axis(rows: Rows, own: Index, n: int) -> None:
     """Regularity on the axis in cylindrical components: n = 0 only along z; n = 1 a translation; n > 1 nothing."""
-    radial, around, axial = own
+    radial, around, axial = own[:, 0], own[:, 1], own[:, 2]
     if n == 0:
-        return {k: [] for k in (*radial, *around)}
-    if n == 1:
-        return {k: [] for k in axial} | {b: [(a, -1.0)] for a, b in zip(radial, around, strict=True)}
-    return {k: [] for component in own for k in component}
+        rows.hold(radial)
+        rows.hold(around)
+    elif n == 1:
+        rows.hold(axial)
+        rows.follow(around.ravel(), radial.ravel(), np.full(radial.size, -1.0))
+    else:
+        rows.hold(own)
 
 
-def _tied_rows(own: list[list[int]], tie: Tie, modes: Array) -> Rows:
-    """Unknowns (component, function) that follow the cross-section's modes, turned from (t, θ, n) to (r, θ, z)."""
+def _follow(rows: Rows, own: Index, tie: Tie, modes: Array) -> None:
+    """Unknowns (places, component, function) that follow the cross-section's modes (places, function, order + 1).
+
+    The cross-section moves along (t, θ, n), the solid along (r, θ, z).
+    """
     place = tie.place
-    turn = np.zeros((3, 3))
-    turn[0, 0], turn[0, 2] = place.tangent_r[0], place.normal_r[0]
-    turn[1, 1] = 1.0
-    turn[2, 0], turn[2, 2] = place.tangent_z[0], place.normal_z[0]
-    rows: Rows = {}
-    for c in range(3):
-        for k, row in enumerate(modes):
-            entries: list[tuple[int, float]] = []
-            first = 0
-            for component, order in enumerate(tie.orders):
-                factors = turn[c, component] * row[: order + 1]
-                entries += [(tie.unknowns[first + j], float(x)) for j, x in enumerate(factors) if abs(x) > 1e-15]
-                first += order + 1
-            rows[own[c][k]] = entries
-    return rows
+    t_r, t_z, n_r, n_z = (float(x[0]) for x in (place.tangent_r, place.tangent_z, place.normal_r, place.normal_z))
+    turn = np.array([[t_r, 0.0, n_r], [0.0, 1.0, 0.0], [t_z, 0.0, n_z]])
+    first = 0
+    rows.hold(own)
+    for component, order in enumerate(tie.orders):
+        masters = np.array(tie.unknowns[first : first + order + 1])
+        factors = turn[:, component, None, None] * modes[:, None, :, : order + 1]
+        followers, masters = np.broadcast_arrays(own[..., None], masters)
+        used = abs(factors) > 1e-15
+        rows.follow(followers[used], masters[used], factors[used])
+        first += order + 1

@@ -9,15 +9,14 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import blas, lapack
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import reverse_cuthill_mckee
 
+from shell.constraints import Index as Index
 from shell.errors import ShellError
 from shell.quadrature import Array
 
-Index = NDArray[np.intp]
 TOO_THIN = "the stiffness lost its last digit in double precision: the shell is too thin (h/R far below 1e-6)."
 
 
@@ -55,12 +54,8 @@ def find_pattern(unknowns: list[Index], size: int) -> Pattern:
     number = np.cumsum(is_shared) - 1
     where = [number[members[k:]] for members, k in zip(unknowns, own, strict=True)]
     if len(shared):
-        owner = np.repeat(np.arange(len(where)), [len(w) for w in where])
-        element = csr_matrix((np.ones(len(owner)), (owner, np.concatenate(where))), shape=(len(unknowns), len(shared)))
-        chain = reverse_cuthill_mckee((element.T @ element).tocsr(), symmetric_mode=True)
-        place = np.empty(len(shared), dtype=np.intp)
-        place[chain] = np.arange(len(shared))
-        where, shared = [place[w] for w in where], shared[chain]
+        place = _in_a_narrow_band(where, len(shared))
+        where, shared = [place[w] for w in where], shared[np.argsort(place)]
     band = max((int(np.ptp(w)) for w in where if len(w)), default=0)
     is_whole = len(unknowns) == 1 and np.array_equal(unknowns[0], np.arange(size))
     entries = []
@@ -68,6 +63,24 @@ def find_pattern(unknowns: list[Index], size: int) -> Pattern:
         rows, columns = np.nonzero(w[:, None] >= w)
         entries.append((w[rows] - w[columns] + (band + 1) * w[columns], rows * len(w) + columns))
     return Pattern(tuple(unknowns), order, own, tuple(where), tuple(entries), shared, size, band, is_whole)
+
+
+def _in_a_narrow_band(elements: list[Index], size: int) -> Index:
+    """Places of unknowns in an order (reverse Cuthill-McKee) in which those of one element lie near one another."""
+    # unknowns that the same elements share stay together
+    rng = np.random.default_rng(3)
+    marks = np.zeros(size, dtype=np.uint64)
+    for members in elements:
+        marks[members] += rng.integers(2**63, dtype=np.uint64)
+    _, bundle = np.unique(marks, return_inverse=True)
+    known = [np.unique(bundle[members]) for members in elements]
+    owner = np.repeat(np.arange(len(known)), [len(k) for k in known])
+    shares = csr_matrix((np.ones(len(owner)), (owner, np.concatenate(known))))
+    rank = np.empty(shares.shape[1], dtype=np.intp)
+    rank[reverse_cuthill_mckee((shares.T @ shares).tocsr(), symmetric_mode=True)] = np.arange(shares.shape[1])
+    place = np.empty(size, dtype=np.intp)
+    place[np.argsort(rank[bundle], kind="stable")] = np.arange(size)
+    return place
 
 
 class Factor:

@@ -189,12 +189,19 @@ class Resonator:
 
     def _thickness_near(self, s: Array, inside: float) -> tuple[Array, Array]:
         """Thickness and slope; at a step of the profile the side on which `inside` lies counts."""
-        position, value = np.array(self.thickness).T
+        knots, value, slopes = self._profile
         nudged = s + 1e-9 * (inside - s)
-        knots = position * self.length
-        k = np.clip(np.searchsorted(knots, nudged, side="right") - 1, 0, len(knots) - 2)
-        slope = (value[k + 1] - value[k]) / (knots[k + 1] - knots[k])
+        k = np.minimum(np.maximum(np.searchsorted(knots, nudged, side="right") - 1, 0), len(slopes) - 1)
+        slope = slopes[k]
         return value[k] + slope * (s - knots[k]), slope
+
+    @cached_property
+    def _profile(self) -> tuple[Array, Array, Array]:
+        """Arc lengths of the knots of the thickness, its values there, and its slopes between them."""
+        position, value = np.array(self.thickness).T
+        knots = position * self.length
+        with np.errstate(divide="ignore", invalid="ignore"):  # a step of the profile is two knots in one place
+            return knots, value, np.diff(value) / np.diff(knots)
 
 
 def hemisphere(

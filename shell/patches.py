@@ -50,16 +50,11 @@ class Patch:
         )
         return r, z
 
-    def place_cell(self, cell: Cell, xi: Array, eta: Array) -> Planar:
-        """Points of one cell at ξ, η in [-1, 1]."""
-        weights = [
-            (1 - xi) * (1 - eta) / 4,
-            (1 + xi) * (1 - eta) / 4,
-            (1 - xi) * (1 + eta) / 4,
-            (1 + xi) * (1 + eta) / 4,
-        ]
-        x, y = (sum(weight * point[k] for weight, point in zip(weights, cell, strict=True)) for k in (0, 1))
-        return self.place(np.asarray(x), np.asarray(y))
+    def place_cells(self, xi: Array, eta: Array) -> Planar:
+        """Points of all cells at ξ, η in [-1, 1], (cells, points)."""
+        weights = np.array([(1 - xi) * (1 - eta), (1 + xi) * (1 - eta), (1 - xi) * (1 + eta), (1 + xi) * (1 + eta)]) / 4
+        x, y = np.moveaxis(np.array(self.cells), 2, 0) @ weights
+        return self.place(x, y)
 
 
 def whole() -> tuple[Cell, ...]:

@@ -41,9 +41,8 @@ def legendre(degree: int, points: Array) -> Basis:
 
 def nodal(degree: int, points: Array) -> Basis:
     """Lagrange polynomials on the Gauss-Lobatto-Legendre nodes, the functions along the meridian."""
-    to_modes = np.linalg.inv(series.legvander(lobatto(degree), degree))
     modal = legendre(degree, points)
-    return Basis(modal.values @ to_modes, modal.slopes @ to_modes)
+    return Basis(modal.values @ _to_modes(degree), modal.slopes @ _to_modes(degree))
 
 
 def hierarchic(degree: int, points: Array) -> Basis:
@@ -65,6 +64,17 @@ def interpolate_hierarchic(degree: int, values: Array) -> Array:
     return np.asarray(np.linalg.solve(hierarchic(degree, lobatto(degree)).values, values))
 
 
+@cache
+def _to_modes(degree: int) -> Array:
+    """Legendre coefficients of the Lagrange polynomials."""
+    return np.linalg.inv(series.legvander(lobatto(degree), degree))
+
+
+@cache
+def _slopes(degree: int) -> Array:
+    """Legendre coefficients of the derivatives of P_0 ... P_degree."""
+    return np.asarray(series.legder(np.eye(degree + 1), axis=0) if degree else np.zeros((1, 1)))
+
+
 def _derivative(degree: int, points: Array) -> Array:
-    matrix = series.legder(np.eye(degree + 1), axis=0) if degree else np.zeros((1, 1))
-    return np.asarray(series.legvander(points, max(degree - 1, 0)) @ matrix)
+    return np.asarray(series.legvander(points, max(degree - 1, 0)) @ _slopes(degree))

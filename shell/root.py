@@ -12,6 +12,7 @@ T2 and T1 are the fillet's ends on the dome and on the stem, M its middle; with 
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import pairwise
 from math import atan2, ceil, hypot, log, pi
 
@@ -28,6 +29,7 @@ Spot = tuple[float, float]
 
 COLLAR = 1.5  # width of the solid ring around the root, in thicknesses
 FILLET_SHRINK = 0.3
+QUIET = 2.5  # stem lengths over its radius from which its clamp is not felt by n > 1
 
 
 @dataclass(frozen=True)
@@ -42,11 +44,43 @@ class Contact:
     on_stem: Spot
 
 
-def lay_root(resonator: Resonator, ring_count: int) -> tuple[Solid, float]:
-    """Patches of cap, root and stem, and the arc length where the shell begins."""
+@dataclass(frozen=True)
+class Frame:
+    """What a root's patches hang on, the same at every level.
+
+    collar : arc length where the shell begins; `widest` : that of the outermost contact.
+    radii : bounds of the columns of the stem, from its side to the axis.
+    above : for each contact, η of the face opposite (0: the middle surface) and its arc lengths at the inner radii.
+    """
+
+    contacts: tuple[Contact, ...]
+    widest: float
+    collar: float
+    radii: tuple[float, ...]
+    above: tuple[tuple[float, tuple[float, ...]], ...]
+
+
+def lay_root(resonator: Resonator, ring_count: int, n: int) -> tuple[Solid, float]:
+    """Patches of cap, root and stem for harmonic n, and the arc length where the shell begins."""
+    frame = _find_frame(resonator)
     stem = resonator.stem
     assert stem is not None
-    contacts = [_touch(resonator, stem, face, end) for face, end in stem.roots]
+    patches: list[Patch] = []
+    for contact, (far, arcs) in zip(frame.contacts, frame.above, strict=True):
+        patches += _half_root(resonator, stem, frame, contact, far, arcs, ring_count, n)
+    ends = [contact.end for contact in frame.contacts]
+
+    def held(r: float, z: float) -> bool:
+        return any(abs(z - end) < 1e-9 * resonator.length for end in ends)
+
+    return Solid(tuple(patches), held, frame.collar / resonator.length), frame.collar
+
+
+@lru_cache(maxsize=16)
+def _find_frame(resonator: Resonator) -> Frame:
+    stem = resonator.stem
+    assert stem is not None
+    contacts = tuple(_touch(resonator, stem, face, end) for face, end in stem.roots)
     h = float(resonator.at([contacts[0].s]).thickness[0])
     widest = max(contact.s for contact in contacts)
     collar = widest + COLLAR * h + min(stem.fillet, h)
@@ -55,63 +89,63 @@ def lay_root(resonator: Resonator, ring_count: int) -> tuple[Solid, float]:
             "the stem leaves no room for the shell: make the stem or its fillet smaller, or the shell thinner."
         )
     radii = _columns(stem.radius, min(0.5 * stem.radius, 2 * h + stem.fillet))
-    patches: list[Patch] = []
+    above = []
     for contact in contacts:
         far = 0.0 if len(contacts) == 2 else -float(contact.face)
-        patches += _half_root(resonator, stem, contact, far, widest, collar, radii, ring_count)
-    ends = [contact.end for contact in contacts]
-
-    def held(r: float, z: float) -> bool:
-        return any(abs(z - end) < 1e-9 * resonator.length for end in ends)
-
-    return Solid(tuple(patches), held, collar / resonator.length), collar
+        surface = _offset(resonator, far)
+        above.append((far, tuple(_at_radius(surface, r, widest) for r in radii[1:])))
+    return Frame(contacts, widest, collar, tuple(radii), tuple(above))
 
 
 def _touch(resonator: Resonator, stem: Stem, face: int, end: float) -> Contact:
     """Solve for the fillet that touches the stem's side and the dome's face; radius 0 gives the corner itself."""
 
-    def center(s: float) -> tuple[float, float]:
-        r, z = (float(x[0]) for x in _offset(resonator, face)(np.array([s])))
-        normal_r, normal_z = _face_normal(resonator, face, s)
+    def center(s: Array) -> Planar:
+        (r, z), (normal_r, normal_z) = _face(resonator, face, s)
         return r + stem.fillet * normal_r, z + stem.fillet * normal_z
 
     reach = stem.radius + stem.fillet
     dome = resonator.segments[0].length
     trial = np.linspace(0, dome, 200)
-    beyond = np.flatnonzero([center(float(s))[0] > reach for s in trial])
+    beyond = np.flatnonzero(center(trial)[0] > reach)
     if not len(beyond):
         raise ShellError("the stem with its fillet is larger than the dome it stands on.")
     s = float(
         brentq(
-            lambda x: center(float(x))[0] - reach, trial[beyond[0] - 1], trial[beyond[0]], xtol=1e-15 * dome, rtol=1e-15
+            lambda x: float(center(np.array([x]))[0][0]) - reach,
+            trial[beyond[0] - 1],
+            trial[beyond[0]],
+            xtol=1e-15 * dome,
+            rtol=1e-15,
         )
     )
-    middle = center(s)
-    on_dome = tuple(float(x[0]) for x in _offset(resonator, face)(np.array([s])))
-    return Contact(face, end, s, middle, (on_dome[0], on_dome[1]), (stem.radius, middle[1]))
+    middle, on_dome = (
+        (float(r[0]), float(z[0])) for r, z in (center(np.array([s])), _face(resonator, face, np.array([s]))[0])
+    )
+    return Contact(face, end, s, middle, on_dome, (stem.radius, middle[1]))
 
 
 def _half_root(
     resonator: Resonator,
     stem: Stem,
+    frame: Frame,
     contact: Contact,
     far: float,
-    s_far: float,
-    collar: float,
-    radii: list[float],
+    arcs: tuple[float, ...],
     ring_count: int,
+    n: int,
 ) -> list[Patch]:
     """The patches between one face of the dome and `far` (η of the opposite face, or 0: the middle surface)."""
     near_face, far_face = _offset(resonator, contact.face), _offset(resonator, far)
-    above = [_at_radius(far_face, r, s_far) for r in radii[1:]]  # arc lengths of X and of the points further in
-    over = _point(far_face, above[0])  # X
+    radii, s_far, collar = frame.radii, frame.widest, frame.collar
+    over = _point(far_face, arcs[0])  # X; `arcs` are those of X and of the points further in
     corner = _point(far_face, s_far)  # O
     level = contact.on_stem[1]
     under: Spot = (radii[1], level)  # X1
     foot: Spot = (stem.radius, level)  # T1
     steps = _steps(stem.fillet, min(hypot(foot[0] - under[0], 0.0), _distance(contact.on_dome, corner)), ring_count)
     rim_near, rim_far = _point(near_face, collar), _point(far_face, collar)
-    cross, roof = straight(contact.on_dome, corner), _along(far_face, s_far, above[0])
+    cross, roof = straight(contact.on_dome, corner), _along(far_face, s_far, arcs[0])
     patches = [
         Patch(
             cross,
@@ -122,7 +156,7 @@ def _half_root(
             "root",
         ),
     ]
-    for (r_out, s_out), (r_in, s_in) in pairwise(zip(radii[1:], above, strict=True)):
+    for (r_out, s_out), (r_in, s_in) in pairwise(zip(radii[1:], arcs, strict=True)):
         left, right = (straight((r, level), _point(far_face, s)) for r, s in ((r_in, s_in), (r_out, s_out)))
         floor = straight((r_in, level), (r_out, level))
         patches.append(Patch(floor, _along(far_face, s_in, s_out), left, right, whole(), "root"))
@@ -132,7 +166,7 @@ def _half_root(
         )
     else:
         patches.append(Patch(cross, straight(under, over), straight(foot, under), roof, rings(steps), "root"))
-    return patches + _stem(radii, level, contact.end, steps, ring_count)
+    return patches + _stem(list(radii), level, contact.end, steps, ring_count, n)
 
 
 def _fillet(
@@ -169,23 +203,35 @@ def _columns(radius: float, inset: float) -> list[float]:
     return [*radii, 0.0]
 
 
-def _stem(radii: list[float], top: float, end: float, steps: tuple[float, ...], ring_count: int) -> list[Patch]:
-    """The stem itself, from its root to the clamped end, in columns between the radii."""
+def _stem(radii: list[float], top: float, end: float, steps: tuple[float, ...], ring_count: int, n: int) -> list[Patch]:
+    """The stem itself, from its root to the clamped end, in columns between the radii.
+
+    A motion with n > 1 dies out as exp(-1.8 z/a) or faster (measured: by e over less than a/2): beyond a length of
+    `QUIET` radii the clamp is not felt, and its edge needs no small cells.
+    """
     direction, length = (1.0 if end > top else -1.0), abs(end - top)
+    quiet = n > 1 and length > QUIET * radii[0]
     # cells grow from both ends; the first is as tall as the outer column is wide
     step = min(radii[0] - radii[1], 0.4 * length)
     low, high = [0.0], [length]
-    while high[-1] - low[-1] > 2.4 * step:
-        low.append(low[-1] + step)
-        high.append(high[-1] - step)
-        step = min(2.5 * step, 1.5 * radii[0])
-    middle = np.linspace(low[-1], high[-1], 1 + ceil((high[-1] - low[-1]) / (1.5 * step)))
-    levels = [top + direction * height for height in (*low, *middle[1:-1].tolist(), *high[::-1])]
+    if quiet:
+        while low[-1] + 3.5 * step < length:
+            low.append(low[-1] + step)
+            step *= 2.5
+        heights = [*low, length]
+    else:
+        while high[-1] - low[-1] > 2.4 * step:
+            low.append(low[-1] + step)
+            high.append(high[-1] - step)
+            step = min(2.5 * step, 1.5 * radii[0])
+        middle = np.linspace(low[-1], high[-1], 1 + ceil((high[-1] - low[-1]) / (1.5 * step)))
+        heights = [*low, *middle[1:-1].tolist(), *high[::-1]]
+    levels = [top + direction * height for height in heights]
     sharp = rings(shrinking(ring_count))
     patches = []
     for k, (one, two) in enumerate(pairwise(levels)):
         side = _rectangle((radii[0], one), (radii[1], two), rings(steps) if k == 0 else whole())
-        if k == len(levels) - 2:  # the edge of the clamp is as singular as a sharp corner
+        if k == len(levels) - 2 and not quiet:  # the edge of the clamp is as singular as a sharp corner
             side = _rectangle((radii[0], two), (radii[1], one), sharp)
         patches += [side, *(_rectangle((r_out, one), (r_in, two), whole()) for r_out, r_in in pairwise(radii[1:]))]
     return patches
@@ -229,14 +275,15 @@ def _at_radius(surface: Callable[[Array], Planar], r: float, s_most: float) -> f
     return float(brentq(lambda s: float(surface(np.array([s]))[0][0]) - r, 0.0, s_most, xtol=1e-15 * s_most))
 
 
-def _face_normal(resonator: Resonator, face: int, s: float) -> Spot:
-    """Unit normal of a face of the dome, out of the material."""
-    there = resonator.at([s], 0)
-    stretch = 1 + there.curvature[0] * face * there.thickness[0] / 2
-    rise = face * there.thickness_slope[0] / 2
-    r = stretch * there.tangent_r[0] + rise * there.normal_r[0]
-    z = stretch * there.tangent_z[0] + rise * there.normal_z[0]
-    return -face * z / hypot(r, z), face * r / hypot(r, z)
+def _face(resonator: Resonator, face: int, s: Array) -> tuple[Planar, Planar]:
+    """Points of a face of the dome and its unit normals, out of the material."""
+    there = resonator.at(s, 0)
+    zeta, rise = face * there.thickness / 2, face * there.thickness_slope / 2
+    stretch = 1 + there.curvature * zeta
+    t_r = stretch * there.tangent_r + rise * there.normal_r
+    t_z = stretch * there.tangent_z + rise * there.normal_z
+    scale = face / np.hypot(t_r, t_z)
+    return (there.r + zeta * there.normal_r, there.z + zeta * there.normal_z), (-scale * t_z, scale * t_r)
 
 
 def _along(surface: Callable[[Array], Planar], first: float, last: float) -> Path:

@@ -74,9 +74,9 @@ def test_shape_is_continuous_and_vanishes_where_held(resonator: Resonator, n: in
     assert abs(np.diff(moved, axis=1)[:, same]).max() < 1e-6 * abs(moved).max()
     if resonator.stem:
         held = np.isin(np.round(places[1], 9), np.round([end for _, end in resonator.stem.roots], 9)) & (
-            places[0] <= 2.5e-3
+            places[0] <= 2.5e-3 + 1e-9
         )
-        assert held.sum() > 20
+        assert held.sum() >= 2 * 5  # at least two cells across the end of the stem
         assert abs(moved[:, held]).max() == 0
 
 
