@@ -3,7 +3,8 @@
 >>> family = build_family(hemisphere(15e-3, 0.9e-3), thickness=(0.8e-3, 1e-3), nu=(0.15, 0.19))
 >>> result = family.evaluate(thickness=np.linspace(0.8e-3, 1e-3, 10_000), nu=0.17, E=72.7e9, rho=2203.0)
 
-E, ρ and the radius need no solve, since f = √(E/ρ)/R F(h/R, shapes, ν) exactly.
+E, ρ and the radius need no solve, since f = √(E/ρ)/R F(h/R, shapes, ν) exactly; a stem whose lengths do not go with the
+radius adds its own size to the arguments of F.
 """
 
 from collections.abc import Sequence
@@ -14,21 +15,24 @@ from math import ceil, isfinite, log, pi
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from shell.assembly import LEVELS, Level, ShellPart, Theory, build_system
+from shell.assembly import LEVELS, Level, Theory
+from shell.condensed import UnfitSolids
+from shell.designs import Box, Designs, Range
 from shell.elastic import Elastic
 from shell.errors import ShellError
 from shell.frozen import FrozenShell, freeze
+from shell.interpolated import Solids, interpolate_solids
 from shell.kernel import lame
 from shell.meridian import Resonator
 from shell.modes import solve_modes
 from shell.profiles import Profiles, Shape
 from shell.quadrature import Array
 from shell.reduced import ReducedModel
-from shell.training import Box, evaluate_many, train
+from shell.training import evaluate_many, train
 
-Range = tuple[float, float]
 MOST_SHAPES = 6  # the training takes every corner of the box
-ROUNDING = 1e-11  # relative error of a full solve's iteration and rounding
+ROUNDING = 1e-11  # relative error of the iteration and rounding of a full solve
+CONDENSATION = 1e-9  # and of the condensed solid parts, at most
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,14 +54,23 @@ class FamilyResult:
 class Cell:
     """A range of thickness with its own layout of elements and its own reduced model."""
 
-    box: Box
-    shell: FrozenShell
+    solids: Solids
     model: ReducedModel
+
+    @property
+    def box(self) -> Box:
+        """Its designs."""
+        return self.solids.box
+
+    @property
+    def shell(self) -> FrozenShell:
+        """Its elements."""
+        return self.solids.shell
 
 
 @dataclass(frozen=True, eq=False)
 class Family:
-    """Designs within ranges of thickness (m, at the nominal radius), ν and shapes; see `build_family`.
+    """Designs within ranges of thickness (m, at the nominal radius), ν, shapes and stem; see `build_family`.
 
     cells : reduced models by rising thickness. Empty where every design is solved in full; `reason` then says why.
     """
@@ -67,6 +80,7 @@ class Family:
     theory: Theory
     thickness: Range
     nu: Range
+    stem: Range
     amplitude: float
     shape_count: int
     own_thickness: float
@@ -85,6 +99,7 @@ class Family:
         thickness: ArrayLike | None = None,
         shapes: ArrayLike | None = None,
         radius: ArrayLike | None = None,
+        stem: ArrayLike = 1.0,
     ) -> FamilyResult:
         """Frequencies of m designs; arguments are numbers or arrays (m,). A design's result does not depend on the others.
 
@@ -94,6 +109,7 @@ class Family:
         thickness : m; default the nominal resonator's largest.
         shapes : amplitudes (m, shapes) or (shapes,); default 0.
         radius : the design's `Resonator.size`, m: every length but the thickness goes with it; default the nominal one.
+        stem : radius, ends and fillet of the stem over those that go with the radius: R_nominal/R where they stay.
 
         Raises
         ------
@@ -111,24 +127,29 @@ class Family:
             E,
             rho,
             self.size if radius is None else radius,
+            stem,
         )
         rows = np.zeros(amplitudes.shape[:-1] or 1)
-        h, poisson, young, density, R, _ = np.broadcast_arrays(*(np.asarray(one, dtype=float) for one in given), rows)
+        h, poisson, young, density, R, root, _ = np.broadcast_arrays(
+            *(np.asarray(one, dtype=float) for one in given), rows
+        )
         if h.ndim != 1:
             raise ShellError("the arguments of a family are numbers or arrays of one dimension.")
         amplitudes = np.broadcast_to(amplitudes, (len(h), self.shape_count))
         scale = R / self.size
-        self._check(h / scale, poisson, amplitudes, np.minimum(np.minimum(young, density), R))
-        eigenvalue, error, full = self._solve(h / scale, amplitudes, poisson)
+        designs = Designs(h / scale, amplitudes, root, poisson)
+        self._check(designs, np.minimum(np.minimum(young, density), R))
+        eigenvalue, error, full = self._solve(designs)
         return FamilyResult(np.sqrt(eigenvalue * young / density) / (2 * pi * scale), error, full, self.theory_error)
 
-    def _check(self, h: Array, nu: Array, amplitudes: Array, positive: Array) -> None:
+    def _check(self, designs: Designs, positive: Array) -> None:
         if not np.all(positive > 0):
             raise ShellError("Young's modulus, density and radius must be positive.")
         ranges = {
-            "thickness (m, at the nominal radius)": (h, self.thickness),
-            "Poisson's ratio": (nu, self.nu),
-            "amplitude of a shape": (amplitudes, (-self.amplitude, self.amplitude)),
+            "thickness (m, at the nominal radius)": (designs.thickness, self.thickness),
+            "Poisson's ratio": (designs.nu, self.nu),
+            "amplitude of a shape": (designs.amplitudes, (-self.amplitude, self.amplitude)),
+            "size of the stem": (designs.stem, self.stem),
         }
         for name, (values, (low, high)) in ranges.items():
             slack = 1e-12 * abs(high)
@@ -138,30 +159,30 @@ class Family:
                     "build it with wider ranges."
                 )
 
-    def _solve(self, h: Array, amplitudes: Array, nu: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
+    def _solve(self, designs: Designs) -> tuple[Array, Array, NDArray[np.bool_]]:
         """ω² for E = ρ = 1 at the nominal radius, the relative error of ω, and whether it was solved in full."""
-        eigenvalue, error, full = np.empty(len(h)), np.empty(len(h)), np.ones(len(h), dtype=bool)
-        which = np.searchsorted([cell.box.thickness[0] for cell in self.cells[1:]], h, side="right")
+        count = len(designs)
+        eigenvalue, error, full = np.empty(count), np.empty(count), np.ones(count, dtype=bool)
+        which = np.searchsorted([cell.box.thickness[0] for cell in self.cells[1:]], designs.thickness, side="right")
         for k, cell in enumerate(self.cells):
             mine = np.flatnonzero(which == k)
             if len(mine):
-                value, estimate = evaluate_many(
-                    cell.model, h[mine], amplitudes[mine], nu[mine], cell.shell.plane_stress
-                )
-                eigenvalue[mine] = value * lame(np.ones(1), nu[mine], cell.shell.plane_stress)[1]
+                own = designs if len(mine) == count else designs.part(mine)
+                value, estimate = evaluate_many(cell.model, own, cell.shell.plane_stress)
+                eigenvalue[mine] = value * lame(np.ones(1), own.nu, cell.shell.plane_stress)[1]
                 error[mine] = estimate / 2
                 full[mine] = ~(error[mine] <= self.tolerance)  # also where it is no number
         for one in np.flatnonzero(full):
-            eigenvalue[one] = self._solve_in_full(int(which[one]), float(h[one]), amplitudes[one], float(nu[one]))
-            error[one] = ROUNDING
+            eigenvalue[one] = self._solve_in_full(int(which[one]), designs.part(slice(one, one + 1)))
+            error[one] = CONDENSATION if self.cells and self.cells[0].shell.parts else ROUNDING
         return eigenvalue, error, full
 
-    def _solve_in_full(self, which: int, h: float, amplitudes: Array, nu: float) -> float:
+    def _solve_in_full(self, which: int, design: Designs) -> float:
         if self.cells:
-            cell = self.cells[which]
-            return cell.shell.solve(cell.box.profile(np.array([h]), amplitudes[None])[0], nu)[0]
+            return self.cells[which].solids.solve(design, 0)[0]
         assert self.profiles is not None
-        resonator = self.profiles.build(h, amplitudes)
+        h, nu, stem = (float(values[0]) for values in (design.thickness, design.nu, design.stem))
+        resonator = self.profiles.build(h, design.amplitudes[0], stem)
         (mode,) = solve_modes(
             resonator, Elastic(1.0, nu, 1.0), self.harmonic, theory=self.theory, tolerance=self.tolerance
         )
@@ -175,6 +196,7 @@ def build_family(
     nu: Range,
     shapes: Sequence[Shape] = (),
     amplitude: float = 0.1,
+    stem: Range = (1.0, 1.0),
     harmonic: int = 2,
     theory: Theory = "solid",
     tolerance: float = 3e-5,
@@ -182,8 +204,8 @@ def build_family(
 ) -> Family:
     """Prepare the lowest mode of one harmonic for many designs: h(s) = thickness (base(s) + Σ a_k shape_k(s)).
 
-    The elements and the training designs follow from the arguments alone. Resonators with solid parts (stem, kink, clamp
-    of a solid) have no reduced model: their designs are all solved in full.
+    The elements and the training designs follow from the arguments alone. Solid parts (stem, corner, clamped edge) take
+    part with polynomials; where these cannot hold them within the ranges, every design is solved in full.
 
     Parameters
     ----------
@@ -191,8 +213,9 @@ def build_family(
     thickness : range, m, at the nominal radius.
     nu : range of Poisson's ratio.
     shapes : changes of the profile: functions of the position (0 ... 1 of the arc length) or (position, value) pairs,
-        linear between them.
+        linear between them; two pairs at one position are a step.
     amplitude : every a_k lies within ±amplitude.
+    stem : range of the stem's lengths over those that go with the radius.
     harmonic : n; at least 2 where the resonator is free.
     theory : "solid" or "shell".
     tolerance : relative error of the frequency, against the full solve, above which a design is solved in full.
@@ -204,57 +227,75 @@ def build_family(
         On ranges that make no sense, or when no reduced basis reaches the tolerance.
     """
     thickness, nu = _widen(thickness, 0.005 * thickness[1]), _widen(nu, 0.002)
-    _check_request(resonator, thickness, nu, amplitude, len(shapes), harmonic, theory, min(tolerance, theory_tolerance))
+    _check_request(resonator, thickness, nu, stem, amplitude, len(shapes), harmonic, theory)
+    if not 0 < min(tolerance, theory_tolerance) < 1 > max(tolerance, theory_tolerance):
+        raise ShellError(
+            f"the tolerance is a relative error between 0 and 1, not {tolerance:g} or {theory_tolerance:g}."
+        )
     profiles = Profiles.of(resonator, shapes)
     own = max(value for _, value in resonator.thickness)
-    request = (harmonic, theory, thickness, nu, amplitude, len(shapes), own, resonator.size, tolerance)
-    parts = build_system(profiles.build(own, np.zeros(len(shapes))), harmonic, theory, LEVELS[theory][0]).groups
-    if len(parts) > 1 or not isinstance(parts[0].place, ShellPart):
-        reason = "solid parts (stem, kink or clamp) change their form with the thickness"
-        if profiles.smooth:
-            raise ShellError(
-                f"{reason}, so every design is solved in full: give the shapes as (position, value) pairs."
-            )
-        return Family(profiles, *request, tolerance, (), reason)
+    request = Request(profiles, harmonic, theory, nu, stem, amplitude)
+    given = (harmonic, theory, thickness, nu, stem, amplitude, len(shapes), own, resonator.size, tolerance)
     ratio = 1.6 if tolerance >= 1e-5 else 1.15  # of a cell: the narrower, the smaller its basis
     count = max(1, ceil(log(thickness[1] / thickness[0]) / log(ratio)))
     edges = [thickness[0], *np.geomspace(*thickness, count + 1)[1:-1].tolist(), thickness[1]]
     spans = list(pairwise(edges))
-    level, theory_error = _choose_level(profiles, request, (spans[0], spans[-1]), theory_tolerance)
-    frozen = [_freeze(profiles, request, span, level) for span in spans]
-    cells = tuple(Cell(box, shell, train(shell, box, tolerance)) for shell, box in frozen)
-    return Family(None, *request, theory_error, cells)
+    try:
+        level, theory_error = _choose_level(request, [spans[0], spans[-1]] if count > 1 else spans, theory_tolerance)
+        cells = tuple(_fill_cell(request, span, level, tolerance) for span in spans)
+    except UnfitSolids as error:
+        return Family(profiles, *given, tolerance, (), str(error))
+    return Family(None, *given, theory_error, cells)
 
 
-Request = tuple[int, Theory, Range, Range, float, int, float, float, float]
+@dataclass(frozen=True, eq=False)
+class Request:
+    """What a family was asked for, beside its thickness and tolerances."""
+
+    profiles: Profiles
+    harmonic: int
+    theory: Theory
+    nu: Range
+    stem: Range
+    amplitude: float
 
 
-def _freeze(profiles: Profiles, request: Request, span: Range, level: Level) -> tuple[FrozenShell, Box]:
+def _fill_cell(request: Request, span: Range, level: Level, tolerance: float) -> Cell:
+    shell, box = _freeze(request, span, level)
+    solids = interpolate_solids(shell, box, request.profiles, tolerance)
+    return Cell(solids, train(solids, tolerance))
+
+
+def _freeze(request: Request, span: Range, level: Level) -> tuple[FrozenShell, Box]:
     """Lay out the elements for a range of thickness."""
-    harmonic, theory, _, nu, amplitude, count, *_ = request
-    base, shapes = profiles.at(np.linspace(0, 1, 2001))
-    reach = amplitude * abs(shapes).sum(axis=0)
-    if np.min(base - reach) <= 0.05 * np.max(base):
+    profiles = request.profiles
+
+    def bounds(position: Array) -> tuple[Array, Array]:
+        base, shapes = profiles.at(position)
+        reach = request.amplitude * abs(shapes).sum(axis=0)
+        return span[0] * (base - reach), span[1] * (base + reach)
+
+    thin, thick = bounds(np.linspace(0, 1, 2001))
+    if np.min(thin) <= 0.05 * span[0] / span[1] * np.max(thick):
         raise ShellError("with these shapes and amplitudes the thickness comes near zero: make the amplitude smaller.")
-    resonator = profiles.build(float(np.sqrt(span[0] * span[1])), np.zeros(count))
-    thinnest, thickest = span[0] * float(np.min(base - reach)), span[1] * float(np.max(base + reach))
-    shell = freeze(resonator, harmonic, theory, level, thinnest, thickest)
-    return shell, Box(span, amplitude, nu, *profiles.at(shell.position))
+    resonator = profiles.build(float(np.sqrt(span[0] * span[1])), np.zeros(len(profiles.shapes)))
+    shell = freeze(resonator, request.harmonic, request.theory, level, bounds)
+    if shell.parts and request.harmonic < 2:
+        raise UnfitSolids("families of resonators with solid parts are for harmonics from 2.")
+    return shell, Box(span, request.amplitude, request.stem, request.nu, *profiles.at(shell.position))
 
 
-def _choose_level(
-    profiles: Profiles, request: Request, spans: tuple[Range, ...], tolerance: float
-) -> tuple[Level, float]:
+def _choose_level(request: Request, spans: list[Range], tolerance: float) -> tuple[Level, float]:
     """The lowest level within the tolerance of the next, judged at the thin and the thick end."""
-    levels, dimensions = LEVELS[request[1]], request[5] + 2
-    ends = np.array([[-1.0] * dimensions, [1.0] * dimensions, [0.0] * dimensions])
+    levels = LEVELS[request.theory]
 
     def solve(level: Level) -> Array:
         found: list[float] = []
         for span in spans:
-            shell, box = _freeze(profiles, request, span, level)
-            thickness, amplitudes, nu = box.designs(ends)
-            found += [shell.solve(h, float(x))[0] for h, x in zip(box.profile(thickness, amplitudes), nu, strict=True)]
+            shell, box = _freeze(request, span, level)
+            designs = box.designs(np.outer([-1.0, 1.0, 0.0], np.ones(box.dimensions)))
+            solids = Solids(shell, box, request.profiles)
+            found += [solids.solve(designs, k)[0] for k in range(len(designs))]
         return np.sqrt(found)
 
     values = solve(levels[0])
@@ -278,11 +319,11 @@ def _check_request(
     resonator: Resonator,
     thickness: Range,
     nu: Range,
+    stem: Range,
     amplitude: float,
     count: int,
     harmonic: int,
     theory: str,
-    tolerance: float,
 ) -> None:
     if theory not in LEVELS:
         raise ShellError(f"the theory of a family is one of {', '.join(LEVELS)}, not {theory!r}.")
@@ -296,11 +337,13 @@ def _check_request(
         )
     if not -1 < nu[0] <= nu[1] < 0.5:
         raise ShellError(f"the range of Poisson's ratio must rise within -1 ... 0.5, not {nu[0]:g} to {nu[1]:g}.")
+    if not 0 < stem[0] <= 1 <= stem[1] or not isfinite(stem[1]):
+        raise ShellError(f"the range of the stem's size must hold 1 and be positive, not {stem[0]:g} to {stem[1]:g}.")
+    if stem != (1.0, 1.0) and resonator.stem is None:
+        raise ShellError("a range of the stem's size needs a resonator with a stem.")
     if count > MOST_SHAPES:
         raise ShellError(f"a family has at most {MOST_SHAPES} shapes, not {count}: study them in groups.")
     if not 0 < amplitude < 1:
         raise ShellError(
             f"the amplitude of the shapes is a fraction of the thickness between 0 and 1, not {amplitude:g}."
         )
-    if not 0 < tolerance < 1:
-        raise ShellError(f"the tolerance is a relative error between 0 and 1, not {tolerance:g}.")

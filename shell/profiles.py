@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from shell.errors import ShellError
-from shell.meridian import Resonator
+from shell.meridian import Resonator, Stem
 from shell.quadrature import Array
 
 Pairs: TypeAlias = tuple[tuple[float, float], ...]
@@ -30,11 +30,6 @@ class Profiles:
         base = tuple((position, value / largest) for position, value in resonator.thickness)
         return cls(resonator, base, tuple(shape if callable(shape) else _read(shape) for shape in shapes))
 
-    @property
-    def smooth(self) -> bool:
-        """Whether some shape is a function, which no resonator can carry exactly."""
-        return any(callable(shape) for shape in self.shapes)
-
     def at(self, position: Array) -> tuple[Array, Array]:
         """The base (...) and the shapes (shapes, ...) at positions (...) that are not knots."""
         base = np.interp(position, *np.array(self.base).T)
@@ -49,25 +44,63 @@ class Profiles:
             raise ShellError("a shape of the family is not finite everywhere along the meridian.")
         return base, shapes
 
-    def build(self, thickness: float, amplitudes: Array) -> Resonator:
-        """The resonator of one design, with a knot at every knot of base and shapes; functions are left out."""
-        known = {position for position, _ in self.base}
-        linear = [
-            (a, np.array(shape).T) for a, shape in zip(amplitudes, self.shapes, strict=True) if not callable(shape)
-        ]
-        new = sorted({float(p) for _, (positions, _) in linear for p in positions} - known)
-        pairs = sorted(
-            [*self.base, *((p, float(np.interp(p, *np.array(self.base).T))) for p in new)], key=lambda pair: pair[0]
+    def build(self, thickness: float, amplitudes: Array, stem: float = 1.0) -> Resonator:
+        """The resonator of one design, with a knot at every knot of base and shapes; `stem` times the stem's lengths."""
+        linear = [(float(a), shape) for a, shape in zip(amplitudes, self.shapes, strict=True) if not callable(shape)]
+        positions = sorted({p for pairs in (self.base, *(shape for _, shape in linear)) for p, _ in pairs})
+        varied: list[tuple[float, float]] = []
+        for p in positions:
+            base = _limits(self.base, p)
+            changes = [(a, _limits(shape, p)) for a, shape in linear]
+            before, after = (
+                thickness * (base[side] + sum(a * limits[side] for a, limits in changes)) for side in (0, 1)
+            )
+            varied += [(p, before)] if before == after else [(p, before), (p, after)]
+        curved = tuple(
+            (thickness * float(a), shape) for a, shape in zip(amplitudes, self.shapes, strict=True) if callable(shape)
         )
-        varied = tuple(
-            (p, thickness * (value + sum(float(a * np.interp(p, *xy)) for a, xy in linear))) for p, value in pairs
-        )
-        return replace(self.resonator, thickness=varied)
+        plain = self.resonator
+        if plain.stem and stem != 1:
+            plain = replace(plain, stem=_scaled(plain.stem, stem))
+        if not curved:
+            return replace(plain, thickness=tuple(varied))
+        return Curved(plain.segments, tuple(varied), plain.support, plain.stem, plain.clamp_radius, curved)
+
+
+@dataclass(frozen=True)
+class Curved(Resonator):
+    """A resonator to whose thickness multiples (m) of smooth functions of the position are added."""
+
+    added: tuple[tuple[float, Callable[[Array], ArrayLike]], ...] = ()
+
+    def _thickness_near(self, s: Array, inside: float) -> tuple[Array, Array]:
+        thickness, slope = super()._thickness_near(s, inside)
+        position, step = s / self.length, 1e-5
+        one, two = np.maximum(position - step, 0.0), np.minimum(position + step, 1.0)
+        for factor, shape in self.added:
+            rise = np.asarray(shape(two), dtype=float) - np.asarray(shape(one), dtype=float)
+            thickness = thickness + factor * np.asarray(shape(position), dtype=float)
+            slope = slope + factor * rise / ((two - one) * self.length)
+        return thickness, slope
+
+
+def _limits(pairs: Pairs, p: float) -> tuple[float, float]:
+    """Values just before and just after a position, which differ at a step."""
+    there = [value for position, value in pairs if position == p]
+    if there:
+        return there[0], there[-1]
+    value = float(np.interp(p, *np.array(pairs).T))
+    return value, value
+
+
+def _scaled(stem: Stem, factor: float) -> Stem:
+    ends = tuple(end * factor for end in stem.ends) if isinstance(stem.ends, tuple) else stem.ends * factor
+    return Stem(stem.radius * factor, ends, stem.fillet * factor, stem.side)  # type: ignore[arg-type]
 
 
 def _read(shape: Sequence[tuple[float, float]]) -> Pairs:
     pairs = tuple((float(position), float(value)) for position, value in shape)
     positions = np.array([position for position, _ in pairs])
-    if len(pairs) < 2 or positions[0] != 0 or positions[-1] != 1 or np.any(np.diff(positions) <= 0):
+    if len(pairs) < 2 or positions[0] != 0 or positions[-1] != 1 or np.any(np.diff(positions) < 0):
         raise ShellError("the positions of a shape must rise from 0 (start) to 1 (rim).")
     return pairs

@@ -1,7 +1,8 @@
 """A reduced basis of shell modes: a few snapshots span the modes of a whole box of designs.
 
 The reduced stiffness and mass are sums over the stations of odd powers of the thickness there; a small set of these
-powers, at stations chosen greedily, reproduces them, so that they come out of one matrix product for many designs.
+powers, at stations chosen greedily, reproduces them. Solid parts add polynomials of what shapes them. So the matrices
+of many designs come out of one product.
 The residual of the reduced mode is tested on further snapshots W, in the norm of their own energies:
 
     δ = Σ_w r_w² / (K_ww - μ M_ww),   r = (K - μ M) V c,   μ = min over c of the Rayleigh quotient in V.
@@ -14,7 +15,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import eigh
 
-from shell.frozen import FrozenShell
+from shell.condensed import Pair
+from shell.designs import Designs
+from shell.interpolated import Polynomials, Solids
 from shell.kernel import lame
 from shell.quadrature import Array
 
@@ -48,14 +51,16 @@ class Features:
 class ReducedModel:
     """The operators of one box of designs on V (r vectors) and W, as products with the features.
 
-    stiffness : rows for the packed lower triangle of Vᵀ K V, Wᵀ K V (v by v) and diag Wᵀ K W; columns for [g, τ g] with
-        τ = λ/G, per unit G.
-    mass : the same rows of M, columns for the leading part of g, per unit density.
-    start : V-coefficients of the mode, the first being 1, as a linear function of [g, τ g].
+    solids : the polynomials e of the solid parts.
+    stiffness : rows for the packed lower triangle of Vᵀ K V, Wᵀ K V (v by v) and diag Wᵀ K W; columns for [e, g, τ g]
+        with τ = λ/G, per unit G.
+    mass : the same rows of M, columns for the leading part of [e, g], per unit density.
+    start : V-coefficients of the mode, the first being 1, as a linear function of [e, g, τ g].
     reference : thickness that features are measured in, m.
     slope, floor : the stated relative error of ω² is slope δ/μ + floor, from designs solved in full.
     """
 
+    solids: tuple[Polynomials, ...]
     features: Features
     stiffness: Array
     mass: Array
@@ -66,21 +71,23 @@ class ReducedModel:
     slope: float
     floor: float
 
-    def evaluate(self, thickness: Array, amplitudes: Array, ratio: Array) -> tuple[Array, Array]:
+    def evaluate(
+        self, thickness: Array, amplitudes: Array, stem: Array, nu: Array, ratio: Array
+    ) -> tuple[Array, Array]:
         """ω² ρ/G of one chunk and its relative error estimate.
 
         Parameters
         ----------
         thickness : m, (CHUNK,).
         amplitudes : (shapes, CHUNK).
-        ratio : λ/G, (CHUNK,); λ is that of plane stress in shell theory.
+        stem : (CHUNK,).
+        nu, ratio : ν and λ/G, (CHUNK,); λ is that of plane stress in shell theory.
         """
         r, w = self.size, self.tests
-        g = self.features.evaluate(thickness / self.reference, amplitudes)
-        both = np.concatenate([g, ratio * g])
-        K, M = self.stiffness @ both, self.mass @ g[: self.mass.shape[1]]
+        terms = self.terms(thickness, amplitudes, stem, nu, ratio)
+        K, M = self.stiffness @ terms, self.mass @ terms[: self.mass.shape[1]]
         packed = r * (r + 1) // 2
-        c = self.start @ both
+        c = self.start @ terms
         with np.errstate(invalid="ignore", divide="ignore"):  # an indefinite stiffness gives no number
             L = factor(K[:packed], r)
         for _ in range(ITERATIONS):
@@ -97,6 +104,12 @@ class ReducedModel:
         gaps = K[-w:] - mu * M[-w:]
         delta = np.add.reduce(residual * residual / gaps) / energy  # relative to μ
         return mu * (1 - delta), self.slope * delta + self.floor
+
+    def terms(self, thickness: Array, amplitudes: Array, stem: Array, nu: Array, ratio: Array) -> Array:
+        """The terms [e, g, τ g] (terms, designs)."""
+        g = self.features.evaluate(thickness / self.reference, amplitudes)
+        e = [one.evaluate(thickness, amplitudes, stem, nu) for one in self.solids]
+        return np.concatenate([*e, g, ratio * g])
 
 
 def factor(K: Array, r: int) -> Array:
@@ -146,27 +159,30 @@ def _column_starts(r: int) -> list[int]:
 
 @dataclass(frozen=True, eq=False)
 class Snapshots:
-    """Designs solved in full: thickness at the stations (designs, elements, stations), ν, ω² for E = ρ = 1, vectors."""
+    """Designs that were solved: ω² for E = ρ = 1, vectors."""
 
-    h: Array
-    nu: Array
+    designs: Designs
     eigenvalues: Array
     vectors: Array
 
     def __len__(self) -> int:
-        return len(self.nu)
+        return len(self.designs)
 
 
-def solve_all(shell: FrozenShell, h: Array, nu: Array) -> Snapshots:
-    """Solve every design in full."""
-    found = [shell.solve(h_, float(nu_)) for h_, nu_ in zip(h, nu, strict=True)]
-    return Snapshots(h, nu, np.array([value for value, _ in found]), np.array([vector for _, vector in found]))
+def solve_all(solids: Solids, designs: Designs) -> Snapshots:
+    """Solve every design with the unknowns of all shell elements."""
+    pairs = solids.at(designs)
+    found = [
+        solids.shell.solve(h, float(nu), pair)
+        for h, nu, pair in zip(solids.box.profile(designs), designs.nu, pairs, strict=True)
+    ]
+    return Snapshots(designs, np.array([value for value, _ in found]), np.array([vector for _, vector in found]))
 
 
-def span(shell: FrozenShell, snapshots: Snapshots, most: int) -> Array:
+def span(solids: Solids, snapshots: Snapshots, most: int) -> Array:
     """The leading directions of the snapshots, orthonormal in the strain energy of the first one (POD)."""
-    vectors = snapshots.vectors.T
-    X = shell.strain_energy(vectors, snapshots.h[0], float(snapshots.nu[0]))
+    vectors, first = snapshots.vectors.T, snapshots.designs.part(slice(0, 1))
+    X = solids.shell.strain_energy(vectors, solids.box.profile(first)[0], float(first.nu[0]), solids.at(first)[0])
     scale = 1 / np.sqrt(np.diag(X))
     values, turn = np.linalg.eigh(X * scale * scale[:, None])
     kept = slice(len(values) - 1, len(values) - 1 - min(most, int(np.sum(values > 1e-11 * values[-1]))), -1)
@@ -175,32 +191,51 @@ def span(shell: FrozenShell, snapshots: Snapshots, most: int) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class Projected:
-    """VᵀAV of the station energies per unit λ, G, ρ: (nodes x elements x stations, pairs)."""
+    """VᵀAV of the station energies per unit λ, G, ρ: (nodes x elements x stations, pairs).
 
-    shell: FrozenShell
+    parts : the same of the solid parts' stiffness per unit G and mass, as coefficients of their polynomials.
+    """
+
+    solids: Solids
     trace: Array
     shear: Array
     mass: Array
+    parts: tuple[Pair, ...]
 
     @classmethod
-    def on(cls, shell: FrozenShell, basis: Array) -> "Projected":
+    def on(cls, solids: Solids, basis: Array) -> "Projected":
         """Project on a basis (unknowns, vectors)."""
-        return cls(shell, *(kind.reshape(-1, basis.shape[1] ** 2) for kind in shell.energies(basis)))
+        shell = solids.shell
+        trace, shear, mass = (kind.reshape(-1, basis.shape[1] ** 2) for kind in shell.energies(basis))
+        parts = []
+        for part, one in zip(shell.parts, solids.parts, strict=True):
+            held = basis[part.columns]
+            parts.append((held.T @ one.stiffness @ held, held.T @ one.mass @ held))
+        return cls(solids, trace, shear, mass, tuple(parts))
 
-    def at(self, h: Array) -> tuple[Array, Array, Array]:
-        """The three matrices (designs, vectors, vectors) of designs with thickness h at the stations."""
-        weights = np.moveaxis(self.shell.interpolate(h), 1, 0).reshape(len(h), -1)
+    def at(self, designs: Designs) -> tuple[Array, Array, Array]:
+        """Trace, shear and mass of the shell's elements (designs, vectors, vectors)."""
+        weights = self.solids.shell.interpolate(self.solids.box.profile(designs))
+        weights = np.moveaxis(weights, 1, 0).reshape(len(designs), -1)
         width = round(np.sqrt(self.trace.shape[1]))
         trace, shear, mass = (
             (weights @ kind).reshape(-1, width, width) for kind in (self.trace, self.shear, self.mass)
         )
         return trace, shear, mass
 
+    def pencils(self, designs: Designs) -> tuple[Array, Array]:
+        """K per unit G and M per unit density, of everything."""
+        trace, shear, mass = self.at(designs)
+        K, M = shear + self.ratio(designs.nu)[:, None, None] * trace, mass
+        for one, (stiff, heavy) in zip(self.solids.parts, self.parts, strict=True):
+            terms = one.terms(designs)
+            K, M = K + np.tensordot(terms, stiff, 1), M + np.tensordot(terms, heavy, 1)
+        return K, M
 
-def pencils(parts: tuple[Array, Array, Array], nu: Array, plane_stress: bool) -> tuple[Array, Array]:
-    """K per unit G and M per unit density."""
-    lam, G = lame(np.ones_like(nu), nu, plane_stress)
-    return parts[1] + (lam / G)[:, None, None] * parts[0], parts[2]
+    def ratio(self, nu: Array) -> Array:
+        """λ/G."""
+        lam, G = lame(np.ones_like(nu), nu, self.solids.shell.plane_stress)
+        return lam / G
 
 
 def rayleigh_ritz(K: Array, M: Array, r: int, w: int) -> tuple[Array, Array, Array]:

@@ -1,12 +1,13 @@
 """Train the reduced model of one box of designs: snapshots, sizes, features, and the error that it states."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import product
 
 import numpy as np
 
+from shell.designs import Box, Designs
 from shell.errors import ShellError
-from shell.frozen import FrozenShell
+from shell.interpolated import Polynomials, Solids
 from shell.kernel import lame
 from shell.quadrature import Array
 from shell.reduced import (
@@ -16,7 +17,6 @@ from shell.reduced import (
     Projected,
     ReducedModel,
     Snapshots,
-    pencils,
     rayleigh_ritz,
     solve_all,
     span,
@@ -25,42 +25,14 @@ from shell.reduced import (
 SIZES = (1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 16, 18, 20, 22, 24, 27, 30)
 LEARNED, CHECKS, FEATURE_DESIGNS = 48, 64, 320  # inside, and again as many on the faces
 SAFETY = 1.5  # on the largest ratio of true to estimated error among the checks
+MORE = 3  # sizes of the basis that are tried
 TOO_WIDE = (
     "no reduced basis of up to {} vectors reaches {:g} in this box: narrow its ranges or allow a larger tolerance."
 )
 ROOM = 0.9  # share of the tolerance that the estimate may take on designs of the training; the rest is for others
 
 
-@dataclass(frozen=True, eq=False)
-class Box:
-    """Designs h(s) = thickness (base(s) + Σ a_k shape_k(s)) with |a_k| <= amplitude, and a range of ν.
-
-    base, shapes : at the stations, (elements, stations) and (shapes, elements, stations).
-    """
-
-    thickness: tuple[float, float]
-    amplitude: float
-    nu: tuple[float, float]
-    base: Array
-    shapes: Array
-
-    @property
-    def dimensions(self) -> int:
-        """Thickness, amplitudes, ν."""
-        return len(self.shapes) + 2
-
-    def designs(self, unit: Array) -> tuple[Array, Array, Array]:
-        """Thickness, amplitudes (designs, shapes) and ν of points of the cube -1 ... 1."""
-        (thin, thick), (low, high) = self.thickness, self.nu
-        thickness = (thin + thick) / 2 + (thick - thin) / 2 * unit[:, 0]
-        return thickness, self.amplitude * unit[:, 1:-1], (low + high) / 2 + (high - low) / 2 * unit[:, -1]
-
-    def profile(self, thickness: Array, amplitudes: Array) -> Array:
-        """Thickness at the stations, (designs, elements, stations)."""
-        return thickness[:, None, None] * (self.base + np.tensordot(amplitudes, self.shapes, 1))
-
-
-def train(shell: FrozenShell, box: Box, tolerance: float) -> ReducedModel:
+def train(solids: Solids, tolerance: float) -> ReducedModel:
     """The smallest reduced model whose stated error of the frequency stays below `tolerance` on its check designs.
 
     Raises
@@ -69,19 +41,19 @@ def train(shell: FrozenShell, box: Box, tolerance: float) -> ReducedModel:
         When no size of the basis reaches the tolerance.
     """
     rng = np.random.default_rng(2026)  # the designs of the training belong to the method
+    box = solids.box
     d = box.dimensions
-    learned = _solve(
-        shell, box, np.vstack([np.zeros((1, d)), _corners(d), _inside(rng, LEARNED, d), _on_faces(rng, LEARNED, d)])
-    )
-    checks = _solve(shell, box, np.vstack([_inside(rng, CHECKS, d), _on_faces(rng, CHECKS, d)]))
-    basis = span(shell, learned[1], SIZES[-1] + _tests(SIZES[-1]))
-    projected = Projected.on(shell, basis)
-    size = _choose_size(projected, (learned[1], checks[1]), tolerance, basis.shape[1])
-    tests = min(_tests(size), basis.shape[1] - size)
-    used = Projected.on(shell, basis[:, : size + tests])
-    for accuracy in (0.02, 0.002, 0.0002):
-        model = _fit(shell, box, used, size, tests, tolerance, accuracy)
-        model, worst = _state_error(model, shell, box, (learned, checks))
+    unit = np.vstack([np.zeros((1, d)), _corners(d), _inside(rng, LEARNED, d), _on_faces(rng, LEARNED, d)])
+    learned = solve_all(solids, box.designs(unit))
+    checks = solve_all(solids, box.designs(np.vstack([_inside(rng, CHECKS, d), _on_faces(rng, CHECKS, d)])))
+    basis = span(solids, learned, SIZES[-1] + _tests(SIZES[-1]))
+    projected = Projected.on(solids, basis)
+    sizes = _choose_sizes(projected, (learned, checks), tolerance, basis.shape[1])
+    for size, accuracy in [(sizes[0], 0.02), *((size, 0.002) for size in sizes), (sizes[-1], 0.0002)]:
+        tests = min(_tests(size), basis.shape[1] - size)
+        used = Projected.on(solids, basis[:, : size + tests])
+        model = _fit(used, size, tests, tolerance, accuracy)
+        model, worst = _state_error(model, solids, (learned, checks))
         if worst / 2 < tolerance:
             return model
     raise ShellError(TOO_WIDE.format(SIZES[-1], tolerance))
@@ -99,19 +71,13 @@ def _on_faces(rng: np.random.Generator, count: int, d: int) -> Array:
     return np.clip(rng.uniform(-2, 2, (count, d)), -1, 1)
 
 
-def _solve(shell: FrozenShell, box: Box, unit: Array) -> tuple[Array, Snapshots]:
-    thickness, amplitudes, nu = box.designs(unit)
-    return unit, solve_all(shell, box.profile(thickness, amplitudes), nu)
-
-
 def _tests(size: int) -> int:
     return min(max(size // 2, 8), 12)
 
 
-def _choose_size(projected: Projected, solved: tuple[Snapshots, ...], tolerance: float, most: int) -> int:
-    """The fewest vectors with which the estimate leaves some room below the tolerance."""
-    parts = [projected.at(one.h) for one in solved]
-    operators = [pencils(part, one.nu, projected.shell.plane_stress) for part, one in zip(parts, solved, strict=True)]
+def _choose_sizes(projected: Projected, solved: tuple[Snapshots, ...], tolerance: float, most: int) -> list[int]:
+    """The fewest vectors with which the estimate leaves some room below the tolerance, and the next more."""
+    operators = [projected.pencils(one.designs) for one in solved]
     for size in SIZES:
         tests = min(_tests(size), most - size)
         if tests < 1:
@@ -119,30 +85,29 @@ def _choose_size(projected: Projected, solved: tuple[Snapshots, ...], tolerance:
         worst, ratio = 0.0, 0.0
         for (K, M), one in zip(operators, solved, strict=True):
             mu, delta, _ = rayleigh_ritz(K, M, size, tests)
-            error = abs(mu * (1 - delta) / _scaled(one, projected.shell) - 1)
+            error = abs(mu * (1 - delta) / _scaled(one, projected.solids.shell.plane_stress) - 1)
             large = delta > 0.1 * np.max(delta)
             ratio = max(ratio, float(np.max(error[large] / delta[large])))
             worst = max(worst, float(np.max(delta)))
-        if SAFETY * ratio * worst / 2 < ROOM * tolerance:
-            return size
+        if (SAFETY * ratio * worst + projected.solids.error) / 2 < ROOM * tolerance:
+            return [other for other in SIZES if size <= other < most][:MORE]
     raise ShellError(TOO_WIDE.format(SIZES[-1], tolerance))
 
 
-def _scaled(one: Snapshots, shell: FrozenShell) -> Array:
+def _scaled(one: Snapshots, plane_stress: bool) -> Array:
     """ω² per unit G instead of E."""
-    return one.eigenvalues / lame(np.ones_like(one.nu), one.nu, shell.plane_stress)[1]
+    nu = one.designs.nu
+    return one.eigenvalues / lame(np.ones_like(nu), nu, plane_stress)[1]
 
 
-def _fit(
-    shell: FrozenShell, box: Box, projected: Projected, r: int, w: int, tolerance: float, accuracy: float
-) -> ReducedModel:
+def _fit(projected: Projected, r: int, w: int, tolerance: float, accuracy: float) -> ReducedModel:
     """Choose the features and fit every reduced entry that is needed to them."""
+    box, solids = projected.solids.box, projected.solids
     d, rng = box.dimensions, np.random.default_rng(2027)
     unit = np.vstack([_corners(d), _inside(rng, FEATURE_DESIGNS, d), _on_faces(rng, FEATURE_DESIGNS, d)])
-    thickness, amplitudes, nu = box.designs(unit)
-    trace, shear, mass = projected.at(box.profile(thickness, amplitudes))
-    K, M = pencils((trace, shear, mass), nu, shell.plane_stress)
-    mu, _, c = rayleigh_ritz(K, M, r, w)
+    designs = box.designs(unit)
+    trace, shear, mass = projected.at(designs)
+    mu, _, c = rayleigh_ritz(*projected.pencils(designs), r, w)
     rows = _entries(r, w)
     # what an error of an entry does to μ: its coefficients; a residual counts as the root of the tolerance
     weight = np.concatenate([np.max(abs(c), axis=0), np.full(w, np.sqrt(tolerance))])
@@ -152,15 +117,39 @@ def _fit(
     targets = np.concatenate([(kind[:, *rows] * pair) for kind in (trace, shear, typical * mass)], axis=1)
     reference = float(np.sqrt(box.thickness[0] * box.thickness[1]))
     # the thickness order sets the highest power; 1 + ζ κ and 1 + ζ n_r/r add small higher ones
-    powers = tuple(range(1, 2 * max(shell.system.level.through) + 6, 2))
-    features = _choose_features(box, powers, thickness / reference, amplitudes, targets, accuracy * tolerance)
-    g = features.evaluate(thickness / reference, amplitudes.T)
+    powers = tuple(range(1, 2 * max(solids.shell.system.level.through) + 6, 2))
+    relative = designs.thickness / reference
+    features = _choose_features(box, powers, relative, designs.amplitudes, targets, accuracy * tolerance)
+    g = features.evaluate(relative, designs.amplitudes.T)
     fit = np.linalg.pinv(g.T, rcond=1e-13)
     by_trace, by_shear = ((fit @ kind[:, *rows]).T for kind in (trace, shear))
     by_mass = _fit_mass(mass[:, *rows], g, features, typical * pair, accuracy * tolerance)
-    ratio = np.divide(*lame(np.ones_like(nu), nu, shell.plane_stress))
-    start = np.linalg.lstsq(np.concatenate([g, ratio * g]).T, c / c[:, :1], rcond=1e-10)[0].T
-    return ReducedModel(features, np.hstack([by_shear, by_trace]), by_mass, start, r, w, reference, 1.0, 0.0)
+    polynomials, stiff, heavy = _choose_terms(projected, rows, pair, typical * pair, accuracy * tolerance)
+    stiffness, inertia = np.hstack([stiff, by_shear, by_trace]), np.hstack([heavy, by_mass])
+    model = ReducedModel(polynomials, features, stiffness, inertia, np.zeros(0), r, w, reference, 1.0, 0.0)
+    terms = model.terms(designs.thickness, designs.amplitudes.T, designs.stem, designs.nu, projected.ratio(designs.nu))
+    start = np.linalg.lstsq(terms.T, c / c[:, :1], rcond=1e-10)[0].T
+    return replace(model, start=np.asarray(start))
+
+
+def _choose_terms(
+    projected: Projected, rows: tuple[Array, Array], stiff_weight: Array, heavy_weight: Array, accuracy: float
+) -> tuple[tuple[Polynomials, ...], Array, Array]:
+    """Leave out the polynomials of the solid parts that together do no more than `accuracy` to any entry."""
+    chosen: list[Polynomials] = []
+    K: list[Array] = [np.zeros((len(stiff_weight), 0))]
+    M: list[Array] = [np.zeros((len(stiff_weight), 0))]
+    for one, (stiff, heavy) in zip(projected.solids.parts, projected.parts, strict=True):
+        by_term, heavy_by_term = stiff[:, *rows], heavy[:, *rows]
+        size = np.linalg.norm(by_term * stiff_weight, axis=1) + np.linalg.norm(heavy_by_term * heavy_weight, axis=1)
+        order = np.argsort(size)
+        kept = np.ones(len(size), dtype=bool)
+        kept[order[np.cumsum(size[order]) < accuracy]] = False
+        polynomials, numbers = one.polynomials.part(kept)
+        chosen.append(polynomials)
+        K.append(by_term[numbers].T)
+        M.append(heavy_by_term[numbers].T)
+    return tuple(chosen), np.hstack(K), np.hstack(M)
 
 
 def _fit_mass(entries: Array, g: Array, features: Features, weight: Array, accuracy: float) -> Array:
@@ -214,16 +203,13 @@ def _choose_features(
     return Features(base[stations], slopes[stations], places)
 
 
-def _state_error(
-    model: ReducedModel, shell: FrozenShell, box: Box, solved: tuple[tuple[Array, Snapshots], ...]
-) -> tuple[ReducedModel, float]:
-    """Hold the model against every design that was solved in full: slope and floor of its error; the largest stated."""
+def _state_error(model: ReducedModel, solids: Solids, solved: tuple[Snapshots, ...]) -> tuple[ReducedModel, float]:
+    """Hold the model against every design that was solved: slope and floor of its error; the largest stated."""
     errors: list[Array] = []
     deltas: list[Array] = []
-    for unit, one in solved:
-        thickness, amplitudes, nu = box.designs(unit)
-        value, delta = evaluate_many(model, thickness, amplitudes, nu, shell.plane_stress)
-        errors.append(abs(value / _scaled(one, shell) - 1))
+    for one in solved:
+        value, delta = evaluate_many(model, one.designs, solids.shell.plane_stress)
+        errors.append(abs(value / _scaled(one, solids.shell.plane_stress) - 1))
         deltas.append(delta)
     error, delta = np.concatenate(errors), np.concatenate(deltas)
     if not np.all(np.isfinite(delta)):  # the features were too coarse for a definite stiffness
@@ -231,24 +217,22 @@ def _state_error(
     large = delta > 0.1 * np.max(delta)
     slope = SAFETY * float(np.max(error[large] / delta[large]))
     floor = SAFETY * float(max(np.max(error - slope * delta), np.max(error[delta <= np.median(delta)])))
-    floor = max(floor, 1e-12)
+    floor = max(floor, 1e-12) + solids.error
     return replace(model, slope=slope, floor=floor), slope * float(np.max(delta)) + floor
 
 
-def evaluate_many(
-    model: ReducedModel, thickness: Array, amplitudes: Array, nu: Array, plane_stress: bool
-) -> tuple[Array, Array]:
+def evaluate_many(model: ReducedModel, designs: Designs, plane_stress: bool) -> tuple[Array, Array]:
     """ω² ρ/G and its error estimate for any number of designs, in chunks of fixed size."""
-    value, error = np.empty(len(thickness)), np.empty(len(thickness))
-    ratio = np.divide(*lame(np.ones_like(nu), nu, plane_stress))
-    for first in range(0, len(thickness), CHUNK):
+    count = len(designs)
+    value, error = np.empty(count), np.empty(count)
+    ratio = np.divide(*lame(np.ones_like(designs.nu), designs.nu, plane_stress))
+    rows = (designs.thickness, designs.amplitudes.T, designs.stem, designs.nu, ratio)
+    for first in range(0, count, CHUNK):
         there = slice(first, first + CHUNK)
-        short = CHUNK - len(thickness[there])
-        padded = (
-            np.pad(thickness[there], (0, short), mode="edge"),
-            np.pad(amplitudes[there], ((0, short), (0, 0)), mode="edge"),
-            np.pad(ratio[there], (0, short), mode="edge"),
-        )
-        values, errors = model.evaluate(padded[0], np.ascontiguousarray(padded[1].T), padded[2])
+        chunk = [np.ascontiguousarray(row[..., there]) for row in rows]
+        short = CHUNK - chunk[0].shape[-1]
+        if short:
+            chunk = [np.pad(row, [(0, 0)] * (row.ndim - 1) + [(0, short)], mode="edge") for row in chunk]
+        values, errors = model.evaluate(*chunk)
         value[there], error[there] = values[: CHUNK - short], errors[: CHUNK - short]
     return value, error

@@ -1,8 +1,9 @@
-"""Many designs at once through reduced bases (`shell.family`): frequency and TCF of shells without solid parts.
+"""Many designs at once through reduced bases (`shell.family`): frequency and TCF.
 
-A family holds the ranges of thickness over radius and of ν that a study needs. E, ρ, radius and growth with
-temperature follow exactly, f = √(E/ρ)/R F(h/R, ν), so that only F is reduced; its error is estimated for each design,
-and a design whose estimate is too large is solved in full. No result depends on the other designs of its batch.
+A family holds the ranges of thickness over radius, of stem over radius and of ν that a study needs. E, ρ, radius and
+growth with temperature follow exactly, f = √(E/ρ)/R F(h/R, a/R, ν) with the stem's own lengths a, so that only F is
+reduced; its error is estimated for each design, and a design whose estimate is too large is solved in full. No result
+depends on the other designs of its batch.
 """
 
 import time
@@ -14,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from shell.family import Family, build_family
+from shell.family import Family, FamilyResult, build_family
 from studies.errors import UNUSABLE_INPUT, InputError
 from studies.instrument.card import ZERO_CELSIUS, Instrument
 from studies.sweeps.parameters import TEMPERATURE, set_parameters
@@ -28,11 +29,13 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 Designs = Sequence[Mapping[str, Any]]
+THICKNESS = "resonator.thickness_mm"
 QUANTITIES = ("frequency", "tcf")
 FEWEST = 64  # cases from which training a basis costs less than solving each design
 TOLERANCE = 1e-6  # of the basis against the full solve; hardly slower to train than a coarse one, and slopes need it
 STEP_H = 2e-3  # relative step of the thickness, and step of ν, for the slopes that the TCF needs
 STEP_NU = 2e-3
+WHATEVER = 0.1  # amplitude of no shape
 STEEPEST = 10.0  # change of the discretisation's error per e-fold of h, or unit of ν, over itself; 2 to 3 were seen
 TEMPERATURES = 9  # at which the range of ν is looked at
 PROPERTIES = ("youngs_modulus", "poisson_ratio", "density")
@@ -63,10 +66,16 @@ class Families:
 
 @dataclass(frozen=True)
 class _Bodies:
-    """Designs as arrays (m,): thickness h and size R (m) at the reference temperature, growth, T (K), materials."""
+    """Designs as arrays (m,): thickness h and size R (m) at the reference temperature, growth, T (K), materials.
+
+    wall : (m, 1) what a cup's wall has more than the card's, over the card's largest thickness; else (m, 0).
+    stem : lengths of the stem over those that would go with the radius.
+    """
 
     h: Array
+    wall: Array
     R: Array
+    stem: Array
     T: Array
     growth: Array
     E: Array
@@ -78,7 +87,7 @@ class _Bodies:
 def why_not(study: "Study") -> str:
     """Return why a study cannot be computed through families, or nothing when it can."""
     card = study.instrument.content["resonator"]
-    allowed = {"resonator.thickness_mm", TEMPERATURE, *(f"material.{key}" for key in ("name", "law", "file"))}
+    allowed = {THICKNESS, TEMPERATURE, *(f"material.{key}" for key in ("name", "law", "file"))}
     allowed |= {f"material.{key}" for key in ("youngs_modulus_GPa", "poisson_ratio", "density_kg_m3")}
     if card["shape"] == "hemisphere":
         allowed.add("resonator.radius_mm")  # the one length beside the thickness
@@ -109,8 +118,9 @@ def build_families(study: "Study", design: "Design") -> "Families | str":
         bodies = _describe(study.instrument, _ends(study, design), None)
     except UNUSABLE_INPUT as error:
         return str(error).rstrip(".")
-    size = study.instrument.resonator.size
-    relative = bodies.h / bodies.R * size
+    resonator = study.instrument.resonator
+    relative = bodies.h / bodies.R * resonator.size
+    stem = (float(bodies.stem.min()), float(bodies.stem.max())) if resonator.stem else (1.0, 1.0)
     thickness = (float(relative.min()) * (1 - 2 * STEP_H), float(relative.max()) * (1 + 2 * STEP_H))
     nu = (float(bodies.nu.min()) - 2 * STEP_NU, float(bodies.nu.max()) + 2 * STEP_NU)
     members: dict[tuple[int, str], Family] = {}
@@ -119,9 +129,12 @@ def build_families(study: "Study", design: "Design") -> "Families | str":
         if key not in members:
             try:
                 members[key] = build_family(
-                    study.instrument.resonator,
+                    resonator,
                     thickness=thickness,
                     nu=nu,
+                    shapes=_wall(study.instrument) if bodies.wall.any() else (),
+                    amplitude=float(abs(bodies.wall).max(initial=0.0)) * (1 + 1e-9) or WHATEVER,
+                    stem=stem,
                     harmonic=key[0],
                     theory=options["theory"],
                     tolerance=TOLERANCE,
@@ -155,11 +168,21 @@ def choose_solver(study: "Study", design: "Design") -> "Families | None":
 def _frequency(families: Families, options: "Options", designs: Designs) -> tuple[Array, Array]:
     bodies = _describe(families.instrument, designs, options["temperature_degC"])
     family = families.members[options["harmonic"], options["theory"]]
-    found = family.evaluate(
-        thickness=bodies.h * bodies.growth, radius=bodies.R * bodies.growth, nu=bodies.nu, E=bodies.E, rho=bodies.rho
-    )
+    found = _evaluate(family, bodies, bodies.h, bodies.nu, bodies.growth)
     error = found.frequency * (found.relative_error_estimate + found.theory_error)
     return found.frequency[:, None], error[:, None]
+
+
+def _evaluate(family: Family, bodies: _Bodies, h: Array, nu: Array, growth: Array) -> FamilyResult:
+    return family.evaluate(
+        thickness=h * growth,
+        shapes=bodies.wall[:, : family.shape_count],
+        radius=bodies.R * growth,
+        stem=bodies.stem,
+        nu=nu,
+        E=bodies.E,
+        rho=bodies.rho,
+    )
 
 
 def _tcf(families: Families, options: "Options", designs: Designs) -> tuple[Array, Array]:
@@ -168,7 +191,7 @@ def _tcf(families: Families, options: "Options", designs: Designs) -> tuple[Arra
     family = families.members[options["harmonic"], options["theory"]]
 
     def logarithm(h: Array, nu: Array) -> tuple[Array, Array]:
-        found = family.evaluate(thickness=h, radius=bodies.R, nu=nu, E=bodies.E, rho=bodies.rho)
+        found = _evaluate(family, bodies, h, nu, np.ones_like(h))
         return np.log(found.frequency), found.relative_error_estimate
 
     (thick, e1), (thin, e2) = (logarithm(bodies.h * (1 + sign * STEP_H), bodies.nu) for sign in (1, -1))
@@ -207,9 +230,14 @@ def _describe(instrument: Instrument, designs: Designs, temperature_degC: float 
     """Return designs as arrays; one material for all that share its parameters."""
     count, reference = len(designs), instrument.reference_temperature
     own = max(value for _, value in instrument.resonator.thickness)
-    h = _column(designs, "resonator.thickness_mm", 1e3 * own) * 1e-3
-    at_card = instrument.content["resonator"].get("radius_mm", 1.0)
-    R = _column(designs, "resonator.radius_mm", at_card) / at_card * instrument.resonator.size
+    table = instrument.content["resonator"]
+    h, wall = np.full(count, own), np.zeros((count, 0))
+    if "bottom_thickness_mm" not in table:
+        h = _column(designs, THICKNESS, 1e3 * own) * 1e-3
+    elif THICKNESS in designs[0]:  # a cup's thickness is that of its wall
+        wall = (_column(designs, THICKNESS, 0.0) - table["thickness_mm"])[:, None] * 1e-3 / own
+    at_card = table.get("radius_mm", 1.0)
+    enlarged = _column(designs, "resonator.radius_mm", at_card) / at_card
     if temperature_degC is None:
         T = _column(designs, TEMPERATURE, reference - ZERO_CELSIUS) + ZERO_CELSIUS
     else:
@@ -228,7 +256,15 @@ def _describe(instrument: Instrument, designs: Designs, temperature_degC: float 
         for place in places:
             materials[place] = material
     E, nu, rho, growth = constants
-    return _Bodies(h, R, T, growth, E, nu, rho, materials)
+    R = enlarged * instrument.resonator.size
+    stem = 1 / enlarged if instrument.resonator.stem else np.ones(count)
+    return _Bodies(h, wall, R, stem, T, growth, E, nu, rho, materials)
+
+
+def _wall(instrument: Instrument) -> tuple[tuple[tuple[float, float], ...]]:
+    """Return the shape that adds to the wall of a cup and not to its bottom."""
+    foot = instrument.resonator.thickness[1][0]
+    return (((0.0, 0.0), (foot, 0.0), (foot, 1.0), (1.0, 1.0)),)
 
 
 def _column(designs: Designs, name: str, default: float) -> Array:

@@ -195,7 +195,10 @@ def _describe(store: Store, study: Study, design: Design, identity: Mapping[str,
 
 
 def _describe_families(families: Families) -> list[Any]:
-    return [[*key, family.thickness, family.nu, family.tolerance] for key, family in families.members.items()]
+    return [
+        [*key, family.thickness, family.nu, family.stem, family.amplitude, family.tolerance]
+        for key, family in families.members.items()
+    ]
 
 
 def _run(store: Store, study: Study, design: Design, base: str, plan: Plan, crew: Workers, show_progress: bool) -> None:

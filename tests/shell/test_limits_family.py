@@ -10,7 +10,7 @@ import pytest
 from shell.elastic import Elastic
 from shell.errors import ShellError
 from shell.family import build_family
-from shell.meridian import Resonator, Stem, hemisphere
+from shell.meridian import Resonator, hemisphere
 from shell.modes import solve_modes
 from shell.profiles import Profiles
 
@@ -127,18 +127,6 @@ def test_designs_beyond_the_tolerance_are_solved_in_full(shell_family):
     chosen = strict.solved_in_full
     np.testing.assert_array_equal(strict.frequency[chosen], full.frequency[chosen])
     np.testing.assert_array_equal(strict.frequency[~chosen], loose.frequency[~chosen])
-
-
-def test_a_stem_is_solved_in_full_and_says_so():
-    stemmed = hemisphere(15e-3, 0.9e-3, support="stem", stem=Stem(2.5e-3, -5e-3, 0.5e-3))
-    family = build_family(stemmed, thickness=(0.8e-3, 1e-3), nu=(0.15, 0.19))
-    assert "solid parts" in family.reason
-    found = family.evaluate(thickness=0.85e-3, nu=0.17, E=E, rho=RHO)
-    (mode,) = solve_modes(stemmed.thickened(0.85 / 0.9), Elastic(E, 0.17, RHO), tolerance=family.tolerance)
-    assert found.solved_in_full[0]
-    assert found.frequency[0] == pytest.approx(mode.frequency, rel=1e-9)
-    with pytest.raises(ShellError, match="position, value"):
-        build_family(stemmed, thickness=(0.8e-3, 1e-3), nu=(0.15, 0.19), shapes=(np.cos,))
 
 
 @pytest.mark.parametrize(
