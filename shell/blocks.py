@@ -8,9 +8,9 @@ from numpy.typing import NDArray
 
 from shell.constraints import Index, Rows
 from shell.kernel import Orders, StrainTable, block_table
-from shell.meridian import MeridianPoints
 from shell.patches import Part, Patch
 from shell.quadrature import Array, gauss, hierarchic, interpolate_hierarchic, legendre, lobatto, nodal
+from shell.resonator import MeridianPoints
 
 
 @dataclass(frozen=True, eq=False)

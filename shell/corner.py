@@ -8,9 +8,9 @@ from scipy.optimize import root
 from shell.blocks import Solid
 from shell.errors import ShellError
 from shell.layout import SMOOTH_JOINT
-from shell.meridian import MeridianPoints, Resonator
 from shell.patches import Cell, Part, Patch, Path, rings, shrinking, straight, whole
 from shell.quadrature import Array
+from shell.resonator import MeridianPoints, Resonator
 
 Spot = tuple[float, float]
 

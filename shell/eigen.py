@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.linalg import blas, lapack
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import reverse_cuthill_mckee
@@ -46,32 +47,39 @@ class Pattern:
 def find_pattern(unknowns: list[Index], size: int) -> Pattern:
     """Split the unknowns of every element and order the shared ones (reverse Cuthill-McKee)."""
     uses = np.bincount(np.concatenate(unknowns), minlength=size)
-    is_shared = uses > 1
-    order = tuple(np.argsort(is_shared[members], kind="stable") for members in unknowns)
-    unknowns = [members[first] for members, first in zip(unknowns, order, strict=True)]
-    own = tuple(int(np.sum(uses[members] == 1)) for members in unknowns)
-    shared = np.flatnonzero(is_shared)
-    number = np.cumsum(is_shared) - 1
-    where = [number[members[k:]] for members, k in zip(unknowns, own, strict=True)]
+    shared = np.flatnonzero(uses > 1)
+    place = np.full(size, -1, dtype=np.intp)  # in the band; -1 for an element's own
+    place[shared] = np.arange(len(shared))
     if len(shared):
-        place = _in_a_narrow_band(where, len(shared))
-        where, shared = [place[w] for w in where], shared[np.argsort(place)]
-    band = max((int(np.ptp(w)) for w in where if len(w)), default=0)
+        ranks = _in_a_narrow_band([place[members][place[members] >= 0] for members in unknowns], len(shared))
+        place[shared] = ranks
+        shared = shared[np.argsort(ranks)]
+    order = tuple(np.argsort(place[members], kind="stable") for members in unknowns)
+    unknowns = [members[first] for members, first in zip(unknowns, order, strict=True)]
+    own = tuple(int(np.count_nonzero(place[members] < 0)) for members in unknowns)
+    where = [place[members[k:]] for members, k in zip(unknowns, own, strict=True)]
+    band = max((int(w[-1] - w[0]) for w in where if len(w)), default=0)
     is_whole = len(unknowns) == 1 and np.array_equal(unknowns[0], np.arange(size))
     entries = []
     for w in where:
-        rows, columns = np.nonzero(w[:, None] >= w)
-        entries.append((w[rows] - w[columns] + (band + 1) * w[columns], rows * len(w) + columns))
+        rows, columns, source = _lower_triangle(len(w))
+        entries.append((w[rows] + band * w[columns], source))
     return Pattern(tuple(unknowns), order, own, tuple(where), tuple(entries), shared, size, band, is_whole)
+
+
+@lru_cache(maxsize=64)
+def _lower_triangle(size: int) -> tuple[Index, Index, Index]:
+    """Rows, columns and flat places of the lower triangle of a matrix."""
+    rows, columns = np.tril_indices(size)
+    return rows, columns, rows * size + columns
 
 
 def _in_a_narrow_band(elements: list[Index], size: int) -> Index:
     """Places of unknowns in an order (reverse Cuthill-McKee) in which those of one element lie near one another."""
     # unknowns that the same elements share stay together
-    rng = np.random.default_rng(3)
     marks = np.zeros(size, dtype=np.uint64)
-    for members in elements:
-        marks[members] += rng.integers(2**63, dtype=np.uint64)
+    for members, mark in zip(elements, _marks(len(elements)), strict=True):
+        marks[members] += mark
     _, bundle = np.unique(marks, return_inverse=True)
     known = [np.unique(bundle[members]) for members in elements]
     owner = np.repeat(np.arange(len(known)), [len(k) for k in known])
@@ -201,6 +209,12 @@ class Iteration:
         x = lapack.dorgqr(reflectors, tau)[0]
         L = _cholesky(x.T @ apply_mass(self.pattern, self.mass, x))
         return np.asarray(blas.dtrsm(1.0, L, x, side=1, lower=1, trans_a=1))
+
+
+@lru_cache(maxsize=16)
+def _marks(count: int) -> NDArray[np.uint64]:
+    """Numbers whose sums tell every set of elements from every other one."""
+    return np.random.default_rng(3).integers(2**63, size=count, dtype=np.uint64)
 
 
 @lru_cache(maxsize=16)

@@ -6,9 +6,11 @@ from math import pi
 
 import numpy as np
 
-from shell.assembly import LEVELS, Group, Level, SolidPart, build_system
-from shell.meridian import Resonator
+from shell.assembly import build_system
+from shell.levels import LEVELS, Level
 from shell.quadrature import Array, gauss, nodal
+from shell.resonator import Resonator
+from shell.system import Group, SolidPart
 
 
 @dataclass(frozen=True)

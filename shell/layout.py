@@ -6,7 +6,7 @@ from typing import Literal
 
 import numpy as np
 
-from shell.meridian import Resonator
+from shell.resonator import Resonator
 
 End = Literal["pole", "free", "clamped", "tied"]
 

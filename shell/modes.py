@@ -10,12 +10,13 @@ from math import pi, sqrt
 
 import numpy as np
 
-from shell.assembly import Theory, build_system
+from shell.assembly import build_system
 from shell.curves import Arc
 from shell.elastic import Elastic, VaryingElastic
 from shell.errors import ShellError
-from shell.meridian import Resonator
+from shell.levels import Theory
 from shell.refinement import refine
+from shell.resonator import Resonator
 from shell.sampling import ShapePatch, sample_shape
 from shell.solution import AlongMeridian, EnergyFractions, Solution, total
 

@@ -11,14 +11,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from shell.assembly import LEVELS, SolidPart, System, _sections, build_system
+from shell.assembly import build_system, sections
 from shell.blocks import SIDES, Mesh
 from shell.errors import ShellError
 from shell.kernel import StrainTable, block_table, displacements, energy_weights, shell_table, strains
 from shell.layout import Chain
-from shell.meridian import Resonator
+from shell.levels import LEVELS
 from shell.quadrature import Array, hierarchic, legendre, nodal
+from shell.resonator import Resonator
 from shell.solution import Solution
+from shell.system import SolidPart, System
 
 if TYPE_CHECKING:
     from shell.modes import Mode
@@ -145,7 +147,7 @@ class _Sides:
         if self.solution is None:
             return _bare(r, z, position)
         level = self.system.level
-        section = _sections(self.resonator, one, xi * INSIDE, np.ones_like(xi))
+        section = sections(self.resonator, one, xi * INSIDE, np.ones_like(xi))
         u, v, w = (legendre(order, eta * INSIDE) for order in level.through)
         points = eta * INSIDE, np.ones_like(eta)
         table = shell_table(section, self.system.n, (u, v, w), points, nodal(level.along, xi * INSIDE))

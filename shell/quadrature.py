@@ -67,7 +67,7 @@ def interpolate_hierarchic(degree: int, values: Array) -> Array:
 @cache
 def _to_modes(degree: int) -> Array:
     """Legendre coefficients of the Lagrange polynomials."""
-    return np.linalg.inv(series.legvander(lobatto(degree), degree))
+    return np.asarray(np.linalg.inv(series.legvander(lobatto(degree), degree)), dtype=float)
 
 
 @cache

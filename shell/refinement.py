@@ -5,12 +5,14 @@ from math import sqrt
 
 import numpy as np
 
-from shell.assembly import LEVELS, Level, ShellPart, System, Theory, build_system
+from shell.assembly import build_system
 from shell.eigen import Iteration, Pattern
 from shell.elastic import Elastic, VaryingElastic
-from shell.meridian import Resonator
+from shell.levels import LEVELS, Level, Theory
 from shell.quadrature import Array, lobatto, nodal
+from shell.resonator import Resonator
 from shell.solution import Constants, Solution, total
+from shell.system import ShellPart, System
 
 TRUE_DIFFERENCE = 0.1  # error of the difference between two levels over the difference
 MOST_SOLID = 0.1  # share of the kinetic energy in solid parts up to which a vector is carried to the next level

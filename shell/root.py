@@ -21,9 +21,9 @@ from scipy.optimize import brentq
 
 from shell.blocks import Solid
 from shell.errors import ShellError
-from shell.meridian import Resonator, Stem
 from shell.patches import Patch, Path, Planar, circular, layers, rings, shrinking, straight, whole
 from shell.quadrature import Array
+from shell.resonator import Resonator, Stem
 
 Spot = tuple[float, float]
 

@@ -5,10 +5,10 @@ from itertools import pairwise
 
 import numpy as np
 
-from shell.assembly import Group, ShellPart, SolidPart
-from shell.meridian import Resonator
 from shell.quadrature import Array, hierarchic, legendre, nodal
+from shell.resonator import Resonator
 from shell.solution import Solution
+from shell.system import Group, ShellPart, SolidPart
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,9 +6,9 @@ from math import pi
 
 import numpy as np
 
-from shell.assembly import Group, ShellPart, System
 from shell.kernel import displacements, energy_weights, lame, lame_slopes, shell_table, strains
 from shell.quadrature import Array, Basis, legendre
+from shell.system import Group, ShellPart, System
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from shell.meridian import Resonator
 from shell.outline import Outline, trace_outlines
 from shell.quadrature import Array
+from shell.resonator import Resonator
 
 if TYPE_CHECKING:
     from shell.modes import Mode

@@ -19,8 +19,8 @@ from shell.elastic import Elastic
 from shell.materials import Material
 
 if TYPE_CHECKING:
-    from shell.assembly import Theory
-    from shell.meridian import Resonator
+    from shell.levels import Theory
+    from shell.resonator import Resonator
 
 
 @dataclass(frozen=True)
@@ -62,18 +62,6 @@ class TemperatureCoefficient:
     def total(self) -> float:
         """The slope d ln f / dT, in 1/K."""
         return self.E + self.nu + self.rho + self.h + self.r
-
-
-def rayleigh_model(n: int, h: float, R: float, phi_1: float = 0.0, phi_2: float = np.pi / 2) -> Model:
-    """Return f of Rayleigh's closed form (HRG paper eq. 13), for h and R in m."""
-    from shell.rayleigh import rayleigh_frequency, rayleigh_log_derivatives
-
-    def model(elastic: Elastic) -> FrequencyGradient:
-        f = float(rayleigh_frequency(n, elastic.E, elastic.nu, elastic.rho, h, R, phi_1, phi_2))
-        slopes = rayleigh_log_derivatives(n, elastic.nu, phi_1, phi_2)
-        return FrequencyGradient(f, slopes.nu, slopes.h)
-
-    return model
 
 
 def mode_model(resonator: "Resonator", harmonic: int = 2, theory: "Theory" = "solid") -> Model:

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from studies.record import Record
 
 TEMPERATURES = ("housing_temperature_degC", "resonator_temperature_degC", "chamber_temperature_degC")
-CELSIUS_ZERO = 273.15
+ZERO_CELSIUS = 273.15
 MOST_ROWS = 20_000
 """Rows beyond which a run is averaged in blocks before a fit: temperature is slow, and noise averages."""
 LEAST_SPIKE = 1e-3
@@ -61,7 +61,7 @@ def celsius_range(lowest: float, highest: float) -> tuple[float, float]:
     """Return a fitted range (K) in °C so that the readings at its ends lie inside, whatever rounding kelvin brought."""
     ends = []
     for kelvin, outward in ((lowest, -1.0), (highest, 1.0)):
-        exact = kelvin - CELSIUS_ZERO
+        exact = kelvin - ZERO_CELSIUS
         short = round(exact, 9)
         ends.append(short if abs(short - exact) < 1e-11 else exact + outward * 1e-9)
     return ends[0], ends[1]
@@ -112,5 +112,5 @@ def gather_rest(records: "Sequence[Record]", outputs: "dict[str, float]") -> Res
             blocks = average_blocks(time, {"output": values, "temperature": temperature}, width)
             time, values, temperature = blocks.time, blocks.columns["output"], blocks.columns["temperature"]
             widest = max(widest, width)
-        runs.append(RestRun(time, values * outputs[output], temperature + CELSIUS_ZERO))
+        runs.append(RestRun(time, values * outputs[output], temperature + ZERO_CELSIUS))
     return RestData(tuple(runs), output, column, left_out, widest)

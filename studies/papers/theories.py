@@ -4,8 +4,8 @@ import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from shell.assembly import Theory
 from shell.elastic import Elastic
+from shell.levels import Theory
 from shell.materials import find_material
 from shell.meridian import hemisphere
 from shell.modes import TheoryRangeWarning, solve_modes

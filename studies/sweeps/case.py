@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 from studies.instrument.card import ZERO_CELSIUS, Instrument
 
 if TYPE_CHECKING:
-    from shell.assembly import Theory
+    from shell.levels import Theory
     from shell.modes import Mode
 
 Options = Mapping[str, Any]

@@ -19,8 +19,9 @@ from pathlib import Path
 
 import numpy as np
 
-from shell.assembly import LEVELS, build_system
+from shell.assembly import build_system
 from shell.elastic import Elastic
+from shell.levels import LEVELS
 from shell.meridian import hemisphere
 from shell.modes import solve_modes
 

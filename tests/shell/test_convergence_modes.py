@@ -6,10 +6,11 @@ from math import log10, pi, sqrt
 import numpy as np
 import pytest
 
-from shell.assembly import LEVELS, Level, Theory, build_system
+from shell.assembly import build_system
 from shell.eigen import lowest_vectors
 from shell.elastic import Elastic
 from shell.kernel import lame
+from shell.levels import LEVELS, Level, Theory
 from shell.meridian import Resonator, Stem, bell, cylinder, hemisphere
 from shell.modes import solve_modes
 from shell.solution import Constants, Solution

@@ -10,11 +10,10 @@ from shell.temperature import (
     frequency_over_temperature,
     mode_model,
     over_poisson_ratio,
-    rayleigh_model,
     temperature_coefficients,
 )
 
-MODEL = rayleigh_model(2, 0.9e-3, 15e-3)
+MODEL = mode_model(hemisphere(15e-3, 0.9e-3), theory="rayleigh")
 
 
 @pytest.mark.parametrize("law", ["spinner", "gwinc", "drawn-fibre"])

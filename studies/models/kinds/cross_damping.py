@@ -14,7 +14,7 @@ from studies.errors import InputError
 from studies.models.c_source import head, polynomial
 from studies.models.file import Model, Part, Source, make_part
 from studies.record import COMPENSATED, Record
-from studies.rest import CELSIUS_ZERO, celsius_range
+from studies.rest import ZERO_CELSIUS, celsius_range
 
 if TYPE_CHECKING:
     from compensation.cross_damping import CrossDampingModel
@@ -35,7 +35,7 @@ def save_cross_damping(
         compensates=output,
         parts=(make_part("cross-damping", names, fit.coefficients, units, fit.covariance),),
         settings={
-            "calibration_temperature_degC": fit.calibration_temperature - CELSIUS_ZERO,
+            "calibration_temperature_degC": fit.calibration_temperature - ZERO_CELSIUS,
             "frequency_Hz": fit.k / (2 * math.pi),
             "relative_damping": fit.zeta,
             "g2": fit.g2,
@@ -58,12 +58,12 @@ def load_cross_damping(model: Model) -> "CrossDampingModel":
     return CrossDampingModel(
         coefficients=np.array(part.values),
         covariance=np.array(part.covariance) if part.covariance else np.full((len(part.values),) * 2, np.nan),
-        calibration_temperature=model.number("calibration_temperature_degC") + CELSIUS_ZERO,
+        calibration_temperature=model.number("calibration_temperature_degC") + ZERO_CELSIUS,
         k=2 * math.pi * model.number("frequency_Hz", above=0),
         zeta=model.number("relative_damping", above=0),
         g2=model.number("g2", above=0),
-        lowest=low + CELSIUS_ZERO,
-        highest=high + CELSIUS_ZERO,
+        lowest=low + ZERO_CELSIUS,
+        highest=high + ZERO_CELSIUS,
         noise=math.nan,
     )
 
@@ -82,7 +82,7 @@ def compensate(model: Model, record: Record, *, extrapolate: bool) -> dict[str, 
     if np.count_nonzero(known) < 2:
         raise InputError(f"the column '{column}' has fewer than two values; nothing can be compensated.")
     predicted = load_cross_damping(model).predict(
-        record["time_s"][known], temperature[known] + CELSIUS_ZERO, extrapolate=True
+        record["time_s"][known], temperature[known] + ZERO_CELSIUS, extrapolate=True
     )
     compensated = np.full(len(record), np.nan)
     compensated[known] = record[output][known] - predicted / OUTPUTS[output]

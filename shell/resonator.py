@@ -1,0 +1,280 @@
+"""The resonator: its middle surface as a chain of smooth curves in the (r, z) plane, thickness, support, stem.
+
+The pole of a dome is at z = +R. Along the chain the tangent is t = (t_r, t_z) and the normal n = (-t_z, t_r), which
+points outwards on a dome; the curvature κ of the meridian is positive where n points away from its centre.
+"""
+
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from math import hypot
+from typing import Literal, TypeAlias
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from shell.curves import Array, Curve
+from shell.errors import ShellError
+
+Support: TypeAlias = Literal["free", "clamped-pole", "clamped-rim", "stem", "clamped-face"]
+LONGEST_STEM = 100.0  # stem lengths over its radius that are meshed as a solid
+
+
+@dataclass(frozen=True)
+class Stem:
+    """A solid cylinder on the axis, joined to the dome at the pole.
+
+    Parameters
+    ----------
+    radius : stem radius, m.
+    ends : height z of the clamped end, m; for side "both" the pair (inner, outer).
+    fillet : radius of the root fillet, m; 0 for a sharp corner.
+    side : "inner", "outer" or "both".
+    """
+
+    radius: float
+    ends: float | tuple[float, float]
+    fillet: float = 0.0
+    side: Literal["inner", "outer", "both"] = "inner"
+
+    def __post_init__(self) -> None:
+        if self.side not in ("inner", "outer", "both"):
+            raise ShellError(f"the side of a stem is inner, outer or both, not {self.side!r}.")
+        if not self.radius > 0:
+            raise ShellError(f"the stem radius must be positive, not {self.radius:g} m.")
+        if not self.fillet >= 0:
+            raise ShellError(f"the fillet radius must be 0 or positive, not {self.fillet:g} m.")
+        if isinstance(self.ends, tuple) != (self.side == "both"):
+            raise ShellError("a stem on both sides needs two ends (inner, outer); on one side, one number.")
+
+    @property
+    def roots(self) -> tuple[tuple[Literal[-1, 1], float], ...]:
+        """The face it stands on (-1 inner, +1 outer) and the height of the clamped end, for each root."""
+        if isinstance(self.ends, tuple):
+            return (-1, self.ends[0]), (1, self.ends[1])
+        return (((1 if self.side == "outer" else -1), self.ends),)
+
+
+@dataclass(frozen=True)
+class MeridianPoints:
+    """Samples of the middle surface: arrays of equal shape, lengths in m, curvatures in 1/m.
+
+    `position` is the arc length divided by the whole length (0 at the start, 1 at the rim); `normal_r / r` is the second
+    principal curvature; `thickness_slope` is dh/ds.
+    """
+
+    position: Array
+    arc_length: Array
+    r: Array
+    z: Array
+    tangent_r: Array
+    tangent_z: Array
+    curvature: Array
+    thickness: Array
+    thickness_slope: Array
+
+    @property
+    def normal_r(self) -> Array:
+        """Radial component of the unit normal."""
+        return -self.tangent_z
+
+    @property
+    def normal_z(self) -> Array:
+        """Axial component of the unit normal."""
+        return self.tangent_r
+
+
+@dataclass(frozen=True)
+class Resonator:
+    """A shell of revolution: middle-surface meridian, thickness along it, support.
+
+    Parameters
+    ----------
+    segments : smooth curves, each starting where the one before ends.
+    thickness : (position, h) pairs, position in 0 ... 1 of the arc length, h in m, linear between them.
+    support : what is held; a clamp holds the edge through its thickness.
+    stem : only with support "stem".
+    clamp_radius : with support "clamped-face", the lower face is held within this radius, m.
+    """
+
+    segments: tuple[Curve, ...]
+    thickness: tuple[tuple[float, float], ...]
+    support: Support = "free"
+    stem: Stem | None = None
+    clamp_radius: float = 0.0
+    _starts: tuple[float, ...] = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        lengths = [segment.length for segment in self.segments]
+        object.__setattr__(self, "_starts", tuple(np.concatenate([[0.0], np.cumsum(lengths)]).tolist()))
+        _check_chain(self)
+        _check_thickness(self)
+        _check_support(self)
+
+    @property
+    def length(self) -> float:
+        """Arc length of the whole meridian, m."""
+        return self._starts[-1]
+
+    @cached_property
+    def size(self) -> float:
+        """Largest distance from the axis, m: the radius that h/R refers to."""
+        return float(np.max(self.sample(201).r))
+
+    @property
+    def joints(self) -> tuple[float, ...]:
+        """Arc lengths where one segment ends and the next begins."""
+        return self._starts[1:-1]
+
+    @property
+    def starts_on_axis(self) -> bool:
+        """Whether the meridian starts at a pole."""
+        return self.segments[0].end_points[0][0] <= 1e-9 * self.length
+
+    @property
+    def ends_on_axis(self) -> bool:
+        """Whether the meridian ends at a pole (a closed shell)."""
+        return self.segments[-1].end_points[1][0] <= 1e-9 * self.length
+
+    def at(self, arc_length: ArrayLike, segment: int | None = None) -> MeridianPoints:
+        """The middle surface at given arc lengths (m); at a joint, `segment` says on which of the two curves."""
+        s = np.atleast_1d(np.asarray(arc_length, dtype=float))
+        if segment is not None:
+            return self._on_segment(s, segment)
+        which = np.clip(np.searchsorted(np.array(self._starts), s, side="right") - 1, 0, len(self.segments) - 1)
+        joined = {name: np.empty_like(s) for name in MeridianPoints.__dataclass_fields__}
+        for k in np.unique(which):
+            piece = self._on_segment(s[which == k], int(k))
+            for name, values in joined.items():
+                values[which == k] = getattr(piece, name)
+        return MeridianPoints(**joined)
+
+    def sample(self, count: int) -> MeridianPoints:
+        """The middle surface at `count` equally spaced arc lengths, both ends included."""
+        return self.at(np.linspace(0.0, self.length, count))
+
+    def scaled(self, factor: float) -> "Resonator":
+        """The same resonator with every length multiplied by `factor`: free uniform thermal expansion."""
+        stem = self.stem and Stem(
+            self.stem.radius * factor,
+            tuple(end * factor for end in self.stem.ends)
+            if isinstance(self.stem.ends, tuple)
+            else self.stem.ends * factor,  # type: ignore[arg-type]
+            self.stem.fillet * factor,
+            self.stem.side,
+        )
+        return replace(
+            self,
+            segments=tuple(segment.scaled(factor) for segment in self.segments),
+            thickness=tuple((position, value * factor) for position, value in self.thickness),
+            stem=stem,
+            clamp_radius=self.clamp_radius * factor,
+        )
+
+    def thickened(self, factor: float) -> "Resonator":
+        """The same middle surface and support with every thickness multiplied by `factor`."""
+        return replace(self, thickness=tuple((position, value * factor) for position, value in self.thickness))
+
+    def _on_segment(self, s: Array, segment: int) -> MeridianPoints:
+        jet = self.segments[segment].at_length(s - self._starts[segment])
+        speed = np.hypot(jet.dr, jet.dz)
+        t_r, t_z = jet.dr / speed, jet.dz / speed
+        # dt/ds = -κ n with n = (-t_z, t_r)
+        curvature = (t_z * jet.ddr - t_r * jet.ddz) / speed / speed  # the square of a tiny speed would vanish
+        middle = (self._starts[segment] + self._starts[segment + 1]) / 2
+        thickness, slope = self._thickness_near(s, middle)
+        return MeridianPoints(s / self.length, s, jet.r, jet.z, t_r, t_z, curvature, thickness, slope)
+
+    def _thickness_near(self, s: Array, inside: float) -> tuple[Array, Array]:
+        """Thickness and slope; at a step of the profile the side on which `inside` lies counts."""
+        knots, value, slopes = self._profile
+        nudged = s + 1e-9 * (inside - s)
+        k = np.minimum(np.maximum(np.searchsorted(knots, nudged, side="right") - 1, 0), len(slopes) - 1)
+        slope = slopes[k]
+        return value[k] + slope * (s - knots[k]), slope
+
+    @cached_property
+    def _profile(self) -> tuple[Array, Array, Array]:
+        """Arc lengths of the knots of the thickness, its values there, and its slopes between them."""
+        position, value = np.array(self.thickness).T
+        knots = position * self.length
+        with np.errstate(divide="ignore", invalid="ignore"):  # a step of the profile is two knots in one place
+            return knots, value, np.diff(value) / np.diff(knots)
+
+
+def _check_chain(resonator: Resonator) -> None:
+    if not resonator.segments:
+        raise ShellError("a meridian needs at least one segment.")
+    tolerance = 1e-9 * resonator.length
+    for k, (one, two) in enumerate(zip(resonator.segments, resonator.segments[1:], strict=False), start=1):
+        (r1, z1), (r2, z2) = one.end_points[1], two.end_points[0]
+        if hypot(r1 - r2, z1 - z2) > max(tolerance, 1e-9):
+            raise ShellError(
+                f"segment {k + 1} of the meridian starts at ({r2:g}, {z2:g}) m, but segment {k} ends at ({r1:g}, {z1:g}) m."
+            )
+    inside = np.concatenate(
+        [segment.at_length(np.linspace(0, segment.length, 201)[1:-1]).r for segment in resonator.segments]
+    )
+    joints = [segment.end_points[0][0] for segment in resonator.segments[1:]]
+    if min(inside) <= 0 or min(joints, default=1.0) <= tolerance:
+        raise ShellError("the meridian touches or crosses the axis between its ends: the shell would overlap itself.")
+
+
+def _check_thickness(resonator: Resonator) -> None:
+    position, value = np.array(resonator.thickness).T
+    if not np.all(np.isfinite(value)) or not np.all(value > 0):
+        raise ShellError(f"the thickness must be positive everywhere, not {np.min(value):g} m.")
+    if len(position) < 2 or position[0] != 0 or abs(position[-1] - 1) > 1e-12 or np.any(np.diff(position) < 0):
+        raise ShellError("the positions of a thickness profile must rise from 0 (start) to 1 (rim).")
+    for k in range(len(resonator.segments)):
+        first, last = resonator._starts[k], resonator._starts[k + 1]
+        points = resonator.at(np.linspace(first, last, 203)[1:-1], k)
+        half = points.thickness / 2
+        meridional = 1 - half * abs(points.curvature)
+        # the face may reach the axis only where the middle surface does
+        circumferential = points.r - half * abs(points.normal_r)
+        if np.any(meridional <= 0) or np.any(circumferential <= 0):
+            raise ShellError(
+                f"the thickness {2 * half.max():g} m is too large for this middle surface: the inner face would overlap itself."
+            )
+
+
+def _check_support(resonator: Resonator) -> None:
+    if resonator.support == "clamped-pole" and resonator.starts_on_axis:
+        raise ShellError("a closed pole has no edge to clamp: open it (a pole angle above 0) or use a stem.")
+    if resonator.support == "clamped-rim" and resonator.ends_on_axis:
+        raise ShellError(
+            "a closed shell has no rim to clamp: end the meridian before the axis or choose another support."
+        )
+    if (resonator.support == "stem") != (resonator.stem is not None):
+        raise ShellError("a stem belongs to the support 'stem', and the support 'stem' needs a stem.")
+    for start, on_axis in ((True, resonator.starts_on_axis), (False, resonator.ends_on_axis)):
+        end = resonator.at([0.0 if start else resonator.length], 0 if start else len(resonator.segments) - 1)
+        if on_axis and abs(end.tangent_z[0]) > 1e-6:
+            raise ShellError("the meridian meets the axis at an angle: a pole must be flat there, or open.")
+    if resonator.stem:
+        _check_stem(resonator, resonator.stem)
+
+
+def _check_stem(resonator: Resonator, stem: Stem) -> None:
+    if not resonator.starts_on_axis:
+        raise ShellError("a stem needs a closed pole: set the pole angle to 0.")
+    dome = resonator.segments[0]
+    points = resonator.at(np.linspace(0, dome.length, 400), 0)
+    for face, end in stem.roots:
+        r = points.r + face * points.thickness / 2 * points.normal_r
+        z = points.z + face * points.thickness / 2 * points.normal_z
+        if not stem.radius + stem.fillet < 0.9 * r.max():
+            raise ShellError(
+                f"the stem (radius {stem.radius:g} m, fillet {stem.fillet:g} m) is larger than the dome it stands on "
+                f"(radius {r.max():g} m)."
+            )
+        at_root = float(np.interp(stem.radius + stem.fillet, r[: r.argmax() + 1], z[: r.argmax() + 1]))
+        if abs(end - at_root) > LONGEST_STEM * stem.radius:
+            raise ShellError(
+                f"the stem is {abs(end - at_root) / stem.radius:.0f} times as long as its radius; it is solved as a solid up to "
+                f"{LONGEST_STEM:g} times: shorten it, since n >= 2 does not reach its far end, or make it thicker."
+            )
+        if not face * (end - at_root) > stem.fillet + 0.1 * stem.radius:
+            raise ShellError(
+                f"the {'outer' if face > 0 else 'inner'} stem ends at {end:g} m, not clear of its root at {at_root:g} m."
+            )
