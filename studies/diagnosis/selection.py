@@ -19,6 +19,9 @@ CONTENDERS = 5
 STARTS, SECOND_START, CLEAR = 2, 0.5, 5.0
 """Where the first evidence is `CLEAR` times the threshold, the second of the contenders is tried as a start too, if it
 has half that evidence: two effects together may look like a third one alone."""
+NOISE_PRICE = 10.0
+"""What an effect pays when it needs slow noise of another kind than the model without it: on nulls with a random walk
+such pairs of effect and noise gained up to 34, effects beside the same noise 20."""
 BESIDE = 0.06
 """A further effect must have this part of the evidence explained before it: no formula of an effect is exact, and what
 its imperfect shape leaves would otherwise be named."""
@@ -179,7 +182,8 @@ def polish_contenders(fit: Fit, nets: Sequence[Candidate], levels: Mapping[str, 
             continue
         problem = restricted(fit.problem, kernel=candidate.kernel)
         polished = fit_terms(problem, (*fit.terms, candidate.term))
-        rivals.append(Rival(candidate.term.name, least - polished.score - levels[candidate.term.name], polished))
+        evidence = least.over(polished) - levels[candidate.term.name]
+        rivals.append(Rival(candidate.term.name, evidence, polished))
     return sorted(rivals, key=lambda rival: -rival.evidence)
 
 
@@ -190,7 +194,7 @@ def _settle(plain: Fit, fit: Fit, bank: Bank, levels: Mapping[str, float], thres
         for index, term in enumerate(fit.terms):
             others = fit.terms[:index] + fit.terms[index + 1 :]
             without = fit_terms(fit.problem, others) if others else plain
-            evidence = _least_score(without) - fit.score - levels[term.name]
+            evidence = _least_score(without).over(fit) - levels[term.name]
             found.append((evidence, index, without))
         weakest = min(found, key=lambda item: item[0])
         strongest = max(item[0] for item in found)
@@ -210,8 +214,26 @@ def _settle(plain: Fit, fit: Fit, bank: Bank, levels: Mapping[str, float], thres
     return Selection(plain, fit, tuple(sorted(places, key=lambda f: -f.evidence)), levels, threshold)
 
 
-def _least_score(fit: Fit) -> float:
+@dataclass(frozen=True)
+class _Least:
+    """Score of a fit beside the noise that suits it best, and which noise that is."""
+
+    score: float
+    kernel: str
+
+    def over(self, fit: Fit) -> float:
+        """Gain of another fit; one that needs noise of another kind pays for it."""
+        return self.score - fit.score - (NOISE_PRICE if fit.problem.kernel != self.kernel else 0.0)
+
+
+def _least_score(fit: Fit) -> _Least:
     """Return the score of a fit under the kind of slow noise that suits it best: the null may choose its noise too."""
     problem = fit.problem
-    others = (restricted(problem, kernel=kernel) for kernel in KERNELS if kernel != problem.kernel)
-    return min(fit.score, *(fit_at(other, other.tau, fit.terms).score for other in others))
+    least = _Least(fit.score, problem.kernel)
+    for kernel in KERNELS:
+        if kernel != problem.kernel:
+            other = restricted(problem, kernel=kernel)
+            score = fit_at(other, other.tau, fit.terms).score
+            if score < least.score:
+                least = _Least(score, kernel)
+    return least
