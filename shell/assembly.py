@@ -4,7 +4,6 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from scipy.sparse import csr_matrix
 
 from shell.blocks import Solid, Tie, constrain, mesh_solid, number_unknowns, surface_sides, tabulate
 from shell.constraints import Index, Rows
@@ -187,7 +186,3 @@ def sections(resonator: Resonator, chain: Chain, xi: Array, weights: Array) -> S
         ds=np.broadcast_to(halves[:, None], shape),
         weight=np.broadcast_to(weights, shape),
     )
-
-
-def _constraint(rows: Rows, size: int) -> csr_matrix:
-    return rows.matrix(size)

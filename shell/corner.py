@@ -1,5 +1,6 @@
 """Solid regions where stress is singular: corners where the meridian kinks, clamped edges and faces."""
 
+from functools import lru_cache
 from math import hypot
 
 import numpy as np
@@ -102,6 +103,7 @@ def _turn(before: MeridianPoints, after: MeridianPoints) -> float:
     return float(np.arctan2(aside, along)[0])
 
 
+@lru_cache(maxsize=32)  # the same at every level and harmonic
 def _meet(resonator: Resonator, joint: int, inner: float) -> tuple[float, float]:
     """Arc lengths on the two segments whose cross-sections share the inner corner I."""
     s = resonator.joints[joint]

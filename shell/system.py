@@ -116,8 +116,6 @@ class System:
         """From the unknowns of every element to its free ones, in the order of `pattern`."""
         return self._elements[1]
 
-    _maps = maps
-
     @cached_property
     def _elements(self) -> tuple[Pattern, list["ToFree"]]:
         counts = np.diff(self.constraint.indptr)
