@@ -10,7 +10,8 @@ The residual of the reduced mode is tested on further snapshots W, in the norm o
 δ is the first-order distance of μ from the eigenvalue: it is subtracted, and it is the error estimate.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from scipy.linalg import eigh
@@ -21,9 +22,8 @@ from shell.interpolated import Polynomials, Solids
 from shell.kernel import lame
 from shell.quadrature import Array
 
-CHUNK = 1024  # designs that are evaluated together; fixed, so that a design's numbers never depend on its company
+CHUNK = 1536  # designs that are evaluated together; fixed, so that a design's numbers never depend on its company
 MOST_FEATURES = 160
-ITERATIONS = 2  # of inverse iteration, each of which takes (ω_1/ω_2)² off the error of the starting vector
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,7 +57,10 @@ class ReducedModel:
     mass : the same rows of M, columns for the leading part of [e, g], per unit density.
     start : V-coefficients of the mode, the first being 1, as a linear function of [e, g, τ g].
     reference : thickness that features are measured in, m.
+    iterations : of inverse iteration, each of which takes (ω_1/ω_2)² off the error of the starting vector.
     slope, floor : the stated relative error of ω² is slope δ/μ + floor, from designs solved in full.
+
+    The precision of the matrices is that of the arithmetic; the stated error holds what it does.
     """
 
     solids: tuple[Polynomials, ...]
@@ -68,6 +71,7 @@ class ReducedModel:
     size: int
     tests: int
     reference: float
+    iterations: int
     slope: float
     floor: float
 
@@ -84,26 +88,31 @@ class ReducedModel:
         nu, ratio : ν and λ/G, (CHUNK,); λ is that of plane stress in shell theory.
         """
         r, w = self.size, self.tests
-        terms = self.terms(thickness, amplitudes, stem, nu, ratio)
+        terms = self.terms(thickness, amplitudes, stem, nu, ratio).astype(self.stiffness.dtype, copy=False)
         K, M = self.stiffness @ terms, self.mass @ terms[: self.mass.shape[1]]
         packed = r * (r + 1) // 2
         c = self.start @ terms
         with np.errstate(invalid="ignore", divide="ignore"):  # an indefinite stiffness gives no number
             L = factor(K[:packed], r)
-        for _ in range(ITERATIONS):
+        for _ in range(self.iterations):
             loaded = multiply(M[:packed], c, r)
             c = substitute(L, loaded)
         energy = np.add.reduce(c * loaded)
         mu = energy / np.add.reduce(c * multiply(M[:packed], c, r))
-        residual, inertia = np.zeros((w, len(mu))), np.zeros((w, len(mu)))
-        for v in range(r):
+        residual, inertia = K[packed : packed + w] * c[0], M[packed : packed + w] * c[0]
+        for v in range(1, r):
             rows = slice(packed + v * w, packed + (v + 1) * w)
             residual += K[rows] * c[v]
             inertia += M[rows] * c[v]
         residual -= mu * inertia
         gaps = K[-w:] - mu * M[-w:]
         delta = np.add.reduce(residual * residual / gaps) / energy  # relative to μ
-        return mu * (1 - delta), self.slope * delta + self.floor
+        return (mu * (1 - delta)).astype(float), self.slope * delta.astype(float) + self.floor
+
+    def with_precision(self, kind: type[np.floating[Any]], iterations: int) -> "ReducedModel":
+        """The same operators in another precision, with another number of iterations."""
+        matrices = {name: getattr(self, name).astype(kind) for name in ("stiffness", "mass", "start")}
+        return replace(self, **matrices, iterations=iterations)
 
     def terms(self, thickness: Array, amplitudes: Array, stem: Array, nu: Array, ratio: Array) -> Array:
         """The terms [e, g, τ g] (terms, designs)."""

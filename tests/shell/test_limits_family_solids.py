@@ -20,14 +20,17 @@ FOOT = CUP.thickness[1][0]
 WALL = ((0.0, 0.0), (FOOT, 0.0), (FOOT, 1.0), (1.0, 1.0))
 STEMMED = hemisphere(15e-3, 0.9e-3, support="stem", stem=Stem(2.5e-3, -5e-3, 0.5e-3))
 KINDS = {
-    "stem": (STEMMED, {"thickness": (0.85e-3, 0.95e-3), "stem": (0.98, 1.02), "shapes": (TILT,), "amplitude": 0.03}),
-    "corner and clamped face": (CUP, {"thickness": (0.95e-3, 1.05e-3), "shapes": (WALL,), "amplitude": 0.05}),
+    "stem": (STEMMED, {"thickness": (0.88e-3, 0.92e-3), "stem": (0.99, 1.01), "shapes": (TILT,), "amplitude": 0.02}),
+    "corner and clamped face": (CUP, {"thickness": (0.99e-3, 1.01e-3), "shapes": (WALL,), "amplitude": 0.02}),
     "outer stem of a bell": (
         bell(12.5e-3, 0.8e-3, 10e-3, 6e-3, 15e-3, "stem", Stem(3e-3, 22e-3, 0.5e-3, "outer")),
-        {"thickness": (0.78e-3, 0.82e-3), "stem": (0.99, 1.01)},
+        {"thickness": (0.79e-3, 0.81e-3)},
     ),
-    "clamped rim": (hemisphere(15e-3, 0.9e-3, support="clamped-rim"), {"thickness": (0.8e-3, 1e-3)}),
-    "clamped pole": (hemisphere(15e-3, 0.9e-3, pole_angle=0.2, support="clamped-pole"), {"thickness": (0.8e-3, 1e-3)}),
+    "clamped rim": (hemisphere(15e-3, 0.9e-3, support="clamped-rim"), {"thickness": (0.85e-3, 0.95e-3)}),
+    "clamped pole": (
+        hemisphere(15e-3, 0.9e-3, pole_angle=0.2, support="clamped-pole"),
+        {"thickness": (0.85e-3, 0.95e-3)},
+    ),
 }
 
 
