@@ -111,6 +111,7 @@ def _evaluate(
 
 def _knobs(fit: Fit) -> list[_Knob]:
     knobs = [_Knob(-1, 0, True, 10.0, 1e5, 0.01, 0.3)] if fit.problem.lagged else []
+    longest = max(float(np.ptp(states.time)) for states in fit.problem.states)
     for index, term in enumerate(fit.terms):
         for number, parameter in enumerate(term.effect.shape):
             if parameter.steady or term.name == "jump":
@@ -119,7 +120,8 @@ def _knobs(fit: Fit) -> list[_Knob]:
                 small, far = (3e-4, 0.03) if term.name == "periodic" else (0.01, 0.5)
             else:
                 small, far = 0.02, 2.0 if parameter.high > 2.0 else 0.2
-            knobs.append(_Knob(index, number, parameter.logarithmic, parameter.low, parameter.high, small, far))
+            high = min(parameter.high, parameter.of_run * longest)
+            knobs.append(_Knob(index, number, parameter.logarithmic, parameter.low, high, small, far))
     return knobs
 
 

@@ -23,7 +23,10 @@ UNITS = {"frequency_Hz": "Hz", "bias_deg_per_h": "deg_per_h", "inverse_q": "1"}
 
 @dataclass(frozen=True)
 class Parameter:
-    """A shape parameter that enters the signature nonlinearly; `steady` ones are chosen from the grid only."""
+    """A shape parameter that enters the signature nonlinearly; `steady` ones are chosen from the grid only.
+
+    `of_run` bounds it from above by that part of the longest run, besides `high`.
+    """
 
     name: str
     low: float
@@ -31,6 +34,7 @@ class Parameter:
     meaning: str
     logarithmic: bool = True
     steady: bool = False
+    of_run: float = np.inf
 
 
 @dataclass(frozen=True)

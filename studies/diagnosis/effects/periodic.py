@@ -7,6 +7,9 @@ import numpy as np
 from studies.diagnosis.effects import Effect, Parameter, Span
 from studies.diagnosis.states import FloatArray, States
 
+CYCLES = 3.0
+"""Periods in the longest run that make a line: with fewer, a wandering response looks the same."""
+
 
 def columns(states: States, shape: Sequence[float], response: str) -> FloatArray:
     """A sin(2πt/P) + b cos(2πt/P), t from the start of the campaign or, after a restart, of the run."""
@@ -16,8 +19,8 @@ def columns(states: States, shape: Sequence[float], response: str) -> FloatArray
 
 
 def grid(span: Span, response: str) -> list[tuple[float, ...]]:
-    """Periods from four steps of the grid to two thirds of a run, spaced finer than a phase slip of 1/4 turn."""
-    slowest, fastest = 1.0 / (0.5 * span.longest_run), 1.0 / (5.0 * span.step)
+    """Periods from five steps of the grid to a third of a run, spaced finer than a phase slip of 1/4 turn."""
+    slowest, fastest = CYCLES / span.longest_run, 1.0 / (5.0 * span.step)
     in_run = np.arange(slowest, fastest, 0.35 / span.longest_run)
     forms: list[tuple[float, ...]] = [(float(1.0 / f), 1.0) for f in in_run]
     if span.runs > 1:
@@ -25,6 +28,7 @@ def grid(span: Span, response: str) -> list[tuple[float, ...]]:
             slowest, min(fastest, slowest + 300 * 0.4 / span.campaign_length), 0.4 / span.campaign_length
         )
         across = np.concatenate([across, *(_around(line, span) for line in span.lines)])
+        across = across[across >= slowest]
         forms += [(float(1.0 / f), 0.0) for f in across]
     return forms
 
@@ -43,7 +47,7 @@ EFFECT = Effect(
     responses=("bias_deg_per_h", "frequency_Hz", "inverse_q"),
     coefficients=("sine_{unit}", "cosine_{unit}"),
     shape=(
-        Parameter("period_s", 1.0, 1e7, "period"),
+        Parameter("period_s", 1.0, 1e7, "period", of_run=1.0 / CYCLES),
         Parameter("restarts_each_run", 0.0, 1.0, "1 when each run starts with the same phase", False, True),
     ),
     columns=columns,
