@@ -7,12 +7,16 @@ import numpy as np
 from studies.diagnosis.effects import Effect, Parameter, Span
 from studies.diagnosis.states import FloatArray, States, lag
 
+AROUND = 293.15
+"""T₀ of the radiated share, K: that of the material laws, whatever range a campaign covers."""
+
 
 def columns(states: States, shape: Sequence[float], response: str) -> FloatArray:
     """Heat ρ (g − 1)(T_h − T_r) reaches the resonator through its lag τ: the change of T_r over ρ.
 
-    g = (T_h + T_r)(T_h² + T_r²)/(4 T₀³) for exchange between housing and resonator, or (T_r/T₀)³ for g(T_r). Where T_r is
-    known without radiation only, `share_of_form` is the ρ at which it is solved for; at 0, T_r is right as it stands.
+    g = (T_h + T_r)(T_h² + T_r²)/(4 T₀³) for exchange between housing and resonator, or (T_r/T₀)³ for g(T_r); τ is the lag
+    at T₀. Where T_r is known without radiation only, `share_of_form` is the ρ at which it is solved for; at 0, T_r is
+    right as it stands.
     """
     share, exchange = shape
     housing, step, tau = states.housing, states.step, states.tau
@@ -20,9 +24,9 @@ def columns(states: States, shape: Sequence[float], response: str) -> FloatArray
     for _ in range(5 if share else 1):
         state = states.resonator + share * change
         if exchange:
-            conductance = (housing + state) * (housing**2 + state**2) / (4.0 * states.reference**3)
+            conductance = (housing + state) * (housing**2 + state**2) / (4.0 * AROUND**3)
         else:
-            conductance = (state / states.reference) ** 3
+            conductance = (state / AROUND) ** 3
         change = _lag_with_feed((conductance - 1.0) * (housing - state), step, tau)
     return change[:, None]
 
@@ -40,7 +44,7 @@ def grid(span: Span, response: str) -> list[tuple[float, ...]]:
 EFFECT = Effect(
     name="radiation",
     summary="part of the heat is radiated, so the thermal time constant is shorter when hot",
-    source="Stefan-Boltzmann exchange linearised about the reference: conductance 4 ε σ A T³",
+    source="Stefan-Boltzmann exchange linearised about 20 °C: conductance 4 ε σ A T³",
     isolate="the same step at a cold and at a hot mean temperature",
     responses=("frequency_Hz",),
     acts_on="temperature",

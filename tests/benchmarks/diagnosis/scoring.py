@@ -12,6 +12,8 @@ SNR_ROWS = (3.0, 1.0, 0.3)
 NOTHING, UNEXPLAINED = "nothing", "unexplained"
 CLAIMS = (0.0, 0.3, 0.6, 0.8, 0.9, 0.96, 1.001)
 NORMAL_90 = 1.645
+READS = (0.08, 1.0006)
+"""Zero error, °C, and gain of the generator's thermometer: a record knows temperatures as they are read only."""
 
 
 def band(hits, total):
@@ -150,7 +152,7 @@ def true_parameters(case):
         case "hysteresis":
             out = {"half_width_K": own["width"]}
         case "activity-dip" | "loss-peak":
-            out = {"temperature_degC": own["centre"]}
+            out = {"temperature_degC": READS[0] + READS[1] * own["centre"]}
         case "periodic":
             out = {"period_s": own["period"]}
         case "ageing" if own.get("kind", "log") == "log":
