@@ -270,8 +270,25 @@ def find_outliers(values: FloatArray) -> np.ndarray:
     steps = np.abs(np.diff(kept))
     resolution = float(steps[steps > 0].min()) if (steps > 0).any() else 0.0
     limit = max(OUTLIER_LIMIT * scale, 1.5 * resolution)
-    mask[present] = (np.abs(beside) > limit) & (np.abs(plain) > limit)
+    outlying = (np.abs(beside) > limit) & (np.abs(plain) > limit)
+    half = OUTLIER_WINDOW // 2
+    outlying[:half] = _outlying_beside_line(kept[:OUTLIER_WINDOW], limit)[:half]
+    outlying[-half:] = _outlying_beside_line(kept[-OUTLIER_WINDOW:], limit)[-half:]
+    mask[present] = outlying
     return mask
+
+
+def _outlying_beside_line(values: FloatArray, limit: float) -> np.ndarray:
+    """Return which of the first or last rows stand out from a robust line, alone among their neighbours.
+
+    At an end a running median is the end itself.
+    """
+    from scipy.stats import theilslopes
+
+    slope, level, _, _ = theilslopes(values)
+    rest = np.abs(values - level - slope * np.arange(values.size))
+    beside = [np.median(np.delete(rest[max(k - 2, 0) : k + 3], min(k, 2))) for k in range(rest.size)]
+    return np.asarray(rest > np.maximum(limit, 4.0 * np.array(beside)))
 
 
 def _usable_responses(

@@ -11,12 +11,9 @@ import numpy as np
 
 from studies.diagnosis.baseline import Problem, View
 from studies.diagnosis.fit import Fit, jacobian_of
-from studies.diagnosis.innovations import find_innovations
 from studies.diagnosis.likelihood import SHARES, orthonormal
 from studies.diagnosis.states import FloatArray, lag
 
-SHARP = 4.0
-"""Second difference of a model, over the noise of a row, at which the rows around it are no witnesses."""
 AMPLITUDES = np.geomspace(1e-4, 1e3, 15)
 
 
@@ -128,9 +125,9 @@ def leftover_evidence(
     rotated = {name: basis.rotate(columns) for name, columns in bases.items()}
     null = np.full((data.shape[1],), np.inf)
     best = {name: np.full((data.shape[1],), np.inf) for name in bases}
-    for share in _near(fit.linear.share):
+    for share in near_shares(fit.linear.share):
         root = np.sqrt(basis.weights(share))[:, None]
-        ortho = orthonormal(_scaled(model) * root)
+        ortho = orthonormal(scaled(model) * root)
         rest = data * root
         rest = rest - ortho @ (ortho.T @ rest)
         total = np.maximum((rest**2).sum(axis=0), 1e-300)
@@ -150,39 +147,16 @@ def leftover_evidence(
     return {name: null - score for name, score in best.items()}
 
 
-def _scaled(columns: FloatArray) -> FloatArray:
+def scaled(columns: FloatArray) -> FloatArray:
+    """Return columns of unit length."""
     size = np.linalg.norm(columns, axis=0)
     return np.asarray(columns / np.where(size > 0, size, 1.0))
 
 
-def _near(share: float) -> FloatArray:
+def near_shares(share: float) -> FloatArray:
+    """Return the shares of slow noise around a fitted one."""
     near = int(np.argmin(np.abs(SHARES - share)))
     return SHARES[max(0, near - 3) : near + 2]
-
-
-def brief_events(fit: Fit) -> float:
-    """Return how far the innovations are from Gaussian: evidence of bursts that no smooth function follows.
-
-    The excess kurtosis of the innovations (residuals whitened in their order of time), scaled so that 17 stands for
-    an excess of 1.2, about seven standard deviations of a Gaussian record of 800 rows. Rows where the model itself bends
-    sharply (a step of a voltage within one step of the grid) are left out: nobody knows them well.
-    """
-    model = fit.columns() @ fit.linear.coefficients
-    edge = SHARP * np.sqrt(fit.linear.variance)
-    begin, parts = 0, []
-    for innovations in find_innovations(fit):
-        end = begin + innovations.size
-        if innovations.size > 8:
-            bend = np.zeros(innovations.size + 4)
-            bend[3:-3] = np.abs(np.diff(model[begin:end], 2))
-            beside = np.max(np.stack([bend[k : k + innovations.size] for k in range(5)]), axis=0)
-            parts.append(innovations[beside < edge])
-        begin = end
-    innovations = np.concatenate(parts) if parts else np.empty(0)
-    if innovations.size < 50:
-        return 0.0
-    innovations = innovations / max(float(innovations.std()), 1e-300)
-    return float(17.0 * (np.mean(innovations**4) - 3.0) / 1.2 * min(1.0, np.sqrt(innovations.size / 800.0)))
 
 
 def strongest(evidence: dict[str, FloatArray], levels: dict[str, float]) -> Leftover:

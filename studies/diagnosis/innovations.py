@@ -23,20 +23,29 @@ def find_innovations(fit: Fit) -> list[FloatArray]:
     return out
 
 
-def find_lines(fit: Fit) -> tuple[float, ...]:
-    """Return the frequencies (Hz) whose power, summed over the runs whatever their phases, stands out most."""
+def line_powers(fit: Fit) -> tuple[FloatArray, FloatArray, int]:
+    """Return frequencies (Hz), the power of the innovations there, and the number of runs.
+
+    The power is twice the periodogram of each run over its variance, summed over the runs whatever their phases.
+    """
     problem = fit.problem
     runs = [mask for mask in problem.present if mask.any()]
     states = [s for s, mask in zip(problem.states, problem.present, strict=True) if mask.any()]
     longest = max(float(np.ptp(s.time)) for s in states)
     step = states[0].step * problem.group
     frequencies = np.arange(1.0, longest / (5.0 * step), 1.0 / OVERSAMPLED) / longest
-    if frequencies.size < 3 * OVERSAMPLED:
-        return ()
     power = np.zeros(frequencies.size)
     for innovations, mask, own in zip(find_innovations(fit), runs, states, strict=True):
         phases = np.exp(2j * np.pi * frequencies[:, None] * average(own.time, problem.group)[mask])
-        power += np.abs(phases @ innovations) ** 2
+        power += 2.0 * np.abs(phases @ innovations) ** 2 / max(float(innovations @ innovations), 1e-300)
+    return frequencies, power, len(runs)
+
+
+def find_lines(fit: Fit) -> tuple[float, ...]:
+    """Return the frequencies (Hz) whose power, summed over the runs whatever their phases, stands out most."""
+    frequencies, power, _ = line_powers(fit)
+    if frequencies.size < 3 * OVERSAMPLED:
+        return ()
     lines: list[float] = []
     for _ in range(MOST_LINES):
         peak = int(np.argmax(power))

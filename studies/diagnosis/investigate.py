@@ -9,14 +9,15 @@ from studies.diagnosis.advice import suggest_next
 from studies.diagnosis.baseline import Law, Problem, choose_kernel, choose_kernel_score, pose, span_of
 from studies.diagnosis.campaign import FEWEST_BINS, Campaign
 from studies.diagnosis.consistency import consistency
-from studies.diagnosis.discrepancy import Leftover, brief_events, generic_bases, leftover_evidence, strongest
+from studies.diagnosis.discrepancy import Leftover, generic_bases, leftover_evidence, strongest
 from studies.diagnosis.effects import Effect
 from studies.diagnosis.fit import fit_terms, intervals
 from studies.diagnosis.gain import Score, rms, row_residuals, score
 from studies.diagnosis.innovations import find_lines
 from studies.diagnosis.null import bootstrap_levels, draw_null, levels_of, shipped_levels
 from studies.diagnosis.scan import applicable, build_bank
-from studies.diagnosis.selection import Found, Selection, scan_model, scan_models, select
+from studies.diagnosis.selection import BESIDE, Found, Selection, scan_model, scan_models, select
+from studies.diagnosis.sharp import sharp_leftover
 from studies.diagnosis.thermometer import Thermometer, read_thermometer, smooth_thermometer
 from studies.diagnosis.verdict import Cause, ResponseResult, Verdict, equivalent_to, overall, probability_of
 
@@ -178,8 +179,9 @@ def inquire(
         }
     selection = select(problem, span, levels, threshold, effects, bank)
     leftover = strongest(leftover_evidence(selection.fit, bases), generic_levels)
-    if (bursts := brief_events(selection.fit)) > leftover.evidence:
-        leftover = Leftover("time, brief events", bursts)
+    sharp = sharp_leftover(selection.fit)
+    if sharp.evidence > max(leftover.evidence, BESIDE * (selection.plain.score - selection.fit.score)):
+        leftover = sharp
     return Inquiry(problem, selection, leftover, levels)
 
 
