@@ -14,7 +14,7 @@ TEMPERATURES = ("housing_temperature_degC", "chamber_temperature_degC", "resonat
 COMMANDS = ("drive_amplitude_V", "electrode_bias_V", "quadrature_V", "pattern_angle_deg")
 OUTLIER_WINDOW, OUTLIER_LIMIT = 11, 6.0
 MOST_BINS = 800
-FINEST = 12
+FINEST = 20
 FEWEST_BINS = 24
 LONGEST_GAP = 900.0
 
@@ -97,8 +97,10 @@ def load_campaign(records: Sequence[Record], reference_degC: float | None = None
         notes.append("the records do not all say when they start: taken one after the other, gaps unknown.")
     spans = [float(table["time_s"][-1] - table["time_s"][0]) for table in tables]
     sampling = max(float(np.median(np.diff(table["time_s"]))) if table["time_s"].size > 1 else 1.0 for table in tables)
-    step = max(sampling, sum(spans) / MOST_BINS)
-    group = max(1, min(FINEST, int(step / sampling)))
+    # whole rows to a bin: the mean of rows is then compared with the mean of the model at the same moments
+    rows = max(1, round(sum(spans) / MOST_BINS / sampling))
+    group = -(-rows // -(-rows // FINEST))
+    step = sampling * group * -(-rows // FINEST)
     temperature = np.concatenate([table["temperature"] for table in tables])
     if not np.isfinite(temperature).any():
         raise InputError(f"{records[0].path}: {source} has no value at all.")
@@ -353,27 +355,26 @@ def _grid_run(
     responses: Sequence[str],
 ) -> Run | None:
     time = table["time_s"]
-    count = int((time[-1] - time[0]) / step + 0.5) // group
-    if count < 5 or time.size < 6:
-        return None
-    fine = time[0] + step * np.arange(count * group)
-    coarse = average(fine, group)
     slot = np.floor((time - time[0]) / step + 0.5).astype(int)
-    inside = slot < fine.size
-    slot, rows = slot[inside], {key: column[inside] for key, column in table.items()}
-    binned = {
-        name: _bin(rows[name], rows["time_s"], slot // group, coarse) if name in rows else np.full(count, np.nan)
-        for name in responses
-    }
+    fine = time[0] + step * np.arange(slot[-1] + 2)  # beyond the last row
+    coarse = average(fine, group)
+    if coarse.size < 5 or time.size < 6:
+        return None
+    whole = slot < coarse.size * group
+    rows = {key: column[whole] for key, column in table.items()}
+
+    def binned(column: FloatArray) -> FloatArray:
+        return _bin(column, rows["time_s"], slot[whole] // group, coarse)
+
     clock_error = None
     if "reference_frequency_Hz" in rows and "frequency_Hz" in rows:
-        clock_error = _bin(rows["frequency_Hz"] - rows["reference_frequency_Hz"], rows["time_s"], slot // group, coarse)
+        clock_error = binned(rows["frequency_Hz"] - rows["reference_frequency_Hz"])
     return Run(
         record,
         label,
-        _states(run, fine, offset, reference, rows, slot),
+        _states(run, fine, offset, reference, table, slot),
         coarse,
-        binned,
+        {name: binned(rows[name]) if name in rows else np.full(coarse.size, np.nan) for name in responses},
         time,
         {name: table.get(name, np.full(time.shape, np.nan)) for name in responses},
         clock_error,
@@ -396,6 +397,15 @@ def _bin(column: FloatArray, time: FloatArray, slot: np.ndarray, grid: FloatArra
     return np.asarray(mean)
 
 
+def _between(grid: FloatArray, time: FloatArray, values: FloatArray) -> FloatArray:
+    """Interpolate linearly; after the last row go on as between the last two."""
+    out = np.interp(grid, time, values)
+    if time.size > 1:
+        late = (grid > time[-1]) & (grid < time[-1] + 2.0 * (time[-1] - time[-2]))
+        out[late] += (values[-1] - values[-2]) / (time[-1] - time[-2]) * (grid[late] - time[-1])
+    return np.asarray(out)
+
+
 def _states(
     run: int, grid: FloatArray, offset: float, reference: float, table: dict[str, FloatArray], slot: np.ndarray
 ) -> States:
@@ -405,9 +415,9 @@ def _states(
     if known.sum() > 1.5 * grid.size:  # finer than the grid: average
         means = _bin(table["temperature"], time, slot, grid)
         solid = np.isfinite(means)
-        housing = np.interp(grid, grid[solid], means[solid]) + 273.15
+        housing = _between(grid, grid[solid], means[solid]) + 273.15
     else:
-        housing = np.interp(grid, time[known], table["temperature"][known]) + 273.15
+        housing = _between(grid, time[known], table["temperature"][known]) + 273.15
 
     def command(name: str) -> FloatArray | None:
         if name not in table or not (known := np.isfinite(table[name])).any():

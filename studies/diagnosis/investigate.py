@@ -18,6 +18,7 @@ from studies.diagnosis.null import bootstrap_levels, draw_null, levels_of, shipp
 from studies.diagnosis.scan import applicable, build_bank
 from studies.diagnosis.selection import BESIDE, Found, Selection, scan_model, scan_models, select
 from studies.diagnosis.sharp import sharp_leftover
+from studies.diagnosis.states import average
 from studies.diagnosis.thermometer import Thermometer, read_thermometer, smooth_thermometer
 from studies.diagnosis.verdict import Cause, ResponseResult, Verdict, equivalent_to, overall, probability_of
 
@@ -246,7 +247,7 @@ def clock_drifts(campaign: Campaign) -> bool | None:
     if not campaign.runs or any(run.clock_error is None for run in campaign.runs):
         return None
     error = np.concatenate([run.clock_error for run in campaign.runs if run.clock_error is not None])
-    time = np.concatenate([run.states.campaign_time.reshape(-1, campaign.group).mean(axis=1) for run in campaign.runs])
+    time = np.concatenate([average(run.states.campaign_time, campaign.group) for run in campaign.runs])
     known = np.isfinite(error)
     line = np.polyfit(time[known], error[known], 1)
     rest = error[known] - np.polyval(line, time[known])
