@@ -5,22 +5,18 @@ from functools import lru_cache
 
 import numpy as np
 
-from shell.blocks import Solid, Tie, constrain, mesh_solid, number_unknowns, surface_sides, tabulate
+from shell.blocks import Mesh, Solid, Tie, constrain, find_boundary, mesh_solid, number_functions
+from shell.cells import tabulate_cells
 from shell.constraints import Index, Rows
 from shell.corner import find_kinks, lay_clamped_edge, lay_clamped_face, lay_corner
 from shell.errors import ShellError
 from shell.kernel import Orders, Section, shell_table
 from shell.layout import Chain, End, lay_chain
-from shell.levels import LEVELS as LEVELS
-from shell.levels import Level as Level
-from shell.levels import Theory as Theory
+from shell.levels import Level, Theory
 from shell.quadrature import Array, gauss, legendre, nodal
 from shell.resonator import Resonator
 from shell.root import lay_root
-from shell.system import Group as Group
-from shell.system import ShellPart as ShellPart
-from shell.system import SolidPart as SolidPart
-from shell.system import System as System
+from shell.system import Group, ShellGroup, ShellPart, SolidGroup, SolidPart, System
 
 SMALL = 0.5  # length over radius of a small element
 
@@ -42,19 +38,18 @@ def build_system(resonator: Resonator, n: int, theory: Theory, level: Level) -> 
     ends: dict[tuple[int, int], Tie] = {}
     size = 0
     for k, chain in enumerate(layout.chains):
-        group, inner_rows, size = _shell_group(resonator, chain, n, level, size)
-        groups.append(group)
+        elements, inner_rows, size = _shell_group(resonator, chain, n, level, size)
+        groups.append(elements)
         rows.extend(inner_rows)
         for side in (0, 1):
-            ends[k, side] = _chain_end(resonator, chain, group, side, level.through)
+            ends[k, side] = _chain_end(resonator, chain, elements, side, level.through)
             _hold_end(rows, chain.ends[side], ends[k, side], n)
     for solid, tied in layout.solids:
         mesh = mesh_solid(solid, level.block)
         ties = tuple(ends[at] for at in tied)
-        rows.extend(constrain(mesh, solid, ties, level.block, n, size))
-        numbers, signs, size = number_unknowns(mesh, level.block, size)
-        place = SolidPart(mesh, surface_sides(mesh, ties))
-        groups.append(Group(tabulate(mesh, solid, level.block, n), numbers, signs, place))
+        cells, inner_rows, size = solid_group(mesh, solid, ties, n, level.block, size)
+        groups.append(cells)
+        rows.extend(inner_rows)
     held = resonator.support != "free"
     return System(tuple(groups), rows.matrix(size), 0 if held or n > 1 else 2, n, level)
 
@@ -101,7 +96,19 @@ def _free_or_pole(on_axis: bool) -> End:
     return "pole" if on_axis else "free"
 
 
-def _shell_group(resonator: Resonator, chain: Chain, n: int, level: Level, start: int) -> tuple[Group, Rows, int]:
+def solid_group(
+    mesh: Mesh, solid: Solid, ties: tuple[Tie, ...], n: int, degree: int, start: int
+) -> tuple[SolidGroup, Rows, int]:
+    """Tabulate the cells of one solid part and number their unknowns, (function, component) from `start`."""
+    boundary = find_boundary(mesh, solid, ties)
+    rows = constrain(mesh, boundary, ties, degree, n, start)
+    numbers, signs, count = number_functions(mesh, degree)
+    unknowns = start + (3 * numbers[:, :, None] + np.arange(3)).reshape(len(numbers), -1)
+    table = tabulate_cells(mesh.grid, degree, n, solid.position)
+    return SolidGroup(table, unknowns, SolidPart(mesh, boundary, signs)), rows, start + 3 * count
+
+
+def _shell_group(resonator: Resonator, chain: Chain, n: int, level: Level, start: int) -> tuple[ShellGroup, Rows, int]:
     """Tabulate one chain and number its unknowns, (node, amplitude) from `start`; see `_anchor` for the rows."""
     p, orders = level.along, level.through
     xi, weights = gauss(p + 2)
@@ -113,7 +120,7 @@ def _shell_group(resonator: Resonator, chain: Chain, n: int, level: Level, start
     nodes = p * np.arange(elements)[:, None] + np.arange(p + 1)
     unknowns = start + (nodes[:, :, None] * m + np.arange(m)).reshape(elements, -1)
     anchors, rows, fresh = _anchor(resonator, chain, unknowns, m, start + (elements * p + 1) * m)
-    group = Group(table, unknowns, np.ones(unknowns.shape), ShellPart(chain, section), anchors)
+    group = ShellGroup(table, unknowns, ShellPart(chain, section), anchors)
     return group, rows, fresh
 
 
@@ -151,7 +158,7 @@ def _anchor(
     return tuple(anchors), rows, fresh
 
 
-def _chain_end(resonator: Resonator, chain: Chain, group: Group, side: int, orders: Orders) -> Tie:
+def _chain_end(resonator: Resonator, chain: Chain, group: ShellGroup, side: int, orders: Orders) -> Tie:
     """The cross-section at one end of a chain and its unknowns."""
     place = resonator.at([chain.breaks[-side]], chain.segments[-side])
     m = sum(orders) + 3

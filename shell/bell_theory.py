@@ -21,8 +21,8 @@ from scipy.integrate import solve_ivp
 
 from shell.elastic import Elastic
 from shell.errors import ShellError
-from shell.meridian import MeridianPoints, Resonator
 from shell.quadrature import Array, gauss, legendre
+from shell.resonator import MeridianPoints, Resonator
 
 ORDER = 32  # Gauss points on each smooth piece of the meridian
 N = 2  # the harmonic of the paper's pattern

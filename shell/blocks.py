@@ -6,10 +6,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from shell.cells import in_order
 from shell.constraints import Index, Rows
-from shell.kernel import Orders, StrainTable, block_table
+from shell.kernel import Orders
 from shell.patches import Part, Patch
-from shell.quadrature import Array, gauss, hierarchic, interpolate_hierarchic, legendre, lobatto, nodal
+from shell.quadrature import Array, interpolate_hierarchic, legendre, lobatto
 from shell.resonator import MeridianPoints
 
 
@@ -74,66 +75,65 @@ def mesh_solid(solid: Solid, degree: int) -> Mesh:
     return Mesh(grid, vertices, edges.reshape(-1, 4), first > last, np.array([r, z])[:, kept], pairs, parts)
 
 
-def tabulate(mesh: Mesh, solid: Solid, degree: int, n: int) -> StrainTable:
-    """Strain table of all cells, geometry interpolated at the Lobatto points."""
-    points, weights = gauss(degree + 2)
-    shape = nodal(degree, points)
-    r, z = np.einsum("ia,gcab,jb->gcij", shape.values, mesh.grid, shape.values)
-    by_xi = np.einsum("ia,gcab,jb->gcij", shape.slopes, mesh.grid, shape.values)
-    by_eta = np.einsum("ia,gcab,jb->gcij", shape.values, mesh.grid, shape.slopes)
-    jacobian = np.stack([by_xi, by_eta], axis=1)
-    basis = hierarchic(degree, points)
-    position = np.full(len(mesh.vertices), solid.position)
-    return block_table((r, z), jacobian, np.outer(weights, weights), n, basis, basis, position)
+@dataclass(frozen=True, eq=False)
+class Boundary:
+    """What holds the vertices of a mesh: on the axis, held, or on the cross-section of a tie (η there, NaN elsewhere)."""
+
+    on_axis: NDArray[np.bool_]
+    held: NDArray[np.bool_]
+    heights: tuple[Array, ...]
+
+    @property
+    def kinds(self) -> list[NDArray[np.bool_]]:
+        """Axis, held, each tie: an edge belongs where both of its vertices do."""
+        return [self.on_axis, self.held, *(np.isfinite(eta) for eta in self.heights)]
 
 
-def number_unknowns(mesh: Mesh, degree: int, start: int) -> tuple[Index, Array, int]:
-    """Global numbers and signs (cells, size) of the hierarchic unknowns: vertices, edges, then insides.
+def find_boundary(mesh: Mesh, solid: Solid, ties: tuple[Tie, ...]) -> Boundary:
+    """Where the vertices of a solid part lie."""
+    size = float(np.ptp(mesh.points, axis=1).max())
+    held = np.array([solid.held(float(r), float(z)) for r, z in mesh.points.T])
+    heights = tuple(_thickness_coordinate(tie.place, mesh.points, size) for tie in ties)
+    return Boundary(mesh.points[0] < 1e-9 * size, held, heights)
 
-    Unknowns of an element are ordered (ξ-function, component, η-function). An edge taken backwards changes the sign of
-    its odd functions.
+
+def number_functions(mesh: Mesh, degree: int) -> tuple[Index, Array, int]:
+    """Numbers and signs (cells, functions) of the hierarchic functions: of vertices, edges, then insides; and their count.
+
+    An edge taken backwards changes the sign of its odd functions.
     """
     inside = degree - 1
-    edge_start = start + 3 * mesh.points.shape[1]
-    inner_start = edge_start + 3 * inside * len(mesh.pairs)
-    cells = len(mesh.vertices)
-    numbers = np.zeros((cells, degree + 1, 3, degree + 1), dtype=np.intp)
+    cells, vertices = len(mesh.vertices), mesh.points.shape[1]
+    numbers = np.zeros((cells, degree + 1, degree + 1), dtype=np.intp)
     signs = np.ones(numbers.shape)
-    parity = np.where(np.arange(2, degree + 1) % 2, -1.0, 1.0)
-    along = np.arange(inside)
-    for c in range(3):
-        for corner, (a, b) in enumerate(((0, 0), (1, 0), (0, 1), (1, 1))):
-            numbers[:, a, c, b] = start + 3 * mesh.vertices[:, corner] + c
-        for side in range(4):
-            run = edge_start + 3 * inside * mesh.edges[:, side, None] + c * inside + along
-            flip = np.where(mesh.reversed_[:, side, None], parity, 1.0)
-            where = (slice(None), slice(2, None), c, side) if side < 2 else (slice(None), side - 2, c, slice(2, None))
-            numbers[where], signs[where] = run, flip
-    inner = np.arange(3 * inside**2).reshape(inside, 3, inside)
-    numbers[:, 2:, :, 2:] = inner_start + 3 * inside**2 * np.arange(cells)[:, None, None, None] + inner
-    end = inner_start + 3 * inside**2 * cells
-    return numbers.reshape(cells, -1), signs.reshape(cells, -1), end
+    numbers[:, :2, :2] = mesh.vertices.reshape(-1, 2, 2).transpose(0, 2, 1)
+    run = vertices + inside * mesh.edges[..., None] + np.arange(inside)
+    flip = np.where(mesh.reversed_[..., None], np.where(np.arange(2, degree + 1) % 2, -1.0, 1.0), 1.0)
+    for values, of in ((numbers, run), (signs, flip)):
+        values[:, 2:, :2] = of[:, :2].transpose(0, 2, 1)
+        values[:, :2, 2:] = of[:, 2:]
+    start = vertices + inside * len(mesh.pairs)
+    numbers[:, 2:, 2:] = start + np.arange(cells * inside**2).reshape(cells, inside, inside)
+    i, j = in_order(degree)
+    return numbers[:, i, j], signs[:, i, j], start + cells * inside**2
 
 
-def constrain(mesh: Mesh, solid: Solid, ties: tuple[Tie, ...], degree: int, n: int, start: int) -> Rows:
+def constrain(mesh: Mesh, boundary: Boundary, ties: tuple[Tie, ...], degree: int, n: int, start: int) -> Rows:
     """Constraints of vertices and edges: the axis, what is held, and what follows a cross-section of the shell."""
     inside = degree - 1
     count = mesh.points.shape[1]
     a, b = mesh.pairs.T
-    size = float(np.ptp(mesh.points, axis=1).max())
-    on_axis = mesh.points[0] < 1e-9 * size
-    held = np.array([solid.held(float(r), float(z)) for r, z in mesh.points.T])
     at_vertices = start + np.arange(3 * count).reshape(count, 3, 1)
-    at_edges = start + 3 * count + np.arange(3 * inside * len(a)).reshape(-1, 3, inside)
+    at_edges = start + 3 * count + np.arange(3 * inside * len(a)).reshape(-1, inside, 3).transpose(0, 2, 1)
     rows = Rows()
+    on_axis, held = boundary.on_axis, boundary.held
     for own, is_held, axial in (
         (at_vertices, held, on_axis),
         (at_edges, held[a] & held[b], on_axis[a] & on_axis[b]),
     ):
         rows.hold(own[is_held])
         _regular_on_axis(rows, own[axial & ~is_held], n)
-    for tie in ties:
-        eta = _thickness_coordinate(tie.place, mesh.points, size)
+    for tie, eta in zip(ties, boundary.heights, strict=True):
         there = np.isfinite(eta)
         _follow(rows, at_vertices[there], tie, legendre(max(tie.orders), eta[there]).values[:, None])
         along = there[a] & there[b]
@@ -143,14 +143,17 @@ def constrain(mesh: Mesh, solid: Solid, ties: tuple[Tie, ...], degree: int, n: i
     return rows
 
 
-def surface_sides(mesh: Mesh, ties: tuple[Tie, ...]) -> tuple[tuple[int, int], ...]:
+def open_edges(mesh: Mesh, boundary: Boundary) -> NDArray[np.bool_]:
+    """The edges that are neither on the axis nor held nor tied."""
+    a, b = mesh.pairs.T
+    return np.asarray(~np.any([where[a] & where[b] for where in boundary.kinds], axis=0))
+
+
+def surface_sides(mesh: Mesh, boundary: Boundary) -> tuple[tuple[int, int], ...]:
     """The sides (cell, side) that no other cell shares, that are not tied and do not lie on the axis."""
-    size = float(np.ptp(mesh.points, axis=1).max())
     a, b = mesh.pairs.T
     outside = np.bincount(mesh.edges.ravel()) == 1
-    inside = [mesh.points[0] < 1e-9 * size]
-    inside += [np.isfinite(_thickness_coordinate(tie.place, mesh.points, size)) for tie in ties]
-    for where in inside:
+    for where in (boundary.on_axis, *boundary.kinds[2:]):
         outside &= ~(where[a] & where[b])
     return tuple(zip(*(index.tolist() for index in np.nonzero(outside[mesh.edges])), strict=True))
 

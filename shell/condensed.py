@@ -15,16 +15,18 @@ from itertools import pairwise
 import numpy as np
 from scipy.optimize import brentq
 
-from shell.assembly import Group, Layout, Level, SolidPart, System, lay_resonator
-from shell.blocks import Solid, Tie, constrain, mesh_solid, number_unknowns, tabulate
-from shell.eigen import Factor, Index, Pattern, find_pattern
+from shell.assembly import Layout, lay_resonator, solid_group
+from shell.blocks import Solid, Tie, mesh_solid
+from shell.constraints import Index
+from shell.eigen import Factor, Pattern, find_pattern
 from shell.errors import ShellError
 from shell.kernel import Orders, lame
-from shell.meridian import MeridianPoints, Resonator
+from shell.levels import Level
 from shell.patches import Cell, Patch, Path, straight
 from shell.quadrature import Array, gauss, legendre
+from shell.resonator import MeridianPoints, Resonator
+from shell.system import Pair, System
 
-Pair = tuple[Array, Array]
 LEAST = (
     0.3  # length of the outermost cells over that of the same design laid out by itself, and the inverse of the most
 )
@@ -155,18 +157,15 @@ def _prolonged(path: Path, end: float) -> Path:
 def _build(solid: Solid, ties: tuple[Tie, ...], n: int, level: Level) -> System:
     """A solid part alone: the unknowns of its ties first."""
     first = sum(len(tie.unknowns) for tie in ties)
-    mesh = mesh_solid(solid, level.block)
-    rows = constrain(mesh, solid, ties, level.block, n, first)
-    numbers, signs, size = number_unknowns(mesh, level.block, first)
-    group = Group(tabulate(mesh, solid, level.block, n), numbers, signs, SolidPart(mesh, ()))
+    group, rows, size = solid_group(mesh_solid(solid, level.block), solid, ties, n, level.block, first)
     return System((group,), rows.matrix(size), 0, n, level)
 
 
 def _condense(system: System, held: int, nu: float, mu: float) -> Pair:
     """Condense a system onto its first unknowns."""
     lam, G = (float(x) for x in lame(np.array(1.0), np.array(nu), False))
-    K = [lam / G * trace + shear for trace, shear, _ in system.units]
-    M = [mass for _, _, mass in system.units]
+    one = np.ones((len(system.groups[0].unknowns), 1))
+    K, M = system.operators([lam / G * one], [one], [one], uniform=True)
     unknowns, size = system.pattern.unknowns, system.pattern.size
     load = np.zeros((size - held, held))
     inner: list[Array] = []

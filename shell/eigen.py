@@ -14,7 +14,7 @@ from scipy.linalg import blas, lapack
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import reverse_cuthill_mckee
 
-from shell.constraints import Index as Index
+from shell.constraints import Index
 from shell.errors import ShellError
 from shell.quadrature import Array
 
@@ -54,16 +54,17 @@ def find_pattern(unknowns: list[Index], size: int) -> Pattern:
         ranks = _in_a_narrow_band([place[members][place[members] >= 0] for members in unknowns], len(shared))
         place[shared] = ranks
         shared = shared[np.argsort(ranks)]
-    order = tuple(np.argsort(place[members], kind="stable") for members in unknowns)
+    order = tuple(np.argsort(place[members] >= 0, kind="stable") for members in unknowns)
     unknowns = [members[first] for members, first in zip(unknowns, order, strict=True)]
     own = tuple(int(np.count_nonzero(place[members] < 0)) for members in unknowns)
     where = [place[members[k:]] for members, k in zip(unknowns, own, strict=True)]
-    band = max((int(w[-1] - w[0]) for w in where if len(w)), default=0)
+    band = max((int(w.max() - w.min()) for w in where if len(w)), default=0)
     is_whole = len(unknowns) == 1 and np.array_equal(unknowns[0], np.arange(size))
     entries = []
     for w in where:
         rows, columns, source = _lower_triangle(len(w))
-        entries.append((w[rows] + band * w[columns], source))
+        one, two = w[rows], w[columns]
+        entries.append((np.maximum(one, two) + band * np.minimum(one, two), source))
     return Pattern(tuple(unknowns), order, own, tuple(where), tuple(entries), shared, size, band, is_whole)
 
 
@@ -157,7 +158,7 @@ def lowest_vectors(
     shift : added to K as shift M so that rigid motions can be factored, 1/s².
     accuracy : relative error of the Ritz values at which the iteration stops.
     """
-    return Iteration(pattern, stiffness, mass, shift).converge(None, count, accuracy)[:, :count]
+    return Iteration(pattern, stiffness, mass, shift).converge(count, accuracy)[:, :count]
 
 
 class Iteration:
@@ -173,24 +174,17 @@ class Iteration:
         """From M X the Ritz values of K⁻¹ M X, the Ritz vectors as columns, and M times these."""
         return self._rotate(self.factor.solve(loaded), loaded)
 
-    def begin(self, x: Array) -> tuple[Array, tuple[Array, Array, Array]]:
-        """The Ritz values of vectors x that are near the wanted ones, and the first step from them."""
-        loaded = apply_mass(self.pattern, self.mass, x)
-        y = self.factor.solve(loaded)
-        return _project(x.T @ loaded, y.T @ loaded)[0], self._rotate(y, loaded)
-
     def _rotate(self, y: Array, loaded: Array) -> tuple[Array, Array, Array]:
         heavy = apply_mass(self.pattern, self.mass, y)
         values, turn = _project(y.T @ loaded, y.T @ heavy)
         return values, y @ turn, heavy @ turn
 
-    def converge(self, start: Array | None, count: int, accuracy: float) -> Array:
-        """A subspace, sorted by Ritz values, of which the first `count` have converged; `start` is one that is near."""
-        if start is None:
-            # the more vectors beyond `count`, the faster they converge
-            x = _random(self.pattern.size, min(2 * count + 3, self.pattern.size))
-            # one solve leaves little but the inextensional modes of a thin shell (two at most) in every column
-            start = self._set_apart(self.factor.solve(apply_mass(self.pattern, self.mass, x)))
+    def converge(self, count: int, accuracy: float) -> Array:
+        """A subspace, sorted by Ritz values, of which the first `count` have converged."""
+        # the more vectors beyond `count`, the faster they converge
+        x = _random(self.pattern.size, min(2 * count + 3, self.pattern.size))
+        # one solve leaves little but the inextensional modes of a thin shell (two at most) in every column
+        start = self._set_apart(self.factor.solve(apply_mass(self.pattern, self.mass, x)))
         loaded = apply_mass(self.pattern, self.mass, start)
         before, change = np.full(count, np.inf), np.inf
         for _ in range(300):

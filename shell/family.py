@@ -15,7 +15,6 @@ from math import ceil, isfinite, log, pi
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from shell.assembly import LEVELS, Level, Theory
 from shell.condensed import UnfitSolids
 from shell.designs import Box, Designs, Range
 from shell.elastic import Elastic
@@ -23,11 +22,12 @@ from shell.errors import ShellError
 from shell.frozen import FrozenShell, freeze
 from shell.interpolated import Solids, interpolate_solids
 from shell.kernel import lame
-from shell.meridian import Resonator
+from shell.levels import LEVELS, Level, Theory
 from shell.modes import solve_modes
 from shell.profiles import Profiles, Shape
 from shell.quadrature import Array
 from shell.reduced import ReducedModel
+from shell.resonator import Resonator
 from shell.training import evaluate_many, train
 
 MOST_SHAPES = 6  # the training takes every corner of the box

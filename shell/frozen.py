@@ -15,13 +15,13 @@ from functools import cached_property
 
 import numpy as np
 
-from shell.assembly import Group, Level, ShellPart, System, Theory, build_system, lay_resonator
-from shell.condensed import Pair, Part, arrange, find_parts
-from shell.eigen import Index, Pattern, find_pattern, lowest_vectors
+from shell.assembly import build_system, lay_resonator
+from shell.condensed import Part, arrange, find_parts
+from shell.constraints import Index
+from shell.eigen import Pattern, find_pattern, lowest_vectors
 from shell.kernel import (
     Section,
     StrainTable,
-    displacements,
     energy_weights,
     integrate_mass,
     integrate_stiffness,
@@ -29,10 +29,11 @@ from shell.kernel import (
     shell_table,
     station_mass,
     station_stiffness,
-    strains,
 )
-from shell.meridian import Resonator
+from shell.levels import Level, Theory
 from shell.quadrature import Array, Basis, gauss, legendre
+from shell.resonator import Resonator
+from shell.system import Pair, ShellGroup, System
 
 BEYOND = 4  # nodes in h² beyond what the thickness order asks for; the neglected term is about (h/2R)^(2 BEYOND)
 
@@ -116,6 +117,7 @@ class FrozenShell:
         found: list[Array] = []
         done = 0
         for group in self.system.groups:
+            assert isinstance(group, ShellGroup)
             found += list(group.matrices(integrate, stations[done : done + len(group.unknowns)], 0))
             done += len(group.unknowns)
         return [at.restrict(matrix) for at, matrix in zip(self.system.maps, found, strict=True)]
@@ -140,10 +142,10 @@ class FrozenShell:
     def _energies(self, table: StrainTable, vectors: Array) -> tuple[Array, Array, Array]:
         """The same at one node, from strains: sums of squares, free of cancellation."""
         spread = [np.concatenate(self.system.spread(vector)) for vector in vectors.T]
-        strain = np.stack([strains(table, q) for q in spread], axis=-1)
-        moved = np.stack([displacements(table, q) for q in spread], axis=-1)
+        strain = np.stack([table.strains(q) for q in spread], axis=-1)
+        moved = np.stack([table.displacements(q) for q in spread], axis=-1)
         root = np.sqrt(table.volume)
-        sheared = strain * np.sqrt(energy_weights(table))[:, None, None] * root[:, :, None, :, None]
+        sheared = strain * np.sqrt(energy_weights(table.transverse_shear))[:, None, None] * root[:, :, None, :, None]
         trace = strain[:, :, :3].sum(axis=2) * root[..., None]
         return _gram(trace), _gram(sheared), _gram(moved * root[:, :, None, :, None])
 
@@ -159,7 +161,7 @@ def freeze(
     bounds : the thinnest and the thickest (m) at positions of the meridian.
     """
     full = build_system(resonator, n, theory, level)
-    groups = tuple(group for group in full.groups if isinstance(group.place, ShellPart))
+    groups = tuple(group for group in full.groups if isinstance(group, ShellGroup))
     limits = [bounds(group.table.position) for group in groups]
     ends = [(float(np.min(thin)), float(np.max(thick))) for thin, thick in limits]
     references = [float(np.sqrt(thin * thick)) for thin, thick in ends]
@@ -170,7 +172,7 @@ def freeze(
     reference = np.concatenate([np.full((len(g.unknowns), 1), h) for g, h in zip(groups, references, strict=True)])
     eta = gauss(max(level.through) + 3)
     along = Basis(*groups[0].table.along)
-    section = _join([group.place.section for group in groups if isinstance(group.place, ShellPart)])
+    section = _join([group.place.section for group in groups])
     tables = []
     for stretch in nodes:
         h = np.broadcast_to(stretch * reference, section.r.shape)
@@ -189,7 +191,7 @@ def freeze(
     return FrozenShell(system, reference, nodes, tuple(tables), parts)
 
 
-def _chains_alone(full: System, groups: tuple[Group, ...]) -> System:
+def _chains_alone(full: System, groups: tuple[ShellGroup, ...]) -> System:
     """The system without its solid parts, whose unknowns come last."""
     rows = full.constraint[: 1 + max(int(group.unknowns.max()) for group in groups)]
     return System(groups, rows[:, np.unique(rows.indices)], full.rigid_motions, full.n, full.level)

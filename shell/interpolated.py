@@ -13,12 +13,13 @@ from math import log
 
 import numpy as np
 
-from shell.condensed import Pair, Part, UnfitSolids, condense_parts
+from shell.condensed import Part, UnfitSolids, condense_parts
 from shell.designs import Box, Designs
 from shell.errors import ShellError
 from shell.frozen import FrozenShell
 from shell.profiles import Profiles
 from shell.quadrature import Array, gauss
+from shell.system import Pair
 
 POINTS = 5  # on each piece of the meridian near a part
 MOST_TERMS = 400

@@ -1,13 +1,13 @@
-"""The one kernel: strains of displacements that vary as cos nθ and sin nθ, in the meridional section.
+"""The kernel of the shell: strains of displacements that vary as cos nθ and sin nθ, in the meridional section.
 
 Every element is a product of polynomials along a first direction ξ (the meridian) and a second one η (the thickness).
 At each *station* ξ_i the strain at the points η_j is a linear function of the *section amplitudes* and of their
 derivatives along ξ. This table of strains is all the mechanics there is: energies, matrices, and stresses follow from it.
-The same table serves the shell (displacements u, v, w along tangent, circumference and normal) and the solid blocks of
-roots and corners (displacements along r, θ, z).
+Displacements u, v, w lie along tangent, circumference and normal; the solid cells of roots and corners (shell.cells) have
+the same strains in cylindrical components.
 
 Components of strain, in order: three normal strains, then the engineering shears 12, 13, 23, where the axes 1, 2, 3 are
-(s, θ, ζ) in the shell and (r, θ, z) in a block.
+(s, θ, ζ) in the shell and (r, θ, z) in a cell.
 """
 
 from dataclasses import dataclass, replace
@@ -44,6 +44,19 @@ class StrainTable:
         """The table of some of the elements."""
         cut = {name: getattr(self, name)[elements] for name in ("strain", "displacement", "volume", "position")}
         return replace(self, **cut)
+
+    def strains(self, unknowns: Array) -> Array:
+        """Strain (elements, stations, 6, points) of element unknowns (elements, size)."""
+        elements, stations, _, points = self.strain.shape[:4]
+        amplitudes = unknowns.reshape(elements, self.along.shape[2], -1)
+        jets = np.moveaxis(self.along @ amplitudes[:, None], 1, 2).reshape(elements, stations, -1, 1)
+        flat = self.strain.reshape(elements, stations, 6 * points, -1)
+        return np.asarray((flat @ jets).reshape(elements, stations, 6, points))
+
+    def displacements(self, unknowns: Array) -> Array:
+        """Displacement (elements, stations, 3, points) of element unknowns (elements, size)."""
+        amplitudes = self.along[0] @ unknowns.reshape(len(unknowns), self.along.shape[2], -1)
+        return np.asarray((self.displacement @ amplitudes[:, :, None, :, None])[..., 0])
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,41 +130,6 @@ def shell_table(
     )
 
 
-def block_table(
-    corners: tuple[Array, Array], jacobian: Array, weights: Array, n: int, across: Basis, along: Basis, position: Array
-) -> StrainTable:
-    """Strains of a solid of revolution in cylindrical components (a, b, c) along r, θ, z.
-
-    ε_r = a_r,  ε_θ = (n b + a)/r,  ε_z = c_z,  γ_rθ = b_r - (n a + b)/r,  γ_rz = a_z + c_r,  γ_θz = b_z - n c/r.
-
-    Parameters
-    ----------
-    corners : r and z at the points, (elements, stations, points).
-    jacobian : ∂(r, z)/∂(ξ, η), (2, 2, elements, stations, points).
-    weights : quadrature weights (stations, points).
-    n : circumferential harmonic.
-    across, along : polynomials in η and in ξ.
-    position : where on the meridian (0 ... 1) each element's material is taken.
-    """
-    r = corners[0][..., None, None]
-    (r_xi, r_eta), (z_xi, z_eta) = jacobian
-    det = r_xi * z_eta - r_eta * z_xi
-    xi_r, xi_z, eta_r, eta_z = (_flat / det for _flat in (z_eta, -r_eta, -z_xi, r_xi))
-    count = across.values.shape[1]
-    (a, b, c), d_eta, d_xi = _jets((across, across, across), [count] * 3)
-
-    def gradient(xi: Array, eta: Array) -> list[Array]:
-        return [xi[..., None, None] * f + eta[..., None, None] * g for f, g in zip(d_xi, d_eta, strict=True)]
-
-    a_r, b_r, c_r = gradient(xi_r, eta_r)
-    a_z, b_z, c_z = gradient(xi_z, eta_z)
-    strain = np.stack([a_r, (n * b + a) / r, c_z, b_r - (n * a + b) / r, a_z + c_r, b_z - n * c / r], axis=2)
-    volume = abs(det) * corners[0] * weights
-    displacement = np.broadcast_to(np.stack([f[:, 0] for f in (a, b, c)]), (*r.shape[:2], 3, r.shape[2], 3 * count))
-    stations = np.broadcast_to(position[:, None], r.shape[:2])
-    return StrainTable(strain, displacement, volume, np.stack([along.values, along.slopes]), stations)
-
-
 def lame(E: Array, nu: Array, plane_stress: bool) -> tuple[Array, Array]:
     """Lamé's λ and G; in plane stress λ is replaced by 2 G λ/(λ + 2 G) = E ν/(1 - ν²)."""
     G = E / (2 * (1 + nu))
@@ -168,10 +146,9 @@ def lame_slopes(E: Array, nu: Array, plane_stress: bool) -> tuple[Array, Array]:
     return E * (1 + 2 * nu**2) / ((1 + nu) * (1 - 2 * nu)) ** 2, by_nu
 
 
-def energy_weights(table: StrainTable) -> Array:
-    """Weights g_c of the shear modulus: 2 U = ∫ λ (ε_1 + ε_2 + ε_3)² + G Σ g_c ε_c²."""
-    k = table.transverse_shear
-    return np.array([2.0, 2.0, 2.0, 1.0, k, k])
+def energy_weights(transverse: float = 1.0) -> Array:
+    """Weights g_c of the shear modulus: 2 U = ∫ λ (ε_1 + ε_2 + ε_3)² + G Σ g_c ε_c²; Naghdi's transverse shear counts less."""
+    return np.array([2.0, 2.0, 2.0, 1.0, transverse, transverse])
 
 
 def station_stiffness(table: StrainTable) -> tuple[Array, Array]:
@@ -180,7 +157,7 @@ def station_stiffness(table: StrainTable) -> tuple[Array, Array]:
     flat = table.strain.reshape(*shape[:4], -1)
     root = np.sqrt(table.volume)[:, :, None, :, None]
     trace = (flat[:, :, 0] + flat[:, :, 1] + flat[:, :, 2]) * root[:, :, 0]
-    sheared = flat * (root * np.sqrt(energy_weights(table))[:, None, None])
+    sheared = flat * (root * np.sqrt(energy_weights(table.transverse_shear))[:, None, None])
     sheared = sheared.reshape(*shape[:2], -1, flat.shape[-1])
     return np.swapaxes(trace, -1, -2) @ trace, np.swapaxes(sheared, -1, -2) @ sheared
 
@@ -217,21 +194,6 @@ def pair_mass(stations: Array, along: Array) -> Array:
     functions = along.shape[2]
     pairs = np.einsum("ia,ib->abi", along[0], along[0]).reshape(functions**2, -1)
     return np.asarray(pairs @ stations.reshape(elements, count, m * m))
-
-
-def strains(table: StrainTable, unknowns: Array) -> Array:
-    """Strain (elements, stations, 6, points) of element unknowns (elements, size)."""
-    elements, stations, _, points = table.strain.shape[:4]
-    amplitudes = unknowns.reshape(elements, table.along.shape[2], -1)
-    jets = np.moveaxis(table.along @ amplitudes[:, None], 1, 2).reshape(elements, stations, -1, 1)
-    flat = table.strain.reshape(elements, stations, 6 * points, -1)
-    return np.asarray((flat @ jets).reshape(elements, stations, 6, points))
-
-
-def displacements(table: StrainTable, unknowns: Array) -> Array:
-    """Displacement (elements, stations, 3, points) of element unknowns (elements, size)."""
-    amplitudes = table.along[0] @ unknowns.reshape(len(unknowns), table.along.shape[2], -1)
-    return np.asarray((table.displacement @ amplitudes[:, :, None, :, None])[..., 0])
 
 
 def _tall(per_station: Array) -> NDArray[np.float64]:

@@ -8,10 +8,7 @@ import numpy as np
 
 from shell.curves import Arc, Hyperbola, Line
 from shell.errors import ShellError
-from shell.resonator import MeridianPoints as MeridianPoints
-from shell.resonator import Resonator as Resonator
-from shell.resonator import Stem as Stem
-from shell.resonator import Support as Support
+from shell.resonator import Resonator, Stem, Support
 
 Profile: TypeAlias = float | list[tuple[float, float]] | tuple[tuple[float, float], ...]
 SUPPORTS = ("free", "clamped-pole", "clamped-rim", "stem")

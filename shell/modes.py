@@ -115,8 +115,8 @@ def solve_modes(
 ) -> tuple[Mode, ...]:
     """The lowest modes of one circumferential harmonic, without rigid motions.
 
-    The polynomial orders rise until the frequencies of one level lie within `tolerance` of the next; that distance is
-    the error estimate of the level that is returned.
+    The polynomial orders rise until what the next functions of every element would still change lies within `tolerance`;
+    that is the error estimate (see shell.surplus).
 
     Parameters
     ----------

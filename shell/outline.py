@@ -12,15 +12,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from shell.assembly import build_system, sections
-from shell.blocks import SIDES, Mesh
+from shell.blocks import SIDES, Mesh, surface_sides
+from shell.cells import CellTable, gradients_at
 from shell.errors import ShellError
-from shell.kernel import StrainTable, block_table, displacements, energy_weights, shell_table, strains
+from shell.kernel import StrainTable, energy_weights, shell_table
 from shell.layout import Chain
 from shell.levels import LEVELS
-from shell.quadrature import Array, hierarchic, legendre, nodal
+from shell.quadrature import Array, legendre, nodal
 from shell.resonator import Resonator
 from shell.solution import Solution
-from shell.system import SolidPart, System
+from shell.system import SolidGroup, System
 
 if TYPE_CHECKING:
     from shell.modes import Mode
@@ -119,8 +120,8 @@ class _Sides:
 
     def all(self, spacing: float) -> Iterator[Outline]:
         for number, group in enumerate(self.system.groups):
-            if isinstance(group.place, SolidPart):
-                for cell, side in group.place.surface:
+            if isinstance(group, SolidGroup):
+                for cell, side in surface_sides(group.place.mesh, group.place.boundary):
                     yield self._solid_side(number, group.place.mesh, cell, side, spacing)
             else:
                 for element in range(len(group.place.chain.segments)):
@@ -166,33 +167,21 @@ class _Sides:
         where = self.system.groups[number].table.position[cell, 0]
         if self.solution is None:
             return _bare(r, z, np.full(r.shape, where))
-        along, across = nodal(degree, xi * INSIDE), nodal(degree, eta * INSIDE)
-        jacobian = np.stack(
-            [_place(grid, along.slopes, across.values), _place(grid, along.values, across.slopes)], axis=1
-        )
-        inside = _place(grid, along.values, across.values)
-        table = block_table(
-            (inside[0], inside[1]),
-            jacobian,
-            np.ones((len(xi), len(eta))),
-            self.system.n,
-            hierarchic(degree, eta * INSIDE),
-            hierarchic(degree, xi * INSIDE),
-            np.full(1, where),
-        )
+        points = xi * INSIDE, eta * INSIDE
+        table = gradients_at(grid, *points, np.ones((len(xi), len(eta))), degree, self.system.n, where)
         displacement, energy = _fields(self.solution, table, number, cell)
         return Outline(r, z, np.full(r.shape, where), displacement.reshape(3, -1), energy.reshape(2, -1))
 
 
-def _fields(solution: Solution, table: StrainTable, number: int, element: int) -> tuple[Array, Array]:
+def _fields(solution: Solution, table: StrainTable | CellTable, number: int, element: int) -> tuple[Array, Array]:
     """Displacement (3, stations, points) and the two parts of the energy density (2, stations, points)."""
     unknowns = solution.unknowns[number][[element]]
     lam, G = (float(np.mean(values[element])) for values in solution.constants[number].lame)
-    e = np.moveaxis(strains(table, unknowns)[0], 1, 0)
-    sheared = G / 2 * energy_weights(table)[:, None, None] * e**2
+    e = np.moveaxis(table.strains(unknowns)[0], 1, 0)
+    sheared = G / 2 * energy_weights(table.transverse_shear)[:, None, None] * e**2
     by_sine = sheared[list(SHEARED)].sum(axis=0)
     by_cosine = lam / 2 * e[:3].sum(axis=0) ** 2 + sheared.sum(axis=0) - by_sine
-    return np.moveaxis(displacements(table, unknowns)[0], 1, 0), np.stack([by_cosine, by_sine])
+    return np.moveaxis(table.displacements(unknowns)[0], 1, 0), np.stack([by_cosine, by_sine])
 
 
 def _points(length: float, spacing: float) -> Array:

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from shell.errors import ShellError
-from shell.meridian import Resonator, Stem
 from shell.quadrature import Array
+from shell.resonator import Resonator, Stem
 
 Pairs: TypeAlias = tuple[tuple[float, float], ...]
 Shape: TypeAlias = Callable[[Array], ArrayLike] | Sequence[tuple[float, float]]

@@ -16,11 +16,11 @@ from typing import Any
 import numpy as np
 from scipy.linalg import eigh
 
-from shell.condensed import Pair
 from shell.designs import Designs
 from shell.interpolated import Polynomials, Solids
 from shell.kernel import lame
 from shell.quadrature import Array
+from shell.system import Pair
 
 CHUNK = 1536  # designs that are evaluated together; fixed, so that a design's numbers never depend on its company
 MOST_FEATURES = 160

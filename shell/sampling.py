@@ -5,10 +5,11 @@ from itertools import pairwise
 
 import numpy as np
 
+from shell.cells import in_order
 from shell.quadrature import Array, hierarchic, legendre, nodal
 from shell.resonator import Resonator
 from shell.solution import Solution
-from shell.system import Group, ShellPart, SolidPart
+from shell.system import ShellGroup, SolidGroup
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,7 +28,7 @@ def sample_shape(resonator: Resonator, solution: Solution, points: int) -> tuple
     x = np.linspace(-1, 1, points)
     found: list[ShapePatch] = []
     for group, q in zip(solution.system.groups, solution.unknowns, strict=True):
-        if isinstance(group.place, ShellPart):
+        if isinstance(group, ShellGroup):
             found += _shell_patches(resonator, group, solution.system.level.through, q, x)
         else:
             found += _solid_patches(group, q, x)
@@ -35,9 +36,8 @@ def sample_shape(resonator: Resonator, solution: Solution, points: int) -> tuple
 
 
 def _shell_patches(
-    resonator: Resonator, group: Group, orders: tuple[int, int, int], q: Array, x: Array
+    resonator: Resonator, group: ShellGroup, orders: tuple[int, int, int], q: Array, x: Array
 ) -> list[ShapePatch]:
-    assert isinstance(group.place, ShellPart)
     along = nodal(group.table.along.shape[2] - 1, x).values
     through = [legendre(order, x).values for order in orders]
     splits = np.cumsum([order + 1 for order in orders])[:2]
@@ -54,10 +54,10 @@ def _shell_patches(
     return found
 
 
-def _solid_patches(group: Group, q: Array, x: Array) -> list[ShapePatch]:
-    assert isinstance(group.place, SolidPart)
-    degree = group.table.along.shape[2] - 1
+def _solid_patches(group: SolidGroup, q: Array, x: Array) -> list[ShapePatch]:
+    degree = group.place.mesh.grid.shape[2] - 1
     place, move = nodal(degree, x).values, hierarchic(degree, x).values
     r, z = np.einsum("ia,geab,jb->geij", place, group.place.mesh.grid, place)
-    u = np.einsum("ia,eacb,jb->ceij", move, q.reshape(len(q), degree + 1, 3, degree + 1), move)
+    i, j = in_order(degree)
+    u = np.einsum("xk,yk,ekc->cexy", move[:, i], move[:, j], q.reshape(len(q), -1, 3))
     return [ShapePatch(*fields) for fields in zip(r, z, *u, strict=True)]

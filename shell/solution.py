@@ -6,9 +6,10 @@ from math import pi
 
 import numpy as np
 
-from shell.kernel import displacements, energy_weights, lame, lame_slopes, shell_table, strains
+from shell.elastic import Elastic, VaryingElastic
+from shell.kernel import energy_weights, lame, lame_slopes, shell_table
 from shell.quadrature import Array, Basis, legendre
-from shell.system import Group, ShellPart, System
+from shell.system import Group, ShellGroup, System
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,6 +30,15 @@ class Constants:
     def wave_speed_squared(self) -> float:
         """Mean G over mean ρ, m²/s²."""
         return float(np.mean(self.lame[1]) / np.mean(self.rho))
+
+
+def find_constants(position: Array, elastic: Elastic | VaryingElastic, plane_stress: bool) -> Constants:
+    """The material at stations with positions (elements, stations) on the meridian."""
+    if isinstance(elastic, VaryingElastic):
+        E, nu, rho = elastic.at(position)
+    else:
+        E, nu, rho = (np.full(position.shape, value) for value in (elastic.E, elastic.nu, elastic.rho))
+    return Constants(E, nu, rho, plane_stress)
 
 
 @dataclass(frozen=True)
@@ -91,12 +101,12 @@ class Solution:
     @cached_property
     def strain(self) -> list[Array]:
         """Strains (elements, stations, 6, points) of every group."""
-        return [strains(group.table, q) for group, q in zip(self.system.groups, self.unknowns, strict=True)]
+        return [group.table.strains(q) for group, q in zip(self.system.groups, self.unknowns, strict=True)]
 
     @cached_property
     def displacement(self) -> list[Array]:
         """Displacements (elements, stations, 3, points) of every group, in its own axes."""
-        return [displacements(group.table, q) for group, q in zip(self.system.groups, self.unknowns, strict=True)]
+        return [group.table.displacements(q) for group, q in zip(self.system.groups, self.unknowns, strict=True)]
 
     @cached_property
     def squares(self) -> list[tuple[Array, Array]]:
@@ -104,7 +114,7 @@ class Solution:
         return [
             (
                 _integrate(np.add.reduce(e[:, :, :3], axis=2) ** 2, group),
-                _integrate(energy_weights(group.table) @ (e * e), group),
+                _integrate(energy_weights(group.table.transverse_shear) @ (e * e), group),
             )
             for group, e in zip(self.system.groups, self.strain, strict=True)
         ]
@@ -152,7 +162,7 @@ class Solution:
         for group, c, e, elastic, kinetic in zip(
             self.system.groups, self.constants, self.strain, self.elastic, self.kinetic, strict=True
         ):
-            if isinstance(group.place, ShellPart):
+            if isinstance(group, ShellGroup):
                 shear = total(
                     [c.lame[1] * group.table.transverse_shear * _integrate(e[:, :, 4] ** 2 + e[:, :, 5] ** 2, group)]
                 )
@@ -176,7 +186,7 @@ class Solution:
         for group, c, elastic, kinetic, nu, q in zip(
             self.system.groups, self.constants, self.elastic, self.kinetic, self._by_nu, self.unknowns, strict=True
         ):
-            if isinstance(group.place, ShellPart):
+            if isinstance(group, ShellGroup):
                 width = group.place.section.weight * group.place.section.ds
                 thickness = _surface_density(self.system, group, c, q, self.eigenvalue) / (2 * U)
                 columns = [group.table.position, width, elastic / U, kinetic / T, nu / (2 * U), thickness]
@@ -217,7 +227,7 @@ def _integrate(at_points: Array, group: Group) -> Array:
 
 def _radial(group: Group, displacement: Array) -> Array:
     """Displacement away from the axis, (elements, stations, points)."""
-    if not isinstance(group.place, ShellPart):
+    if not isinstance(group, ShellGroup):
         return displacement[:, :, 0]
     section = group.place.section
     return np.asarray(
@@ -225,7 +235,7 @@ def _radial(group: Group, displacement: Array) -> Array:
     )
 
 
-def _membrane(group: Group, c: Constants, e: Array) -> float:
+def _membrane(group: ShellGroup, c: Constants, e: Array) -> float:
     """Energy of the mean in-plane strains, in plane stress."""
     weights = group.table.volume / group.table.volume.sum(axis=2, keepdims=True)
     s, theta, twist = (np.einsum("eij,eij->ei", e[:, :, k], weights) for k in (0, 1, 3))
@@ -237,18 +247,17 @@ def _plane_energy(c: Constants, s: Array, theta: Array, twist: Array) -> Array:
     return np.asarray(lam * (s + theta) ** 2 + G * (2 * s**2 + 2 * theta**2 + twist**2))
 
 
-def _surface_density(system: System, group: Group, c: Constants, q: Array, eigenvalue: float) -> Array:
+def _surface_density(system: System, group: ShellGroup, c: Constants, q: Array, eigenvalue: float) -> Array:
     """Change of (elastic - ω² kinetic) as both faces move outwards by h/2: energies at the faces (Hadamard's formula).
 
     Of a solid the faces are free of traction, so their strain energy is that of plane stress; Naghdi's transverse shear
     does not vanish there and counts.
     """
-    assert isinstance(group.place, ShellPart)
     faces = np.array([-1.0, 1.0])
     u, v, w = (legendre(order, faces) for order in system.level.through)
     along = Basis(*group.table.along)
     table = shell_table(group.place.section, system.n, (u, v, w), (faces, np.ones(2)), along)
-    e, d = strains(table, q), displacements(table, q)
+    e, d = table.strains(q), table.displacements(q)
     at_stations = Constants(c.E[..., None], c.nu[..., None], c.rho[..., None], True)
     density = _plane_energy(at_stations, e[:, :, 0], e[:, :, 1], e[:, :, 3])
     if table.plane_stress:

@@ -3,18 +3,20 @@
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TypeAlias
 
 import numpy as np
 from scipy.sparse import csr_matrix
 
-from shell.blocks import Mesh
+from shell.blocks import Boundary, Mesh
+from shell.cells import CellTable, cell_mass, cell_stiffness
 from shell.constraints import Index
 from shell.eigen import Pattern, find_pattern
 from shell.kernel import (
     Section,
     StrainTable,
-    pair_mass,
-    pair_stiffness,
+    integrate_mass,
+    integrate_stiffness,
     station_mass,
     station_stiffness,
 )
@@ -22,8 +24,10 @@ from shell.layout import Chain
 from shell.levels import Level
 from shell.quadrature import Array
 
+Pair: TypeAlias = tuple[Array, Array]
 PORTION = 16  # elements integrated at a time
 TINY = 160  # unknowns of a dense matrix
+KEPT = 3_000_000  # numbers that a system may keep for the next material (24 MB)
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,20 +40,20 @@ class ShellPart:
 
 @dataclass(frozen=True, eq=False)
 class SolidPart:
-    """Where the cells of a solid part lie, and which of their sides (cell, side) are free or held surface."""
+    """Where the cells of a solid part lie, and the signs (cells, functions) that turn their edges the same way."""
 
     mesh: Mesh
-    surface: tuple[tuple[int, int], ...]
+    boundary: Boundary
+    signs: Array
 
 
 @dataclass(frozen=True, eq=False)
-class Group:
-    """Elements of one kind: their strain table, their unknowns with orientation signs, where they lie."""
+class ShellGroup:
+    """Elements of one chain: their strain table, their unknowns, where they lie, and `anchors`; see `matrices`."""
 
     table: StrainTable
     unknowns: Index
-    signs: Array
-    place: ShellPart | SolidPart
+    place: ShellPart
     anchors: tuple[tuple[int, int], ...] = ()
 
     def matrices(self, integrate: Callable[[Array, Array], Array], stations: Array, first: int) -> Array:
@@ -69,8 +73,6 @@ class Group:
     def spread(self, raw: Array) -> Array:
         """Unknowns (elements, size) of the plain basis."""
         unknowns = raw[self.unknowns]
-        if isinstance(self.place, SolidPart):
-            unknowns *= self.signs.reshape(self.signs.shape + (1,) * (raw.ndim - 1))
         for element, node in self.anchors:
             amplitudes = unknowns[element].reshape(self.table.along.shape[2], -1)
             inner = amplitudes[node].copy()
@@ -78,20 +80,83 @@ class Group:
             amplitudes[node] = inner
         return np.asarray(unknowns)
 
-    def gather(self, amplitudes: Array, raw: Array) -> None:
-        """The way back for a shell: write `amplitudes` (elements, functions, amplitudes, columns) to the raw unknowns."""
-        for element, node in self.anchors:
-            inner = amplitudes[element, node].copy()
-            amplitudes[element] -= inner
-            amplitudes[element, node] = inner
-        raw[self.unknowns] = amplitudes.reshape(*self.unknowns.shape, -1)
+    def units(self, maps: list["ToFree"]) -> list[Array]:
+        """Element matrices on free unknowns per unit λ, G and ρ, (3, size, size) each, the same material everywhere."""
+        found: list[Array] = []
+        for first, part in self._portions():
+            trace, shear = station_stiffness(part)
+            kinds = (
+                self.matrices(integrate_stiffness, trace, first),
+                self.matrices(integrate_stiffness, shear, first),
+                self.matrices(integrate_mass, station_mass(part), first),
+            )
+            here = maps[first : first + len(trace)]
+            found += [
+                np.stack([at.restrict(kind) for kind in element]) for *element, at in zip(*kinds, here, strict=True)
+            ]
+        return found
+
+    def varying(self, maps: list["ToFree"], lam: Array, G: Array, rho: Array) -> Iterator[Pair]:
+        """Stiffness and mass of every element with λ, G, ρ at its stations."""
+        for first, part in self._portions():
+            here = slice(first, first + len(part.volume))
+            lam_there, G_there, rho_there = (field[here, :, None, None] for field in (lam, G, rho))
+            trace, shear = station_stiffness(part)
+            trace *= lam_there
+            trace += G_there * shear
+            stiffness = self.matrices(integrate_stiffness, trace, first)
+            mass = self.matrices(integrate_mass, rho_there * station_mass(part), first)
+            for k, m, at in zip(stiffness, mass, maps[here], strict=True):
+                yield at.restrict(k), at.restrict(m)
+
+    def _portions(self) -> Iterator[tuple[int, StrainTable]]:
+        """A few elements at a time, so that the passing arrays stay small."""
+        for first in range(0, len(self.unknowns), PORTION):
+            yield first, self.table.part(slice(first, first + PORTION))
+
+
+@dataclass(frozen=True, eq=False)
+class SolidGroup:
+    """Cells of one solid part: the gradients of their functions, their unknowns, where they lie."""
+
+    table: CellTable
+    unknowns: Index
+    place: SolidPart
+
+    def spread(self, raw: Array) -> Array:
+        """Unknowns (cells, size) of functions as they are in each cell."""
+        return np.asarray(raw[self.unknowns] * np.repeat(self.place.signs, 3, axis=1))
+
+    @cached_property
+    def products(self) -> Array:
+        """See `CellTable.products`."""
+        return self.table.products(self.place.signs)
+
+    def stiffness(self, maps: list["ToFree"], lam: Array, G: Array, keep: bool) -> Iterator[Array]:
+        """Stiffness of every cell with its λ and G, (cells, 1) each."""
+        for here, products in self._portions(keep):
+            whole = cell_stiffness(products, lam[here, 0], G[here, 0], self.table.n)
+            yield from (at.restrict(matrix) for matrix, at in zip(whole, maps[here], strict=True))
+
+    def mass(self, maps: list["ToFree"], keep: bool) -> Iterator[Array]:
+        """Mass of every cell per unit density."""
+        for here, products in self._portions(keep):
+            yield from (at.restrict(matrix) for matrix, at in zip(cell_mass(products), maps[here], strict=True))
+
+    def _portions(self, keep: bool) -> Iterator[tuple[slice, Array]]:
+        for first in range(0, len(self.unknowns), PORTION):
+            here = slice(first, first + PORTION)
+            yield here, self.products[here] if keep else self.table.part(here).products(self.place.signs[here])
+
+
+Group: TypeAlias = ShellGroup | SolidGroup
 
 
 @dataclass(frozen=True, eq=False)
 class System:
     """Every element of a resonator at one harmonic and level, with the constraints between raw and free unknowns.
 
-    raw = constraint @ free. Matrices come per unit λ, G, ρ, so that a new material or temperature costs no geometry.
+    raw = constraint @ free. What costs geometry is kept for the next material or temperature where it is not too large.
     """
 
     groups: tuple[Group, ...]
@@ -99,12 +164,6 @@ class System:
     rigid_motions: int
     n: int
     level: Level
-
-    @cached_property
-    def free(self) -> Index:
-        """The raw unknown that each free one is: the first of those that follow it."""
-        columns = self.constraint.tocsc()
-        return np.asarray(columns.indices[columns.indptr[:-1]], dtype=np.intp)
 
     @property
     def pattern(self) -> Pattern:
@@ -121,130 +180,113 @@ class System:
         counts = np.diff(self.constraint.indptr)
         column = np.full(len(counts), -1, dtype=np.intp)
         column[counts == 1] = self.constraint.indices[self.constraint.indptr[:-1][counts == 1]]
+        by_column = self.constraint.tocsc()
+        free = by_column.indices[
+            by_column.indptr[:-1]
+        ]  # the raw unknown that each free one is: the first that follows it
         follows = counts > 0
-        follows[self.free] = False
+        follows[free] = False
         maps: list[ToFree] = []
         for group in self.groups:
             columns, tied = column[group.unknowns], np.any(follows[group.unknowns], axis=1)
-            for members, own, signs, general in zip(group.unknowns, columns, group.signs, tied, strict=True):
+            for members, own, general in zip(group.unknowns, columns, tied, strict=True):
                 kept = np.flatnonzero(own >= 0)
-                maps.append(self._free(members, signs) if general else ToFree(own[kept], kept, signs[kept]))
+                maps.append(self._free(members) if general else ToFree(own[kept], kept, None))
         pattern = find_pattern([at.free for at in maps], self.constraint.shape[1])
         return pattern, [at.reordered(order) for at, order in zip(maps, pattern.order, strict=True)]
 
-    @property
+    def _free(self, members: Index) -> "ToFree":
+        rows = self.constraint[members]
+        free = np.unique(rows.indices).astype(np.intp)
+        return ToFree(free, None, rows[:, free].toarray())
+
+    def _by_group(self) -> Iterator[tuple[Group, list["ToFree"]]]:
+        first = 0
+        for group in self.groups:
+            yield group, self.maps[first : first + len(group.unknowns)]
+            first += len(group.unknowns)
+
+    @cached_property
     def is_small(self) -> bool:
-        """Whether the matrices are worth keeping: below 24 MB."""
-        return sum(len(at.free) ** 2 for at in self.maps) < 1e6
+        """Whether what costs geometry is worth keeping."""
+        numbers = 0
+        for group in self.groups:
+            size = group.unknowns.shape[1] ** 2
+            numbers += len(group.unknowns) * (3 * size if isinstance(group, ShellGroup) else size + 10 * size // 9)
+        return numbers < KEPT
 
     @property
     def is_tiny(self) -> bool:
         """Whether one dense matrix costs less than the elements one by one."""
         return len(self.groups) == 1 and self.constraint.shape[1] <= TINY
 
-    @cached_property
-    def units(self) -> list[Array]:
-        """Element matrices on free unknowns per unit λ, G and ρ, (3, size, size) each, the same material everywhere."""
-        found: list[Array] = []
-        for group, first, part, maps in self._portions():
-            trace, shear = station_stiffness(part)
-            kinds = (
-                group.matrices(pair_stiffness, trace, first),
-                group.matrices(pair_stiffness, shear, first),
-                group.matrices(pair_mass, station_mass(part), first),
-            )
-            found += [at.collect(element) for *element, at in zip(*kinds, maps, strict=True)]
-        return found
-
-    @cached_property
-    def whole(self) -> tuple[Pattern, list[Array]]:
-        """The units of all elements as of one, of a small shell without solid parts: fewer and larger products."""
-        size = self.pattern.size
-        merged = np.zeros((3, size, size))
-        for members, kinds in zip(self.pattern.unknowns, self.units, strict=True):
-            merged[:, members[:, None], members] += kinds
-        return find_pattern([np.arange(size)], size), [merged]
-
-    def varying(self, lam: list[Array], G: list[Array], rho: list[Array]) -> tuple[list[Array], list[Array]]:
-        """Stiffness and mass of every element with λ, G, ρ given at the stations of every group."""
+    def operators(
+        self, lam: list[Array], G: list[Array], rho: list[Array], uniform: bool
+    ) -> tuple[list[Array], list[Array]]:
+        """Stiffness and mass of every element with λ, G, ρ at the stations of every group; `uniform`: the same in a group."""
         K: list[Array] = []
         M: list[Array] = []
-        fields = iter(
-            [
-                (a[k : k + PORTION], b[k : k + PORTION], c[k : k + PORTION])
-                for a, b, c in zip(lam, G, rho, strict=True)
-                for k in range(0, len(a), PORTION)
-            ]
-        )
-        for group, first, part, maps in self._portions():
-            lam_there, G_there, rho_there = (field[..., None, None] for field in next(fields))
-            trace, shear = station_stiffness(part)
-            trace *= lam_there
-            trace += G_there * shear
-            stiffness = group.matrices(pair_stiffness, trace, first)
-            mass = group.matrices(pair_mass, rho_there * station_mass(part), first)
-            for k, m, at in zip(stiffness, mass, maps, strict=True):
-                K.append(at.collect([k])[0])
-                M.append(at.collect([m])[0])
+        for k, (group, maps) in enumerate(self._by_group()):
+            if isinstance(group, SolidGroup):
+                K += group.stiffness(maps, lam[k], G[k], self.is_small)
+                unit = self._unit_masses[k] if self.is_small else group.mass(maps, False)
+                M += [m if density == 1 else density * m for m, density in zip(unit, rho[k][:, 0], strict=True)]
+            elif uniform and self.is_small:
+                moduli = np.array([lam[k][0, 0], G[k][0, 0]])
+                K += [(moduli @ unit[:2].reshape(2, -1)).reshape(unit.shape[1:]) for unit in self._units[k]]
+                density = rho[k][0, 0]
+                M += [unit[2] if density == 1 else density * unit[2] for unit in self._units[k]]
+            else:
+                for stiff, heavy in group.varying(maps, lam[k], G[k], rho[k]):
+                    K.append(stiff)
+                    M.append(heavy)
         return K, M
 
-    def _portions(self) -> Iterator[tuple[Group, int, StrainTable, list["ToFree"]]]:
-        """A few elements at a time, so that the passing arrays stay small."""
-        done = 0
-        for group in self.groups:
-            for k in range(0, len(group.unknowns), PORTION):
-                part = group.table.part(slice(k, k + PORTION))
-                count = len(part.volume)
-                yield group, k, part, self.maps[done : done + count]
-                done += count
+    @cached_property
+    def _units(self) -> list[list[Array]]:
+        return [group.units(maps) if isinstance(group, ShellGroup) else [] for group, maps in self._by_group()]
+
+    @cached_property
+    def _unit_masses(self) -> list[list[Array]]:
+        return [
+            list(group.mass(maps, True)) if isinstance(group, SolidGroup) else [] for group, maps in self._by_group()
+        ]
+
+    @cached_property
+    def whole(self) -> tuple[Pattern, Array]:
+        """The units of a small shell without solid parts as of one element, (3, size, size): fewer and larger products."""
+        size = self.pattern.size
+        merged = np.zeros((3, size, size))
+        for members, kinds in zip(self.pattern.unknowns, self._units[0], strict=True):
+            merged[:, members[:, None], members] += kinds
+        return find_pattern([np.arange(size)], size), merged
 
     def spread(self, free: Array) -> list[Array]:
         """Element unknowns (elements, size) of every group from the free unknowns of one vector."""
         raw = self.constraint @ free
         return [group.spread(raw) for group in self.groups]
 
-    def _free(self, members: Index, signs: Array) -> "ToFree":
-        rows = self.constraint[members]
-        free = np.unique(rows.indices).astype(np.intp)
-        return ToFree(free, None, signs[:, None] * rows[:, free].toarray())
-
 
 @dataclass(frozen=True, eq=False)
 class ToFree:
-    """From an element's unknowns to free ones: a choice with signs, or (kept None) a full matrix of factors."""
+    """From an element's unknowns to free ones: a choice, or (kept None) a full matrix of factors."""
 
     free: Index
     kept: Index | None
-    factors: Array
+    factors: Array | None
 
     def reordered(self, order: Index) -> "ToFree":
         """The same with the free unknowns in another order."""
         if self.kept is None:
+            assert self.factors is not None
             return ToFree(self.free[order], None, self.factors[:, order])
-        return ToFree(self.free[order], self.kept[order], self.factors[order])
+        return ToFree(self.free[order], self.kept[order], None)
 
     def restrict(self, matrix: Array) -> Array:
         """The element's matrix on the free unknowns."""
         if self.kept is None:
+            assert self.factors is not None
             return np.asarray(self.factors.T @ matrix @ self.factors)
-        return self._signed(matrix[self.kept[:, None], self.kept])
-
-    def collect(self, pairs: list[Array]) -> Array:
-        """Some matrices on the free unknowns from their integrals (functions², amplitudes²), (kinds, free, free)."""
-        functions, m = (round(x**0.5) for x in pairs[0].shape)
-        local = np.arange(functions * m) if self.kept is None else self.kept
-        function, amplitude = np.divmod(local, m)
-        rows, columns = (function * functions * m + amplitude) * m, function * m * m + amplitude
-        where = rows[:, None] + columns
-        found = np.empty((len(pairs), *where.shape))
-        for matrix, integrals in zip(found, pairs, strict=True):
-            integrals.ravel().take(where, out=matrix, mode="clip")  # this mode takes without a copy
-        if self.kept is None:
-            return np.asarray(self.factors.T @ found @ self.factors)
-        return self._signed(found)
-
-    def _signed(self, matrices: Array) -> Array:
-        if np.any(self.factors < 0):
-            matrices *= self.factors
-            matrices *= self.factors[:, None]
-        return matrices
+        if len(self.kept) == len(matrix) and np.all(self.kept[1:] > self.kept[:-1]):
+            return matrix
+        return np.asarray(matrix.ravel().take(self.kept[:, None] * len(matrix) + self.kept, mode="clip"))

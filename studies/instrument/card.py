@@ -20,7 +20,7 @@ from studies.files.writing import write_text
 if TYPE_CHECKING:
     from shell.elastic import Elastic
     from shell.materials import Material
-    from shell.meridian import Resonator
+    from shell.resonator import Resonator
 
 SCHEMA = "hrg.card/1"
 ZERO_CELSIUS = 273.15

@@ -9,7 +9,7 @@ from studies.errors import InputError, naming
 from studies.files.toml import Section, check_number
 
 if TYPE_CHECKING:
-    from shell.meridian import Resonator, Stem, Support
+    from shell.resonator import Resonator, Stem, Support
 
 MM = 1e-3
 SUPPORTS = ("free", "clamped-pole", "clamped-rim", "stem")
@@ -93,7 +93,7 @@ def _meridian(table: Section) -> "Resonator":
 
 
 def _support(table: Section) -> "tuple[Support, Stem | None]":
-    from shell.meridian import Stem
+    from shell.resonator import Stem
 
     support = cast("Support", table.text("support", "free", SUPPORTS))
     if (support == "stem") != ("stem" in table):

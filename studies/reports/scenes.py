@@ -11,8 +11,8 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from shell.meridian import Resonator
     from shell.modes import Mode
+    from shell.resonator import Resonator
     from shell.scene import Scene
     from shell.surface import Surface
 

@@ -16,9 +16,9 @@ import numpy as np
 from studies.reports.page import Embedded
 
 if TYPE_CHECKING:
-    from shell.meridian import Resonator
     from shell.modes import Mode
     from shell.outline import Outline
+    from shell.resonator import Resonator
 
 KINK = np.radians(35.0)  # where the outline turns by more than this, the shading breaks
 

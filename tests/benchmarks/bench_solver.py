@@ -18,6 +18,7 @@ import time
 from pathlib import Path
 
 import numpy as np
+from bench_modes import forget
 
 from shell.assembly import build_system
 from shell.elastic import Elastic
@@ -62,7 +63,7 @@ def ours():
         if theory != "rayleigh":
 
             def cold(solve=solve):
-                build_system.cache_clear()
+                forget()
                 return solve()
 
             yield f"ours {name}, cold", best_time(cold, 3)[0], size, [mode.frequency]
@@ -71,51 +72,29 @@ def ours():
 def stages():
     """Print what one cached solve of one level spends its time on."""
     from shell.eigen import Factor, apply_mass, lowest_vectors
-    from shell.kernel import lame
-    from shell.solution import Constants, Solution
+    from shell.solution import Solution, find_constants
+    from shell.surplus import estimate_error
 
     print("\nOne level, operators cached (ms):")
+    dome = hemisphere(R, H)
     for theory, number in (("shell", 0), ("solid", 0), ("solid", 1)):
-        system = build_system(hemisphere(R, H), 2, theory, LEVELS[theory][number])
-        group = system.groups[0]
-        lam, G = (float(x) for x in lame(np.float64(GLASS.E), np.float64(GLASS.nu), group.table.plane_stress))
-
-        def matrices(system=system, lam=lam, G=G):
-            K = [lam * trace + G * shear for trace, shear, _ in system.units]
-            return K, [GLASS.rho * mass for _, _, mass in system.units]
-
-        t_matrices, (K, M) = best_time(matrices, 20)
-        pattern = system.pattern
+        system = build_system(dome, 2, theory, LEVELS[theory][number])
+        group, pattern = system.groups[0], system.pattern
+        constants = find_constants(group.table.position, GLASS, group.table.plane_stress)
+        fields = [[field] for field in (*constants.lame, constants.rho)]
+        t_matrices, (K, M) = best_time(lambda s=system, f=fields: s.operators(*f, uniform=True), 20)
         t_factor, factor = best_time(lambda p=pattern, K=K: Factor(p, K), 20)
         x = np.ones((pattern.size, 5))
         t_step, _ = best_time(lambda f=factor, p=pattern, M=M, x=x: f.solve(apply_mass(p, M, x)), 20)
         t_vectors, vector = best_time(lambda p=pattern, K=K, M=M: lowest_vectors(p, K, M, 1, 0.0, 1e-11), 20)
-        constants = Constants(
-            *(np.full(group.table.position.shape, v) for v in (GLASS.E, GLASS.nu, GLASS.rho)), group.table.plane_stress
-        )
-        t_quotient, _ = best_time(lambda s=system, c=constants, v=vector: Solution(s, (c,), v[:, 0]).eigenvalue, 20)
-        t_bryan, _ = best_time(lambda s=system, c=constants, v=vector: Solution(s, (c,), v[:, 0]).bryan_factor, 20)
+        solution = Solution(system, (constants,), vector[:, 0])
+        t_quotient, _ = best_time(lambda s=solution: Solution(s.system, s.constants, s.vector).eigenvalue, 20)
+        t_error, _ = best_time(lambda s=solution: estimate_error(dome, GLASS, s), 20)
         print(
             f"  {theory} level {number}, {pattern.size} unknowns: matrices {1e3 * t_matrices:.3f}, factor {1e3 * t_factor:.3f}, "
-            f"one step {1e3 * t_step:.3f}, vectors {1e3 * t_vectors:.3f}, Rayleigh quotient {1e3 * t_quotient:.3f}, with Bryan factor {1e3 * t_bryan:.3f}"
+            f"one step {1e3 * t_step:.3f}, vectors {1e3 * t_vectors:.3f}, Rayleigh quotient {1e3 * t_quotient:.3f}, "
+            f"error estimate {1e3 * t_error:.3f}"
         )
-
-
-def card_to_frequency():
-    """Print the time from a card to its frequency after all imports."""
-    from studies.instrument.card import load_card, shipped_cards
-
-    print("\nFrom a card to a frequency, after imports, nothing cached (ms):")
-    for name in shipped_cards():
-
-        def run(name=name):
-            build_system.cache_clear()
-            instrument = load_card(name)
-            elastic = instrument.material.elastic(instrument.reference_temperature)
-            return solve_modes(instrument.resonator, elastic)[0].frequency
-
-        seconds, frequency = best_time(run, 2)
-        print(f"  {name}: {1e3 * seconds:.0f} ({frequency:.3f} Hz)")
 
 
 def dome_hexahedra(cells, layers=1):
@@ -328,7 +307,6 @@ def main():
             f"{name:42} {1e3 * seconds:8.2f} ms {seconds / unit:8.2f} {unknowns:9d} {mean:12.4f} {mean / EXACT - 1:9.1e} {split:>9}"
         )
     stages()
-    card_to_frequency()
     return 0
 
 

@@ -8,8 +8,9 @@ import pytest
 from shell.curves import Arc, Hyperbola, Line
 from shell.elastic import Elastic
 from shell.errors import ShellError
-from shell.meridian import Resonator, Stem, bell, cylinder, hemisphere, meridian
+from shell.meridian import bell, cylinder, hemisphere, meridian
 from shell.modes import solve_modes
+from shell.resonator import Resonator, Stem
 
 SILICA = Elastic(72.7e9, 0.17, 2203.0)
 

@@ -8,8 +8,9 @@ import pytest
 
 from shell.elastic import Elastic, VaryingElastic
 from shell.errors import ShellError
-from shell.meridian import Resonator, Stem, cylinder, hemisphere
+from shell.meridian import cylinder, hemisphere
 from shell.modes import TheoryRangeWarning, solve_modes
+from shell.resonator import Resonator, Stem
 
 SILICA = Elastic(72.7e9, 0.17, 2203.0)
 DOME = hemisphere(radius=15e-3, thickness=0.9e-3)

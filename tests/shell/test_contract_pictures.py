@@ -13,9 +13,10 @@ from PIL import Image
 import shell.render
 from shell.elastic import Elastic
 from shell.errors import ShellError
-from shell.meridian import Stem, hemisphere
+from shell.meridian import hemisphere
 from shell.modes import solve_modes
 from shell.render import NoOpenGL, can_draw, render_animation, render_png
+from shell.resonator import Stem
 from shell.scene import compose_scene
 from shell.surface import build_surface
 

@@ -7,13 +7,12 @@ import numpy as np
 import pytest
 
 from shell.assembly import build_system
-from shell.eigen import lowest_vectors
 from shell.elastic import Elastic
-from shell.kernel import lame
 from shell.levels import LEVELS, Level, Theory
-from shell.meridian import Resonator, Stem, bell, cylinder, hemisphere
+from shell.meridian import bell, cylinder, hemisphere
 from shell.modes import solve_modes
-from shell.solution import Constants, Solution
+from shell.refinement import solve_level
+from shell.resonator import Resonator, Stem
 
 SILICA = Elastic(72.7e9, 0.17, 2203.0)
 
@@ -59,22 +58,8 @@ def test_error_estimate_is_true_for_random_designs() -> None:
 
 def frequency(resonator: Resonator, elastic: Elastic, n: int, theory: Theory, level: Level) -> float:
     """Lowest frequency at one level."""
-    system = build_system(resonator, n, theory, level)
-    lam, G = lame(np.array(elastic.E), np.array(elastic.nu), theory == "shell")
-    lam_solid, _ = lame(np.array(elastic.E), np.array(elastic.nu), False)
-    fields = tuple(
-        Constants(
-            *(np.full(group.table.position.shape, value) for value in (elastic.E, elastic.nu, elastic.rho)),
-            group.table.plane_stress,
-        )
-        for group in system.groups
-    )
-    moduli = [lam if group.table.plane_stress else lam_solid for group in system.groups for _ in group.unknowns]
-    K = [first * trace + G * shear for first, (trace, shear, _) in zip(moduli, system.units, strict=True)]
-    M = [elastic.rho * mass for _, _, mass in system.units]
-    shift = 1e-2 * float(G) / elastic.rho / resonator.size**2 if system.rigid_motions else 0.0
-    vectors = lowest_vectors(system.pattern, K, M, 1 + system.rigid_motions, shift, 1e-11)
-    return sorted(sqrt(Solution(system, fields, vector).eigenvalue) / (2 * pi) for vector in vectors.T)[-1]
+    (solution,) = solve_level(build_system(resonator, n, theory, level), resonator.size, elastic, 1, 1e-11)
+    return sqrt(solution.eigenvalue) / (2 * pi)
 
 
 @pytest.mark.parametrize("thickness", [0.9e-3, 0.15e-3])

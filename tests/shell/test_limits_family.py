@@ -10,9 +10,10 @@ import pytest
 from shell.elastic import Elastic
 from shell.errors import ShellError
 from shell.family import build_family
-from shell.meridian import Resonator, hemisphere
+from shell.meridian import hemisphere
 from shell.modes import solve_modes
 from shell.profiles import Profiles
+from shell.resonator import Resonator
 
 NOMINAL = hemisphere(15e-3, 0.9e-3)
 TILT = ((0.0, -1.0), (1.0, 1.0))

@@ -10,9 +10,10 @@ import pytest
 from shell.elastic import Elastic
 from shell.errors import ShellError
 from shell.family import build_family
-from shell.meridian import Stem, bell, cylinder, hemisphere
+from shell.meridian import bell, cylinder, hemisphere
 from shell.modes import solve_modes
 from shell.profiles import Profiles
+from shell.resonator import Stem
 
 TILT = ((0.0, -1.0), (1.0, 1.0))
 CUP = cylinder(12.5e-3, 0.6e-3, 18e-3, bottom_thickness=1e-3, clamp_radius=3e-3)

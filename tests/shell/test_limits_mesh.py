@@ -12,9 +12,10 @@ import trimesh
 from shell.elastic import Elastic
 from shell.errors import ShellError
 from shell.inertia import weigh
-from shell.meridian import Stem, bell, cylinder, hemisphere
+from shell.meridian import bell, cylinder, hemisphere
 from shell.mesh import build_mesh, encode_animation, encode_mesh
 from shell.modes import solve_modes
+from shell.resonator import Stem
 from shell.surface import build_surface
 
 R, H, RHO = 15e-3, 0.9e-3, 2203.0

@@ -8,9 +8,10 @@ import pytest
 
 from shell.curves import Arc, Line
 from shell.elastic import Elastic, VaryingElastic
-from shell.meridian import Resonator, Stem, bell, cylinder, hemisphere, meridian
+from shell.meridian import bell, cylinder, hemisphere, meridian
 from shell.modes import solve_modes
 from shell.rayleigh import rayleigh_frequency
+from shell.resonator import Resonator, Stem
 
 SILICA = Elastic(72.7e9, 0.17, 2203.0)
 DOME = hemisphere(15e-3, 0.9e-3)

@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 from shell.elastic import Elastic
-from shell.meridian import Resonator, Stem, cylinder, hemisphere
+from shell.meridian import cylinder, hemisphere
 from shell.modes import Mode, solve_modes
+from shell.resonator import Resonator, Stem
 
 REFERENCE = Path(__file__).parents[1] / "reference"
 SILICA = Elastic(72.7e9, 0.17, 2203.0)

@@ -1,0 +1,176 @@
+r"""The kernel of the solid cells of roots, corners and clamps: every strain is a sum of gradients of scalar functions.
+
+Displacements a, b, c along r, θ, z vary as cos nθ, sin nθ, cos nθ (for n = 0, b as 1). With φ_r, φ_z and φ_0 = φ/r of a
+function φ of the section,
+
+    ε_r = a_r,  ε_θ = a_0 + n b_0,  ε_z = c_z,  γ_rθ = b_r - n a_0 - b_0,  γ_rz = a_z + c_r,  γ_θz = b_z - n c_0,
+
+or ε_k = Σ S_kαc u_c,α. So the stiffness for any n, λ and G follows from the nine products ∫ φ_α ψ_β dV.
+"""
+
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+
+from shell.constraints import Index
+from shell.kernel import energy_weights
+from shell.quadrature import Array, Basis, gauss, hierarchic, nodal
+
+R, Z, ZERO = range(3)  # the gradients φ_r, φ_z, φ_0
+
+
+@dataclass(frozen=True, eq=False)
+class CellTable:
+    """Gradients of the functions of solid cells at their quadrature points.
+
+    gradients : φ_r, φ_z, φ/r, (cells, 3, points, functions).
+    radius : r of the points, m, (cells, points).
+    volume : dr dz times r and the quadrature weights, (cells, 1, points).
+    position : where on the meridian (0 ... 1) the material is to be taken, (cells, 1).
+    """
+
+    gradients: Array
+    radius: Array
+    volume: Array
+    position: Array
+    n: int
+    transverse_shear: float = 1.0
+    plane_stress: bool = False
+
+    def part(self, cells: slice) -> "CellTable":
+        """The table of some of the cells."""
+        return CellTable(self.gradients[cells], self.radius[cells], self.volume[cells], self.position[cells], self.n)
+
+    def strains(self, unknowns: Array) -> Array:
+        """Strain (cells, 1, 6, points) of cell unknowns (cells, functions x 3)."""
+        count, _, points, functions = self.gradients.shape
+        u = self.gradients @ unknowns.reshape(count, 1, functions, 3)
+        flat = strain_of_gradients(self.n).reshape(6, 9) @ u.transpose(0, 1, 3, 2).reshape(count, 9, points)
+        return np.asarray(flat[:, None])
+
+    def displacements(self, unknowns: Array) -> Array:
+        """Displacement (cells, 1, 3, points) of cell unknowns (cells, functions x 3)."""
+        count, _, _, functions = self.gradients.shape
+        over_r = np.swapaxes(self.gradients[:, ZERO] @ unknowns.reshape(count, functions, 3), 1, 2)
+        return np.asarray((over_r * self.radius[:, None])[:, None])
+
+    def products(self, signs: Array) -> Array:
+        """∫ φ_α ψ_β dV, nine rows, and ∫ φ ψ dV, the last, of functions turned by their signs: (cells, 10, functions²)."""
+        count, _, _, functions = self.gradients.shape
+        weighted = self.gradients * (np.sqrt(self.volume)[..., None] * signs[:, None, None])
+        found = np.empty((count, 10, functions, functions))
+        np.matmul(
+            np.swapaxes(weighted, 2, 3)[:, :, None],
+            weighted[:, None],
+            out=found[:, :9].reshape(count, 3, 3, functions, functions),
+        )
+        moved = weighted[:, ZERO] * self.radius[..., None]
+        np.matmul(np.swapaxes(moved, 1, 2), moved, out=found[:, 9])
+        return found.reshape(count, 10, functions**2)
+
+    def loads(self, stress: Array, force: Array, functions: Index) -> Array:
+        """∫ (σ : ε(φ) - f · φ) dV of chosen functions, (cells, functions, 3), for stress (cells, 6, points), force (cells, 3, points)."""
+        count, points = self.radius.shape
+        chosen = self.gradients[..., functions]
+        dual = strain_of_gradients(self.n).reshape(6, 9).T @ (stress * self.volume)
+        dual = dual.reshape(count, 3, 3, points)
+        dual[:, ZERO] -= force * (self.volume * self.radius[:, None])
+        return np.asarray((np.swapaxes(chosen, 2, 3) @ np.swapaxes(dual, 2, 3)).sum(axis=1))
+
+
+@cache
+def strain_of_gradients(n: int) -> Array:
+    """S_kαc (6, 3, 3): strain k from the gradient α of component c."""
+    S = np.zeros((6, 3, 3))
+    a, b, c = range(3)
+    S[0, R, a] = 1
+    S[1, ZERO, a], S[1, ZERO, b] = 1, n
+    S[2, Z, c] = 1
+    S[3, R, b], S[3, ZERO, a], S[3, ZERO, b] = 1, -n, -1
+    S[4, Z, a], S[4, R, c] = 1, 1
+    S[5, Z, b], S[5, ZERO, c] = 1, -n
+    return S
+
+
+@cache
+def _laws(n: int) -> tuple[Array, Array]:
+    """Factors of the nine products in the stiffness between components c and d, (9, 9): per unit λ and per unit G."""
+    S = strain_of_gradients(n)
+    trace = S[:3].sum(axis=0)
+    dilation = np.einsum("ac,bd->cdab", trace, trace)
+    shear = np.einsum("k,kac,kbd->cdab", energy_weights(), S, S)
+    return dilation.reshape(9, 9), shear.reshape(9, 9)
+
+
+def cell_stiffness(products: Array, lam: Array, G: Array, n: int) -> Array:
+    """Stiffness of cells with λ and G (Pa), (cells,): (cells, size, size), unknowns ordered (function, component)."""
+    dilation, shear = _laws(n)
+    blocks = (lam[:, None, None] * dilation + G[:, None, None] * shear) @ products[:, :9]
+    return _whole(blocks)
+
+
+def cell_mass(products: Array) -> Array:
+    """Mass of cells per unit density in the same order."""
+    blocks = np.zeros((len(products), 9, products.shape[2]))
+    blocks[:, ::4] = products[:, 9:]
+    return _whole(blocks)
+
+
+def _whole(blocks: Array) -> Array:
+    """Matrices (cells, size, size) from blocks (cells, component², function²)."""
+    functions = round(blocks.shape[2] ** 0.5)
+    return np.asarray(blocks.reshape(len(blocks), -1).take(_places(functions), axis=1, mode="clip"))
+
+
+@cache
+def _places(functions: int) -> Index:
+    function, component = np.divmod(np.arange(3 * functions), 3)
+    return np.asarray((3 * component * functions + function)[:, None] * functions + component * functions**2 + function)
+
+
+@cache
+def in_order(degree: int) -> tuple[Index, Index]:
+    """The two degrees i and j of every function φ_i(ξ) φ_j(η): those inside the cell first, then sides and corners."""
+    i, j = (axis.ravel() for axis in np.meshgrid(np.arange(degree + 1), np.arange(degree + 1), indexing="ij"))
+    order = np.argsort(np.minimum(i, j) < 2, kind="stable")
+    return i[order], j[order]
+
+
+def tabulate_cells(grid: Array, degree: int, n: int, position: float) -> CellTable:
+    """Gradients at the Gauss points of cells whose sides are polynomials through `grid` (2, cells, Lobatto ξ, η)."""
+    points, weights = gauss(degree + 2)
+    return gradients_at(grid, points, points, np.outer(weights, weights), degree, n, position)
+
+
+def gradients_at(grid: Array, xi: Array, eta: Array, weights: Array, degree: int, n: int, position: float) -> CellTable:
+    """The same at the points (ξ_i, η_j) with weights (ξ, η)."""
+    along, across = (nodal(grid.shape[2] - 1, axis) for axis in (xi, eta))
+    r = _interpolate(grid[0], along.values, across.values)
+    r_xi, z_xi = (_interpolate(x, along.slopes, across.values) for x in grid)
+    r_eta, z_eta = (_interpolate(x, along.values, across.slopes) for x in grid)
+    det = r_xi * z_eta - r_eta * z_xi
+    value, by_xi, by_eta = _functions(hierarchic(degree, xi), hierarchic(degree, eta), degree)
+    to_r = (z_eta / det)[..., None] * by_xi - (z_xi / det)[..., None] * by_eta
+    to_z = (r_xi / det)[..., None] * by_eta - (r_eta / det)[..., None] * by_xi
+    gradients = np.stack([to_r, to_z, value / r[..., None]], axis=1)
+    volume = abs(det) * r * weights.ravel()
+    return CellTable(gradients, r, volume[:, None], np.full((len(r), 1), position), n)
+
+
+def _functions(along: Basis, across: Basis, degree: int) -> tuple[Array, Array, Array]:
+    """Values, ξ- and η-slopes of all functions at the points of a product, (points, functions) each."""
+    i, j = in_order(degree)
+
+    def product(one: Array, two: Array) -> Array:
+        return (one[:, None, i] * two[None, :, j]).reshape(-1, len(i))
+
+    return (
+        product(along.values, across.values),
+        product(along.slopes, across.values),
+        product(along.values, across.slopes),
+    )
+
+
+def _interpolate(grid: Array, along: Array, across: Array) -> Array:
+    return np.asarray((along @ grid @ across.T).reshape(len(grid), -1))
