@@ -180,13 +180,13 @@ def baseline_columns(
         own = np.zeros((x.size, runs))
         if problem.response == "bias_deg_per_h":
             own[:, k] = 1.0
-            columns = [x / 10.0, (x / 10.0) ** 2, (x / 10.0) ** 3]
+            columns = [x / 10.0, (x**2 + s.spread) / 1e2, (x**3 + 3.0 * x * s.spread) / 1e3]
         elif problem.response == "frequency_Hz":
             change = seen.excess - x
             slope = x if problem.law is None else scaled_law(problem.law, seen) - law_slope(problem.law, seen) * change
-            columns = [np.ones_like(x), slope, x**2 - change**2]
+            columns = [np.ones_like(x), slope, x**2 - change**2 + s.spread]
         else:
-            columns = [np.ones_like(x), x, x**2]
+            columns = [np.ones_like(x), x, x**2 + s.spread]
         if problem.lagged:
             steep = steepness(problem, seen) if problem.response == "frequency_Hz" else np.ones_like(x)
             start = np.zeros((x.size, runs))

@@ -31,6 +31,8 @@ class States:
         Temperature from which polynomials count, K.
     amplitude_squared, voltage_squared, quadrature, pattern_angle : (N,) array or None
         Square of the drive amplitude and of the electrode bias, V²; quadrature control, V; azimuth, rad.
+    spread : (N,) array or 0
+        Variance of the resonator temperature within each sample of an averaged grid, K²: the mean of x² is x̄² + spread.
     """
 
     run: int
@@ -44,6 +46,7 @@ class States:
     voltage_squared: FloatArray | None = None
     quadrature: FloatArray | None = None
     pattern_angle: FloatArray | None = None
+    spread: FloatArray | float = 0.0
 
     @property
     def step(self) -> float:
@@ -80,6 +83,7 @@ class States:
             voltage_squared=mean(self.voltage_squared),
             quadrature=mean(self.quadrature),
             pattern_angle=mean(self.pattern_angle),
+            spread=average(self.excess**2, group) - average(self.excess, group) ** 2,
         )
 
     def with_lag(self, tau: float) -> "States":
