@@ -143,8 +143,8 @@ def corrected(fit: Fit) -> Fit:
         return fit
     for _ in range(UPDATES):
         problem = replace(fit.problem, correction=thermal_correction(fit))
-        before, fit = fit, fit_terms(problem, _with_heat(fit), rounds=3 if fit.terms else 0)
-        if not fit.terms or abs(before.score - fit.score) < SETTLED:
+        before, fit = fit, fit_terms(problem, _with_heat(fit), rounds=3)
+        if abs(before.score - fit.score) < SETTLED:
             break
     return fit
 
