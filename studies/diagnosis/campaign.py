@@ -364,7 +364,10 @@ def _grid_run(
     rows = {key: column[whole] for key, column in table.items()}
 
     def binned(column: FloatArray) -> FloatArray:
-        return _bin(column, rows["time_s"], slot[whole] // group, coarse)
+        means = _bin(column, rows["time_s"], slot[whole] // group, coarse)
+        if fine.size == coarse.size * group:
+            means[-1] = np.nan  # this bin holds the moment beyond the last row
+        return means
 
     clock_error = None
     if "reference_frequency_Hz" in rows and "frequency_Hz" in rows:

@@ -1,5 +1,7 @@
 """Residuals in their order of time, freed of what the noise before them foretells, and the lines in their spectrum."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from studies.diagnosis.fit import Fit
@@ -7,18 +9,41 @@ from studies.diagnosis.states import FloatArray, average
 
 OVERSAMPLED = 4
 MOST_LINES = 2
+BESIDE, ALONE = 5, 3.5
+"""Rows around a row, and how many robust deviations it is from their median when it stands out alone."""
 
 
-def find_innovations(fit: Fit) -> list[FloatArray]:
-    """Return the innovations of every run that has rows: independent and of one variance when the noise model is right."""
+def find_innovations(fit: Fit, spikes: bool = True) -> list[FloatArray]:
+    """Return the innovations of every run that has rows: independent and of one variance when the noise model is right.
+
+    Without `spikes`, rows that stand out alone are brought to the level of their neighbours first.
+    """
     problem = fit.problem
-    rest = problem.basis.rotate(problem.values - fit.columns() @ fit.linear.coefficients)
+    left = problem.values - fit.columns() @ fit.linear.coefficients
+    if not spikes:
+        left = _without_spikes(left, problem.present)
+    rest = problem.basis.rotate(left)
     begin, out = 0, []
     for vectors in problem.basis.vectors[: len(problem.basis.vectors) - (problem.delay_row is not None)]:
         end = begin + vectors.shape[0]
         spread = 1.0 + fit.linear.share * problem.basis.walk[begin:end]
         covariance = (vectors * spread) @ vectors.T
         out.append(np.linalg.solve(np.linalg.cholesky(covariance), vectors @ rest[begin:end]))
+        begin = end
+    return out
+
+
+def _without_spikes(left: FloatArray, present: Sequence[np.ndarray]) -> FloatArray:
+    from scipy.ndimage import median_filter
+
+    out, begin = left.copy(), 0
+    for mask in present:
+        end = begin + int(mask.sum())
+        if end - begin > 2 * BESIDE:
+            level = median_filter(left[begin:end], BESIDE, mode="mirror")
+            apart = left[begin:end] - level
+            spiky = np.abs(apart) > ALONE * 1.4826 * np.median(np.abs(apart))
+            out[begin:end][spiky] = level[spiky]
         begin = end
     return out
 

@@ -31,13 +31,14 @@ def brief_events(fit: Fit) -> float:
     """Return how far the innovations are from Gaussian: evidence of bursts that no smooth function follows.
 
     The excess kurtosis of the innovations (residuals whitened in their order of time), scaled so that 17 stands for
-    an excess of 1.2, about seven standard deviations of a Gaussian record of 800 rows. Rows where the model itself bends
-    sharply (a step of a voltage within one step of the grid) are left out: nobody knows them well.
+    an excess of 1.2, about seven standard deviations of a Gaussian record of 800 rows. Rows that stand out alone are
+    noise with heavy tails, no event; rows where the model itself bends sharply (a step of a voltage within one step of
+    the grid) are left out: nobody knows them well.
     """
     model = fit.columns() @ fit.linear.coefficients
     edge = SHARP * np.sqrt(fit.linear.variance)
     begin, parts = 0, []
-    for innovations in find_innovations(fit):
+    for innovations in find_innovations(fit, spikes=False):
         end = begin + innovations.size
         if innovations.size > 8:
             bend = np.zeros(innovations.size + 4)
