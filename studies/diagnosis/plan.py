@@ -19,13 +19,15 @@ from studies.diagnosis.baseline import pose
 from studies.diagnosis.campaign import Campaign, load_campaign
 from studies.diagnosis.effects import library
 from studies.diagnosis.fit import fit_terms
+from studies.diagnosis.investigate import SPARSE, THRESHOLD
+from studies.diagnosis.programme import HOUSING_LAG
 from studies.diagnosis.rehearsal import NOTHING, UNEXPLAINED, Answer, hide, rehearse, set_stage
 from studies.diagnosis.states import lag
 from studies.diagnosis.thermometer import read_thermometer
 from studies.record import Record
 from studies.reports.page import Table
 
-HOUSING_LAG, RESONATOR_LAG = 600.0, 2500.0
+RESONATOR_LAG = 2500.0
 NOISE = {"frequency_Hz": 0.01, "bias_deg_per_h": 0.1, "inverse_q": 1e-9}
 POLISHED = 12
 """Cases of each effect in which the contenders are fitted."""
@@ -119,8 +121,6 @@ def predict(campaign: Campaign, snr: float, cases: int, rng: np.random.Generator
     polished : int
         Most cases of each effect in which the contenders are fitted; they stand for the others that need it.
     """
-    from studies.diagnosis.investigate import SPARSE, THRESHOLD
-
     confusion: dict[str, dict[str, float]] = {}
     sets: dict[str, dict[str, float]] = {}
     survives: dict[str, float] = {}

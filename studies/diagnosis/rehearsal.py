@@ -21,6 +21,7 @@ from studies.diagnosis.scan import Bank, Candidate, Dictionary, applicable, buil
 from studies.diagnosis.selection import Found, polish_contenders, scan_model
 from studies.diagnosis.states import FloatArray
 from studies.diagnosis.thermometer import corrected
+from studies.diagnosis.verdict import equivalent_to
 
 NOTHING, UNEXPLAINED = "nothing", "unexplained"
 SLOW_NOISE = (0.1, 1.0)
@@ -307,8 +308,6 @@ def _fitted(
     stage: Stage, side: Side, values: FloatArray, candidates: Sequence[Candidate], levels: Mapping[str, float]
 ) -> Answer:
     """Return what the diagnosis says of one case after fitting the contenders; empty when it names nothing."""
-    from studies.diagnosis.verdict import equivalent_to  # the verdict carries a next run, which is planned
-
     plain = corrected(fit_terms(replace(side.fit.problem, values=stage.plain + values), ()))
     rivals = polish_contenders(plain, candidates, levels)
     if not rivals or rivals[0].evidence < stage.threshold:
