@@ -156,10 +156,3 @@ def orthonormal(columns: FloatArray) -> FloatArray:
     q, r = np.linalg.qr(columns)
     size = np.abs(np.diag(r))
     return np.asarray(q[:, size > 1e-9 * max(float(size.max()), 1e-300)])
-
-
-def profile_shares(score: FloatArray, most: int = 5) -> FloatArray:
-    """Return the shares worth trying around the most likely one, given the score at each of `SHARES`."""
-    best = int(np.argmin(score))
-    low = max(0, best - most + 2)
-    return SHARES[low : min(len(SHARES), best + 2)]

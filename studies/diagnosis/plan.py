@@ -3,12 +3,11 @@
 A gyro without effects goes through the planned chamber profiles with nominal physics. Every effect is hidden in it many
 times, with random shapes, under white and slow noise of random kind and strength, at the stated SNR (rms of what the
 refitted baseline cannot absorb over the rms of the noise after the same projection). The scan of the diagnosis looks at
-every case; where it leaves a choice, the contenders of a sample of the cases are fitted as on real data, and the answer
-counts by the rules of the diagnosis: named rightly means that the set it names holds the truth.
+every case, and the answer counts by the rules of the diagnosis: named rightly means that the set it names holds the truth.
 Drives that are not planned cannot show.
 """
 
-from collections import defaultdict
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -29,8 +28,6 @@ from studies.reports.page import Table
 
 RESONATOR_LAG = 2500.0
 NOISE = {"frequency_Hz": 0.01, "bias_deg_per_h": 0.1, "inverse_q": 1e-9}
-POLISHED = 12
-"""Cases of each effect in which the contenders are fitted."""
 
 
 @dataclass(frozen=True)
@@ -103,10 +100,10 @@ def plan_campaign(
     """
     rng = np.random.default_rng(seed)
     campaign = imagine(profiles, rng, card)
-    return predict(campaign, snr, cases, rng, min(POLISHED, max(cases // 8, 3)))
+    return predict(campaign, snr, cases, rng)
 
 
-def predict(campaign: Campaign, snr: float, cases: int, rng: np.random.Generator, polished: int = POLISHED) -> Plan:
+def predict(campaign: Campaign, snr: float, cases: int, rng: np.random.Generator) -> Plan:
     """Predict the confusion for the temperatures and drives of a campaign, planned or recorded.
 
     Parameters
@@ -115,11 +112,9 @@ def predict(campaign: Campaign, snr: float, cases: int, rng: np.random.Generator
     snr : float
         Of every hidden effect.
     cases : int
-        Cases of each effect that are scanned.
+        Cases of each effect.
     rng : numpy Generator
         Seeded by the caller.
-    polished : int
-        Most cases of each effect in which the contenders are fitted; they stand for the others that need it.
     """
     confusion: dict[str, dict[str, float]] = {}
     sets: dict[str, dict[str, float]] = {}
@@ -146,7 +141,7 @@ def predict(campaign: Campaign, snr: float, cases: int, rng: np.random.Generator
             if own.noise.shape[1]:
                 hidden.append((key, own))
         if hidden:
-            said = rehearse(stage, [own for _, own in hidden], polished, rng)
+            said = rehearse(stage, [own for _, own in hidden])
             for (key, own), answers in zip(hidden, said, strict=True):
                 confusion[key], sets[key] = _shares(own.effect.name, answers)
     invisible = {
@@ -157,22 +152,15 @@ def predict(campaign: Campaign, snr: float, cases: int, rng: np.random.Generator
     return Plan(snr, cases, confusion, sets, survives, invisible)
 
 
-def _shares(truth: str, answers: Sequence[tuple[Answer, float]]) -> tuple[dict[str, float], dict[str, float]]:
+def _shares(truth: str, answers: Sequence[Answer]) -> tuple[dict[str, float], dict[str, float]]:
     """Return what is said, the truth where the set holds it, and with whom it stands in a set: shares of all cases."""
-    said: dict[str, float] = defaultdict(float)
-    beside: dict[str, float] = defaultdict(float)
-    total = sum(weight for _, weight in answers)
-    for members, weight in answers:
-        said[truth if truth in members else members[0]] += weight / total
-        if truth in members:
-            for other in members:
-                if other != truth:
-                    beside[other] += weight / total
-    return _sorted(said), _sorted(beside)
 
+    def shares(counted: Counter[str]) -> dict[str, float]:
+        return {name: count / len(answers) for name, count in counted.most_common()}
 
-def _sorted(shares: dict[str, float]) -> dict[str, float]:
-    return dict(sorted(shares.items(), key=lambda item: -item[1]))
+    said = Counter(truth if truth in members else members[0] for members in answers)
+    beside = Counter(other for members in answers if truth in members for other in members if other != truth)
+    return shares(said), shares(beside)
 
 
 def imagine(profiles: Sequence[str], rng: np.random.Generator, card: str | None = None) -> Campaign:

@@ -1,18 +1,23 @@
 """Score every hypothesis of the library at once: the gain of each signature over the present model."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from studies.diagnosis.baseline import Problem, Term, restricted
 from studies.diagnosis.effects import Effect, Span, library
-from studies.diagnosis.likelihood import KERNELS, SHARES, orthonormal, profile_shares
+from studies.diagnosis.likelihood import KERNELS, SHARES, orthonormal
 from studies.diagnosis.states import FloatArray
 
+Draws = NDArray[np.floating[Any]]
 SURVIVES = 1e-5
 """A signature of which the model absorbs all but this part of its square cannot be seen."""
+LESS, MORE = 3, 1
+"""Shares of the slow noise that are tried below and above that of the model alone: a signature explains noise away."""
 
 
 @dataclass(frozen=True)
@@ -33,6 +38,8 @@ class Dictionary:
         Candidates that have a second column, in the order of `second`.
     whole : (G,) bool array
         Candidates that make sense with the first column alone.
+    jumps : int
+        How many of the last candidates are jumps.
     """
 
     effects: tuple[str, ...]
@@ -42,6 +49,12 @@ class Dictionary:
     second: FloatArray
     pairs: np.ndarray
     whole: np.ndarray
+    jumps: int
+
+    @cached_property
+    def light(self) -> tuple[Draws, Draws]:
+        """First columns without the jumps, and second ones, in single precision: for many draws near the noise."""
+        return self.first[: len(self.first) - self.jumps].astype(np.float32), self.second.astype(np.float32)
 
     @cached_property
     def squares(self) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -160,6 +173,7 @@ def _rotated(signatures: _Signatures, problem: Problem, span: Span) -> Dictionar
         np.ascontiguousarray(problem.basis.rotate(signatures.second).T),
         np.array(signatures.pairs, dtype=int),
         np.array([*signatures.whole, *[True] * len(shapes)], dtype=bool),
+        len(shapes),
     )
 
 
@@ -167,37 +181,54 @@ def _steps(problem: Problem, span: Span) -> tuple[list[tuple[float, ...]], Float
     """Rotated jumps at every step of every run, by cumulative sums of the rotation instead of products."""
     shapes: list[tuple[float, ...]] = []
     parts: list[FloatArray] = []
-    lasting = (False, True) if problem.response != "bias_deg_per_h" else (False,)
-    sizes = [int(mask.sum()) for mask in problem.present]
-    begins = np.concatenate([[0], np.cumsum(sizes)])
-    block = -1
-    for run, (grid, mask) in enumerate(zip(span.bins, problem.present, strict=True)):
-        if not mask.any():
-            continue
-        block += 1
-        if sizes[run] < 2:
-            continue
-        times = grid[mask]
-        middle = 0.5 * (times[1:] + times[:-1])
-        own = problem.basis.steps(block)
-        for stays in lasting:
-            later = problem.values.size - begins[run + 1]
-            if stays and later == 0:
-                continue
-            columns = np.zeros((problem.values.size, middle.size))
-            columns[begins[run] : begins[run + 1]] = own
-            if stays:
-                ones = np.zeros(problem.values.size)
-                ones[begins[run + 1] :] = 1.0
-                columns += problem.basis.rotate(ones)[:, None]
-            parts.append(columns)
-            shapes += [(float(run), float(t), float(stays)) for t in middle]
+    times = [grid[mask] for grid, mask in zip(span.bins, problem.present, strict=True)]
+    for run, block, begin, end, last, stays in _step_blocks(problem):
+        middle = 0.5 * (times[run][1:] + times[run][:-1])
+        columns = np.zeros((problem.values.size, middle.size))
+        columns[begin:end] = problem.basis.steps(block)
+        if stays:
+            ones = np.zeros(problem.values.size)
+            ones[end:last] = 1.0
+            columns += problem.basis.rotate(ones)[:, None]
+        parts.append(columns)
+        shapes += [(float(run), float(t), float(stays)) for t in middle]
     return shapes, np.concatenate(parts, axis=1) if parts else np.zeros((problem.values.size, 0))
 
 
-def scan_gains(
-    problem: Problem, dictionary: Dictionary, model: FloatArray, targets: FloatArray
-) -> tuple[FloatArray, FloatArray]:
+def _step_blocks(problem: Problem) -> Iterator[tuple[int, int, int, int, int, bool]]:
+    """Yield (run, block of the basis, first row, row after it, rows of all runs, whether later runs stay up) of jumps."""
+    sizes = [int(mask.sum()) for mask in problem.present]
+    begins = np.concatenate([[0], np.cumsum(sizes)])
+    block = -1
+    for run, size in enumerate(sizes):
+        block += bool(size)
+        begin, end, last = int(begins[run]), int(begins[run + 1]), int(begins[-1])
+        if size > 1:
+            yield run, block, begin, end, last, False
+            if problem.response != "bias_deg_per_h" and end < last:
+                yield run, block, begin, end, last, True
+
+
+def _step_products(problem: Problem, rotated: Draws, out: Draws) -> None:
+    """Fill in the products of all jumps with rotated columns: sums over the rows that come later."""
+    if not len(out):
+        return
+    unrotated = np.empty_like(rotated)
+    begin = 0
+    for vectors in problem.basis.vectors:
+        end = begin + vectors.shape[0]
+        unrotated[begin:end] = vectors.astype(rotated.dtype) @ rotated[begin:end]
+        begin = end
+    row = 0
+    for _, _, begin, end, last, stays in _step_blocks(problem):
+        later = out[row : row + end - begin - 1]
+        np.cumsum(unrotated[end - 1 : begin : -1], axis=0, out=later[::-1])
+        if stays:
+            later += unrotated[end:last].sum(axis=0)
+        row += len(later)
+
+
+def scan_gains(problem: Problem, dictionary: Dictionary, model: FloatArray, targets: Draws) -> tuple[Draws, Draws]:
     """Return the likelihood gain of every candidate, with its first column alone and with both.
 
     Parameters
@@ -207,7 +238,7 @@ def scan_gains(
     model : (M, p) array
         Rotated columns of the present model.
     targets : (M, B) array
-        Rotated data, one or many draws.
+        Rotated data, one or many draws; draws near the noise may come in single precision.
 
     Returns
     -------
@@ -219,7 +250,7 @@ def scan_gains(
 
 
 def scan_bank(
-    bank: Bank, models: Sequence[FloatArray], targets: Sequence[FloatArray]
+    bank: Bank, models: Sequence[FloatArray], targets: Sequence[Draws]
 ) -> tuple[FloatArray, np.ndarray, np.ndarray, np.ndarray]:
     """Return, for each effect and draw, the best gain under any noise over the model under the noise that suits it best.
 
@@ -250,8 +281,8 @@ def scan_bank(
 
 
 def _scores(
-    problem: Problem, dictionary: Dictionary, model: FloatArray, targets: FloatArray
-) -> tuple[FloatArray, FloatArray, FloatArray]:
+    problem: Problem, dictionary: Dictionary, model: FloatArray, targets: Draws
+) -> tuple[FloatArray, Draws, Draws]:
     """Minus twice the log-likelihood of the model (B,) and of every candidate on top of it, (G, B) and (P, B)."""
     rows = targets.shape[0]
     null = np.empty((len(SHARES), targets.shape[1]))
@@ -261,20 +292,29 @@ def _scores(
         rest = targets * root
         rest = rest - ortho @ (ortho.T @ rest)
         null[k] = rows * np.log(np.maximum((rest**2).sum(axis=0), 1e-300)) + problem.basis.log_determinant(share)
-    shares = profile_shares(np.median(null - null.min(axis=0), axis=1))
-    single = np.full((dictionary.first.shape[0], targets.shape[1]), np.inf)
-    double = np.full((dictionary.pairs.size, targets.shape[1]), np.inf)
-    for share in shares:
-        one, two = _residuals(problem, dictionary, model, targets, share)
-        log_determinant = problem.basis.log_determinant(share)
-        np.minimum(single, rows * np.log(one) + log_determinant, out=single)
-        np.minimum(double, rows * np.log(two) + log_determinant, out=double)
-    return null.min(axis=0), single, double
+    best = null.argmin(axis=0)
+    order = np.argsort(best, kind="stable")  # draws that share their shares lie side by side
+    best, targets = best[order], targets[:, order]
+    single = np.full((dictionary.first.shape[0], order.size), np.inf, targets.dtype)
+    double = np.full((dictionary.pairs.size, order.size), np.inf, targets.dtype)
+    for k, share in enumerate(SHARES):
+        near = slice(*np.searchsorted(best, [k - MORE, k + LESS + 1]))
+        if near.start == near.stop:
+            continue
+        for into, left in zip(
+            (single, double), _residuals(problem, dictionary, model, targets[:, near], share), strict=True
+        ):
+            np.log(left, out=left)
+            left *= rows
+            left += problem.basis.log_determinant(share)
+            np.minimum(into[:, near], left, out=into[:, near])
+    back = np.argsort(order)
+    return null.min(axis=0), single[:, back], double[:, back]
 
 
 def _residuals(
-    problem: Problem, dictionary: Dictionary, model: FloatArray, targets: FloatArray, share: float
-) -> tuple[FloatArray, FloatArray]:
+    problem: Problem, dictionary: Dictionary, model: FloatArray, targets: Draws, share: float
+) -> tuple[Draws, Draws]:
     """Sum of squares left after adding each candidate, whitened with one share: closed form for one or two columns."""
     squares = dictionary.squares
     weight = problem.basis.weights(share)
@@ -282,32 +322,50 @@ def _residuals(
     ortho = orthonormal(model * root)
     rest = targets * root
     rest = rest - ortho @ (ortho.T @ rest)
-    total = np.maximum((rest**2).sum(axis=0), 1e-300)
-    beside = np.concatenate([rest, ortho], axis=1) * root
-    draws = targets.shape[1]
-    first = dictionary.first @ beside
+    total = np.maximum((rest**2).sum(axis=0), 1e-300).astype(targets.dtype)
+    modelled = dictionary.first @ (ortho * root)
+    first, second = _products(problem, dictionary, (rest * root).astype(targets.dtype))
     norm = squares[0] @ weight
-    own = norm - (first[:, draws:] ** 2).sum(axis=1)
+    own = norm - (modelled**2).sum(axis=1)
     seen = own > SURVIVES * norm
     safe = np.where(seen, own, 1.0)
-    one = first[:, :draws] ** 2 / safe[:, None] * seen[:, None]
-    left = np.maximum(total - one, 1e-9 * total)
-    if not dictionary.pairs.size:
-        return left, np.empty((0, draws))
-    pairs = dictionary.pairs
-    second = dictionary.second @ beside
-    norm2 = squares[1] @ weight
-    cross = squares[2] @ weight - (first[pairs, draws:] * second[:, draws:]).sum(axis=1)
-    own2 = norm2 - (second[:, draws:] ** 2).sum(axis=1) - cross**2 / safe[pairs] * seen[pairs]
-    seen2 = own2 > SURVIVES * norm2
-    projected = second[:, :draws] - (cross / safe[pairs] * seen[pairs])[:, None] * first[pairs, :draws]
-    two = one[pairs] + projected**2 / np.where(seen2, own2, 1.0)[:, None] * seen2[:, None]
-    return left, np.maximum(total - two, 1e-9 * total)
+    two = second
+    if dictionary.pairs.size:
+        pairs = dictionary.pairs
+        modelled2 = dictionary.second @ (ortho * root)
+        norm2 = squares[1] @ weight
+        cross = (squares[2] @ weight - (modelled[pairs] * modelled2).sum(axis=1)) / safe[pairs] * seen[pairs]
+        own2 = norm2 - (modelled2**2).sum(axis=1) - cross**2 * safe[pairs]
+        seen2 = own2 > SURVIVES * norm2
+        two = second - cross.astype(first.dtype)[:, None] * first[pairs]
+        two *= two
+        two *= (seen2 / np.where(seen2, own2, 1.0)).astype(first.dtype)[:, None]
+    first *= first
+    first *= (seen / safe).astype(first.dtype)[:, None]
+    if dictionary.pairs.size:
+        two += first[pairs]
+    return _left(total, first), _left(total, two)
 
 
-def best_gains(
-    dictionary: Dictionary, single: FloatArray, double: FloatArray
-) -> tuple[FloatArray, np.ndarray, np.ndarray]:
+def _left(total: Draws, explained: Draws) -> Draws:
+    """What remains of the squares (in the place of what is explained), never quite nothing."""
+    np.subtract(total, explained, out=explained)
+    np.maximum(explained, 1e-9 * total, out=explained)
+    return explained
+
+
+def _products(problem: Problem, dictionary: Dictionary, rest: Draws) -> tuple[Draws, Draws]:
+    """Products of the first and of the second columns with (M, B) residuals; many draws take the short way."""
+    if rest.dtype != np.float32:
+        return dictionary.first @ rest, dictionary.second @ rest
+    first, second = dictionary.light
+    out = np.empty((dictionary.first.shape[0], rest.shape[1]), rest.dtype)
+    np.matmul(first, rest, out=out[: first.shape[0]])
+    _step_products(problem, rest, out[first.shape[0] :])
+    return out, second @ rest
+
+
+def best_gains(dictionary: Dictionary, single: Draws, double: Draws) -> tuple[FloatArray, np.ndarray, np.ndarray]:
     """Return, for each effect and draw, the best gain, the candidate that has it, and its number of columns.
 
     A second column of a nested effect must pay for itself: it counts only with PAIR_PRICE taken off.

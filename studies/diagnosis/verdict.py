@@ -131,14 +131,21 @@ def equivalent_to(found: Found, response: str, clock_drifts: bool | None = None)
     clock_drifts : bool, optional
         What a reference clock says: it tells a drifting clock from an ageing frequency.
     """
-    best = found.rivals[0].evidence if found.rivals else found.evidence
-    members = {rival.name for rival in found.rivals if np.exp((rival.evidence - best) / (2.0 * TEMPER)) >= MEMBER}
+    evidence = {rival.name: rival.evidence for rival in found.rivals}
+    return set_beside(found.rivals[0].name, evidence, response, clock_drifts)
+
+
+def set_beside(
+    name: str, evidence: Mapping[str, float], response: str, clock_drifts: bool | None = None
+) -> tuple[str, ...]:
+    """Return what the strongest effect cannot be told from, given the evidence of all that contend."""
+    members = {other for other, own in evidence.items() if np.exp((own - evidence[name]) / (2.0 * TEMPER)) >= MEMBER}
     clock = {"clock-drift", "ageing"}
-    if clock_drifts is None or found.rivals[0].name not in clock:
-        members |= set((find_effect(found.rivals[0].name).equivalents or {}).get(response, ()))
+    if clock_drifts is None or name not in clock:
+        members |= set((find_effect(name).equivalents or {}).get(response, ()))
     else:
         members -= clock
-    members.discard(found.rivals[0].name)
+    members.discard(name)
     return tuple(sorted(members))
 
 

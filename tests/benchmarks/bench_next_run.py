@@ -1,6 +1,6 @@
 """Is the suggested run worth its chamber hours? One 8 h run with a hidden effect, then one or two runs more.
 
-    python tests/benchmarks/bench_next_run.py cases.jsonl --minutes 10 [--snr 1.5] [--seed N]
+    python tests/benchmarks/bench_next_run.py cases.jsonl --minutes 10 [--snr 0.25] [--noise walk,flicker] [--seed N]
     python tests/benchmarks/bench_next_run.py cases.jsonl --report report/next-run-benchmark.md
 
 The further runs of the same gyro are those that the diagnosis suggests, repeats of the first one, random ones of the same
@@ -82,11 +82,11 @@ def run_of(twin, profile, drives, rng, plan):
     return add_run(twin, chamber, rng, steps("electrode_bias_V"), steps("drive_amplitude_V"))
 
 
-def run_case(seed, snr, with_all=True):
+def run_case(seed, snr, families=FAMILIES, with_all=True):
     """Build one case and continue it by every arm; return what was hidden and what was said."""
     rng = np.random.default_rng(seed)
     plan, name = first_run(rng)
-    family = FAMILIES[int(rng.integers(len(FAMILIES)))]
+    family = families[int(rng.integers(len(families)))]
     first, truth = build(plan, family, np.random.default_rng(seed + 1), (name,), "", snr)
     campaign, before, suggestion = answer(first)
     case = {"seed": seed, "snr": snr, "effect": name, "family": family, "before": before, "after": {}, "profiles": {}}
@@ -181,7 +181,8 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("cases", type=Path)
     parser.add_argument("--minutes", type=float, default=10.0)
-    parser.add_argument("--snr", type=float, default=1.5)
+    parser.add_argument("--snr", type=float, default=0.25)
+    parser.add_argument("--noise", default=",".join(FAMILIES), help="families of noise that are drawn")
     parser.add_argument("--seed", type=int, default=None)
     parser.add_argument("--report", type=Path)
     parser.add_argument("--all-every", type=int, default=4, help="run the whole family in one case of so many")
@@ -194,7 +195,9 @@ def main():
             for count in itertools.count():
                 if time.time() > end:
                     break
-                case = run_case(seed + 10 * count, arguments.snr, with_all=count % arguments.all_every == 0)
+                case = run_case(
+                    seed + 10 * count, arguments.snr, arguments.noise.split(","), count % arguments.all_every == 0
+                )
                 file.write(json.dumps(case, default=float) + "\n")
                 file.flush()
     cases = [json.loads(line) for line in arguments.cases.read_text().splitlines()]

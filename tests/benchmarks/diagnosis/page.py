@@ -11,10 +11,12 @@ from tests.benchmarks.diagnosis.baselines import METHODS, as_cases, read_answers
 from tests.benchmarks.diagnosis.cases import key_of, read_cases
 from tests.benchmarks.diagnosis.plan_check import (
     FEWEST,
+    POOLS,
     WITHIN,
     agreement,
     compare,
     largest,
+    plan_of,
     planned_cases,
     read_predictions,
 )
@@ -343,89 +345,71 @@ def _coverage(cases):
 
 def _plan(cases, predictions):
     plans = predictions["plans"]
-    cases = [c for c in cases if f"{c['design']} {c['snr']:g}" in plans]
-    blocks, summary = [], []
-    pools = {"all SNR": cases} | {
-        f"SNR {snr:g}": [c for c in cases if c["snr"] == snr] for snr in sorted({c["snr"] for c in cases}, reverse=True)
-    }
-    for title, mine in pools.items():
-        found = agreement(compare(mine, plans))
-        ranks = found["ranks"]
-        summary.append(
-            [
-                title,
-                str(len(mine)),
-                str(found["entries"]),
-                str(found["near"]),
-                str(found["excused"]),
-                f"{ranks['all entries']:.2f}",
-                f"{ranks['named rightly']:.2f}",
-            ]
-        )
-    blocks.append(
-        Table(
-            f"Predicted against measured confusion, entries of {FEWEST} cases or more",
-            (
-                "cases",
-                "number",
-                "entries",
-                f"within {100 * WITHIN:.0f} points",
-                "beyond, but within chance",
-                "rank agreement, all",
-                "named rightly",
-            ),
-            summary,
-            "Within chance: no more than ten points outside the measured rate's 90 % band.",
-        )
+    cases = [c for c in cases if plan_of(c) in plans]
+    if not cases:
+        return [Text("No case of these designs and SNR was planned.", "note")]
+    summary, beyond = [], []
+    for title, pool in POOLS.items():
+        for outcomes in (True, False):
+            entries = compare(cases, plans, pool, outcomes)
+            found = agreement(entries)
+            if found["entries"]:
+                summary.append(
+                    [
+                        f"by {title}, {'four outcomes' if outcomes else 'every answer'}",
+                        str(found["entries"]),
+                        f"{found['near']} ({100 * found['near'] / found['entries']:.0f} %)",
+                        f"{found['beyond']} ({100 * found['beyond'] / found['entries']:.0f} %)",
+                        f"{100 * found['rms']:.1f}",
+                        f"{found['rank']:.2f}",
+                    ]
+                )
+            if outcomes:
+                beyond += largest(entries, 5)
+    table = Table(
+        f"Predicted against measured shares of {len(cases)} cases, entries of {FEWEST} cases or more",
+        ("pool", "entries", f"within {100 * WITHIN:.0f} points", "outside the 90 % band", "error beyond chance / points",
+         "rank agreement"),
+        summary,
+        "Four outcomes: named, nothing, unexplained, wrong. Band: where nine of ten counts would lie were the prediction "
+        "right; up to one entry in ten is outside by chance. Error beyond chance: rms difference less what chance gives.",
+    )  # fmt: skip
+    worst = Table(
+        "Furthest outside their band",
+        ("pool", "outcome", "predicted / %", "90 % band / %", "measured / %", "cases"),
+        [
+            [e.pool, e.said, f"{100 * e.predicted:.0f}", f"{100 * e.low:.0f}–{100 * e.high:.0f}",
+             f"{100 * e.measured:.0f}", str(e.cases)]
+            for e in sorted(beyond, key=lambda e: -abs(e.predicted - e.measured))
+        ],
+    )  # fmt: skip
+    words = Text(
+        "The plan gets the temperatures and drives of a design, with one gyro that hides nothing. It does not know the "
+        "noise: it assumes slow noise of random kind and strength. Every case is compared with the prediction for its own "
+        f"design, effect and SNR. Program of the prediction: {predictions['commit']}, {predictions['draws']} cases each."
     )
-    with figure(1, 2, height=3.7) as (made, axes):
-        for ax, (title, mine) in zip(axes, (("all SNR", cases), ("by SNR", cases)), strict=True):
-            pool = (lambda c: c["raw"][0]) if title == "all SNR" else (lambda c: f"{c['raw'][0]} {c['snr']:g}")
-            rows = [r for r in compare(mine, plans, pool) if r[4] >= FEWEST]
-            for word, colour in (("named rightly", BLUE), (NOTHING, ORANGE), ("other", VERMILION)):
-                own = [r for r in rows if _sort(r) == word]
+    return [words, table, _plan_picture(cases, plans), *([worst] if beyond else [])]
+
+
+def _plan_picture(cases, plans):
+    colours = {"named": BLUE, NOTHING: ORANGE, UNEXPLAINED: PURPLE, "wrong": VERMILION}
+    with figure(1, 2, height=3.9) as (made, axes):
+        for ax, title in zip(axes, ("effect", "design and SNR"), strict=True):
+            entries = [e for e in compare(cases, plans, POOLS[title], outcomes=True) if e.cases >= FEWEST]
+            ax.fill_between([-10, 110], [-20, 100], [0, 120], color="#d5dae0", alpha=0.5, linewidth=0)
+            for word, colour in colours.items():
+                own = [e for e in entries if e.said == word]
                 if own:
-                    y = np.array([100 * r[3] for r in own])
-                    bands = 100 * np.array([band(round(r[3] * r[4]), r[4]) for r in own])
-                    ax.errorbar(
-                        [100 * r[2] for r in own],
-                        y,
-                        np.abs(bands.T - y),
-                        fmt="o",
-                        ms=3.5,
-                        lw=0.7,
-                        color=colour,
-                        label=word,
-                    )
+                    y = np.array([100 * e.measured for e in own])
+                    bands = 100 * np.array([band(round(e.measured * e.cases), e.cases) for e in own])
+                    x = [100 * e.predicted for e in own]
+                    ax.errorbar(x, y, np.abs(bands.T - y), fmt="o", ms=3.5, lw=0.7, color=colour, label=word)
             ax.plot([0, 100], [0, 100], color="#5b6470", linewidth=0.8)
-            ax.fill_between([0, 100], [-10, 90], [10, 110], color="#d5dae0", alpha=0.5, linewidth=0)
             ax.set(xlabel="predicted / %", ylabel="measured / %", xlim=(-3, 103), ylim=(-3, 103))
-            ax.set_title("pooled over designs and SNR" if title == "all SNR" else "each SNR", loc="left", fontsize=10)
-        axes[0].legend(loc="lower right")
-        blocks.append(
-            draw(made, "Every entry of the confusion; grey: within ten points.", "Predicted against measured confusion")
+            ax.set_title(f"pooled by {title}", loc="left", fontsize=10)
+        axes[0].legend(loc="lower right", fontsize=8)
+        return draw(
+            made,
+            "Predicted and measured shares of the four outcomes with 90 % bands of the count; grey: within ten points.",
+            "Predicted against measured shares of the four outcomes",
         )
-    pooled = compare(cases, plans)
-    by_snr = compare(cases, plans, lambda c: f"{c['raw'][0]}, SNR {c['snr']:g}")
-    for title, rows in (("pooled over designs and SNR", pooled), ("each SNR", by_snr)):
-        blocks.append(
-            Table(
-                f"Largest differences, {title}",
-                ("truth", "said", "predicted / %", "measured / %", "cases"),
-                [[t, s, f"{100 * p:.0f}", f"{100 * m:.0f}", str(n)] for t, s, p, m, n in largest(rows, 10)],
-            )
-        )
-    blocks.append(
-        Text(
-            "The plan gets the temperatures and drives of a design, with one gyro that hides nothing. It does not know the "
-            "noise: it assumes slow noise of random kind and strength. Prediction and measurement are pooled over the same "
-            f"designs and SNR. Program of the prediction: {predictions['commit']}, {predictions['draws']} cases each."
-        )
-    )
-    return blocks
-
-
-def _sort(row):
-    if row[1] == row[0].split(" ")[0].split("@")[0]:
-        return "named rightly"
-    return row[1] if row[1] == NOTHING else "other"

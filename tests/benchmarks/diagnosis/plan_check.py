@@ -2,24 +2,61 @@
 
 The plan sees the temperatures and drives of a design, through the record of one gyro that hides nothing. It does not know
 the noise of the cases: it assumes a random kind and strength of slow noise, and its hidden effects have the library's own
-forms. The cases have other gyros, the generator's forms, and its five families of noise in turn. Both sides are pooled
-over the same cases: to each case belongs the prediction for its design and SNR.
+forms. The cases have other gyros, the generator's forms, and its five families of noise in turn.
+
+Cells hold few cases, so they are pooled: by effect and SNR, by design and SNR, by design and effect. To each case belongs
+the prediction for its own design, effect and SNR. If the prediction is right, the count of an answer in a pool is a sum of
+unequal coins; its 90 % band is simulated, the prediction's own finite draws included. What the differences hold beyond
+chance is the rms error of the prediction: the mean square less the variance that chance gives.
 """
 
 import json
 from collections import defaultdict
+from typing import NamedTuple
 
 import numpy as np
 from scipy.stats import spearmanr
 
 from studies.diagnosis.campaign import load_campaign
-from studies.diagnosis.plan import NOTHING, predict
+from studies.diagnosis.plan import NOTHING, UNEXPLAINED, predict
 from tests.benchmarks.diagnosis.cases import current_commit, read_cases
-from tests.benchmarks.diagnosis.scoring import band, of_kind, said
+from tests.benchmarks.diagnosis.scoring import of_kind, said
 from tests.generator.device import build
 
 FEWEST = 12
 WITHIN = 0.10
+DRAWS = 2000
+NAMED, WRONG = "named", "wrong"
+OUTCOMES = (NAMED, NOTHING, UNEXPLAINED, WRONG)
+POOLS = {
+    "effect": lambda c: c["raw"][0],
+    "effect and SNR": lambda c: f"{c['raw'][0]}, SNR {c['snr']:g}",
+    "design and SNR": lambda c: f"{c['design']}, SNR {c['snr']:g}",
+    "design and effect": lambda c: f"{c['design']}, {c['raw'][0]}",
+}
+
+
+class Entry(NamedTuple):
+    """One answer in one pool: predicted and measured share, cases, 90 % band and spread of the share if predicted right."""
+
+    pool: str
+    said: str
+    predicted: float
+    measured: float
+    cases: int
+    low: float
+    high: float
+    spread: float
+
+    @property
+    def near(self):
+        """Within ten points."""
+        return abs(self.predicted - self.measured) <= WITHIN
+
+    @property
+    def beyond(self):
+        """Outside of what chance allows in nine of ten counts."""
+        return not self.low <= self.measured <= self.high
 
 
 def predictions_file(path):
@@ -35,7 +72,7 @@ def check_plan(path, draws):
         records, _ = build(design, "white", np.random.default_rng(20))
         campaign = load_campaign(records)
         for snr in sorted({c["snr"] for c in cases if c["design"] == design}):
-            plan = predict(campaign, snr, draws, np.random.default_rng(21), max(draws // 8, 3))
+            plan = predict(campaign, snr, draws, np.random.default_rng(21))
             out["plans"][f"{design} {snr:g}"] = plan.as_dict()
     predictions_file(path).write_text(json.dumps(out, indent=1))
     return compare_in_words(cases, out["plans"])
@@ -58,80 +95,100 @@ def plan_key(raw, channel):
     return f"{name} ({channel})" if elsewhere else name
 
 
+def plan_of(case):
+    """Which plan speaks of a case."""
+    return f"{case['design']} {case['snr']:g}"
+
+
 def expected(case, plans):
     """Return said -> probability for one case; said is the truth where the answer holds it."""
-    plan = plans[f"{case['design']} {case['snr']:g}"]
-    return plan["confusion"].get(plan_key(case["raw"][0], case["channel"]), {NOTHING: 1.0})
+    key = plan_key(case["raw"][0], case["channel"])
+    return plans[plan_of(case)]["confusion"].get(key, {NOTHING: 1.0})
 
 
-def compare(cases, plans, pool=lambda case: case["raw"][0]):
-    """Return rows (truth, said, predicted, measured, cases) for every pair that occurs on either side."""
+def outcome(truth, word):
+    """Return which of the four outcomes an answer is."""
+    return NAMED if word == truth else word if word in (NOTHING, UNEXPLAINED) else WRONG
+
+
+def compare(cases, plans, pool=POOLS["effect"], outcomes=False, rng=None):
+    """Return the entries of every pool: its answers, or with `outcomes` the four outcomes only."""
+    rng = np.random.default_rng(0) if rng is None else rng
     groups = defaultdict(list)
     for case in cases:
         groups[pool(case)].append(case)
-    rows = []
-    for truth, mine in sorted(groups.items()):
-        predicted, measured = defaultdict(float), defaultdict(float)
+    entries = []
+    for name, mine in sorted(groups.items()):
+        predicted, answers = [], []
         for case in mine:
-            measured[said(case)] += 1.0 / len(mine)
-            for name, share in expected(case, plans).items():
-                predicted[name] += share / len(mine)
-        names = sorted({*predicted, *measured}, key=lambda name: -measured[name])
-        rows += [(truth, name, predicted[name], measured[name], len(mine)) for name in names]
-    return rows
+            truth, own = case["truth"][0], defaultdict(float)
+            for word, share in expected(case, plans).items():
+                own[outcome(truth, word) if outcomes else word] += share
+            predicted.append(own)
+            answers.append(outcome(truth, said(case)) if outcomes else said(case))
+        words = OUTCOMES if outcomes else sorted({*answers, *(w for own in predicted for w in own)})
+        keys = np.unique([f"{plan_of(c)} {plan_key(c['raw'][0], c['channel'])}" for c in mine], return_inverse=True)[1]
+        draws = np.array([plans[plan_of(c)].get("cases", DRAWS) for c in mine], dtype=float)
+        for word in words:
+            p = np.array([own[word] for own in predicted])
+            shares = simulated_shares(p, draws, keys, rng)
+            low, high = np.quantile(shares, [0.05, 0.95])
+            measured = answers.count(word) / len(mine)
+            entries.append(Entry(name, word, float(p.mean()), measured, len(mine), low, high, float(shares.std())))
+    return entries
 
 
-def agreement(rows):
-    """Return how many entries lie within ten points, how many beyond what chance allows, and the rank agreement."""
-    enough = [row for row in rows if row[4] >= FEWEST]
-    near = sum(abs(p - m) <= WITHIN for _, _, p, m, _ in enough)
-    excused = sum(abs(p - m) > WITHIN and not outside_band(p, round(m * n), n, WITHIN) for _, _, p, m, n in enough)
-    own = [row for row in enough if row[1] == row[0].split(" ")[0].split("@")[0]]
-    ranks = {
-        "all entries": spearmanr([r[2] for r in enough], [r[3] for r in enough]).statistic
-        if len(enough) > 2
-        else np.nan,
-        "named rightly": spearmanr([r[2] for r in own], [r[3] for r in own]).statistic if len(own) > 2 else np.nan,
+def simulated_shares(p, draws, keys, rng):
+    """Return what share would be counted, many times over, were the probabilities right within their own finite draws.
+
+    Cases with the same key share one prediction, and so its error.
+    """
+    first = np.unique(keys, return_index=True)[1]
+    held = rng.beta(p[first] * draws[first] + 0.5, (1.0 - p[first]) * draws[first] + 0.5, (DRAWS, first.size))
+    return (rng.random((DRAWS, p.size)) < held[:, keys]).mean(axis=1)
+
+
+def agreement(entries):
+    """Return how many entries with enough cases lie within ten points and beyond their band, and the error beyond chance."""
+    enough = [e for e in entries if e.cases >= FEWEST]
+    if not enough:
+        return {"entries": 0, "near": 0, "beyond": 0, "rms": np.nan, "rank": np.nan}
+    difference = np.array([e.predicted - e.measured for e in enough])
+    chance = np.array([e.spread for e in enough])
+    return {
+        "entries": len(enough),
+        "near": sum(e.near for e in enough),
+        "beyond": sum(e.beyond for e in enough),
+        "rms": float(np.sqrt(max(np.mean(difference**2 - chance**2), 0.0))),
+        "rank": float(spearmanr([e.predicted for e in enough], [e.measured for e in enough]).statistic),
     }
-    return {"entries": len(enough), "near": near, "excused": excused, "ranks": ranks}
 
 
-def outside_band(predicted, hits, total, slack=0.0):
-    """Whether a prediction lies outside the 90 % band of what was counted, by more than a slack."""
-    low, high = band(hits, total)
-    return not low - slack <= predicted <= high + slack
-
-
-def largest(rows, count=8):
-    """Return the entries with the largest differences, those with enough cases."""
-    return sorted((r for r in rows if r[4] >= FEWEST), key=lambda r: -abs(r[2] - r[3]))[:count]
+def largest(entries, count=8):
+    """Return the entries that are furthest from their prediction for their spread, those with enough cases."""
+    enough = [e for e in entries if e.cases >= FEWEST and e.beyond]
+    return sorted(enough, key=lambda e: -abs(e.predicted - e.measured))[:count]
 
 
 def compare_in_words(cases, plans):
     """Return the comparison as text."""
     lines = [f"# Predicted and measured confusion: {len(cases)} cases", ""]
-    pools = {
-        "pooled over designs and SNR": lambda c: c["raw"][0],
-        **{
-            f"SNR {snr:g}, pooled over designs": lambda c, snr=snr: c["raw"][0]
-            for snr in sorted({c["snr"] for c in cases}, reverse=True)
-        },
-    }
-    for title, pool in pools.items():
-        mine = [c for c in cases if title.startswith("pooled") or title.startswith(f"SNR {c['snr']:g},")]
-        rows = compare(mine, plans, pool)
-        found = agreement(rows)
-        ranks = ", ".join(f"{name} {value:.2f}" for name, value in found["ranks"].items())
-        lines += [
-            f"## {title} ({len(mine)} cases)",
-            "",
-            f"- entries with {FEWEST} cases or more: {found['entries']}; within 10 points: {found['near']}; "
-            f"of the others within 10 points of the measured 90 % band: {found['excused']}",
-            f"- rank agreement (Spearman): {ranks}",
-            *(
-                f"- {truth} → {name}: predicted {100 * p:.0f} %, measured {100 * m:.0f} % of {n}"
-                for truth, name, p, m, n in largest(rows)
-            ),
-            "",
-        ]
+    for title, pool in POOLS.items():
+        for outcomes in (True, False):
+            entries = compare(cases, plans, pool, outcomes)
+            found = agreement(entries)
+            lines += [
+                f"## By {title}, {'four outcomes' if outcomes else 'every answer'}",
+                "",
+                f"- entries with {FEWEST} cases or more: {found['entries']}; within 10 points: {found['near']}; outside "
+                f"their 90 % band: {found['beyond']} (chance alone: up to one in ten)",
+                f"- error of the prediction beyond chance: {100 * found['rms']:.1f} points rms; "
+                f"rank agreement {found['rank']:.2f}",
+                *(
+                    f"- {e.pool} → {e.said}: predicted {100 * e.predicted:.0f} % (band {100 * e.low:.0f}–"
+                    f"{100 * e.high:.0f}), measured {100 * e.measured:.0f} % of {e.cases}"
+                    for e in largest(entries, 12)
+                ),
+                "",
+            ]
     return "\n".join(lines)

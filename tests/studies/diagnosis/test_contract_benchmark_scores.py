@@ -4,8 +4,10 @@ import numpy as np
 import pytest
 
 from tests.benchmarks.diagnosis.baselines import as_cases, merge, stepwise_terms
-from tests.benchmarks.diagnosis.plan_check import agreement, compare
+from tests.benchmarks.diagnosis.plan_check import agreement, compare, simulated_shares
 from tests.benchmarks.diagnosis.scoring import band, confusion, exact_set, first_right, reliability, said
+
+NAMES = ("jump", "ageing", "leak", "radiation", "periodic", "hysteresis", "curvature", "rate-bias")
 
 
 def case(truth, *causes, verdict="explained", **more):
@@ -57,16 +59,37 @@ def test_predicted_and_measured_confusion_are_pooled_over_the_same_cases():
     }
     cases = [case(["jump"], ("jump",)) for _ in range(10)]
     cases += [case(["jump"], ("jump",) if k < 2 else ("ageing",), design="plain") for k in range(10)]
-    rows = {(truth, word): (p, m, n) for truth, word, p, m, n in compare(cases, plans)}
-    assert rows["jump", "jump"] == (pytest.approx(0.75), pytest.approx(0.6), 20)
-    assert rows["jump", "nothing"] == (pytest.approx(0.25), 0, 20)
-    assert rows["jump", "ageing"] == (0, pytest.approx(0.4), 20)
+    entries = {(e.pool, e.said): (e.predicted, e.measured, e.cases) for e in compare(cases, plans)}
+    assert entries["jump", "jump"] == (pytest.approx(0.75), pytest.approx(0.6), 20)
+    assert entries["jump", "nothing"] == (pytest.approx(0.25), 0, 20)
+    assert entries["jump", "ageing"] == (0, pytest.approx(0.4), 20)
     assert agreement(compare(cases, plans))["near"] == 0
+    outcomes = {e.said: e.measured for e in compare(cases, plans, outcomes=True)}
+    assert outcomes == pytest.approx({"named": 0.6, "nothing": 0.0, "unexplained": 0.0, "wrong": 0.4})
 
 
 def test_an_effect_that_the_plan_calls_invisible_is_predicted_as_nothing():
-    rows = compare([case(["self-heating"])], {"rich 1": {"confusion": {}}})
-    assert rows[0][:3] == ("self-heating", "nothing", 1.0)
+    entry = compare([case(["self-heating"])], {"rich 1": {"confusion": {}}})[0]
+    assert (entry.pool, entry.said, entry.predicted) == ("self-heating", "nothing", 1.0)
+
+
+def test_the_band_of_a_pool_is_that_of_its_unequal_coins():
+    # 30 cases at 0.9 and 10 at 0.2 with exact predictions: the count is a sum of two binomials
+    p = np.repeat([0.9, 0.2], [30, 10])
+    shares = simulated_shares(p, np.full(40, 1e9), np.arange(40), np.random.default_rng(1))
+    assert shares.mean() == pytest.approx(29 / 40, abs=0.01)
+    assert shares.std() == pytest.approx(np.sqrt(30 * 0.09 + 10 * 0.16) / 40, rel=0.06)
+
+
+def test_right_predictions_leave_no_error_beyond_chance_and_wrong_ones_do():
+    rng = np.random.default_rng(2)
+    plans = {"rich 1": {"cases": 1e6, "confusion": {name: {name: 0.6, "nothing": 0.4} for name in NAMES}}}
+    cases = [case([name], *[(name,)] * int(rng.random() < 0.6)) for name in NAMES for _ in range(60)]
+    found = agreement(compare(cases, plans))
+    assert found["rms"] < 0.04
+    assert found["beyond"] <= 0.3 * found["entries"]
+    shifted = {"rich 1": {"cases": 1e6, "confusion": {name: {name: 0.9, "nothing": 0.1} for name in NAMES}}}
+    assert agreement(compare(cases, shifted))["rms"] == pytest.approx(0.3, abs=0.05)
 
 
 def test_stepwise_regression_keeps_the_planted_terms_only():

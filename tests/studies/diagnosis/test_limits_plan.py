@@ -16,7 +16,7 @@ def planned(response):
 
 @pytest.fixture(scope="module")
 def loud():
-    return predict(planned("frequency_Hz"), 10.0, 6, np.random.default_rng(4), polished=2)
+    return predict(planned("frequency_Hz"), 10.0, 6, np.random.default_rng(4))
 
 
 def test_clock_drift_and_ageing_are_always_a_set(loud):
@@ -37,7 +37,7 @@ def test_a_loud_effect_is_not_overlooked(loud):
 
 
 def test_an_effect_far_below_the_noise_is_nothing():
-    plan = predict(planned("bias_deg_per_h"), 1e-4, 20, np.random.default_rng(5), polished=2)
+    plan = predict(planned("bias_deg_per_h"), 1e-4, 20, np.random.default_rng(5))
     for effect in plan.confusion:
         outcome = plan.outcome(effect)
         assert sum(outcome.values()) == pytest.approx(1.0)
