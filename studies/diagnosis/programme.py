@@ -182,7 +182,10 @@ def _imagine(
         resonator=housing,
         tau=1.0,
         reference=campaign.reference,
-        **drives[0],
+        voltage_squared=drives[0]["voltage_squared"],
+        amplitude_squared=drives[0]["amplitude_squared"],
+        quadrature=drives[0]["quadrature"],
+        pattern_angle=drives[0]["pattern_angle"],
     )
     return Programme(kind, words, states, chamber, drives[1])
 
