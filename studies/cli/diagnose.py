@@ -32,7 +32,7 @@ def diagnose(
     calibrate : bool
         Draw the null of this campaign for the thresholds, instead of the shipped, conservative ones (slower).
     draws : int
-        Number of draws for --calibrate, and of each predicted case for --plan.
+        Number of draws for --calibrate; for --plan, four times the cases of each effect at each SNR (1, 0.3, 0.1).
     seed : int
         Of the draws.
     json : bool
@@ -50,13 +50,19 @@ def diagnose(
     from studies.files.writing import write_text
 
     if plan:
-        from studies.diagnosis.plan import plan_campaign, plan_table
+        from studies.diagnosis.plan import plan_campaign
+        from studies.reports.plan import headline, plan_page, plan_table
 
-        outcome = plan_campaign([*plan, *runs], seed=seed, cases=max(4, min(draws, 2000)), card=card)
+        profiles = [*plan, *runs]
+        outlook = plan_campaign(profiles, seed=seed, cases=max(4, min(draws, 2000) // 4), card=card)
+        if report is not None:
+            write_text(report, plan_page(outlook, profiles))
+            say(f"report: {report}")
         if json:
-            print_json(outcome.as_dict())
+            print_json(outlook.as_dict())
             return 0
-        block = plan_table(outcome)
+        print(headline(outlook))
+        block = plan_table(outlook)
         print_table(block.caption, block.columns, block.rows, block.note)
         return 0
     if not runs:

@@ -20,13 +20,13 @@ from studies.diagnosis.effects import library
 from studies.diagnosis.fit import fit_terms
 from studies.diagnosis.investigate import SPARSE, THRESHOLD
 from studies.diagnosis.programme import HOUSING_LAG
-from studies.diagnosis.rehearsal import NOTHING, UNEXPLAINED, Answer, hide, rehearse, set_stage
+from studies.diagnosis.rehearsal import NOISES, NOTHING, UNEXPLAINED, Answer, hide, rehearse, set_stage
 from studies.diagnosis.states import lag
 from studies.diagnosis.thermometer import read_thermometer
 from studies.record import Record
-from studies.reports.page import Table
 
 RESONATOR_LAG = 2500.0
+LADDER, SURE = (1.0, 0.3, 0.1), 0.9
 NOISE = {"frequency_Hz": 0.01, "bias_deg_per_h": 0.1, "inverse_q": 1e-9}
 
 
@@ -44,6 +44,8 @@ class Plan:
         Said is the effect itself where the answer, alone or as a set, holds it.
     sets : mapping effect -> mapping other -> share
         Shares of the cases in which the answer is a set that holds the effect and the other.
+    by_noise : mapping noise -> effect -> said -> share
+        The confusion under white noise alone and with slow noise besides.
     survives : mapping effect -> share of the signature's rms that the baseline cannot absorb
     invisible : mapping effect -> why it cannot show
     """
@@ -52,6 +54,7 @@ class Plan:
     cases: int
     confusion: dict[str, dict[str, float]]
     sets: dict[str, dict[str, float]]
+    by_noise: dict[str, dict[str, dict[str, float]]]
     survives: dict[str, float]
     invisible: dict[str, str]
 
@@ -63,13 +66,14 @@ class Plan:
         return {**shares, "wrong": max(1.0 - sum(shares.values()), 0.0)}
 
     def as_dict(self) -> dict[str, Any]:
-        """Return the object of `hrg diagnose --plan --json`."""
+        """Return the object for `--json`."""
         return {
             "schema": "hrg.plan/1",
             "snr": self.snr,
             "cases": self.cases,
             "confusion": self.confusion,
             "as_set_with": self.sets,
+            "by_noise": self.by_noise,
             "outcome": {key: self.outcome(key) for key in self.confusion},
             "survives_baseline": self.survives,
             "invisible": self.invisible,
@@ -81,26 +85,56 @@ def effect_of(key: str) -> str:
     return key.split(" ")[0]
 
 
+@dataclass(frozen=True)
+class Outlook:
+    """The same campaign with effects of several sizes, the largest SNR first; one of them is told in full."""
+
+    plans: tuple[Plan, ...]
+
+    @property
+    def close(self) -> Plan:
+        """The plan that is told in full: the middle one."""
+        return self.plans[len(self.plans) // 2]
+
+    def smallest(self, key: str) -> float | None:
+        """Return the smallest SNR from which on an effect is named in at least nine of ten cases."""
+        found = None
+        for plan in self.plans:
+            if key not in plan.confusion or plan.outcome(key)["named"] < SURE:
+                break
+            found = plan.snr
+        return found
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the object of `hrg diagnose --plan --json`."""
+        named = {f"{p.snr:g}": {key: p.outcome(key)["named"] for key in p.confusion} for p in self.plans}
+        return {**self.close.as_dict(), "named_at": named}
+
+
 def plan_campaign(
-    profiles: Sequence[str], snr: float = 1.0, cases: int = 60, seed: int = 0, card: str | None = None
-) -> Plan:
+    profiles: Sequence[str],
+    snrs: Sequence[float] = LADDER,
+    cases: int = 100,
+    seed: int = 0,
+    card: str | None = None,
+) -> Outlook:
     """Predict what a campaign of the given chamber profiles could tell apart.
 
     Parameters
     ----------
     profiles : sequence of str
         In words ("step 20 -10 5h") or as files; one a run.
-    snr : float
-        Of every hidden effect.
+    snrs : sequence of float
+        Of every hidden effect, the largest first.
     cases : int
-        Cases of each effect.
+        Cases of each effect and SNR.
     seed : int
     card : str, optional
         Takes the resonator's lag from its thermal network.
     """
     rng = np.random.default_rng(seed)
     campaign = imagine(profiles, rng, card)
-    return predict(campaign, snr, cases, rng)
+    return Outlook(tuple(predict(campaign, snr, cases, rng) for snr in snrs))
 
 
 def predict(campaign: Campaign, snr: float, cases: int, rng: np.random.Generator) -> Plan:
@@ -118,6 +152,7 @@ def predict(campaign: Campaign, snr: float, cases: int, rng: np.random.Generator
     """
     confusion: dict[str, dict[str, float]] = {}
     sets: dict[str, dict[str, float]] = {}
+    by_noise: dict[str, dict[str, dict[str, float]]] = {noise: {} for noise in NOISES}
     survives: dict[str, float] = {}
     thermometer = None
     for response in campaign.responses:
@@ -144,12 +179,14 @@ def predict(campaign: Campaign, snr: float, cases: int, rng: np.random.Generator
             said = rehearse(stage, [own for _, own in hidden])
             for (key, own), answers in zip(hidden, said, strict=True):
                 confusion[key], sets[key] = _shares(own.effect.name, answers)
+                for turn, noise in enumerate(NOISES):
+                    by_noise[noise][key] = _shares(own.effect.name, answers[turn :: len(NOISES)])[0]
     invisible = {
         name: "its drive is not part of the plan" if effect.needs else "no temperature varies"
         for name, effect in library().items()
         if name not in confusion and name != "calibration"
     }
-    return Plan(snr, cases, confusion, sets, survives, invisible)
+    return Plan(snr, cases, confusion, sets, by_noise, survives, invisible)
 
 
 def _shares(truth: str, answers: Sequence[Answer]) -> tuple[dict[str, float], dict[str, float]]:
@@ -194,41 +231,3 @@ def imagine(profiles: Sequence[str], rng: np.random.Generator, card: str | None 
             )
         )
     return replace(load_campaign(records), notes=())
-
-
-def plan_table(plan: Plan) -> Table:
-    """Return the prediction as a table."""
-
-    def listed(shares: dict[str, float], but: tuple[str, ...]) -> str:
-        words = (f"{name} {100 * share:.0f} %" for name, share in shares.items() if name not in but and share >= 0.02)
-        return ", ".join(words) or "—"
-
-    rows = []
-    for name in sorted(plan.confusion, key=lambda name: -plan.outcome(name)["named"]):
-        own, outcome = effect_of(name), plan.outcome(name)
-        rows.append(
-            [
-                name,
-                f"{100 * outcome['named']:.0f}",
-                listed(plan.sets[name], ()),
-                f"{100 * outcome[NOTHING]:.0f}",
-                f"{100 * outcome[UNEXPLAINED]:.0f}",
-                listed(plan.confusion[name], (own, NOTHING, UNEXPLAINED)),
-                f"{100 * plan.survives[name]:.0f}",
-            ]
-        )
-    rows += [[name, "0", "—", "100", "0", why, "0"] for name, why in plan.invisible.items()]
-    return Table(
-        f"What this campaign could tell apart, effects at SNR {plan.snr:g}, {plan.cases} cases each",
-        (
-            "effect",
-            "named rightly / %",
-            "as a set with",
-            "nothing / %",
-            "unexplained / %",
-            "wrongly",
-            "survives baseline / %",
-        ),
-        rows,
-        "Named rightly: share of hidden cases in which the answer, alone or as a set, holds the effect.",
-    )

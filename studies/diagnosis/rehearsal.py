@@ -25,7 +25,9 @@ from studies.diagnosis.verdict import set_beside
 
 NOTHING, UNEXPLAINED = "nothing", "unexplained"
 SLOW_NOISE = (0.1, 1.0)
-"""Range of the slow noise's rms over that of the white noise of one row; four cases in five have some."""
+"""Range of the slow noise's rms over that of the white noise of one row."""
+NOISES = ("white", "slow")
+"""Cases have white noise alone, and besides it slow noise of every kind, by turns."""
 VISIBLE = 3e-3
 """Part of a signature's rms that must survive the baseline for an effect to be hidden at an SNR at all."""
 AT_ONCE = 800
@@ -183,7 +185,7 @@ def draw_noise(stage: Stage, cases: int, rng: np.random.Generator) -> tuple[Floa
     """
     noise = np.empty((stage.problem.values.size, cases))
     level = np.empty(cases)
-    turn = np.arange(cases) % (len(KERNELS) + 1)
+    turn = np.where(np.arange(cases) % 2, 1 + np.arange(cases) // 2 % len(KERNELS), 0)
     for number in range(len(KERNELS) + 1):
         mine = np.flatnonzero(turn == number)
         basis = stage.bank.problems[number - 1].basis
@@ -210,33 +212,36 @@ def _rows_of(basis: NoiseBasis, rotated: FloatArray) -> FloatArray:
 
 
 def rehearse(stage: Stage, hidden: Sequence[Hidden]) -> list[list[Answer]]:
-    """Return the answers to the cases of every hidden effect."""
+    """Return the answers to the cases of every hidden effect: white and slow noise by turns."""
     owner = np.repeat(np.arange(len(hidden)), [h.noise.shape[1] for h in hidden])
     data = np.concatenate([h.left + h.noise for h in hidden], axis=1)
-    evidence = np.concatenate(
-        [_evidence(stage, data[:, k : k + AT_ONCE]) for k in range(0, data.shape[1], AT_ONCE)], axis=1
-    )
+    parts = [_evidence(stage, data[:, k : k + AT_ONCE]) for k in range(0, data.shape[1], AT_ONCE)]
+    evidence, noises, shares = (np.concatenate(part, axis=-1) for part in zip(*parts, strict=True))
+    heard = _unexplained(stage, data, noises, shares, np.flatnonzero(evidence.max(axis=0) < stage.threshold))
     answers: list[list[Answer]] = [[] for _ in hidden]
-    silent = np.flatnonzero(evidence.max(axis=0) < stage.threshold)
-    for case in np.flatnonzero(evidence.max(axis=0) >= stage.threshold):
-        own = dict(zip(stage.names, evidence[:, case], strict=True))
+    for case, values in enumerate(evidence.T):
+        own = dict(zip(stage.names, values, strict=True))
         name = max(own, key=own.__getitem__)
-        answers[owner[case]].append((name, *set_beside(name, own, stage.problem.response)))
-    heard = _unexplained(stage, data, silent)
-    for case in silent:
-        answers[owner[case]].append((UNEXPLAINED if case in heard else NOTHING,))
+        if own[name] >= stage.threshold:
+            answers[owner[case]].append((name, *set_beside(name, own, stage.problem.response)))
+        else:
+            answers[owner[case]].append((UNEXPLAINED if case in heard else NOTHING,))
     return answers
 
 
-def _evidence(stage: Stage, data: FloatArray) -> FloatArray:
-    """Return the net evidence of every effect in every case, (E, B): what noise of another kind costs is taken off."""
+def _evidence(stage: Stage, data: FloatArray) -> tuple[FloatArray, np.ndarray, np.ndarray]:
+    """Return the net evidence of every effect, (E, B), and the baseline's likeliest kind of noise and its share, (B,).
+
+    What noise of another kind than the baseline's costs is taken off.
+    """
     unit = data / np.sqrt(stage.white)
     rotated = [problem.basis.rotate(unit).astype(np.float32) for problem in stage.bank.problems]
     gains, _, _, noises = scan_bank(stage.bank, stage.models, rotated)
-    least = _plain_scores(stage, data).min(axis=1).argmin(axis=0)
+    scores = _plain_scores(stage, data)
+    least = scores.min(axis=1).argmin(axis=0)
     levels = shipped_levels(stage.names)
     net = gains - np.array([levels[name] for name in stage.names])[:, None]
-    return np.asarray(net - np.where(noises == least, 0.0, NOISE_PRICE))
+    return net - np.where(noises == least, 0.0, NOISE_PRICE), least, scores.min(axis=0).argmin(axis=0)
 
 
 def _plain_scores(stage: Stage, data: FloatArray) -> FloatArray:
@@ -254,15 +259,15 @@ def _plain_scores(stage: Stage, data: FloatArray) -> FloatArray:
     return scores
 
 
-def _unexplained(stage: Stage, data: FloatArray, silent: np.ndarray) -> set[int]:
+def _unexplained(
+    stage: Stage, data: FloatArray, noises: np.ndarray, shares: np.ndarray, silent: np.ndarray
+) -> set[int]:
     """Return the cases in which the generic witness sees structure, out of those in which nothing is named."""
     out: set[int] = set()
     bases = generic_bases(stage.problem)
-    scores = _plain_scores(stage, data[:, silent])
-    noise, shares = scores.min(axis=1).argmin(axis=0), scores.min(axis=0).argmin(axis=0)
     for number, plain in enumerate(stage.fits):
         for k in range(0, len(SHARES), 2):
-            mine = silent[(noise == number) & (shares // 2 == k // 2)]
+            mine = silent[(noises[silent] == number) & (shares[silent] // 2 == k // 2)]
             if mine.size:
                 fit = replace(plain, linear=replace(plain.linear, share=float(SHARES[k])))
                 seen = leftover_evidence(fit, bases, fit.problem.basis.rotate(data[:, mine]))

@@ -1,8 +1,10 @@
 """Is the confusion that `--plan` predicts the one that is measured?
 
-The plan sees the temperatures and drives of a design, through the record of one gyro that hides nothing. It does not know
-the noise of the cases: it assumes a random kind and strength of slow noise, and its hidden effects have the library's own
-forms. The cases have other gyros, the generator's forms, and its five families of noise in turn.
+The plan sees the temperatures and drives of a design, through the record of one gyro that hides nothing. Its slow noise has
+a random kind and strength, and its hidden effects have the library's own forms. The cases have other gyros, the generator's
+forms, and its five families of noise in turn: to the white one belongs the plan's prediction for white noise, to walk, flicker
+and correlated that for slow noise. Gross outliers count in the noise of a case but are left out by the diagnosis: these cases
+are planned with white noise at the SNR that the other rows have.
 
 Cells hold few cases, so they are pooled: by effect and SNR, by design and SNR, by design and effect. To each case belongs
 the prediction for its own design, effect and SNR. If the prediction is right, the count of an answer in a pool is a sum of
@@ -18,7 +20,8 @@ import numpy as np
 from scipy.stats import spearmanr
 
 from studies.diagnosis.campaign import load_campaign
-from studies.diagnosis.plan import NOTHING, UNEXPLAINED, predict
+from studies.diagnosis.plan import predict
+from studies.diagnosis.rehearsal import NOTHING, UNEXPLAINED
 from tests.benchmarks.diagnosis.cases import current_commit, read_cases
 from tests.benchmarks.diagnosis.scoring import of_kind, said
 from tests.generator.device import build
@@ -26,6 +29,8 @@ from tests.generator.device import build
 FEWEST = 12
 WITHIN = 0.10
 DRAWS = 2000
+OUTLIERS = float(np.sqrt(1.0 + 0.004 * 25.0**2))
+"""rms of the noise with the generator's outliers, 0.4 % of the rows with 25 times the spread, over that of the other rows."""
 NAMED, WRONG = "named", "wrong"
 OUTCOMES = (NAMED, NOTHING, UNEXPLAINED, WRONG)
 POOLS = {
@@ -71,7 +76,7 @@ def check_plan(path, draws):
     for design in sorted({c["design"] for c in cases}):
         records, _ = build(design, "white", np.random.default_rng(20))
         campaign = load_campaign(records)
-        for snr in sorted({c["snr"] for c in cases if c["design"] == design}):
+        for snr in sorted({effective_snr(c) for c in cases if c["design"] == design}):
             plan = predict(campaign, snr, draws, np.random.default_rng(21))
             out["plans"][f"{design} {snr:g}"] = plan.as_dict()
     predictions_file(path).write_text(json.dumps(out, indent=1))
@@ -97,13 +102,19 @@ def plan_key(raw, channel):
 
 def plan_of(case):
     """Which plan speaks of a case."""
-    return f"{case['design']} {case['snr']:g}"
+    return f"{case['design']} {effective_snr(case):g}"
+
+
+def effective_snr(case):
+    """SNR against the noise of the rows that are no gross outliers."""
+    return case["snr"] * (OUTLIERS if case["family"] == "outliers" else 1.0)
 
 
 def expected(case, plans):
     """Return said -> probability for one case; said is the truth where the answer holds it."""
     key = plan_key(case["raw"][0], case["channel"])
-    return plans[plan_of(case)]["confusion"].get(key, {NOTHING: 1.0})
+    noise = "white" if case["family"] in ("white", "outliers") else "slow"
+    return plans[plan_of(case)]["by_noise"][noise].get(key, {NOTHING: 1.0})
 
 
 def outcome(truth, word):
@@ -127,8 +138,8 @@ def compare(cases, plans, pool=POOLS["effect"], outcomes=False, rng=None):
             predicted.append(own)
             answers.append(outcome(truth, said(case)) if outcomes else said(case))
         words = OUTCOMES if outcomes else sorted({*answers, *(w for own in predicted for w in own)})
-        keys = np.unique([f"{plan_of(c)} {plan_key(c['raw'][0], c['channel'])}" for c in mine], return_inverse=True)[1]
-        draws = np.array([plans[plan_of(c)].get("cases", DRAWS) for c in mine], dtype=float)
+        keys = np.unique([f"{plan_of(c)} {c['family']} {c['raw'][0]}" for c in mine], return_inverse=True)[1]
+        draws = np.array([plans[plan_of(c)]["cases"] / 2 for c in mine], dtype=float)
         for word in words:
             p = np.array([own[word] for own in predicted])
             shares = simulated_shares(p, draws, keys, rng)

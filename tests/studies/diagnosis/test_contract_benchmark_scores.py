@@ -13,7 +13,12 @@ NAMES = ("jump", "ageing", "leak", "radiation", "periodic", "hysteresis", "curva
 def case(truth, *causes, verdict="explained", **more):
     listed = [[name, list(others), "frequency_Hz", 0.9, 50.0] for name, *others in causes]
     own = {"kind": "effect", "count": 1, "seed": 2, "design": "rich", "snr": 1.0, "channel": "frequency_Hz"}
+    own["family"] = "white"
     return {**own, "truth": truth, "raw": truth, "alien": "", "causes": listed, "verdict": verdict, **more}
+
+
+def plan(**white):
+    return {"cases": 1e6, "by_noise": {"white": white, "slow": {}}}
 
 
 def test_the_truth_in_the_strongest_set_is_right():
@@ -54,8 +59,8 @@ def test_reliability_of_claims_that_are_right_as_often_as_they_say():
 
 def test_predicted_and_measured_confusion_are_pooled_over_the_same_cases():
     plans = {
-        "rich 1": {"confusion": {"jump": {"jump": 1.0}}},
-        "plain 1": {"confusion": {"jump": {"jump": 0.5, "nothing": 0.5}}},
+        "rich 1": plan(jump={"jump": 1.0}),
+        "plain 1": plan(jump={"jump": 0.5, "nothing": 0.5}),
     }
     cases = [case(["jump"], ("jump",)) for _ in range(10)]
     cases += [case(["jump"], ("jump",) if k < 2 else ("ageing",), design="plain") for k in range(10)]
@@ -69,7 +74,7 @@ def test_predicted_and_measured_confusion_are_pooled_over_the_same_cases():
 
 
 def test_an_effect_that_the_plan_calls_invisible_is_predicted_as_nothing():
-    entry = compare([case(["self-heating"])], {"rich 1": {"confusion": {}}})[0]
+    entry = compare([case(["self-heating"])], {"rich 1": plan()})[0]
     assert (entry.pool, entry.said, entry.predicted) == ("self-heating", "nothing", 1.0)
 
 
@@ -83,12 +88,12 @@ def test_the_band_of_a_pool_is_that_of_its_unequal_coins():
 
 def test_right_predictions_leave_no_error_beyond_chance_and_wrong_ones_do():
     rng = np.random.default_rng(2)
-    plans = {"rich 1": {"cases": 1e6, "confusion": {name: {name: 0.6, "nothing": 0.4} for name in NAMES}}}
+    plans = {"rich 1": plan(**{name: {name: 0.6, "nothing": 0.4} for name in NAMES})}
     cases = [case([name], *[(name,)] * int(rng.random() < 0.6)) for name in NAMES for _ in range(60)]
     found = agreement(compare(cases, plans))
     assert found["rms"] < 0.04
     assert found["beyond"] <= 0.3 * found["entries"]
-    shifted = {"rich 1": {"cases": 1e6, "confusion": {name: {name: 0.9, "nothing": 0.1} for name in NAMES}}}
+    shifted = {"rich 1": plan(**{name: {name: 0.9, "nothing": 0.1} for name in NAMES})}
     assert agreement(compare(cases, shifted))["rms"] == pytest.approx(0.3, abs=0.05)
 
 

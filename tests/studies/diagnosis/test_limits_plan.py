@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from studies.diagnosis.plan import imagine, predict
+from studies.diagnosis.plan import Outlook, Plan, imagine, predict
+from studies.reports.plan import headline, plan_page, plan_table
 
 WORDS = "cycle 20 -15 40 0.5 30min 1"
 
@@ -47,3 +48,37 @@ def test_an_effect_far_below_the_noise_is_nothing():
 def test_the_baseline_takes_a_part_of_a_cubic_and_is_no_finding_itself(loud):
     assert 0.0 < loud.survives["curvature"] < 1.0
     assert "calibration" not in loud.confusion
+
+
+def test_white_noise_and_slow_noise_make_up_the_whole(loud):
+    for effect, said in loud.confusion.items():
+        halves = [loud.by_noise[noise][effect].get(effect.split(" ")[0], 0.0) for noise in ("white", "slow")]
+        assert np.mean(halves) == pytest.approx(said.get(effect.split(" ")[0], 0.0))
+
+
+def made_up(snr, **named):
+    confusion = {name: {name: share, "nothing": 1.0 - share} for name, share in named.items()}
+    halves = {"white": confusion, "slow": confusion}
+    return Plan(
+        snr, 10, confusion, {name: {} for name in named}, halves, dict.fromkeys(named, 0.5), {"leak": "no wall"}
+    )
+
+
+def test_the_smallest_effect_is_named_at_every_larger_size_too():
+    outlook = Outlook(
+        (
+            made_up(1.0, jump=1.0, ageing=0.8, curvature=0.95),
+            made_up(0.3, jump=0.9, ageing=1.0, curvature=0.5),
+            made_up(0.1, jump=0.2, ageing=1.0, curvature=0.0),
+        )
+    )
+    assert [outlook.smallest(name) for name in ("jump", "ageing", "curvature", "leak")] == [0.3, None, 1.0, None]
+    words = headline(outlook)
+    assert "2 of 3 at SNR 1, 1 of 3 at SNR 0.3, 0 of 3 at SNR 0.1" in words
+    assert "Not even at SNR 1: ageing" in words
+    assert "no wall: leak" in words
+    rows = {row[0]: row[1:4] for row in plan_table(outlook).rows}
+    assert rows["jump"] == ["100", "90", "20"]
+    page = plan_page(outlook, ["cycle 20 -15 40 0.5 30min 1"])
+    assert "cycle 20 -15 40 0.5 30min 1" in page
+    assert words.split(".")[0] in page

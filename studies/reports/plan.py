@@ -1,0 +1,142 @@
+"""What a planned campaign could tell apart: two sentences, a table, and a page."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from studies.diagnosis.plan import Outlook, Plan, effect_of
+from studies.diagnosis.rehearsal import NOTHING, UNEXPLAINED
+from studies.reports.page import Chapter, Facts, Picture, Table, Text, draw, render_page
+from studies.reports.style import figure
+
+SEEN = 0.02
+"""Share below which an answer is not listed."""
+SNR_WORDS = (
+    "SNR: rms of what the refitted simulation cannot absorb of the effect, over the rms of the noise of one row of the record; "
+    "many rows make an effect visible that is far below the noise of one."
+)
+
+
+def headline(outlook: Outlook) -> str:
+    """Return what the campaign is good for, in a few sentences."""
+    effects = list(outlook.close.confusion)
+    parts = []
+    for plan in outlook.plans:
+        sure = sum(1 for key in effects if (least := outlook.smallest(key)) is not None and least <= plan.snr)
+        parts.append(f"{sure} of {len(effects)} at SNR {plan.snr:g}")
+    text = f"Effects that this campaign names rightly nine times in ten: {', '.join(parts)}."
+    never = [key for key in effects if outlook.smallest(key) is None]
+    if never:
+        text += f" Not even at SNR {outlook.plans[0].snr:g}: {', '.join(never)}."
+    for reason in dict.fromkeys(outlook.close.invisible.values()):
+        names = [name for name, why in outlook.close.invisible.items() if why == reason]
+        text += f" Cannot show, {reason}: {', '.join(names)}."
+    return text
+
+
+def plan_table(outlook: Outlook) -> Table:
+    """Return the prediction as a table, the effects that are easiest to name first."""
+    close = outlook.close
+    order = sorted(close.confusion, key=lambda key: [-_named(plan, key) for plan in reversed(outlook.plans)])
+    rows = [
+        [
+            key,
+            *(f"{100 * _named(plan, key):.0f}" for plan in outlook.plans),
+            _listed(close.sets[key], ()),
+            _listed(close.confusion[key], (effect_of(key),)),
+            f"{100 * close.survives[key]:.0f}",
+        ]
+        for key in order
+    ]
+    rows += [[name, *["0"] * len(outlook.plans), "—", why, "0"] for name, why in close.invisible.items()]
+    return Table(
+        f"What this campaign could tell apart, {close.cases} cases each",
+        (
+            "hidden effect",
+            *(f"named rightly at SNR {plan.snr:g} / %" for plan in outlook.plans),
+            f"as a set with (SNR {close.snr:g})",
+            f"said instead (SNR {close.snr:g})",
+            "survives the baseline / %",
+        ),
+        rows,
+        "Named rightly: the answer, alone or as a set, holds the effect. " + SNR_WORDS,
+    )
+
+
+def _named(plan: Plan, key: str) -> float:
+    return plan.outcome(key)["named"] if key in plan.confusion else 0.0
+
+
+def _listed(shares: dict[str, float], but: tuple[str, ...]) -> str:
+    words = (f"{name} {100 * share:.0f} %" for name, share in shares.items() if name not in but and share >= SEEN)
+    return ", ".join(words) or "—"
+
+
+def plan_page(outlook: Outlook, profiles: Sequence[str]) -> str:
+    """Return the page of a plan as HTML."""
+    effects = list(outlook.close.confusion)
+    facts = []
+    for plan in outlook.plans:
+        sure = sum(1 for key in effects if (least := outlook.smallest(key)) is not None and least <= plan.snr)
+        facts.append((f"named nine times in ten, SNR {plan.snr:g}", f"{sure} of {len(effects)}", _size_words(plan.snr)))
+    facts.append(("cannot show at all", str(len(outlook.close.invisible)), "a drive that is not stepped, or no change"))
+    runs = Table("Planned runs", ("run", "chamber"), [[str(k + 1), words] for k, words in enumerate(profiles)])
+    return render_page(
+        "What a planned campaign could tell apart",
+        headline(outlook),
+        [
+            Chapter("In short", [Facts(facts), _ladder(outlook), runs]),
+            Chapter("Every effect", [plan_table(outlook)]),
+            Chapter("What would be said", [_matrix(outlook.close)]),
+            Chapter(
+                "How it was predicted",
+                [
+                    Text(
+                        "A gyro without effects goes through the planned runs with nominal physics. Every effect is hidden in it "
+                        f"{outlook.close.cases} times at each SNR, with random shapes, under white noise and, in every second "
+                        "case, slow noise besides; the answers count by the rules of the diagnosis. " + SNR_WORDS
+                    )
+                ],
+            ),
+        ],
+    )
+
+
+def _size_words(snr: float) -> str:
+    return "as large as the noise of one row" if snr == 1.0 else f"{snr:g} of the noise of one row"
+
+
+def _ladder(outlook: Outlook) -> Picture:
+    """Draw how often each effect is named at each SNR, under white and with slow noise."""
+    keys = sorted(outlook.close.confusion, key=lambda key: [-_named(plan, key) for plan in reversed(outlook.plans)])
+    columns = [(plan, noise) for plan in outlook.plans for noise in plan.by_noise]
+    shares = np.array(
+        [[plan.by_noise[noise].get(key, {}).get(effect_of(key), 0.0) for plan, noise in columns] for key in keys]
+    )
+    labels = [f"SNR {plan.snr:g}\n{noise} noise" for plan, noise in columns]
+    return _map(
+        shares, keys, labels, "How often each effect would be named rightly, %: white noise, and slow noise besides."
+    )
+
+
+def _matrix(plan: Plan) -> Picture:
+    """Draw the confusion matrix."""
+    keys = list(plan.confusion)
+    said = {name for shares in plan.confusion.values() for name in shares} | {effect_of(key) for key in keys}
+    names = [*sorted(said - {NOTHING, UNEXPLAINED}), NOTHING, UNEXPLAINED]
+    shares = np.array([[plan.confusion[key].get(name, 0.0) for name in names] for key in keys])
+    caption = f"Rows the hidden effect, columns the answer, % of {plan.cases} cases at SNR {plan.snr:g}."
+    return _map(shares, keys, names, caption, 55.0)
+
+
+def _map(shares: np.ndarray, rows: Sequence[str], columns: Sequence[str], caption: str, turn: float = 0.0) -> Picture:
+    with figure(height=0.25 * len(rows) + (1.8 if turn else 0.8)) as (made, axes):
+        axes.imshow(shares, cmap="Blues", vmin=0.0, vmax=1.0, aspect="auto")
+        axes.grid(False)
+        side = {"ha": "right", "rotation_mode": "anchor"} if turn else {"ha": "center"}
+        axes.set_xticks(range(len(columns)), columns, rotation=turn, fontsize=8, **side)
+        axes.set_yticks(range(len(rows)), rows, fontsize=8)
+        for i, j in zip(*np.nonzero(np.round(100 * shares)), strict=True):
+            colour = "w" if shares[i, j] > 0.55 else "k"
+            axes.text(j, i, f"{100 * shares[i, j]:.0f}", ha="center", va="center", fontsize=7, color=colour)
+        return draw(made, caption, caption)
