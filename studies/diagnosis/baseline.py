@@ -78,6 +78,8 @@ class Problem:
         Curvature over slope of the frequency, 1/K: how the slope changes with temperature.
     thermometer : tuple of arrays or None
         Resonator temperature minus reference from the frequency, K, run by run on the coarse grid.
+    timed : bool
+        Whether the records say when they start.
     """
 
     response: str
@@ -93,6 +95,7 @@ class Problem:
     law: Law | None = None
     delay_row: float | None = None
     kernel: str = "walk"
+    timed: bool = True
     correction: tuple[FloatArray, ...] | None = None
 
     @property
@@ -190,7 +193,7 @@ def baseline_columns(
         if problem.lagged:
             steep = steepness(problem, seen) if problem.response == "frequency_Hz" else np.ones_like(x)
             start = np.zeros((x.size, runs))
-            start[:, k] = np.exp(-(s.time - s.time[0]) / s.tau) * steep
+            start[:, k] = s.fading * steep
             own = np.concatenate([own, start], axis=1) if problem.response == "bias_deg_per_h" else start
             if problem.delay_row is not None:
                 delay = -(s.housing - s.resonator) / s.tau * steep
@@ -254,6 +257,7 @@ def pose(
         lagged,
         thermometer=None if lagged else tuple(thermometer or ()),
         law=law,
+        timed=campaign.timed,
     )
     if not lagged:
         return problem
@@ -359,19 +363,13 @@ def span_of(campaign: Campaign, tau: float) -> Span:
     """Return the ranges that the campaign covers."""
     temperature = np.concatenate([run.states.housing for run in campaign.runs])
     lagged = np.concatenate([lag(run.states.housing, run.states.step, tau) for run in campaign.runs])
-    return (
-        Span(
-            float(lagged.min()),
-            float(lagged.max()),
-            max(float(np.ptp(run.states.time)) for run in campaign.runs),
-            max(float(run.states.campaign_time[-1]) for run in campaign.runs),
-            campaign.step,
-            tau,
-            len(campaign.runs),
-            tuple(run.time for run in campaign.runs),
-        )
-        if np.ptp(temperature) > 0
-        else Span(
-            float(temperature.min()), float(temperature.max()) + 1e-3, 1.0, 1.0, campaign.step, tau, len(campaign.runs)
-        )
+    return Span(
+        float(lagged.min()),
+        float(lagged.max()) + (0.0 if np.ptp(temperature) > 0.0 else 1e-3),
+        max(float(np.ptp(run.states.time)) for run in campaign.runs),
+        max(float(run.states.campaign_time[-1]) for run in campaign.runs),
+        campaign.step,
+        tau,
+        len(campaign.runs),
+        tuple(run.time for run in campaign.runs),
     )

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
+from numpy.typing import NDArray
 
 from studies.diagnosis.effects import RESPONSES
 from studies.diagnosis.states import FloatArray, States, average
@@ -17,6 +18,8 @@ MOST_BINS = 800
 FINEST = 20
 FEWEST_BINS = 24
 LONGEST_GAP = 900.0
+UNKNOWN_HEAT = 50.0
+"""Area between temperature and line, K s, that a gap may hide: 50 mK of the resonator at a time constant of 1000 s."""
 
 
 @dataclass(frozen=True)
@@ -297,6 +300,7 @@ def _usable_responses(
     records: Sequence[Record], tables: Sequence[dict[str, FloatArray]]
 ) -> tuple[tuple[str, ...], dict[str, str]]:
     usable, skipped = [], {}
+    constant = np.nanmax([np.ptp(t["temperature"][np.isfinite(t["temperature"])]) for t in tables]) == 0.0
     for name in RESPONSES:
         values = np.concatenate([table[name] for table in tables if name in table] or [np.empty(0)])
         values = values[np.isfinite(values)]
@@ -307,6 +311,8 @@ def _usable_responses(
             skipped[name] = f"only {values.size} values"
         elif np.ptp(values) == 0.0:
             skipped[name] = "constant"
+        elif constant:
+            skipped[name] = "the temperature never changes: a stuck sensor, or nothing to learn from"
         else:
             usable.append(name)
     if not usable and not skipped:
@@ -336,11 +342,32 @@ def _stretches(table: dict[str, FloatArray]) -> list[tuple[int, int]]:
     known = np.flatnonzero(np.isfinite(table["temperature"]))
     if known.size < 2:
         return []
-    limit = max(LONGEST_GAP, 20.0 * float(np.median(np.diff(time[known]))))
-    breaks = np.flatnonzero(np.diff(time[known]) > limit)
+    gaps = np.diff(time[known])
+    usual = 20.0 * float(np.median(gaps))
+    breaks: NDArray[np.intp] = np.array(
+        [
+            place
+            for place in np.flatnonzero(gaps > min(usual, LONGEST_GAP))
+            if gaps[place] > max(usual, LONGEST_GAP)
+            or _unknown_heat(time[known], table["temperature"][known], int(place)) > UNKNOWN_HEAT
+        ],
+        dtype=np.intp,
+    )
     begins = [known[0], *known[breaks + 1]]
     ends = [*(known[breaks] + 1), known[-1] + 1]
     return list(zip(map(int, begins), map(int, ends), strict=True))
+
+
+def _unknown_heat(time: FloatArray, temperature: FloatArray, place: int) -> float:
+    """Return how far the temperature may have strayed from a line during a gap, K s: slope changes times gap² / 12."""
+    gap = time[place + 1] - time[place]
+    chord = (temperature[place + 1] - temperature[place]) / gap
+    strays = []
+    for side in (slice(0, place + 1), slice(place + 1, None)):
+        near = np.abs(time[side] - time[place]) < 2.0 * gap + 60.0
+        t, values = time[side][near], temperature[side][near]
+        strays.append(abs(np.polyfit(t, values, 1)[0] - chord) if t.size > 3 else 0.0)
+    return float(max(strays) * gap**2 / 12.0)
 
 
 def _grid_run(

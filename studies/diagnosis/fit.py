@@ -12,6 +12,10 @@ from studies.diagnosis.states import FloatArray
 ROUNDS = 12
 TWO_LAGS = ("second-lag", "mounting-stress")
 """Effects that divide one thermal constant in two."""
+LIKELY = 2.71
+"""Twice the log-likelihood that a single parameter of a 90 % interval may cost."""
+FRINGE, MOST_FRINGES = 0.2, 150
+"""Steps of a period between its fringes, in cycles over the campaign, and at most so many on each side."""
 QUIET = 0.02
 """A round that gains less than this in minus twice the log-likelihood is the last."""
 
@@ -264,6 +268,8 @@ def intervals(fit: Fit, index: int) -> dict[str, Interval]:
             half = 0.5 * problem.states[0].step * problem.group if parameter.name == "time_s" else 0.0
             value = term.shape[number]
             out[parameter.name] = Interval(value, value - half, value + half)
+    if term.name == "periodic" and len(problem.basis.vectors) > 1 and not term.shape[1]:
+        out["period_s"] = _span_of_fringes(fit, index, out["period_s"])
     scale = fit.linear.coefficients[1] if term.effect.acts_on == "temperature" else 1.0
     begin = count - sum(t.count for t in fit.terms[index:])
     for k, name in enumerate(term.effect.coefficient_names(problem.response, term.count)):
@@ -273,3 +279,31 @@ def intervals(fit: Fit, index: int) -> dict[str, Interval]:
     if term.effect.sees_heat:
         out["share_of_form"] = out["radiated_share"]
     return out
+
+
+def _span_of_fringes(fit: Fit, index: int, local: Interval) -> Interval:
+    """Return the interval of a period whose phase goes on from run to run: the gaps leave fringes that fit as well.
+
+    Where the records do not say when they start, every run has a phase of its own.
+    """
+    problem, term = fit.problem, fit.terms[index]
+    longest = max(float(np.ptp(states.time)) for states in problem.states)
+    campaign = max(float(states.campaign_time[-1]) for states in problem.states)
+    steps = min(int(campaign / longest / FRINGE), MOST_FRINGES)
+    frequencies = 1.0 / local.value + np.linspace(-1.0, 1.0, 2 * steps + 1) / longest
+    periods = 1.0 / frequencies[frequencies > 0.5 / local.value]
+    others = fit.terms[:index] + fit.terms[index + 1 :]
+    beside = problem.basis.rotate(problem.model(problem.tau, others))
+    views = problem.views(problem.tau)
+    scores = []
+    for period in periods:
+        parts = [
+            term.effect.columns(view.seen, (float(period), float(not problem.timed)), problem.response)
+            for view in views
+        ]
+        if not problem.timed:
+            parts = [np.kron(np.eye(len(parts))[k], part) for k, part in enumerate(parts)]
+        columns = np.concatenate([beside, problem.basis.rotate(problem.stack(parts))], axis=1)
+        scores.append(fit_linear(problem.basis, problem.rotated, columns, [fit.linear.share]).score)
+    likely = periods[np.array(scores) < min(scores) + LIKELY]
+    return Interval(local.value, min(local.low, float(likely.min())), max(local.high, float(likely.max())))

@@ -64,6 +64,7 @@ def _short(states: States) -> States:
         campaign_time=states.campaign_time[:1],
         housing=states.housing[:1],
         resonator=states.resonator[:1],
+        fading=states.fading[:1] if isinstance(states.fading, np.ndarray) else states.fading,
     )
 
 

@@ -58,7 +58,7 @@ def line_powers(fit: Fit) -> tuple[FloatArray, FloatArray, int]:
     states = [s for s, mask in zip(problem.states, problem.present, strict=True) if mask.any()]
     longest = max(float(np.ptp(s.time)) for s in states)
     step = states[0].step * problem.group
-    frequencies = np.arange(1.0, longest / (5.0 * step), 1.0 / OVERSAMPLED) / longest
+    frequencies = np.arange(1.0, longest / (2.5 * step), 1.0 / OVERSAMPLED) / longest
     power = np.zeros(frequencies.size)
     for innovations, mask, own in zip(find_innovations(fit), runs, states, strict=True):
         phases = np.exp(2j * np.pi * frequencies[:, None] * average(own.time, problem.group)[mask])

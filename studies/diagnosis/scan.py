@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from studies.diagnosis.baseline import Problem, Term, restricted
+from studies.diagnosis.baseline import Problem, Term, fit_at, restricted
 from studies.diagnosis.effects import Effect, Span, library
 from studies.diagnosis.likelihood import KERNELS, SHARES, orthonormal
 from studies.diagnosis.states import FloatArray
@@ -40,6 +40,8 @@ class Dictionary:
         Candidates that make sense with the first column alone.
     jumps : int
         How many of the last candidates are jumps.
+    signs : (G,) array
+        Which sign the first coefficient must have; 0 where both will do.
     """
 
     effects: tuple[str, ...]
@@ -50,6 +52,7 @@ class Dictionary:
     pairs: np.ndarray
     whole: np.ndarray
     jumps: int
+    signs: np.ndarray
 
     @cached_property
     def light(self) -> tuple[Draws, Draws]:
@@ -124,6 +127,7 @@ class _Signatures:
     second: FloatArray
     pairs: tuple[int, ...]
     whole: tuple[bool, ...]
+    signs: tuple[float, ...]
     jumps: int | None
 
 
@@ -135,6 +139,10 @@ def _signatures(problem: Problem, span: Span, effects: Sequence[Effect]) -> _Sig
     seconds: list[FloatArray] = []
     pairs: list[int] = []
     whole: list[bool] = []
+    signs: list[float] = []
+    rising = 1.0
+    if any(effect.positive and effect.acts_on == "temperature" for effect in effects):
+        rising = float(np.sign(fit_at(problem, problem.tau).coefficients[1]))
     jumps: int | None = None
     for index, effect in enumerate(effects):
         if effect.name == "jump":
@@ -148,6 +156,7 @@ def _signatures(problem: Problem, span: Span, effects: Sequence[Effect]) -> _Sig
             owner.append(index)
             shapes.append(tuple(shape))
             whole.append(effect.nested or columns.shape[1] == 1)
+            signs.append((rising if effect.acts_on == "temperature" else 1.0) if effect.positive else 0.0)
             firsts.append(columns[:, 0])
     empty = np.empty((problem.values.size, 0))
     return _Signatures(
@@ -158,6 +167,7 @@ def _signatures(problem: Problem, span: Span, effects: Sequence[Effect]) -> _Sig
         np.stack(seconds, axis=1) if seconds else empty,
         tuple(pairs),
         tuple(whole),
+        tuple(signs),
         jumps,
     )
 
@@ -174,6 +184,7 @@ def _rotated(signatures: _Signatures, problem: Problem, span: Span) -> Dictionar
         np.array(signatures.pairs, dtype=int),
         np.array([*signatures.whole, *[True] * len(shapes)], dtype=bool),
         len(shapes),
+        np.array([*signatures.signs, *[0.0] * len(shapes)]),
     )
 
 
@@ -325,6 +336,8 @@ def _residuals(
     total = np.maximum((rest**2).sum(axis=0), 1e-300).astype(targets.dtype)
     modelled = dictionary.first @ (ortho * root)
     first, second = _products(problem, dictionary, (rest * root).astype(targets.dtype))
+    signed = np.flatnonzero(dictionary.signs)
+    first[signed] *= first[signed] * dictionary.signs[signed, None] > 0.0
     norm = squares[0] @ weight
     own = norm - (modelled**2).sum(axis=1)
     seen = own > SURVIVES * norm

@@ -182,9 +182,18 @@ def polish_contenders(fit: Fit, nets: Sequence[Candidate], levels: Mapping[str, 
             continue
         problem = restricted(fit.problem, kernel=candidate.kernel)
         polished = fit_terms(problem, (*fit.terms, candidate.term))
+        if not _possible(polished):
+            continue
         evidence = least.over(polished) - levels[candidate.term.name]
         rivals.append(Rival(candidate.term.name, evidence, polished))
     return sorted(rivals, key=lambda rival: -rival.evidence)
+
+
+def _possible(fit: Fit) -> bool:
+    """Whether the effect added last has the sign that its physics allows."""
+    effect = fit.terms[-1].effect
+    scale = fit.linear.coefficients[1] if effect.acts_on == "temperature" else 1.0
+    return not effect.positive or bool(fit.coefficients_of(len(fit.terms) - 1)[0] * scale > 0.0)
 
 
 def _settle(plain: Fit, fit: Fit, bank: Bank, levels: Mapping[str, float], threshold: float) -> Selection:

@@ -33,6 +33,8 @@ class States:
         Square of the drive amplitude and of the electrode bias, V²; quadrature control, V; azimuth, rad.
     spread : (N,) array or 0
         Variance of the resonator temperature within each sample of an averaged grid, K²: the mean of x² is x̄² + spread.
+    fading : (N,) array or 0
+        What is left of an initial offset of the resonator, e^(−t/τ), once there is a lag.
     """
 
     run: int
@@ -47,6 +49,7 @@ class States:
     quadrature: FloatArray | None = None
     pattern_angle: FloatArray | None = None
     spread: FloatArray | float = 0.0
+    fading: FloatArray | float = 0.0
 
     @property
     def step(self) -> float:
@@ -83,12 +86,14 @@ class States:
             voltage_squared=mean(self.voltage_squared),
             quadrature=mean(self.quadrature),
             pattern_angle=mean(self.pattern_angle),
+            fading=average(self.fading, group) if isinstance(self.fading, np.ndarray) else self.fading,
             spread=average(self.excess**2, group) - average(self.excess, group) ** 2,
         )
 
     def with_lag(self, tau: float) -> "States":
         """Return the same run with the resonator following the housing through the lag `tau`, s."""
-        return replace(self, tau=tau, resonator=lag(self.housing, self.step, tau))
+        fading = np.exp(-(self.time - self.time[0]) / tau)
+        return replace(self, tau=tau, resonator=lag(self.housing, self.step, tau), fading=fading)
 
 
 def average(values: FloatArray, group: int) -> FloatArray:

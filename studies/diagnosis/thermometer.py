@@ -129,7 +129,7 @@ def thermal_correction(fit: Fit) -> tuple[FloatArray, ...]:
                     states = view.seen_fine if term.effect.sees_heat else fine
                     columns = term.effect.columns(states, term.shape, problem.response)[:, : term.count]
                     warmer += columns @ fit.coefficients_of(index) / slope
-            warmer += coefficients[3 + k] / slope * np.exp(-(fine.time - fine.time[0]) / problem.tau)
+            warmer += coefficients[3 + k] / slope * fine.fading
             if problem.delay_row is not None:
                 delay = float(coefficients[3 + len(problem.states)] / slope)
                 warmer -= delay * (fine.housing - fine.resonator) / problem.tau

@@ -17,6 +17,8 @@ TEMPER = 1.6
 """Evidence differences are divided by this: likelihoods of imperfect models are too sure of themselves."""
 MEMBER = 0.06
 """A rival belongs to the set when its weight is at least this part of the winner's."""
+KIN = 0.2
+"""Part of its evidence by which an effect must be better than one whose formula is nearly the same."""
 DOUBT = 0.02
 """Share of answers that are wrong for reasons outside the likelihood."""
 
@@ -140,6 +142,8 @@ def set_beside(
 ) -> tuple[str, ...]:
     """Return what the strongest effect cannot be told from, given the evidence of all that contend."""
     members = {other for other, own in evidence.items() if np.exp((own - evidence[name]) / (2.0 * TEMPER)) >= MEMBER}
+    kin = (find_effect(name).kin or {}).get(response, ())
+    members |= {other for other, own in evidence.items() if other in kin and own > (1.0 - KIN) * evidence[name]}
     clock = {"clock-drift", "ageing"}
     if clock_drifts is None or name not in clock:
         members |= set((find_effect(name).equivalents or {}).get(response, ()))

@@ -81,6 +81,10 @@ class Effect:
         Fields of `States` that must be measured and must vary.
     equivalents : mapping from response to names
         Effects that no record of that response alone can separate from this one.
+    kin : mapping from response to names
+        Effects whose formula differs from this one's by less than formulas of their kind are sure.
+    positive : bool
+        Whether its coefficient cannot be negative.
     nested : bool
         Whether the first column alone is a simpler form of the effect.
     fine : bool
@@ -101,6 +105,8 @@ class Effect:
     acts_on: str = "response"
     needs: tuple[str, ...] = ()
     equivalents: Mapping[str, tuple[str, ...]] | None = None
+    kin: Mapping[str, tuple[str, ...]] | None = None
+    positive: bool = False
     nested: bool = False
     fine: bool = False
     sees_heat: bool = False

@@ -39,4 +39,5 @@ EFFECT = Effect(
     columns=columns,
     grid=grid,
     equivalents={"frequency_Hz": ("clock-drift",)},
+    kin={"inverse_q": ("leak",)},
 )

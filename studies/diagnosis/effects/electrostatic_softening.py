@@ -25,6 +25,7 @@ EFFECT = Effect(
     responses=("frequency_Hz",),
     needs=("voltage_squared",),
     coefficients=("softening_{unit}_per_V2",),
+    positive=True,
     columns=columns,
     grid=grid,
 )

@@ -2,20 +2,22 @@
 
 from collections.abc import Sequence
 
-import numpy as np
-
-from studies.diagnosis.effects import Effect, Span
+from studies.diagnosis.effects import Effect, Parameter, Span
 from studies.diagnosis.states import FloatArray, States
+
+AROUND = 293.15
+"""Temperature at which the growth counts, K."""
 
 
 def columns(states: States, shape: Sequence[float], response: str) -> FloatArray:
-    """1/Q ∝ P/√T in the free molecular regime; a sealed housing has P ∝ T, so 1/Q grows as t √(T/T₀), per day."""
-    return (states.campaign_time / 86400.0 * np.sqrt(states.resonator / states.reference))[:, None]
+    """1/Q ∝ P/√T in the free molecular regime: with P ∝ t T in a sealed housing, growth is t (T/T₀)^½; with P ∝ t, −½."""
+    (exponent,) = shape
+    return (states.campaign_time / 86400.0 * (states.resonator / AROUND) ** exponent)[:, None]
 
 
 def grid(span: Span, response: str) -> list[tuple[float, ...]]:
-    """No shape parameter."""
-    return [()]
+    """Gas that stays and is warmed with the housing, or that comes and goes at one pressure."""
+    return [(0.5,), (-0.5,)]
 
 
 EFFECT = Effect(
@@ -25,6 +27,9 @@ EFFECT = Effect(
     isolate="store the gyro warm for a known time and repeat the run; heat the getter",
     responses=("inverse_q",),
     coefficients=("growth_per_day",),
+    positive=True,
+    kin={"inverse_q": ("ageing",)},
+    shape=(Parameter("temperature_exponent", -0.5, 0.5, "0.5 in a sealed housing, -0.5 at one pressure", False, True),),
     columns=columns,
     grid=grid,
 )

@@ -37,6 +37,7 @@ EFFECT = Effect(
         Parameter("temperature_degC", -150.0, 250.0, "where the peak is", False),
         Parameter("width_K", 2.5, 60.0, "width of the peak"),
     ),
+    positive=True,
     columns=columns,
     grid=grid,
     fine=True,

@@ -12,15 +12,15 @@ CYCLES = 3.0
 
 
 def columns(states: States, shape: Sequence[float], response: str) -> FloatArray:
-    """A sin(2πt/P) + b cos(2πt/P), t from the start of the campaign or, after a restart, of the run."""
+    """A sin(2πt/P) + b cos(2πt/P), its mean over a step; t from the start of the campaign or, after a restart, of the run."""
     period, restarts = shape
     phase = 2.0 * np.pi * (states.time if restarts else states.campaign_time) / period
-    return np.stack([np.sin(phase), np.cos(phase)], axis=1)
+    return np.stack([np.sin(phase), np.cos(phase)], axis=1) * np.sinc(states.step / period)
 
 
 def grid(span: Span, response: str) -> list[tuple[float, ...]]:
-    """Periods from five steps of the grid to a third of a run, spaced finer than a phase slip of 1/4 turn."""
-    slowest, fastest = CYCLES / span.longest_run, 1.0 / (5.0 * span.step)
+    """Periods from 2.5 steps of the grid to a third of a run, spaced finer than a phase slip of 1/4 turn."""
+    slowest, fastest = CYCLES / span.longest_run, 1.0 / (2.5 * span.step)
     in_run = np.arange(slowest, fastest, 0.35 / span.longest_run)
     forms: list[tuple[float, ...]] = [(float(1.0 / f), 1.0) for f in in_run]
     if span.runs > 1:

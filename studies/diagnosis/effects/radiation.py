@@ -53,6 +53,7 @@ EFFECT = Effect(
         Parameter("share_of_form", 0.0, 1.0, "share at which the form is computed", steady=True),
         Parameter("exchange", 0.0, 1.0, "1: exchange with the housing, 0: by the resonator alone", False, True),
     ),
+    positive=True,
     columns=columns,
     grid=grid,
     fine=True,

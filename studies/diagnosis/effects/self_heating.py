@@ -26,6 +26,7 @@ EFFECT = Effect(
     acts_on="temperature",
     needs=("amplitude_squared",),
     coefficients=("heating_K_per_V2",),
+    positive=True,
     columns=columns,
     grid=grid,
     fine=True,
