@@ -235,27 +235,26 @@ def _evidence(stage: Stage, data: FloatArray) -> tuple[FloatArray, np.ndarray, n
     What noise of another kind than the baseline's costs is taken off.
     """
     unit = data / np.sqrt(stage.white)
-    rotated = [problem.basis.rotate(unit).astype(np.float32) for problem in stage.bank.problems]
-    gains, _, _, noises = scan_bank(stage.bank, stage.models, rotated)
-    scores = _plain_scores(stage, data)
+    rotated = [problem.basis.rotate(unit) for problem in stage.bank.problems]
+    gains, _, _, noises = scan_bank(stage.bank, stage.models, [target.astype(np.float32) for target in rotated])
+    scores = _plain_scores(stage, rotated)
     least = scores.min(axis=1).argmin(axis=0)
     levels = shipped_levels(stage.names)
     net = gains - np.array([levels[name] for name in stage.names])[:, None]
     return net - np.where(noises == least, 0.0, NOISE_PRICE), least, scores.min(axis=0).argmin(axis=0)
 
 
-def _plain_scores(stage: Stage, data: FloatArray) -> FloatArray:
+def _plain_scores(stage: Stage, rotated: Sequence[FloatArray]) -> FloatArray:
     """Return minus twice the log-likelihood of the baseline for every kind of slow noise, share and case, (K, S, B)."""
-    scores = np.empty((len(KERNELS), len(SHARES), data.shape[1]))
-    for number, (problem, model) in enumerate(zip(stage.bank.problems, stage.models, strict=True)):
-        basis = problem.basis
-        rotated = basis.rotate(data)
+    scores = np.empty((len(KERNELS), len(SHARES), rotated[0].shape[1]))
+    for number, (problem, model, target) in enumerate(zip(stage.bank.problems, stage.models, rotated, strict=True)):
         for k, share in enumerate(SHARES):
-            root = np.sqrt(basis.weights(share))[:, None]
+            root = np.sqrt(problem.basis.weights(share))[:, None]
             ortho = orthonormal(model * root)
-            rest = rotated * root
+            rest = target * root
             rest -= ortho @ (ortho.T @ rest)
-            scores[number, k] = data.shape[0] * np.log((rest**2).sum(axis=0)) + basis.log_determinant(share)
+            determinant = problem.basis.log_determinant(share)
+            scores[number, k] = target.shape[0] * np.log((rest**2).sum(axis=0)) + determinant
     return scores
 
 

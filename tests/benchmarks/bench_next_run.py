@@ -17,6 +17,7 @@ import time
 from pathlib import Path
 
 import numpy as np
+from scipy.stats import binomtest
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
@@ -131,6 +132,12 @@ def alone(case, said):
     return right(case, said) and set(said["said"]) <= exact
 
 
+def paired(cases, arm, holds):
+    """How many cases only the suggestion answers, and how many only the other arm, after one run each."""
+    pairs = [(holds(c, c["after"]["suggested"][0]), holds(c, c["after"][arm][0])) for c in cases]
+    return sum(a and not b for a, b in pairs), sum(b and not a for a, b in pairs)
+
+
 def rate(hits, total):
     """Percentage with a 90 % band (Wilson)."""
     if not total:
@@ -164,6 +171,15 @@ def summarise(cases):
                 f"| {sum(s['verdict'] == 'unexplained' for _, s in said)} "
                 f"| {sum(not s['said'] for _, s in said)} |"
             )
+        lines.append("")
+        for arm in ("repeat", "random"):
+            for word, holds in (("right", right), ("right with nothing else in the set", alone)):
+                better, worse = paired(mine, arm, holds)
+                chance = binomtest(better, better + worse).pvalue if better + worse else 1.0
+                lines.append(
+                    f"- One suggested run against one {arm}: {word} only after the suggestion {better}, only after the "
+                    f"{arm} {worse} times (sign test p = {chance:.2g})."
+                )
         asked = [p for c in mine for p in c["profiles"]["suggested"]]
         lines += ["", f"No run suggested: {asked.count(None)} of {len(asked)} times.", ""]
         lines += ["| effect | none | 1 suggested | 2 suggested | 1 repeat | 1 random | all |", "| --- " * 7 + "|"]
