@@ -6,7 +6,7 @@ from functools import lru_cache
 import numpy as np
 
 from shell.blocks import Mesh, Solid, Tie, constrain, find_boundary, mesh_solid, number_functions
-from shell.cells import tabulate_cells
+from shell.cells import at_gauss_points, tabulate_cells
 from shell.constraints import Index, Rows
 from shell.corner import find_kinks, lay_clamped_edge, lay_clamped_face, lay_corner
 from shell.errors import ShellError
@@ -104,7 +104,7 @@ def solid_group(
     rows = constrain(mesh, boundary, ties, degree, n, start)
     numbers, signs, count = number_functions(mesh, degree)
     unknowns = start + (3 * numbers[:, :, None] + np.arange(3)).reshape(len(numbers), -1)
-    table = tabulate_cells(mesh.grid, degree, n, solid.position)
+    table = tabulate_cells(mesh.grid, at_gauss_points(degree, degree), n, solid.position)
     return SolidGroup(table, unknowns, SolidPart(mesh, boundary, signs)), rows, start + 3 * count
 
 

@@ -137,39 +137,61 @@ def in_order(degree: int) -> tuple[Index, Index]:
     return i[order], j[order]
 
 
-def tabulate_cells(grid: Array, degree: int, n: int, position: float) -> CellTable:
-    """Gradients at the Gauss points of cells whose sides are polynomials through `grid` (2, cells, Lobatto ξ, η)."""
+@dataclass(frozen=True, eq=False)
+class Reference:
+    """The functions of a cell and those of its sides at points (ξ_i, η_j) of the reference square.
+
+    weights : of the points, (points,).
+    along, across : functions of the sides.
+    value, by_xi, by_eta : of the functions of the cell, (points, functions).
+    """
+
+    weights: Array
+    along: Basis
+    across: Basis
+    value: Array
+    by_xi: Array
+    by_eta: Array
+
+    @classmethod
+    def at(cls, xi: Array, eta: Array, weights: Array, degree: int, sides: int) -> "Reference":
+        """At given points, for functions of one degree and sides of another."""
+        one, two = hierarchic(degree, xi), hierarchic(degree, eta)
+        i, j = in_order(degree)
+
+        def product(f: Array, g: Array) -> Array:
+            return np.asarray((f[:, None, i] * g[None, :, j]).reshape(-1, len(i)))
+
+        return cls(
+            weights.ravel(),
+            nodal(sides, xi),
+            nodal(sides, eta),
+            product(one.values, two.values),
+            product(one.slopes, two.values),
+            product(one.values, two.slopes),
+        )
+
+
+@cache
+def at_gauss_points(degree: int, sides: int) -> Reference:
+    """The reference cell at the points of the Gauss rule that integrates its energies."""
     points, weights = gauss(degree + 2)
-    return gradients_at(grid, points, points, np.outer(weights, weights), degree, n, position)
+    return Reference.at(points, points, np.outer(weights, weights), degree, sides)
 
 
-def gradients_at(grid: Array, xi: Array, eta: Array, weights: Array, degree: int, n: int, position: float) -> CellTable:
-    """The same at the points (ξ_i, η_j) with weights (ξ, η)."""
-    along, across = (nodal(grid.shape[2] - 1, axis) for axis in (xi, eta))
+def tabulate_cells(grid: Array, place: Reference, n: int, position: float) -> CellTable:
+    """Gradients in cells whose sides are polynomials through `grid` (2, cells, Lobatto ξ, η)."""
+    along, across = place.along, place.across
     r = _interpolate(grid[0], along.values, across.values)
     r_xi, z_xi = (_interpolate(x, along.slopes, across.values) for x in grid)
     r_eta, z_eta = (_interpolate(x, along.values, across.slopes) for x in grid)
     det = r_xi * z_eta - r_eta * z_xi
-    value, by_xi, by_eta = _functions(hierarchic(degree, xi), hierarchic(degree, eta), degree)
-    to_r = (z_eta / det)[..., None] * by_xi - (z_xi / det)[..., None] * by_eta
-    to_z = (r_xi / det)[..., None] * by_eta - (r_eta / det)[..., None] * by_xi
-    gradients = np.stack([to_r, to_z, value / r[..., None]], axis=1)
-    volume = abs(det) * r * weights.ravel()
-    return CellTable(gradients, r, volume[:, None], np.full((len(r), 1), position), n)
-
-
-def _functions(along: Basis, across: Basis, degree: int) -> tuple[Array, Array, Array]:
-    """Values, ξ- and η-slopes of all functions at the points of a product, (points, functions) each."""
-    i, j = in_order(degree)
-
-    def product(one: Array, two: Array) -> Array:
-        return (one[:, None, i] * two[None, :, j]).reshape(-1, len(i))
-
-    return (
-        product(along.values, across.values),
-        product(along.slopes, across.values),
-        product(along.values, across.slopes),
-    )
+    gradients = np.empty((len(r), 3, *place.value.shape))
+    for to, (xi, eta) in enumerate(((z_eta, -z_xi), (-r_eta, r_xi))):
+        np.multiply((xi / det)[..., None], place.by_xi, out=gradients[:, to])
+        gradients[:, to] += (eta / det)[..., None] * place.by_eta
+    np.divide(place.value, r[..., None], out=gradients[:, ZERO])
+    return CellTable(gradients, r, (abs(det) * r * place.weights)[:, None], np.full((len(r), 1), position), n)
 
 
 def _interpolate(grid: Array, along: Array, across: Array) -> Array:

@@ -165,22 +165,19 @@ def _condense(system: System, held: int, nu: float, mu: float) -> Pair:
     """Condense a system onto its first unknowns."""
     lam, G = (float(x) for x in lame(np.array(1.0), np.array(nu), False))
     one = np.ones((len(system.groups[0].unknowns), 1))
-    K, M = system.operators([lam / G * one], [one], [one], uniform=True)
+    dynamic, M = system.operators([lam / G * one], [one], [one], True, -mu / G)
     unknowns, size = system.pattern.unknowns, system.pattern.size
     load = np.zeros((size - held, held))
     inner: list[Array] = []
-    for members, stiff, heavy in zip(unknowns, K, M, strict=True):
-        dynamic = stiff - mu / G * heavy
+    for members, stiff in zip(unknowns, dynamic, strict=True):
         own, outer = np.flatnonzero(members >= held), np.flatnonzero(members < held)
-        inner.append(dynamic[own[:, None], own])
-        load[(members[own] - held)[:, None], members[outer]] -= dynamic[own[:, None], outer]
+        inner.append(stiff[own[:, None], own])
+        load[(members[own] - held)[:, None], members[outer]] -= stiff[own[:, None], outer]
     pattern = find_pattern([members[members >= held] - held for members in unknowns], size - held)
     follow = np.vstack([np.eye(held), Factor(pattern, arrange(pattern, inner)).solve(load)])
     parts = [follow[members] for members in unknowns]
-    return (
-        np.sum([p.T @ k @ p for p, k in zip(parts, K, strict=True)], axis=0),
-        np.sum([p.T @ m @ p for p, m in zip(parts, M, strict=True)], axis=0),
-    )
+    inertia = follow.T @ (M @ follow)
+    return np.sum([p.T @ k @ p for p, k in zip(parts, dynamic, strict=True)], axis=0) + mu / G * inertia, inertia
 
 
 def arrange(pattern: Pattern, matrices: list[Array]) -> list[Array]:

@@ -1,10 +1,9 @@
 """Solid regions where stress is singular: corners where the meridian kinks, clamped edges and faces."""
 
 from functools import lru_cache
-from math import hypot
+from math import hypot, tan
 
 import numpy as np
-from scipy.optimize import root
 
 from shell.blocks import Solid
 from shell.errors import ShellError
@@ -107,15 +106,20 @@ def _turn(before: MeridianPoints, after: MeridianPoints) -> float:
 def _meet(resonator: Resonator, joint: int, inner: float) -> tuple[float, float]:
     """Arc lengths on the two segments whose cross-sections share the inner corner I."""
     s = resonator.joints[joint]
-
-    def gap(x: Array) -> list[float]:
-        one, two = _face(resonator.at([x[0]], joint), inner), _face(resonator.at([x[1]], joint + 1), inner)
-        return [one[0] - two[0], one[1] - two[1]]
-
-    h = float(resonator.at([s], joint).thickness[0])
-    found = root(gap, [s - h / 2, s + h / 2], tol=1e-14)
-    s_1, s_2 = (float(x) for x in found.x)
-    if hypot(*gap(found.x)) > 1e-9 * h or not resonator._starts[joint] < s_1 <= s <= s_2 < resonator._starts[joint + 2]:
+    before, after = resonator.at([s], joint), resonator.at([s], joint + 1)
+    h = float(before.thickness[0])
+    reach = h / 2 * abs(tan(_turn(before, after) / 2))  # where both segments are straight
+    s_1, s_2, gap = s - reach, s + reach, np.inf
+    for _ in range(20):  # Newton's method: the two faces meet where the gap between their points vanishes
+        places = resonator.at([s_1], joint), resonator.at([s_2], joint + 1)
+        (r_1, z_1), (r_2, z_2) = (_face(place, inner) for place in places)
+        gap = hypot(r_1 - r_2, z_1 - z_2)
+        if not 1e-13 * h < gap < resonator.length:
+            break
+        (a_1, b_1), (a_2, b_2) = (_along_face(place, inner) for place in places)
+        step = np.linalg.solve([[a_1, -a_2], [b_1, -b_2]], [r_2 - r_1, z_2 - z_1])
+        s_1, s_2 = s_1 + float(step[0]), s_2 + float(step[1])
+    if not gap <= 1e-9 * h or not resonator._starts[joint] < s_1 <= s <= s_2 < resonator._starts[joint + 2]:
         raise ShellError(
             f"the corner between segments {joint + 1} and {joint + 2} is too sharp or its segments too short for the thickness."
         )
@@ -166,6 +170,16 @@ def _strip(
 def _face(points: MeridianPoints, eta: float) -> Spot:
     zeta = eta * points.thickness[0] / 2
     return float(points.r[0] + zeta * points.normal_r[0]), float(points.z[0] + zeta * points.normal_z[0])
+
+
+def _along_face(points: MeridianPoints, eta: float) -> Spot:
+    """Change of a point of the face η per arc length of the middle surface, (1 + κ ζ) t + η h'/2 n."""
+    stretch = 1 + points.curvature[0] * eta * points.thickness[0] / 2
+    rise = eta * points.thickness_slope[0] / 2
+    return (
+        float(stretch * points.tangent_r[0] + rise * points.normal_r[0]),
+        float(stretch * points.tangent_z[0] + rise * points.normal_z[0]),
+    )
 
 
 def _tangent(points: MeridianPoints) -> Spot:

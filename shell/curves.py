@@ -56,7 +56,7 @@ class Curve(ABC):
             jet = self.jet(x)
             step = (s - self._length_to(x)) / np.hypot(jet.dr, jet.dz)
             x = x + step
-            if np.all(abs(step) < 1e-15):
+            if np.all(abs(step) < 1e-8):  # the next step is about its square
                 break
         return self.jet(x)
 

@@ -7,6 +7,7 @@ subspace is projected with Yᵀ K Y = Yᵀ M X, free of cancellation. The freque
 
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,13 +45,13 @@ class Pattern:
     is_whole: bool
 
 
-def find_pattern(unknowns: list[Index], size: int) -> Pattern:
-    """Split the unknowns of every element and order the shared ones (reverse Cuthill-McKee)."""
+def find_pattern(unknowns: list[Index], size: int, in_order: bool = False) -> Pattern:
+    """Split the unknowns of every element and order the shared ones (reverse Cuthill-McKee) unless they are in order."""
     uses = np.bincount(np.concatenate(unknowns), minlength=size)
     shared = np.flatnonzero(uses > 1)
     place = np.full(size, -1, dtype=np.intp)  # in the band; -1 for an element's own
     place[shared] = np.arange(len(shared))
-    if len(shared):
+    if len(shared) and not in_order:
         ranks = _in_a_narrow_band([place[members][place[members] >= 0] for members in unknowns], len(shared))
         place[shared] = ranks
         shared = shared[np.argsort(ranks)]
@@ -66,6 +67,12 @@ def find_pattern(unknowns: list[Index], size: int) -> Pattern:
         one, two = w[rows], w[columns]
         entries.append((np.maximum(one, two) + band * np.minimum(one, two), source))
     return Pattern(tuple(unknowns), order, own, tuple(where), tuple(entries), shared, size, band, is_whole)
+
+
+@lru_cache(maxsize=16)
+def whole_pattern(size: int) -> Pattern:
+    """The pattern of one element with all unknowns."""
+    return find_pattern([np.arange(size)], size)
 
 
 @lru_cache(maxsize=64)
@@ -135,60 +142,60 @@ class Factor:
         return x
 
 
-def apply_mass(pattern: Pattern, mass: list[Array], x: Array) -> Array:
-    """M x for several columns, element by element."""
-    if pattern.is_whole:
-        return np.asarray(mass[0] @ x)
-    y = np.zeros_like(x)
-    for M, members in zip(mass, pattern.unknowns, strict=True):
-        y[members] += M @ x[members]
-    return y
+class Mass(Protocol):
+    """Whatever multiplies several columns by the mass matrix."""
+
+    def __matmul__(self, x: Array) -> Array: ...
 
 
-def lowest_vectors(
-    pattern: Pattern, stiffness: list[Array], mass: list[Array], count: int, shift: float, accuracy: float
-) -> Array:
-    """The `count` lowest eigenvectors of K + shift M, M-orthonormal, as columns.
+@dataclass(frozen=True, eq=False)
+class ElementMass:
+    """The mass element by element."""
+
+    pattern: Pattern
+    matrices: list[Array]
+
+    def __matmul__(self, x: Array) -> Array:
+        """M x for several columns."""
+        y = np.zeros_like(x)
+        for M, members in zip(self.matrices, self.pattern.unknowns, strict=True):
+            y[members] += M @ x[members]
+        return y
+
+
+def lowest_vectors(pattern: Pattern, stiffness: list[Array], mass: Mass, count: int, accuracy: float) -> Array:
+    """The `count` lowest eigenvectors of K, M-orthonormal, as columns.
 
     Parameters
     ----------
     pattern : unknowns of the elements.
-    stiffness, mass : their matrices, in the pattern's order.
+    stiffness : their matrices, in the pattern's order.
+    mass : M.
     count : how many.
-    shift : added to K as shift M so that rigid motions can be factored, 1/s².
     accuracy : relative error of the Ritz values at which the iteration stops.
     """
-    return Iteration(pattern, stiffness, mass, shift).converge(count, accuracy)[:, :count]
+    return Iteration(Factor(pattern, stiffness), mass).converge(count, accuracy)[:, :count]
 
 
 class Iteration:
-    """Inverse iteration of a subspace with K + shift M."""
+    """Inverse iteration of a subspace."""
 
-    def __init__(self, pattern: Pattern, stiffness: list[Array], mass: list[Array], shift: float) -> None:
-        if shift:
-            stiffness = [K + shift * M for K, M in zip(stiffness, mass, strict=True)]
-        self.pattern, self.mass = pattern, mass
-        self.factor = Factor(pattern, stiffness)
-
-    def step(self, loaded: Array) -> tuple[Array, Array, Array]:
-        """From M X the Ritz values of K⁻¹ M X, the Ritz vectors as columns, and M times these."""
-        return self._rotate(self.factor.solve(loaded), loaded)
-
-    def _rotate(self, y: Array, loaded: Array) -> tuple[Array, Array, Array]:
-        heavy = apply_mass(self.pattern, self.mass, y)
-        values, turn = _project(y.T @ loaded, y.T @ heavy)
-        return values, y @ turn, heavy @ turn
+    def __init__(self, factor: "Factor", mass: Mass) -> None:
+        self.factor, self.mass = factor, mass
 
     def converge(self, count: int, accuracy: float) -> Array:
         """A subspace, sorted by Ritz values, of which the first `count` have converged."""
         # the more vectors beyond `count`, the faster they converge
-        x = _random(self.pattern.size, min(2 * count + 3, self.pattern.size))
+        size = self.factor.pattern.size
+        x = self.factor.solve(self.mass @ _random(size, min(2 * count + 3, size)))
         # one solve leaves little but the inextensional modes of a thin shell (two at most) in every column
-        start = self._set_apart(self.factor.solve(apply_mass(self.pattern, self.mass, x)))
-        loaded = apply_mass(self.pattern, self.mass, start)
+        x = _set_apart(x)
+        loaded = self.mass @ x
+        L = _cholesky(x.T @ loaded)
+        loaded = blas.dtrsm(1.0, L, loaded, side=1, lower=1, trans_a=1)
         before, change = np.full(count, np.inf), np.inf
         for _ in range(300):
-            values, x, loaded = self.step(loaded)
+            values, x, loaded = self._step(loaded)
             last, change = change, float(np.max(abs(values[:count] / before - 1)))
             before = values[:count]
             # a step takes the errors down at least by this; the factor allows for Ritz values that are not yet true
@@ -197,12 +204,18 @@ class Iteration:
                 break
         return x
 
-    def _set_apart(self, x: Array) -> Array:
-        """A basis of the columns that is orthonormal in the inner product of M."""
-        reflectors, tau, _, _ = lapack.dgeqrf(x)
-        x = lapack.dorgqr(reflectors, tau)[0]
-        L = _cholesky(x.T @ apply_mass(self.pattern, self.mass, x))
-        return np.asarray(blas.dtrsm(1.0, L, x, side=1, lower=1, trans_a=1))
+    def _step(self, loaded: Array) -> tuple[Array, Array, Array]:
+        """From M X the Ritz values of K⁻¹ M X, the Ritz vectors as columns, and M times these."""
+        y = self.factor.solve(loaded)
+        heavy = self.mass @ y
+        values, turn = _project(y.T @ loaded, y.T @ heavy)
+        return values, y @ turn, heavy @ turn
+
+
+def _set_apart(x: Array) -> Array:
+    """An orthonormal basis of the columns."""
+    reflectors, tau, _, _ = lapack.dgeqrf(x)
+    return np.asarray(lapack.dorgqr(reflectors, tau)[0])
 
 
 @lru_cache(maxsize=16)

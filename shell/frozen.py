@@ -18,7 +18,7 @@ import numpy as np
 from shell.assembly import build_system, lay_resonator
 from shell.condensed import Part, arrange, find_parts
 from shell.constraints import Index
-from shell.eigen import Pattern, find_pattern, lowest_vectors
+from shell.eigen import ElementMass, Pattern, find_pattern, lowest_vectors
 from shell.kernel import (
     Section,
     StrainTable,
@@ -104,7 +104,7 @@ class FrozenShell:
         K = self._restrict(integrate_stiffness, lam * trace + G * shear) + [G * stiff for stiff, _ in solids]
         M = self._restrict(integrate_mass, mass) + [heavy for _, heavy in solids]
         K, M = arrange(self.pattern, K), arrange(self.pattern, M)
-        vector = lowest_vectors(self.pattern, K, M, 1, 0.0, accuracy)
+        vector = lowest_vectors(self.pattern, K, ElementMass(self.pattern, M), 1, accuracy)
         trace, shear, mass = (np.einsum("cej,cej->", weights, kind[..., 0, 0]) for kind in self.energies(vector))
         stiffness, inertia = lam * trace + G * shear, mass
         for part, (stiff, heavy) in zip(self.parts, solids, strict=True):

@@ -58,6 +58,17 @@ class StrainTable:
         amplitudes = self.along[0] @ unknowns.reshape(len(unknowns), self.along.shape[2], -1)
         return np.asarray((self.displacement @ amplitudes[:, :, None, :, None])[..., 0])
 
+    def loads(self, stress: Array, force: Array) -> Array:
+        """∫ (σ : ε(φ) - f · φ) dV of all functions (elements, functions, amplitudes), for stress and force at the points."""
+        elements, stations, _, points = self.strain.shape[:4]
+        volume = self.volume[:, :, None]
+        strain = self.strain.reshape(elements, stations, 6 * points, -1)
+        moved = self.displacement.reshape(elements, stations, 3 * points, -1)
+        jets = (stress * volume).reshape(elements, stations, 1, -1) @ strain
+        jets = jets.reshape(elements, stations, 2, -1)
+        jets[:, :, 0] -= ((force * volume).reshape(elements, stations, 1, -1) @ moved)[:, :, 0]
+        return np.asarray(np.einsum("dsf,esdm->efm", self.along, jets))
+
 
 @dataclass(frozen=True, eq=False)
 class Section:

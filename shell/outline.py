@@ -13,7 +13,7 @@ import numpy as np
 
 from shell.assembly import build_system, sections
 from shell.blocks import SIDES, Mesh, surface_sides
-from shell.cells import CellTable, gradients_at
+from shell.cells import CellTable, Reference, tabulate_cells
 from shell.errors import ShellError
 from shell.kernel import StrainTable, energy_weights, shell_table
 from shell.layout import Chain
@@ -167,8 +167,9 @@ class _Sides:
         where = self.system.groups[number].table.position[cell, 0]
         if self.solution is None:
             return _bare(r, z, np.full(r.shape, where))
-        points = xi * INSIDE, eta * INSIDE
-        table = gradients_at(grid, *points, np.ones((len(xi), len(eta))), degree, self.system.n, where)
+        weights = np.ones((len(xi), len(eta)))
+        place = Reference.at(xi * INSIDE, eta * INSIDE, weights, degree, degree)
+        table = tabulate_cells(grid, place, self.system.n, where)
         displacement, energy = _fields(self.solution, table, number, cell)
         return Outline(r, z, np.full(r.shape, where), displacement.reshape(3, -1), energy.reshape(2, -1))
 

@@ -1,10 +1,9 @@
 """Rising polynomial orders: solve one level after the other until its own estimate of the error is small enough."""
 
 from shell.assembly import build_system
-from shell.eigen import Iteration, Pattern
+from shell.eigen import Factor, Iteration, whole_pattern
 from shell.elastic import Elastic, VaryingElastic
 from shell.levels import LEVELS, Theory
-from shell.quadrature import Array
 from shell.resonator import Resonator
 from shell.solution import Constants, Solution, find_constants
 from shell.surplus import estimate_error
@@ -36,26 +35,25 @@ def solve_level(
     constants = tuple(
         find_constants(group.table.position, elastic, group.table.plane_stress) for group in system.groups
     )
-    pattern, K, M = _operators(system, elastic, constants)
     # a small shift factors the rigid motions and leaves the elastic modes in order
     shift = 1e-2 * constants[0].wave_speed_squared / size**2 if system.rigid_motions else 0.0
     wanted = count + system.rigid_motions
-    vectors = Iteration(pattern, K, M, shift).converge(wanted, accuracy)
+    vectors = _begin(system, elastic, constants, shift).converge(wanted, accuracy)
     found = [Solution(system, constants, vector) for vector in vectors.T[:wanted]]
     return sorted(found, key=lambda solution: solution.eigenvalue)[system.rigid_motions :]
 
 
-def _operators(
-    system: System, elastic: Elastic | VaryingElastic, constants: tuple[Constants, ...]
-) -> tuple[Pattern, list[Array], list[Array]]:
-    """Stiffness and mass of the elements with their pattern; both over ρ where it is the same everywhere."""
-    uniform = isinstance(elastic, Elastic)
-    rho = elastic.rho if isinstance(elastic, Elastic) else 1.0
+def _begin(
+    system: System, elastic: Elastic | VaryingElastic, constants: tuple[Constants, ...], shift: float
+) -> Iteration:
+    """Factor K + shift M; both over ρ where it is the same everywhere."""
+    uniform, rho = (True, elastic.rho) if isinstance(elastic, Elastic) else (False, 1.0)
     if uniform and system.is_tiny:
-        pattern, unit = system.whole
+        trace, shear, mass = system.whole
         lam, G = (field[0, 0] / rho for field in constants[0].lame)
-        return pattern, [lam * unit[0] + G * unit[1]], [unit[2]]
+        return Iteration(Factor(whole_pattern(len(mass)), [lam * trace + G * shear + shift * mass]), mass)
     lam, G, density = (
         [field / rho for field in fields] for fields in zip(*((*one.lame, one.rho) for one in constants), strict=True)
     )
-    return system.pattern, *system.operators(lam, G, density, uniform)
+    K, M = system.operators(lam, G, density, uniform, shift)
+    return Iteration(Factor(system.pattern, K), M)

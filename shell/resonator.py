@@ -118,7 +118,7 @@ class Resonator:
     @cached_property
     def size(self) -> float:
         """Largest distance from the axis, m: the radius that h/R refers to."""
-        return float(np.max(self.sample(201).r))
+        return max(float(np.max(segment.jet(np.linspace(0.0, 1.0, 201)).r)) for segment in self.segments)
 
     @property
     def joints(self) -> tuple[float, ...]:
@@ -211,9 +211,7 @@ def _check_chain(resonator: Resonator) -> None:
             raise ShellError(
                 f"segment {k + 1} of the meridian starts at ({r2:g}, {z2:g}) m, but segment {k} ends at ({r1:g}, {z1:g}) m."
             )
-    inside = np.concatenate(
-        [segment.at_length(np.linspace(0, segment.length, 201)[1:-1]).r for segment in resonator.segments]
-    )
+    inside = np.concatenate([segment.jet(np.linspace(0.0, 1.0, 201)[1:-1]).r for segment in resonator.segments])
     joints = [segment.end_points[0][0] for segment in resonator.segments[1:]]
     if min(inside) <= 0 or min(joints, default=1.0) <= tolerance:
         raise ShellError("the meridian touches or crosses the axis between its ends: the shell would overlap itself.")

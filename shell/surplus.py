@@ -10,19 +10,21 @@ degree more in solid cells, two degrees more along the shell and two modes more 
 """
 
 from dataclasses import dataclass, replace
-from functools import cache, lru_cache
+from functools import lru_cache
 from typing import TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 
 from shell.assembly import sections
 from shell.blocks import open_edges
-from shell.cells import CellTable, cell_stiffness, in_order, tabulate_cells
+from shell.cells import CellTable, at_gauss_points, cell_stiffness, in_order, tabulate_cells
 from shell.constraints import Index
+from shell.eigen import Factor, Pattern, find_pattern
 from shell.elastic import Elastic, VaryingElastic
-from shell.kernel import StrainTable, energy_weights, integrate_stiffness, shell_table, station_stiffness
+from shell.kernel import StrainTable, energy_weights, pair_stiffness, shell_table, station_stiffness
 from shell.levels import Level
-from shell.quadrature import Array, gauss, legendre, lobatto, nodal
+from shell.quadrature import Array, gauss, hierarchic, interpolate_hierarchic, legendre
 from shell.resonator import Resonator
 from shell.solution import Constants, Solution, find_constants, total
 from shell.system import ShellGroup, SolidGroup, System
@@ -48,46 +50,36 @@ def estimate_error(resonator: Resonator, elastic: Elastic | VaryingElastic, solu
 
 @dataclass(frozen=True, eq=False)
 class ShellExtension:
-    """More functions on the elements of a chain.
+    """More functions on the elements of a chain, hierarchic along the meridian: those of its two ends, then the others.
 
-    table : with the orders `through` and more functions along the meridian.
-    coarse : orders and values of the level's own functions at the nodes of the new ones.
-    new : (elements, functions, amplitudes), which of them the level lacks.
+    table : with more orders through the thickness and along the meridian.
+    is_old : which amplitudes the level has.
+    to_old : from the values at the level's nodes.
+    pattern : the functions that may answer: the new ones, and the old ones inside an element, with which these go
+        together in a thin shell.
+    places : where these are among the functions and amplitudes of every element.
+    units : their stiffness per unit λ and G.
     """
 
     table: StrainTable
-    through: tuple[int, ...]
-    coarse: tuple[tuple[int, ...], Array]
-    new: np.ndarray
+    is_old: NDArray[np.bool_]
+    to_old: Array
+    pattern: Pattern
+    places: tuple[Index, ...]
+    units: tuple[Array, ...]
 
     def surplus(self, q: Array, constants: Constants, eigenvalue: float) -> float:
-        """xᵀ r of all elements for a mode with element unknowns q."""
-        elements = len(self.new)
-        stress, force = _loads(self.table, self._refine(q), constants, eigenvalue)
-        jets = np.einsum("eskp,eskpdm->esdm", stress * self.table.volume[:, :, None], self.table.strain)
-        jets[:, :, 0] -= np.einsum("escp,escpm->esm", force * self.table.volume[:, :, None], self.table.displacement)
-        r = np.einsum("dsf,esdm->efm", self.table.along, jets)
-        lam, G = (field[..., None, None] for field in constants.lame)
-        trace, shear = station_stiffness(self.table)
-        K = integrate_stiffness(lam * trace + G * shear, self.table.along)
-        k = np.diagonal(K, axis1=1, axis2=2).reshape(r.shape)
-        share = k[:-1, -1] / (k[:-1, -1] + k[1:, 0])
-        at_joints = r[:-1, -1] + r[1:, 0]
-        r[:-1, -1], r[1:, 0] = share * at_joints, (1 - share) * at_joints
-        found = 0.0
-        for stiff, load, new in zip(K, r.reshape(elements, -1), self.new.reshape(elements, -1), strict=True):
-            found += _answer(stiff[np.ix_(new, new)], load[new])
-        return found
-
-    def _refine(self, q: Array) -> Array:
-        orders, along = self.coarse
-        here = along @ q.reshape(len(q), along.shape[1], -1)
-        there = np.zeros(self.new.shape)
-        of, to = 0, 0
-        for few, many in zip(orders, self.through, strict=True):
-            there[:, :, to : to + few + 1] = here[:, :, of : of + few + 1]
-            of, to = of + few + 1, to + many + 1
-        return there.reshape(len(q), -1)
+        """xᵀ r of the chain for a mode with element unknowns q."""
+        old = self.to_old @ q.reshape(len(q), len(self.to_old), -1)
+        refined = np.zeros((len(q), len(self.to_old) + ALONG, len(self.is_old)))
+        refined[:, :-ALONG, self.is_old] = old
+        r = self.table.loads(*_loads(self.table, refined, constants, eigenvalue)).reshape(len(q), -1)
+        load = np.zeros(self.pattern.size)
+        for members, own, places in zip(self.pattern.unknowns, r, self.places, strict=True):
+            load[members] += own[places]
+        lam, G = (field.mean(axis=1) for field in constants.lame)
+        K = [a * trace + b * shear for a, b, (trace, shear) in zip(lam, G, self.units, strict=True)]
+        return float(load @ Factor(self.pattern, K).solve(load[:, None])[:, 0])
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,7 +98,7 @@ class SolidExtension:
     products: Array
     edges: Index
     turned: Array
-    are_open: np.ndarray
+    are_open: NDArray[np.bool_]
 
     def surplus(self, q: Array, constants: Constants, eigenvalue: float) -> float:
         """xᵀ r of all cells for a mode with cell unknowns q."""
@@ -142,24 +134,43 @@ def extend(resonator: Resonator, system: System) -> tuple[Extension, ...]:
 
 
 def _extend_shell(resonator: Resonator, group: ShellGroup, n: int, level: Level) -> ShellExtension:
-    p, orders = level.along + ALONG, level.through
+    p, orders = level.along, level.through
     more = tuple(order + 2 for order in orders) if max(orders) > 1 else orders
-    xi, weights = gauss(p + 2)
+    xi, weights = gauss(p + ALONG + 2)
     eta = gauss(max(more) + 2)
     chain = group.place.chain
     u, v, w = (legendre(order, eta[0]) for order in more)
-    table = shell_table(sections(resonator, chain, xi, weights), n, (u, v, w), eta, nodal(p, xi))
-    new = np.ones((len(chain.segments), p + 1, sum(more) + 3), dtype=bool)
-    ends = np.concatenate([np.arange(many + 1) > few for few, many in zip(orders, more, strict=True)])
-    new[:, [0, -1]] = ends
-    for end, (element, node) in zip(chain.ends, ((0, 0), (-1, -1)), strict=True):
-        new[element, node] &= end == "free"
-    return ShellExtension(table, more, (orders, _at_nodes(level.along, p)), new)
+    along = hierarchic(p + ALONG, xi)
+    table = shell_table(sections(resonator, chain, xi, weights), n, (u, v, w), eta, along)
+    is_old = np.concatenate([np.arange(many + 1) <= few for few, many in zip(orders, more, strict=True)])
+    elements, functions, width = len(chain.segments), p + ALONG + 1, len(is_old)
+    asked = np.ones((elements, functions, width), dtype=bool)
+    asked[:, :2] = ~is_old
+    for end, (element, function) in zip(chain.ends, ((0, 0), (-1, 1)), strict=True):
+        asked[element, function] &= end == "free"
+    # the ends of the elements count 0 ... elements, then come the functions inside
+    inside = elements + 1 + np.arange(elements * (functions - 2)).reshape(elements, -1)
+    number = np.column_stack([np.arange(elements), np.arange(1, elements + 1), inside])[..., None] * width + np.arange(
+        width
+    )
+    used = np.unique(number[asked])
+    places = [np.flatnonzero(one) for one in asked.reshape(elements, -1)]
+    members = [np.searchsorted(used, one[here]) for one, here in zip(number.reshape(elements, -1), places, strict=True)]
+    pattern = find_pattern(members, len(used), in_order=True)
+    places = [here[order] for here, order in zip(places, pattern.order, strict=True)]
+    kinds = [pair_stiffness(kind, table.along).reshape(elements, -1) for kind in station_stiffness(table)]
+    units = []
+    for e, here in enumerate(places):
+        node, amplitude = np.divmod(here, width)
+        rows, columns = (node * functions * width + amplitude) * width, node * width**2 + amplitude
+        where = rows[:, None] + columns
+        units.append(np.array([kind[e].take(where, mode="clip") for kind in kinds]))
+    return ShellExtension(table, is_old, interpolate_hierarchic(p, np.eye(p + 1)), pattern, tuple(places), tuple(units))
 
 
 def _extend_solid(group: SolidGroup, degree: int) -> SolidExtension:
     mesh = group.place.mesh
-    table = tabulate_cells(mesh.grid, degree + 1, group.table.n, group.table.position[0, 0])
+    table = tabulate_cells(mesh.grid, at_gauss_points(degree + 1, degree), group.table.n, group.table.position[0, 0])
     place = np.empty((degree + 2, degree + 2), dtype=np.intp)
     place[in_order(degree + 1)] = np.arange(table.gradients.shape[3])
     low, top = np.arange(2), degree + 1
@@ -181,16 +192,3 @@ def _loads(
     stress = G[:, :, None] * energy_weights(table.transverse_shear)[:, None] * strain
     stress[:, :, :3] += (lam * strain[:, :, :3].sum(axis=2))[:, :, None]
     return stress, eigenvalue * constants.rho[..., None, None] * table.displacements(unknowns)
-
-
-def _answer(K: Array, r: Array) -> float:
-    """xᵀ r with K x = r, in a scale in which K has a diagonal of ones."""
-    scale = 1 / np.sqrt(np.diagonal(K))
-    load = r * scale
-    return float(load @ np.linalg.solve(K * scale * scale[:, None], load))
-
-
-@cache
-def _at_nodes(few: int, many: int) -> Array:
-    """Values of the functions of a lower degree at the nodes of a higher one."""
-    return nodal(few, lobatto(many)).values

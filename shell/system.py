@@ -80,39 +80,26 @@ class ShellGroup:
             amplitudes[node] = inner
         return np.asarray(unknowns)
 
-    def units(self, maps: list["ToFree"]) -> list[Array]:
-        """Element matrices on free unknowns per unit λ, G and ρ, (3, size, size) each, the same material everywhere."""
-        found: list[Array] = []
-        for first, part in self._portions():
-            trace, shear = station_stiffness(part)
-            kinds = (
-                self.matrices(integrate_stiffness, trace, first),
-                self.matrices(integrate_stiffness, shear, first),
-                self.matrices(integrate_mass, station_mass(part), first),
-            )
-            here = maps[first : first + len(trace)]
-            found += [
-                np.stack([at.restrict(kind) for kind in element]) for *element, at in zip(*kinds, here, strict=True)
-            ]
-        return found
+    @cached_property
+    def units(self) -> tuple[Array, Array, Array]:
+        """Element matrices per unit λ, G and ρ, the same material everywhere, (elements, size, size) each."""
+        one = np.ones(self.table.position.shape)
+        trace, mass = self.vary(one, 0 * one, one)
+        return trace, self.vary(0 * one, one, one)[0], mass
 
-    def varying(self, maps: list["ToFree"], lam: Array, G: Array, rho: Array) -> Iterator[Pair]:
-        """Stiffness and mass of every element with λ, G, ρ at its stations."""
-        for first, part in self._portions():
-            here = slice(first, first + len(part.volume))
-            lam_there, G_there, rho_there = (field[here, :, None, None] for field in (lam, G, rho))
-            trace, shear = station_stiffness(part)
-            trace *= lam_there
-            trace += G_there * shear
-            stiffness = self.matrices(integrate_stiffness, trace, first)
-            mass = self.matrices(integrate_mass, rho_there * station_mass(part), first)
-            for k, m, at in zip(stiffness, mass, maps[here], strict=True):
-                yield at.restrict(k), at.restrict(m)
-
-    def _portions(self) -> Iterator[tuple[int, StrainTable]]:
-        """A few elements at a time, so that the passing arrays stay small."""
+    def vary(self, lam: Array, G: Array, rho: Array) -> Pair:
+        """Stiffness and mass of all elements with λ, G, ρ at their stations."""
+        found: list[Pair] = []
         for first in range(0, len(self.unknowns), PORTION):
-            yield first, self.table.part(slice(first, first + PORTION))
+            here = slice(first, first + PORTION)
+            part = self.table.part(here)
+            trace, shear = station_stiffness(part)
+            trace *= lam[here, :, None, None]
+            trace += G[here, :, None, None] * shear
+            mass = rho[here, :, None, None] * station_mass(part)
+            found.append((self.matrices(integrate_stiffness, trace, first), self.matrices(integrate_mass, mass, first)))
+        stiffness, inertia = (np.concatenate(kind) for kind in zip(*found, strict=True))
+        return stiffness, inertia
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,18 +119,8 @@ class SolidGroup:
         """See `CellTable.products`."""
         return self.table.products(self.place.signs)
 
-    def stiffness(self, maps: list["ToFree"], lam: Array, G: Array, keep: bool) -> Iterator[Array]:
-        """Stiffness of every cell with its λ and G, (cells, 1) each."""
-        for here, products in self._portions(keep):
-            whole = cell_stiffness(products, lam[here, 0], G[here, 0], self.table.n)
-            yield from (at.restrict(matrix) for matrix, at in zip(whole, maps[here], strict=True))
-
-    def mass(self, maps: list["ToFree"], keep: bool) -> Iterator[Array]:
-        """Mass of every cell per unit density."""
-        for here, products in self._portions(keep):
-            yield from (at.restrict(matrix) for matrix, at in zip(cell_mass(products), maps[here], strict=True))
-
-    def _portions(self, keep: bool) -> Iterator[tuple[slice, Array]]:
+    def portions(self, keep: bool) -> Iterator[tuple[slice, Array]]:
+        """The products of a few cells at a time, kept or fresh."""
         for first in range(0, len(self.unknowns), PORTION):
             here = slice(first, first + PORTION)
             yield here, self.products[here] if keep else self.table.part(here).products(self.place.signs[here])
@@ -200,19 +177,13 @@ class System:
         free = np.unique(rows.indices).astype(np.intp)
         return ToFree(free, None, rows[:, free].toarray())
 
-    def _by_group(self) -> Iterator[tuple[Group, list["ToFree"]]]:
-        first = 0
-        for group in self.groups:
-            yield group, self.maps[first : first + len(group.unknowns)]
-            first += len(group.unknowns)
-
     @cached_property
     def is_small(self) -> bool:
         """Whether what costs geometry is worth keeping."""
         numbers = 0
         for group in self.groups:
             size = group.unknowns.shape[1] ** 2
-            numbers += len(group.unknowns) * (3 * size if isinstance(group, ShellGroup) else size + 10 * size // 9)
+            numbers += len(group.unknowns) * (3 * size if isinstance(group, ShellGroup) else 10 * size // 9)
         return numbers < KEPT
 
     @property
@@ -221,45 +192,52 @@ class System:
         return len(self.groups) == 1 and self.constraint.shape[1] <= TINY
 
     def operators(
-        self, lam: list[Array], G: list[Array], rho: list[Array], uniform: bool
-    ) -> tuple[list[Array], list[Array]]:
-        """Stiffness and mass of every element with λ, G, ρ at the stations of every group; `uniform`: the same in a group."""
+        self, lam: list[Array], G: list[Array], rho: list[Array], uniform: bool, shift: float = 0.0
+    ) -> tuple[list[Array], "Inertia"]:
+        """Stiffness (plus shift times mass) of every element in the order of `pattern`, and the mass.
+
+        Parameters
+        ----------
+        lam, G, rho : λ, G, ρ at the stations of every group.
+        uniform : whether they are the same everywhere in a group.
+        shift : 1/s², added as shift M so that rigid motions can be factored.
+        """
         K: list[Array] = []
         M: list[Array] = []
-        for k, (group, maps) in enumerate(self._by_group()):
+        maps = iter(self.maps)
+        for group, dilation, shear, density in zip(self.groups, lam, G, rho, strict=True):
             if isinstance(group, SolidGroup):
-                K += group.stiffness(maps, lam[k], G[k], self.is_small)
-                unit = self._unit_masses[k] if self.is_small else group.mass(maps, False)
-                M += [m if density == 1 else density * m for m, density in zip(unit, rho[k][:, 0], strict=True)]
-            elif uniform and self.is_small:
-                moduli = np.array([lam[k][0, 0], G[k][0, 0]])
-                K += [(moduli @ unit[:2].reshape(2, -1)).reshape(unit.shape[1:]) for unit in self._units[k]]
-                density = rho[k][0, 0]
-                M += [unit[2] if density == 1 else density * unit[2] for unit in self._units[k]]
+                blocks = np.empty((len(density), *(group.table.gradients.shape[3],) * 2))
+                for here, products in group.portions(self.is_small):
+                    stiffness = cell_stiffness(products, dilation[here, 0], shear[here, 0], self.n)
+                    if shift:
+                        stiffness += shift * density[here, :, None] * cell_mass(products)
+                    blocks[here] = density[here, :, None] * products[:, 9].reshape(-1, *blocks.shape[1:])
+                    K += [next(maps).restrict(one) for one in stiffness]
+                M.append(blocks)
+                continue
+            if uniform and self.is_small:
+                trace, sheared, mass = group.units
+                stiffness, mass = dilation[0, 0] * trace + shear[0, 0] * sheared, density[0, 0] * mass
             else:
-                for stiff, heavy in group.varying(maps, lam[k], G[k], rho[k]):
-                    K.append(stiff)
-                    M.append(heavy)
-        return K, M
+                stiffness, mass = group.vary(dilation, shear, density)
+            K += [next(maps).restrict(one) for one in (stiffness + shift * mass if shift else stiffness)]
+            M.append(mass)
+        starts = np.cumsum([group.unknowns.size for group in self.groups[:-1]], dtype=np.intp)
+        return K, Inertia(self._choice, starts, tuple(M))
 
     @cached_property
-    def _units(self) -> list[list[Array]]:
-        return [group.units(maps) if isinstance(group, ShellGroup) else [] for group, maps in self._by_group()]
+    def _choice(self) -> csr_matrix:
+        """From the free unknowns to those of all elements."""
+        return self.constraint[np.concatenate([group.unknowns.ravel() for group in self.groups])]
 
     @cached_property
-    def _unit_masses(self) -> list[list[Array]]:
-        return [
-            list(group.mass(maps, True)) if isinstance(group, SolidGroup) else [] for group, maps in self._by_group()
-        ]
-
-    @cached_property
-    def whole(self) -> tuple[Pattern, Array]:
+    def whole(self) -> Array:
         """The units of a small shell without solid parts as of one element, (3, size, size): fewer and larger products."""
-        size = self.pattern.size
-        merged = np.zeros((3, size, size))
-        for members, kinds in zip(self.pattern.unknowns, self._units[0], strict=True):
-            merged[:, members[:, None], members] += kinds
-        return find_pattern([np.arange(size)], size), merged
+        (group,), P = self.groups, self._choice.toarray()
+        assert isinstance(group, ShellGroup)
+        P = P.reshape(*group.unknowns.shape, -1)
+        return np.stack([np.sum(np.swapaxes(P, 1, 2) @ unit @ P, axis=0) for unit in group.units])
 
     def spread(self, free: Array) -> list[Array]:
         """Element unknowns (elements, size) of every group from the free unknowns of one vector."""
@@ -290,3 +268,23 @@ class ToFree:
         if len(self.kept) == len(matrix) and np.all(self.kept[1:] > self.kept[:-1]):
             return matrix
         return np.asarray(matrix.ravel().take(self.kept[:, None] * len(matrix) + self.kept, mode="clip"))
+
+
+@dataclass(frozen=True, eq=False)
+class Inertia:
+    """The mass of all elements: M x = Pᵀ m P x.
+
+    choice : P, from the free unknowns to those of the elements; `starts` : its first rows of the second group and on.
+    blocks : m of the elements of every group, (elements, functions, functions), the same for each component of a solid.
+    """
+
+    choice: csr_matrix
+    starts: Index
+    blocks: tuple[Array, ...]
+
+    def __matmul__(self, x: Array) -> Array:
+        """M x for several columns."""
+        local = self.choice @ x
+        for block, rows in zip(self.blocks, np.split(local, self.starts), strict=True):
+            rows[:] = (block @ rows.reshape(*block.shape[:2], -1)).reshape(rows.shape)
+        return np.asarray(self.choice.T @ local)
