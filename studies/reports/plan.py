@@ -121,11 +121,14 @@ def _ladder(outlook: Outlook) -> Picture:
 
 def _matrix(plan: Plan) -> Picture:
     """Draw the confusion matrix."""
-    keys = list(plan.confusion)
+    keys = sorted(plan.confusion)
     said = {name for shares in plan.confusion.values() for name in shares} | {effect_of(key) for key in keys}
     names = [*sorted(said - {NOTHING, UNEXPLAINED}), NOTHING, UNEXPLAINED]
     shares = np.array([[plan.confusion[key].get(name, 0.0) for name in names] for key in keys])
-    caption = f"Rows the hidden effect, columns the answer, % of {plan.cases} cases at SNR {plan.snr:g}."
+    caption = (
+        f"Rows the hidden effect, columns the answer, % of {plan.cases} cases at SNR {plan.snr:g}; nothing: it would stay "
+        "unseen; unexplained: seen, but not named."
+    )
     return _map(shares, keys, names, caption, 55.0)
 
 
