@@ -9,7 +9,7 @@ from shell.blocks import Mesh, Solid, Tie, constrain, find_boundary, mesh_solid,
 from shell.cells import at_gauss_points, tabulate_cells
 from shell.constraints import Index, Rows
 from shell.corner import find_kinks, lay_clamped_edge, lay_clamped_face, lay_corner
-from shell.errors import ShellError
+from shell.errors import ShellError, mm
 from shell.kernel import Orders, Section, shell_table
 from shell.layout import Chain, End, lay_chain
 from shell.levels import Level, Theory
@@ -82,12 +82,18 @@ def lay_resonator(resonator: Resonator, n: int, level: Level) -> Layout:
     for joint in kinks:
         corner, (before, after) = lay_corner(resonator, joint, level.rings)
         if not before > start:
-            raise ShellError("two solid corners or clamps of the meridian overlap: lengthen the segment between them.")
+            raise ShellError(
+                f"the corner or clamp that ends at {mm(start)} of the meridian overlaps the next, which begins at "
+                f"{mm(before)}: lengthen the segment between them or take less of it for the clamp."
+            )
         chains.append(lay_chain(resonator, start, before, (first, "tied"), n, level.split))
         solids.append((corner, ((len(chains) - 1, 1), (len(chains), 0))))
         start, first = after, "tied"
     if not stop > start:
-        raise ShellError("the clamps or corners of the meridian overlap: lengthen its last segment.")
+        raise ShellError(
+            f"the corner or clamp that ends at {mm(start)} of the meridian overlaps the one that begins at {mm(stop)}: "
+            "lengthen the last segment."
+        )
     chains.append(lay_chain(resonator, start, stop, (first, last), n, level.split))
     return Layout(tuple(chains), tuple(solids))
 

@@ -8,7 +8,7 @@ from math import atan2, hypot, pi
 import numpy as np
 from numpy.typing import NDArray
 
-from shell.errors import ShellError
+from shell.errors import ShellError, mm
 from shell.quadrature import gauss
 
 Array = NDArray[np.float64]
@@ -109,7 +109,7 @@ class Arc(Curve):
         radii = [hypot(*offset) for offset in offsets]
         if abs(radii[0] - radii[1]) > 1e-6 * max(radii):
             raise ShellError(
-                f"the arc's ends are {radii[0]:g} m and {radii[1]:g} m from its centre: they must be equal."
+                f"the arc's ends are {mm(radii[0])} and {mm(radii[1])} from its centre: they must be equal."
             )
         first, last = (atan2(*offset) for offset in offsets)
         turn = (last - first + pi) % (2 * pi) - pi

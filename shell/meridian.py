@@ -7,7 +7,7 @@ from typing import TypeAlias
 import numpy as np
 
 from shell.curves import Arc, Hyperbola, Line
-from shell.errors import ShellError
+from shell.errors import ShellError, mm
 from shell.resonator import Resonator, Stem, Support
 
 Profile: TypeAlias = float | list[tuple[float, float]] | tuple[tuple[float, float], ...]
@@ -75,9 +75,9 @@ def cylinder(
         return Resonator((Line((radius, 0.0), (radius, height)),), wall)
     _require_positive(bottom_thickness=bottom_thickness)
     if not height > bottom_thickness:
-        raise ShellError(f"the height ({height:g} m) must exceed the bottom thickness ({bottom_thickness:g} m).")
+        raise ShellError(f"the height ({mm(height)}) must exceed the bottom thickness ({mm(bottom_thickness)}).")
     if not 0 <= clamp_radius < radius - wall[0][1] / 2:
-        raise ShellError(f"the clamp radius must be 0 or positive and within the cup, not {clamp_radius:g} m.")
+        raise ShellError(f"the clamp radius must be 0 or positive and within the cup, not {mm(clamp_radius)}.")
     middle = bottom_thickness / 2
     length = radius + height - middle
     foot = radius / length
@@ -113,7 +113,7 @@ def bell(
     """
     _require_positive(radius=radius, cylinder_height=cylinder_height, hyperbola_height=hyperbola_height)
     if not mouth_radius >= radius:
-        raise ShellError(f"the mouth radius ({mouth_radius:g} m) must not be smaller than the radius ({radius:g} m).")
+        raise ShellError(f"the mouth radius ({mm(mouth_radius)}) must not be smaller than the radius ({mm(radius)}).")
     waist = -cylinder_height
     segments = (
         Arc((0.0, 0.0), radius, 0.0, pi / 2),
@@ -152,4 +152,4 @@ def _known(support: Support) -> Support:
 def _require_positive(**lengths: float) -> None:
     for name, value in lengths.items():
         if not (value > 0 and isfinite(value)):
-            raise ShellError(f"the {name.replace('_', ' ')} must be positive, not {value:g} m.")
+            raise ShellError(f"the {name.replace('_', ' ')} must be positive, not {mm(value)}.")

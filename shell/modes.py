@@ -149,7 +149,7 @@ def solve_modes(
     solutions, errors = refine(resonator, elastic, harmonic, count, theory, tolerance)
     if max(errors) > tolerance:
         warnings.warn(
-            f"the frequency is known to {max(errors):.1g}, {max(errors) / tolerance:.2g} times the tolerance asked for.",
+            f"the frequency is known to {max(errors):.2g}, {max(errors) / tolerance:.2g} times the tolerance asked for.",
             TheoryRangeWarning,
             stacklevel=2,
         )

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from shell.curves import Array, Curve
-from shell.errors import ShellError
+from shell.errors import ShellError, mm
 
 Support: TypeAlias = Literal["free", "clamped-pole", "clamped-rim", "stem", "clamped-face"]
 LONGEST_STEM = 100.0  # stem lengths over its radius that are meshed as a solid
@@ -40,9 +40,9 @@ class Stem:
         if self.side not in ("inner", "outer", "both"):
             raise ShellError(f"the side of a stem is inner, outer or both, not {self.side!r}.")
         if not self.radius > 0:
-            raise ShellError(f"the stem radius must be positive, not {self.radius:g} m.")
+            raise ShellError(f"the stem radius must be positive, not {mm(self.radius)}.")
         if not self.fillet >= 0:
-            raise ShellError(f"the fillet radius must be 0 or positive, not {self.fillet:g} m.")
+            raise ShellError(f"the fillet radius must be 0 or positive, not {mm(self.fillet)}.")
         if isinstance(self.ends, tuple) != (self.side == "both"):
             raise ShellError("a stem on both sides needs two ends (inner, outer); on one side, one number.")
 
@@ -220,19 +220,20 @@ def _check_chain(resonator: Resonator) -> None:
 def _check_thickness(resonator: Resonator) -> None:
     position, value = np.array(resonator.thickness).T
     if not np.all(np.isfinite(value)) or not np.all(value > 0):
-        raise ShellError(f"the thickness must be positive everywhere, not {np.min(value):g} m.")
+        raise ShellError(f"the thickness must be positive everywhere, not {mm(np.min(value))}.")
     if len(position) < 2 or position[0] != 0 or abs(position[-1] - 1) > 1e-12 or np.any(np.diff(position) < 0):
         raise ShellError("the positions of a thickness profile must rise from 0 (start) to 1 (rim).")
     for k in range(len(resonator.segments)):
         first, last = resonator._starts[k], resonator._starts[k + 1]
         points = resonator.at(np.linspace(first, last, 203)[1:-1], k)
         half = points.thickness / 2
-        meridional = 1 - half * abs(points.curvature)
-        # the face may reach the axis only where the middle surface does
-        circumferential = points.r - half * abs(points.normal_r)
-        if np.any(meridional <= 0) or np.any(circumferential <= 0):
+        # a face may not pass the centres of curvature: of the meridian, and on the axis that of the circles around it
+        with np.errstate(divide="ignore"):
+            room = np.minimum(1 / abs(points.curvature), points.r / abs(points.normal_r))
+        if np.any(half >= room):
             raise ShellError(
-                f"the thickness {2 * half.max():g} m is too large for this middle surface: the inner face would overlap itself."
+                f"the thickness {mm(2 * half.max())} is too large for this middle surface: the inner face would overlap "
+                f"itself. Segment {k + 1} allows less than {mm(2 * float(np.min(room)))}; is a length in the wrong unit?"
             )
 
 
@@ -263,8 +264,8 @@ def _check_stem(resonator: Resonator, stem: Stem) -> None:
         z = points.z + face * points.thickness / 2 * points.normal_z
         if not stem.radius + stem.fillet < 0.9 * r.max():
             raise ShellError(
-                f"the stem (radius {stem.radius:g} m, fillet {stem.fillet:g} m) is larger than the dome it stands on "
-                f"(radius {r.max():g} m)."
+                f"the stem (radius {mm(stem.radius)}, fillet {mm(stem.fillet)}) is larger than the dome it stands on "
+                f"(radius {mm(r.max())}): make it thinner."
             )
         at_root = float(np.interp(stem.radius + stem.fillet, r[: r.argmax() + 1], z[: r.argmax() + 1]))
         if abs(end - at_root) > LONGEST_STEM * stem.radius:
@@ -274,5 +275,6 @@ def _check_stem(resonator: Resonator, stem: Stem) -> None:
             )
         if not face * (end - at_root) > stem.fillet + 0.1 * stem.radius:
             raise ShellError(
-                f"the {'outer' if face > 0 else 'inner'} stem ends at {end:g} m, not clear of its root at {at_root:g} m."
+                f"the {'outer' if face > 0 else 'inner'} stem ends at {mm(end)}, not clear of its root at {mm(at_root)}: move its "
+                "end away from the dome."
             )

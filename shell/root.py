@@ -20,7 +20,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from shell.blocks import Solid
-from shell.errors import ShellError
+from shell.errors import ShellError, mm
 from shell.patches import Patch, Path, Planar, circular, layers, rings, shrinking, straight, whole
 from shell.quadrature import Array
 from shell.resonator import Resonator, Stem
@@ -86,7 +86,9 @@ def _find_frame(resonator: Resonator) -> Frame:
     collar = widest + COLLAR * h + min(stem.fillet, h)
     if collar > widest + 0.5 * (resonator.length - widest):
         raise ShellError(
-            "the stem leaves no room for the shell: make the stem or its fillet smaller, or the shell thinner."
+            f"the stem (radius {mm(stem.radius)}, fillet {mm(stem.fillet)}) with {mm(collar - widest)} of solid around its root "
+            f"leaves no room for the shell, whose meridian is {mm(resonator.length)} long: make the stem or its fillet "
+            "smaller, or the shell thinner."
         )
     radii = _columns(stem.radius, min(0.5 * stem.radius, 2 * h + stem.fillet))
     above = []

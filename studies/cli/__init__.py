@@ -6,6 +6,7 @@ Exit status: 0 done, 1 a fault of the program, 2 unusable input or arguments, 3 
 
 import os
 import sys
+import warnings
 from collections.abc import Sequence
 
 # The solver's matrices are small: threads cost more than they bring. Read by the libraries when numpy is first imported.
@@ -80,6 +81,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         # the line stands in lists of commands; a command's own help page shows its whole docstring
         alone = words[: len(group) + 1] == name.split(" ")
         parent.command(target, name=command, **({} if alone else {"help": help_line}))
+    plain = warnings.formatwarning
+    warnings.formatwarning = lambda message, *_, **__: f"hrg: warning: {message}\n"
     try:
         status = app(words)
     except CycloptsError as error:
@@ -100,6 +103,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
             1,
             error if debug else None,
         )
+    finally:
+        warnings.formatwarning = plain
     return int(status) if isinstance(status, int) else 0
 
 

@@ -44,15 +44,20 @@ def modes(
 
     from shell.modes import solve_modes
     from studies.cli.output import print_json, print_table
-    from studies.errors import InputError
+    from studies.errors import InputError, naming
     from studies.instrument.card import ZERO_CELSIUS, load_card
 
     if count < 1:
         raise InputError(f"--count {count}: at least one mode must be asked for.")
+    if min(harmonic) < 0:
+        raise InputError(f"--harmonic {min(harmonic)}: a harmonic is a whole number from 0 up.")
+    if not 0 < tolerance < 1:
+        raise InputError(f"--tolerance {tolerance:g}: it is a relative error between 0 and 1.")
     instrument = load_card(card)
     T = instrument.reference_temperature if temperature is None else temperature + ZERO_CELSIUS
-    resonator, elastic = instrument.at(T)
-    found = [m for n in harmonic for m in solve_modes(resonator, elastic, n, count, theory, tolerance)]
+    with naming(instrument.path):
+        resonator, elastic = instrument.at(T)
+        found = [m for n in harmonic for m in solve_modes(resonator, elastic, n, count, theory, tolerance)]
     detailed = theory != "rayleigh"
     if json:
         entries = []
