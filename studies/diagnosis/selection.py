@@ -133,7 +133,10 @@ def select(
 def _beside_best_noise(fit: Fit) -> Fit:
     """Return the fit beside the noise that suits it best."""
     problem = choose_kernel(fit.problem, fit.terms)
-    return fit if problem.kernel == fit.problem.kernel else corrected(fit_terms(problem, fit.terms))
+    if problem.kernel == fit.problem.kernel:
+        return fit
+    other = corrected(fit_terms(problem, fit.terms))
+    return other if other.score < fit.score else fit
 
 
 class _Path:
