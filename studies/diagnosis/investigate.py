@@ -32,6 +32,8 @@ FURTHER = 120.0
 """Evidence at which a further cause beside the strongest deserves two thirds of its claim (measured on the generator)."""
 LEAK = 0.002
 """Part of the evidence in the frequency that a cause in another response must have: its thermometer is not exact."""
+REPEATED = 3
+"""So often the same effect is named in one response when it is none of the kind."""
 NARROW_RANGE = 1.0
 CLOCK_PAIR = ("clock-drift", "ageing")
 PREFERENCE = 6.0
@@ -180,10 +182,31 @@ def inquire(
         }
     selection = select(problem, span, levels, threshold, effects, bank)
     leftover = strongest(leftover_evidence(selection.fit, bases), generic_levels)
+    if patched(selection):
+        leftover = Leftover("effects that cancel or repeat", max(selection.found[-1].evidence, leftover.evidence))
     sharp = sharp_leftover(selection.fit)
     if sharp.evidence > max(leftover.evidence, BESIDE * (selection.plain.score - selection.fit.score)):
         leftover = sharp
     return Inquiry(problem, selection, leftover, levels)
+
+
+def patched(selection: Selection) -> bool:
+    """Whether the effects only patch up what none of them is: one of them thrice, or two that cancel each other.
+
+    Of effects that cancel, no coefficient is known to better than itself.
+    """
+    fit = selection.fit
+    names = [term.name for term in fit.terms]
+    if any(names.count(name) >= REPEATED for name in names):
+        return True
+    if len(names) < 2:
+        return False
+    for index, term in enumerate(fit.terms):
+        known = intervals(fit, index)
+        own = [known[name] for name in term.effect.coefficient_names(fit.problem.response, term.count)]
+        if all(p.high - p.low > 2.0 * abs(p.value) for p in own):
+            return True
+    return False
 
 
 def _explained(inquiries: Mapping[str, Inquiry]) -> float:

@@ -9,7 +9,7 @@ from studies.diagnosis.baseline import Problem, choose_kernel, fit_at, restricte
 from studies.diagnosis.effects import Effect, Span
 from studies.diagnosis.fit import Fit, fit_terms
 from studies.diagnosis.innovations import find_lines
-from studies.diagnosis.likelihood import KERNELS
+from studies.diagnosis.likelihood import KERNELS, orthonormal
 from studies.diagnosis.scan import Bank, Candidate, applicable, build_bank, scan
 from studies.diagnosis.states import FloatArray
 from studies.diagnosis.thermometer import corrected
@@ -22,6 +22,10 @@ has half that evidence: two effects together may look like a third one alone."""
 NOISE_PRICE = 10.0
 """What an effect pays when it needs slow noise of another kind than the model without it: on nulls with a random walk
 such pairs of effect and noise gained up to 34, effects beside the same noise 20."""
+ORDER_PRICE = 6.0
+"""What a further order of a static law must gain."""
+FEWEST_ROWS = 4.0
+"""Rows on which an effect must rest: what shows in fewer is an outlier, or the edge of a fast passage."""
 BESIDE = 0.06
 """A further effect must have this part of the evidence explained before it: no formula of an effect is exact, and what
 its imperfect shape leaves would otherwise be named."""
@@ -184,12 +188,24 @@ def polish_contenders(fit: Fit, nets: Sequence[Candidate], levels: Mapping[str, 
         if candidate.gain - levels[candidate.term.name] < 0.5 * top - 8.0:
             continue
         problem = restricted(fit.problem, kernel=candidate.kernel)
-        polished = fit_terms(problem, (*fit.terms, candidate.term))
-        if not _possible(polished):
+        polished = _with_orders(fit_terms(problem, (*fit.terms, candidate.term)))
+        if not (_possible(polished) and _rests_on(polished) >= FEWEST_ROWS):
             continue
         evidence = least.over(polished) - levels[candidate.term.name]
         rivals.append(Rival(candidate.term.name, evidence, polished))
     return sorted(rivals, key=lambda rival: -rival.evidence)
+
+
+def _with_orders(fit: Fit) -> Fit:
+    """Return the fit with as many further orders of the effect added last as pay for themselves."""
+    *others, last = fit.terms
+    if not last.effect.nested or last.count < 2:
+        return fit
+    for count in range(last.count + 1, len(last.effect.coefficients) + 1):
+        longer = fit_terms(fit.problem, (*others, replace(last, count=count)), rounds=2)
+        if longer.score < fit.score - ORDER_PRICE * (count - fit.terms[-1].count):
+            fit = longer
+    return fit
 
 
 def _possible(fit: Fit) -> bool:
@@ -197,6 +213,17 @@ def _possible(fit: Fit) -> bool:
     effect = fit.terms[-1].effect
     scale = fit.linear.coefficients[1] if effect.acts_on == "temperature" else 1.0
     return not effect.positive or bool(fit.coefficients_of(len(fit.terms) - 1)[0] * scale > 0.0)
+
+
+def _rests_on(fit: Fit) -> float:
+    """Number of rows that carry the effect added last: (Σ s²)²/Σ s⁴ of its signature s, freed of the rest of the model."""
+    columns = fit.columns()
+    count = fit.terms[-1].count
+    rest = orthonormal(columns[:, :-count] / np.maximum(np.linalg.norm(columns[:, :-count], axis=0), 1e-300))
+    signature = columns[:, -count:] @ fit.linear.coefficients[-count:]
+    signature = signature - rest @ (rest.T @ signature)
+    squares = (signature / max(float(np.abs(signature).max()), 1e-300)) ** 2
+    return float(squares.sum() ** 2 / max(float((squares**2).sum()), 1e-300))
 
 
 def _settle(plain: Fit, fit: Fit, bank: Bank, levels: Mapping[str, float], threshold: float) -> Selection:

@@ -9,9 +9,9 @@ from studies.diagnosis.states import FloatArray, States
 
 
 def columns(states: States, shape: Sequence[float], response: str) -> FloatArray:
-    """B ∝ ζ₁₂(T), the static terms of fourth and fifth order, x = T_r − T₀ in units of 10 K."""
+    """B ∝ ζ₁₂(T), the static terms of fourth to seventh order, x = T_r − T₀ in units of 10 K."""
     x = states.excess / 10.0
-    return np.stack([x**4, x**5], axis=1)
+    return np.stack([x**order for order in range(4, 8)], axis=1)
 
 
 def grid(span: Span, response: str) -> list[tuple[float, ...]]:
@@ -25,7 +25,12 @@ EFFECT = Effect(
     source="CVG paper eqs. (9), (10)",
     isolate="turn the wave to another azimuth: damping bias goes as sin 4(θ − θ_τ)",
     responses=("bias_deg_per_h",),
-    coefficients=("quartic_{unit}_per_10K4", "quintic_{unit}_per_10K5"),
+    coefficients=(
+        "quartic_{unit}_per_10K4",
+        "quintic_{unit}_per_10K5",
+        "sextic_{unit}_per_10K6",
+        "septic_{unit}_per_10K7",
+    ),
     columns=columns,
     grid=grid,
     nested=True,
