@@ -7,13 +7,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from studies.diagnosis.effects import RESPONSES
+from studies.diagnosis.outliers import find_outliers
 from studies.diagnosis.states import FloatArray, States, average
 from studies.errors import InputError
 from studies.record import Record
 
 TEMPERATURES = ("housing_temperature_degC", "chamber_temperature_degC", "resonator_temperature_degC")
 COMMANDS = ("drive_amplitude_V", "electrode_bias_V", "quadrature_V", "pattern_angle_deg")
-OUTLIER_WINDOW, OUTLIER_LIMIT = 11, 6.0
 MOST_BINS = 800
 FINEST = 20
 FEWEST_BINS = 24
@@ -76,9 +76,7 @@ class Campaign:
 def load_campaign(records: Sequence[Record], reference_degC: float | None = None) -> Campaign:
     """Check several records of one gyro and put them on one even grid.
 
-    A row is an outlier when it deviates from the running median of 11 rows, with and without the trend, by more than
-    six robust standard deviations (1.4826 times the median absolute deviation over the run); it is left out of fit
-    and score alike.
+    Outlying rows (see `find_outliers`) are left out of fit and score alike.
 
     Raises
     ------
@@ -248,52 +246,6 @@ def _remove_outliers(table: dict[str, FloatArray]) -> int:
         table[name][outlying] = np.nan
         count += int(outlying.sum())
     return count
-
-
-def find_outliers(values: FloatArray) -> np.ndarray:
-    """Return a mask of the rows that the stated rule calls outliers.
-
-    A row must stand out both as it is, so that the edge of a step does not, and beside the trend, so that the
-    scale of the noise is right where the response is steep.
-    """
-    from scipy.ndimage import median_filter
-
-    present = np.isfinite(values)
-    mask = np.zeros(values.shape, dtype=bool)
-    kept = values[present]
-    if kept.size < 3 * OUTLIER_WINDOW:
-        return mask
-    blocks = kept[: kept.size // OUTLIER_WINDOW * OUTLIER_WINDOW].reshape(-1, OUTLIER_WINDOW)
-    centres = (np.arange(len(blocks)) + 0.5) * OUTLIER_WINDOW - 0.5
-    trend = np.interp(np.arange(kept.size), centres, np.median(blocks, axis=1))
-    level = kept - trend
-    beside = level - median_filter(level, OUTLIER_WINDOW, mode="nearest")
-    plain = kept - median_filter(kept, OUTLIER_WINDOW, mode="nearest")
-    scale = 1.4826 * float(np.median(np.abs(beside)))
-    if scale == 0.0:
-        scale = float(np.std(beside))
-    steps = np.abs(np.diff(kept))
-    resolution = float(steps[steps > 0].min()) if (steps > 0).any() else 0.0
-    limit = max(OUTLIER_LIMIT * scale, 1.5 * resolution)
-    outlying = (np.abs(beside) > limit) & (np.abs(plain) > limit)
-    half = OUTLIER_WINDOW // 2
-    outlying[:half] = _outlying_beside_line(kept[:OUTLIER_WINDOW], limit)[:half]
-    outlying[-half:] = _outlying_beside_line(kept[-OUTLIER_WINDOW:], limit)[-half:]
-    mask[present] = outlying
-    return mask
-
-
-def _outlying_beside_line(values: FloatArray, limit: float) -> np.ndarray:
-    """Return which of the first or last rows stand out from a robust line, alone among their neighbours.
-
-    At an end a running median is the end itself.
-    """
-    from scipy.stats import theilslopes
-
-    slope, level, _, _ = theilslopes(values)
-    rest = np.abs(values - level - slope * np.arange(values.size))
-    beside = [np.median(np.delete(rest[max(k - 2, 0) : k + 3], min(k, 2))) for k in range(rest.size)]
-    return np.asarray(rest > np.maximum(limit, 4.0 * np.array(beside)))
 
 
 def _usable_responses(
