@@ -127,33 +127,29 @@ def plan_campaign(
     snrs : sequence of float
         Of every hidden effect, the largest first.
     cases : int
-        Cases of each effect and SNR.
+        Cases of each effect, at every SNR the same ones.
     seed : int
     card : str, optional
         Takes the resonator's lag from its thermal network.
     """
     rng = np.random.default_rng(seed)
-    campaign = imagine(profiles, rng, card)
-    return Outlook(tuple(predict(campaign, snr, cases, rng) for snr in snrs))
+    return predict(imagine(profiles, rng, card), snrs, cases, rng)
 
 
-def predict(campaign: Campaign, snr: float, cases: int, rng: np.random.Generator) -> Plan:
+def predict(campaign: Campaign, snrs: Sequence[float], cases: int, rng: np.random.Generator) -> Outlook:
     """Predict the confusion for the temperatures and drives of a campaign, planned or recorded.
 
     Parameters
     ----------
     campaign : Campaign
-    snr : float
+    snrs : sequence of float
         Of every hidden effect.
     cases : int
         Cases of each effect.
     rng : numpy Generator
         Seeded by the caller.
     """
-    confusion: dict[str, dict[str, float]] = {}
-    sets: dict[str, dict[str, float]] = {}
-    by_noise: dict[str, dict[str, dict[str, float]]] = {noise: {} for noise in NOISES}
-    survives: dict[str, float] = {}
+    plans = tuple(Plan(snr, cases, {}, {}, {noise: {} for noise in NOISES}, {}, {}) for snr in snrs)
     thermometer = None
     for response in campaign.responses:
         if thermometer is None or response == "frequency_Hz":
@@ -168,25 +164,31 @@ def predict(campaign: Campaign, snr: float, cases: int, rng: np.random.Generator
         if response == "frequency_Hz":
             threshold *= max(1.0, campaign.runs[0].states.step / SPARSE)
         stage = set_stage(campaign, fit, threshold, problem.tau if problem.lagged else RESONATOR_LAG)
-        hidden = []
-        for effect in stage.effects:
-            key = effect.name if effect.responses[0] == response else f"{effect.name} ({response})"
-            own = hide(stage, effect, snr, cases, rng)
-            survives[key] = own.survives
-            if own.noise.shape[1]:
-                hidden.append((key, own))
-        if hidden:
-            said = rehearse(stage, [own for _, own in hidden])
-            for (key, own), answers in zip(hidden, said, strict=True):
-                confusion[key], sets[key] = _shares(own.effect.name, answers)
-                for turn, noise in enumerate(NOISES):
-                    by_noise[noise][key] = _shares(own.effect.name, answers[turn :: len(NOISES)])[0]
-    invisible = {
-        name: "its drive is not part of the plan" if effect.needs else "no temperature varies"
-        for name, effect in library().items()
-        if name not in confusion and name != "calibration"
-    }
-    return Plan(snr, cases, confusion, sets, by_noise, survives, invisible)
+        keys = [e.name if e.responses[0] == response else f"{e.name} ({response})" for e in stage.effects]
+        every = dict(zip(keys, (hide(stage, effect, cases, rng) for effect in stage.effects), strict=True))
+        seen = {key: own for key, own in every.items() if own.noise.shape[1]}
+        for plan in plans:
+            plan.survives.update({key: own.survives for key, own in every.items()})
+        if seen:
+            for plan, said in zip(plans, rehearse(stage, list(seen.values()), snrs), strict=True):
+                _fill(plan, list(seen), said)
+    for plan in plans:
+        plan.invisible.update(
+            {
+                name: "its drive is not part of the plan" if effect.needs else "no temperature varies"
+                for name, effect in library().items()
+                if name not in plan.confusion and name != "calibration"
+            }
+        )
+    return Outlook(plans)
+
+
+def _fill(plan: Plan, keys: Sequence[str], said: Sequence[Sequence[Answer]]) -> None:
+    """Count the answers to the cases of every effect."""
+    for key, answers in zip(keys, said, strict=True):
+        plan.confusion[key], plan.sets[key] = _shares(effect_of(key), answers)
+        for turn, noise in enumerate(NOISES):
+            plan.by_noise[noise][key] = _shares(effect_of(key), answers[turn :: len(NOISES)])[0]
 
 
 def _shares(truth: str, answers: Sequence[Answer]) -> tuple[dict[str, float], dict[str, float]]:

@@ -30,8 +30,8 @@ NOISES = ("white", "slow")
 """Cases have white noise alone, and besides it slow noise of every kind, by turns."""
 VISIBLE = 3e-3
 """Part of a signature's rms that must survive the baseline for an effect to be hidden at an SNR at all."""
-AT_ONCE = 800
-"""Cases that are scanned together."""
+AT_ONCE = 2000
+"""About so many cases are scanned together."""
 SPARSE_GRID = 40
 """A grid of one parameter with fewer shapes is doubled: the diagnosis would fit the shape between them."""
 
@@ -81,10 +81,15 @@ class Stage:
         """Names of the effects, in the order of their evidence."""
         return self.bank.dictionaries[0].effects
 
+    def sign(self, effect: Effect) -> float:
+        """Sign that the first coefficient of an effect must have; 0 where both will do."""
+        dictionary = self.bank.dictionaries[0]
+        return float(dictionary.signs[dictionary.owner == self.names.index(effect.name)][0])
+
 
 @dataclass(frozen=True)
 class Hidden:
-    """Cases that hide one effect: what the baseline leaves of it, and the noise, (M, B) each."""
+    """Cases that hide one effect: what the baseline leaves of it at SNR 1, and the noise, (M, B) each."""
 
     effect: Effect
     left: FloatArray
@@ -142,11 +147,12 @@ def doubled(effect: Effect) -> Effect:
     return replace(effect, grid=grid) if len(effect.shape) == 1 and not effect.shape[0].steady else effect
 
 
-def hide(stage: Stage, effect: Effect, snr: float, cases: int, rng: np.random.Generator) -> Hidden:
-    """Hide an effect of random shape under noise of random kind, `cases` times."""
+def hide(stage: Stage, effect: Effect, cases: int, rng: np.random.Generator) -> Hidden:
+    """Hide an effect of random shape and SNR 1 under noise of random kind, `cases` times."""
     signals, shares = [], []
     grid = list(effect.grid(stage.span, stage.problem.response))
     views = stage.problem.views(stage.problem.tau)
+    sign = stage.sign(effect)
     for _ in range(cases):
         shape = list(grid[int(rng.integers(len(grid)))])
         for k, parameter in enumerate(effect.shape):
@@ -155,18 +161,21 @@ def hide(stage: Stage, effect: Effect, snr: float, cases: int, rng: np.random.Ge
         columns = stage.problem.term(Term(effect, tuple(shape), 2), views)
         used = columns[:, :1] if effect.nested and rng.random() < 0.5 else columns
         scale = np.linalg.norm(used, axis=0)
-        signal = used / np.where(scale > 0, scale, 1.0) @ rng.standard_normal(used.shape[1])
+        sizes = rng.standard_normal((used.shape[1],))
+        if sign:
+            sizes[0] = sign * abs(sizes[0])
+        signal = used / np.where(scale > 0, scale, 1.0) @ sizes
         left = signal - stage.absorbs @ (stage.absorbs.T @ signal)
         share = float(np.linalg.norm(left)) / max(float(np.linalg.norm(signal)), 1e-300)
         shares.append(share)
         if share > VISIBLE:
             signals.append(left / np.linalg.norm(left))
     survives = float(np.median(shares)) if shares else 0.0
-    size = stage.problem.values.size
+    rows = stage.problem.values.size
     if not signals:
-        return Hidden(effect, *(np.empty((size, 0)),) * 2, survives)
+        return Hidden(effect, *(np.empty((rows, 0)),) * 2, survives)
     noise, level = draw_noise(stage, len(signals), rng)
-    return Hidden(effect, np.stack(signals, axis=1) * (snr * level * np.sqrt(size)), noise, survives)
+    return Hidden(effect, np.stack(signals, axis=1) * (level * np.sqrt(rows)), noise, survives)
 
 
 def _jitter(value: float, parameter: Parameter, rng: np.random.Generator) -> float:
@@ -211,14 +220,15 @@ def _rows_of(basis: NoiseBasis, rotated: FloatArray) -> FloatArray:
     return np.concatenate([vectors @ part for vectors, part in zip(basis.vectors, parts, strict=True)])
 
 
-def rehearse(stage: Stage, hidden: Sequence[Hidden]) -> list[list[Answer]]:
-    """Return the answers to the cases of every hidden effect: white and slow noise by turns."""
-    owner = np.repeat(np.arange(len(hidden)), [h.noise.shape[1] for h in hidden])
-    data = np.concatenate([h.left + h.noise for h in hidden], axis=1)
-    parts = [_evidence(stage, data[:, k : k + AT_ONCE]) for k in range(0, data.shape[1], AT_ONCE)]
+def rehearse(stage: Stage, hidden: Sequence[Hidden], snrs: Sequence[float]) -> list[list[list[Answer]]]:
+    """Return, for every SNR and hidden effect, the answers to its cases: white and slow noise by turns."""
+    pairs = [(snr, h) for snr in snrs for h in hidden]
+    owner = np.repeat(np.arange(len(pairs)), [h.noise.shape[1] for _, h in pairs])
+    data = np.concatenate([snr * h.left + h.noise for snr, h in pairs], axis=1)
+    parts = [_evidence(stage, part) for part in np.array_split(data, max(1, round(owner.size / AT_ONCE)), axis=1)]
     evidence, noises, shares = (np.concatenate(part, axis=-1) for part in zip(*parts, strict=True))
     heard = _unexplained(stage, data, noises, shares, np.flatnonzero(evidence.max(axis=0) < stage.threshold))
-    answers: list[list[Answer]] = [[] for _ in hidden]
+    answers: list[list[Answer]] = [[] for _ in pairs]
     for case, values in enumerate(evidence.T):
         own = dict(zip(stage.names, values, strict=True))
         name = max(own, key=own.__getitem__)
@@ -226,7 +236,7 @@ def rehearse(stage: Stage, hidden: Sequence[Hidden]) -> list[list[Answer]]:
             answers[owner[case]].append((name, *set_beside(name, own, stage.problem.response)))
         else:
             answers[owner[case]].append((UNEXPLAINED if case in heard else NOTHING,))
-    return answers
+    return [answers[k : k + len(hidden)] for k in range(0, len(pairs), len(hidden))]
 
 
 def _evidence(stage: Stage, data: FloatArray) -> tuple[FloatArray, np.ndarray, np.ndarray]:

@@ -76,9 +76,9 @@ def check_plan(path, draws):
     for design in sorted({c["design"] for c in cases}):
         records, _ = build(design, "white", np.random.default_rng(20))
         campaign = load_campaign(records)
-        for snr in sorted({effective_snr(c) for c in cases if c["design"] == design}):
-            plan = predict(campaign, snr, draws, np.random.default_rng(21))
-            out["plans"][f"{design} {snr:g}"] = plan.as_dict()
+        snrs = sorted({effective_snr(c) for c in cases if c["design"] == design})
+        for plan in predict(campaign, snrs, draws, np.random.default_rng(21)).plans:
+            out["plans"][f"{design} {plan.snr:g}"] = plan.as_dict()
     predictions_file(path).write_text(json.dumps(out, indent=1))
     return compare_in_words(cases, out["plans"])
 

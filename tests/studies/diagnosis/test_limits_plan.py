@@ -17,7 +17,7 @@ def planned(response):
 
 @pytest.fixture(scope="module")
 def loud():
-    return predict(planned("frequency_Hz"), 10.0, 6, np.random.default_rng(4))
+    return predict(planned("frequency_Hz"), [10.0], 6, np.random.default_rng(4)).close
 
 
 def test_clock_drift_and_ageing_are_always_a_set(loud):
@@ -33,12 +33,12 @@ def test_effects_without_their_drive_cannot_show(loud):
 
 
 def test_a_loud_effect_is_not_overlooked(loud):
-    for effect in ("curvature", "jump", "periodic (frequency_Hz)", "thermometer-scale", "activity-dip"):
+    for effect in ("curvature", "jump", "periodic (frequency_Hz)", "thermometer-scale", "activity-dip", "radiation"):
         assert loud.outcome(effect)["named"] == pytest.approx(1.0)
 
 
 def test_an_effect_far_below_the_noise_is_nothing():
-    plan = predict(planned("bias_deg_per_h"), 1e-4, 20, np.random.default_rng(5))
+    plan = predict(planned("bias_deg_per_h"), [1e-4], 20, np.random.default_rng(5)).close
     for effect in plan.confusion:
         outcome = plan.outcome(effect)
         assert sum(outcome.values()) == pytest.approx(1.0)
