@@ -51,7 +51,7 @@ class Curve(ABC):
 
     def at_length(self, s: Array) -> Jet:
         """Position and derivatives at arc lengths s (m), by Newton's method on s(x)."""
-        x = s / self.length
+        x = np.interp(s, self._lengths, np.linspace(0.0, 1.0, len(self._lengths)))
         for _ in range(8):
             jet = self.jet(x)
             step = (s - self._length_to(x)) / np.hypot(jet.dr, jet.dz)
@@ -59,6 +59,11 @@ class Curve(ABC):
             if np.all(abs(step) < 1e-8):  # the next step is about its square
                 break
         return self.jet(x)
+
+    @cached_property
+    def _lengths(self) -> Array:
+        """Arc lengths to equally spaced parameters, the start of Newton's method."""
+        return self._length_to(np.linspace(0.0, 1.0, 65))
 
     def _length_to(self, x: Array) -> Array:
         points, weights = gauss(48)

@@ -154,28 +154,26 @@ class System:
 
     @cached_property
     def _elements(self) -> tuple[Pattern, list["ToFree"]]:
-        counts = np.diff(self.constraint.indptr)
-        column = np.full(len(counts), -1, dtype=np.intp)
-        column[counts == 1] = self.constraint.indices[self.constraint.indptr[:-1][counts == 1]]
-        by_column = self.constraint.tocsc()
-        free = by_column.indices[
-            by_column.indptr[:-1]
-        ]  # the raw unknown that each free one is: the first that follows it
-        follows = counts > 0
-        follows[free] = False
+        P = self._choice
+        uses = np.diff(P.indptr)
         maps: list[ToFree] = []
+        first = 0
         for group in self.groups:
-            columns, tied = column[group.unknowns], np.any(follows[group.unknowns], axis=1)
-            for members, own, general in zip(group.unknowns, columns, tied, strict=True):
-                kept = np.flatnonzero(own >= 0)
-                maps.append(self._free(members) if general else ToFree(own[kept], kept, None))
+            size = group.unknowns.shape[1]
+            for _ in group.unknowns:
+                terms, start, stop = uses[first : first + size], P.indptr[first], P.indptr[first + size]
+                columns, factors = P.indices[start:stop], P.data[start:stop]
+                kept = np.flatnonzero(terms)
+                if len(set(columns.tolist())) == len(kept) == len(columns) and np.all(factors == 1):
+                    maps.append(ToFree(columns.astype(np.intp), kept, None))
+                else:
+                    free, place = np.unique(columns, return_inverse=True)
+                    matrix = np.zeros((size, len(free)))
+                    matrix[np.repeat(np.arange(size), terms), place] = factors
+                    maps.append(ToFree(free.astype(np.intp), None, matrix))
+                first += size
         pattern = find_pattern([at.free for at in maps], self.constraint.shape[1])
         return pattern, [at.reordered(order) for at, order in zip(maps, pattern.order, strict=True)]
-
-    def _free(self, members: Index) -> "ToFree":
-        rows = self.constraint[members]
-        free = np.unique(rows.indices).astype(np.intp)
-        return ToFree(free, None, rows[:, free].toarray())
 
     @cached_property
     def is_small(self) -> bool:
