@@ -8,6 +8,7 @@ import numpy as np
 from studies.diagnosis.advice import suggest_next
 from studies.diagnosis.baseline import Law, Problem, choose_kernel, choose_kernel_score, pose, span_of
 from studies.diagnosis.campaign import FEWEST_BINS, Campaign
+from studies.diagnosis.clock import CLOCK_PAIR, clock_drifts, with_clock
 from studies.diagnosis.consistency import consistency
 from studies.diagnosis.discrepancy import Leftover, generic_bases, leftover_evidence, strongest
 from studies.diagnosis.effects import Effect
@@ -18,7 +19,6 @@ from studies.diagnosis.null import bootstrap_levels, draw_null, levels_of, shipp
 from studies.diagnosis.scan import applicable, build_bank
 from studies.diagnosis.selection import BESIDE, Found, Selection, scan_model, scan_models, select
 from studies.diagnosis.sharp import sharp_leftover
-from studies.diagnosis.states import average
 from studies.diagnosis.thermometer import Thermometer, read_thermometer, smooth_thermometer
 from studies.diagnosis.verdict import Cause, ResponseResult, Verdict, equivalent_to, overall, probability_of
 
@@ -35,7 +35,6 @@ LEAK = 0.002
 REPEATED = 3
 """So often the same effect is named in one response when it is none of the kind."""
 NARROW_RANGE = 1.0
-CLOCK_PAIR = ("clock-drift", "ageing")
 PREFERENCE = 6.0
 """How much likelier another thermometer than the corrected frequency must be."""
 
@@ -181,6 +180,8 @@ def inquire(
             for name, values in leftover_evidence(plain, bases, noise).items()
         }
     selection = select(problem, span, levels, threshold, effects, bank)
+    if problem.response == "frequency_Hz" and any(effect.name == CLOCK_PAIR[0] for effect in usable):
+        selection = with_clock(selection, campaign)
     leftover = strongest(leftover_evidence(selection.fit, bases), generic_levels)
     if patched(selection):
         leftover = Leftover("effects that cancel or repeat", max(selection.found[-1].evidence, leftover.evidence))
@@ -263,20 +264,6 @@ def _cause(inquiry: Inquiry, found: Found, response: str, drifts: bool | None = 
         winner.evidence,
         consistency(winner.fit, index),
     )
-
-
-def clock_drifts(campaign: Campaign) -> bool | None:
-    """Whether the gyro's clock drifts against the reference clock; None where no reference was recorded."""
-    if not campaign.runs or any(run.clock_error is None for run in campaign.runs):
-        return None
-    error = np.concatenate([run.clock_error for run in campaign.runs if run.clock_error is not None])
-    time = np.concatenate([average(run.states.campaign_time, campaign.group) for run in campaign.runs])
-    known = np.isfinite(error)
-    line = np.polyfit(time[known], error[known], 1)
-    rest = error[known] - np.polyval(line, time[known])
-    # neighbouring rows share slow noise: count one independent row in ten
-    spread = np.sqrt(10.0 * np.mean(rest**2) / known.sum()) / max(float(np.std(time[known])), 1e-300)
-    return bool(abs(line[0]) > 4.0 * spread)
 
 
 def _same_set(one: Cause, two: Cause) -> bool:
