@@ -25,8 +25,8 @@ def find_outliers(values: FloatArray) -> np.ndarray:
     kept = values[present]
     if kept.size < 3 * WINDOW:
         return mask
-    steps = np.abs(np.diff(kept))
-    resolution = float(steps[steps > 0].min()) if (steps > 0).any() else 0.0
+    bends = np.abs(np.diff(kept, 2))
+    resolution = float(bends[bends > 0].min()) if (bends > 0).any() else 0.0
     mask[present] = _off_median(kept, resolution) | _off_lines(kept, resolution)
     return mask
 
@@ -46,7 +46,8 @@ def _off_median(kept: FloatArray, resolution: float) -> np.ndarray:
     beside = level - median_filter(level, WINDOW, mode="nearest")
     plain = kept - median_filter(kept, WINDOW, mode="nearest")
     limit = _limit(beside, resolution)
-    outlying = (np.abs(beside) > limit) & (np.abs(plain) > limit)
+    bend = np.abs(kept - 0.5 * (np.roll(kept, 1) + np.roll(kept, -1)))
+    outlying = (np.abs(beside) > limit) & (np.abs(plain) > limit) & (bend > 0.75 * limit)
     half = WINDOW // 2
     outlying[:half] = _off_line(kept[:WINDOW], limit)[:half]
     outlying[-half:] = _off_line(kept[-WINDOW:], limit)[-half:]
@@ -75,7 +76,12 @@ def _off_lines(kept: FloatArray, resolution: float) -> np.ndarray:
     )
     out = np.zeros(kept.size, dtype=bool)
     inside = np.all([np.abs(d) > _limit(d, resolution) for d in deviations], axis=0)
-    bend = np.pad(np.abs(deviations[-1]), reach, mode="edge")
-    around = np.stack([bend[reach + k : bend.size - reach + k] for k in (-3, -2, -1, 1, 2, 3)])
-    out[reach:-reach] = inside & (np.abs(deviations[-1]) > ALONE * np.median(around, axis=0))
+    out[reach:-reach] = inside & _alone(deviations[-1])
     return out
+
+
+def _alone(deviations: FloatArray) -> np.ndarray:
+    """Which rows stand out `ALONE` times as far as the three rows on each side."""
+    size = np.pad(np.abs(deviations), 3, mode="edge")
+    around = np.stack([size[k : k + deviations.size] for k in (0, 1, 2, 4, 5, 6)])
+    return np.asarray(size[3:-3] > ALONE * np.median(around, axis=0))

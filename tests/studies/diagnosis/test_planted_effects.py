@@ -69,10 +69,18 @@ def test_aliens_are_not_explained():
     ]
 
 
-def test_effect_without_its_file_is_not_explained_by_another():
-    effects = [e for e in library().values() if e.name != "quadrature-leakage"]
-    verdict, _ = diagnose("rich", "white", ("quadrature-leakage",), salt=4000, effects_of=effects)
+@pytest.mark.parametrize("name", ["quadrature-leakage", "periodic", "jump"])
+def test_effect_without_its_file_is_not_explained_by_another(name):
+    effects = [e for e in library().values() if e.name != name]
+    verdict, _ = diagnose("rich", "white", (name,), salt=4000, effects_of=effects)
     assert verdict.verdict == "unexplained", verdict.causes
+
+
+def test_wandering_noise_is_no_line():
+    """A bias that wanders with six knots a run: noise, or unexplained, but no periodic disturbance."""
+    for k, family in enumerate(("white", "walk", "correlated")):
+        verdict, _ = diagnose("plain", family, alien="drift@bias", salt=8000 + k)
+        assert not [c for c in verdict.causes if c.effect == "periodic" and c.probability > 0.5], verdict.causes
 
 
 def test_two_effects_are_both_found():
@@ -117,3 +125,35 @@ def test_reference_clock_tells_a_drifting_clock_from_ageing(hidden):
     assert verdict.causes[0].effect == hidden
     assert verdict.causes[0].equivalent == ()
     assert verdict.responses["frequency_Hz"].verdict == "explained"
+
+
+def test_reference_clock_finds_a_drift_that_the_record_hides():
+    """A drift of the size of the run-to-run noise: the record alone is adequate, with the reference it is named."""
+    seed = FRESH + 9000
+    print(f"seed {seed}: faint clock drift")
+    rng = np.random.default_rng(seed)
+    records, _ = build("three", "walk", rng, (), snr=0.0)
+    slope = 0.05 * np.std(records[0].columns["frequency_Hz"][:50]) / 86400.0
+    alone, together = [], []
+    for record in records:
+        time = record.columns["time_s"] + (record.start - records[0].start).total_seconds()
+        drifted = record.columns["frequency_Hz"] + slope * time
+        true = record.columns["frequency_Hz"] + rng.normal(0.0, 0.02 * slope * time.max(), time.size)
+        alone.append(record.with_columns({"frequency_Hz": drifted}))
+        together.append(record.with_columns({"frequency_Hz": drifted, "reference_frequency_Hz": true}))
+    named = investigate(load_campaign(together), held_out=False).verdict
+    assert "clock-drift" in {cause.effect for cause in named.causes}
+    assert not investigate(load_campaign(alone), held_out=False).verdict.causes
+
+
+def test_damping_that_falls_is_no_leak():
+    """A leak only adds gas: 1/Q that falls with time must have another name, or none."""
+    seed = FRESH + 9500
+    print(f"seed {seed}: falling damping")
+    records, _ = build("plain", "white", np.random.default_rng(seed), ("leak",), snr=1.0)
+    falling = [
+        r.with_columns({"inverse_q": 2.0 * records[0].columns["inverse_q"].mean() - r.columns["inverse_q"]})
+        for r in records
+    ]
+    verdict = investigate(load_campaign(falling), held_out=False).verdict
+    assert "leak" not in {cause.effect for cause in verdict.causes}
