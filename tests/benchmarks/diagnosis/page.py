@@ -362,6 +362,7 @@ def _plan(cases, predictions):
                         f"by {title}, {'four outcomes' if outcomes else 'every answer'}",
                         str(found["entries"]),
                         f"{found['near']} ({100 * found['near'] / found['entries']:.0f} %)",
+                        f"{found['open_near']} of {found['open']}",
                         f"{found['beyond']} ({100 * found['beyond'] / found['entries']:.0f} %)",
                         f"{100 * found['rms']:.1f}",
                         f"{found['rank']:.2f}",
@@ -371,7 +372,7 @@ def _plan(cases, predictions):
                 beyond += largest(entries, 5)
     table = Table(
         f"Predicted against measured shares of {len(cases)} cases, entries of {FEWEST} cases or more",
-        ("pool", "entries", f"within {100 * WITHIN:.0f} points", "outside the 90 % band", "error beyond chance / points",
+        ("pool", "entries", f"within {100 * WITHIN:.0f} points", "those predicted at 5–95 %", "outside the 90 % band", "error beyond chance / points",
          "rank agreement"),
         summary,
         "Four outcomes: named, nothing, unexplained, wrong. Band: where nine of ten counts would lie were the prediction "

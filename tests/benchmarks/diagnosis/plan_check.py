@@ -27,7 +27,7 @@ from tests.benchmarks.diagnosis.scoring import of_kind, said
 from tests.generator.device import build
 
 FEWEST = 12
-WITHIN = 0.10
+WITHIN, CERTAIN = 0.10, 0.05
 DRAWS = 2000
 OUTLIERS = float(np.sqrt(1.0 + 0.004 * 25.0**2))
 """rms of the noise with the generator's outliers, 0.4 % of the rows with 25 times the spread, over that of the other rows."""
@@ -163,13 +163,16 @@ def agreement(entries):
     """Return how many entries with enough cases lie within ten points and beyond their band, and the error beyond chance."""
     enough = [e for e in entries if e.cases >= FEWEST]
     if not enough:
-        return {"entries": 0, "near": 0, "beyond": 0, "rms": np.nan, "rank": np.nan}
+        return {"entries": 0, "near": 0, "beyond": 0, "open": 0, "open_near": 0, "rms": np.nan, "rank": np.nan}
     difference = np.array([e.predicted - e.measured for e in enough])
     chance = np.array([e.spread for e in enough])
+    undecided = [e for e in enough if CERTAIN < e.predicted < 1.0 - CERTAIN]
     return {
         "entries": len(enough),
         "near": sum(e.near for e in enough),
         "beyond": sum(e.beyond for e in enough),
+        "open": len(undecided),
+        "open_near": sum(e.near for e in undecided),
         "rms": float(np.sqrt(max(np.mean(difference**2 - chance**2), 0.0))),
         "rank": float(spearmanr([e.predicted for e in enough], [e.measured for e in enough]).statistic),
     }
@@ -191,8 +194,9 @@ def compare_in_words(cases, plans):
             lines += [
                 f"## By {title}, {'four outcomes' if outcomes else 'every answer'}",
                 "",
-                f"- entries with {FEWEST} cases or more: {found['entries']}; within 10 points: {found['near']}; outside "
-                f"their 90 % band: {found['beyond']} (chance alone: up to one in ten)",
+                f"- entries with {FEWEST} cases or more: {found['entries']}; within 10 points: {found['near']} (of those "
+                f"predicted between 5 and 95 %: {found['open_near']} of {found['open']}); outside their 90 % band: "
+                f"{found['beyond']} (chance alone: up to one in ten)",
                 f"- error of the prediction beyond chance: {100 * found['rms']:.1f} points rms; "
                 f"rank agreement {found['rank']:.2f}",
                 *(
