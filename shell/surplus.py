@@ -4,9 +4,9 @@ The stresses of a mode u leave forces on the next functions w of every element,
 
     r(w) = ∫ σ(u) : ε(w) dV - ω² ∫ ρ u · w dV,
 
-which move them by x = K_ww⁻¹ r and so take xᵀ r off ω² ∫ ρ u² dV (hierarchical surplus). Every element answers with its
-own stiffness; a force that falls on several elements is divided among them as their stiffness is. The functions are one
-degree more in solid cells, two degrees more along the shell and two modes more through its thickness.
+which move them by x = K_ww⁻¹ r and so take xᵀ r off ω² ∫ ρ u² dV (hierarchical surplus). A chain of shell elements answers
+as a whole, with two degrees more along it and two modes more through its thickness; a solid cell answers by itself with
+one degree more, and a force on an edge is divided among the cells there as their stiffness is.
 """
 
 from dataclasses import dataclass, replace
