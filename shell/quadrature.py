@@ -1,5 +1,6 @@
 """Gauss points and the one-dimensional polynomial bases from which every element is a product."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 
@@ -59,9 +60,21 @@ def hierarchic(degree: int, points: Array) -> Basis:
     return Basis(values, slopes)
 
 
+@cache
+def at_gauss(basis: Callable[[int, Array], Basis], degree: int, count: int) -> Basis:
+    """One of these bases at the points of a Gauss rule."""
+    return basis(degree, gauss(count)[0])
+
+
 def interpolate_hierarchic(degree: int, values: Array) -> Array:
     """Coefficients in the hierarchic basis of a polynomial given at the Gauss-Lobatto-Legendre nodes."""
-    return np.asarray(np.linalg.solve(hierarchic(degree, lobatto(degree)).values, values))
+    return np.asarray(values_to_hierarchic(degree) @ values)
+
+
+@cache
+def values_to_hierarchic(degree: int) -> Array:
+    """From values at the Gauss-Lobatto-Legendre nodes to coefficients in the hierarchic basis."""
+    return np.asarray(np.linalg.inv(hierarchic(degree, lobatto(degree)).values))
 
 
 @cache

@@ -24,7 +24,7 @@ from shell.eigen import Factor, Pattern, find_pattern
 from shell.elastic import Elastic, VaryingElastic
 from shell.kernel import StrainTable, energy_weights, pair_stiffness, shell_table, station_stiffness
 from shell.levels import Level
-from shell.quadrature import Array, gauss, hierarchic, interpolate_hierarchic, legendre
+from shell.quadrature import Array, at_gauss, gauss, hierarchic, legendre, values_to_hierarchic
 from shell.resonator import Resonator
 from shell.solution import Constants, Solution, find_constants, total
 from shell.system import ShellGroup, SolidGroup, System
@@ -139,8 +139,8 @@ def _extend_shell(resonator: Resonator, group: ShellGroup, n: int, level: Level)
     xi, weights = gauss(p + ALONG + 2)
     eta = gauss(max(more) + 2)
     chain = group.place.chain
-    u, v, w = (legendre(order, eta[0]) for order in more)
-    along = hierarchic(p + ALONG, xi)
+    u, v, w = (at_gauss(legendre, order, len(eta[0])) for order in more)
+    along = at_gauss(hierarchic, p + ALONG, p + ALONG + 2)
     table = shell_table(sections(resonator, chain, xi, weights), n, (u, v, w), eta, along)
     is_old = np.concatenate([np.arange(many + 1) <= few for few, many in zip(orders, more, strict=True)])
     elements, functions, width = len(chain.segments), p + ALONG + 1, len(is_old)
@@ -165,7 +165,7 @@ def _extend_shell(resonator: Resonator, group: ShellGroup, n: int, level: Level)
         rows, columns = (node * functions * width + amplitude) * width, node * width**2 + amplitude
         where = rows[:, None] + columns
         units.append(np.array([kind[e].take(where, mode="clip") for kind in kinds]))
-    return ShellExtension(table, is_old, interpolate_hierarchic(p, np.eye(p + 1)), pattern, tuple(places), tuple(units))
+    return ShellExtension(table, is_old, values_to_hierarchic(p), pattern, tuple(places), tuple(units))
 
 
 def _extend_solid(group: SolidGroup, degree: int) -> SolidExtension:
