@@ -17,7 +17,7 @@ TEMPER = 1.6
 """Evidence differences are divided by this: likelihoods of imperfect models are too sure of themselves."""
 MEMBER = 0.06
 """A rival belongs to the set when its weight is at least this part of the winner's."""
-KIN = 0.2
+KIN = 0.15
 """Part of its evidence by which an effect must be better than one whose formula is nearly the same."""
 DOUBT = 0.02
 """Share of answers that are wrong for reasons outside the likelihood."""

@@ -26,6 +26,7 @@ EFFECT = Effect(
     responses=("frequency_Hz", "bias_deg_per_h"),
     coefficients=("stress_{unit}_per_K",),
     shape=(Parameter("relaxation_time_s", 600.0, 1e6, "time in which the stress relaxes"),),
+    kin={"frequency_Hz": ("second-lag",)},
     columns=columns,
     grid=grid,
     fine=True,

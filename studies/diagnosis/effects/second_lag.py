@@ -27,6 +27,7 @@ EFFECT = Effect(
     acts_on="temperature",
     coefficients=("weight",),
     shape=(Parameter("second_time_constant_s", 20.0, 3e5, "the other time constant"),),
+    kin={"frequency_Hz": ("mounting-stress",)},
     columns=columns,
     grid=grid,
     fine=True,
