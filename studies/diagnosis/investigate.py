@@ -16,6 +16,7 @@ from studies.diagnosis.fit import fit_terms, intervals
 from studies.diagnosis.gain import Score, rms, row_residuals, score
 from studies.diagnosis.innovations import find_lines
 from studies.diagnosis.null import bootstrap_levels, draw_null, levels_of, shipped_levels
+from studies.diagnosis.patchwork import patched
 from studies.diagnosis.scan import applicable, build_bank
 from studies.diagnosis.selection import BESIDE, Found, Selection, scan_model, scan_models, select
 from studies.diagnosis.sharp import sharp_leftover
@@ -32,8 +33,6 @@ FURTHER = 120.0
 """Evidence at which a further cause beside the strongest deserves two thirds of its claim (measured on the generator)."""
 LEAK = 0.002
 """Part of the evidence in the frequency that a cause in another response must have: its thermometer is not exact."""
-REPEATED = 3
-"""So often the same effect is named in one response when it is none of the kind."""
 NARROW_RANGE = 1.0
 PREFERENCE = 6.0
 """How much likelier another thermometer than the corrected frequency must be."""
@@ -183,31 +182,12 @@ def inquire(
     if problem.response == "frequency_Hz" and any(effect.name == CLOCK_PAIR[0] for effect in usable):
         selection = with_clock(selection, campaign)
     leftover = strongest(leftover_evidence(selection.fit, bases), generic_levels)
-    if patched(selection):
+    if patched(selection.fit):
         leftover = Leftover("effects that cancel or repeat", max(selection.found[-1].evidence, leftover.evidence))
     sharp = sharp_leftover(selection.fit)
     if sharp.evidence > max(leftover.evidence, BESIDE * (selection.plain.score - selection.fit.score)):
         leftover = sharp
     return Inquiry(problem, selection, leftover, levels)
-
-
-def patched(selection: Selection) -> bool:
-    """Whether the effects only patch up what none of them is: one of them thrice, or two that cancel each other.
-
-    Of effects that cancel, no coefficient is known to better than itself.
-    """
-    fit = selection.fit
-    names = [term.name for term in fit.terms]
-    if any(names.count(name) >= REPEATED for name in names):
-        return True
-    if len(names) < 2:
-        return False
-    for index, term in enumerate(fit.terms):
-        known = intervals(fit, index)
-        own = [known[name] for name in term.effect.coefficient_names(fit.problem.response, term.count)]
-        if all(p.high - p.low > 2.0 * abs(p.value) for p in own):
-            return True
-    return False
 
 
 def _explained(inquiries: Mapping[str, Inquiry]) -> float:
