@@ -32,11 +32,14 @@ class Fit:
         Effects with their fitted shapes.
     linear : LinearFit
         Coefficients of the baseline, then of the terms in order.
+    matrix : (M, p) array
+        The columns that they multiply.
     """
 
     problem: Problem
     terms: tuple[Term, ...]
     linear: LinearFit
+    matrix: FloatArray
 
     @property
     def score(self) -> float:
@@ -45,7 +48,7 @@ class Fit:
 
     def columns(self) -> FloatArray:
         """Columns of baseline and terms, (M, p)."""
-        return self.problem.model(self.problem.tau, self.terms)
+        return self.matrix
 
     def coefficients_of(self, index: int) -> FloatArray:
         """Coefficients of one term."""
@@ -109,8 +112,8 @@ def _with_bend(problem: Problem, terms: Sequence[Term]) -> Problem:
 def _evaluate(
     problem: Problem, terms: tuple[Term, ...], target: FloatArray, shares: Sequence[float] | FloatArray
 ) -> Fit:
-    columns = problem.basis.rotate(problem.model(problem.tau, terms))
-    return Fit(problem, terms, fit_linear(problem.basis, target, columns, shares))
+    columns = problem.model(problem.tau, terms)
+    return Fit(problem, terms, fit_linear(problem.basis, target, problem.basis.rotate(columns), shares), columns)
 
 
 def _knobs(fit: Fit) -> list[_Knob]:
@@ -168,12 +171,15 @@ def jacobian_of(fit: Fit, knobs: Sequence[_Knob] | None = None) -> FloatArray:
     """Return the derivatives of the fitted response with respect to every nonlinear parameter, (M, k)."""
     knobs = _knobs(fit) if knobs is None else knobs
     out = np.empty((fit.problem.values.size, len(knobs)))
+    views = fit.problem.views(fit.problem.tau)
     for k, knob in enumerate(knobs):
         sides = []
         for sign in (1.0, -1.0):
-            turns = [sign * knob.nudge if j == k else 0.0 for j in range(len(knobs))]
-            problem, terms = _turn(fit, knobs, turns)
-            sides.append(problem.model(problem.tau, terms) @ fit.linear.coefficients)
+            problem, terms = _turn(fit, [knob], [sign * knob.nudge])
+            if knob.term < 0:
+                sides.append(problem.model(problem.tau, terms) @ fit.linear.coefficients)
+            else:
+                sides.append(problem.term(terms[knob.term], views) @ fit.coefficients_of(knob.term))
         out[:, k] = (sides[0] - sides[1]) / (2.0 * knob.nudge)
     return out
 

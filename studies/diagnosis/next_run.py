@@ -175,10 +175,12 @@ def continued(fit: Fit, states: States, clock: Fit | None) -> Fit:
         thermometer=thermometer,
         correction=None,
     )
-    out = Fit(ahead, fit.terms, replace(fit.linear, coefficients=coefficients))
+    linear = replace(fit.linear, coefficients=coefficients)
+    out = Fit(ahead, fit.terms, linear, ahead.model(ahead.tau, fit.terms))
     if problem.correction is None:
         return out
-    return replace(out, problem=replace(ahead, correction=thermal_correction(out)))
+    seen = replace(ahead, correction=thermal_correction(out))
+    return Fit(seen, fit.terms, linear, seen.model(seen.tau, fit.terms))
 
 
 def loss(truth: tuple[FloatArray, FloatArray], rival: tuple[FloatArray, FloatArray], columns: FloatArray) -> float:

@@ -1,5 +1,7 @@
 """What one run goes through on an even time grid, and the operators with memory that act on it."""
 
+import itertools
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -123,26 +125,35 @@ def lag(drive: FloatArray, step: float, tau: float) -> FloatArray:
     return np.asarray(out)
 
 
-def play(drive: FloatArray, radius: float, start: float = 0.0) -> FloatArray:
+def play(drive: FloatArray, radius: float | Sequence[float], start: float = 0.0) -> FloatArray:
     """Return the play (backlash) operator, the elementary rate-independent hysteresis.
 
-    p_k = min(u_k + r, max(u_k − r, p_{k−1})), with p_0 = u_0 + start · r.
+    p_k = min(u_k + r, max(u_k − r, p_{k−1})), with p_0 = u_0 + start · r. While u rises that is max(u_k − r, p before),
+    while it falls min(u_k + r, p before), so that each branch is done at once.
 
     Parameters
     ----------
     drive : (N,) array
         Input.
-    radius : float
+    radius : float or (R,) sequence
         Half width of the loop, in the unit of the drive.
     start : float
         Where in its band the operator starts, −1 … 1.
+
+    Returns
+    -------
+    output : (N,) or (N, R) array
     """
-    out = np.empty_like(drive)
-    state = float(drive[0]) + start * radius
-    for k, value in enumerate(drive.tolist()):
-        if state < value - radius:
-            state = value - radius
-        elif state > value + radius:
-            state = value + radius
-        out[k] = state
-    return out
+    radii = np.atleast_1d(np.asarray(radius, dtype=float))
+    out = np.empty((drive.size, radii.size))
+    state = drive[0] + start * radii
+    rising = np.diff(drive) >= 0.0
+    turns = np.flatnonzero(rising[1:] != rising[:-1]) + 1
+    out[0] = state
+    for begin, end in itertools.pairwise([0, *turns.tolist(), rising.size]):
+        if end > begin:
+            branch = drive[begin + 1 : end + 1, None]
+            up = bool(rising[begin])
+            out[begin + 1 : end + 1] = np.maximum(branch - radii, state) if up else np.minimum(branch + radii, state)
+            state = out[end]
+    return out[:, 0] if np.ndim(radius) == 0 else out

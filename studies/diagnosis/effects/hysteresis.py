@@ -12,7 +12,7 @@ def columns(states: States, shape: Sequence[float], response: str) -> FloatArray
     """Mean of three plays of scattered half widths (a small Preisach model) less the temperature itself, K."""
     radius, scatter, start = shape
     radii = [radius * max(1.0 + scatter * part, 0.05) for part in (-1.2247, 0.0, 1.2247)]
-    loops = np.stack([play(states.resonator, r, start) for r in radii], axis=1)
+    loops = play(states.resonator, radii, start)
     return np.asarray(loops.mean(axis=1, keepdims=True) - states.resonator[:, None])
 
 
