@@ -13,6 +13,8 @@ from studies.diagnosis.likelihood import orthonormal
 from studies.diagnosis.states import FloatArray, States
 
 BLOCKS = 5
+KNOWN_START = 0.5
+"""Part of the initial state's signature in a block from which on it is refitted there."""
 
 
 @dataclass(frozen=True)
@@ -157,22 +159,33 @@ def _leave_one_block_out(fit: Fit, campaign: Campaign) -> float | None:
         keep = [(run.time < low - gap) | (run.time > high + gap) for run in campaign.runs]
         if sum(int((m & k).sum()) for m, k in zip(problem.present, keep, strict=True)) < 40:
             return None
-        trained = _without_unseen(_train(restricted(problem, keep), fit.terms), campaign, keep)
+        trained = _train(restricted(problem, keep), fit.terms)
         for k, run in enumerate(campaign.runs):
             inside = (run.row_time >= low) & (run.row_time < high + (1e-9 if block < BLOCKS - 1 else 1.0))
             if inside.any():
-                residuals.append(row_residuals(trained, campaign)[k][inside])
+                residuals.append(_with_start(trained, campaign, k, inside))
     return rms(residuals)
 
 
-def _without_unseen(trained: Fit, campaign: Campaign, keep: Sequence[NDArray[np.bool_]]) -> Fit:
-    """Set the initial thermal states of which the rows that are left know nothing to zero: e^(−t/τ) is over by then."""
+def _with_start(trained: Fit, campaign: Campaign, k: int, inside: NDArray[np.bool_]) -> FloatArray:
+    """Return the residual of a block; where the block holds what is left of the initial thermal state, that is refitted.
+
+    The rows outside it know next to nothing of e^(−t/τ) then.
+    """
+    columns = fine_model(trained.problem, trained.terms, campaign, k)
     coefficients = trained.linear.coefficients.copy()
-    for k, kept in enumerate(keep):
-        columns = fine_model(trained.problem, trained.terms, campaign, k)
-        left = np.interp(trained.problem.states[k].time, campaign.runs[k].time, kept.astype(float)) > 0.5
-        own = own_columns(trained.problem, k)[-1:] if trained.problem.lagged else []
-        for index in own:
-            if np.linalg.norm(columns[left, index]) < 1e-6 * np.linalg.norm(columns[:, index]):
-                coefficients[index] = 0.0
-    return replace(trained, linear=replace(trained.linear, coefficients=coefficients))
+    start = None
+    if trained.problem.lagged:
+        place = own_columns(trained.problem, k)[-1]
+        start = on_rows(campaign, k, columns[:, place])
+        if np.linalg.norm(start[inside]) < KNOWN_START * np.linalg.norm(start):
+            start = None
+        else:
+            coefficients[place] = 0.0
+    measured = campaign.runs[k].row_responses[trained.problem.response]
+    rest = (measured - on_rows(campaign, k, columns @ coefficients))[inside]
+    known = np.isfinite(rest)
+    if start is None or not known.any():
+        return np.asarray(rest)
+    own = start[inside]
+    return np.asarray(rest - own * (own[known] @ rest[known]) / (own[known] @ own[known]))
