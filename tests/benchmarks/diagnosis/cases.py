@@ -92,7 +92,9 @@ def run_case(kind, count, seed, held_out=True, commit=""):
         "channel": truth.channel,
         "seconds": time.perf_counter() - begin,
         "verdict": found.verdict,
-        "causes": [[c.effect, list(c.equivalent), c.response, c.probability, c.evidence, c.agreement.p] for c in found.causes],
+        "causes": [
+            [c.effect, list(c.equivalent), c.response, c.probability, c.evidence, c.agreement.p] for c in found.causes
+        ],
         "intervals": [{n: [p.value, p.low, p.high] for n, p in c.parameters.items()} for c in found.causes],
         "responses": {
             k: [r.verdict, r.noise, r.baseline, r.extended, r.left_over_input, r.left_over_evidence]

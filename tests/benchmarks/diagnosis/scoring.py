@@ -12,6 +12,7 @@ SNR_ROWS = (3.0, 1.0, 0.3)
 NOTHING, UNEXPLAINED = "nothing", "unexplained"
 CLAIMS = (0.0, 0.3, 0.6, 0.8, 0.9, 0.96, 1.001)
 NORMAL_90 = 1.645
+EVENTS = ("jump", "ageing", "clock-drift", "leak")
 READS = (0.08, 1.0006)
 """Zero error, °C, and gain of the generator's thermometer: a record knows temperatures as they are read only."""
 
@@ -101,6 +102,15 @@ def floor_ratio(case):
     if result is None or result[3] is None or result[3][1] is None:
         return None
     return result[3][1] / result[1]
+
+
+def held_out_group(case):
+    """What a run that is left out can be expected to show: effects that the other runs know, or something of its own."""
+    if case["truth"][0] in EVENTS:
+        return "events and drifts: what the other runs cannot know"
+    if case["design"] == "steps":
+        return "single steps: every run has temperatures of its own"
+    return "effects that the other runs know"
 
 
 def claims(cases):

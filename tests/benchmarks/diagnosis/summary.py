@@ -14,6 +14,7 @@ from tests.benchmarks.diagnosis.scoring import (
     exact_set,
     first_right,
     floor_ratio,
+    held_out_group,
     named_without_warning,
     of_kind,
     rate,
@@ -48,11 +49,18 @@ def summarise(cases):
         wrong = Counter(_word(c) for c in mine if c["snr"] >= 1 and not first_right(c))
         lines.append(f"| {name} | {' | '.join(f'{hits}/{total}' for hits, total in row)} | {_counts(wrong)} |")
     lines += ["", "## Held-out residual over the noise (right name)", ""]
-    for snr in levels:
-        ratios = [r for c in singles if c["snr"] == snr and first_right(c) and (r := floor_ratio(c)) is not None]
+    groups = sorted({held_out_group(c) for c in singles})
+    for group, snr in [(None, snr) for snr in levels] + [(group, None) for group in groups]:
+        ratios = [
+            r
+            for c in singles
+            if (c["snr"] == snr if group is None else held_out_group(c) == group)
+            and first_right(c)
+            and (r := floor_ratio(c)) is not None
+        ]
         if ratios:
             lines.append(
-                f"- SNR {snr:g}: median {np.median(ratios):.3f}, "
+                f"- {f'SNR {snr:g}' if group is None else group}: median {np.median(ratios):.3f}, "
                 f"within 10 % {rate(sum(r < 1.1 for r in ratios), len(ratios))}, "
                 f"within 5 % {rate(sum(r < 1.05 for r in ratios), len(ratios))}"
             )
