@@ -17,8 +17,8 @@ def find_outliers(values: FloatArray) -> np.ndarray:
 
     A row is one when it deviates by more than six robust standard deviations from the running median of 11 rows, both as
     it is, so that the edge of a step is none, and beside the trend, so that the scale of the noise is right where the
-    response is steep; or, for steep responses, from the lines through the five rows before it and the five after it and
-    from the mean of its neighbours, and four times as far as the rows around it.
+    response is steep; or, for steep responses, to one side of the lines through the five rows before it and the five
+    after it and of the mean of its neighbours, and four times as far as the rows around it.
     """
     present = np.isfinite(values)
     mask = np.zeros(values.shape, dtype=bool)
@@ -75,7 +75,8 @@ def _off_lines(kept: FloatArray, resolution: float) -> np.ndarray:
         middle - 0.5 * (windows[:, reach - 1] + windows[:, reach + 1]),
     )
     out = np.zeros(kept.size, dtype=bool)
-    inside = np.all([np.abs(d) > _limit(d, resolution) for d in deviations], axis=0)
+    one_side = np.abs(np.sum(np.sign(deviations), axis=0)) == len(deviations)  # at a kink the lines lie on both sides
+    inside = one_side & np.all([np.abs(d) > _limit(d, resolution) for d in deviations], axis=0)
     out[reach:-reach] = inside & _alone(deviations[-1])
     return out
 

@@ -28,7 +28,8 @@ def headline(verdict: Verdict) -> str:
     """Return the verdict in one or two sentences."""
     text = WORDS[verdict.verdict]
     if verdict.causes:
-        text += " " + "; ".join(name_cause(cause) for cause in verdict.causes) + "."
+        causes = "; ".join(name_cause(cause) for cause in verdict.causes)
+        text += f" {causes[0].upper()}{causes[1:]}."
     return text
 
 
@@ -60,11 +61,12 @@ def cause_table(verdict: Verdict) -> Table:
                 if first
                 else [""] * 5
             )
-            rows.append([*lead, name, number(p.value, 4), f"{number(p.low, 4)} … {number(p.high, 4)}"])
+            between = f" ({number(p.low, 4)} … {number(p.high, 4)})" if p.high > p.low else ""
+            rows.append([*lead, name, number(p.value, 4) + between])
             first = False
     return Table(
         "Causes",
-        ("cause", "or equally", "in", "probability", "evidence", "parameter", "value", "90 % interval"),
+        ("cause", "or equally", "in", "probability", "evidence", "parameter", "value (90 % interval)"),
         rows,
         "Evidence: twice the log-likelihood ratio, net of what chance gains.",
     )
@@ -155,7 +157,7 @@ def agreement_words(cause: Cause) -> str:
     if agreement.p < DISAGREE:
         return f"{SPLITS[agreement.split]} disagree about its coefficient (p = {agreement.p:.1g})."
     said = ", ".join(SPLITS[name] for name in agreement.by_split)
-    return f"its coefficient is the same in {said} (p = {agreement.p:.2f})."
+    return f"its coefficient is the same in {said} (p = {agreement.p:.2g})."
 
 
 DISAGREE = 1e-3
