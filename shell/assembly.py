@@ -110,7 +110,7 @@ def solid_group(
     rows = constrain(mesh, boundary, ties, degree, n, start)
     numbers, signs, count = number_functions(mesh, degree)
     unknowns = start + (3 * numbers[:, :, None] + np.arange(3)).reshape(len(numbers), -1)
-    table = tabulate_cells(mesh.grid, at_gauss_points(degree, degree), n, solid.position)
+    table = tabulate_cells(mesh.grid, at_gauss_points(degree, degree, degree + 2), n, solid.position)
     return SolidGroup(table, unknowns, SolidPart(mesh, boundary, signs)), rows, start + 3 * count
 
 

@@ -8,7 +8,7 @@ function φ of the section,
 or ε_k = Σ S_kαc u_c,α. So the stiffness for any n, λ and G follows from the nine products ∫ φ_α ψ_β dV.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 
 import numpy as np
@@ -69,14 +69,13 @@ class CellTable:
         np.matmul(np.swapaxes(moved, 1, 2), moved, out=found[:, 9])
         return found.reshape(count, 10, functions**2)
 
-    def loads(self, stress: Array, force: Array, functions: Index) -> Array:
-        """∫ (σ : ε(φ) - f · φ) dV of chosen functions, (cells, functions, 3), for stress (cells, 6, points), force (cells, 3, points)."""
+    def loads(self, stress: Array, force: Array) -> Array:
+        """∫ (σ : ε(φ) - f · φ) dV of all functions, (cells, functions, 3), for stress (cells, 6, points), force (cells, 3, points)."""
         count, points = self.radius.shape
-        chosen = self.gradients[..., functions]
         dual = strain_of_gradients(self.n).reshape(6, 9).T @ (stress * self.volume)
         dual = dual.reshape(count, 3, 3, points)
         dual[:, ZERO] -= force * (self.volume * self.radius[:, None])
-        return np.asarray((np.swapaxes(chosen, 2, 3) @ np.swapaxes(dual, 2, 3)).sum(axis=1))
+        return np.asarray((np.swapaxes(self.gradients, 2, 3) @ np.swapaxes(dual, 2, 3)).sum(axis=1))
 
 
 @cache
@@ -171,11 +170,16 @@ class Reference:
             product(one.values, two.slopes),
         )
 
+    def chosen(self, functions: Index) -> "Reference":
+        """The same with some of the functions."""
+        cut = {name: getattr(self, name)[:, functions] for name in ("value", "by_xi", "by_eta")}
+        return replace(self, **cut)
+
 
 @cache
-def at_gauss_points(degree: int, sides: int) -> Reference:
-    """The reference cell at the points of the Gauss rule that integrates its energies."""
-    points, weights = gauss(degree + 2)
+def at_gauss_points(degree: int, sides: int, count: int) -> Reference:
+    """The reference cell at the points of a Gauss rule of `count` by `count`."""
+    points, weights = gauss(count)
     return Reference.at(points, points, np.outer(weights, weights), degree, sides)
 
 

@@ -9,8 +9,8 @@ as a whole, with two degrees more along it and two modes more through its thickn
 one degree more, and a force on an edge is divided among the cells there as their stiffness is.
 """
 
-from dataclasses import dataclass, replace
-from functools import lru_cache
+from dataclasses import dataclass
+from functools import cache, lru_cache
 from typing import TypeAlias
 
 import numpy as np
@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from shell.assembly import sections
 from shell.blocks import open_edges
-from shell.cells import CellTable, at_gauss_points, cell_stiffness, in_order, tabulate_cells
+from shell.cells import CellTable, Reference, at_gauss_points, cell_stiffness, in_order, tabulate_cells
 from shell.constraints import Index
 from shell.eigen import Factor, Pattern, find_pattern
 from shell.elastic import Elastic, VaryingElastic
@@ -41,10 +41,9 @@ def estimate_error(resonator: Resonator, elastic: Elastic | VaryingElastic, solu
     """
     system = solution.system
     found = 0.0
-    for group, extension, q in zip(system.groups, extend(resonator, system), solution.unknowns, strict=True):
-        constants = find_constants(extension.table.position, elastic, group.table.plane_stress)
-        factor = SMOOTH if isinstance(group, ShellGroup) else (system.level.block + 1) / 2
-        found += factor * extension.surplus(q, constants, solution.eigenvalue)
+    for part, extension in enumerate(extend(resonator, system)):
+        factor = SMOOTH if isinstance(extension, ShellExtension) else (system.level.block + 1) / 2
+        found += factor * extension.surplus(solution, part, elastic)
     return found / (2 * solution.eigenvalue * total(solution.kinetic))
 
 
@@ -68,12 +67,15 @@ class ShellExtension:
     places: tuple[Index, ...]
     units: tuple[Array, ...]
 
-    def surplus(self, q: Array, constants: Constants, eigenvalue: float) -> float:
-        """xᵀ r of the chain for a mode with element unknowns q."""
+    def surplus(self, solution: Solution, part: int, elastic: Elastic | VaryingElastic) -> float:
+        """xᵀ r of the chain, one part of the system of a mode."""
+        q = solution.unknowns[part]
+        constants = find_constants(self.table.position, elastic, self.table.plane_stress)
         old = self.to_old @ q.reshape(len(q), len(self.to_old), -1)
         refined = np.zeros((len(q), len(self.to_old) + ALONG, len(self.is_old)))
         refined[:, :-ALONG, self.is_old] = old
-        r = self.table.loads(*_loads(self.table, refined, constants, eigenvalue)).reshape(len(q), -1)
+        strain, moved = self.table.strains(refined), self.table.displacements(refined)
+        r = self.table.loads(*_loads(self.table, strain, moved, constants, solution.eigenvalue)).reshape(len(q), -1)
         load = np.zeros(self.pattern.size)
         for members, own, places in zip(self.pattern.unknowns, r, self.places, strict=True):
             load[members] += own[places]
@@ -84,29 +86,27 @@ class ShellExtension:
 
 @dataclass(frozen=True, eq=False)
 class SolidExtension:
-    """Functions of one more degree on the cells of a solid part.
+    """Functions of one more degree on the cells of a solid part, at the points of the level.
 
-    table : all functions; `new` : places of the new ones, `old` : of the level's own.
-    products : of the new ones.
-    edges, turned : the edge of the four first new ones, and the sign that turns them the same way, (cells, 4).
+    table : the new functions.
+    products : of the same.
+    edges, turned : the edge of the four first ones, and the sign that turns them the same way, (cells, 4).
     are_open : whether an edge may move, (edges,).
     """
 
     table: CellTable
-    new: Index
-    old: Index
     products: Array
     edges: Index
     turned: Array
     are_open: NDArray[np.bool_]
 
-    def surplus(self, q: Array, constants: Constants, eigenvalue: float) -> float:
-        """xᵀ r of all cells for a mode with cell unknowns q."""
-        cells = len(q)
-        refined = np.zeros((cells, self.table.gradients.shape[3], 3))
-        refined[:, self.old] = q.reshape(cells, -1, 3)
-        stress, force = _loads(self.table, refined, constants, eigenvalue)
-        r = self.table.loads(stress[:, 0], force[:, 0], self.new)
+    def surplus(self, solution: Solution, part: int, elastic: Elastic | VaryingElastic) -> float:
+        """xᵀ r of all cells, one part of the system of a mode."""
+        constants = solution.constants[part]
+        stress, force = _loads(
+            self.table, solution.strain[part], solution.displacement[part], constants, solution.eigenvalue
+        )
+        r = self.table.loads(stress[:, 0], force[:, 0])
         lam, G = (field[:, 0] for field in constants.lame)
         K = cell_stiffness(self.products, lam, G, self.table.n)
         k = np.diagonal(K, axis1=1, axis2=2).reshape(r.shape)
@@ -115,7 +115,7 @@ class SolidExtension:
         np.add.at(stiffness, self.edges, k[:, :4])
         share = k[:, :4] / stiffness[self.edges] * self.are_open[self.edges][..., None]
         r[:, :4] = self.turned * at_edges[self.edges] * share
-        load = r.reshape(cells, -1)
+        load = r.reshape(len(r), -1)
         return float(np.sum(load * np.linalg.solve(K, load[..., None])[..., 0]))
 
 
@@ -170,25 +170,29 @@ def _extend_shell(resonator: Resonator, group: ShellGroup, n: int, level: Level)
 
 def _extend_solid(group: SolidGroup, degree: int) -> SolidExtension:
     mesh = group.place.mesh
-    table = tabulate_cells(mesh.grid, at_gauss_points(degree + 1, degree), group.table.n, group.table.position[0, 0])
-    place = np.empty((degree + 2, degree + 2), dtype=np.intp)
-    place[in_order(degree + 1)] = np.arange(table.gradients.shape[3])
-    low, top = np.arange(2), degree + 1
-    sides = [place[top, low], place[low, top]]
-    new = np.concatenate([*sides, place[top, 2:], place[2:-1, top]])
-    products = replace(table, gradients=table.gradients[..., new]).products(np.ones((len(mesh.edges), len(new))))
-    turned = np.where(mesh.reversed_ & bool(top % 2), -1.0, 1.0)[..., None]
-    return SolidExtension(
-        table, new, place[in_order(degree)], products, mesh.edges, turned, open_edges(mesh, group.place.boundary)
+    table = tabulate_cells(mesh.grid, _next_functions(degree), group.table.n, group.table.position[0, 0])
+    products = table.products(np.ones((len(mesh.edges), table.gradients.shape[3])))
+    turned = np.where(mesh.reversed_ & bool((degree + 1) % 2), -1.0, 1.0)[..., None]
+    return SolidExtension(table, products, mesh.edges, turned, open_edges(mesh, group.place.boundary))
+
+
+@cache
+def _next_functions(degree: int) -> Reference:
+    """The functions of one degree more at the points of a degree: those of the four edges, then the ones inside."""
+    top = degree + 1
+    place = np.empty((top + 1, top + 1), dtype=np.intp)
+    place[in_order(top)] = np.arange((top + 1) ** 2)
+    low = np.arange(2)
+    return at_gauss_points(top, degree, degree + 2).chosen(
+        np.concatenate([place[top, low], place[low, top], place[top, 2:], place[2:top, top]])
     )
 
 
 def _loads(
-    table: StrainTable | CellTable, unknowns: Array, constants: Constants, eigenvalue: float
+    table: StrainTable | CellTable, strain: Array, displacement: Array, constants: Constants, eigenvalue: float
 ) -> tuple[Array, Array]:
-    """Stress and inertial force ω² ρ u at the points."""
+    """Stress and inertial force ω² ρ u of strain and displacement at the points."""
     lam, G = (field[..., None] for field in constants.lame)
-    strain = table.strains(unknowns)
     stress = G[:, :, None] * energy_weights(table.transverse_shear)[:, None] * strain
     stress[:, :, :3] += (lam * strain[:, :, :3].sum(axis=2))[:, :, None]
-    return stress, eigenvalue * constants.rho[..., None, None] * table.displacements(unknowns)
+    return stress, eigenvalue * constants.rho[..., None, None] * displacement
