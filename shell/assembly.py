@@ -187,15 +187,17 @@ def _hold_end(rows: Rows, end: End, tie: Tie, n: int) -> None:
 def sections(resonator: Resonator, chain: Chain, xi: Array, weights: Array) -> Section:
     """The middle surface at ξ of every element of a chain."""
     names = ("r", "tangent_r", "tangent_z", "curvature", "thickness", "thickness_slope", "position")
-    gathered: dict[str, list[Array]] = {name: [] for name in names}
-    for one, two, segment in zip(chain.breaks, chain.breaks[1:], chain.segments, strict=False):
-        points = resonator.at((one + two) / 2 + (two - one) / 2 * xi, segment)
+    breaks, segments = np.array(chain.breaks), np.array(chain.segments)
+    halves = np.diff(breaks) / 2
+    s = (breaks[:-1] + halves)[:, None] + halves[:, None] * xi
+    gathered = {name: np.empty(s.shape) for name in names}
+    for segment in np.unique(segments):
+        there = segments == segment
+        points = resonator.at(s[there].ravel(), int(segment))
         for name in names:
-            gathered[name].append(getattr(points, name))
-    halves = np.diff(np.array(chain.breaks)) / 2
-    shape = (len(halves), len(xi))
+            gathered[name][there] = getattr(points, name).reshape(-1, len(xi))
     return Section(
-        **{name: np.array(values) for name, values in gathered.items()},
-        ds=np.broadcast_to(halves[:, None], shape),
-        weight=np.broadcast_to(weights, shape),
+        **gathered,
+        ds=np.broadcast_to(halves[:, None], s.shape),
+        weight=np.broadcast_to(weights, s.shape),
     )

@@ -65,7 +65,7 @@ class ShellExtension:
     to_old: Array
     pattern: Pattern
     places: tuple[Index, ...]
-    units: tuple[Array, ...]
+    units: tuple[tuple[Array, ...], ...]
 
     def surplus(self, solution: Solution, part: int, elastic: Elastic | VaryingElastic) -> float:
         """xᵀ r of the chain, one part of the system of a mode."""
@@ -164,7 +164,7 @@ def _extend_shell(resonator: Resonator, group: ShellGroup, n: int, level: Level)
         node, amplitude = np.divmod(here, width)
         rows, columns = (node * functions * width + amplitude) * width, node * width**2 + amplitude
         where = rows[:, None] + columns
-        units.append(np.array([kind[e].take(where, mode="clip") for kind in kinds]))
+        units.append(tuple(kind[e].take(where, mode="clip") for kind in kinds))
     return ShellExtension(table, is_old, values_to_hierarchic(p), pattern, tuple(places), tuple(units))
 
 

@@ -28,6 +28,11 @@ Pair: TypeAlias = tuple[Array, Array]
 PORTION = 16  # elements integrated at a time
 TINY = 160  # unknowns of a dense matrix
 KEPT = 3_000_000  # numbers that a system may keep for the next material (24 MB)
+HELD = 31 << 20  # bytes
+
+# glibc keeps as much freed memory as twice the largest block freed (of 32 MB at most), and gives back what is more: then a
+# fifth of the time of a design would go into getting its pages anew. One block, never touched, is enough.
+np.empty(HELD, dtype=np.uint8)
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,9 +88,12 @@ class ShellGroup:
     @cached_property
     def units(self) -> tuple[Array, Array, Array]:
         """Element matrices per unit λ, G and ρ, the same material everywhere, (elements, size, size) each."""
-        one = np.ones(self.table.position.shape)
-        trace, mass = self.vary(one, 0 * one, one)
-        return trace, self.vary(0 * one, one, one)[0], mass
+        dilation, shear = station_stiffness(self.table)
+        return (
+            self.matrices(integrate_stiffness, dilation, 0),
+            self.matrices(integrate_stiffness, shear, 0),
+            self.matrices(integrate_mass, station_mass(self.table), 0),
+        )
 
     def vary(self, lam: Array, G: Array, rho: Array) -> Pair:
         """Stiffness and mass of all elements with λ, G, ρ at their stations."""
