@@ -204,17 +204,18 @@ def _flip(fit: Fit, target: FloatArray) -> Fit:
 def _spread_lags(fit: Fit, target: FloatArray) -> Fit:
     """Start two time constants from the best of a grid: their likelihood has several summits, one for each order."""
     problem = fit.problem
-    if not problem.lagged or not fit.terms or fit.terms[-1].name not in TWO_LAGS:
+    index = next((k for k, term in enumerate(fit.terms) if term.name in TWO_LAGS), None)
+    if not problem.lagged or index is None:
         return fit
-    *others, last = fit.terms
+    before, own, after = fit.terms[:index], fit.terms[index], fit.terms[index + 1 :]
     span = problem.states[0].step * problem.group
     for first in problem.tau * np.array([0.35, 0.6, 1.0, 1.6]):
         for second in first * np.array([0.1, 0.25, 0.5, 1.6, 3.0, 7.0, 20.0]):
-            parameter = last.effect.shape[0]
+            parameter = own.effect.shape[0]
             if not max(parameter.low, span / 2) < second < parameter.high:
                 continue
-            term = replace(last, shape=(float(second), *last.shape[1:]))
-            tried = _evaluate(replace(problem, tau=float(first)), (*others, term), target, SHARES[::3])
+            term = replace(own, shape=(float(second), *own.shape[1:]))
+            tried = _evaluate(replace(problem, tau=float(first)), (*before, term, *after), target, SHARES[::3])
             if tried.score < fit.score:
                 fit = tried
     return fit

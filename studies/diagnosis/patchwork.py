@@ -1,7 +1,6 @@
 """A third witness: effects that only patch up together what none of them is.
 
-With enough of them, loops, dips and lags follow any curve. A gyro may jump more than once, hear more than one line and
-have more than one spurious mode, but it has one hysteresis, one second lag, one law of each kind.
+With enough of them, dips and lines follow any curve. Effects that a gyro has once are selected once (`selection.MOST`).
 """
 
 import itertools
@@ -10,19 +9,14 @@ from collections.abc import Sequence
 from studies.diagnosis.baseline import Term
 from studies.diagnosis.fit import Fit, intervals
 
-MOST = {"jump": 2, "periodic": 2, "activity-dip": 2, "loss-peak": 2}
-"""How often an effect may stand in one response; all others once."""
 APART = 3.0
 """Distance of two dips or peaks over the sum of their widths, from which on they are two."""
 
 
 def patched(fit: Fit) -> bool:
-    """Whether an effect repeats where it cannot, or effects cancel: none of their coefficients is known to better than itself."""
+    """Whether dips or peaks overlap, or effects cancel: none of their coefficients is known to better than itself."""
     terms = fit.terms
-    names = [term.name for term in terms]
-    if any(names.count(name) > MOST.get(name, 1) for name in names) or _overlap(terms):
-        return True
-    return len(terms) > 1 and any(_unknown(fit, index) for index in range(len(terms)))
+    return _overlap(terms) or (len(terms) > 1 and any(_unknown(fit, index) for index in range(len(terms))))
 
 
 def _overlap(terms: Sequence[Term]) -> bool:

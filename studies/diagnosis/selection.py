@@ -15,6 +15,8 @@ from studies.diagnosis.states import FloatArray
 from studies.diagnosis.thermometer import corrected
 
 MOST_TERMS = 4
+MOST = {"jump": 3, "periodic": 3, "activity-dip": 2, "loss-peak": 2}
+"""How often an effect may stand in one response; all others once: a gyro has one hysteresis, one second lag."""
 CONTENDERS = 5
 STARTS, SECOND_START, CLEAR = 2, 0.5, 5.0
 """Where the first evidence is `CLEAR` times the threshold, the second of the contenders is tried as a start too, if it
@@ -172,11 +174,17 @@ class _Path:
 
 def compete(fit: Fit, bank: Bank, levels: Mapping[str, float], threshold: float) -> list[Rival]:
     """Return what each contending effect would add to a fit, after polishing, strongest first."""
-    candidates = scan(bank, scan_models(fit, bank))
-    nets = sorted(candidates, key=lambda c: levels[c.term.name] - c.gain)
+    nets = _strongest(fit, bank, levels)
     if not nets or nets[0].gain - levels[nets[0].term.name] < 0.6 * threshold:
         return []
     return polish_contenders(fit, nets, levels)
+
+
+def _strongest(fit: Fit, bank: Bank, levels: Mapping[str, float]) -> list[Candidate]:
+    """Return the candidates that a fit has room for, the largest net gain first."""
+    names = [term.name for term in fit.terms]
+    free = [c for c in scan(bank, scan_models(fit, bank)) if names.count(c.term.name) < MOST.get(c.term.name, 1)]
+    return sorted(free, key=lambda c: levels[c.term.name] - c.gain)
 
 
 def polish_contenders(fit: Fit, nets: Sequence[Candidate], levels: Mapping[str, float]) -> list[Rival]:
@@ -245,8 +253,7 @@ def _settle(plain: Fit, fit: Fit, bank: Bank, levels: Mapping[str, float], thres
     places = []
     for evidence, index, without in found:
         name = fit.terms[index].name
-        candidates = scan(bank, scan_models(without, bank))
-        nets = sorted(candidates, key=lambda c: levels[c.term.name] - c.gain)
+        nets = _strongest(without, bank, levels)
         rivals = [r for r in polish_contenders(without, nets, levels) if r.name != name]
         rivals.insert(0, Rival(name, evidence, fit))
         places.append(Found(index, name, evidence, tuple(sorted(rivals, key=lambda r: -r.evidence))))

@@ -141,6 +141,17 @@ def corrected(fit: Fit) -> Fit:
     """Return the fit with the temperature that static effects and radiation see brought up to date."""
     if fit.problem.response != "frequency_Hz":
         return fit
+    fit = _updated(fit)
+    for index, term in enumerate(fit.terms):
+        if term.effect.sees_heat:
+            # which law of conductance holds shows only once the temperature is right
+            other = replace(term, shape=(*term.shape[:-1], 1.0 - term.shape[-1]))
+            terms = (*fit.terms[:index], other, *fit.terms[index + 1 :])
+            fit = min(fit, _updated(fit_terms(fit.problem, terms, rounds=3)), key=lambda tried: tried.score)
+    return fit
+
+
+def _updated(fit: Fit) -> Fit:
     for _ in range(UPDATES):
         problem = replace(fit.problem, correction=thermal_correction(fit))
         before, fit = fit, fit_terms(problem, _with_heat(fit), rounds=3)
