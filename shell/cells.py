@@ -70,11 +70,11 @@ class CellTable:
         return found.reshape(count, 10, functions**2)
 
     def loads(self, stress: Array, force: Array) -> Array:
-        """∫ (σ : ε(φ) - f · φ) dV of all functions, (cells, functions, 3), for stress (cells, 6, points), force (cells, 3, points)."""
+        """∫ (σ : ε(φ) - f · φ) dV of all functions, (cells, functions, 3), for stress and force (cells, 1, 6 or 3, points)."""
         count, points = self.radius.shape
-        dual = strain_of_gradients(self.n).reshape(6, 9).T @ (stress * self.volume)
+        dual = strain_of_gradients(self.n).reshape(6, 9).T @ (stress[:, 0] * self.volume)
         dual = dual.reshape(count, 3, 3, points)
-        dual[:, ZERO] -= force * (self.volume * self.radius[:, None])
+        dual[:, ZERO] -= force[:, 0] * (self.volume * self.radius[:, None])
         return np.asarray((np.swapaxes(self.gradients, 2, 3) @ np.swapaxes(dual, 2, 3)).sum(axis=1))
 
 

@@ -22,7 +22,6 @@ from shell.solution import AlongMeridian, EnergyFractions, Solution, total
 
 THEORIES = ("solid", "shell", "rayleigh")
 THICKEST_SHELL = 0.1  # h/R up to which shell theory has been held against the solid
-THINNEST = 1e-6  # h/R below which double precision loses the digits
 
 
 class TheoryRangeWarning(UserWarning):
@@ -116,7 +115,7 @@ def solve_modes(
     """The lowest modes of one circumferential harmonic, without rigid motions.
 
     The polynomial orders rise until what the next functions of every element would still change lies within `tolerance`;
-    that is the error estimate (see shell.surplus).
+    that is the error estimate (see shell.surplus), to which thin shells add what double precision loses (shell.rounding).
 
     Parameters
     ----------
@@ -215,13 +214,6 @@ def _check_range(resonator: Resonator, theory: Theory) -> None:
         warnings.warn(
             f"h/R = {ratio:.3g} is {ratio / THICKEST_SHELL:.2g} times the thickest ({THICKEST_SHELL:g}) for which the "
             f"{theory} theory is meant: use the solid theory.",
-            TheoryRangeWarning,
-            stacklevel=3,
-        )
-    thinnest = min(value for _, value in resonator.thickness) / resonator.size
-    if theory != "rayleigh" and thinnest < THINNEST:
-        warnings.warn(
-            f"h/R = {thinnest:.3g} is {THINNEST / thinnest:.2g} times thinner than double precision resolves ({THINNEST:g}).",
             TheoryRangeWarning,
             stacklevel=3,
         )

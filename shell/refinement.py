@@ -5,6 +5,7 @@ from shell.eigen import Factor, Iteration, whole_pattern
 from shell.elastic import Elastic, VaryingElastic
 from shell.levels import LEVELS, Theory
 from shell.resonator import Resonator
+from shell.rounding import THIN, find_loss
 from shell.solution import Constants, Solution, find_constants
 from shell.surplus import estimate_error
 from shell.system import System
@@ -18,12 +19,20 @@ def refine(
     theory: Theory,
     tolerance: float,
 ) -> tuple[list[Solution], list[float]]:
-    """The `count` lowest elastic modes of the first level whose estimated errors lie within `tolerance`, and these errors."""
+    """The `count` lowest elastic modes of the first level whose estimated errors lie within `tolerance`, and these errors.
+
+    An error has two parts: what the level lacks, and what the arithmetic loses in a thin shell; where the second is the
+    larger, a finer level would only lose more.
+    """
+    thinnest = min(value for _, value in resonator.thickness) / resonator.size
+    density = _density(elastic)
     for level in LEVELS[theory]:
         system = build_system(resonator, n, theory, level)
-        solutions = solve_level(system, resonator.size, elastic, count, max(1e-6 * tolerance, 1e-13))
-        errors = [estimate_error(resonator, elastic, solution) for solution in solutions]
-        if max(errors) <= tolerance:
+        solutions, factor = _solve(system, resonator.size, elastic, count, max(1e-6 * tolerance, 1e-13))
+        lacking = [estimate_error(resonator, elastic, solution) for solution in solutions]
+        lost = [find_loss(solution, factor, density) if thinnest < THIN else 0.0 for solution in solutions]
+        errors = [one + other for one, other in zip(lacking, lost, strict=True)]
+        if max(errors) <= tolerance or max(lost) > max(lacking):
             break
     return solutions, errors
 
@@ -32,22 +41,30 @@ def solve_level(
     system: System, size: float, elastic: Elastic | VaryingElastic, count: int, accuracy: float
 ) -> list[Solution]:
     """The `count` lowest elastic modes of one system, for a resonator of radius `size`, m; `accuracy` is that of ω²."""
+    return _solve(system, size, elastic, count, accuracy)[0]
+
+
+def _solve(
+    system: System, size: float, elastic: Elastic | VaryingElastic, count: int, accuracy: float
+) -> tuple[list[Solution], Factor]:
+    """The modes of one system and the factor of its stiffness over ρ (where ρ is the same everywhere)."""
     constants = tuple(
         find_constants(group.table.position, elastic, group.table.plane_stress) for group in system.groups
     )
     # a small shift factors the rigid motions and leaves the elastic modes in order
     shift = 1e-2 * constants[0].wave_speed_squared / size**2 if system.rigid_motions else 0.0
     wanted = count + system.rigid_motions
-    vectors = _begin(system, elastic, constants, shift).converge(wanted, accuracy)
+    iteration = _begin(system, elastic, constants, shift)
+    vectors = iteration.converge(wanted, accuracy)
     found = [Solution(system, constants, vector) for vector in vectors.T[:wanted]]
-    return sorted(found, key=lambda solution: solution.eigenvalue)[system.rigid_motions :]
+    return sorted(found, key=lambda solution: solution.eigenvalue)[system.rigid_motions :], iteration.factor
 
 
 def _begin(
     system: System, elastic: Elastic | VaryingElastic, constants: tuple[Constants, ...], shift: float
 ) -> Iteration:
     """Factor K + shift M; both over ρ where it is the same everywhere."""
-    uniform, rho = (True, elastic.rho) if isinstance(elastic, Elastic) else (False, 1.0)
+    uniform, rho = isinstance(elastic, Elastic), _density(elastic)
     if uniform and system.is_tiny:
         trace, shear, mass = system.whole
         lam, G = (field[0, 0] / rho for field in constants[0].lame)
@@ -57,3 +74,8 @@ def _begin(
     )
     K, M = system.operators(lam, G, density, uniform, shift)
     return Iteration(Factor(system.pattern, K), M)
+
+
+def _density(elastic: Elastic | VaryingElastic) -> float:
+    """What the equations are divided by: ρ where it is the same everywhere."""
+    return elastic.rho if isinstance(elastic, Elastic) else 1.0

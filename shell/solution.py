@@ -6,8 +6,9 @@ from math import pi
 
 import numpy as np
 
+from shell.cells import CellTable
 from shell.elastic import Elastic, VaryingElastic
-from shell.kernel import energy_weights, lame, lame_slopes, shell_table
+from shell.kernel import StrainTable, energy_weights, lame, lame_slopes, shell_table
 from shell.quadrature import Array, Basis, legendre
 from shell.system import Group, ShellGroup, System
 
@@ -25,6 +26,13 @@ class Constants:
     def lame(self) -> tuple[Array, Array]:
         """λ (that of plane stress in shell theory) and G."""
         return lame(self.E, self.nu, self.plane_stress)
+
+    def stress(self, table: StrainTable | CellTable, strain: Array) -> Array:
+        """Stresses (elements, stations, 6, points) of such strains, Pa."""
+        lam, G = (field[..., None] for field in self.lame)
+        stress = G[:, :, None] * energy_weights(table.transverse_shear)[:, None] * strain
+        stress[:, :, :3] += (lam * np.add.reduce(strain[:, :, :3], axis=2))[:, :, None]
+        return np.asarray(stress)
 
     @property
     def wave_speed_squared(self) -> float:
@@ -107,6 +115,21 @@ class Solution:
     def displacement(self) -> list[Array]:
         """Displacements (elements, stations, 3, points) of every group, in its own axes."""
         return [group.table.displacements(q) for group, q in zip(self.system.groups, self.unknowns, strict=True)]
+
+    @cached_property
+    def stress(self) -> list[Array]:
+        """Stresses (elements, stations, 6, points) of every group, Pa."""
+        return [
+            c.stress(group.table, e)
+            for c, group, e in zip(self.constants, self.system.groups, self.strain, strict=True)
+        ]
+
+    @cached_property
+    def force(self) -> list[Array]:
+        """Inertial forces ω² ρ u (elements, stations, 3, points) of every group, N/m³."""
+        return [
+            self.eigenvalue * c.rho[..., None, None] * d for c, d in zip(self.constants, self.displacement, strict=True)
+        ]
 
     @cached_property
     def squares(self) -> list[tuple[Array, Array]]:

@@ -22,11 +22,11 @@ from shell.cells import CellTable, Reference, at_gauss_points, cell_stiffness, i
 from shell.constraints import Index
 from shell.eigen import Factor, Pattern, find_pattern
 from shell.elastic import Elastic, VaryingElastic
-from shell.kernel import StrainTable, energy_weights, pair_stiffness, shell_table, station_stiffness
+from shell.kernel import StrainTable, pair_stiffness, shell_table, station_stiffness
 from shell.levels import Level
 from shell.quadrature import Array, at_gauss, gauss, hierarchic, legendre, values_to_hierarchic
 from shell.resonator import Resonator
-from shell.solution import Constants, Solution, find_constants, total
+from shell.solution import Solution, find_constants, total
 from shell.system import ShellGroup, SolidGroup, System
 
 ALONG = 2  # degrees added along the shell
@@ -74,8 +74,9 @@ class ShellExtension:
         old = self.to_old @ q.reshape(len(q), len(self.to_old), -1)
         refined = np.zeros((len(q), len(self.to_old) + ALONG, len(self.is_old)))
         refined[:, :-ALONG, self.is_old] = old
-        strain, moved = self.table.strains(refined), self.table.displacements(refined)
-        r = self.table.loads(*_loads(self.table, strain, moved, constants, solution.eigenvalue)).reshape(len(q), -1)
+        stress = constants.stress(self.table, self.table.strains(refined))
+        force = solution.eigenvalue * constants.rho[..., None, None] * self.table.displacements(refined)
+        r = self.table.loads(stress, force).reshape(len(q), -1)
         load = np.zeros(self.pattern.size)
         for members, own, places in zip(self.pattern.unknowns, r, self.places, strict=True):
             load[members] += own[places]
@@ -103,10 +104,7 @@ class SolidExtension:
     def surplus(self, solution: Solution, part: int, elastic: Elastic | VaryingElastic) -> float:
         """xᵀ r of all cells, one part of the system of a mode."""
         constants = solution.constants[part]
-        stress, force = _loads(
-            self.table, solution.strain[part], solution.displacement[part], constants, solution.eigenvalue
-        )
-        r = self.table.loads(stress[:, 0], force[:, 0])
+        r = self.table.loads(solution.stress[part], solution.force[part])
         lam, G = (field[:, 0] for field in constants.lame)
         K = cell_stiffness(self.products, lam, G, self.table.n)
         k = np.diagonal(K, axis1=1, axis2=2).reshape(r.shape)
@@ -186,13 +184,3 @@ def _next_functions(degree: int) -> Reference:
     return at_gauss_points(top, degree, degree + 2).chosen(
         np.concatenate([place[top, low], place[low, top], place[top, 2:], place[2:top, top]])
     )
-
-
-def _loads(
-    table: StrainTable | CellTable, strain: Array, displacement: Array, constants: Constants, eigenvalue: float
-) -> tuple[Array, Array]:
-    """Stress and inertial force ω² ρ u of strain and displacement at the points."""
-    lam, G = (field[..., None] for field in constants.lame)
-    stress = G[:, :, None] * energy_weights(table.transverse_shear)[:, None] * strain
-    stress[:, :, :3] += (lam * strain[:, :, :3].sum(axis=2))[:, :, None]
-    return stress, eigenvalue * constants.rho[..., None, None] * displacement

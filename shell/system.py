@@ -85,6 +85,12 @@ class ShellGroup:
             amplitudes[node] = inner
         return np.asarray(unknowns)
 
+    def gather(self, loads: Array) -> Array:
+        """Loads (elements, functions, amplitudes) on the unknowns (elements, size) that are solved for."""
+        for element, node in self.anchors:
+            loads[element, node] = loads[element].sum(axis=0)
+        return loads.reshape(self.unknowns.shape)
+
     @cached_property
     def units(self) -> tuple[Array, Array, Array]:
         """Element matrices per unit λ, G and ρ, the same material everywhere, (elements, size, size) each."""
@@ -121,6 +127,10 @@ class SolidGroup:
     def spread(self, raw: Array) -> Array:
         """Unknowns (cells, size) of functions as they are in each cell."""
         return np.asarray(raw[self.unknowns] * np.repeat(self.place.signs, 3, axis=1))
+
+    def gather(self, loads: Array) -> Array:
+        """Loads (cells, functions, 3) of functions as they are in each cell, on the unknowns (cells, size)."""
+        return (loads * self.place.signs[..., None]).reshape(self.unknowns.shape)
 
     @cached_property
     def products(self) -> Array:
@@ -249,6 +259,13 @@ class System:
         """Element unknowns (elements, size) of every group from the free unknowns of one vector."""
         raw = self.constraint @ free
         return [group.spread(raw) for group in self.groups]
+
+    def gather(self, loads: list[Array]) -> Array:
+        """Loads on the free unknowns from those on the functions of every group."""
+        raw = np.zeros(self.constraint.shape[0])
+        for group, own in zip(self.groups, loads, strict=True):
+            np.add.at(raw, group.unknowns, group.gather(own))
+        return np.asarray(self.constraint.T @ raw)
 
 
 @dataclass(frozen=True, eq=False)
