@@ -105,6 +105,9 @@ def diagnose(
     instrument = None if card is None else load_card(card)
     reference = None if instrument is None else instrument.reference_temperature - 273.15
     campaign = load_campaign([read_record(path) for path in runs], reference)
+    if instrument is not None:
+        for run in campaign.runs:
+            instrument.material.check(run.states.housing)
     diagnosis = investigate(
         campaign,
         None if instrument is None else law_of(instrument),

@@ -23,13 +23,19 @@ WELL_CONDUCTING = 2000.0
 
 
 def law_of(instrument: "Instrument") -> Law:
-    """Return the relative frequency of the card's material law, √(E/((1+ν)ρ)) over its growth (HRG paper eq. 15)."""
+    """Return the relative frequency of the card's material law, √(E/((1+ν)ρ)) over its growth (HRG paper eq. 15).
+
+    A cubic spline through a value every kelvin of the law's range: a diagnosis asks for it some ten thousand times.
+    """
+    from scipy.interpolate import CubicSpline
+
     material, reference = instrument.material, instrument.reference_temperature
+    T = np.linspace(material.lowest, material.highest, max(int(material.highest - material.lowest), 8) + 1)
+    E, nu, rho = (material.value(name, T) for name in ("youngs_modulus", "poisson_ratio", "density"))
+    spline = CubicSpline(T, np.sqrt(E / ((1.0 + nu) * rho)) / material.growth(T, reference))
 
     def law(temperature: "np.ndarray[Any, np.dtype[np.float64]]") -> "np.ndarray[Any, np.dtype[np.float64]]":
-        T = np.asarray(temperature, dtype=float)
-        E, nu, rho = (material.value(name, T) for name in ("youngs_modulus", "poisson_ratio", "density"))
-        return np.asarray(np.sqrt(E / ((1.0 + nu) * rho)) / material.growth(T, reference))
+        return np.asarray(spline(temperature))
 
     return law
 
@@ -66,6 +72,8 @@ def _entry(fit: Fit, index: int, response: str) -> dict[str, Any]:
     scale = float(fit.linear.coefficients[1]) if term.effect.acts_on == "temperature" else 1.0
     entry: dict[str, Any] = {"name": term.name, "response": response}
     entry |= {p.name: float(value) for p, value in zip(term.effect.shape, term.shape, strict=True)}
+    if term.effect.sees_heat:  # the fit knew the temperature with it; a simulation has to solve for it
+        entry["share_of_form"] = float(np.clip(fit.coefficients_of(index)[0] / scale, 0.0, 1.0))
     names = term.effect.coefficient_names(response, term.count)
     entry |= {name: float(value / scale) for name, value in zip(names, fit.coefficients_of(index), strict=True)}
     return entry

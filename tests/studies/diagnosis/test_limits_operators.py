@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
+from studies.diagnosis.effects import apply_effect
 from studies.diagnosis.likelihood import KERNELS, NoiseBasis, fit_linear
-from studies.diagnosis.states import average, lag, play
+from studies.diagnosis.states import States, average, lag, play
 
 
 @pytest.mark.parametrize("tau", [40.0, 900.0, 2e4])
@@ -62,3 +63,24 @@ def test_walk_kernel_is_brownian_with_a_past():
 
 def test_average_leaves_out_an_incomplete_group():
     assert np.allclose(average(np.arange(7.0), 3), [1.0, 4.0])
+
+
+def test_radiation_of_a_saved_card_solves_the_exchange_of_heat():
+    """Forward, at the fitted share: against small explicit steps of τ T′ = (1 − ρ)(T_h − T) + ρ (T_h⁴ − T⁴)/(4 T₀³)."""
+    share, tau, step = 0.6, 1200.0, 10.0
+    time = np.arange(0.0, 20000.0, step)
+    housing = 293.15 + 30.0 * np.sin(time / 2500.0)
+    states = States(0, time, time, housing, housing, 1.0, 285.0).with_lag(tau)
+    _, change = apply_effect(
+        "radiation", {"share_of_form": share, "exchange": 1.0, "radiated_share": share}, states, "frequency_Hz"
+    )
+    fine = np.arange(0.0, 20000.0, 0.5)
+    drive = np.interp(fine, time, housing)
+    T = np.empty_like(fine)
+    T[0] = drive[0]
+    for k in range(1, fine.size):
+        u, t = drive[k - 1], T[k - 1]
+        T[k] = t + 0.5 / tau * ((1.0 - share) * (u - t) + share * (u**4 - t**4) / (4.0 * 293.15**3))
+    exact = np.interp(time, fine, T)
+    assert np.abs(exact - states.resonator).max() > 0.4
+    assert np.abs(states.resonator + change - exact).max() < 0.01
