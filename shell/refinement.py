@@ -10,6 +10,8 @@ from shell.solution import Constants, Solution, find_constants
 from shell.surplus import estimate_error
 from shell.system import System
 
+UNDONE = 1e-2  # share of the tolerance, as error of ω², at which the iteration may stop
+
 
 def refine(
     resonator: Resonator,
@@ -28,7 +30,7 @@ def refine(
     density = _density(elastic)
     for level in LEVELS[theory]:
         system = build_system(resonator, n, theory, level)
-        solutions, factor = _solve(system, resonator.size, elastic, count, max(1e-6 * tolerance, 1e-13))
+        solutions, factor = _solve(system, resonator.size, elastic, count, max(UNDONE * tolerance, 1e-13))
         lacking = [estimate_error(resonator, elastic, solution) for solution in solutions]
         lost = [find_loss(solution, factor, density) if thinnest < THIN else 0.0 for solution in solutions]
         errors = [one + other for one, other in zip(lacking, lost, strict=True)]
