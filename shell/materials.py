@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from shell.elastic import Elastic
 from shell.errors import ShellError
+from shell.quadrature import gauss
 
 ZERO_CELSIUS = 273.15
 PROPERTIES = {
@@ -151,7 +152,7 @@ class Material:
             raise ShellError(self._lack("expansion"))
         T = self.check(temperature)
         self.check(reference)
-        x, w = np.polynomial.legendre.leggauss(16)
+        x, w = gauss(16)
         half = (T - reference) / 2
         nodes = reference + half[..., None] * (1 + x)
         return np.asarray(np.exp(half * (self.properties["expansion"](nodes) @ w)))

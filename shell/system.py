@@ -28,11 +28,6 @@ Pair: TypeAlias = tuple[Array, Array]
 PORTION = 16  # elements integrated at a time
 TINY = 160  # unknowns of a dense matrix
 KEPT = 3_000_000  # numbers that a system may keep for the next material (24 MB)
-HELD = 31 << 20  # bytes
-
-# glibc keeps as much freed memory as twice the largest block freed (of 32 MB at most), and gives back what is more: then a
-# fifth of the time of a design would go into getting its pages anew. One block, never touched, is enough.
-np.empty(HELD, dtype=np.uint8)
 
 
 @dataclass(frozen=True, eq=False)
