@@ -87,7 +87,11 @@ def fit_terms(problem: Problem, terms: Sequence[Term], rounds: int = ROUNDS) -> 
         return fit
     if rounds == ROUNDS:
         fit = _evaluate(problem, _place_jumps(_flip(fit, target), target), target, SHARES)
-        fit = _spread_lags(fit, target)
+        return min((_polish(start, target, rounds) for start in _spread_lags(fit, target)), key=lambda one: one.score)
+    return _polish(fit, target, rounds)
+
+
+def _polish(fit: Fit, target: FloatArray, rounds: int) -> Fit:
     knobs = _knobs(fit)
     for _ in range(rounds if knobs else 0):
         better = _gauss_newton(fit, knobs, target)
@@ -201,15 +205,20 @@ def _flip(fit: Fit, target: FloatArray) -> Fit:
     return fit
 
 
-def _spread_lags(fit: Fit, target: FloatArray) -> Fit:
-    """Start two time constants from the best of a grid: their likelihood has several summits, one for each order."""
+def _spread_lags(fit: Fit, target: FloatArray) -> list[Fit]:
+    """Return starts for two time constants: their likelihood has several summits, one for each order.
+
+    The best of a grid as it stands, and the best once the derivatives of all shapes are free: a summit is narrow in the
+    larger of the two, and a grid passes beside it.
+    """
     problem = fit.problem
     index = next((k for k, term in enumerate(fit.terms) if term.name in TWO_LAGS), None)
     if not problem.lagged or index is None:
-        return fit
+        return [fit]
+    ahead, least = fit, np.inf
     before, own, after = fit.terms[:index], fit.terms[index], fit.terms[index + 1 :]
     span = problem.states[0].step * problem.group
-    for first in problem.tau * np.array([0.35, 0.6, 1.0, 1.6]):
+    for first in problem.tau * np.array([0.35, 0.6, 1.0, 1.25, 1.6]):
         for second in first * np.array([0.1, 0.25, 0.5, 1.6, 3.0, 7.0, 20.0]):
             parameter = own.effect.shape[0]
             if not max(parameter.low, span / 2) < second < parameter.high:
@@ -218,7 +227,11 @@ def _spread_lags(fit: Fit, target: FloatArray) -> Fit:
             tried = _evaluate(replace(problem, tau=float(first)), (*before, term, *after), target, SHARES[::3])
             if tried.score < fit.score:
                 fit = tried
-    return fit
+            free = problem.basis.rotate(np.concatenate([tried.columns(), jacobian_of(tried)], axis=1))
+            score = fit_linear(problem.basis, target, free, SHARES[::3]).score
+            if score < least:
+                ahead, least = tried, score
+    return [fit, ahead]
 
 
 def _place_jumps(fit: Fit, target: FloatArray) -> tuple[Term, ...]:
