@@ -1,6 +1,6 @@
 """Forward selection: add the hypothesis with the strongest evidence until nothing beyond chance is left."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -165,7 +165,7 @@ class _Path:
             rivals = compete(self.fit, self.bank, levels, threshold)
             if not rivals or rivals[0].evidence < threshold + BESIDE * (plain.score - self.fit.score):
                 break
-            self.fit = corrected(rivals[0].fit)
+            self.fit = corrected(_with_orders(rivals[0].fit, range(len(self.fit.terms))))
 
     def cost(self, levels: Mapping[str, float], threshold: float) -> float:
         """Minus twice the log-likelihood, and what every effect must bring to be named."""
@@ -196,7 +196,7 @@ def polish_contenders(fit: Fit, nets: Sequence[Candidate], levels: Mapping[str, 
         if candidate.gain - levels[candidate.term.name] < 0.5 * top - 8.0:
             continue
         problem = restricted(fit.problem, kernel=candidate.kernel)
-        polished = _with_orders(fit_terms(problem, (*fit.terms, candidate.term)))
+        polished = _with_orders(fit_terms(problem, (*fit.terms, candidate.term)), [len(fit.terms)])
         if not (_possible(polished) and _rests_on(polished) >= FEWEST_ROWS):
             continue
         evidence = least.over(polished) - levels[candidate.term.name]
@@ -204,15 +204,16 @@ def polish_contenders(fit: Fit, nets: Sequence[Candidate], levels: Mapping[str, 
     return sorted(rivals, key=lambda rival: -rival.evidence)
 
 
-def _with_orders(fit: Fit) -> Fit:
-    """Return the fit with as many further orders of the effect added last as pay for themselves."""
-    *others, last = fit.terms
-    if not last.effect.nested or last.count < 2:
-        return fit
-    for count in range(last.count + 1, len(last.effect.coefficients) + 1):
-        longer = fit_terms(fit.problem, (*others, replace(last, count=count)), rounds=2)
-        if longer.score < fit.score - ORDER_PRICE * (count - fit.terms[-1].count):
-            fit = longer
+def _with_orders(fit: Fit, places: Iterable[int]) -> Fit:
+    """Return the fit with as many further orders of the laws at some places as pay for themselves."""
+    for place in places:
+        for count in range(fit.terms[place].count + 1, len(fit.terms[place].effect.coefficients) + 1):
+            if not fit.terms[place].effect.nested:
+                break
+            terms = [replace(term, count=count) if k == place else term for k, term in enumerate(fit.terms)]
+            longer = fit_terms(fit.problem, terms, rounds=2)
+            if longer.score < fit.score - ORDER_PRICE * (count - fit.terms[place].count):
+                fit = longer
     return fit
 
 
