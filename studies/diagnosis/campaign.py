@@ -18,6 +18,8 @@ MOST_BINS = 800
 FINEST = 20
 FEWEST_BINS = 24
 LONGEST_GAP = 900.0
+FASTEST = 1.0
+"""Mean rate of temperature over a record, K/s, beyond which its time cannot be in seconds."""
 UNKNOWN_HEAT = 50.0
 """Area between temperature and line, K s, that a gap may hide: 50 mK of the resonator at a time constant of 1000 s."""
 
@@ -203,6 +205,15 @@ def _check_units(records: Sequence[Record], tables: Sequence[dict[str, FloatArra
         if "inverse_q" in table and not 0.0 < (value := float(np.nanmedian(table["inverse_q"]))) < 0.1:
             raise InputError(
                 f"{where}: inverse_q is about {value:g}; it must be 1/Q, between 0 and 0.1. Is it Q itself?"
+            )
+        temperature = table["temperature"][np.isfinite(table["temperature"])]
+        if not temperature.size:
+            continue
+        lasts = float(np.ptp(table["time_s"]))
+        if np.subtract(*np.percentile(temperature, [95, 5])) > FASTEST * max(lasts, 1e-9):
+            raise InputError(
+                f"{where}: the temperature moves by {np.ptp(temperature):.3g} K within {lasts:.3g} s; no chamber does. "
+                "time_s must be in seconds: is it in minutes or hours?"
             )
 
 

@@ -183,7 +183,10 @@ def inquire(
         selection = with_clock(selection, campaign)
     leftover = strongest(leftover_evidence(selection.fit, bases), generic_levels)
     if patched(selection.fit):
-        leftover = Leftover("effects that cancel or overlap", max(selection.found[-1].evidence, leftover.evidence))
+        leftover = Leftover(
+            "temperature and time, where the named effects cancel or overlap",
+            max(selection.found[-1].evidence, leftover.evidence),
+        )
     sharp = sharp_leftover(selection.fit)
     if sharp.evidence > max(leftover.evidence, BESIDE * (selection.plain.score - selection.fit.score)):
         leftover = sharp

@@ -412,7 +412,8 @@ def _plan_picture(cases, plans):
             ax.plot([0, 100], [0, 100], color="#5b6470", linewidth=0.8)
             ax.set(xlabel="predicted / %", ylabel="measured / %", xlim=(-3, 103), ylim=(-3, 103))
             ax.set_title(f"pooled by {title}", loc="left", fontsize=10)
-        axes[0].legend(loc="lower right", fontsize=8)
+        if axes[0].get_legend_handles_labels()[0]:
+            axes[0].legend(loc="lower right", fontsize=8)
         return draw(
             made,
             "Predicted and measured shares of the four outcomes with 90 % bands of the count; grey: within ten points.",
