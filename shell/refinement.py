@@ -10,7 +10,7 @@ from shell.solution import Constants, Solution, find_constants
 from shell.surplus import estimate_error
 from shell.system import System
 
-UNDONE = 1e-2  # share of the tolerance, as error of ω², at which the iteration may stop
+UNDONE = 1e-4  # share of the tolerance, as error of ω², at which the iteration stops: sensitivities feel the root of it
 
 
 def refine(
