@@ -1,0 +1,68 @@
+"""Records that cannot be of one gyro in the stated units."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from studies.diagnosis.states import FloatArray
+from studies.errors import InputError
+from studies.record import Record
+
+FEWEST_ROWS = 24
+"""Rows from which on the noise of a column can be told."""
+FASTEST = 1.0
+"""Mean rate of temperature over a record, K/s, beyond which its time cannot be in seconds."""
+
+
+def check_units(records: Sequence[Record], tables: Sequence[dict[str, FloatArray]]) -> None:
+    """Raise InputError when a column can hardly be in the unit that its name says."""
+    for record, table in zip(records, tables, strict=True):
+        where = record.path or "record"
+        if "frequency_Hz" in table and not 100.0 < (value := float(np.nanmedian(table["frequency_Hz"]))) < 1e6:
+            raise InputError(
+                f"{where}: frequency_Hz is about {value:g}; a resonator vibrates at 100 Hz to 1 MHz. Is it in another unit?"
+            )
+        if "inverse_q" in table and not 0.0 < (value := float(np.nanmedian(table["inverse_q"]))) < 0.1:
+            raise InputError(
+                f"{where}: inverse_q is about {value:g}; it must be 1/Q, between 0 and 0.1. Is it Q itself?"
+            )
+        temperature = table["temperature"][np.isfinite(table["temperature"])]
+        if not temperature.size:
+            continue
+        lasts = float(np.ptp(table["time_s"]))
+        if np.subtract(*np.percentile(temperature, [95, 5])) > FASTEST * max(lasts, 1e-9):
+            raise InputError(
+                f"{where}: the temperature moves by {np.ptp(temperature):.3g} K within {lasts:.3g} s; no chamber does. "
+                "time_s must be in seconds: is it in minutes or hours?"
+            )
+
+
+def check_device(records: Sequence[Record], tables: Sequence[dict[str, FloatArray]]) -> None:
+    """Raise InputError when the records can hardly be of one gyro."""
+    names = {record.instrument: record.path for record in records if record.instrument}
+    if len(names) > 1:
+        (one, first), (two, second), *_ = names.items()
+        raise InputError(f"{second}: instrument '{two}' is not that of {first}, '{one}'; diagnose one gyro at a time.")
+    for name, most in (("frequency_Hz", 1.03), ("inverse_q", 30.0)):
+        levels = [
+            (float(np.nanmedian(table[name])), record.path)
+            for record, table in zip(records, tables, strict=True)
+            if name in table
+        ]
+        if levels and max(levels)[0] > most * min(levels)[0]:
+            raise InputError(
+                f"{max(levels)[1]}: {name} is about {max(levels)[0]:g}, in {min(levels)[1]} about {min(levels)[0]:g}; "
+                "the records are of different gyros, or one is in another unit."
+            )
+    spreads = []
+    for record, table in zip(records, tables, strict=True):
+        if "bias_deg_per_h" in table and np.isfinite(table["bias_deg_per_h"]).sum() > FEWEST_ROWS:
+            known = table["bias_deg_per_h"][np.isfinite(table["bias_deg_per_h"])]
+            noise = float(np.median(np.abs(np.diff(known))))
+            if noise > 0:
+                spreads.append((noise, record.path))
+    if spreads and max(spreads)[0] > 150.0 * min(spreads)[0]:
+        raise InputError(
+            f"{max(spreads)[1]}: bias_deg_per_h is {max(spreads)[0] / min(spreads)[0]:.0f} times as noisy as in "
+            f"{min(spreads)[1]}; one of the two is in another unit, or of another gyro."
+        )
