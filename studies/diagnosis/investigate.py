@@ -29,7 +29,7 @@ SPARSE = 60.0
 """Sampling, s, beyond which thresholds of the frequency grow: the housing between two rows is anyone's guess."""
 LEFT_OVER, LEFT_OVER_SHARE = 30.0, 0.03
 """Evidence of the generic witness that counts, and its least part of what was explained: no noise model is exact."""
-FURTHER = 120.0
+FURTHER = 50.0
 """Evidence at which a further cause beside the strongest deserves two thirds of its claim (measured on the generator)."""
 LEAK = 0.002
 """Part of the evidence in the frequency that a cause in another response must have: its thermometer is not exact."""
