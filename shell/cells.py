@@ -40,7 +40,8 @@ class CellTable:
 
     def part(self, cells: slice) -> "CellTable":
         """The table of some of the cells."""
-        return CellTable(self.gradients[cells], self.radius[cells], self.volume[cells], self.position[cells], self.n)
+        cut = {name: getattr(self, name)[cells] for name in ("gradients", "radius", "volume", "position")}
+        return replace(self, **cut)
 
     def strains(self, unknowns: Array) -> Array:
         """Strain (cells, 1, 6, points) of cell unknowns (cells, functions x 3)."""

@@ -105,12 +105,12 @@ def diagnose(
     instrument = None if card is None else load_card(card)
     reference = None if instrument is None else instrument.reference_temperature - 273.15
     campaign = load_campaign([read_record(path) for path in runs], reference)
+    law = None
     if instrument is not None:
-        for run in campaign.runs:
-            instrument.material.check(run.states.housing)
+        law = law_of(instrument, np.concatenate([np.empty(0), *(run.states.housing for run in campaign.runs)]))
     diagnosis = investigate(
         campaign,
-        None if instrument is None else law_of(instrument),
+        law,
         draws if calibrate else 0,
         np.random.default_rng(seed),
     )

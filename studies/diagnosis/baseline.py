@@ -293,15 +293,20 @@ def restricted(problem: Problem, keep: Sequence[np.ndarray] | None = None, kerne
 
 def choose_kernel_score(problem: Problem) -> float:
     """Return the score of the baseline under the kind of slow noise that suits it best."""
-    return min(fit_at(restricted(problem, kernel=kernel), problem.tau).score for kernel in KERNELS)
+    return min(score for _, score in _beside_every_noise(problem))
+
+
+def _beside_every_noise(problem: Problem, terms: Sequence[Term] = ()) -> list[tuple[Problem, float]]:
+    """Return the problem beside every kind of slow noise, and the score that baseline and terms have there."""
+    others = [restricted(problem, kernel=kernel) for kernel in KERNELS]
+    return [(other, fit_at(other, other.tau, terms).score) for other in others]
 
 
 def choose_kernel(problem: Problem, terms: Sequence[Term] = ()) -> Problem:
     """Return the problem with the kind of slow noise that the data make most likely."""
-    tried = [restricted(problem, kernel=kernel) for kernel in KERNELS]
-    scores = [fit_at(other, other.tau, terms).score for other in tried]
-    best = int(np.argmin(scores))
-    return tried[best] if scores[best] < scores[KERNELS.index(problem.kernel)] - 1.0 else problem
+    tried = _beside_every_noise(problem, terms)
+    best, least = min(tried, key=lambda pair: pair[1])
+    return best if least < tried[KERNELS.index(problem.kernel)][1] - 1.0 else problem
 
 
 def white_level(problem: Problem) -> float:

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from studies.diagnosis.checks import check_device, check_units
+from studies.diagnosis.checks import FEWEST_BINS, check_device, check_units
 from studies.diagnosis.effects import RESPONSES
 from studies.diagnosis.outliers import find_outliers
 from studies.diagnosis.states import FloatArray, States, average
@@ -17,7 +17,6 @@ TEMPERATURES = ("housing_temperature_degC", "chamber_temperature_degC", "resonat
 COMMANDS = ("drive_amplitude_V", "electrode_bias_V", "quadrature_V", "pattern_angle_deg")
 MOST_BINS = 800
 FINEST = 20
-FEWEST_BINS = 24
 LONGEST_GAP = 900.0
 UNKNOWN_HEAT = 50.0
 """Area between temperature and line, K s, that a gap may hide: 50 mK of the resonator at a time constant of 1000 s."""

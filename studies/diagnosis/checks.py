@@ -8,8 +8,8 @@ from studies.diagnosis.states import FloatArray
 from studies.errors import InputError
 from studies.record import Record
 
-FEWEST_ROWS = 24
-"""Rows from which on the noise of a column can be told."""
+FEWEST_BINS = 24
+"""Values from which on the noise of a response can be told."""
 FASTEST = 1.0
 """Mean rate of temperature over a record, K/s, beyond which its time cannot be in seconds."""
 
@@ -56,7 +56,7 @@ def check_device(records: Sequence[Record], tables: Sequence[dict[str, FloatArra
             )
     spreads = []
     for record, table in zip(records, tables, strict=True):
-        if "bias_deg_per_h" in table and np.isfinite(table["bias_deg_per_h"]).sum() > FEWEST_ROWS:
+        if "bias_deg_per_h" in table and np.isfinite(table["bias_deg_per_h"]).sum() > FEWEST_BINS:
             known = table["bias_deg_per_h"][np.isfinite(table["bias_deg_per_h"])]
             noise = float(np.median(np.abs(np.diff(known))))
             if noise > 0:

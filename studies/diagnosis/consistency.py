@@ -14,7 +14,7 @@ from scipy.stats import chi2
 
 from studies.diagnosis.baseline import Problem
 from studies.diagnosis.fit import Fit, jacobian_of
-from studies.diagnosis.likelihood import fit_linear, orthonormal
+from studies.diagnosis.likelihood import fit_linear, orthonormal, unit
 from studies.diagnosis.states import FloatArray
 
 SURVIVES = 1e-3
@@ -87,28 +87,23 @@ def consistency(fit: Fit, index: int) -> Agreement:
     model = basis.rotate(columns)
     together = fit_linear(basis, target, model).score
     root = np.sqrt(basis.weights(fit.linear.share))[:, None]
-    span = orthonormal(_unit(model) * root)
+    span = orthonormal(unit(model) * root)
     p: dict[str, float] = {}
     gains: dict[str, float] = {}
     for name, parts in splits_of(problem).items():
         apart = np.concatenate([own * part[:, None] for part in parts.T[1:]], axis=1)
         apart = basis.rotate(apart)
-        white = _unit(apart) * root
+        white = unit(apart) * root
         left = white - span @ (span.T @ white)
         size = np.linalg.svd(left, compute_uv=False) / max(float(np.linalg.norm(white, 2)), 1e-300)
         freedom = int((size > SURVIVES).sum())
         seen = np.linalg.norm(left, axis=0) > SURVIVES * np.linalg.norm(white, axis=0)
         if freedom == 0 or not seen.any():
             continue
-        split = fit_linear(basis, target, np.concatenate([_unit(model), _unit(apart[:, seen])], axis=1)).score
+        split = fit_linear(basis, target, np.concatenate([unit(model), unit(apart[:, seen])], axis=1)).score
         gains[name] = max(together - split, 0.0)
         p[name] = float(chi2.sf(gains[name], min(freedom, int(seen.sum()))))
     if not p:
         return Agreement()
     worst = min(p, key=lambda name: p[name])
     return Agreement(min(1.0, p[worst] * len(p)), worst, gains[worst], p)
-
-
-def _unit(columns: FloatArray) -> FloatArray:
-    size = np.linalg.norm(columns, axis=0)
-    return np.asarray(columns / np.where(size > 0, size, 1.0))

@@ -11,7 +11,7 @@ import numpy as np
 
 from studies.diagnosis.baseline import Problem, View
 from studies.diagnosis.fit import Fit, jacobian_of
-from studies.diagnosis.likelihood import SHARES, orthonormal
+from studies.diagnosis.likelihood import SHARES, orthonormal, unit
 from studies.diagnosis.states import FloatArray, lag
 
 AMPLITUDES = np.geomspace(1e-4, 1e3, 15)
@@ -127,7 +127,7 @@ def leftover_evidence(
     best = {name: np.full((data.shape[1],), np.inf) for name in bases}
     for share in near_shares(fit.linear.share):
         root = np.sqrt(basis.weights(share))[:, None]
-        ortho = orthonormal(scaled(model) * root)
+        ortho = orthonormal(unit(model) * root)
         rest = data * root
         rest = rest - ortho @ (ortho.T @ rest)
         total = np.maximum((rest**2).sum(axis=0), 1e-300)
@@ -145,12 +145,6 @@ def leftover_evidence(
                 score = rows * np.log(np.maximum(total - gain @ seen, 1e-9 * total))
                 np.minimum(best[name], score + determinant + np.log1p(amplitude * values).sum(), out=best[name])
     return {name: null - score for name, score in best.items()}
-
-
-def scaled(columns: FloatArray) -> FloatArray:
-    """Return columns of unit length."""
-    size = np.linalg.norm(columns, axis=0)
-    return np.asarray(columns / np.where(size > 0, size, 1.0))
 
 
 def near_shares(share: float) -> FloatArray:

@@ -22,14 +22,20 @@ WELL_CONDUCTING = 2000.0
 """Conductivity that makes shell, stem and base one lump behind the mount, W/(m K)."""
 
 
-def law_of(instrument: "Instrument") -> Law:
+def law_of(instrument: "Instrument", measured: "np.ndarray[Any, np.dtype[np.float64]]") -> Law:
     """Return the relative frequency of the card's material law, √(E/((1+ν)ρ)) over its growth (HRG paper eq. 15).
 
     A cubic spline through a value every kelvin of the law's range: a diagnosis asks for it some ten thousand times.
+
+    Raises
+    ------
+    ShellError
+        If a measured temperature, K, lies outside the law's range.
     """
     from scipy.interpolate import CubicSpline
 
     material, reference = instrument.material, instrument.reference_temperature
+    material.check(measured)
     T = np.linspace(material.lowest, material.highest, max(int(material.highest - material.lowest), 8) + 1)
     E, nu, rho = (material.value(name, T) for name in ("youngs_modulus", "poisson_ratio", "density"))
     spline = CubicSpline(T, np.sqrt(E / ((1.0 + nu) * rho)) / material.growth(T, reference))

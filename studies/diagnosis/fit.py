@@ -101,7 +101,7 @@ def _polish(fit: Fit, target: FloatArray, rounds: int) -> Fit:
         fit = better
         if gained < QUIET:
             break
-    return _evaluate(fit.problem, fit.terms, target, SHARES)
+    return replace(fit, linear=fit_linear(fit.problem.basis, target, fit.problem.basis.rotate(fit.columns()), SHARES))
 
 
 def _with_bend(problem: Problem, terms: Sequence[Term]) -> Problem:

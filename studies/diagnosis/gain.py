@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from studies.diagnosis.baseline import Problem, Term, View, baseline_columns, restricted, term_columns
 from studies.diagnosis.campaign import Campaign
 from studies.diagnosis.fit import Fit, fit_terms
-from studies.diagnosis.likelihood import orthonormal
+from studies.diagnosis.likelihood import orthonormal, unit
 from studies.diagnosis.states import FloatArray, States
 
 BLOCKS = 5
@@ -114,7 +114,8 @@ def _leave_one_record_out(fit: Fit, campaign: Campaign) -> float | None:
         trained = _train(restricted(fit.problem, keep), fit.terms)
         for k, run in enumerate(campaign.runs):
             if run.record == record:
-                residuals.append(_refit_own(trained, campaign, k))
+                every = np.ones(run.row_time.size, dtype=bool)
+                residuals.append(_refit(trained, campaign, k, own_columns(trained.problem, k), every))
     return rms(residuals)
 
 
@@ -125,7 +126,7 @@ def _train(problem: Problem, terms: Sequence[Term]) -> Fit:
     known: list[Term] = []
     for term in terms:
         own = problem.term(term, views)
-        ortho = orthonormal(columns / np.maximum(np.linalg.norm(columns, axis=0), 1e-300))
+        ortho = orthonormal(unit(columns))
         left = own - ortho @ (ortho.T @ own)
         if (np.linalg.norm(left, axis=0) > 1e-6 * np.linalg.norm(own, axis=0)).all():
             known.append(term)
@@ -133,15 +134,16 @@ def _train(problem: Problem, terms: Sequence[Term]) -> Fit:
     return fit_terms(problem, known, rounds=2)
 
 
-def _refit_own(trained: Fit, campaign: Campaign, k: int) -> FloatArray:
+def _refit(trained: Fit, campaign: Campaign, k: int, own: Sequence[int], inside: NDArray[np.bool_]) -> FloatArray:
+    """Return the residual of some rows of run `k`, the columns `own` refitted on them."""
     columns = fine_model(trained.problem, trained.terms, campaign, k)
-    own = own_columns(trained.problem, k)
     coefficients = trained.linear.coefficients.copy()
-    coefficients[own] = 0.0
-    rest = campaign.runs[k].row_responses[trained.problem.response] - on_rows(campaign, k, columns @ coefficients)
+    coefficients[list(own)] = 0.0
+    measured = campaign.runs[k].row_responses[trained.problem.response]
+    rest = (measured - on_rows(campaign, k, columns @ coefficients))[inside]
     known = np.isfinite(rest)
     if own and known.sum() > len(own):
-        free = np.stack([on_rows(campaign, k, columns[:, index]) for index in own], axis=1)
+        free = np.stack([on_rows(campaign, k, columns[:, index])[inside] for index in own], axis=1)
         rest = rest - free @ np.linalg.lstsq(free[known], rest[known], rcond=None)[0]
     return np.asarray(rest)
 
@@ -163,29 +165,15 @@ def _leave_one_block_out(fit: Fit, campaign: Campaign) -> float | None:
         for k, run in enumerate(campaign.runs):
             inside = (run.row_time >= low) & (run.row_time < high + (1e-9 if block < BLOCKS - 1 else 1.0))
             if inside.any():
-                residuals.append(_with_start(trained, campaign, k, inside))
+                start = _start_within(trained, campaign, k, inside)
+                residuals.append(_refit(trained, campaign, k, start, inside))
     return rms(residuals)
 
 
-def _with_start(trained: Fit, campaign: Campaign, k: int, inside: NDArray[np.bool_]) -> FloatArray:
-    """Return the residual of a block; where the block holds what is left of the initial thermal state, that is refitted.
-
-    The rows outside it know next to nothing of e^(−t/τ) then.
-    """
-    columns = fine_model(trained.problem, trained.terms, campaign, k)
-    coefficients = trained.linear.coefficients.copy()
-    start = None
-    if trained.problem.lagged:
-        place = own_columns(trained.problem, k)[-1]
-        start = on_rows(campaign, k, columns[:, place])
-        if np.linalg.norm(start[inside]) < KNOWN_START * np.linalg.norm(start):
-            start = None
-        else:
-            coefficients[place] = 0.0
-    measured = campaign.runs[k].row_responses[trained.problem.response]
-    rest = (measured - on_rows(campaign, k, columns @ coefficients))[inside]
-    known = np.isfinite(rest)
-    if start is None or not known.any():
-        return np.asarray(rest)
-    own = start[inside]
-    return np.asarray(rest - own * (own[known] @ rest[known]) / (own[known] @ own[known]))
+def _start_within(trained: Fit, campaign: Campaign, k: int, inside: NDArray[np.bool_]) -> list[int]:
+    """Return the column of the initial thermal state where a block holds most of it: other rows know next to nothing of it."""
+    if not trained.problem.lagged:
+        return []
+    place = own_columns(trained.problem, k)[-1]
+    start = on_rows(campaign, k, fine_model(trained.problem, trained.terms, campaign, k)[:, place])
+    return [place] if np.linalg.norm(start[inside]) >= KNOWN_START * np.linalg.norm(start) else []

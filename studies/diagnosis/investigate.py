@@ -7,7 +7,8 @@ import numpy as np
 
 from studies.diagnosis.advice import suggest_next
 from studies.diagnosis.baseline import Law, Problem, choose_kernel, choose_kernel_score, pose, span_of
-from studies.diagnosis.campaign import FEWEST_BINS, Campaign
+from studies.diagnosis.campaign import Campaign
+from studies.diagnosis.checks import FEWEST_BINS
 from studies.diagnosis.clock import CLOCK_PAIR, clock_drifts, with_clock
 from studies.diagnosis.consistency import consistency
 from studies.diagnosis.discrepancy import Leftover, generic_bases, leftover_evidence, strongest

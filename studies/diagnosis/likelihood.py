@@ -151,6 +151,12 @@ def fit_linear(
     return LinearFit(score, share, variance, np.asarray(back @ (first + part)), np.asarray(covariance))
 
 
+def unit(columns: FloatArray) -> FloatArray:
+    """Return columns of unit length; empty ones stay empty."""
+    size = np.linalg.norm(columns, axis=0)
+    return np.asarray(columns / np.where(size > 0, size, 1.0))
+
+
 def orthonormal(columns: FloatArray) -> FloatArray:
     """Return an orthonormal basis of the columns; those that the earlier ones already span are dropped."""
     q, r = np.linalg.qr(columns)

@@ -21,7 +21,7 @@ from studies.diagnosis.baseline import Problem, Term, span_of
 from studies.diagnosis.campaign import Campaign
 from studies.diagnosis.effects import Effect, library
 from studies.diagnosis.fit import Fit, jacobian_of
-from studies.diagnosis.likelihood import NoiseBasis, orthonormal
+from studies.diagnosis.likelihood import NoiseBasis, orthonormal, unit
 from studies.diagnosis.null import shipped_levels
 from studies.diagnosis.programme import Programme, Steps, candidates
 from studies.diagnosis.selection import Found, Selection
@@ -186,7 +186,7 @@ def continued(fit: Fit, states: States, clock: Fit | None) -> Fit:
 def loss(truth: tuple[FloatArray, FloatArray], rival: tuple[FloatArray, FloatArray], columns: FloatArray) -> float:
     """Return D: what is left of the difference of two means after the rival is refitted."""
     difference = np.concatenate([truth[0] - rival[0], truth[1] - rival[1]])
-    span = orthonormal(columns / np.maximum(np.linalg.norm(columns, axis=0), 1e-300))
+    span = orthonormal(unit(columns))
     left = difference - span @ (span.T @ difference)
     return float(left @ left)
 
@@ -267,7 +267,7 @@ def to_detect(campaign: Campaign, selections: Mapping[str, Selection]) -> list[S
         spans = {}
         for key, member in members.items():
             columns = member.joined(member.follow(programme.states)[1])
-            spans[key] = orthonormal(columns / np.maximum(np.linalg.norm(columns, axis=0), 1e-300))
+            spans[key] = orthonormal(unit(columns))
         for k, s in enumerate(signatures):
             column = np.concatenate([s.recorded, _ahead(s, programme.states)])
             span = spans[id(s.member)]
@@ -299,7 +299,7 @@ def _signatures(campaign: Campaign, selection: Selection, selections: Mapping[st
     problem = fit.problem
     member = Member(NOTHING, fit, clock_of(problem.response, selections), fit)
     mean, columns = member.recorded
-    span = orthonormal(columns / np.maximum(np.linalg.norm(columns, axis=0), 1e-300))
+    span = orthonormal(unit(columns))
     root = np.sqrt(problem.basis.weights(member.share)) / member.deviation
     rest = problem.rotated * root - mean
     rest = rest - span @ (span.T @ rest)

@@ -9,7 +9,7 @@ from studies.diagnosis.baseline import Problem, choose_kernel, fit_at, restricte
 from studies.diagnosis.effects import Effect, Span
 from studies.diagnosis.fit import Fit, fit_terms
 from studies.diagnosis.innovations import find_lines
-from studies.diagnosis.likelihood import KERNELS, orthonormal
+from studies.diagnosis.likelihood import KERNELS, orthonormal, unit
 from studies.diagnosis.scan import Bank, Candidate, applicable, build_bank, scan
 from studies.diagnosis.states import FloatArray
 from studies.diagnosis.thermometer import corrected
@@ -150,7 +150,6 @@ class _Path:
 
     def __init__(self, fit: Fit, bank: Bank) -> None:
         self.fit, self.bank = fit, bank
-        self.built_at = fit.problem.tau if not fit.terms else 0.0
 
     def grow(
         self, plain: Fit, span: Span, usable: Sequence[Effect], levels: Mapping[str, float], threshold: float
@@ -228,7 +227,7 @@ def _rests_on(fit: Fit) -> float:
     """Number of rows that carry the effect added last: (Σ s²)²/Σ s⁴ of its signature s, freed of the rest of the model."""
     columns = fit.columns()
     count = fit.terms[-1].count
-    rest = orthonormal(columns[:, :-count] / np.maximum(np.linalg.norm(columns[:, :-count], axis=0), 1e-300))
+    rest = orthonormal(unit(columns[:, :-count]))
     signature = columns[:, -count:] @ fit.linear.coefficients[-count:]
     signature = signature - rest @ (rest.T @ signature)
     squares = (signature / max(float(np.abs(signature).max()), 1e-300)) ** 2

@@ -7,10 +7,10 @@ of them then is more of the same kind.
 import numpy as np
 from scipy.stats import chi2
 
-from studies.diagnosis.discrepancy import Leftover, near_shares, scaled
+from studies.diagnosis.discrepancy import Leftover, near_shares
 from studies.diagnosis.fit import Fit, jacobian_of
 from studies.diagnosis.innovations import find_innovations, line_powers
-from studies.diagnosis.likelihood import orthonormal
+from studies.diagnosis.likelihood import orthonormal, unit
 
 SHARP = 4.0
 """Second difference of a model, over the noise of a row, at which the rows around it are no witnesses."""
@@ -60,7 +60,7 @@ def step_evidence(fit: Fit) -> float:
     and s_k freed of what the model absorbs.
     """
     problem, basis = fit.problem, fit.problem.basis
-    model = scaled(basis.rotate(np.concatenate([fit.columns(), jacobian_of(fit)], axis=1)))
+    model = unit(basis.rotate(np.concatenate([fit.columns(), jacobian_of(fit)], axis=1)))
     rows = problem.values.size
     null = best = np.inf
     for share in near_shares(fit.linear.share):

@@ -122,7 +122,7 @@ def diagnose_table(path: str, card: str | None = None) -> TableDiagnosis:
     data = read_frequency_table(path)
     T, f = data.values["temperature_degC"], data.values["frequency_Hz"]
     order = np.argsort(T)
-    law = law_of(load_card("hrg-30mm" if card is None else card))
+    law = law_of(load_card("hrg-30mm" if card is None else card), T + 273.15)
     return study_steady_table(T[order], f[order], reading_resolution(f), law)
 
 

@@ -18,6 +18,8 @@ from studies.diagnosis.states import FloatArray, States
 from studies.errors import InputError, nearest
 
 RESPONSES = ("frequency_Hz", "bias_deg_per_h", "inverse_q")
+AROUND = 293.15
+"""Temperature at which coefficients count that would otherwise hang on the range a campaign covers, K."""
 UNITS = {"frequency_Hz": "Hz", "bias_deg_per_h": "deg_per_h", "inverse_q": "1"}
 
 

@@ -2,11 +2,8 @@
 
 from collections.abc import Sequence
 
-from studies.diagnosis.effects import Effect, Parameter, Span
+from studies.diagnosis.effects import AROUND, Effect, Parameter, Span
 from studies.diagnosis.states import FloatArray, States
-
-AROUND = 293.15
-"""Temperature at which the growth counts, K."""
 
 
 def columns(states: States, shape: Sequence[float], response: str) -> FloatArray:

@@ -4,11 +4,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from studies.diagnosis.effects import Effect, Parameter, Span
+from studies.diagnosis.effects import AROUND, Effect, Parameter, Span
 from studies.diagnosis.states import FloatArray, States, lag
-
-AROUND = 293.15
-"""T₀ of the radiated share, K: that of the material laws, whatever range a campaign covers."""
 
 
 def columns(states: States, shape: Sequence[float], response: str) -> FloatArray:

@@ -204,3 +204,16 @@ def test_every_second_value_missing_and_two_rows(campaign, capsys, tmp_path):
     found = verdict_of(capsys, save(tmp_path, two, "two.csv"))
     assert found["verdict"] == "not-identifiable"
     assert found["responses"]["frequency_Hz"]["remark"] == "only 2 values"
+
+
+@pytest.mark.parametrize("kind", ["run", "table"])
+def test_temperatures_beyond_the_material_law_are_named(campaign, capsys, tmp_path, kind):
+    """The law of the card ends at -60 degrees: nothing is extrapolated in silence."""
+    if kind == "run":
+        cold = columns_of(campaign[0][0])
+        cold["housing_temperature_degC"] = cold["housing_temperature_degC"] - 60.0
+    else:
+        cold = {"temperature_degC": np.linspace(-90.0, 20.0, 8), "frequency_Hz": np.linspace(4400.0, 4432.0, 8)}
+    status, _, err = run(capsys, save(tmp_path, cold), "--card", "hrg-30mm")
+    assert status == 2
+    assert "outside the range" in err
