@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from studies.diagnosis.baseline import Term
+from studies.diagnosis.baseline import Term, fit_at, restricted
 from studies.diagnosis.campaign import Campaign
 from studies.diagnosis.effects import find_effect
 from studies.diagnosis.fit import fit_terms
@@ -57,9 +57,10 @@ def with_clock(selection: Selection, campaign: Campaign) -> Selection:
         return selection
     term = Term(find_effect(CLOCK_PAIR[0]), (), 1)
     fit = corrected(fit_terms(selection.fit.problem, (*selection.fit.terms, term)))
-    own, deviation = fit.linear.coefficients[-1], np.sqrt(fit.linear.covariance[-1, -1])
+    # beside a random walk: stationary noise would not let a record wander from run to run
+    walking = fit_at(restricted(fit.problem, kernel="walk"), fit.problem.tau, fit.terms)
+    own, deviation = walking.coefficients[-1], np.sqrt(walking.covariance[-1, -1])
     if abs(own - drift) > AGREE * np.hypot(deviation, spread):
         return selection
-
     found = Found(len(fit.terms) - 1, term.name, evidence, (Rival(term.name, evidence, fit),))
     return replace(selection, fit=fit, found=tuple(sorted((*selection.found, found), key=lambda f: -f.evidence)))
