@@ -10,8 +10,8 @@ from thermal.errors import ThermalError
 from thermal.lag import lag
 from thermal.network import Array, Network
 from thermal.profile import Profile
-from thermal.radiative import sweep
 from thermal.steady import find_steady_state
+from thermal.sweeping import sweep
 from thermal.transient import propagate
 
 SUBSTEPS = 4  # of a row, between which what radiation adds is linear

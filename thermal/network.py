@@ -11,6 +11,7 @@ import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,10 +27,10 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Node:
-    """A lump of one temperature; `capacity` in J/K, a number or a callable of temperature (K)."""
+    """A lump of one temperature; `capacity` in J/K, a number or a callable of temperature (K), of arrays too."""
 
     name: str
-    capacity: float | Callable[[float], float]
+    capacity: float | Callable[[Any], Any]
 
     def capacity_at(self, temperature: float) -> float:
         """Heat capacity (J/K) at a temperature (K)."""
@@ -140,7 +141,10 @@ class Network:
         C = np.empty_like(temperature[: self.count])
         for i, node in enumerate(self.nodes):
             if callable(node.capacity):
-                C[i] = np.vectorize(node.capacity_at, otypes=[float])(temperature[i])
+                C[i] = node.capacity(temperature[i])
+                if not (np.isfinite(C[i]) & (C[i] > 0)).all():
+                    worst = np.asarray(temperature[i])[~(np.isfinite(C[i]) & (C[i] > 0))].flat[0]
+                    node.capacity_at(float(worst))
             else:
                 C[i] = node.capacity
         return C

@@ -6,13 +6,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.constants import Stefan_Boltzmann
 
-from thermal import radiative
+from thermal import sweeping
 from thermal.balance import check_energy
-from thermal.errors import ThermalError
 from thermal.lag import lag, scan
 from thermal.network import Boundary, Conductor, Node, Radiator, Source, assemble, linearise
 from thermal.profile import Profile, constant, parse_profile
-from thermal.radiative import integrate, simulate, sweep
+from thermal.radiative import integrate, simulate
+from thermal.sweeping import sweep
 from thermal.transient import propagate
 
 LINEAR = (
@@ -168,14 +168,14 @@ def test_simulate_chooses_the_exact_way_where_there_is_one():
     t = np.linspace(0.0, 7000.0, 50)
     linear, radiative = assemble(LINEAR), assemble(RADIATIVE)
     assert np.array_equal(simulate(linear, CHAMBER).at(t), propagate(linear, CHAMBER).at(t))
-    assert np.array_equal(simulate(radiative, CHAMBER).at(t), integrate(radiative, CHAMBER).at(t))
+    assert np.array_equal(simulate(radiative, CHAMBER).at(t), sweep(radiative, CHAMBER).at(t))
     rows = np.linspace(0.0, 7200.0, 721)
     measured = {"chamber": Profile(rows, 293.15 + np.sin(rows / 500.0))}
     assert np.array_equal(simulate(radiative, measured).at(t), sweep(radiative, measured).at(t))
 
 
 def test_sweeps_tend_to_the_integrated_radiation_with_the_fourth_power_of_the_rows(monkeypatch):
-    monkeypatch.setattr(radiative, "LONGEST_ROW", 1e4)
+    monkeypatch.setattr(sweeping, "LONGEST_ROW", 1e4)
     parts = [part for part in RADIATIVE if part != LINEAR[3]]
     network = assemble([*parts, Node("shell", lambda T: 2.0 * (1 + 2e-3 * (T - 293.15))), Source("shell", 0.01)])
     errors = []
@@ -197,8 +197,3 @@ def test_many_cycles_with_long_ramps_are_simulated_as_exactly_as_few():
     t = np.linspace(0.0, few.time[-2], 200)  # the last ramp of the short one leads home
     exact = integrate(network, {"chamber": few}, relative_tolerance=1e-10).at(t)
     assert simulate(network, {"chamber": many}).at(t) == pytest.approx(exact, abs=1e-5)
-
-
-def test_sweeps_refuse_a_jump():
-    with pytest.raises(ThermalError, match="a profile with jumps is integrated, not swept"):
-        sweep(assemble(RADIATIVE), CHAMBER)

@@ -1,0 +1,212 @@
+"""Temperatures of a network in time with their derivatives by any of its constants: the sensitivity equations.
+
+With S = ∂T/∂p, L, R, C, q the network's conduction, radiation, capacities and powers (`thermal.network`),
+
+    C dS/dt = −(L + 4σ R diag T³) S + ∂q/∂p − ∂L/∂p T − σ ∂R/∂p T⁴ − (∂ln C/∂p + C'/C S) C dT/dt,
+
+linear in S, along the temperatures that `thermal.sweeping` has found; it is swept in the same way, all constants at once.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.constants import Stefan_Boltzmann
+
+from thermal.network import Array, Network
+from thermal.profile import Profile
+from thermal.steady import find_steady_state
+from thermal.sweeping import MOST_SWEEPS, Sweep, SweepError, capacity_ratio, hermite, hold, outflow, run_sweeps
+
+RELATIVE_TOLERANCE = 1e-7  # of the derivatives, at the last sweep
+BEND_STEP = 0.5  # K, half the central difference of a capacity over temperature
+
+
+@dataclass(frozen=True)
+class Change:
+    """How a network changes with one value: derivatives of its matrices; all zero unless given.
+
+    Attributes
+    ----------
+    conduction, radiation : arrays (N, N), ∂L/∂p and ∂R/∂p over nodes and boundaries
+    capacity : array (n,), ∂ ln C/∂p of the nodes
+    power : array (n,), ∂q/∂p
+    boundaries : mapping of a boundary's name to the change of its profile, on rows as long as the run
+    initial : array (n,), ∂T(0)/∂p beyond what a settled start does (K)
+    """
+
+    conduction: Array
+    radiation: Array
+    capacity: Array
+    power: Array
+    boundaries: Mapping[str, Profile] = field(default_factory=dict)
+    initial: Array | None = None
+
+
+def no_change(
+    network: Network, boundaries: Mapping[str, Profile] | None = None, initial: Array | None = None
+) -> Change:
+    """Return a change that leaves the network as it is: of the boundaries or of the initial state alone."""
+    n, N = network.count, len(network.names)
+    zero = np.zeros((N, N))
+    return Change(zero, zero, np.zeros(n), np.zeros(n), boundaries or {}, initial)
+
+
+def difference(above: Network, below: Network, step: float, time: float = 0.0, temperature: float = 293.15) -> Change:
+    """Change from two networks of the same nodes built half a `step` above and below a value."""
+    C1, C0 = (network.capacities(np.full(network.count, temperature)) for network in (above, below))
+    return Change(
+        (above.conduction - below.conduction) / step,
+        (above.radiation - below.radiation) / step,
+        np.log(C1 / C0) / step,
+        (above.power(time) - below.power(time)) / step,
+    )
+
+
+@dataclass(frozen=True)
+class Response:
+    """Sums of node temperatures at the rows, and their derivatives.
+
+    Attributes
+    ----------
+    temperature, rate : arrays (M, sums), K and K/s
+    slope, rate_slope : arrays (changes, M, sums), the derivatives of both
+    """
+
+    temperature: Array
+    rate: Array
+    slope: Array
+    rate_slope: Array
+
+
+def respond(
+    network: Network,
+    boundaries: Mapping[str, Profile],
+    time: ArrayLike,
+    weights: Array,
+    changes: Sequence[Change] = (),
+    departure: Array | None = None,
+) -> Response:
+    """Temperatures of a network at the rows, with derivatives by every change.
+
+    Parameters
+    ----------
+    network, boundaries : as for `thermal.sweeping.sweep`
+    time : array (M,), s
+    weights : array (sums, n), of the nodes
+    departure : array (n,), K, optional
+        Of the initial state from the steady state before the profiles begin.
+
+    Raises
+    ------
+    ThermalError
+        As `run_sweeps`.
+    """
+    rows = np.asarray(time, dtype=float)
+    first = {name: float(profile.value[0]) for name, profile in boundaries.items()}
+    begin = min(profile.start for profile in boundaries.values())
+    steady = find_steady_state(network, first, begin)
+    n = network.count
+    swept = run_sweeps(network, boundaries, steady[:n] if departure is None else steady[:n] + departure)
+    T, rate = _observe(swept, boundaries, rows, weights)
+    if not changes:
+        empty = np.zeros((0, *T.shape))
+        return Response(T, rate, empty, empty)
+    return Response(T, rate, *_Slopes(swept, steady, changes).at(rows, weights))
+
+
+def _observe(swept: Sweep, boundaries: Mapping[str, Profile], rows: Array, weights: Array) -> tuple[Array, Array]:
+    """Sums of temperatures and of their rates: of T₁ from its equation, of δ from its cubics."""
+    linear, grid = swept.linear, swept.grid
+    n = linear.count
+    drain = linear.conduction[:n] / swept.grid.modes.capacity[:, None]
+    first = swept.first.observe(rows, np.vstack([weights, -weights @ drain[:, :n]]))
+    count = len(weights)
+    T, rate = first[:, :count], first[:, count:]
+    held = np.column_stack([boundaries[b.name].at(rows) for b in linear.boundaries])
+    rate = rate - held @ (weights @ drain[:, n:]).T
+    if any(isinstance(source.power, Profile) for source in linear.sources):
+        power = np.array([linear.power(float(t)) for t in rows])
+    else:
+        power = linear.power(float(rows[0]))
+    rate = rate + (power / grid.modes.capacity) @ weights.T
+    delta, delta_rate = hermite(grid, rows, swept.beyond @ weights.T, swept.beyond_rate @ weights.T)
+    return T + delta, rate + delta_rate
+
+
+class _Slopes:
+    """Derivatives at all moments of the grid, found by sweeping."""
+
+    def __init__(self, swept: Sweep, steady: Array, changes: Sequence[Change]) -> None:
+        self.swept = swept
+        network, linear = swept.network, swept.linear
+        n = self.count = network.count
+        everything = swept.everything
+        self.cube: Array = 4 * Stefan_Boltzmann * everything**3
+        self.varies = any(callable(node.capacity) for node in network.nodes)
+        self.ratio = capacity_ratio(network, linear, everything) if self.varies else np.ones(n)
+        self.flow = self.ratio * (swept.power - outflow(network, everything)[..., :n])  # C₀ dT/dt
+        if self.varies:
+            warm, cold = (capacity_ratio(network, linear, everything + d) for d in (BEND_STEP, -BEND_STEP))
+            self.bend = (np.log(cold) - np.log(warm)) / (2 * BEND_STEP)  # d ln C/dT
+        held = np.stack([self._hold(change) for change in changes], axis=2)
+        forcing = np.stack([self._force(change) for change in changes], axis=2) - held @ linear.conduction[n:, :n]
+        start = np.stack([_initial_slope(network, steady, change) for change in changes])
+        S = np.zeros((*everything.shape[:2], len(changes), n))
+        for _ in range(MOST_SWEEPS):
+            last = S
+            S, self.rate = swept.grid.answer(forcing + self._beyond(S, held), start)
+            size = np.abs(S).max(axis=(0, 1, 3))
+            if (np.abs(S - last).max(axis=(0, 1, 3)) <= RELATIVE_TOLERANCE * size).all():
+                self.slope = S
+                return
+        raise SweepError("the derivatives of the temperatures do not converge; the radiation is too strong.")
+
+    def _hold(self, change: Change) -> Array:
+        """Changes of the boundaries at all moments, (3, K, boundaries)."""
+        grid, names = self.swept.grid, [b.name for b in self.swept.network.boundaries]
+        held = np.zeros((*grid.moments.shape, len(names)))
+        for name, profile in change.boundaries.items():
+            held[..., names.index(name)] = hold({name: profile}, (name,), grid.knots, measured=True)[..., 0]
+        return held
+
+    def _force(self, change: Change) -> Array:
+        """What one change does at fixed temperatures (W), (3, K, n)."""
+        swept, n = self.swept, self.count
+        push = np.zeros_like(self.flow)
+        if change.conduction.any():
+            push -= swept.everything @ change.conduction[:n].T
+        if change.radiation.any():
+            push -= Stefan_Boltzmann * (swept.everything**4 @ change.radiation[:n].T)
+        forcing: Array = self.ratio * (push + change.power) - change.capacity * self.flow
+        return forcing
+
+    def _beyond(self, S: Array, held: Array) -> Array:
+        """Derivative of b(T) along S, (3, K, p, n)."""
+        network, linear, n = self.swept.network, self.swept.linear, self.count
+        both = np.concatenate([S, held], axis=3)
+        result: Array = both @ (linear.conduction - network.conduction)[:, :n]
+        if network.radiators:
+            result -= (self.cube[:, :, None] * both) @ network.radiation[:, :n]
+        if self.varies:
+            drained = result - both @ linear.conduction[:, :n]
+            result += (self.ratio[:, :, None] - 1) * drained - (self.flow * self.bend)[:, :, None] * S
+        return result
+
+    def at(self, rows: Array, weights: Array) -> tuple[Array, Array]:
+        """Sums over the nodes at the rows, (changes, M, sums), and their rates."""
+        slope, rate = hermite(self.swept.grid, rows, self.slope @ weights.T, self.rate @ weights.T)
+        return np.moveaxis(slope, 1, 0), np.moveaxis(rate, 1, 0)
+
+
+def _initial_slope(network: Network, steady: Array, change: Change) -> Array:
+    """∂T(0)/∂p (n,), of the steady state before the profiles begin and of the departure from it."""
+    n = network.count
+    held = np.zeros(len(network.names))
+    for name, profile in change.boundaries.items():
+        held[network.index(name)] = profile.value[0]
+    slope: Array = network.outflow_slope(steady)
+    push: Array = change.power - (change.conduction @ steady + Stefan_Boltzmann * (change.radiation @ steady**4))[:n]
+    settled: Array = np.asarray(np.linalg.solve(slope[:n, :n], push - (slope @ held)[:n]))
+    return settled if change.initial is None else np.asarray(settled + change.initial)

@@ -1,0 +1,254 @@
+"""Waveform relaxation: what radiation adds to a linear network is swept over the whole run until it stays the same.
+
+With L₀, C₀ of the network linearised at the mean temperature, C dT/dt = q − L T − σ R T⁴ is C₀ dT/dt = q − L₀ T + b(T),
+
+    b(T) = (q − L T − σ R T⁴) C₀/C(T) − (q − L₀ T).
+
+T = T₁ + δ: the linear network answers the boundaries exactly, at every row of theirs; δ answers b, which is smooth and
+is a parabola between knots at most 60 s apart (its mean by Simpson's rule). Each sweep contracts the error by about
+the relative change of T³; the error is of fourth order in the distance of the knots.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.constants import Stefan_Boltzmann
+
+from thermal.errors import ThermalError
+from thermal.forcing import MOST_ROWS, find_corners, initial_state, source_powers
+from thermal.network import Array, Network, linearise
+from thermal.profile import Profile
+from thermal.relaxation import Relaxation, find_relaxation
+from thermal.transient import Transient, propagate
+
+MOST_SWEEPS = 60
+SWEEP_TOLERANCE = 1e-7  # K
+LONGEST_ROW = 60.0  # s, between which what radiation adds is a parabola
+MOST_CORNERS = 1500  # of profiles whose every corner is a knot; a measured column of more rows is averaged for δ
+
+
+class SweepError(ThermalError):
+    """Radiation so strong that sweeps do not converge."""
+
+
+@dataclass(frozen=True)
+class Grid:
+    """Knots of a run with their midpoints, and the linear network's modes between them.
+
+    Arrays over "moments" have the shape (3, K, …): start, middle and end of each of the K intervals; what jumps at a
+    knot has its value before the jump at the end and the value after it at the start.
+    """
+
+    knots: Array
+    modes: Relaxation
+
+    @cached_property
+    def length(self) -> Array:
+        """Lengths (s) of the intervals."""
+        return np.diff(self.knots)
+
+    @cached_property
+    def moments(self) -> Array:
+        """Start, middle and end (s) of the intervals, (3, K)."""
+        start, end = self.knots[:-1], self.knots[1:]
+        return np.array([start, (start + end) / 2, end])
+
+    @cached_property
+    def _weights(self) -> tuple[Array, ...]:
+        """Decay, and weights of the forcing at both ends, over a half and over a whole interval; each (K, n)."""
+        rate = 1 / self.modes.time_constants
+        weights: list[Array] = []
+        for part in (0.5, 1.0):
+            h = part * self.length[:, None]
+            decay = np.exp(-rate * h)
+            even = (1 - decay) / rate  # ∫ e^(−λ(h − s)) ds
+            slanted = (h - even) / (rate * h)  # ∫ e^(−λ(h − s)) s/h ds
+            weights += [decay, even - slanted, slanted]
+        return tuple(weights)
+
+    def answer(self, power: Array, start: Array) -> tuple[Array, Array]:
+        """Temperatures and their rates at all moments, (3, K, p, n), for power (W) at all moments, from `start` (p, n)."""
+        shapes, rate = self.modes.shapes, 1 / self.modes.time_constants
+        u = power @ shapes
+        shift = (2 * u[1] - u[0] - u[2]) / 3  # straight lines of the parabola's mean
+        u0, u1 = u[0] + shift, u[2] + shift
+        decay2, near2, far2, decay, near, far = (w[:, None, :] for w in self._weights)
+        forced = near * u0 + far * u1
+        x = np.empty((len(forced) + 1, *forced.shape[1:]))
+        x[0] = (start * self.modes.capacity) @ shapes
+        for k in range(len(forced)):
+            x[k + 1] = decay[k] * x[k] + forced[k]
+        half = decay2 * x[:-1] + near2 * u0 + far2 * (u0 + u1) / 2
+        states = np.array([x[:-1], half, x[1:]])
+        return states @ shapes.T, (u - rate * states) @ shapes.T
+
+
+@dataclass(frozen=True)
+class Sweep:
+    """A network's temperatures at all moments of its grid, and what they were found with.
+
+    Attributes
+    ----------
+    held : array (3, K, boundaries), K
+    power : array (3, K, n), W, of the sources
+    temperature : array (3, K, n), K
+    beyond, beyond_rate : arrays (3, K, n), δ and its rate (K, K/s)
+    first : Transient, the linear network's answer T₁
+    """
+
+    network: Network
+    linear: Network
+    grid: Grid
+    held: Array
+    power: Array
+    temperature: Array
+    beyond: Array
+    beyond_rate: Array
+    first: Transient
+
+    @cached_property
+    def everything(self) -> Array:
+        """Temperatures (K) of nodes and boundaries at all moments, (3, K, N)."""
+        return np.concatenate([self.temperature, self.held], axis=2)
+
+    def transient(self) -> Transient:
+        """Return the temperatures as functions of time."""
+
+        def evaluate(time: Array) -> Array:
+            interpolated = hermite(self.grid, time, self.beyond, self.beyond_rate)[0]
+            total: Array = self.first.evaluate(time) + interpolated
+            return total
+
+        return Transient(self.first.nodes, self.first.knots, evaluate)
+
+
+def sweep(network: Network, boundaries: Mapping[str, Profile], initial: ArrayLike | None = None) -> Transient:
+    """Follow profiles through a network with radiation, or capacities that depend on temperature (see the module)."""
+    return run_sweeps(network, boundaries, initial).transient()
+
+
+def run_sweeps(network: Network, boundaries: Mapping[str, Profile], initial: ArrayLike | None = None) -> Sweep:
+    """Sweep until no temperature changes by more than 1e-7 K.
+
+    Raises
+    ------
+    ThermalError
+        Profiles that do not fit the network, or radiation so strong that the sweeps do not converge.
+    """
+    corners = find_corners(network, boundaries)
+    knots = _choose_knots(corners, boundaries)
+    T0 = initial_state(network, boundaries, initial)
+    held = hold(boundaries, tuple(b.name for b in network.boundaries), knots, len(corners) > MOST_CORNERS)
+    linear = linearise(network, float(held.mean()))
+    modes = find_relaxation(linear, 1.0)
+    grid = Grid(knots, modes)
+    power = np.array([source_powers(network, t, 0) for t in grid.moments])
+    first = propagate(linear, boundaries, T0)
+    start = np.zeros((1, network.count))
+    moments = grid.moments
+    T1 = np.array([first.evaluate(t) for t in moments])
+    T, delta, rate = T1, np.zeros_like(T1), np.zeros_like(T1)
+    for _ in range(MOST_SWEEPS if not network.is_linear else 0):
+        delta, rate = (
+            part[:, :, 0] for part in grid.answer(_beyond(network, linear, T, held, power)[:, :, None], start)
+        )
+        last, T = T, T1 + delta
+        change = np.abs(T - last).max()
+        if change < SWEEP_TOLERANCE:
+            break
+        if not change < 1e4:
+            raise SweepError("the radiation is too strong to be swept; integrate the network instead.")
+    else:
+        if not network.is_linear:
+            raise SweepError("the radiation is too strong to be swept; integrate the network instead.")
+    return Sweep(network, linear, grid, held, power, T, delta, rate, first)
+
+
+def _beyond(network: Network, linear: Network, T: Array, held: Array, power: Array) -> Array:
+    """Return b(T) (W) at all moments, (3, K, n)."""
+    n = network.count
+    everything = np.concatenate([T, held], axis=2)
+    if not any(callable(node.capacity) for node in network.nodes):
+        return outflow(linear, everything)[..., :n] - outflow(network, everything)[..., :n]
+    flow = (power - outflow(network, everything)[..., :n]) * capacity_ratio(network, linear, everything)
+    beyond: Array = flow - (power - outflow(linear, everything)[..., :n])
+    return beyond
+
+
+def outflow(network: Network, temperature: Array) -> Array:
+    """Heat leaving each node and boundary, L T + σ R T⁴ (W); `temperature` has shape (..., N)."""
+    flow: Array = temperature @ network.conduction
+    if network.radiators:
+        flow += Stefan_Boltzmann * (temperature**4 @ network.radiation)
+    return flow
+
+
+def capacity_ratio(network: Network, linear: Network, temperature: Array) -> Array:
+    """C₀/C(T) of the nodes, (..., n), at temperatures (..., N)."""
+    T = np.moveaxis(temperature, -1, 0)
+    return np.moveaxis(linear.capacities(T) / network.capacities(T), 0, -1)
+
+
+def hermite(grid: Grid, time: Array, value: Array, rate: Array) -> tuple[Array, Array]:
+    """Interpolate values and their rates, (3, K, …), at times (M,) by cubics between the moments; (M, …)."""
+    nodes = np.append(grid.moments[:2].T.ravel(), grid.knots[-1])
+    k = np.clip(np.searchsorted(nodes, time, side="right") - 1, 0, len(nodes) - 2)
+    interval, half = np.divmod(k, 2)
+    behind = (slice(None), *[None] * (value.ndim - 2))
+    h = (nodes[k + 1] - nodes[k])[behind]
+    s = (time - nodes[k])[behind] / h
+    y0, y1 = value[half, interval], value[half + 1, interval]
+    d0, d1 = h * rate[half, interval], h * rate[half + 1, interval]
+    c2, c3 = 3 * (y1 - y0) - 2 * d0 - d1, 2 * (y0 - y1) + d0 + d1
+    return y0 + s * (d0 + s * (c2 + s * c3)), (d0 + s * (2 * c2 + 3 * s * c3)) / h
+
+
+def hold(profiles: Mapping[str, Profile], names: tuple[str, ...], knots: Array, measured: bool) -> Array:
+    """Values of profiles at all moments, (3, K, profiles); of a measured column, means that keep its area."""
+    start, end = knots[:-1], knots[1:]
+    moments = np.array([start, (start + end) / 2, end])
+    columns = []
+    for name in names:
+        profile = profiles[name]
+        if measured:
+            middle = (start + end) / 2
+            first, last = _mean_around(profile, np.array([start, end]), (end - start) / 4)
+            mean = _mean_around(profile, middle, (end - start) / 2)
+            columns.append(np.array([first, (6 * mean - first - last) / 4, last]))
+        else:
+            value, slope = profile.segments(start)
+            columns.append(value + slope * (moments - start))
+    return np.stack(columns, axis=-1)
+
+
+def _mean_around(profile: Profile, time: Array, reach: Array) -> Array:
+    integral = np.concatenate([[0.0], np.cumsum(np.diff(profile.time) * (profile.value[1:] + profile.value[:-1]) / 2)])
+
+    def antiderivative(t: Array) -> Array:
+        value, slope = profile.segments(t.ravel())
+        k = np.minimum(np.searchsorted(profile.time, t.ravel(), side="right") - 1, len(profile.time) - 2)
+        s = t.ravel() - profile.time[k]
+        area: Array = integral[k] + s * (value - slope * s / 2)
+        return area.reshape(t.shape)
+
+    low = np.maximum(time - reach, profile.start)
+    high = np.minimum(time + reach, profile.end)
+    mean: Array = (antiderivative(high) - antiderivative(low)) / (high - low)
+    return mean
+
+
+def _choose_knots(corners: Array, boundaries: Mapping[str, Profile]) -> Array:
+    """Corners, or of very many only the jumps, divided until no interval is longer than `LONGEST_ROW`."""
+    if len(corners) > MOST_CORNERS:
+        jumps = [profile.jumps for profile in boundaries.values()]
+        corners = np.unique(np.concatenate([corners[[0, -1]], *jumps]))
+    parts = np.ceil(np.diff(corners) / LONGEST_ROW)
+    if parts.sum() > MOST_ROWS:
+        raise ThermalError(f"the profile is too long to be swept ({np.ptp(corners):.3g} s); shorten it.")
+    counts = parts.astype(np.intp)
+    within = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
+    finer: Array = np.repeat(corners[:-1], counts) + within * np.repeat(np.diff(corners) / counts, counts)
+    return np.append(finer, corners[-1])
