@@ -4,6 +4,9 @@ Schema hrg.derive/1: `harmonic`, `pole_angle_deg`, `rim_angle_deg`; `I`, `J` and
 `closed_form` (text) and `value`; `d_ln_f_d_rim_angle_per_rad`; `equations`, a list in the order of the derivation
 with `number` in the paper (null where it has none), `title`, and the equations of the step in `latex` and in
 `plain` text; with --code also `code` with its `language` and `text`.
+
+With --dynamics: schema hrg.derive-dynamics/1, `equations` and, with --code, `code` as above; the numbers are those of the
+CVG paper on demodulated dynamics.
 """
 
 from typing import Any, Literal
@@ -13,6 +16,7 @@ MOST_HARMONIC = 100  # the closed forms of higher ones take minutes
 
 def derive(
     *,
+    dynamics: bool = False,
     latex: bool = False,
     code: Literal["python", "c"] | None = None,
     harmonic: int = 2,
@@ -23,10 +27,13 @@ def derive(
     """Derive the frequency of the inextensional spherical shell, HRG paper equations (1)-(14).
 
     Prints the chain of equations for any harmonic n, from the displacements to the frequency, and its
-    closed forms for one harmonic and one polar range.
+    closed forms for one harmonic and one polar range. With --dynamics, instead, how the standing wave moves: amplitude,
+    quadrature, precession and phase from the two-dimensional oscillator.
 
     Parameters
     ----------
+    dynamics : bool
+        Derive the averaged dynamics of the vibration (Lynch's form, and the CVG paper's equations 7 to 25 from it).
     latex : bool
         Print a LaTeX fragment (amsmath) instead.
     code : {'python', 'c'}, optional
@@ -51,6 +58,10 @@ def derive(
 
     if latex and code is not None:
         raise InputError("--latex and --code each print in another form; choose one of them.")
+    if dynamics:
+        if (harmonic, pole_angle_deg, rim_angle_deg) != (2, 0.0, 90.0):
+            raise InputError("--dynamics holds for any harmonic and shape; leave out --harmonic and the angles.")
+        return _derive_dynamics(latex, code, json)
     if not 0 <= pole_angle_deg < rim_angle_deg < 180:
         raise InputError(
             f"a dome from {pole_angle_deg:g} to {rim_angle_deg:g} degrees has no inextensional mode: the pole angle must "
@@ -76,6 +87,30 @@ def derive(
         print(emit_code(case, code), end="")
     else:
         print(emit_latex(case) if latex else emit_text(case), end="")
+    return 0
+
+
+def _derive_dynamics(latex: bool, code: Literal["python", "c"] | None, json: bool) -> int:
+    from compensation.derivation import chain
+    from compensation.derivation.design_code import emit_code
+    from studies.cli.output import print_json
+
+    if json:
+        text = {} if code is None else {"code": {"language": code, "text": emit_code(code)}}
+        equations = [
+            {
+                "number": step.number or None,
+                "title": step.title,
+                "latex": [chain.typeset(equation) for equation in step.equations],
+                "plain": [chain.write_plainly(equation) for equation in step.equations],
+            }
+            for step in chain.steps()
+        ]
+        print_json({"schema": "hrg.derive-dynamics/1", "equations": equations} | text)
+    elif code is not None:
+        print(emit_code(code), end="")
+    else:
+        print(chain.emit_latex() if latex else chain.emit_text(), end="")
     return 0
 
 

@@ -1,0 +1,114 @@
+"""The derivation of the averaged dynamics as one chain of equations, as text for a terminal and in LaTeX."""
+
+from dataclasses import dataclass
+from textwrap import fill
+
+import sympy as sp
+
+from compensation.derivation import averaging, demodulated, oscillator
+
+WIDTH = 120
+# Unicode has no subscript for these; in code they are Delta_tau, psi_tau …
+PLAIN = {
+    oscillator.delta_tau: "Δ(1/τ)",
+    oscillator.psi_tau: "ψτ",
+    oscillator.delta_omega: "Δω",
+    oscillator.psi_omega: "ψω",
+}
+TYPESET = {oscillator.delta_tau: r"\Delta(1/\tau)", oscillator.delta_omega: r"\Delta\omega"} | {
+    sp.Symbol(name): latex
+    for name, latex in (
+        ("x''+ω²x", r"\ddot x + \omega^2 x"),
+        ("y''+ω²y", r"\ddot y + \omega^2 y"),
+        *((f"{name}'", rf"\dot {name}") for name in ("X", "Y", "a", "q", "A_1", "A_2")),
+        ("ψ'", r"\dot\psi"),
+        ("φ'", r"\dot\phi"),
+        ("ΔA_1'", r"\Delta\dot A_1"),
+        ("ΔA_2'", r"\Delta\dot A_2"),
+    )
+}
+WORDS = {
+    letter: f"${name}$"
+    for letter, name in zip("ωψφτζ−", (r"\omega", r"\psi", r"\phi", r"\tau", r"\zeta", "-"), strict=True)
+} | {
+    "{": r"\{",
+    "}": r"\}",
+}
+
+
+@dataclass(frozen=True)
+class Step:
+    """One step: its number in the paper on demodulated dynamics (empty where it has none), title and equations."""
+
+    number: str
+    title: str
+    equations: tuple[sp.Eq, ...]
+
+
+def steps() -> list[Step]:
+    """Return the whole chain, from the oscillator of two patterns to what a rate does to the measured one."""
+    position, velocity = (sp.ImmutableMatrix(sp.symbols(names, real=True)) for names in ("x y", "x' y'"))
+    motion = oscillator.small_forces(position, velocity, sp.ImmutableMatrix([sp.Symbol("f_x"), sp.Symbol("f_y")]))
+    return [
+        Step(
+            "",
+            "Two patterns of a turning shell: oscillator in a plane, constant rate",
+            _name("x''+ω²x y''+ω²y", motion),
+        ),
+        Step("", "Amplitudes x = Re{X exp(iωt)}, averaged over a cycle", _name("X' Y'", averaging.amplitude_rates())),
+        Step(
+            "",
+            "Orbit (X, Y) = R(ψ)(a, −iq) exp(iφ): amplitude, quadrature, precession, phase (Lynch's form)",
+            _name("a' q' ψ' φ'", averaging.ellipse_rates()),
+        ),
+        Step(
+            "7",
+            "The paper's amplitude equations, from (4) by x = Im{A exp(jωt)}",
+            tuple(sp.Eq(left, sp.S.Zero, evaluate=False) for left in demodulated.amplitude_equations()),
+        ),
+        Step("", "Their leading order where A_1, A_2 are slow", _name("A_1' A_2'", demodulated.slow_rates())),
+        Step(
+            "3",
+            "Averaged less the paper's: only the neglected reaction of the secondary",
+            _name("ΔA_1' ΔA_2'", demodulated.neglected()),
+        ),
+        Step("25", "Measured over actual rate, 1/τ = kζ", _name("W", [demodulated.measured_rate()])),
+    ]
+
+
+def emit_text() -> str:
+    """Return the chain for a terminal: each equation in two dimensions under its number and title."""
+    blocks = []
+    for step in steps():
+        head = fill(f"({step.number}) {step.title}" if step.number else step.title, WIDTH)
+        shown = (equation.xreplace({old: sp.Symbol(new) for old, new in PLAIN.items()}) for equation in step.equations)
+        drawn = (sp.pretty(equation, use_unicode=True, num_columns=WIDTH - 4) for equation in shown)
+        blocks.append("\n\n".join([head, *("\n".join(f"    {line}" for line in text.splitlines()) for text in drawn)]))
+    return "\n\n".join(blocks) + "\n"
+
+
+def emit_latex() -> str:
+    """Return the chain as a LaTeX fragment for a document that loads amsmath."""
+    lines = ["% Averaged dynamics of a Coriolis vibratory gyro; \\input this where amsmath is loaded."]
+    for step in steps():
+        tag = rf" \tag{{{step.number}}}" if step.number else r" \notag"
+        first, *others = [typeset(equation) for equation in step.equations]
+        body = " \\\\\n".join([first + tag, *(line + r" \notag" for line in others)])
+        title = step.title.translate({ord(letter): written for letter, written in WORDS.items()})
+        lines.append(f"\\paragraph{{{title}}}\n\\begin{{gather}}\n{body}\n\\end{{gather}}")
+    return "\n".join(lines) + "\n"
+
+
+def write_plainly(equation: sp.Eq) -> str:
+    """Return one equation on one line, in Python's notation."""
+    return f"{equation.lhs} = {equation.rhs}"
+
+
+def typeset(equation: sp.Eq) -> str:
+    """Return one equation in LaTeX."""
+    return str(sp.latex(equation, symbol_names=TYPESET))
+
+
+def _name(names: str, expressions: object) -> tuple[sp.Eq, ...]:
+    pairs = zip((sp.Symbol(name) for name in names.split()), expressions, strict=True)  # type: ignore[call-overload]
+    return tuple(sp.Eq(left, right, evaluate=False) for left, right in pairs)

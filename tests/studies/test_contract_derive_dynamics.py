@@ -1,0 +1,48 @@
+"""`hrg derive --dynamics` speaks as promised, and the C that it prints computes what the Python does."""
+
+import ctypes
+import json
+import shutil
+import subprocess
+
+import numpy as np
+import pytest
+
+from studies.cli import main
+
+
+def speak(capsys, *words):
+    status = main(["derive", "--dynamics", *words])
+    return status, capsys.readouterr()
+
+
+def test_schema_is_kept(capsys):
+    status, said = speak(capsys, "--json", "--code", "c")
+    payload = json.loads(said.out)
+    assert status == 0
+    assert list(payload) == ["schema", "equations", "code"]
+    assert payload["schema"] == "hrg.derive-dynamics/1"
+    assert [step["number"] for step in payload["equations"] if step["number"]] == ["7", "3", "25"]
+    assert all(list(step) == ["number", "title", "latex", "plain"] for step in payload["equations"])
+
+
+def test_options_of_the_shell_are_refused(capsys):
+    status, said = speak(capsys, "--harmonic", "3")
+    assert status == 2
+    assert "--dynamics holds for any harmonic" in said.err
+
+
+@pytest.mark.skipif(shutil.which("cc") is None, reason="no C compiler")
+def test_both_languages_agree(tmp_path, capsys):
+    space = {}
+    exec(speak(capsys, "--code", "python")[1].out, space)
+    source, library = tmp_path / "averaged.c", tmp_path / "averaged.so"
+    source.write_text(speak(capsys, "--code", "c")[1].out)
+    subprocess.run(["cc", "-Wall", "-Werror", "-O1", "-shared", "-fPIC", "-o", library, source, "-lm"], check=True)
+    compiled = ctypes.CDLL(str(library)).averaged_rates
+    rng = np.random.default_rng(5)
+    for _ in range(20):
+        values = rng.uniform(0.2, 2.0, 15)
+        rates = (ctypes.c_double * 4)()
+        compiled(*(ctypes.c_double(value) for value in values), rates)
+        assert list(rates) == pytest.approx(list(space["averaged_rates"](*values)), rel=1e-12)
