@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from compensation.bell import ZERO_CELSIUS, Chain, Curve
-from compensation.correlated import correlated_covariance
+from compensation.coloured import correlated_covariance
 from compensation.errors import CompensationError
 from compensation.fir import design_smoother
 from compensation.polynomial import fit_polynomial

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from compensation.correlated import correlated_covariance
+from compensation.coloured import correlated_covariance
 from compensation.demodulated import expand_secondary, expand_slow_secondary, relate_rate_to_secondary
 from compensation.errors import CompensationError
 from compensation.regression import fit_linear, refuse_constant_columns

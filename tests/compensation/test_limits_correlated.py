@@ -1,0 +1,106 @@
+"""The one model of correlated noise: against its own definition, drawn noise, and the restricted likelihood."""
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy.linalg import block_diag
+from scipy.stats import chi2
+
+from compensation.correlated import HOUR, Noise, NoiseRows, estimate_noise, scaled
+from compensation.errors import CompensationError
+
+Array = NDArray[np.float64]
+GAPPED = np.cumsum(np.concatenate([np.full(60, 80.0), [4000.0], np.full(50, 130.0)]))
+EVEN = 96.0 * np.arange(200.0)
+
+
+def draw(rows: NoiseRows, noise: Noise, generator: np.random.Generator) -> Array:
+    parts = [np.linalg.cholesky(rows.covariance(run, noise)) for run in range(len(rows.times))]
+    return np.concatenate([L @ generator.standard_normal(len(L)) for L in parts])
+
+
+def test_whitened_rows_have_the_identity_as_covariance():
+    rows = NoiseRows.of([EVEN, GAPPED, EVEN], [np.ones(200), np.linspace(0.5, 3.0, 111), np.ones(200)])
+    noise = Noise(0.2, 0.3, 0.1, 0.5)
+    covariance = block_diag(*[rows.covariance(run, noise) for run in range(3)])
+    W = rows.whiten(np.eye(rows.count), noise)
+    assert W @ covariance @ W.T == pytest.approx(np.eye(rows.count), abs=1e-9)
+
+
+def test_the_walk_grows_with_the_root_of_time_and_the_offset_is_shared():
+    rows = NoiseRows.of([np.array([0.0, 3600.0, 4 * 3600.0])])
+    walk = rows.covariance(0, Noise(0.0, walk=2.0))
+    assert np.diag(walk) == pytest.approx([0.0, 4.0, 16.0])
+    assert rows.covariance(0, Noise(0.0, offset=3.0)) == pytest.approx(np.full((3, 3), 9.0))
+
+
+def test_flicker_has_a_spectrum_of_1_over_f():
+    """S(f) = 2 Σ 2τ/(1 + (2πfτ)²) of the exponentials; between 1/(60 h) and 1/(5 min) f S(f) is even within 30 %."""
+    t = 30.0 * np.arange(2.0)
+    rows = NoiseRows.of([t])
+    assert rows.covariance(0, Noise(0.0, flicker=2.0))[0, 0] == pytest.approx(4.0)
+    lags = np.linspace(0.0, 40 * 86400.0, 2_000_001)
+    covariance = np.mean([np.exp(-lags / tau) for tau in 60.0 * 4.0 ** np.arange(7)], axis=0)
+    f = np.geomspace(1 / (20 * HOUR), 1 / 600.0, 8)
+    product = [x * np.trapezoid(covariance * np.cos(2 * np.pi * x * lags), lags) for x in f]
+    assert np.ptp(product) / np.mean(product) < 0.3
+
+
+def test_levels_are_recovered_from_drawn_noise():
+    generator = np.random.default_rng(11)
+    rows = NoiseRows.of([EVEN] * 4)
+    columns = np.column_stack([np.ones(800), np.tile(np.sin(EVEN / 3000.0), 4)])
+    true = Noise(0.15, 0.25, 0.02)
+    found = [estimate_noise(rows, draw(rows, true, generator) + columns @ [3.0, -1.0], columns) for _ in range(12)]
+    assert np.median([n.white for n in found]) == pytest.approx(0.15, rel=0.05)
+    assert np.median([n.flicker for n in found]) == pytest.approx(0.25, rel=0.2)
+    quiet = [estimate_noise(rows, draw(rows, Noise(0.15), generator), columns) for _ in range(6)]
+    assert max(n.flicker for n in quiet) < 0.06
+    assert max(n.walk for n in quiet) < 0.03
+
+
+def test_tests_at_the_estimated_noise_keep_their_level():
+    """A smooth column that is not there: χ² of its coefficient exceeds its 5 % quantile in about 5 % of runs of noise."""
+    generator = np.random.default_rng(5)
+    rows = NoiseRows.of([EVEN[:120]] * 3)
+    t = EVEN[:120]
+    X = np.column_stack([np.ones(360), np.tile(np.sin(t / 2500.0), 3), np.tile(t / t[-1], 3)])
+    beyond = 0
+    for _ in range(60):
+        r = draw(rows, Noise(0.15, 0.2, 0.05), generator)
+        noise = estimate_noise(rows, r, X)
+        W = rows.whiten(np.column_stack([X, r]), noise)
+        covariance = np.linalg.inv(W[:, :3].T @ W[:, :3])
+        coefficient = covariance @ W[:, :3].T @ W[:, 3]
+        beyond += coefficient[1] ** 2 / covariance[1, 1] > chi2.ppf(0.95, 1)
+    assert beyond <= 8  # of 60; 3 expected
+
+
+def test_a_prior_narrows_and_its_absence_is_restricted_likelihood():
+    generator = np.random.default_rng(2)
+    rows = NoiseRows.of([EVEN[:50]])
+    X, r = np.column_stack([np.ones(50), EVEN[:50] / HOUR]), generator.standard_normal(50)
+    noise = Noise(1.1)
+    V = 1.21 * np.eye(50) + X @ X.T / 4.0
+    exact = np.linalg.slogdet(V)[1] + r @ np.linalg.solve(V, r)
+    given = rows.deviance(r, X, np.full(2, 4.0), noise)
+    assert given - 2 * np.log(4.0) == pytest.approx(exact, rel=1e-9)
+    rss = float(np.linalg.lstsq(X, r, rcond=None)[1][0])
+    restricted = 100 * np.log(1.1) + np.linalg.slogdet(X.T @ X / 1.21)[1] + rss / 1.21
+    assert rows.deviance(r, X, np.zeros(2), noise) == pytest.approx(restricted, rel=1e-9)
+
+
+def test_the_unit_of_the_signal_does_not_matter():
+    generator = np.random.default_rng(8)
+    rows = NoiseRows.of([EVEN, GAPPED])
+    r = draw(rows, Noise(0.2, 0.2), generator)
+    one, other = estimate_noise(rows, r), estimate_noise(rows, 1e-9 * r)
+    assert scaled(one, 1e-9).white == pytest.approx(other.white, rel=1e-3)
+    assert scaled(one, 1e-9).flicker == pytest.approx(other.flicker, rel=1e-2)
+
+
+def test_rows_that_are_none_are_refused():
+    with pytest.raises(CompensationError, match="rows in every run"):
+        NoiseRows.of([EVEN, np.array([])])
+    with pytest.raises(CompensationError, match="must increase"):
+        NoiseRows.of([np.array([0.0, 2.0, 1.0])])
