@@ -14,6 +14,7 @@ from functools import cache
 import numpy as np
 
 from shell.constraints import Index
+from shell.errors import FoldedCells
 from shell.kernel import energy_weights
 from shell.quadrature import Array, Basis, gauss, hierarchic, nodal
 
@@ -185,12 +186,23 @@ def at_gauss_points(degree: int, sides: int, count: int) -> Reference:
 
 
 def tabulate_cells(grid: Array, place: Reference, n: int, position: float) -> CellTable:
-    """Gradients in cells whose sides are polynomials through `grid` (2, cells, Lobatto ξ, η)."""
+    """Gradients in cells whose sides are polynomials through `grid` (2, cells, Lobatto ξ, η).
+
+    Raises
+    ------
+    FoldedCells
+        Where a cell overlaps itself.
+    """
     along, across = place.along, place.across
     r = _interpolate(grid[0], along.values, across.values)
     r_xi, z_xi = (_interpolate(x, along.slopes, across.values) for x in grid)
     r_eta, z_eta = (_interpolate(x, along.values, across.slopes) for x in grid)
     det = r_xi * z_eta - r_eta * z_xi
+    if not np.all(det * det[:, :1] > 0):
+        raise FoldedCells(
+            f"the root, corner or clamp at {100 * position:.3g} % of the meridian cannot be divided into cells that do not overlap: "
+            "its faces meet too sharply for the thickness. Change the stem, its fillet, or the thickness there."
+        )
     gradients = np.empty((len(r), 3, *place.value.shape))
     for to, (xi, eta) in enumerate(((z_eta, -z_xi), (-r_eta, r_xi))):
         np.multiply((xi / det)[..., None], place.by_xi, out=gradients[:, to])

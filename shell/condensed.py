@@ -19,7 +19,7 @@ from shell.assembly import Layout, lay_resonator, solid_group
 from shell.blocks import Solid, Tie, mesh_solid
 from shell.constraints import Index
 from shell.eigen import Factor, Pattern, find_pattern
-from shell.errors import ShellError
+from shell.errors import FoldedCells, ShellError
 from shell.kernel import Orders, lame
 from shell.levels import Level
 from shell.patches import Cell, Patch, Path, straight
@@ -157,7 +157,10 @@ def _prolonged(path: Path, end: float) -> Path:
 def _build(solid: Solid, ties: tuple[Tie, ...], n: int, level: Level) -> System:
     """A solid part alone: the unknowns of its ties first."""
     first = sum(len(tie.unknowns) for tie in ties)
-    group, rows, size = solid_group(mesh_solid(solid, level.block), solid, ties, n, level.block, first)
+    try:
+        group, rows, size = solid_group(mesh_solid(solid, level.block), solid, ties, n, level.block, first)
+    except FoldedCells as fault:
+        raise UnfitSolids(OTHER_CELLS) from fault
     return System((group,), rows.matrix(size), 0, n, level)
 
 

@@ -273,8 +273,9 @@ def _check_stem(resonator: Resonator, stem: Stem) -> None:
                 f"the stem is {abs(end - at_root) / stem.radius:.0f} times as long as its radius; it is solved as a solid up to "
                 f"{LONGEST_STEM:g} times: shorten it, since n >= 2 does not reach its far end, or make it thicker."
             )
-        if not face * (end - at_root) > stem.fillet + 0.1 * stem.radius:
+        base = max(at_root, float(z[0])) if face > 0 else at_root  # the dome bulges into an outer stem
+        if not face * (end - base) > stem.fillet + 0.1 * stem.radius:
             raise ShellError(
-                f"the {'outer' if face > 0 else 'inner'} stem ends at {mm(end)}, not clear of its root at {mm(at_root)}: move its "
+                f"the {'outer' if face > 0 else 'inner'} stem ends at {mm(end)}, not clear of the dome at {mm(base)}: move its "
                 "end away from the dome."
             )

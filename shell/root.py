@@ -7,7 +7,9 @@ The section is cut along the cross-section of the shell where the fillet (or the
                axis ----- X1 -- M/T1-T2 ---- collar end
                 |  stem   | side |
 
-T2 and T1 are the fillet's ends on the dome and on the stem, M its middle; with a sharp corner they are one point.
+T2 and T1 are the fillet's ends on the dome and on the stem, M its middle; with a sharp corner they are one point. The core
+ends at the height of T1 under an inner stem; under an outer one, towards which the dome bulges, it follows the dome's face
+and so has the dome's thickness however thin that is.
 """
 
 from collections.abc import Callable
@@ -21,7 +23,7 @@ from scipy.optimize import brentq
 
 from shell.blocks import Solid
 from shell.errors import ShellError, mm
-from shell.patches import Patch, Path, Planar, circular, layers, rings, shrinking, straight, whole
+from shell.patches import Cell, Patch, Path, Planar, circular, layers, rings, shrinking, straight, whole
 from shell.quadrature import Array
 from shell.resonator import Resonator, Stem
 
@@ -29,6 +31,7 @@ Spot = tuple[float, float]
 
 COLLAR = 1.5  # width of the solid ring around the root, in thicknesses
 FILLET_SHRINK = 0.3
+SLANT = 0.25  # most by which a cut through the shell may slant, over the thickness
 QUIET = 2.5  # stem lengths over its radius from which its clamp is not felt by n > 1
 
 
@@ -43,21 +46,31 @@ class Contact:
     on_dome: Spot
     on_stem: Spot
 
+    @property
+    def turn(self) -> tuple[float, float]:
+        """Angle of T2 as seen from the fillet's centre, and from there to T1."""
+        first, last = (atan2(z - self.center[1], r - self.center[0]) for r, z in (self.on_dome, self.on_stem))
+        return first, (last - first + pi) % (2 * pi) - pi
+
 
 @dataclass(frozen=True)
 class Frame:
     """What a root's patches hang on, the same at every level.
 
     collar : arc length where the shell begins; `widest` : that of the outermost contact.
+    corners : for each contact, the arc length of O.
     radii : bounds of the columns of the stem, from its side to the axis.
     above : for each contact, η of the face opposite (0: the middle surface) and its arc lengths at the inner radii.
+    cuts : arc lengths between O and X on the opposite face at which the cells of a fillet end; two stems share them.
     """
 
     contacts: tuple[Contact, ...]
     widest: float
     collar: float
+    corners: tuple[float, ...]
     radii: tuple[float, ...]
     above: tuple[tuple[float, tuple[float, ...]], ...]
+    cuts: tuple[float, ...]
 
 
 def lay_root(resonator: Resonator, ring_count: int, n: int) -> tuple[Solid, float]:
@@ -66,8 +79,8 @@ def lay_root(resonator: Resonator, ring_count: int, n: int) -> tuple[Solid, floa
     stem = resonator.stem
     assert stem is not None
     patches: list[Patch] = []
-    for contact, (far, arcs) in zip(frame.contacts, frame.above, strict=True):
-        patches += _half_root(resonator, stem, frame, contact, far, arcs, ring_count, n)
+    for which in range(len(frame.contacts)):
+        patches += _half_root(resonator, stem, frame, which, ring_count, n)
     ends = [contact.end for contact in frame.contacts]
 
     def held(r: float, z: float) -> bool:
@@ -96,7 +109,25 @@ def _find_frame(resonator: Resonator) -> Frame:
         far = 0.0 if len(contacts) == 2 else -float(contact.face)
         surface = _offset(resonator, far)
         above.append((far, tuple(_at_radius(surface, r, widest) for r in radii[1:])))
-    return Frame(contacts, widest, collar, tuple(radii), tuple(above))
+    # two fillets end at different places of a thin shell; where they nearly do not, one slanting cut serves both
+    slant = SLANT * h if stem.fillet else np.inf
+    corners = tuple(widest if widest - contact.s < slant else contact.s for contact in contacts)
+    cuts = _cuts(resonator, stem, contacts, corners, above[0][0], above[0][1][0])
+    return Frame(contacts, widest, collar, corners, tuple(radii), tuple(above), cuts)
+
+
+def _cuts(
+    resonator: Resonator, stem: Stem, contacts: tuple[Contact, ...], corners: tuple[float, ...], far: float, over: float
+) -> tuple[float, ...]:
+    """Beside a thin shell the wedge under the fillet is long: its cells grow away from the shell."""
+    if not stem.fillet:
+        return ()
+    far_face, near = _offset(resonator, far), min(corners)
+    count = 0
+    for contact, corner in zip(contacts, corners, strict=True):
+        height = _distance(contact.on_dome, _point(far_face, corner))
+        count = max(count, ceil(log(abs(contact.turn[1]) / 2 * stem.fillet / (2 * height)) / log(3)))
+    return (near, *(near + (over - near) * step for step in shrinking(count, 1 / 3)[:0:-1]))
 
 
 def _touch(resonator: Resonator, stem: Stem, face: int, end: float) -> Contact:
@@ -127,48 +158,60 @@ def _touch(resonator: Resonator, stem: Stem, face: int, end: float) -> Contact:
     return Contact(face, end, s, middle, on_dome, (stem.radius, middle[1]))
 
 
-def _half_root(
-    resonator: Resonator,
-    stem: Stem,
-    frame: Frame,
-    contact: Contact,
-    far: float,
-    arcs: tuple[float, ...],
-    ring_count: int,
-    n: int,
-) -> list[Patch]:
+def _half_root(resonator: Resonator, stem: Stem, frame: Frame, which: int, ring_count: int, n: int) -> list[Patch]:
     """The patches between one face of the dome and `far` (η of the opposite face, or 0: the middle surface)."""
+    contact, (far, arcs), own = frame.contacts[which], frame.above[which], frame.corners[which]
     near_face, far_face = _offset(resonator, contact.face), _offset(resonator, far)
-    radii, s_far, collar = frame.radii, frame.widest, frame.collar
+    radii, collar = frame.radii, frame.collar
     over = _point(far_face, arcs[0])  # X; `arcs` are those of X and of the points further in
-    corner = _point(far_face, s_far)  # O
-    level = contact.on_stem[1]
-    under: Spot = (radii[1], level)  # X1
-    foot: Spot = (stem.radius, level)  # T1
+    corner = _point(far_face, own)  # O
+    base = _base(resonator, contact, radii)
+    foot, under = _point(base.path, base.arcs[0]), _point(base.path, base.arcs[1])  # T1, X1
     steps = _steps(stem.fillet, min(hypot(foot[0] - under[0], 0.0), _distance(contact.on_dome, corner)), ring_count)
-    rim_near, rim_far = _point(near_face, collar), _point(far_face, collar)
-    cross, roof = straight(contact.on_dome, corner), _along(far_face, s_far, arcs[0])
-    patches = [
-        Patch(
-            cross,
-            straight(rim_near, rim_far),
-            _along(near_face, contact.s, collar),
-            _along(far_face, s_far, collar),
-            rings(steps),
-            "root",
-        ),
-    ]
-    for (r_out, s_out), (r_in, s_in) in pairwise(zip(radii[1:], arcs, strict=True)):
-        left, right = (straight((r, level), _point(far_face, s)) for r, s in ((r_in, s_in), (r_out, s_out)))
-        floor = straight((r_in, level), (r_out, level))
+    cross, roof = straight(contact.on_dome, corner), _along(far_face, own, arcs[0])
+    ends = [collar] if own == frame.widest else [frame.widest, collar]
+    patches: list[Patch] = []
+    begin, near = cross, contact.s
+    for end in ends:
+        section = straight(_point(near_face, end), _point(far_face, end))
+        sides = _along(near_face, near, end), _along(far_face, near if patches else own, end)
+        patches.append(Patch(begin, section, *sides, whole() if patches else rings(steps), "root"))
+        begin, near = section, end
+    for (a_out, s_out), (a_in, s_in) in pairwise(zip(base.arcs[1:], arcs, strict=True)):
+        left, right = (straight(_point(base.path, a), _point(far_face, s)) for a, s in ((a_in, s_in), (a_out, s_out)))
+        floor = _along(base.path, a_in, a_out)
         patches.append(Patch(floor, _along(far_face, s_in, s_out), left, right, whole(), "root"))
+    floor, wall = _along(base.path, *base.arcs[:2]), straight(under, over)
     if stem.fillet:
-        patches += _fillet(
-            contact, stem.fillet, cross, roof, straight(foot, under), straight(under, over), corner, over, steps
-        )
+        cuts = [(s - own) / (arcs[0] - own) for s in frame.cuts if s < own]
+        patches += _fillet(contact, stem.fillet, cross, roof, floor, wall, over, steps, (1.0, *cuts[::-1]))
     else:
-        patches.append(Patch(cross, straight(under, over), straight(foot, under), roof, rings(steps), "root"))
-    return patches + _stem(list(radii), level, contact.end, steps, ring_count, n)
+        patches.append(Patch(cross, wall, floor, roof, rings(steps), "root"))
+    return patches + _stem(list(radii), base, contact.end, steps, ring_count, n)
+
+
+@dataclass(frozen=True)
+class Base:
+    """Where the core ends and the stem begins: a curve, and its parameters at the radii of the columns."""
+
+    path: Callable[[Array], Planar]
+    arcs: tuple[float, ...]
+
+
+def _base(resonator: Resonator, contact: Contact, radii: tuple[float, ...]) -> Base:
+    """The level of T1, or under an outer stem the dome's face raised to T1."""
+    level = contact.on_stem[1]
+    if contact.face < 0:
+        return Base(lambda r: (r, np.full_like(r, level)), radii)
+    face = _offset(resonator, contact.face)
+    arcs = tuple(_at_radius(face, r, (1 + 1e-6) * contact.s) for r in radii)
+    rise = level - _point(face, arcs[0])[1]
+
+    def raised(s: Array) -> Planar:
+        r, z = face(s)
+        return r, z + rise
+
+    return Base(raised, arcs)
 
 
 def _fillet(
@@ -178,17 +221,13 @@ def _fillet(
     roof: Path,
     floor: Path,
     wall: Path,
-    corner: Spot,
     over: Spot,
     steps: tuple[float, ...],
+    cuts: tuple[float, ...],
 ) -> list[Patch]:
     """Two patches that meet on the line from the middle of the fillet to X."""
-    (r, z), on_dome, on_stem = contact.center, contact.on_dome, contact.on_stem
-    first = atan2(on_dome[1] - z, on_dome[0] - r)
-    turn = (atan2(on_stem[1] - z, on_stem[0] - r) - first + pi) % (2 * pi) - pi
+    (r, z), (first, turn) = contact.center, contact.turn
     middle = first + turn / 2
-    # beside a thin shell the wedge under the fillet is long: its cells grow away from the shell
-    cuts = shrinking(max(0, ceil(log(abs(turn) / 2 * radius / (2 * _distance(on_dome, corner))) / log(3))), 1 / 3)
     center_line = straight((r + radius * np.cos(middle), z + radius * np.sin(middle)), over)
     return [
         Patch(cross, center_line, circular((r, z), radius, first, middle), roof, layers(steps, cuts), "root"),
@@ -205,13 +244,13 @@ def _columns(radius: float, inset: float) -> list[float]:
     return [*radii, 0.0]
 
 
-def _stem(radii: list[float], top: float, end: float, steps: tuple[float, ...], ring_count: int, n: int) -> list[Patch]:
+def _stem(radii: list[float], base: Base, end: float, steps: tuple[float, ...], ring_count: int, n: int) -> list[Patch]:
     """The stem itself, from its root to the clamped end, in columns between the radii.
 
     A motion with n > 1 dies out as exp(-1.8 z/a) or faster (measured: by e over less than a/2): beyond a length of
     `QUIET` radii the clamp is not felt, and its edge needs no small cells.
     """
-    direction, length = (1.0 if end > top else -1.0), abs(end - top)
+    length = min(abs(end - _point(base.path, arc)[1]) for arc in (base.arcs[0], base.arcs[-1]))
     quiet = n > 1 and length > QUIET * radii[0]
     # cells grow from both ends; the first is as tall as the outer column is wide
     step = min(radii[0] - radii[1], 0.4 * length)
@@ -228,27 +267,33 @@ def _stem(radii: list[float], top: float, end: float, steps: tuple[float, ...], 
             step = min(2.5 * step, 1.5 * radii[0])
         middle = np.linspace(low[-1], high[-1], 1 + ceil((high[-1] - low[-1]) / (1.5 * step)))
         heights = [*low, *middle[1:-1].tolist(), *high[::-1]]
-    levels = [top + direction * height for height in heights]
+    levels = [height / length for height in heights]
     sharp = rings(shrinking(ring_count))
     patches = []
     for k, (one, two) in enumerate(pairwise(levels)):
-        side = _rectangle((radii[0], one), (radii[1], two), rings(steps) if k == 0 else whole())
         if k == len(levels) - 2 and not quiet:  # the edge of the clamp is as singular as a sharp corner
-            side = _rectangle((radii[0], two), (radii[1], one), sharp)
-        patches += [side, *(_rectangle((r_out, one), (r_in, two), whole()) for r_out, r_in in pairwise(radii[1:]))]
+            side = _block(base, base.arcs[:2], (two, one), end, sharp)
+        else:
+            side = _block(base, base.arcs[:2], (one, two), end, rings(steps) if k == 0 else whole())
+        patches += [side, *(_block(base, arcs, (one, two), end, whole()) for arcs in pairwise(base.arcs[1:]))]
     return patches
 
 
-def _rectangle(corner: Spot, opposite: Spot, cells: tuple) -> Patch:  # type: ignore[type-arg]
-    (r0, z0), (r1, z1) = corner, opposite
-    return Patch(
-        straight((r0, z0), (r1, z0)),
-        straight((r0, z1), (r1, z1)),
-        straight((r0, z0), (r0, z1)),
-        straight((r1, z0), (r1, z1)),
-        cells,
-        "stem",
-    )
+def _block(
+    base: Base, arcs: tuple[float, ...], rows: tuple[float, float], end: float, cells: tuple[Cell, ...]
+) -> Patch:
+    """A patch between two columns and two rows, 0 at the base and 1 at the flat end."""
+
+    def row(x: float) -> Path:
+        def path(y: Array) -> Planar:
+            r, z = base.path(arcs[0] + (arcs[1] - arcs[0]) * y)
+            return r, (1 - x) * z + x * end
+
+        return path
+
+    bottom, top = row(rows[0]), row(rows[1])
+    left, right = (straight(_point(bottom, y), _point(top, y)) for y in (0.0, 1.0))
+    return Patch(bottom, top, left, right, cells, "stem")
 
 
 def _steps(fillet: float, reach: float, ring_count: int) -> tuple[float, ...]:
