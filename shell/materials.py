@@ -6,9 +6,9 @@ extrapolation, and a property that no source states is refused by name.
 
 import difflib
 import tomllib
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
-from functools import lru_cache
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -17,86 +17,45 @@ from numpy.typing import ArrayLike, NDArray
 
 from shell.elastic import Elastic
 from shell.errors import ShellError
+from shell.property import FORMS, LISTS, PROPERTIES, ROOM, SIGNED, ZERO_CELSIUS, Array, Property, coefficient_names
 from shell.quadrature import gauss
 
-ZERO_CELSIUS = 273.15
-PROPERTIES = {
-    "shear_modulus": "Pa",
-    "youngs_modulus": "Pa",
-    "poisson_ratio": "1",
-    "density": "kg/m³",
-    "expansion": "1/K",
-    "conductivity": "W/(m K)",
-    "heat_capacity": "J/(kg K)",
-}
 ELASTIC = ("shear_modulus", "youngs_modulus", "poisson_ratio")
 _SHIPPED = Path(__file__).with_name("materials.toml")
 
 
-def _constant(T: NDArray[np.float64], p: Mapping[str, Any]) -> NDArray[np.float64]:
-    return np.full_like(T, p["value"])
+@dataclass(frozen=True, eq=False)
+class Prior:
+    """What a law leaves open: coefficients of its deviation, jointly Gaussian about zero.
 
+    Attributes
+    ----------
+    names : (k,) such as `shear_modulus.log_slope_per_K`; x counts from the material's reference temperature.
+    sd : (k,) array
+    correlation : (k, k) array
+    """
 
-def _linear(T: NDArray[np.float64], p: Mapping[str, Any]) -> NDArray[np.float64]:
-    return np.asarray(p["value"] * (1 + p["slope"] * (T - ZERO_CELSIUS - p["at_degC"])))
+    names: tuple[str, ...]
+    sd: Array
+    correlation: Array
 
-
-def _parabola(T: NDArray[np.float64], p: Mapping[str, Any]) -> NDArray[np.float64]:
-    distance = (T - ZERO_CELSIUS - p["maximum_degC"]) / (p["at_degC"] - p["maximum_degC"])
-    return np.asarray(p["value"] * (1 + p["rise"] * (1 - distance**2)))
-
-
-def _table(T: NDArray[np.float64], p: Mapping[str, Any]) -> NDArray[np.float64]:
-    from scipy.interpolate import PchipInterpolator
-
-    at = p["temperature_degC"]
-    # The law's range is checked in kelvin; rounding on the way back must not lead out of the table.
-    values = PchipInterpolator(at, p["values"])(np.clip(T - ZERO_CELSIUS, at[0], at[-1]))
-    return np.asarray(p.get("value", 1.0) * values)
-
-
-FORMS: dict[str, tuple[Callable[[NDArray[np.float64], Mapping[str, Any]], NDArray[np.float64]], tuple[str, ...]]] = {
-    # form: (function of temperature, the numbers that it needs)
-    "constant": (_constant, ("value",)),
-    "linear": (_linear, ("value", "at_degC", "slope")),
-    "parabola": (_parabola, ("value", "at_degC", "rise", "maximum_degC")),
-    "table": (_table, ("temperature_degC", "values")),
-}
-
-
-LISTS = ("temperature_degC", "values")
-"""Numbers of a form that are lists."""
-
-
-@dataclass(frozen=True)
-class Property:
-    """One property over temperature: a form, its numbers, and the standard uncertainty of any of them."""
-
-    form: str
-    numbers: Mapping[str, Any]
-    uncertainty: Mapping[str, float] = field(default_factory=dict)
-    source: str = ""
-
-    def __call__(self, temperature: ArrayLike) -> NDArray[np.float64]:
-        """Evaluate the form at temperatures in kelvin."""
-        return FORMS[self.form][0](np.asarray(temperature, dtype=float), self.numbers)
-
-    def with_number(self, name: str, value: float) -> "Property":
-        """Return the same property with one of its numbers changed."""
-        return replace(self, numbers={**self.numbers, name: value})
-
-    def scaled(self, factor: float) -> "Property":
-        """Return the property times a factor, its relative shape over temperature unchanged."""
-        shifted = {**self.uncertainty}
-        if "value" in shifted:
-            shifted["value"] *= abs(factor)
-        value = self.numbers.get("value", 1.0) * factor
-        return replace(self, numbers={**self.numbers, "value": value}, uncertainty=shifted)
+    @property
+    def covariance(self) -> Array:
+        """Covariance of the coefficients, (k, k)."""
+        return np.asarray(self.correlation * np.outer(self.sd, self.sd))
 
 
 @dataclass(frozen=True)
 class Material:
-    """One law of one material: properties over a range of temperature, and where they come from."""
+    """One law of one material: properties over a range of temperature, and where they come from.
+
+    Attributes
+    ----------
+    lowest, highest : float, K
+        Range of the law.
+    reference : float, K
+        Temperature about which the deviations of the law and their prior count.
+    """
 
     name: str
     law: str
@@ -105,6 +64,7 @@ class Material:
     properties: Mapping[str, Property]
     source: str = ""
     note: str = ""
+    reference: float = ROOM
 
     def value(self, name: str, temperature: ArrayLike) -> NDArray[np.float64]:
         """Return a property at temperatures in kelvin; E, G and nu are derived from the two that are stated.
@@ -130,16 +90,15 @@ class Material:
             return self.properties["youngs_modulus"](T) / (2 * (1 + self.properties["poisson_ratio"](T)))
         return self.properties["youngs_modulus"](T) / (2 * self.properties["shear_modulus"](T)) - 1
 
-    def slope(self, name: str, temperature: float) -> float:
+    def slope(self, name: str, temperature: ArrayLike) -> Array:
         """Return the slope of a property per kelvin, by a central difference that stays inside the range."""
         step = 0.05
-        middle = min(max(temperature, self.lowest + step), self.highest - step)
-        low, high = self.value(name, np.array([middle - step, middle + step]))
-        return float((high - low) / (2 * step))
+        middle = np.clip(self.check(temperature), self.lowest + step, self.highest - step)
+        return np.asarray((self.value(name, middle + step) - self.value(name, middle - step)) / (2 * step))
 
-    def log_slope(self, name: str, temperature: float) -> float:
+    def log_slope(self, name: str, temperature: ArrayLike) -> Array:
         """Return the relative slope of a property, d ln p/dT in 1/K."""
-        return self.slope(name, temperature) / float(self.value(name, temperature))
+        return np.asarray(self.slope(name, temperature) / self.value(name, temperature))
 
     def elastic(self, temperature: float) -> Elastic:
         """Return E, nu and rho at one temperature in kelvin."""
@@ -170,9 +129,42 @@ class Material:
             )
         return T
 
-    def uncertain_numbers(self) -> list[tuple[str, str, float]]:
-        """Return (property, number, standard uncertainty) for every number that has one."""
-        return [(p, n, u) for p, prop in self.properties.items() for n, u in prop.uncertainty.items() if u > 0]
+    @cached_property
+    def prior(self) -> Prior:
+        """What the law leaves open; coefficients that nothing makes uncertain are not in it."""
+        names = [f"{p}.{one}" for p in self.properties for one in coefficient_names(p)]
+        covariance = np.zeros((len(names), len(names)))
+        for k, found in enumerate(self.properties.values()):
+            covariance[3 * k : 3 * k + 3, 3 * k : 3 * k + 3] = found.covariance
+        open_ones = np.flatnonzero(np.diag(covariance) > 0)
+        sd = np.sqrt(np.diag(covariance)[open_ones])
+        correlation = covariance[np.ix_(open_ones, open_ones)] / np.outer(sd, sd)
+        return Prior(tuple(names[k] for k in open_ones), sd, correlation)
+
+    def with_coefficients(self, values: Mapping[str, float]) -> "Material":
+        """Return the same material with coefficients of its deviation set, for example `expansion.value` in 1/K.
+
+        Raises
+        ------
+        ShellError
+            An unknown coefficient; a value that leads to an impossible property within the range.
+        """
+        changed: dict[str, list[float]] = {}
+        for key, value in values.items():
+            name, _, coefficient = key.partition(".")
+            if name not in self.properties or coefficient not in coefficient_names(name):
+                known = [f"{p}.{one}" for p in self.properties for one in coefficient_names(p)]
+                raise ShellError(f"material '{self.name}' has no coefficient '{key}'{_nearest(key, known)}")
+            held = changed.setdefault(name, list(self.properties[name].deviation))
+            held[coefficient_names(name).index(coefficient)] = float(value)
+        moved = {
+            name: replace(self.properties[name], deviation=(a, b, c), reference=self.reference)
+            for name, (a, b, c) in changed.items()
+        }
+        span = [self.lowest - ZERO_CELSIUS, self.highest - ZERO_CELSIUS]
+        for name, found in moved.items():
+            _check_sign(f"material '{self.name}', coefficients of {name}", name, found, span)
+        return replace(self, properties={**self.properties, **moved})
 
     def with_number(self, name: str, number: str, value: float) -> "Material":
         """Return the same material with one number of one property changed."""
@@ -181,6 +173,8 @@ class Material:
 
     def rescaled(self, reference: float, **given: float) -> "Material":
         """Return the material with given values at the reference temperature, its laws' shapes kept.
+
+        Deviations and their prior count from that temperature.
 
         Parameters
         ----------
@@ -205,8 +199,9 @@ class Material:
                 properties[name] = properties[name].scaled(value / now)
             else:
                 numbers = {"value": value, "at_degC": reference - ZERO_CELSIUS}
-                properties[name] = Property("constant", numbers, source="given value")
-        return replace(self, properties=properties)
+                properties[name] = Property("constant", numbers, source="given value", relative=name not in SIGNED)
+        properties = {name: replace(found, reference=reference) for name, found in properties.items()}
+        return replace(self, properties=properties, reference=reference)
 
     def _growth_since_density(self, T: NDArray[np.float64]) -> NDArray[np.float64]:
         if "expansion" not in self.properties:
@@ -224,8 +219,10 @@ def constant_material(name: str, youngs_modulus: float, poisson_ratio: float, de
     """Return a material whose given values (Pa, 1, kg/m³) hold at every temperature and that does not expand."""
     given = {"youngs_modulus": youngs_modulus, "poisson_ratio": poisson_ratio, "density": density}
     numbers = {key: {"value": value, "at_degC": 20.0} for key, value in given.items()}
-    properties = {key: Property("constant", n, source="given value") for key, n in numbers.items()}
-    properties["expansion"] = Property("constant", {"value": 0.0}, source="given values do not expand")
+    properties = {
+        key: Property("constant", n, source="given value", relative=key not in SIGNED) for key, n in numbers.items()
+    }
+    properties["expansion"] = Property("constant", {"value": 0.0}, source="given values do not expand", relative=False)
     return Material(name, "given values", 0.0, 5000.0, properties, source="given in the card")
 
 
@@ -295,8 +292,9 @@ def _read_property(where: str, name: str, entry: Any, span: list[float]) -> Prop
     if not isinstance(entry["form"], str) or entry["form"] not in FORMS:
         raise ShellError(f"{where}: unknown form '{entry['form']}'{_nearest(str(entry['form']), FORMS)}")
     needed = FORMS[entry["form"]][1] + (("at_degC",) if name == "density" else ())
-    _check_keys(where, entry, ("form", "source", "uncertainty", "at_degC", *needed), required=needed)
-    numbers = {key: value for key, value in entry.items() if key not in ("form", "source", "uncertainty")}
+    words = ("form", "source", "uncertainty", "unsettled")
+    _check_keys(where, entry, (*words, "at_degC", *needed), required=needed)
+    numbers = {key: value for key, value in entry.items() if key not in words}
     for key, value in numbers.items():
         if key in LISTS:
             if not isinstance(value, list) or not all(_is_number(x) for x in value):
@@ -313,11 +311,14 @@ def _read_property(where: str, name: str, entry: Any, span: list[float]) -> Prop
             raise ShellError(f"{where}: the table covers {at[0]:g} to {at[-1]:g} °C, less than the law's range_degC.")
     if entry["form"] == "parabola" and numbers["maximum_degC"] == numbers["at_degC"]:
         raise ShellError(f"{where}: maximum_degC must differ from at_degC, between which the property rises.")
-    uncertainty = entry.get("uncertainty", {})
+    coefficients = coefficient_names(name)
+    uncertainty, unsettled = entry.get("uncertainty", {}), entry.get("unsettled", {})
     _check_keys(f"{where} uncertainty", uncertainty, tuple(key for key in needed if key not in LISTS))
-    if not all(_is_number(x) and x >= 0 for x in uncertainty.values()):
+    _check_keys(f"{where} unsettled", unsettled, coefficients)
+    if not all(_is_number(x) and x >= 0 for x in (*uncertainty.values(), *unsettled.values())):
         raise ShellError(f"{where}: uncertainties must be numbers, zero or more.")
-    result = Property(entry["form"], numbers, uncertainty, str(entry.get("source", "")))
+    a, b, c = (float(unsettled.get(one, 0.0)) for one in coefficients)
+    result = Property(entry["form"], numbers, uncertainty, str(entry.get("source", "")), name not in SIGNED, (a, b, c))
     _check_sign(where, name, result, span)
     return result
 

@@ -70,9 +70,9 @@ def _law(runs: Sequence[Run], instrument: "Instrument | None") -> FrequencyLaw:
     middle = (low + high) / 2
     if instrument is None:
         return FrequencyLaw(middle, slope=None, curvature=None)
-    from studies.simulation.frequency import build_frequency_model
+    from studies.law import law_of
 
-    model = build_frequency_model(instrument, low - 10, high + 10)
-    T = np.linspace(model.lowest, model.highest, 61)
-    cubic = np.polynomial.Polynomial.fit(T - middle, model.frequency(T), 3).convert().coef
+    law = law_of(instrument, low - 10, high + 10)
+    T = np.linspace(law.lowest, law.highest, 61)
+    cubic = np.polynomial.Polynomial.fit(T - middle, law.frequency(T), 3).convert().coef
     return FrequencyLaw(middle, slope=None, curvature=float(cubic[2]), cubic=float(cubic[3]))

@@ -3,7 +3,7 @@
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from shell.materials import Material
+    from shell.materials import Material, Prior
 
 
 def cards(*, json: bool = False) -> int:
@@ -84,7 +84,7 @@ def materials(name: str = "", *, json: bool = False) -> int:
 
 
 def _print_law(law: "Material") -> None:
-    from shell.materials import PROPERTIES
+    from shell.property import PROPERTIES
     from studies.cli.output import print_table
 
     rows = []
@@ -94,6 +94,21 @@ def _print_law(law: "Material") -> None:
         rows.append([key, PROPERTIES[key], prop.form, numbers, spread, prop.source])
     columns = ["Property", "Unit", "Form", "Numbers", "Standard uncertainty", "Source"]
     print_table(f"{law.name}, law '{law.law}'", columns, rows, law.note)
+    prior = law.prior
+    if prior.names:
+        beside = [
+            ", ".join(f"{prior.correlation[k, j]:+.2f} with {prior.names[j]}" for j in _correlated(prior, k))
+            for k in range(len(prior.names))
+        ]
+        open_ones = [[name, f"{sd:.2g}", c] for name, sd, c in zip(prior.names, prior.sd, beside, strict=True)]
+        note = "p(T) = law(T) exp(a + b x + ½ c x²), x = T − 20 °C: log_value, log_slope, log_curvature; without log, + instead of exp."
+        print_table(
+            f"What law '{law.law}' leaves open", ["Coefficient", "Standard deviation", "Correlation"], open_ones, note
+        )
+
+
+def _correlated(prior: "Prior", k: int) -> list[int]:
+    return [j for j in range(len(prior.names)) if j != k and abs(prior.correlation[k, j]) >= 0.005]
 
 
 def _describe(law: "Material") -> "dict[str, Any]":
@@ -104,6 +119,11 @@ def _describe(law: "Material") -> "dict[str, Any]":
         "source": law.source,
         "note": law.note,
         "lacks": _lacking(law),
+        "prior": {
+            "coefficients": list(law.prior.names),
+            "sd": law.prior.sd.tolist(),
+            "correlation": law.prior.correlation.tolist(),
+        },
         "properties": {
             key: {"form": p.form, **p.numbers, "uncertainty": dict(p.uncertainty), "source": p.source}
             for key, p in law.properties.items()
@@ -112,7 +132,8 @@ def _describe(law: "Material") -> "dict[str, Any]":
 
 
 def _lacking(law: "Material") -> "list[str]":
-    from shell.materials import ELASTIC, PROPERTIES
+    from shell.materials import ELASTIC
+    from shell.property import PROPERTIES
 
     stated = [p for p in ELASTIC if p in law.properties]
     elastic = [] if len(stated) > 1 else ["poisson_ratio" if "poisson_ratio" not in stated else "youngs_modulus"]

@@ -97,7 +97,7 @@ def diagnose(
         return 0
 
     from studies.diagnosis.campaign import load_campaign
-    from studies.diagnosis.extension import extend, law_of
+    from studies.diagnosis.extension import extend, relative_law
     from studies.diagnosis.investigate import investigate
     from studies.instrument.card import load_card, save_card
     from studies.record import read_record
@@ -107,7 +107,7 @@ def diagnose(
     campaign = load_campaign([read_record(path) for path in runs], reference)
     law = None
     if instrument is not None:
-        law = law_of(instrument, np.concatenate([np.empty(0), *(run.states.housing for run in campaign.runs)]))
+        law = relative_law(instrument, np.concatenate([np.empty(0), *(run.states.housing for run in campaign.runs)]))
     diagnosis = investigate(
         campaign,
         law,

@@ -68,7 +68,6 @@ def simulate(
             say(f"written {written} of {rows} rows ({100 * written / rows:.0f} %)")
 
     write_record(run.record, out, progress)
-    model = run.frequency_model
     summary = {
         "schema": "hrg.simulate/1",
         "card": instrument.name,
@@ -78,8 +77,8 @@ def simulate(
         "rate_Hz": rate,
         "seed": None if noiseless else seed,
         "frequency_Hz": {"first": run.record["frequency_Hz"][0], "last": run.record["frequency_Hz"][-1]},
-        "solver_relative_error": model.solver_error,
-        "interpolation_relative_error": model.interpolation_error,
+        "solver_relative_error": run.law.solver_error,
+        "interpolation_relative_error": run.law.interpolation_error,
         "warnings": list(run.warnings),
     }
     if json:
@@ -88,7 +87,7 @@ def simulate(
     span = float(np.ptp(run.record["resonator_temperature_degC"]))
     print(
         f"{out}: {rows} rows over {run.record['time_s'][-1] - run.record['time_s'][0]:g} s; the resonator's temperature"
-        f" covers {span:.2f} °C; the frequency model lies within {model.interpolation_error:.0e} of the solver, the"
-        f" solver within {model.solver_error:.0e} of its theory."
+        f" covers {span:.2f} °C; the frequency law lies within {run.law.interpolation_error:.0e} of the solver, the"
+        f" solver within {run.law.solver_error:.0e} of its theory."
     )
     return 0

@@ -5,7 +5,10 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from cyclopts import Parameter
 
 if TYPE_CHECKING:
-    from shell.temperature import TemperatureCoefficient
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from shell.law import FrequencyLaw
 
 MOST_POINTS = 10_000
 
@@ -45,10 +48,10 @@ def tcf(
     """
     import numpy as np
 
-    from shell.temperature import mode_model, temperature_coefficients
     from studies.cli.output import print_json, print_table
     from studies.errors import InputError
     from studies.instrument.card import load_card
+    from studies.law import law_of
 
     if not step > 0 or not to_degC >= from_degC:
         raise InputError(
@@ -60,8 +63,9 @@ def tcf(
         )
     instrument = load_card(card)
     at = np.arange(from_degC, to_degC + 1e-9 * step, step)
-    model = mode_model(instrument.resonator, harmonic, theory)
-    found = temperature_coefficients(model, instrument.material, instrument.reference_temperature, at + 273.15)
+    T = instrument.material.check(at + 273.15)
+    law = law_of(instrument, float(T[0]), float(T[-1]), theory, harmonic)
+    points = _points(law, T)
     local = _measured_slopes(instrument.name, measured)
     if json:
         print_json(
@@ -71,7 +75,8 @@ def tcf(
                 "theory": theory,
                 "harmonic": harmonic,
                 "law": instrument.material.law,
-                "points": [_point(c) for c in found],
+                "relative_error": law.error,
+                "points": points,
                 "measured": [{"temperature_degC": T, "slope_ppm_per_degC": s} for T, s in local],
             }
         )
@@ -80,10 +85,10 @@ def tcf(
         [f"{p['temperature_degC']:.1f}", f"{p['frequency_Hz']:.3f}"]
         + [f"{p['parts_ppm_per_degC'][k]:+.2f}" for k in ("E", "nu", "rho", "h", "r")]
         + [f"{p['slope_ppm_per_degC']:.2f} ± {p['uncertainty_ppm_per_degC']:.1f}"]
-        for p in map(_point, found)
+        for p in points
     ]
     columns = ["T (°C)", "f (Hz)", "E", "μ", "ρ", "h", "r", "slope"]
-    note = f"Slopes in ppm/°C; ± is one standard deviation that law '{instrument.material.law}' states of itself."
+    note = f"Slopes in ppm/°C; ± is one standard deviation by the prior of law '{instrument.material.law}'."
     print_table(f"{instrument.name}, n = {harmonic}, {theory}", columns, rows, note)
     if local:
         beside = [[f"{T:.1f}", f"{s:.2f}"] for T, s in local]
@@ -91,14 +96,19 @@ def tcf(
     return 0
 
 
-def _point(c: "TemperatureCoefficient") -> "dict[str, Any]":
-    return {
-        "temperature_degC": c.temperature - 273.15,
-        "frequency_Hz": c.frequency,
-        "slope_ppm_per_degC": 1e6 * c.total,
-        "uncertainty_ppm_per_degC": 1e6 * c.uncertainty,
-        "parts_ppm_per_degC": {name: 1e6 * getattr(c, name) for name in ("E", "nu", "rho", "h", "r")},
-    }
+def _points(law: "FrequencyLaw", T: "NDArray[np.float64]") -> "list[dict[str, Any]]":
+    parts = law.parts(T)
+    f, slope, spread = law.frequency(T), 1e6 * parts.total, 1e6 * law.slope_uncertainty(T)
+    return [
+        {
+            "temperature_degC": float(T[k]) - 273.15,
+            "frequency_Hz": float(f[k]),
+            "slope_ppm_per_degC": float(slope[k]),
+            "uncertainty_ppm_per_degC": float(spread[k]),
+            "parts_ppm_per_degC": {name: 1e6 * float(getattr(parts, name)[k]) for name in ("E", "nu", "rho", "h", "r")},
+        }
+        for k in range(len(T))
+    ]
 
 
 def _measured_slopes(card: str, path: str | None) -> list[tuple[float, float]]:

@@ -23,7 +23,7 @@ DELAY = 10.0
 """Standard deviation of the delay between housing sensor and resonator that every model tolerates, s."""
 
 Law = Callable[[FloatArray], FloatArray]
-"""Relative frequency of the card's material law, f(T)/f(T₀) − 1 at T in K."""
+"""The card's frequency at T in K; its scale does not matter."""
 
 
 @dataclass(frozen=True)

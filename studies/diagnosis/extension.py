@@ -13,6 +13,7 @@ from studies.diagnosis.baseline import Law
 from studies.diagnosis.fit import Fit
 from studies.diagnosis.investigate import Diagnosis
 from studies.errors import InputError
+from studies.law import law_of
 
 if TYPE_CHECKING:
     from studies.instrument.card import Instrument
@@ -22,28 +23,22 @@ WELL_CONDUCTING = 2000.0
 """Conductivity that makes shell, stem and base one lump behind the mount, W/(m K)."""
 
 
-def law_of(instrument: "Instrument", measured: "np.ndarray[Any, np.dtype[np.float64]]") -> Law:
-    """Return the relative frequency of the card's material law, √(E/((1+ν)ρ)) over its growth (HRG paper eq. 15).
-
-    A cubic spline through a value every kelvin of the law's range: a diagnosis asks for it some ten thousand times.
+def relative_law(instrument: "Instrument", measured: "np.ndarray[Any, np.dtype[np.float64]]") -> Law:
+    """Return the card's frequency over temperature (K), continued beyond its range for the trial states of a fit.
 
     Raises
     ------
     ShellError
         If a measured temperature, K, lies outside the law's range.
     """
-    from scipy.interpolate import CubicSpline
-
-    material, reference = instrument.material, instrument.reference_temperature
+    material = instrument.material
     material.check(measured)
-    T = np.linspace(material.lowest, material.highest, max(int(material.highest - material.lowest), 8) + 1)
-    E, nu, rho = (material.value(name, T) for name in ("youngs_modulus", "poisson_ratio", "density"))
-    spline = CubicSpline(T, np.sqrt(E / ((1.0 + nu) * rho)) / material.growth(T, reference))
+    law = law_of(instrument, material.lowest, material.highest)
 
-    def law(temperature: "np.ndarray[Any, np.dtype[np.float64]]") -> "np.ndarray[Any, np.dtype[np.float64]]":
-        return np.asarray(spline(temperature))
+    def frequency(temperature: "np.ndarray[Any, np.dtype[np.float64]]") -> "np.ndarray[Any, np.dtype[np.float64]]":
+        return law.frequency(temperature, extrapolate=True)
 
-    return law
+    return frequency
 
 
 def extend(instrument: "Instrument", diagnosis: Diagnosis) -> "Instrument":
@@ -100,14 +95,12 @@ def _at_mean_drive(fit: Fit) -> float:
 
 
 def _calibrate_frequency(instrument: "Instrument", fit: Fit) -> "tuple[Instrument, dict[str, Any]]":
-    from studies.simulation.frequency import build_frequency_model
-
     reference = instrument.reference_temperature
     low = min(float(s.housing.min()) for s in fit.problem.states) - 1.0
     high = max(float(s.housing.max()) for s in fit.problem.states) + 1.0
-    model = build_frequency_model(instrument, min(low, reference - 5.0), max(high, reference + 5.0))
+    own_law = law_of(instrument, min(low, reference - 5.0), max(high, reference + 5.0))
     f0 = float(fit.linear.coefficients[0]) + _at_mean_drive(fit)
-    factor = (f0 / float(model.frequency(np.array([reference]))[0])) ** 2
+    factor = (f0 / float(own_law.frequency(np.array([reference]))[0])) ** 2
     modulus = float(instrument.material.value("youngs_modulus", reference)) * factor
     material = {**instrument.content["material"], "youngs_modulus_GPa": modulus / 1e9}
     extended = instrument.with_table("material", material)
@@ -120,7 +113,7 @@ def _calibrate_frequency(instrument: "Instrument", fit: Fit) -> "tuple[Instrumen
     else:
         ends = law(np.array([reference - 0.5, reference + 0.5]))
         measured = measured + fit.linear.coefficients[1] * (law(T) - law(np.array([reference]))) / (ends[1] - ends[0])
-    own = np.sqrt(factor) * (model.frequency(T) - model.frequency(np.array([reference])))
+    own = np.sqrt(factor) * (own_law.frequency(T) - own_law.frequency(np.array([reference])))
     slope, curvature = np.linalg.lstsq(np.stack([x, x**2], axis=1), measured - own, rcond=None)[0]
     calibration = {
         "name": "calibration",

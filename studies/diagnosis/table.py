@@ -13,7 +13,7 @@ from scipy.stats import chi2
 from scipy.stats import f as f_distribution
 
 from studies.diagnosis.baseline import Law
-from studies.diagnosis.extension import law_of
+from studies.diagnosis.extension import relative_law
 from studies.diagnosis.fit import Interval
 from studies.diagnosis.states import FloatArray
 from studies.diagnosis.verdict import Cause, ResponseResult, Verdict
@@ -122,7 +122,7 @@ def diagnose_table(path: str, card: str | None = None) -> TableDiagnosis:
     data = read_frequency_table(path)
     T, f = data.values["temperature_degC"], data.values["frequency_Hz"]
     order = np.argsort(T)
-    law = law_of(load_card("hrg-30mm" if card is None else card), T + 273.15)
+    law = relative_law(load_card("hrg-30mm" if card is None else card), T + 273.15)
     return study_steady_table(T[order], f[order], reading_resolution(f), law)
 
 
@@ -134,7 +134,7 @@ def study_steady_table(T: FloatArray, f: FloatArray, resolution: float, law: Law
     law_left = _left(free, f)
     base = np.stack([np.ones_like(T), law_values, T**2], axis=1)
     left = _left(base, f)
-    ratio = _curvature(T, f) / _curvature(T, law_values + 1.0)
+    ratio = _curvature(T, f) / _curvature(T, law_values)
     law_rms = float(np.sqrt(np.mean(law_left**2)))
     if distinct < FEWEST_POINTS:
         remark = f"{distinct} temperatures; a baseline of three numbers needs five or more to be tested"
@@ -290,7 +290,7 @@ def _sentences(
         middle = 0.5 * (T[lowest] + T[lowest + 1])
         out.append(
             f"The local slope falls to {local[lowest]:.1f} ppm/°C near {middle:.0f} °C and rises again to "
-            f"{local[-1]:.1f}: the silica law has no such turn."
+            f"{local[-1]:.1f}: the law has no such turn, but its curvature is open to either sign."
         )
     if T.size >= 7:
         cubic, quartic = (float(np.sum((f - np.polyval(np.polyfit(T, f, p), T)) ** 2)) for p in (3, 4))

@@ -27,8 +27,8 @@ def calibrate_and_apply() -> Outcome:
     """Fit the cubic to the settled end of every step and apply it to the ramp."""
     gyro = load_card("hrg-30mm")
     staircase = simulate_run(gyro, load_profile("staircase -20 40 10 6h"), 0.01, noise=False, theory="shell")
-    slowly, known = load_profile("ramp -20 40 0.05"), staircase.frequency_model
-    ramp = simulate_run(gyro, slowly, 0.01, noise=False, frequency_model=known).record
+    slowly, known = load_profile("ramp -20 40 0.05"), staircase.law
+    ramp = simulate_run(gyro, slowly, 0.01, noise=False, law=known).record
     record = staircase.record
     settled = np.searchsorted(record["time_s"], STEP * np.arange(1, 8)) - 1
     T, f = record["housing_temperature_degC"][settled], record["frequency_Hz"][settled]

@@ -19,7 +19,7 @@ from studies.simulation.chamber import load_profile
 from studies.simulation.virtual_gyro import simulate_run
 
 if TYPE_CHECKING:
-    from studies.simulation.frequency import FrequencyModel
+    from shell.law import FrequencyLaw
 
 CARD = "hrg-30mm"
 COOLING, WARMING = "step 25 -20 5h", "step -20 25 5h"
@@ -104,9 +104,7 @@ def run_gyro(tables: dict[str, Any], profile: str, seed: int) -> BiasRun:
     """Run a gyro through a profile and decimate its record as `hrg fit bias` does a measured one."""
     card = load_card(CARD)
     instrument = replace(card, content={**card.content, **tables})
-    record = simulate_run(
-        instrument, load_profile(profile), ROWS_PER_SECOND, seed, frequency_model=_frequency_model()
-    ).record
+    record = simulate_run(instrument, load_profile(profile), ROWS_PER_SECOND, seed, law=_law()).record
     return prepare_run(record["time_s"], record["frequency_Hz"], record["bias_deg_per_h"])
 
 
@@ -143,5 +141,5 @@ def spread(gains: Sequence[float]) -> Spread:
 
 
 @cache
-def _frequency_model() -> "FrequencyModel":
-    return simulate_run(load_card(CARD), load_profile(COOLING), 0.01, noise=False).frequency_model
+def _law() -> "FrequencyLaw":
+    return simulate_run(load_card(CARD), load_profile(COOLING), 0.01, noise=False).law

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from compensation.frequency import FrequencyFit, OrderComparison, compare_orders, fit_frequency
 
 if TYPE_CHECKING:
-    from shell.temperature import TemperatureCoefficient
+    from shell.law import SlopeParts
     from studies.instrument.card import Instrument
 
 Array = NDArray[np.float64]
@@ -58,20 +58,29 @@ class FrequencyStudy:
 class PhysicsComparison:
     """What the material's published laws predict for a card, beside the measured table.
 
-    `coefficients` of the default law at the local temperatures and, last, at 20 °C; `laws` (name, slope at 20 °C, its
-    uncertainty in ppm/°C) of every published law; curvatures in ppm/°C², twice the quadratic coefficient of ln f.
+    `parts` (1/K) of the slope by the card's law, and its `uncertainty` (1/K), at the local temperatures and, last, at 20 °C;
+    `laws` (name, slope at 20 °C, its uncertainty in ppm/°C) of every published law; curvatures in ppm/°C², twice the
+    quadratic coefficient of ln f, of the law with its standard deviation.
     """
 
     instrument: "Instrument"
-    coefficients: "Sequence[TemperatureCoefficient]"
+    temperature: Array
+    parts: "SlopeParts"
+    uncertainty: Array
     laws: Sequence[tuple[str, float, float]]
     curvature_measured: float
     curvature_law: float
+    curvature_uncertainty: float
 
     @property
-    def at_20(self) -> "TemperatureCoefficient":
-        """The slope at 20 °C and its parts."""
-        return self.coefficients[-1]
+    def slope_ppm(self) -> Array:
+        """Slopes of ln f, ppm/°C."""
+        return np.asarray(1e6 * self.parts.total)
+
+    @property
+    def uncertainty_ppm(self) -> Array:
+        """Their standard deviations by the law's prior, ppm/°C."""
+        return 1e6 * self.uncertainty
 
 
 def printed_table1() -> tuple[Array, Array]:
@@ -134,23 +143,34 @@ def local_slopes(temperature_degC: Array, frequency: Array) -> tuple[Array, Arra
 
 def compare_physics(study: FrequencyStudy, instrument: "Instrument") -> PhysicsComparison:
     """Set first-principles physics, the solid solver over the card's material law, beside a measured table."""
+    from shell.law import build_law
     from shell.materials import read_materials
-    from shell.temperature import frequency_over_temperature, mode_model, temperature_coefficients
+    from studies.law import law_of
 
-    T0, material = instrument.reference_temperature, instrument.material
-    model = mode_model(instrument.resonator)
+    T = study.temperature_degC + ZERO_CELSIUS
+    law = law_of(instrument, float(T.min()), float(T.max()))
     at = np.append(study.local_degC, 20.0) + ZERO_CELSIUS
-    coefficients = temperature_coefficients(model, material, T0, at)
     laws = []
-    for law in read_materials()[material.name].values():
-        c = temperature_coefficients(model, law, T0, 20.0 + ZERO_CELSIUS)[0]
-        laws.append((law.law, 1e6 * c.total, 1e6 * c.uncertainty))
-    predicted = frequency_over_temperature(model, material, T0, study.temperature_degC + ZERO_CELSIUS)
-    curvature = [
-        2e6 * np.polynomial.Polynomial.fit(study.temperature_degC, np.log(f), 2).convert().coef[2]
-        for f in (study.frequency, predicted)
-    ]
-    return PhysicsComparison(instrument, coefficients, laws, *curvature)
+    for material in read_materials()[instrument.material.name].values():
+        one = build_law(instrument.resonator, material, instrument.reference_temperature, at[-1], at[-1])
+        laws.append((material.law, 1e6 * float(one.parts(at[-1]).total), 1e6 * float(one.slope_uncertainty(at[-1]))))
+
+    def curvature(values: Array) -> float:
+        return float(2e6 * np.polynomial.Polynomial.fit(study.temperature_degC, values, 2).convert().coef[2])
+
+    moved, prior = law.derivatives(T), law.material.prior
+    acting = [k for k, name in enumerate(prior.names) if name in moved]
+    bends = np.array([curvature(moved[prior.names[k]]) for k in acting])
+    return PhysicsComparison(
+        instrument,
+        at,
+        law.parts(at),
+        law.slope_uncertainty(at),
+        laws,
+        curvature(np.log(study.frequency)),
+        curvature(law.logarithm(T)),
+        float(np.sqrt(bends @ prior.covariance[np.ix_(acting, acting)] @ bends)),
+    )
 
 
 def _data(name: str) -> Path:

@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from studies.simulation.frequency import FrequencyModel, build_frequency_model
+from shell.law import FrequencyLaw
+from studies.law import law_of
 from studies.simulation.heat_path import build_network, build_shell_and_stem
 from studies.simulation.virtual_gyro import cell_weights
 from thermal.network import Network
@@ -89,7 +90,7 @@ def identify_mount(instrument: "Instrument") -> float:
 
     What is left is that of the temperature which the frequency sees.
     """
-    weights = cell_weights(instrument, _model(instrument))
+    weights = cell_weights(instrument, _law(instrument))
 
     def remaining(conductance: float) -> float:
         table = {**instrument.table("thermal"), "mount_conductance_W_per_K": conductance}
@@ -107,20 +108,20 @@ def study_settling(instrument: "Instrument", hours: tuple[float, ...] = (4.0, 4.
     """Compute Figure 3 and the soak errors of Table 1 in the radiative and the linear network."""
     from studies.papers.hrg import printed_table1
 
-    model = _model(instrument)
-    weights = cell_weights(instrument, model)
+    law = _law(instrument)
+    weights = cell_weights(instrument, law)
     networks = dict(zip(NETWORKS, _networks(instrument), strict=True))
     curves = [
-        _curve(name, network, weights, model, target) for target in STEPS_degC for name, network in networks.items()
+        _curve(name, network, weights, law, target) for target in STEPS_degC for name, network in networks.items()
     ]
     soaks = [
-        _soak(protocol, name, networks[name], weights, model, hour)
+        _soak(protocol, name, networks[name], weights, law, hour)
         for protocol in PROTOCOLS
         for hour in hours
         for name in NETWORKS[:2]
     ]
     T, f = printed_table1()
-    settled = model.frequency(POINTS_degC + ZERO_CELSIUS)
+    settled = law.frequency(POINTS_degC + ZERO_CELSIUS)
     return SettlingStudy(
         tuple(curves), tuple(soaks), *_slope_and_curvature(T, f), *_slope_and_curvature(POINTS_degC, settled)
     )
@@ -134,21 +135,19 @@ def _networks(instrument: "Instrument") -> tuple[Network, Network, Network]:
     )
 
 
-def _curve(name: str, network: Network, weights: Array, model: FrequencyModel, target_degC: float) -> StepCurve:
+def _curve(name: str, network: Network, weights: Array, law: FrequencyLaw, target_degC: float) -> StepCurve:
     time = np.linspace(0.0, END, 721)
     room, target = ROOM_degC + ZERO_CELSIUS, target_degC + ZERO_CELSIUS
     row = shell_weights(tuple(node.name for node in network.nodes), weights)
     left = step_remaining(network, room, target, row, time)
-    return StepCurve(name, target_degC, time, left, model.frequency(target + (room - target) * left))
+    return StepCurve(name, target_degC, time, left, law.frequency(target + (room - target) * left))
 
 
-def _soak(
-    protocol: str, name: str, network: Network, weights: Array, model: FrequencyModel, hours: float
-) -> SoakResult:
+def _soak(protocol: str, name: str, network: Network, weights: Array, law: FrequencyLaw, hours: float) -> SoakResult:
     """Read every point after `hours`."""
     row = shell_weights(tuple(node.name for node in network.nodes), weights)
     reach = _reach_from_room if protocol == PROTOCOLS[0] else _reach_upwards
-    settled, read = model.frequency(POINTS_degC + ZERO_CELSIUS), model.frequency(reach(network, row, 3600 * hours))
+    settled, read = law.frequency(POINTS_degC + ZERO_CELSIUS), law.frequency(reach(network, row, 3600 * hours))
     with_soak, without = _slope_and_curvature(POINTS_degC, read), _slope_and_curvature(POINTS_degC, settled)
     return SoakResult(protocol, name, hours, read - settled, with_soak[0] - without[0], with_soak[1] - without[1])
 
@@ -174,6 +173,6 @@ def _slope_and_curvature(T: Array, f: Array) -> tuple[float, float]:
     return float(1e6 * c[1]), float(2e6 * c[2])
 
 
-def _model(instrument: "Instrument") -> FrequencyModel:
+def _law(instrument: "Instrument") -> FrequencyLaw:
     low, high = POINTS_degC[[0, -1]] + ZERO_CELSIUS
-    return build_frequency_model(instrument, low - 5, high + 5)
+    return law_of(instrument, low - 5, high + 5)

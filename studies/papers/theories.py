@@ -5,11 +5,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from shell.elastic import Elastic
+from shell.law import build_law
 from shell.levels import Theory
 from shell.materials import find_material
 from shell.meridian import hemisphere
 from shell.modes import TheoryRangeWarning, solve_modes
-from shell.temperature import mode_model, temperature_coefficients
 
 THEORIES: tuple[Theory, ...] = ("rayleigh", "shell", "solid")
 RADIUS = 15e-3
@@ -60,6 +60,6 @@ def slopes_by_theory(ratio: float = 0.06, temperature: float = 293.15) -> dict[s
     """Return the slope of ln f at one temperature (1/K) by theory, default silica, free hemisphere."""
     dome, silica = hemisphere(RADIUS, ratio * RADIUS), find_material("fused-silica")
     return {
-        theory: temperature_coefficients(mode_model(dome, 2, theory), silica, temperature, temperature)[0].total
+        theory: float(build_law(dome, silica, temperature, temperature, temperature, theory).parts(temperature).total)
         for theory in THEORIES
     }

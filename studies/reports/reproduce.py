@@ -75,7 +75,6 @@ def summarise(parts: "Reproduction") -> dict[str, Any]:
     study, physics = parts.study, parts.physics
     fit, better = study.fit, study.next_fit
     assert better is not None
-    at = physics.at_20
     return {
         "schema": "hrg.reproduce/1",
         "cubic": {
@@ -97,17 +96,18 @@ def summarise(parts: "Reproduction") -> dict[str, Any]:
         "table2": {"calculated_degC": study.calculated_degC, "error_degC": study.error_degC},
         "sensitivity_ppm_per_degC": {
             "measured": float(fit.slope_ppm(20.0)),
-            "simulated": 1e6 * at.total,
-            "uncertainty": 1e6 * at.uncertainty,
+            "simulated": float(physics.slope_ppm[-1]),
+            "uncertainty": float(physics.uncertainty_ppm[-1]),
             "local_degC": study.local_degC,
             "local_measured": study.local_slope_ppm,
-            "local_simulated": [1e6 * c.total for c in physics.coefficients[:-1]],
+            "local_simulated": physics.slope_ppm[:-1].tolist(),
             "laws": {name: {"value": value, "uncertainty": u} for name, value, u in physics.laws},
         },
         "law_imposed": {
             "residual_rms_Hz": parts.diagnosis.law_rms,
             "curvature_measured_ppm_per_degC2": physics.curvature_measured,
             "curvature_law_ppm_per_degC2": physics.curvature_law,
+            "curvature_uncertainty_ppm_per_degC2": physics.curvature_uncertainty,
         },
         "diagnosis_of_table1": parts.diagnosis.as_dict(),
         "card": physics.instrument.name,
@@ -116,7 +116,7 @@ def summarise(parts: "Reproduction") -> dict[str, Any]:
 
 
 def _facts(parts: "Reproduction") -> Facts:
-    study, at = parts.study, parts.physics.at_20
+    study, physics = parts.study, parts.physics
     return Facts(
         [
             (
@@ -126,7 +126,7 @@ def _facts(parts: "Reproduction") -> Facts:
             ),
             (
                 "Predicted slope at 20 °C",
-                f"{1e6 * at.total:.0f} ± {1e6 * at.uncertainty:.0f} ppm/°C",
+                f"{physics.slope_ppm[-1]:.0f} ± {physics.uncertainty_ppm[-1]:.0f} ppm/°C",
                 "solid solver, default silica law",
             ),
             (
@@ -147,8 +147,8 @@ def _short(parts: "Reproduction") -> list[Text]:
     study, physics = parts.study, parts.physics
     better = study.next_fit
     assert better is not None
-    at = physics.at_20
-    away = (1e6 * at.total - float(study.fit.slope_ppm(20.0))) / (1e6 * at.uncertainty)
+    away = (physics.slope_ppm[-1] - float(study.fit.slope_ppm(20.0))) / physics.uncertainty_ppm[-1]
+    bends = abs(physics.curvature_measured - physics.curvature_law) / physics.curvature_uncertainty
     slopes = [value for _, value, _ in physics.laws]
     return [
         Text(
@@ -160,8 +160,12 @@ def _short(parts: "Reproduction") -> list[Text]:
         Text(
             f"Physics gives the size of the slope: the prediction at 20 °C lies {abs(away):.1f} standard deviations"
             f" {'above' if away > 0 else 'below'} the measurement, and the published laws of fused silica themselves span"
-            f" {min(slopes):.0f} to {max(slopes):.0f} ppm/°C. It does not give the curvature: the table"
-            f" bends {parts.diagnosis.curvature_ratio:.1f} times as much as the law, and its slope rises again above 25 °C, which no published silica law does."
+            f" {min(slopes):.0f} to {max(slopes):.0f} ppm/°C. It leaves the curvature open: the table bends"
+            f" {parts.diagnosis.curvature_ratio:.2f} times as much as the default law, a parabola through published statements"
+            " about its maximum near 1100 °C. The slope of silica also vanishes near −200 °C, so that not even the sign of the"
+            f" second derivative is settled in between: {physics.curvature_law:.2f} ± {physics.curvature_uncertainty:.2f}"
+            f" ppm/°C² is what the sources allow, and the measured {physics.curvature_measured:.2f} lies {bends:.1f} standard"
+            " deviations away. A slope that falls to 25 °C and rises again is beyond a constant curvature."
             " Seven points, each approached once, cannot say whether that is the glass, the thermometer, the mounting or"
             " the soak: a staircase up and down with a second thermometer would.",
             "note",
@@ -208,11 +212,13 @@ def _table2(study: "FrequencyStudy") -> Table:
 
 
 def _physics(physics: "PhysicsComparison", study: "FrequencyStudy") -> list[Block]:
+    slope = physics.parts
+    numbers = 1e6 * np.stack([slope.E, slope.nu, slope.rho, slope.h, slope.r], axis=1)
     rows = [
-        [f"{c.temperature - hrg.ZERO_CELSIUS:.0f}"]
-        + [f"{1e6 * part:+.2f}" for part in (c.E, c.nu, c.rho, c.h, c.r)]
-        + [f"{1e6 * c.total:.2f} ± {1e6 * c.uncertainty:.1f}", measured]
-        for c, measured in zip(physics.coefficients, _measured(study), strict=True)
+        [f"{T - hrg.ZERO_CELSIUS:.0f}", *(f"{part:+.2f}" for part in parts), f"{total:.2f} ± {sd:.1f}", measured]
+        for T, parts, total, sd, measured in zip(
+            physics.temperature, numbers, physics.slope_ppm, physics.uncertainty_ppm, _measured(study), strict=True
+        )
     ]
     columns = ["T (°C)", "E", "μ", "ρ", "h", "r", "Predicted", "Measured"]
     parts = Table(
@@ -220,12 +226,12 @@ def _physics(physics: "PhysicsComparison", study: "FrequencyStudy") -> list[Bloc
         columns,
         rows,
         "Measured: between neighbouring points of Table 1, ± 0.09 from rounding; at 20 °C the cubic's slope. The uncertainty is one"
-        " standard deviation, from what the material law states of itself.",
+        " standard deviation by the law's prior: its stated numbers, and a curvature that no source settles.",
     )
     laws = Table(
         "Slope at 20 °C by published law of fused silica",
-        ["Law", "Slope (ppm/°C)", "Stated uncertainty"],
-        [[name, f"{value:.1f}", f"{u:.1f}" if u else "none stated"] for name, value, u in physics.laws],
+        ["Law", "Slope (ppm/°C)", "Uncertainty"],
+        [[name, f"{value:.1f}", f"{u:.1f}"] for name, value, u in physics.laws],
         "The laws differ by more than any of them admits: most of the spread is the literature's, not the solver's.",
     )
     return [
@@ -244,9 +250,7 @@ def _measured(study: "FrequencyStudy") -> list[str]:
 
 
 def _slope_figure(physics: "PhysicsComparison", study: "FrequencyStudy") -> Picture:
-    local = physics.coefficients[:-1]
-    total = 1e6 * np.array([c.total for c in local])
-    spread = 1e6 * np.array([c.uncertainty for c in local])
+    total, spread = physics.slope_ppm[:-1], physics.uncertainty_ppm[:-1]
     with style.figure(height=3.2) as (made, axes):
         axes.fill_between(
             study.local_degC, total - spread, total + spread, color=style.SKY, alpha=0.3, label="± 1 standard deviation"

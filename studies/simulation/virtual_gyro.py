@@ -7,11 +7,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from shell.law import FrequencyLaw
 from studies.errors import InputError, naming
+from studies.law import law_of
 from studies.record import Record
 from studies.simulation.bias import read_bias, read_loss
 from studies.simulation.chamber import ZERO_CELSIUS, check_profile
-from studies.simulation.frequency import FrequencyModel, Theory, build_frequency_model
 from studies.simulation.heat_path import build_network, cut_shell, root_to_end
 from studies.simulation.noise import SILENT, bias_noise, frequency_noise, quantise, read_noise, white_noise
 from thermal.lag import lag
@@ -23,6 +24,7 @@ from thermal.relaxation import find_relaxation
 from thermal.transient import Transient
 
 if TYPE_CHECKING:
+    from shell.levels import Theory
     from studies.instrument.card import Instrument
 
 Array = NDArray[np.float64]
@@ -47,7 +49,7 @@ class VirtualRun:
     record: Record
     network: Network
     transient: Transient
-    frequency_model: FrequencyModel
+    law: FrequencyLaw
     warnings: tuple[str, ...] = ()
 
 
@@ -69,8 +71,8 @@ def simulate_run(
     rate: float = 1.0,
     seed: int = 0,
     noise: bool = True,
-    theory: Theory = "solid",
-    frequency_model: FrequencyModel | None = None,
+    theory: "Theory" = "solid",
+    law: FrequencyLaw | None = None,
 ) -> VirtualRun:
     """Run a virtual gyro through a chamber profile.
 
@@ -88,7 +90,7 @@ def simulate_run(
         False records what is true, without noise, sensor lag or rounding.
     theory : str
         Of the shell: "solid" or "shell".
-    frequency_model : FrequencyModel, optional
+    law : FrequencyLaw, optional
         One that was built before for the same instrument.
 
     Raises
@@ -103,8 +105,8 @@ def simulate_run(
     transient = simulate(network, {"chamber": profile})
     reached = np.append(profile.value, instrument.reference_temperature)
     low, high = float(reached.min()) - MARGIN, float(reached.max()) + MARGIN
-    model = frequency_model or build_frequency_model(instrument, low, high, theory)
-    true = _respond(instrument, transient, model, time)
+    law = law or law_of(instrument, low, high, theory)
+    true = _respond(instrument, transient, law, time)
     generator = np.random.default_rng(seed)
     columns = _observe(true, levels, rate, generator)
     columns = {"time_s": time, "chamber_temperature_degC": profile.at(time) - ZERO_CELSIUS, **columns}
@@ -121,29 +123,31 @@ def simulate_run(
         source=f"simulated, rate {rate:g} Hz, " + (f"seed {seed}" if noise else "without noise"),
         resolution={name: step for name, step in resolution.items() if step > 0},
     )
-    return VirtualRun(record, network, transient, model, _idle_effects(instrument))
+    return VirtualRun(record, network, transient, law, _idle_effects(instrument))
 
 
-def cell_weights(instrument: "Instrument", model: FrequencyModel) -> Array:
+def cell_weights(instrument: "Instrument", law: FrequencyLaw) -> Array:
     """Share of the mode's elastic energy in each cell of the shell, from its root to its free end; they add up to 1."""
-    weights = _to_cells(instrument, model, model.elastic)
+    weights = _to_cells(instrument, law, law.along.elastic)
     return np.asarray(weights / weights.sum())
 
 
-def cell_sensitivities(instrument: "Instrument", model: FrequencyModel) -> Array:
+def cell_sensitivities(instrument: "Instrument", law: FrequencyLaw) -> Array:
     """Contribution to d ln f/dT (1/K) of each cell of the shell, from its root to its free end."""
-    return _to_cells(instrument, model, model.sensitivity)
+    return _to_cells(instrument, law, law.sensitivity())
 
 
-def _to_cells(instrument: "Instrument", model: FrequencyModel, share: Array) -> Array:
+def _to_cells(instrument: "Instrument", law: FrequencyLaw, share: Array) -> Array:
     (s, _, _), length = root_to_end(instrument), instrument.resonator.length
-    from_start = length * (1 - model.position if instrument.resonator.support == "clamped-rim" else model.position)
+    from_start = length * (
+        1 - law.along.position if instrument.resonator.support == "clamped-rim" else law.along.position
+    )
     return energy_weights(cut_shell(instrument), from_start - s[0], share)
 
 
-def _observed_rows(instrument: "Instrument", transient: Transient, model: FrequencyModel) -> Array:
+def _observed_rows(instrument: "Instrument", transient: Transient, law: FrequencyLaw) -> Array:
     """Sums over the nodes: the housing, the resonator's mean, and δ ln f of what departs from the mean."""
-    mean, sensitivity = cell_weights(instrument, model), cell_sensitivities(instrument, model)
+    mean, sensitivity = cell_weights(instrument, law), cell_sensitivities(instrument, law)
     rows = np.zeros((3, len(transient.nodes)))
     cells = [transient.nodes.index(name) for name in cell_names(len(mean))]
     rows[0, transient.nodes.index("housing")] = 1.0
@@ -152,14 +156,14 @@ def _observed_rows(instrument: "Instrument", transient: Transient, model: Freque
     return rows
 
 
-def _respond(instrument: "Instrument", transient: Transient, model: FrequencyModel, time: Array) -> _Noiseless:
-    T = transient.observe(time, _observed_rows(instrument, transient, model))
+def _respond(instrument: "Instrument", transient: Transient, law: FrequencyLaw, time: Array) -> _Noiseless:
+    T = transient.observe(time, _observed_rows(instrument, transient, law))
     housing, resonator = np.ascontiguousarray(T[:, 0]), np.ascontiguousarray(T[:, 1])
     changes = _apply_effects(instrument, transient, time, housing, resonator)
     resonator = resonator + changes.get("resonator_temperature", 0.0)
     reference = instrument.reference_temperature
     # The bias follows the temperature, for which the thermal frequency stands; a spring or a clock moves only the reading.
-    thermal = model.frequency(resonator) * np.exp(T[:, 2])
+    thermal = law.frequency(resonator) * np.exp(T[:, 2])
     frequency = thermal + changes.get("frequency_Hz", 0.0)
     loss = read_loss(instrument.table("loss"), f"{instrument.path} [loss]")
     inverse_q = loss.at(resonator - reference) + changes.get("inverse_q", 0.0)
@@ -167,9 +171,9 @@ def _respond(instrument: "Instrument", transient: Transient, model: FrequencyMod
         raise InputError(
             f"{instrument.path} [loss]: 1/Q becomes negative in this profile; correct its slope or curvature."
         )
-    change = thermal - float(model.frequency(np.array([reference]))[0])
+    change = thermal - float(law.frequency(np.array([reference]))[0])
     bias_model = read_bias(instrument.table("bias"), f"{instrument.path} [bias]")
-    bias = bias_model.at(change, np.gradient(change, time[1] - time[0]), frequency, inverse_q, model.bryan_factor)
+    bias = bias_model.at(change, np.gradient(change, time[1] - time[0]), frequency, inverse_q, law.bryan_factor)
     return _Noiseless(time, housing, resonator, frequency, bias + changes.get("bias_deg_per_h", 0.0), inverse_q)
 
 

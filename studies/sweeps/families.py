@@ -219,9 +219,9 @@ FAST = {"frequency": _frequency, "tcf": _tcf}
 
 def _slopes(material: "Material", T: float) -> tuple[float, float, float, float]:
     return (
-        material.log_slope("youngs_modulus", T),
-        material.slope("poisson_ratio", T),
-        material.log_slope("density", T),
+        float(material.log_slope("youngs_modulus", T)),
+        float(material.slope("poisson_ratio", T)),
+        float(material.log_slope("density", T)),
         float(material.value("expansion", T)),
     )
 

@@ -5,13 +5,12 @@ import pytest
 
 from shell.elastic import VaryingElastic
 from shell.modes import solve_modes
-from shell.temperature import mode_model, temperature_coefficients
 from studies.errors import InputError
 from studies.instrument.card import load_card
+from studies.law import law_of
 from studies.record import read_record, write_record
 from studies.simulation.bias import read_bias, read_loss
 from studies.simulation.chamber import load_profile
-from studies.simulation.frequency import build_frequency_model
 from studies.simulation.heat_path import build_heat_path, build_network, build_shell_and_stem, cut_shell
 from studies.simulation.virtual_gyro import cell_sensitivities, cell_weights, simulate_run, slowest_lag
 from thermal.errors import ThermalError
@@ -39,31 +38,31 @@ def card(tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def model(card):
-    return build_frequency_model(card, 233.15, 333.15, theory="shell")
+def law(card):
+    return law_of(card, 233.15, 333.15, theory="shell")
 
 
-def run(card, model, words="step 20 -10 5h", **options):
-    return simulate_run(card, load_profile(words), frequency_model=model, **options)
+def run(card, law, words="step 20 -10 5h", **options):
+    return simulate_run(card, load_profile(words), law=law, **options)
 
 
-def test_the_frequency_model_is_the_solver_between_its_nodes(card, model):
+def test_the_frequency_model_is_the_solver_between_its_nodes(card, law):
     for T in (240.0, 281.0, 321.0):
         resonator, elastic = card.at(T)
         (mode,) = solve_modes(resonator, elastic, theory="shell")
-        assert model.frequency(np.array([T]))[0] == pytest.approx(mode.frequency, rel=2e-9)
-    assert model.interpolation_error < 2e-9
+        assert law.frequency(np.array([T]))[0] == pytest.approx(mode.frequency, rel=2e-9)
+    assert law.interpolation_error < 2e-9
 
 
-def test_the_weights_of_the_cells_add_up_to_the_slope(card, model):
-    (slope,) = temperature_coefficients(mode_model(card.resonator, 2, "shell"), card.material, 293.15, [293.15])
-    assert cell_sensitivities(card, model).sum() == pytest.approx(slope.total, rel=1e-12)
-    assert cell_weights(card, model).sum() == pytest.approx(1.0, rel=1e-12)
-    centre = np.log(model.frequency(np.array([293.1, 293.2])))
-    assert np.diff(centre)[0] / 0.1 == pytest.approx(slope.total, rel=1e-6)
+def test_the_weights_of_the_cells_add_up_to_the_slope(card, law):
+    slope = float(law_of(card, 293.15, 293.15, "shell").parts(293.15).total)
+    assert cell_sensitivities(card, law).sum() == pytest.approx(slope, rel=1e-12)
+    assert cell_weights(card, law).sum() == pytest.approx(1.0, rel=1e-12)
+    centre = np.log(law.frequency(np.array([293.1, 293.2])))
+    assert np.diff(centre)[0] / 0.1 == pytest.approx(slope, rel=1e-6)
 
 
-def test_a_field_along_the_meridian_shifts_the_mode_as_its_weights_say(card, model):
+def test_a_field_along_the_meridian_shifts_the_mode_as_its_weights_say(card, law):
     """A field of ±2 K, once through the weights and once through a solve with E, ν, ρ along the meridian.
 
     The solve leaves the geometry as it is; the expansion, 0.51 of 79 ppm/°C, is added with the elastic energy's shares.
@@ -87,7 +86,7 @@ def test_a_field_along_the_meridian_shifts_the_mode_as_its_weights_say(card, mod
     by_solver = (solve(2.0) - solve(-2.0)) / 2 - growth
     cells = cut_shell(card)
     field = -2.0 * np.cos(np.pi * cells.middle / cells.edge[-1])
-    assert cell_sensitivities(card, model) @ field == pytest.approx(by_solver, rel=2e-3)
+    assert cell_sensitivities(card, law) @ field == pytest.approx(by_solver, rel=2e-3)
     assert abs(by_solver) > 5e-5
 
 
@@ -102,7 +101,7 @@ def test_an_elinvar_whose_slope_vanishes_keeps_a_sound_resonator_temperature():
     assert T.min() >= 0.0
     assert T.max() <= 20.0
     assert np.diff(T).max() < 1e-6
-    settled = made.frequency_model.frequency(T + 273.15)
+    settled = made.law.frequency(T + 273.15)
     assert made.record["frequency_Hz"] == pytest.approx(settled, rel=2e-6)
 
 
@@ -140,28 +139,28 @@ def test_loss_is_quadratic_in_the_excess():
     assert loss.at(np.array([-10.0, 0.0, 10.0])) == pytest.approx([2e-7 * 0.91, 2e-7, 2e-7 * 1.11])
 
 
-def test_a_soak_stays_where_it_is(card, model):
-    record = run(card, model, "soak 0 2h", noise=False).record
+def test_a_soak_stays_where_it_is(card, law):
+    record = run(card, law, "soak 0 2h", noise=False).record
     for name in ("housing_temperature_degC", "resonator_temperature_degC"):
         assert record[name] == pytest.approx(np.zeros(7201), abs=1e-6)
     assert np.ptp(record["frequency_Hz"]) < 1e-6
 
 
-def test_after_a_long_soak_the_frequency_is_that_of_the_chamber(card, model):
-    record = run(card, model, "step 20 -10 20h", rate=0.1, noise=False).record
-    assert record["frequency_Hz"][-1] == pytest.approx(model.frequency(np.array([263.15]))[0], abs=1e-5)
+def test_after_a_long_soak_the_frequency_is_that_of_the_chamber(card, law):
+    record = run(card, law, "step 20 -10 20h", rate=0.1, noise=False).record
+    assert record["frequency_Hz"][-1] == pytest.approx(law.frequency(np.array([263.15]))[0], abs=1e-5)
     assert record["chamber_temperature_degC"][0] == -10.0
     assert record["resonator_temperature_degC"][0] == pytest.approx(20.0, abs=1e-5)
 
 
-def test_the_same_seed_makes_the_same_record_and_another_another(card, model):
-    one, again, other = (run(card, model, "soak 20 1h", seed=seed).record for seed in (1, 1, 2))
+def test_the_same_seed_makes_the_same_record_and_another_another(card, law):
+    one, again, other = (run(card, law, "soak 20 1h", seed=seed).record for seed in (1, 1, 2))
     assert np.array_equal(one["frequency_Hz"], again["frequency_Hz"])
     assert not np.array_equal(one["frequency_Hz"], other["frequency_Hz"])
 
 
-def test_the_record_keeps_the_contract_and_is_read_back(card, model, tmp_path):
-    made = run(card.with_table("noise", {"frequency_resolution_Hz": 0.01}), model, rate=0.5).record
+def test_the_record_keeps_the_contract_and_is_read_back(card, law, tmp_path):
+    made = run(card.with_table("noise", {"frequency_resolution_Hz": 0.01}), law, rate=0.5).record
     write_record(made, tmp_path / "run.csv")
     read = read_record(tmp_path / "run.csv")
     assert list(read.columns) == [
@@ -175,40 +174,40 @@ def test_the_record_keeps_the_contract_and_is_read_back(card, model, tmp_path):
     assert read["frequency_Hz"] * 100 == pytest.approx(np.round(read["frequency_Hz"] * 100), abs=1e-6)
 
 
-def test_a_profile_from_a_file_is_the_profile_from_words(card, model, tmp_path):
+def test_a_profile_from_a_file_is_the_profile_from_words(card, law, tmp_path):
     path = tmp_path / "chamber.csv"
     path.write_text("time_s,chamber_temperature_degC\n0,20\n1200,40\n4800,40\n", encoding="utf-8")
-    file = run(card, model, str(path), noise=False).record
-    words = run(card, model, "ramp 20 40 1 then soak 40 1h", noise=False).record
+    file = run(card, law, str(path), noise=False).record
+    words = run(card, law, "ramp 20 40 1 then soak 40 1h", noise=False).record
     assert file["resonator_temperature_degC"] == pytest.approx(words["resonator_temperature_degC"], abs=1e-6)
 
 
-def test_a_measured_profile_of_many_rows_is_the_same_as_its_corners(card, model, tmp_path):
+def test_a_measured_profile_of_many_rows_is_the_same_as_its_corners(card, law, tmp_path):
     t = np.arange(0.0, 4801.0, 5.0)
     T = np.interp(t, [0.0, 1200.0, 4800.0], [20.0, 40.0, 40.0])
     rows = "".join(f"{a:g},{b:.10g}\n" for a, b in zip(t, T, strict=True))
     path = tmp_path / "chamber.csv"
     path.write_text("time_s,chamber_temperature_degC\n" + rows, encoding="utf-8")
-    many = run(card, model, str(path), noise=False).record
-    few = run(card, model, "ramp 20 40 1 then soak 40 1h", noise=False).record
+    many = run(card, law, str(path), noise=False).record
+    few = run(card, law, "ramp 20 40 1 then soak 40 1h", noise=False).record
     assert many["resonator_temperature_degC"] == pytest.approx(few["resonator_temperature_degC"], abs=1e-5)
 
 
-def test_an_effect_of_the_card_is_added(card, model):
+def test_an_effect_of_the_card_is_added(card, law):
     lagging = card.with_table("effect", [{"name": "second-lag", "weight": 0.2, "second_time_constant_s": 20000.0}])
-    plain, slow = (run(c, model, noise=False).record for c in (card, lagging))
+    plain, slow = (run(c, law, noise=False).record for c in (card, lagging))
     assert slow["frequency_Hz"][9000] > plain["frequency_Hz"][9000] + 0.05
     jump = [{"name": "rate-bias", "coefficient_deg_per_h_per_K_per_s": 100.0}]
-    rated = run(card.with_table("effect", jump), model, noise=False).record
+    rated = run(card.with_table("effect", jump), law, noise=False).record
     rate = np.gradient(plain["resonator_temperature_degC"])
     assert rated["bias_deg_per_h"] - plain["bias_deg_per_h"] == pytest.approx(100 * rate, abs=2e-3)
 
 
-def test_an_effect_whose_drive_stays_is_named(card, model):
+def test_an_effect_whose_drive_stays_is_named(card, law):
     softened = card.with_table("effect", [{"name": "electrostatic-softening", "softening_Hz_per_V2": 1e-4}])
-    made = run(softened, model, "soak 20 1h", noise=False)
+    made = run(softened, law, "soak 20 1h", noise=False)
     assert made.record["frequency_Hz"] == pytest.approx(
-        run(card, model, "soak 20 1h", noise=False).record["frequency_Hz"]
+        run(card, law, "soak 20 1h", noise=False).record["frequency_Hz"]
     )
     assert made.warnings == (
         "the effect 'electrostatic-softening' adds nothing: a virtual run does not move its drive (voltage_squared).",
@@ -269,9 +268,9 @@ def test_every_shipped_shape_has_a_heat_path(card):
         ("effect", [{"name": "second-lag", "weight": "much"}], "weight must be a finite number"),
     ],
 )
-def test_unusable_tables_are_refused_by_key(card, model, table, content, words):
+def test_unusable_tables_are_refused_by_key(card, law, table, content, words):
     with pytest.raises(InputError, match=words):
-        run(card.with_table(table, content), model)
+        run(card.with_table(table, content), law)
 
 
 def test_a_material_without_heat_capacity_is_asked_for_by_its_key():
@@ -279,15 +278,15 @@ def test_a_material_without_heat_capacity_is_asked_for_by_its_key():
         build_network(load_card("bvg-bell"))
 
 
-def test_unusable_runs_are_refused(card, model, tmp_path):
+def test_unusable_runs_are_refused(card, law, tmp_path):
     with pytest.raises(ThermalError, match=r"reaches -80 °C at 0 s, outside the range of fused-silica"):
-        run(card, model, "step 20 -80 1h")
+        run(card, law, "step 20 -80 1h")
     with pytest.raises(InputError, match="the rate must be positive"):
-        run(card, model, rate=0.0)
+        run(card, law, rate=0.0)
     with pytest.raises(InputError, match="choose a lower rate"):
-        run(card, model, rate=1e6)
+        run(card, law, rate=1e6)
     with pytest.raises(InputError, match="choose a higher rate"):
-        run(card, model, rate=1e-6)
+        run(card, law, rate=1e-6)
     with pytest.raises(InputError, match="there is no such file"):
         load_profile(str(tmp_path / "absent.csv"))
     with pytest.raises(ThermalError, match="'jump' is no profile"):

@@ -1,5 +1,6 @@
 """The temperature coefficient of frequency, d ln f/dT, and its parts from E, ν, ρ, h and r (HRG paper eq. 15)."""
 
+from studies.law import law_of
 from studies.sweeps.case import Case, Options
 from studies.sweeps.quantity import HARMONIC, TEMPERATURE, THEORY, Column, Number, Quantity, mode_stem
 
@@ -13,13 +14,9 @@ def _columns(options: Options) -> tuple[Column, ...]:
 
 
 def _evaluate(case: Case, options: Options) -> tuple[Number, ...]:
-    from shell.temperature import mode_model, temperature_coefficients
-
-    instrument = case.instrument
-    model = mode_model(instrument.resonator, options["harmonic"], options["theory"])
-    at = case.temperature(options)
-    found = temperature_coefficients(model, instrument.material, instrument.reference_temperature, at)[0]
-    return tuple(Number(1e6 * value) for value in (found.total, *(getattr(found, part) for part in PARTS)))
+    T = case.temperature(options)
+    found = law_of(case.instrument, T, T, options["theory"], options["harmonic"]).parts(T)
+    return tuple(Number(1e6 * float(value)) for value in (found.total, *(getattr(found, part) for part in PARTS)))
 
 
 QUANTITY = Quantity(

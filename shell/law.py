@@ -1,0 +1,413 @@
+"""The frequency law: f of one mode over temperature, with its parts, its derivatives, its error and its places.
+
+A free resonator of one material expands evenly, so by dimensions, for every theory,
+
+    f(T) = √(E(T)/ρ(T)) Φ(ν(T)) / g(T),      g = exp ∫ α dT the growth of lengths since the reference temperature,
+
+and only Φ, a smooth function of one number, needs the solver. The slope has five parts (HRG paper eq. 15),
+
+    d ln f/dT = ½ E'/E + (∂ ln f/∂ν) ν' − ½ ρ'/ρ + (∂ ln f/∂ ln h) h'/h + (∂ ln f/∂ ln r) r'/r,
+
+with ∂ ln f/∂ ln h + ∂ ln f/∂ ln r = −1 and h'/h = r'/r = α. For a temperature that varies along the meridian, to first
+order in its unevenness, δ ln f = Σ sensitivity (T(s) − T_mean) over the stations of the mode.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.polynomial import Chebyshev
+from numpy.polynomial.chebyshev import chebpts1
+from numpy.typing import ArrayLike, NDArray
+from scipy.interpolate import CubicSpline
+
+from shell.curves import Arc
+from shell.elastic import Elastic
+from shell.errors import ShellError
+from shell.levels import Theory
+from shell.materials import Material
+from shell.modes import Mode, solve_modes
+from shell.property import ZERO_CELSIUS, coefficient_names, powers
+from shell.rayleigh import rayleigh_log_derivatives
+from shell.resonator import Resonator
+from shell.solution import AlongMeridian
+
+Array = NDArray[np.float64]
+NODES = (5, 8, 12)  # Poisson's ratios tried, until the error is small enough
+CLOSE = 1e-9  # wanted error of ln Φ between them
+REACH = 5.0  # standard deviations of Poisson's ratio that Φ covers beside the law's own range
+WIDEST = 0.04  # and not more than this
+SPACING = 1.0  # K, of the knots of ln f(T)
+ACTING = ("shear_modulus", "youngs_modulus", "poisson_ratio", "density", "expansion")
+
+
+@dataclass(frozen=True, eq=False)
+class SlopeParts:
+    """What each quantity's own change with temperature contributes to d ln f/dT: arrays like the temperatures, 1/K."""
+
+    E: Array
+    nu: Array
+    rho: Array
+    h: Array
+    r: Array
+
+    @property
+    def total(self) -> Array:
+        """The slope d ln f/dT, 1/K."""
+        return np.asarray(self.E + self.nu + self.rho + self.h + self.r)
+
+
+@dataclass(frozen=True, eq=False)
+class ShapeFactor:
+    """ln Φ(ν), Φ = f/√(E/ρ) at the reference geometry in 1/m, through full solves at a few Poisson's ratios.
+
+    Attributes
+    ----------
+    resonator : of the solves.
+    lowest, highest : the Poisson's ratios between which it holds.
+    logarithm : polynomial of ln Φ in ν.
+    modes : the solves, at Chebyshev points.
+    ratios : (k,) array, their Poisson's ratios.
+    error : relative, of Φ between them.
+    solver_error : relative, the largest of the solves against the exact solution of their theory.
+    """
+
+    resonator: Resonator
+    lowest: float
+    highest: float
+    logarithm: Chebyshev
+    modes: tuple[Mode, ...]
+    ratios: Array
+    error: float
+    solver_error: float
+
+    @cached_property
+    def by_nu(self) -> Chebyshev:
+        """∂ ln f/∂ν at constant E, over ν."""
+        return self.logarithm.deriv()
+
+    @cached_property
+    def by_thickness(self) -> Chebyshev:
+        """∂ ln f/∂ ln h over ν."""
+        slopes = [_slopes(mode, self.resonator, float(nu))[1] for mode, nu in zip(self.modes, self.ratios, strict=True)]
+        return _through(slopes, *(self.logarithm.domain if len(slopes) == 1 else (self.lowest, self.highest)))
+
+
+@dataclass(frozen=True, eq=False)
+class FrequencyLaw:
+    """Frequency of the lowest mode of one harmonic over temperature.
+
+    Attributes
+    ----------
+    material : Material
+        Its laws give E, ν, ρ and the growth of lengths.
+    reference_temperature : float, K
+        Dimensions hold here.
+    lowest, highest : float, K
+        Where the law holds.
+    theory, harmonic : of the shell solver; n.
+    shape : ShapeFactor
+    mode : Mode
+        The mode at the reference temperature: Bryan factor, energies, shape.
+    """
+
+    material: Material
+    reference_temperature: float
+    lowest: float
+    highest: float
+    theory: Theory
+    harmonic: int
+    shape: ShapeFactor
+    mode: Mode
+
+    def frequency(self, temperature: ArrayLike, *, extrapolate: bool = False) -> Array:
+        """Frequency (Hz) at even temperatures of the resonator (K).
+
+        Parameters
+        ----------
+        temperature : array_like, K
+        extrapolate : bool
+            Continue a little beyond the range, as the trial states of a fit do, instead of raising.
+
+        Raises
+        ------
+        ShellError
+            A temperature outside the range of the law.
+        """
+        return np.asarray(np.exp(self.logarithm(temperature, extrapolate=extrapolate)))
+
+    def logarithm(self, temperature: ArrayLike, *, extrapolate: bool = False) -> Array:
+        """Return ln f, f in Hz; arguments as in `frequency`."""
+        T = np.asarray(temperature, dtype=float)
+        return np.asarray(self._spline(T if extrapolate else self._check(T)))
+
+    def slope(self, temperature: ArrayLike, *, extrapolate: bool = False) -> Array:
+        """Return d ln f/dT, 1/K; arguments as in `frequency`."""
+        T = np.asarray(temperature, dtype=float)
+        return np.asarray(self._spline(T if extrapolate else self._check(T), 1))
+
+    def parts(self, temperature: ArrayLike) -> SlopeParts:
+        """The five parts of d ln f/dT (HRG paper eq. 15)."""
+        T = self._check(temperature)
+        alpha, by_h = self.material.value("expansion", T), self.shape.by_thickness(self._nu(T))
+        return SlopeParts(
+            E=0.5 * self.material.log_slope("youngs_modulus", T),
+            nu=np.asarray(self.shape.by_nu(self._nu(T)) * self.material.slope("poisson_ratio", T)),
+            rho=-0.5 * self.material.log_slope("density", T),
+            h=by_h * alpha,
+            r=(-1 - by_h) * alpha,
+        )
+
+    def derivatives(self, temperature: ArrayLike) -> dict[str, Array]:
+        """Derivative of ln f(T) by every coefficient of the material's deviation that acts on it.
+
+        Returns
+        -------
+        dict
+            Coefficient, such as `shear_modulus.log_slope_per_K`, -> array like the temperatures.
+        """
+        return self._derivatives(self._check(temperature))
+
+    def uncertainty(self, temperature: ArrayLike) -> Array:
+        """Standard deviation of ln f(T) by the material's prior."""
+        return self._spread(self.derivatives(temperature))
+
+    def slope_uncertainty(self, temperature: ArrayLike) -> Array:
+        """Standard deviation of d ln f/dT by the material's prior, 1/K."""
+        step = 0.05
+        T = np.clip(self._check(temperature), self.material.lowest + step, self.material.highest - step)
+        ahead, behind = self._derivatives(T + step), self._derivatives(T - step)
+        return self._spread({name: (ahead[name] - behind[name]) / (2 * step) for name in ahead})
+
+    @property
+    def error(self) -> float:
+        """Relative error of f against the exact solution of the theory for this material: solver and interpolation."""
+        return self.solver_error + self.interpolation_error
+
+    @property
+    def solver_error(self) -> float:
+        """Relative error of the solves against the exact solution of their theory."""
+        return self.shape.solver_error
+
+    @cached_property
+    def interpolation_error(self) -> float:
+        """Relative error of f against the solver: between the Poisson's ratios and between the knots."""
+        T = np.linspace(self.lowest, self.highest, 1 + 3 * len(self._knots))
+        return self.shape.error + float(np.abs(self._spline(T) - self._exact(T)).max())
+
+    @property
+    def bryan_factor(self) -> float:
+        """Precession of the standing wave per angle of rotation, at the reference temperature."""
+        return self.mode.bryan_factor
+
+    @property
+    def along(self) -> AlongMeridian:
+        """What each station of the meridian contributes to d ln f by E, ρ and ν, at the reference temperature."""
+        return self.mode.along
+
+    def sensitivity(self, temperature: float | None = None) -> Array:
+        """What each station of the meridian contributes to d ln f/dT (1/K); they add up to the slope.
+
+        The expansion is spread like the elastic energy. `temperature` (K) is that of the material's slopes, the
+        reference temperature when absent.
+        """
+        T = self.reference_temperature if temperature is None else temperature
+        alpha = self.material.value("expansion", T)
+        return np.asarray(
+            self.along.elastic * (0.5 * self.material.log_slope("youngs_modulus", T) - alpha)
+            - 0.5 * self.along.kinetic * self.material.log_slope("density", T)
+            + self.along.nu * self.material.slope("poisson_ratio", T)
+        )
+
+    def with_material(self, material: Material) -> "FrequencyLaw":
+        """Return the law of the same resonator with another material; nothing is solved again.
+
+        Raises
+        ------
+        ShellError
+            The material's Poisson's ratio leaves the range for which the mode was solved.
+        """
+        nu = material.value("poisson_ratio", np.linspace(self.lowest, self.highest, 41))
+        low, high = self.shape.lowest, self.shape.highest
+        if not (nu.min() >= low - 1e-9 and nu.max() <= high + 1e-9):
+            raise ShellError(
+                f"Poisson's ratio {nu.min():.4f} to {nu.max():.4f} leaves the range {low:.4f} to {high:.4f} for which this"
+                " frequency law was solved: build the law anew with this material."
+            )
+        return replace(self, material=material)
+
+    def _check(self, temperature: ArrayLike) -> Array:
+        T = np.asarray(temperature, dtype=float)
+        if T.size and not (T.min() >= self.lowest - 1e-6 and T.max() <= self.highest + 1e-6):
+            raise ShellError(
+                f"the resonator reaches {T.min() - ZERO_CELSIUS:.2f} to {T.max() - ZERO_CELSIUS:.2f} °C, but its frequency"
+                f" is known from {self.lowest - ZERO_CELSIUS:.2f} to {self.highest - ZERO_CELSIUS:.2f} °C only."
+            )
+        return np.asarray(np.clip(T, self.lowest, self.highest))
+
+    def _nu(self, T: Array) -> Array:
+        return self.material.value("poisson_ratio", T)
+
+    def _exact(self, T: Array) -> Array:
+        """Ln f at temperatures, the material evaluated at each."""
+        E, nu, rho = (self.material.value(name, T) for name in ("youngs_modulus", "poisson_ratio", "density"))
+        growth = self.material.growth(T, self.reference_temperature)
+        return np.asarray(0.5 * np.log(E / rho) + self.shape.logarithm(nu) - np.log(growth))
+
+    @cached_property
+    def _knots(self) -> Array:
+        low = max(self.lowest - SPACING, self.material.lowest)
+        high = min(self.highest + SPACING, self.material.highest)
+        return np.linspace(low, high, 9 + int((high - low) / SPACING))
+
+    @cached_property
+    def _spline(self) -> CubicSpline:
+        return CubicSpline(self._knots, self._exact(self._knots))
+
+    def _derivatives(self, T: Array) -> dict[str, Array]:
+        found: dict[str, Array] = {}
+        weights, about = self._elastic_weights(T), self.material.reference
+        for name in (name for name in ACTING if name in self.material.properties):
+            if name == "expansion":  # ln f holds −∫ α from the reference, and 3/2 ∫ α from where the density is stated
+                at_density = self.material.properties["density"].numbers["at_degC"] + ZERO_CELSIUS
+                since = (_integrals(x - about) for x in (T, np.array(at_density), np.array(self.reference_temperature)))
+                moved = [t / 2 - 1.5 * d + r for t, d, r in zip(*since, strict=True)]
+            else:
+                moved = [weights[name] * power for power in powers(T - about)]
+            found |= {f"{name}.{c}": value for c, value in zip(coefficient_names(name), moved, strict=True)}
+        return found
+
+    def _elastic_weights(self, T: Array) -> dict[str, Array]:
+        """∂ ln f by the logarithm of each modulus that the law states, by ν itself, and by ln ρ, at constant others."""
+        nu = self._nu(T)
+        by_nu, half = self.shape.by_nu(nu), np.full_like(T, 0.5)
+        stated = self.material.properties
+        if "shear_modulus" not in stated:
+            found = {"youngs_modulus": half, "poisson_ratio": by_nu}
+        elif "youngs_modulus" not in stated:  # ln E = ln G + ln 2 (1 + ν)
+            found = {"shear_modulus": half, "poisson_ratio": by_nu + 0.5 / (1 + nu)}
+        else:  # ν = E/2G − 1
+            found = {"youngs_modulus": half + by_nu * (1 + nu), "shear_modulus": -by_nu * (1 + nu)}
+        return {**found, "density": -half}
+
+    def _spread(self, derivatives: Mapping[str, Array]) -> Array:
+        prior = self.material.prior
+        acting = [k for k, name in enumerate(prior.names) if name in derivatives]
+        if not acting:
+            return np.zeros_like(next(iter(derivatives.values())))
+        J = np.stack([derivatives[prior.names[k]] for k in acting])
+        return np.asarray(np.sqrt(np.einsum("i...,ij,j...->...", J, prior.covariance[np.ix_(acting, acting)], J)))
+
+
+def build_law(
+    resonator: Resonator,
+    material: Material,
+    reference_temperature: float,
+    lowest: float,
+    highest: float,
+    theory: Theory = "solid",
+    harmonic: int = 2,
+) -> FrequencyLaw:
+    """Solve the mode at a few Poisson's ratios and build its frequency law.
+
+    Parameters
+    ----------
+    resonator : Resonator
+        With its dimensions at the reference temperature.
+    material : Material
+    reference_temperature : float, K
+    lowest, highest : float, K
+        Wanted range; it ends where the material's does. Where both are one temperature, there is a single solve, and
+        the law does not follow changes of Poisson's ratio.
+    theory : "solid", "shell" or "rayleigh".
+    harmonic : n.
+
+    Raises
+    ------
+    ShellError
+        The range lies outside that of the material, or the material lacks a property.
+    """
+    lowest, highest = max(lowest, material.lowest), min(highest, material.highest)
+    material.check([lowest, highest])
+
+    def solve(elastic: Elastic) -> Mode:
+        return solve_modes(resonator, elastic, harmonic, theory=theory)[0]
+
+    T = np.linspace(lowest, highest, 41)
+    nu = material.value("poisson_ratio", T)
+    if lowest == highest:
+        elastic = material.elastic(lowest)
+        mode = solve(elastic)
+        shape = _tangent(mode, resonator, elastic)
+    else:
+        elastic = material.elastic(reference_temperature)
+        mode = solve(elastic)
+        reach = min(REACH * _ratio_spread(material, T), WIDEST)
+        low, high = min(float(nu.min()), elastic.nu) - reach, max(float(nu.max()), elastic.nu) + reach
+        if high - low < 1e-9:
+            shape = _tangent(mode, resonator, elastic)
+        else:
+            shape = _through_solves(mode, resonator, elastic, max(low, -0.99), min(high, 0.499), solve)
+    return FrequencyLaw(material, reference_temperature, lowest, highest, theory, harmonic, shape, mode)
+
+
+def _through_solves(
+    unseen: Mode, resonator: Resonator, elastic: Elastic, low: float, high: float, solve: Callable[[Elastic], Mode]
+) -> ShapeFactor:
+    """Interpolate ln Φ; its error is the larger of the last coefficient and what it misses of a mode that it does not use."""
+    speed = 0.5 * np.log(elastic.E / elastic.rho)
+    for count in NODES:
+        ratios = (low + high) / 2 + (high - low) / 2 * chebpts1(count)
+        modes = tuple(solve(replace(elastic, nu=float(nu))) for nu in ratios)
+        polynomial = _through([np.log(mode.frequency) - speed for mode in modes], low, high)
+        missed = abs(float(polynomial(elastic.nu)) + speed - np.log(unseen.frequency))
+        error = max(missed, abs(float(polynomial.coef[-1])))
+        if error <= CLOSE:
+            break
+    solver = max(mode.relative_error_estimate for mode in (unseen, *modes))
+    return ShapeFactor(resonator, low, high, polynomial, modes, ratios, error, solver)
+
+
+def _tangent(mode: Mode, resonator: Resonator, elastic: Elastic) -> ShapeFactor:
+    """Φ about a single solve."""
+    value = float(np.log(mode.frequency) - 0.5 * np.log(elastic.E / elastic.rho))
+    line = Chebyshev([value, _slopes(mode, resonator, elastic.nu)[0]], domain=[elastic.nu - 1, elastic.nu + 1])
+    return ShapeFactor(
+        resonator, elastic.nu, elastic.nu, line, (mode,), np.array([elastic.nu]), 0.0, mode.relative_error_estimate
+    )
+
+
+def _through(values: Sequence[float], low: float, high: float) -> Chebyshev:
+    """Return the polynomial through values at the Chebyshev points of a range."""
+    points = chebpts1(len(values))
+    return Chebyshev(np.polynomial.chebyshev.chebfit(points, values, len(values) - 1), domain=[low, high])
+
+
+def _slopes(mode: Mode, resonator: Resonator, nu: float) -> tuple[float, float]:
+    """Return ∂ ln f/∂ν and ∂ ln f/∂ ln h of a solved mode."""
+    dome = resonator.segments[0]
+    if mode.theory == "rayleigh" and isinstance(dome, Arc):
+        closed = rayleigh_log_derivatives(mode.harmonic, nu, dome.first_angle, dome.last_angle)
+        return closed.nu, closed.h
+    return mode.sensitivities.nu, mode.sensitivities.thickness
+
+
+def _ratio_spread(material: Material, T: Array) -> float:
+    """Return the largest standard deviation of ν by the material's prior."""
+    open_ones = dict(zip(material.prior.names, material.prior.sd, strict=True))
+
+    def spread(name: str) -> Array:
+        x = powers(T - material.reference)
+        terms = [open_ones.get(f"{name}.{c}", 0.0) * power for c, power in zip(coefficient_names(name), x, strict=True)]
+        return np.asarray(np.linalg.norm(terms, axis=0))
+
+    if "poisson_ratio" in material.properties:
+        return float(spread("poisson_ratio").max())
+    both = np.hypot(spread("youngs_modulus"), spread("shear_modulus"))
+    return float(((1 + material.value("poisson_ratio", T)) * both).max())
+
+
+def _integrals(x: Array) -> tuple[Array, Array, Array]:
+    """Return the integrals of 1, x and ½ x² from 0."""
+    return x, x**2 / 2, x**3 / 6
