@@ -1,0 +1,41 @@
+"""Loss inside the material: of its bulk, of its damaged surface, and of processes that heat activates."""
+
+from math import cosh
+
+from shell.damping.faces import Surface
+from shell.errors import ShellError
+
+BOLTZMANN = 8.617333262e-5  # eV/K
+
+
+def bulk_loss(coefficient: float, exponent: float, frequency: float) -> float:
+    """φ = c f^b (f in Hz): loss of the material's volume (Penn et al., Phys. Lett. A 352 (2006) 3, gr-qc/0507097)."""
+    return float(coefficient * frequency**exponent)
+
+
+def surface_loss(depth: float, surfaces: tuple[Surface, ...], strain_energy: float) -> float:
+    """1/Q = (d φ_s) ∫ σ : ε dA / ∫ σ : ε dV, energy of the mode at its surfaces, which a ratio S/V misses threefold in bending.
+
+    Parameters
+    ----------
+    depth : product of the damaged layer's depth and loss, m.
+    surfaces : of `free_surfaces`.
+    strain_energy : ∫ σ : ε dV / π of the mode, J.
+    """
+    return depth * sum(surface.integrate(surface.energy) for surface in surfaces) / strain_energy
+
+
+def activated_loss(height: float, energy: float, peak: float, temperature: float) -> float:
+    """Debye peak 1/Q = 2 H ωτ/(1 + (ωτ)²) with τ = τ₀ exp(E/(k T)); it is highest at T_p, where ωτ = 1.
+
+    Parameters
+    ----------
+    height : H, 1/Q at the peak.
+    energy : activation energy E, eV.
+    peak : T_p at the mode's frequency, K.
+    temperature : K.
+    """
+    if not (energy > 0 and peak > 0):
+        raise ShellError("an activated loss needs a positive activation energy and peak temperature.")
+    z = energy / BOLTZMANN * (1 / temperature - 1 / peak)
+    return height / cosh(min(abs(z), 300.0))

@@ -1,0 +1,314 @@
+"""The loss budget of a mode: 1/Q over temperature as a sum of parts, each with source and interval."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from shell.damping.anelastic import activated_loss, bulk_loss, surface_loss
+from shell.damping.faces import Surface, free_surfaces, shell_faces
+from shell.damping.film import Film, check_film, film_internal_loss, film_thermoelastic_loss
+from shell.damping.gas import Gas, gas_loss
+from shell.damping.heat import Heat
+from shell.damping.thermoelastic import heat_flow
+from shell.errors import ShellError
+from shell.materials import Material
+from shell.modes import Mode
+from shell.quadrature import Array
+from shell.resonator import Resonator
+from shell.solution import Solution, total
+
+NORMAL_90 = 1.6448536269514722  # a 90 % interval is ± this many standard deviations
+STEP = 0.5  # K, for slopes over temperature
+
+
+@dataclass(frozen=True, eq=False)
+class Vibration:
+    """A solved mode with its material, for the causes of loss to work on.
+
+    reference : temperature (K) at which it was solved. Over temperature its shape stays and ω follows √(E/ρ).
+    """
+
+    solution: Solution
+    resonator: Resonator
+    material: Material
+    reference: float
+
+    @classmethod
+    def of(cls, mode: Mode, material: Material, reference: float) -> "Vibration":
+        """From a mode of theory solid or shell."""
+        if mode.solution is None or mode.resonator is None:
+            raise ShellError("Rayleigh's closed form carries no energies: a loss budget needs theory solid or shell.")
+        return cls(mode.solution, mode.resonator, material, reference)
+
+    @cached_property
+    def faces(self) -> tuple[Surface, Surface]:
+        """Inner and outer face."""
+        return shell_faces(self.solution)
+
+    @cached_property
+    def surfaces(self) -> tuple[Surface, ...]:
+        """All free surfaces."""
+        return free_surfaces(self.solution, self.resonator)
+
+    @cached_property
+    def strain_energy(self) -> float:
+        """∫ σ : ε dV / π, J."""
+        return total(self.solution.elastic)
+
+    @cached_property
+    def kinetic(self) -> float:
+        """∫ ρ |u|² dV / π, kg m²."""
+        return total(self.solution.kinetic)
+
+    @property
+    def thinnest(self) -> float:
+        """Least thickness of the wall, m."""
+        return min(value for _, value in self.resonator.thickness)
+
+    def omega(self, temperature: ArrayLike) -> Array:
+        """ω (rad/s) at temperatures (K)."""
+        now, then = (
+            self.material.value("youngs_modulus", T) / self.material.value("density", T)
+            for T in (np.asarray(temperature, dtype=float), np.asarray(self.reference))
+        )
+        return np.asarray(np.sqrt(self.solution.eigenvalue * now / then))
+
+
+HeatLaw = Callable[[float], Heat]
+
+
+@dataclass(frozen=True)
+class Cause:
+    """One cause of loss: its name, 1/Q at temperatures (K), relative standard uncertainty, source.
+
+    `advice` says what lowers it.
+    """
+
+    name: str
+    inverse_q: Callable[[Vibration, Array], Array]
+    relative_sd: float
+    source: str
+    advice: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class Part:
+    """One part of a budget over its temperatures: 1/Q and d ln(1/Q)/dT (1/K), with relative uncertainty and source."""
+
+    name: str
+    inverse_q: Array
+    slope: Array
+    relative_sd: float
+    source: str
+    advice: str = ""
+
+    @property
+    def interval(self) -> tuple[Array, Array]:
+        """90 % interval of 1/Q, lognormal so that it stays positive."""
+        return _interval(self.inverse_q, self.relative_sd)
+
+
+@dataclass(frozen=True, eq=False)
+class Budget:
+    """1/Q of one mode over temperatures (K), and its parts, largest first."""
+
+    temperatures: Array
+    parts: tuple[Part, ...]
+
+    @property
+    def inverse_q(self) -> Array:
+        """The sum of the parts."""
+        return np.asarray(sum((part.inverse_q for part in self.parts), np.zeros(len(self.temperatures))))
+
+    @property
+    def sd(self) -> Array:
+        """Standard uncertainty of the sum, the parts taken as independent."""
+        squares = sum(
+            ((part.relative_sd * part.inverse_q) ** 2 for part in self.parts), np.zeros(len(self.temperatures))
+        )
+        return np.asarray(np.sqrt(squares))
+
+    @property
+    def interval(self) -> tuple[Array, Array]:
+        """90 % interval of 1/Q."""
+        return _interval(self.inverse_q, self.sd / self.inverse_q)
+
+    @property
+    def slope(self) -> Array:
+        """D ln(1/Q)/dT, 1/K."""
+        return np.asarray(sum(part.slope * part.inverse_q for part in self.parts) / self.inverse_q)
+
+    @property
+    def first(self) -> Part:
+        """The part to attack first: the largest on the mean."""
+        return self.parts[0]
+
+    @property
+    def least_known(self) -> Part:
+        """The part whose uncertainty is largest."""
+        return max(self.parts, key=lambda part: float(np.mean(part.inverse_q)) * part.relative_sd)
+
+    def without(self, name: str) -> Array:
+        """Q if one part were not there; infinite where it is all."""
+        rest = self.inverse_q - next(part.inverse_q for part in self.parts if part.name == name)
+        with np.errstate(divide="ignore"):
+            return np.asarray(1 / rest)
+
+
+def loss_budget(vibration: Vibration, causes: Sequence[Cause], temperatures: ArrayLike) -> Budget:
+    """Sum the causes over temperatures (K).
+
+    Raises
+    ------
+    ShellError
+        No cause, or a temperature outside the material's range.
+    """
+    T = vibration.material.check(np.atleast_1d(np.asarray(temperatures, dtype=float)))
+    if not causes:
+        raise ShellError("a loss budget needs at least one cause of loss.")
+    low, high = (np.clip(T + step, vibration.material.lowest, vibration.material.highest) for step in (-STEP, STEP))
+    everywhere = np.concatenate([T, low, high])
+    parts = []
+    for cause in causes:
+        now, before, after = np.split(cause.inverse_q(vibration, everywhere), 3)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            slope = np.where(now > 0, (after - before) / (high - low) / now, 0.0)
+        parts.append(Part(cause.name, now, slope, cause.relative_sd, cause.source, cause.advice))
+    return Budget(T, tuple(sorted(parts, key=lambda part: -float(np.mean(part.inverse_q)))))
+
+
+def thermoelastic_cause(
+    vibration: Vibration, heat: HeatLaw, relative: tuple[float, float, float], source: str
+) -> Cause:
+    """Heat through the wall; `relative` are the relative uncertainties of expansion, capacity and conductivity."""
+    T = vibration.reference
+    at = heat(T)
+    x = np.sqrt(vibration.solution.eigenvalue) * at.capacity / at.conductivity
+    nodes = x * np.exp(np.array([-0.05, 0.0, 0.05]))  # temperature moves x by a few per cent
+    flows = np.log([heat_flow(vibration.solution, float(node)) for node in nodes])
+    law = np.polynomial.Polynomial.fit(np.log(nodes / x), flows, 2)
+    by_x = float(law.deriv()(0.0))
+    sd = float(np.hypot(np.hypot(2 * relative[0], (by_x - 1) * relative[1]), by_x * relative[2]))
+
+    def inverse_q(vibration: Vibration, temperatures: Array) -> Array:
+        found = []
+        for temperature, omega in zip(temperatures, vibration.omega(temperatures), strict=True):
+            now = heat(float(temperature))
+            flow = np.exp(law(np.log(omega * now.capacity / now.conductivity / x)))
+            found.append(now.expansion**2 * temperature / now.capacity * flow / vibration.strain_energy)
+        return np.array(found)
+
+    advice = "a wall thinner or thicker than the heat's path, or a material that expands less"
+    return Cause("thermoelastic", inverse_q, float(np.hypot(sd, 0.02)), source, advice)
+
+
+def bulk_cause(coefficient: float, exponent: float, relative_sd: float, source: str) -> Cause:
+    """Loss of the material's volume, c f^b."""
+    return Cause(
+        "bulk",
+        lambda v, T: np.array([bulk_loss(coefficient, exponent, omega / (2 * np.pi)) for omega in v.omega(T)]),
+        relative_sd,
+        source,
+        "another glass or alloy, and its annealing",
+    )
+
+
+def surface_cause(depth: float, relative_sd: float, source: str) -> Cause:
+    """Loss of the damaged surface, of depth times loss (m)."""
+    return Cause(
+        "surface",
+        lambda v, T: np.full(len(T), surface_loss(depth, v.surfaces, v.strain_energy)),
+        relative_sd,
+        source,
+        "polish and etch the faces; cracks of the grinding reach deeper than its roughness",
+    )
+
+
+def film_causes(name: str, film: Film, heat: HeatLaw | None, relative: tuple[float, float], source: str) -> list[Cause]:
+    """A film's own loss, and the heat between it and the wall where both materials' heat is known.
+
+    `relative` are the relative uncertainties of thickness and of the film's loss.
+    """
+
+    def internal(v: Vibration, T: Array) -> Array:
+        check_film(film, v.thinnest)
+        return np.full(len(T), film_internal_loss(film, v.faces, v.strain_energy))
+
+    found = [
+        Cause(
+            f"film {name}",
+            internal,
+            float(np.hypot(*relative)),
+            source,
+            "a thinner film, none where the mode bends, or a metal with less loss",
+        )
+    ]
+    if film.heat is not None and heat is not None:
+
+        def thermoelastic(v: Vibration, T: Array) -> Array:
+            check_film(film, v.thinnest)
+            return np.array(
+                [
+                    film_thermoelastic_loss(film, v.faces, v.strain_energy, heat(float(t)), float(t), float(omega))
+                    for t, omega in zip(T, v.omega(T), strict=True)
+                ]
+            )
+
+        sd = float(np.hypot(relative[0], 0.2))  # films differ from the bulk whose constants they are given
+        found.append(
+            Cause(f"film {name}, heat", thermoelastic, sd, source, "a thinner film, or a metal that expands less")
+        )
+    return found
+
+
+def gas_cause(gas: Gas, pressure: float, relative_sd: float, accommodation: float = 1.0) -> Cause:
+    """Gas at a pressure (Pa) that holds at the reference temperature, sealed in: p ∝ T."""
+    if not pressure >= 0:
+        raise ShellError(f"the gas pressure must be 0 or positive, not {pressure:g} Pa.")
+
+    def inverse_q(v: Vibration, T: Array) -> Array:
+        return np.array(
+            [
+                gas_loss(
+                    v.faces,
+                    v.kinetic,
+                    v.solution.system.n,
+                    gas,
+                    pressure * t / v.reference,
+                    float(t),
+                    float(omega),
+                    accommodation,
+                )
+                for t, omega in zip(T, v.omega(T), strict=True)
+            ]
+        )
+
+    return Cause("gas", inverse_q, relative_sd, f"{gas.name} at {pressure:g} Pa, sealed", "pump, bake and getter")
+
+
+def activated_cause(height: float, energy: float, peak: float, relative_sd: float, source: str) -> Cause:
+    """A Debye peak of height 1/Q at T_p (K) with an activation energy (eV)."""
+    if not height >= 0:
+        raise ShellError(f"the height of an activated loss must be 0 or positive, not {height:g}.")
+    return Cause(
+        "activated",
+        lambda v, T: np.array([activated_loss(height, energy, peak, float(t)) for t in T]),
+        relative_sd,
+        source,
+        "another glass (OH, alkali), or a working temperature away from the peak",
+    )
+
+
+def constant_cause(name: str, inverse_q: float, relative_sd: float, source: str, advice: str = "") -> Cause:
+    """A loss that does not change with temperature."""
+    if not inverse_q >= 0:
+        raise ShellError(f"the loss '{name}' must be 0 or positive, not {inverse_q:g}.")
+    return Cause(name, lambda v, T: np.full(len(T), inverse_q), relative_sd, source, advice)
+
+
+def _interval(value: Array, relative_sd: Array | float) -> tuple[Array, Array]:
+    spread = np.exp(NORMAL_90 * np.sqrt(np.log1p(np.asarray(relative_sd) ** 2)))
+    return np.asarray(value / spread), np.asarray(value * spread)

@@ -1,0 +1,170 @@
+"""What a mode does at the free surfaces of its body: strains, stresses and motion at the faces, the edges and the root.
+
+Areas are per π around the axis, as the solver's volumes are (`table.volume`), so that ratios to its energies need no factor.
+"""
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from shell.assembly import sections
+from shell.blocks import surface_sides
+from shell.cells import CellTable, Reference, tabulate_cells
+from shell.kernel import StrainTable, shell_table
+from shell.quadrature import Array, Basis, gauss, legendre, nodal
+from shell.resonator import Resonator
+from shell.solution import Constants, Solution
+from shell.system import ShellGroup, SolidGroup
+
+Kind = Literal["inner", "outer", "edge", "root"]
+SIDES = ((None, -1.0), (None, 1.0), (-1.0, None), (1.0, None))  # (ξ, η) held on the sides of a cell, as in shell.blocks
+
+
+@dataclass(frozen=True, eq=False)
+class Surface:
+    """A free surface of the body as a mode moves it: arrays over quadrature points.
+
+    kind : inner or outer face of the shell, its free edges, the surface of roots, corners and stem.
+    position : of the meridian, 0 ... 1, (points,).
+    area : dA/π, m², (points,).
+    strain : ε_1, ε_2, ε_3, γ_12, γ_13, γ_23, (6, points); on faces 1, 2, 3 are meridian, circumference and normal.
+    energy : σ : ε, twice the strain energy density, J/m³, (points,).
+    moved : displacement along 1, 2, 3, m, (3, points).
+    E, nu : of the material there, Pa and 1, (points,).
+    """
+
+    kind: Kind
+    position: Array
+    area: Array
+    strain: Array
+    energy: Array
+    moved: Array
+    E: Array
+    nu: Array
+
+    @property
+    def stretch(self) -> Array:
+        """ε_s + ε_θ, what heats a film on the face, (points,)."""
+        return np.asarray(self.strain[0] + self.strain[1])
+
+    def integrate(self, density: Array) -> float:
+        """∫ density dA / π."""
+        return float(np.sum(density * self.area))
+
+
+def shell_faces(solution: Solution) -> tuple[Surface, Surface]:
+    """The inner and the outer face of the shell, without roots and corners; free of traction, so in plane stress."""
+    found: tuple[list[Surface], list[Surface]] = ([], [])
+    for group, c, q in zip(solution.system.groups, solution.constants, solution.unknowns, strict=True):
+        if not isinstance(group, ShellGroup):
+            continue
+        ends = np.array([-1.0, 1.0])
+        u, v, w = (legendre(order, ends) for order in solution.system.level.through)
+        section = group.place.section
+        table = shell_table(section, solution.system.n, (u, v, w), (ends, np.ones(2)), Basis(*group.table.along))
+        strain, moved = table.strains(q), table.displacements(q)
+        area = table.volume * (2 / section.thickness)[..., None]
+        lam, G = c.E * c.nu / (1 - c.nu**2), c.E / (2 * (1 + c.nu))
+        for k, name in enumerate(("inner", "outer")):
+            s, theta, twist = (strain[:, :, row, k] for row in (0, 1, 3))
+            energy = lam * (s + theta) ** 2 + G * (2 * s**2 + 2 * theta**2 + twist**2)
+            found[k].append(
+                Surface(
+                    name,  # type: ignore[arg-type]
+                    section.position.ravel(),
+                    area[..., k].ravel(),
+                    _rows(strain[..., k]),
+                    energy.ravel(),
+                    _rows(moved[..., k]),
+                    c.E.ravel(),
+                    c.nu.ravel(),
+                )
+            )
+    inner, outer = (_join(surfaces) for surfaces in found)
+    return inner, outer
+
+
+def free_surfaces(solution: Solution, resonator: Resonator) -> tuple[Surface, ...]:
+    """Every free surface: both faces, free edges, and the open sides of roots, corners and stem."""
+    found: list[Surface] = [*shell_faces(solution)]
+    for group, c, q in zip(solution.system.groups, solution.constants, solution.unknowns, strict=True):
+        if isinstance(group, ShellGroup):
+            found += [
+                _edge(solution, resonator, group, c, q, end) for end in (0, 1) if group.place.chain.ends[end] == "free"
+            ]
+        else:
+            found += _sides(solution, group, c, q)
+    return tuple(found)
+
+
+def _edge(solution: Solution, resonator: Resonator, group: ShellGroup, c: Constants, q: Array, end: int) -> Surface:
+    """The face across the thickness where the shell ends."""
+    level = solution.system.level
+    element = slice(0, 1) if end == 0 else slice(len(q) - 1, len(q))
+    xi, eta = np.array([-1.0 if end == 0 else 1.0]), gauss(max(level.through) + 2)
+    section = sections(resonator, group.place.chain, xi, np.ones(1))
+    u, v, w = (legendre(order, eta[0]) for order in level.through)
+    table = shell_table(section, solution.system.n, (u, v, w), eta, nodal(level.along, xi)).part(element)
+    stretch = 1 + section.curvature[element, :, None] * section.thickness[element, :, None] / 2 * eta[0]
+    area = table.volume / (section.ds[element, :, None] * stretch)
+    nearest = 0 if end == 0 else -1
+    E, nu, rho = (np.full((1, 1), field[nearest, nearest]) for field in (c.E, c.nu, c.rho))
+    there = Constants(E, nu, rho, c.plane_stress)
+    return _surface("edge", table, there, q[element], area)
+
+
+def _sides(solution: Solution, group: SolidGroup, c: Constants, q: Array) -> list[Surface]:
+    """The open sides of solid cells, without what is held."""
+    mesh, boundary = group.place.mesh, group.place.boundary
+    degree = mesh.grid.shape[2] - 1
+    points, weights = gauss(degree + 2)
+    a, b = mesh.pairs.T
+    held = boundary.held[a] & boundary.held[b]
+    open_sides = [(cell, side) for cell, side in surface_sides(mesh, boundary) if not held[mesh.edges[cell, side]]]
+    found = []
+    for side, (xi, eta) in enumerate(SIDES):
+        cells = [cell for cell, one in open_sides if one == side]
+        if not cells:
+            continue
+        place = Reference.at(
+            points if xi is None else np.array([xi]),
+            points if eta is None else np.array([eta]),
+            weights,
+            degree,
+            degree,
+        )
+        table = tabulate_cells(mesh.grid[:, cells], place, solution.system.n, float(group.table.position[0, 0]))
+        along = place.along.slopes if xi is None else place.along.values
+        across = place.across.slopes if eta is None else place.across.values
+        r, z = ((along @ x[cells] @ across.T).reshape(len(cells), -1) for x in mesh.grid)
+        area = (np.hypot(r, z) * table.radius * weights)[:, None]
+        there = Constants(c.E[cells], c.nu[cells], c.rho[cells], c.plane_stress)
+        found.append(_surface("root", table, there, q[cells], area))
+    return found
+
+
+def _surface(kind: Kind, table: StrainTable | CellTable, c: Constants, q: Array, area: Array) -> Surface:
+    strain, moved = table.strains(q), table.displacements(q)
+    stress = c.stress(table, strain)
+    E, nu = (np.broadcast_to(field[..., None], area.shape).ravel() for field in (c.E, c.nu))
+    position = np.broadcast_to(table.position[..., None], area.shape).ravel()
+    energy = np.sum(stress * strain, axis=2).ravel()
+    return Surface(kind, position, area.ravel(), _points(strain), energy, _points(moved), E, nu)
+
+
+def _rows(field: Array) -> Array:
+    """(elements, stations, k) to (k, points)."""
+    return np.moveaxis(field, 2, 0).reshape(field.shape[2], -1)
+
+
+def _points(field: Array) -> Array:
+    """(elements, stations, k, points) to (k, all points)."""
+    return np.moveaxis(field, 2, 0).reshape(field.shape[2], -1)
+
+
+def _join(parts: list[Surface]) -> Surface:
+    fields = ("position", "area", "strain", "energy", "moved", "E", "nu")
+    return Surface(
+        parts[0].kind, *(np.concatenate([getattr(part, name) for part in parts], axis=-1) for name in fields)
+    )

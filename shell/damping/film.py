@@ -1,0 +1,121 @@
+"""Loss in a thin film on the faces: its own, and the heat that flows between film and wall.
+
+The film follows the strain of the face. Its own loss counts with its energy,
+
+    1/Q = φ t ∫ σ_f : ε dA / ∫ σ : ε dV,
+
+and because it warms otherwise than the wall beneath it, θ_f - θ_s = T (α_s tr σ_s/C_s - α_f tr σ_f/C_f), heat crosses the
+interface: with κ = √(iω C/k), a = k_f κ_f tanh(κ_f t) of the film and b = k_s κ_s of the wall (thick against 1/|κ_s|),
+
+    1/Q = ∫ (θ_f - θ_s)² dA / (T ω ∫ σ : ε dV) · Re[a b/(a + b)]
+
+(the one-dimensional heat equation in both, exactly; Fejer et al., Phys. Rev. D 70 (2004) 082003 treat the same heat flow).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from shell.damping.faces import Surface
+from shell.damping.heat import Heat
+from shell.errors import ShellError, mm
+from shell.quadrature import Array
+
+THICKEST = 0.05  # film over wall up to which it follows the face and leaves the mode as it is
+
+
+@dataclass(frozen=True)
+class Film:
+    """A film on the faces of the shell.
+
+    thickness : m.
+    E, nu : Young's modulus (Pa) and Poisson ratio.
+    loss : its own loss angle φ.
+    heat : what it does with heat; None leaves its thermoelastic loss out.
+    faces : the faces that carry it.
+    span : part of the meridian that carries it, 0 ... 1 of the arc length.
+    coverage : covered share of that part (a pattern finer than the mode's wavelength).
+    """
+
+    thickness: float
+    E: float
+    nu: float
+    loss: float
+    heat: Heat | None = None
+    faces: tuple[str, ...] = ("inner", "outer")
+    span: tuple[float, float] = (0.0, 1.0)
+    coverage: float = 1.0
+
+    def __post_init__(self) -> None:
+        if not (self.thickness >= 0 and self.loss >= 0):
+            raise ShellError("a film's thickness and loss must be 0 or positive.")
+        if not (self.E > 0 and -1 < self.nu < 0.5):
+            raise ShellError("a film's modulus must be positive and its Poisson ratio between -1 and 0.5.")
+        if not 0 <= self.coverage <= 1 or not 0 <= self.span[0] < self.span[1] <= 1:
+            raise ShellError("a film covers a share 0 ... 1 of a part of the meridian [from, to] within 0 ... 1.")
+        unknown = set(self.faces) - {"inner", "outer"}
+        if unknown or not self.faces:
+            raise ShellError(
+                f"a film lies on inner, outer or both faces, not on {', '.join(sorted(unknown)) or 'none'}."
+            )
+
+    def carries(self, face: Surface) -> Array:
+        """Covered share at the points of a face."""
+        there = (face.position >= self.span[0]) & (face.position <= self.span[1])
+        return np.asarray(self.coverage * there * (face.kind in self.faces))
+
+
+def check_film(film: Film, wall: float) -> None:
+    """Refuse a film that is not thin against the thinnest wall (m)."""
+    if film.thickness >= wall:
+        raise ShellError(
+            f"the film ({mm(film.thickness)}) is thicker than the wall ({mm(wall)}): film thickness is in nm."
+        )
+    if film.thickness > THICKEST * wall:
+        raise ShellError(
+            f"the film ({mm(film.thickness)}) is more than {THICKEST:.0%} of the wall ({mm(wall)}): the mode would change;"
+            " make it a wall of its own."
+        )
+
+
+def film_energy(film: Film, face: Surface) -> Array:
+    """σ_f : ε of the film per volume of film, plane stress, at the points of a face (J/m³)."""
+    s, theta, twist = face.strain[0], face.strain[1], face.strain[3]
+    lam, G = film.E * film.nu / (1 - film.nu**2), film.E / (2 * (1 + film.nu))
+    return np.asarray(lam * (s + theta) ** 2 + G * (2 * s**2 + 2 * theta**2 + twist**2))
+
+
+def film_internal_loss(film: Film, faces: tuple[Surface, ...], strain_energy: float) -> float:
+    """1/Q of the film's own loss.
+
+    Parameters
+    ----------
+    film : thickness, modulus, loss.
+    faces : of `shell_faces`.
+    strain_energy : ∫ σ : ε dV / π of the mode, J.
+    """
+    energy = sum(face.integrate(film.carries(face) * film_energy(film, face)) for face in faces)
+    return film.loss * film.thickness * energy / strain_energy
+
+
+def film_thermoelastic_loss(
+    film: Film, faces: tuple[Surface, ...], strain_energy: float, wall: Heat, temperature: float, omega: float
+) -> float:
+    """1/Q of the heat that flows between film and wall (formula above), at a temperature (K) and ω (rad/s)."""
+    if film.heat is None or film.thickness == 0:
+        return 0.0
+    inside = film.heat
+    own = inside.expansion * film.E / (1 - film.nu) / inside.capacity
+    gap = 0.0
+    for face in faces:
+        beneath = wall.expansion * face.E / (1 - face.nu) / wall.capacity
+        gap += face.integrate(film.carries(face) * ((own - beneath) * face.stretch) ** 2)
+    return temperature * gap * exchange(film.thickness, inside, wall, omega) / (omega * strain_energy)
+
+
+def exchange(thickness: float, film: Heat, wall: Heat, omega: float) -> float:
+    """Re[a b/(a + b)] of film and wall, W/(m² K)."""
+    kappa = np.sqrt(1j * omega * film.capacity / film.conductivity)
+    a = film.conductivity * kappa * np.tanh(kappa * thickness)
+    b = np.sqrt(1j * omega * wall.capacity * wall.conductivity)
+    return float(np.real(a * b / (a + b)))

@@ -1,0 +1,123 @@
+"""Loss to the gas around the shell: molecules one by one at low pressure, a viscous layer at high pressure.
+
+A face that moves with velocity v loses Z v² per area, so 1/Q = ∫ Z |u|² dA / (ω ∫ ρ |u|² dV). Free molecules at rest
+give, per face and with the accommodation a of the wall,
+
+    Z = p √(M/(R T)) × [(1 - a) 2√(2/π) + a (√(2/π) + ½ √(π/2))] along the normal, a/√(2π) along the face;
+
+both faces of a plate in normal motion with a = 0: 1/Q = 4 √(2/π) p √(M/(R T))/(ρ h ω) (Christian, Vacuum 16 (1966) 175;
+Bao et al., J. Micromech. Microeng. 12 (2002) 341). In a viscous gas the layer of width √(2μ/(ρ_g ω)) shears with the slip between
+the wall and the potential flow that its waves drive, Z = √(ρ_g μ ω/2) on that slip (Stokes). Between the two regimes, where no
+closed form holds, the two are joined by Q² = Q_free² + Q_viscous², and the uncertainty is a half.
+"""
+
+from dataclasses import dataclass
+from math import pi, sqrt
+
+import numpy as np
+
+from shell.damping.faces import Surface
+from shell.errors import ShellError
+
+R = 8.314462618  # J/(mol K)
+
+
+@dataclass(frozen=True)
+class Gas:
+    """A gas: molar mass (kg/mol), viscosity μ₀ (Pa s) at T₀ (K), and Sutherland's constant S (K)."""
+
+    name: str
+    molar_mass: float
+    viscosity: float
+    at: float
+    sutherland: float
+
+    def viscosity_at(self, temperature: float) -> float:
+        """Sutherland's law μ = μ₀ (T/T₀)^1.5 (T₀ + S)/(T + S), Pa s."""
+        ratio = temperature / self.at
+        return float(self.viscosity * ratio**1.5 * (self.at + self.sutherland) / (temperature + self.sutherland))
+
+
+# viscosities and Sutherland constants: White, Viscous Fluid Flow, table 1-2
+GASES = {
+    gas.name: gas
+    for gas in (
+        Gas("air", 0.0289652, 1.716e-5, 273.0, 111.0),
+        Gas("nitrogen", 0.0280134, 1.663e-5, 273.0, 107.0),
+        Gas("argon", 0.039948, 2.125e-5, 273.0, 144.0),
+        Gas("hydrogen", 0.00201588, 8.411e-6, 273.0, 97.0),
+    )
+}
+
+
+def gas_loss(
+    faces: tuple[Surface, ...],
+    kinetic: float,
+    harmonic: int,
+    gas: Gas,
+    pressure: float,
+    temperature: float,
+    omega: float,
+    accommodation: float = 1.0,
+) -> float:
+    """1/Q to a gas at a pressure (Pa) and temperature (K).
+
+    Parameters
+    ----------
+    faces : of `shell_faces`.
+    kinetic : ∫ ρ |u|² dV / π of the mode, kg m².
+    harmonic : n, for the flow that the waves drive in a viscous gas.
+    accommodation : share of molecules that leave the wall diffusely, 0 ... 1.
+    """
+    if not pressure >= 0:
+        raise ShellError(f"the gas pressure must be 0 or positive, not {pressure:g} Pa.")
+    if not 0 <= accommodation <= 1:
+        raise ShellError(f"the accommodation is a share 0 ... 1, not {accommodation:g}.")
+    if pressure == 0:
+        return 0.0
+    free = free_molecular_loss(faces, kinetic, gas, pressure, temperature, omega, accommodation)
+    viscous = viscous_loss(faces, kinetic, harmonic, gas, pressure, temperature, omega)
+    return free * viscous / float(np.hypot(free, viscous))
+
+
+def free_molecular_loss(
+    faces: tuple[Surface, ...],
+    kinetic: float,
+    gas: Gas,
+    pressure: float,
+    temperature: float,
+    omega: float,
+    accommodation: float,
+) -> float:
+    """1/Q to molecules that hit the faces one by one."""
+    normal = (1 - accommodation) * 2 * sqrt(2 / pi) + accommodation * (sqrt(2 / pi) + 0.5 * sqrt(pi / 2))
+    along = accommodation / sqrt(2 * pi)
+    hit = sum(
+        face.integrate(normal * face.moved[2] ** 2 + along * (face.moved[0] ** 2 + face.moved[1] ** 2))
+        for face in faces
+    )
+    return pressure * sqrt(gas.molar_mass / (R * temperature)) * hit / (omega * kinetic)
+
+
+def viscous_loss(
+    faces: tuple[Surface, ...],
+    kinetic: float,
+    harmonic: int,
+    gas: Gas,
+    pressure: float,
+    temperature: float,
+    omega: float,
+) -> float:
+    """1/Q to the viscous layer on the faces; the waves' own flow runs around as fast as the wall moves along its normal."""
+    density = pressure * gas.molar_mass / (R * temperature)
+    resistance = sqrt(density * gas.viscosity_at(temperature) * omega / 2)
+    slip = 0.0
+    for face in faces:
+        flow = (1.0 if face.kind == "outer" else -1.0) * (harmonic > 0) * face.moved[2]
+        slip += face.integrate(face.moved[0] ** 2 + (face.moved[1] - flow) ** 2)
+    return resistance * slip / (omega * kinetic)
+
+
+def mean_free_path(gas: Gas, pressure: float, temperature: float) -> float:
+    """λ = (μ/p) √(π R T/(2 M)), m: how far molecules fly; below it a gap or a layer is no continuum."""
+    return float(gas.viscosity_at(temperature) / pressure * np.sqrt(pi * R * temperature / (2 * gas.molar_mass)))

@@ -1,0 +1,55 @@
+"""Published numbers of loss: P of the free dome, the plate strip, Lifshitz and Roukes' maximum, Q of bare and coated silica."""
+
+from math import pi, sqrt
+
+import pytest
+
+from shell.damping.budget import Vibration, bulk_cause, loss_budget, surface_cause
+from shell.damping.gas import GASES, R, free_molecular_loss
+from shell.damping.thermoelastic import lifshitz_roukes, trace_share
+from shell.elastic import Elastic
+from shell.materials import find_material
+from shell.meridian import hemisphere
+from shell.modes import solve_modes
+
+SILICA = Elastic(72.7e9, 0.17, 2203.0)
+
+
+@pytest.mark.parametrize(("n", "share"), [(2, 0.2259), (3, 0.388), (4, 0.530)])
+def test_trace_share_of_the_free_dome(n: int, share: float) -> None:
+    """Notes on imperfection, loss and loops, section 3: P at h/R = 0.06, ν = 0.17."""
+    (mode,) = solve_modes(hemisphere(radius=15e-3, thickness=0.9e-3), SILICA, n)
+    assert mode.solution is not None
+    assert trace_share(mode.solution) == pytest.approx(share, abs=1e-3 * share)
+
+
+def test_maximum_of_lifshitz_and_roukes() -> None:
+    """Phys. Rev. B 61 (2000) 5600: the largest damping is 0.494 of E α² T/C, at ξ = 2.225."""
+    assert float(lifshitz_roukes(2.225)) == pytest.approx(0.494, abs=5e-4)
+    assert lifshitz_roukes(2.225) > max(lifshitz_roukes([2.2, 2.25]))
+
+
+def test_bare_silica_resonator_lies_where_bare_resonators_are_measured() -> None:
+    """quality_factors.csv: bare high-purity HRG shells 30-50e6, an etched cylinder 25e6, a ground one 20e6."""
+    silica = find_material("fused-silica")
+    (mode,) = solve_modes(hemisphere(radius=15e-3, thickness=0.8558e-3), silica.elastic(293.15))
+    vibration = Vibration.of(mode, silica, 293.15)
+    causes = [bulk_cause(7.6e-12, 0.77, 0.4, "gwinc"), surface_cause(5.2e-12, 0.2, "gwinc")]
+    budget = loss_budget(vibration, causes, 293.15)
+    low, high = budget.interval
+    assert 1 / high[0] < 30e6
+    assert 1 / low[0] > 20e6
+    assert budget.first.name == "surface"
+
+
+def test_christians_formula_for_a_wall_in_normal_motion() -> None:
+    """1/Q = 4 √(2/π) p √(M/(R T))/(ρ h ω), both faces, specular; here for the share of normal motion in the mode."""
+    h = 0.3e-3
+    (mode,) = solve_modes(hemisphere(radius=15e-3, thickness=h), SILICA)
+    vibration = Vibration.of(mode, find_material("fused-silica"), 293.15)
+    gas, omega = GASES["nitrogen"], 2 * pi * mode.frequency
+    found = free_molecular_loss(vibration.faces, vibration.kinetic, gas, 1e-2, 293.15, omega, 0.0)
+    normal = sum(face.integrate(face.moved[2] ** 2) for face in vibration.faces)
+    every = sum(face.integrate((face.moved**2).sum(axis=0)) for face in vibration.faces)
+    christian = 4 * sqrt(2 / pi) * 1e-2 * sqrt(gas.molar_mass / (R * 293.15)) / (2203.0 * h * omega)
+    assert found == pytest.approx(christian * normal / every, rel=2e-3)
