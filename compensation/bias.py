@@ -2,10 +2,15 @@
 
 B = B₀ + k₁ f + k₂ f² + k₃ f³ + k₄ ḟ + k₅ ḟ² + k₆ ḟ³ + k₇ f ḟ + k₈ f² ḟ + k₉ f ḟ², f the *change* of frequency (Hz),
 ḟ its rate (Hz/s), B in the unit of the bias column. Which terms are taken is decided in `compensation.bias_selection`.
+
+A gyro whose frequency is not measured has a thermometer instead: then f stands for the change of its temperature (°C).
+A thermometer is not the sensing element, so the temperature may first pass a lag, and a tenth candidate is the `play`
+p − T of a backlash p that follows T at a distance of no more than w: the loop between cooling and warming
+(`compensation.memory`).
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -14,6 +19,7 @@ from compensation.coloured import coloured_covariance, fit_coloured
 from compensation.decimation import average_blocks
 from compensation.derivative import differentiate
 from compensation.errors import CompensationError
+from compensation.memory import NO_MEMORY, Memory, follow_lag, follow_play
 from compensation.regression import fit_linear
 from compensation.stepwise import Selection
 
@@ -28,29 +34,47 @@ PARENTS = {
     for name, (a, b) in TERMS.items()
 }
 SELECTED_BY_THE_PAPER = ("f", "f^2", "f^3", "fdot", "fdot^2", "f*fdot")
+PLAY = "play"
+
+
+@dataclass(frozen=True)
+class Variable:
+    """What the bias is a function of: `name` in a sentence, unit, symbol, and the least value that it can have."""
+
+    name: str
+    unit: str
+    symbol: str
+    above: float
+
+
+FREQUENCY = Variable("frequency", "Hz", "f", 0.0)
+TEMPERATURE = Variable("temperature", "°C", "T", -273.15)
 
 
 @dataclass(frozen=True)
 class BiasRun:
-    """One run, decimated: mean `time` (s), `frequency` (Hz), its `rate` (Hz/s) and `bias` of each block (b,).
+    """One run, decimated: mean `time` (s), `state` (Hz or °C), its `rate` (per s), `play`, and `bias` of each block (b,).
 
-    `width` of a block (s); `lag` of the rate (s); `window` over which it was taken (s); rows that were left out:
-    `missing` values, `spikes`.
+    `state` is the frequency, or the temperature behind the lag of `memory`; `width` of a block (s); `lag` of the rate
+    (s); `window` over which it was taken (s); rows that were left out: `missing` values, `spikes`.
     """
 
     time: Array
-    frequency: Array
+    state: Array
     rate: Array
+    play: Array
     bias: Array
     width: float
     window: float
     lag: float
     missing: int
     spikes: int
+    variable: Variable = FREQUENCY
+    memory: Memory = field(default=NO_MEMORY)
 
     def part(self, rows: slice) -> "BiasRun":
         """Return some consecutive rows as a run of its own."""
-        cut = {name: getattr(self, name)[rows] for name in ("time", "frequency", "rate", "bias")}
+        cut = {name: getattr(self, name)[rows] for name in ("time", "state", "rate", "play", "bias")}
         return replace(self, **cut)
 
 
@@ -64,7 +88,7 @@ class BiasFit:
     the terms were chosen by it (else empty).
     """
 
-    reference_frequency: float
+    reference: float
     terms: tuple[str, ...]
     coefficients: Array
     covariance: Array
@@ -72,60 +96,76 @@ class BiasFit:
     theta: float
     selection: Selection | None
     held_out: tuple[float, ...]
-    frequency_range: tuple[float, float]
+    state_range: tuple[float, float]
     rate_range: tuple[float, float]
+    variable: Variable
+    memory: Memory
 
     @property
     def standard_errors(self) -> Array:
         """Standard errors of ("constant", *terms) that respect the autocorrelation."""
         return np.sqrt(np.diag(self.covariance))
 
-    def predict(self, frequency: ArrayLike, rate: ArrayLike) -> Array:
-        """Return the bias that the model expects at a frequency (Hz) and its rate (Hz/s)."""
-        columns = term_columns(frequency, rate, self.reference_frequency, self.terms)
+    def predict(self, state: ArrayLike, rate: ArrayLike, play: ArrayLike = 0.0) -> Array:
+        """Return the bias that the model expects at a frequency (Hz) or temperature (°C), its rate (1/s) and play."""
+        columns = term_columns(state, rate, self.reference, self.terms, play)
         return np.asarray(self.coefficients[0] + columns @ self.coefficients[1:])
+
+    def left(self, run: BiasRun) -> Array:
+        """Return what the model leaves of a run's bias (b,)."""
+        return np.asarray(run.bias - self.predict(run.state, run.rate, run.play))
 
 
 def prepare_run(
     time: ArrayLike,
-    frequency: ArrayLike,
+    state: ArrayLike,
     bias: ArrayLike,
     width: float = 100.0,
     window: float = 300.0,
     *,
     causal: bool = False,
+    variable: Variable = FREQUENCY,
+    memory: Memory = NO_MEMORY,
 ) -> BiasRun:
-    """Decimate one run and add the rate of its frequency.
+    """Decimate one run and add the rate of its frequency or temperature.
 
     Parameters
     ----------
-    time, frequency, bias : array, shape (m,)
-        Time (s), frequency (Hz) and zero-rate output; NaN where missing.
+    time, state, bias : array, shape (m,)
+        Time (s), frequency (Hz) or temperature (°C), and zero-rate output; NaN where missing.
     width : float
         Length of the blocks that are averaged, s; never less than the sampling interval.
     window : float
         Length of the window over which the rate is taken, s.
     causal : bool
         The rate uses past samples only, as firmware must, and lags by window/2.
+    variable : Variable
+        FREQUENCY or TEMPERATURE.
+    memory : Memory
+        Lag and play behind which the temperature acts.
 
     Raises
     ------
     CompensationError
-        Too little data, frequencies that cannot be, a constant bias, time that does not increase, a window that is too short.
+        Too little data, values that cannot be, a constant bias, time that does not increase, a window that is too short.
     """
     t = np.asarray(time, dtype=np.float64)
-    if np.any(np.asarray(frequency, dtype=np.float64) <= 0):
-        raise CompensationError("a frequency must be positive; check the unit of the column.")
+    if np.any(np.asarray(state, dtype=np.float64) <= variable.above):
+        raise CompensationError(
+            f"a {variable.name} must be above {variable.above:g} {variable.unit}; check the unit of the column."
+        )
     for name, seconds in (("averaging", width), ("window of the rate", window)):
         if not (np.isfinite(seconds) and seconds > 0):
             raise CompensationError(f"the {name} must be a positive number of seconds, not {seconds:g}.")
     width = max(width, float(np.median(np.diff(t)))) if t.size > 1 else width
-    blocks = average_blocks(t, {"frequency": frequency, "bias": bias}, width)
-    f = blocks.columns["frequency"]
+    blocks = average_blocks(t, {variable.name: state, "bias": bias}, width)
+    f = blocks.columns[variable.name]
     if f.size < 3:
         raise CompensationError(
             f"averaging over {width:g} s leaves {f.size} rows, and three are the least; record longer or average less."
         )
+    f = follow_lag(blocks.time, f, memory.lag)
+    play = follow_play(f, memory.play) - f
     if np.ptp(blocks.columns["bias"]) <= 1e-13 * np.max(np.abs(blocks.columns["bias"])):
         raise CompensationError(
             f"the bias is constant ({blocks.columns['bias'][0]:g}): nothing can be learnt from it; check the column."
@@ -139,50 +179,61 @@ def prepare_run(
         )
     return BiasRun(
         time=blocks.time[ok],
-        frequency=f[ok],
+        state=f[ok],
         rate=derivative.slope[ok],
+        play=play[ok],
         bias=blocks.columns["bias"][ok],
         width=width,
         window=max(window, 3 * width),
         lag=derivative.lag,
         missing=blocks.missing,
         spikes=blocks.spikes,
+        variable=variable,
+        memory=memory,
     )
 
 
-def term_columns(frequency: ArrayLike, rate: ArrayLike, reference_frequency: float, terms: Sequence[str]) -> Array:
-    """Return one column per term of HRG paper eq. (21), shape (m, len(terms))."""
-    f = np.asarray(frequency, dtype=np.float64) - reference_frequency
-    rate = np.asarray(rate, dtype=np.float64)
-    columns = [f ** TERMS[name][0] * rate ** TERMS[name][1] for name in terms]
+def term_columns(
+    state: ArrayLike, rate: ArrayLike, reference: float, terms: Sequence[str], play: ArrayLike = 0.0
+) -> Array:
+    """Return one column per term of HRG paper eq. (21), or the play, shape (m, len(terms))."""
+    f = np.asarray(state, dtype=np.float64) - reference
+    rate, play = np.asarray(rate, dtype=np.float64), np.broadcast_to(np.asarray(play, dtype=np.float64), f.shape)
+    columns = [play if name == PLAY else f ** TERMS[name][0] * rate ** TERMS[name][1] for name in terms]
     return np.column_stack(columns) if columns else np.empty((f.size, 0))
 
 
 class Design:
-    """Several runs below each other: `constants` (m, runs), the nine `candidates` (m, 9), `bias` (m,), `rows` per run."""
+    """Several runs below each other: `constants` (m, runs), `candidates` (m, names), `bias` (m,), `rows` per run.
+
+    The candidates are the nine terms of eq. (21), and the play where the runs have one.
+    """
 
     def __init__(self, runs: Sequence[BiasRun], reference: float) -> None:
         sizes = [run.time.size for run in runs]
         ends = np.cumsum(sizes)
         self.reference = reference
         self.rows = [slice(end - size, end) for end, size in zip(ends, sizes, strict=True)]
-        self.frequency = np.concatenate([run.frequency for run in runs])
+        self.variable, self.memory = runs[0].variable, runs[0].memory
+        self.names = (*TERMS, PLAY) if self.memory.play else tuple(TERMS)
+        self.state = np.concatenate([run.state for run in runs])
         self.rate = np.concatenate([run.rate for run in runs])
         self.bias = np.concatenate([run.bias for run in runs])
         self.constants = np.zeros((self.bias.size, len(runs)))
         for k, rows in enumerate(self.rows):
             self.constants[rows, k] = 1.0
-        if np.ptp(self.frequency) <= 1e-12 * np.max(self.frequency):
+        if np.ptp(self.state) <= 1e-12 * np.max(np.abs(self.state)):
             raise CompensationError(
-                f"the frequency is constant ({self.frequency[0]:g} Hz): nothing can be learnt from it; record a run in "
-                "which the temperature changes."
+                f"the {self.variable.name} is constant ({self.state[0]:g} {self.variable.unit}): nothing can be learnt from"
+                " it; record a run in which the temperature changes."
             )
-        if self.bias.size <= len(runs) + len(TERMS):
+        if self.bias.size <= len(runs) + len(self.names):
             raise CompensationError(
-                f"{len(TERMS)} candidate terms and {len(runs)} constants need more than {len(runs) + len(TERMS)} averages, "
-                f"not {self.bias.size}; record longer or average over less than {runs[0].width:g} s."
+                f"{len(self.names)} candidate terms and {len(runs)} constants need more than {len(runs) + len(self.names)}"
+                f" averages, not {self.bias.size}; record longer or average over less than {runs[0].width:g} s."
             )
-        self.candidates = term_columns(self.frequency, self.rate, reference, tuple(TERMS))
+        play = np.concatenate([run.play for run in runs])
+        self.candidates = term_columns(self.state, self.rate, reference, self.names, play)
 
 
 def fit_terms(
@@ -196,7 +247,7 @@ def fit_terms(
 
     `theta` of the noise is estimated with these terms unless it is given.
     """
-    X = np.column_stack([design.constants, design.candidates[:, [list(TERMS).index(name) for name in terms]]])
+    X = np.column_stack([design.constants, design.candidates[:, [design.names.index(name) for name in terms]]])
     count = design.constants.shape[1]
     names = [*(f"constant of run {k + 1}" for k in range(count)), *terms]
     fit = fit_linear(X, design.bias, names, constant=False)
@@ -207,7 +258,7 @@ def fit_terms(
     M[0, :count] = 1.0 / count
     M[1:, count:] = np.eye(len(terms))
     return BiasFit(
-        reference_frequency=design.reference,
+        reference=design.reference,
         terms=terms,
         coefficients=M @ fit.coefficients,
         covariance=M @ coloured @ M.T,
@@ -215,6 +266,8 @@ def fit_terms(
         theta=noise.theta,
         selection=selection,
         held_out=scores,
-        frequency_range=(float(design.frequency.min()), float(design.frequency.max())),
+        state_range=(float(design.state.min()), float(design.state.max())),
         rate_range=(float(design.rate.min()), float(design.rate.max())),
+        variable=design.variable,
+        memory=design.memory,
     )

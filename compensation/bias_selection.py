@@ -8,9 +8,9 @@ Two ways of selecting stand side by side; the coefficients of the chosen terms a
            the path that best predicts a run from the others is kept, if any does better than a constant.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
+from itertools import pairwise, product
 from typing import Literal
 
 import numpy as np
@@ -19,6 +19,8 @@ from numpy.typing import NDArray
 from compensation.bias import PARENTS, TERMS, BiasFit, BiasRun, Design, fit_terms
 from compensation.coloured import estimate_theta, whiten
 from compensation.errors import CompensationError
+from compensation.memory import NO_MEMORY, Memory
+from compensation.regression import fit_linear
 from compensation.stepwise import Selection, select_stepwise
 
 Array = NDArray[np.float64]
@@ -29,6 +31,10 @@ AVERAGING = 100.0
 BLOCKS = 5
 # The noise is taken at one standard deviation towards the random walk, which keeps the rate of false terms near 5 %.
 CAUTION = 1.0
+LAGS = (0.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1000.0, 2000.0)  # s, of a temperature
+PLAYS = (0.0, 0.02, 0.05, 0.1, 0.2)  # half-widths over the span of the temperature
+# Deviance that each number of a memory must gain: a chance of 0.001 by noise alone (χ² of one degree of freedom).
+WORTH = 10.8
 
 
 class NoHeldOut(CompensationError):
@@ -62,7 +68,7 @@ class _Fold:
     rest: list[BiasRun]
 
 
-def fit_bias(runs: Sequence[BiasRun], method: Method = "guarded", reference_frequency: float | None = None) -> BiasFit:
+def fit_bias(runs: Sequence[BiasRun], method: Method = "guarded", reference: float | None = None) -> BiasFit:
     """Select and fit the bias model on one run or several, HRG paper eqs. (21), (22).
 
     Parameters
@@ -71,15 +77,48 @@ def fit_bias(runs: Sequence[BiasRun], method: Method = "guarded", reference_freq
         Every run has its own constant (turn-on bias); B₀ is their mean.
     method : "paper" or "guarded"
         See the head of this module.
-    reference_frequency : float, optional
-        The frequency from which changes are counted; the first of the first run unless given.
+    reference : float, optional
+        The frequency or temperature from which changes are counted; the first of the first run unless given.
 
     Raises
     ------
     CompensationError
         Fewer rows than terms, or a frequency that does not change.
     """
-    return _select(runs, method, reference_frequency, by_runs=len(runs) > 1)
+    return _select(runs, method, reference, by_runs=len(runs) > 1)
+
+
+def choose_memory(prepare: Callable[[Memory], Sequence[BiasRun]]) -> Memory:
+    """Return the lag and play of highest likelihood behind which all candidate terms together act.
+
+    Each must gain `WORTH` in deviance, m ln(SSE/m) of the whitened rows, to be taken.
+
+    Parameters
+    ----------
+    prepare : callable
+        Memory to runs that were prepared with it.
+    """
+    plain = prepare(NO_MEMORY)
+    span = float(np.ptp(np.concatenate([run.state for run in plain])))
+    theta: float | None = None
+    best, least = NO_MEMORY, np.inf
+    for lag, play in product(LAGS, PLAYS):
+        memory = Memory(lag, play * span)
+        runs = plain if memory == NO_MEMORY else prepare(memory)
+        design = Design(runs, float(plain[0].state[0]))
+        X = np.column_stack([design.constants, design.candidates])
+        theta = estimate_theta(X, design.bias, design.rows, CAUTION) if theta is None else theta
+        left = fit_linear(
+            whiten(X, theta, design.rows), whiten(design.bias, theta, design.rows), _numbers(X), constant=False
+        ).residuals
+        deviance = left.size * float(np.log(np.mean(left**2))) + WORTH * ((lag > 0) + (play > 0))
+        if deviance < least:
+            best, least = memory, deviance
+    return best
+
+
+def _numbers(X: Array) -> list[str]:
+    return [str(k) for k in range(X.shape[1])]
 
 
 def score_held_out(runs: Sequence[BiasRun], method: Method = "guarded") -> HeldOut:
@@ -105,10 +144,10 @@ def score_held_out(runs: Sequence[BiasRun], method: Method = "guarded") -> HeldO
     return _pool(folds, fits, by_runs=by_runs)
 
 
-def _select(pieces: Sequence[BiasRun], method: Method, reference_frequency: float | None, *, by_runs: bool) -> BiasFit:
-    reference = float(pieces[0].frequency[0]) if reference_frequency is None else reference_frequency
+def _select(pieces: Sequence[BiasRun], method: Method, reference: float | None, *, by_runs: bool) -> BiasFit:
+    reference = float(pieces[0].state[0]) if reference is None else reference
     design = Design(pieces, reference)
-    names = tuple(TERMS)
+    names = design.names
     everything = np.column_stack([design.constants, design.candidates])
     theta = estimate_theta(everything, design.bias, design.rows, CAUTION)
     if method == "paper":
@@ -150,10 +189,10 @@ def _folds(pieces: Sequence[BiasRun], by_runs: bool) -> list[_Fold]:
 
 
 def thermal_constant(pieces: Sequence[BiasRun]) -> float:
-    """Return std(f) / rms(ḟ), the time in which the frequency changes by its own spread (s)."""
-    frequency = np.concatenate([piece.frequency for piece in pieces])
+    """Return std(f) / rms(ḟ), the time in which frequency or temperature changes by its own spread (s)."""
+    state = np.concatenate([piece.state for piece in pieces])
     rate = np.concatenate([piece.rate for piece in pieces])
-    return float(np.std(frequency) / np.sqrt(np.mean(rate**2)))
+    return float(np.std(state) / np.sqrt(np.mean(rate**2)))
 
 
 def score_path(runs: Sequence[BiasRun], selection: Selection) -> tuple[float, ...]:
@@ -168,7 +207,7 @@ def score_path(runs: Sequence[BiasRun], selection: Selection) -> tuple[float, ..
     """
     by_runs = len(runs) > 1
     folds = _folds(runs, by_runs)
-    designs = [Design(fold.rest, float(runs[0].frequency[0])) for fold in folds]
+    designs = [Design(fold.rest, float(runs[0].state[0])) for fold in folds]
     scores = []
     for step in (selection.start, *selection.steps):
         fits = [fit_terms(design, step.terms, theta=1.0) for design in designs]  # θ matters to no prediction
@@ -199,8 +238,8 @@ def _pool(folds: Sequence[_Fold], fits: Sequence[BiasFit], *, by_runs: bool, eve
     compensated: list[Array] = []
     for fold, fit in zip(folds, fits, strict=True):
         run = fold.held_out
-        inside = within(run.frequency, fit.frequency_range) & within(run.rate, fit.rate_range) | everywhere
-        left = run.bias - fit.predict(run.frequency, run.rate)
+        inside = within(run.state, fit.state_range) & within(run.rate, fit.rate_range) | everywhere
+        left = fit.left(run)
         averages = [_averages(values[inside], run) for values in (run.bias, left)]
         if averages[0].size > 2:
             raw.append(averages[0] - averages[0].mean())

@@ -5,24 +5,38 @@ This is what `hrg fit bias` computes and its page shows.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from compensation.bias import BiasFit, BiasRun, prepare_run
-from compensation.bias_selection import HeldOut, Method, NoHeldOut, bias_stability, fit_bias, score_held_out, score_path
+from compensation.bias import FREQUENCY, TEMPERATURE, BiasFit, BiasRun, prepare_run
+from compensation.bias_selection import (
+    HeldOut,
+    Method,
+    NoHeldOut,
+    bias_stability,
+    choose_memory,
+    fit_bias,
+    score_held_out,
+    score_path,
+)
 from compensation.decimation import average_blocks, find_spikes
 from compensation.errors import CompensationError
+from compensation.memory import NO_MEMORY, Memory
 from compensation.stability import AllanDeviation, NoiseCoefficients, allan_deviation, fit_noise
 from studies.errors import InputError, naming
 from studies.models import Model, compensate, source_of
 from studies.models.kinds.bias import OUTPUTS, save_bias
 from studies.record import COMPENSATED, Record
-from studies.rest import LARGEST_REST
+from studies.rest import LARGEST_REST, TEMPERATURES, choose_column
 
+Over = Literal["auto", "frequency", "temperature"]
 Array = NDArray[np.float64]
 METHODS: tuple[Method, ...] = ("guarded", "paper")
 LOWEST_FREQUENCY = 100.0  # Hz
+FEWEST_FOR_ALLAN = 30
+"""Samples below which an Allan deviation says nothing."""
 
 
 @dataclass(frozen=True)
@@ -56,15 +70,17 @@ class Spectrum:
 class BiasStudy:
     """Everything about one calibration: runs, both methods, `model` of the chosen one, Allan before and after.
 
-    `allan_step` (s) of the series behind the Allan deviations; `no_held_out` why there is no held-out score.
+    `column` is what the bias is a function of; `allan_step` (s) of the series behind the Allan deviations, which short
+    runs do not have (None); `no_held_out` why there is no held-out score.
     """
 
     output: str
+    column: str
     runs: tuple[BiasRun, ...]
     judged: tuple[Judged, ...]
     model: Model
-    before: Spectrum
-    after: Spectrum
+    before: Spectrum | None
+    after: Spectrum | None
     allan_step: float
     no_held_out: str
 
@@ -80,6 +96,7 @@ def study_bias(
     window: float = 300.0,
     *,
     causal: bool = False,
+    over: Over = "auto",
     progress: Callable[[str], None] = lambda _: None,
 ) -> BiasStudy:
     """Fit the bias model to records of a gyro at rest while its temperature changes.
@@ -87,13 +104,15 @@ def study_bias(
     Parameters
     ----------
     records : sequence of Record
-        Runs with time_s, frequency_Hz and bias_deg_per_h (or measured_rate_deg_per_s) at zero rate.
+        Runs with time_s, bias_deg_per_h (or measured_rate_deg_per_s) at zero rate, and frequency_Hz or a temperature.
     method : "guarded" or "paper"
         Whose terms `model` takes; both are computed.
     width, window : float
         Averaging before the fit and window of the frequency's rate, s.
     causal : bool
         The rate uses past samples only.
+    over : "auto", "frequency" or "temperature"
+        What the bias is a function of; "auto" takes the frequency where every record has it.
     progress : callable
         Told in words what is being done.
 
@@ -102,13 +121,25 @@ def study_bias(
     InputError
         A record that lacks a column or was not at rest; the message names the file.
     """
-    output = find_output(records)
-    runs = []
-    for record in records:
-        progress(f"averaging {record.path or 'record'} ({len(record):,} rows) over {width:g} s")
-        columns = record["time_s"], record["frequency_Hz"], record[output]
-        with naming(record.path or "record"):
-            runs.append(prepare_run(*columns, width, window, causal=causal))
+    output, column = find_output(records), find_state(records, over)
+    variable = FREQUENCY if column == "frequency_Hz" else TEMPERATURE
+
+    def prepare(memory: Memory) -> list[BiasRun]:
+        runs = []
+        for record in records:
+            columns = record["time_s"], record[column], record[output]
+            with naming(record.path or "record"):
+                run = prepare_run(*columns, width, window, causal=causal, variable=variable, memory=memory)
+            runs.append(run)
+        return runs
+
+    rows = sum(len(record) for record in records)
+    progress(f"averaging {rows:,} rows over {width:g} s")
+    runs = prepare(NO_MEMORY)
+    if variable is TEMPERATURE:
+        progress("looking for a lag and a loop between thermometer and bias")
+        with naming(", ".join(record.path or "record" for record in records)):
+            runs = prepare(choose_memory(prepare))
     judged, why = [], ""
     for name in METHODS:
         progress(f"selecting terms stepwise ({name})")
@@ -121,14 +152,26 @@ def study_bias(
         judged.append(Judged(name, fit, _training(runs, fit), held_out, _score_path(runs, fit)))
     fit = next(j.fit for j in judged if j.method == method)
     model = save_bias(
-        fit, runs[0], output, tuple(source_of(r) for r in records), f"hrg-workbench, hrg fit bias --method {method}"
+        fit,
+        runs[0],
+        output,
+        column,
+        tuple(source_of(r) for r in records),
+        f"hrg-workbench, hrg fit bias --method {method}",
     )
     progress("Allan deviation before and after")
     longest = max(records, key=len)
     after = compensate(model, longest, extrapolate=True)[f"{COMPENSATED}{output}"]
     step, series = unbroken(longest["time_s"], {"before": longest[output], "after": after})
-    spectra = [Spectrum(allan, fit_noise(allan)) for allan in (allan_deviation(y, step) for y in series.values())]
-    return BiasStudy(output, tuple(runs), tuple(judged), model, spectra[0], spectra[1], step, why)
+    spectra = [_spectrum(values, step) for values in series.values()]
+    return BiasStudy(output, column, tuple(runs), tuple(judged), model, spectra[0], spectra[1], step, why)
+
+
+def _spectrum(values: Array, step: float) -> Spectrum | None:
+    if values.size < FEWEST_FOR_ALLAN:
+        return None
+    allan = allan_deviation(values, step)
+    return Spectrum(allan, fit_noise(allan))
 
 
 def find_output(records: Sequence[Record]) -> str:
@@ -137,21 +180,10 @@ def find_output(records: Sequence[Record]) -> str:
     Raises
     ------
     InputError
-        No such column in all of them, no frequency, or a record that was not at rest.
+        No such column in all of them, or a record that was not at rest.
     """
     for record in records:
         where = record.path or "record"
-        if "frequency_Hz" not in record:
-            raise InputError(f"{where}: the column 'frequency_Hz' is missing; the bias model is a function of it.")
-        typical = (
-            float(np.nanmedian(record["frequency_Hz"]))
-            if np.isfinite(record["frequency_Hz"]).any()
-            else LOWEST_FREQUENCY
-        )
-        if 0 < typical < LOWEST_FREQUENCY:
-            raise InputError(
-                f"{where}: frequency_Hz around {typical:g} cannot be a resonator's; is it in kHz? Multiply it by 1000."
-            )
         if "rate_deg_per_s" in record and np.any(np.abs(record["rate_deg_per_s"]) > LARGEST_REST):
             raise InputError(
                 f"{where}: rate_deg_per_s is not zero; a bias is fitted to runs at rest ('hrg fit scale' else)."
@@ -162,6 +194,29 @@ def find_output(records: Sequence[Record]) -> str:
     raise InputError(
         f"{records[0].path or 'record'}: a column {' or '.join(OUTPUTS)} is missing, or not in all records."
     )
+
+
+def find_state(records: Sequence[Record], over: Over = "auto") -> str:
+    """Return the column that the bias is a function of: the frequency, or a temperature where there is none.
+
+    Raises
+    ------
+    InputError
+        The records do not share such a column, or a frequency cannot be a resonator's.
+    """
+    if over == "temperature" or (over == "auto" and not all("frequency_Hz" in record for record in records)):
+        return choose_column(records, TEMPERATURES, "a bias over temperature (no frequency in every record)")
+    for record in records:
+        where = record.path or "record"
+        if "frequency_Hz" not in record:
+            raise InputError(f"{where}: the column 'frequency_Hz' is missing; take --over temperature.")
+        frequency = record["frequency_Hz"]
+        typical = float(np.nanmedian(frequency)) if np.isfinite(frequency).any() else LOWEST_FREQUENCY
+        if 0 < typical < LOWEST_FREQUENCY:
+            raise InputError(
+                f"{where}: frequency_Hz around {typical:g} cannot be a resonator's; is it in kHz? Multiply it by 1000."
+            )
+    return "frequency_Hz"
 
 
 def unbroken(time: Array, columns: dict[str, Array]) -> tuple[float, dict[str, Array]]:
@@ -193,5 +248,5 @@ def _score_path(runs: Sequence[BiasRun], fit: BiasFit) -> tuple[float, ...]:
 def _training(runs: Sequence[BiasRun], fit: BiasFit) -> tuple[float, float]:
     """Bias stability before and after on the fitted runs, root mean square over the runs."""
     before = [bias_stability(run) for run in runs]
-    after = [bias_stability(run, run.bias - fit.predict(run.frequency, run.rate)) for run in runs]
+    after = [bias_stability(run, fit.left(run)) for run in runs]
     return float(np.sqrt(np.mean(np.square(before)))), float(np.sqrt(np.mean(np.square(after))))

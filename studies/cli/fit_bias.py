@@ -12,6 +12,7 @@ def fit_bias(
     average: float = 100.0,
     window: float = 300.0,
     causal: bool = False,
+    over: Literal["auto", "frequency", "temperature"] = "auto",
     save: str | None = None,
     emit: str | None = None,
     report: str | None = None,
@@ -19,8 +20,9 @@ def fit_bias(
 ) -> int:
     """Fit the bias over the change of frequency and its rate, stepwise (HRG paper, equations 19 to 22).
 
-    The records are of a gyro at rest while its temperature changes: time_s, frequency_Hz, and bias_deg_per_h or
-    measured_rate_deg_per_s. Terms are selected in two ways, shown side by side: as the paper does, and guarded against
+    The records are of a gyro at rest while its temperature changes: time_s, bias_deg_per_h or measured_rate_deg_per_s,
+    and frequency_Hz or, for a gyro whose frequency is not measured, a temperature; that may act behind a lag and a loop,
+    which are taken where they pay. Terms are selected in two ways, shown side by side: as the paper does, and guarded against
     noise that remembers. Give several runs, cooling and warming: then whole runs are held out.
 
     Parameters
@@ -35,6 +37,8 @@ def fit_bias(
         Seconds over which the rate of the frequency is taken.
     causal : bool
         Take the rate from past samples only, as firmware must; it lags by half the window.
+    over : str
+        What the bias is a function of; auto takes the frequency where every record has it, else a temperature.
     save : str
         Write the model (TOML), for hrg compensate.
     emit : str
@@ -58,7 +62,7 @@ def fit_bias(
     for path in data:
         say(f"reading {path}")
         records.append(read_record(path))
-    study = study_bias(records, method, average, window, causal=causal, progress=say)
+    study = study_bias(records, method, average, window, causal=causal, over=over, progress=say)
     if save is not None:
         write_model(study.model, save)
         say(f"model: {save}")
@@ -71,12 +75,12 @@ def fit_bias(
     if json:
         print_json(_payload(study, method, data))
         return 0
-    tables = (
-        page.path_table(study.by(method), study.output),
+    tables = [
+        page.path_table(study.by(method)),
         page.coefficients_table(study.by(method), study.output),
         page.gain_table(study),
-        page.noise_table(study),
-    )
+    ]
+    tables += [page.noise_table(study)] if study.before else []
     for block in tables:
         print_table(block.caption, block.columns, block.rows, block.note)
     print(page.verdict(study, method))
@@ -88,19 +92,26 @@ def _payload(study: "BiasStudy", method: str, data: tuple[str, ...]) -> dict[str
 
     `methods.guarded` and `methods.paper` hold coefficients in the unit of `output` per powers of Hz and Hz/s, the
     selection's `path`, and stability `before` and `after` with their ratio, on the fitted data and held out (null
-    when nothing can be held out). `allan` is of the longest run, N in unit·√s, B in unit, K in unit/√s.
+    when nothing can be held out). `over` is the column that the bias is a function of, `reference` its value from which
+    changes are counted; a temperature acts behind `lag_s` and a loop of `play_half_width_degC` (0: none). `allan` is of
+    the longest run, N in unit·√s, B in unit, K in unit/√s; null for runs too short for it.
     """
     return {
         "schema": "hrg.fit-bias/1",
         "data": data,
         "output": study.output,
+        "over": study.column,
+        "lag_s": study.runs[0].memory.lag,
+        "play_half_width_degC": study.runs[0].memory.play,
         "method": method,
         "rows": [int(run.time.size) for run in study.runs],
         "missing": sum(run.missing for run in study.runs),
         "spikes": sum(run.spikes for run in study.runs),
         "rate_lag_s": study.runs[0].lag,
         "methods": {judged.method: _judged(judged) for judged in study.judged},
-        "allan": {"step_s": study.allan_step, "before": _spectrum(study.before), "after": _spectrum(study.after)},
+        "allan": {"step_s": study.allan_step, "before": _spectrum(study.before), "after": _spectrum(study.after)}
+        if study.before and study.after
+        else None,
     }
 
 
@@ -108,7 +119,7 @@ def _judged(judged: "Judged") -> dict[str, Any]:
     fit, held_out = judged.fit, judged.held_out
     steps = fit.selection.steps if fit.selection else ()
     return {
-        "reference_frequency_Hz": fit.reference_frequency,
+        "reference": fit.reference,
         "terms": ["constant", *fit.terms],
         "coefficients": fit.coefficients,
         "standard_errors": fit.standard_errors,

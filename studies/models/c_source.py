@@ -25,3 +25,38 @@ def polynomial(name: str, variable: str, coefficients: Sequence[float]) -> str:
 
 def _one_comment(text: str) -> str:
     return " ".join(text.split()).replace("*/", "* /").replace("/*", "/ *")
+
+
+def self_test(rows: Sequence[Sequence[float]], meaning: str, step: str) -> str:
+    """Return a `main` under HRG_SELF_TEST that compares the code with a table of what Python computes.
+
+    Parameters
+    ----------
+    rows : sequence of rows, the expected value last; NaN where none is expected
+    meaning : str
+        Of the columns.
+    step : str
+        C statements that set `found` and `expected` from `row`, a pointer to one row.
+    """
+    width = len(rows[0])
+    table = ",\n".join("    {" + ", ".join("NAN" if x != x else repr(float(x)) for x in row) + "}" for row in rows)
+    return f"""/* Test: cc -std=c99 -DHRG_SELF_TEST this_file.c -lm && ./a.out; columns: {meaning}. */
+#ifdef HRG_SELF_TEST
+#include <stdio.h>
+static const double hrg_rows[][{width}] = {{
+{table}
+}};
+
+static int hrg_differs(const double *row) {{
+{step}
+    return !(fabs(found - expected) <= 1e-9 * (1.0 + fabs(expected)));
+}}
+
+int main(void) {{
+    int wrong = 0, count = (int)(sizeof hrg_rows / sizeof hrg_rows[0]);
+    for (int k = 0; k < count; ++k) wrong += hrg_differs(hrg_rows[k]);
+    printf("%d rows, %d differ\\n", count, wrong);
+    return wrong != 0;
+}}
+#endif
+"""

@@ -120,7 +120,7 @@ def study_twin(seed: int) -> tuple[TwinFit, ...]:
     for method in METHODS:
         for count in (1, 3):
             fit = fit_bias(runs[:count], method)
-            left = first.bias - fit.predict(first.frequency, first.rate)
+            left = fit.left(first)
             fits.append(
                 TwinFit(
                     method,

@@ -12,6 +12,7 @@ from studies.reports import style
 from studies.reports.page import Block, Chapter, Facts, Picture, Table, Text, draw, render_page
 
 if TYPE_CHECKING:
+    from compensation.memory import Memory
     from studies.bias import BiasStudy, Judged, Spectrum
 
 SOURCES = (
@@ -21,16 +22,18 @@ SOURCES = (
 )
 SYMBOLS = {
     "f": "f", "f^2": "f²", "f^3": "f³", "fdot": "ḟ", "fdot^2": "ḟ²", "fdot^3": "ḟ³", "f*fdot": "f·ḟ",
-    "f^2*fdot": "f²·ḟ", "f*fdot^2": "f·ḟ²",
+    "f^2*fdot": "f²·ḟ", "f*fdot^2": "f·ḟ²", "play": "loop",
 }  # fmt: skip
+ORDER = list(SYMBOLS)
 METHOD = {"guarded": "guarded", "paper": "as the paper does"}
 Method = Literal["guarded", "paper"]
 
 
 def bias_page(study: "BiasStudy", source: str, method: Method) -> str:
     """Return the page for a user's records."""
+    name = study.runs[0].variable.name
     lead = (
-        f"The zero-rate output of {source} as a function of the gyro's own frequency and its rate, selected stepwise from the"
+        f"The zero-rate output of {source} as a function of the gyro's own {name} and its rate, selected stepwise from the"
         " nine terms of the HRG paper's equation (21)."
     )
     other: Method = "paper" if method == "guarded" else "guarded"
@@ -40,12 +43,13 @@ def bias_page(study: "BiasStudy", source: str, method: Method) -> str:
         Chapter("Before and after", [runs_figure(study, method), gain_table(study)]),
         Chapter(
             "The selection, step by step",
-            [path_table(judged, study.output), path_table(study.by(other), study.output), Text(PATH_NOTE, "note")],
+            [path_table(judged), path_table(study.by(other)), Text(PATH_NOTE, "note")],
         ),
         Chapter("Coefficients", [coefficients_table(judged, study.output), Text(how_rows_were_made(study), "note")]),
-        Chapter("Stability", [allan_figure(study), noise_table(study), Text(WHERE_READ, "note")]),
     ]
-    return render_page("Bias over frequency and its rate", lead, chapters, SOURCES)
+    if study.before:
+        chapters.append(Chapter("Stability", [allan_figure(study), noise_table(study), Text(WHERE_READ, "note")]))
+    return render_page(f"Bias over {name} and its rate", lead, chapters, SOURCES)
 
 
 PATH_NOTE = (
@@ -74,7 +78,7 @@ def verdict(study: "BiasStudy", method: Method) -> str:
     what = "runs" if held.by_runs else "blocks of the same run"
     sentence = (
         f"Improvement {judged.training_gain:.2f} times on the data that were fitted and {held.gain:.2f} times on held-out {what}"
-        f" ({held.coverage:.0%} of the rows lie where the rest has seen frequency and rate)."
+        f" ({held.coverage:.0%} of the rows lie where the rest has seen {study.runs[0].variable.name} and rate)."
     )
     if held.by_runs and held.gain <= 1:
         sentence += " Held out, it makes things worse: do not use it before a further run says otherwise."
@@ -91,19 +95,27 @@ def how_rows_were_made(study: "BiasStudy") -> str:
     return (
         f"Each row is the average over {run.width:g} s ({rows} rows); {left_out[0]} samples with missing values and {left_out[1]}"
         f" spikes were left out. The rate is the slope of the line through {run.window:g} s of averages; its lag is {run.lag:g} s."
-        " Changes of frequency are counted from"
-        f" {study.by('guarded').fit.reference_frequency:.4f} Hz. Bias stability is the standard deviation of 100 s averages."
+        f" Changes of {run.variable.name} are counted from"
+        f" {study.by('guarded').fit.reference:.4f} {run.variable.unit}. Bias stability is the standard deviation of 100 s averages."
+        + memory_sentence(run.memory)
     )
 
 
-def path_table(judged: "Judged", output: str) -> Table:
+def memory_sentence(memory: "Memory") -> str:
+    """Say what stands between the thermometer and the bias, if anything does."""
+    parts = [f"a lag of {memory.lag:g} s"] if memory.lag else []
+    parts += [f"a loop of half-width {memory.play:.2g} °C as a tenth candidate"] if memory.play else []
+    return f" The temperature acts behind {' and '.join(parts)}." if parts else ""
+
+
+def path_table(judged: "Judged") -> Table:
     """Return the steps of a selection: term, F, p, criterion, residual."""
-    selection = judged.fit.selection
+    selection, symbol = judged.fit.selection, judged.fit.variable.symbol
     rows = []
     steps = () if selection is None else (selection.start, *selection.steps)
     held_out = judged.path_scores or (math.nan,) * len(steps)
     for k, (step, score) in enumerate(zip(steps, held_out, strict=True)):
-        action = "start" if k == 0 else f"{'+' if step.added else '−'} {SYMBOLS[step.term]}"
+        action = "start" if k == 0 else f"{'+' if step.added else '−'} {_symbol(step.term, symbol)}"
         rows.append(
             [
                 str(k),
@@ -112,12 +124,12 @@ def path_table(judged: "Judged", output: str) -> Table:
                 "" if math.isnan(step.p_value) else _probability(step.p_value),
                 f"{step.criterion:.2f}",
                 "" if math.isnan(score) else f"{score:.3f}",
-                ", ".join(SYMBOLS[name] for name in sorted(step.terms, key=list(TERMS).index)) or "constant only",
+                ", ".join(_symbol(name, symbol) for name in sorted(step.terms, key=ORDER.index)) or "constant only",
             ]
         )
     refused = {} if selection is None else selection.refused
     notes = (
-        [f"Left out from the start: {', '.join(f'{SYMBOLS[n]} ({why})' for n, why in refused.items())}."]
+        [f"Left out from the start: {', '.join(f'{_symbol(n, symbol)} ({why})' for n, why in refused.items())}."]
         if refused
         else []
     )
@@ -139,23 +151,23 @@ def coefficients_table(judged: "Judged", output: str) -> Table:
         ("constant", *fit.terms), fit.coefficients, fit.standard_errors, fit.naive_errors, strict=True
     ):
         number = list(TERMS).index(name) + 1 if name in TERMS else 0
-        a, b = TERMS.get(name, (0, 0))
         printed = "" if name == "constant" else ("yes" if name in SELECTED_BY_THE_PAPER else "no")
         rows.append(
             [
-                f"k{number}" if number else "B0",
-                SYMBOLS.get(name, "constant"),
+                f"k{number}" if number else ("B0" if name == "constant" else ""),
+                "constant" if name == "constant" else _symbol(name, fit.variable.symbol),
                 f"{value:.5g}",
                 f"{error:.2g}",
                 f"{naive:.2g}",
-                unit_of_term(unit, a, b).replace("*", "·") if name in TERMS else unit,
+                unit_of_term(unit, name, fit.variable).replace("*", "·"),
                 printed,
             ]
         )
     columns = ["", "Term", "Value", "Standard error", "if rows were independent", "Unit", "in eq. (22)"]
-    low, high = fit.frequency_range
+    low, high = fit.state_range
+    unit = fit.variable.unit
     note = (
-        f"Valid from {low:.4f} to {high:.4f} Hz and from {fit.rate_range[0]:.2e} to {fit.rate_range[1]:.2e} Hz/s."
+        f"Valid from {low:.4f} to {high:.4f} {unit} and from {fit.rate_range[0]:.2e} to {fit.rate_range[1]:.2e} {unit}/s."
         f" The noise remembers with θ = {fit.theta:.3f} (1: white, 0: random walk)."
     )
     if judged.method == "guarded" and fit.theta < 0.99:
@@ -168,7 +180,7 @@ def gain_table(study: "BiasStudy") -> Table:
     unit = OUTPUTS[study.output].replace("deg", "°")
     rows = []
     for judged in study.judged:
-        terms = ", ".join(SYMBOLS[name] for name in judged.fit.terms) or "none"
+        terms = ", ".join(_symbol(name, judged.fit.variable.symbol) for name in judged.fit.terms) or "none"
         before, after = judged.training
         rows.append(
             [
@@ -222,7 +234,8 @@ def noise_table(study: "BiasStudy") -> Table:
         f"Longest run, samples of {study.allan_step:g} s. A misfit well above 1 says that more than white noise, flicker and random"
         " walk is there, such as drift with temperature; the uncertainties are widened by it."
     )
-    return Table("Noise coefficients", columns, [row("before", study.before), row("after", study.after)], note)
+    rows = [row(label, s) for label, s in (("before", study.before), ("after", study.after)) if s is not None]
+    return Table("Noise coefficients", columns, rows, note)
 
 
 def runs_figure(study: "BiasStudy", method: Method) -> Picture:
@@ -231,7 +244,7 @@ def runs_figure(study: "BiasStudy", method: Method) -> Picture:
     fit, shown = study.by(method).fit, study.runs[:3]
     with style.figure(2, len(shown), height=4.6, squeeze=False, sharex="col", sharey="row") as (figure, axes):
         for k, run in enumerate(shown):
-            predicted = fit.predict(run.frequency, run.rate)
+            predicted = run.bias - fit.left(run)
             hours = run.time / 3600
             offset = np.mean(run.bias - predicted)
             axes[0, k].plot(hours, run.bias, ".", color=style.SKY, markersize=3, label="output")
@@ -251,6 +264,8 @@ def allan_figure(study: "BiasStudy") -> Picture:
     unit = OUTPUTS[study.output].replace("deg", "°")
     with style.figure(height=3.8) as (figure, axes):
         for spectrum, colour, label in ((study.before, style.ORANGE, "before"), (study.after, style.BLUE, "after")):
+            if spectrum is None:
+                continue
             allan = spectrum.allan
             axes.fill_between(allan.tau, allan.low, allan.high, color=colour, alpha=0.25, linewidth=0)
             axes.loglog(allan.tau, allan.deviation, color=colour, label=label)
@@ -284,6 +299,10 @@ def _facts(study: "BiasStudy", method: Method) -> Block:
         ),
     ]
     return Facts(facts)
+
+
+def _symbol(term: str, symbol: str) -> str:
+    return SYMBOLS[term] if symbol == "f" else SYMBOLS[term].replace("ḟ", "Ṫ").replace("f", symbol)
 
 
 def _probability(p: float) -> str:

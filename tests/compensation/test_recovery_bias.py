@@ -37,7 +37,7 @@ def test_planted_coefficients_are_covered_by_the_stated_intervals(white, walk):
     honest, naive, fits = 0, 0, 0
     for seed in range(80):
         rng = np.random.default_rng(seed)
-        fit = fit_bias([make_run(rng, white=white, walk=walk) for _ in range(3)], reference_frequency=4433.0)
+        fit = fit_bias([make_run(rng, white=white, walk=walk) for _ in range(3)], reference=4433.0)
         if fit.terms != tuple(PLANTED):
             continue
         fits += 1
@@ -74,9 +74,7 @@ def test_held_out_runs_gain_when_there_is_something_to_gain():
     assert score.coverage > 0.5
     fit = fit_bias(runs[:2])
     assert score_runs(fit, runs[2:]).gain > 4.3
-    assert bias_stability(runs[0]) > 4.3 * bias_stability(
-        runs[0], runs[0].bias - fit.predict(runs[0].frequency, runs[0].rate)
-    )
+    assert bias_stability(runs[0]) > 4.3 * bias_stability(runs[0], fit.left(runs[0]))
 
 
 def test_one_run_is_held_out_in_blocks_and_says_how_little_that_covers():
@@ -219,8 +217,8 @@ def test_a_trend_of_any_steepness_is_no_spike(noise):
     ("change", "message"),
     [
         ({"time": TIME[::-1]}, "does not increase"),
-        ({"frequency": np.full(TIME.size, np.nan)}, "only 0 rows have a value"),
-        ({"frequency": -profile(np.random.default_rng(0))}, "must be positive"),
+        ({"state": np.full(TIME.size, np.nan)}, "only 0 rows have a value"),
+        ({"state": -profile(np.random.default_rng(0))}, "must be above 0 Hz"),
         ({"bias": np.zeros(5)}, "has 5 values for 1800 times"),
         ({"width": 1.0}, None),
         ({"width": -1.0}, "positive number of seconds"),
@@ -229,7 +227,7 @@ def test_a_trend_of_any_steepness_is_no_spike(noise):
     ],
 )
 def test_unusable_runs_are_refused(change, message):
-    arguments = {"time": TIME, "frequency": profile(np.random.default_rng(0)), "bias": np.sin(TIME)} | change
+    arguments = {"time": TIME, "state": profile(np.random.default_rng(0)), "bias": np.sin(TIME)} | change
     if message is None:  # a block is never shorter than the sampling interval
         assert prepare_run(**arguments).width == 10.0
         return
@@ -243,9 +241,7 @@ def test_irregular_sampling_gives_the_same_coefficients():
     change = -17.0 * (1 - (3000 * np.exp(-t / 3000) - 900 * np.exp(-t / 900)) / 2100)
     rate = -17.0 * (np.exp(-t / 3000) - np.exp(-t / 900)) / 2100
     bias = 1 + 0.3 * change - 500 * rate + 0.3 * rng.normal(size=t.size)
-    fit = fit_bias(
-        [prepare_run(t, 4433.0 + change + 0.003 * rng.normal(size=t.size), bias)], reference_frequency=4433.0
-    )
+    fit = fit_bias([prepare_run(t, 4433.0 + change + 0.003 * rng.normal(size=t.size), bias)], reference=4433.0)
     assert fit.terms == ("f", "fdot")
     assert np.all(np.abs(fit.coefficients - [1.0, 0.3, -500.0]) < 4 * fit.standard_errors)
 

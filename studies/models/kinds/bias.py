@@ -1,9 +1,14 @@
 """Models of kind `bias`: B(f, ḟ) of HRG paper eq. (21), applied to a record or emitted as C.
 
-The file has one part "bias" (constant and terms) and the settings `reference_frequency_Hz`, `rate_window_s` and
-`rate_lag_s`: the rate is the slope of the line through the frequencies of the last `rate_window_s` seconds when the lag
-is half of that, and of a window centred on the sample when it is 0. Ranges are those of the fit, widened by 5 % of their
-length, because readings scatter.
+The file has one part "bias" (constant and terms) and the settings `variable`, the column that the bias is a function of
+(`frequency_Hz` or a temperature), `reference_frequency_Hz` or `reference_temperature_degC`, `rate_window_s` and
+`rate_lag_s`: the rate is the slope of the line through the values of the last `rate_window_s` seconds when the lag is half
+of that, and of a window centred on the sample when it is 0. A temperature may act behind `memory_lag_s` and a loop of
+half-width `play_degC`. Ranges are those of the fit, widened by 5 % of their length, because readings scatter.
+
+A causal model is applied as firmware applies it, and its C source computes the same: samples are averaged over blocks of
+ten seconds; when a block is complete its mean and the slope of the line through the blocks of the window give the bias,
+which holds until the next block is complete.
 """
 
 from typing import TYPE_CHECKING
@@ -11,12 +16,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from compensation.bias import TERMS, term_columns
+from compensation.bias import FREQUENCY, PLAY, TEMPERATURE, TERMS, Variable, term_columns
 from compensation.decimation import average_blocks
 from compensation.derivative import differentiate
+from compensation.memory import NO_MEMORY, Memory, follow_lag, follow_play
 from compensation.samples import check_time
 from studies.errors import InputError, nearest
-from studies.models.c_source import head
 from studies.models.file import Model, Source, make_part
 from studies.record import COMPENSATED, Record
 
@@ -27,104 +32,175 @@ Array = NDArray[np.float64]
 OUTPUTS = {"bias_deg_per_h": "deg/h", "measured_rate_deg_per_s": "deg/s"}
 WIDENED = 0.05
 BLOCK = 10.0  # s over which the frequency is averaged before it is used
+LEAST_BLOCKS = 3  # and half a window, before a causal rate is known
 
 
-def save_bias(fit: "BiasFit", run: "BiasRun", output: str, sources: tuple[Source, ...], made_by: str) -> Model:
-    """Return a fitted bias model; `run` tells how the rate was taken, `output` the column that was fitted."""
-    units = [OUTPUTS[output], *(unit_of_term(OUTPUTS[output], *TERMS[name]) for name in fit.terms)]
+def save_bias(
+    fit: "BiasFit", run: "BiasRun", output: str, column: str, sources: tuple[Source, ...], made_by: str
+) -> Model:
+    """Return a fitted bias model; `run` tells how the rate was taken, `output` the column fitted, `column` over which."""
+    units = [OUTPUTS[output], *(unit_of_term(OUTPUTS[output], name, fit.variable) for name in fit.terms)]
+    names = [name_term(name, fit.variable) for name in fit.terms]
+    settings: dict[str, float | str] = {
+        "variable": column,
+        _reference_key(column): fit.reference,
+        "rate_window_s": run.window,
+        "rate_lag_s": run.lag,
+    }
+    if fit.memory.lag or fit.memory.play:
+        settings |= {"memory_lag_s": fit.memory.lag, "play_degC": fit.memory.play}
     return Model(
         kind="bias",
         compensates=output,
-        parts=(make_part("bias", ("constant", *fit.terms), fit.coefficients, units, fit.covariance),),
-        settings={
-            "reference_frequency_Hz": fit.reference_frequency,
-            "rate_window_s": run.window,
-            "rate_lag_s": run.lag,
-        },
-        validity={
-            "frequency_Hz": _widen(*fit.frequency_range),
-            "frequency_rate_Hz_per_s": _widen(*fit.rate_range),
-        },
+        parts=(make_part("bias", ("constant", *names), fit.coefficients, units, fit.covariance),),
+        settings=settings,
+        validity={column: _widen(*fit.state_range), rate_name(column): _widen(*fit.rate_range)},
         sources=sources,
         made_by=made_by,
     )
 
 
 def compensate(model: Model, record: Record, *, extrapolate: bool) -> dict[str, Array]:
-    """Take the predicted bias out of the output; rows farther than a window from any frequency reading stay NaN."""
-    terms, coefficients = _terms(model)
-    f, time, output = record["frequency_Hz"], record["time_s"], record[model.compensates]
-    window, lag = model.number("rate_window_s", above=0), model.number("rate_lag_s", least=0)
-    check_time(time)
-    blocks = average_blocks(time, {"frequency_Hz": f}, min(max(BLOCK, float(np.median(np.diff(time)))), window / 2))
-    smooth = blocks.columns["frequency_Hz"]
-    rate = differentiate(blocks.time, smooth, window, causal=lag > 0).slope
-    model.check_range("frequency_Hz", smooth, extrapolate)
-    model.check_range("frequency_rate_Hz_per_s", rate, extrapolate)
-    columns = term_columns(smooth, rate, model.number("reference_frequency_Hz"), terms)
-    predicted = coefficients[0] + columns @ coefficients[1:]
-    after = np.clip(np.searchsorted(blocks.time, time), 1, blocks.time.size - 1)
-    distance = np.minimum(np.abs(time - blocks.time[after - 1]), np.abs(time - blocks.time[after]))
-    bias = np.where(distance <= window, np.interp(time, blocks.time, predicted), np.nan)
-    return {f"{COMPENSATED}{model.compensates}": output - bias}
+    """Take the predicted bias out of the output; rows farther than a window from any reading stay NaN."""
+    column, output = variable_column(model), model.compensates
+    for name in (column, output):
+        if name not in record:
+            raise InputError(f"the column '{name}' is missing; this bias model needs it.")
+    predict = _predict_causally if model.number("rate_lag_s", least=0) > 0 else _predict_centred
+    bias = predict(model, record["time_s"], record[column], extrapolate)
+    return {f"{COMPENSATED}{output}": record[output] - bias}
 
 
 def emit_c(model: Model) -> str:
-    """Return `hrg_rate`, `hrg_bias` and `hrg_compensate` in C99."""
-    terms, coefficients = _terms(model)
-    window, lag = model.number("rate_window_s", above=0), model.number("rate_lag_s", least=0)
-    products = [
-        f"({value!r})" + _product(*TERMS[name]) for name, value in zip(terms, coefficients[1:].tolist(), strict=True)
-    ]
-    total = "\n        + ".join([f"({coefficients[0].item()!r})", *products])
-    (f_low, f_high), (r_low, r_high) = model.range_of("frequency_Hz"), model.range_of("frequency_rate_Hz_per_s")
-    return f"""{head(model)}
-/* Slope (Hz/s) of the line through n frequencies, step seconds apart, oldest first; the fit used {window:g} s
-   {f"up to the present sample, so that the rate lags by {lag:g} s" if lag else "centred on the sample: delay the rest by half of it"}. */
-double hrg_rate(const double *frequency, int n, double step) {{
-    double sum = 0.0, middle = 0.5 * (n - 1);
-    for (int k = 0; k < n; ++k) sum += (k - middle) * (frequency[k] - frequency[0]);
-    return 12.0 * sum / ((double)n * ((double)n * n - 1.0) * step);
-}}
+    """Return the model as C99 for firmware, with a table of its own to test it."""
+    from studies.models.bias_c import write_c
 
-/* Bias ({OUTPUTS[model.compensates]}) at a frequency (Hz) and its rate (Hz/s). */
-double hrg_bias(double frequency, double rate) {{
-    double f = frequency - ({model.number("reference_frequency_Hz")!r}), r = rate;
-    (void)f;
-    (void)r;
-    return {total};
-}}
-
-/* Output with the bias taken out; *ok is 0 outside the calibrated range. */
-double hrg_compensate(double output, double frequency, double rate, int *ok) {{
-    *ok = frequency >= {f_low!r} && frequency <= {f_high!r} && rate >= {r_low!r} && rate <= {r_high!r};
-    return output - hrg_bias(frequency, rate);
-}}
-"""
+    return write_c(model)
 
 
-def _terms(model: Model) -> tuple[tuple[str, ...], Array]:
-    part = model.part("bias")
-    if model.compensates not in OUTPUTS:
+def _predict_centred(model: Model, time: Array, values: Array, extrapolate: bool) -> Array:
+    """Return the bias at every row, from averages around it."""
+    window = model.number("rate_window_s", above=0)
+    check_time(time)
+    blocks = average_blocks(time, {"state": values}, min(max(BLOCK, float(np.median(np.diff(time)))), window / 2))
+    state = follow_lag(blocks.time, blocks.columns["state"], memory_of(model).lag)
+    rate = differentiate(blocks.time, state, window).slope
+    predicted = _evaluate(model, state, rate, extrapolate)
+    after = np.clip(np.searchsorted(blocks.time, time), 1, blocks.time.size - 1)
+    distance = np.minimum(np.abs(time - blocks.time[after - 1]), np.abs(time - blocks.time[after]))
+    return np.where(distance <= window, np.interp(time, blocks.time, predicted), np.nan)
+
+
+def _predict_causally(model: Model, time: Array, values: Array, extrapolate: bool) -> Array:
+    """Return the bias at every row, from the blocks that were complete by then, as the emitted C does."""
+    window = model.number("rate_window_s", above=0)
+    check_time(time)
+    known = np.isfinite(values)
+    if np.count_nonzero(known) < 2:
         raise InputError(
-            f"{model.path or 'model'}: compensates = '{model.compensates}'{nearest(model.compensates, OUTPUTS)}"
+            f"the column '{variable_column(model)}' has fewer than two values; nothing can be compensated."
         )
+    length = block_length(model)
+    numbers = np.floor((time - time[known][0]) / length).astype(int)
+    used, starts = np.unique(numbers[known], return_index=True)
+    counts = np.diff(np.append(starts, np.count_nonzero(known)))
+    middle = np.add.reduceat(time[known], starts) / counts
+    zero = float(values[known][0])
+    state = np.add.reduceat(values[known] - zero, starts) / counts + zero
+    state = follow_lag(middle, state, memory_of(model).lag) if middle.size > 1 else state
+    if middle.size < LEAST_BLOCKS:
+        return np.full(time.shape, np.nan)
+    rate = differentiate(middle, state, window, causal=True).slope
+    first = np.searchsorted(middle, middle - window - 1e-6)
+    ready = (np.arange(middle.size) - first >= LEAST_BLOCKS - 1) & (middle - middle[first] >= window / 2)
+    predicted = np.where(ready, _evaluate(model, state, rate, extrapolate, ready), np.nan)
+    # A block is complete when a reading of a later one has come.
+    latest = np.maximum.accumulate(np.where(known, numbers, -1))
+    complete = np.searchsorted(used, latest) - 1
+    bias = np.where(complete >= 0, predicted[np.maximum(complete, 0)], np.nan)
+    fresh = time - middle[np.maximum(complete, 0)] <= window
+    return np.where(fresh, bias, np.nan)
+
+
+def _evaluate(
+    model: Model, state: Array, rate: Array, extrapolate: bool, judged: NDArray[np.bool_] | None = None
+) -> Array:
+    column, (terms, coefficients) = variable_column(model), read_terms(model)
+    rows = slice(None) if judged is None else judged
+    model.check_range(column, state[rows], extrapolate)
+    model.check_range(rate_name(column), rate[rows], extrapolate)
+    play = follow_play(state, memory_of(model).play) - state
+    columns = term_columns(state, rate, reference_of(model), terms, play)
+    return np.asarray(coefficients[0] + columns @ coefficients[1:])
+
+
+def block_length(model: Model) -> float:
+    """Length (s) of the blocks that a causal model averages over."""
+    return min(BLOCK, model.number("rate_window_s", above=0) / 2)
+
+
+def variable_column(model: Model) -> str:
+    """Return the column that the bias is a function of; the frequency where an older file does not say."""
+    column = model.settings.get("variable", "frequency_Hz")
+    if not isinstance(column, str):
+        raise InputError(f"{model.path or 'model'} [settings]: the key 'variable' must name a column.")
+    return column
+
+
+def rate_name(column: str) -> str:
+    """Return the name of a column's rate in `[validity]`: frequency_rate_Hz_per_s for frequency_Hz."""
+    name, unit = column.rsplit("_", 1)
+    return f"{name}_rate_{unit}_per_s"
+
+
+def reference_of(model: Model) -> float:
+    """Return the value from which changes are counted, Hz or °C."""
+    return model.number(_reference_key(variable_column(model)))
+
+
+def memory_of(model: Model) -> Memory:
+    """Return the lag and play that stand before the bias."""
+    if "memory_lag_s" not in model.settings:
+        return NO_MEMORY
+    return Memory(model.number("memory_lag_s", least=0), model.number("play_degC", least=0))
+
+
+def read_terms(model: Model) -> tuple[tuple[str, ...], Array]:
+    """Return the terms in the names of `compensation.bias`, and all coefficients, the constant first."""
+    part, variable = model.part("bias"), _variable(variable_column(model))
+    where = model.path or "model"
+    if model.compensates not in OUTPUTS:
+        raise InputError(f"{where}: compensates = '{model.compensates}'{nearest(model.compensates, OUTPUTS)}")
     if part.names[0] != "constant":
-        raise InputError(f"{model.path or 'model'}: the first coefficient must be 'constant', not '{part.names[0]}'.")
+        raise InputError(f"{where}: the first coefficient must be 'constant', not '{part.names[0]}'.")
+    known = {name_term(name, variable): name for name in (*TERMS, PLAY)}
     for name in part.names[1:]:
-        if name not in TERMS:
-            raise InputError(f"{model.path or 'model'}: unknown term '{name}'{nearest(name, TERMS)}")
-    return part.names[1:], np.array(part.values)
+        if name not in known:
+            raise InputError(f"{where}: unknown term '{name}'{nearest(name, known)}")
+    if PLAY in part.names and not memory_of(model).play:
+        raise InputError(f"{where} [settings]: the term 'play' needs play_degC above 0; add it.")
+    return tuple(known[name] for name in part.names[1:]), np.array(part.values)
 
 
-def unit_of_term(output: str, a: int, b: int) -> str:
-    """Return the unit of the coefficient of fᵃ ḟᵇ."""
-    factors = [*["Hz"] * a, *["(Hz/s)"] * b]
+def name_term(name: str, variable: Variable) -> str:
+    """Return a term's name in a file: fdot is Tdot where the bias is a function of temperature."""
+    return name.replace("f", variable.symbol)
+
+
+def unit_of_term(output: str, name: str, variable: Variable) -> str:
+    """Return the unit of the coefficient of a term."""
+    unit = variable.unit.replace("°", "deg")
+    a, b = TERMS.get(name, (1, 0))
+    factors = [*[unit] * a, *[f"({unit}/s)"] * b]
     return f"{output}/{factors[0]}" if len(factors) == 1 else f"{output}/({'*'.join(factors)})"
 
 
-def _product(a: int, b: int) -> str:
-    return " * f" * a + " * r" * b
+def _reference_key(column: str) -> str:
+    return "reference_frequency_Hz" if column == "frequency_Hz" else "reference_temperature_degC"
+
+
+def _variable(column: str) -> Variable:
+    return FREQUENCY if column == "frequency_Hz" else TEMPERATURE
 
 
 def _widen(low: float, high: float) -> tuple[float, float]:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from studies.errors import InputError
-from studies.models.c_source import head, polynomial
+from studies.models.c_source import head, polynomial, self_test
 from studies.models.file import Model, Part, Source, make_part
 from studies.record import COMPENSATED, Record
 from studies.rest import ZERO_CELSIUS, celsius_range
@@ -90,7 +90,7 @@ def compensate(model: Model, record: Record, *, extrapolate: bool) -> dict[str, 
 
 
 def emit_c(model: Model) -> str:
-    """Return `hrg_cross_damping_step(&state, T, dt)`, the erroneous rate to subtract, in C99."""
+    """Return `hrg_cross_damping_step(&state, T, dt)`, the error to subtract, in C99, with a table to test it."""
     part = _part(model)
     unit = OUTPUTS.get(model.compensates)
     if unit is None:
@@ -98,21 +98,46 @@ def emit_c(model: Model) -> str:
     pole = 2 * math.pi * model.number("frequency_Hz", above=0) * model.number("relative_damping", above=0)
     gain = 2 * (2 * math.pi * model.number("frequency_Hz", above=0)) / model.number("g2", above=0) / unit
     return f"""{head(model)}
+/* Call with every temperature reading, {_temperature_column(model)}; the temperature counts as linear between readings. */
+typedef struct {{
+    double target, value;
+}} hrg_cross_damping_state;
+
 {polynomial("hrg_cross_damping", "shift", part.values)}
 
-/* Set the state as if temperature_degC had lasted; call once before the first step. */
-void hrg_cross_damping_settle(double *state, double temperature_degC) {{
-    *state = {gain!r} * hrg_cross_damping(temperature_degC - ({model.number("calibration_temperature_degC")!r}));
+/* Set the state as if temperature_degC had lasted; call with the first reading. Returns the error of {model.compensates}. */
+double hrg_cross_damping_settle(hrg_cross_damping_state *state, double temperature_degC) {{
+    state->target = {gain!r} * hrg_cross_damping(temperature_degC - ({model.number("calibration_temperature_degC")!r}));
+    state->value = state->target;
+    return state->value;
 }}
 
-/* Error of {model.compensates} at this temperature, one step of dt_s seconds later: subtract it from the output. */
-double hrg_cross_damping_step(double *state, double temperature_degC, double dt_s) {{
-    double target;
-    hrg_cross_damping_settle(&target, temperature_degC);
-    *state = target + (*state - target) * exp(-{pole!r} * dt_s);
-    return *state;
+/* Error of {model.compensates} at this reading, dt_s seconds after the last: subtract it from the output. */
+double hrg_cross_damping_step(hrg_cross_damping_state *state, double temperature_degC, double dt_s) {{
+    double before = state->target, value = state->value, x = {pole!r} * dt_s, rise;
+    hrg_cross_damping_settle(state, temperature_degC);
+    rise = x > 0.0 ? (state->target - before) * (-expm1(-x) / x) : 0.0;
+    state->value = state->target - rise + (value - before) * exp(-x);
+    return state->value;
 }}
-"""
+
+{self_test(_test_rows(model), "dt_s (0: settle), temperature_degC, expected", STEP)}"""
+
+
+STEP = """    static hrg_cross_damping_state state;
+    double found = row[0] > 0.0 ? hrg_cross_damping_step(&state, row[1], row[0])
+                                : hrg_cross_damping_settle(&state, row[1]);
+    double expected = row[2];"""
+
+
+def _test_rows(model: Model) -> list[tuple[float, ...]]:
+    """A few uneven steps through the calibrated range, with what Python makes of them."""
+    low, high = model.range_of(_temperature_column(model))
+    steps = np.array([0.0, *np.resize([1.0, 2.0, 4.0, 2.0, 0.5], 23)])
+    temperature = np.round((low + high) / 2 + 0.45 * (high - low) * np.sin(0.5 * np.arange(24)), 9)
+    fit = load_cross_damping(model)
+    error = fit.predict(np.cumsum(steps), temperature + ZERO_CELSIUS, extrapolate=True) / OUTPUTS[model.compensates]
+    return list(zip(steps.tolist(), temperature.tolist(), error.tolist(), strict=True))
 
 
 def _part(model: Model) -> Part:
