@@ -171,6 +171,12 @@ def _step(A: Complex, B: Complex, steps: NDArray[np.float64]) -> tuple[Complex, 
     from scipy.linalg import expm
 
     n = len(B)
+    if n == 1 and A[0, 0] != 0:  # one pole: e^x, (e^x − 1) B/a and the ramp's (e^x − 1 − x) B/(a x), x = a Δt
+        x = A[0, 0] * steps
+        grown = np.expm1(x)
+        short = np.abs(x) < 1e-4  # where the ramp's difference loses digits: x/2 + x²/6 + x³/24
+        slow = np.where(short, x * (0.5 + x / 6 + x**2 / 24), (grown - x) / np.where(short, 1.0, x))
+        return np.exp(x)[:, None, None], (grown * B[0] / A[0, 0])[:, None], (slow * B[0] / A[0, 0])[:, None]
     augmented = np.zeros((len(steps), n + 2, n + 2), dtype=complex)
     augmented[:, :n, :n] = A * steps[:, None, None]
     augmented[:, :n, n] = B * steps[:, None]

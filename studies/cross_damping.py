@@ -28,8 +28,8 @@ class CrossDampingStudy:
 
     @property
     def is_useful(self) -> bool:
-        """Whether the compensation improves data that the fit has not seen."""
-        return self.held_out.ratio > 1.0
+        """Whether the compensation improves averages of data that the fit has not seen."""
+        return self.held_out.averages.ratio > 1.0
 
     @property
     def memory(self) -> float:
@@ -41,7 +41,6 @@ def study_cross_damping(
     runs: Sequence[RestRun], *, k: float, zeta: float, calibration_temperature: float = 293.15, order: int = 3
 ) -> CrossDampingStudy:
     """Fit ζ₁₂(T) and judge it; parameters as for `compensation.cross_damping.fit_cross_damping`."""
-    import numpy as np
 
     def fit(chosen: Sequence[RestRun]) -> CrossDampingModel:
         return fit_cross_damping(chosen, k=k, zeta=zeta, calibration_temperature=calibration_temperature, order=order)
@@ -54,14 +53,16 @@ def study_cross_damping(
         raise CompensationError(
             f"{len(runs[0].time)} rows are too few to judge the fit on data left out; record {LEAST_ROWS} or more."
         )
-    after = np.concatenate([model.compensate(run.time, run.rate, run.temperature) for run in runs])
-    training = compare_outputs(np.concatenate([run.rate for run in runs]), after)
-    if training.before == 0 or training.after == 0:
+    after = [model.compensate(run.time, run.rate, run.temperature) for run in runs]
+    training = compare_outputs([run.time for run in runs], [run.rate for run in runs], after)
+    if training.rows.before == 0 or training.rows.after == 0:
         raise CompensationError(
             "the output is constant: there is no error that varies with temperature; check the column."
         )
     pieces = runs if len(runs) > 1 else split_run(runs[0], BLOCKS)
-    return CrossDampingStudy(model, tuple(runs), training, hold_out(pieces, lambda run: run.rate, compensate))
+    left = hold_out(pieces, compensate)
+    held_out = compare_outputs([piece.time for piece in pieces], [piece.rate for piece in pieces], left)
+    return CrossDampingStudy(model, tuple(runs), training, held_out)
 
 
 def split_run(run: RestRun, parts: int) -> list[RestRun]:

@@ -3,6 +3,7 @@
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from compensation.improvement import Change
     from studies.cross_damping import CrossDampingStudy
     from studies.record import Record
     from studies.rest import RestData
@@ -119,14 +120,20 @@ def _summarise(study: "CrossDampingStudy", data: "RestData") -> dict[str, Any]:
         "calibration_temperature_degC": round(model.calibration_temperature - 273.15, 9),
         "coefficients": model.coefficients,
         "standard_errors": np.sqrt(np.diag(model.covariance)),
-        "training": {"before": study.training.before / unit, "after": study.training.after / unit},
-        "held_out": {"before": study.held_out.before / unit, "after": study.held_out.after / unit},
-        "improvement_training": study.training.ratio,
-        "improvement_held_out": study.held_out.ratio,
+        "training": _change(study.training.rows, unit),
+        "training_averages_100s": _change(study.training.averages, unit),
+        "held_out": _change(study.held_out.rows, unit),
+        "held_out_averages_100s": _change(study.held_out.averages, unit),
+        "improvement_training": study.training.rows.ratio,
+        "improvement_held_out": study.held_out.rows.ratio,
         "useful": study.is_useful,
         "dynamic_part": study.memory / unit,
         "rows_left_out": data.left_out,
     }
+
+
+def _change(change: "Change", unit: float) -> dict[str, float]:
+    return {"before": change.before / unit, "after": change.after / unit, "improvement": change.ratio}
 
 
 def _quality(records: "list[Record]") -> float:

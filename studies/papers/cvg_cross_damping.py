@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from compensation.cross_damping import RestRun, evaluate_cross_damping, fit_cross_damping, simulate_bias
-from compensation.improvement import Improvement, compare_outputs
+from compensation.improvement import Change, compare_outputs
 from compensation.transfer import TransferFunction
 from studies.cross_damping import CrossDampingStudy, study_cross_damping
 
@@ -94,7 +94,7 @@ class CrossDampingTwin:
 
     study: CrossDampingStudy
     second: RestRun
-    improvement: Improvement
+    improvement: Change
     spread: tuple[float, float, float]
     lags: tuple[float, ...]
     noises: tuple[float, ...]
@@ -119,10 +119,11 @@ def _draw_runs(seed: int, lag: float, random_walk: float) -> tuple[RestRun, Rest
     return first, simulate_rest(generator, lag=lag, random_walk=random_walk, soak_h=0.5)
 
 
-def _improve(seed: int, lag: float, random_walk: float) -> Improvement:
+def _improve(seed: int, lag: float, random_walk: float) -> Change:
     first, second = _draw_runs(seed, lag, random_walk)
     model = fit_cross_damping([first], k=K, zeta=ZETA, calibration_temperature=CALIBRATION)
-    return compare_outputs(second.rate, model.compensate(second.time, second.rate, second.temperature))
+    after = model.compensate(second.time, second.rate, second.temperature)
+    return compare_outputs([second.time], [second.rate], [after]).rows
 
 
 def count_bias_of_printed_values(carrier: float = FREQUENCY) -> float:

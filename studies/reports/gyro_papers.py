@@ -46,7 +46,7 @@ def _summarise_damping(twin: "CrossDampingTwin") -> dict[str, Any]:
 
     return {
         "improvement_printed": PRINTED_IMPROVEMENT,
-        "improvement_training": twin.study.training.ratio,
+        "improvement_training": twin.study.training.rows.ratio,
         "improvement_held_out": twin.improvement.ratio,
         "improvement_over_seeds_5_50_95": twin.spread,
         "by_lag_s": twin.lags,

@@ -41,6 +41,8 @@ KEYS = {
     "standard_errors",
     "training",
     "held_out",
+    "training_averages_100s",
+    "held_out_averages_100s",
     "improvement_training",
     "improvement_held_out",
     "useful",
@@ -129,7 +131,7 @@ def test_pure_noise_gains_nothing(tmp_path, capsys):
             white = generator.standard_normal(len(time))
             rate = DEG_PER_H * (white + walk * np.cumsum(generator.standard_normal(len(time))))
             study = study_cross_damping([RestRun(time, rate, temperature)], k=3e4, zeta=5e-5)
-            ratios.append(study.held_out.ratio)
+            ratios.append(study.held_out.rows.ratio)
     assert np.median(ratios[:12]) < 1
     assert np.median(ratios[12:]) < 1
     assert np.max(ratios[:12]) < 1.01
