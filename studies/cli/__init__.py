@@ -29,6 +29,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "render": ("studies.cli.render:render", "A mode shape as picture, animation, page or mesh."),
     "import": ("studies.cli.import_:import_", "Laboratory files into the record format."),
     "compensate": ("studies.cli.compensate:compensate", "Apply a saved model to a record, or emit it as C."),
+    "temperature": ("studies.cli.temperature:temperature", "The resonator's temperature from its own frequency."),
     "fit scale": ("studies.cli.fit_scale:fit_scale", "Bias and scale of a bell-shaped gyro, step by step."),
     "study run": ("studies.cli.study:run", "Run or resume a parametric study."),
     "study status": ("studies.cli.study:status", "How far a study is, and what failed."),

@@ -12,7 +12,7 @@ import pytest
 from compensation.frequency import fit_frequency
 from studies.errors import InputError
 from studies.models import Source, compensate, emit_c, format_model, model_kinds, read_model, write_model
-from studies.models.kinds.frequency import save_frequency
+from studies.models.kinds.frequency import find_temperature, save_frequency
 from studies.record import Record
 
 T = np.linspace(-20, 40, 7)
@@ -58,9 +58,12 @@ def test_frequency_c_code_agrees_with_the_fit(model, tmp_path):
     library.hrg_frequency.argtypes = [ctypes.c_double]
     library.hrg_temperature.argtypes = [ctypes.c_double, ctypes.POINTER(ctypes.c_int)]
     fit, ok = fit_frequency(T, F), ctypes.c_int()
-    for t in (-20.0, 3.3, 40.0):
-        assert library.hrg_frequency(t) == pytest.approx(float(fit.frequency(t)), rel=1e-14)
-        assert library.hrg_temperature(float(fit.frequency(t)), ctypes.byref(ok)) == pytest.approx(t, abs=1e-8)
+    for t in (-22.9, -20.0, 3.3, 40.0, 42.9):
+        assert library.hrg_frequency(t) == pytest.approx(float(fit.frequency(t, extrapolate=True)), rel=1e-14)
+        f = float(fit.frequency(t, extrapolate=True))
+        assert library.hrg_temperature(f, ctypes.byref(ok)) == pytest.approx(t, abs=1e-8)
+        assert ok.value == 1
+        assert find_temperature(model, np.array([f, np.nan]))[0] == pytest.approx(t, abs=1e-8)
     library.hrg_temperature(4500.0, ctypes.byref(ok))
     assert ok.value == 0
 
@@ -76,7 +79,7 @@ def test_compensation_takes_the_curve_out_and_refuses_to_extrapolate(model):
     assert out[[0, 1, 2, 4]] == pytest.approx(expected[[0, 1, 2, 4]], abs=1e-9)
     assert np.isnan(out[3])
     hot = record.with_columns({"housing_temperature_degC": housing + 20})
-    with pytest.raises(InputError, match=r"from 10 to 50, outside -20 to 40 .*--extrapolate"):
+    with pytest.raises(InputError, match=r"from 10 to 50, outside -23 to 43 .*--extrapolate"):
         compensate(model, hot)
     assert np.isfinite(compensate(model, hot, extrapolate=True)["compensated_frequency_Hz"][0])
     with pytest.raises(InputError, match="already"):
@@ -91,7 +94,7 @@ def test_compensation_takes_the_curve_out_and_refuses_to_extrapolate(model):
         ("coefficients = [", "coefficients = [3,", "array of tables"),
         ('name = "a1"', 'name = "f0"', "same name"),
         ('frequency_Hz"', "frequency_Hz", "not valid TOML"),
-        ("temperature_degC = [-20.0, 40.0]", "temperature_degC = [40.0, -20.0]", "must be below"),
+        ("temperature_degC = [-23.0, 43.0]", "temperature_degC = [43.0, -23.0]", "must be below"),
         ("reference_temperature_degC = 0.0", "reference_temperature_degC = nan", "finite number"),
         ("rows = 7", 'rows = "7"', "finite number"),
     ],

@@ -1,0 +1,81 @@
+"""`hrg temperature`: the HRG paper's Table 2 from its Table 1, a simulated run's own temperature, bad input named."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from studies.cli import main
+from studies.record import read_record
+
+TABLE1 = "studies/papers/hrg_table1.csv"
+TABLE2 = [-19.976, -10.058, -0.003, 10.071, 20.011, 29.924, 40.031]  # HRG paper, Table 2, calculated (theory: checked)
+
+
+@pytest.fixture(scope="module")
+def model(tmp_path_factory):
+    path = tmp_path_factory.mktemp("model") / "f.toml"
+    assert main(["fit", "frequency", TABLE1, "--save", str(path)]) == 0
+    return str(path)
+
+
+def test_table_2_of_the_paper_comes_from_the_measured_frequencies(model, tmp_path):
+    """All seven of its own readings lie in the model's range, the last one at 40.031 °C included."""
+    lines = Path(TABLE1).read_text(encoding="utf-8").splitlines()
+    rows = [line.split(",")[1] for line in lines if line[0] in "-0123456789"]
+    run = tmp_path / "run.csv"
+    run.write_text("time_s,frequency_Hz\n" + "".join(f"{k},{f}\n" for k, f in enumerate(map(str.strip, rows))))
+    assert main(["temperature", model, str(run), "--out", str(tmp_path / "t.csv")]) == 0
+    assert read_record(tmp_path / "t.csv")["resonator_temperature_degC"] == pytest.approx(TABLE2, abs=1e-3)
+
+
+def test_a_simulated_resonator_is_its_own_thermometer(tmp_path, capsys):
+    """The curve is fitted to settled points of the same virtual gyro; the ramp in between is then read from f alone."""
+    soak = "time_s,chamber_temperature_degC\n0,-20\n9000,-20\n9001,40\n70000,40\n70001,-20\n"
+    (tmp_path / "p.csv").write_text(soak.replace("70001,-20\n", "90000,10\n"))
+    assert (
+        main(["simulate", "hrg-30mm", str(tmp_path / "p.csv"), "--rate", "0.05", "--out", str(tmp_path / "r.csv")]) == 0
+    )
+    record = read_record(tmp_path / "r.csv")
+    T, f = record["resonator_temperature_degC"], record["frequency_Hz"]
+    points = [int(np.argmin(np.abs(T - x))) for x in (-19.9, -10, 0, 10, 20, 30, 39.9)]
+    table = "temperature_degC,frequency_Hz\n" + "".join(f"{T[k]},{f[k]}\n" for k in points)
+    (tmp_path / "table.csv").write_text(table)
+    assert main(["fit", "frequency", str(tmp_path / "table.csv"), "--save", str(tmp_path / "m.toml")]) == 0
+    capsys.readouterr()
+    out = ["--out", str(tmp_path / "o.csv"), "--report", str(tmp_path / "o.html"), "--json"]
+    assert main(["temperature", str(tmp_path / "m.toml"), str(tmp_path / "r.csv"), *out]) == 0
+    payload = json.loads(capsys.readouterr().out)
+    assert payload["schema"] == "hrg.temperature/1"
+    assert payload["rms_difference_from_simulated_K"] < 0.05  # of 60 K; the unevenness of the shell while it cools
+    assert "<svg" in (tmp_path / "o.html").read_text() or "data:image" in (tmp_path / "o.html").read_text()
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("time_s,frequency_Hz\n0,4430\n1,4600\n", "outside 4415"),
+        ("time_s,bias_deg_per_h\n0,1\n1,2\n", "'frequency_Hz' is missing"),
+        ("time_s,frequency_Hz\n0,\n1,\n", "has no value"),
+    ],
+)
+def test_what_cannot_be_read_is_named(model, tmp_path, capsys, text, message):
+    (tmp_path / "run.csv").write_text(text)
+    assert main(["temperature", model, str(tmp_path / "run.csv"), "--out", str(tmp_path / "o.csv")]) == 2
+    assert message in capsys.readouterr().err
+    assert not (tmp_path / "o.csv").exists()
+
+
+def test_a_curve_that_turns_round_is_not_inverted(tmp_path, capsys):
+    T = np.arange(-20.0, 41.0, 10.0)
+    rows = "".join(f"{t},{4430 - 0.01 * (t - 10) ** 2}\n" for t in T)
+    (tmp_path / "t.csv").write_text("temperature_degC,frequency_Hz\n" + rows)
+    assert main(["fit", "frequency", str(tmp_path / "t.csv"), "--order", "2", "--save", str(tmp_path / "m.toml")]) in (
+        0,
+        2,
+    )
+    if (tmp_path / "m.toml").exists():
+        (tmp_path / "r.csv").write_text("time_s,frequency_Hz\n0,4428\n1,4429\n")
+        assert main(["temperature", str(tmp_path / "m.toml"), str(tmp_path / "r.csv"), "--json"]) == 2
+    assert "turns round" in capsys.readouterr().err
