@@ -30,9 +30,12 @@ class Layout:
 
 
 @lru_cache(maxsize=6)
-def build_system(resonator: Resonator, n: int, theory: Theory, level: Level) -> System:
-    """Lay out, number and tabulate a resonator; cached, since only the material changes with temperature."""
-    layout = lay_resonator(resonator, n, level)
+def build_system(resonator: Resonator, n: int, theory: Theory, level: Level, alongside: tuple[int, ...] = ()) -> System:
+    """Lay out, number and tabulate a resonator; cached, since only the material changes with temperature.
+
+    The elements suit the harmonics `alongside` too, and are the same for all of them.
+    """
+    layout = lay_resonator(resonator, n, level, alongside)
     groups: list[Group] = []
     rows = Rows()
     ends: dict[tuple[int, int], Tie] = {}
@@ -54,15 +57,16 @@ def build_system(resonator: Resonator, n: int, theory: Theory, level: Level) -> 
     return System(tuple(groups), rows.matrix(size), 0 if held or n > 1 else 2, n, level)
 
 
-def lay_resonator(resonator: Resonator, n: int, level: Level) -> Layout:
+def lay_resonator(resonator: Resonator, n: int, level: Level, alongside: tuple[int, ...] = ()) -> Layout:
     """Divide the section: a solid root or clamped face first, then chains of shell with a solid corner at every kink."""
+    lowest, highest = min(n, *alongside, n), max(n, *alongside, n)
     start, first = 0.0, _free_or_pole(resonator.starts_on_axis)
     stop, last = resonator.length, _free_or_pole(resonator.ends_on_axis)
     solids: list[tuple[Solid, tuple[tuple[int, int], ...]]] = []
     kinks = find_kinks(resonator)
     whole_section = max(level.through) > 1  # a Naghdi shell is clamped as a line and has no singular corners there
     if resonator.support == "stem":
-        root, start = lay_root(resonator, level.rings, n)
+        root, start = lay_root(resonator, level.rings, lowest)
     elif resonator.support == "clamped-face":
         root, start = lay_clamped_face(resonator, level.rings)
     elif resonator.support == "clamped-pole" and whole_section:
@@ -86,7 +90,7 @@ def lay_resonator(resonator: Resonator, n: int, level: Level) -> Layout:
                 f"the corner or clamp that ends at {mm(start)} of the meridian overlaps the next, which begins at "
                 f"{mm(before)}: lengthen the segment between them or take less of it for the clamp."
             )
-        chains.append(lay_chain(resonator, start, before, (first, "tied"), n, level.split))
+        chains.append(lay_chain(resonator, start, before, (first, "tied"), highest, level.split))
         solids.append((corner, ((len(chains) - 1, 1), (len(chains), 0))))
         start, first = after, "tied"
     if not stop > start:
@@ -94,7 +98,7 @@ def lay_resonator(resonator: Resonator, n: int, level: Level) -> Layout:
             f"the corner or clamp that ends at {mm(start)} of the meridian overlaps the one that begins at {mm(stop)}: "
             "lengthen the last segment."
         )
-    chains.append(lay_chain(resonator, start, stop, (first, last), n, level.split))
+    chains.append(lay_chain(resonator, start, stop, (first, last), highest, level.split))
     return Layout(tuple(chains), tuple(solids))
 
 

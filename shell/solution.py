@@ -206,12 +206,12 @@ class Solution:
         """Contributions of the places of the meridian to d ln f."""
         U, T = total(self.elastic), total(self.kinetic)
         rows: list[list[Array]] = []
-        for group, c, elastic, kinetic, nu, q in zip(
-            self.system.groups, self.constants, self.elastic, self.kinetic, self._by_nu, self.unknowns, strict=True
+        for k, (group, elastic, kinetic, nu) in enumerate(
+            zip(self.system.groups, self.elastic, self.kinetic, self._by_nu, strict=True)
         ):
             if isinstance(group, ShellGroup):
                 width = group.place.section.weight * group.place.section.ds
-                thickness = _surface_density(self.system, group, c, q, self.eigenvalue) / (2 * U)
+                thickness = sum(faces.sum(axis=2) for faces in surface_energies(self, k)) / (2 * U)
                 columns = [group.table.position, width, elastic / U, kinetic / T, nu / (2 * U), thickness]
             else:
                 columns = [
@@ -262,28 +262,37 @@ def _membrane(group: ShellGroup, c: Constants, e: Array) -> float:
     """Energy of the mean in-plane strains, in plane stress."""
     weights = group.table.volume / group.table.volume.sum(axis=2, keepdims=True)
     s, theta, twist = (np.einsum("eij,eij->ei", e[:, :, k], weights) for k in (0, 1, 3))
-    return float(np.sum(_plane_energy(c, s, theta, twist) * group.table.volume.sum(axis=2)))
+    cosine, sine = _plane_energies(c, s, theta, twist)
+    return float(np.sum((cosine + sine) * group.table.volume.sum(axis=2)))
 
 
-def _plane_energy(c: Constants, s: Array, theta: Array, twist: Array) -> Array:
+def _plane_energies(c: Constants, s: Array, theta: Array, twist: Array) -> tuple[Array, Array]:
+    """Twice the energy density of plane stress, of what varies as cos nθ and of the twist, which varies as sin nθ."""
     lam, G = lame(c.E, c.nu, True)
-    return np.asarray(lam * (s + theta) ** 2 + G * (2 * s**2 + 2 * theta**2 + twist**2))
+    return np.asarray(lam * (s + theta) ** 2 + 2 * G * (s**2 + theta**2)), np.asarray(G * twist**2)
 
 
-def _surface_density(system: System, group: ShellGroup, c: Constants, q: Array, eigenvalue: float) -> Array:
-    """Change of (elastic - ω² kinetic) as both faces move outwards by h/2: energies at the faces (Hadamard's formula).
+def surface_energies(solution: Solution, number: int) -> tuple[Array, Array]:
+    """Change of (elastic - ω² kinetic) as the faces of one shell group move outwards by h/2, (elements, stations, 2) each.
 
-    Of a solid the faces are free of traction, so their strain energy is that of plane stress; Naghdi's transverse shear
-    does not vanish there and counts.
+    The energies at the faces (Hadamard's formula), inner and outer: first of what varies as cos nθ, then as sin nθ. Of a
+    solid the faces are free of traction, so their strain energy is that of plane stress; Naghdi's transverse shear does
+    not vanish there and counts.
     """
+    system, group, c = solution.system, solution.system.groups[number], solution.constants[number]
+    assert isinstance(group, ShellGroup)
     faces = np.array([-1.0, 1.0])
     u, v, w = (legendre(order, faces) for order in system.level.through)
     along = Basis(*group.table.along)
     table = shell_table(group.place.section, system.n, (u, v, w), (faces, np.ones(2)), along)
+    q = solution.unknowns[number]
     e, d = table.strains(q), table.displacements(q)
     at_stations = Constants(c.E[..., None], c.nu[..., None], c.rho[..., None], True)
-    density = _plane_energy(at_stations, e[:, :, 0], e[:, :, 1], e[:, :, 3])
+    cosine, sine = _plane_energies(at_stations, e[:, :, 0], e[:, :, 1], e[:, :, 3])
     if table.plane_stress:
-        density += c.lame[1][..., None] * table.transverse_shear * (e[:, :, 4] ** 2 + e[:, :, 5] ** 2)
-    density -= eigenvalue * c.rho[..., None] * (d**2).sum(axis=2)
-    return np.asarray(np.einsum("eij,eij->ei", density, table.volume))
+        transverse = c.lame[1][..., None] * table.transverse_shear
+        cosine, sine = cosine + transverse * e[:, :, 4] ** 2, sine + transverse * e[:, :, 5] ** 2
+    heavy = solution.eigenvalue * c.rho[..., None]
+    cosine = cosine - heavy * (d[:, :, 0] ** 2 + d[:, :, 2] ** 2)
+    sine = sine - heavy * d[:, :, 1] ** 2
+    return cosine * table.volume, sine * table.volume

@@ -1,0 +1,140 @@
+"""What makes a resonator differ from the body of revolution that was designed."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, fields
+from math import pi
+
+import numpy as np
+
+from shell.errors import ShellError
+from shell.imperfection.field import Faded, Field, Waves, add, scaled
+from shell.quadrature import Array
+
+
+@dataclass(frozen=True)
+class PointMass:
+    """A small mass (kg; negative: taken away) at an azimuth (rad) and a position (0 ... 1, 1 the rim).
+
+    height : through the wall, -1 the inner face, 0 the middle surface, 1 the outer face.
+    """
+
+    mass: float
+    azimuth: float
+    position: float = 1.0
+    height: float = 0.0
+
+
+@dataclass(frozen=True)
+class LineMass:
+    """A mass along a circle at a position and height, kg per metre of the circle, as a field over θ."""
+
+    per_length: Field
+    position: float = 1.0
+    height: float = 0.0
+
+
+@dataclass(frozen=True)
+class Imperfection:
+    """Small departures from the body of revolution; lengths in m, densities and moduli relative.
+
+    thickness : change of the wall, the middle surface kept.
+    outer, inner : how far the outer and the inner face stand out of the material.
+    offset : how far the middle surface stands out along its normal, the wall kept (a radius that varies around).
+    density, modulus : of ρ, and of E at constant ν.
+    rim : how far the edge of the rim stands out along the meridian; its value at position 1 counts.
+    masses, lines : point and line masses.
+    """
+
+    thickness: Field | None = None
+    outer: Field | None = None
+    inner: Field | None = None
+    offset: Field | None = None
+    density: Field | None = None
+    modulus: Field | None = None
+    rim: Field | None = None
+    masses: tuple[PointMass, ...] = ()
+    lines: tuple[LineMass, ...] = ()
+
+    def __add__(self, other: "Imperfection") -> "Imperfection":
+        """Both together."""
+        joined = {name: add(getattr(self, name), getattr(other, name)) for name in FIELDS}
+        return Imperfection(**joined, masses=self.masses + other.masses, lines=self.lines + other.lines)
+
+    def times(self, factor: float) -> "Imperfection":
+        """All of it larger by a factor."""
+        masses = tuple(PointMass(factor * m.mass, m.azimuth, m.position, m.height) for m in self.masses)
+        lines = []
+        for line in self.lines:
+            larger = scaled(line.per_length, factor)
+            assert larger is not None
+            lines.append(LineMass(larger, line.position, line.height))
+        return Imperfection(
+            **{name: scaled(getattr(self, name), factor) for name in FIELDS}, masses=masses, lines=tuple(lines)
+        )
+
+    def faces(self, fade: Callable[[Array], Array] | None = None) -> tuple[Field | None, Field | None]:
+        """How far the inner and the outer face stand out of the material: thickness, faces and offset together.
+
+        fade : factor along the meridian (shell.imperfection.place).
+        """
+        half = scaled(self.thickness, 0.5)
+        inner, outer = add(half, self.inner, scaled(self.offset, -1.0)), add(half, self.outer, self.offset)
+        if fade is None:
+            return inner, outer
+        return inner and Faded(inner, fade), outer and Faded(outer, fade)
+
+    @property
+    def orders(self) -> tuple[int, ...]:
+        """The waves around that its fields have (point masses have all)."""
+        fields_ = [getattr(self, name) for name in FIELDS] + [line.per_length for line in self.lines]
+        return tuple(sorted({m for one in fields_ if one is not None for m in one.orders}))
+
+
+FIELDS = tuple(one.name for one in fields(Imperfection) if one.name not in ("masses", "lines"))
+
+
+def teeth(count: int, width: float, height: float, azimuth: float = 0.0, errors: Sequence[float] = ()) -> Waves:
+    """A rim edge of equal teeth as a field for `Imperfection.rim`.
+
+    Tooth j covers `width` around azimuth + 2π j/count and stands out by height (1 + error_j):
+
+        c_m = Σ_j h_j (2/(π m)) sin(m w/2) exp(i m θ_j),  c_0 = Σ_j h_j w/(2π).
+
+    The strain in a tooth is taken as that of the edge, which is small, so it is mostly mass.
+
+    Parameters
+    ----------
+    count : number of teeth.
+    width : of each, rad.
+    height : m.
+    azimuth : of the middle of the first, rad.
+    errors : relative errors of their heights, (count,); none unless given.
+    """
+    if not (count >= 1 and 0 < width * count <= 2 * pi * (1 + 1e-12)):
+        raise ShellError(f"{count} teeth of {np.rad2deg(width):g}° do not fit around the rim.")
+    if errors and len(errors) != count:
+        raise ShellError(f"{len(errors)} errors were given for {count} teeth.")
+    theta = azimuth + 2 * pi * np.arange(count) / count
+    heights = height * (1 + (np.asarray(errors, dtype=float) if len(errors) else np.zeros(count)))
+    m = np.arange(1, max(4 * count, 24) + 1)
+    waves = 2 / (pi * m) * np.sin(m * width / 2) * (np.exp(1j * np.multiply.outer(m, theta)) @ heights)
+    return Waves(
+        {0: complex(heights.sum() * width / (2 * pi)), **{int(k): complex(c) for k, c in zip(m, waves, strict=True)}}
+    )
+
+
+def holes(
+    count: int, radius: float, wall: float, density: float, position: float, azimuth: float = 0.0
+) -> tuple[PointMass, ...]:
+    """Round holes through the wall as masses taken away, ρ π a² h each; what they take off the stiffness is left out.
+
+    Parameters
+    ----------
+    count : number of holes, equally spaced.
+    radius, wall : of each hole and of the wall there, m.
+    density : kg/m³.
+    position : 0 ... 1 of the meridian.
+    azimuth : of the first, rad.
+    """
+    mass = -density * pi * radius**2 * wall
+    return tuple(PointMass(mass, azimuth + 2 * pi * k / count, position) for k in range(count))

@@ -1,0 +1,175 @@
+r"""What each place of a harmonic pair contributes to its mean shift and to its split (degenerate perturbation, first order).
+
+The two modes of a pair, cos nθ and sin nθ, share ω². Energies of the first vary as e_c cos² nθ + e_s sin² nθ, of the second
+with cos and sin exchanged, and those between them as (e_c - e_s) sin nθ cos nθ. So of a field p = Re Σ c_m exp(-i m θ) that
+multiplies an energy only two waves are felt,
+
+    δ(ω²) = c_0 Σ (e_c + e_s)/T ± |z|,   z = ½ c_2n Σ (e_c - e_s)/T,
+
+with T = ∫ ρ (u_c² + u_s²) over the section. The mode of higher frequency has its antinode where 2n α = arg z. A face that moves brings
+the energy density at the face (Hadamard's formula); masses bring -ω² times their kinetic energy.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from shell.errors import ShellError
+from shell.imperfection.field import Complex, Field
+from shell.imperfection.place import CrossSection, cut, fade
+from shell.kernel import energy_weights
+from shell.modes import Mode
+from shell.quadrature import Array, gauss
+from shell.resonator import Resonator
+from shell.solution import Constants, Solution, surface_energies, total
+from shell.system import ShellGroup
+
+WAVE = np.array([True, True, True, False, True, False])  # strains that vary as cos nθ, in the order of the kernel
+
+
+@dataclass(frozen=True, eq=False)
+class Density:
+    """Change of ln ω² per unit of a field at stations: of the mean, and of z with the wave 2n.
+
+    position : 0 ... 1, (stations,). mean, wave : (stations,).
+    """
+
+    position: Array
+    mean: Array
+    wave: Array
+
+    def apply(self, field: Field, harmonic: int) -> tuple[float, complex]:
+        """The mean shift and z, both relative to ω²."""
+        mean = float(self.mean @ field.wave(0, self.position).real) if 0 in field.orders else 0.0
+        around = 2 * harmonic
+        z = complex(self.wave @ field.wave(around, self.position)) if around in field.orders else 0j
+        return mean, z
+
+    def of_wave(self, profile: Complex) -> complex:
+        """Z of a wave 2n with this profile at the stations."""
+        return complex(self.wave @ profile)
+
+
+@dataclass(frozen=True, eq=False)
+class Pair:
+    """A solved mode n >= 1 as the pair that it is, with what every kind of imperfection does to it."""
+
+    mode: Mode
+
+    def __post_init__(self) -> None:
+        if self.mode.harmonic < 1:
+            raise ShellError("a mode with n = 0 is single and cannot split: choose a harmonic from 1 up.")
+        if self.mode.solution is None:
+            raise ShellError("Rayleigh's closed form carries no energies: use theory solid or shell.")
+
+    @property
+    def solution(self) -> Solution:
+        """The eigenvector."""
+        assert self.mode.solution is not None
+        return self.mode.solution
+
+    @property
+    def resonator(self) -> Resonator:
+        """The body of revolution."""
+        assert self.mode.resonator is not None
+        return self.mode.resonator
+
+    @cached_property
+    def scale(self) -> float:
+        """ω² T: twice the kinetic energy, which is twice the strain energy."""
+        return self.solution.eigenvalue * total(self.solution.kinetic)
+
+    @cached_property
+    def fade(self) -> Callable[[Array], Array] | None:
+        """Factor with which the faces of the shell join solid parts and clamps, which keep their shape."""
+        return fade(self.resonator, self.solution.system)
+
+    @cached_property
+    def faces(self) -> tuple[Density, Density]:
+        """Per metre that the inner and the outer face stand out of the material; solid roots and corners are left out."""
+        x, c, s = [], [], []
+        for number, group in enumerate(self.solution.system.groups):
+            if isinstance(group, ShellGroup):
+                half = group.place.section.thickness[..., None] / 2
+                cosine, sine = surface_energies(self.solution, number)
+                x.append(group.table.position.ravel())
+                c.append((cosine / half).reshape(-1, 2))
+                s.append((sine / half).reshape(-1, 2))
+        position, cosine, sine = np.concatenate(x), np.concatenate(c) / self.scale, np.concatenate(s) / self.scale
+        inner, outer = (Density(position, (cosine + sine)[:, k], (cosine - sine)[:, k] / 2) for k in (0, 1))
+        return inner, outer
+
+    @cached_property
+    def density(self) -> Density:
+        """Per unit relative change of ρ."""
+        found = []
+        for group, c, d in zip(
+            self.solution.system.groups, self.solution.constants, self.solution.displacement, strict=True
+        ):
+            heavy = -self.solution.eigenvalue * c.rho[..., None] * group.table.volume
+            cosine, sine = d[:, :, 0] ** 2 + d[:, :, 2] ** 2, d[:, :, 1] ** 2
+            found.append(_columns(group.table.position, heavy, cosine, sine))
+        return _gather(found, self.scale)
+
+    @cached_property
+    def modulus(self) -> Density:
+        """Per unit relative change of E at constant ν."""
+        found = []
+        for group, c, e in zip(self.solution.system.groups, self.solution.constants, self.solution.strain, strict=True):
+            lam, G = (field[..., None] for field in c.lame)
+            sheared = G[:, :, None] * energy_weights(group.table.transverse_shear)[:, None] * e * e
+            cosine = lam * e[:, :, :3].sum(axis=2) ** 2 + sheared[:, :, WAVE].sum(axis=2)
+            found.append(_columns(group.table.position, group.table.volume, cosine, sheared[:, :, ~WAVE].sum(axis=2)))
+        return _gather(found, self.scale)
+
+    def rim(self) -> Density:
+        """Per metre that the edge of the rim stands out along the meridian: the energies of the edge, free of traction."""
+        self._require_free_rim()
+        eta, weights = gauss(max(self.solution.system.level.through) + 2)
+        edge = cut(self.resonator, self.solution.system, 1.0, eta)
+        e, d = edge.strains(self.solution.unknowns), edge.displacements(self.solution.unknowns)
+        c, q = self._material(edge), edge.table.volume[0, 0] * weights
+        lam, G = (field[0, 0] for field in c.lame)
+        sheared = G * energy_weights(edge.table.transverse_shear)[:, None] * e * e
+        cosine = lam * e[:3].sum(axis=0) ** 2 + sheared[WAVE].sum(axis=0)
+        sine = sheared[~WAVE].sum(axis=0)
+        heavy = self.solution.eigenvalue * c.rho[0, 0]
+        one = q @ (cosine - heavy * (d[0] ** 2 + d[2] ** 2)) / self.scale
+        two = q @ (sine - heavy * d[1] ** 2) / self.scale
+        return Density(np.ones(1), np.array([one + two]), np.array([one - two]) / 2)
+
+    def mass(self, position: float = 1.0, height: float = 0.0) -> tuple[float, float]:
+        """Per kilogram of a point mass there: the mean shift, and z for the azimuth 0; at θ it is z exp(2 i n θ).
+
+        δK - ω² δM = -ω² m (u_c² cos² + u_s² sin²); here T includes the factor π of the integral around.
+        """
+        here = cut(self.resonator, self.solution.system, position, np.array([height]))
+        u, v, w = here.displacements(self.solution.unknowns)[:, 0]
+        norm = -self.solution.eigenvalue / (np.pi * self.scale)
+        return float(norm * (u**2 + w**2 + v**2) / 2), float(norm * (u**2 + w**2 - v**2) / 2)
+
+    def radius(self, position: float, height: float) -> float:
+        """Distance from the axis of a place of the wall, m."""
+        place = self.resonator.at([position * self.resonator.length])
+        return float((place.r + height * place.thickness / 2 * place.normal_r)[0])
+
+    def _material(self, edge: CrossSection) -> Constants:
+        c = self.solution.constants[edge.group]
+        here = (slice(edge.element, edge.element + 1), slice(-1, None))
+        return Constants(c.E[here], c.nu[here], c.rho[here], c.plane_stress)
+
+    def _require_free_rim(self) -> None:
+        if self.resonator.support == "clamped-rim" or self.resonator.ends_on_axis:
+            raise ShellError("the meridian has no free rim whose edge could stand out.")
+
+
+def _columns(position: Array, volume: Array, cosine: Array, sine: Array) -> Array:
+    integrals = [np.sum(volume * energy, axis=-1) for energy in (cosine, sine)]
+    return np.array([np.broadcast_to(position, integrals[0].shape).ravel(), *(one.ravel() for one in integrals)])
+
+
+def _gather(found: list[Array], scale: float) -> Density:
+    position, cosine, sine = np.concatenate(found, axis=1)
+    return Density(position, (cosine + sine) / scale, (cosine - sine) / (2 * scale))

@@ -1,0 +1,117 @@
+"""A mode at one place of its shell: strains and displacements on a cross-section."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from math import sqrt
+
+import numpy as np
+
+from shell.errors import ShellError, mm
+from shell.kernel import Section, StrainTable, shell_table
+from shell.quadrature import Array, legendre, nodal
+from shell.resonator import MeridianPoints, Resonator
+from shell.system import ShellGroup, System
+
+
+@dataclass(frozen=True, eq=False)
+class CrossSection:
+    """Where a position of the meridian lies among the elements, and the table of strains there, one station.
+
+    group, element : numbers of the group and of the element in it.
+    along : values and ξ-derivatives of the functions along the element, (2, functions).
+    place, section : the middle surface.
+    table : at the heights that were asked for; its volumes are those of a slice of unit arc length and unit η.
+    """
+
+    group: int
+    element: int
+    along: Array
+    place: MeridianPoints
+    section: Section
+    table: StrainTable
+
+    def strains(self, unknowns: list[Array]) -> Array:
+        """Strain (6, heights) of the unknowns of every group."""
+        q = unknowns[self.group][self.element][None]
+        return np.asarray(self.table.strains(q)[0, 0])
+
+    def displacements(self, unknowns: list[Array]) -> Array:
+        """Displacement (3, heights) along tangent, circle and normal."""
+        q = unknowns[self.group][self.element][None]
+        return np.asarray(self.table.displacements(q)[0, 0])
+
+
+def fade(resonator: Resonator, system: System) -> Callable[[Array], Array] | None:
+    """What the departures of the faces are multiplied with along the meridian: 1, and 0 where a solid part or clamp holds.
+
+    Solid roots, corners and clamps keep their shape; the faces of the shell join them smoothly over a length √(h R). None
+    where nothing is held.
+    """
+    edges: list[tuple[float, int, float]] = []
+    for group in system.groups:
+        if isinstance(group, ShellGroup):
+            chain = group.place.chain
+            for s, inward, end in zip((chain.breaks[0], chain.breaks[-1]), (1, -1), chain.ends, strict=True):
+                if end in ("tied", "clamped"):
+                    h = float(resonator.at([s], chain.segments[0 if inward > 0 else -1]).thickness[0])
+                    edges.append((s / resonator.length, inward, sqrt(h * resonator.size) / resonator.length))
+    if not edges:
+        return None
+
+    def factor(position: Array) -> Array:
+        found = np.ones(np.shape(position))
+        for place, inward, width in edges:
+            off = (position - place) * inward / width
+            beside = abs(position - place) < width
+            x = np.clip(off, 0.0, 1.0)
+            found = np.where(beside, found * x**3 * (10 - 15 * x + 6 * x**2), found)
+        return found
+
+    return factor
+
+
+def cut(resonator: Resonator, system: System, position: float, heights: Array) -> CrossSection:
+    """The cross-section at a position of the meridian, at heights η (-1 inner face, 1 outer face).
+
+    Raises
+    ------
+    ShellError
+        The position lies outside 0 ... 1, or in a solid root or corner.
+    """
+    if not 0 <= position <= 1:
+        raise ShellError(f"a position on the meridian lies in 0 (start) ... 1 (rim), not at {position:g}.")
+    s, margin = position * resonator.length, 1e-9 * resonator.length
+    for number, group in enumerate(system.groups):
+        if not isinstance(group, ShellGroup):
+            continue
+        breaks = np.array(group.place.chain.breaks)
+        if not breaks[0] - margin <= s <= breaks[-1] + margin:
+            continue
+        element = int(np.clip(np.searchsorted(breaks, s, side="right") - 1, 0, len(breaks) - 2))
+        one, two = breaks[element], breaks[element + 1]
+        xi = np.array([np.clip((2 * s - one - two) / (two - one), -1.0, 1.0)])
+        place = resonator.at([s], group.place.chain.segments[element])
+        along = nodal(group.table.along.shape[2] - 1, xi)
+        section = Section(
+            *(
+                np.reshape(value, (1, 1))
+                for value in (
+                    place.r,
+                    place.tangent_r,
+                    place.tangent_z,
+                    place.curvature,
+                    place.thickness,
+                    place.thickness_slope,
+                    (two - one) / 2,
+                    2 / (two - one),
+                    place.position,
+                )
+            )
+        )
+        u, v, w = (legendre(order, heights) for order in system.level.through)
+        table = shell_table(section, system.n, (u, v, w), (heights, np.ones(len(heights))), along)
+        return CrossSection(number, element, np.stack([along.values[0], along.slopes[0]]), place, section, table)
+    raise ShellError(
+        f"the position {position:g} ({mm(s)} along the meridian) lies in a solid root, corner or clamp, where no mass can be "
+        "placed: choose one on the shell, 1 for the rim."
+    )

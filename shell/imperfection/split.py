@@ -1,0 +1,88 @@
+"""The split of a harmonic pair: frequencies and axes of its two modes."""
+
+from dataclasses import dataclass
+from math import pi
+
+import numpy as np
+
+from shell.imperfection.imperfect import Imperfection
+from shell.imperfection.pair import Pair
+
+
+@dataclass(frozen=True)
+class Split:
+    """Two modes where the perfect resonator has a pair.
+
+    harmonic : n.
+    frequency : of the perfect pair, Hz.
+    shift : of the mean frequency, relative.
+    wave : (f_fast - f_slow)/f · exp(2 i n α), α the azimuth of an antinode of the faster mode.
+    """
+
+    harmonic: int
+    frequency: float
+    shift: float
+    wave: complex
+
+    @property
+    def relative(self) -> float:
+        """(f_fast - f_slow)/f."""
+        return abs(self.wave)
+
+    @property
+    def hertz(self) -> float:
+        """f_fast - f_slow, Hz."""
+        return self.frequency * abs(self.wave)
+
+    @property
+    def fast_axis(self) -> float:
+        """Azimuth of an antinode of the faster mode, rad, in 0 ... π/n; 0 where there is no split."""
+        return float(np.angle(self.wave) / (2 * self.harmonic) % (pi / self.harmonic))
+
+    @property
+    def slow_axis(self) -> float:
+        """Azimuth of an antinode of the slower mode, rad, in 0 ... π/n: where mass is to be taken away."""
+        return (self.fast_axis + pi / (2 * self.harmonic)) % (pi / self.harmonic)
+
+    @property
+    def frequencies(self) -> tuple[float, float]:
+        """Of the slower and of the faster mode, Hz."""
+        mean = self.frequency * (1 + self.shift)
+        return mean - self.hertz / 2, mean + self.hertz / 2
+
+
+def find_split(pair: Pair, imperfection: Imperfection) -> Split:
+    """The split to first order in the imperfection: only its waves 0 and 2n are felt.
+
+    Parameters
+    ----------
+    pair : a solved mode.
+    imperfection : fields and masses.
+    """
+    mean, z = 0.0, 0j
+    n = pair.mode.harmonic
+    inner, outer = imperfection.faces(pair.fade)
+    terms = [
+        (getattr(pair, name), field)
+        for name, field in (("density", imperfection.density), ("modulus", imperfection.modulus))
+        if field is not None
+    ]
+    if inner is not None or outer is not None:
+        terms += [
+            (density, field) for density, field in zip(pair.faces, (inner, outer), strict=True) if field is not None
+        ]
+    if imperfection.rim is not None:
+        terms.append((pair.rim(), imperfection.rim))
+    for density, field in terms:
+        one, two = density.apply(field, n)
+        mean, z = mean + one, z + two
+    for mass in imperfection.masses:
+        one, around = pair.mass(mass.position, mass.height)
+        mean, z = mean + one * mass.mass, z + around * mass.mass * np.exp(2j * n * mass.azimuth)
+    for line in imperfection.lines:
+        one, around = pair.mass(line.position, line.height)
+        at = np.array([line.position])
+        circle = pi * 2 * pair.radius(line.position, line.height)
+        mean += one * circle * float(line.per_length.wave(0, at)[0].real)
+        z += around * circle / 2 * complex(line.per_length.wave(2 * n, at)[0])
+    return Split(n, pair.mode.frequency, mean / 2, complex(z))

@@ -1,0 +1,180 @@
+"""What must hold exactly or to known order: symmetry, invariance, agreement of first order and coupled solve."""
+
+from math import pi
+
+import numpy as np
+import pytest
+
+from shell.elastic import Elastic
+from shell.imperfection import (
+    CoupledHarmonics,
+    Function,
+    Imperfection,
+    LineMass,
+    Map,
+    Pair,
+    PointMass,
+    Sum,
+    find_split,
+    holes,
+    split_ring,
+    teeth,
+    wave,
+)
+from shell.meridian import hemisphere
+from shell.modes import solve_modes
+from shell.resonator import Stem
+
+SILICA = Elastic(72.7e9, 0.17, 2203.0)
+R, H = 15e-3, 0.9e-3
+DOME = hemisphere(radius=R, thickness=H)
+
+
+@pytest.fixture(scope="module")
+def coupled():
+    (mode,) = solve_modes(DOME, SILICA, 2)
+    return CoupledHarmonics(mode, SILICA)
+
+
+@pytest.fixture(scope="module")
+def pair(coupled):
+    return Pair(coupled.mode)
+
+
+@pytest.mark.parametrize("n", [1, 2, 3, 4])
+def test_a_perfect_dome_does_not_split(n):
+    (mode,) = solve_modes(DOME, SILICA, n)
+    assert CoupledHarmonics(mode, SILICA).solve(Imperfection()).relative <= 1e-12
+    assert find_split(Pair(mode), Imperfection()).relative == 0.0
+
+
+def test_a_perfect_dome_on_a_stem_does_not_split_and_even_departures_only_shift():
+    stemmed = hemisphere(radius=R, thickness=H, support="stem", stem=Stem(2.5e-3, -5e-3, 0.5e-3))
+    (mode,) = solve_modes(stemmed, SILICA, 2)
+    coupled = CoupledHarmonics(mode, SILICA)
+    assert coupled.solve(Imperfection()).relative <= 1e-12
+    thicker = coupled.solve(Imperfection(thickness=wave(0, 1e-3 * H), density=wave(0, 1e-3)))
+    assert thicker.relative <= 1e-12
+    assert thicker.shift > 0
+
+
+@pytest.mark.parametrize("name", ["thickness", "outer", "inner", "offset", "density", "modulus", "rim"])
+@pytest.mark.parametrize("n", [1, 2, 3, 4])
+def test_first_order_is_the_limit_of_the_coupled_harmonics(name, n):
+    """They differ by the square of the amplitude; Hadamard's face energies bring the discretisation of the faces."""
+    (mode,) = solve_modes(DOME, SILICA, n, tolerance=1e-7)
+    size = 1.0 if name in ("density", "modulus") else H
+    flaw = Imperfection(**{name: wave(2 * n, 1e-4 * size, azimuth=0.3)})
+    first, whole = find_split(Pair(mode), flaw), CoupledHarmonics(mode, SILICA).solve(flaw)
+    assert abs(whole.wave - first.wave) < 1e-5 * 1e-4  # per unit of amplitude, where a split may be a small difference
+
+
+def test_first_order_is_good_to_5e_5_at_one_per_cent(coupled, pair):
+    """The same discretisation on both sides: the coupled solve at 1 % against its own limit."""
+    small = coupled.solve(Imperfection(thickness=wave(4, 1e-5 * H))).relative / 1e-5
+    one_per_cent = coupled.solve(Imperfection(thickness=wave(4, 1e-2 * H))).relative / 1e-2
+    assert 2e-5 < one_per_cent / small - 1 < 6e-5
+
+
+def test_mean_shift_is_the_frequency_of_the_changed_dome(pair, coupled):
+    for flaw, changed in (
+        (Imperfection(thickness=wave(0, 1e-4 * H)), hemisphere(radius=R, thickness=(1 + 1e-4) * H)),
+        (Imperfection(offset=wave(0, 1e-4 * H)), hemisphere(radius=R + 1e-4 * H, thickness=H)),
+    ):
+        (exact,) = solve_modes(changed, SILICA, 2)
+        wanted = exact.frequency / pair.mode.frequency - 1
+        assert find_split(pair, flaw).shift == pytest.approx(wanted, rel=2e-4)
+        assert coupled.solve(flaw).shift == pytest.approx(wanted, rel=2e-4)
+
+
+def test_the_edge_of_the_rim_moves_as_a_longer_dome_does(pair):
+    longer = hemisphere(radius=R, thickness=H, rim_angle=pi / 2 + 1e-5)
+    (exact,) = solve_modes(longer, SILICA, 2)
+    shift = find_split(pair, Imperfection(rim=wave(0, 1e-5 * R))).shift
+    assert shift == pytest.approx(exact.frequency / pair.mode.frequency - 1, rel=1e-3)
+
+
+@pytest.mark.parametrize("rounds", [1, 2])
+def test_turning_the_imperfection_turns_the_axes_and_nothing_else(coupled, rounds):
+    def flaw(turn):
+        return Imperfection(
+            thickness=Sum(((1.0, wave(1, 0.02 * H, turn)), (1.0, wave(4, 0.01 * H, 0.2 + turn)))),
+            density=wave(3, 0.02, 0.1 + turn),
+            masses=(PointMass(2e-7, turn),),
+        )
+
+    here, there = (coupled.solve(flaw(turn), rounds) for turn in (0.0, 0.7))
+    assert there.relative == pytest.approx(here.relative, rel=1e-7)
+    assert (there.slow_axis - here.slow_axis - 0.7 + pi / 4) % (pi / 2) - pi / 4 == pytest.approx(0.0, abs=1e-7)
+    assert there.shift == pytest.approx(here.shift, rel=1e-7)
+
+
+def test_harmonics_m_and_m_plus_4_act_together_as_their_product(coupled):
+    """Second order: split ∝ a b, along the difference (or sum) of their phases; each alone does nothing."""
+
+    def split(a, b):
+        return coupled.solve(Imperfection(density=Sum(((1.0, wave(1, a, 0.5)), (1.0, wave(3, b, -0.2))))))
+
+    base = split(1e-3, 1e-3)
+    assert split(2e-3, 1e-3).relative == pytest.approx(2 * base.relative, rel=1e-4)
+    assert split(1e-3, 3e-3).relative == pytest.approx(3 * base.relative, rel=1e-4)
+    assert split(1e-3, 0.0).relative < 1e-6 * base.relative
+    phase = np.angle(base.wave) - (1 * 0.5 + 3 * -0.2)  # 1 + 3 = 4
+    assert min(abs(phase % pi), abs(phase % pi - pi)) < 1e-5
+
+
+def test_one_round_errs_in_the_fifth_order(coupled):
+    one, two = (
+        [coupled.solve(Imperfection(thickness=wave(4, e * H)), k).relative / e for e in (0.01, 0.02)] for k in (1, 2)
+    )
+    gaps = [abs(a - b) for a, b in zip(one, two, strict=True)]
+    assert gaps[1] / gaps[0] == pytest.approx(16, rel=0.1)  # the split over ε, of which only even orders are not 0
+    assert gaps[0] < 1e-5
+
+
+def test_point_masses_around_are_a_line_mass(pair):
+    theta = 2 * pi * np.arange(64) / 64
+    profile = 1e-9 * (1 + 0.3 * np.cos(4 * (theta - 0.2)))
+    points = tuple(PointMass(m, a) for m, a in zip(profile, theta, strict=True))
+    per_metre = 64 / (2 * pi * R) * 1e-9
+    line = LineMass(Sum(((1.0, wave(0, per_metre)), (1.0, wave(4, 0.3 * per_metre, 0.2)))))
+    one = find_split(pair, Imperfection(masses=points))
+    other = find_split(pair, Imperfection(lines=(line,)))
+    assert other.wave == pytest.approx(one.wave, rel=1e-10)
+    assert other.shift == pytest.approx(one.shift, rel=1e-10)
+
+
+def test_functions_and_maps_are_their_harmonics(pair):
+    def shape(x, theta):
+        return H * 1e-3 * x**3 * np.cos(4 * (theta - 0.25)) + 1e-6 * np.cos(3 * theta)
+
+    waves = wave(4, 1e-3 * H, 0.25, lambda x: x**3)
+    x, theta = np.linspace(0, 1, 41), 2 * pi * np.arange(72) / 72 + 0.01
+    expected = find_split(pair, Imperfection(thickness=waves)).wave
+    function = find_split(pair, Imperfection(thickness=Function(shape))).wave
+    table = find_split(pair, Imperfection(thickness=Map(x, theta, shape(x[:, None], theta)))).wave
+    assert function == pytest.approx(expected, rel=1e-12)
+    assert table == pytest.approx(expected, rel=1e-6)
+
+
+def test_equal_teeth_do_not_split_but_a_heavy_one_does(pair):
+    equal = Imperfection(rim=teeth(36, pi / 36, 0.3e-3))
+    assert find_split(pair, equal).relative < 1e-15
+    errors = np.zeros(36)
+    errors[5] = 0.1
+    one = find_split(pair, Imperfection(rim=teeth(36, pi / 36, 0.3e-3, errors=tuple(errors))))
+    assert one.relative > 1e-7
+    assert one.slow_axis == pytest.approx(2 * pi * 5 / 36 % (pi / 2), abs=1e-9)
+
+
+def test_holes_four_waves_apart_make_their_azimuth_light(pair):
+    drilled = Imperfection(masses=holes(4, 0.2e-3, H, SILICA.rho, 0.98, azimuth=0.1))
+    split = find_split(pair, drilled)
+    assert split.fast_axis == pytest.approx(0.1, abs=1e-9)
+    assert split.shift > 0
+
+
+def test_the_split_ring_is_the_first_order_of_any_n():
+    for n in (2, 3, 4):
+        expected = (n**2 - 1) / (2 * (n**2 + 1))
+        assert split_ring(n, wave(2 * n, 1e-5, 0.1)).relative / 1e-5 == pytest.approx(expected, rel=1e-6)

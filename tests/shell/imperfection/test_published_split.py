@@ -1,0 +1,117 @@
+"""Splits of a ring and of a free hemisphere against numbers computed elsewhere: Hadamard, coupled harmonics, 3-D finite elements."""
+
+from math import log, pi
+
+import numpy as np
+import pytest
+
+from shell.elastic import Elastic
+from shell.imperfection import (
+    CoupledHarmonics,
+    Imperfection,
+    Pair,
+    PointMass,
+    Sum,
+    find_split,
+    ring_frequency,
+    split_ring,
+    wave,
+)
+from shell.inertia import weigh
+from shell.meridian import hemisphere
+from shell.modes import solve_modes
+
+SILICA = Elastic(72.7e9, 0.17, 2203.0)
+R, H = 15e-3, 0.9e-3
+
+
+@pytest.fixture(scope="module")
+def dome():
+    """The free hemisphere of 15 mm x 0.9 mm, n = 2, to 1e-9."""
+    (mode,) = solve_modes(hemisphere(radius=R, thickness=H), SILICA, 2, tolerance=1e-9)
+    return Pair(mode)
+
+
+def relative(pair, **flaw):
+    """(f_cos - f_sin)/f for waves with their crest at θ = 0."""
+    return find_split(pair, Imperfection(**flaw)).wave.real
+
+
+def test_thickness_splits_the_dome_by_0_36902(dome):
+    assert relative(dome, thickness=wave(4, H)) == pytest.approx(-0.369021, abs=5e-7)
+
+
+def test_density_and_modulus_split_the_dome_as_three_methods_say(dome):
+    assert relative(dome, density=wave(4, 1.0)) == pytest.approx(-0.3608, abs=5e-5)
+    assert relative(dome, modulus=wave(4, 1.0)) == pytest.approx(0.0082, abs=5e-5)
+
+
+def test_thickness_split_of_the_coupled_harmonics_is_the_same():
+    (mode,) = solve_modes(hemisphere(radius=R, thickness=H), SILICA, 2, tolerance=1e-7)
+    split = CoupledHarmonics(mode, SILICA).solve(Imperfection(thickness=wave(4, 1e-4 * H)))
+    assert split.wave.real / 1e-4 == pytest.approx(-0.36903, abs=1.5e-5)
+
+
+def test_a_mass_at_the_rim_lowers_the_mode_with_its_antinode_there_by_1077_ppm_per_mg_the_other_by_233(dome):
+    split = find_split(dome, Imperfection(masses=(PointMass(1e-6, azimuth=0.4),)))
+    slow, fast = (1e6 * (f / split.frequency - 1) for f in split.frequencies)
+    assert slow == pytest.approx(-1077, abs=0.5)
+    assert fast == pytest.approx(-233, abs=0.5)
+    assert split.slow_axis == pytest.approx(0.4, abs=1e-12)
+
+
+def test_split_times_dome_mass_over_rim_mass_is_2_3677(dome):
+    mass = weigh(dome.resonator, SILICA.rho).mass
+    split = find_split(dome, Imperfection(masses=(PointMass(1e-9, 0.0),)))
+    assert split.relative * mass / 1e-9 == pytest.approx(2.3677, abs=6e-5)
+
+
+def test_a_dome_of_4432_hz_splits_by_3_91_hz_per_mg():
+    (mode,) = solve_modes(hemisphere(radius=R, thickness=0.8558e-3), SILICA, 2)
+    pair = Pair(mode)
+    split = find_split(pair, Imperfection(masses=(PointMass(1e-6, 0.0),)))
+    assert split.hertz == pytest.approx(3.91, abs=5e-3)
+    for hertz, mass in ((0.020, 5.1e-9), (0.0005, 0.13e-9)):  # 20 mHz is 5.1 µg, 0.5 mHz is 0.13 µg
+        assert find_split(pair, Imperfection(masses=(PointMass(mass, 0.0),))).hertz == pytest.approx(hertz, rel=0.02)
+
+
+def test_rim_mass_goes_to_rayleighs_limit_4_over_j2_as_the_wall_thins():
+    """Split · M/(f m) -> 4/J₂ = 2.61505 like √(h/R), as the frequency does."""
+    J = 20 * log(2) - 37 / 3
+    found = []
+    for ratio in (4e-4, 1e-4):
+        resonator = hemisphere(radius=R, thickness=ratio * R)
+        (mode,) = solve_modes(resonator, SILICA, 2)
+        split = find_split(Pair(mode), Imperfection(masses=(PointMass(1e-12, 0.0),)))
+        found.append(split.relative * weigh(resonator, SILICA.rho).mass / 1e-12)
+    assert 2 * found[1] - found[0] == pytest.approx(4 / J, rel=1e-3)
+    assert abs(found[1] - 4 / J) < abs(found[0] - 4 / J)
+
+
+def test_density_around_a_ring_splits_it_by_0_3():
+    for epsilon, expected, digits in ((1e-3, 0.3, 1e-6), (1e-2, 0.3, 5e-6), (3e-2, 0.300005, 1e-6)):
+        split = split_ring(2, wave(4, epsilon))
+        assert split.relative / (1 + split.shift) / epsilon == pytest.approx(expected, abs=digits)
+
+
+def test_a_mass_on_a_ring_splits_it_by_0_6_of_its_share():
+    """Over the lower of the two frequencies."""
+    for share, expected in ((1e-4, 0.59995), (1e-3, 0.59948)):
+        split = split_ring(2, masses=[(share, 0.7)])
+        assert split.hertz / split.frequencies[0] / share == pytest.approx(expected, abs=6e-6)
+
+
+def test_pairs_of_harmonics_split_a_ring_to_second_order():
+    frequency = ring_frequency(2, 20e-3, 0.5e-3, 70e9, 2210.0)
+    assert frequency == pytest.approx(867.2786, abs=5e-5)
+    for one, other, expected in ((1, 3, 0.1500), (1, 5, 0.0500), (3, 7, 0.00502)):
+        both = Sum(((1.0, wave(one, 1e-2)), (1.0, wave(other, 1e-2))))
+        split = split_ring(2, both, frequency=frequency)
+        assert split.hertz / frequency / 1e-4 == pytest.approx(expected, rel=2e-3)
+
+
+def test_harmonics_other_than_2n_do_not_split_to_first_order(dome):
+    for m in (1, 2, 3, 5, 6, 8):
+        assert relative(dome, thickness=wave(m, H), density=wave(m, 1.0)) == 0.0
+    assert split_ring(2, masses=[(1e-3, 2 * pi * k / 3) for k in range(3)]).relative < 1e-9  # C3 keeps the pair whole
+    assert np.isclose(split_ring(2, wave(3, 1e-2)).relative, 0.0, atol=1e-9)
