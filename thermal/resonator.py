@@ -12,7 +12,7 @@ import numpy as np
 
 from thermal.errors import ThermalError
 from thermal.meridian import Capacity, MeridianCells, cell_names, describe_meridian, scale
-from thermal.network import Array, Boundary, Conductor, Node, Part, Radiator
+from thermal.network import Array, Boundary, Conductor, Node, Part, Radiator, Source
 
 
 @dataclass(frozen=True)
@@ -40,6 +40,8 @@ class HeatPath:
         Base to housing, exchange area in m².
     chamber_conductance : float
         Housing to chamber, W/K.
+    drive_power : float
+        Heat of the vibration, W, spread evenly over the shell's volume.
     """
 
     cells: MeridianCells
@@ -53,6 +55,7 @@ class HeatPath:
     mount_conductance: float
     mount_exchange: float
     chamber_conductance: float
+    drive_power: float = 0.0
 
     def __post_init__(self) -> None:
         if not 0 <= self.emissivity <= 1:
@@ -89,6 +92,10 @@ def describe_resonator(path: HeatPath) -> list[Part]:
     ]
     if path.mount_exchange:
         parts.append(Radiator("housing", "base", path.mount_exchange))
+    if path.drive_power:
+        share = path.cells.volume / path.cells.volume.sum()
+        names = cell_names(path.cells.count)
+        parts += [Source(name, path.drive_power * float(part)) for name, part in zip(names, share, strict=True)]
     return parts + describe_shell_and_stem(path)
 
 

@@ -22,19 +22,16 @@ def cards(*, json: bool = False) -> int:
         entries = [
             {
                 "name": card.name,
-                "shape": card.content["resonator"]["shape"],
-                "material": card.content["material"]["name"],
-                "note": card.content.get("note", ""),
+                "shape": card.keys("resonator").shape,
+                "material": card.material.name,
+                "note": card.note,
                 "path": card.path,
             }
             for card in found
         ]
         print_json({"schema": "hrg.cards/1", "cards": entries})
         return 0
-    rows = [
-        [c.name, c.content["resonator"]["shape"], c.content["material"]["name"], c.content.get("note", "")]
-        for c in found
-    ]
+    rows = [[c.name, c.keys("resonator").shape, c.material.name, c.note] for c in found]
     print_table("Cards", ["Name", "Shape", "Material", "What is printed, what is illustrative"], rows)
     return 0
 

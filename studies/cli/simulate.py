@@ -22,7 +22,7 @@ def simulate(
     """Run a virtual gyro through a chamber profile and write the record.
 
     The card's optional tables [thermal], [loss], [bias], [noise] and [[effect]] say what the gyro is like; all have
-    defaults (studies/simulation).
+    defaults (studies/instrument/tables).
 
     Parameters
     ----------

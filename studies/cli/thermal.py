@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 def thermal(card: str, profile: str, *, rows: int = 13, json: bool = False) -> int:
     """Show time constants, what decides them, and the temperatures of housing, base, stem and shell in time.
 
-    The heat path is the card's table [thermal] with its defaults (studies/simulation/heat_path.py).
+    The heat path is the card's table [thermal] with its defaults (studies/instrument/tables/thermal.py).
 
     Parameters
     ----------
@@ -37,7 +37,7 @@ def thermal(card: str, profile: str, *, rows: int = 13, json: bool = False) -> i
     from studies.errors import InputError
     from studies.instrument.card import load_card
     from studies.simulation.chamber import ZERO_CELSIUS, check_profile, load_profile
-    from studies.simulation.heat_path import build_network, build_shell_and_stem, cut_shell
+    from studies.simulation.heat_path import build_network, build_shell_and_stem
     from thermal.balance import check_energy
     from thermal.radiative import simulate
     from thermal.relaxation import find_relaxation
@@ -54,7 +54,7 @@ def thermal(card: str, profile: str, *, rows: int = 13, json: bool = False) -> i
     transient = simulate(network, {"chamber": chamber})
     time = np.linspace(chamber.start, chamber.end, rows)
     shown = ["housing", "base", "stem"]
-    mean = shell_weights(transient.nodes, cut_shell(instrument).volume)
+    mean = shell_weights(transient.nodes, instrument.heat_path.cells.volume)
     picks = [[float(node == name) for node in transient.nodes] for name in shown]
     rim = [float(node == transient.nodes[-1]) for node in transient.nodes]
     T = transient.observe(time, np.array([*picks, mean, rim])) - ZERO_CELSIUS

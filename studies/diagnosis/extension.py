@@ -102,8 +102,7 @@ def _calibrate_frequency(instrument: "Instrument", fit: Fit) -> "tuple[Instrumen
     f0 = float(fit.linear.coefficients[0]) + _at_mean_drive(fit)
     factor = (f0 / float(own_law.frequency(np.array([reference]))[0])) ** 2
     modulus = float(instrument.material.value("youngs_modulus", reference)) * factor
-    material = {**instrument.content["material"], "youngs_modulus_GPa": modulus / 1e9}
-    extended = instrument.with_table("material", material)
+    extended = instrument.with_values({"material.youngs_modulus_GPa": modulus / 1e9})
     T = np.linspace(low, high, 61)
     x = T - reference
     law = fit.problem.law
@@ -128,27 +127,20 @@ def _calibrate_lag(instrument: "Instrument", tau: float) -> "Instrument":
     """Scale the mount's conductance and exchange until the resonator's slowest constant behind the housing is `tau`."""
     from scipy.optimize import brentq
 
-    from studies.simulation.heat_path import IDENTIFIED_MOUNT
-    from studies.simulation.virtual_gyro import slowest_lag
+    from studies.simulation.heat_path import build_network, slowest_lag
 
     # one lag and nothing else: what the gyro has beyond it is an effect, and must not be counted twice
-    thermal = {**instrument.table("thermal"), "conductivity_W_per_m_K": WELL_CONDUCTING, "radiation": False, "cells": 1}
-    conductance = float(thermal.get("mount_conductance_W_per_K", IDENTIFIED_MOUNT))
-    exchange = float(thermal.get("mount_exchange_cm2", 10.0))
+    lump = {"conductivity_W_per_m_K": WELL_CONDUCTING, "radiation": False, "cells": 1}
+    mount = ("mount_conductance_W_per_K", "mount_exchange_cm2")
 
     def scaled(log_factor: float) -> "Instrument":
         factor = float(np.exp(log_factor))
-        return instrument.with_table(
-            "thermal",
-            {
-                **thermal,
-                "mount_conductance_W_per_K": conductance * factor,
-                "mount_exchange_cm2": exchange * factor,
-            },
-        )
+        given = {key: getattr(instrument.thermal, key) * factor for key in mount}
+        return instrument.with_values({f"thermal.{key}": value for key, value in (lump | given).items()})
 
     def miss(log_factor: float) -> float:
-        return float(np.log(slowest_lag(scaled(log_factor)) / tau))
+        lag = slowest_lag(build_network(scaled(log_factor)), instrument.reference_temperature)
+        return float(np.log(lag / tau))
 
     low, high = -5.0, 5.0
     if miss(low) * miss(high) > 0:

@@ -209,9 +209,10 @@ def imagine(profiles: Sequence[str], rng: np.random.Generator, card: str | None 
     tau = RESONATOR_LAG
     if card is not None:
         from studies.instrument.card import load_card
-        from studies.simulation.virtual_gyro import slowest_lag
+        from studies.simulation.heat_path import build_network, slowest_lag
 
-        tau = slowest_lag(load_card(card))
+        instrument = load_card(card)
+        tau = slowest_lag(build_network(instrument), instrument.reference_temperature)
     records = []
     for number, words in enumerate(profiles):
         profile = load_profile(words)

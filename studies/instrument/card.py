@@ -1,97 +1,183 @@
-"""Cards: the description of one instrument, `schema = "hrg.card/1"`.
+"""Cards: the description of one instrument, `schema = "hrg.card/1"`, parsed whole when it is loaded.
 
 A card names the resonator's geometry at the reference temperature and its material; the optional tables `[thermal]`,
-`[bias]`, `[loss]`, `[noise]` and `[[effect]]` extend it, and are checked by the part that reads them.
+`[bias]`, `[loss]`, `[noise]` and `[[effect]]` say more, and every file of `studies.instrument.tables` adds one.
 """
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from importlib.resources import files
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
-from studies.errors import InputError, naming
+from studies.errors import InputError, nearest
 from studies.files.reading import find_shipped, list_shipped
-from studies.files.toml import Section, check_number, read_toml
+from studies.files.toml import read_toml
 from studies.files.writing import write_text
+from studies.instrument.dotted import replaced
+from studies.instrument.keys import Table, number
+from studies.instrument.mending import read_keys
+from studies.instrument.registry import Place, ReadTable, card_tables, read_table
+from studies.instrument.uncertain import UncertainValue
 
 if TYPE_CHECKING:
     from shell.elastic import Elastic
     from shell.materials import Material
     from shell.resonator import Resonator
+    from studies.instrument.tables.bias import Bias
+    from studies.instrument.tables.effect import EffectEntry
+    from studies.instrument.tables.loss import Loss
+    from studies.instrument.tables.noise import Noise
+    from studies.instrument.tables.thermal import Thermal
+    from thermal.resonator import HeatPath
 
 SCHEMA = "hrg.card/1"
 ZERO_CELSIUS = 273.15
-KEYS = (
-    "schema",
-    "name",
-    "note",
-    "reference_temperature_degC",
-    "resonator",
-    "material",
-    "thermal",
-    "bias",
-    "loss",
-    "noise",
-    "effect",
-)
-MATERIAL_KEYS = ("name", "law", "file", "youngs_modulus_GPa", "poisson_ratio", "density_kg_m3")
+
+
+class Head(Table, frozen=True, kw_only=True):
+    """The keys of a card outside its tables."""
+
+    schema: str
+    name: str
+    note: str = ""
+    reference_temperature_degC: Annotated[float, number(least=-200.0, most=200.0)] = 20.0
 
 
 @dataclass(frozen=True)
 class Instrument:
-    """One instrument: its card's content, and the resonator and material that follow from it.
+    """One instrument: the typed parts of its card.
 
     Attributes
     ----------
-    name : str
+    name, note : str
     reference_temperature : float, K
         Dimensions and given material values hold here.
+    tables : mapping from table to `ReadTable`
+        What every table says; `part` and the properties below pick from it.
     content : mapping
-        The card as read, in the units of its keys.
+        The card as written, in the units of its keys: for saving, hashing, and names of parameters only.
     path : str
         The file it came from.
     """
 
     name: str
     reference_temperature: float
-    content: Mapping[str, Any] = field(repr=False)
-    path: str = ""
+    tables: Mapping[str, ReadTable] = field(repr=False)
+    note: str = field(default="", repr=False)
+    content: Mapping[str, Any] = field(default_factory=dict, repr=False, compare=False)
+    path: str = field(default="", compare=False)
 
-    @cached_property
+    def part(self, table: str, name: str = "") -> Any:
+        """Return what a table of the card has become; `name` tells the parts of one table apart."""
+        return self.tables[table].parts[name or table]
+
+    def keys(self, table: str, name: str = "") -> Any:
+        """Return the keys of a table as they stand in the card, with their defaults, in the units of their names."""
+        return self.tables[table].keys[name or table]
+
+    @property
     def resonator(self) -> "Resonator":
-        """The resonator at the reference temperature."""
-        from studies.instrument.resonator import build_resonator
+        """The resonator at the reference temperature, SI units."""
+        found: Resonator = self.part("resonator")
+        return found
 
-        return build_resonator(self.content["resonator"], f"{self.path} [resonator]")
+    @property
+    def material(self) -> "Material":
+        """The material over temperature, SI units."""
+        found: Material = self.part("material")
+        return found
+
+    @property
+    def thermal(self) -> "Thermal":
+        """The table `[thermal]` with its defaults."""
+        found: Thermal = self.part("thermal")
+        return found
+
+    @property
+    def bias(self) -> "Bias":
+        """Zero-rate output."""
+        found: Bias = self.part("bias")
+        return found
+
+    @property
+    def loss(self) -> "Loss":
+        """1/Q over temperature."""
+        found: Loss = self.part("loss")
+        return found
+
+    @property
+    def noise(self) -> "Noise":
+        """What a record is read with."""
+        found: Noise = self.part("noise")
+        return found
+
+    @property
+    def effects(self) -> "tuple[EffectEntry, ...]":
+        """The effects that extend the model."""
+        found: tuple[EffectEntry, ...] = self.part("effect", "effects")
+        return found
 
     @cached_property
-    def material(self) -> "Material":
-        """The material over temperature."""
-        return _build_material(self.content["material"], self.path, self.reference_temperature)
+    def heat_path(self) -> "HeatPath":
+        """The heat path from the chamber to the cells of the shell, SI units; built once.
+
+        Raises
+        ------
+        InputError
+            No source states the material's conductivity or heat capacity, and `[thermal]` does not give it.
+        """
+        from studies.instrument.heat_path import build_heat_path
+
+        where = f"{self.path} [thermal]"
+        return build_heat_path(self.thermal, self.resonator, self.material, self.reference_temperature, where)
+
+    @cached_property
+    def uncertain(self) -> tuple[UncertainValue, ...]:
+        """Every number of the card that is not exact, in the card's units: stated so, or by the documentation of its key."""
+        from studies.instrument.material_values import uncertain_of_material
+
+        stated = [value for table in self.tables.values() for value in table.uncertain]
+        return (*stated, *uncertain_of_material(self.material, self.thermal, self.reference_temperature))
 
     def at(self, temperature: float) -> "tuple[Resonator, Elastic]":
         """Return the resonator, grown by its expansion, and its elastic constants at a uniform temperature (K)."""
         growth = float(self.material.growth(temperature, self.reference_temperature))
         return self.resonator.scaled(growth), self.material.elastic(temperature)
 
-    @property
-    def effects(self) -> Sequence[Mapping[str, Any]]:
-        """The `[[effect]]` tables that extend the model."""
-        return list(self.content.get("effect", []))
+    def with_table(self, name: str, raw: Any) -> "Instrument":
+        """Return a new instrument with one table of the card, as it would be written there, replaced or added."""
+        return _reread(self, {**self.content, name: raw}, {name})
 
-    def table(self, name: str) -> Mapping[str, Any]:
-        """Return one of the optional tables (`thermal`, `bias`, `loss`, `noise`); empty when the card has none."""
-        found = self.content.get(name, {})
-        if not isinstance(found, Mapping):
-            raise InputError(f"{self.path}: {name} must be a table ([{name}]).")
-        return found
+    def with_values(self, values: Mapping[str, Any]) -> "Instrument":
+        """Return a new instrument with other values at dotted keys of the card.
 
-    def with_table(self, name: str, content: Any) -> "Instrument":
-        """Return a new instrument with one table replaced or added."""
-        return replace(self, content={**self.content, name: content})
+        Parameters
+        ----------
+        values : mapping from dotted key to value
+            In the card's units: {"thermal.mount_conductance_W_per_K": 0.012}. A plain number leaves the uncertainty beside it as
+            it is; a mapping such as {"value": 0.012, "sd": 0.001} replaces both. Text and lists replace text and lists.
+
+        Raises
+        ------
+        InputError
+            A key that the card cannot have, or a value that it does not allow.
+        """
+        content: Mapping[str, Any] = self.content
+        for name, value in values.items():
+            table = name.split(".")[0]
+            if table not in card_tables():
+                raise InputError(f"{self.path}: no table of a card has the key '{name}'{nearest(table, card_tables())}")
+            try:
+                content = replaced(content, name.split("."), value)
+            except (LookupError, ValueError, TypeError):
+                raise InputError(f"{self.path}: the card has no place '{name}'.") from None
+        return _reread(self, content, {name.split(".")[0] for name in values}) if values else self
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {key: value for key, value in self.__dict__.items() if key not in ("heat_path", "uncertain")}
 
 
 def load_card(card: str | Path) -> Instrument:
@@ -100,26 +186,22 @@ def load_card(card: str | Path) -> Instrument:
     Raises
     ------
     InputError
-        No such card, an unknown key, a value of the wrong type or out of its range.
+        No such card; anywhere in it an unknown key, a value of the wrong type or out of its range.
     """
     path = find_shipped(card, shipped_cards(), "card")
-    content = read_toml(path, SCHEMA)
-    top = Section(content, str(path), KEYS)
-    reference = top.number("reference_temperature_degC", 20.0, least=-200.0, most=200.0) + ZERO_CELSIUS
-    instrument = Instrument(top.text("name"), reference, content, str(path))
-    for name in ("resonator", "material"):
-        if not isinstance(top.raw(name), Mapping):
-            raise InputError(f"{path}: {name} must be a table ([{name}]).")
-    for name in ("thermal", "bias", "loss", "noise"):
-        instrument.table(name)
-    top.text("note", "-")
-    for number, effect in enumerate(top.raw("effect", []), 1) if isinstance(top.raw("effect", []), list) else []:
-        if not isinstance(effect, Mapping) or not isinstance(effect.get("name"), str):
-            raise InputError(f'{path} [[effect]] number {number}: the line name = "..." is missing; add it.')
-    if not isinstance(top.raw("effect", []), list):
-        raise InputError(f"{path}: effect must be an array of tables ([[effect]]).")
-    _ = instrument.material, instrument.resonator
-    return instrument
+    return build_instrument(read_toml(path, SCHEMA), str(path))
+
+
+def build_instrument(content: Mapping[str, Any], path: str = "card") -> Instrument:
+    """Build an instrument from the content of a card; `path` is where material files are looked for, and in messages."""
+    known = (*Head.__struct_fields__, *card_tables())
+    for key in content:
+        if key not in known:
+            raise InputError(f"{path}: unknown key '{key}'{nearest(key, known)}")
+    head = read_keys({key: content[key] for key in Head.__struct_fields__ if key in content}, Head, path)
+    reference = head.reference_temperature_degC + ZERO_CELSIUS
+    bare = Instrument(head.name, reference, {}, head.note, content, path)
+    return _reread(bare, content, set(card_tables()))
 
 
 def save_card(instrument: Instrument, path: str | Path) -> None:
@@ -139,32 +221,14 @@ def shipped_cards() -> dict[str, Path]:
     return list_shipped(Path(str(files("studies"))) / "cards")
 
 
-def _build_material(table: Mapping[str, Any], path: str, reference: float) -> "Material":
-    from shell.materials import constant_material, find_material, read_materials
-
-    section = Section(table, f"{path} [material]", MATERIAL_KEYS)
-    name = section.text("name")
-    given = {
-        key: check_number(table[source], f"{section.where}: {source}", above=0.0 if key != "poisson_ratio" else None)
-        * factor
-        for key, source, factor in (
-            ("youngs_modulus", "youngs_modulus_GPa", 1e9),
-            ("poisson_ratio", "poisson_ratio", 1.0),
-            ("density", "density_kg_m3", 1.0),
-        )
-        if source in table
-    }
-    if "poisson_ratio" in given and not -1 < given["poisson_ratio"] < 0.5:
-        raise InputError(f"{section.where}: poisson_ratio must lie between -1 and 0.5, not {given['poisson_ratio']:g}.")
-    own = Path(path).parent / section.text("file") if "file" in section else None
-    law = section.text("law", "default")
-    with naming(section.where):
-        if own is None and name not in read_materials() and given:
-            missing = [k for k in ("youngs_modulus", "poisson_ratio", "density") if k not in given]
-            if missing:
-                raise InputError(
-                    f"{section.where}: '{name}' is not in the material table, so all of youngs_modulus_GPa,"
-                    f" poisson_ratio and density_kg_m3 must be given; missing: {', '.join(missing)}."
-                )
-            return constant_material(name, **given)
-        return find_material(name, law, own).rescaled(reference, **given)
+def _reread(instrument: Instrument, content: Mapping[str, Any], changed: set[str]) -> Instrument:
+    folder = Path(instrument.path).parent
+    tables = dict(instrument.tables)
+    for name in card_tables():
+        if name in changed:
+            place = Place(f"{instrument.path} [{name}]", folder, instrument.reference_temperature)
+            tables[name] = read_table(name, content.get(name), place)
+    unknown = changed - set(tables)
+    if unknown:
+        raise InputError(f"{instrument.path}: unknown table '{min(unknown)}'{nearest(min(unknown), tables)}")
+    return replace(instrument, tables=tables, content=content)

@@ -6,7 +6,7 @@ judgement that the paper lacks. Gyros are drawn from typical values; nothing is 
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
@@ -102,8 +102,9 @@ def draw_tables(generator: np.random.Generator) -> dict[str, Any]:
 
 def run_gyro(tables: dict[str, Any], profile: str, seed: int) -> BiasRun:
     """Run a gyro through a profile and decimate its record as `hrg fit bias` does a measured one."""
-    card = load_card(CARD)
-    instrument = replace(card, content={**card.content, **tables})
+    instrument = load_card(CARD)
+    for name, table in tables.items():
+        instrument = instrument.with_table(name, table)
     record = simulate_run(instrument, load_profile(profile), ROWS_PER_SECOND, seed, law=_law()).record
     return prepare_run(record["time_s"], record["frequency_Hz"], record["bias_deg_per_h"])
 

@@ -93,8 +93,7 @@ def identify_mount(instrument: "Instrument") -> float:
     weights = cell_weights(instrument, _law(instrument))
 
     def remaining(conductance: float) -> float:
-        table = {**instrument.table("thermal"), "mount_conductance_W_per_K": conductance}
-        changed = instrument.with_table("thermal", table)
+        changed = instrument.with_values({"thermal.mount_conductance_W_per_K": conductance})
         network = build_network(changed, radiation=True)
         row = shell_weights(tuple(node.name for node in network.nodes), weights)
         room = ROOM_degC + ZERO_CELSIUS

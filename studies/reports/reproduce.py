@@ -237,7 +237,7 @@ def _physics(physics: "PhysicsComparison", study: "FrequencyStudy") -> list[Bloc
     return [
         Text(
             f"The card '{physics.instrument.name}' stands for the paper's resonator, whose geometry is not printed:"
-            f" {physics.instrument.content.get('note', '')}"
+            f" {physics.instrument.note}"
         ),
         parts,
         _slope_figure(physics, study),

@@ -4,9 +4,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from studies.instrument.units import UNITS
 from studies.reports import style
 from studies.reports.page import Picture, draw
-from studies.sweeps.parameters import UNITS
 
 if TYPE_CHECKING:
     from studies.sweeps.quantity import Column
@@ -21,7 +21,7 @@ COLOURS = (style.BLUE, style.VERMILION, style.GREEN, style.PURPLE, style.ORANGE,
 def label(name: str, unit: str) -> str:
     """Return a parameter's name without its table and the unit that it carries, and the unit in brackets."""
     words = name.split(".", 1)[-1]
-    suffix = next((suffix for suffix in UNITS if words.endswith(suffix)), "")
+    suffix = max((suffix for suffix in UNITS if words.endswith(suffix)), key=len, default="")
     plain = words.removesuffix(suffix).replace("_", " ").replace(".", " ")
     return plain + ("" if unit == "1" else f" ({unit})")
 

@@ -1,46 +1,16 @@
-"""Noise of a virtual record, from a seeded generator, with levels as they are read off an Allan deviation.
+"""Noise of a virtual record, from a seeded generator, with the levels of the card's table `[noise]`."""
 
-[noise]                              # every key may be left out; a level of 0 switches that noise off
-frequency_white_Hz = 2e-3            # Allan deviation at 1 s
-frequency_flicker_Hz = 2e-4          # flat part of the Allan deviation
-frequency_walk_Hz = 1e-5             # random walk: standard deviation of the change in 1 s
-bias_white_deg_per_rt_h = 0.02       # angle random walk
-bias_flicker_deg_per_h = 0.1         # flat part of the Allan deviation (0.664 of the bias instability)
-bias_walk_deg_per_h_per_rt_h = 0.01  # rate random walk: standard deviation of the change in 1 h
-inverse_q_white = 0.01               # relative, Allan deviation at 1 s
-housing_white_K = 5e-3               # of the housing sensor, Allan deviation at 1 s
-housing_lag_s = 10.0                 # of the housing sensor
-frequency_resolution_Hz = 0.0        # rounding of what is recorded; 0 keeps every digit
-bias_resolution_deg_per_h = 0.0
-housing_resolution_degC = 0.0
-"""
-
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import irfft, next_fast_len
 
-from studies.files.toml import Section
+if TYPE_CHECKING:
+    from studies.instrument.tables.noise import Noise
 
 Array = NDArray[np.float64]
-DEFAULTS = {
-    "frequency_white_Hz": 2e-3,
-    "frequency_flicker_Hz": 2e-4,
-    "frequency_walk_Hz": 1e-5,
-    "bias_white_deg_per_rt_h": 0.02,
-    "bias_flicker_deg_per_h": 0.1,
-    "bias_walk_deg_per_h_per_rt_h": 0.01,
-    "inverse_q_white": 0.01,
-    "housing_white_K": 5e-3,
-    "housing_lag_s": 10.0,
-    "frequency_resolution_Hz": 0.0,
-    "bias_resolution_deg_per_h": 0.0,
-    "housing_resolution_degC": 0.0,
-}
-SILENT = dict.fromkeys(DEFAULTS, 0.0)
 
 
 @dataclass(frozen=True)
@@ -59,23 +29,17 @@ class NoiseLevels:
         return noise
 
 
-def read_noise(table: Mapping[str, Any], where: str) -> dict[str, float]:
-    """Read a `[noise]` table; what it leaves out has its default."""
-    section = Section(table, where, tuple(DEFAULTS))
-    return {key: section.number(key, value, least=0.0) for key, value in DEFAULTS.items()}
-
-
-def frequency_noise(levels: Mapping[str, float]) -> NoiseLevels:
+def frequency_noise(noise: "Noise") -> NoiseLevels:
     """Noise of the frequency, Hz."""
-    return NoiseLevels(levels["frequency_white_Hz"], levels["frequency_flicker_Hz"], levels["frequency_walk_Hz"])
+    return NoiseLevels(noise.frequency_white_Hz, noise.frequency_flicker_Hz, noise.frequency_walk_Hz)
 
 
-def bias_noise(levels: Mapping[str, float]) -> NoiseLevels:
+def bias_noise(noise: "Noise") -> NoiseLevels:
     """Noise of the zero-rate output, deg/h; one hour has 3600 s."""
     return NoiseLevels(
-        60.0 * levels["bias_white_deg_per_rt_h"],
-        levels["bias_flicker_deg_per_h"],
-        levels["bias_walk_deg_per_h_per_rt_h"] / 60.0,
+        60.0 * noise.bias_white_deg_per_rt_h,
+        noise.bias_flicker_deg_per_h,
+        noise.bias_walk_deg_per_h_per_rt_h / 60.0,
     )
 
 

@@ -1,31 +1,30 @@
 """A card and a chamber profile become a record: temperatures, frequency, zero-rate output, loss, noise."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from shell.law import FrequencyLaw
 from studies.errors import InputError, naming
+from studies.instrument.tables.noise import SILENT
 from studies.law import law_of
 from studies.record import Record
-from studies.simulation.bias import read_bias, read_loss
 from studies.simulation.chamber import ZERO_CELSIUS, check_profile
-from studies.simulation.heat_path import build_network, cut_shell, root_to_end
-from studies.simulation.noise import SILENT, bias_noise, frequency_noise, quantise, read_noise, white_noise
+from studies.simulation.heat_path import build_network, slowest_lag
+from studies.simulation.noise import bias_noise, frequency_noise, quantise, white_noise
 from thermal.lag import lag
 from thermal.meridian import cell_names, energy_weights
-from thermal.network import Boundary, Network, Part, assemble
+from thermal.network import Network
 from thermal.profile import Profile
 from thermal.radiative import simulate
-from thermal.relaxation import find_relaxation
 from thermal.transient import Transient
 
 if TYPE_CHECKING:
     from shell.levels import Theory
     from studies.instrument.card import Instrument
+    from studies.instrument.tables.noise import Noise
 
 Array = NDArray[np.float64]
 MOST_ROWS = 40_000_000
@@ -100,22 +99,22 @@ def simulate_run(
     """
     check_profile(profile, instrument)
     time = _rows(profile, rate)
-    levels = read_noise(instrument.table("noise"), f"{instrument.path} [noise]") if noise else dict(SILENT)
+    levels = instrument.noise if noise else SILENT
     network = build_network(instrument)
     transient = simulate(network, {"chamber": profile})
     reached = np.append(profile.value, instrument.reference_temperature)
     low, high = float(reached.min()) - MARGIN, float(reached.max()) + MARGIN
     law = law or law_of(instrument, low, high, theory)
-    true = _respond(instrument, transient, law, time)
+    true = _respond(instrument, network, transient, law, time)
     generator = np.random.default_rng(seed)
     columns = _observe(true, levels, rate, generator)
     columns = {"time_s": time, "chamber_temperature_degC": profile.at(time) - ZERO_CELSIUS, **columns}
     for name, values in columns.items():
         np.round(values, DIGITS[name], out=values)
     resolution = {
-        "frequency_Hz": levels["frequency_resolution_Hz"],
-        "bias_deg_per_h": levels["bias_resolution_deg_per_h"],
-        "housing_temperature_degC": levels["housing_resolution_degC"],
+        "frequency_Hz": levels.frequency_resolution_Hz,
+        "bias_deg_per_h": levels.bias_resolution_deg_per_h,
+        "housing_temperature_degC": levels.housing_resolution_degC,
     }
     record = Record(
         columns,
@@ -138,11 +137,10 @@ def cell_sensitivities(instrument: "Instrument", law: FrequencyLaw) -> Array:
 
 
 def _to_cells(instrument: "Instrument", law: FrequencyLaw, share: Array) -> Array:
-    (s, _, _), length = root_to_end(instrument), instrument.resonator.length
-    from_start = length * (
-        1 - law.along.position if instrument.resonator.support == "clamped-rim" else law.along.position
-    )
-    return energy_weights(cut_shell(instrument), from_start - s[0], share)
+    cells, resonator = instrument.heat_path.cells, instrument.resonator
+    from_start = 1 - law.along.position if resonator.support == "clamped-rim" else law.along.position
+    root = resonator.length - cells.edge[-1]
+    return energy_weights(cells, resonator.length * from_start - root, share)
 
 
 def _observed_rows(instrument: "Instrument", transient: Transient, law: FrequencyLaw) -> Array:
@@ -156,48 +154,47 @@ def _observed_rows(instrument: "Instrument", transient: Transient, law: Frequenc
     return rows
 
 
-def _respond(instrument: "Instrument", transient: Transient, law: FrequencyLaw, time: Array) -> _Noiseless:
+def _respond(
+    instrument: "Instrument", network: Network, transient: Transient, law: FrequencyLaw, time: Array
+) -> _Noiseless:
     T = transient.observe(time, _observed_rows(instrument, transient, law))
     housing, resonator = np.ascontiguousarray(T[:, 0]), np.ascontiguousarray(T[:, 1])
-    changes = _apply_effects(instrument, transient, time, housing, resonator)
+    changes = _apply_effects(instrument, network, time, housing, resonator)
     resonator = resonator + changes.get("resonator_temperature", 0.0)
     reference = instrument.reference_temperature
     # The bias follows the temperature, for which the thermal frequency stands; a spring or a clock moves only the reading.
     thermal = law.frequency(resonator) * np.exp(T[:, 2])
     frequency = thermal + changes.get("frequency_Hz", 0.0)
-    loss = read_loss(instrument.table("loss"), f"{instrument.path} [loss]")
-    inverse_q = loss.at(resonator - reference) + changes.get("inverse_q", 0.0)
+    inverse_q = instrument.loss.at(resonator - reference) + changes.get("inverse_q", 0.0)
     if not (inverse_q > 0).all():
         raise InputError(
             f"{instrument.path} [loss]: 1/Q becomes negative in this profile; correct its slope or curvature."
         )
     change = thermal - float(law.frequency(np.array([reference]))[0])
-    bias_model = read_bias(instrument.table("bias"), f"{instrument.path} [bias]")
-    bias = bias_model.at(change, np.gradient(change, time[1] - time[0]), frequency, inverse_q, law.bryan_factor)
+    rate = np.gradient(change, time[1] - time[0])
+    bias = instrument.bias.at(change, rate, frequency, inverse_q, law.bryan_factor)
     return _Noiseless(time, housing, resonator, frequency, bias + changes.get("bias_deg_per_h", 0.0), inverse_q)
 
 
-def _observe(
-    true: _Noiseless, levels: Mapping[str, float], rate: float, generator: np.random.Generator
-) -> dict[str, Array]:
+def _observe(true: _Noiseless, levels: "Noise", rate: float, generator: np.random.Generator) -> dict[str, Array]:
     """Return the columns as they are read: sensor lag, noise, rounding. The resonator's temperature stays true."""
     count = len(true.time)
-    sensed = lag(true.time, true.housing, levels["housing_lag_s"]) if levels["housing_lag_s"] > 0 else true.housing
-    sensed = sensed + white_noise(count, rate, levels["housing_white_K"], generator) - ZERO_CELSIUS
+    sensed = lag(true.time, true.housing, levels.housing_lag_s) if levels.housing_lag_s > 0 else true.housing
+    sensed = sensed + white_noise(count, rate, levels.housing_white_K, generator) - ZERO_CELSIUS
     frequency = true.frequency + frequency_noise(levels).draw(count, rate, generator)
     bias = true.bias + bias_noise(levels).draw(count, rate, generator)
-    loss = true.inverse_q * (1 + white_noise(count, rate, levels["inverse_q_white"], generator))
+    loss = true.inverse_q * (1 + white_noise(count, rate, levels.inverse_q_white, generator))
     return {
-        "housing_temperature_degC": quantise(sensed, levels["housing_resolution_degC"]),
+        "housing_temperature_degC": quantise(sensed, levels.housing_resolution_degC),
         "resonator_temperature_degC": true.resonator - ZERO_CELSIUS,
-        "frequency_Hz": quantise(frequency, levels["frequency_resolution_Hz"]),
-        "bias_deg_per_h": quantise(bias, levels["bias_resolution_deg_per_h"]),
+        "frequency_Hz": quantise(frequency, levels.frequency_resolution_Hz),
+        "bias_deg_per_h": quantise(bias, levels.bias_resolution_deg_per_h),
         "inverse_q": loss,
     }
 
 
 def _apply_effects(
-    instrument: "Instrument", transient: Transient, time: Array, housing: Array, resonator: Array
+    instrument: "Instrument", network: Network, time: Array, housing: Array, resonator: Array
 ) -> dict[str, Array]:
     """Sum what the card's `[[effect]]` tables add to the resonator's temperature (K) and to the responses."""
     if not instrument.effects:
@@ -212,15 +209,11 @@ def _apply_effects(
         campaign_time=time - time[0],
         housing=housing,
         resonator=resonator,
-        tau=slowest_lag(instrument),
+        tau=slowest_lag(network, reference),
         reference=reference,
     )
-    entries = []
-    for number, effect in enumerate(instrument.effects, 1):
-        response, parameters = _read_effect(effect, f"{instrument.path} [[effect]] number {number}")
-        entries.append((effect["name"], response, parameters))
     with naming(f"{instrument.path} [[effect]]"):
-        return apply_effects(entries, states)
+        return apply_effects([(one.name, one.response, one.parameters) for one in instrument.effects], states)
 
 
 def _idle_effects(instrument: "Instrument") -> tuple[str, ...]:
@@ -230,35 +223,11 @@ def _idle_effects(instrument: "Instrument") -> tuple[str, ...]:
     from studies.diagnosis.effects import find_effect
 
     return tuple(
-        f"the effect '{effect['name']}' adds nothing: a virtual run does not move its drive"
-        f" ({', '.join(find_effect(effect['name']).needs)})."
+        f"the effect '{effect.name}' adds nothing: a virtual run does not move its drive"
+        f" ({', '.join(find_effect(effect.name).needs)})."
         for effect in instrument.effects
-        if find_effect(effect["name"]).needs
+        if find_effect(effect.name).needs
     )
-
-
-def slowest_lag(instrument: "Instrument") -> float:
-    """Slowest time constant (s) of the resonator behind its housing."""
-    network = build_network(instrument)
-    parts: list[Part] = [Boundary("housing")]
-    parts += [node for node in network.nodes if node.name != "housing"]
-    parts += [link for link in network.conductors if "chamber" not in (link.one, link.other)]
-    parts += network.radiators
-    return float(find_relaxation(assemble(parts), instrument.reference_temperature).time_constants[0])
-
-
-def _read_effect(effect: Mapping[str, Any], where: str) -> tuple[str, dict[str, float]]:
-    from studies.diagnosis.effects import find_effect
-    from studies.files.toml import check_number
-
-    with naming(where):
-        known = find_effect(effect["name"])
-    response = effect.get("response", known.responses[0])
-    if not isinstance(response, str):
-        raise InputError(f"{where}: response must be text in quotes, not {response!r}.")
-    return response, {
-        key: check_number(value, f"{where}: {key}") for key, value in effect.items() if key not in ("name", "response")
-    }
 
 
 def _rows(profile: Profile, rate: float) -> Array:

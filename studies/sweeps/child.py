@@ -111,8 +111,6 @@ def ask(function: str, limit: float, case: "Case") -> float:
     """
     instrument = case.instrument
     request = {
-        "name": instrument.name,
-        "reference_temperature": instrument.reference_temperature,
         "content": instrument.content,
         "path": instrument.path,
         "parameters": dict(case.parameters),
@@ -192,11 +190,11 @@ def _hash_source(call: Any) -> str:
 def _answer(function: str, call: Any, request: dict[str, Any]) -> dict[str, Any]:
     import math
 
-    from studies.instrument.card import Instrument
+    from studies.instrument.card import build_instrument
 
     parameters = request.pop("parameters")
     try:
-        value = call(Instrument(**request), parameters)
+        value = call(build_instrument(**request), parameters)
         if isinstance(value, bool) or (not isinstance(value, int | float) and not hasattr(value, "__float__")):
             return {"problem": f"{function} returned {value!r:.80}, not a number."}
         value = float(value)

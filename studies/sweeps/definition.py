@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from studies.instrument.card import Instrument
-from studies.sweeps.parameters import unit_of
+from studies.instrument.units import unit_of
 from studies.sweeps.quantity import Column, Quantity
 
 FREE = (

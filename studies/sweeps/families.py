@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from shell.family import Family, FamilyResult, build_family
 from studies.errors import UNUSABLE_INPUT, InputError
 from studies.instrument.card import ZERO_CELSIUS, Instrument
+from studies.instrument.tables.resonator import Cylinder, Hemisphere
 from studies.sweeps.parameters import TEMPERATURE, set_parameters
 from studies.sweeps.row import Row
 
@@ -86,10 +87,9 @@ class _Bodies:
 
 def why_not(study: "Study") -> str:
     """Return why a study cannot be computed through families, or nothing when it can."""
-    card = study.instrument.content["resonator"]
     allowed = {THICKNESS, TEMPERATURE, *(f"material.{key}" for key in ("name", "law", "file"))}
     allowed |= {f"material.{key}" for key in ("youngs_modulus_GPa", "poisson_ratio", "density_kg_m3")}
-    if card["shape"] == "hemisphere":
+    if isinstance(study.instrument.keys("resonator"), Hemisphere):
         allowed.add("resonator.radius_mm")  # the one length beside the thickness
     for parameter in study.parameters:
         if parameter.name not in allowed:
@@ -230,13 +230,14 @@ def _describe(instrument: Instrument, designs: Designs, temperature_degC: float 
     """Return designs as arrays; one material for all that share its parameters."""
     count, reference = len(designs), instrument.reference_temperature
     own = max(value for _, value in instrument.resonator.thickness)
-    table = instrument.content["resonator"]
+    table = instrument.keys("resonator")
+    cup = isinstance(table, Cylinder) and table.bottom_thickness_mm is not None
     h, wall = np.full(count, own), np.zeros((count, 0))
-    if "bottom_thickness_mm" not in table:
+    if not cup:
         h = _column(designs, THICKNESS, 1e3 * own) * 1e-3
     elif THICKNESS in designs[0]:  # a cup's thickness is that of its wall
-        wall = (_column(designs, THICKNESS, 0.0) - table["thickness_mm"])[:, None] * 1e-3 / own
-    at_card = table.get("radius_mm", 1.0)
+        wall = (_column(designs, THICKNESS, 0.0) - table.thickness_mm)[:, None] * 1e-3 / own
+    at_card = getattr(table, "radius_mm", 1.0)
     enlarged = _column(designs, "resonator.radius_mm", at_card) / at_card
     if temperature_degC is None:
         T = _column(designs, TEMPERATURE, reference - ZERO_CELSIUS) + ZERO_CELSIUS

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from studies.instrument.card import Instrument
+from studies.instrument.card import build_instrument
 from studies.sweeps.definition import Study
 from studies.sweeps.design import nominal_design
 from studies.sweeps.engine import make_item
@@ -147,5 +147,5 @@ def open_results(folder: str | Path) -> Results:
     store = open_store(folder)
     about = store.about()
     given = about["instrument"]
-    instrument = Instrument(given["name"], given["reference_temperature"], given["content"], given["path"])
+    instrument = build_instrument(given["content"], given["path"])
     return Results(check_study(about["spec"], instrument, str(folder), about["folder"], about["spec_text"]), store)

@@ -39,17 +39,14 @@ def _extremes(parameter: "Parameter") -> tuple[Any, ...]:
 
 def _build(study: "Study", values: Mapping[str, Any], where: str) -> float:
     """Return the largest thickness over size of the design."""
-    from studies.simulation.heat_path import build_heat_path
-
     words = ", ".join(f"{name} = {value}" for name, value in values.items())
     try:
         instrument = set_parameters(study.instrument, values)
-        resonator, _ = instrument.resonator, instrument.material
         if any(name.startswith("thermal.") for name in values):
-            build_heat_path(instrument)
+            _ = instrument.heat_path
     except UNUSABLE_INPUT as error:
         raise InputError(f"{where}: with {words} the card is not valid: {error}") from error
-    return float(max(h for _, h in resonator.thickness) / resonator.size)
+    return float(max(h for _, h in instrument.resonator.thickness) / instrument.resonator.size)
 
 
 def _check_temperatures(study: "Study", where: str) -> None:

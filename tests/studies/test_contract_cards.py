@@ -7,6 +7,7 @@ import pytest
 from studies.errors import InputError
 from studies.instrument.card import load_card, save_card, shipped_cards
 
+LAG = {"name": "second-lag", "weight": 0.1, "second_time_constant_s": 2000.0}
 HRG = shipped_cards()["hrg-30mm"].read_text(encoding="utf-8")
 
 
@@ -14,7 +15,7 @@ HRG = shipped_cards()["hrg-30mm"].read_text(encoding="utf-8")
 def test_shipped_card_is_complete(name):
     card = load_card(name)
     assert card.name == name
-    assert "llustrative" in card.content["note"]
+    assert "llustrative" in card.note
     elastic = card.material.elastic(card.reference_temperature)
     assert 1e10 < elastic.E < 3e11
     assert card.resonator.length > 0
@@ -114,9 +115,10 @@ def test_saved_card_loads_equal_even_from_another_folder(tmp_path):
     card.write_text(HRG.replace('name = "fused-silica"', 'name = "glass"\nfile = "mine.toml"'), encoding="utf-8")
     first = load_card(card)
     moved = tmp_path / "b" / "card.toml"
-    save_card(first.with_table("effect", [{"name": "second-lag", "weight": 0.1}]), moved)
+    save_card(first.with_table("effect", [LAG]), moved)
     again = load_card(moved)
     assert again.material == first.material
     assert again.resonator == first.resonator
-    assert again.effects == [{"name": "second-lag", "weight": 0.1}]
+    (effect,) = again.effects
+    assert (effect.name, effect.parameters) == ("second-lag", {"weight": 0.1, "second_time_constant_s": 2000.0})
     assert tomllib.loads(moved.read_text())["schema"] == "hrg.card/1"

@@ -4,14 +4,13 @@ import allantools
 import numpy as np
 import pytest
 
+from studies.instrument.tables.noise import Noise
 from studies.simulation.noise import (
-    DEFAULTS,
     NoiseLevels,
     bias_noise,
     flicker_noise,
     quantise,
     random_walk,
-    read_noise,
     white_noise,
 )
 
@@ -46,7 +45,7 @@ def test_flicker_noise_is_flat_at_its_level():
 
 def test_levels_of_the_rate_output_are_in_the_units_of_gyro_data_sheets():
     """Angle random walk N: N/√τ with τ in h; rate random walk K: K √(τ/3)."""
-    levels = dict.fromkeys(DEFAULTS, 0.0) | {"bias_white_deg_per_rt_h": 0.02, "bias_walk_deg_per_h_per_rt_h": 0.5}
+    levels = Noise(bias_white_deg_per_rt_h=0.02, bias_flicker_deg_per_h=0.0, bias_walk_deg_per_h_per_rt_h=0.5)
     both = bias_noise(levels)
     rng = np.random.default_rng(3)
     white = NoiseLevels(white=both.white).draw(400_000, 1.0, rng)
@@ -60,9 +59,3 @@ def test_levels_of_zero_are_silent_and_rounding_rounds():
     assert quantise(np.array([4432.0749, 4432.0751]), 0.01) == pytest.approx([4432.07, 4432.08])
     values = np.array([0.123456789])
     assert quantise(values, 0.0) is values
-
-
-def test_a_table_keeps_the_defaults_of_what_it_leaves_out():
-    levels = read_noise({"frequency_white_Hz": 0}, "card [noise]")
-    assert levels["frequency_white_Hz"] == 0.0
-    assert levels["bias_flicker_deg_per_h"] == DEFAULTS["bias_flicker_deg_per_h"]

@@ -3,9 +3,9 @@
 import pytest
 
 from studies.instrument.card import load_card
+from studies.instrument.tables.thermal import IDENTIFIED_MOUNT
 from studies.papers.settling import FAST, SETTLED, identify_mount, study_settling
 from studies.reports.settling import settling_chapter, soak_sentence
-from studies.simulation.heat_path import IDENTIFIED_MOUNT
 
 
 @pytest.fixture(scope="module")
@@ -23,7 +23,7 @@ def curves(study, network):
 
 
 def test_the_cards_mount_is_the_identified_one(instrument):
-    mount = instrument.table("thermal")["mount_conductance_W_per_K"]
+    mount = instrument.thermal.mount_conductance_W_per_K
     assert mount == pytest.approx(identify_mount(instrument), rel=1e-3)
     assert pytest.approx(mount, rel=1e-2) == IDENTIFIED_MOUNT
 

@@ -1,0 +1,48 @@
+"""Dotted names of a card's keys: `resonator.stem.radius_mm`; a whole number is a place in a list, from 0."""
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+
+def look_up(content: Mapping[str, Any], name: str) -> Any:
+    """Return what stands at a dotted name; of a number with its uncertainty, the number.
+
+    Raises
+    ------
+    LookupError, ValueError, TypeError
+        When nothing stands there.
+    """
+    found: Any = content
+    for word in name.split("."):
+        found = found[int(word)] if isinstance(found, list) else found[word]
+    return found["value"] if isinstance(found, Mapping) and "value" in found else found
+
+
+def replaced(content: Any, path: list[str], value: Any) -> Any:
+    """Return the content with another value at a path; a plain number keeps the uncertainty that stands beside it.
+
+    Raises
+    ------
+    LookupError, ValueError, TypeError
+        When the path leads through something that is neither table nor list.
+    """
+    if not path:
+        if isinstance(content, Mapping) and "value" in content and not isinstance(value, Mapping):
+            return {**content, "value": value}
+        return value
+    if isinstance(content, list):
+        place = int(path[0])
+        return [*content[:place], replaced(content[place], path[1:], value), *content[place + 1 :]]
+    if not isinstance(content, Mapping):
+        raise TypeError(f"{content!r} is neither a table nor a list")
+    return {**content, path[0]: replaced(content.get(path[0], {} if path[1:] else None), path[1:], value)}
+
+
+def names(content: Any, before: str = "") -> Iterator[str]:
+    """Yield the dotted name of every number and text in a table."""
+    items = enumerate(content) if isinstance(content, list) else content.items()
+    for key, value in items:
+        if isinstance(value, Mapping | list) and not (isinstance(value, Mapping) and "value" in value):
+            yield from names(value, f"{before}{key}.")
+        else:
+            yield f"{before}{key}"

@@ -1,0 +1,154 @@
+"""The tables that a card may have: one file each in `studies.instrument.tables`, found by discovery."""
+
+import importlib
+import pkgutil
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from studies.errors import InputError, nearest
+from studies.instrument.keys import describe, known_keys, structs
+from studies.instrument.mending import read_keys
+from studies.instrument.uncertain import UncertainValue, gather_uncertain, split_spreads
+
+TABLES = "studies.instrument.tables"
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where a table stands: "file [table]" for messages, the folder of the card, and its reference temperature (K)."""
+
+    where: str
+    folder: Path
+    reference_temperature: float
+
+
+def _as_it_is(keys: Any, place: Place) -> Any:
+    return keys
+
+
+@dataclass(frozen=True)
+class CardTable:
+    """A table of the card, or some keys of one, and the part of the instrument that it becomes.
+
+    Attributes
+    ----------
+    table : str
+        Its name in the card; several entries may share a table and own different keys of it.
+    keys : type
+        Class of its keys (`keys.Table`), or a union of classes that a tag tells apart.
+    part : str
+        Name of what it becomes in `Instrument.parts`; that of the table unless given.
+    build : callable (keys, place) -> part
+        The part in SI units; the keys themselves where they are the part.
+    required : bool
+        Whether every card must have it.
+    keys_of : callable (raw, where) -> type
+        Only for an array of tables ([[effect]]), whose members differ: the class for one of them.
+    """
+
+    table: str
+    keys: Any = None
+    part: str = ""
+    build: Callable[[Any, Place], Any] = _as_it_is
+    required: bool = False
+    keys_of: Callable[[Mapping[str, Any], str], Any] | None = None
+
+    @property
+    def name(self) -> str:
+        """Name of the part."""
+        return self.part or self.table
+
+
+@dataclass(frozen=True)
+class ReadTable:
+    """What one table of a card says.
+
+    `keys` as they stand in the card and `parts` as built from them, by name of the part; the uncertain numbers.
+    """
+
+    keys: Mapping[str, Any]
+    parts: Mapping[str, Any]
+    uncertain: tuple[UncertainValue, ...]
+
+
+@cache
+def card_tables() -> Mapping[str, tuple[CardTable, ...]]:
+    """Return the entries of every table by its name."""
+    found: dict[str, tuple[CardTable, ...]] = {}
+    package = importlib.import_module(TABLES)
+    for module in pkgutil.iter_modules(package.__path__):
+        entry: CardTable = importlib.import_module(f"{TABLES}.{module.name}").TABLE
+        found[entry.table] = (*found.get(entry.table, ()), entry)
+    return found
+
+
+def read_table(name: str, raw: Any, place: Place) -> ReadTable:
+    """Read one table of a card; an absent one has its defaults.
+
+    Raises
+    ------
+    InputError
+        A key is unknown, missing, of the wrong type or out of its bounds.
+    """
+    entries = card_tables()[name]
+    if entries[0].keys_of is not None:
+        return _read_array(entries[0], raw, place)
+    if raw is None and any(entry.required for entry in entries):
+        raise InputError(f"{place.where}: the table is missing; add it.")
+    if not isinstance(raw, Mapping | None):
+        raise InputError(f"{place.where}: {name} must be a table ([{name}]), not {raw!r:.60}.")
+    bare, spreads = split_spreads(raw or {}, place.where)
+    own = [known_keys(describe(entry.keys), bare) for entry in entries]
+    for key in bare:
+        if not any(key in keys for keys in own) and len(entries) > 1:
+            raise InputError(f"{place.where}: unknown key '{key}'{nearest(key, [k for keys in own for k in keys])}")
+    read: dict[str, Any] = {}
+    parts: dict[str, Any] = {}
+    uncertain: list[UncertainValue] = []
+    for entry, keys in zip(entries, own, strict=True):
+        mine = {key: value for key, value in bare.items() if key in keys or len(entries) == 1}
+        found = read[entry.name] = read_keys(mine, entry.keys, place.where)
+        stated = {path: spread for path, spread in spreads.items() if path[0] in keys}
+        uncertain += gather_uncertain(name, mine, found, entry.keys, stated, place.where)
+        parts[entry.name] = entry.build(found, place)
+    return ReadTable(read, parts, tuple(uncertain))
+
+
+def _read_array(entry: CardTable, raw: Any, place: Place) -> ReadTable:
+    assert entry.keys_of is not None
+    if not isinstance(raw, list | None):
+        raise InputError(f"{place.where}: {entry.table} must be an array of tables ([[{entry.table}]]).")
+    parts, uncertain = [], []
+    for number, member in enumerate(raw or []):
+        where = f"{place.where.removesuffix(f'[{entry.table}]')}[[{entry.table}]] number {number + 1}"
+        if not isinstance(member, Mapping):
+            raise InputError(f"{where}: must be a table, not {member!r:.60}.")
+        bare, spreads = split_spreads(member, where)
+        keys = entry.keys_of(bare, where)
+        read = read_keys(bare, keys, where)
+        uncertain += gather_uncertain(f"{entry.table}.{number}", bare, read, keys, spreads, where)
+        parts.append(entry.build(read, Place(where, place.folder, place.reference_temperature)))
+    return ReadTable({}, {entry.name: tuple(parts)}, tuple(uncertain))
+
+
+def possible_keys(content: Mapping[str, Any]) -> Iterable[str]:
+    """Yield the dotted names of the keys that this card has or may have, those in lists left out."""
+    for table, entries in card_tables().items():
+        raw = content.get(table) or {}
+        for entry in entries if isinstance(raw, Mapping) else ():
+            if entry.keys is not None:
+                yield from _names(describe(entry.keys), raw, table)
+
+
+def _names(node: Any, raw: Any, before: str) -> Iterable[str]:
+    for struct in structs(node, raw):
+        for field in struct.fields:
+            name = f"{before}.{field.encode_name}"
+            inner = raw.get(field.encode_name) if isinstance(raw, Mapping) else None
+            if not structs(field.type):
+                yield name
+            elif inner is not None:
+                yield from _names(field.type, inner, name)

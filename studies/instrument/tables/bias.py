@@ -1,0 +1,91 @@
+"""`[bias]`: the zero-rate output of the gyro.
+
+[bias]                             # every key may be left out
+offset_deg_per_h = 0.0             # ± 10
+damping_anisotropy = 0.01          # Δ(1/τ) over the mean 1/τ = π f/Q; known to a factor of e unless stated
+damping_axis_deg = 0.0             # θ_τ; ± 13: anywhere within half of its period of 45°
+pattern_angle_deg = 22.5           # θ of the standing wave: commanded, exact
+k1_deg_per_h_per_Hz, k2_…_per_Hz2, k3_…_per_Hz3          # ± 1, 0.1, 0.01; HRG paper eqs. (21), (22), with f the
+k4_deg_per_h_s_per_Hz, k5_…_s2_per_Hz2, k6_…_s3_per_Hz3  # change of frequency from the reference temperature and
+k7_deg_per_h_s_per_Hz2, k8_…_s_per_Hz3, k9_…_s2_per_Hz3  # its rate; all 0 unless given, k4 to k9 then exact
+"""
+
+from typing import TYPE_CHECKING, Annotated, Any
+
+from studies.instrument.keys import Table, number
+from studies.instrument.registry import CardTable
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    Array = NDArray[np.float64]
+
+TERMS = {
+    # key: powers of f and of its rate (HRG paper eq. 21)
+    "k1_deg_per_h_per_Hz": (1, 0),
+    "k2_deg_per_h_per_Hz2": (2, 0),
+    "k3_deg_per_h_per_Hz3": (3, 0),
+    "k4_deg_per_h_s_per_Hz": (0, 1),
+    "k5_deg_per_h_s2_per_Hz2": (0, 2),
+    "k6_deg_per_h_s3_per_Hz3": (0, 3),
+    "k7_deg_per_h_s_per_Hz2": (1, 1),
+    "k8_deg_per_h_s_per_Hz3": (2, 1),
+    "k9_deg_per_h_s2_per_Hz3": (1, 2),
+}
+
+
+class Bias(Table, frozen=True, kw_only=True):
+    """Zero-rate output: offset, damping anisotropy, and the paper's polynomial in f and its rate."""
+
+    offset_deg_per_h: Annotated[float, number(sd=10.0)] = 0.0
+    damping_anisotropy: Annotated[float, number(least=0.0, relative_sd=1.0)] = 0.01
+    damping_axis_deg: Annotated[float, number(sd=13.0)] = 0.0
+    pattern_angle_deg: float = 22.5
+    k1_deg_per_h_per_Hz: Annotated[float, number(sd=1.0)] = 0.0
+    k2_deg_per_h_per_Hz2: Annotated[float, number(sd=0.1)] = 0.0
+    k3_deg_per_h_per_Hz3: Annotated[float, number(sd=0.01)] = 0.0
+    k4_deg_per_h_s_per_Hz: float = 0.0
+    k5_deg_per_h_s2_per_Hz2: float = 0.0
+    k6_deg_per_h_s3_per_Hz3: float = 0.0
+    k7_deg_per_h_s_per_Hz2: float = 0.0
+    k8_deg_per_h_s_per_Hz3: float = 0.0
+    k9_deg_per_h_s2_per_Hz3: float = 0.0
+    note: str = ""
+
+    @property
+    def terms(self) -> dict[tuple[int, int], float]:
+        """The polynomial's coefficients that are not 0, by their powers of f and of its rate."""
+        return {powers: k for key, powers in TERMS.items() if (k := getattr(self, key))}
+
+    def at(
+        self,
+        change: "Array",
+        rate: "Array",
+        frequency: "Array",
+        inverse_q: "Array",
+        bryan_factor: float,
+        harmonic: int = 2,
+    ) -> "Array":
+        """Zero-rate output (deg/h).
+
+        B = Δ(1/τ) sin 2n(θ − θ_τ) / (2 n k) (averaged equations of Lynch 1995), 1/τ = π f/Q, plus Σ k fⁱ ḟʲ.
+
+        Parameters
+        ----------
+        change, rate : arrays (N,), Hz and Hz/s
+        frequency, inverse_q : arrays (N,), Hz and 1
+        """
+        import numpy as np
+
+        angle = 2 * harmonic * np.radians(self.pattern_angle_deg - self.damping_axis_deg)
+        spread = self.damping_anisotropy * np.pi * frequency * inverse_q
+        bias: Any = self.offset_deg_per_h + DEG_PER_H * spread * np.sin(angle) / (2 * harmonic * bryan_factor)
+        for (power, rate_power), coefficient in self.terms.items():
+            bias = bias + coefficient * change**power * rate**rate_power
+        return np.asarray(bias)
+
+
+DEG_PER_H = 3600.0 * 180.0 / 3.141592653589793  # of 1 rad/s
+
+TABLE = CardTable("bias", Bias)

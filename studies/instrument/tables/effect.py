@@ -1,0 +1,78 @@
+"""`[[effect]]`: what extends the model of a card beyond its other tables, by the names of the library of effects.
+
+[[effect]]
+name = "second-lag"                # `hrg effects` lists names, parameters and bounds
+response = "frequency_Hz"          # of those that the effect acts on; the first of them unless given
+second_time_constant_s = 20000.0   # every parameter of its shape, within its bounds
+weight = 0.2                       # and at least one of its coefficients
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Annotated, Any, Literal
+
+import msgspec
+
+from studies.errors import InputError, naming
+from studies.instrument.keys import Table, number
+from studies.instrument.registry import CardTable, Place
+
+
+@dataclass(frozen=True)
+class EffectEntry:
+    """One `[[effect]]` of a card: the effect, the response it changes, and its parameters by name."""
+
+    name: str
+    response: str
+    parameters: Mapping[str, float]
+
+
+def keys_of(raw: Mapping[str, Any], where: str) -> Any:
+    """Return the class of an entry's keys, from what the effect says of itself."""
+    from studies.diagnosis.effects import find_effect
+
+    name = raw.get("name")
+    if not isinstance(name, str):
+        raise InputError(f'{where}: the line name = "..." is missing; add it.')
+    with naming(where):
+        try:
+            effect = find_effect(name)
+        except InputError as error:
+            raise InputError(f"{where}: {error}") from None
+    response = raw.get("response", effect.responses[0])
+    return _declare(name, response if response in effect.responses else effect.responses[0])
+
+
+@lru_cache(maxsize=256)
+def _declare(name: str, response: str) -> Any:
+    from studies.diagnosis.effects import find_effect
+
+    effect = find_effect(name)
+    fields: list[Any] = [
+        ("name", str),
+        ("response", Literal[effect.responses], effect.responses[0]),
+    ]
+    for shape in effect.shape:
+        kind = Annotated[float, number(least=shape.low, most=shape.high)]
+        fields.append((shape.name, kind, shape.low) if shape.steady else (shape.name, kind))
+    coefficients = effect.coefficient_names(response)
+    weight: Any = Annotated[float, number(least=0.0)] if effect.positive else float
+    fields += [(key, weight | None, None) for key in coefficients]
+
+    def check(entry: Any) -> None:
+        if all(getattr(entry, key) is None for key in coefficients):
+            raise ValueError(f"the effect '{name}' needs a coefficient; add {' or '.join(coefficients)}.")
+
+    return msgspec.defstruct(
+        "Entry", fields, bases=(Table,), namespace={"__post_init__": check}, frozen=True, kw_only=True
+    )
+
+
+def build_entry(keys: Any, place: Place) -> EffectEntry:
+    """Return an entry without the parameters that it leaves out."""
+    given = {key: getattr(keys, key) for key in keys.__struct_fields__ if key not in ("name", "response")}
+    return EffectEntry(keys.name, keys.response, {key: value for key, value in given.items() if value is not None})
+
+
+TABLE = CardTable("effect", part="effects", build=build_entry, keys_of=keys_of)

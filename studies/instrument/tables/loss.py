@@ -1,0 +1,33 @@
+"""`[loss]`: 1/Q of the drive mode over temperature.
+
+[loss]                             # every key may be left out
+inverse_q = 1e-7                   # at the reference temperature; known to a factor of e unless stated
+slope_per_K = 4e-3                 # relative; ± 4e-3
+curvature_per_K2 = 0.0             # relative; ± 4e-5
+"""
+
+from typing import TYPE_CHECKING, Annotated, Any
+
+from studies.instrument.keys import Table, number
+from studies.instrument.registry import CardTable
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+
+class Loss(Table, frozen=True, kw_only=True):
+    """1/Q = q₀ (1 + a x + b x²), x = T − T_ref (K)."""
+
+    inverse_q: Annotated[float, number(above=0.0, relative_sd=1.0)] = 1e-7
+    slope_per_K: Annotated[float, number(sd=4e-3)] = 4e-3
+    curvature_per_K2: Annotated[float, number(sd=4e-5)] = 0.0
+    note: str = ""
+
+    def at(self, excess: "NDArray[np.float64]") -> "NDArray[np.float64]":
+        """1/Q at temperatures above the reference (K)."""
+        result: Any = self.inverse_q * (1 + excess * (self.slope_per_K + self.curvature_per_K2 * excess))
+        return result  # type: ignore[no-any-return]
+
+
+TABLE = CardTable("loss", Loss)

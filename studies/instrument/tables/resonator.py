@@ -1,0 +1,197 @@
+"""`[resonator]`: geometry and support at the reference temperature, in mm and degrees (the forms are in the classes)."""
+
+import math
+from itertools import pairwise
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+import msgspec
+
+from studies.errors import naming
+from studies.instrument.keys import Table, number
+from studies.instrument.registry import CardTable, Place
+
+if TYPE_CHECKING:
+    from shell.resonator import Resonator, Stem, Support
+
+MM = 1e-3
+Length = Annotated[float, number(above=0.0)]
+NotNegative = Annotated[float, number(least=0.0)]
+Share = Annotated[float, number(least=0.0, most=1.0)]
+Thickness = Length | Annotated[list[tuple[Share, Length]], msgspec.Meta(min_length=2)]
+Point = tuple[float, float]
+
+
+class StemKeys(Table, frozen=True, kw_only=True):
+    """`[resonator.stem]`: a solid cylinder on the axis, clamped at `end_mm`; with side "both" at [inner, outer]."""
+
+    radius_mm: Length
+    end_mm: float | Point
+    side: Literal["inner", "outer", "both"] = "inner"
+    fillet_mm: NotNegative = 0.0
+
+    def __post_init__(self) -> None:
+        if isinstance(self.end_mm, tuple) != (self.side == "both"):
+            wanted = "[inner, outer]" if self.side == "both" else "one number"
+            raise ValueError(f"with side = '{self.side}' end_mm must be {wanted}, not {self.end_mm!r}.")
+
+    def build(self) -> "Stem":
+        """Return the stem in SI units."""
+        from shell.resonator import Stem
+
+        ends = (self.end_mm[0] * MM, self.end_mm[1] * MM) if isinstance(self.end_mm, tuple) else self.end_mm * MM
+        return Stem(radius=self.radius_mm * MM, ends=ends, fillet=self.fillet_mm * MM, side=self.side)
+
+
+class Shape(Table, frozen=True, kw_only=True, tag_field="shape"):
+    """What every shape has: a number, or [position, value] pairs that are joined linearly from 0 (start) to 1 (rim)."""
+
+    thickness_mm: Thickness
+
+    def __post_init__(self) -> None:
+        places = [s for s, _ in self.thickness_mm] if isinstance(self.thickness_mm, list) else []
+        if any(b <= a for a, b in pairwise(places)):
+            raise ValueError("thickness_mm: the positions must increase from 0 (start) to 1 (rim).")
+
+    @property
+    def shape(self) -> str:
+        """Name of the shape in the card."""
+        return str(self.__struct_config__.tag)
+
+    @property
+    def thickness(self) -> float | list[tuple[float, float]]:
+        """Thickness in m."""
+        if isinstance(self.thickness_mm, list):
+            return [(s, h * MM) for s, h in self.thickness_mm]
+        return self.thickness_mm * MM
+
+    def build(self) -> "Resonator":
+        """Return the resonator in SI units."""
+        raise NotImplementedError
+
+
+class Stemmed(Shape, frozen=True, kw_only=True):
+    """A dome that may stand on a stem."""
+
+    support: Literal["free", "clamped-pole", "clamped-rim", "stem"] = "free"
+    stem: StemKeys | None = None
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if (self.support == "stem") != (self.stem is not None):
+            raise ValueError("support = 'stem' and a table [resonator.stem] go together; give both or none.")
+
+    @property
+    def held(self) -> "dict[str, Any]":
+        """Support and stem in SI units."""
+        return {"support": self.support, "stem": None if self.stem is None else self.stem.build()}
+
+
+class Hemisphere(Stemmed, frozen=True, kw_only=True, tag="hemisphere"):
+    """A dome of `radius_mm` from the polar angle `pole_angle_deg` (above 0 the pole is open) to `rim_angle_deg`."""
+
+    radius_mm: Length
+    rim_angle_deg: Annotated[float, number(above=0.0, most=180.0)] = 90.0
+    pole_angle_deg: Annotated[float, number(least=0.0, below=180.0)] = 0.0
+
+    def build(self) -> "Resonator":
+        """Return the resonator in SI units."""
+        from shell.meridian import hemisphere
+
+        return hemisphere(
+            radius=self.radius_mm * MM,
+            thickness=self.thickness,
+            rim_angle=math.radians(self.rim_angle_deg),
+            pole_angle=math.radians(self.pole_angle_deg),
+            **self.held,
+        )
+
+
+class Cylinder(Shape, frozen=True, kw_only=True, tag="cylinder"):
+    """A cup (without `bottom_thickness_mm` an open tube) whose lower face is clamped within `clamp_radius_mm`."""
+
+    radius_mm: Length
+    height_mm: Length
+    bottom_thickness_mm: Length | None = None
+    clamp_radius_mm: NotNegative = 0.0
+
+    def build(self) -> "Resonator":
+        """Return the resonator in SI units."""
+        from shell.meridian import cylinder
+
+        return cylinder(
+            radius=self.radius_mm * MM,
+            thickness=self.thickness,
+            height=self.height_mm * MM,
+            bottom_thickness=None if self.bottom_thickness_mm is None else self.bottom_thickness_mm * MM,
+            clamp_radius=self.clamp_radius_mm * MM,
+        )
+
+
+class Bell(Stemmed, frozen=True, kw_only=True, tag="bell"):
+    """Hemisphere, cylinder and hyperbola (BVG paper, eq. 1)."""
+
+    radius_mm: Length
+    cylinder_height_mm: NotNegative
+    hyperbola_height_mm: NotNegative
+    mouth_radius_mm: Length
+
+    def build(self) -> "Resonator":
+        """Return the resonator in SI units."""
+        from shell.meridian import bell
+
+        return bell(
+            radius=self.radius_mm * MM,
+            thickness=self.thickness,
+            cylinder_height=self.cylinder_height_mm * MM,
+            hyperbola_height=self.hyperbola_height_mm * MM,
+            mouth_radius=self.mouth_radius_mm * MM,
+            **self.held,
+        )
+
+
+class LineKeys(Table, frozen=True, kw_only=True, tag_field="kind", tag="line"):
+    """A straight piece of a meridian, [r, z] to [r, z]."""
+
+    from_mm: Point
+    to_mm: Point
+
+
+class ArcKeys(Table, frozen=True, kw_only=True, tag_field="kind", tag="arc"):
+    """A circular piece of a meridian about `center_mm`."""
+
+    from_mm: Point
+    to_mm: Point
+    center_mm: Point
+
+
+class Meridian(Shape, frozen=True, kw_only=True, tag="meridian"):
+    """A middle surface of lines and arcs in order; the support holds the first point or the last."""
+
+    segment: Annotated[list[LineKeys | ArcKeys], msgspec.Meta(min_length=1)]
+    support: Literal["free", "clamped-pole", "clamped-rim"] = "free"
+
+    def build(self) -> "Resonator":
+        """Return the resonator in SI units."""
+        from shell.curves import Arc, Line
+        from shell.meridian import meridian
+
+        def metres(point: Point) -> Point:
+            return point[0] * MM, point[1] * MM
+
+        segments: list[Line | Arc] = [
+            Line(metres(part.from_mm), metres(part.to_mm))
+            if isinstance(part, LineKeys)
+            else Arc.through(metres(part.from_mm), metres(part.to_mm), metres(part.center_mm))
+            for part in self.segment
+        ]
+        support: Support = self.support
+        return meridian(segments, thickness=self.thickness, support=support)
+
+
+def build_resonator(keys: Shape, place: Place) -> "Resonator":
+    """Build the resonator; what the geometry does not allow is named with the card."""
+    with naming(place.where):
+        return keys.build()
+
+
+TABLE = CardTable("resonator", Hemisphere | Cylinder | Bell | Meridian, build=build_resonator, required=True)

@@ -1,0 +1,221 @@
+"""Contract of the typed instrument: one parse of the whole card, values with their uncertainties, and new values of it."""
+
+import json
+import math
+import pickle
+import tomllib
+
+import numpy as np
+import pytest
+import tomli_w
+
+from studies.cli import main
+from studies.errors import InputError
+from studies.instrument.card import build_instrument, load_card, save_card, shipped_cards
+from studies.instrument.registry import card_tables
+
+HRG = tomllib.loads(shipped_cards()["hrg-30mm"].read_text(encoding="utf-8"))
+LAG = {"name": "second-lag", "weight": 0.1, "second_time_constant_s": 2000.0}
+TYPOS = {
+    # table: (content with a typo, what the message names)
+    "head": ({"nmae": "x"}, ["'nmae'", "'name'"]),
+    "resonator": ({"resonator": HRG["resonator"] | {"rim_angel_deg": 90}}, ["[resonator]", "'rim_angle_deg'"]),
+    "stem": (
+        {"resonator": HRG["resonator"] | {"stem": {"radius_m": 2.5, "end_mm": -5}}},
+        ["[resonator.stem]", "'radius_mm'"],
+    ),
+    "material": ({"material": {"name": "fused-silica", "lwa": "default"}}, ["[material]", "'law'"]),
+    "thermal": ({"thermal": {"film_emisivity": 0.03}}, ["[thermal]", "'film_emissivity'"]),
+    "bias": ({"bias": {"ofset_deg_per_h": 1}}, ["[bias]", "'offset_deg_per_h'"]),
+    "loss": ({"loss": {"invers_q": 1e-7}}, ["[loss]", "'inverse_q'"]),
+    "noise": ({"noise": {"frequency_white": 1e-3}}, ["[noise]", "'frequency_white_Hz'"]),
+    "effect": ({"effect": [LAG | {"wieght": 0.1}]}, ["[[effect]] number 1", "'weight'"]),
+    "effect name": ({"effect": [LAG, {"name": "second-leg"}]}, ["[[effect]] number 2", "'second-lag'"]),
+    "uncertainty": ({"thermal": {"cells": {"value": 3, "relativ_sd": 1}}}, ["[thermal]: cells", "'relative_sd'"]),
+}
+COMMANDS = {
+    "modes": ["modes", "CARD"],
+    "tcf": ["tcf", "CARD"],
+    "thermal": ["thermal", "CARD", "soak 20 1h"],
+    "simulate": ["simulate", "CARD", "soak 20 1h", "--out", "OUT"],
+    "render": ["render", "CARD", "--out", "OUT.ply"],
+    "study": ["study", "run", "STUDY", "--out", "OUT", "--card", "CARD"],
+    "diagnose": ["diagnose", "RUN", "--card", "CARD"],
+    "plan": ["diagnose", "--plan", "step 20 -10 5h", "--card", "CARD"],
+    "fit thermal": ["fit", "thermal", "RUN", "--card", "CARD"],
+}
+
+
+@pytest.fixture(scope="module")
+def places(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("typos")
+    spec = {"schema": "hrg.study/1", "name": "s", "card": "hrg-30mm", "sampling": {"method": "grid"}}
+    spec["parameter"] = [{"name": "resonator.radius_mm", "values": [15.0]}]
+    spec["quantity"] = [{"name": "frequency", "theory": "shell"}]
+    (folder / "study.toml").write_text(tomli_w.dumps(spec), encoding="utf-8")
+    rows = "".join(f"{t},20.0,{4432 + 0.01 * math.sin(t):.4f}\n" for t in range(0, 4000, 100))
+    (folder / "run.csv").write_text("time_s,housing_temperature_degC,frequency_Hz\n" + rows, encoding="utf-8")
+    return folder
+
+
+@pytest.mark.parametrize("typo", TYPOS)
+@pytest.mark.parametrize("command", COMMANDS)
+def test_a_typo_in_any_table_is_named_by_every_command_that_loads_the_card(places, capsys, command, typo):
+    content, words = TYPOS[typo]
+    card = places / "card.toml"
+    card.write_text(tomli_w.dumps(HRG | content), encoding="utf-8")
+    files = {"CARD": card, "OUT": places / "out", "OUT.ply": places / "out.ply"}
+    files |= {"STUDY": places / "study.toml", "RUN": places / "run.csv"}
+    status = main([str(files.get(word, word)) for word in COMMANDS[command]])
+    told = capsys.readouterr()
+    assert (status, told.out) == (2, "")
+    for word in [str(card), *words]:
+        assert word in told.err
+    assert "Traceback" not in told.err
+    assert not files["OUT"].exists()
+
+
+@pytest.mark.parametrize(
+    ("table", "words"),
+    [
+        ({"thermal": {"film_emissivity": 1.5}}, "[thermal]: film_emissivity must be at most 1, not 1.5."),
+        ({"thermal": {"film_emissivity": "0.3"}}, "film_emissivity must be a finite number, not '0.3'."),
+        ({"thermal": {"film_emissivity": float("inf")}}, "film_emissivity must be a finite number, not inf."),
+        ({"thermal": {"base_heat_capacity_J_per_K": 10**400}}, "base_heat_capacity_J_per_K must be a finite number"),
+        ({"thermal": {"radiation": 1}}, "radiation must be true or false, not 1."),
+        ({"thermal": {"cells": 2.5}}, "cells must be a whole number, not 2.5."),
+        ({"thermal": 3}, "thermal must be a table ([thermal]), not 3."),
+        ({"effect": {"name": "second-lag"}}, "effect must be an array of tables ([[effect]])"),
+        ({"effect": [{"weight": 1}]}, '[[effect]] number 1: the line name = "..." is missing; add it.'),
+        ({"effect": [{k: v for k, v in LAG.items() if k != "weight"}]}, "needs a coefficient; add weight."),
+        ({"effect": [LAG | {"second_time_constant_s": 1.0}]}, "second_time_constant_s must be at least 20, not 1."),
+        ({"effect": [LAG | {"response": "bias_deg_per_h"}]}, "response = 'bias_deg_per_h' is unknown"),
+        ({"resonator": HRG["resonator"] | {"thickness_mm": [[0, 1], [2, 1]]}}, "thickness_mm.1.0 must be at most 1"),
+        ({"resonator": {"shape": "meridian", "thickness_mm": 1, "segment": [{"kind": "line", "from_mm": [1, 0]}]}},
+         "[[resonator.segment]] number 1: the key 'to_mm' is missing; add it."),
+        ({"resonator": {"radius_mm": 1}}, "[resonator]: the key 'shape' is missing; add it."),
+        ({"thermal": {"cells": {"value": 3}}}, "cells: its uncertainty is missing; give sd, relative_sd, or low and high."),
+        ({"thermal": {"cells": {"sd": 3}}}, "cells: the key 'value' is missing; add it."),
+        ({"loss": {"inverse_q": {"value": 1e-7, "sd": -1e-8}}}, "inverse_q: sd must be at least 0, not -1e-08."),
+        ({"loss": {"inverse_q": {"value": 1e-7, "relative_sd": -0.1}}}, "relative_sd must be at least 0, not -0.1."),
+        ({"loss": {"inverse_q": {"value": 1e-7, "sd": 1e-8, "relative_sd": 0.1}}}, "give sd or relative_sd, not both."),
+        ({"loss": {"inverse_q": {"value": 1e-7, "low": 2e-7, "high": 1e-8}}}, "low must be below high"),
+        ({"loss": {"inverse_q": {"value": 3e-7, "low": 1e-8, "high": 2e-7}}}, "value = 3e-07 lies outside low and high"),
+        ({"loss": {"inverse_q": {"value": 1e-7, "low": -1e-7, "high": 2e-7}}}, "low = -1e-07 lies beyond 0"),
+        ({"loss": {"curvature_per_K2": {"value": 0, "relative_sd": 0.2}}}, "a part of 0 is 0; give sd"),
+    ],
+)  # fmt: skip
+def test_an_unusable_value_is_named_with_its_mend(table, words):
+    with pytest.raises(InputError) as caught:
+        build_instrument(HRG | table, "card.toml")
+    assert words in str(caught.value)
+    assert str(caught.value).startswith("card.toml")
+
+
+@pytest.mark.parametrize("name", sorted(shipped_cards()))
+def test_a_saved_card_loads_equal(tmp_path, name):
+    card = load_card(name)
+    save_card(card, tmp_path / "again.toml")
+    again = load_card(tmp_path / "again.toml")
+    assert again == card
+    assert again.uncertain == card.uncertain
+    assert pickle.loads(pickle.dumps(card)) == card
+
+
+@pytest.mark.parametrize("name", sorted(shipped_cards()))
+def test_every_uncertain_value_can_be_set_saved_and_found_again(tmp_path, name):
+    card = load_card(name)
+    generator = np.random.default_rng(3)
+    drawn = {one.name: one.draw(generator) for one in card.uncertain}
+    other = card.with_values({key: {"value": value, "sd": 1e-3 * abs(value) + 1e-9} for key, value in drawn.items()})
+    save_card(other, tmp_path / "other.toml")
+    found = {one.name: one for one in load_card(tmp_path / "other.toml").uncertain}
+    assert {key: one.value for key, one in found.items()} == drawn
+    assert all(one.sd == pytest.approx(1e-3 * abs(one.value) + 1e-9) for one in found.values())
+    assert load_card(name) == card
+    assert other != card
+
+
+def test_a_stated_uncertainty_replaces_the_documented_one():
+    given = {"value": 0.012, "relative_sd": 0.1, "high": 0.02}
+    card = build_instrument(HRG | {"thermal": {"mount_conductance_W_per_K": given, "mount_exchange_cm2": 4.0}})
+    found = {one.name: one for one in card.uncertain}
+    mount = found["thermal.mount_conductance_W_per_K"]
+    assert (mount.value, mount.sd, mount.low, mount.high) == (0.012, pytest.approx(0.0012), 0.0, 0.02)
+    assert (mount.logarithmic, mount.unit) == (True, "W/K")
+    assert found["thermal.mount_exchange_cm2"].sd == 4.0  # documented as a part of the value
+    assert card.heat_path.mount_conductance == 0.012
+    assert card.heat_path.mount_exchange == pytest.approx(4e-4)
+    even = card.with_values({"thermal.mount_conductance_W_per_K": {"value": 0.02, "low": 0.01, "high": 0.04}})
+    (mount,) = (one for one in even.uncertain if one.name == mount.name)
+    assert mount.sd == pytest.approx(0.03 / math.sqrt(12))
+    exact = card.with_values({"thermal.mount_conductance_W_per_K": {"value": 0.02, "sd": 0.0}})
+    assert mount.name not in {one.name for one in exact.uncertain}
+
+
+def test_any_number_of_any_table_may_be_uncertain():
+    resonator = HRG["resonator"] | {"thickness_mm": [[0, {"value": 0.86, "sd": 0.002}], [1, 0.85]]}
+    resonator["stem"] = HRG["resonator"]["stem"] | {"radius_mm": {"value": 2.5, "relative_sd": 0.01}}
+    effect = LAG | {"weight": {"value": 0.1, "sd": 0.02}}
+    card = build_instrument(HRG | {"resonator": resonator, "effect": [effect]})
+    found = {one.name: one for one in card.uncertain}
+    assert found["resonator.thickness_mm.0.1"].sd == 0.002
+    assert found["resonator.stem.radius_mm"].unit == "mm"
+    assert found["effect.0.weight"].low == -math.inf
+    new = card.with_values({"resonator.thickness_mm.0.1": 0.87, "effect.0.weight": 0.3})
+    assert new.resonator.thickness[0] == (0.0, pytest.approx(0.87e-3))
+    assert new.effects[0].parameters["weight"] == 0.3
+    assert {one.name: one.sd for one in new.uncertain}["resonator.thickness_mm.0.1"] == 0.002
+    assert card.resonator.thickness[0] == (0.0, pytest.approx(0.86e-3))  # never a mutation
+
+
+@pytest.mark.parametrize(
+    "name", ["thermal.film_emisivity", "thermic.cells", "resonator.radius_mm.2", "effect.3.weight"]
+)
+def test_a_value_that_the_card_cannot_have_is_refused(name):
+    with pytest.raises(InputError):
+        load_card("hrg-30mm").with_values({name: 1.0})
+
+
+def test_priors_are_drawn_as_they_are_stated():
+    """A logarithmic value has the median `value`; low and high are never passed."""
+    generator = np.random.default_rng(5)
+    card = build_instrument(HRG | {"thermal": {"film_emissivity": {"value": 0.3, "relative_sd": 0.5, "high": 0.4}}})
+    found = {one.name: one for one in card.uncertain}
+    drawn = [found["thermal.film_emissivity"].draw(generator) for _ in range(500)]
+    assert 0.0 < min(drawn) <= max(drawn) <= 0.4
+    q = [found["loss.inverse_q"].draw(generator) for _ in range(2000)]
+    assert np.median(q) == pytest.approx(1e-7, rel=0.1)
+    assert np.std(np.log(q)) == pytest.approx(1.0, rel=0.1)
+
+
+def test_every_table_documents_its_keys():
+    """What a card may write stands in the docstring of the table's file or class."""
+    import importlib
+
+    from studies.instrument.keys import describe, structs
+
+    for entries in card_tables().values():
+        for entry in entries:
+            for struct in structs(describe(entry.keys)) if entry.keys is not None else ():
+                module = importlib.import_module(struct.cls.__module__)
+                text = module.__doc__ or ""
+                if entry.table == "resonator":
+                    continue
+                stems = [f.encode_name.split("_")[0] for f in struct.fields if f.encode_name != "note"]
+                assert all(stem in text for stem in stems)
+
+
+@pytest.mark.parametrize("name", sorted(shipped_cards()))
+def test_every_shipped_card_works_with_every_command(tmp_path, capsys, name):
+    commands = (
+        ["modes", name, "--theory", "shell"],
+        ["tcf", name, "--theory", "shell"],
+        ["thermal", name, "step 20 10 1h"],
+        ["simulate", name, "step 20 10 1h", "--rate", "0.1", "--theory", "shell", "--out", str(tmp_path / "run.csv")],
+    )
+    for command in commands:
+        status = main([*command, "--json"])
+        told = capsys.readouterr()
+        assert status == 0, told.err
+        assert json.loads(told.out)["schema"] == f"hrg.{command[0]}/1"
