@@ -4,7 +4,7 @@ A block average is the anti-alias filter of stability analysis: its response sin
 multiple of the output rate, and the averages of white noise stay white. Sampling may be irregular.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,7 +14,8 @@ from compensation.errors import CompensationError
 from compensation.samples import check_time
 
 Array = NDArray[np.float64]
-NEIGHBOURS = 7
+REACH = 3
+NEIGHBOURS = 2 * REACH + 1
 SPIKE = 8.0
 
 
@@ -91,25 +92,37 @@ def average_blocks(time: ArrayLike, columns: Mapping[str, ArrayLike], width: flo
 def find_spikes(values: Array) -> NDArray[np.bool_]:
     """Mark samples that stand out from their neighbours by more than 8 robust standard deviations.
 
-    What the neighbours say is the median of (y_{i−k} + y_{i+k})/2, k = 1, 2, 3, which follows any straight trend. The
-    distance from it must exceed 8 times 1.4826 times the median distance of the whole series, and 8 times the distance
-    that is usual next to the sample, so that bends, gaps and jumps are no spikes.
+    What the neighbours say is the median of (y_{i−k} + y_{i+k})/2, k = 1, 2, 3, which follows any straight trend; at the
+    ends of the series that of 2 y_{i+k} − y_{i+2k}, looking inwards. The distance from it must exceed 8 times 1.4826 times
+    the median distance of the whole series, and 8 times the distance that is usual next to the sample, so that bends, gaps
+    and jumps are no spikes.
     """
-    distance = np.abs(values - _median_of_pairs(values, lambda before, after: (before + after) / 2))
+    distance = np.abs(values - _expect(values))
     # A straight ramp is left with the rounding of its own arithmetic, which is no spread.
     distance[distance < 64 * np.finfo(float).eps * np.max(np.abs(values))] = 0.0
-    nearby = _median_of_pairs(distance, np.maximum)
+    padded = np.pad(distance, REACH, mode="reflect")
+    nearby = _middle(*(np.maximum(padded[REACH - k : -REACH - k], _shifted(padded, k)) for k in (1, 2, 3)))
     positive = distance[distance > 0]
     # Rounded readings may have no spread at all: then the smallest distance takes its place.
     spread = max(1.4826 * float(np.median(distance)), float(positive.min()) if positive.size else 1.0)
     return np.asarray(distance > SPIKE * np.maximum(spread, nearby))
 
 
-def _median_of_pairs(values: Array, join: Callable[[Array, Array], Array]) -> Array:
-    """Return the median over k = 1, 2, 3 of join(y_{i−k}, y_{i+k}), the series continued straight at its ends."""
-    reach = NEIGHBOURS // 2
-    padded = np.pad(values, reach, mode="reflect", reflect_type="odd")
-    low, middle, high = (
-        join(padded[reach - k : -reach - k], padded[reach + k : padded.size - reach + k]) for k in (1, 2, 3)
-    )
+def _expect(values: Array) -> Array:
+    """Return what the neighbours of every sample say that it should be."""
+    padded = np.pad(values, REACH, mode="reflect", reflect_type="odd")
+    expected = _middle(*((padded[REACH - k : -REACH - k] + _shifted(padded, k)) / 2 for k in (1, 2, 3)))
+    if values.size > 3 * REACH:
+        for series, ends in ((values, expected), (values[::-1], expected[::-1])):  # views: written through
+            inward = (2 * series[k : REACH + k] - series[2 * k : REACH + 2 * k] for k in (1, 2, 3))
+            ends[:REACH] = _middle(*inward)
+    return expected
+
+
+def _shifted(padded: Array, k: int) -> Array:
+    return padded[REACH + k : padded.size - REACH + k]
+
+
+def _middle(low: Array, middle: Array, high: Array) -> Array:
+    """Return the median of three arrays, entry by entry."""
     return np.asarray(np.maximum(np.minimum(low, middle), np.minimum(np.maximum(low, middle), high)))

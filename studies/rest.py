@@ -34,26 +34,33 @@ class RestData:
     block_s: float
 
 
-def drop_spikes(keep: "NDArray[np.bool_]", *columns: "NDArray[np.float64]") -> "NDArray[np.bool_]":
-    """Return the rows to keep without those in which a column is contradicted by its neighbours.
+def mark_spikes(values: "NDArray[np.float64]") -> "NDArray[np.bool_]":
+    """Mark the readings that their neighbours contradict; missing ones are not marked.
 
-    A smooth column has no noise to measure a spike by; there, one must stand out by a thousandth of the column's span.
+    A smooth column has no noise to measure a spike by; there, one must stand out by a thousandth of the column's span,
+    the spikes themselves left out of it.
     """
     import numpy as np
     from scipy.ndimage import median_filter
 
     from compensation.decimation import NEIGHBOURS, find_spikes
 
-    def mark(values: "NDArray[np.float64]") -> "NDArray[np.bool_]":
-        distance = np.abs(values - median_filter(values, NEIGHBOURS, mode="nearest"))
-        return np.asarray(find_spikes(values) & (distance > LEAST_SPIKE * np.ptp(values)))
-
-    rows = np.flatnonzero(keep)
+    marked, rows = np.zeros(len(values), dtype=bool), np.flatnonzero(np.isfinite(values))
     if len(rows) < NEIGHBOURS:
-        return keep
-    spikes = np.any([mark(column[rows]) for column in columns], axis=0)
+        return marked
+    known = values[rows]
+    smooth = median_filter(known, NEIGHBOURS, mode="mirror")
+    marked[rows] = find_spikes(known) & (np.abs(known - smooth) > LEAST_SPIKE * np.ptp(smooth))
+    return marked
+
+
+def drop_spikes(keep: "NDArray[np.bool_]", *columns: "NDArray[np.float64]") -> "NDArray[np.bool_]":
+    """Return the rows to keep without those in which a column is contradicted by its neighbours."""
+    import numpy as np
+
     cleaned = keep.copy()
-    cleaned[rows[spikes]] = False
+    for column in columns:
+        cleaned &= ~mark_spikes(np.where(keep, column, np.nan))
     return cleaned
 
 

@@ -7,6 +7,7 @@ import numpy as np
 
 from studies.errors import InputError, naming
 from studies.record import Record
+from studies.rest import mark_spikes
 from thermal.followers import make_series
 from thermal.identification import FrequencyLaw, Identification, identify, identify_lags
 from thermal.run import Run
@@ -59,8 +60,11 @@ def _run(record: Record) -> Run:
             f"{record.path}: thermal constants need frequency_Hz and {SENSORS[0]} (or {SENSORS[1]});"
             f" it has {', '.join(record.columns)}."
         )
+    frequency, housing = (
+        np.where(mark_spikes(record[name]), np.nan, record[name]) for name in ("frequency_Hz", sensor)
+    )
     with naming(record.path):
-        return Run(record["time_s"], record["frequency_Hz"], record[sensor] + ZERO_CELSIUS)
+        return Run(record["time_s"], frequency, housing + ZERO_CELSIUS)
 
 
 def _law(runs: Sequence[Run], instrument: "Instrument | None") -> FrequencyLaw:

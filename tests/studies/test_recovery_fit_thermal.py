@@ -43,6 +43,18 @@ def test_one_lag_without_radiation_is_found_with_its_interval(tmp_path, capsys):
     assert "time_constant_1" in capsys.readouterr().out
 
 
+@pytest.mark.parametrize("row", [0, 1, 200, -1])
+@pytest.mark.parametrize("column", ["frequency_Hz", "housing_temperature_degC"])
+def test_one_accidental_reading_does_not_move_the_lag(row, column):
+    """A start-up accident of a real voltmeter's record made a lag of 1.4e6 s out of 6 649 s."""
+    clean = record("step 20 -20 4h then step -20 40 4h")
+    spoilt = clean[column].copy()
+    spoilt[row] *= 4.7
+    found = fit_thermal_constants([clean.with_columns({column: spoilt})], lags=1).estimates["time_constant_1"]
+    assert found.low < 1800.0 < found.high
+    assert found.value == pytest.approx(1800.0, rel=0.01)
+
+
 def test_unusable_records_are_refused(tmp_path, capsys):
     path = tmp_path / "still.csv"
     write_record(record("soak 20 5h"), path)
