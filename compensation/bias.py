@@ -170,11 +170,12 @@ def prepare_run(
         raise CompensationError(
             f"the bias is constant ({blocks.columns['bias'][0]:g}): nothing can be learnt from it; check the column."
         )
-    derivative = differentiate(blocks.time, f, max(window, 3 * width), causal=causal)
+    window = max(window, 3 * width, 2.05 * float(np.median(np.diff(blocks.time))))  # three rows, in bursts too
+    derivative = differentiate(blocks.time, f, window, causal=causal)
     ok = derivative.complete
     if np.count_nonzero(ok) < 3:
         raise CompensationError(
-            f"no stretch of the run fills the window of {max(window, 3 * width):g} s over which the rate is taken; "
+            f"no stretch of the run fills the window of {window:g} s over which the rate is taken; "
             "shorten the window or record longer."
         )
     return BiasRun(
@@ -184,7 +185,7 @@ def prepare_run(
         play=play[ok],
         bias=blocks.columns["bias"][ok],
         width=width,
-        window=max(window, 3 * width),
+        window=window,
         lag=derivative.lag,
         missing=blocks.missing,
         spikes=blocks.spikes,

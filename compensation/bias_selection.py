@@ -20,7 +20,6 @@ from compensation.bias import PARENTS, TERMS, BiasFit, BiasRun, Design, fit_term
 from compensation.coloured import estimate_theta, whiten
 from compensation.errors import CompensationError
 from compensation.memory import NO_MEMORY, Memory
-from compensation.regression import fit_linear
 from compensation.stepwise import Selection, select_stepwise
 
 Array = NDArray[np.float64]
@@ -108,17 +107,13 @@ def choose_memory(prepare: Callable[[Memory], Sequence[BiasRun]]) -> Memory:
         design = Design(runs, float(plain[0].state[0]))
         X = np.column_stack([design.constants, design.candidates])
         theta = estimate_theta(X, design.bias, design.rows, CAUTION) if theta is None else theta
-        left = fit_linear(
-            whiten(X, theta, design.rows), whiten(design.bias, theta, design.rows), _numbers(X), constant=False
-        ).residuals
+        white, bias = whiten(X, theta, design.rows), whiten(design.bias, theta, design.rows)
+        white /= np.maximum(np.linalg.norm(white, axis=0), 1e-300)
+        left = bias - white @ np.linalg.lstsq(white, bias, rcond=1e-10)[0]  # a loop may be a constant in one-way runs
         deviance = left.size * float(np.log(np.mean(left**2))) + WORTH * ((lag > 0) + (play > 0))
         if deviance < least:
             best, least = memory, deviance
     return best
-
-
-def _numbers(X: Array) -> list[str]:
-    return [str(k) for k in range(X.shape[1])]
 
 
 def score_held_out(runs: Sequence[BiasRun], method: Method = "guarded") -> HeldOut:

@@ -34,6 +34,7 @@ from studies.rest import LARGEST_REST, TEMPERATURES, choose_column
 Over = Literal["auto", "frequency", "temperature"]
 Array = NDArray[np.float64]
 METHODS: tuple[Method, ...] = ("guarded", "paper")
+AVERAGING, ROWS = 100.0, 150  # s; rows that a run should leave
 LOWEST_FREQUENCY = 100.0  # Hz
 FEWEST_FOR_ALLAN = 30
 """Samples below which an Allan deviation says nothing."""
@@ -92,8 +93,8 @@ class BiasStudy:
 def study_bias(
     records: Sequence[Record],
     method: Method = "guarded",
-    width: float = 100.0,
-    window: float = 300.0,
+    width: float | None = None,
+    window: float | None = None,
     *,
     causal: bool = False,
     over: Over = "auto",
@@ -108,7 +109,8 @@ def study_bias(
     method : "guarded" or "paper"
         Whose terms `model` takes; both are computed.
     width, window : float
-        Averaging before the fit and window of the frequency's rate, s.
+        Averaging before the fit and window of the rate, s. Unless given, 100 s, less for runs of less than 200 such rows,
+        and three times that.
     causal : bool
         The rate uses past samples only.
     over : "auto", "frequency" or "temperature"
@@ -122,6 +124,8 @@ def study_bias(
         A record that lacks a column or was not at rest; the message names the file.
     """
     output, column = find_output(records), find_state(records, over)
+    width = choose_width(records) if width is None else width
+    window = 3 * width if window is None else window
     variable = FREQUENCY if column == "frequency_Hz" else TEMPERATURE
 
     def prepare(memory: Memory) -> list[BiasRun]:
@@ -172,6 +176,12 @@ def _spectrum(values: Array, step: float) -> Spectrum | None:
         return None
     allan = allan_deviation(values, step)
     return Spectrum(allan, fit_noise(allan))
+
+
+def choose_width(records: Sequence[Record]) -> float:
+    """Return AVERAGING, or what makes ROWS averages of the longest run where that is less (s)."""
+    longest = max(float(np.ptp(record["time_s"])) for record in records)
+    return min(AVERAGING, float(f"{longest / ROWS:.1g}"))
 
 
 def find_output(records: Sequence[Record]) -> str:

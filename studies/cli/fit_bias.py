@@ -9,8 +9,8 @@ if TYPE_CHECKING:
 def fit_bias(
     *data: str,
     method: Literal["guarded", "paper"] = "guarded",
-    average: float = 100.0,
-    window: float = 300.0,
+    average: float | None = None,
+    window: float | None = None,
     causal: bool = False,
     over: Literal["auto", "frequency", "temperature"] = "auto",
     save: str | None = None,
@@ -32,9 +32,9 @@ def fit_bias(
     method : str
         Which selection the saved model takes.
     average : float
-        Seconds that are averaged into one row before the fit.
+        Seconds that are averaged into one row before the fit: 100, or less for a short run.
     window : float
-        Seconds over which the rate of the frequency is taken.
+        Seconds over which the rate is taken: three times the average unless given.
     causal : bool
         Take the rate from past samples only, as firmware must; it lags by half the window.
     over : str

@@ -190,6 +190,8 @@ def name_term(name: str, variable: Variable) -> str:
 def unit_of_term(output: str, name: str, variable: Variable) -> str:
     """Return the unit of the coefficient of a term."""
     unit = variable.unit.replace("°", "deg")
+    if name == "constant":
+        return output
     a, b = TERMS.get(name, (1, 0))
     factors = [*[unit] * a, *[f"({unit}/s)"] * b]
     return f"{output}/{factors[0]}" if len(factors) == 1 else f"{output}/({'*'.join(factors)})"
