@@ -166,6 +166,11 @@ class Material:
             _check_sign(f"material '{self.name}', coefficients of {name}", name, found, span)
         return replace(self, properties={**self.properties, **moved})
 
+    def coefficient(self, key: str) -> float:
+        """Return one coefficient of the deviation, for example `expansion.value`."""
+        name, _, coefficient = key.partition(".")
+        return self.properties[name].deviation[coefficient_names(name).index(coefficient)]
+
     def with_number(self, name: str, number: str, value: float) -> "Material":
         """Return the same material with one number of one property changed."""
         changed = self.properties[name].with_number(number, value)

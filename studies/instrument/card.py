@@ -137,10 +137,20 @@ class Instrument:
     @cached_property
     def uncertain(self) -> tuple[UncertainValue, ...]:
         """Every number of the card that is not exact, in the card's units: stated so, or by the documentation of its key."""
-        from studies.instrument.material_values import uncertain_of_material
+        from studies.instrument.material_values import uncertain_of_heat, uncertain_of_law
 
-        stated = [value for table in self.tables.values() for value in table.uncertain]
-        return (*stated, *uncertain_of_material(self.material, self.thermal, self.reference_temperature))
+        documented = [value for table in self.tables.values() for value in table.uncertain]
+        stated = frozenset[str]().union(*(table.stated for table in self.tables.values()))
+        law = uncertain_of_law(self.material, stated)
+        return (*documented, *law, *uncertain_of_heat(self.material, self.thermal, self.reference_temperature))
+
+    @cached_property
+    def correlation(self) -> Mapping[tuple[str, str], float]:
+        """Prior correlation of pairs of uncertain values; of pairs that it does not have, none."""
+        from studies.instrument.material_values import correlations_of_law
+
+        stated = frozenset[str]().union(*(table.stated for table in self.tables.values()))
+        return correlations_of_law(self.material, {one.name for one in self.uncertain} - stated)
 
     def at(self, temperature: float) -> "tuple[Resonator, Elastic]":
         """Return the resonator, grown by its expansion, and its elastic constants at a uniform temperature (K)."""
@@ -177,7 +187,9 @@ class Instrument:
         return _reread(self, content, {name.split(".")[0] for name in values}) if values else self
 
     def __getstate__(self) -> dict[str, Any]:
-        return {key: value for key, value in self.__dict__.items() if key not in ("heat_path", "uncertain")}
+        return {
+            key: value for key, value in self.__dict__.items() if key not in ("heat_path", "uncertain", "correlation")
+        }
 
 
 def load_card(card: str | Path) -> Instrument:

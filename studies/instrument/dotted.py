@@ -3,6 +3,8 @@
 from collections.abc import Iterator, Mapping
 from typing import Any
 
+from studies.instrument.uncertain import is_spread
+
 
 def look_up(content: Mapping[str, Any], name: str) -> Any:
     """Return what stands at a dotted name; of a number with its uncertainty, the number.
@@ -15,7 +17,7 @@ def look_up(content: Mapping[str, Any], name: str) -> Any:
     found: Any = content
     for word in name.split("."):
         found = found[int(word)] if isinstance(found, list) else found[word]
-    return found["value"] if isinstance(found, Mapping) and "value" in found else found
+    return found["value"] if is_spread(found) else found
 
 
 def replaced(content: Any, path: list[str], value: Any) -> Any:
@@ -27,7 +29,7 @@ def replaced(content: Any, path: list[str], value: Any) -> Any:
         When the path leads through something that is neither table nor list.
     """
     if not path:
-        if isinstance(content, Mapping) and "value" in content and not isinstance(value, Mapping):
+        if is_spread(content) and not isinstance(value, Mapping):
             return {**content, "value": value}
         return value
     if isinstance(content, list):
@@ -42,7 +44,7 @@ def names(content: Any, before: str = "") -> Iterator[str]:
     """Yield the dotted name of every number and text in a table."""
     items = enumerate(content) if isinstance(content, list) else content.items()
     for key, value in items:
-        if isinstance(value, Mapping | list) and not (isinstance(value, Mapping) and "value" in value):
+        if isinstance(value, Mapping | list) and not is_spread(value):
             yield from names(value, f"{before}{key}.")
         else:
             yield f"{before}{key}"

@@ -85,11 +85,18 @@ def _enter(node: inspect.Type, word: str | int, raw: Any) -> inspect.Type | None
             return one.item_type
         if isinstance(word, int) and isinstance(one, inspect.TupleType) and word < len(one.item_types):
             return one.item_types[word]
+        if isinstance(word, str) and isinstance(one, inspect.DictType):
+            return one.value_type
     for struct in structs(node, raw) if isinstance(word, str) else ():
         for field in struct.fields:
             if field.encode_name == word:
                 return field.type
     return None
+
+
+def is_table(node: inspect.Type | None) -> bool:
+    """Return whether a place holds a table, never a number."""
+    return node is not None and any(isinstance(one, inspect.StructType | inspect.DictType) for one in options(node))
 
 
 def known_keys(node: inspect.Type, raw: Any = None) -> list[str]:

@@ -1,12 +1,10 @@
-"""Uncertain values that a card leaves to the material table.
+"""Uncertain values that a card leaves to the material table: the deviation of its law, and the heat values of `[thermal]`."""
 
-The material's law becomes uncertain here: its slope and curvature go by names "material.…" of keys that `[material]` has.
-"""
-
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator, Mapping
 from typing import TYPE_CHECKING
 
 from studies.instrument.heat_path import FROM_MATERIAL
+from studies.instrument.tables.material import GIVEN
 from studies.instrument.uncertain import UncertainValue
 from studies.instrument.units import unit_of
 
@@ -14,14 +12,51 @@ if TYPE_CHECKING:
     from shell.materials import Material
     from studies.instrument.tables.thermal import Thermal
 
+LAW = "material.deviation."
 
-def uncertain_of_material(material: "Material", thermal: "Thermal", reference: float) -> Iterator[UncertainValue]:
+
+def uncertain_of_law(material: "Material", stated: Collection[str]) -> Iterator[UncertainValue]:
+    """Yield the coefficients of the law's deviation that act on the frequency, as uncertain as the material's prior.
+
+    Parameters
+    ----------
+    stated : dotted names whose uncertainty the card states; they are not repeated here, and where it states that of a
+        given value (`material.youngs_modulus_GPa`), the law's own value is exact.
+    """
+    from shell.law import ACTING
+
+    given = {f"{_scaled_by(material, name)}." for key, (name, _) in GIVEN.items() if f"material.{key}" in stated}
+    for name, sd in zip(material.prior.names, material.prior.sd, strict=True):
+        quantity, coefficient = name.split(".")
+        settled = f"{quantity}." in given and coefficient in ("value", "log_value")
+        if quantity in ACTING and LAW + name not in stated and not settled:
+            value = material.coefficient(name)
+            yield UncertainValue(LAW + name, value, float(sd), unit=unit_of(name))
+
+
+def correlations_of_law(material: "Material", names: Collection[str]) -> Mapping[tuple[str, str], float]:
+    """Return the prior correlation of every pair of these names that the material's prior ties together."""
+    found = {}
+    for i, one in enumerate(material.prior.names):
+        for j, other in enumerate(material.prior.names[:i]):
+            correlation = float(material.prior.correlation[i, j])
+            if abs(correlation) > 1e-12 and LAW + one in names and LAW + other in names:
+                found[LAW + other, LAW + one] = correlation
+    return found
+
+
+def uncertain_of_heat(material: "Material", thermal: "Thermal", reference: float) -> Iterator[UncertainValue]:
     """Yield what `[thermal]` takes from the material table, with the uncertainty stated there; `reference` in K."""
     for key, name in FROM_MATERIAL.items():
         law = material.properties.get(name)
         if law is None or getattr(thermal, key) is not None:
             continue
         value = float(material.value(name, reference))
-        sd = law.uncertainty.get("value", 0.0) * abs(value / float(law.numbers.get("value", value)))
+        sd = value * float(law.covariance[0, 0]) ** 0.5
         if sd > 0:
             yield UncertainValue(f"thermal.{key}", value, sd, 0.0, float("inf"), True, unit_of(key))
+
+
+def _scaled_by(material: "Material", name: str) -> str:
+    """Return the property of the law that a given value rescales."""
+    return "shear_modulus" if name == "youngs_modulus" and name not in material.properties else name

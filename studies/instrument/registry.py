@@ -4,7 +4,8 @@ import importlib
 import pkgutil
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, reduce
+from operator import or_
 from pathlib import Path
 from typing import Any
 
@@ -66,12 +67,14 @@ class CardTable:
 class ReadTable:
     """What one table of a card says.
 
-    `keys` as they stand in the card and `parts` as built from them, by name of the part; the uncertain numbers.
+    `keys` as they stand in the card and `parts` as built from them, by name of the part; the uncertain numbers; the dotted
+    names of those whose uncertainty the card states, exact ones among them.
     """
 
     keys: Mapping[str, Any]
     parts: Mapping[str, Any]
     uncertain: tuple[UncertainValue, ...]
+    stated: frozenset[str]
 
 
 @cache
@@ -100,7 +103,8 @@ def read_table(name: str, raw: Any, place: Place) -> ReadTable:
         raise InputError(f"{place.where}: the table is missing; add it.")
     if not isinstance(raw, Mapping | None):
         raise InputError(f"{place.where}: {name} must be a table ([{name}]), not {raw!r:.60}.")
-    bare, spreads = split_spreads(raw or {}, place.where)
+    union = reduce(or_, [entry.keys for entry in entries])
+    bare, spreads = split_spreads(raw or {}, union, place.where)
     own = [known_keys(describe(entry.keys), bare) for entry in entries]
     for key in bare:
         if not any(key in keys for keys in own) and len(entries) > 1:
@@ -114,24 +118,29 @@ def read_table(name: str, raw: Any, place: Place) -> ReadTable:
         stated = {path: spread for path, spread in spreads.items() if path[0] in keys}
         uncertain += gather_uncertain(name, mine, found, entry.keys, stated, place.where)
         parts[entry.name] = entry.build(found, place)
-    return ReadTable(read, parts, tuple(uncertain))
+    return ReadTable(read, parts, tuple(uncertain), _dotted(name, spreads))
 
 
 def _read_array(entry: CardTable, raw: Any, place: Place) -> ReadTable:
     assert entry.keys_of is not None
     if not isinstance(raw, list | None):
         raise InputError(f"{place.where}: {entry.table} must be an array of tables ([[{entry.table}]]).")
-    parts, uncertain = [], []
+    parts, uncertain, stated = [], [], frozenset[str]()
     for number, member in enumerate(raw or []):
         where = f"{place.where.removesuffix(f'[{entry.table}]')}[[{entry.table}]] number {number + 1}"
         if not isinstance(member, Mapping):
             raise InputError(f"{where}: must be a table, not {member!r:.60}.")
-        bare, spreads = split_spreads(member, where)
-        keys = entry.keys_of(bare, where)
+        keys = entry.keys_of(member, where)
+        bare, spreads = split_spreads(member, keys, where)
         read = read_keys(bare, keys, where)
         uncertain += gather_uncertain(f"{entry.table}.{number}", bare, read, keys, spreads, where)
         parts.append(entry.build(read, Place(where, place.folder, place.reference_temperature)))
-    return ReadTable({}, {entry.name: tuple(parts)}, tuple(uncertain))
+        stated |= _dotted(f"{entry.table}.{number}", spreads)
+    return ReadTable({}, {entry.name: tuple(parts)}, tuple(uncertain), stated)
+
+
+def _dotted(name: str, paths: Iterable[tuple[str | int, ...]]) -> frozenset[str]:
+    return frozenset(".".join([name, *map(str, path)]) for path in paths)
 
 
 def possible_keys(content: Mapping[str, Any]) -> Iterable[str]:

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Any
 
 from studies.errors import InputError
-from studies.instrument.keys import Path, Table, bounds, find, number, priors
+from studies.instrument.keys import Path, Table, bounds, find, is_table, number, priors
 from studies.instrument.mending import read_keys, spell_place
 from studies.instrument.units import unit_of
 
@@ -96,19 +96,31 @@ class UncertainValue:
         return self.value
 
 
-def split_spreads(raw: Any, where: str, path: Path = ()) -> tuple[Any, dict[Path, Spread]]:
-    """Return a table with plain numbers in the place of those with uncertainties, and these by their paths."""
+def is_spread(raw: Any) -> bool:
+    """Return whether a value of a card is a number with its uncertainty."""
+    return isinstance(raw, Mapping) and "value" in raw and 1 < len(raw) and set(raw) <= set(SPREAD_KEYS)
+
+
+def split_spreads(raw: Any, keys: Any, where: str) -> tuple[Any, dict[Path, Spread]]:
+    """Return a table with plain numbers in the place of those with uncertainties, and these by their paths.
+
+    `keys` is the class of the table: a mapping is a number with its uncertainty where the class has no table.
+    """
+    return _split(raw, keys, raw, where, ())
+
+
+def _split(raw: Any, keys: Any, table: Any, where: str, path: Path) -> tuple[Any, dict[Path, Spread]]:
     if isinstance(raw, Mapping):
-        if raw and ("value" in raw or set(raw) <= set(SPREAD_KEYS)) and path:
+        if path and ("value" in raw or set(raw) <= set(SPREAD_KEYS)) and not is_table(find(keys, path, table)):
             place = spell_place(where, path)
             spread = read_keys(raw, Spread, place)
             if spread.value == 0 and spread.relative_sd:
                 raise InputError(f"{place}: a part of 0 is 0; give sd instead of relative_sd.")
             return spread.value, {path: spread}
-        pairs = {key: split_spreads(value, where, (*path, key)) for key, value in raw.items()}
+        pairs = {key: _split(value, keys, table, where, (*path, key)) for key, value in raw.items()}
         return {key: bare for key, (bare, _) in pairs.items()}, _joined(found for _, found in pairs.values())
     if isinstance(raw, list):
-        parts = [split_spreads(value, where, (*path, place)) for place, value in enumerate(raw)]
+        parts = [_split(value, keys, table, where, (*path, place)) for place, value in enumerate(raw)]
         return [bare for bare, _ in parts], _joined(found for _, found in parts)
     return raw, {}
 

@@ -10,11 +10,12 @@ UNITS = {
     "_Hz_per_K2": "Hz/K²", "_Hz_per_K": "Hz/K", "_K_per_V2": "K/V²", "_kg_m3": "kg/m³", "_W_per_m_K": "W/(m K)",
     "_J_per_kg_K": "J/(kg K)", "_J_per_K": "J/K", "_W_per_K": "W/K", "_per_K2": "1/K²", "_per_K": "1/K", "_degC": "°C",
     "_GPa": "GPa", "_mm": "mm", "_deg": "°", "_cm2": "cm²", "_mW": "mW", "_Hz": "Hz", "_V": "V", "_K": "K", "_s": "s",
+    "expansion.value": "1/K", "expansion.slope_per_K": "1/K²", "expansion.curvature_per_K2": "1/K³",
 }  # fmt: skip
 
 
 def unit_of(name: str) -> str:
     """Return the unit that the last word of a dotted key carries, or "1"."""
-    words = [word for word in name.split(".") if not word.isdigit()]
-    found = [suffix for suffix in UNITS if words[-1].endswith(suffix)]
+    words = ".".join(word for word in name.split(".") if not word.isdigit())
+    found = [suffix for suffix in UNITS if words.endswith(suffix)]
     return UNITS[max(found, key=len)] if found else "1"

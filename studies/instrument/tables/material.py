@@ -1,14 +1,21 @@
 """`[material]`: an entry of the material table, or given values.
 
-[material]
-name = "fused-silica"       # an entry of the material table
-law = "default"             # which published temperature law
-file = "mine.toml"          # a user's own material table, beside the card
-youngs_modulus_GPa, poisson_ratio, density_kg_m3   # given values at the reference temperature: with a table's name
-# they rescale its law, with any other name they are constant
+    [material]
+    name = "fused-silica"       # an entry of the material table
+    law = "default"             # which published temperature law
+    file = "mine.toml"          # a user's own material table, beside the card
+    youngs_modulus_GPa, poisson_ratio, density_kg_m3   # given values at the reference temperature
+
+    [material.deviation.shear_modulus]                 # of the law, by property; for poisson_ratio and expansion: value,
+    log_value, log_slope_per_K, log_curvature_per_K2   # slope_per_K, curvature_per_K2
+
+Given values rescale the law of a table's name; with any other name they are constant. A deviation is 0 unless given, and as
+uncertain as the material table says ("hrg materials NAME").
 """
 
 from typing import TYPE_CHECKING, Annotated
+
+import msgspec
 
 from studies.errors import InputError, naming
 from studies.instrument.keys import Table, number
@@ -34,6 +41,7 @@ class MaterialKeys(Table, frozen=True, kw_only=True):
     youngs_modulus_GPa: Annotated[float, number(above=0.0)] | None = None
     poisson_ratio: Annotated[float, number(above=-1.0, below=0.5)] | None = None
     density_kg_m3: Annotated[float, number(above=0.0)] | None = None
+    deviation: dict[str, dict[str, float]] = msgspec.field(default_factory=dict)
     note: str = ""
 
 
@@ -51,8 +59,11 @@ def build_material(keys: MaterialKeys, place: Place) -> "Material":
                     f"{place.where}: '{keys.name}' is not in the material table, so all of youngs_modulus_GPa,"
                     f" poisson_ratio and density_kg_m3 must be given; missing: {', '.join(missing)}."
                 )
-            return constant_material(keys.name, **given)
-        return find_material(keys.name, keys.law, own).rescaled(place.reference_temperature, **given)
+            material = constant_material(keys.name, **given)
+        else:
+            material = find_material(keys.name, keys.law, own).rescaled(place.reference_temperature, **given)
+        moved = {f"{name}.{key}": number for name, table in keys.deviation.items() for key, number in table.items()}
+        return material.with_coefficients(moved) if moved else material
 
 
 TABLE = CardTable("material", MaterialKeys, build=build_material, required=True)
