@@ -35,7 +35,12 @@ def build_system(resonator: Resonator, n: int, theory: Theory, level: Level, alo
 
     The elements suit the harmonics `alongside` too, and are the same for all of them.
     """
-    layout = lay_resonator(resonator, n, level, alongside)
+    rigid = 0 if resonator.support != "free" or n > 1 else 2
+    return assemble(resonator, lay_resonator(resonator, n, level, alongside), n, level, rigid)
+
+
+def assemble(resonator: Resonator, layout: Layout, n: int, level: Level, rigid_motions: int = 0) -> System:
+    """Number and tabulate the elements of a layout, its own or one that was extended."""
     groups: list[Group] = []
     rows = Rows()
     ends: dict[tuple[int, int], Tie] = {}
@@ -53,8 +58,7 @@ def build_system(resonator: Resonator, n: int, theory: Theory, level: Level, alo
         cells, inner_rows, size = solid_group(mesh, solid, ties, n, level.block, size)
         groups.append(cells)
         rows.extend(inner_rows)
-    held = resonator.support != "free"
-    return System(tuple(groups), rows.matrix(size), 0 if held or n > 1 else 2, n, level)
+    return System(tuple(groups), rows.matrix(size), rigid_motions, n, level)
 
 
 def lay_resonator(resonator: Resonator, n: int, level: Level, alongside: tuple[int, ...] = ()) -> Layout:

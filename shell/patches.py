@@ -11,7 +11,7 @@ from shell.quadrature import Array
 
 Planar = tuple[Array, Array]
 Path = Callable[[Array], Planar]
-Part = Literal["shell", "root", "stem", "corner"]
+Part = Literal["shell", "root", "stem", "corner", "base"]
 Cell = tuple[tuple[float, float], tuple[float, float], tuple[float, float], tuple[float, float]]
 
 SHRINK = 0.18  # size of one ring of cells around a sharp corner over the ring outside it

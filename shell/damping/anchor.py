@@ -1,0 +1,144 @@
+"""Anchor loss: what a mode sends down its stem into the body that the stem stands on."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from shell.assembly import assemble, lay_resonator
+from shell.blocks import mesh_solid
+from shell.damping.base import lay_half_space
+from shell.damping.radiation import Radiating, Waves, assemble_waves, radiating_mode
+from shell.elastic import Elastic, VaryingElastic
+from shell.errors import ShellError
+from shell.modes import Mode
+from shell.quadrature import Array, legendre
+from shell.resonator import Resonator
+from shell.solution import Solution, total
+from shell.system import ShellGroup, SolidGroup, System
+
+
+def anchor_loss(mode: Mode, elastic: Elastic | VaryingElastic, base: Elastic | None = None) -> Radiating:
+    """The mode on its stem, no longer clamped but standing on an elastic half-space that takes its waves away.
+
+    A mode with n >= 2 has neither force nor moment on the stem, and its motion dies out along it as exp(-1.8 z/a) or faster:
+    what arrives is tiny. The harmonics 0 and 1 arrive as a force; an imperfect resonator has them too (`unbalance_loss`).
+
+    Parameters
+    ----------
+    mode : of a resonator on one stem.
+    elastic : of the resonator, the same everywhere.
+    base : of the half-space; that of the resonator unless given.
+
+    Returns
+    -------
+    Radiating
+        Frequency, 1/Q, and the resonator's share of the motion.
+
+    Raises
+    ------
+    ShellError
+        A resonator without a stem or with two, or with properties that vary.
+    """
+    _, waves = _stand(mode, elastic, base, _solved(mode).system.n)
+    return radiating_mode(waves, mode.frequency)
+
+
+def unbalance_loss(
+    mode: Mode, elastic: Elastic | VaryingElastic, mass: float, order: int = 1, base: Elastic | None = None
+) -> float:
+    """1/Q of the force that a mode with n = 2 puts on its stem because the rim is heavier on one side.
+
+    The rim carries dm/dθ = (m/π) cos kθ, k = 1 or 3, as a point mass m does; moving with the mode it drives the motion of n = 1,
+    which reaches the base: (K₁ - ω² M₁) v = ω² δM u₂ and 1/Q = -Im(vᵀ ω² δM u₂)/(ω² ∫ ρ |u₂|² dV). The square of m counts.
+
+    Parameters
+    ----------
+    mode : with n = 2, of a resonator on one stem, its rim free.
+    elastic, base : as for `anchor_loss`.
+    mass : m, kg.
+    order : k.
+
+    Raises
+    ------
+    ShellError
+        Another harmonic or order, no stem, no free rim.
+    """
+    solution = _solved(mode)
+    if solution.system.n != 2 or order not in (1, 3):
+        raise ShellError("the first or third harmonic of the rim's mass couples a mode with n = 2 to the stem.")
+    system, waves = _stand(mode, elastic, base, 1)
+    assert mode.resonator is not None
+    raw = solution.system.constraint @ solution.vector
+    radial, around, axial = (float(row @ raw) for row in _rim(mode.resonator, solution.system))
+    drive = (radial, around if order == 1 else -around, axial)
+    rows = _rim(mode.resonator, system)
+    load = mass / (2 * np.pi) * (system.constraint.T @ np.einsum("k,kr->r", drive, rows))
+    v = waves.factor(complex(solution.eigenvalue))((solution.eigenvalue * load).astype(complex))
+    return float(-np.imag(v @ load) / total(solution.kinetic))
+
+
+def _solved(mode: Mode) -> Solution:
+    if mode.solution is None or mode.resonator is None or mode.resonator.stem is None:
+        raise ShellError("anchor loss needs a resonator on a stem, solved by theory solid or shell.")
+    return mode.solution
+
+
+def _stand(mode: Mode, elastic: Elastic | VaryingElastic, base: Elastic | None, n: int) -> tuple[System, Waves]:
+    """The resonator on its half-space, for motion of harmonic n at the mode's frequency."""
+    resonator, solution = mode.resonator, _solved(mode)
+    assert resonator is not None
+    assert resonator.stem is not None
+    if len(resonator.stem.roots) != 1 or not isinstance(elastic, Elastic):
+        raise ShellError("anchor loss is computed for one stem of one material.")
+    base = base or elastic
+    ((face, end),) = resonator.stem.roots
+    level = solution.system.level
+    if n < 2:  # what arrives at the base bends its edge: graded cells there, of lower degree
+        level = replace(level, block=4, rings=2)
+    layout = lay_resonator(resonator, n, level)
+    (root, tied), *others = layout.solids
+    radii = _cuts(mesh_solid(root, level.block).points, end)
+    wavelength = float(np.sqrt(base.G / base.rho)) / mode.frequency
+    patches, layer = lay_half_space(radii, end, face < 0, wavelength)
+    far = layer.start + layer.width
+
+    def held(r: float, z: float) -> bool:
+        return abs(r - far) < 1e-9 * far or abs(abs(z - end) - far) < 1e-9 * far
+
+    standing = replace(root, patches=(*root.patches, *patches), held=held)
+    system = assemble(resonator, replace(layout, solids=((standing, tied), *others)), n, level)
+    bases = [
+        np.array([part == "base" for part in group.place.mesh.parts])
+        if isinstance(group, SolidGroup)
+        else np.zeros(0, dtype=bool)
+        for group in system.groups
+    ]
+    return system, assemble_waves(system, (elastic, base), bases, layer)
+
+
+def _cuts(points: Array, end: float) -> list[float]:
+    """Radii where the cells of the stem meet at its end."""
+    r, z = points
+    size = float(r.max())
+    at_end = np.sort(r[abs(z - end) < 1e-9 * size])
+    return [0.0, *at_end[at_end > 1e-9 * size].tolist()]
+
+
+def _rim(resonator: Resonator, system: System) -> list[Array]:
+    """Radial, circumferential and axial motion of the middle surface at the free rim, as rows over the raw unknowns."""
+    group = [one for one in system.groups if isinstance(one, ShellGroup)][-1]
+    if group.place.chain.ends[1] != "free":
+        raise ShellError("an unbalanced rim is a free rim.")
+    orders, element = system.level.through, len(group.unknowns) - 1
+    width = sum(orders) + 3
+    ends = [group.unknowns[element, -width:]]
+    ends += [group.unknowns[k, node * width : (node + 1) * width] for k, node in group.anchors if k == element]
+    along, turned, normal = (np.zeros(system.constraint.shape[0]) for _ in range(3))
+    for unknowns in ends:  # in an anchored element the end is a sum of the anchor and a difference
+        first = 0
+        for row, order in zip((along, turned, normal), orders, strict=True):
+            row[unknowns[first : first + order + 1]] += legendre(order, np.zeros(1)).values[0]
+            first += order + 1
+    rim = resonator.at([resonator.length], len(resonator.segments) - 1)
+    t_r, t_z = float(rim.tangent_r[0]), float(rim.tangent_z[0])
+    return [t_r * along - t_z * normal, turned, t_z * along + t_r * normal]
