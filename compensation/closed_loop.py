@@ -1,0 +1,228 @@
+"""The four loops closed around the averaged wave, sample by sample, and many samples in one exact step.
+
+In the frame of the commanded wave and over its amplitude, antinode and node are P = 1 + p, S (complex), and
+
+    (ṗ, Ṡ) = A (p, S) + C_d c + w,   y = C_p (1 + p, S) + offset + noise,
+
+A the averaged dynamics (`wave`), w what drives the wave from its command: decay, rate, damping and frequency split.
+Between samples the plant is propagated by its matrix exponential with w linear in time, so one sample is a linear map;
+a row of the record is that map to the power of the samples in it. Nothing is lost by the long step, and the noise of the row, with
+all that the loops remember of it, is drawn from its exact covariance.
+
+Channels, in this order: amplitude, phase, rate, quadrature. The phase command is a frequency of the oscillator.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import expm
+
+from compensation.controllers import Loops
+from compensation.electronics import Electronics
+from compensation.errors import CompensationError
+
+Real = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+CHANNELS = ("amplitude", "phase", "rate", "quadrature")
+FOUR = 4
+
+
+@dataclass(frozen=True)
+class ClosedLoop:
+    """One sample of wave and loops as a linear map of the state, and its powers.
+
+    Attributes
+    ----------
+    A : complex (2, 2), 1/s
+        Averaged dynamics in the frame of the wave.
+    pickoff, drive : complex (2, 2)
+        Channels in the frame of the wave.
+    loops : Loops
+    electronics : Electronics
+        For the noise; its channels are those above.
+    turning : bool
+        The wave turns freely (whole angle): the frame follows it, there is no rate loop.
+    """
+
+    A: Complex
+    pickoff: Complex
+    drive: Complex
+    loops: Loops
+    electronics: Electronics
+    turning: bool = False
+
+    @cached_property
+    def places(self) -> dict[str, slice]:
+        """Where the parts of the state stand.
+
+        wave (p, S as real parts), filtered, integral, sent (commands under way, newest first), forcing w and measurement
+        offset with their slopes, sums of the commands and of the wave over the row.
+        """
+        late = self.loops.late[0] + 1
+        sizes = {"wave": 4, "filtered": 4, "integral": 4, "sent": 4 * late, "forcing": 4, "forcing_slope": 4}
+        sizes |= {"offset": 4, "offset_slope": 4, "sum": 4, "wave_sum": 4}
+        places, start = {}, 0
+        for name, size in sizes.items():
+            places[name] = slice(start, start + size)
+            start += size
+        return places
+
+    @property
+    def size(self) -> int:
+        """Length of the state."""
+        return int(self.places["wave_sum"].stop)
+
+    @cached_property
+    def sample(self) -> tuple[Real, Real]:
+        """The map of one sample, and the covariance of the noise that it adds."""
+        T, (late, rest) = self.loops.step, self.loops.late
+        at, N = self.places, self.size
+        rows = np.eye(N)
+
+        def part(name: str) -> Real:
+            return rows[at[name]]
+
+        A, C_p = real_form(self.A), real_form(self.pickoff)
+        active = np.ones(FOUR)
+        if self.turning:
+            active[2] = 0.0
+            A[2, :] = A[:, 2] = 0.0
+        drive = _drive_matrix(self.drive, self.turning)
+        K = np.array([self.loops.gains(name)[0] for name in CHANNELS]) * active
+        K_i = np.array([self.loops.gains(name)[1] for name in CHANNELS]) * active
+        smoothing = self.loops.smoothing
+        seen = C_p @ part("wave") + part("offset")
+        filtered = part("filtered") + smoothing * (seen - part("filtered"))
+        command = -(K[:, None] * filtered + part("integral"))
+        sent = part("sent")
+        newest = np.vstack([command, sent])  # c_n, c_{n−1}, …
+        first, second = newest[4 * (late + 1) : 4 * (late + 2)], newest[4 * late : 4 * (late + 1)]
+        whole, early = _held_maps(A, T), _held_maps(A, T - rest)
+        before = expm(A * (T - rest)) @ _held_maps(A, rest)[1]
+        wave = whole[0] @ part("wave") + whole[1] @ part("forcing") + whole[2] @ part("forcing_slope")
+        wave += before @ drive @ first + early[1] @ drive @ second
+        F = np.zeros((N, N))
+        F[at["wave"]] = wave
+        F[at["filtered"]] = filtered
+        F[at["integral"]] = part("integral") + (K_i * T)[:, None] * filtered
+        F[at["sent"]] = newest[: sent.shape[0]]
+        for name in ("forcing", "offset"):
+            F[at[name]] = part(name) + T * part(f"{name}_slope")
+            F[at[f"{name}_slope"]] = part(f"{name}_slope")
+        F[at["sum"]] = part("sum") + command
+        F[at["wave_sum"]] = part("wave_sum") + part("wave")
+        noise = self.electronics.noise
+        reading = np.zeros((N, FOUR))
+        reading[at["filtered"]] = smoothing * np.eye(FOUR)
+        reading[at["integral"]] = np.diag(K_i * T * smoothing)
+        reading[at["sum"]] = np.diag(-K * smoothing)
+        reading[at["sent"].start : at["sent"].start + 4] = np.diag(-K * smoothing)
+        if late == 0:  # a command acts in the sample that made it
+            reading[at["wave"]] = early[1] @ drive @ np.diag(-K * smoothing)
+        force = np.zeros((N, FOUR))
+        force[at["wave"]] = whole[1] @ drive
+        heat = np.zeros((N, FOUR))
+        heat[at["wave"]] = np.diag(active) if self.turning else np.eye(FOUR)
+        covariance = (
+            noise.measurement_variance(self.loops.sampling) * reading @ reading.T
+            + noise.command_variance(self.loops.sampling) * force @ np.diag([1.0, 0.0, active[2], 1.0]) @ force.T
+            + noise.thermal**2 * T * heat @ heat.T
+        )
+        return F, covariance
+
+    def require_stable(self) -> None:
+        """Raise when the loops together, with the errors of the electronics, do not come to rest."""
+        at = self.places
+        kept = np.r_[at["wave"], at["filtered"], at["integral"], at["sent"]]
+        if self.turning:
+            kept = kept[~np.isin(kept, [at[name].start + 2 for name in ("wave", "filtered", "integral")])]
+        F = self.sample[0][np.ix_(kept, kept)]
+        radius = float(np.max(np.abs(np.linalg.eigvals(F))))
+        if radius >= 1:
+            raise CompensationError(
+                "the loops together are unstable, although each alone is not: the electronics' errors couple them"
+                f" (growth {np.log(radius) * self.loops.sampling:.3g} 1/s); lower the bandwidths or the errors."
+            )
+
+    def settle(self, forcing: Real, offset: Real) -> Real:
+        """Return the state at rest under a constant forcing and measurement offset."""
+        at, F = self.places, self.sample[0]
+        state = np.zeros(self.size)
+        state[at["forcing"]], state[at["offset"]] = forcing, offset
+        kept = np.r_[at["wave"], at["filtered"], at["integral"], at["sent"]]
+        if self.turning:
+            kept = kept[~np.isin(kept, [at[name].start + 2 for name in ("wave", "filtered", "integral")])]
+        given = np.r_[at["forcing"], at["offset"]]
+        left = np.eye(len(kept)) - F[np.ix_(kept, kept)]
+        state[kept] = np.linalg.solve(left, F[np.ix_(kept, given)] @ state[given])
+        return state
+
+    def row(self, samples: int) -> "RowMap":
+        """Return the map of a row of this many samples."""
+        F, noise = self.sample
+        total, covariance = np.eye(self.size), np.zeros_like(F)
+        power, spread, left = F, noise, samples
+        while left:
+            if left & 1:
+                covariance = power @ covariance @ power.T + spread
+                total = power @ total
+            left >>= 1
+            if left:
+                spread = power @ spread @ power.T + spread
+                power = power @ power
+        return RowMap(self, samples, total, covariance)
+
+
+@dataclass(frozen=True)
+class RowMap:
+    """The map of a row of `samples` samples, and the covariance of the noise that gathers in it."""
+
+    loop: ClosedLoop
+    samples: int
+    map: Real
+    covariance: Real
+
+    @cached_property
+    def root(self) -> Real:
+        """A square root of the covariance."""
+        values, vectors = np.linalg.eigh(self.covariance)
+        return np.asarray(vectors * np.sqrt(np.clip(values, 0.0, None)))
+
+    def start(self, state: Real, forcing: tuple[Real, Real], offset: tuple[Real, Real], seconds: float) -> Real:
+        """Return the state at the start of a row: sums empty, forcing and offset linear from one end to the other."""
+        at, begun = self.loop.places, state.copy()
+        begun[at["sum"]] = begun[at["wave_sum"]] = 0.0
+        for name, (begin, end) in (("forcing", forcing), ("offset", offset)):
+            begun[at[name]] = begin
+            begun[at[f"{name}_slope"]] = (end - begin) / seconds
+        return begun
+
+
+def real_form(matrix: Complex) -> Real:
+    """Return a complex (2, 2) matrix as the real (4, 4) one of (Re, Im) pairs."""
+    form = np.zeros((FOUR, FOUR))
+    form[0::2, 0::2] = form[1::2, 1::2] = matrix.real
+    form[1::2, 0::2] = matrix.imag
+    form[0::2, 1::2] = -matrix.imag
+    return form
+
+
+def _drive_matrix(channels: Complex, turning: bool) -> Real:
+    """Return the map of the four commands to the wave's four rates: forces through the channels, phase directly."""
+    drive = real_form(channels)
+    drive[:, 1] = [0.0, 1.0, 0.0, 0.0]
+    if turning:
+        drive[2, :] = 0.0
+    return drive
+
+
+def _held_maps(A: Real, time: float) -> tuple[Real, Real, Real]:
+    """e^{At}, ∫ e^{As} ds and ∫ (t − s) e^{As} ds: free motion, a constant and a linear input."""
+    n = len(A)
+    block = np.zeros((3 * n, 3 * n))
+    block[:n, :n] = A
+    block[:n, n : 2 * n] = block[n : 2 * n, 2 * n :] = np.eye(n)
+    E = expm(block * time)
+    return E[:n, :n], E[:n, n : 2 * n], E[:n, 2 * n :]

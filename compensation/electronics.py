@@ -1,0 +1,96 @@
+"""What stands between the wave and its numbers: gains, phases and angles of the electrodes, delay, steps and noise.
+
+A channel pair maps the plane of the two patterns: G = R(n β) [1 + ½ [[δ + iη, κ], [κ, −δ − iη]]] e^{iφ}, with δ and η the
+relative differences of gain and phase between the channels along cos nθ and sin nθ, κ how far the axes are from being
+square, β a turn of the electrodes and φ the phase error that both share. All errors are small numbers, all amplitudes relative to the commanded one.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from compensation.errors import CompensationError
+from compensation.wave import StandingWave, turn
+
+Complex = NDArray[np.complex128]
+BOLTZMANN = 1.380649e-23  # J/K
+
+
+@dataclass(frozen=True)
+class Channels:
+    """The pair of pick-offs, or of drives.
+
+    `gain_ratio` δ = g_x/g_y − 1, `phase_difference` η (rad), `skew` κ (rad), `rotation` β (rad on the shell), `phase` φ (rad).
+    """
+
+    gain_ratio: float = 0.0
+    phase_difference: float = 0.0
+    skew: float = 0.0
+    rotation: float = 0.0
+    phase: float = 0.0
+
+    def __post_init__(self) -> None:
+        for name in ("gain_ratio", "phase_difference", "skew", "phase"):
+            if not abs(getattr(self, name)) < 0.5:
+                raise CompensationError(f"{name} = {getattr(self, name):g} of the electronics must be a small number.")
+
+    def matrix(self, harmonic: int) -> Complex:
+        """Return G (2, 2)."""
+        uneven = self.gain_ratio + 1j * self.phase_difference
+        stretch = np.eye(2) + np.array([[uneven, self.skew], [self.skew, -uneven]]) / 2
+        return np.asarray(turn(harmonic * self.rotation) @ stretch * np.exp(1j * self.phase))
+
+
+@dataclass(frozen=True)
+class Noise:
+    """Noise by source, as it enters the loops; everything over the commanded amplitude.
+
+    `pickoff` (1/√Hz, one-sided density at the carrier), `adc_step` and `dac_step` (steps of a demodulated sample, 1, and of
+    a command, 1/s: white noise of step²/12 per sample, true where other noise moves the signal over several steps),
+    `drive` (1/s/√Hz, of the force over 2ω), `thermal` (1/√s, of either quadrature of either pattern).
+    """
+
+    pickoff: float = 0.0
+    adc_step: float = 0.0
+    dac_step: float = 0.0
+    drive: float = 0.0
+    thermal: float = 0.0
+
+    def __post_init__(self) -> None:
+        for name, value in vars(self).items():
+            if not (np.isfinite(value) and value >= 0):
+                raise CompensationError(f"the noise '{name}' must be 0 or positive, not {value:g}.")
+
+    def measurement_variance(self, sampling: float) -> float:
+        """Variance of one demodulated sample: density² times sampling rate (white about the carrier), and the ADC's step."""
+        return self.pickoff**2 * sampling + self.adc_step**2 / 12
+
+    def command_variance(self, sampling: float) -> float:
+        """Variance (1/s²) of one command: the DAC's step, and drive noise."""
+        return self.drive**2 * sampling + self.dac_step**2 / 12
+
+
+def thermal_noise(wave: StandingWave, temperature: float, modal_mass: float, amplitude: float) -> float:
+    """Return the thermomechanical noise (1/√s) of each quadrature over the amplitude: √(2 k_B T/(m ω² τ))/a.
+
+    A quadrature X obeys dX = −X/τ dt + σ dW; equipartition, ⟨X²⟩ = k_B T/(m ω²) = σ² τ/2, gives σ. As angle random walk
+    of the rate it is σ/(a n k) (rad/√s).
+
+    Parameters
+    ----------
+    temperature, modal_mass, amplitude : float, K, kg, m
+    """
+    if not (temperature > 0 and modal_mass > 0 and amplitude > 0):
+        raise CompensationError("thermal noise needs a positive temperature, modal mass and amplitude.")
+    omega, tau = float(np.mean(wave.omega)), float(np.mean(wave.tau))
+    return float(np.sqrt(2 * BOLTZMANN * temperature / (modal_mass * omega**2 * tau)) / amplitude)
+
+
+@dataclass(frozen=True)
+class Electronics:
+    """Pick-offs, drives and noise of a gyro."""
+
+    pickoff: Channels = Channels()
+    drive: Channels = Channels()
+    noise: Noise = Noise()

@@ -1,0 +1,165 @@
+"""Force to rebalance: the wave is held at its azimuth, and the force that holds it is the rate.
+
+Settled, and to first order in the errors of the electronics, the rate loop indicates
+
+    Ω + Δ(1/τ)/(2 n k) sin 2n(θ − θ_τ) + [(n β − ½ δ sin 2nθ + ½ κ cos 2nθ)/τ − ε ½ Δω sin 2n(θ − θ_ω)] / (n k):
+
+damping anisotropy, the amplitude's drive seen by the rate axis, and quadrature seen through the phase error, with β, δ, κ
+and ε the sums of turn, gain ratio, skew and phase error of pick-off and drive.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from compensation.closed_loop import ClosedLoop
+from compensation.controllers import Loops, require_stable
+from compensation.electronics import Electronics
+from compensation.errors import CompensationError
+from compensation.samples import require_regular
+from compensation.wave import StandingWave, turn
+
+Real = NDArray[np.float64]
+PHYSICAL = ("omega", "tau", "damping_split", "damping_axis", "frequency_split", "frequency_axis")
+ALIKE = 0.01
+"""Part of 1/τ, and of n k per rad/s, within which rows share one matrix; what drives the wave is exact in every row."""
+
+
+@dataclass(frozen=True)
+class LoopRun:
+    """What the loops say, one value a row, each the mean over the row.
+
+    `time` (s), `rate` (rad/s, indicated), `quadrature` (1/s, the force over 2ω and amplitude that holds the quadrature:
+    ½ Δω sin 2n(θ − θ_ω)), `decay` (1/s, the amplitude's drive, so 1/τ), `omega` (rad/s), `angle` (rad, azimuth).
+    """
+
+    time: Real
+    rate: Real
+    quadrature: Real
+    decay: Real
+    omega: Real
+    angle: Real
+
+
+def simulate_rebalance(
+    wave: StandingWave,
+    electronics: Electronics,
+    loops: Loops,
+    time: ArrayLike,
+    *,
+    rate: ArrayLike = 0.0,
+    angle: ArrayLike = 0.0,
+    generator: np.random.Generator | None = None,
+) -> LoopRun:
+    """Run a gyro in force-to-rebalance mode, settled at the first row.
+
+    Parameters
+    ----------
+    wave : StandingWave
+        Its values numbers, or arrays (N,).
+    electronics, loops
+    time : array (N,)
+        Even times (s), a whole number of samples apart.
+    rate : float or array (N,)
+        Rate (rad/s), linear between rows.
+    angle : float or array (N,)
+        Commanded azimuth (rad); where it changes, the loops are settled anew.
+    generator : numpy Generator, optional
+        Of the noise; without it there is none.
+
+    Raises
+    ------
+    CompensationError
+        A loop is unstable (said with its margins, before anything is simulated), or the rows are uneven.
+    """
+    t = np.asarray(time, dtype=float)
+    samples = samples_in_row(t, loops)
+    require_stable(loops, float(np.max(1 / np.asarray(wave.tau))))
+    rows = spread_over_rows(wave, len(t))
+    turning, azimuth = (np.broadcast_to(np.asarray(x, dtype=float), t.shape) for x in (rate, angle))
+    forcing = np.empty((len(t), 4))
+    start = float(rows.omega[0] + rows.detuning(azimuth)[0])  # type: ignore[index]
+    forcing[:, 0] = -rows.decay(azimuth)
+    forcing[:, 1] = rows.omega + rows.detuning(azimuth) - start
+    forcing[:, 2] = rows.coupling * (turning + rows.drift(azimuth))
+    forcing[:, 3] = -rows.quadrature(azimuth)
+    commands = np.empty((len(t), 4))
+    state = None
+    for block in _alike(rows, turning, azimuth):
+        loop, offset = _close(rows, electronics, loops, turning, azimuth, block)
+        if block.start == 0 or azimuth[block.start] != azimuth[block.start - 1]:
+            loop.require_stable()
+            state = loop.settle(forcing[block.start], offset)
+        assert state is not None
+        row = loop.row(samples)
+        draws = generator.standard_normal((block.stop - block.start, loop.size)) if generator is not None else None
+        for n in range(block.start, block.stop):
+            later = min(n + 1, len(t) - 1)
+            end = forcing[later] if azimuth[later] == azimuth[n] else forcing[n]
+            state = row.map @ row.start(state, (forcing[n], end), (offset, offset), samples * loops.step)
+            if draws is not None:
+                state += row.root @ draws[n - block.start]
+            commands[n] = state[loop.places["sum"]] / samples
+    return LoopRun(
+        t, -commands[:, 2] / rows.coupling, commands[:, 3], commands[:, 0], start - commands[:, 1], azimuth.copy()
+    )
+
+
+def samples_in_row(time: Real, loops: Loops) -> int:
+    """Return how many samples of the loops make one row, or say that they do not."""
+    step = require_regular(time, "the simulation of the loops")
+    samples = round(step * loops.sampling)
+    if samples < 1 or abs(samples - step * loops.sampling) > 1e-6 * samples:
+        raise CompensationError(
+            f"a row of {step:g} s is not a whole number of the loops' samples of {loops.step:g} s; change one of them."
+        )
+    return samples
+
+
+def spread_over_rows(wave: StandingWave, count: int) -> StandingWave:
+    """Return the wave with every physical value as an array of rows."""
+    rows = {name: np.broadcast_to(np.asarray(getattr(wave, name), float), (count,)) for name in PHYSICAL}
+    return StandingWave(harmonic=wave.harmonic, bryan_factor=wave.bryan_factor, **rows)
+
+
+def at_row(wave: StandingWave, row: int) -> StandingWave:
+    """Return the wave at one row, in numbers."""
+    values = {name: float(getattr(wave, name)[row]) for name in PHYSICAL}
+    return StandingWave(harmonic=wave.harmonic, bryan_factor=wave.bryan_factor, **values)
+
+
+def _alike(rows: StandingWave, rate: Real, angle: Real) -> Iterator[slice]:
+    """Cut the rows where the averaged dynamics have changed by more than `ALIKE`, and where the azimuth moves."""
+    scale = 1 / np.asarray(rows.tau)
+    columns = np.stack(
+        [
+            scale,
+            np.asarray(rows.damping_split) * np.cos(2 * rows.harmonic * np.asarray(rows.damping_axis)),
+            np.asarray(rows.damping_split) * np.sin(2 * rows.harmonic * np.asarray(rows.damping_axis)),
+            np.asarray(rows.frequency_split) * np.cos(2 * rows.harmonic * np.asarray(rows.frequency_axis)),
+            np.asarray(rows.frequency_split) * np.sin(2 * rows.harmonic * np.asarray(rows.frequency_axis)),
+            rows.coupling * rate,
+        ],
+        axis=1,
+    )
+    width = np.concatenate([np.full(5, ALIKE * scale[0]), [ALIKE * rows.coupling]])
+    cell = np.column_stack([np.floor(columns / width + 0.5), angle])
+    edges = np.flatnonzero(np.any(np.diff(cell, axis=0) != 0, axis=1)) + 1
+    for begin, end in zip([0, *edges], [*edges, len(rate)], strict=True):
+        yield slice(int(begin), int(end))
+
+
+def _close(
+    rows: StandingWave, electronics: Electronics, loops: Loops, rate: Real, angle: Real, block: slice
+) -> tuple[ClosedLoop, Real]:
+    middle = (block.start + block.stop) // 2
+    wave, azimuth = at_row(rows, middle), float(angle[middle])
+    R = turn(wave.harmonic * azimuth)
+    A = R.T @ wave.envelope(float(rate[middle])) @ R - 1j * float(wave.detuning(azimuth)) * np.eye(2)
+    pickoff = R.T @ electronics.pickoff.matrix(wave.harmonic) @ R
+    drive = R.T @ electronics.drive.matrix(wave.harmonic) @ R
+    seen = pickoff[:, 0]
+    offset = np.array([seen[0].real - 1, seen[0].imag, seen[1].real, seen[1].imag])
+    return ClosedLoop(A, pickoff, drive, loops, electronics), offset

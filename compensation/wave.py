@@ -1,0 +1,160 @@
+"""The standing wave of a shell between its two patterns: decay, detuning, precession, and what they do to a rate.
+
+    (Ẋ, Ẏ) = M (X, Y) + u,   M = n k Ω J − 1/τ − ½ Δ(1/τ) S(n θ_τ) + ½ i Δω S(n θ_ω)
+
+for x = Re{X e^{iωt}} along cos nθ and y along sin nθ; derived, and shown equal to the CVG paper's eqs. (7)–(25), in
+`compensation.derivation`. u = −i F/(2ω) is the force per modal mass F = Re{F e^{iωt}}. Azimuths θ are physical angles on
+the shell, counted in the sense in which a positive rate turns the wave.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from compensation.errors import CompensationError
+
+Real = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+TURN = np.array([[0.0, -1.0], [1.0, 0.0]])
+
+
+@dataclass(frozen=True)
+class StandingWave:
+    """The n-th harmonic of a shell as a gyro; every value a number, or one per row of a run.
+
+    Attributes
+    ----------
+    omega : float or array, rad/s
+        Mean angular frequency of the two patterns.
+    tau : float or array, s
+        Decay time of the amplitude, 2 Q/ω.
+    damping_split : float or array, 1/s
+        Δ(1/τ) = 1/τ₁ − 1/τ₂, of the axis `damping_axis` (rad) that is damped most.
+    frequency_split : float or array, rad/s
+        Δω = ω₁ − ω₂, of the axis `frequency_axis` (rad) of the higher frequency.
+    harmonic, bryan_factor
+        n and k: a rate Ω turns the wave with k Ω against the shell.
+    """
+
+    omega: float | Real
+    tau: float | Real
+    damping_split: float | Real = 0.0
+    damping_axis: float | Real = 0.0
+    frequency_split: float | Real = 0.0
+    frequency_axis: float | Real = 0.0
+    harmonic: int = 2
+    bryan_factor: float = 0.277
+
+    def __post_init__(self) -> None:
+        for name in ("omega", "tau"):
+            if not np.all(np.asarray(getattr(self, name)) > 0):
+                raise CompensationError(f"{name} of a standing wave must be positive.")
+        if np.any(np.abs(self.damping_split) * np.asarray(self.tau) >= 2):
+            raise CompensationError("the damping split leaves one axis undamped: Δ(1/τ) must be below 2/τ.")
+        if not self.bryan_factor > 0:
+            raise CompensationError(f"the Bryan factor must be positive, not {self.bryan_factor:g}.")
+
+    @property
+    def coupling(self) -> float:
+        """N k, the precession of n θ per rate."""
+        return self.harmonic * self.bryan_factor
+
+    @property
+    def quality(self) -> float | Real:
+        """Q = ω τ/2."""
+        return self.omega * self.tau / 2
+
+    def decay(self, angle: ArrayLike) -> Real:
+        """1/τ of a wave at the azimuth θ (1/s): 1/τ + ½ Δ(1/τ) cos 2n(θ − θ_τ)."""
+        return np.asarray(1 / self.tau + self.damping_split / 2 * np.cos(self._twice(angle, self.damping_axis)))
+
+    def drift(self, angle: ArrayLike) -> Real:
+        """Rate (rad/s) that damping feigns at the azimuth θ: Δ(1/τ)/(2 n k) sin 2n(θ − θ_τ)."""
+        return np.asarray(self.damping_split / (2 * self.coupling) * np.sin(self._twice(angle, self.damping_axis)))
+
+    def quadrature(self, angle: ArrayLike) -> Real:
+        """Growth of the quadrature over the amplitude at the azimuth θ (1/s): ½ Δω sin 2n(θ − θ_ω)."""
+        return np.asarray(self.frequency_split / 2 * np.sin(self._twice(angle, self.frequency_axis)))
+
+    def detuning(self, angle: ArrayLike) -> Real:
+        """Angular frequency of a wave at the azimuth θ less the mean (rad/s): ½ Δω cos 2n(θ − θ_ω)."""
+        return np.asarray(self.frequency_split / 2 * np.cos(self._twice(angle, self.frequency_axis)))
+
+    def mean_rate(self, rate: float) -> float:
+        """Mean indicated rate (rad/s) of a free wave: sign(Ω) √(Ω² − Ω_d²), and 0 where it locks, |Ω| ≤ Ω_d.
+
+        The angle obeys θ̇ = k [Ω + Ω_d sin 2n(θ − θ_τ)] with Ω_d = Δ(1/τ)/(2 n k).
+        """
+        most = abs(float(self.damping_split)) / (2 * self.coupling)
+        return float(np.sign(rate) * np.sqrt(max(rate**2 - most**2, 0.0)))
+
+    def envelope(self, rate: float = 0.0) -> Complex:
+        """Return M (2, 2) of the complex amplitudes (1/s) for numbers, not rows."""
+        return np.asarray(
+            self.coupling * rate * TURN
+            - np.eye(2) / self.tau
+            - self.damping_split / 2 * split(self.harmonic * np.asarray(self.damping_axis))
+            + 0.5j * self.frequency_split * split(self.harmonic * np.asarray(self.frequency_axis))
+        )
+
+    def carrier(self, rate: float = 0.0) -> Real:
+        """Return the matrix (4, 4) of d/dt (x, y, ẋ, ẏ), every cycle of the carrier, for numbers, not rows."""
+        damping = 2 / self.tau * np.eye(2) + self.damping_split * split(self.harmonic * np.asarray(self.damping_axis))
+        stiffness = self.omega**2 * np.eye(2) + self.omega * self.frequency_split * split(
+            self.harmonic * np.asarray(self.frequency_axis)
+        )
+        turning = 2 * self.coupling * rate * TURN
+        return np.asarray(np.block([[np.zeros((2, 2)), np.eye(2)], [-stiffness, turning - damping]]))
+
+    def _twice(self, angle: ArrayLike, axis: ArrayLike) -> Real:
+        return np.asarray(2 * self.harmonic * (np.asarray(angle, dtype=float) - np.asarray(axis, dtype=float)))
+
+
+def split(axis: ArrayLike) -> Real:
+    """Return S(α) = [[cos 2α, sin 2α], [sin 2α, −cos 2α]], an anisotropy of the plane with its axis at α (rad)."""
+    cosine, sine = np.cos(2 * np.asarray(axis)), np.sin(2 * np.asarray(axis))
+    return np.asarray(np.array([[cosine, sine], [sine, -cosine]]))
+
+
+def turn(angle: float) -> Real:
+    """Return the rotation R(ψ) of the plane."""
+    cosine, sine = np.cos(angle), np.sin(angle)
+    return np.array([[cosine, -sine], [sine, cosine]])
+
+
+def from_quality(
+    frequency: float,
+    quality: float,
+    *,
+    damping_anisotropy: float = 0.0,
+    damping_axis: float = 0.0,
+    frequency_split: float = 0.0,
+    frequency_axis: float = 0.0,
+    harmonic: int = 2,
+    bryan_factor: float = 0.277,
+) -> StandingWave:
+    """Return the wave of a resonator in the numbers of its data sheet.
+
+    Parameters
+    ----------
+    frequency, frequency_split : float, Hz
+    quality : float
+        Q; 1/τ = π f/Q.
+    damping_anisotropy : float
+        Δ(1/τ) over 1/τ (1).
+    damping_axis, frequency_axis : float, rad
+    """
+    if not (frequency > 0 and quality > 0):
+        raise CompensationError("frequency and quality factor must be positive.")
+    decay = np.pi * frequency / quality
+    return StandingWave(
+        2 * np.pi * frequency,
+        1 / decay,
+        damping_anisotropy * decay,
+        damping_axis,
+        2 * np.pi * frequency_split,
+        frequency_axis,
+        harmonic,
+        bryan_factor,
+    )

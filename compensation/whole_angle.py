@@ -1,0 +1,233 @@
+"""Whole angle: the wave turns freely, or at a commanded rate (self-precession), and its azimuth is the output.
+
+    ψ̇ = n k Ω + ½ Δ(1/τ) sin 2(ψ − ψ_τ) + Δω s cos 2(ψ − ψ_ω) + Re u,     ψ = n θ,
+
+s the quadrature that the loop leaves (−q/a) and u the force across the wave: the commanded turn, and what gain ratios,
+skew and phase errors let through from amplitude drive and quadrature control. Amplitude, phase and quadrature loops are
+`closed_loop` in the frame of the wave, driven by what the turning wave meets; errors of the electronics are kept to first
+order there, and exactly in the measured azimuth.
+"""
+
+import cmath
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from compensation.closed_loop import ClosedLoop, RowMap
+from compensation.controllers import Loops, require_stable
+from compensation.electronics import Electronics
+from compensation.rebalance import LoopRun, at_row, samples_in_row, spread_over_rows
+from compensation.wave import StandingWave
+
+Real = NDArray[np.float64]
+TURN = 0.1
+"""Largest turn of 2ψ (rad) in one step."""
+WITHOUT_RATE = ("amplitude", "phase", "quadrature")
+
+
+def simulate_whole_angle(
+    wave: StandingWave,
+    electronics: Electronics,
+    loops: Loops,
+    time: ArrayLike,
+    *,
+    rate: ArrayLike = 0.0,
+    precession: ArrayLike = 0.0,
+    angle: float = 0.0,
+    generator: np.random.Generator | None = None,
+) -> LoopRun:
+    """Run a gyro in whole-angle mode, its loops settled at the first row.
+
+    Parameters
+    ----------
+    wave : StandingWave
+        Its values numbers, or arrays (N,).
+    electronics, loops
+        The rate loop is not used.
+    time : array (N,)
+        Even times (s), a whole number of samples apart.
+    rate : float or array (N,)
+        Rate (rad/s), linear between rows.
+    precession : float or array (N,)
+        Commanded turn of the azimuth against the shell (rad/s).
+    angle : float
+        Azimuth at the start (rad).
+    generator : numpy Generator, optional
+        Of the noise.
+
+    Returns
+    -------
+    LoopRun
+        `angle` is the measured azimuth at the row, unwrapped; `rate` the indicated rate to the next row, what is not
+        commanded of the turn over k; the other values are means from the row to the next.
+
+    Raises
+    ------
+    CompensationError
+        A loop is unstable, or the rows are uneven.
+    """
+    t = np.asarray(time, dtype=float)
+    samples = samples_in_row(t, loops)
+    require_stable(loops, float(np.max(1 / np.asarray(wave.tau))), WITHOUT_RATE)
+    rows = spread_over_rows(wave, len(t))
+    turning, commanded = (np.broadcast_to(np.asarray(x, dtype=float), t.shape) for x in (rate, precession))
+    course = _Course(rows, electronics, turning, commanded * rows.harmonic)
+    loop = ClosedLoop(
+        np.diag([-1 / float(np.mean(np.asarray(wave.tau)))] * 2).astype(complex),
+        np.eye(2, dtype=complex),
+        np.eye(2, dtype=complex),
+        loops,
+        electronics,
+        turning=True,
+    )
+    loop.require_stable()
+    maps: dict[int, RowMap] = {}
+    h = samples * loops.step
+    psi = rows.harmonic * angle
+    means = (float(rows.decay(angle)[0]), float(rows.quadrature(angle)[0]), 0.0)
+    forcing = course.forcing(0, 0.0, psi, means)
+    state = loop.settle(forcing, course.offset(0, psi))
+    at = loop.places
+    noise = electronics.noise
+    readout = math.sqrt(noise.measurement_variance(loops.sampling) * loops.smoothing / (2 - loops.smoothing))
+    commands, measured = np.empty((len(t), 4)), np.empty(len(t))
+    for n in range(len(t)):
+        measured[n] = course.measured(psi) + (generator.normal(0, readout) if generator is not None else 0.0)
+        pieces = min(samples, math.ceil(2 * abs(course.turn(n, 0.0, psi, means)) * h / TURN) or 1)
+        total = np.zeros(4)
+        for piece in range(pieces):
+            done, part = piece * samples // pieces, (piece + 1) * samples // pieces - piece * samples // pieces
+            if part not in maps:
+                maps[part] = loop.row(part)
+            row, step = maps[part], part * loops.step
+            begin, end = done / samples, (done + part) / samples
+            shake = row.root @ generator.standard_normal(loop.size) if generator is not None else 0.0
+            psi_end = psi + step * course.turn(n, begin, psi, means)
+            for _ in range(2):
+                ends = course.forcing(n, begin, psi, means), course.forcing(n, end, psi_end, means)
+                offsets = course.offset(n, psi), course.offset(n, psi_end)
+                new = row.map @ row.start(state, ends, offsets, step) + shake
+                sums, waves = new[at["sum"]] / part, new[at["wave_sum"]] / part
+                means = (float(sums[0]), float(sums[3]), float(waves[3]))
+                middle = (psi + psi_end) / 2
+                psi_end = psi + step / 6 * (
+                    course.turn(n, begin, psi, means)
+                    + 4 * course.turn(n, (begin + end) / 2, middle, means)
+                    + course.turn(n, end, psi_end, means)
+                )
+            if generator is not None:
+                psi_end += noise.thermal * math.sqrt(step) * generator.standard_normal()
+                psi_end += math.sqrt(noise.command_variance(loops.sampling) * step / loops.sampling) * (
+                    generator.standard_normal()
+                )
+            psi, state = psi_end, new
+            total += new[at["sum"]]
+        commands[n] = total / samples
+    after = course.measured(psi)
+    theta = measured / rows.harmonic
+    turned = np.diff(np.append(theta, after / rows.harmonic)) / h
+    return LoopRun(
+        t,
+        (turned - commanded) / rows.bryan_factor,
+        commands[:, 3],
+        commands[:, 0],
+        course.start - commands[:, 1],
+        theta,
+    )
+
+
+@dataclass
+class _Course:
+    """What the turning wave meets, at a fraction of a row and an angle ψ of the plane."""
+
+    rows: StandingWave
+    electronics: Electronics
+    rate: Real
+    command: Real
+
+    def __post_init__(self) -> None:
+        rows = self.rows
+        n = rows.harmonic
+        first = at_row(rows, 0)
+        self.start = float(first.omega)
+        columns = [
+            1 / np.asarray(rows.tau),
+            np.asarray(rows.damping_split) / 2 * np.cos(2 * n * np.asarray(rows.damping_axis)),
+            np.asarray(rows.damping_split) / 2 * np.sin(2 * n * np.asarray(rows.damping_axis)),
+            np.asarray(rows.frequency_split) / 2 * np.cos(2 * n * np.asarray(rows.frequency_axis)),
+            np.asarray(rows.frequency_split) / 2 * np.sin(2 * n * np.asarray(rows.frequency_axis)),
+            np.asarray(rows.omega) - self.start,
+            rows.coupling * self.rate,
+            self.command,
+        ]
+        self.columns = np.stack(columns, axis=1).tolist()
+        self.columns.append(self.columns[-1])
+        pickoff, drive = self.electronics.pickoff, self.electronics.drive
+        self.pickoff = (pickoff.matrix(n) * cmath.exp(-1j * pickoff.phase)).tolist()
+        self.drive = (drive.matrix(n) * cmath.exp(1j * pickoff.phase)).tolist()
+        self.ideal = pickoff == type(pickoff)() and drive == type(drive)()
+
+    def values(self, row: int, fraction: float) -> list[float]:
+        """1/τ, ½Δ(1/τ) cos and sin, ½Δω cos and sin, ω − ω₀, n k Ω, commanded ψ̇: linear between rows."""
+        now = self.columns[row]
+        if fraction == 0.0:
+            return list(now)
+        return [a + fraction * (b - a) for a, b in zip(now, self.columns[row + 1], strict=True)]
+
+    def measured(self, psi: float) -> float:
+        """The angle ψ that the pick-offs show."""
+        if self.ideal:
+            return psi
+        (xx, xy), (yx, yy) = self.pickoff
+        c, s = math.cos(psi), math.sin(psi)
+        seen = math.atan2((yx * c + yy * s).real, (xx * c + xy * s).real)
+        return psi + (seen - psi + math.pi) % (2 * math.pi) - math.pi
+
+    def forces(self, psi: float, command: float, means: tuple[float, float, float]) -> tuple[complex, complex]:
+        """The forces along and across the wave that commands (along a, across command + i quadrature) become."""
+        along, across = means[0], complex(command, means[1])
+        if self.ideal:
+            return along, across
+        seen = self.measured(psi)
+        c, s = math.cos(seen), math.sin(seen)
+        x, y = c * along - s * across, s * along + c * across
+        (xx, xy), (yx, yy) = self.drive
+        x, y = xx * x + xy * y, yx * x + yy * y
+        c, s = math.cos(psi), math.sin(psi)
+        return c * x + s * y, c * y - s * x
+
+    def turn(self, row: int, fraction: float, psi: float, means: tuple[float, float, float]) -> float:
+        """ψ̇ (rad/s)."""
+        _, dc, ds, wc, ws, _, coriolis, command = self.values(row, fraction)
+        c, s = math.cos(2 * psi), math.sin(2 * psi)
+        damping = dc * s - ds * c
+        detuned = 2 * (wc * c + ws * s) * means[2]
+        return coriolis + damping + detuned + self.forces(psi, command, means)[1].real
+
+    def forcing(self, row: int, fraction: float, psi: float, means: tuple[float, float, float]) -> Real:
+        """What drives amplitude, phase and quadrature from their commands (1/s)."""
+        decay, dc, ds, wc, ws, drift, _, command = self.values(row, fraction)
+        c, s = math.cos(2 * psi), math.sin(2 * psi)
+        along, across = self.forces(psi, command, means)
+        return np.array(
+            [
+                -(decay + dc * c + ds * s) + along.real - means[0],
+                drift + wc * c + ws * s + along.imag,
+                0.0,
+                -(wc * s - ws * c) + across.imag - means[1],
+            ]
+        )
+
+    def offset(self, row: int, psi: float) -> Real:
+        """What the pick-offs add to amplitude, phase and quadrature."""
+        if self.ideal:
+            return np.zeros(4)
+        seen = self.measured(psi)
+        (xx, xy), (yx, yy) = self.pickoff
+        c, s = math.cos(psi), math.sin(psi)
+        x, y = xx * c + xy * s, yx * c + yy * s
+        c, s = math.cos(seen), math.sin(seen)
+        along, across = c * x + s * y, c * y - s * x
+        return np.array([along.real - 1, along.imag, 0.0, across.imag])

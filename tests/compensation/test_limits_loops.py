@@ -1,0 +1,145 @@
+"""The loop twin against closed forms and against the carrier, every cycle of it."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from compensation.carrier import simulate_carrier
+from compensation.closed_loop import ClosedLoop
+from compensation.controllers import Loops, find_margins
+from compensation.electronics import Channels, Electronics, Noise, thermal_noise
+from compensation.errors import CompensationError
+from compensation.rebalance import simulate_rebalance
+from compensation.wave import from_quality
+from compensation.whole_angle import simulate_whole_angle
+
+DEG_PER_H = np.degrees(1.0) * 3600
+EARTH = 15.041 / DEG_PER_H
+ERRORS = Electronics(Channels(0.01, 0.002, 0.003, 0.001, 0.01), Channels(-0.02, 0.001, 0.002, 0.0005, 0.02))
+
+
+@pytest.mark.parametrize(("quality", "drift"), [(1e5, 259.2), (1e6, 25.92), (1e7, 2.592)])
+def test_damping_anisotropy_becomes_bias(quality, drift):
+    """1 % of 1/τ at 4432 Hz, k = 0.277: Ω_d = Δ(1/τ)/(4 k) at 22.5° from its axis, held and free."""
+    wave = from_quality(4432.0, quality, damping_anisotropy=0.01)
+    time = np.arange(0.0, 20.0)
+    held = simulate_rebalance(wave, Electronics(), Loops(), time, angle=np.pi / 8)
+    assert held.rate[-1] * DEG_PER_H == pytest.approx(drift, rel=1e-3)
+    assert held.decay[-1] == pytest.approx(np.pi * 4432.0 / quality, rel=1e-6)
+    free = simulate_whole_angle(wave, Electronics(), Loops(), time, angle=np.pi / 8)
+    assert free.rate[0] * DEG_PER_H == pytest.approx(drift, rel=1e-2)
+
+
+@pytest.mark.parametrize("quality", [1e5, 1e6, 1e7])
+@pytest.mark.parametrize("ratio", [15.041 / 2.592, 1.2, 0.5])
+def test_mean_rate_and_dead_zone_of_a_free_wave(quality, ratio):
+    """√(Ω² − Ω_d²): 14.816 °/h of 15.041 at Ω_d = 2.592; nothing below the threshold, where the wave locks."""
+    wave = from_quality(4432.0, quality, damping_anisotropy=0.01)
+    threshold = wave.damping_split / (2 * wave.coupling)
+    rate = ratio * threshold
+    mean = np.sqrt(max(ratio**2 - 1, 0)) * threshold
+    # One turn of sin 4θ is 90° of azimuth; a locked wave settles in a few of its own time constants.
+    seconds = np.pi / 2 / (wave.bryan_factor * mean) if mean else 20 / (wave.coupling * threshold)
+    loops = Loops(sampling=1000.0)
+    step = max(round(seconds / 400, 3), 1e-3)
+    time = step * np.arange(round(seconds / step) + 1)
+    run = simulate_whole_angle(wave, Electronics(), loops, time, rate=rate)
+    turned = run.angle[-1] - (run.angle[0] if mean else run.angle[3 * len(time) // 4])
+    found = turned / wave.bryan_factor / time[-1]
+    assert found == pytest.approx(mean, rel=1e-2, abs=1e-6 * threshold)
+
+
+def test_every_error_of_the_electronics_against_the_carrier():
+    """Q = 1000, all errors at once, a step of rate: the commands of the averaged loops follow those of the carrier."""
+    frequency = 4432.07
+    wave = from_quality(
+        frequency, 1e3, damping_anisotropy=0.01, damping_axis=0.1, frequency_split=0.5, frequency_axis=0.4
+    )
+    sample = 8 / frequency
+    loops = Loops(8.0, 15.0, 15.0, 10.0, sampling=1 / sample, delay=sample, demodulator=100.0)
+    true = simulate_carrier(wave, ERRORS, loops, 1.6, rate=0.5, rate_from=0.8, angle=0.2)
+    time = sample * np.arange(len(true.time))
+    rate = np.where(time >= 0.8 - 1e-12, 0.5, 0.0)
+    # The demodulated sample of the carrier is a mean over one interval, half of it old.
+    averaged = simulate_rebalance(wave, ERRORS, replace(loops, delay=1.5 * sample), time, rate=rate, angle=0.2)
+    before, after = int(0.75 / sample), len(time) - 1
+    for row in (before, after):
+        assert averaged.rate[row] == pytest.approx(true.rate[row], abs=2e-3)
+        assert averaged.quadrature[row] == pytest.approx(true.quadrature[row], rel=2e-3)
+        assert averaged.decay[row] == pytest.approx(true.decay[row], rel=2e-3)
+        assert averaged.omega[row] == pytest.approx(true.omega[row], abs=0.02)
+    moving = slice(int(0.8 / sample), int(1.1 / sample))
+    assert np.max(np.abs(averaged.rate[moving] - true.rate[moving])) < 0.01 * 0.5
+
+
+def test_free_and_held_wave_show_the_same_bias():
+    wave = from_quality(4432.0, 1e5, damping_anisotropy=0.02, damping_axis=0.3, frequency_split=0.01)
+    time = np.arange(0.0, 30.0)
+    for angle in (0.1, 0.5, 1.2):
+        held = simulate_rebalance(wave, ERRORS, Loops(), time, angle=angle)
+        free = simulate_whole_angle(wave, ERRORS, Loops(), time[:2], angle=angle)
+        # Pick-offs that err by a per cent hold the wave, and read it, at another azimuth: second order.
+        assert free.rate[0] == pytest.approx(held.rate[-1], abs=0.02 * 0.01 * np.pi * 4432 / 1e5 / wave.coupling + 3e-5)
+
+
+def test_closed_form_of_the_bias():
+    """What the docstring of `rebalance` says, to first order in the errors."""
+    wave = from_quality(4432.0, 1e6, damping_anisotropy=0.01, frequency_split=0.02, frequency_axis=0.5)
+    electronics = Electronics(Channels(1e-3, 0.0, 2e-3, 1e-3, 3e-3), Channels(5e-4, 0.0, -1e-3, 5e-4, 2e-3))
+    angle, time = 0.2, np.arange(0.0, 10.0)
+    run = simulate_rebalance(wave, electronics, Loops(), time, rate=1e-4, angle=angle)
+    leak = 2 * 1.5e-3 - 1.5e-3 / 2 * np.sin(4 * angle) + 1e-3 / 2 * np.cos(4 * angle)
+    expected = 1e-4 + wave.drift(angle) + (leak / wave.tau - 5e-3 * wave.quadrature(angle)) / wave.coupling
+    assert run.rate[-1] == pytest.approx(expected, rel=0.01)
+
+
+def test_angle_random_walk_of_thermal_noise():
+    """A rate loop hides nothing of it: σ/(n k) per √s, Leland (2001) and others; 4000 rows of 1 s."""
+    wave = from_quality(4432.0, 1e6)
+    level = thermal_noise(wave, 293.0, 1e-4, 1e-7)
+    electronics = Electronics(noise=Noise(thermal=level))
+    run = simulate_rebalance(wave, electronics, Loops(), np.arange(0.0, 4000.0), generator=np.random.default_rng(3))
+    assert np.std(run.rate) == pytest.approx(level / wave.coupling, rel=0.05)
+
+
+def test_quantisation_is_the_noise_that_is_said():
+    """Rounded samples and commands of the carrier against white noise of step²/12 in the averaged loop."""
+    frequency, sample = 4432.07, 8 / 4432.07
+    loops = Loops(8.0, 15.0, 15.0, 10.0, sampling=1 / sample, delay=sample, demodulator=100.0)
+    wave = from_quality(frequency, 1e3)
+    electronics = Electronics(noise=Noise(pickoff=3e-5, adc_step=2e-3))
+    true = simulate_carrier(wave, electronics, loops, 20.0, generator=np.random.default_rng(1)).rate[1000:]
+    time = sample * np.arange(10000)
+    said = simulate_rebalance(
+        wave, electronics, replace(loops, delay=1.5 * sample), time, generator=np.random.default_rng(2)
+    ).rate
+    assert np.std(said[1000:]) == pytest.approx(np.std(true), rel=0.1)
+
+
+def test_margins_and_instability():
+    loops = Loops(rate=20.0)
+    (margin,) = find_margins(loops, 1e-3, ("rate",))
+    # At the reversal the loop turns its input around, at the crossover it has gain one.
+    assert loops.open_loop("rate", 1e-3, margin.reversal).real * margin.gain == pytest.approx(-1, abs=1e-3)
+    assert abs(loops.open_loop("rate", 1e-3, margin.crossover)) == pytest.approx(1, abs=1e-6)
+    # Margins end where the poles of the sampled loop leave the unit circle.
+    for bandwidth in np.linspace(80.0, 160.0, 9):
+        for delay in (0.0, 0.6e-3, 1e-3, 2.3e-3):
+            fast = Loops(rate=bandwidth, delay=delay)
+            one = ClosedLoop(-1e-3 * np.eye(2, dtype=complex), np.eye(2), np.eye(2), fast, Electronics())
+            kept = one.places["sent"].stop
+            poles = np.abs(np.linalg.eigvals(one.sample[0][:kept, :kept]))
+            assert find_margins(fast, 1e-3, ("rate",))[0].stable == (poles.max() < 1)
+    with pytest.raises(CompensationError, match=r"rate loop \(GR\) is unstable: gain margin -"):
+        simulate_rebalance(from_quality(4432.0, 1e6), Electronics(), Loops(rate=200.0), np.arange(0.0, 5.0))
+
+
+def test_what_cannot_be_simulated_is_refused():
+    wave = from_quality(4432.0, 1e6)
+    with pytest.raises(CompensationError, match="not a whole number of the loops' samples"):
+        simulate_rebalance(wave, Electronics(), Loops(), 0.0015 * np.arange(5))
+    with pytest.raises(CompensationError, match="undamped"):
+        from_quality(4432.0, 1e6, damping_anisotropy=2.0)
+    with pytest.raises(CompensationError, match="positive frequency"):
+        Loops(rate=0.0)
