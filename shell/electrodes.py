@@ -1,0 +1,284 @@
+r"""Electrodes over a face of the shell: what their voltage does to a harmonic pair.
+
+An electrode at a gap g pulls with the energy -½ ε₀ V²/(g - w) per area, w the displacement of the face towards it. Its second
+derivative is a spring of negative stiffness, -ε₀ V²/g³ per area, which lowers the pair and, by its wave 2n, splits it:
+
+    δ(ω²) = -Σ_j V_j² ∫ ε₀/g³ w² dA / ∫ ρ |u|² dV,
+
+for each orientation of the mode (shell.imperfection.pair). For a full ring of electrodes this is
+δf/f = -½ ε₀ V²/(g³ ρ h ω²) times the mode factor h ∫ w² dA / ∫ |u|² dV. The waves of the gap enter through 1/g³, all orders of it.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from itertools import pairwise
+from math import pi
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.optimize import linprog
+
+from shell.errors import ShellError
+from shell.imperfection.field import Complex, Field, values_around
+from shell.imperfection.pair import Pair
+from shell.imperfection.place import cut
+from shell.imperfection.split import Split
+from shell.quadrature import Array, gauss
+from shell.system import ShellGroup
+
+VACUUM = 8.8541878188e-12  # ε₀, F/m (CODATA 2022)
+PIECE = pi / 12  # longest piece of an electrode that is integrated at once, rad
+
+
+@dataclass(frozen=True)
+class Electrode:
+    """A patch over the face: azimuth of its middle and width (rad), the positions (0 ... 1) between which it lies, its volts."""
+
+    azimuth: float
+    width: float
+    voltage: float
+    first: float = 0.0
+    last: float = 1.0
+
+
+def ring_of_electrodes(
+    count: int,
+    coverage: float,
+    voltage: float | Sequence[float],
+    azimuth: float = 0.0,
+    first: float = 0.0,
+    last: float = 1.0,
+) -> tuple[Electrode, ...]:
+    """Equal electrodes around, the first one centred at `azimuth`, which cover a share of the circle.
+
+    Parameters
+    ----------
+    count : number. coverage : 0 ... 1 of the circle. voltage : of all, or of each, V.
+    azimuth : rad. first, last : positions along the meridian.
+    """
+    if not (count >= 1 and 0 < coverage <= 1):
+        raise ShellError(f"electrodes cover a share of the circle above 0 and up to 1, not {coverage:g}.")
+    volts = np.broadcast_to(np.asarray(voltage, dtype=float), (count,))
+    width = 2 * pi * coverage / count
+    return tuple(Electrode(azimuth + 2 * pi * k / count, width, float(v), first, last) for k, v in enumerate(volts))
+
+
+@dataclass(frozen=True, eq=False)
+class Electrodes:
+    """Electrodes with their gap.
+
+    pair : the mode that feels them.
+    electrodes : patches with their voltages.
+    gap : mean gap, m.
+    departure : relative departure of the gap over the shell, g = gap (1 + departure); its waves 1, 2, ... are the gap harmonics.
+    face : "inner" or "outer", the face that they look at.
+    """
+
+    pair: Pair
+    electrodes: tuple[Electrode, ...]
+    gap: float
+    departure: Field | None = None
+    face: Literal["inner", "outer"] = "inner"
+    _bands: dict[tuple[float, float], tuple[Array, Array, Array]] = field(default_factory=dict, repr=False)
+
+    def __post_init__(self) -> None:
+        if not self.gap > 0:
+            raise ShellError(f"the gap must be positive, not {1e6 * self.gap:g} µm.")
+        size = self.pair.resonator.size
+        if self.gap > 0.2 * size:
+            raise ShellError(
+                f"a gap of {1e3 * self.gap:g} mm is no gap beside a radius of {1e3 * size:g} mm: is it in µm?"
+            )
+        for one in self.electrodes:
+            if not (one.width > 0 and 0 <= one.first < one.last <= 1):
+                raise ShellError(
+                    "an electrode has a positive width and lies between two positions 0 <= first < last <= 1."
+                )
+
+    def charged(self, voltage: float | Sequence[float]) -> "Electrodes":
+        """The same electrodes at other voltages, one for all or one for each."""
+        volts = np.broadcast_to(np.asarray(voltage, dtype=float), (len(self.electrodes),))
+        patches = tuple(replace(one, voltage=float(v)) for one, v in zip(self.electrodes, volts, strict=True))
+        return Electrodes(self.pair, patches, self.gap, self.departure, self.face, self._bands)
+
+    @property
+    def voltages(self) -> Array:
+        """Of every electrode, V."""
+        return np.array([one.voltage for one in self.electrodes])
+
+    @cached_property
+    def per_square_volt(self) -> tuple[Array, Complex]:
+        """Mean shift of ln f and wave of the split, (f_fast - f_slow)/f exp(2 i n α), per V² on each electrode."""
+        n = self.pair.mode.harmonic
+        means, waves = [], []
+        for one in self.electrodes:
+            area, w, theta, weight, gap = self._patch(one)
+            spring = -VACUUM / gap**3 * (area * w**2)[:, None] * weight / (pi * self.pair.scale)
+            # δ ln ω² of the two orientations: ∫ spring cos² nθ, the mean of the two and the wave between them
+            means.append(float(spring.sum()) / 2)
+            waves.append(complex((spring * np.exp(2j * n * theta)).sum()) / 2)
+        return np.array(means) / 2, np.array(waves)
+
+    def soften(self) -> Split:
+        """The pair under the voltages, to first order in V²/g³.
+
+        Raises
+        ------
+        ShellError
+            The voltage lies beyond pull-in.
+        """
+        squares = self.voltages**2
+        means, waves = self.per_square_volt
+        split = Split(
+            self.pair.mode.harmonic, self.pair.mode.frequency, float(means @ squares), complex(waves @ squares)
+        )
+        if self.pull_in < 1.0:
+            raise ShellError(
+                f"the electrodes pull the shell in: {self.voltages.max():g} V is {1 / self.pull_in:.3g} times what it bears at "
+                f"a gap of {1e6 * self.gap:g} µm. Lower the voltage or widen the gap."
+            )
+        return split
+
+    @cached_property
+    def pull_in(self) -> float:
+        """Factor by which all voltages can grow before the shell, bending in this mode, is pulled onto an electrode.
+
+        On the way q of the mode towards an electrode K q = s² F(q), F = ½ ∫ ε₀ V² w/(g - q w)² dA; s is the largest for which
+        there is a solution. A small electrode alone gives √(8/27) of what the stiffness would balance; a balanced ring the
+        voltage that makes the frequency vanish.
+        """
+        patches = [(one.voltage, *self._patch(one)) for one in self.electrodes if one.voltage]
+        if not patches:
+            return float("inf")
+        n = self.pair.mode.harmonic
+        stiffness = pi * self.pair.scale  # ∫ ρ |u|² dV ω² of the eigenvector as it is scaled
+        largest = max(float(abs(w).max()) for _, _, w, *_ in patches)
+        travel = np.linspace(0.0, 1.0, 201)[1:-1] * self.gap / largest
+        best = np.inf
+        for turn in {round(one.azimuth % (pi / n), 9) for one in self.electrodes if one.voltage}:
+            for sign in (1.0, -1.0):
+                force = np.zeros_like(travel)
+                for volts, area, w, theta, weight, gap in patches:
+                    shape = sign * w[:, None] * np.cos(n * (theta - turn))
+                    left = np.maximum(gap - travel[:, None, None] * shape, 1e-9 * gap)
+                    force += VACUUM / 2 * volts**2 * (shape * area[:, None] * weight / left**2).sum(axis=(1, 2))
+                if np.any(force > 0):
+                    best = min(best, float(np.max((stiffness * travel / force)[force > 0])))
+        return float(np.sqrt(best))
+
+    def per_volt(self) -> float:
+        """df/dV when all voltages change together by the same volts, over f, 1/V."""
+        return float(2 * self.per_square_volt[0] @ self.voltages)
+
+    def per_kelvin(self, gap_expansion: float, voltage_slope: float = 0.0) -> float:
+        """Relative change of f per kelvin by the electrodes alone, 1/K.
+
+        Parameters
+        ----------
+        gap_expansion : (1/g) dg/dT, 1/K: of a frame and a shell (a_frame r_frame - a_shell r_shell)/g.
+        voltage_slope : (1/V) dV/dT of the supply, 1/K.
+        """
+        return float(self.per_square_volt[0] @ self.voltages**2) * (2 * voltage_slope - 3 * gap_expansion)
+
+    def _patch(self, one: Electrode) -> tuple[Array, Array, Array, Array, Array]:
+        """Area per radian and w at places along the meridian; azimuths with weights; the gap (places, azimuths)."""
+        position, area, w = self._band(one.first, one.last)
+        pieces = max(1, int(np.ceil(one.width / PIECE)))
+        x, weights = gauss(8)
+        starts = one.azimuth - one.width / 2 + one.width / pieces * np.arange(pieces)[:, None]
+        theta = (starts + one.width / pieces * (x + 1) / 2).ravel()
+        weight = np.tile(weights * one.width / pieces / 2, pieces)
+        gap = np.full((position.size, theta.size), self.gap)
+        if self.departure is not None:
+            gap = gap * (1 + values_around(self.departure, self.departure.orders, position, theta)[0])
+        if np.any(gap <= 0):
+            raise ShellError("the gap closes somewhere: its relative departure falls below -1.")
+        return area, w, theta, weight, gap
+
+    def _band(self, first: float, last: float) -> tuple[Array, Array, Array]:
+        """Places of a band of the face: position, area per radian that each stands for (m²), displacement out of the material."""
+        if (first, last) not in self._bands:
+            self._bands[first, last] = self._lay_band(first, last)
+        return self._bands[first, last]
+
+    def _lay_band(self, first: float, last: float) -> tuple[Array, Array, Array]:
+        solution, resonator = self.pair.solution, self.pair.resonator
+        side = 1.0 if self.face == "outer" else -1.0
+        x, weights = gauss(12)
+        rows: list[tuple[float, float, float]] = []
+        for group in solution.system.groups:
+            if not isinstance(group, ShellGroup):
+                continue
+            for one, two in pairwise(np.array(group.place.chain.breaks) / resonator.length):
+                low, high = max(one, first), min(two, last)
+                if high - low < 1e-12:
+                    continue
+                for at, weight in zip((low + high) / 2 + (high - low) / 2 * x, weights, strict=True):
+                    here = cut(resonator, solution.system, float(at), np.array([side]))
+                    half = here.place.thickness / 2
+                    # per unit of η and of position the volume of the cut is A ρ h/2 ds
+                    area = here.table.volume[0, 0, 0] / float(half[0]) * resonator.length * weight * (high - low) / 2
+                    rows.append((float(at), float(area), side * float(here.displacements(solution.unknowns)[2, 0])))
+        if not rows:
+            raise ShellError("the electrodes face a solid root or corner only: place them over the shell.")
+        position, area, w = np.array(rows).T
+        return position, area, w
+
+
+@dataclass(frozen=True)
+class Trim:
+    """Voltages that null a split: of every electrode, V; `left` the wave of the split that stays; `shift` of ln f."""
+
+    voltages: tuple[float, ...]
+    left: complex
+    shift: float
+
+
+def trim_voltages(electrodes: Electrodes, wave: complex, limit: float) -> Trim:
+    """The voltages, of least Σ V², with which the electrodes null a split.
+
+    Parameters
+    ----------
+    electrodes : as they lie; their own voltages are not used.
+    wave : (f_fast - f_slow)/f exp(2 i n α) that is to be cancelled.
+    limit : largest voltage, V.
+
+    Raises
+    ------
+    ShellError
+        The split lies beyond what the electrodes reach within the limit.
+    """
+    means, waves = electrodes.per_square_volt
+    scale = float(abs(waves).max())
+    sought = linprog(
+        np.ones(len(waves)),
+        A_eq=np.array([waves.real, waves.imag]) / scale * limit**2,
+        b_eq=-np.array([wave.real, wave.imag]) / scale,
+        bounds=[(0.0, 1.0)] * len(waves),
+    )
+    if sought.status != 0:
+        raise ShellError(
+            f"{limit:g} V on these electrodes null splits up to {1e6 * reach(electrodes, limit):.3g} ppm in any direction; "
+            f"{1e6 * abs(wave):.3g} ppm is beyond: take more voltage, a smaller gap, or mass."
+        )
+    squares = np.maximum(np.asarray(sought.x), 0.0) * limit**2
+    return Trim(tuple(np.sqrt(squares).tolist()), complex(waves @ squares + wave), float(means @ squares))
+
+
+def reach(electrodes: Electrodes, limit: float) -> float:
+    """The largest relative split that voltages up to a limit (V) null whatever its axis.
+
+    Splits that can be made are the sums of x_j z_j, 0 <= x_j <= V², a polygon around 0; this is its inscribed circle.
+    """
+    _, waves = electrodes.per_square_volt
+    normals = np.exp(1j * (np.angle(waves)[:, None] + np.array([-pi / 2, pi / 2]))).ravel()
+    support: Array = np.maximum((waves[:, None] * np.conj(normals)).real, 0.0).sum(axis=0)
+    return float(support.min()) * limit**2
+
+
+def uniform_softening(frequency: ArrayLike, rho: float, h: float, gap: float, voltage: float) -> Array:
+    """δf/f = -½ ε₀ V²/(g³ ρ h ω²) of a full ring with mode factor 1, the estimate on the back of an envelope."""
+    omega = 2 * pi * np.asarray(frequency, dtype=float)
+    return np.asarray(-VACUUM * voltage**2 / (2 * gap**3 * rho * h * omega**2))

@@ -1,0 +1,122 @@
+"""Electrostatic softening, its 4θ part, trim voltages and pull-in against closed forms."""
+
+from math import pi, sqrt
+
+import numpy as np
+import pytest
+
+from shell.elastic import Elastic
+from shell.electrodes import (
+    Electrode,
+    Electrodes,
+    reach,
+    ring_of_electrodes,
+    trim_voltages,
+    uniform_softening,
+)
+from shell.errors import ShellError
+from shell.imperfection import Pair, Sum, wave
+from shell.meridian import hemisphere
+from shell.modes import solve_modes
+
+SILICA = Elastic(72.7e9, 0.17, 2203.0)
+R, H = 15e-3, 0.8558e-3
+
+
+@pytest.fixture(scope="module")
+def pair():
+    (mode,) = solve_modes(hemisphere(radius=R, thickness=H), SILICA, 2)
+    return Pair(mode)
+
+
+def test_a_full_ring_softens_by_30_28_ppm_and_969_ppm():
+    assert 1e6 * uniform_softening(4432.0, 2203.0, H, 100e-6, 100.0) == pytest.approx(-30.28, abs=5e-3)
+    assert 1e6 * uniform_softening(4432.0, 2203.0, H, 50e-6, 200.0) == pytest.approx(-969.0, abs=0.5)
+
+
+def test_a_thin_dome_feels_its_mode_factor_of_rayleighs_solution():
+    """Thin limit: ∫ w² dA/∫ |u|² dA = ∫ (2 + cos φ)² t⁴ sin φ dφ / J, t = tan(φ/2); it goes there like √(h/R)."""
+    phi = (np.arange(20000) + 0.5) / 20000 * pi / 2
+    t = np.tan(phi / 2) ** 4 * np.sin(phi)
+    normal, tangent = (2 + np.cos(phi)) ** 2 @ t, 2 * np.sin(phi) ** 2 @ t
+    expected = normal / (normal + tangent)
+    found = []
+    for ratio in (4e-4, 1e-4):
+        (mode,) = solve_modes(hemisphere(radius=R, thickness=ratio * R), SILICA, 2)
+        shift = Electrodes(Pair(mode), ring_of_electrodes(1, 1.0, 0.01), 100e-6).soften().shift
+        found.append(shift / uniform_softening(mode.frequency, 2203.0, ratio * R, 100e-6, 0.01))
+    assert 2 * found[1] - found[0] == pytest.approx(expected, rel=1e-3)
+
+
+def test_softening_goes_with_the_square_of_the_volts_and_the_cube_of_the_gap(pair):
+    ring = Electrodes(pair, ring_of_electrodes(16, 0.8, 50.0), 100e-6)
+    base = ring.soften()
+    assert ring.charged(100.0).soften().shift == pytest.approx(4 * base.shift, rel=1e-12)
+    half = Electrodes(pair, ring_of_electrodes(16, 0.8, 50.0), 50e-6).soften()
+    assert half.shift == pytest.approx(8 * base.shift, rel=1e-12)
+    assert base.relative < 1e-12 * abs(base.shift)  # sixteen equal electrodes do not split n = 2
+    full = Electrodes(pair, ring_of_electrodes(1, 1.0, 50.0), 100e-6).soften()
+    assert base.shift == pytest.approx(0.8 * full.shift, rel=1e-12)
+
+
+def test_waves_of_the_gap_split_as_the_inverse_cube_says(pair):
+    ring = ring_of_electrodes(1, 1.0, 100.0)
+    fourth = Electrodes(pair, ring, 100e-6, wave(4, 1e-3, 0.2)).soften()
+    assert fourth.wave / fourth.shift == pytest.approx(-3e-3 * np.exp(0.8j), rel=1e-5)
+    # 1/(1 + x)³ = 1 - 3 x + 6 x²: waves 1 and 3 of 1 % each make 6 · 1e-4 of the wave 4
+    pairwise = Electrodes(pair, ring, 100e-6, Sum(((1.0, wave(1, 0.01)), (1.0, wave(3, 0.01))))).soften()
+    assert (pairwise.wave / pairwise.shift).real == pytest.approx(6e-4, rel=2e-3)
+    first = Electrodes(pair, ring, 100e-6, wave(1, 0.01)).soften()
+    assert first.relative < 1e-5 * abs(first.shift)
+
+
+def test_one_electrode_pulls_its_own_azimuth_soft(pair):
+    split = Electrodes(pair, (Electrode(0.3, 0.2, 100.0, 0.7, 1.0),), 100e-6).soften()
+    assert split.slow_axis == pytest.approx(0.3, abs=1e-9)
+    assert split.shift == pytest.approx(-split.relative / 2 / (np.sin(0.4) / 0.4), rel=1e-9)  # ∫ cos 4θ over the width
+
+
+def test_pull_in_of_a_balanced_ring_is_where_the_frequency_vanishes(pair):
+    ring = Electrodes(pair, ring_of_electrodes(1, 1.0, 100.0), 50e-6)
+    assert ring.pull_in == pytest.approx(1 / sqrt(2 * abs(ring.soften().shift)), rel=2e-4)
+
+
+def test_pull_in_of_a_small_electrode_is_that_of_two_plates(pair):
+    """V² = 8 k g³/(27 ε₀ A): √(8/27) of the voltage whose softening equals the stiffness."""
+    small = Electrodes(pair, (Electrode(0.0, 0.01, 100.0, 0.985, 1.0),), 50e-6)
+    softest = 2 * abs(small.soften().shift) + small.soften().relative
+    assert small.pull_in == pytest.approx(sqrt(8 / 27 / softest), rel=2e-3)
+
+
+def test_trim_voltages_null_the_split_within_their_reach(pair):
+    sixteen = Electrodes(pair, ring_of_electrodes(16, 0.8, 0.0, first=0.7), 50e-6)
+    limit, f = 100.0, pair.mode.frequency
+    most = reach(sixteen, limit)
+    for angle in np.linspace(0, 2 * pi, 7):
+        wanted = 0.999 * most * np.exp(1j * angle)
+        trim = trim_voltages(sixteen, wanted, limit)
+        assert max(trim.voltages) <= limit * (1 + 1e-9)
+        assert abs(sixteen.charged(trim.voltages).soften().wave + wanted) < 1e-6 * most
+    longest = abs(sixteen.per_square_volt[1]).sum() * limit**2  # no direction reaches as far
+    with pytest.raises(ShellError, match="is beyond"):
+        trim_voltages(sixteen, longest, limit)
+    assert 0.1 < most * f < 1.0  # Hz
+
+
+def test_coefficients_are_the_slopes_of_the_softening(pair):
+    ring = Electrodes(pair, ring_of_electrodes(16, 0.8, 60.0), 80e-6)
+    step = ring.charged(60.01).soften().shift - ring.charged(59.99).soften().shift
+    assert ring.per_volt() == pytest.approx(step / 0.02, rel=1e-9)
+    wider = Electrodes(pair, ring_of_electrodes(16, 0.8, 60.0), 80e-6 * (1 + 1e-5)).soften().shift
+    assert ring.per_kelvin(1e-5) == pytest.approx(wider - ring.soften().shift, rel=1e-4)
+
+
+def test_bad_electrodes_are_refused(pair):
+    with pytest.raises(ShellError, match="pull the shell in"):
+        Electrodes(pair, ring_of_electrodes(1, 1.0, 20000.0), 50e-6).soften()
+    with pytest.raises(ShellError, match="is it in µm"):
+        Electrodes(pair, ring_of_electrodes(1, 1.0, 100.0), 50e-3)
+    with pytest.raises(ShellError, match="the gap closes"):
+        Electrodes(pair, ring_of_electrodes(1, 1.0, 100.0), 50e-6, wave(2, 1.1)).soften()
+    with pytest.raises(ShellError, match="share of the circle"):
+        ring_of_electrodes(8, 1.2, 1.0)
