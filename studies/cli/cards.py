@@ -6,17 +6,25 @@ if TYPE_CHECKING:
     from shell.materials import Material, Prior
 
 
-def cards(*, json: bool = False) -> int:
-    """List the instrument cards that ship with the package.
+def cards(card: str = "", *, json: bool = False) -> int:
+    """List the instrument cards that ship with the package, or the uncertain values of one card.
+
+    A number of a card may carry its uncertainty: { value = 0.0118, relative_sd = 0.3 }, { value = ..., sd = ... }, or
+    { value = ..., low = ..., high = ... } with hard bounds; sd = 0 makes it exact. Others are as uncertain as their key is
+    documented to be.
 
     Parameters
     ----------
+    card : str
+        Path of a card, or the name of one that ships: show its uncertain values.
     json : bool
-        Print one JSON object instead of a table.
+        Print one JSON object (schema hrg.cards/1; hrg.card-values/1 for one card) instead of a table.
     """
     from studies.cli.output import print_json, print_table
     from studies.instrument.card import load_card, shipped_cards
 
+    if card:
+        return _show_values(card, json)
     found = [load_card(path) for path in shipped_cards().values()]
     if json:
         entries = [
@@ -33,6 +41,35 @@ def cards(*, json: bool = False) -> int:
         return 0
     rows = [[c.name, c.keys("resonator").shape, c.material.name, c.note] for c in found]
     print_table("Cards", ["Name", "Shape", "Material", "What is printed, what is illustrative"], rows)
+    return 0
+
+
+def _show_values(card: str, json: bool) -> int:
+    from dataclasses import asdict
+
+    from studies.cli.output import print_json, print_table
+    from studies.instrument.card import load_card
+
+    instrument = load_card(card)
+    values, stated = instrument.uncertain, instrument.stated
+    if json:
+        print_json(
+            {
+                "schema": "hrg.card-values/1",
+                "card": instrument.name,
+                "values": [{**asdict(one), "stated": one.name in stated} for one in values],
+                "correlations": [[*pair, correlation] for pair, correlation in instrument.correlation.items()],
+            }
+        )
+        return 0
+    print(f"{instrument.name}: what is uncertain (± one standard deviation; everything else is exact)")
+    tables: dict[str, list[list[str]]] = {}
+    for one in values:
+        table, key = one.name.split(".", 1)
+        origin = "card" if one.name in stated else "default"
+        tables.setdefault(table, []).append([key, f"{one.value:.4g}", f"{one.sd:.2g}", origin])
+    for table, rows in tables.items():
+        print_table(f"[{table}]", ["Key", "Value", "±", "From"], rows)
     return 0
 
 

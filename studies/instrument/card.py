@@ -139,18 +139,21 @@ class Instrument:
         """Every number of the card that is not exact, in the card's units: stated so, or by the documentation of its key."""
         from studies.instrument.material_values import uncertain_of_heat, uncertain_of_law
 
-        documented = [value for table in self.tables.values() for value in table.uncertain]
-        stated = frozenset[str]().union(*(table.stated for table in self.tables.values()))
-        law = uncertain_of_law(self.material, stated)
-        return (*documented, *law, *uncertain_of_heat(self.material, self.thermal, self.reference_temperature))
+        tables = [value for table in self.tables.values() for value in table.uncertain]
+        law = uncertain_of_law(self.material, self.stated)
+        return (*tables, *law, *uncertain_of_heat(self.material, self.thermal, self.reference_temperature))
 
     @cached_property
     def correlation(self) -> Mapping[tuple[str, str], float]:
         """Prior correlation of pairs of uncertain values; of pairs that it does not have, none."""
         from studies.instrument.material_values import correlations_of_law
 
-        stated = frozenset[str]().union(*(table.stated for table in self.tables.values()))
-        return correlations_of_law(self.material, {one.name for one in self.uncertain} - stated)
+        return correlations_of_law(self.material, {one.name for one in self.uncertain} - self.stated)
+
+    @property
+    def stated(self) -> frozenset[str]:
+        """Names of the numbers whose uncertainty the card itself states, exact ones among them."""
+        return frozenset[str]().union(*(table.stated for table in self.tables.values()))
 
     def at(self, temperature: float) -> "tuple[Resonator, Elastic]":
         """Return the resonator, grown by its expansion, and its elastic constants at a uniform temperature (K)."""

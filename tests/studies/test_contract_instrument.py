@@ -36,6 +36,7 @@ TYPOS = {
     "uncertainty": ({"thermal": {"cells": {"value": 3, "relativ_sd": 1}}}, ["[thermal]: cells", "'relative_sd'"]),
 }
 COMMANDS = {
+    "cards": ["cards", "CARD"],
     "modes": ["modes", "CARD"],
     "tcf": ["tcf", "CARD"],
     "thermal": ["thermal", "CARD", "soak 20 1h"],
@@ -228,6 +229,21 @@ def test_every_key_of_a_table_is_explained_in_its_file():
                 assert key == "note" or key.split("_")[0] in text, f"[{entry.table}] {key}"
                 explained += 1
     assert explained > 40
+
+
+def test_the_uncertain_values_of_a_card_are_listed(capsys):
+    assert main(["cards", "cvg-25mm", "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert told["schema"] == "hrg.card-values/1"
+    found = {one["name"]: one for one in told["values"]}
+    assert found["material.youngs_modulus_GPa"] | {"low": None} == {
+        "name": "material.youngs_modulus_GPa", "value": 190.0, "sd": 5.0, "low": None, "high": None,
+        "logarithmic": True, "unit": "GPa", "stated": True,
+    }  # fmt: skip
+    assert not found["thermal.mount_exchange_cm2"]["stated"]
+    assert all({one, other} <= set(found) for one, other, _ in told["correlations"])
+    assert main(["cards", "hrg-30mm"]) == 0
+    assert max(map(len, capsys.readouterr().out.splitlines())) <= 82
 
 
 @pytest.mark.parametrize("name", sorted(shipped_cards()))

@@ -9,14 +9,16 @@ weight = 0.2                       # and at least one of its coefficients
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import lru_cache
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import msgspec
 
-from studies.errors import InputError, naming
+from studies.errors import InputError
 from studies.instrument.keys import Table, number
 from studies.instrument.registry import CardTable, Place
+
+if TYPE_CHECKING:
+    from studies.diagnosis.effects import Effect
 
 
 @dataclass(frozen=True)
@@ -35,24 +37,17 @@ def keys_of(raw: Mapping[str, Any], where: str) -> Any:
     name = raw.get("name")
     if not isinstance(name, str):
         raise InputError(f'{where}: the line name = "..." is missing; add it.')
-    with naming(where):
-        try:
-            effect = find_effect(name)
-        except InputError as error:
-            raise InputError(f"{where}: {error}") from None
-    response = raw.get("response", effect.responses[0])
-    return _declare(name, response if response in effect.responses else effect.responses[0])
+    try:
+        effect = find_effect(name)
+    except InputError as error:
+        raise InputError(f"{where}: {error}") from None
+    response = raw.get("response")
+    return _declare(effect, response if response in effect.responses else effect.responses[0])
 
 
-@lru_cache(maxsize=256)
-def _declare(name: str, response: str) -> Any:
-    from studies.diagnosis.effects import find_effect
-
-    effect = find_effect(name)
-    fields: list[Any] = [
-        ("name", str),
-        ("response", Literal[effect.responses], effect.responses[0]),
-    ]
+def _declare(effect: "Effect", response: str) -> Any:
+    """Declare the parameters of the effect's shape with their bounds, and its coefficients for one response."""
+    fields: list[Any] = [("name", str), ("response", Literal[effect.responses], effect.responses[0])]
     for shape in effect.shape:
         kind = Annotated[float, number(least=shape.low, most=shape.high)]
         fields.append((shape.name, kind, shape.low) if shape.steady else (shape.name, kind))
@@ -62,7 +57,7 @@ def _declare(name: str, response: str) -> Any:
 
     def check(entry: Any) -> None:
         if all(getattr(entry, key) is None for key in coefficients):
-            raise ValueError(f"the effect '{name}' needs a coefficient; add {' or '.join(coefficients)}.")
+            raise ValueError(f"the effect '{effect.name}' needs a coefficient; add {' or '.join(coefficients)}.")
 
     return msgspec.defstruct(
         "Entry", fields, bases=(Table,), namespace={"__post_init__": check}, frozen=True, kw_only=True
