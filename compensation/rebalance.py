@@ -107,6 +107,63 @@ def simulate_rebalance(
     )
 
 
+def settle_rebalance(
+    wave: StandingWave, electronics: Electronics, rate: ArrayLike = 0.0, angle: ArrayLike = 0.0
+) -> LoopRun:
+    """Return what settled loops say, without noise, for any number of rows at once: exact in the electronics' errors.
+
+    Integral control shows the pick-offs their command, C_p (P, S) = (1, 0); the commands c are what that takes,
+    C_d c = (iν − A)(P, S), and ν, how far the oscillator is from the mean frequency, makes the amplitude's command real.
+
+    Parameters
+    ----------
+    wave : StandingWave
+        Its values numbers, or arrays (N,).
+    rate, angle : float or array (N,)
+        Rate (rad/s) and azimuth of the wave (rad).
+
+    Returns
+    -------
+    LoopRun
+        `time` counts the rows.
+    """
+    values = [np.asarray(getattr(wave, name), dtype=float) for name in PHYSICAL]
+    shape = np.broadcast_shapes(*(np.shape(x) for x in (*values, rate, angle)), (1,))
+    rows = spread_over_rows(wave, shape[0])
+    turning, azimuth = (np.broadcast_to(np.asarray(x, dtype=float), shape) for x in (rate, angle))
+    A = _dynamics(rows, turning, azimuth)
+    c, s = np.cos(rows.harmonic * azimuth), np.sin(rows.harmonic * azimuth)
+    R = np.moveaxis(np.array([[c, -s], [s, c]]), -1, 0)
+    back = np.swapaxes(R, 1, 2)
+    pickoff = back @ electronics.pickoff.matrix(rows.harmonic) @ R
+    drive = back @ electronics.drive.matrix(rows.harmonic) @ R
+    moved = np.linalg.solve(pickoff, np.broadcast_to([[1.0], [0.0]], (*shape, 2, 1)))
+    held = np.linalg.solve(drive, -A @ moved)[..., 0]
+    shifted = np.linalg.solve(drive, 1j * moved)[..., 0]
+    nu = -held[:, 0].imag / shifted[:, 0].imag
+    command = held + nu[:, None] * shifted
+    return LoopRun(
+        np.arange(shape[0], dtype=float),
+        -command[:, 1].real / rows.coupling,
+        command[:, 1].imag,
+        command[:, 0].real,
+        rows.omega + nu,
+        azimuth.copy(),
+    )
+
+
+def _dynamics(rows: StandingWave, rate: Real, angle: Real) -> NDArray[np.complex128]:
+    """Return A (N, 2, 2) of the averaged wave in the frame at each azimuth, about the mean frequency."""
+    damped = np.asarray(rows.damping_split) / 2 * np.exp(2j * rows.harmonic * (np.asarray(rows.damping_axis) - angle))
+    detuned = (
+        np.asarray(rows.frequency_split) / 2 * np.exp(2j * rows.harmonic * (np.asarray(rows.frequency_axis) - angle))
+    )
+    along, across = -damped.real + 1j * detuned.real, -damped.imag + 1j * detuned.imag
+    decay, coriolis = -1 / np.asarray(rows.tau), rows.coupling * rate
+    A = np.array([[decay + along, across - coriolis], [across + coriolis, decay - along]])
+    return np.moveaxis(A, -1, 0)
+
+
 def samples_in_row(time: Real, loops: Loops) -> int:
     """Return how many samples of the loops make one row, or say that they do not."""
     step = require_regular(time, "the simulation of the loops")
@@ -157,7 +214,8 @@ def _close(
     middle = (block.start + block.stop) // 2
     wave, azimuth = at_row(rows, middle), float(angle[middle])
     R = turn(wave.harmonic * azimuth)
-    A = R.T @ wave.envelope(float(rate[middle])) @ R - 1j * float(wave.detuning(azimuth)) * np.eye(2)
+    locked = settle_rebalance(wave, electronics, float(rate[middle]), azimuth).omega[0] - wave.omega
+    A = R.T @ wave.envelope(float(rate[middle])) @ R - 1j * locked * np.eye(2)
     pickoff = R.T @ electronics.pickoff.matrix(wave.harmonic) @ R
     drive = R.T @ electronics.drive.matrix(wave.harmonic) @ R
     seen = pickoff[:, 0]

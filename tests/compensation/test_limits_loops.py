@@ -10,7 +10,8 @@ from compensation.closed_loop import ClosedLoop
 from compensation.controllers import Loops, find_margins
 from compensation.electronics import Channels, Electronics, Noise, thermal_noise
 from compensation.errors import CompensationError
-from compensation.rebalance import simulate_rebalance
+from compensation.rebalance import settle_rebalance, simulate_rebalance
+from compensation.start_up import fit_run_down, start_up
 from compensation.wave import from_quality
 from compensation.whole_angle import simulate_whole_angle
 
@@ -143,3 +144,41 @@ def test_what_cannot_be_simulated_is_refused():
         from_quality(4432.0, 1e6, damping_anisotropy=2.0)
     with pytest.raises(CompensationError, match="positive frequency"):
         Loops(rate=0.0)
+
+
+def test_settled_loops_are_where_the_simulation_comes_to_rest():
+    wave = from_quality(
+        4432.0, 1e5, damping_anisotropy=0.02, damping_axis=0.3, frequency_split=0.01, frequency_axis=0.2
+    )
+    run = simulate_rebalance(wave, ERRORS, Loops(), np.arange(0.0, 40.0), rate=1e-3, angle=0.3)
+    settled = settle_rebalance(wave, ERRORS, 1e-3, 0.3)
+    for name in ("rate", "quadrature", "decay"):
+        assert getattr(run, name)[-1] == pytest.approx(getattr(settled, name)[0], rel=1e-6)
+    assert run.omega[-1] - wave.omega == pytest.approx(settled.omega[0] - wave.omega, rel=1e-5)
+
+
+def test_start_at_full_drive_takes_what_the_closed_form_says():
+    """A limited drive reaches the amplitude after τ ln(N/(N − 1)), N the headroom: 14.5 s at Q = 1e7, N = 50."""
+    tau = 1e7 / np.pi / 4432
+    run = start_up(tau, Loops(), headroom=50.0, offset=10.0)
+    assert run.ready == pytest.approx(tau * np.log(50 / 49), rel=0.03)
+    assert run.locked < 1.0
+    assert run.offset[-1] == pytest.approx(10.0, rel=1e-3)
+    with pytest.raises(CompensationError, match="it needs more than 1"):
+        start_up(tau, Loops(), headroom=0.9)
+
+
+def test_run_down_is_recovered_and_refused_where_nothing_decays():
+    rng = np.random.default_rng(4)
+    time = np.arange(0.0, 1500.0)
+    covered = 0
+    for _ in range(100):
+        amplitude = np.exp(-time / 718.2) + rng.normal(0, 1e-3, time.size)
+        found = fit_run_down(time, amplitude)
+        covered += found.low <= 718.2 <= found.high
+        assert found.tau == pytest.approx(718.2, rel=0.01)
+    assert covered >= 88
+    with pytest.raises(CompensationError, match="does not decay"):
+        fit_run_down(time, 1 + rng.normal(0, 1e-3, time.size))
+    with pytest.raises(CompensationError, match="not positive in row 2"):
+        fit_run_down([0, 1, 2, 3, 4], [1, -1, 1, 1, 1])

@@ -1,0 +1,162 @@
+"""Start-up and run-down of the primary vibration: acquisition under a limited drive, and free decay."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from compensation.controllers import Loops, require_stable
+from compensation.errors import CompensationError
+from compensation.regression import fit_linear
+from compensation.samples import check_time, read_columns
+
+Real = NDArray[np.float64]
+LOCKED = math.radians(5.0)
+SETTLED = 0.01
+
+
+@dataclass(frozen=True)
+class StartUp:
+    """Course of a start: `time` (s), `amplitude` over the command, `phase_error` (rad), `offset` of the oscillator (rad/s).
+
+    `locked` and `ready` are the times (s) from which the phase stays within 5° and the amplitude within 1 %; NaN when
+    that did not happen.
+    """
+
+    time: Real
+    amplitude: Real
+    phase_error: Real
+    offset: Real
+    locked: float
+    ready: float
+
+
+def start_up(
+    tau: float,
+    loops: Loops,
+    *,
+    headroom: float = 20.0,
+    offset: float = 0.0,
+    amplitude: float = 1e-4,
+    seconds: float | None = None,
+    most_steps: int = 200_000,
+) -> StartUp:
+    """Start the vibration from almost nothing: nothing is linearised here.
+
+    Ż = −Z/τ − i (ν − ω + ω_n) Z + u, Z the amplitude in the phase of the oscillator, u the drive in its phase, at most
+    `headroom` times what holds the amplitude. The phase loop reads arg Z at any amplitude, and its integral starts at 0.
+
+    Parameters
+    ----------
+    tau : float
+        Decay time (s).
+    loops : Loops
+    headroom : float
+        Largest drive over 1/τ.
+    offset : float
+        Of the resonance from where the oscillator starts (rad/s).
+    amplitude : float
+        At the start, over the command: what noise and a kick leave.
+    seconds : float, optional
+        Length; what a full drive needs three times over, unless given.
+
+    Raises
+    ------
+    CompensationError
+        A loop is unstable, or a drive that does not reach the amplitude.
+    """
+    if not headroom > 1:
+        raise CompensationError(
+            f"the drive reaches {headroom:g} of the commanded amplitude and no more; it needs more than 1."
+        )
+    require_stable(loops, 1 / tau, ("amplitude", "phase"))
+    least = tau * math.log(headroom / (headroom - 1))
+    seconds = seconds if seconds is not None else 3 * least + 20 / loops.phase + 10 / loops.amplitude
+    T = max(loops.step, seconds / most_steps)
+    slow = Loops(
+        loops.amplitude, loops.phase, loops.rate, loops.quadrature, 1 / T, loops.delay, min(loops.demodulator, 1 / T)
+    )
+    require_stable(slow, 1 / tau, ("amplitude", "phase"))
+    (K_a, I_a), (K_p, I_p) = slow.gains("amplitude"), slow.gains("phase")
+    most, smoothing, (late, rest) = headroom / tau, slow.smoothing, slow.late
+    steps = math.ceil(seconds / T)
+    course = np.empty((steps, 3))
+    Z, seen = complex(amplitude, 0.0), complex(amplitude, 0.0)
+    drive_integral = phase_integral = 0.0
+    waiting = [(0.0, 0.0)] * (late + (rest > 0) + 1)
+    for n in range(steps):
+        u, nu = waiting[-1]
+        rate = complex(-1 / tau, offset - nu)
+        grown = np.exp(rate * T)
+        Z = Z * grown + u * (grown - 1) / rate
+        seen += smoothing * (Z - seen)
+        size, phase = abs(seen), math.atan2(seen.imag, seen.real)
+        wanted = K_a * (1 - size) + drive_integral
+        given = min(max(wanted, 0.0), most)
+        if wanted == given:  # the integral waits while the drive is at its limit
+            drive_integral += I_a * T * (1 - size)
+        nu = K_p * phase + phase_integral
+        phase_integral += I_p * T * phase
+        waiting = [(given, nu), *waiting[:-1]]
+        course[n] = abs(Z), phase, nu
+    time = np.asarray(T * np.arange(1, steps + 1), dtype=float)
+    return StartUp(
+        time,
+        course[:, 0],
+        course[:, 1],
+        course[:, 2],
+        _since(time, np.abs(course[:, 1]) < LOCKED),
+        _since(time, np.abs(course[:, 0] - 1) < SETTLED),
+    )
+
+
+def _since(time: Real, holds: NDArray[np.bool_]) -> float:
+    """Return the time from which a condition holds to the end; NaN when it does not hold there."""
+    broken = np.flatnonzero(~holds)
+    if not len(broken):
+        return float(time[0])
+    return float(time[broken[-1] + 1]) if broken[-1] + 1 < len(time) else math.nan
+
+
+@dataclass(frozen=True)
+class RunDown:
+    """Decay time τ (s) of a free vibration with the ends of its interval, and the misfit of ln a (1)."""
+
+    tau: float
+    low: float
+    high: float
+    misfit: float
+
+
+def fit_run_down(time: ArrayLike, amplitude: ArrayLike, confidence: float = 0.95) -> RunDown:
+    """Fit a = a₀ e^{−t/τ} by least squares on ln a with weights a², the noise being that of the amplitude.
+
+    Neighbouring rows are averaged so that their noise is independent; the interval is Student's.
+
+    Raises
+    ------
+    CompensationError
+        The amplitude is not positive, or does not decay.
+    """
+    from scipy import stats
+
+    t, a = read_columns(time=time, amplitude=amplitude)
+    check_time(t)
+    if np.any(a <= 0):
+        row = int(np.flatnonzero(a <= 0)[0])
+        raise CompensationError(
+            f"the amplitude is not positive in row {row + 1}; cut the run-down where it ends in noise."
+        )
+    if len(t) < 5:
+        raise CompensationError(f"a run-down needs five rows or more, not {len(t)}.")
+    weight = a / a.max()
+    X = np.stack([weight, weight * (t - t[0])], axis=1)
+    fit = fit_linear(X, weight * np.log(a), ("ln a0", "decay"), constant=False)
+    reach = float(stats.t.ppf(0.5 + confidence / 2, fit.degrees_of_freedom)) * float(fit.standard_errors[1])
+    decay = -float(fit.coefficients[1])
+    if decay - reach <= 0:
+        raise CompensationError(
+            f"the run-down does not decay: ln a changes by {-decay:.3g} ± {reach:.2g} per s; was the drive off?"
+        )
+    return RunDown(1 / decay, 1 / (decay + reach), 1 / (decay - reach), fit.standard_deviation)
