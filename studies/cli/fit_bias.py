@@ -116,17 +116,25 @@ def _payload(study: "BiasStudy", method: str, data: tuple[str, ...]) -> dict[str
 
 
 def _judged(judged: "Judged") -> dict[str, Any]:
+    from studies.models.kinds.bias import name_term
+
     fit, held_out = judged.fit, judged.held_out
     steps = fit.selection.steps if fit.selection else ()
     return {
         "reference": fit.reference,
-        "terms": ["constant", *fit.terms],
+        "terms": ["constant", *(name_term(name, fit.variable) for name in fit.terms)],
         "coefficients": fit.coefficients,
         "standard_errors": fit.standard_errors,
         "naive_standard_errors": fit.naive_errors,
         "theta": fit.theta,
         "path": [
-            {"added": step.added, "term": step.term, "F": step.F, "p_value": step.p_value, "bic": step.criterion}
+            {
+                "added": step.added,
+                "term": name_term(step.term, fit.variable),
+                "F": step.F,
+                "p_value": step.p_value,
+                "bic": step.criterion,
+            }
             for step in steps
         ],
         "training": {"before": judged.training[0], "after": judged.training[1], "gain": judged.training_gain},

@@ -1,8 +1,18 @@
 """`hrg import`: laboratory files into the record format, by a map that states every change."""
 
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from studies.importing.mapping import ImportMap
+
+    Columns = Mapping[str, NDArray[np.float64]]
 
 
 def import_(
@@ -10,13 +20,15 @@ def import_(
     map_: Annotated[str | None, Parameter(name="--map")] = None,
     out: str | None = None,
     draft: str | None = None,
+    preview: str | None = None,
     json: bool = False,
 ) -> int:
     """Bring laboratory files into the record format, or draft the map that says how.
 
     First 'hrg import RAW --draft MAP.toml', then read and correct the map, then 'hrg import RAW --map MAP.toml --out RUN.csv'.
     Several raw files, such as two loggers, are joined on their clocks onto the times of the first.
-    What was changed is listed in the header of the record. All keys of a map: python -m pydoc studies.importing.mapping.
+    What was changed is listed in the header of the record. Columns that name an axis make one record for each: RUN_x.csv,
+    RUN_y.csv … All keys of a map: python -m pydoc studies.importing.mapping.
 
     Parameters
     ----------
@@ -28,6 +40,8 @@ def import_(
         The record to write.
     draft : str
         Write a map drafted from the files instead; a file that exists is not overwritten.
+    preview : str
+        Write a page (HTML) that shows what was understood: every column over time, gaps, changes.
     json : bool
         Print one JSON object (schema hrg.import/1): rows, columns, missing values, notes.
     """
@@ -39,7 +53,7 @@ def import_(
         return _draft(raw, draft, json)
     if draft is not None or map_ is None or out is None:
         raise InputError("give either --draft MAP.toml, or both --map MAP.toml and --out RUN.csv.")
-    return _import(raw, map_, out, json)
+    return _import(raw, map_, out, preview, json)
 
 
 def _draft(raw: tuple[str, ...], path: str, json: bool) -> int:
@@ -57,6 +71,8 @@ def _draft(raw: tuple[str, ...], path: str, json: bool) -> int:
     if json:
         print_json({"schema": "hrg.import-draft/1", "map": path, "mapped": draft.mapped, "left_over": draft.left_over})
         return 0
+    for note in draft.notes:
+        say(note)
     say(
         f"{path}: drafted. Mapped: {', '.join(draft.mapped) or 'nothing'}. Left over: {', '.join(draft.left_over) or 'nothing'}."
     )
@@ -64,33 +80,89 @@ def _draft(raw: tuple[str, ...], path: str, json: bool) -> int:
     return 0
 
 
-def _import(raw: tuple[str, ...], path: str, out: str, json: bool) -> int:
-    import numpy as np
-
-    from studies.cli.output import print_json, print_table
-    from studies.importing.join import import_record
+def _import(raw: tuple[str, ...], path: str, out: str, preview: str | None, json: bool) -> int:
+    from studies.cli.output import print_json, say
+    from studies.files.writing import write_text
+    from studies.importing.join import import_records
     from studies.importing.mapping import load_map
     from studies.record import write_record
+    from studies.reports.preview import import_page
 
-    record = import_record(raw, load_map(path))
-    write_record(record, out)
-    if json:
-        print_json(
-            {
-                "schema": "hrg.import/1",
-                "record": out,
-                "rows": len(record),
-                "start": record.start.isoformat() if record.start else None,
-                "columns": {name: {"missing": int(np.isnan(v).sum())} for name, v in record.columns.items()},
-                "notes": list(record.comments),
-            }
+    import_map = load_map(path)
+    if import_map.is_table:
+        return _import_table(raw, import_map, out, preview, json)
+    records = import_records(raw, import_map)
+    files = {axis: _with_axis(out, axis) for axis in records}
+    for axis, record in records.items():
+        write_record(record, files[axis])
+    if preview is not None:
+        write_text(
+            preview, import_page({files[axis]: record.columns for axis, record in records.items()}, record.comments)
         )
+        say(f"preview: {preview}")
+    if json:
+        described = [_payload(files[axis], record.columns, record.comments) for axis, record in records.items()]
+        first = next(iter(records.values()))
+        start = first.start.isoformat() if first.start else None
+        more = {"axes": {axis: files[axis] for axis in records}} if len(records) > 1 else {}
+        print_json({"schema": "hrg.import/1", "start": start, **described[0], **more})
         return 0
+    for axis, record in records.items():
+        _show(files[axis], record.columns)
+    print("\n".join(record.comments))
+    return 0
+
+
+def _import_table(raw: tuple[str, ...], import_map: "ImportMap", out: str, preview: str | None, json: bool) -> int:
+    from studies.cli.output import print_json, say
+    from studies.errors import InputError
+    from studies.files.writing import write_text
+    from studies.importing.join import import_table
+    from studies.reports.preview import import_page
+
+    if len(raw) != 1:
+        raise InputError(f"{import_map.path}: describes one table, but {len(raw)} raw files are given.")
+    columns, notes = import_table(raw[0], import_map)
+    rows = zip(*(values.tolist() for values in columns.values()), strict=True)
+    text = "".join(f"# {note}\n" for note in notes) + ",".join(columns) + "\n"
+    write_text(out, text + "".join(",".join(f"{value:.12g}" for value in row) + "\n" for row in rows))
+    if preview is not None:
+        write_text(preview, import_page({out: columns}, notes))
+        say(f"preview: {preview}")
+    if json:
+        print_json({"schema": "hrg.import/1", "start": None, **_payload(out, columns, notes)})
+        return 0
+    _show(out, columns)
+    print("\n".join(notes))
+    return 0
+
+
+def _with_axis(out: str, axis: str) -> str:
+    from pathlib import Path
+
+    return str(Path(out).with_stem(f"{Path(out).stem}_{axis}")) if axis else out
+
+
+def _payload(out: str, columns: "Columns", notes: "Sequence[str]") -> dict[str, Any]:
+    import numpy as np
+
+    return {
+        "record": out,
+        "rows": len(next(iter(columns.values()))),
+        "columns": {name: {"missing": int(np.isnan(v).sum())} for name, v in columns.items()},
+        "notes": list(notes),
+    }
+
+
+def _show(out: str, columns: "Columns") -> None:
+    import numpy as np
+
+    from studies.cli.output import print_table
+
     rows = []
-    for name, values in record.columns.items():
+    for name, values in columns.items():
         known = values[np.isfinite(values)]
         span = (f"{known.min():.8g}", f"{known.max():.8g}") if len(known) else ("", "")
         rows.append([name, *span, str(len(values) - len(known))])
-    print_table(f"{out}: {len(record)} rows", ["Column", "Lowest", "Highest", "Missing"], rows)
-    print("\n".join(record.comments))
-    return 0
+    count = len(next(iter(columns.values())))
+    print_table(f"{out}: {count} rows", ["Column", "Lowest", "Highest", "Missing"], rows)

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from studies.errors import InputError
-from studies.importing.mapping import NUMERIC_TIMES, SECONDS, FileMap
+from studies.importing.mapping import NUMERIC_TIMES, SECONDS, UNIX, FileMap
 from studies.importing.raw import RawTable, shorten
 
 if TYPE_CHECKING:
@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 _EXCEL_EPOCH = datetime.datetime(1899, 12, 30)
 _UNIX_EPOCH = datetime.datetime(1970, 1, 1, tzinfo=datetime.UTC)
 _HALF_DAY = 43200.0
+LONGEST_RUN = 10 * 365.25 * 86400.0  # s
 
 
 @dataclass(frozen=True)
@@ -36,14 +37,19 @@ def read_times(table: RawTable, file: "FileMap") -> Times:
     """
     form = file.time_format
     origin, notes = file.start, []
+    if file.sample_period is not None:
+        import numpy as np
+
+        rows = np.arange(len(table.cells), dtype=np.float64)
+        return Times(np.asarray(file.sample_period * rows + file.clock_offset), origin)
     if form in NUMERIC_TIMES and len(file.time) > 1:
         raise InputError(
             f"{table.path}: time_format = '{form}' is a number in one column, but 'time' names {len(file.time)}."
         )
     if form in SECONDS:
         seconds = table.numbers(file.time[0]) * SECONDS[form]
-    elif form in ("unix-s", "unix-ms"):
-        seconds, origin = _from_first(table.numbers(file.time[0]) * (1.0 if form == "unix-s" else 1e-3), _UNIX_EPOCH)
+    elif form in UNIX:
+        seconds, origin = _from_first(table.numbers(file.time[0]) * UNIX[form], _UNIX_EPOCH)
     elif form == "excel-days":
         seconds, origin = _from_first(table.numbers(file.time[0]) * 86400.0, _EXCEL_EPOCH)
     else:
@@ -52,6 +58,11 @@ def read_times(table: RawTable, file: "FileMap") -> Times:
             seconds, nights = _unroll_midnights(seconds)
             origin = _combine(file.start, origin)
             notes += [f"{nights} midnights passed: a day added at each"] if nights else []
+    _check_span(seconds, table, file)
+    if file.timezone is not None and origin is not None and origin.tzinfo is None:
+        import zoneinfo
+
+        origin = origin.replace(tzinfo=zoneinfo.ZoneInfo(file.timezone))
     if file.clock_rate:
         seconds = seconds / (1 + file.clock_rate)
         notes.append(f"its clock runs {file.clock_rate * 1e6:g} ppm fast: times divided by {1 + file.clock_rate!r}")
@@ -59,6 +70,27 @@ def read_times(table: RawTable, file: "FileMap") -> Times:
         seconds = seconds + file.clock_offset
         notes.append(f"{file.clock_offset:g} s added to its times")
     return Times(seconds, origin, tuple(notes))
+
+
+def _check_span(seconds: "Array", table: RawTable, file: "FileMap") -> None:
+    """Refuse times that span longer than any run, and name the units that would make a run of them."""
+    import numpy as np
+
+    known = seconds[np.isfinite(seconds)]
+    span = float(np.ptp(known)) if known.size else 0.0
+    if span <= LONGEST_RUN:
+        return
+    unit, family = next(
+        ((factors[file.time_format], factors) for factors in (SECONDS, UNIX) if file.time_format in factors), (1.0, {})
+    )
+    better = [
+        f"'{name}' ({span / unit * f:.3g} s)" for name, f in family.items() if 1 < span / unit * f < LONGEST_RUN / 10
+    ]
+    hint = f" time_format = {' or '.join(better)} would be possible." if better else " Check the dates."
+    raise InputError(
+        f"{table.path}: with time_format = '{file.time_format}' its times span {span / 31557600:.3g} years, which is no"
+        f" run.{hint}"
+    )
 
 
 def drop_repeated(table: RawTable, times: Times, rule: str) -> "tuple[Times, NDArray[np.intp]]":

@@ -1,13 +1,19 @@
 """A first map for raw files: notation, time, columns and units guessed from names and cells, and every guess marked."""
 
+import itertools
+import math
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from studies.importing.look import as_number, is_stamp, look_at
-from studies.importing.mapping import SCHEMA
+from studies.errors import InputError
+from studies.importing.look import Look, as_number, is_stamp, look_at
+from studies.importing.mapping import SCHEMA, SECONDS, TABLE_TARGETS, load_map
+from studies.importing.meaning import Meaning, find_meanings, find_unit
+from studies.importing.offset import estimate_offset
 from studies.importing.units import units_of
 
+MOST_SETTLED = 500  # rows of a table of settled readings
 STAMPS = (
     "%Y-%m-%d %H:%M:%S",
     "%Y-%m-%d %H:%M:%S.%f",
@@ -21,62 +27,25 @@ STAMPS = (
     "%m/%d/%Y %H:%M:%S",
     "%m/%d/%Y %H:%M:%S.%f",
     "%m/%d/%Y %I:%M:%S %p",
+    "%d.%m.%y %H:%M:%S",
+    "%d/%m/%y %H:%M:%S",
+    "%m/%d/%y %H:%M:%S",
     "%H:%M:%S",
     "%H:%M:%S.%f",
 )
-TARGET_WORDS: tuple[tuple[str, str], ...] = (
-    # (pattern in the lower-case column name, column of the record); the first that fits counts
-    (r"chamber|kammer|oven|set ?point|soll|ambient", "chamber_temperature_degC"),
-    (r"housing|geh(ä|ae)use|case|pt ?100\b|temp|(^|[^a-z])t[ _]?(case|h|1)?($|[^a-z])", "housing_temperature_degC"),
-    (r"ref\w*[ _]*freq|freq\w*[ _]*ref|external|counter|gps", "reference_frequency_Hz"),
-    (r"freq|period|gate|\bf\b|\bf[ _](res|drive)", "frequency_Hz"),
-    (r"freq|period|gate", "reference_frequency_Hz"),
-    (r"applied|table|command\w*[ _]*rate|stimulus", "rate_deg_per_s"),
-    (r"bias|zero[ _-]*rate|drift|zro", "bias_deg_per_h"),
-    (r"rate|omega|gyro", "measured_rate_deg_per_s"),
-    (r"1/q|inv\w*[ _]*q|^q\b|q[ _-]*fact", "inverse_q"),
-    (r"quad", "quadrature_V"),
-    (r"drive|amplitude|ampl", "drive_amplitude_V"),
-    (r"electrode|polari[sz]|trim", "electrode_bias_V"),
-    (r"pattern|azimuth|theta", "pattern_angle_deg"),
-    (r"counts?\b|adc|raw", "output_counts"),
-)
-TIME_WORDS = r"time|zeit|date|datum|clock|stamp|uhr|^t$|^t[ _\[(]s"
-UNIT_WORDS: tuple[tuple[str, str], ...] = (
-    (r"kelvin|(^|[^a-z])k($|[^a-z])", "K"),
-    (r"°\s*f|deg ?f\b|fahrenheit", "degF"),
-    (r"°\s*c|deg ?c\b|celsius|(^|[^a-z])c($|[^a-z])", "degC"),
-    (r"mhz", "MHz"),
-    (r"khz", "kHz"),
-    (r"period.*count|count.*period", "period-counts"),
-    (r"gate|counts?\b", "gate-counts"),
-    (r"period.*(us|µs|μs)\b|(us|µs|μs)\b.*period", "period-us"),
-    (r"period.*\bms\b", "period-ms"),
-    (r"period", "period-s"),
-    (r"rad/s", "rad/s"),
-    (r"\bhz", "Hz"),
-    (r"mdeg/s|mdps|m°/s", "mdeg/s"),
-    (r"(deg|°)[ _]?(/|per)[ _]?h|dph", "deg/h"),
-    (r"(deg|°)[ _]?(/|per)[ _]?s|dps", "deg/s"),
-    (r"rpm", "rpm"),
-    (r"arcsec", "arcsec/s"),
-    (r"\bmv\b", "mV"),
-    (r"\b(uv|µv|μv)\b", "uV"),
-    (r"\bkv\b", "kV"),
-    (r"\bv\b|volt", "V"),
-    (r"\brad\b", "rad"),
-    (r"1/q|inv", "1/Q"),
-    (r"^q|q[ _-]*fact", "Q"),
-)
+TIME_WORDS = r"time|zeit|date|datum|clock|stamp|uhr|^t$|^t\s*[ _/\[(]\s*[mµun]?s\b"
+UNIX_BY_SIZE = ((1e9, "unix-s"), (1e12, "unix-ms"), (1e15, "unix-us"), (1e18, "unix-ns"))
+USUAL_STEP = (1e-3, 3600.0)  # s between rows
 
 
 @dataclass(frozen=True)
 class Draft:
-    """The text of a map, the columns of the record that it fills, and raw columns for which no meaning was found."""
+    """The text of a map, the columns of the record that it fills, raw columns without a meaning, and what was noticed."""
 
     text: str
     mapped: tuple[str, ...]
     left_over: tuple[str, ...]
+    notes: tuple[str, ...] = ()
 
 
 def draft_map(paths: Sequence[str]) -> Draft:
@@ -87,32 +56,88 @@ def draft_map(paths: Sequence[str]) -> Draft:
     InputError
         A file has no table of numbers that could be found.
     """
-    lines = [
+    head = [
         "# A draft: compare every line with the file before relying on it; CHECK marks guesses.",
         f'schema = "{SCHEMA}"',
         '# instrument = "..."',
         '# source = "..."',
-        "# step_s = 1.0    # a regular time grid; without it the times of the first file",
     ]
+    if len(paths) == 1 and (table := _draft_table(paths[0])) is not None:
+        return Draft("\n".join([*head, 'target = "table"', "", *table]) + "\n", TABLE_TARGETS, ())
+    head.append("# step_s = 1.0    # a regular time grid; without it the times of the first file")
+    files: list[list[str]] = []
     mapped: list[str] = []
     left_over: list[str] = []
     for path in paths:
         written, found, others = _draft_file(path, mapped)
-        lines += ["", *written]
+        files.append(written)
         mapped += found
         left_over += others
-    return Draft("\n".join(lines) + "\n", tuple(mapped), tuple(left_over))
+    notes = _find_offsets(paths, head, files) if len(paths) > 1 else []
+    text = "\n".join([*head, *(line for written in files for line in ("", *written))])
+    return Draft(text + "\n", tuple(dict.fromkeys(mapped)), tuple(left_over), tuple(notes))
 
 
-def _draft_file(path: str, taken: Sequence[str]) -> tuple[list[str], list[str], list[str]]:
+def _find_offsets(paths: Sequence[str], head: Sequence[str], files: list[list[str]]) -> list[str]:
+    """Offer the offset between the first file's clock and each other's, where their columns share enough."""
+    import tempfile
+    from pathlib import Path
+
+    from studies.importing.join import read_series, shift_between
+
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "map.toml"
+        file.write_text("\n".join([*head, *(line for written in files for line in written)]), encoding="utf-8")
+        try:
+            series = [read_series(p, m) for p, m in zip(paths, load_map(file).files, strict=True)]
+            shifts = [shift_between(series[0], other) for other in series]
+        except InputError:  # the draft is not complete yet: nothing can be compared
+            return []
+    notes, base = [], series[0]
+    for written, path, other, shift in zip(files[1:], paths[1:], series[1:], shifts[1:], strict=True):
+        found = [
+            (offset, one, two)
+            for (one, _), y1 in base.columns.items()
+            for (two, _), y2 in other.columns.items()
+            if (offset := estimate_offset(base.time, y1, other.time + shift, y2)) is not None
+        ]
+        if not found:
+            continue
+        offset, one, two = max(found, key=lambda item: item[0].correlation)
+        said = f"{offset.value:.3g} s (90 %: {offset.low:.3g} to {offset.high:.3g} s)"
+        place = next(k for k, line in enumerate(written) if line.startswith("# clock_offset_s"))
+        written[place : place + 1] = [
+            f"# {two} here follows {one} of the first file best with {said}, correlation {offset.correlation:.4f};",
+            "# a real lag between two places looks the same: take it only if both show one thing.",
+            f"# clock_offset_s = {offset.value:.4g}    # CHECK: added to this file's times",
+        ]
+        notes.append(f"{path}: its clock seems to need {said}, from {two} against {one}; see the draft.")
+    return notes
+
+
+def _draft_table(path: str) -> list[str] | None:
+    """Draft a table of settled readings: a file without a time, with one temperature and one frequency."""
     look = look_at(path)
-    names = [" ".join(cell.split()) or f"column {k}" for k, cell in enumerate(look.rows[look.header], 1)]
-    names = [f"{name} #{k}" if name in names[: k - 1] else name for k, name in enumerate(names, 1)]
-    units = look.rows[look.header + 1] if look.data > look.header + 1 else [""] * len(names)
-    body = [row for row in look.rows[look.data :] if any(cell.strip() for cell in row)]
-    cells = {name: [row[k].strip() if k < len(row) else "" for row in body] for k, name in enumerate(names)}
-    hints = {name: f"{name} {unit}" for name, unit in zip(names, [*units, *[""] * len(names)], strict=False)}
-    time, form, unsure = _find_time(names, cells, hints, look.decimal)
+    if look.header is None or any(re.search(TIME_WORDS, name.lower()) for name in look.names):
+        return None
+    body = look.rows[look.data :]
+    if any(is_stamp(cell) for row in body[:5] for cell in row):
+        return None
+    hints = {name: f"{name} {unit}".strip() for name, unit in zip(look.names, look.units, strict=True)}
+    by_target = {meaning.target: name for name, meaning in find_meanings(hints).items()}
+    temperature = by_target.get("housing_temperature_degC") or by_target.get("chamber_temperature_degC")
+    if temperature is None or "frequency_Hz" not in by_target or len(body) > MOST_SETTLED:
+        return None
+    lines = _describe_notation(path, look)
+    for name, target in ((temperature, "temperature_degC"), (by_target["frequency_Hz"], "frequency_Hz")):
+        place = look.names.index(name)
+        cells = [row[place] for row in body if place < len(row)]
+        numbers = [n for cell in cells if (n := as_number(cell, look.decimal)) is not None]
+        lines += ["", *_draft_column(name, Meaning(target), hints[name], numbers)]
+    return lines
+
+
+def _describe_notation(path: str, look: Look) -> list[str]:
     lines = ["[[file]]", f"# {_comment(path)}"]
     if not look.excel:
         lines += [
@@ -120,61 +145,96 @@ def _draft_file(path: str, taken: Sequence[str]) -> tuple[list[str], list[str], 
             f'decimal = "{look.decimal}"',
             f'encoding = "{look.encoding}"',
         ]
-    lines += [f"header_line = {look.header + 1}", f"data_line = {look.data + 1}"]
+    header = 0 if look.header is None else look.header + 1
+    return [*lines, f"header_line = {header}", f"data_line = {look.data + 1}"]
+
+
+def _draft_file(path: str, taken: Sequence[str]) -> tuple[list[str], list[str], list[str]]:
+    look = look_at(path)
+    names = look.names
+    body = [row for row in look.rows[look.data :] if any(cell.strip() for cell in row)]
+    cells = {name: [row[k].strip() if k < len(row) else "" for row in body] for k, name in enumerate(names)}
+    hints = {name: f"{name} {unit}".strip() for name, unit in zip(names, look.units, strict=True)}
+    numbers = {name: [n for c in cells[name] if (n := as_number(c, look.decimal)) is not None] for name in names}
+    time, form, unsure = _find_time(names, cells, hints, numbers, look.decimal)
+    lines = _describe_notation(path, look)
     markers = _find_markers(names, cells, time, look.decimal)
     if markers:
         lines.append(
             f"missing = [{', '.join(_quote(marker) for marker in markers)}]    # CHECK: these cells mean 'no value'"
         )
-    lines.append(f"time = {_quote(time[0]) if len(time) == 1 else '[' + ', '.join(map(_quote, time)) + ']'}")
-    lines.append(f"time_format = {_quote(form)}{f'    # CHECK: {unsure}' if unsure else ''}")
+    if time:
+        lines.append(f"time = {_quote(time[0]) if len(time) == 1 else '[' + ', '.join(map(_quote, time)) + ']'}")
+        lines.append(f"time_format = {_quote(form)}{f'    # CHECK: {unsure}' if unsure else ''}")
+    else:
+        lines.append(f"sample_period_s = 1.0    # CHECK: {unsure}")
     joined = [" ".join(stamp) for stamp in zip(*(cells[name] for name in time), strict=True)]
     if len(set(joined)) < len(joined):
         lines.append('repeated_times = "spread"    # CHECK: some times repeat; "first" keeps one row of each')
     lines.append("# clock_offset_s = 0.0    # added to this file's times: positive when its clock is behind")
-    found: list[str] = []
-    others: list[str] = []
+    usable = {name: hints[name] for name in names if name not in time and numbers[name]}
+    meanings = find_meanings(usable, taken) if look.header is not None else _guess_meanings(usable, numbers)
+    others = [name for name in names if name not in time and name not in meanings]
     for name in names:
-        if name in time:
-            continue
-        target = _find_target(hints[name], [*taken, *found])
-        if target is None or not any(as_number(cell, look.decimal) is not None for cell in cells[name]):
-            others.append(name)
+        if name in others:
             lines += ["", f"# no meaning found for the column {_quote(name)}"]
-            continue
-        found.append(target)
-        lines += [
-            "",
-            *_draft_column(
-                name, target, hints[name], [n for c in cells[name] if (n := as_number(c, look.decimal)) is not None]
-            ),
-        ]
-    return lines, found, others
+        elif name in meanings:
+            guessed = "    # CHECK: guessed from its values" if look.header is None else ""
+            lines += ["", *_draft_column(name, meanings[name], hints[name], numbers[name], guessed)]
+    return lines, [meaning.target for meaning in meanings.values()], others
 
 
-def _draft_column(name: str, target: str, hint: str, numbers: Sequence[float]) -> list[str]:
-    units = units_of(target)
-    guessed = next((unit for pattern, unit in UNIT_WORDS if unit in units and re.search(pattern, hint.lower())), None)
-    unit, remark = guessed or next(iter(units)), "" if guessed else "    # CHECK: the name states no unit"
+def _guess_meanings(hints: Mapping[str, str], numbers: Mapping[str, Sequence[float]]) -> dict[str, Meaning]:
+    """Guess columns without a name by their values: a frequency is large and hardly changes, a temperature is moderate."""
+    found: dict[str, Meaning] = {}
+    for name in hints:
+        ordered = sorted(numbers[name])
+        low, middle, high = ordered[0], ordered[len(ordered) // 2], ordered[-1]
+        targets = [meaning.target for meaning in found.values()]
+        if middle > 900 and high - low < 0.05 * middle and "frequency_Hz" not in targets:
+            found[name] = Meaning("frequency_Hz")
+        elif -80 < low <= high < 150 and high - low > 0.2 and middle > 5 and "housing_temperature_degC" not in targets:
+            found[name] = Meaning("housing_temperature_degC")
+    return found
+
+
+def _draft_column(name: str, meaning: Meaning, hint: str, numbers: Sequence[float], remark: str = "") -> list[str]:
+    target = meaning.target
+    units, stated = units_of(target), find_unit(target, hint)
+    unit = stated or next(iter(units))
+    remark = remark or ("" if stated else "    # CHECK: the name states no unit")
     middle = sorted(numbers)[len(numbers) // 2]
+    lines = [f"from = {_quote(name)}", f'to = "{target}"']
     if target.endswith("_degC") and unit == "degC" and 200 < middle < 500:
         unit, remark = "K", "    # CHECK: the values look like kelvin"
-    lines = ["[[file.column]]", f"from = {_quote(name)}", f'to = "{target}"', f'unit = "{unit}"{remark}']
+    lines.append(f'unit = "{unit}"{remark}')
+    if target.endswith("_degC") and abs(middle) >= 500:
+        lines += [
+            "scale = 1.0     # CHECK: the values look like raw counts; reading × scale + offset is the temperature",
+            "offset = 0.0    # CHECK",
+        ]
     lines += [f"{key} = 1.0    # CHECK: {_SETTING_WORDS[key]}" for key in units[unit].settings]
-    return lines
+    if meaning.axis:
+        lines.append(f'axis = "{meaning.axis}"')
+    return ["[[file.column]]", *lines]
 
 
 _SETTING_WORDS = {
     "clock_Hz": "frequency of the clock that is counted",
     "periods": "number of periods in which it is counted",
     "gate_s": "length of the gate in which periods are counted",
+    "nominal_Hz": "frequency from which the reading is counted",
 }
 
 
 def _find_time(
-    names: Sequence[str], cells: dict[str, list[str]], hints: dict[str, str], decimal: str
+    names: Sequence[str],
+    cells: Mapping[str, list[str]],
+    hints: Mapping[str, str],
+    numbers: Mapping[str, Sequence[float]],
+    decimal: str,
 ) -> tuple[list[str], str, str]:
-    """Return the time columns, their format, and what is doubtful about it."""
+    """Return the time columns, their format, and what is doubtful about it; no columns where the rows have no time."""
     named = [name for name in names if re.search(TIME_WORDS, name.lower())]
     stamps = [name for name in names if cells[name] and all(is_stamp(cell) for cell in cells[name] if cell)]
     stamped = [name for name in (named or stamps) if name in stamps][:2]
@@ -184,18 +244,21 @@ def _find_time(
             if form:
                 return list(columns), form, unsure
         return stamped[:1], "iso", "no known form fits; write the pattern"
-    time = named[0] if named else names[0]
-    unsure = "" if named else "no column is named time; the first was taken"
-    numbers = [n for cell in cells[time] if (n := as_number(cell, decimal)) is not None]
-    first = numbers[0] if numbers else 0.0
-    if 1e9 < first < 4e9:
-        return [time], "unix-s", unsure
-    if 1e12 < first < 4e12:
-        return [time], "unix-ms", unsure
+    rising = [name for name in names if _rises(numbers[name])]
+    if not named and not rising:
+        return [], "", "no column is a time; by how many seconds do the rows lie apart?"
+    time = named[0] if named else rising[0]
+    unsure = "" if named else "no column is named time; the first that only rises was taken"
+    values = numbers[time]
+    first = values[0] if values else 0.0
+    for size, form in UNIX_BY_SIZE:
+        if size <= first < 4 * size:
+            return [time], form, unsure
     hint = hints[time].lower()
     for pattern, form in (
-        (r"\bms\b|milli", "ms"),
-        (r"\b(us|µs|μs)\b|micro", "us"),
+        (r"\bms\b|milli|_ms\b", "ms"),
+        (r"\b(us|µs|μs)\b|micro|_us\b", "us"),
+        (r"\bns\b|nano|_ns\b", "ns"),
         (r"\bmin", "min"),
         (r"\b(h|hours?|std)\b", "h"),
         (r"\bdays?\b", "days"),
@@ -204,10 +267,25 @@ def _find_time(
             return [time], form, unsure
     if 40000 < first < 60000 and first % 1:
         return [time], "excel-days", "the values look like Excel's days"
-    return [time], "s", unsure or ("" if re.search(r"_s\b|\bs\b|sec|sek", hint) else "the name states no unit")
+    if re.search(r"_s\b|\bs\b|sec|sek", hint):
+        return [time], "s", unsure
+    return [time], _likely_unit(values), unsure or "the name states no unit; chosen by the step between rows"
 
 
-def _find_stamp(columns: Sequence[str], cells: dict[str, list[str]], decimal: str) -> tuple[str, str]:
+def _rises(values: Sequence[float]) -> bool:
+    return len(values) > 2 and all(b > a for a, b in itertools.pairwise(values))
+
+
+def _likely_unit(values: Sequence[float]) -> str:
+    """Return s, or ms, us, ns where seconds would put the rows hours apart."""
+    steps = sorted(b - a for a, b in itertools.pairwise(values))
+    step = steps[len(steps) // 2] if steps else 1.0
+    if USUAL_STEP[0] <= step <= USUAL_STEP[1]:
+        return "s"
+    return min(("s", "ms", "us", "ns"), key=lambda unit: abs(math.log10(max(step, 1e-300) * SECONDS[unit])))
+
+
+def _find_stamp(columns: Sequence[str], cells: Mapping[str, list[str]], decimal: str) -> tuple[str, str]:
     import pandas as pd
 
     text = pd.Series([" ".join(stamp) for stamp in zip(*(cells[name] for name in columns), strict=True)], dtype=str)
@@ -231,7 +309,7 @@ def _fits(text: "object", form: str) -> bool:
         return False
 
 
-def _find_markers(names: Sequence[str], cells: dict[str, list[str]], time: Sequence[str], decimal: str) -> list[str]:
+def _find_markers(names: Sequence[str], cells: Mapping[str, list[str]], time: Sequence[str], decimal: str) -> list[str]:
     """Return texts that stand in columns of numbers."""
     markers: list[str] = []
     for name in names:
@@ -239,13 +317,6 @@ def _find_markers(names: Sequence[str], cells: dict[str, list[str]], time: Seque
         if name not in time and 0 < 2 * len(words) < len(cells[name]):
             markers += [word for word in dict.fromkeys(words) if word not in markers]
     return markers[:20]
-
-
-def _find_target(hint: str, taken: Sequence[str]) -> str | None:
-    lowered = hint.lower().replace("_", " ")
-    return next(
-        (target for pattern, target in TARGET_WORDS if target not in taken and re.search(pattern, lowered)), None
-    )
 
 
 def _quote(text: str) -> str:

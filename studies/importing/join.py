@@ -8,7 +8,7 @@ import numpy as np
 
 from studies.errors import InputError
 from studies.importing.clock import drop_repeated, read_times, seconds_between
-from studies.importing.mapping import ColumnMap, FileMap, ImportMap
+from studies.importing.mapping import TABLE_TARGETS, ColumnMap, FileMap, ImportMap
 from studies.importing.raw import RawTable, read_raw
 from studies.record import Record
 
@@ -31,7 +31,7 @@ class Series:
     path: str
     time: "Array"
     origin: "datetime.datetime | None"
-    columns: "dict[str, Array]"
+    columns: "dict[tuple[str, str], Array]"
     notes: tuple[str, ...]
 
     @property
@@ -42,8 +42,8 @@ class Series:
         return USUAL_GAP * float(np.median(np.diff(self.time))) if len(self.time) > 1 else 0.0
 
 
-def import_record(paths: Sequence[str], import_map: ImportMap) -> Record:
-    """Read raw files, convert and join them into one record.
+def import_records(paths: Sequence[str], import_map: ImportMap) -> dict[str, Record]:
+    """Read raw files, convert and join them into one record, or one for each axis ("" where there is only one).
 
     The comments of the record's header list every change; nothing is extrapolated, and nothing interpolated across gaps.
 
@@ -52,51 +52,111 @@ def import_record(paths: Sequence[str], import_map: ImportMap) -> Record:
     InputError
         A file does not fit its map, or the clocks cannot be placed against each other.
     """
-    wanted = len(import_map.files)
-    if len(paths) != wanted:
-        raise InputError(f"{import_map.path}: describes {wanted} raw files, but {len(paths)} are given.")
+    _check_count(paths, import_map)
     series = [read_series(path, file) for path, file in zip(paths, import_map.files, strict=True)]
     base = series[0]
-    shifts = [_shift(base, other) for other in series]
+    shifts = [shift_between(base, other) for other in series]
     grid = _lay_grid(base, import_map)
     notes = [f"imported with {import_map.path}; every change is listed here"]
-    columns: dict[str, Array] = {"time_s": grid - grid[0]}
+    columns: dict[tuple[str, str], Array] = {}
     for number, (one, shift) in enumerate(zip(series, shifts, strict=True), 1):
         notes += [f"file {number}, {note}" for note in one.notes]
         if number > 1:
             notes.append(f"file {number}, its zero lies at {shift - float(base.time[0]):.6g} s of the record")
+        notes += [f"file {number}, {note}" for note in _report_gaps(one)]
         for column in one.file.columns:
-            values = one.columns[column.target]
+            values = one.columns[column.target, column.axis]
             if one is not base or import_map.step is not None:
                 values = resample(one.time + shift, values, grid, column.resample, one.longest_gap)
-            columns[column.target] = values
+            columns[column.target, column.axis] = values
             notes.append(_describe(column, values, moved=one is not base or import_map.step is not None))
         if one is not base or import_map.step is not None:
             notes.append(f"file {number}, nothing is interpolated across gaps longer than {one.longest_gap:.6g} s")
     if import_map.step is not None:
         notes.append(f"regular time grid of {import_map.step:g} s")
     start = None if base.origin is None else _later(base.origin, float(grid[0]))
-    return Record(
-        columns,
-        instrument=import_map.instrument,
-        source=import_map.source,
-        start=start,
-        comments=tuple(" ".join(note.split()) for note in notes),
-    )
+    return {
+        axis: Record(
+            {"time_s": grid - grid[0], **{name: v for (name, of), v in columns.items() if of in ("", axis)}},
+            instrument=" ".join(filter(None, (import_map.instrument, f"axis {axis}" if axis else ""))),
+            source=import_map.source,
+            start=start,
+            comments=tuple(" ".join(note.split()) for note in notes),
+        )
+        for axis in import_map.axes
+    }
+
+
+def import_table(path: str, import_map: ImportMap) -> "tuple[dict[str, Array], tuple[str, ...]]":
+    """Read settled readings: temperature (°C) and frequency (Hz) in the order of the file, and what was changed.
+
+    Rows that lack one of the two are left out.
+    """
+    (file,) = import_map.files
+    table = read_raw(path, file)
+    columns = {column.target: convert(table, column) for column in file.columns}
+    whole = np.all([np.isfinite(values) for values in columns.values()], axis=0)
+    if not whole.any():
+        raise InputError(f"{path}: no row has both {' and '.join(columns)}.")
+    notes = [
+        f"imported with {import_map.path}; every change is listed here",
+        f"{' '.join(str(path).split())}, sha256 {table.sha256}, {int(whole.sum())} of {len(whole)} rows",
+        *(_describe(column, columns[column.target], moved=False) for column in file.columns),
+    ]
+    notes += [f"source: {import_map.source}"] if import_map.source else []
+    return {name: columns[name][whole] for name in TABLE_TARGETS}, tuple(" ".join(note.split()) for note in notes)
+
+
+def _check_count(paths: Sequence[str], import_map: ImportMap) -> None:
+    wanted = len(import_map.files)
+    if len(paths) != wanted:
+        raise InputError(f"{import_map.path}: describes {wanted} raw files, but {len(paths)} are given.")
+
+
+def _report_gaps(one: Series) -> list[str]:
+    """Say where the sampling of a file has gaps."""
+    steps = np.diff(one.time)
+    if not len(steps):
+        return []
+    gaps = np.flatnonzero(steps > one.longest_gap)
+    usual = f"{len(one.time)} rows, usually {float(np.median(steps)):.6g} s apart"
+    if not len(gaps):
+        return [f"{usual}; no gap longer than {one.longest_gap:.6g} s"]
+    longest = int(gaps[np.argmax(steps[gaps])])
+    return [
+        f"{usual}; {len(gaps)} gaps longer than {one.longest_gap:.6g} s, {float(steps[gaps].sum()):.6g} s together, the"
+        f" longest of {float(steps[longest]):.6g} s after {float(one.time[longest] - one.time[0]):.6g} s"
+    ]
 
 
 def read_series(path: str, file: FileMap) -> Series:
     """Read one raw file: its clock corrected, its columns converted, rows without a time left out."""
     table = read_raw(path, file)
     times, rows = drop_repeated(table, read_times(table, file), file.repeated_times)
-    columns = {column.target: convert(table, column)[rows] for column in file.columns}
+    columns = {(column.target, column.axis): convert(table, column)[rows] for column in file.columns}
     _check_lone_values(table, columns, rows)
     name = " ".join(str(path).split())
     notes = (
-        f"{name}, sha256 {table.sha256}, {len(rows)} rows from '{' '.join(file.time)}' ({file.time_format})",
+        f"{name}, sha256 {table.sha256}, {len(rows)} rows {_name_clock(file)}",
         *times.notes,
+        *_report_overloads(table, file),
     )
     return Series(file, str(path), times.seconds, times.origin, columns, notes)
+
+
+def _name_clock(file: FileMap) -> str:
+    if file.sample_period is not None:
+        return f"without a time, {file.sample_period!r} s apart"
+    return f"from '{' '.join(file.time)}' ({file.time_format})"
+
+
+def _report_overloads(table: RawTable, file: FileMap) -> list[str]:
+    counts = {column.source: table.count_overloads(column.source) for column in file.columns}
+    return [
+        f"{count} readings of '{name}' are an instrument's overload: left empty"
+        for name, count in counts.items()
+        if count
+    ]
 
 
 def convert(table: RawTable, column: ColumnMap) -> "Array":
@@ -171,7 +231,7 @@ def _lay_grid(base: Series, import_map: ImportMap) -> "Array":
     return np.asarray(base.time[0] + import_map.step * np.arange(int(count)))
 
 
-def _shift(base: Series, other: Series) -> float:
+def shift_between(base: Series, other: Series) -> float:
     """Return what must be added to the other file's times to bring them onto the first file's clock."""
     if base.origin is None and other.origin is None:
         return 0.0
@@ -190,16 +250,16 @@ def _shift(base: Series, other: Series) -> float:
     return shift
 
 
-def _check_lone_values(table: RawTable, columns: "dict[str, Array]", rows: "NDArray[np.intp]") -> None:
+def _check_lone_values(table: RawTable, columns: "dict[tuple[str, str], Array]", rows: "NDArray[np.intp]") -> None:
     """Refuse a file whose mapped columns hold no value at all."""
-    for name, values in columns.items():
+    for (name, _), values in columns.items():
         if not np.isfinite(values).any():
             raise InputError(f"{table.path}: the column for {name} holds no value in any of the {len(rows)} rows.")
 
 
 def _describe(column: ColumnMap, values: "Array", moved: bool) -> str:
     unit = column.conversion
-    steps = [f"x = '{column.source}'"]
+    steps = [f"x = '{column.source}'" + (f" (axis {column.axis})" if column.axis else "")]
     if column.scale != 1 or column.offset != 0:
         steps.append(f"x × {column.scale!r} + {column.offset!r}")
     named = dict(zip(unit.settings, column.settings, strict=True))

@@ -15,15 +15,31 @@ SEEN = 2000  # lines that are looked at
 
 @dataclass(frozen=True)
 class Look:
-    """What a first look at one raw file finds."""
+    """What a first look at one raw file finds; `header` is None where no line names the columns."""
 
     encoding: str
     separator: str
     rows: list[list[str]]
-    header: int
+    header: int | None
     data: int
     decimal: str
     excel: bool
+
+    @property
+    def names(self) -> list[str]:
+        """The columns' names, their places where a name is missing; a repeated one gets its place."""
+        cells = self.rows[self.data if self.header is None else self.header]
+        given = [""] * len(cells) if self.header is None else [" ".join(cell.split()) for cell in cells]
+        names = [name or f"column {k}" for k, name in enumerate(given, 1)]
+        return [f"{name} #{k}" if name in names[: k - 1] else name for k, name in enumerate(names, 1)]
+
+    @property
+    def units(self) -> list[str]:
+        """The cells of the line of units below the names, empty where there is none."""
+        if self.header is None or self.data == self.header + 1:
+            return [""] * len(self.names)
+        units = self.rows[self.header + 1]
+        return [*units, *[""] * len(self.names)][: len(self.names)]
 
 
 def look_at(path: str) -> Look:
@@ -32,7 +48,7 @@ def look_at(path: str) -> Look:
     Raises
     ------
     InputError
-        No line of names above rows of numbers was found.
+        No rows of numbers were found.
     """
     excel = Path(path).suffix.lower() in EXCEL
     if excel:
@@ -54,10 +70,8 @@ def look_at(path: str) -> Look:
         named = [k for k in range(first) if sum(bool(cell.strip()) for cell in rows[k]) >= max(1, width - 1)]
         # of two lines with a cell for every column the second one holds the units
         header = named[-2] if len(named) > 1 and _is_unit_line(rows[named[-1]]) else named[-1] if named else None
-    if first is None or header is None:
-        raise InputError(
-            f"{path}: no table with a line of names above rows of numbers was found; write the map by hand."
-        )
+    if first is None or width < 2:
+        raise InputError(f"{path}: no table with rows of two numbers or more was found; write the map by hand.")
     return Look(encoding, separator, rows, header, first, decimal, excel)
 
 

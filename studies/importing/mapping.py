@@ -4,18 +4,22 @@
 schema = "hrg.map/1"
 instrument = "unit 7"            # optional: goes into the record's header, as does source = "..."
 step_s = 1.0                     # optional: a regular time grid; without it the times of the first file
+target = "record"                # "record", or "table": settled readings temperature_degC, frequency_Hz without a time
 
 [[file]]                         # one table for each raw file, in the order of the command line
 separator = ";"                  # ";" "," "tab" "space"
 decimal = ","                    # "." or ","
 encoding = "utf-8"               # utf-8, utf-16, cp1252, latin-1
-header_line = 1                  # the line with the column names
+header_line = 1                  # the line with the column names; 0: there is none, the columns are "column 1", "column 2" …
 data_line = 2                    # the first line with numbers; default: the line after the header
 last_line = 9000                 # optional: what follows is not data
 sheet = "Sheet1"                 # Excel workbooks only
 missing = ["---", "OVL"]         # cells that mean "no value", besides empty ones
 time = "Zeit"                    # the column with the time; ["Datum", "Zeit"] joins two with a blank
-time_format = "s"                # s, ms, us, min, h, days, unix-s, unix-ms, excel-days, iso, or a pattern such as "%d.%m.%Y %H:%M:%S"
+time_format = "s"                # s, ms, us, ns, min, h, days, unix-s, unix-ms, unix-us, unix-ns, excel-days, iso, or a pattern such as
+                                 # "%d.%m.%Y %H:%M:%S"
+sample_period_s = 0.1            # instead of time and time_format: rows without a time, evenly spaced
+timezone = "Europe/Berlin"       # optional: of stamps that do not state one
 start = 2026-01-31T12:00:00      # optional: when a clock that counts from 0 was started
 clock_offset_s = 0.0             # added to this file's times: positive when its clock is behind
 clock_rate_ppm = 0.0             # by how much its clock runs fast
@@ -30,12 +34,13 @@ scale = 1.0
 offset = 0.0
 sign = 1                         # -1 turns the converted value's sign
 resample = "linear"              # linear | mean | nearest | previous
-# unit "period-counts" needs clock_Hz and periods, "gate-counts" needs gate_s
+axis = "x"                       # optional: one record for each axis, with the columns that have none in all of them
+# unit "period-counts" needs clock_Hz and periods, "gate-counts" needs gate_s, "ppm" and "ppb" need nominal_Hz
 ```
 """
 
 import datetime
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal, cast
@@ -46,8 +51,9 @@ from studies.importing.units import SETTINGS, TARGETS, Unit, units_of
 
 SCHEMA = "hrg.map/1"
 SEPARATORS = {";": ";", ",": ",", "tab": "\t", "space": r"\s+"}
-SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "min": 60.0, "h": 3600.0, "days": 86400.0}
-NUMERIC_TIMES = (*SECONDS, "unix-s", "unix-ms", "excel-days")
+SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0, "days": 86400.0}
+UNIX = {"unix-s": 1.0, "unix-ms": 1e-3, "unix-us": 1e-6, "unix-ns": 1e-9}
+NUMERIC_TIMES = (*SECONDS, *UNIX, "excel-days")
 TIME_FORMATS = (*NUMERIC_TIMES, "iso")
 ENCODINGS = ("utf-8", "utf-16", "cp1252", "latin-1")
 FILE_KEYS = (
@@ -61,6 +67,8 @@ FILE_KEYS = (
     "missing",
     "time",
     "time_format",
+    "sample_period_s",
+    "timezone",
     "start",
     "clock_offset_s",
     "clock_rate_ppm",
@@ -68,7 +76,8 @@ FILE_KEYS = (
     "longest_gap_s",
     "column",
 )
-COLUMN_KEYS = ("from", "to", "unit", "scale", "offset", "sign", "resample", *SETTINGS)
+COLUMN_KEYS = ("from", "to", "unit", "scale", "offset", "sign", "resample", "axis", *SETTINGS)
+TABLE_TARGETS = ("temperature_degC", "frequency_Hz")
 RESAMPLING = ("linear", "mean", "nearest", "previous")
 
 Resampling = Literal["linear", "mean", "nearest", "previous"]
@@ -86,6 +95,7 @@ class ColumnMap:
     sign: float = 1.0
     resample: Resampling = "linear"
     settings: tuple[float, ...] = ()
+    axis: str = ""
 
     @property
     def conversion(self) -> Unit:
@@ -113,6 +123,8 @@ class FileMap:
     clock_rate: float = 0.0
     repeated_times: str = "error"
     longest_gap: float | None = None
+    sample_period: float | None = None
+    timezone: str | None = None
 
 
 @dataclass(frozen=True)
@@ -123,7 +135,14 @@ class ImportMap:
     step: float | None = None
     instrument: str = ""
     source: str = ""
+    is_table: bool = False
     path: str = field(default="", compare=False)
+
+    @property
+    def axes(self) -> tuple[str, ...]:
+        """The axes that columns name, in their order; ("",) where none does."""
+        named = dict.fromkeys(column.axis for file in self.files for column in file.columns if column.axis)
+        return tuple(named) or ("",)
 
 
 def load_map(path: str | Path) -> ImportMap:
@@ -134,28 +153,43 @@ def load_map(path: str | Path) -> ImportMap:
     InputError
         Unknown keys, units or columns, missing or impossible values: the message names the place and the mend.
     """
-    top = Section(read_toml(path, SCHEMA), str(path), ("schema", "instrument", "source", "step_s", "file"))
-    files = tuple(_read_file(section) for section in top.sections("file", FILE_KEYS))
+    top = Section(read_toml(path, SCHEMA), str(path), ("schema", "instrument", "source", "step_s", "target", "file"))
+    is_table = top.text("target", "record", ("record", "table")) == "table"
+    files = tuple(_read_file(section, is_table) for section in top.sections("file", FILE_KEYS))
     if not files:
         raise InputError(f"{path}: a table [[file]] is missing; 'hrg import RAW --draft MAP.toml' drafts one.")
     step = top.number("step_s", above=0.0) if "step_s" in top else None
-    seen: dict[str, int] = {}
+    if is_table and (len(files) > 1 or step is not None):
+        raise InputError(f"{path}: target = 'table' goes with one [[file]] and without step_s.")
+    seen: dict[tuple[str, str], int] = {}
     for number, file in enumerate(files, 1):
         for column in file.columns:
-            if column.target in seen:
-                raise InputError(
-                    f"{path}: '{column.target}' is filled twice, by files {seen[column.target]} and {number}."
-                )
-            seen[column.target] = number
-    return ImportMap(files, step, _text(top, "instrument"), _text(top, "source"), str(path))
+            for axis in {"", column.axis}:
+                if (column.target, axis) in seen and (axis or not column.axis):
+                    raise InputError(
+                        f"{path}: '{column.target}' is filled twice, by files {seen[column.target, axis]} and {number}."
+                    )
+            seen[column.target, column.axis] = number
+    return ImportMap(files, step, _text(top, "instrument"), _text(top, "source"), is_table, str(path))
 
 
-def _read_file(section: Section) -> FileMap:
+def _read_file(section: Section, is_table: bool) -> FileMap:
     where = section.where
-    columns = tuple(_read_column(part) for part in section.sections("column", COLUMN_KEYS))
+    targets = TABLE_TARGETS if is_table else TARGETS
+    columns = tuple(_read_column(part, targets) for part in section.sections("column", COLUMN_KEYS))
     if not columns:
         raise InputError(f"{where}: no [[file.column]] says which column becomes what; add one.")
-    header = _line(section, "header_line", 1)
+    missing = [target for target in TABLE_TARGETS if target not in {column.target for column in columns}]
+    if is_table and missing:
+        raise InputError(f"{where}: a table needs a column that becomes {' and one that becomes '.join(missing)}.")
+    period = section.number("sample_period_s", above=0.0) if "sample_period_s" in section else None
+    timed = period is None and not is_table
+    if not timed and ("time" in section or "time_format" in section):
+        why = "sample_period_s is given" if period else "a table has no time"
+        raise InputError(f"{where}: {why}; remove time and time_format.")
+    if is_table and period is not None:
+        raise InputError(f"{where}: a table has no time; remove sample_period_s.")
+    header = _line(section, "header_line", 1, least=0)
     data = _line(section, "data_line", header + 1)
     last = _line(section, "last_line", 0) if "last_line" in section else None
     if data <= header or (last is not None and last < data):
@@ -164,8 +198,8 @@ def _read_file(section: Section) -> FileMap:
         )
     return FileMap(
         columns,
-        _read_time(section),
-        _read_time_format(section),
+        _read_time(section) if timed else (),
+        _read_time_format(section) if timed else "s",
         section.text("separator", ",", tuple(SEPARATORS)),
         section.text("decimal", ".", (".", ",")),
         section.text("encoding", "utf-8", ENCODINGS),
@@ -179,13 +213,16 @@ def _read_file(section: Section) -> FileMap:
         section.number("clock_rate_ppm", 0.0, least=-1e5, most=1e5) * 1e-6,
         section.text("repeated_times", "error", ("error", "first", "spread")),
         section.number("longest_gap_s", above=0.0) if "longest_gap_s" in section else None,
+        period,
+        _read_timezone(section),
     )
 
 
-def _read_column(section: Section) -> ColumnMap:
+def _read_column(section: Section, targets: Sequence[str]) -> ColumnMap:
     target = section.text("to")
-    if target not in TARGETS:
-        raise InputError(f"{section.where}: to = '{target}' is no column of a record{nearest(target, TARGETS)}")
+    if target not in targets:
+        what = "table" if targets is TABLE_TARGETS else "record"
+        raise InputError(f"{section.where}: to = '{target}' is no column of a {what}{nearest(target, targets)}")
     units: Mapping[str, Unit] = units_of(target)
     unit = section.text("unit", choices=tuple(units))
     settings = tuple(section.number(key, above=0.0) for key in units[unit].settings)
@@ -201,7 +238,10 @@ def _read_column(section: Section) -> ColumnMap:
     usual = "nearest" if target == "pattern_angle_deg" else "linear"  # an angle may jump by a turn
     resample = cast("Resampling", section.text("resample", usual, RESAMPLING))
     offset = section.number("offset", 0.0)
-    return ColumnMap(section.text("from"), target, unit, scale, offset, sign, resample, settings)
+    axis = section.text("axis") if "axis" in section else ""
+    if axis and not axis.isalnum():
+        raise InputError(f"{section.where}: axis = '{axis}' becomes part of a file's name; take letters and digits.")
+    return ColumnMap(section.text("from"), target, unit, scale, offset, sign, resample, settings, axis)
 
 
 def _read_time(section: Section) -> tuple[str, ...]:
@@ -243,10 +283,26 @@ def _read_start(section: Section) -> datetime.datetime | None:
     return value
 
 
-def _line(section: Section, key: str, default: int) -> int:
+def _read_timezone(section: Section) -> str | None:
+    if "timezone" not in section:
+        return None
+    import zoneinfo
+
+    name = section.text("timezone")
+    try:
+        zoneinfo.ZoneInfo(name)
+    except (zoneinfo.ZoneInfoNotFoundError, ValueError, OSError):
+        raise InputError(
+            f"{section.where}: timezone = '{name}' is not known here; take a name such as 'Europe/Berlin' or 'UTC'"
+            " (a machine without a time zone database needs 'pip install tzdata')."
+        ) from None
+    return name
+
+
+def _line(section: Section, key: str, default: int, least: int = 1) -> int:
     value = section.raw(key, default)
-    if isinstance(value, bool) or not isinstance(value, int) or not 1 <= value <= 10**9:
-        raise InputError(f"{section.where}: {key} must be a line number from 1 up, not {value!r}.")
+    if isinstance(value, bool) or not isinstance(value, int) or not least <= value <= 10**9:
+        raise InputError(f"{section.where}: {key} must be a line number from {least} up, not {value!r}.")
     return value
 
 

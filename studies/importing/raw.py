@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 
 EXCEL = (".xlsx", ".xlsm")
 OVERFLOW = "(beyond the header)"
+OVERLOAD = 1e36
+"""Instruments write 9.9e37 or 1e38 where a reading overloads them."""
 
 
 @dataclass(frozen=True)
@@ -63,13 +65,21 @@ class RawTable:
         empty = self.is_empty(text)
         plain = text.str.replace(self.decimal, ".", regex=False) if self.decimal != "." else text
         values = pd.to_numeric(plain.mask(empty, "nan"), errors="coerce").to_numpy(dtype=float, copy=True)
-        bad = np.flatnonzero(~np.isfinite(values) & ~empty)
+        overloaded = np.abs(values) >= OVERLOAD
+        bad = np.flatnonzero(~np.isfinite(values) & ~empty & ~overloaded)
         if len(bad):
             raise InputError(
                 f"{self.path}, line {self.line(bad[0])}: '{shorten(text.iloc[bad[0]])}' in column '{column}' is not a"
                 f" number (decimal = '{self.decimal}'); where it marks a missing value, add it to 'missing' in the map."
             )
+        values[overloaded] = np.nan
         return values
+
+    def count_overloads(self, column: str) -> int:
+        """Return how many readings of a column stand for an overload of the instrument; `numbers` leaves them empty."""
+        import numpy as np
+
+        return int(np.count_nonzero(np.isnan(self.numbers(column)) & ~self.is_empty(self.text(column))))
 
     def line(self, row: int) -> int:
         """Return the line of the file on which a row (from 0) stands."""
@@ -162,8 +172,9 @@ def _cell_text(value: object) -> str:
 
 
 def _split_lines(path: str | Path, text: str, file: "FileMap") -> list[list[str]]:
-    """Return the cells of the lines down to the header."""
-    lines = text.split("\n", file.header_line)[: file.header_line]
+    """Return the cells of the lines down to the header; of the first line of data where there is none."""
+    count = file.header_line or file.data_line
+    lines = text.split("\n", count)[:count]
     separator = SEPARATORS[file.separator]
     if file.separator == "space":
         return [line.split() for line in lines]
@@ -178,6 +189,11 @@ def _head(path: str | Path, lines: Sequence[Sequence[str]], file: "FileMap") -> 
     if len(lines) < file.header_line:
         raise InputError(f"{path}: has {len(lines)} lines, but header_line is {file.header_line} in the map.")
     names: list[str] = []
+    if file.header_line == 0:
+        width = len(lines[file.data_line - 1]) if len(lines) >= file.data_line else 0
+        if not width:
+            raise InputError(f"{path}: there are no rows from line {file.data_line} on (data_line in the map).")
+        return [f"column {place}" for place in range(1, width + 1)]
     cells = [" ".join(cell.split()) for cell in lines[file.header_line - 1]]
     while cells and not cells[-1]:
         cells.pop()

@@ -54,6 +54,8 @@ _FREQUENCY = {
         lambda x, clock, periods: periods * clock / x, "periods clock_Hz / x", ("clock_Hz", "periods"), divides=True
     ),
     "gate-counts": Unit(lambda x, gate: x / gate, "x / gate_s", ("gate_s",)),
+    "ppm": Unit(lambda x, nominal: nominal * (1 + 1e-6 * x), "nominal_Hz (1 + x / 1e6)", ("nominal_Hz",)),
+    "ppb": Unit(lambda x, nominal: nominal * (1 + 1e-9 * x), "nominal_Hz (1 + x / 1e9)", ("nominal_Hz",)),
 }
 _RATE_PER_H = {
     "deg/h": _SAME,
@@ -95,4 +97,4 @@ def units_of(column: str) -> Mapping[str, Unit]:
 
 
 TARGETS = tuple(name for name in COLUMNS if name != "time_s")
-SETTINGS = ("clock_Hz", "periods", "gate_s")
+SETTINGS = ("clock_Hz", "periods", "gate_s", "nominal_Hz")

@@ -20,7 +20,7 @@ from compensation.frequency import fit_frequency
 from studies.cli import main
 from studies.errors import UNUSABLE_INPUT, MissingEnvironment
 from studies.importing.draft import draft_map
-from studies.importing.join import import_record
+from studies.importing.join import import_records
 from studies.importing.mapping import load_map
 from studies.instrument.card import load_card, shipped_cards
 from studies.models import Source, compensate, emit_c, read_model, write_model
@@ -205,7 +205,7 @@ def documents(tmp_path):
     raw = tmp_path / "raw.csv"
     raw.write_text(raw_text(), encoding="utf-8")
     text = draft_map([str(raw)]).text
-    found.append(("map", text, lambda path: import_record([str(raw)], load_map(path))))
+    found.append(("map", text, lambda path: import_records([str(raw)], load_map(path))[""]))
     found += [(f"study {name}", path.read_text(), read_study) for name, path in shipped_specs().items()]
     return found
 
@@ -267,7 +267,7 @@ def test_mutated_raw_files_through_a_map_never_harm(tmp_path):
         )
         text = text.replace(",", ";")
         raw.write_bytes(mutate_text(text, rng) if rng.random() < 0.4 else text.encode())
-        accepted += check(lambda file: import_record([str(file)], fixed), raw, f"raw file {case}", harmed)
+        accepted += check(lambda file: import_records([str(file)], fixed)[""], raw, f"raw file {case}", harmed)
     assert not harmed
     assert not (tmp_path / "evaluated").exists()
     assert 0 < accepted < CASES

@@ -3,6 +3,7 @@
 import datetime
 import json
 import sys
+import tomllib
 
 import numpy as np
 import pytest
@@ -10,7 +11,7 @@ import pytest
 from studies.cli import main
 from studies.errors import InputError, MissingEnvironment
 from studies.importing.draft import draft_map
-from studies.importing.join import import_record, resample
+from studies.importing.join import import_records, resample
 from studies.importing.mapping import load_map
 from studies.importing.units import TARGETS, units_of
 from studies.record import read_record, write_record
@@ -124,12 +125,12 @@ def test_unsynchronised_loggers_are_joined_on_their_clocks(tmp_path):
     path = tmp_path / "map.toml"
     behind = START - datetime.timedelta(seconds=50 + 7)
     path.write_text(MAP.format(start=behind.isoformat(), offset=7.0, rate=200.0))
-    record = import_record([str(one), str(two)], load_map(path))
+    record = import_records([str(one), str(two)], load_map(path))[""]
     inside = t < 299
     assert np.allclose(record["frequency_Hz"][inside], signal(t)[1][inside], atol=2e-6)
     assert np.isnan(record["frequency_Hz"][t > 300]).all()  # nothing is extrapolated
     path.write_text(MAP.format(start=behind.isoformat(), offset=0.0, rate=200.0))
-    wrong = import_record([str(one), str(two)], load_map(path))
+    wrong = import_records([str(one), str(two)], load_map(path))[""]
     assert np.nanmax(abs(wrong["frequency_Hz"] - signal(t)[1])[inside]) > 0.05  # the offset matters
     saved = tmp_path / "run.csv"
     write_record(record, saved)
@@ -148,10 +149,10 @@ def test_a_clock_without_a_date_needs_start(tmp_path):
     text = MAP.format(start="2026-01-31T23:58:00", offset=0.0, rate=0.0)
     path.write_text(text.replace("start = 2026-01-31T23:58:00\n", ""))
     with pytest.raises(InputError, match="say when its clock was started"):
-        import_record([str(one), str(two)], load_map(path))
+        import_records([str(one), str(two)], load_map(path))[""]
     path.write_text(text.replace("23:58:00", "12:00:00"))
     with pytest.raises(InputError, match="lies wholly before"):
-        import_record([str(one), str(two)], load_map(path))
+        import_records([str(one), str(two)], load_map(path))[""]
 
 
 def simple(tmp_path, rows, extra="", column="", header="t,x"):
@@ -161,7 +162,7 @@ def simple(tmp_path, rows, extra="", column="", header="t,x"):
         f'schema = "hrg.map/1"\n[[file]]\ntime = "t"\n{extra or "time_format = " + chr(34) + "s" + chr(34)}\n'
         f'[[file.column]]\nfrom = "x"\n{column or "to = " + chr(34) + "frequency_Hz" + chr(34) + chr(10) + "unit = " + chr(34) + "Hz" + chr(34)}\n'
     )
-    return import_record([str(raw)], load_map(path))
+    return import_records([str(raw)], load_map(path))[""]
 
 
 @pytest.mark.parametrize(
@@ -205,9 +206,10 @@ def test_every_unit_of_every_column_is_right(target):
         "period-counts": 1000 * 10e6 / 4430.0, "gate-counts": 44300.0,
         "deg/h": 15.0, "arcsec/s": 15.0, "deg/s": 15.0 / 3600, "mdeg/s": 15.0 / 3.6, "rad/s of rate": np.deg2rad(15.0) / 3600,
         "rpm": 15.0 / 3600 / 6, "V": 0.25, "mV": 250.0, "uV": 250e3, "kV": 0.25e-3,
-        "deg": 45.0, "rad": np.pi / 4, "turns": 0.125, "counts": 17.0, "1/Q": 1e-7, "Q": 1e7, "ppm": 0.1,
+        "deg": 45.0, "rad": np.pi / 4, "turns": 0.125, "counts": 17.0, "1/Q": 1e-7, "Q": 1e7,
+        "ppm": 0.1 if target == "inverse_q" else 1e6 * (4430.0 / 4400.0 - 1), "ppb": 1e9 * (4430.0 / 4400.0 - 1),
     }  # fmt: skip
-    settings = {"clock_Hz": 10e6, "periods": 1000.0, "gate_s": 10.0}
+    settings = {"clock_Hz": 10e6, "periods": 1000.0, "gate_s": 10.0, "nominal_Hz": 4400.0}
     found = []
     for name, unit in units_of(target).items():
         key = "rad/s of rate" if name == "rad/s" and "deg_per" in target else name
@@ -240,12 +242,12 @@ def test_a_regular_grid(tmp_path):
     raw.write_text("t,x\n" + "".join(f"{0.1 * k:.1f},{k}\n" for k in range(101)))
     text = 'schema = "hrg.map/1"\nstep_s = 1.0\n[[file]]\ntime = "t"\ntime_format = "s"\n[[file.column]]\nfrom = "x"\nto = "output_counts"\nunit = "counts"\nresample = "mean"\n'
     path.write_text(text)
-    record = import_record([str(raw)], load_map(path))
+    record = import_records([str(raw)], load_map(path))[""]
     assert record["time_s"].tolist() == list(range(11))
     assert record["output_counts"][3] == pytest.approx(29.5)  # of 25 ... 34
     path.write_text(text.replace("1.0", "1e-9"))
     with pytest.raises(InputError, match="rows"):
-        import_record([str(raw)], load_map(path))
+        import_records([str(raw)], load_map(path))[""]
 
 
 @pytest.mark.parametrize(
@@ -297,11 +299,137 @@ def test_an_excel_workbook(tmp_path):
     raw, path = tmp_path / "raw.xlsx", tmp_path / "map.toml"
     book.save(raw)
     path.write_text(draft_map([str(raw)]).text)
-    record = import_record([str(raw)], load_map(path))
+    record = import_records([str(raw)], load_map(path))[""]
     assert record["time_s"].tolist() == [0, 2, 4, 6, 8]
     assert np.allclose(record["housing_temperature_degC"], 20 + np.arange(5.0))
     assert np.isnan(record["frequency_Hz"][2])
     assert record.start == START
     raw.write_bytes(raw.read_bytes()[:200])
     with pytest.raises(InputError, match="not an Excel workbook"):
-        import_record([str(raw)], load_map(path))
+        import_records([str(raw)], load_map(path))[""]
+
+
+@pytest.mark.parametrize(
+    ("names", "expected"),
+    [
+        (
+            ("time_s", "Temp. chamber", "PT100 housing", "f0"),
+            ("chamber_temperature_degC", "housing_temperature_degC", "frequency_Hz"),
+        ),
+        (("time_s", "temp", "temp chamber"), ("housing_temperature_degC", "chamber_temperature_degC")),
+        (("t / s", "f0 / kHz", "T [K]"), ("frequency_Hz", "housing_temperature_degC")),
+        (("time_s", "mag1x [T]", "mag temp [T]", "temperature"), (None, None, "housing_temperature_degC")),
+        (("time_s", "ref freq", "frequency"), ("reference_frequency_Hz", "frequency_Hz")),
+        (("time_s", "acc x (m/s^2)", "rate [deg/s]"), (None, "measured_rate_deg_per_s")),
+    ],
+)
+def test_the_best_fitting_column_wins_whatever_the_order(tmp_path, names, expected):
+    values = np.random.default_rng(0).uniform(20, 30, (30, len(names) - 1))
+    rows = [",".join([f"{k}", *(f"{v:.4f}" for v in row)]) for k, row in enumerate(values)]
+    (tmp_path / "raw.csv").write_text(",".join(names) + "\n" + "\n".join(rows) + "\n")
+    content = tomllib.loads(draft_map([str(tmp_path / "raw.csv")]).text)
+    found = {column["from"]: column["to"] for column in content["file"][0].get("column", [])}
+    assert tuple(found.get(name) for name in names[1:]) == expected
+
+
+def draft_and_import(path, folder, *edits):
+    text = draft_map([str(path)]).text
+    for old, new in edits:
+        assert old in text
+        text = text.replace(old, new)
+    (folder / "map.toml").write_text(text)
+    return import_records([str(path)], load_map(folder / "map.toml"))[""]
+
+
+def test_rows_without_a_time_have_a_sample_period(tmp_path):
+    rng = np.random.default_rng(1)
+    rows = [f"{20 + rng.normal():.4f};{4432 + rng.normal():.4f}" for _ in range(50)]
+    (tmp_path / "raw.csv").write_text("temp [°C];freq [Hz]\n" + "\n".join(rows) + "\n", encoding="utf-8")
+    (tmp_path / "map.toml").write_text(
+        'schema = "hrg.map/1"\n[[file]]\nseparator = ";"\nsample_period_s = 0.25\n'
+        '[[file.column]]\nfrom = "freq [Hz]"\nto = "frequency_Hz"\nunit = "Hz"\n'
+    )
+    record = import_records([str(tmp_path / "raw.csv")], load_map(tmp_path / "map.toml"))[""]
+    assert record["time_s"] == pytest.approx(0.25 * np.arange(50))
+
+
+@pytest.mark.parametrize(("form", "factor"), [("unix-s", 1), ("unix-ms", 1e3), ("unix-us", 1e6), ("unix-ns", 1e9)])
+def test_times_since_1970_are_told_by_their_size(tmp_path, form, factor):
+    stamps = [int((1627342541 + 11 * k) * factor) for k in range(30)]
+    rows = [f"{stamp},{20 + k / 10}" for k, stamp in enumerate(stamps)]
+    (tmp_path / "raw.csv").write_text("time,temp\n" + "\n".join(rows) + "\n")
+    record = draft_and_import(tmp_path / "raw.csv", tmp_path)
+    assert f'"{form}"' in (tmp_path / "map.toml").read_text()
+    assert record["time_s"] == pytest.approx(11.0 * np.arange(30), abs=1e-5)
+    assert record.start == datetime.datetime(2021, 7, 26, 23, 35, 41, tzinfo=datetime.UTC)
+
+
+def test_a_span_of_a_lifetime_is_no_run(tmp_path):
+    rows = [f"{256551281491968 + 505629 * k},{20 + k / 10}" for k in range(9000)]
+    (tmp_path / "raw.csv").write_text("timestamp,temp\n" + "\n".join(rows) + "\n")
+    with pytest.raises(InputError, match=r"span 144 years, which is no run.*'us' \(4.55e\+03 s\)"):
+        draft_and_import(tmp_path / "raw.csv", tmp_path, ('"us"', '"s"'))
+
+
+def test_stamps_of_a_time_zone(tmp_path):
+    rows = [f"2026-07-01 12:00:{k:02d},{20 + k / 10}" for k in range(30)]
+    (tmp_path / "raw.csv").write_text("time,temp\n" + "\n".join(rows) + "\n")
+    zone = ("# clock_offset_s", 'timezone = "Europe/Berlin"\n# clock_offset_s')
+    record = draft_and_import(tmp_path / "raw.csv", tmp_path, zone)
+    assert record.start.isoformat() == "2026-07-01T12:00:00+02:00"
+    with pytest.raises(InputError, match="timezone = 'Mars/Base' is not known"):
+        draft_and_import(tmp_path / "raw.csv", tmp_path, (zone[0], zone[1].replace("Europe/Berlin", "Mars/Base")))
+
+
+def test_overloads_of_an_instrument_are_missing_values(tmp_path):
+    rows = [f"{k},{9.9e37 if k in (3, 4) else 4432 + k / 10}" for k in range(40)]
+    (tmp_path / "raw.csv").write_text("time_s,freq [Hz]\n" + "\n".join(rows) + "\n")
+    record = draft_and_import(tmp_path / "raw.csv", tmp_path)
+    assert np.flatnonzero(np.isnan(record["frequency_Hz"])).tolist() == [3, 4]
+    assert any("2 readings of 'freq [Hz]' are an instrument's overload" in note for note in record.comments)
+
+
+def test_gaps_are_reported(tmp_path):
+    rows = [f"{k + (500 if k > 20 else 0)},{20 + k / 10}" for k in range(40)]
+    (tmp_path / "raw.csv").write_text("time_s,temp\n" + "\n".join(rows) + "\n")
+    record = draft_and_import(tmp_path / "raw.csv", tmp_path)
+    assert any(
+        "1 gaps longer than 10 s" in note and "the longest of 501 s after 20 s" in note for note in record.comments
+    )
+
+
+def test_a_table_of_settled_readings(tmp_path, capsys):
+    """Table 1 of the HRG paper as a laboratory might write it goes through to its cubic."""
+    readings = zip(
+        (-20, -10, 0, 10, 20, 30, 40), (4416.97, 4421.05, 4424.90, 4428.56, 4432.07, 4435.56, 4439.20), strict=True
+    )
+    rows = [f"{t + 273.15:.2f};{f / 1000:.5f}" for t, f in readings]
+    (tmp_path / "raw.csv").write_text("Temperature [K];f0 / kHz\n" + "\n".join(rows) + "\n")
+    assert hrg_import(tmp_path / "raw.csv", "--draft", tmp_path / "map.toml") == 0
+    assert hrg_import(tmp_path / "raw.csv", "--map", tmp_path / "map.toml", "--out", tmp_path / "table.csv") == 0
+    capsys.readouterr()
+    assert main(["fit", "frequency", str(tmp_path / "table.csv"), "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)["coefficients"]
+    assert found == pytest.approx([4424.90095, 0.3715556, -9.70238e-4, 1.527778e-5], rel=1e-5)
+
+
+@pytest.mark.parametrize("offset", [-37.0, 3.0, 420.0])
+def test_the_offset_of_a_second_clock_is_offered(tmp_path, offset):
+    """Both loggers saw one temperature; the second one's clock is behind by the offset."""
+    rng = np.random.default_rng(5)
+    t = np.arange(0.0, 7200.0, 5.0)
+
+    def temperature(at):
+        return 20 + 15 * np.sin(at / 900) + 4 * np.sin(at / 251)
+
+    one = [f"{x},{temperature(x) + 0.05 * rng.normal():.4f}" for x in t]
+    two = [
+        f"{x},{temperature(x + offset) + 0.05 * rng.normal():.4f},{4432 + temperature(x + offset) / 3:.4f}"
+        for x in t[::2]
+    ]
+    (tmp_path / "one.csv").write_text("time_s,temp housing\n" + "\n".join(one) + "\n")
+    (tmp_path / "two.csv").write_text("time_s,temp chamber,freq [Hz]\n" + "\n".join(two) + "\n")
+    draft = draft_map([str(tmp_path / "one.csv"), str(tmp_path / "two.csv")])
+    (line,) = [line for line in draft.text.splitlines() if line.startswith("# clock_offset_s") and "CHECK" in line]
+    assert float(line.split("=")[1].split("#")[0]) == pytest.approx(offset, abs=0.5)
+    assert "its clock seems to need" in draft.notes[0]

@@ -1,0 +1,137 @@
+"""What a laboratory's column means: every column of the record bids for it, and the best bid wins.
+
+A bid is the weight of the words in the column's name, raised by a unit that fits. A unit that cannot belong to a column
+of the record, such as [T] or m/s² beside "temp", forbids it.
+"""
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from studies.importing.units import units_of
+
+BIDS: tuple[tuple[str, str, int], ...] = (
+    # (pattern in the lower-case name, column of the record, weight)
+    (r"chamber|kammer|oven|ofen|bath\b|box|set ?point|soll|ambient|umgebung|\bair\b", "chamber_temperature_degC", 6),
+    (r"housing|geh(ä|ae)use|\bcase\b|t[ _]case|body|\bdut\b|device", "housing_temperature_degC", 6),
+    (r"temp|pt ?100\b|pt ?1000\b|thermo|ntc\b|\bt[ _]?(h|housing|\d)?$|^t\b", "housing_temperature_degC", 3),
+    (r"temp|pt ?100\b|pt ?1000\b|thermo|ntc\b", "chamber_temperature_degC", 1),
+    (r"(ref\w*|external|counter|gps)[ _]*(freq|f\b)|(freq\w*|\bf)[ _]*(ref|external|counter|gps)", "reference_frequency_Hz", 6),
+    (r"counter|period|gate", "reference_frequency_Hz", 1),
+    (r"freq|\bf[ _]?(0|res|drive|n?2)?\b", "frequency_Hz", 4),
+    (r"period|gate", "frequency_Hz", 3),
+    (r"freq", "reference_frequency_Hz", 2),
+    (r"applied|table|command\w*[ _]*rate|stimulus|turntable", "rate_deg_per_s", 6),
+    (r"bias|zero[ _-]*rate|drift|\bzro", "bias_deg_per_h", 5),
+    (r"rate|omega|gyr|\bw[xyz]\b", "measured_rate_deg_per_s", 4),
+    (r"1/q|inv\w*[ _]*q|^q\b|q[ _-]*fact", "inverse_q", 5),
+    (r"quad", "quadrature_V", 5),
+    (r"drive|amplitude|ampl", "drive_amplitude_V", 4),
+    (r"electrode|polari[sz]|trim", "electrode_bias_V", 5),
+    (r"pattern|azimuth|theta", "pattern_angle_deg", 5),
+    (r"counts?\b|\badc\b|\braw\b", "output_counts", 2),
+)  # fmt: skip
+FITTING_UNIT = 2
+UNIT_WORDS: tuple[tuple[str, str], ...] = (
+    (r"kelvin|(^|[^a-z])k($|[^a-z])", "K"),
+    (r"°\s*f|deg ?f\b|fahrenheit", "degF"),
+    (r"°\s*c|deg ?c\b|celsius|(^|[^a-z])c($|[^a-z])", "degC"),
+    (r"mhz", "MHz"),
+    (r"khz", "kHz"),
+    (r"ppm", "ppm"),
+    (r"ppb", "ppb"),
+    (r"period.*count|count.*period", "period-counts"),
+    (r"gate|counts?\b", "gate-counts"),
+    (r"period.*(us|µs|μs)\b|(us|µs|μs)\b.*period", "period-us"),
+    (r"period.*\bms\b", "period-ms"),
+    (r"period", "period-s"),
+    (r"rad/s", "rad/s"),
+    (r"\bhz", "Hz"),
+    (r"mdeg/s|mdps|m°/s", "mdeg/s"),
+    (r"(deg|°)[ _]?(/|per)[ _]?h|dph", "deg/h"),
+    (r"(deg|°)[ _]?(/|per)[ _]?s|dps", "deg/s"),
+    (r"rpm", "rpm"),
+    (r"arcsec", "arcsec/s"),
+    (r"\bmv\b", "mV"),
+    (r"\b(uv|µv|μv)\b", "uV"),
+    (r"\bkv\b", "kV"),
+    (r"\bv\b|volt", "V"),
+    (r"\brad\b", "rad"),
+    (r"1/q|inv", "1/Q"),
+    (r"^q|q[ _-]*fact", "Q"),
+    (r"counts?\b", "counts"),
+)
+BRACKETED = r"[\[(]\s*([^\])]{1,12}?)\s*[\])]"
+AXIS = re.compile(r"^(.*?)([xyz])((?:[^a-z].*)?)$", re.IGNORECASE)
+
+
+@dataclass(frozen=True)
+class Meaning:
+    """What a raw column becomes: a column of the record, and the axis ("" where there is only one)."""
+
+    target: str
+    axis: str = ""
+
+
+def find_meanings(hints: Mapping[str, str], taken: Sequence[str] = ()) -> dict[str, Meaning]:
+    """Return the meaning of every column for which one is found.
+
+    Parameters
+    ----------
+    hints : mapping
+        Name of a column to what is known of it: its name and its unit.
+    taken : sequence of str
+        Columns of the record that other files fill.
+    """
+    axes = _find_axes(hints)
+    bids = [
+        (-weight, place, name, target)
+        for place, (name, hint) in enumerate(hints.items())
+        if name not in axes
+        for target, weight in _bids(hint).items()
+        if target not in taken
+    ]
+    found = {name: Meaning("measured_rate_deg_per_s", axis) for name, axis in axes.items()}
+    filled = {meaning.target for meaning in found.values()}
+    for _, _, name, target in sorted(bids):
+        if name not in found and target not in filled:
+            found[name] = Meaning(target)
+            filled.add(target)
+    return {name: found[name] for name in hints if name in found}
+
+
+def find_unit(target: str, hint: str) -> str | None:
+    """Return the unit that a name states, of those from which the column can be made."""
+    units = units_of(target)
+    return next((unit for pattern, unit in UNIT_WORDS if unit in units and re.search(pattern, hint.lower())), None)
+
+
+def _bids(hint: str) -> dict[str, int]:
+    name = re.sub(r"[\[(][^\])]*[\])]", " ", hint).lower().replace("_", " ").replace(".", " ")
+    bids: dict[str, int] = {}
+    for pattern, target, weight in BIDS:
+        if not re.search(pattern, name):
+            continue
+        fits = _unit_fits(target, hint)
+        if fits is not False:
+            bids[target] = max(bids.get(target, 0), weight + (FITTING_UNIT if fits else 0))
+    return bids
+
+
+def _unit_fits(target: str, hint: str) -> bool | None:
+    """Tell whether the stated unit can belong to a column of the record; None where none is stated."""
+    stated = re.findall(BRACKETED, hint)
+    if stated:
+        return find_unit(target, stated[-1]) is not None or find_unit(target, hint.lower()) == "period-counts"
+    return True if find_unit(target, hint) is not None else None
+
+
+def _find_axes(hints: Mapping[str, str]) -> dict[str, str]:
+    """Return the axis of columns that come as x, y and z of one rate."""
+    groups: dict[tuple[str, str], dict[str, str]] = {}
+    for name, hint in hints.items():
+        parts = AXIS.match(name)
+        if parts and "measured_rate_deg_per_s" in _bids(hint):
+            groups.setdefault((parts[1].lower(), parts[3].lower()), {})[parts[2].lower()] = name
+    whole = [group for group in groups.values() if set(group) == {"x", "y", "z"}]
+    return {name: axis for axis, name in whole[0].items()} if whole else {}
