@@ -1,5 +1,6 @@
 """The frequency law of an instrument: what a simulation, a diagnosis, a study and a page take f(T) from."""
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -14,5 +15,11 @@ def law_of(
     """Build the frequency law of an instrument between two temperatures (K), within its material's range."""
     from shell.law import build_law
 
-    T0 = instrument.reference_temperature
-    return build_law(instrument.resonator, instrument.material, T0, lowest, highest, theory, harmonic)
+    T0, material = instrument.reference_temperature, instrument.material
+    given = next((one for one in instrument.uncertain if one.name == "material.poisson_ratio"), None)
+    if given is None:
+        return build_law(instrument.resonator, material, T0, lowest, highest, theory, harmonic)
+    # A given Poisson's ratio that is uncertain: the law is solved for the ratios that it may have.
+    ratio = replace(material.properties["poisson_ratio"], unsettled=(given.sd, 0.0, 0.0))
+    open_one = replace(material, properties={**material.properties, "poisson_ratio": ratio})
+    return build_law(instrument.resonator, open_one, T0, lowest, highest, theory, harmonic).with_material(material)

@@ -18,6 +18,7 @@ from thermal.network import Array, Network
 from thermal.profile import Profile
 from thermal.steady import find_steady_state
 from thermal.sweeping import MOST_SWEEPS, Sweep, SweepError, capacity_ratio, hermite, hold, outflow, run_sweeps
+from thermal.transient import BLOCK
 
 RELATIVE_TOLERANCE = 1e-7  # of the derivatives, at the last sweep
 BEND_STEP = 0.5  # K, half the central difference of a capacity over temperature
@@ -42,6 +43,12 @@ class Change:
     power: Array
     boundaries: Mapping[str, Profile] = field(default_factory=dict)
     initial: Array | None = None
+
+    @property
+    def moves(self) -> bool:
+        """Whether it changes any temperature."""
+        matrices = (self.conduction, self.radiation, self.capacity, self.power)
+        return bool(self.boundaries) or self.initial is not None or any(part.any() for part in matrices)
 
 
 def no_change(
@@ -117,7 +124,14 @@ def respond(
 
 
 def _observe(swept: Sweep, boundaries: Mapping[str, Profile], rows: Array, weights: Array) -> tuple[Array, Array]:
-    """Sums of temperatures and of their rates: of T₁ from its equation, of δ from its cubics."""
+    """Sums of temperatures and of their rates, in blocks of rows, so that only the sums are stored."""
+    blocks = [rows[k : k + BLOCK] for k in range(0, max(len(rows), 1), BLOCK)]
+    T, rate = zip(*[_observe_block(swept, boundaries, block, weights) for block in blocks], strict=True)
+    return np.concatenate(T), np.concatenate(rate)
+
+
+def _observe_block(swept: Sweep, boundaries: Mapping[str, Profile], rows: Array, weights: Array) -> tuple[Array, Array]:
+    """Sums and rates: of T₁ from its equation, of δ from its cubics."""
     linear, grid = swept.linear, swept.grid
     n = linear.count
     drain = linear.conduction[:n] / swept.grid.modes.capacity[:, None]

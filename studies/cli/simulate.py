@@ -1,7 +1,7 @@
 """`hrg simulate`: a virtual run in the record format.
 
-With --json one object, schema `hrg.simulate/1`: `card`, `out`, `rows`, `columns`, `rate_Hz`, `seed` (null without noise),
-`frequency_Hz` (`first`, `last`), `solver_relative_error` (of the shell solver against its theory),
+With --json one object, schema `hrg.simulate/1`: `card`, `out`, `rows`, `columns`, `rate_Hz`, `boundary` (what is imposed:
+"chamber" or "housing"), `seed` (null without noise), `frequency_Hz` (`first`, `last`), `solver_relative_error` (of the shell solver against its theory),
 `interpolation_relative_error` (of the frequency model against the solver), `warnings`.
 """
 
@@ -17,9 +17,10 @@ def simulate(
     seed: int = 0,
     noiseless: bool = False,
     theory: Literal["solid", "shell"] = "solid",
+    boundary: Literal["chamber", "housing"] | None = None,
     json: bool = False,
 ) -> int:
-    """Run a virtual gyro through a chamber profile and write the record.
+    """Run a virtual gyro through a chamber profile, or as a record was driven, and write the record.
 
     The card's optional tables [thermal], [loss], [bias], [noise] and [[effect]] say what the gyro is like; all have
     defaults (studies/instrument/tables).
@@ -32,17 +33,20 @@ def simulate(
         A CSV file (time_s,chamber_temperature_degC, linear between its rows), or words in quotes with temperatures in °C,
         durations as 5h, 30min or 90s, and rates in K/min: "soak T DURATION", "step FROM TO DURATION",
         "ramp FROM TO RATE", "staircase FROM TO STEP HOLD", "cycle START FIRST SECOND RATE HOLD COUNT", joined by "then";
-        for example "step 20 -10 5h then ramp -10 40 1". The gyro has settled at its first temperature.
+        for example "step 20 -10 5h then ramp -10 40 1". Or a record: its housing column, else its chamber column, is
+        imposed on its own rows. The gyro has settled at the first temperature.
     out : str
         The record to write.
     rate : float
-        Rows per second.
+        Rows per second; a record has its own.
     seed : int
         Seed of the noise.
     noiseless : bool
         Leave out noise, sensor lag and rounding.
     theory : str
         Of the shell: solid (three-dimensional) or shell (Naghdi).
+    boundary : str
+        Column of a record that is imposed: chamber or housing.
     json : bool
         Print one JSON object (schema hrg.simulate/1) instead of a sentence.
     """
@@ -52,13 +56,13 @@ def simulate(
     from studies.errors import InputError
     from studies.instrument.card import load_card
     from studies.record import write_record
-    from studies.simulation.chamber import load_profile
+    from studies.simulation.chamber import load_drive
     from studies.simulation.virtual_gyro import simulate_run
 
     if seed < 0:
         raise InputError(f"--seed {seed}: a seed is a whole number from 0 up.")
     instrument = load_card(card)
-    run = simulate_run(instrument, load_profile(profile), rate, seed, not noiseless, theory)
+    run = simulate_run(instrument, load_drive(profile, boundary), rate, seed, not noiseless, theory)
     rows = len(run.record)
     for warning in run.warnings:
         say(f"warning: {warning}")
@@ -74,7 +78,8 @@ def simulate(
         "out": out,
         "rows": rows,
         "columns": list(run.record.columns),
-        "rate_Hz": rate,
+        "rate_Hz": 1 / float(np.median(np.diff(run.record["time_s"]))),
+        "boundary": run.prediction.drive.boundary,
         "seed": None if noiseless else seed,
         "frequency_Hz": {"first": run.record["frequency_Hz"][0], "last": run.record["frequency_Hz"][-1]},
         "solver_relative_error": run.law.solver_error,

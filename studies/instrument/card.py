@@ -145,10 +145,11 @@ class Instrument:
 
     @cached_property
     def correlation(self) -> Mapping[tuple[str, str], float]:
-        """Prior correlation of pairs of uncertain values; of pairs that it does not have, none."""
+        """Correlation of pairs of uncertain values, by the law's prior or as the card states; of other pairs, none."""
         from studies.instrument.material_values import correlations_of_law
 
-        return correlations_of_law(self.material, {one.name for one in self.uncertain} - self.stated)
+        by_law = correlations_of_law(self.material, {one.name for one in self.uncertain} - self.stated)
+        return {**by_law, **self.part("posterior").pairs}
 
     @property
     def stated(self) -> frozenset[str]:

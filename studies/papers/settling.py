@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from shell.law import FrequencyLaw
 from studies.law import law_of
 from studies.simulation.heat_path import build_network, build_shell_and_stem
-from studies.simulation.virtual_gyro import cell_weights
+from studies.simulation.response import cell_weights
 from thermal.network import Network
 from thermal.profile import Profile
 from thermal.radiative import simulate

@@ -1,4 +1,4 @@
-"""A chamber profile from words (`thermal.profile`) or from a file `time_s,chamber_temperature_degC`."""
+"""A chamber profile from words (`thermal.profile`) or from a file `time_s,chamber_temperature_degC`; a record as a drive."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -7,6 +7,7 @@ from studies.errors import InputError
 
 if TYPE_CHECKING:
     from studies.instrument.card import Instrument
+    from studies.simulation.drive import Boundary, Drive
     from thermal.profile import Profile
 
 ZERO_CELSIUS = 273.15
@@ -23,6 +24,30 @@ def load_profile(text: str) -> "Profile":
     if len(table.values["time_s"]) < 2:
         raise InputError(f"{text}: a profile needs at least two rows.")
     return Profile(table.values["time_s"], table.values["chamber_temperature_degC"] + ZERO_CELSIUS)
+
+
+def load_drive(text: str, boundary: "Boundary | None" = None) -> "Profile | Drive":
+    """Read what drives a run: a profile in words or from a file, or a record, of which a measured column is imposed.
+
+    Parameters
+    ----------
+    boundary : "chamber" or "housing", optional
+        Column of a record; the housing's where there is one.
+
+    Raises
+    ------
+    InputError
+        A record without that column; a boundary for what is no record.
+    """
+    from studies.files.columns import read_header
+    from studies.record import PROFILE_COLUMNS, read_record
+    from studies.simulation.drive import drive_by_record
+
+    if Path(text).is_file() and set(read_header(text)) - set(PROFILE_COLUMNS):
+        return drive_by_record(read_record(text), boundary)
+    if boundary == "housing":
+        raise InputError(f"{text}: only a record has a housing column to impose; leave out --boundary housing.")
+    return load_profile(text)
 
 
 def check_profile(profile: "Profile", instrument: "Instrument") -> None:

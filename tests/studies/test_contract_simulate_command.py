@@ -30,7 +30,7 @@ def test_simulate_writes_a_record_and_one_json_object(tmp_path, capsys):
     answer = json.loads(capsys.readouterr().out)
     assert answer["schema"] == "hrg.simulate/1"
     assert list(answer) == [
-        "schema", "card", "out", "rows", "columns", "rate_Hz", "seed", "frequency_Hz", "solver_relative_error",
+        "schema", "card", "out", "rows", "columns", "rate_Hz", "boundary", "seed", "frequency_Hz", "solver_relative_error",
         "interpolation_relative_error", "warnings",
     ]  # fmt: skip
     assert answer["rows"] == 361

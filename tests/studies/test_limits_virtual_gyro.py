@@ -13,7 +13,8 @@ from studies.law import law_of
 from studies.record import read_record, write_record
 from studies.simulation.chamber import load_profile
 from studies.simulation.heat_path import build_network, build_shell_and_stem, slowest_lag
-from studies.simulation.virtual_gyro import cell_sensitivities, cell_weights, simulate_run
+from studies.simulation.response import cell_weights, to_cells
+from studies.simulation.virtual_gyro import simulate_run
 from thermal.errors import ThermalError
 from thermal.relaxation import find_relaxation
 
@@ -57,7 +58,7 @@ def test_the_frequency_model_is_the_solver_between_its_nodes(card, law):
 
 def test_the_weights_of_the_cells_add_up_to_the_slope(card, law):
     slope = float(law_of(card, 293.15, 293.15, "shell").parts(293.15).total)
-    assert cell_sensitivities(card, law).sum() == pytest.approx(slope, rel=1e-12)
+    assert to_cells(card, law, law.sensitivity()).sum() == pytest.approx(slope, rel=1e-12)
     assert cell_weights(card, law).sum() == pytest.approx(1.0, rel=1e-12)
     centre = np.log(law.frequency(np.array([293.1, 293.2])))
     assert np.diff(centre)[0] / 0.1 == pytest.approx(slope, rel=1e-6)
@@ -87,7 +88,7 @@ def test_a_field_along_the_meridian_shifts_the_mode_as_its_weights_say(card, law
     by_solver = (solve(2.0) - solve(-2.0)) / 2 - growth
     cells = card.heat_path.cells
     field = -2.0 * np.cos(np.pi * cells.middle / cells.edge[-1])
-    assert cell_sensitivities(card, law) @ field == pytest.approx(by_solver, rel=2e-3)
+    assert to_cells(card, law, law.sensitivity()) @ field == pytest.approx(by_solver, rel=2e-3)
     assert abs(by_solver) > 5e-5
 
 

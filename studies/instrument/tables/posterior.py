@@ -1,0 +1,36 @@
+"""`[posterior]`: how the uncertainties of a calibrated card go together; written by `hrg calibrate --save`.
+
+[posterior]
+names = ["thermal.mount_conductance_W_per_K", "thermal.base_heat_capacity_J_per_K"]   # keys of the card with an uncertainty
+correlation = [[1.0, 0.9], [0.9, 1.0]]                                                # of their normal coordinates
+"""
+
+from studies.instrument.keys import Table
+from studies.instrument.registry import CardTable
+
+
+class Posterior(Table, frozen=True, kw_only=True):
+    """Correlations of uncertain values."""
+
+    names: tuple[str, ...] = ()
+    correlation: tuple[tuple[float, ...], ...] = ()
+    note: str = ""
+
+    def __post_init__(self) -> None:
+        count = len(self.names)
+        if len(self.correlation) != count or any(len(row) != count for row in self.correlation):
+            raise ValueError(f"correlation must be a square table of {count} by {count} numbers, one for each name.")
+        if any(not -1.0 <= rho <= 1.0 for row in self.correlation for rho in row):
+            raise ValueError("correlation must hold numbers from -1 to 1.")
+
+    @property
+    def pairs(self) -> dict[tuple[str, str], float]:
+        """Correlations by pairs of names."""
+        return {
+            (one, other): self.correlation[i][j]
+            for i, one in enumerate(self.names)
+            for j, other in enumerate(self.names[:i])
+        }
+
+
+TABLE = CardTable("posterior", Posterior)

@@ -1,0 +1,123 @@
+"""What a run is driven with: its rows, the boundary that is imposed, its commands, and how it begins."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from studies.errors import InputError
+from studies.record import Record
+from thermal.profile import Profile
+
+Array = NDArray[np.float64]
+Boundary = Literal["chamber", "housing"]
+ZERO_CELSIUS = 273.15
+COLUMN: dict[Boundary, str] = {
+    "chamber": "chamber_temperature_degC",
+    "housing": "housing_temperature_degC",
+}
+COMMANDS = {
+    # field of the effects' states: (column, factor, power)
+    "amplitude_squared": ("drive_amplitude_V", 1.0, 2),
+    "voltage_squared": ("electrode_bias_V", 1.0, 2),
+    "quadrature": ("quadrature_V", 1.0, 1),
+    "pattern_angle": ("pattern_angle_deg", np.pi / 180.0, 1),
+}
+LUMPS = ("housing", "base", "resonator")
+"""Parts of the heat path whose temperature at the start may depart from the settled one."""
+MOST_BOUNDARY_ROWS = 20_000
+
+
+@dataclass(frozen=True)
+class Drive:
+    """Everything that a prediction is told of one run.
+
+    Attributes
+    ----------
+    time : array (N,), s
+        Rows that are wanted, increasing, any sampling.
+    boundary : "chamber" or "housing"
+        What is imposed: the chamber, or the housing as its sensor reads it, lag included.
+    profile : Profile, K
+        Temperature of the boundary over all the rows.
+    initial : mapping
+        How far (K) the "housing", the "base" and the "resonator" depart at the start from having settled at the first value.
+    commands : mapping
+        Amplitude and voltage squared (V²), quadrature (V), pattern angle (rad) at the rows; what is absent does not move.
+    start : float, s
+        Since the start of the first run of the campaign.
+    """
+
+    time: Array
+    boundary: Boundary
+    profile: Profile
+    initial: Mapping[str, float] = field(default_factory=dict)
+    commands: Mapping[str, Array] = field(default_factory=dict)
+    start: float = 0.0
+
+    def __post_init__(self) -> None:
+        for name in self.initial:
+            if name not in self.lumps:
+                raise InputError(
+                    f"a drive by the {self.boundary} has no initial '{name}'; it has {', '.join(self.lumps)}."
+                )
+
+    @property
+    def lumps(self) -> tuple[str, ...]:
+        """Parts whose initial temperature is free."""
+        return LUMPS if self.boundary == "chamber" else LUMPS[1:]
+
+    def with_initial(self, **initial: float) -> "Drive":
+        """Return the drive with another thermal state at the start."""
+        return replace(self, initial={**self.initial, **initial})
+
+
+def drive_by_profile(profile: Profile, time: Array) -> Drive:
+    """Impose a chamber profile."""
+    return Drive(time, "chamber", profile)
+
+
+def drive_by_record(record: Record, boundary: Boundary | None = None, time: Array | None = None) -> Drive:
+    """Impose a measured column: the housing's unless it is absent or the chamber's is asked for.
+
+    Gaps of the column are bridged by straight lines; of very many rows, means are taken.
+
+    Raises
+    ------
+    InputError
+        The column is absent, or has fewer than two values.
+    """
+    if boundary is None:
+        boundary = "chamber" if COLUMN["housing"] not in record and COLUMN["chamber"] in record else "housing"
+    if COLUMN[boundary] not in record:
+        raise InputError(
+            f"{record.path}: nothing says what drives the run; add the column {COLUMN['housing']} or {COLUMN['chamber']}."
+            if not any(column in record for column in COLUMN.values())
+            else f"{record.path}: the column {COLUMN[boundary]} is missing; choose the other boundary, or add it."
+        )
+    rows = record["time_s"]
+    values = record[COLUMN[boundary]]
+    known = np.isfinite(values)
+    if np.count_nonzero(known) < 2:
+        raise InputError(f"{record.path}: {COLUMN[boundary]} has fewer than two values.")
+    t, T = rows[known], values[known] + ZERO_CELSIUS
+    if len(t) > MOST_BOUNDARY_ROWS:
+        size = int(np.ceil(len(t) / MOST_BOUNDARY_ROWS))
+        edges = np.arange(0, len(t), size)
+        counts = np.diff(np.append(edges, len(t)))
+        means = np.add.reduceat(np.array([t, T]), edges, axis=1) / counts
+        t, T = np.concatenate([[t[0]], means[0], [t[-1]]]), np.concatenate([[means[1, 0]], means[1], [means[1, -1]]])
+        apart = np.diff(t, prepend=-np.inf) > 0
+        t, T = t[apart], T[apart]
+    if t[0] > rows[0]:
+        t, T = np.insert(t, 0, rows[0]), np.insert(T, 0, T[0])
+    if t[-1] < rows[-1]:
+        t, T = np.append(t, rows[-1]), np.append(T, T[-1])
+    commands = {
+        name: (record[column] * factor) ** power
+        for name, (column, factor, power) in COMMANDS.items()
+        if column in record and np.isfinite(record[column]).all()
+    }
+    return Drive(rows if time is None else time, boundary, Profile(t, T), commands=commands if time is None else {})

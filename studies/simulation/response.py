@@ -1,0 +1,160 @@
+"""What a gyro reads at given temperatures: frequency, zero-rate output, loss, and its housing sensor.
+
+    f = f(T_r) (1 + …):  ln f = ln f(T_r) − ½ (ρ'/ρ) (T_k − T_r) + ν' Σ n (T − T_r) + effects,
+
+T_r the mean temperature of the shell weighed with the mode's elastic energy, T_k with its kinetic energy, n its density
+of ∂ ln f/∂ν: to first order in the unevenness of the shell, and nothing is divided by the whole slope, which vanishes in
+an Elinvar alloy. The bias follows the *thermal* frequency: a spring or a clock moves only the reading.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from studies.errors import InputError, naming
+from studies.simulation.drive import ZERO_CELSIUS, Drive
+from thermal.lag import lag
+from thermal.meridian import cell_names, energy_weights
+
+if TYPE_CHECKING:
+    from shell.law import FrequencyLaw
+    from studies.instrument.card import Instrument
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Temperatures:
+    """Temperatures at the rows and their rates, arrays (N, 4), K and K/s.
+
+    Columns: the housing (its rate is not used), the resonator's mean T_r, T_k − T_r, and Σ n (T − T_r).
+    """
+
+    value: Array
+    rate: Array
+
+    def moved(self, slope: Array, rate: Array, step: float) -> "Temperatures":
+        """Return the temperatures a step along a derivative."""
+        return Temperatures(self.value + step * slope, self.rate + step * rate)
+
+
+def observed_rows(instrument: "Instrument", law: "FrequencyLaw", nodes: tuple[str, ...]) -> Array:
+    """Sums over the nodes that make `Temperatures`, (4, nodes); the housing's is empty where it is no node."""
+    elastic = cell_weights(instrument, law)
+    kinetic, ratio = (to_cells(instrument, law, share) for share in (law.along.kinetic, law.along.nu))
+    rows = np.zeros((4, len(nodes)))
+    cells = [nodes.index(name) for name in cell_names(len(elastic))]
+    if "housing" in nodes:
+        rows[0, nodes.index("housing")] = 1.0
+    rows[1, cells] = elastic
+    rows[2, cells] = kinetic - kinetic.sum() * elastic
+    rows[3, cells] = ratio - ratio.sum() * elastic
+    return rows
+
+
+def cell_weights(instrument: "Instrument", law: "FrequencyLaw") -> Array:
+    """Share of the mode's elastic energy in each cell of the shell, from its root to its free end; they add up to 1."""
+    weights = to_cells(instrument, law, law.along.elastic)
+    return np.asarray(weights / weights.sum())
+
+
+def to_cells(instrument: "Instrument", law: "FrequencyLaw", share: Array) -> Array:
+    """Give what belongs to the stations of the mode to the cells of the shell, from its root to its free end."""
+    cells, resonator = instrument.heat_path.cells, instrument.resonator
+    from_start = 1 - law.along.position if resonator.support == "clamped-rim" else law.along.position
+    root = resonator.length - cells.edge[-1]
+    return energy_weights(cells, resonator.length * from_start - root, share)
+
+
+def read_out(
+    instrument: "Instrument", law: "FrequencyLaw", drive: Drive, found: Temperatures, tau: float
+) -> dict[str, Array]:
+    """Columns of the record, without noise: °C, Hz, deg/h, 1.
+
+    Parameters
+    ----------
+    tau : float
+        Slowest time constant (s) of the resonator behind its housing, for the effects.
+
+    Raises
+    ------
+    InputError
+        A loss that becomes negative.
+    """
+    reference = instrument.reference_temperature
+    housing, resonator, kinetic, ratio = found.value.T
+    changes = _apply_effects(instrument, drive, housing, resonator, tau)
+    warmed, rate = resonator, found.rate[:, 1]
+    if "resonator_temperature" in changes:
+        warmed = resonator + changes["resonator_temperature"]
+        rate = rate + np.gradient(changes["resonator_temperature"], drive.time)
+    by_density = -0.5 * float(law.material.log_slope("density", reference))
+    by_ratio = float(law.material.slope("poisson_ratio", reference))
+    thermal = np.exp(law.logarithm(warmed) + by_density * kinetic + by_ratio * ratio)
+    frequency = thermal + changes.get("frequency_Hz", 0.0)
+    inverse_q = instrument.loss.at(warmed - reference) + changes.get("inverse_q", 0.0)
+    change = thermal - float(law.frequency(reference))
+    uneven = by_density * found.rate[:, 2] + by_ratio * found.rate[:, 3]
+    bias = instrument.bias.at(
+        change, thermal * (law.slope(warmed) * rate + uneven), frequency, inverse_q, law.bryan_factor
+    )
+    return {
+        "housing_temperature_degC": _read_housing(instrument, drive, housing),
+        "resonator_temperature_degC": warmed - ZERO_CELSIUS,
+        "frequency_Hz": frequency,
+        "bias_deg_per_h": bias + changes.get("bias_deg_per_h", 0.0),
+        "inverse_q": inverse_q,
+    }
+
+
+def check_loss(instrument: "Instrument", inverse_q: Array) -> None:
+    """Raise when 1/Q has become negative."""
+    if not (inverse_q > 0).all():
+        raise InputError(
+            f"{instrument.path} [loss]: 1/Q becomes negative in this profile; correct its slope or curvature."
+        )
+
+
+def _read_housing(instrument: "Instrument", drive: Drive, housing: Array) -> Array:
+    time_constant = instrument.noise.housing_lag_s
+    if drive.boundary == "housing":
+        return drive.profile.at(drive.time) - ZERO_CELSIUS
+    if time_constant == 0 or len(housing) < 2:
+        return housing - ZERO_CELSIUS
+    return lag(drive.time, housing, time_constant) - ZERO_CELSIUS
+
+
+def _apply_effects(
+    instrument: "Instrument", drive: Drive, housing: Array, resonator: Array, tau: float
+) -> Mapping[str, Array]:
+    """Sum what the card's effects add to the resonator's temperature (K) and to the responses; they need even rows."""
+    if not instrument.effects:
+        return {}
+    from studies.diagnosis.effects import apply_effects
+    from studies.diagnosis.states import States
+
+    time = drive.time - drive.time[0]
+    step = np.diff(time)
+    even = time
+    if np.ptp(step) > 1e-6 * step.max():
+        even = np.linspace(0.0, time[-1], int(np.ceil(time[-1] / np.median(step))) + 1)
+
+    def onto(values: Array) -> Array:
+        return values if even is time else np.interp(even, time, values)
+
+    states = States(
+        run=0,
+        time=even,
+        campaign_time=even + drive.start,
+        housing=onto(housing),
+        resonator=onto(resonator),
+        tau=tau,
+        reference=instrument.reference_temperature,
+        **{name: onto(values) for name, values in drive.commands.items()},
+    )
+    with naming(f"{instrument.path} [[effect]]"):
+        changes = apply_effects([(one.name, one.response, one.parameters) for one in instrument.effects], states)
+    return changes if even is time else {name: np.interp(time, even, values) for name, values in changes.items()}

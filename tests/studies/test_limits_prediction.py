@@ -1,0 +1,136 @@
+"""The one forward model: its derivatives against differences, and its boundaries against each other."""
+
+import numpy as np
+import pytest
+
+from studies.errors import InputError
+from studies.instrument.card import load_card
+from studies.record import Record
+from studies.simulation.drive import drive_by_profile, drive_by_record
+from studies.simulation.prediction import law_for, predict
+from studies.simulation.virtual_gyro import simulate_run
+from thermal.profile import parse_profile
+
+PROFILE = parse_profile("step 20 -10 1h then ramp -10 35 1")
+TIME = np.arange(0.0, PROFILE.end, 20.0)
+BENT = {
+    "bias.k1_deg_per_h_per_Hz": 0.3,
+    "bias.k2_deg_per_h_per_Hz2": 0.01,
+    "bias.k4_deg_per_h_s_per_Hz": 50.0,
+    "loss.curvature_per_K2": 1e-5,
+}
+EFFECTS = [
+    {"name": "second-lag", "weight": {"value": 0.1, "sd": 0.05}, "second_time_constant_s": 9000.0},
+    {"name": "rate-bias", "coefficient_deg_per_h_per_K_per_s": {"value": 30.0, "sd": 10.0}},
+]
+
+
+@pytest.fixture(scope="module")
+def card():
+    return load_card("hrg-30mm").with_values(BENT).with_table("effect", EFFECTS)
+
+
+@pytest.fixture(scope="module")
+def drive():
+    return drive_by_profile(PROFILE, TIME)
+
+
+@pytest.fixture(scope="module")
+def law(card, drive):
+    return law_for(card, drive, theory="shell")
+
+
+@pytest.fixture(scope="module")
+def measured(card, drive, law):
+    """A housing column as its sensor reads it, with noise, on uneven rows."""
+    generator = np.random.default_rng(3)
+    rows = np.sort(generator.choice(len(TIME), size=len(TIME) // 2, replace=False))
+    sensed = predict(card, drive, law=law).columns["housing_temperature_degC"][rows]
+    columns = {"time_s": TIME[rows], "housing_temperature_degC": sensed + 1e-3 * generator.standard_normal(len(rows))}
+    return drive_by_record(Record(columns))
+
+
+def names_of(card, drive):
+    return [*(value.name for value in card.uncertain), *(f"initial.{lump}" for lump in drive.lumps)]
+
+
+@pytest.mark.parametrize("boundary", ["chamber", "housing"])
+def test_every_derivative_against_central_differences(card, drive, law, measured, boundary):
+    drive = drive if boundary == "chamber" else measured
+    known = {value.name: value for value in card.uncertain}
+    found = predict(card, drive, names_of(card, drive), law)
+    for name in names_of(card, drive):
+
+        def moved(step, name=name):
+            if name not in known:
+                return predict(card, drive.with_initial(**{name.removeprefix("initial."): step}), law=law)
+            other = card.with_values({name: known[name].value + step})
+            own = law.with_material(other.material) if name.startswith("material.") else law
+            return predict(other, drive, law=own)
+
+        step = 0.01 * known[name].sd if name in known else 0.1
+        above, below = moved(step), moved(-step)
+        for column, values in found.derivatives[name].items():
+            expected = (above.columns[column] - below.columns[column]) / (2 * step)
+            size = np.abs(expected).max()
+            floor = 1e-9 * np.abs(found.columns[column]).max() / step
+            assert values == pytest.approx(expected, abs=2e-3 * size + floor), (name, column)
+
+
+def test_the_measured_housing_gives_the_record_that_the_chamber_gives(card, drive, law):
+    """The reading of the housing, its sensor's lag taken out, drives the resonator as the housing itself did."""
+    whole = predict(card, drive, law=law)
+    columns = {"time_s": TIME, "housing_temperature_degC": whole.columns["housing_temperature_degC"]}
+    again = predict(card, drive_by_record(Record(columns)), law=law)
+    late = TIME > 600.0
+    assert (
+        np.abs(again.columns["resonator_temperature_degC"] - whole.columns["resonator_temperature_degC"]).max() < 5e-3
+    )
+    assert again.columns["frequency_Hz"][late] == pytest.approx(whole.columns["frequency_Hz"][late], abs=2e-3)
+    assert again.columns["bias_deg_per_h"][late] == pytest.approx(whole.columns["bias_deg_per_h"][late], abs=5e-3)
+
+
+def test_what_is_simulated_is_what_is_predicted(card, drive, law):
+    run = simulate_run(card, PROFILE, 0.05, noise=False, law=law)
+    found = predict(card, drive_by_profile(PROFILE, run.record["time_s"]), law=law)
+    for name in ("frequency_Hz", "bias_deg_per_h", "inverse_q"):
+        assert run.record[name] == pytest.approx(found.columns[name], abs=1e-6 if name != "inverse_q" else 1e-15)
+
+
+def test_the_bias_counts_in_the_frequency_of_the_calibrated_law(card, drive, law):
+    """k1 multiplies the change of the same frequency that is recorded, also when the law deviates from the published one."""
+    steep = load_card("hrg-30mm").with_values(
+        {
+            "bias.k1_deg_per_h_per_Hz": 2.0,
+            "bias.damping_anisotropy": 0.0,
+            "material.deviation.shear_modulus.log_slope_per_K": 5e-5,
+        }
+    )
+    own = law.with_material(steep.material)
+    found = predict(steep, drive, law=own).columns
+    at_reference = float(own.frequency(steep.reference_temperature))
+    assert found["bias_deg_per_h"] == pytest.approx(2.0 * (found["frequency_Hz"] - at_reference), abs=1e-8)
+    plain = predict(load_card("hrg-30mm"), drive, law=law).columns
+    more = np.ptp(found["frequency_Hz"]) - np.ptp(plain["frequency_Hz"])
+    assert more == pytest.approx(0.5 * 5e-5 * 4432.0 * np.ptp(plain["resonator_temperature_degC"]), rel=5e-3)
+
+
+def test_departures_decay_from_their_start(drive, law):
+    bare = load_card("hrg-30mm")
+    found = predict(bare, drive.with_initial(base=2.0, resonator=-1.0), law=law)
+    plain = predict(bare, drive, law=law)
+    away = found.columns["resonator_temperature_degC"] - plain.columns["resonator_temperature_degC"]
+    assert away[0] == pytest.approx(-1.0, abs=1e-9)
+    assert away.max() > 0.2  # the base warms it
+    assert abs(away[-1]) < 0.5 * away.max()
+
+
+def test_a_run_without_a_drive_and_an_unknown_start_are_refused(card, drive):
+    with pytest.raises(InputError, match="nothing says what drives the run; add the column housing_temperature_degC"):
+        drive_by_record(Record({"time_s": TIME, "frequency_Hz": TIME}))
+    with pytest.raises(InputError, match="chamber_temperature_degC is missing; choose the other boundary"):
+        drive_by_record(Record({"time_s": TIME, "housing_temperature_degC": TIME * 0.0}), "chamber")
+    with pytest.raises(InputError, match="no initial 'shell'"):
+        drive.with_initial(shell=1.0)
+    with pytest.raises(InputError, match="the card has no number"):
+        predict(card, drive, ["thermal.mass"])
