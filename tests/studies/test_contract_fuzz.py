@@ -252,7 +252,8 @@ def test_mutated_tables_never_harm(tmp_path, name):
         accepted += check(read, path, f"{name} {case}", harmed)
     assert not harmed
     assert not flag.exists()
-    assert 0 < accepted < CASES  # some mutations are harmless, some are refused
+    assert accepted  # some mutations are harmless
+    assert accepted < CASES or name == "raw file"  # and some refused; any table of numbers can be drafted
 
 
 def test_mutated_raw_files_through_a_map_never_harm(tmp_path):
