@@ -18,6 +18,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "reproduce": ("studies.cli.reproduce:reproduce", "The HRG paper's tables and figures from its own data."),
     "modes": ("studies.cli.modes:modes", "Frequencies, Bryan factors and sensitivities of the modes."),
     "tcf": ("studies.cli.tcf:tcf", "Frequency against temperature and its parts."),
+    "loss": ("studies.cli.loss:loss", "Q over temperature: where the loss comes from, and what to attack first."),
     "simulate": ("studies.cli.simulate:simulate", "A virtual run of a card through a chamber profile."),
     "thermal": ("studies.cli.thermal:thermal", "Temperatures of the heat path for a chamber profile."),
     "fit frequency": ("studies.cli.fit_frequency:fit_frequency", "f(T) and its inverse from a steady-state table."),

@@ -118,9 +118,21 @@ def bounds(node: inspect.Type | None) -> tuple[float, float]:
     return -float("inf"), float("inf")
 
 
-def priors(keys: Any, raw: Any) -> Iterator[tuple[str, Mapping[str, float]]]:
-    """Yield the keys of a table that are uncertain where the card does not say so, and how much."""
-    for struct in structs(describe(keys), raw):
+def priors(keys: Any, raw: Any) -> Iterator[tuple[Path, Mapping[str, float]]]:
+    """Yield the places of a table that are uncertain where the card does not say so, and how much."""
+    yield from _priors(describe(keys), raw, ())
+
+
+def _priors(node: inspect.Type, raw: Any, before: Path) -> Iterator[tuple[Path, Mapping[str, float]]]:
+    for struct in structs(node, raw):
         for field in struct.fields:
-            if isinstance(field.type, inspect.Metadata) and field.type.extra:
-                yield field.encode_name, field.type.extra
+            path = (*before, field.encode_name)
+            inner = raw.get(field.encode_name) if isinstance(raw, Mapping) else None
+            for one in field.type.types if isinstance(field.type, inspect.UnionType) else (field.type,):
+                if isinstance(one, inspect.Metadata) and one.extra:
+                    yield path, one.extra
+                elif isinstance(inner, list) and isinstance(one, inspect.ListType | inspect.VarTupleType):
+                    for place, member in enumerate(inner):
+                        yield from _priors(one.item_type, member, (*path, place))
+                elif isinstance(inner, Mapping) and structs(one):
+                    yield from _priors(one, inner, path)

@@ -4,8 +4,7 @@ import importlib
 import pkgutil
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
-from functools import cache, reduce
-from operator import or_
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -103,22 +102,23 @@ def read_table(name: str, raw: Any, place: Place) -> ReadTable:
         raise InputError(f"{place.where}: the table is missing; add it.")
     if not isinstance(raw, Mapping | None):
         raise InputError(f"{place.where}: {name} must be a table ([{name}]), not {raw!r:.60}.")
-    union = reduce(or_, [entry.keys for entry in entries])
-    bare, spreads = split_spreads(raw or {}, union, place.where)
-    own = [known_keys(describe(entry.keys), bare) for entry in entries]
-    for key in bare:
+    given = raw or {}
+    own = [known_keys(describe(entry.keys), given) for entry in entries]
+    for key in given:
         if not any(key in keys for keys in own) and len(entries) > 1:
             raise InputError(f"{place.where}: unknown key '{key}'{nearest(key, [k for keys in own for k in keys])}")
     read: dict[str, Any] = {}
     parts: dict[str, Any] = {}
     uncertain: list[UncertainValue] = []
+    stated = frozenset[str]()
     for entry, keys in zip(entries, own, strict=True):
-        mine = {key: value for key, value in bare.items() if key in keys or len(entries) == 1}
-        found = read[entry.name] = read_keys(mine, entry.keys, place.where)
-        stated = {path: spread for path, spread in spreads.items() if path[0] in keys}
-        uncertain += gather_uncertain(name, mine, found, entry.keys, stated, place.where)
+        mine = {key: value for key, value in given.items() if key in keys or len(entries) == 1}
+        bare, spreads = split_spreads(mine, entry.keys, place.where)
+        found = read[entry.name] = read_keys(bare, entry.keys, place.where)
+        uncertain += gather_uncertain(name, bare, found, entry.keys, spreads, place.where)
         parts[entry.name] = entry.build(found, place)
-    return ReadTable(read, parts, tuple(uncertain), _dotted(name, spreads))
+        stated |= _dotted(name, spreads)
+    return ReadTable(read, parts, tuple(uncertain), stated)
 
 
 def _read_array(entry: CardTable, raw: Any, place: Place) -> ReadTable:

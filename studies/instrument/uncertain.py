@@ -13,6 +13,7 @@ cannot be negative and is not 0 is `logarithmic`: its logarithm is normal, with 
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import reduce
 from typing import TYPE_CHECKING, Annotated, Any
 
 from studies.errors import InputError
@@ -142,13 +143,12 @@ def gather_uncertain(
         if spread.width > 0:
             key = ".".join(str(word) for word in path)
             found[key] = _make(f"{name}.{key}", spread, low, high)
-    stated = {path[0] for path in spreads}
-    for key, prior in priors(keys, bare):
-        value = getattr(part, key)
-        if key not in stated and value is not None:
-            spread = Spread(value=value, **prior)
+    for path, prior in priors(keys, bare):
+        value = reduce(lambda one, word: one[word] if isinstance(word, int) else getattr(one, word), path, part)
+        if path not in spreads and value is not None:
+            spread, key = Spread(value=value, **prior), ".".join(str(word) for word in path)
             if spread.width > 0:
-                found[key] = _make(f"{name}.{key}", spread, *bounds(find(keys, (key,), bare)))
+                found[key] = _make(f"{name}.{key}", spread, *bounds(find(keys, path, bare)))
     return list(found.values())
 
 

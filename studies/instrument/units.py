@@ -9,7 +9,7 @@ UNITS = {
     "_deg_per_h_per_rt_h": "°/h/√h", "_deg_per_rt_h": "°/√h", "_deg_per_h": "°/h", "_Hz_per_V2": "Hz/V²",
     "_Hz_per_K2": "Hz/K²", "_Hz_per_K": "Hz/K", "_K_per_V2": "K/V²", "_kg_m3": "kg/m³", "_W_per_m_K": "W/(m K)",
     "_J_per_kg_K": "J/(kg K)", "_J_per_K": "J/K", "_W_per_K": "W/K", "_per_K2": "1/K²", "_per_K": "1/K", "_degC": "°C",
-    "_GPa": "GPa", "_mm": "mm", "_deg": "°", "_cm2": "cm²", "_mW": "mW", "_Hz": "Hz", "_V": "V", "_K": "K", "_s": "s",
+    "_GPa": "GPa", "_Pa": "Pa", "_nm": "nm", "_pm": "pm", "_mg": "mg", "_eV": "eV", "_mm": "mm", "_deg": "°", "_cm2": "cm²", "_mW": "mW", "_Hz": "Hz", "_V": "V", "_K": "K", "_s": "s",
     "expansion.value": "1/K", "expansion.slope_per_K": "1/K²", "expansion.curvature_per_K2": "1/K³",
 }  # fmt: skip
 

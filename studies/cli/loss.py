@@ -1,0 +1,165 @@
+"""`hrg loss`: 1/Q over temperature as a sum of its parts, and which part to attack first."""
+
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+from cyclopts import Parameter
+
+if TYPE_CHECKING:
+    from shell.damping.budget import Budget, Part
+    from studies.loss import LossModel
+
+MOST_POINTS = 10_000
+
+
+def loss(
+    card: str,
+    *,
+    from_degC: Annotated[float, Parameter(name="--from")] = -20.0,
+    to_degC: Annotated[float, Parameter(name="--to")] = 40.0,
+    step: float = 10.0,
+    harmonic: int = 2,
+    theory: Literal["solid", "shell"] = "solid",
+    anchor: bool = False,
+    json: bool = False,
+) -> int:
+    """Show Q over temperature, where its loss comes from, and which part to attack first.
+
+    Heat through the wall, loss of the bulk and of the surface follow from geometry and material; films, gas, activated losses,
+    imbalance and what the mount takes are keys of the card's table [loss] and of [[loss.film]] and [[loss.activated]].
+
+    Parameters
+    ----------
+    card : str
+        Path of a card, or the name of one that ships (hrg cards).
+    from_degC : float
+        Lowest temperature in °C.
+    to_degC : float
+        Highest temperature in °C.
+    step : float
+        Step in °C.
+    harmonic : int
+        Circumferential harmonic n.
+    theory : str
+        solid (three-dimensional) or shell (Naghdi).
+    anchor : bool
+        Compute what a stem sends into the body that it stands on (a second or two).
+    json : bool
+        Print one JSON object (schema hrg.loss/1) instead of tables.
+    """
+    import numpy as np
+
+    from studies.cli.output import print_json
+    from studies.errors import InputError
+    from studies.instrument.card import ZERO_CELSIUS, load_card
+    from studies.loss import loss_model
+
+    if not step > 0 or not to_degC >= from_degC:
+        raise InputError(
+            f"--from {from_degC:g} --to {to_degC:g} --step {step:g}: the step must be positive and --to not below --from."
+        )
+    if not (to_degC - from_degC) / step < MOST_POINTS:
+        raise InputError(
+            f"--from {from_degC:g} --to {to_degC:g} --step {step:g}: more than {MOST_POINTS} temperatures; take a longer step."
+        )
+    instrument = load_card(card)
+    T = instrument.material.check(np.arange(from_degC, to_degC + 1e-9 * step, step) + ZERO_CELSIUS)
+    model = loss_model(instrument, harmonic, theory, anchor)
+    budget = model.budget(T)
+    if json:
+        print_json({"schema": "hrg.loss/1", "card": instrument.name, **_describe(model, budget, harmonic, theory)})
+    else:
+        _print(instrument.name, model, budget, harmonic, theory)
+    return 0
+
+
+def _describe(model: "LossModel", budget: "Budget", harmonic: int, theory: str) -> "dict[str, Any]":
+    low, high = budget.interval
+    return {
+        "harmonic": harmonic,
+        "theory": theory,
+        "frequency_Hz": model.frequency,
+        "temperature_degC": budget.temperatures - 273.15,
+        "inverse_q": budget.inverse_q,
+        "inverse_q_low": low,
+        "inverse_q_high": high,
+        "q": 1 / budget.inverse_q,
+        "slope_per_K": budget.slope,
+        "parts": [_part(part) for part in budget.parts],
+        "attack_first": {
+            "part": budget.first.name,
+            "q_without": budget.without(budget.first.name),
+            "advice": budget.first.advice,
+        },
+        "least_known": budget.least_known.name,
+        "left_out": list(model.left_out),
+    }
+
+
+def _part(part: "Part") -> "dict[str, Any]":
+    low, high = part.interval
+    return {
+        "name": part.name,
+        "inverse_q": part.inverse_q,
+        "low": low,
+        "high": high,
+        "slope_per_K": part.slope,
+        "relative_sd": part.relative_sd,
+        "source": part.source,
+    }
+
+
+def _print(name: str, model: "LossModel", budget: "Budget", harmonic: int, theory: str) -> None:
+    import numpy as np
+
+    from studies.cli.output import print_table
+
+    low, high = budget.interval
+    rows = [
+        [
+            f"{T - 273.15:.1f}",
+            _plain(1 / total),
+            f"{_plain(1 / most)} … {_plain(1 / least)}",
+            f"{1e9 * total:.3g}",
+            f"{rise:+.2f}",
+        ]
+        for T, total, least, most, rise in zip(
+            budget.temperatures, budget.inverse_q, low, high, 100 * budget.slope, strict=True
+        )
+    ]
+    title = f"{name}, n = {harmonic}, {model.frequency:.1f} Hz, {theory}"
+    print_table(title, ["T (°C)", "Q", "90 %", "1/Q (1e-9)", "1/Q (%/°C)"], rows)
+    middle = int(np.argmin(abs(budget.temperatures - model.vibration.reference)))
+    shown = sorted({0, middle, len(budget.temperatures) - 1})
+    table = []
+    for part in budget.parts:
+        least, most = (1e9 * float(end[middle]) for end in part.interval)
+        share = 100 * part.inverse_q[middle] / budget.inverse_q[middle]
+        table.append(
+            [
+                part.name,
+                f"{share:.3g} %",
+                *(f"{1e9 * part.inverse_q[k]:.3g}" for k in shown),
+                f"{least:.2g} … {most:.2g}",
+                f"{100 * part.slope[middle]:+.2f}",
+                part.source,
+            ]
+        )
+    degrees = [f"{budget.temperatures[k] - 273.15:.0f} °C" for k in shown]
+    note = f"1/Q in 1e-9; share, 90 % interval and slope at {budget.temperatures[middle] - 273.15:.0f} °C."
+    print_table("Parts", ["part", "share", *degrees, "90 %", "%/°C", "source"], table, note)
+    without, first = float(budget.without(budget.first.name)[middle]), budget.first
+    gain = "nothing known would be left" if not np.isfinite(without) else f"without it Q would be {_plain(without)}"
+    print(f"Attack first: {first.name}; {gain}. {_sentence(first.advice)}")
+    known = budget.least_known.name
+    print("It is also the least known." if known == first.name else f"Least known: {known}.")
+    for sentence in model.left_out:
+        print(f"Not in the budget: {sentence}")
+
+
+def _plain(value: float) -> str:
+    """Three digits, 7.28e6 for 7.28e+06."""
+    return f"{value:.3g}".replace("e+0", "e").replace("e+", "e")
+
+
+def _sentence(words: str) -> str:
+    return words[:1].upper() + words[1:] + "." if words else ""

@@ -1,0 +1,267 @@
+"""The loss budget of an instrument: from its card to the causes of loss of one solved mode."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from studies.errors import InputError, naming
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+    from shell.damping.budget import Budget, Cause, Vibration
+    from shell.damping.film import Film
+    from shell.damping.heat import Heat
+    from shell.levels import Theory
+    from studies.instrument.card import Instrument
+    from studies.instrument.tables.loss_parts import FilmKeys, LossParts
+
+FILM_NUMBERS = ("youngs_modulus_GPa", "poisson_ratio", "loss")
+FILM_HEAT = ("expansion_per_K", "conductivity_W_per_m_K", "heat_capacity_J_per_kg_K", "density_kg_m3")
+
+
+@dataclass(frozen=True)
+class LossModel:
+    """The causes of loss of one mode of an instrument.
+
+    vibration : the solved mode.
+    causes : what loses energy, with uncertainty and source.
+    left_out : sentences on what the budget does not have, and what would bring it in.
+    bryan_factor, frequency : of the mode, Hz at the reference temperature.
+    """
+
+    vibration: "Vibration"
+    causes: "tuple[Cause, ...]"
+    left_out: tuple[str, ...]
+    bryan_factor: float
+    frequency: float
+
+    def budget(self, temperatures: "ArrayLike") -> "Budget":
+        """The budget at temperatures (K)."""
+        from shell.damping.budget import loss_budget
+
+        return loss_budget(self.vibration, self.causes, temperatures)
+
+
+def loss_model(
+    instrument: "Instrument", harmonic: int = 2, theory: "Theory" = "solid", anchor: bool = False
+) -> LossModel:
+    """Solve the lowest mode of a harmonic and gather its causes of loss.
+
+    Parameters
+    ----------
+    anchor : compute what a stem sends into its base (a second or two); else it is left out and said so.
+
+    Raises
+    ------
+    InputError, ShellError
+        Unusable parts in the card; the mode cannot be solved.
+    """
+    from shell.damping.budget import Vibration
+    from shell.modes import solve_modes
+
+    T0, material = instrument.reference_temperature, instrument.material
+    mode = solve_modes(instrument.resonator, material.elastic(T0), harmonic, theory=theory)[0]
+    vibration = Vibration.of(mode, material, T0)
+    parts: LossParts = instrument.part("loss", "loss_parts")
+    spread = _relative_sds(instrument)
+    heat, lacking = _heat_law(instrument)
+    causes: list[Cause] = []
+    left_out: list[str] = []
+    with naming(f"{instrument.path} [loss]"):
+        if heat is None:
+            left_out.append(
+                f"thermoelastic: no source states {lacking} of {material.name}; give it in [thermal] or a material file."
+            )
+        else:
+            causes.append(_thermoelastic(instrument, vibration, heat))
+        causes += _of_material(instrument, parts, spread, left_out)
+        for number, film in enumerate(parts.film):
+            causes += _film(
+                film,
+                vibration.thinnest,
+                heat,
+                f"{instrument.path} [[loss.film]] number {number + 1}",
+                f"loss.film.{number}",
+                spread,
+            )
+        causes += _others(instrument, parts, spread, left_out)
+        if anchor or parts.unbalance_mg:
+            causes += _anchor(instrument, mode, parts, spread, anchor)
+        elif instrument.resonator.stem is not None and parts.anchor_inverse_q is None:
+            left_out.append("anchor: --anchor computes what the stem sends into its base.")
+    if not causes:
+        raise InputError(f"{instrument.path} [loss]: nothing is known that loses energy. {' '.join(left_out)}")
+    return LossModel(vibration, tuple(causes), tuple(left_out), mode.bryan_factor, mode.frequency)
+
+
+def _thermoelastic(instrument: "Instrument", vibration: "Vibration", heat: "Callable[[float], Heat]") -> "Cause":
+    from shell.damping.budget import thermoelastic_cause
+
+    T0, material = instrument.reference_temperature, instrument.material
+    prior = dict(zip(material.prior.names, material.prior.sd, strict=True))
+    thermal = {one.name: one.sd / one.value for one in instrument.uncertain if one.name.startswith("thermal.")}
+    expansion = float(prior.get("expansion.value", 0.0)) / abs(float(material.value("expansion", T0)) or 1.0)
+    relative = (
+        expansion,
+        thermal.get("thermal.heat_capacity_J_per_kg_K", 0.0),
+        thermal.get("thermal.conductivity_W_per_m_K", 0.0),
+    )
+    return thermoelastic_cause(vibration, heat, relative, f"heat through the wall; {material.name}, law {material.law}")
+
+
+def _heat_law(instrument: "Instrument") -> "tuple[Callable[[float], Heat] | None, str]":
+    """Return expansion, capacity and conductivity over temperature, or what is lacking."""
+    from shell.damping.heat import Heat
+
+    material, thermal = instrument.material, instrument.thermal
+    given = {"conductivity": thermal.conductivity_W_per_m_K, "heat_capacity": thermal.heat_capacity_J_per_kg_K}
+    lacking = [name for name in ("expansion", "density") if name not in material.properties]
+    lacking += [name for name, value in given.items() if value is None and name not in material.properties]
+    if lacking:
+        return None, " or ".join(name.replace("_", " ") for name in lacking)
+
+    def value(name: str, temperature: float) -> float:
+        stated = given.get(name)
+        return float(material.value(name, temperature)) if stated is None else stated
+
+    def heat(temperature: float) -> Heat:
+        capacity = value("density", temperature) * value("heat_capacity", temperature)
+        return Heat(value("expansion", temperature), capacity, value("conductivity", temperature))
+
+    return heat, ""
+
+
+def _of_material(
+    instrument: "Instrument", parts: "LossParts", spread: Mapping[str, float], left_out: list[str]
+) -> "list[Cause]":
+    """Loss of the bulk and of the surface, from the card or the table."""
+    from shell.damping.budget import bulk_cause, surface_cause
+    from shell.damping.sources import known_losses
+
+    known, causes = known_losses(instrument.material.name), []
+    bulk: Mapping[str, Any] = known.get("bulk", {})
+    if parts.bulk_coefficient is not None:
+        exponent = parts.bulk_exponent if parts.bulk_exponent is not None else bulk.get("exponent", 0.0)
+        causes.append(
+            bulk_cause(parts.bulk_coefficient, exponent, spread.get("loss.bulk_coefficient", 0.0), "given in the card")
+        )
+    elif bulk:
+        causes.append(bulk_cause(bulk["coefficient"], bulk["exponent"], bulk["relative_sd"], bulk["source"]))
+    else:
+        left_out.append(
+            f"bulk: no source states that of {instrument.material.name}; give bulk_coefficient and bulk_exponent."
+        )
+    surface: Mapping[str, Any] = known.get("surface", {})
+    if parts.surface_layer_pm is not None:
+        depth = 1e-12 * parts.surface_layer_pm
+        causes.append(surface_cause(depth, spread.get("loss.surface_layer_pm", 0.0), "given in the card"))
+    elif surface:
+        causes.append(surface_cause(surface["depth_m"], surface["relative_sd"], surface["source"]))
+    else:
+        left_out.append(f"surface: no source states that of {instrument.material.name}; give surface_layer_pm.")
+    return causes
+
+
+def _film(
+    keys: "FilmKeys",
+    wall: float,
+    heat: "Callable[[float], Heat] | None",
+    where: str,
+    name: str,
+    spread: Mapping[str, float],
+) -> "list[Cause]":
+    from shell.damping.budget import film_causes
+    from shell.damping.film import check_film
+    from shell.damping.sources import film_names, known_film
+
+    known = known_film(keys.material)
+    numbers = {
+        key: getattr(keys, key) if getattr(keys, key) is not None else known.get(key)
+        for key in (*FILM_NUMBERS, *FILM_HEAT)
+    }
+    missing = [key for key in FILM_NUMBERS if numbers[key] is None]
+    if missing:
+        listed = "" if known else f" (films of the table: {', '.join(film_names())})"
+        raise InputError(
+            f"{where}: no source states {' and '.join(missing)} of the film '{keys.material}'{listed}; add it."
+        )
+    with naming(where):
+        relative = (spread.get(f"{name}.thickness_nm", 0.0), spread.get(f"{name}.loss", 0.0))
+        source = str(known.get("source", "given in the card"))
+        film = _build_film(keys, numbers)
+        check_film(film, wall)
+        return film_causes(keys.material, film, heat, relative, source)
+
+
+def _build_film(keys: "FilmKeys", numbers: Mapping[str, Any]) -> "Film":
+    from shell.damping.film import Film
+    from shell.damping.heat import Heat
+
+    heat = None
+    if all(numbers[key] is not None for key in FILM_HEAT):
+        capacity = numbers["density_kg_m3"] * numbers["heat_capacity_J_per_kg_K"]
+        heat = Heat(numbers["expansion_per_K"], capacity, numbers["conductivity_W_per_m_K"])
+    return Film(
+        1e-9 * keys.thickness_nm,
+        1e9 * numbers["youngs_modulus_GPa"],
+        numbers["poisson_ratio"],
+        numbers["loss"],
+        heat,
+        ("inner", "outer") if keys.face == "both" else (keys.face,),
+        (keys.from_position, keys.to_position),
+        keys.coverage,
+    )
+
+
+def _others(
+    instrument: "Instrument", parts: "LossParts", spread: Mapping[str, float], left_out: list[str]
+) -> "list[Cause]":
+    """Gas, activated losses, and what leaves through the mount as the card gives it."""
+    from shell.damping.budget import activated_cause, constant_cause, gas_cause
+    from shell.damping.gas import GASES
+    from studies.instrument.card import ZERO_CELSIUS
+
+    causes = []
+    if parts.pressure_Pa is None:
+        left_out.append("gas: give pressure_Pa of the sealed housing.")
+    elif parts.pressure_Pa > 0:
+        sd = spread.get("loss.pressure_Pa", 0.0)
+        causes.append(gas_cause(GASES[parts.gas], parts.pressure_Pa, sd, parts.accommodation))
+    for number, peak in enumerate(parts.activated):
+        sd = spread.get(f"loss.activated.{number}.height", 0.0)
+        found = activated_cause(peak.height, peak.energy_eV, peak.peak_degC + ZERO_CELSIUS, sd, "given in the card")
+        causes.append(found)
+    if parts.anchor_inverse_q is not None:
+        sd = spread.get("loss.anchor_inverse_q", 0.0)
+        causes.append(constant_cause("mount", parts.anchor_inverse_q, sd, "given in the card", MOUNT_ADVICE))
+    return causes
+
+
+MOUNT_ADVICE = "a longer or thinner stem, a stiffer joint, balance of the rim's first and third harmonic"
+
+
+def _anchor(
+    instrument: "Instrument", mode: Any, parts: "LossParts", spread: Mapping[str, float], balanced: bool
+) -> "list[Cause]":
+    """What the stem sends into a half-space of the resonator's own material: of the balanced mode, and of its imbalance."""
+    from shell.damping.anchor import anchor_loss, unbalance_loss
+    from shell.damping.budget import constant_cause
+
+    elastic, causes = instrument.material.elastic(instrument.reference_temperature), []
+    source = "waves in a half-space of the same material, with an absorbing layer"
+    if balanced:
+        found = anchor_loss(mode, elastic)
+        causes.append(constant_cause("anchor", found.inverse_q, 0.5, source, MOUNT_ADVICE))
+    if parts.unbalance_mg:
+        loss = unbalance_loss(mode, elastic, 1e-6 * parts.unbalance_mg, parts.unbalance_order)
+        sd = 2 * spread.get("loss.unbalance_mg", 0.0)  # the square of the mass counts
+        causes.append(constant_cause("unbalance", loss, sd, source, MOUNT_ADVICE))
+    return causes
+
+
+def _relative_sds(instrument: "Instrument") -> dict[str, float]:
+    """Return the relative standard deviation of every uncertain number of `[loss]` by its dotted key."""
+    return {
+        one.name: one.sd / abs(one.value) for one in instrument.uncertain if one.name.startswith("loss.") and one.value
+    }

@@ -1,0 +1,132 @@
+"""`hrg loss` and the loss parts of a card: schema, units, uncertainties, bad input named with its mend, speed-free."""
+
+import json
+
+import numpy as np
+import pytest
+import tomli_w
+
+from studies.cli import main
+from studies.instrument.card import build_instrument, load_card, shipped_cards
+from studies.loss import loss_model
+
+DOME = {
+    "schema": "hrg.card/1",
+    "name": "dome",
+    "resonator": {"shape": "hemisphere", "radius_mm": 15.0, "thickness_mm": 0.9},
+    "material": {"name": "fused-silica"},
+}
+GOLD = {"material": "gold", "thickness_nm": 100.0, "loss": 1e-4}
+PEAK = {"height": 1e-9, "energy_eV": 0.5, "peak_degC": 120.0}
+
+
+def _run(capsys, *words):
+    status = main(["loss", *words])
+    told = capsys.readouterr()
+    return status, told.out, told.err
+
+
+@pytest.mark.parametrize("card", sorted(shipped_cards()))
+def test_every_shipped_card_has_a_budget(capsys, card):
+    status, out, err = _run(capsys, card, "--from", "20", "--to", "30", "--json")
+    assert (status, err) == (0, "")
+    found = json.loads(out)
+    assert found["schema"] == "hrg.loss/1"
+    total = np.sum([part["inverse_q"] for part in found["parts"]], axis=0)
+    assert found["inverse_q"] == pytest.approx(total.tolist(), rel=1e-12)
+    assert found["q"] == pytest.approx((1 / total).tolist(), rel=1e-12)
+    assert found["attack_first"]["part"] == found["parts"][0]["name"]
+    assert all(a < b < c for a, b, c in zip(found["inverse_q_low"], total, found["inverse_q_high"], strict=True))
+    assert all(part["source"] for part in found["parts"])
+
+
+def test_every_key_of_the_card_makes_its_part(capsys, tmp_path):
+    loss = {"pressure_Pa": {"value": 1e-2, "relative_sd": 0.1}, "gas": "nitrogen", "anchor_inverse_q": 2e-9}
+    loss |= {
+        "film": [GOLD, GOLD | {"material": "chromium", "thickness_nm": 10.0, "face": "inner"}],
+        "activated": [PEAK],
+    }
+    path = tmp_path / "card.toml"
+    path.write_text(tomli_w.dumps(DOME | {"loss": loss}), encoding="utf-8")
+    status, out, _ = _run(capsys, str(path), "--json", "--from", "20", "--to", "20")
+    assert status == 0
+    found = {part["name"]: part for part in json.loads(out)["parts"]}
+    wanted = {
+        "thermoelastic",
+        "bulk",
+        "surface",
+        "film gold",
+        "film gold, heat",
+        "film chromium",
+        "film chromium, heat",
+    }
+    assert set(found) == {*wanted, "gas", "mount", "activated"}
+    assert found["gas"]["relative_sd"] == pytest.approx(0.1)
+    assert found["mount"]["inverse_q"] == pytest.approx([2e-9])
+    assert json.loads(out)["left_out"] == []
+    status, out, _ = _run(capsys, str(path))
+    assert status == 0
+    assert "Attack first: film gold" in out
+
+
+def test_uncertain_parts_are_values_of_the_card():
+    card = build_instrument(DOME | {"loss": {"pressure_Pa": 1e-3, "film": [GOLD], "activated": [PEAK]}})
+    found = {one.name: (one.value, one.sd, one.unit) for one in card.uncertain}
+    assert found["loss.pressure_Pa"] == (1e-3, 5e-4, "Pa")
+    assert found["loss.film.0.thickness_nm"] == (100.0, 10.0, "nm")
+    assert found["loss.film.0.loss"] == (1e-4, 1e-4, "1")
+    assert found["loss.activated.0.height"] == (1e-9, 5e-10, "1")
+    thicker = card.with_values({"loss.film.0.thickness_nm": 200.0})
+    part = {p.name: p.inverse_q[0] for p in loss_model(card).budget(293.15).parts}
+    twice = {p.name: p.inverse_q[0] for p in loss_model(thicker).budget(293.15).parts}
+    assert twice["film gold"] == pytest.approx(2 * part["film gold"], rel=1e-12)
+    assert twice["surface"] == part["surface"]
+
+
+def test_what_no_source_states_is_left_out_and_said():
+    found = loss_model(load_card("bvg-bell"))
+    assert any(sentence.startswith("bulk: no source states that of 3j53") for sentence in found.left_out)
+    assert any(sentence.startswith("gas: give pressure_Pa") for sentence in found.left_out)
+
+
+@pytest.mark.parametrize(
+    ("loss", "words"),
+    [
+        ({"pressure_Pa": -1.0}, "pressure_Pa must be at least 0, not -1."),
+        ({"gas": "xenon"}, "gas = 'xenon' is unknown"),
+        ({"film": [GOLD | {"thickness_nm": 2e6}]}, "thicker than the wall (0.9 mm): film thickness is in nm."),
+        ({"film": [GOLD | {"thickness_nm": 1e5}]}, "more than 5% of the wall"),
+        ({"film": [{"material": "gold", "thickness_nm": 100.0}]}, "no source states loss of the film 'gold'; add it."),
+        (
+            {"film": [{"material": "ti", "thickness_nm": 9.0}]},
+            "(films of the table: gold, chromium, tantala, silica); add it.",
+        ),
+        ({"film": [GOLD | {"coverage": 2.0}]}, "coverage must be at most 1, not 2."),
+        ({"film": [GOLD | {"from_position": 1.0}]}, "from_position (1) must lie before to_position (1)."),
+        ({"film": [GOLD | {"thicknes_nm": 1.0}]}, "unknown key 'thicknes_nm'"),
+        ({"activated": [PEAK | {"energy_eV": 0.0}]}, "energy_eV must be"),
+        ({"unbalance_mg": 1.0}, "on a stem"),
+        ({"presure_Pa": 1.0}, "unknown key 'presure_Pa'; did you mean 'pressure_Pa'?"),
+    ],
+)
+def test_an_unusable_part_is_named_with_its_mend(capsys, tmp_path, loss, words):
+    path = tmp_path / "card.toml"
+    path.write_text(tomli_w.dumps(DOME | {"loss": loss}), encoding="utf-8")
+    status, out, err = _run(capsys, str(path))
+    assert (status, out) == (2, "")
+    assert words in err
+    assert str(path) in err
+
+
+def test_a_range_outside_the_material_is_refused(capsys):
+    status, _, err = _run(capsys, "free-dome", "--from", "-100", "--to", "20")
+    assert status == 2
+    assert "outside the range" in err
+    assert _run(capsys, "free-dome", "--from", "30", "--to", "20")[0] == 2
+
+
+def test_anchor_of_a_stem(capsys):
+    status, out, _ = _run(capsys, "hrg-30mm", "--anchor", "--from", "20", "--to", "20", "--json")
+    assert status == 0
+    found = {part["name"]: part for part in json.loads(out)["parts"]}
+    assert 0 < found["anchor"]["inverse_q"][0] < 1e-15
