@@ -1,21 +1,53 @@
 """Units that the names of keys carry: `mount_conductance_W_per_K` is in W/K."""
 
-UNITS = {
-    # end of a key: its unit
-    "_deg_per_h_per_Hz": "°/h/Hz", "_deg_per_h_per_Hz2": "°/h/Hz²", "_deg_per_h_per_Hz3": "°/h/Hz³",
-    "_deg_per_h_s_per_Hz": "°/h s/Hz", "_deg_per_h_s2_per_Hz2": "°/h s²/Hz²", "_deg_per_h_s3_per_Hz3": "°/h s³/Hz³",
-    "_deg_per_h_s_per_Hz2": "°/h s/Hz²", "_deg_per_h_s_per_Hz3": "°/h s/Hz³", "_deg_per_h_s2_per_Hz3": "°/h s²/Hz³",
-    "_deg_per_h_per_K_per_s": "°/h/(K/s)", "_deg_per_h_per_K2_per_s": "°/h/(K²/s)", "_deg_per_h_per_K": "°/h/K",
-    "_deg_per_h_per_rt_h": "°/h/√h", "_deg_per_rt_h": "°/√h", "_deg_per_h": "°/h", "_Hz_per_V2": "Hz/V²",
-    "_Hz_per_K2": "Hz/K²", "_Hz_per_K": "Hz/K", "_K_per_V2": "K/V²", "_kg_m3": "kg/m³", "_W_per_m_K": "W/(m K)",
-    "_J_per_kg_K": "J/(kg K)", "_J_per_K": "J/K", "_W_per_K": "W/K", "_per_K2": "1/K²", "_per_K": "1/K", "_degC": "°C",
-    "_GPa": "GPa", "_Pa": "Pa", "_nm": "nm", "_pm": "pm", "_mg": "mg", "_eV": "eV", "_mm": "mm", "_deg": "°", "_cm2": "cm²", "_mW": "mW", "_Hz": "Hz", "_V": "V", "_K": "K", "_s": "s",
-    "expansion.value": "1/K", "expansion.slope_per_K": "1/K²", "expansion.curvature_per_K2": "1/K³",
-}  # fmt: skip
+import re
+
+SYMBOLS = {"deg": "°", "degC": "°C", "day": "d", "rt": "√"}
+UNIT = re.compile(r"(10)?(per|rt|degC|deg|ppm|day|[GMkmun]?(?:Pa|Hz|W|J|V|eV|N|g|K|s)|[cmunp]?m|pF|h|1)([2-9])?")
+RATES = {
+    # words of a key: one unit, so that what follows belongs to it as a whole
+    "deg per h": "°/h",
+    "deg per s": "°/s",
+    "K per s": "(K/s)",
+    "K2 per s": "(K²/s)",
+    "kg m3": "kg/m³",
+}
+EXPANSION = {"value": "1/K", "slope_per_K": "1/K²", "curvature_per_K2": "1/K³"}
+"""Coefficients of the expansion's deviation, whose names say the powers of K beyond its own."""
 
 
 def unit_of(name: str) -> str:
     """Return the unit that the last word of a dotted key carries, or "1"."""
-    words = ".".join(word for word in name.split(".") if not word.isdigit())
-    found = [suffix for suffix in UNITS if words.endswith(suffix)]
-    return UNITS[max(found, key=len)] if found else "1"
+    words = [word for word in name.split(".") if not word.isdigit()]
+    if words[-2:-1] == ["expansion"]:
+        return EXPANSION.get(words[-1], "1")
+    return split_unit(words[-1])[1]
+
+
+def split_unit(key: str) -> tuple[str, str]:
+    """Split a key into its name and its unit ("1" where it carries none): `film_K_per_s` into ("film", "K/s")."""
+    words = key.split("_")
+    first = len(words)
+    while first > 1 and UNIT.fullmatch(words[first - 1]):
+        first -= 1
+    unit = " ".join(words[first:])
+    for spelled, symbol in RATES.items():
+        unit = re.sub(rf"\b{spelled}\b(?! *rt)", symbol, unit)
+    over, *under = (_spell(part) for part in unit.split("per"))
+    under = [f"({part})" if " " in part and not part.startswith("(") else part for part in under]
+    return "_".join(words[:first]), "/".join([over or "1", *under])
+
+
+def _spell(words: str) -> str:
+    """Spell the words between two "per": powers raised, 10 K2 as (10 K)²."""
+    found = []
+    for word in words.split():
+        matched = UNIT.fullmatch(word)
+        if matched is None:
+            found.append(word)
+            continue
+        ten, symbol, power = matched.groups()
+        spelled = SYMBOLS.get(symbol, symbol)
+        raised = "" if power is None else "²³⁴⁵⁶⁷⁸⁹"[int(power) - 2]
+        found.append(f"(10 {spelled}){raised}" if ten and power else f"10 {spelled}" if ten else spelled + raised)
+    return " ".join(found).replace("√ ", "√")

@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from studies.instrument.units import UNITS
+from studies.instrument.units import split_unit
 from studies.reports import style
 from studies.reports.page import Picture, draw
 
@@ -21,8 +21,7 @@ COLOURS = (style.BLUE, style.VERMILION, style.GREEN, style.PURPLE, style.ORANGE,
 def label(name: str, unit: str) -> str:
     """Return a parameter's name without its table and the unit that it carries, and the unit in brackets."""
     words = name.split(".", 1)[-1]
-    suffix = max((suffix for suffix in UNITS if words.endswith(suffix)), key=len, default="")
-    plain = words.removesuffix(suffix).replace("_", " ").replace(".", " ")
+    plain = split_unit(words)[0].replace("_", " ").replace(".", " ")
     return plain + ("" if unit == "1" else f" ({unit})")
 
 

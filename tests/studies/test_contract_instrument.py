@@ -15,6 +15,7 @@ from studies.errors import InputError
 from studies.instrument.card import build_instrument, load_card, save_card, shipped_cards
 from studies.instrument.keys import describe, structs
 from studies.instrument.registry import card_tables
+from studies.instrument.units import unit_of
 
 HRG = tomllib.loads(shipped_cards()["hrg-30mm"].read_text(encoding="utf-8"))
 LAG = {"name": "second-lag", "weight": 0.1, "second_time_constant_s": 2000.0}
@@ -229,6 +230,26 @@ def test_every_key_of_a_table_is_explained_in_its_file():
                 assert key == "note" or key.split("_")[0] in text, f"[{entry.table}] {key}"
                 explained += 1
     assert explained > 40
+
+
+@pytest.mark.parametrize(
+    ("key", "unit"),
+    [
+        ("thermal.conductivity_W_per_m_K", "W/(m K)"),
+        ("material.density_kg_m3", "kg/m³"),
+        ("resonator.thickness_mm.1.1", "mm"),
+        ("bias.k9_deg_per_h_s2_per_Hz3", "°/h s²/Hz³"),
+        ("noise.bias_walk_deg_per_h_per_rt_h", "°/h/√h"),
+        ("effect.0.coefficient_deg_per_h_per_K_per_s", "°/h/(K/s)"),
+        ("effect.0.leakage_slope_deg_per_h_per_V_per_10K", "°/h/V/(10 K)"),
+        ("effect.0.quadratic_K_per_10K2", "K/(10 K)²"),
+        ("effect.0.growth_per_day", "1/d"),
+        ("material.deviation.expansion.slope_per_K", "1/K²"),
+        ("loss.inverse_q", "1"),
+    ],
+)
+def test_a_key_carries_its_unit(key, unit):
+    assert unit_of(key) == unit
 
 
 def test_the_uncertain_values_of_a_card_are_listed(capsys):

@@ -10,17 +10,16 @@ k4_deg_per_h_s_per_Hz, k5_…_s2_per_Hz2, k6_…_s3_per_Hz3  # change of frequen
 k7_deg_per_h_s_per_Hz2, k8_…_s_per_Hz3, k9_…_s2_per_Hz3  # its rate; all 0 unless given, k4 to k9 then exact
 """
 
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated
+
+import numpy as np
+from numpy.typing import NDArray
 
 from studies.instrument.keys import Table, number
 from studies.instrument.registry import CardTable
 
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
-    Array = NDArray[np.float64]
-
+Array = NDArray[np.float64]
+DEG_PER_H = np.degrees(1.0) * 3600.0  # of 1 rad/s
 TERMS = {
     # key: powers of f and of its rate (HRG paper eq. 21)
     "k1_deg_per_h_per_Hz": (1, 0),
@@ -60,13 +59,13 @@ class Bias(Table, frozen=True, kw_only=True):
 
     def at(
         self,
-        change: "Array",
-        rate: "Array",
-        frequency: "Array",
-        inverse_q: "Array",
+        change: Array,
+        rate: Array,
+        frequency: Array,
+        inverse_q: Array,
         bryan_factor: float,
         harmonic: int = 2,
-    ) -> "Array":
+    ) -> Array:
         """Zero-rate output (deg/h).
 
         B = Δ(1/τ) sin 2n(θ − θ_τ) / (2 n k) (averaged equations of Lynch 1995), 1/τ = π f/Q, plus Σ k fⁱ ḟʲ.
@@ -76,16 +75,12 @@ class Bias(Table, frozen=True, kw_only=True):
         change, rate : arrays (N,), Hz and Hz/s
         frequency, inverse_q : arrays (N,), Hz and 1
         """
-        import numpy as np
-
         angle = 2 * harmonic * np.radians(self.pattern_angle_deg - self.damping_axis_deg)
         spread = self.damping_anisotropy * np.pi * frequency * inverse_q
-        bias: Any = self.offset_deg_per_h + DEG_PER_H * spread * np.sin(angle) / (2 * harmonic * bryan_factor)
+        bias = self.offset_deg_per_h + DEG_PER_H * spread * np.sin(angle) / (2 * harmonic * bryan_factor)
         for (power, rate_power), coefficient in self.terms.items():
             bias = bias + coefficient * change**power * rate**rate_power
         return np.asarray(bias)
 
-
-DEG_PER_H = 3600.0 * 180.0 / 3.141592653589793  # of 1 rad/s
 
 TABLE = CardTable("bias", Bias)

@@ -5,6 +5,8 @@ name = "second-lag"                # `hrg effects` lists names, parameters and b
 response = "frequency_Hz"          # of those that the effect acts on; the first of them unless given
 second_time_constant_s = 20000.0   # every parameter of its shape, within its bounds
 weight = 0.2                       # and at least one of its coefficients
+
+Parameters are exact unless the card states their uncertainty.
 """
 
 from collections.abc import Mapping

@@ -6,14 +6,13 @@ slope_per_K = 4e-3                 # relative; ± 4e-3
 curvature_per_K2 = 0.0             # relative; ± 4e-5
 """
 
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated
+
+import numpy as np
+from numpy.typing import NDArray
 
 from studies.instrument.keys import Table, number
 from studies.instrument.registry import CardTable
-
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
 
 
 class Loss(Table, frozen=True, kw_only=True):
@@ -24,10 +23,9 @@ class Loss(Table, frozen=True, kw_only=True):
     curvature_per_K2: Annotated[float, number(sd=4e-5)] = 0.0
     note: str = ""
 
-    def at(self, excess: "NDArray[np.float64]") -> "NDArray[np.float64]":
+    def at(self, excess: NDArray[np.float64]) -> NDArray[np.float64]:
         """1/Q at temperatures above the reference (K)."""
-        result: Any = self.inverse_q * (1 + excess * (self.slope_per_K + self.curvature_per_K2 * excess))
-        return result  # type: ignore[no-any-return]
+        return np.asarray(self.inverse_q * (1 + excess * (self.slope_per_K + self.curvature_per_K2 * excess)))
 
 
 TABLE = CardTable("loss", Loss)
