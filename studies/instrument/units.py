@@ -32,7 +32,7 @@ def split_unit(key: str) -> tuple[str, str]:
         first -= 1
     unit = " ".join(words[first:])
     for spelled, symbol in RATES.items():
-        unit = re.sub(rf"\b{spelled}\b(?! *rt)", symbol, unit)
+        unit = re.sub(rf"\b{spelled}\b", symbol, unit)
     over, *under = (_spell(part) for part in unit.split("per"))
     under = [f"({part})" if " " in part and not part.startswith("(") else part for part in under]
     return "_".join(words[:first]), "/".join([over or "1", *under])
