@@ -88,7 +88,10 @@ def simulate_rebalance(
     commands = np.empty((len(t), 4))
     state = None
     for block in _alike(rows, turning, azimuth):
-        loop, offset = _close(rows, electronics, loops, turning, azimuth, block)
+        middle = (block.start + block.stop) // 2
+        loop, offset = close_loops(
+            at_row(rows, middle), electronics, loops, float(turning[middle]), float(azimuth[middle])
+        )
         if block.start == 0 or azimuth[block.start] != azimuth[block.start - 1]:
             loop.require_stable()
             state = loop.settle(forcing[block.start], offset)
@@ -208,14 +211,13 @@ def _alike(rows: StandingWave, rate: Real, angle: Real) -> Iterator[slice]:
         yield slice(int(begin), int(end))
 
 
-def _close(
-    rows: StandingWave, electronics: Electronics, loops: Loops, rate: Real, angle: Real, block: slice
+def close_loops(
+    wave: StandingWave, electronics: Electronics, loops: Loops, rate: float, angle: float
 ) -> tuple[ClosedLoop, Real]:
-    middle = (block.start + block.stop) // 2
-    wave, azimuth = at_row(rows, middle), float(angle[middle])
-    R = turn(wave.harmonic * azimuth)
-    locked = settle_rebalance(wave, electronics, float(rate[middle]), azimuth).omega[0] - wave.omega
-    A = R.T @ wave.envelope(float(rate[middle])) @ R - 1j * locked * np.eye(2)
+    """Return the loops closed about a wave held at an azimuth (rad), and what the pick-offs' errors add to their reading."""
+    R = turn(wave.harmonic * angle)
+    locked = settle_rebalance(wave, electronics, rate, angle).omega[0] - float(wave.omega)
+    A = R.T @ wave.envelope(rate) @ R - 1j * locked * np.eye(2)
     pickoff = R.T @ electronics.pickoff.matrix(wave.harmonic) @ R
     drive = R.T @ electronics.drive.matrix(wave.harmonic) @ R
     seen = pickoff[:, 0]

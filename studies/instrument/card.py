@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from shell.resonator import Resonator
     from studies.instrument.tables.bias import Bias
     from studies.instrument.tables.effect import EffectEntry
+    from studies.instrument.tables.loop import Loop
     from studies.instrument.tables.loss import Loss
     from studies.instrument.tables.noise import Noise
     from studies.instrument.tables.thermal import Thermal
@@ -107,6 +108,11 @@ class Instrument:
         """1/Q over temperature."""
         found: Loss = self.part("loss")
         return found
+
+    @property
+    def loop(self) -> "Loop | None":
+        """The loops that read the gyro; None where the card has no such table."""
+        return self.part("loop") if "loop" in self.content else None
 
     @property
     def noise(self) -> "Noise":

@@ -45,6 +45,8 @@ class CardTable:
         The part in SI units; the keys themselves where they are the part.
     required : bool
         Whether every card must have it.
+    optional : bool
+        The documented uncertainties hold only where the card has the table: without it there is no such thing.
     keys_of : callable (raw, where) -> type
         Only for an array of tables ([[effect]]), whose members differ: the class for one of them.
     """
@@ -54,6 +56,7 @@ class CardTable:
     part: str = ""
     build: Callable[[Any, Place], Any] = _as_it_is
     required: bool = False
+    optional: bool = False
     keys_of: Callable[[Mapping[str, Any], str], Any] | None = None
 
     @property
@@ -115,7 +118,8 @@ def read_table(name: str, raw: Any, place: Place) -> ReadTable:
         mine = {key: value for key, value in given.items() if key in keys or len(entries) == 1}
         bare, spreads = split_spreads(mine, entry.keys, place.where)
         found = read[entry.name] = read_keys(bare, entry.keys, place.where)
-        uncertain += gather_uncertain(name, bare, found, entry.keys, spreads, place.where)
+        if raw is not None or not entry.optional:
+            uncertain += gather_uncertain(name, bare, found, entry.keys, spreads, place.where)
         parts[entry.name] = entry.build(found, place)
         stated |= _dotted(name, spreads)
     return ReadTable(read, parts, tuple(uncertain), stated)

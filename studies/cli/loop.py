@@ -1,0 +1,210 @@
+"""`hrg loop`: the loops of a card: margins, bias and noise by source, start-up, and a run through them.
+
+With --json one object, schema `hrg.loop/1`: `card`, `mode`, `temperature_degC`, `frequency_Hz`, `quality_factor`,
+`bryan_factor`; `settled` (columns of a record, at rest); `bias` (list of `source`, `deg_per_h`, `sd_deg_per_h`; the last is
+"all"); `noise` (list of `source`, `deg_per_h_over_1s`, `deg_per_rt_h`); `margins` (list of `loop`, `paper`, `crossover_Hz`,
+`phase_margin_deg`, `gain_margin_dB`, `reversal_Hz`); `start` (`locked_s`, `ready_s`); `out` and `rows` of the run, or null.
+"""
+
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from studies.simulation.loop import LoopStudy
+
+NOISE_NAMES = {
+    "pickoff": "pick-off noise",
+    "adc_step": "ADC steps",
+    "dac_step": "DAC steps",
+    "drive": "drive noise",
+    "thermal": "thermomechanical",
+    "all": "all",
+}
+
+
+def loop(
+    card: str,
+    *,
+    temperature: float | None = None,
+    out: str | None = None,
+    hours: float = 1.0,
+    row: float = 1.0,
+    rate: float = 0.0,
+    profile: str | None = None,
+    seed: int = 0,
+    noiseless: bool = False,
+    json: bool = False,
+) -> int:
+    """Study the loops of a card: stability margins, bias and noise by source, start-up; with --out also a run through them.
+
+    The card's table [loop] says how the gyro is read; loss, damping anisotropy and azimuth come from [loss] and [bias]. A
+    loop that is unstable is refused with its margin.
+
+    Parameters
+    ----------
+    card : str
+        Path of a card, or the name of one that ships (hrg cards).
+    temperature : float
+        In °C; the card's reference temperature unless given.
+    out : str
+        Write a record of a run through the loops.
+    hours : float
+        Its length, when no profile is given.
+    row : float
+        Its rows, in s.
+    rate : float
+        Applied rate in °/s.
+    profile : str
+        Chamber profile, as for hrg simulate: frequency and loss follow the temperature.
+    seed : int
+        Seed of the noise.
+    noiseless : bool
+        Leave out noise.
+    json : bool
+        Print one JSON object (schema hrg.loop/1) instead of tables.
+    """
+    import numpy as np
+
+    from studies.cli.output import print_json, print_table, say
+    from studies.errors import InputError
+    from studies.instrument.card import ZERO_CELSIUS, load_card
+    from studies.law import law_of
+    from studies.simulation.loop import require_loop, study_loops
+
+    instrument = load_card(card)
+    keys = require_loop(instrument)
+    T = instrument.reference_temperature if temperature is None else temperature + ZERO_CELSIUS
+    if not (row > 0 and hours > 0):
+        raise InputError("--row and --hours must be positive.")
+    law = law_of(instrument, min(T, instrument.reference_temperature) - 5, max(T, instrument.reference_temperature) + 5)
+    frequency = float(np.ravel(law.frequency(T))[0])
+    inverse_q = float(instrument.loss.at(np.array([T - instrument.reference_temperature]))[0])
+    study = study_loops(instrument, frequency, inverse_q, law.bryan_factor)
+    rows = None
+    if out is not None:
+        rows = _run(
+            instrument,
+            law.bryan_factor,
+            frequency,
+            inverse_q,
+            out,
+            hours,
+            row,
+            rate,
+            profile,
+            None if noiseless else seed,
+        )
+        say(f"record: {out}, {rows} rows")
+    if json:
+        head = {
+            "schema": "hrg.loop/1",
+            "card": instrument.name,
+            "mode": keys.mode,
+            "temperature_degC": T - ZERO_CELSIUS,
+            "frequency_Hz": frequency,
+            "quality_factor": 1 / inverse_q,
+            "bryan_factor": law.bryan_factor,
+        }
+        print_json({**head, **_payload(study), "out": out, "rows": rows})
+        return 0
+    print_table(
+        f"Loops of {instrument.name}: {keys.mode}, {frequency:.2f} Hz, Q = {1 / inverse_q:.3g}, τ = {float(study.wave.tau):.4g} s",
+        ["loop", "paper", "gain 1 at Hz", "phase margin °", "gain margin dB", "turns over at Hz"],
+        [
+            [
+                m.loop,
+                m_paper,
+                f"{m.crossover:.3g}",
+                f"{np.degrees(m.phase):.0f}",
+                f"{20 * np.log10(m.gain):.1f}",
+                f"{m.reversal:.3g}",
+            ]
+            for m, m_paper in ((m, _paper(m.loop)) for m in study.margins)
+        ],
+        f"From rest with {keys.drive_headroom:g} times the holding drive: locked after {study.start.locked:.3g} s,"
+        f" amplitude within 1 % after {study.start.ready:.4g} s.",
+    )
+    print_table(
+        "Bias by source, settled",
+        ["source", "deg/h", "± deg/h"],
+        [[s.name, f"{s.bias:.4g}", f"{s.sd:.2g}"] for s in study.sources],
+        "± one standard deviation, from the card's uncertain values; all: with the axes and the split that they share.",
+    )
+    print_table(
+        "Noise of the held rate by source",
+        ["source", "deg/h over 1 s", "deg/√h"],
+        [[NOISE_NAMES[name], f"{one:.3g}", f"{walk:.3g}"] for name, (one, walk) in study.noise.items()],
+        "deg/√h from a mean over 100 s.",
+    )
+    return 0
+
+
+def _paper(name: str) -> str:
+    from compensation.controllers import Loops
+
+    return Loops.PAPER[name]
+
+
+def _payload(study: "LoopStudy") -> dict[str, Any]:
+    from math import degrees, log10
+
+    return {
+        "settled": study.settled,
+        "bias": [{"source": s.name, "deg_per_h": s.bias, "sd_deg_per_h": s.sd} for s in study.sources],
+        "noise": [
+            {"source": name, "deg_per_h_over_1s": one, "deg_per_rt_h": walk}
+            for name, (one, walk) in study.noise.items()
+        ],
+        "margins": [
+            {
+                "loop": m.loop,
+                "paper": _paper(m.loop),
+                "crossover_Hz": m.crossover,
+                "phase_margin_deg": degrees(m.phase),
+                "gain_margin_dB": 20 * log10(m.gain),
+                "reversal_Hz": m.reversal,
+            }
+            for m in study.margins
+        ],
+        "start": {"locked_s": study.start.locked, "ready_s": study.start.ready},
+    }
+
+
+def _run(
+    instrument: Any,
+    bryan_factor: float,
+    frequency: float,
+    inverse_q: float,
+    out: str,
+    hours: float,
+    row: float,
+    rate: float,
+    profile: str | None,
+    seed: int | None,
+) -> int:
+    import numpy as np
+
+    from studies.record import Record, write_record
+    from studies.simulation.chamber import load_profile
+    from studies.simulation.loop import columns_of, run_loops
+    from studies.simulation.virtual_gyro import simulate_run
+
+    columns: dict[str, Any] = {}
+    f, loss = np.array(frequency), np.array(inverse_q)
+    if profile is not None:
+        thermal = simulate_run(instrument, load_profile(profile), 1 / row, noise=False).record
+        time = thermal["time_s"]
+        f, loss = thermal["frequency_Hz"], thermal["inverse_q"]
+        names = ("chamber_temperature_degC", "housing_temperature_degC", "resonator_temperature_degC")
+        columns = {name: thermal[name] for name in names if name in thermal}
+    else:
+        time = np.asarray(row * np.arange(int(hours * 3600 / row * (1 + 1e-12)) + 1), dtype=float)
+    generator = None if seed is None else np.random.default_rng(seed)
+    run = run_loops(instrument, time, f, loss, bryan_factor, rate=np.radians(rate), generator=generator)
+    found = columns_of(instrument.loop, run)
+    columns = {"time_s": time, **columns, **found}
+    if rate:
+        columns["rate_deg_per_s"] = np.full(len(time), rate)
+        columns["measured_rate_deg_per_s"] = columns.pop("bias_deg_per_h") / 3600
+    source = f"loops, {instrument.loop.mode}, " + ("without noise" if seed is None else f"seed {seed}")
+    write_record(Record(columns, instrument=instrument.name, source=source), out)
+    return len(time)

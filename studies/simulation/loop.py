@@ -1,0 +1,288 @@
+"""The loops of a card's gyro: its standing wave and electronics in SI units, what they say settled, and over a run."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from compensation.closed_loop import ClosedLoop
+from compensation.controllers import Loops, Margin, require_stable
+from compensation.electronics import Channels, Electronics, Noise, thermal_noise
+from compensation.rebalance import LoopRun, close_loops, settle_rebalance, simulate_rebalance
+from compensation.start_up import StartUp, start_up
+from compensation.wave import StandingWave
+from compensation.whole_angle import WITHOUT_RATE, simulate_whole_angle
+from studies.errors import InputError, naming
+
+if TYPE_CHECKING:
+    from studies.instrument.card import Instrument
+    from studies.instrument.tables.loop import Loop
+
+Array = NDArray[np.float64]
+DEG_PER_H = float(np.degrees(1.0)) * 3600.0
+ERRORS = {
+    # source of bias: keys of the card that are 0 without it
+    "damping anisotropy": ("bias.damping_anisotropy",),
+    "turn of the drives": ("loop.misalignment_mrad",),
+    "gain ratios": ("loop.pickoff_gain_ratio", "loop.drive_gain_ratio"),
+    "phase errors on the quadrature": ("loop.pickoff_phase_deg", "loop.drive_phase_deg"),
+    "phase differences": ("loop.pickoff_phase_difference_deg", "loop.drive_phase_difference_deg"),
+    "skewed axes": ("loop.pickoff_skew_mrad", "loop.drive_skew_mrad"),
+}
+NOISES = ("pickoff", "adc_step", "dac_step", "drive", "thermal")
+
+
+def wave_of(
+    instrument: "Instrument", frequency: ArrayLike, inverse_q: ArrayLike, bryan_factor: float, harmonic: int = 2
+) -> StandingWave:
+    """Return the standing wave at frequencies (Hz) and losses, numbers or rows."""
+    loop, bias = require_loop(instrument), instrument.bias
+    omega = 2 * np.pi * np.asarray(frequency, dtype=float)
+    decay = omega * np.asarray(inverse_q, dtype=float) / 2
+    return StandingWave(
+        omega,
+        1 / decay,
+        bias.damping_anisotropy * decay,
+        np.radians(bias.damping_axis_deg),
+        2e-3 * np.pi * loop.frequency_split_mHz,
+        np.radians(loop.frequency_axis_deg),
+        harmonic,
+        bryan_factor,
+    )
+
+
+def electronics_of(loop: "Loop", wave: StandingWave, temperature: float, amplitude: float = 1.0) -> Electronics:
+    """Return pick-offs, drives and noise for a vibration of `amplitude` times the card's, at a temperature (K)."""
+
+    def channels(side: str, rotation: float) -> Channels:
+        return Channels(
+            getattr(loop, f"{side}_gain_ratio"),
+            np.radians(getattr(loop, f"{side}_phase_difference_deg")),
+            1e-3 * getattr(loop, f"{side}_skew_mrad"),
+            rotation,
+            np.radians(getattr(loop, f"{side}_phase_deg")),
+        )
+
+    full = wave.coupling * np.radians(loop.rate_range_deg_per_s)  # of the force over 2ω and the amplitude
+    thermal = 0.0
+    if loop.vibration_um is not None and loop.modal_mass_mg is not None:
+        thermal = thermal_noise(wave, temperature, 1e-6 * loop.modal_mass_mg, 1e-6 * loop.vibration_um * amplitude)
+    volts = loop.amplitude_V * amplitude
+    noise = Noise(
+        pickoff=1e-6 * loop.pickoff_noise_uV_per_rt_Hz / volts,
+        adc_step=1e-6 * loop.adc_step_uV / volts,
+        dac_step=2 * full / 2**loop.dac_bits / amplitude,
+        drive=1e-6 * loop.drive_noise_ppm_per_rt_Hz * full / amplitude,
+        thermal=thermal,
+    )
+    return Electronics(channels("pickoff", 0.0), channels("drive", 1e-3 * loop.misalignment_mrad), noise)
+
+
+def loops_of(loop: "Loop") -> Loops:
+    """Return the four loops with their sampling, delay and low pass."""
+    return Loops(
+        loop.amplitude_bandwidth_Hz,
+        loop.phase_bandwidth_Hz,
+        loop.rate_bandwidth_Hz,
+        loop.quadrature_bandwidth_Hz,
+        loop.sampling_Hz,
+        1e-3 * loop.delay_ms,
+        loop.demodulator_Hz,
+    )
+
+
+def require_loop(instrument: "Instrument") -> "Loop":
+    """Return the card's loops, or say that it has none."""
+    if instrument.loop is None:
+        raise InputError(
+            f"{instrument.path}: the card has no loops; add a table [loop] (it may be empty: all keys have defaults)."
+        )
+    return instrument.loop
+
+
+def settled_columns(
+    instrument: "Instrument",
+    frequency: Array,
+    inverse_q: Array,
+    bryan_factor: float,
+    pattern_angle: ArrayLike | None = None,
+) -> dict[str, Array]:
+    """Return what the settled loops of a card record at rest, without the offset and polynomial of `[bias]`.
+
+    Parameters
+    ----------
+    frequency, inverse_q : arrays (N,), Hz and 1
+        Of the resonator.
+    pattern_angle : array (N,), optional
+        Azimuth (rad); that of `[bias]` unless given.
+
+    Returns
+    -------
+    dict
+        `frequency_Hz`, `bias_deg_per_h`, `inverse_q`, `quadrature_V`, `pattern_angle_deg`.
+    """
+    angle = np.radians(instrument.bias.pattern_angle_deg) if pattern_angle is None else np.asarray(pattern_angle)
+    wave = wave_of(instrument, frequency, inverse_q, bryan_factor)
+    electronics = electronics_of(require_loop(instrument), wave, instrument.reference_temperature)
+    run = settle_rebalance(wave, electronics, 0.0, np.broadcast_to(angle, np.shape(frequency)))
+    return columns_of(require_loop(instrument), run)
+
+
+def columns_of(loop: "Loop", run: LoopRun) -> dict[str, Array]:
+    """Return a run of the loops in the columns and units of a record."""
+    return {
+        "frequency_Hz": run.omega / (2 * np.pi),
+        "bias_deg_per_h": run.rate * DEG_PER_H,
+        "inverse_q": 2 * run.decay / run.omega,
+        "quadrature_V": loop.quadrature_V_per_Hz * run.quadrature / np.pi,
+        "pattern_angle_deg": np.degrees(run.angle),
+    }
+
+
+def run_loops(
+    instrument: "Instrument",
+    time: Array,
+    frequency: ArrayLike,
+    inverse_q: ArrayLike,
+    bryan_factor: float,
+    *,
+    rate: ArrayLike = 0.0,
+    pattern_angle: ArrayLike | None = None,
+    generator: np.random.Generator | None = None,
+) -> LoopRun:
+    """Run the card's loops over even rows (s), its resonator's frequency (Hz) and loss numbers or rows.
+
+    Parameters
+    ----------
+    rate : float or array (N,)
+        Rate (rad/s).
+    pattern_angle : float or array (N,), optional
+        Azimuth (rad), at the start in whole-angle mode; that of `[bias]` unless given.
+    """
+    loop = require_loop(instrument)
+    angle = np.radians(instrument.bias.pattern_angle_deg) if pattern_angle is None else np.asarray(pattern_angle)
+    wave = wave_of(instrument, frequency, inverse_q, bryan_factor)
+    electronics = electronics_of(loop, wave, instrument.reference_temperature)
+    with naming(f"{instrument.path} [loop]"):
+        if loop.mode == "whole-angle":
+            return simulate_whole_angle(
+                wave,
+                electronics,
+                loops_of(loop),
+                time,
+                rate=rate,
+                precession=np.radians(loop.self_precession_deg_per_s),
+                angle=float(np.ravel(angle)[0]),
+                generator=generator,
+            )
+        return simulate_rebalance(wave, electronics, loops_of(loop), time, rate=rate, angle=angle, generator=generator)
+
+
+@dataclass(frozen=True)
+class Source:
+    """One source of bias: what it makes (deg/h), and one standard deviation of it from the card's uncertain values."""
+
+    name: str
+    bias: float
+    sd: float
+
+
+@dataclass(frozen=True)
+class LoopStudy:
+    """What the loops of a card are like at one temperature.
+
+    `settled` the columns at rest; `sources` of bias; `noise` by source: deg/h of a mean over 1 s, and angle random walk
+    (deg/√h) from a mean over 100 s; `margins`; `start` from rest.
+    """
+
+    wave: StandingWave
+    settled: dict[str, float]
+    sources: tuple[Source, ...]
+    noise: dict[str, tuple[float, float]]
+    margins: tuple[Margin, ...]
+    start: StartUp
+
+
+def study_loops(instrument: "Instrument", frequency: float, inverse_q: float, bryan_factor: float) -> LoopStudy:
+    """Return margins, bias by source, noise by source and start of a card's loops.
+
+    Raises
+    ------
+    InputError
+        The card has no `[loop]`, or a loop is unstable.
+    """
+    loop = require_loop(instrument)
+    wave = wave_of(instrument, frequency, inverse_q, bryan_factor)
+    electronics = electronics_of(loop, wave, instrument.reference_temperature)
+    loops = loops_of(loop)
+    decay = float(1 / np.asarray(wave.tau))
+    names = Loops.NAMES if loop.mode == "force-rebalance" else WITHOUT_RATE
+    with naming(f"{instrument.path} [loop]"):
+        margins = require_stable(loops, decay, names)
+        start = start_up(1 / decay, loops, headroom=loop.drive_headroom, offset=2 * np.pi * loop.start_offset_Hz)
+        noise = {
+            name: _noise_of(wave, electronics, loops, instrument, (name,))
+            for name in NOISES
+            if getattr(electronics.noise, name) > 0
+        }
+        noise["all"] = _noise_of(wave, electronics, loops, instrument, NOISES)
+    settled = settled_columns(instrument, np.array([frequency]), np.array([inverse_q]), bryan_factor)
+    return LoopStudy(
+        wave,
+        {name: float(values[0]) for name, values in settled.items()},
+        _sources(instrument, frequency, inverse_q, bryan_factor),
+        noise,
+        margins,
+        start,
+    )
+
+
+def _sources(instrument: "Instrument", frequency: float, inverse_q: float, bryan_factor: float) -> tuple[Source, ...]:
+    """Bias of each source: what goes when its keys are 0; its spread: the card's uncertain values, moved by their sd."""
+
+    def bias(values: dict[str, float]) -> float:
+        moved = instrument.with_values(values)
+        column = settled_columns(moved, np.array([frequency]), np.array([inverse_q]), bryan_factor)
+        return float(column["bias_deg_per_h"][0])
+
+    total = bias({})
+    spread = {value.name: value for value in instrument.uncertain}
+    sources = []
+    for name, keys in ERRORS.items():
+        effects = [_step(bias, spread[key].value, spread[key].sd, key) for key in keys if key in spread]
+        sources.append(Source(name, total - bias(dict.fromkeys(keys, 0.0)), float(np.hypot.reduce([0.0, *effects]))))
+    axes = [
+        key for key in ("bias.damping_axis_deg", "loop.frequency_axis_deg", "loop.frequency_split_mHz") if key in spread
+    ]
+    shared = [_step(bias, spread[key].value, spread[key].sd, key) for key in axes]
+    everything = [*(source.sd for source in sources), *shared]
+    return (*sources, Source("all", total, float(np.hypot.reduce([0.0, *everything]))))
+
+
+def _step(bias: Callable[[dict[str, float]], float], value: float, sd: float, key: str) -> float:
+    """Return how the bias changes when a value of the card moves by one standard deviation."""
+    least = 0.0 if key.endswith(("anisotropy", "mHz")) else -np.inf
+    return abs(bias({key: value + sd}) - bias({key: max(value - sd, least)})) / 2
+
+
+def _noise_of(
+    wave: StandingWave, electronics: Electronics, loops: Loops, instrument: "Instrument", names: tuple[str, ...]
+) -> tuple[float, float]:
+    """Deg/h of a mean of the held rate over 1 s, and deg/√h from a mean over 100 s, of these sources together."""
+    only = Noise(**{name: getattr(electronics.noise, name) for name in names})
+    angle = float(np.radians(instrument.bias.pattern_angle_deg))
+    loop: ClosedLoop = close_loops(wave, Electronics(electronics.pickoff, electronics.drive, only), loops, 0.0, angle)[
+        0
+    ]
+    at = loop.places
+    settled = loop.row(round(100 * loops.sampling)).covariance.copy()
+    settled[at["sum"]] = settled[:, at["sum"]] = settled[at["wave_sum"]] = settled[:, at["wave_sum"]] = 0.0
+    means = []
+    for seconds in (1.0, 100.0):
+        row = loop.row(round(seconds * loops.sampling))
+        total = row.map @ settled @ row.map.T + row.covariance
+        place = at["sum"].start + 2
+        means.append(np.sqrt(max(total[place, place], 0.0)) / row.samples / wave.coupling * DEG_PER_H)
+    return float(means[0]), float(means[1] * 10 / 60)

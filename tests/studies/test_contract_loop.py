@@ -1,0 +1,81 @@
+"""`hrg loop` speaks as promised: its schema, its refusals, and a record whose noise and bias are those that it states."""
+
+import json
+
+import numpy as np
+import pytest
+
+from studies.cli import main
+from studies.instrument.card import load_card, shipped_cards
+from studies.record import read_record
+
+KEYS = [
+    "schema",
+    "card",
+    "mode",
+    "temperature_degC",
+    "frequency_Hz",
+    "quality_factor",
+    "bryan_factor",
+    "settled",
+    "bias",
+    "noise",
+    "margins",
+    "start",
+    "out",
+    "rows",
+]
+
+
+@pytest.fixture
+def card(tmp_path):
+    def write(lines):
+        path = tmp_path / "looped.toml"
+        path.write_text(shipped_cards()["free-dome"].read_text() + "\n[loop]\n" + lines)
+        return str(path)
+
+    return write
+
+
+def test_schema_and_record(card, tmp_path, capsys):
+    path = card("misalignment_mrad = 0.5\nvibration_um = 1.0\nmodal_mass_mg = 500.0\n")
+    out = tmp_path / "run.csv"
+    assert main(["loop", path, "--json", "--out", str(out), "--hours", "1"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert list(found) == KEYS
+    assert found["schema"] == "hrg.loop/1"
+    assert [margin["paper"] for margin in found["margins"]] == ["GA", "GF", "GR", "GQ"]
+    assert list(found["bias"][0]) == ["source", "deg_per_h", "sd_deg_per_h"]
+    record = read_record(out)
+    assert len(record) == found["rows"] == 3601
+    bias = record["bias_deg_per_h"]
+    one = next(noise for noise in found["noise"] if noise["source"] == "all")["deg_per_h_over_1s"]
+    assert np.std(bias) == pytest.approx(one, rel=0.06)
+    assert np.mean(bias) == pytest.approx(found["bias"][-1]["deg_per_h"], abs=5 * one / 60)
+    # turn of the drives: n β/τ over n k, from the card's Q = 1e7
+    turn = next(source for source in found["bias"] if source["source"] == "turn of the drives")["deg_per_h"]
+    decay = np.pi * found["frequency_Hz"] / 1e7
+    assert turn == pytest.approx(np.degrees(0.5e-3 * decay / found["bryan_factor"]) * 3600, rel=1e-3)
+
+
+def test_unstable_loop_is_said_with_its_margin(card, capsys):
+    assert main(["loop", card("rate_bandwidth_Hz = 200.0\n")]) == 2
+    said = capsys.readouterr().err
+    assert "[loop]: the rate loop (GR) is unstable: gain margin -" in said
+    assert "lower its bandwidth" in said
+
+
+def test_card_without_loops_is_refused(capsys):
+    assert main(["loop", "free-dome"]) == 2
+    assert "add a table [loop]" in capsys.readouterr().err
+
+
+def test_uncertainties_of_the_loops_hold_only_where_the_card_has_them(card):
+    names = {value.name for value in load_card(card("")).uncertain}
+    assert "loop.pickoff_phase_deg" in names
+    assert not any(value.name.startswith("loop.") for value in load_card("free-dome").uncertain)
+
+
+def test_half_of_the_thermal_noise_is_refused(card, capsys):
+    assert main(["loop", card("vibration_um = 1.0\n")]) == 2
+    assert "needs both vibration_um and modal_mass_mg" in capsys.readouterr().err
