@@ -22,7 +22,7 @@ def simulate(
 ) -> int:
     """Run a virtual gyro through a chamber profile, or as a record was driven, and write the record.
 
-    The card's optional tables [thermal], [loss], [bias], [noise] and [[effect]] say what the gyro is like; all have
+    The card's optional tables [thermal], [loss], [bias], [loop], [noise] and [[effect]] say what the gyro is like; all have
     defaults (studies/instrument/tables).
 
     Parameters
@@ -30,7 +30,8 @@ def simulate(
     card : str
         Path of a card, or the name of one that ships (hrg cards).
     profile : str
-        A CSV file (time_s,chamber_temperature_degC, linear between its rows), or words in quotes with temperatures in °C,
+        A CSV file (time_s,chamber_temperature_degC, linear between its rows; drive_amplitude_V, electrode_bias_V,
+        quadrature_V or pattern_angle_deg beside them command the drives), or words in quotes with temperatures in °C,
         durations as 5h, 30min or 90s, and rates in K/min: "soak T DURATION", "step FROM TO DURATION",
         "ramp FROM TO RATE", "staircase FROM TO STEP HOLD", "cycle START FIRST SECOND RATE HOLD COUNT", joined by "then";
         for example "step 20 -10 5h then ramp -10 40 1". Or a record: its housing column, else its chamber column, is
@@ -62,7 +63,7 @@ def simulate(
     if seed < 0:
         raise InputError(f"--seed {seed}: a seed is a whole number from 0 up.")
     instrument = load_card(card)
-    run = simulate_run(instrument, load_drive(profile, boundary), rate, seed, not noiseless, theory)
+    run = simulate_run(instrument, load_drive(profile, boundary, rate), rate, seed, not noiseless, theory)
     rows = len(run.record)
     for warning in run.warnings:
         say(f"warning: {warning}")

@@ -26,24 +26,39 @@ def load_profile(text: str) -> "Profile":
     return Profile(table.values["time_s"], table.values["chamber_temperature_degC"] + ZERO_CELSIUS)
 
 
-def load_drive(text: str, boundary: "Boundary | None" = None) -> "Profile | Drive":
+def load_drive(text: str, boundary: "Boundary | None" = None, rate: float = 1.0) -> "Profile | Drive":
     """Read what drives a run: a profile in words or from a file, or a record, of which a measured column is imposed.
+
+    A profile may have commands beside the chamber: drive_amplitude_V, electrode_bias_V, quadrature_V, pattern_angle_deg.
 
     Parameters
     ----------
     boundary : "chamber" or "housing", optional
         Column of a record; the housing's where there is one.
+    rate : float
+        Rows per second of a profile with commands.
 
     Raises
     ------
     InputError
         A record without that column; a boundary for what is no record.
     """
+    import numpy as np
+
     from studies.files.columns import read_header
     from studies.record import PROFILE_COLUMNS, read_record
-    from studies.simulation.drive import drive_by_record
+    from studies.simulation.drive import COMMAND_COLUMNS, drive_by_record, drive_by_schedule
 
-    if Path(text).is_file() and set(read_header(text)) - set(PROFILE_COLUMNS):
+    columns = set(read_header(text)) if Path(text).is_file() else set()
+    if set(PROFILE_COLUMNS) < columns <= {*PROFILE_COLUMNS, *COMMAND_COLUMNS}:
+        record = read_record(text)
+        for name in columns:
+            if not np.isfinite(record[name]).all():
+                raise InputError(f"{text}: {name} has empty cells; a profile needs every value.")
+        if len(record) < 2:
+            raise InputError(f"{text}: a profile needs at least two rows.")
+        return drive_by_schedule(record.columns, rate)
+    if columns - set(PROFILE_COLUMNS):
         return drive_by_record(read_record(text), boundary)
     if boundary == "housing":
         raise InputError(f"{text}: only a record has a housing column to impose; leave out --boundary housing.")

@@ -25,9 +25,11 @@ COMMANDS = {
     "quadrature": ("quadrature_V", 1.0, 1),
     "pattern_angle": ("pattern_angle_deg", np.pi / 180.0, 1),
 }
+COMMAND_COLUMNS = tuple(column for column, _, _ in COMMANDS.values())
 LUMPS = ("housing", "base", "resonator")
 """Parts of the heat path whose temperature at the start may depart from the settled one."""
 MOST_BOUNDARY_ROWS = 20_000
+MOST_ROWS = 40_000_000
 
 
 @dataclass(frozen=True)
@@ -77,6 +79,38 @@ class Drive:
 def drive_by_profile(profile: Profile, time: Array) -> Drive:
     """Impose a chamber profile."""
     return Drive(time, "chamber", profile)
+
+
+def drive_by_schedule(columns: Mapping[str, Array], rate: float) -> Drive:
+    """Impose a chamber profile, and commands beside it, all linear between the rows of a table.
+
+    Parameters
+    ----------
+    columns : mapping
+        `time_s`, `chamber_temperature_degC`, and any of the commands' columns of a record.
+    rate : float
+        Rows per second.
+    """
+    profile = Profile(columns["time_s"], columns[COLUMN["chamber"]] + ZERO_CELSIUS)
+    time = rows_of(profile, rate)
+    commands = {
+        name: (np.interp(time, columns["time_s"], columns[column]) * factor) ** power
+        for name, (column, factor, power) in COMMANDS.items()
+        if column in columns
+    }
+    return Drive(time, "chamber", profile, commands=commands)
+
+
+def rows_of(profile: Profile, rate: float) -> Array:
+    """Return the times (s) of the rows of a run through a profile, `rate` per second."""
+    if not (np.isfinite(rate) and rate > 0):
+        raise InputError(f"--rate {rate:g}: the rate must be positive (rows per second).")
+    count = int(np.floor((profile.end - profile.start) * rate * (1 + 1e-12))) + 1
+    if count > MOST_ROWS:
+        raise InputError(f"--rate {rate:g} makes {count} rows; choose a lower rate (at most {MOST_ROWS} rows).")
+    if count < 2:
+        raise InputError(f"--rate {rate:g} makes a single row; choose a higher rate.")
+    return np.minimum(profile.start + np.arange(count) / rate, profile.end)
 
 
 def drive_by_record(record: Record, boundary: Boundary | None = None, time: Array | None = None) -> Drive:

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from studies.errors import InputError, naming
 from studies.simulation.drive import ZERO_CELSIUS, Drive
+from studies.simulation.loop import settled_columns
 from thermal.lag import lag
 from thermal.meridian import cell_names, energy_weights
 
@@ -72,7 +73,7 @@ def to_cells(instrument: "Instrument", law: "FrequencyLaw", share: Array) -> Arr
 def read_out(
     instrument: "Instrument", law: "FrequencyLaw", drive: Drive, found: Temperatures, tau: float
 ) -> dict[str, Array]:
-    """Columns of the record, without noise: °C, Hz, deg/h, 1.
+    """Columns of the record, without noise: °C, Hz, deg/h, 1; of a card with loops also what their quadrature control says.
 
     Parameters
     ----------
@@ -98,15 +99,21 @@ def read_out(
     inverse_q = instrument.loss.at(warmed - reference) + changes.get("inverse_q", 0.0)
     change = thermal - float(law.frequency(reference))
     uneven = by_density * found.rate[:, 2] + by_ratio * found.rate[:, 3]
-    bias = instrument.bias.at(
-        change, thermal * (law.slope(warmed) * rate + uneven), frequency, inverse_q, law.bryan_factor
-    )
+    slope, angle = thermal * (law.slope(warmed) * rate + uneven), drive.commands.get("pattern_angle")
+    read = {"frequency_Hz": frequency, "inverse_q": inverse_q}
+    if instrument.loop is None:
+        read["bias_deg_per_h"] = instrument.bias.at(
+            change, slope, frequency, inverse_q, law.bryan_factor, pattern_angle=angle
+        )
+    else:
+        check_loss(instrument, inverse_q)
+        read = settled_columns(instrument, frequency, inverse_q, law.bryan_factor, angle)
+        read["bias_deg_per_h"] = read["bias_deg_per_h"] + instrument.bias.polynomial(change, slope)
+    read["bias_deg_per_h"] = read["bias_deg_per_h"] + changes.get("bias_deg_per_h", 0.0)
     return {
         "housing_temperature_degC": _read_housing(instrument, drive, housing),
         "resonator_temperature_degC": warmed - ZERO_CELSIUS,
-        "frequency_Hz": frequency,
-        "bias_deg_per_h": bias + changes.get("bias_deg_per_h", 0.0),
-        "inverse_q": inverse_q,
+        **read,
     }
 
 

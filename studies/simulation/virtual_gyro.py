@@ -6,11 +6,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from studies.errors import InputError
 from studies.instrument.tables.noise import SILENT
 from studies.record import Record
 from studies.simulation.chamber import ZERO_CELSIUS, check_profile
-from studies.simulation.drive import COLUMN, Drive, drive_by_profile
+from studies.simulation.drive import COLUMN, COMMANDS, Drive, drive_by_profile, rows_of
 from studies.simulation.noise import bias_noise, frequency_noise, quantise, white_noise
 from studies.simulation.prediction import Prediction, law_for, predict
 from thermal.profile import Profile
@@ -22,7 +21,6 @@ if TYPE_CHECKING:
     from studies.instrument.tables.noise import Noise
 
 Array = NDArray[np.float64]
-MOST_ROWS = 40_000_000
 DIGITS = {
     # decimals that are recorded, far below any noise
     "time_s": 9,
@@ -33,6 +31,7 @@ DIGITS = {
     "bias_deg_per_h": 6,
     "inverse_q": 16,
 }
+COMMAND_DIGITS = 9
 
 
 @dataclass(frozen=True)
@@ -82,7 +81,7 @@ def simulate_run(
     InputError, ThermalError, ShellError
         An unusable table or effect; a boundary that leaves the range of the material.
     """
-    drive = driven if isinstance(driven, Drive) else drive_by_profile(driven, _rows(driven, rate))
+    drive = driven if isinstance(driven, Drive) else drive_by_profile(driven, rows_of(driven, rate))
     if isinstance(driven, Drive):
         rate = 1 / float(np.median(np.diff(drive.time)))
     check_profile(drive.profile, instrument)
@@ -97,8 +96,12 @@ def simulate_run(
     else:
         true["housing_temperature_degC"] = drive.profile.at(drive.time) - ZERO_CELSIUS
     columns |= _observe(true, levels, rate, np.random.default_rng(seed), sensed=drive.boundary == "chamber")
+    columns |= {name: true[name] for name in ("quadrature_V", "pattern_angle_deg") if name in true}
+    for name, (column, factor, power) in COMMANDS.items():
+        if name in drive.commands:
+            columns[column] = drive.commands[name] ** (1 / power) / factor
     for name, values in columns.items():
-        columns[name] = np.round(values, DIGITS[name])
+        columns[name] = np.round(values, DIGITS.get(name, COMMAND_DIGITS))
     resolution = {
         "frequency_Hz": levels.frequency_resolution_Hz,
         "bias_deg_per_h": levels.bias_resolution_deg_per_h,
@@ -144,14 +147,3 @@ def _idle_effects(instrument: "Instrument", drive: Drive) -> tuple[str, ...]:
         for effect in instrument.effects
         if any(need not in drive.commands for need in find_effect(effect.name).needs)
     )
-
-
-def _rows(profile: Profile, rate: float) -> Array:
-    if not (np.isfinite(rate) and rate > 0):
-        raise InputError(f"--rate {rate:g}: the rate must be positive (rows per second).")
-    count = int(np.floor((profile.end - profile.start) * rate * (1 + 1e-12))) + 1
-    if count > MOST_ROWS:
-        raise InputError(f"--rate {rate:g} makes {count} rows; choose a lower rate (at most {MOST_ROWS} rows).")
-    if count < 2:
-        raise InputError(f"--rate {rate:g} makes a single row; choose a higher rate.")
-    return np.minimum(profile.start + np.arange(count) / rate, profile.end)

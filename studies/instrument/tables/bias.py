@@ -65,6 +65,7 @@ class Bias(Table, frozen=True, kw_only=True):
         inverse_q: Array,
         bryan_factor: float,
         harmonic: int = 2,
+        pattern_angle: Array | None = None,
     ) -> Array:
         """Zero-rate output (deg/h).
 
@@ -74,10 +75,18 @@ class Bias(Table, frozen=True, kw_only=True):
         ----------
         change, rate : arrays (N,), Hz and Hz/s
         frequency, inverse_q : arrays (N,), Hz and 1
+        pattern_angle : array (N,), rad
+            Where the azimuth is commanded; that of the card unless given.
         """
-        angle = 2 * harmonic * np.radians(self.pattern_angle_deg - self.damping_axis_deg)
+        theta = np.radians(self.pattern_angle_deg) if pattern_angle is None else pattern_angle
+        angle = 2 * harmonic * (theta - np.radians(self.damping_axis_deg))
         spread = self.damping_anisotropy * np.pi * frequency * inverse_q
-        bias = self.offset_deg_per_h + DEG_PER_H * spread * np.sin(angle) / (2 * harmonic * bryan_factor)
+        damping = DEG_PER_H * spread * np.sin(angle) / (2 * harmonic * bryan_factor)
+        return np.asarray(self.polynomial(change, rate) + damping)
+
+    def polynomial(self, change: Array, rate: Array) -> Array:
+        """Return the offset and Σ k fⁱ ḟʲ (deg/h) of the change of frequency (Hz) and its rate (Hz/s)."""
+        bias: Array | float = self.offset_deg_per_h
         for (power, rate_power), coefficient in self.terms.items():
             bias = bias + coefficient * change**power * rate**rate_power
         return np.asarray(bias)
