@@ -30,7 +30,8 @@ def replaced(content: Any, path: list[str], value: Any) -> Any:
     """
     if not path:
         if is_spread(content) and not isinstance(value, Mapping):
-            return {**content, "value": value}
+            exact = {"relative_sd": 0.0} if value == 0 and "relative_sd" in content else {}  # a part of 0 is 0
+            return {**content, "value": value, **exact}
         return value
     if isinstance(content, list):
         place = int(path[0])

@@ -1,5 +1,6 @@
 """Contract of the typed instrument: one parse of the whole card, values with their uncertainties, and new values of it."""
 
+import importlib
 import inspect
 import json
 import math
@@ -10,10 +11,11 @@ import numpy as np
 import pytest
 import tomli_w
 
+from studies.cli import COMMANDS as CLI
 from studies.cli import main
 from studies.errors import InputError
 from studies.instrument.card import build_instrument, load_card, save_card, shipped_cards
-from studies.instrument.keys import describe, structs
+from studies.instrument.keys import describe, known_keys, structs
 from studies.instrument.registry import card_tables
 from studies.instrument.units import unit_of
 
@@ -37,6 +39,8 @@ TYPOS = {
     "uncertainty": ({"thermal": {"cells": {"value": 3, "relativ_sd": 1}}}, ["[thermal]: cells", "'relative_sd'"]),
 }
 COMMANDS = {
+    "loss": ["loss", "CARD"],
+    "loop": ["loop", "CARD"],
     "cards": ["cards", "CARD"],
     "modes": ["modes", "CARD"],
     "tcf": ["tcf", "CARD"],
@@ -77,6 +81,25 @@ def test_a_typo_in_any_table_is_named_by_every_command_that_loads_the_card(place
         assert word in told.err
     assert "Traceback" not in told.err
     assert not files["OUT"].exists()
+
+
+def test_every_command_that_takes_a_card_is_tried_above():
+    takes = set()
+    for name, (target, _) in CLI.items():
+        module, function = target.split(":")
+        if {"card", "cards"} & set(inspect.signature(getattr(importlib.import_module(module), function)).parameters):
+            takes.add(name)
+    assert takes <= {" ".join(words[:k]) for words in COMMANDS.values() for k in (1, 2)}
+
+
+@pytest.mark.parametrize("table", [name for name, entries in card_tables().items() if entries[0].keys_of is None])
+def test_every_key_of_every_table_is_the_nearest_to_its_own_typo(table):
+    raw = HRG.get(table, {})
+    for entry in card_tables()[table]:
+        for key in known_keys(describe(entry.keys), raw):
+            with pytest.raises(InputError) as caught:
+                build_instrument(HRG | {table: {f"{key}s": 1} | raw}, "card.toml")
+            assert f"card.toml [{table}]: unknown key '{key}s'; did you mean '{key}'?" == str(caught.value)
 
 
 @pytest.mark.parametrize(
@@ -197,6 +220,12 @@ def test_the_deviation_of_the_law_is_a_value_of_the_card():
     assert "material.deviation.shear_modulus.log_value" not in {one.name for one in given.uncertain}
     with pytest.raises(InputError, match=r"no coefficient 'shear_modulus\.log_slop_per_K'; did you mean"):
         silica.with_values({"material.deviation.shear_modulus.log_slop_per_K": 1.0})
+
+
+def test_a_value_whose_uncertainty_is_a_part_of_it_may_become_nothing():
+    card = load_card("cvg-25mm").with_values({"bias.damping_anisotropy": 0.0})
+    assert card.bias.damping_anisotropy == 0.0
+    assert "bias.damping_anisotropy" not in {one.name for one in card.uncertain}
 
 
 @pytest.mark.parametrize(
