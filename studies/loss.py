@@ -1,18 +1,25 @@
 """The loss budget of an instrument: from its card to the causes of loss of one solved mode."""
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 from studies.errors import InputError, naming
 
 if TYPE_CHECKING:
-    from numpy.typing import ArrayLike
+    import numpy as np
+    from numpy.typing import ArrayLike, NDArray
 
+    from shell.damping.anisotropy import Complex, Ripple
     from shell.damping.budget import Budget, Cause, Vibration
     from shell.damping.film import Film
     from shell.damping.heat import Heat
+    from shell.elastic import Elastic
     from shell.levels import Theory
+    from shell.modes import Mode
+    from shell.resonator import Resonator
     from studies.instrument.card import Instrument
     from studies.instrument.tables.loss_parts import FilmKeys, LossParts
 
@@ -27,14 +34,27 @@ class LossModel:
     vibration : the solved mode.
     causes : what loses energy, with uncertainty and source.
     left_out : sentences on what the budget does not have, and what would bring it in.
+    ripples : how parts vary around the axis.
     bryan_factor, frequency : of the mode, Hz at the reference temperature.
     """
 
     vibration: "Vibration"
     causes: "tuple[Cause, ...]"
     left_out: tuple[str, ...]
+    ripples: "tuple[Ripple, ...]"
     bryan_factor: float
     frequency: float
+
+    @property
+    def harmonic(self) -> int:
+        """N of the mode."""
+        return self.vibration.solution.system.n
+
+    def wave(self, budget: "Budget") -> "Complex":
+        """Δ(1/Q) exp(2 i n θ_τ) over the budget's temperatures; 0 where nothing varies around."""
+        from shell.damping.anisotropy import damping_wave
+
+        return damping_wave(budget, self.ripples, self.harmonic)
 
     def budget(self, temperatures: "ArrayLike") -> "Budget":
         """The budget at temperatures (K)."""
@@ -58,16 +78,16 @@ def loss_model(
         Unusable parts in the card; the mode cannot be solved.
     """
     from shell.damping.budget import Vibration
-    from shell.modes import solve_modes
 
     T0, material = instrument.reference_temperature, instrument.material
-    mode = solve_modes(instrument.resonator, material.elastic(T0), harmonic, theory=theory)[0]
+    mode = _solve(instrument.resonator, material.elastic(T0), harmonic, theory)
     vibration = Vibration.of(mode, material, T0)
     parts: LossParts = instrument.part("loss", "loss_parts")
     spread = _relative_sds(instrument)
     heat, lacking = _heat_law(instrument)
     causes: list[Cause] = []
     left_out: list[str] = []
+    ripples: list[Ripple] = []
     with naming(f"{instrument.path} [loss]"):
         if heat is None:
             left_out.append(
@@ -76,15 +96,14 @@ def loss_model(
         else:
             causes.append(_thermoelastic(instrument, vibration, heat))
         causes += _of_material(instrument, parts, spread, left_out)
-        for number, film in enumerate(parts.film):
-            causes += _film(
-                film,
-                vibration.thinnest,
-                heat,
-                f"{instrument.path} [[loss.film]] number {number + 1}",
-                f"loss.film.{number}",
-                spread,
-            )
+        for number, keys in enumerate(parts.film):
+            place = f"{instrument.path} [[loss.film]] number {number + 1}"
+            found, waves = _film(keys, vibration, heat, place, f"loss.film.{number}", spread)
+            if any(cause.name == found[0].name for cause in causes):
+                found, waves = _renamed(found, waves, number + 1)
+            causes += found
+            ripples += waves
+        ripples += _surface_ripple(parts, vibration, causes)
         causes += _others(instrument, parts, spread, left_out)
         if anchor or parts.unbalance_mg:
             causes += _anchor(instrument, mode, parts, spread, anchor)
@@ -92,7 +111,55 @@ def loss_model(
             left_out.append("anchor: --anchor computes what the stem sends into its base.")
     if not causes:
         raise InputError(f"{instrument.path} [loss]: nothing is known that loses energy. {' '.join(left_out)}")
-    return LossModel(vibration, tuple(causes), tuple(left_out), mode.bryan_factor, mode.frequency)
+    return LossModel(vibration, tuple(causes), tuple(left_out), tuple(ripples), mode.bryan_factor, mode.frequency)
+
+
+@dataclass(frozen=True)
+class DampingLaw:
+    """1/Q and its anisotropy over temperature, for a simulation: between nodes as cubic splines.
+
+    wave : Δ(1/Q) exp(2 i n θ_τ); None where the card states no anisotropy of its parts.
+    """
+
+    inverse_q: "Callable[[NDArray[np.float64]], NDArray[np.float64]]"
+    wave: "Callable[[NDArray[np.float64]], Complex] | None"
+
+
+def damping_law(instrument: "Instrument", lowest: float, highest: float) -> DampingLaw | None:
+    """1/Q of the drive mode (n = 2) between two temperatures (K) from the parts in the card; None where it has none."""
+    import numpy as np
+    from scipy.interpolate import CubicSpline
+
+    if not instrument.part("loss", "loss_parts").given:
+        return None
+    material = instrument.material
+    low, high = max(lowest, material.lowest), min(highest, material.highest)
+    nodes = np.linspace(low, high, max(9, 1 + math.ceil((high - low) / NODE_STEP)))
+    model = loss_model(instrument)
+    budget = model.budget(nodes)
+    logarithm = CubicSpline(nodes, np.log(budget.inverse_q))
+    wave = CubicSpline(nodes, model.wave(budget)) if model.ripples else None
+    return DampingLaw(lambda T: np.asarray(np.exp(logarithm(T))), wave)
+
+
+def settled_loss(instrument: "Instrument", temperature: float) -> "tuple[float, Instrument]":
+    """Return 1/Q at a temperature (K), and the instrument whose `[bias]` has the anisotropy of its parts there."""
+    import numpy as np
+
+    law = damping_law(instrument, temperature - 1.0, temperature + 1.0)
+    at = np.array([temperature])
+    if law is None:
+        return float(instrument.loss.at(at - instrument.reference_temperature)[0]), instrument
+    inverse_q = float(law.inverse_q(at)[0])
+    if law.wave is None:
+        return inverse_q, instrument
+    wave = complex(law.wave(at)[0])
+    axis = float(np.degrees(np.angle(wave) / 4))  # n = 2
+    moved = {"bias.damping_anisotropy": abs(wave) / inverse_q, "bias.damping_axis_deg": axis}
+    return inverse_q, instrument.with_values(moved)
+
+
+NODE_STEP = 4.0  # K, for the narrowest activated peaks
 
 
 def _thermoelastic(instrument: "Instrument", vibration: "Vibration", heat: "Callable[[float], Heat]") -> "Cause":
@@ -165,14 +232,16 @@ def _of_material(
 
 def _film(
     keys: "FilmKeys",
-    wall: float,
+    vibration: "Vibration",
     heat: "Callable[[float], Heat] | None",
     where: str,
     name: str,
     spread: Mapping[str, float],
-) -> "list[Cause]":
+) -> "tuple[list[Cause], list[Ripple]]":
+    """A film's causes of loss, and how they vary around."""
+    from shell.damping.anisotropy import Ripple, film_weight
     from shell.damping.budget import film_causes
-    from shell.damping.film import check_film
+    from shell.damping.film import check_film, thickness_power
     from shell.damping.sources import film_names, known_film
 
     known = known_film(keys.material)
@@ -188,10 +257,51 @@ def _film(
         )
     with naming(where):
         relative = (spread.get(f"{name}.thickness_nm", 0.0), spread.get(f"{name}.loss", 0.0))
-        source = str(known.get("source", "given in the card"))
         film = _build_film(keys, numbers)
-        check_film(film, wall)
-        return film_causes(keys.material, film, heat, relative, source)
+        check_film(film, vibration.thinnest)
+        causes = film_causes(keys.material, film, heat, relative, str(known.get("source", "given in the card")))
+        if keys.anisotropy is None:
+            return causes, []
+        angle = math.radians(keys.anisotropy_angle_deg)
+        waves = [Ripple(causes[0].name, keys.anisotropy, angle, film_weight(film, vibration.faces))]
+        if len(causes) > 1 and heat is not None:  # heat follows ε_s + ε_θ alone
+            T0 = vibration.reference
+            power = thickness_power(film, heat(T0), float(vibration.omega(T0)))
+            waves.append(Ripple(causes[1].name, keys.anisotropy, angle, power))
+        return causes, waves
+
+
+def _renamed(causes: "list[Cause]", waves: "list[Ripple]", number: int) -> "tuple[list[Cause], list[Ripple]]":
+    """Tell a second film of the same material apart by its number."""
+    return (
+        [replace(cause, name=f"{cause.name} ({number})") for cause in causes],
+        [replace(wave, part=f"{wave.part} ({number})") for wave in waves],
+    )
+
+
+def _surface_ripple(parts: "LossParts", vibration: "Vibration", causes: "Sequence[Cause]") -> "list[Ripple]":
+    from shell.damping.anisotropy import Ripple, surface_weight
+
+    if parts.surface_anisotropy is None or not any(cause.name == "surface" for cause in causes):
+        return []
+    angle = math.radians(parts.surface_anisotropy_angle_deg)
+    return [Ripple("surface", parts.surface_anisotropy, angle, surface_weight(vibration.surfaces))]
+
+
+@lru_cache(maxsize=8)
+def _solve(resonator: "Resonator", elastic: "Elastic", harmonic: int, theory: "Theory") -> "Mode":
+    """The lowest mode; kept, since many values of a card leave it as it is."""
+    from shell.modes import solve_modes
+
+    return solve_modes(resonator, elastic, harmonic, theory=theory)[0]
+
+
+@lru_cache(maxsize=8)
+def _unbalance(resonator: "Resonator", elastic: "Elastic", order: int) -> float:
+    """1/Q per square of the unbalanced mass, 1/kg²."""
+    from shell.damping.anchor import unbalance_loss
+
+    return unbalance_loss(_solve(resonator, elastic, 2, "solid"), elastic, 1.0, order)
 
 
 def _build_film(keys: "FilmKeys", numbers: Mapping[str, Any]) -> "Film":
@@ -245,7 +355,7 @@ def _anchor(
     instrument: "Instrument", mode: Any, parts: "LossParts", spread: Mapping[str, float], balanced: bool
 ) -> "list[Cause]":
     """What the stem sends into a half-space of the resonator's own material: of the balanced mode, and of its imbalance."""
-    from shell.damping.anchor import anchor_loss, unbalance_loss
+    from shell.damping.anchor import anchor_loss
     from shell.damping.budget import constant_cause
 
     elastic, causes = instrument.material.elastic(instrument.reference_temperature), []
@@ -254,7 +364,7 @@ def _anchor(
         found = anchor_loss(mode, elastic)
         causes.append(constant_cause("anchor", found.inverse_q, 0.5, source, MOUNT_ADVICE))
     if parts.unbalance_mg:
-        loss = unbalance_loss(mode, elastic, 1e-6 * parts.unbalance_mg, parts.unbalance_order)
+        loss = (1e-6 * parts.unbalance_mg) ** 2 * _unbalance(instrument.resonator, elastic, parts.unbalance_order)
         sd = 2 * spread.get("loss.unbalance_mg", 0.0)  # the square of the mass counts
         causes.append(constant_cause("unbalance", loss, sd, source, MOUNT_ADVICE))
     return causes

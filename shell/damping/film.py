@@ -119,3 +119,12 @@ def exchange(thickness: float, film: Heat, wall: Heat, omega: float) -> float:
     a = film.conductivity * kappa * np.tanh(kappa * thickness)
     b = np.sqrt(1j * omega * wall.capacity * wall.conductivity)
     return float(np.real(a * b / (a + b)))
+
+
+def thickness_power(film: Film, wall: Heat, omega: float) -> float:
+    """Power of the thickness with which the heat's loss grows: 2 of a thin film, whose heat meets no resistance within."""
+    if film.heat is None:
+        raise ShellError("a film without heat constants has no thermoelastic loss.")
+    step = 1e-3
+    more, less = (exchange(film.thickness * (1 + side * step), film.heat, wall, omega) for side in (1, -1))
+    return float(np.log(more / less) / np.log((1 + step) / (1 - step)))

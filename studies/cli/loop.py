@@ -68,6 +68,7 @@ def loop(
     from studies.errors import InputError
     from studies.instrument.card import ZERO_CELSIUS, load_card
     from studies.law import law_of
+    from studies.loss import settled_loss
     from studies.simulation.loop import require_loop, study_loops
 
     instrument = load_card(card)
@@ -77,7 +78,7 @@ def loop(
         raise InputError("--row and --hours must be positive.")
     law = law_of(instrument, min(T, instrument.reference_temperature) - 5, max(T, instrument.reference_temperature) + 5)
     frequency = float(np.ravel(law.frequency(T))[0])
-    inverse_q = float(instrument.loss.at(np.array([T - instrument.reference_temperature]))[0])
+    inverse_q, instrument = settled_loss(instrument, T)
     study = study_loops(instrument, frequency, inverse_q, law.bryan_factor)
     rows = None
     if out is not None:

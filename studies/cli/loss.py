@@ -91,8 +91,32 @@ def _describe(model: "LossModel", budget: "Budget", harmonic: int, theory: str) 
             "advice": budget.first.advice,
         },
         "least_known": budget.least_known.name,
+        "anisotropy": _anisotropy(model, budget),
         "left_out": list(model.left_out),
     }
+
+
+def _anisotropy(model: "LossModel", budget: "Budget") -> "dict[str, Any] | None":
+    """What varies around: Δ(1/Q), the axis that is damped most, and the largest drift of the wave; None where nothing does."""
+    import numpy as np
+
+    from compensation.wave import StandingWave
+    from shell.damping.anisotropy import describe_wave
+
+    if not model.ripples:
+        return None
+    split, axis = describe_wave(model.wave(budget), model.harmonic)
+    omega = model.vibration.omega(budget.temperatures)
+    wave = StandingWave(
+        omega,
+        2 / (omega * budget.inverse_q),
+        omega * split / 2,
+        axis,
+        harmonic=model.harmonic,
+        bryan_factor=model.bryan_factor,
+    )
+    worst = np.degrees(wave.drift(axis + np.pi / (4 * model.harmonic))) * 3600
+    return {"inverse_q_split": split, "damping_axis_deg": np.degrees(axis), "largest_drift_deg_per_h": worst}
 
 
 def _part(part: "Part") -> "dict[str, Any]":
@@ -147,6 +171,15 @@ def _print(name: str, model: "LossModel", budget: "Budget", harmonic: int, theor
     degrees = [f"{budget.temperatures[k] - 273.15:.0f} °C" for k in shown]
     note = f"1/Q in 1e-9; share, 90 % interval and slope at {budget.temperatures[middle] - 273.15:.0f} °C."
     print_table("Parts", ["part", "share", *degrees, "90 %", "%/°C", "source"], table, note)
+    around = _anisotropy(model, budget)
+    if around is not None:
+        columns = ["T (°C)", "Δ(1/Q) (1e-9)", "axis (°)", "drift at most (°/h)"]
+        fields = ("inverse_q_split", "damping_axis_deg", "largest_drift_deg_per_h")
+        lines = [
+            [f"{T - 273.15:.1f}", f"{1e9 * split:.3g}", f"{axis:.2f}", f"{drift:.4g}"]
+            for T, split, axis, drift in zip(budget.temperatures, *(around[field] for field in fields), strict=True)
+        ]
+        print_table("Around the axis", columns, lines, "Axis: azimuth of the pattern that is damped most.")
     without, first = float(budget.without(budget.first.name)[middle]), budget.first
     gain = "nothing known would be left" if not np.isfinite(without) else f"without it Q would be {_plain(without)}"
     print(f"Attack first: {first.name}; {gain}. {_sentence(first.advice)}")

@@ -35,17 +35,28 @@ NOISES = ("pickoff", "adc_step", "dac_step", "drive", "thermal")
 
 
 def wave_of(
-    instrument: "Instrument", frequency: ArrayLike, inverse_q: ArrayLike, bryan_factor: float, harmonic: int = 2
+    instrument: "Instrument",
+    frequency: ArrayLike,
+    inverse_q: ArrayLike,
+    bryan_factor: float,
+    harmonic: int = 2,
+    damping: NDArray[np.complex128] | None = None,
 ) -> StandingWave:
-    """Return the standing wave at frequencies (Hz) and losses, numbers or rows."""
+    """Return the standing wave at frequencies (Hz) and losses, numbers or rows.
+
+    `damping` is Δ(1/Q) exp(2inθ_τ) of the parts of a loss budget, in place of the anisotropy and axis of `[bias]`.
+    """
     loop, bias = require_loop(instrument), instrument.bias
     omega = 2 * np.pi * np.asarray(frequency, dtype=float)
     decay = omega * np.asarray(inverse_q, dtype=float) / 2
+    split, axis = bias.damping_anisotropy * decay, np.asarray(np.radians(bias.damping_axis_deg))
+    if damping is not None:
+        split, axis = omega * np.abs(damping) / 2, np.angle(damping) / (2 * harmonic)
     return StandingWave(
         omega,
         1 / decay,
-        bias.damping_anisotropy * decay,
-        np.radians(bias.damping_axis_deg),
+        split,
+        axis,
         2e-3 * np.pi * loop.frequency_split_mHz,
         np.radians(loop.frequency_axis_deg),
         harmonic,
@@ -108,6 +119,7 @@ def settled_columns(
     inverse_q: Array,
     bryan_factor: float,
     pattern_angle: ArrayLike | None = None,
+    damping: NDArray[np.complex128] | None = None,
 ) -> dict[str, Array]:
     """Return what the settled loops of a card record at rest, without the offset and polynomial of `[bias]`.
 
@@ -117,6 +129,8 @@ def settled_columns(
         Of the resonator.
     pattern_angle : array (N,), optional
         Azimuth (rad); that of `[bias]` unless given.
+    damping : array (N,), optional
+        Of the parts of a loss budget; see `wave_of`.
 
     Returns
     -------
@@ -124,7 +138,7 @@ def settled_columns(
         `frequency_Hz`, `bias_deg_per_h`, `inverse_q`, `quadrature_V`, `pattern_angle_deg`.
     """
     angle = np.radians(instrument.bias.pattern_angle_deg) if pattern_angle is None else np.asarray(pattern_angle)
-    wave = wave_of(instrument, frequency, inverse_q, bryan_factor)
+    wave = wave_of(instrument, frequency, inverse_q, bryan_factor, damping=damping)
     electronics = electronics_of(require_loop(instrument), wave, instrument.reference_temperature)
     run = settle_rebalance(wave, electronics, 0.0, np.broadcast_to(angle, np.shape(frequency)))
     return columns_of(require_loop(instrument), run)

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from studies.errors import InputError
 from studies.instrument.dotted import look_up
 from studies.law import law_of
+from studies.loss import DampingLaw, damping_law
 from studies.simulation.drive import Drive
 from studies.simulation.heat_path import build_network, lump_shape, slowest_lag
 from studies.simulation.response import Temperatures, check_loss, observed_rows, read_out
@@ -95,7 +96,8 @@ def predict(
     found = Temperatures(thermal.temperature, thermal.rate)
     if drive.boundary == "housing":
         found.value[:, 0] = boundary["housing"].at(drive.time)
-    columns = read_out(instrument, law, drive, found, tau)
+    damping = damping_law(instrument, law.lowest, law.highest)
+    columns = read_out(instrument, law, drive, found, tau, damping)
     check_loss(instrument, columns["inverse_q"])
     slopes = {}
     for value in values:
@@ -107,7 +109,7 @@ def predict(
                 slope[:, 0] = profile.at(drive.time)
             along = partial(found.moved, slope, thermal.rate_slope[k])
         above, below = (
-            read_out(value.instrument(d), value.law(d), drive, along(d), lag)
+            read_out(value.instrument(d), value.law(d), drive, along(d), lag, value.damping(d, damping))
             for d, lag in zip(value.ends, value.lags, strict=True)
         )
         slopes[value.name] = {name: (above[name] - below[name]) / value.step for name in columns}
@@ -169,6 +171,13 @@ class _Value:
         if table == "material":
             return self.base_law.with_material(moved.material)
         return law_of(moved, self.base_law.lowest, self.base_law.highest, self.base_law.theory)
+
+    def damping(self, distance: float, base: DampingLaw | None) -> DampingLaw | None:
+        """Return the loss of that instrument."""
+        of_wall = self.name in ("thermal.conductivity_W_per_m_K", "thermal.heat_capacity_J_per_kg_K")
+        if base is None or not (self.name.startswith(("loss.", "material.", "resonator.")) or of_wall):
+            return base
+        return damping_law(self.instrument(distance), self.base_law.lowest, self.base_law.highest)
 
     def _change(self, network: Network, drive: Drive) -> Change | None:
         """What the value does to the temperatures; None for nothing."""

@@ -23,6 +23,7 @@ from thermal.meridian import cell_names, energy_weights
 if TYPE_CHECKING:
     from shell.law import FrequencyLaw
     from studies.instrument.card import Instrument
+    from studies.loss import DampingLaw
 
 Array = NDArray[np.float64]
 
@@ -71,7 +72,12 @@ def to_cells(instrument: "Instrument", law: "FrequencyLaw", share: Array) -> Arr
 
 
 def read_out(
-    instrument: "Instrument", law: "FrequencyLaw", drive: Drive, found: Temperatures, tau: float
+    instrument: "Instrument",
+    law: "FrequencyLaw",
+    drive: Drive,
+    found: Temperatures,
+    tau: float,
+    damping: "DampingLaw | None" = None,
 ) -> dict[str, Array]:
     """Columns of the record, without noise: °C, Hz, deg/h, 1; of a card with loops also what their quadrature control says.
 
@@ -79,6 +85,8 @@ def read_out(
     ----------
     tau : float
         Slowest time constant (s) of the resonator behind its housing, for the effects.
+    damping : DampingLaw, optional
+        1/Q and its anisotropy from the parts in the card; else `[loss]`'s polynomial and `[bias]`'s anisotropy.
 
     Raises
     ------
@@ -96,18 +104,20 @@ def read_out(
     by_ratio = float(law.material.slope("poisson_ratio", reference))
     thermal = np.exp(law.logarithm(warmed) + by_density * kinetic + by_ratio * ratio)
     frequency = thermal + changes.get("frequency_Hz", 0.0)
-    inverse_q = instrument.loss.at(warmed - reference) + changes.get("inverse_q", 0.0)
+    own = instrument.loss.at(warmed - reference) if damping is None else damping.inverse_q(warmed)
+    inverse_q = own + changes.get("inverse_q", 0.0)
+    wave = None if damping is None or damping.wave is None else damping.wave(warmed)
     change = thermal - float(law.frequency(reference))
     uneven = by_density * found.rate[:, 2] + by_ratio * found.rate[:, 3]
     slope, angle = thermal * (law.slope(warmed) * rate + uneven), drive.commands.get("pattern_angle")
     read = {"frequency_Hz": frequency, "inverse_q": inverse_q}
     if instrument.loop is None:
         read["bias_deg_per_h"] = instrument.bias.at(
-            change, slope, frequency, inverse_q, law.bryan_factor, pattern_angle=angle
+            change, slope, frequency, inverse_q, law.bryan_factor, pattern_angle=angle, wave=wave
         )
     else:
         check_loss(instrument, inverse_q)
-        read = settled_columns(instrument, frequency, inverse_q, law.bryan_factor, angle)
+        read = settled_columns(instrument, frequency, inverse_q, law.bryan_factor, angle, wave)
         read["bias_deg_per_h"] = read["bias_deg_per_h"] + instrument.bias.polynomial(change, slope)
     read["bias_deg_per_h"] = read["bias_deg_per_h"] + changes.get("bias_deg_per_h", 0.0)
     return {

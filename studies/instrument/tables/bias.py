@@ -66,6 +66,7 @@ class Bias(Table, frozen=True, kw_only=True):
         bryan_factor: float,
         harmonic: int = 2,
         pattern_angle: Array | None = None,
+        wave: NDArray[np.complex128] | None = None,
     ) -> Array:
         """Zero-rate output (deg/h).
 
@@ -77,11 +78,15 @@ class Bias(Table, frozen=True, kw_only=True):
         frequency, inverse_q : arrays (N,), Hz and 1
         pattern_angle : array (N,), rad
             Where the azimuth is commanded; that of the card unless given.
+        wave : array (N,), optional
+            Δ(1/Q) exp(2inθ_τ) of the parts of a loss budget, in place of the anisotropy and axis of this table.
         """
         theta = np.radians(self.pattern_angle_deg) if pattern_angle is None else pattern_angle
-        angle = 2 * harmonic * (theta - np.radians(self.damping_axis_deg))
-        spread = self.damping_anisotropy * np.pi * frequency * inverse_q
-        damping = DEG_PER_H * spread * np.sin(angle) / (2 * harmonic * bryan_factor)
+        if wave is None:
+            axis = np.exp(2j * harmonic * np.radians(self.damping_axis_deg))
+            wave = np.asarray(self.damping_anisotropy * inverse_q * axis)
+        spread = np.pi * frequency * np.imag(np.exp(2j * harmonic * theta) * np.conj(wave))  # Δ(1/τ) sin 2n(θ − θ_τ)
+        damping = DEG_PER_H * spread / (2 * harmonic * bryan_factor)
         return np.asarray(self.polynomial(change, rate) + damping)
 
     def polynomial(self, change: Array, rate: Array) -> Array:

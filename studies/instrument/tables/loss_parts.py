@@ -7,6 +7,8 @@
     bulk_coefficient = 7.6e-12          # of the material's own loss c f^b, f in Hz; of the loss table unless given
     bulk_exponent = 0.77
     surface_layer_pm = 5.2              # depth times loss of the damaged surface; of the loss table unless given
+    surface_anisotropy = 0.01           # wave 2n around of the surface's loss; × e
+    surface_anisotropy_angle_deg = 0.0  # azimuth of its crest; ± 13
     anchor_inverse_q = 1e-9             # what leaves through the mount
     unbalance_mg = 0.1                  # first harmonic of the rim's mass, as of a point mass; needs a stem
     unbalance_order = 1                 # 1 or 3
@@ -19,6 +21,8 @@
     from_position = 0.0                 # of the meridian, 0 … 1
     to_position = 1.0
     coverage = 1.0                      # covered share, of a pattern
+    anisotropy = 0.01                   # relative amplitude of the wave 2n of its thickness around (4θ for n = 2); × e
+    anisotropy_angle_deg = 10.0         # azimuth of its crest; ± 13
     youngs_modulus_GPa, poisson_ratio, expansion_per_K, conductivity_W_per_m_K, heat_capacity_J_per_kg_K, density_kg_m3
 
     [[loss.activated]]                  # a Debye peak
@@ -26,7 +30,8 @@
     energy_eV = 0.5                     # activation energy
     peak_degC = 120.0                   # where it is at the mode's frequency
 
-With any of these keys a simulation takes 1/Q from the budget and not from the polynomial.
+With any of these keys a simulation takes 1/Q from the budget and not from the polynomial, and with an anisotropy it takes Δ(1/τ)
+and its axis from the parts and not from `[bias]`.
 """
 
 from typing import Annotated, Literal
@@ -49,6 +54,8 @@ class FilmKeys(Table, frozen=True, kw_only=True):
     from_position: Share = 0.0
     to_position: Share = 1.0
     coverage: Share = 1.0
+    anisotropy: Annotated[float, number(least=0.0, most=1.0, relative_sd=1.0)] | None = None
+    anisotropy_angle_deg: Annotated[float, number(sd=13.0)] = 0.0
     youngs_modulus_GPa: Positive | None = None
     poisson_ratio: Annotated[float, number(above=-1.0, below=0.5)] | None = None
     expansion_per_K: float | None = None
@@ -80,6 +87,8 @@ class LossParts(Table, frozen=True, kw_only=True):
     bulk_coefficient: Annotated[float, number(least=0.0, relative_sd=0.4)] | None = None
     bulk_exponent: float | None = None
     surface_layer_pm: Annotated[float, number(least=0.0, relative_sd=0.2)] | None = None
+    surface_anisotropy: Annotated[float, number(least=0.0, most=1.0, relative_sd=1.0)] | None = None
+    surface_anisotropy_angle_deg: Annotated[float, number(sd=13.0)] = 0.0
     anchor_inverse_q: Annotated[float, number(least=0.0, relative_sd=1.0)] | None = None
     unbalance_mg: Annotated[float, number(least=0.0, relative_sd=0.5)] | None = None
     unbalance_order: Literal[1, 3] = 1

@@ -1,0 +1,113 @@
+"""Damping that differs around the axis: what a film or surface that varies over θ does to the two patterns of a mode.
+
+A part of the loss whose density goes as 1 + Σ a_k cos k(θ - θ_k) around meets the energies of a pattern at the azimuth θ₀: normal
+strains, u and w as cos² n(θ - θ₀), twist and v as sin². Only the wave k = 2n is felt, to first order in a:
+
+    1/Q(θ₀) = q [1 + ½ a κ cos 2n(θ₀ - θ_a)],   κ = (C - S)/(C + S),
+
+C and S being the part's energies of the first and of the second kind. The parts add as Δ(1/Q) e^{2inθ_τ} = Σ q κ a e^{2inθ_a}, θ_τ
+the azimuth of the pattern that is damped most; Δ(1/τ) = ω Δ(1/Q)/2 makes the drift Δ(1/τ)/(2 n k) sin 2n(θ - θ_τ).
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from shell.damping.budget import Budget
+from shell.damping.faces import Surface
+from shell.damping.film import Film
+from shell.errors import ShellError
+from shell.quadrature import Array
+
+Complex = NDArray[np.complex128]
+
+
+@dataclass(frozen=True)
+class Ripple:
+    """How one part of the budget varies around: its name there, a and θ_a (rad) of the wave 2n, and κ of the mode."""
+
+    part: str
+    amplitude: float
+    angle: float
+    weight: float
+
+    def __post_init__(self) -> None:
+        if not 0 <= self.amplitude <= 1:
+            raise ShellError(f"a loss that varies around by {self.amplitude:g} would be negative somewhere: at most 1.")
+
+
+def damping_wave(budget: Budget, ripples: Sequence[Ripple], harmonic: int) -> Complex:
+    """Δ(1/Q) exp(2 i n θ_τ) over the budget's temperatures.
+
+    Parameters
+    ----------
+    budget : its parts by name.
+    ripples : how some of them vary around.
+    harmonic : n.
+    """
+    parts = {part.name: part.inverse_q for part in budget.parts}
+    total = np.zeros(len(budget.temperatures), dtype=complex)
+    for ripple in ripples:
+        if ripple.part not in parts:
+            raise ShellError(f"the budget has no part '{ripple.part}' that could vary around.")
+        total += parts[ripple.part] * ripple.weight * ripple.amplitude * np.exp(2j * harmonic * ripple.angle)
+    return total
+
+
+def map_wave(theta: ArrayLike, values: ArrayLike, order: int) -> tuple[float, float]:
+    """Relative amplitude a_k and angle θ_k (rad) of one wave of a map that was measured around, by least squares of all up to it.
+
+    Parameters
+    ----------
+    theta : rad, anywhere around.
+    values : thickness or loss there, in any unit.
+    order : k, for damping 2n.
+    """
+    angle, value = np.ravel(np.asarray(theta, dtype=float)), np.ravel(np.asarray(values, dtype=float))
+    if len(angle) < 2 * order + 1:
+        raise ShellError(f"the wave {order} around needs at least {2 * order + 1} places, not {len(angle)}.")
+    waves = np.arange(1, order + 1)
+    columns = [np.ones_like(angle), *np.cos(np.outer(waves, angle)), *np.sin(np.outer(waves, angle))]
+    fitted, _, rank, _ = np.linalg.lstsq(np.stack(columns, axis=1), value, rcond=None)
+    if rank < len(columns) or not fitted[0] > 0:
+        raise ShellError("the map's places do not tell its waves apart, or its mean is not positive.")
+    cosine, sine = fitted[order], fitted[2 * order]
+    return float(np.hypot(cosine, sine) / fitted[0]), float(np.arctan2(sine, cosine) / order)
+
+
+def film_weight(film: Film, faces: tuple[Surface, ...]) -> float:
+    """κ of a film's own loss: its normal strains against its twist."""
+    lam, G = film.E * film.nu / (1 - film.nu**2), film.E / (2 * (1 + film.nu))
+    return _weight(
+        [
+            (
+                face.integrate(
+                    film.carries(face) * (lam * face.stretch**2 + 2 * G * (face.strain[0] ** 2 + face.strain[1] ** 2))
+                ),
+                face.integrate(film.carries(face) * G * face.strain[3] ** 2),
+            )
+            for face in faces
+        ]
+    )
+
+
+def surface_weight(surfaces: tuple[Surface, ...]) -> float:
+    """κ of the surface's loss; on roots the shears γ_12 and γ_23, about the axis, are those that vary as sine."""
+    pairs = []
+    for surface in surfaces:
+        G = surface.E / (2 * (1 + surface.nu))
+        sine = G * (surface.strain[3] ** 2 + surface.strain[5] ** 2)
+        pairs.append((surface.integrate(surface.energy - sine), surface.integrate(sine)))
+    return _weight(pairs)
+
+
+def _weight(pairs: Sequence[tuple[float, float]]) -> float:
+    cosine, sine = (float(np.sum(column)) for column in zip(*pairs, strict=True))
+    return (cosine - sine) / (cosine + sine)
+
+
+def describe_wave(wave: Complex, harmonic: int) -> tuple[Array, Array]:
+    """Δ(1/Q) and the azimuth θ_τ (rad, 0 ... π/n) of a damping wave."""
+    return np.abs(wave), np.asarray(np.angle(wave) / (2 * harmonic) % (np.pi / harmonic))
