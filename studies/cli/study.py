@@ -6,7 +6,7 @@ if TYPE_CHECKING:
     from studies.sweeps.results import Results
     from studies.sweeps.run import Estimate
 
-SOLVERS = {"full": "each solved in full", "family": "through reduced bases"}
+SOLVERS = {"full": "each solved in full", "family": "interpolated between full solves"}
 
 
 def run(
@@ -40,7 +40,7 @@ def run(
     out : str
         Folder for the study's store; needed except with --dry-run. Running again with the same folder resumes.
     workers : int
-        Processes on this machine; one for each core unless given. None are started where reduced bases do it here.
+        Processes on this machine; one for each core unless given. None are started where a family of designs does it here.
     scheduler : str
         Address of a Dask scheduler (tcp://HOST:8786), to compute on its workers instead.
     card : str

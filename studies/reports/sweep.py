@@ -139,7 +139,7 @@ def _asked(results: "Results") -> list[Block]:
     words = f"Sampled by {METHODS[sampling.method]}"
     words += f", seed {sampling.seed}" if sampling.method in ("latin-hypercube", "sobol", "sensitivity") else ""
     full = results.about["identity"]["solver"] == "full"
-    solver = "every design solved in full" if full else "through reduced bases, with an error estimate for every design"
+    solver = "every design solved in full" if full else "interpolated between full solves, with the error of that"
     return [parameters, Table("Quantities", ["Column", "What", "Options"], rows), Text(f"{words}; {solver}.")]
 
 

@@ -1,9 +1,8 @@
-"""Many designs at once through reduced bases (`shell.family`): frequency and TCF.
+"""Many designs at once through families (`shell.family`): frequency, TCF and Bryan factor.
 
-A family holds the ranges of thickness over radius, of stem over radius and of ν that a study needs. E, ρ, radius and
-growth with temperature follow exactly, f = √(E/ρ)/R F(h/R, a/R, ν) with the stem's own lengths a, so that only F is
-reduced; its error is estimated for each design, and a design whose estimate is too large is solved in full. No result
-depends on the other designs of its batch.
+A family interpolates full solves over the ranges of the dimensions and of ν that a study needs; E, ρ and growth with
+temperature follow exactly. Its error is judged by full solves that it has not seen; where it is too large, or would take
+more solves than half the designs, every design is solved in full. No result depends on the other designs of its batch.
 """
 
 import time
@@ -15,40 +14,39 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from shell.family import Family, FamilyResult, build_family
+from shell.family import MOST_SOLVES, Axis, Family, FamilyResult, build_family
 from studies.errors import UNUSABLE_INPUT, InputError
 from studies.instrument.card import ZERO_CELSIUS, Instrument
-from studies.instrument.tables.resonator import Cylinder, Hemisphere
 from studies.sweeps.parameters import TEMPERATURE, set_parameters
+from studies.sweeps.quantities.tcf import STEEPEST
 from studies.sweeps.row import Row
 
 if TYPE_CHECKING:
     from shell.materials import Material
+    from shell.resonator import Resonator
     from studies.sweeps.case import Options
-    from studies.sweeps.definition import Study
+    from studies.sweeps.definition import Parameter, Study
     from studies.sweeps.design import Design
 
 Array = NDArray[np.float64]
 Designs = Sequence[Mapping[str, Any]]
-THICKNESS = "resonator.thickness_mm"
-QUANTITIES = ("frequency", "tcf")
-FEWEST = 64  # cases from which training a basis costs less than solving each design
-TOLERANCE = 1e-6  # of the basis against the full solve; hardly slower to train than a coarse one, and slopes need it
-STEP_H = 2e-3  # relative step of the thickness, and step of ν, for the slopes that the TCF needs
-STEP_NU = 2e-3
-WHATEVER = 0.1  # amplitude of no shape
-STEEPEST = 10.0  # change of the discretisation's error per e-fold of h, or unit of ν, over itself; 2 to 3 were seen
+FEWEST = 64  # cases from which a family may cost less than solving each design
+SHARE = 2  # designs for each full solve that a family may take, so that it at least halves the work
+TOLERANCE = 1e-6  # of the family against the full solve
 TEMPERATURES = 9  # at which the range of ν is looked at
+MARGIN = 0.02  # of that range, beyond its ends
+DIMENSIONS, MATERIAL = "resonator.", "material."
+ELSEWHERE = ("thermal.", "bias.", "loss.", "noise.", "loop.", "user.")  # parameters that no mode depends on
 PROPERTIES = ("youngs_modulus", "poisson_ratio", "density")
 
 
 @dataclass(frozen=True)
 class Families:
-    """The families of a study by (harmonic, theory), and what it takes to evaluate its designs with them."""
+    """The families of a study by (harmonic, index, theory), and what it takes to evaluate its designs with them."""
 
     instrument: Instrument
     asked: tuple[tuple[str, "Options", int], ...]
-    members: Mapping[tuple[int, str], Family]
+    members: Mapping[tuple[int, int, str], Family]
 
     def evaluate(self, designs: Designs) -> list[Row]:
         """Evaluate a batch; where it contains a design that cannot be computed, each design for itself."""
@@ -64,19 +62,18 @@ class Families:
         each = (time.perf_counter() - began) / len(designs)
         return [Row("ok", "", tuple(v), tuple(e), each) for v, e in zip(values, errors, strict=True)]
 
+    def modes(self, options: "Options", designs: Designs, bodies: "_Bodies") -> tuple[Family, FamilyResult]:
+        """Return the family that a quantity asks for and what it gives."""
+        family = self.members[_key(options)]
+        values = np.array([[design[axis.name] for axis in family.axes] for design in designs], dtype=float)
+        values = values.reshape(len(designs), len(family.axes))
+        return family, family.evaluate(values, nu=bodies.nu, E=bodies.E, rho=bodies.rho, growth=bodies.growth)
+
 
 @dataclass(frozen=True)
 class _Bodies:
-    """Designs as arrays (m,): thickness h and size R (m) at the reference temperature, growth, T (K), materials.
+    """What designs are made of, arrays (m,): T (K), growth of lengths, E (Pa), ν, ρ (kg/m³); and their materials."""
 
-    wall : (m, 1) what a cup's wall has more than the card's, over the card's largest thickness; else (m, 0).
-    stem : lengths of the stem over those that would go with the radius.
-    """
-
-    h: Array
-    wall: Array
-    R: Array
-    stem: Array
     T: Array
     growth: Array
     E: Array
@@ -87,62 +84,59 @@ class _Bodies:
 
 def why_not(study: "Study") -> str:
     """Return why a study cannot be computed through families, or nothing when it can."""
-    allowed = {THICKNESS, TEMPERATURE, *(f"material.{key}" for key in ("name", "law", "file"))}
-    allowed |= {f"material.{key}" for key in ("youngs_modulus_GPa", "poisson_ratio", "density_kg_m3")}
-    if isinstance(study.instrument.keys("resonator"), Hemisphere):
-        allowed.add("resonator.radius_mm")  # the one length beside the thickness
     for parameter in study.parameters:
-        if parameter.name not in allowed:
-            return f"the parameter '{parameter.name}' is none that a family follows"
+        name = parameter.name
+        follows = name == TEMPERATURE or name.startswith((MATERIAL, *ELSEWHERE))
+        if not (follows or (name.startswith(DIMENSIONS) and not isinstance(parameter.nominal, str))):
+            return f"the parameter '{name}' is none that a family follows"
     for asked in study.asked:
-        if asked.quantity.name not in QUANTITIES or asked.options.get("index", 0):
+        if asked.quantity.name not in FAST:
             return f"the quantity '{asked.columns[0].name}' is none that a family gives"
-        if asked.options["theory"] == "rayleigh" or asked.options["harmonic"] < 2:
-            return "families are for theory solid or shell and harmonics from 2"
+        if asked.options["theory"] == "rayleigh":
+            return "families are for theory solid or shell"
     return ""
 
 
-def build_families(study: "Study", design: "Design") -> "Families | str":
-    """Train the families that a study asks for, or say why it must be computed design by design.
+def build_families(study: "Study", design: "Design", most: int = MOST_SOLVES) -> "Families | str":
+    """Build the families that a study asks for, or say why it must be computed design by design.
 
     Parameters
     ----------
     study : the study.
     design : its designs; with the ends of the parameters they decide the ranges.
+    most : full solves that each family may take.
     """
     reason = why_not(study)
     if reason:
         return reason
-    asked = tuple((one.quantity.name, one.options, len(one.columns)) for one in study.asked)
+    axes = [Axis(p.name, *_range(study, design, k)) for k, p in enumerate(study.parameters) if _is_dimension(p)]
+
+    def build(values: Array) -> "Resonator":
+        named = {axis.name: float(value) for axis, value in zip(axes, values, strict=True)}
+        return set_parameters(study.instrument, named).resonator
+
+    sloped = {_key(one.options) for one in study.asked if one.quantity.name == "tcf"}
+    members: dict[tuple[int, int, str], Family] = {}
     try:
-        bodies = _describe(study.instrument, _ends(study, design), None)
+        nu = _describe(study.instrument, _ends(study, design), None).nu
+        beyond = MARGIN * float(np.ptp(nu))
+        for one in study.asked:
+            key = harmonic, index, theory = _key(one.options)
+            if key not in members:
+                members[key] = build_family(
+                    build,
+                    axes,
+                    nu=(float(nu.min()) - beyond, float(nu.max()) + beyond),
+                    harmonic=harmonic,
+                    index=index,
+                    theory=theory,
+                    slopes=key in sloped,
+                    tolerance=TOLERANCE,
+                    most=most,
+                )
     except UNUSABLE_INPUT as error:
         return str(error).rstrip(".")
-    resonator = study.instrument.resonator
-    relative = bodies.h / bodies.R * resonator.size
-    stem = (float(bodies.stem.min()), float(bodies.stem.max())) if resonator.stem else (1.0, 1.0)
-    thickness = (float(relative.min()) * (1 - 2 * STEP_H), float(relative.max()) * (1 + 2 * STEP_H))
-    nu = (float(bodies.nu.min()) - 2 * STEP_NU, float(bodies.nu.max()) + 2 * STEP_NU)
-    members: dict[tuple[int, str], Family] = {}
-    for _, options, _ in asked:
-        key = (options["harmonic"], options["theory"])
-        if key not in members:
-            try:
-                members[key] = build_family(
-                    resonator,
-                    thickness=thickness,
-                    nu=nu,
-                    shapes=_wall(study.instrument) if bodies.wall.any() else (),
-                    amplitude=float(abs(bodies.wall).max(initial=0.0)) * (1 + 1e-9) or WHATEVER,
-                    stem=stem,
-                    harmonic=key[0],
-                    theory=options["theory"],
-                    tolerance=TOLERANCE,
-                )
-            except UNUSABLE_INPUT as error:
-                return str(error).rstrip(".")
-            if not members[key].cells:
-                return members[key].reason.rstrip(".")
+    asked = tuple((one.quantity.name, one.options, len(one.columns)) for one in study.asked)
     return Families(study.instrument, asked, members)
 
 
@@ -154,10 +148,10 @@ def choose_solver(study: "Study", design: "Design") -> "Families | None":
     InputError
         The spec asks for families and the study cannot be computed with them.
     """
-    wanted = study.sampling.solver
-    if wanted == "full" or (wanted == "auto" and len(design.unique) < FEWEST):
+    wanted, count = study.sampling.solver, len(design.unique)
+    if wanted == "full" or (wanted == "auto" and count < FEWEST):
         return None
-    found = build_families(study, design)
+    found = build_families(study, design, min(count // SHARE, MOST_SOLVES) if wanted == "auto" else MOST_SOLVES)
     if isinstance(found, Families):
         return found
     if wanted == "family":
@@ -167,54 +161,37 @@ def choose_solver(study: "Study", design: "Design") -> "Families | None":
 
 def _frequency(families: Families, options: "Options", designs: Designs) -> tuple[Array, Array]:
     bodies = _describe(families.instrument, designs, options["temperature_degC"])
-    family = families.members[options["harmonic"], options["theory"]]
-    found = _evaluate(family, bodies, bodies.h, bodies.nu, bodies.growth)
-    error = found.frequency * (found.relative_error_estimate + found.theory_error)
+    family, found = families.modes(options, designs, bodies)
+    error = found.frequency * (family.error.frequency + family.theory_error)
     return found.frequency[:, None], error[:, None]
 
 
-def _evaluate(family: Family, bodies: _Bodies, h: Array, nu: Array, growth: Array) -> FamilyResult:
-    return family.evaluate(
-        thickness=h * growth,
-        shapes=bodies.wall[:, : family.shape_count],
-        radius=bodies.R * growth,
-        stem=bodies.stem,
-        nu=nu,
-        E=bodies.E,
-        rho=bodies.rho,
-    )
+def _bryan_factor(families: Families, options: "Options", designs: Designs) -> tuple[Array, Array]:
+    bodies = _describe(families.instrument, designs, options["temperature_degC"])
+    family, found = families.modes(options, designs, bodies)
+    return found.bryan_factor[:, None], np.full((len(designs), 1), family.error.bryan_factor + family.theory_error)
 
 
 def _tcf(families: Families, options: "Options", designs: Designs) -> tuple[Array, Array]:
-    """The five parts of d ln f/dT (HRG paper eq. 15), with the slopes of ln F by ν and ln h from differences."""
+    """Return the five parts of d ln f/dT (HRG paper eq. 15) and their sum."""
     bodies = _describe(families.instrument, designs, options["temperature_degC"])
-    family = families.members[options["harmonic"], options["theory"]]
-
-    def logarithm(h: Array, nu: Array) -> tuple[Array, Array]:
-        found = _evaluate(family, bodies, h, nu, np.ones_like(h))
-        return np.log(found.frequency), found.relative_error_estimate
-
-    (thick, e1), (thin, e2) = (logarithm(bodies.h * (1 + sign * STEP_H), bodies.nu) for sign in (1, -1))
-    (more, e3), (less, e4) = (logarithm(bodies.h, bodies.nu + sign * STEP_NU) for sign in (1, -1))
-    level = STEEPEST * family.theory_error
-    by_h, error_h = (thick - thin) / (np.log1p(STEP_H) - np.log1p(-STEP_H)), (e1 + e2) / (2 * STEP_H) + level
-    by_nu, error_nu = (more - less) / (2 * STEP_NU), (e3 + e4) / (2 * STEP_NU) + level
+    family, found = families.modes(options, designs, bodies)
     slopes: dict[tuple[int, float], tuple[float, float, float, float]] = {}
-    for material, T in zip(bodies.materials, bodies.T.tolist(), strict=True):
-        if (id(material), T) not in slopes:
-            slopes[id(material), T] = _slopes(material, T)
-    E, nu, rho, alpha = np.array(
-        [slopes[id(material), T] for material, T in zip(bodies.materials, bodies.T.tolist(), strict=True)]
-    ).T
+    places = [(id(material), T) for material, T in zip(bodies.materials, bodies.T.tolist(), strict=True)]
+    for place, material in zip(places, bodies.materials, strict=True):
+        if place not in slopes:
+            slopes[place] = _slopes(material, place[1])
+    E, nu, rho, alpha = np.array([slopes[place] for place in places]).T
+    by_nu, by_h = found.by_nu, found.by_thickness
     parts = np.stack([0.5 * E, by_nu * nu, -0.5 * rho, by_h * alpha, (-1 - by_h) * alpha], axis=1)
-    nothing = np.zeros_like(E)
-    of_parts = np.stack([nothing, error_nu * abs(nu), nothing, error_h * abs(alpha), error_h * abs(alpha)], axis=1)
-    values = np.column_stack([parts.sum(axis=1), parts])
+    level, nothing = STEEPEST * family.theory_error, np.zeros_like(E)
+    of_nu, of_h = (family.error.by_nu + level) * abs(nu), (family.error.by_thickness + level) * abs(alpha)
     # the parts of h and r add up to −alpha whatever the slope by h
-    return 1e6 * values, 1e6 * np.column_stack([of_parts[:, 1], of_parts])
+    errors = np.stack([of_nu, nothing, of_nu, nothing, of_h, of_h], axis=1)
+    return 1e6 * np.column_stack([parts.sum(axis=1), parts]), 1e6 * errors
 
 
-FAST = {"frequency": _frequency, "tcf": _tcf}
+FAST = {"frequency": _frequency, "tcf": _tcf, "bryan-factor": _bryan_factor}
 
 
 def _slopes(material: "Material", T: float) -> tuple[float, float, float, float]:
@@ -226,24 +203,19 @@ def _slopes(material: "Material", T: float) -> tuple[float, float, float, float]
     )
 
 
+def _key(options: "Options") -> tuple[int, int, Any]:
+    return options["harmonic"], options.get("index", 0), options["theory"]
+
+
 def _describe(instrument: Instrument, designs: Designs, temperature_degC: float | None) -> _Bodies:
-    """Return designs as arrays; one material for all that share its parameters."""
+    """Return what designs are made of; one material for all that share its parameters."""
     count, reference = len(designs), instrument.reference_temperature
-    own = max(value for _, value in instrument.resonator.thickness)
-    table = instrument.keys("resonator")
-    cup = isinstance(table, Cylinder) and table.bottom_thickness_mm is not None
-    h, wall = np.full(count, own), np.zeros((count, 0))
-    if not cup:
-        h = _column(designs, THICKNESS, 1e3 * own) * 1e-3
-    elif THICKNESS in designs[0]:  # a cup's thickness is that of its wall
-        wall = (_column(designs, THICKNESS, 0.0) - table.thickness_mm)[:, None] * 1e-3 / own
-    at_card = getattr(table, "radius_mm", 1.0)
-    enlarged = _column(designs, "resonator.radius_mm", at_card) / at_card
     if temperature_degC is None:
-        T = _column(designs, TEMPERATURE, reference - ZERO_CELSIUS) + ZERO_CELSIUS
+        T = np.array([design.get(TEMPERATURE, reference - ZERO_CELSIUS) for design in designs], dtype=float)
     else:
-        T = np.full(count, temperature_degC + ZERO_CELSIUS)
-    names = [name for name in designs[0] if name.startswith("material.")]
+        T = np.full(count, temperature_degC)
+    T = T + ZERO_CELSIUS
+    names = [name for name in designs[0] if name.startswith(MATERIAL)]
     groups: dict[tuple[Any, ...], list[int]] = {}
     for place, design in enumerate(designs):
         groups.setdefault(tuple(design[name] for name in names), []).append(place)
@@ -257,35 +229,28 @@ def _describe(instrument: Instrument, designs: Designs, temperature_degC: float 
         for place in places:
             materials[place] = material
     E, nu, rho, growth = constants
-    R = enlarged * instrument.resonator.size
-    stem = 1 / enlarged if instrument.resonator.stem else np.ones(count)
-    return _Bodies(h, wall, R, stem, T, growth, E, nu, rho, materials)
+    return _Bodies(T, growth, E, nu, rho, materials)
 
 
-def _wall(instrument: Instrument) -> tuple[tuple[tuple[float, float], ...]]:
-    """Return the shape that adds to the wall of a cup and not to its bottom."""
-    foot = instrument.resonator.thickness[1][0]
-    return (((0.0, 0.0), (foot, 0.0), (foot, 1.0), (1.0, 1.0)),)
+def _is_dimension(parameter: "Parameter") -> bool:
+    return parameter.name.startswith(DIMENSIONS)
 
 
-def _column(designs: Designs, name: str, default: float) -> Array:
-    if name not in designs[0]:
-        return np.full(len(designs), float(default))
-    return np.array([design[name] for design in designs], dtype=float)
+def _range(study: "Study", design: "Design", k: int) -> tuple[float, float]:
+    """Return the ends of a numeric parameter over the designs, its range and its nominal value."""
+    p, values = study.parameters[k], design.values[:, k]
+    return min(float(values.min()), p.low, float(p.nominal)), max(float(values.max()), p.high, float(p.nominal))
 
 
 def _ends(study: "Study", design: "Design") -> list[dict[str, Any]]:
-    """Return designs at the ends of every parameter, which bound thickness over radius and ν of all designs."""
-    temperatures = [one.options["temperature_degC"] for one in study.asked]
-    fixed = [T for T in temperatures if T is not None]
+    """Return designs at the ends of temperature and every material parameter, which bound ν of all designs."""
+    fixed = [T for T in (one.options["temperature_degC"] for one in study.asked) if T is not None]
     choices: dict[str, Sequence[Any]] = {}
     for k, p in enumerate(study.parameters):
-        if isinstance(p.nominal, str):
-            choices[p.name] = p.values
-            continue
-        low, high = (float(end) for end in (design.values[:, k].min(), design.values[:, k].max()))
-        ends = (min(low, p.low, float(p.nominal)), max(high, p.high, float(p.nominal)))
-        choices[p.name] = np.linspace(*ends, TEMPERATURES).tolist() if p.name == TEMPERATURE else ends
+        if p.name == TEMPERATURE:
+            choices[p.name] = np.linspace(*_range(study, design, k), TEMPERATURES).tolist()
+        elif p.name.startswith(MATERIAL):
+            choices[p.name] = p.values if isinstance(p.nominal, str) else _range(study, design, k)
     reference = study.instrument.reference_temperature - ZERO_CELSIUS
     choices[TEMPERATURE] = [*choices.get(TEMPERATURE, [reference]), *fixed]
     return [dict(zip(choices, values, strict=True)) for values in product(*choices.values())]

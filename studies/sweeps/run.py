@@ -196,7 +196,13 @@ def _describe(store: Store, study: Study, design: Design, identity: Mapping[str,
 
 def _describe_families(families: Families) -> list[Any]:
     return [
-        [*key, family.thickness, family.nu, family.stem, family.amplitude, family.tolerance]
+        [
+            *key,
+            [[axis.name, axis.low, axis.high] for axis in family.axes],
+            family.nu,
+            family.solver_tolerance,
+            family.solves,
+        ]
         for key, family in families.members.items()
     ]
 

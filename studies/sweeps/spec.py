@@ -10,7 +10,7 @@ method = "sobol"                   # grid | list | latin-hypercube | sobol | sen
 cases = 1024                       # not for grid, list and one-at-a-time; a power of two for sobol and sensitivity
 seed = 1
 # batch = 8                        # cases that are computed and kept together; 1024 with families
-# solver = "auto"                  # family: reduced bases with error estimates; full: every design by the solver
+# solver = "auto"                  # family: interpolated between full solves, with its error; full: every design by the solver
 
 [[parameter]]
 name = "resonator.thickness_mm"    # a key of the card; or temperature_degC; or user.NAME for a function of yours

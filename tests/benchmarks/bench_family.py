@@ -1,105 +1,188 @@
-"""Designs per second of a family with its error estimate, and whether the estimate holds; run by hand.
+"""What a family of designs costs, how many designs it gives in a second, and whether its errors hold; run by hand.
 
     OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 python tests/benchmarks/bench_family.py [CHECKED [NAME …]]
 
-`free`: a hemisphere of radius 15 mm, thickness 0.5 ... 1.2 mm, four Chebyshev shapes of ±10 % each (±40 % at the corners),
-ν 0.14 ... 0.20. The shipped cards with solid parts in a wide box of the same kind (`hrg-30mm-wide`; the cup's wall has two
-shapes), and in a box of ±5 % (`hrg-30mm`); E, ρ, radius free. Seconds are those of the process.
+`free`: a hemisphere of radius 15 mm, thickness ± 11 %; `free-wide`: thickness by a factor of 4, to two tolerances; `free-N`:
+N thicknesses along the meridian ± 2 %, linear between them; `free-6-wide` ± 25 %. The shipped cards with solid parts:
+dimensions ± 2 %, and `…-wide` ± 20 %. ν 0.14 … 0.20 everywhere. Every checked design, a third of them corners of the box, is
+solved in full at the tolerance of the family's own solves. Seconds are those of the process. With `--out FILE.json` the
+figures are added to a file, with commit and machine.
 """
 
+import argparse
+import json
 import os
-import resource
-import sys
+import platform
+import subprocess
 import time
 from dataclasses import replace
-from itertools import product
+from pathlib import Path
 
 import numpy as np
 
-from shell.family import build_family
+from shell.elastic import Elastic
+from shell.errors import ShellError
+from shell.family import Axis, build_family
 from shell.meridian import hemisphere
+from shell.modes import solve_modes
 from studies.instrument.card import load_card
+from studies.sweeps.parameters import set_parameters
 
-CHEBYSHEV = [lambda x, k=k: np.cos(k * np.arccos(np.clip(2 * x - 1, -1, 1))) for k in (1, 2, 3, 4)]
-DESIGNS = 65_536
-CARDS = ("hrg-30mm", "cvg-25mm", "bvg-bell")
 NU = (0.14, 0.20)
+DESIGNS = 10_000
+DIMENSIONS = {
+    "hrg-30mm": ("thickness_mm", "stem.radius_mm", "radius_mm"),
+    "cvg-25mm": ("thickness_mm", "bottom_thickness_mm", "radius_mm"),
+    "bvg-bell": ("thickness_mm", "mouth_radius_mm", "stem.radius_mm"),
+}
+
+
+def profiled(count, reach):
+    """Return a dome with so many thicknesses along its meridian, each within ±reach of 0.9 mm."""
+    at = np.linspace(0, 1, count).tolist()
+
+    def build(values):
+        return replace(hemisphere(15e-3, 0.9e-3), thickness=tuple(zip(at, (0.9e-3 * values).tolist(), strict=True)))
+
+    return build, [Axis(f"h{k}", 1 - reach, 1 + reach) for k in range(count)]
+
+
+def carded(name, reach):
+    """Return a shipped card with three of its dimensions within ±reach."""
+    card = load_card(name)
+    paths = [f"resonator.{key}" for key in DIMENSIONS[name]]
+    nominal = []
+    for path in paths:
+        value = card.content
+        for word in path.split("."):
+            value = value[word]
+        nominal.append(value)
+
+    def build(values):
+        return set_parameters(card, dict(zip(paths, values.tolist(), strict=True))).resonator
+
+    return build, [Axis(p, v * (1 - reach), v * (1 + reach)) for p, v in zip(paths, nominal, strict=True)]
 
 
 def boxes():
-    """Return resonator and ranges by name."""
-    free = hemisphere(15e-3, 0.9e-3)
-    found = {"free": (free, {"thickness": (0.5e-3, 1.2e-3), "nu": NU, "shapes": CHEBYSHEV})}
-    others = {name: load_card(name).resonator for name in CARDS}
-    others["clamped-rim"] = hemisphere(15e-3, 0.9e-3, support="clamped-rim")
-    for name, resonator in others.items():
-        h = max(value for _, value in resonator.thickness)
-        stem = {"stem": (0.99, 1.01)} if resonator.stem else {}
-        foot = resonator.thickness[1][0]
-        wall = [((0, 0), (foot, 0), (foot, 1), (1, 1)), ((0, 0), (foot, 0), (foot, -1), (1, 1))]
-        shapes = wall if name == "cvg-25mm" else CHEBYSHEV
-        found[name + "-wide"] = (resonator, {"thickness": (0.6 * h, 1.35 * h), "nu": NU, "shapes": shapes, **stem})
-        found[name] = (resonator, {"thickness": (0.95 * h, 1.05 * h), "nu": (0.16, 0.18), **stem})
+    """Return build, axes and tolerance by name."""
+
+    def free(low, high):
+        return lambda v: hemisphere(15e-3, 0.9e-3 * v[0]), [Axis("h", low, high)]
+
+    found = {
+        "free": (*free(0.89, 1.11), 1e-8),
+        "free-wide": (*free(0.5, 2.0), 1e-6),
+        "free-wide-fine": (*free(0.5, 2.0), 6.5e-8),
+    }
+    for count in (6, 8):
+        found[f"free-{count}"] = (*profiled(count, 0.02), 1e-6)
+    found["free-6-wide"] = (*profiled(6, 0.25), 3e-5)
+    for name in DIMENSIONS:
+        found[name] = (*carded(name, 0.02), 2e-8)
+        found[f"{name}-wide"] = (*carded(name, 0.2), 1e-5)
     return found
 
 
-def scale(family, unit):
-    """Return the designs of points of the cube -1 ... 1: thickness, ν, stem, shapes."""
-    spans = (family.thickness, family.nu, family.stem)
-    values = [(low + high) / 2 + (high - low) / 2 * x for (low, high), x in zip(spans, unit.T, strict=False)]
-    return dict(zip(("thickness", "nu", "stem"), values, strict=True)) | {"shapes": family.amplitude * unit[:, 3:]}
-
-
-def main(checked, names):
-    """Print one line for each box, theory and tolerance."""
-    print(f"threads of BLAS: {os.environ.get('OPENBLAS_NUM_THREADS', 'not limited')}; load {os.getloadavg()[0]:.1f}")
-    for name, (resonator, ranges) in boxes().items():
-        for theory, tolerance in (("shell", 3e-5), ("solid", 3e-5), ("shell", 1e-6), ("solid", 1e-6)):
-            solid_parts = name != "free"
-            if (names and name not in names) or (
-                solid_parts and (theory == "shell" or ("wide" in name and tolerance < 1e-5))
-            ):
-                continue
-            began = time.process_time()
-            family = build_family(resonator, theory=theory, tolerance=tolerance, **ranges)
-            built = time.process_time() - began
-            print(f"{name}, {theory} {tolerance:g}: {measure(family, built, checked)}", flush=True)
-
-
-def measure(family, built, checked):
-    """Return rate, sizes and errors in words."""
-    if not family.cells:
-        return family.reason
-    rng, d = np.random.default_rng(99), family.shape_count + 3
-    designs = scale(family, rng.uniform(-1, 1, (DESIGNS, d)))
-    designs |= {"E": rng.uniform(70e9, 75e9, DESIGNS), "rho": rng.uniform(2150, 2250, DESIGNS)}
+def measure(build, axes, tolerance, checked):
+    """Return the figures of one box."""
+    began = time.process_time()
+    try:
+        family = build_family(build, axes, nu=NU, tolerance=tolerance)
+    except ShellError as error:
+        return {"refused": str(error), "seconds": time.process_time() - began}
+    seconds = time.process_time() - began
+    rng, ranges = np.random.default_rng(99), np.array([*((axis.low, axis.high) for axis in axes), NU])
+    middle, half = ranges.mean(axis=1), np.ptp(ranges, axis=1) / 2
+    many = middle + half * rng.uniform(-1, 1, (DESIGNS, len(ranges)))
     times = []
     for _ in range(20):  # short enough to find quiet moments of a shared machine
         began = time.process_time()
-        found = family.evaluate(**designs)
+        family.evaluate(many[:, :-1], nu=many[:, -1], E=72.7e9, rho=2203.0)
         times.append(time.process_time() - began)
-        if found.solved_in_full.any():
-            break
-    inside, faces = rng.uniform(-1, 1, (checked // 2, d)), np.clip(rng.uniform(-2, 2, (checked // 2, d)), -1, 1)
-    some = scale(family, np.vstack([list(product((-1.0, 1.0), repeat=d)), inside, faces]))
-    quick = family.evaluate(**some, E=1.0, rho=1.0)
+    each = max(checked // 3, 1)
+    unit = np.vstack(
+        [
+            rng.uniform(-1, 1, (each, len(ranges))),
+            np.clip(rng.uniform(-2, 2, (each, len(ranges))), -1, 1),
+            rng.choice([-1.0, 1.0], (each, len(ranges))),
+        ]
+    )
+    some = middle + half * unit
+    found = family.evaluate(some[:, :-1], nu=some[:, -1], E=1.0, rho=1.0)
     began = time.process_time()
-    full = replace(family, tolerance=1e-15).evaluate(**some, E=1.0, rho=1.0)
-    seconds = (time.process_time() - began) / len(full.frequency)
-    error = abs(quick.frequency / full.frequency - 1)
-    kept = ~quick.solved_in_full
-    share = error[kept] / (quick.relative_error_estimate + full.relative_error_estimate)[kept]
-    models = [cell.model for cell in family.cells]
-    return (
-        f"{DESIGNS / min(times):,.0f} designs/s at best, {DESIGNS / np.median(times):,.0f} in the median, "
-        f"{found.solved_in_full.sum()} of {DESIGNS} in full; built in {built:.1f} s; vectors {[one.size for one in models]}, "
-        f"{[str(one.stiffness.dtype) for one in models]}; of {len(error)} checked {quick.solved_in_full.sum()} in full "
-        f"({1e3 * seconds:.0f} ms each), error at most {error.max():.1e}, stated at most "
-        f"{quick.relative_error_estimate.max():.1e}, beyond the stated {np.sum(share > 1)}, largest share {share.max():.2f}; "
-        f"error of the level {family.theory_error:.1e}; "
-        f"memory {resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024:.0f} MB"
+    modes = [
+        solve_modes(build(row[:-1]), Elastic(1.0, float(row[-1]), 1.0), tolerance=family.solver_tolerance)[0]
+        for row in some
+    ]
+    solve = (time.process_time() - began) / len(modes)
+    error = abs(found.frequency / np.array([mode.frequency for mode in modes]) - 1)
+    turn = abs(found.bryan_factor - np.array([mode.bryan_factor for mode in modes]))
+    return {
+        "solves": family.solves,
+        "terms": len(family.polynomial.indices),
+        "seconds": seconds,
+        "solver_tolerance": family.solver_tolerance,
+        "ms_of_a_full_solve": 1e3 * solve,
+        "ms_of_10000_designs": 1e3 * float(np.median(times)),
+        "checked": len(modes),
+        "stated": family.error.frequency,
+        "largest": float(error.max()),
+        "beyond": int(np.sum(error > family.error.frequency)),
+        "bryan_stated": family.error.bryan_factor,
+        "bryan_largest": float(turn.max()),
+        "bryan_beyond": int(np.sum(turn > family.error.bryan_factor)),
+        "theory_error": family.theory_error,
+    }
+
+
+def say(name, tolerance, figures):
+    """Print the figures of one box."""
+    if "refused" in figures:
+        print(f"{name}, {tolerance:g}: {figures['refused']} ({figures['seconds']:.1f} s)", flush=True)
+        return
+    print(
+        f"{name}, {tolerance:g}: {figures['solves']} solves ({figures['terms']} terms) in {figures['seconds']:.2f} s, one to"
+        f" {figures['solver_tolerance']:g} takes {figures['ms_of_a_full_solve']:.1f} ms; {DESIGNS} designs in"
+        f" {figures['ms_of_10000_designs']:.2f} ms; error stated {figures['stated']:.1e}, largest of {figures['checked']}"
+        f" {figures['largest']:.1e}, beyond {figures['beyond']}; Bryan factor stated {figures['bryan_stated']:.1e}, largest"
+        f" {figures['bryan_largest']:.1e}, beyond {figures['bryan_beyond']}; theory {figures['theory_error']:.1e}",
+        flush=True,
     )
 
 
+def main():
+    """Measure the boxes that are named, or all of them."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    known = boxes()
+    parser.add_argument("checked", nargs="?", type=int, default=300, help="designs solved in full (300)")
+    parser.add_argument("names", nargs="*", help=f"of {', '.join(known)}; all of them unless given")
+    parser.add_argument("--out", type=Path, help="file to which the figures are added")
+    given = parser.parse_args()
+    unknown = set(given.names) - set(known)
+    if unknown:
+        parser.error(f"unknown: {', '.join(sorted(unknown))}; known: {', '.join(known)}")
+    print(f"threads of BLAS: {os.environ.get('OPENBLAS_NUM_THREADS', 'not limited')}; load {os.getloadavg()[0]:.1f}")
+    figures = {}
+    for name in given.names or known:
+        build, axes, tolerance = known[name]
+        figures[name] = measure(build, axes, tolerance, given.checked)
+        say(name, tolerance, figures[name])
+    if given.out:
+        history = json.loads(given.out.read_text()) if given.out.exists() else []
+        commit = subprocess.run(
+            ["git", "rev-parse", "--short", "HEAD"], capture_output=True, text=True, check=False
+        ).stdout
+        history.append(
+            {
+                "commit": commit.strip(),
+                "machine": f"{platform.machine()}, {os.cpu_count()} cores, {platform.python_version()}",
+                "date": time.strftime("%Y-%m-%d"),
+                "figures": figures,
+            }
+        )
+        given.out.write_text(json.dumps(history, indent=1) + "\n")
+
+
 if __name__ == "__main__":
-    main(int(sys.argv[1]) if len(sys.argv) > 1 else 1000, sys.argv[2:])
+    main()

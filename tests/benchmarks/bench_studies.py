@@ -1,7 +1,7 @@
 """Speed of studies, run by hand: python tests/benchmarks/bench_studies.py [CASES]
 
 Designs per second of a free hemisphere's n = 2 frequency: a plain loop over the solver, a study on one and two processes,
-one Dask task a design as a peer would do it, a study on a two-worker Dask cluster, reduced bases; Dask's cost per chunk;
+one Dask task a design as a peer would do it, a study on a two-worker Dask cluster, families; Dask's cost per chunk;
 and what a million designs take. Everything in one run, on one machine, one thread a process.
 """
 
@@ -74,7 +74,7 @@ def main(cases: int) -> None:
     for many in (10_000, 1_000_000):
         began = time.perf_counter()
         results = run_study(spec_of(card, many, "family"), folder / f"family{many}")
-        tell("study through reduced bases, training and store included", many, time.perf_counter() - began)
+        tell("study through a family, its solves and the store included", many, time.perf_counter() - began)
         tell("  of which evaluation of the bases", many, results.store.seconds())
         print(f"  largest relative error estimate {(results.errors / results.values).max():.1e}")
 

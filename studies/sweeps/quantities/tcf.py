@@ -5,6 +5,7 @@ from studies.sweeps.case import Case, Options
 from studies.sweeps.quantity import HARMONIC, TEMPERATURE, THEORY, Column, Number, Quantity, mode_stem
 
 PARTS = ("E", "nu", "rho", "h", "r")
+STEEPEST = 10.0  # error of a solve's slopes of ln f, by ν or ln h, over its error of f; 2 to 3 were seen
 
 
 def _columns(options: Options) -> tuple[Column, ...]:
@@ -15,8 +16,14 @@ def _columns(options: Options) -> tuple[Column, ...]:
 
 def _evaluate(case: Case, options: Options) -> tuple[Number, ...]:
     T = case.temperature(options)
-    found = law_of(case.instrument, T, T, options["theory"], options["harmonic"]).parts(T)
-    return tuple(Number(1e6 * float(value)) for value in (found.total, *(getattr(found, part) for part in PARTS)))
+    law = law_of(case.instrument, T, T, options["theory"], options["harmonic"])
+    found, level = law.parts(T), STEEPEST * law.solver_error
+    of_nu = level * abs(float(law.material.slope("poisson_ratio", T)))
+    of_h = level * abs(float(law.material.value("expansion", T)))
+    # the parts of h and r add up to −alpha whatever the slope by h
+    values = (found.total, *(getattr(found, part) for part in PARTS))
+    errors = (of_nu, 0.0, of_nu, 0.0, of_h, of_h)
+    return tuple(Number(1e6 * float(value), 1e6 * error) for value, error in zip(values, errors, strict=True))
 
 
 QUANTITY = Quantity(

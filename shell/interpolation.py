@@ -1,0 +1,153 @@
+"""Interpolation of a smooth function of several numbers through as few evaluations as its smoothness allows.
+
+Newton's form on a sparse grid of Leja points of the cube -1 ... 1 (Chkifa, Cohen, Schwab 2014; Gerstner, Griebel 2003):
+
+    p(x) = Σ_i s_i Π_a N_{i_a}(x_a),      N_j(x) = Π_{k<j} (x − l_k)/(l_j − l_k),
+
+over a set of indices i that holds with each index all that lie below it. l_j is where |Π_{k<j} (x − l_k)| is largest, so
+that every |N_j| ≤ 1 and the surplus s_i, the function at the new point minus what is known of it there, bounds what
+its term adds anywhere. One evaluation buys one term; the next index is the one whose surplus was the largest.
+"""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from functools import cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Index = tuple[int, ...]
+MOST_POINTS = 33  # along one axis
+
+
+@cache
+def leja_points() -> Array:
+    """The sequence 0, 1, −1, …, each where the product of the distances to those before is largest."""
+    grid = np.cos(np.linspace(0.0, np.pi, 20_001))
+    points, product = [0.0, 1.0, -1.0], abs(grid * (grid - 1) * (grid + 1))
+    while len(points) < MOST_POINTS:
+        points.append(float(grid[np.argmax(product)]))
+        product = product * abs(grid - points[-1])
+    return np.array(points)
+
+
+def tabulate(x: Array, count: int) -> tuple[Array, Array]:
+    """N_0 … N_{count−1} at points (m,) and their derivatives, each (count, m)."""
+    points = leja_points()
+    values, slopes = np.ones((count, *x.shape)), np.zeros((count, *x.shape))
+    for j in range(1, count):
+        values[j] = values[j - 1] * (x - points[j - 1])
+        slopes[j] = slopes[j - 1] * (x - points[j - 1]) + values[j - 1]
+    for j in range(1, count):
+        largest = np.prod(points[j] - points[:j])
+        values[j] /= largest
+        slopes[j] /= largest
+    return values, slopes
+
+
+@dataclass(frozen=True, eq=False)
+class SparsePolynomial:
+    """The interpolant of a vector function.
+
+    indices : in lexical order.
+    surpluses : (terms, outputs).
+    """
+
+    indices: tuple[Index, ...]
+    surpluses: Array
+
+    def __call__(self, x: Array, along: int | None = None) -> Array:
+        """Values (m, outputs) at points (m, dimensions), or their derivatives by the coordinate `along`.
+
+        What a point gives does not depend on the other points.
+        """
+        tables = []
+        for axis, column in enumerate(x.T):
+            values, slopes = tabulate(column, 1 + max(index[axis] for index in self.indices))
+            tables.append(slopes if axis == along else values)
+        found = np.zeros((self.surpluses.shape[1], len(x)))
+        products = [np.ones(len(x))]  # of the factors up to each axis: neighbours share the first ones
+        last: Index = ()
+        for index, surplus in zip(self.indices, self.surpluses, strict=True):
+            same = next((k for k, (a, b) in enumerate(zip(index, last, strict=False)) if a != b), len(last))
+            del products[same + 1 :]
+            for axis in range(same, len(index)):
+                products.append(products[-1] * tables[axis][index[axis]])
+            found += surplus[:, None] * products[-1]
+            last = index
+        return found.T
+
+
+@dataclass
+class Exploration:
+    """A sparse grid that grows where the first output of a function needs it.
+
+    function : point (dimensions,) -> outputs (k,).
+    surpluses : of every index evaluated so far.
+    """
+
+    function: Callable[[Array], Array]
+    dimensions: int
+    surpluses: dict[Index, Array] = field(default_factory=dict)
+    _settled: set[Index] = field(default_factory=set)
+
+    @property
+    def frontier(self) -> list[Index]:
+        """Indices evaluated whose neighbours above are not."""
+        return [index for index in self.surpluses if index not in self._settled]
+
+    @property
+    def pending(self) -> float:
+        """The largest surplus of the first output on the frontier."""
+        return max((abs(float(self.surpluses[index][0])) for index in self.frontier), default=0.0)
+
+    def refine(self, threshold: float, most: int) -> bool:
+        """Grow until no surplus on the frontier exceeds the threshold; False where that is not reached.
+
+        At most about `most` evaluations are spent, and MOST_POINTS along an axis.
+        """
+        self.polynomial()
+        for index in self._quadratic():
+            self._settle(index)
+        while self.pending > threshold:
+            largest = max(self.frontier, key=lambda index: abs(float(self.surpluses[index][0])))
+            if len(self.surpluses) >= most or max(largest) + 1 == MOST_POINTS:
+                return False
+            self._settle(largest)
+        return True
+
+    def polynomial(self) -> SparsePolynomial:
+        """The interpolant through everything evaluated so far; at first through the middle alone."""
+        if not self.surpluses:
+            self._evaluate((0,) * self.dimensions)
+        indices = tuple(sorted(self.surpluses))
+        return SparsePolynomial(indices, np.array([self.surpluses[index] for index in indices]))
+
+    def _quadratic(self) -> Iterator[Index]:
+        """0 and the first index of each axis: with their neighbours all terms of the second degree."""
+        zero = (0,) * self.dimensions
+        for index in (zero, *(_above(zero, axis) for axis in range(self.dimensions))):
+            if index not in self._settled:
+                yield index
+
+    def _settle(self, index: Index) -> None:
+        self._settled.add(index)
+        for axis in range(self.dimensions):
+            new = _above(index, axis)
+            below = [_below(new, other) for other in range(self.dimensions) if new[other]]
+            if all(one in self._settled for one in below):
+                self._evaluate(new)
+
+    def _evaluate(self, index: Index) -> None:
+        point = leja_points()[list(index)]
+        value = np.asarray(self.function(point), dtype=float)
+        self.surpluses[index] = value - (self.polynomial()(point[None])[0] if self.surpluses else 0.0)
+
+
+def _above(index: Index, axis: int) -> Index:
+    return (*index[:axis], index[axis] + 1, *index[axis + 1 :])
+
+
+def _below(index: Index, axis: int) -> Index:
+    return (*index[:axis], index[axis] - 1, *index[axis + 1 :])
