@@ -16,8 +16,6 @@ from shell.resonator import Stem
 
 NU = (0.15, 0.19)
 E, RHO = 72.7e9, 2203.0
-STEM = Stem(2.5e-3, -5e-3, 0.5e-3)
-CUP = cylinder(12.5e-3, 0.6e-3, 18e-3, bottom_thickness=1e-3, clamp_radius=3e-3)
 
 
 def dome(v):
