@@ -100,6 +100,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except BrokenPipeError:
         sys.stderr.close()
         return 0
+    except (OSError, MemoryError, UnicodeError) as error:
+        sentence = describe_environment_error(error)
+        return _complain(sentence, 3, error if debug else None)
     except Exception as error:
         return _complain(
             f"internal fault: {type(error).__name__}: {error}. Run again with --debug and report it.",
@@ -134,6 +137,37 @@ def _complain(message: str, status: int, error: BaseException | None = None) -> 
     return status
 
 
+def describe_environment_error(error: BaseException) -> str:
+    """Say in one sentence what the system refused: a file, memory, a character that the terminal cannot show."""
+    if isinstance(error, MemoryError):
+        return "there is not enough memory for this; take fewer rows, a lower rate or a smaller study."
+    if isinstance(error, UnicodeError):
+        return f"a text cannot be shown or read here ({error}); set PYTHONUTF8=1, or rename the file."
+    assert isinstance(error, OSError)
+    named = f"{os.fsdecode(error.filename)!r}: " if error.filename else ""
+    return f"{named}the system refuses ({error.strerror or error}); check its rights, its place and the disk."
+
+
 def run() -> None:
-    """Entry point of the console script."""
-    sys.exit(main())
+    """Entry point of the console script: a request to end counts as Ctrl-C, and a terminal shows what it can."""
+    import signal
+
+    def end(number: int, frame: object) -> None:
+        raise KeyboardInterrupt
+
+    try:
+        signal.signal(signal.SIGTERM, end)
+        for stream in (sys.stdout, sys.stderr):
+            if stream is not None and hasattr(stream, "reconfigure"):
+                stream.reconfigure(errors="backslashreplace")
+        if sys.stdout is None:
+            sys.exit(_complain("standard output is closed; redirect it to a file or to /dev/null.", 3))
+        status = main()
+        sys.stdout.flush()
+    except KeyboardInterrupt:
+        status = _complain("interrupted.", 130)
+    except BrokenPipeError:
+        os._exit(0)  # who reads has gone; nothing is left to tell
+    except OSError as error:
+        status = _complain(describe_environment_error(error), 3)
+    sys.exit(status)

@@ -17,6 +17,7 @@ def run(
     scheduler: str | None = None,
     card: str | None = None,
     allow_python: bool = False,
+    retry_failed: bool = False,
     dry_run: bool = False,
     quiet: bool = False,
     json: bool = False,
@@ -47,6 +48,8 @@ def run(
         Another card than the one that the spec names.
     allow_python : bool
         Run the Python functions that the spec names. Read them first.
+    retry_failed : bool
+        Compute again what failed in an earlier run; cases whose worker was lost are always tried again.
     dry_run : bool
         Say how many cases, how long and how much memory; keep nothing.
     quiet : bool
@@ -84,6 +87,7 @@ def run(
             workers=workers,
             scheduler=scheduler,
             allow_python=allow_python,
+            retry_failed=retry_failed,
             show_progress=not quiet,
         )
     except KeyboardInterrupt:
@@ -92,10 +96,15 @@ def run(
     if json:
         print_json(_status(results, out, running=False))
     else:
-        failed = results.store.counts().get("failed", 0)
+        failed = _failed(results)
         print(f"{results.total} cases computed, {failed} failed. Next: hrg study report {out}, hrg study export {out}.")
         _print_reasons(results)
-    return 4 if results.store.counts().get("failed", 0) else 0
+    return 4 if _failed(results) else 0
+
+
+def _failed(results: "Results") -> int:
+    counts = results.store.counts()
+    return sum(counts.values()) - counts.get("ok", 0)
 
 
 def status(folder: str, *, json: bool = False) -> int:
@@ -200,7 +209,8 @@ def _status(results: "Results", folder: str, running: bool) -> dict[str, Any]:
         "state": "running" if running else "finished" if finished else "unfinished",
         "cases": results.total,
         "done": done,
-        "failed": counts.get("failed", 0),
+        "failed": done - counts.get("ok", 0),
+        "lost": counts.get("lost", 0),
         "reasons": [{"reason": reason, "cases": count} for reason, count in results.store.reasons()],
         "seconds_each": results.store.seconds() / done if done else None,
         "runs": len(results.store.runs()),

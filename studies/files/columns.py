@@ -9,6 +9,7 @@ import csv
 import hashlib
 import io
 import re
+from collections import Counter
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -137,13 +138,14 @@ def _check_names(
         raise InputError(f"{where}: the columns are not separated by commas; 'hrg import' reads such files.")
     if all(_is_number(name) for name in names):
         raise InputError(f"{where}: a header line with the column names is missing; add {','.join(required)}.")
+    counts = Counter(names)
     for name in names:
-        if names.count(name) > 1:
+        if counts[name] > 1:
             raise InputError(f"{where}: the column '{name}' stands twice; remove one.")
         if name not in known and not any(name.startswith(prefix) for prefix in prefixes):
             raise InputError(f"{where}: unknown column '{name}'{nearest(name, known)}")
     for name in required:
-        if name not in names:
+        if name not in counts:
             raise InputError(f"{where}: the column '{name}' is missing; the header has {', '.join(names)}.")
     return names
 

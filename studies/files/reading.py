@@ -1,26 +1,42 @@
 """Files that a user names: read with one sentence where that fails, and found by bare name where they ship."""
 
+import stat
 from pathlib import Path
 
 from studies.errors import InputError, nearest
 
+MOST_BYTES = 2 * 1024**3
+"""A record at 200 Hz over a month is smaller; a table of numbers takes about four times its file in memory."""
 
-def read_bytes(path: str | Path) -> bytes:
-    """Return the content of a file.
+
+def read_bytes(path: str | Path, most: int = MOST_BYTES) -> bytes:
+    """Return the content of a regular file of at most so many bytes.
 
     Raises
     ------
     InputError
-        There is no such file, it is a folder, or it cannot be read.
+        There is no such file, it is a folder, a device or a pipe, it is too large, or it cannot be read.
     """
     try:
+        about = Path(path).stat()
+        if stat.S_ISDIR(about.st_mode):
+            raise InputError(f"{path}: is a folder; give the name of a file.")
+        if not stat.S_ISREG(about.st_mode):
+            raise InputError(f"{path}: is a device or a pipe, not a file; save what it gives and name that file.")
+        if about.st_size > most:
+            raise InputError(
+                f"{path}: has {about.st_size / 1e6:,.0f} MB, and {most / 1e6:,.0f} MB are the most that is read; split it or"
+                " record at a lower rate."
+            )
         return Path(path).read_bytes()
+    except InputError:
+        raise
     except FileNotFoundError:
         raise InputError(f"{path}: there is no such file.") from None
-    except IsADirectoryError:
-        raise InputError(f"{path}: is a folder; give the name of a file.") from None
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror}).") from error
+    except ValueError as error:
+        raise InputError(f"{str(path)!r}: cannot be the name of a file ({error}).") from error
 
 
 def list_shipped(folder: Path) -> dict[str, Path]:

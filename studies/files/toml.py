@@ -9,6 +9,8 @@ from typing import Any
 from studies.errors import InputError, nearest
 from studies.files.reading import read_bytes
 
+MOST_BYTES = 16 * 1024**2
+
 
 def read_toml(path: str | Path, schema: str | None = None) -> dict[str, Any]:
     """Read a TOML file and check its `schema` key.
@@ -19,7 +21,7 @@ def read_toml(path: str | Path, schema: str | None = None) -> dict[str, Any]:
         No such file, not UTF-8, a syntax error (with its line), or another schema.
     """
     try:
-        content = tomllib.loads(read_bytes(path).decode("utf-8-sig"))
+        content = tomllib.loads(read_bytes(path, MOST_BYTES).decode("utf-8-sig"))
     except UnicodeDecodeError:
         raise InputError(f"{path}: not UTF-8 text; save the file as UTF-8.") from None
     except tomllib.TOMLDecodeError as error:

@@ -1,6 +1,7 @@
 """Output files appear whole or not at all: written beside their place, then renamed into it."""
 
 import os
+import shutil
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -14,6 +15,8 @@ from studies.errors import InputError
 def written_whole(path: str | Path) -> Iterator[IO[bytes]]:
     """Open a binary file that takes its name only when everything has been written.
 
+    A link is followed; what is no regular file, such as /dev/null or a pipe, is written into and stays what it is.
+
     Parameters
     ----------
     path : str or Path
@@ -24,23 +27,34 @@ def written_whole(path: str | Path) -> Iterator[IO[bytes]]:
     InputError
         The folder cannot be made or written, or the disk is full; nothing is left behind.
     """
-    target = Path(path)
     temporary: Path | None = None
     try:
-        target.parent.mkdir(parents=True, exist_ok=True)
+        target = Path(path).resolve() if Path(path).is_symlink() else Path(path)
         if target.is_dir():
-            raise InputError(f"{target}: is a folder; give the name of a file.")
-        handle, name = tempfile.mkstemp(prefix=f".{target.name}.", dir=target.parent)
+            raise InputError(f"{path}: is a folder; give the name of a file.")
+        special = target.exists() and not target.is_file()
+        target.parent.mkdir(parents=True, exist_ok=True)
+        handle, name = tempfile.mkstemp(prefix=".hrg-", dir=None if special else target.parent)
         temporary = Path(name)
         with os.fdopen(handle, "wb") as file:
             yield file
             file.flush()
             os.fsync(file.fileno())
+        if special:
+            with temporary.open("rb") as whole, target.open("wb") as outlet:
+                shutil.copyfileobj(whole, outlet)
+            return
         temporary.chmod(0o666 & ~_umask())
         os.replace(temporary, target)
-    except OSError as error:
-        reason = error.strerror or str(error)
-        raise InputError(f"{target}: cannot be written ({reason}); choose another place.") from error
+    except InputError:
+        raise
+    except (OSError, RuntimeError) as error:  # RuntimeError: a loop of links
+        reason = getattr(error, "strerror", None) or str(error)
+        raise InputError(f"{path}: cannot be written ({reason}); choose another place.") from error
+    except ValueError as error:
+        if "null" not in str(error):
+            raise
+        raise InputError(f"{str(path)!r}: a file's name cannot hold a zero byte; choose another name.") from error
     finally:
         if temporary is not None:
             temporary.unlink(missing_ok=True)

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
 EXCEL = (".xlsx", ".xlsm")
 OVERFLOW = "(beyond the header)"
+MOST_CELLS = 20_000_000
 OVERLOAD = 1e36
 """Instruments write 9.9e37 or 1e38 where a reading overloads them."""
 
@@ -151,12 +152,20 @@ def read_sheet(path: str | Path, sheet: str | None) -> list[list[str]]:
         ) from None
     try:
         book = openpyxl.load_workbook(path, read_only=True, data_only=True)
-    except Exception as error:  # openpyxl lets errors of zip, XML and its own through
+        if sheet is not None and sheet not in book.sheetnames:
+            raise InputError(f"{path}: there is no sheet '{sheet}'{nearest(sheet, book.sheetnames)}")
+        page = book[sheet] if sheet is not None else book.worksheets[0]
+        cells = (page.max_row or 0) * (page.max_column or 0)
+        if cells > MOST_CELLS:
+            raise InputError(
+                f"{path}: its sheet reaches to row {page.max_row}, column {page.max_column}; {MOST_CELLS:,} cells are the"
+                " most. Delete what stands far from the table, or export the sheet as CSV."
+            )
+        return [[_cell_text(value) for value in row] for row in page.iter_rows(values_only=True)]
+    except InputError:
+        raise
+    except Exception as error:  # openpyxl lets errors of zip, XML and its own through, also while it reads
         raise InputError(f"{path}: not an Excel workbook that can be read ({shorten(str(error))}).") from None
-    if sheet is not None and sheet not in book.sheetnames:
-        raise InputError(f"{path}: there is no sheet '{sheet}'{nearest(sheet, book.sheetnames)}")
-    page = book[sheet] if sheet is not None else book.worksheets[0]
-    return [[_cell_text(value) for value in row] for row in page.iter_rows(values_only=True)]
 
 
 def shorten(text: str) -> str:

@@ -1,36 +1,56 @@
 """The C99 source of a bias model: causal, one call per sample, and a table of its own to test it with."""
 
-import numpy as np
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import ceil
 
 from compensation.bias import PLAY, TERMS
+from compensation.memory import Memory
 from studies.models.c_source import head, self_test
 from studies.models.file import Model
-from studies.models.kinds import bias
-from studies.record import COMPENSATED, Record
-
-TEST_ROWS = 80
 
 
-def write_c(model: Model) -> str:
-    """Return `hrg_bias`, `hrg_bias_reset` and `hrg_compensate` in C99; see `kinds.bias` for what they compute."""
-    terms, coefficients = bias.read_terms(model)
-    column, memory = bias.variable_column(model), bias.memory_of(model)
-    window, lag, length = model.number("rate_window_s"), model.number("rate_lag_s"), bias.block_length(model)
-    (low, high), (r_low, r_high) = model.range_of(column), model.range_of(bias.rate_name(column))
+@dataclass(frozen=True)
+class CausalBias:
+    """What the code computes: see `kinds.bias`.
+
+    `column` of the input, its `reference` and the `unit` of the bias; `terms` and their `coefficients`, the constant
+    first; `memory` before them; `window`, `lag` of the rate and `block` (s); the fewest `blocks` of a rate; the calibrated
+    `values` and `rates`.
+    """
+
+    column: str
+    unit: str
+    reference: float
+    terms: tuple[str, ...]
+    coefficients: tuple[float, ...]
+    memory: Memory
+    window: float
+    lag: float
+    block: float
+    blocks: int
+    values: tuple[float, float]
+    rates: tuple[float, float]
+
+
+def write_c(model: Model, law: CausalBias, rows: Sequence[Sequence[float]]) -> str:
+    """Return `hrg_bias`, `hrg_bias_reset` and `hrg_compensate` in C99, with rows (time, output, value, expected) to test."""
+    window, lag, length, memory = law.window, law.lag, law.block, law.memory
+    (low, high), (r_low, r_high) = law.values, law.rates
     total = "\n        + ".join(
-        [f"({coefficients[0].item()!r})"]
-        + [f"({value!r}){_product(name)}" for name, value in zip(terms, coefficients[1:].tolist(), strict=True)]
+        [f"({law.coefficients[0]!r})"]
+        + [f"({value!r}){_product(name)}" for name, value in zip(law.terms, law.coefficients[1:], strict=True)]
     )
     warning = "" if lag else " The model was fitted with a centred rate: fit it with --causal to match this code."
     return f"""{head(model)}
-/* The input `value` is {column}. Samples are averaged over {length:g} s; when a block is complete, its mean and the slope of
+/* The input `value` is {law.column}. Samples are averaged over {length:g} s; when a block is complete, its mean and the slope of
    the line through the blocks of the last {window:g} s give the bias, which holds until the next block is complete. The
    rate lags by {window / 2:g} s.{warning} A NaN is a missing value; outliers are for the caller to leave out. */
 #define HRG_BLOCK_S {length!r}
 #define HRG_WINDOW_S {window!r}
 #define HRG_LAG_S {memory.lag!r}
 #define HRG_PLAY {memory.play!r}
-#define HRG_BLOCKS {int(np.ceil(window / length)) + 2}
+#define HRG_BLOCKS {ceil(window / length) + 2}
 
 typedef struct {{
     double start, zero;               /* time and value of the first sample */
@@ -41,9 +61,9 @@ typedef struct {{
     int started, any, ready;
 }} hrg_bias_state;
 
-/* Bias ({bias.OUTPUTS[model.compensates]}) at a value of the input, its rate per second, and its play. */
+/* Bias ({law.unit}) at a value of the input, its rate per second, and its play. */
 double hrg_bias(double value, double rate, double play) {{
-    double f = value - ({bias.reference_of(model)!r}), r = rate;
+    double f = value - ({law.reference!r}), r = rate;
     (void)f;
     (void)r;
     (void)play;
@@ -78,7 +98,7 @@ static void hrg_finish_block(hrg_bias_state *s) {{
     s->mean[s->blocks++] = y;
     last = s->blocks - 1;
     for (k = 0; s->time[k] < t - HRG_WINDOW_S - 1e-6; ++k) {{}}
-    s->ready = last - k >= {bias.LEAST_BLOCKS - 1} && t - s->time[k] >= 0.5 * HRG_WINDOW_S;
+    s->ready = last - k >= {law.blocks - 1} && t - s->time[k] >= 0.5 * HRG_WINDOW_S;
     if (s->ready) {{
         double n = last - k + 1, mt = 0.0, mx = 0.0, tx = 0.0, tt = 0.0, rate;
         int i;
@@ -121,35 +141,13 @@ double hrg_compensate(hrg_bias_state *s, double time_s, double output, double va
     return *ok ? output - s->bias : output;
 }}
 
-{self_test(_test_rows(model), "time_s, output, value, expected (NaN: not ok)", STEP)}"""
+{self_test(rows, "time_s, output, value, expected (NaN: not ok)", STEP)}"""
 
 
 STEP = """    static hrg_bias_state state;
     int ok;
     double found = hrg_compensate(&state, row[0], row[1], row[2], &ok), expected = row[3];
     if (!ok) return expected == expected;"""
-
-
-def _test_rows(model: Model) -> list[tuple[float, ...]]:
-    """Inputs inside the calibrated range, with what Python makes of them."""
-    column, window = bias.variable_column(model), model.number("rate_window_s")
-    (low, high), (r_low, r_high) = model.range_of(column), model.range_of(bias.rate_name(column))
-    time = np.arange(TEST_ROWS) * window / 24
-    middle, speed = (low + high) / 2, 0.4 * max(abs(r_low), abs(r_high))
-    speed = min(speed, 0.3 * (high - low) / time[-1])
-    value = middle + (0.0 if r_low <= 0 <= r_high else (r_low + r_high) / 2) * (time - time[-1] / 2)
-    value = np.round(value + speed * window / 3 * np.sin(time * 3 / window), 9)
-    output = np.round(1.0 + 0.25 * np.cos(0.7 * np.arange(TEST_ROWS)), 9)
-    causal = model if model.number("rate_lag_s") > 0 else _made_causal(model)
-    record = Record({"time_s": time, column: value, model.compensates: output})
-    expected = bias.compensate(causal, record, extrapolate=True)[f"{COMPENSATED}{model.compensates}"]
-    return list(zip(time.tolist(), output.tolist(), value.tolist(), expected.tolist(), strict=True))
-
-
-def _made_causal(model: Model) -> Model:
-    from dataclasses import replace
-
-    return replace(model, settings={**model.settings, "rate_lag_s": model.number("rate_window_s") / 2})
 
 
 def _product(name: str) -> str:

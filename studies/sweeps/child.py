@@ -32,7 +32,14 @@ class Child:
     """One process that holds one user function."""
 
     def __init__(self, function: str) -> None:
-        command = [sys.executable, "-c", "from studies.sweeps.child import serve; serve()", function, str(os.getpid())]
+        command = [
+            sys.executable,
+            "-P",
+            "-c",
+            "from studies.sweeps.child import serve; serve()",
+            function,
+            str(os.getpid()),
+        ]
         path = os.pathsep.join([str(Path(__file__).parents[2]), *filter(None, [os.environ.get("PYTHONPATH")])])
         self.function = function
         self.process = subprocess.Popen(

@@ -2,7 +2,8 @@
 
 The spec fixes the batches. How many of them travel as one task is decided by how long they take, and changes no result.
 A task that comes back is committed whole. When a worker is lost, what it had is tried again, alone and in pieces, so
-that a design that kills its worker is found, kept as failed, and does not stop the rest.
+that a design that kills its worker is found and does not stop the rest. The loss of a worker is no result: such a case
+is noted as lost and tried again by the next run. Workers that end before any of them has computed anything stop the run.
 """
 
 from collections import deque
@@ -27,6 +28,8 @@ if TYPE_CHECKING:
 
 TASK_SECONDS = 1.0  # a task should last so long: long against its cost, short against what kill -9 may lose
 BATCH, BATCH_VECTORISED = 8, 1024  # cases, where the spec says nothing
+TRIES_ALONE = 2  # of a case whose worker is lost
+STILLBORN = 3  # losses before anything was computed, after which the workers cannot be started
 MOST_TASKS = 2  # queued for each worker, so that millions of cases do not swamp a scheduler
 
 
@@ -46,6 +49,7 @@ Batch = Sequence[Item]
 class _Task:
     batches: list[Batch]
     alone: bool = False  # after a worker was lost: nothing else runs beside it
+    tries: int = 0  # that were alone and lost their worker
 
 
 def make_item(base: str, position: int | None, parameters: dict[str, Any]) -> Item:
@@ -100,7 +104,7 @@ def compute(
     take = batches.take if isinstance(batches, Batches) else batches.popleft
     suspects: deque[_Task] = deque()
     running: dict[Future[Any], _Task] = {}
-    size = 1
+    size, losses, computed = 1, 0, False
     while batches or suspects or running:
         if suspects and not running:
             _submit(suspects.popleft(), plan, workers, running)
@@ -112,7 +116,13 @@ def compute(
                 continue
             try:
                 rows: list[list[Row]] = future.result()
-            except workers.lost:
+            except workers.lost as error:
+                losses += 1
+                if losses >= STILLBORN and not computed:
+                    raise MissingEnvironment(
+                        "the worker processes end before they compute anything. In a script, call run_study under"
+                        " 'if __name__ == \"__main__\":' or with workers=1; else look for what ends them (memory?)."
+                    ) from error
                 _divide(task, plan, suspects, store, progress)
                 if workers.restart():
                     for other in running.values():
@@ -124,6 +134,7 @@ def compute(
                     f"the workers are gone ({error}); everything computed before is kept. Run the same command again to resume."
                 ) from error
             _keep(task, rows, store, progress)
+            computed = True
             each = sum(row.seconds for batch in rows for row in batch) / len(rows)
             size = max(1, min(int(TASK_SECONDS / max(each, 1e-9)), ceil(len(batches) / (8 * workers.count))))
 
@@ -144,15 +155,17 @@ def _keep(task: _Task, rows: list[list[Row]], store: "Store", progress: "Progres
         for item, row in zip(batch, found, strict=True)
     ]
     store.add((item.key, item.position, item.spelled, row) for item, row in pairs)
-    progress.advance(len(pairs), sum(row.status == "failed" for _, row in pairs))
+    progress.advance(len(pairs), sum(row.status != "ok" for _, row in pairs))
 
 
 def _divide(task: _Task, plan: Plan, suspects: deque[_Task], store: "Store", progress: "Progress") -> None:
-    """Put what a lost worker had into the queue of suspects; a case that was alone when its worker ended has failed."""
+    """Put what a lost worker had into the queue of suspects; a case alone that loses it again and again is noted as lost."""
     if not task.alone:
         suspects.extend(_Task([batch], alone=True) for batch in task.batches)
     elif len(task.batches[0]) > 1:
         suspects.extendleft(_Task([[item]], alone=True) for item in reversed(task.batches[0]))
+    elif task.tries + 1 < TRIES_ALONE:
+        suspects.appendleft(_Task(task.batches, alone=True, tries=task.tries + 1))
     else:
-        reason = "the worker process ended while it computed this case, alone and for the second time or more (killed or crashed)."
+        reason = "the worker process ended each time it computed this case alone (killed or crashed); the next run tries again."
         _keep(task, [[lost_row(plan, reason)]], store, progress)

@@ -68,7 +68,7 @@ def evaluate_case(plan: Plan, parameters: Mapping[str, Any]) -> Row:
 def lost_row(plan: Plan, reason: str) -> Row:
     """Return the row of a case whose worker did not survive it."""
     nothing = (math.nan,) * sum(width for _, _, width in plan.asked)
-    return Row("failed", reason, nothing, nothing, 0.0)
+    return Row("lost", reason, nothing, nothing, 0.0)
 
 
 def _evaluate(name: str, options: Mapping[str, Any], width: int, case: Case) -> "tuple[Sequence[Number], str]":

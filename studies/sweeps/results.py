@@ -103,7 +103,7 @@ class Results:
             for name, value in json.loads(parameters).items():
                 columns[name].append(value)
             numbers += packed
-            failed.append(status == "failed")
+            failed.append(status != "ok")
             remarks.append(remark)
         loaded = _Loaded(
             {name: np.array(columns[name]) for name in names},

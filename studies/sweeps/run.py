@@ -2,6 +2,7 @@
 
 import os
 import time
+import warnings
 from collections.abc import Mapping
 from contextlib import nullcontext
 from dataclasses import dataclass
@@ -34,6 +35,7 @@ def run_study(
     workers: int | None = None,
     scheduler: str | None = None,
     allow_python: bool = False,
+    retry_failed: bool = False,
     show_progress: bool = False,
 ) -> Results:
     """Run a study, or resume it where an earlier run stopped, and return its results.
@@ -52,11 +54,14 @@ def run_study(
     card : str, optional
         Another card than the spec's.
     workers : int, optional
-        Processes on this machine; one for every core unless given.
+        Processes on this machine; one for every core unless given. With 1 everything is computed in this process. In a
+        script, more than one need the guard `if __name__ == "__main__":`.
     scheduler : str, optional
         Address of a Dask scheduler, instead of processes here.
     allow_python : bool
         Run the user functions that the spec names.
+    retry_failed : bool
+        Compute the cases again that failed in an earlier run. Those whose worker was lost are always tried again.
     show_progress : bool
         Show progress on standard error.
 
@@ -75,6 +80,10 @@ def run_study(
     store = memory_store() if out is None else claim_store(out)
     try:
         _describe(store, study, design, identity)
+        damaged = store.forget_damaged()
+        if damaged:
+            warnings.warn(f"{len(damaged)} damaged cases are computed again (first: case {damaged[0]}).", stacklevel=2)
+        store.forget("lost", *(["failed"] if retry_failed else []))
         crew = Here() if families else None
         _run(
             store,
@@ -230,4 +239,5 @@ def _hire(workers: int | None, scheduler: str | None) -> Workers:
         from studies.sweeps.cluster import Cluster
 
         return Cluster(scheduler)
-    return Pool(workers or cores())
+    count = workers or cores()
+    return Here() if count == 1 else Pool(count)

@@ -13,6 +13,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import UTC, datetime
+from hashlib import blake2b
 from pathlib import Path
 from types import TracebackType
 from typing import IO, TYPE_CHECKING, Any, Self
@@ -25,7 +26,7 @@ if TYPE_CHECKING:
 
 FILE = "study.sqlite"
 LOCK = "lock"
-LAYOUT = 1  # of the tables; sqlite's user_version
+LAYOUT = 2  # of the tables; sqlite's user_version
 SHOWN_CHANGES = 6
 TABLES = """
 CREATE TABLE study (
@@ -36,8 +37,8 @@ CREATE TABLE run (
   id INTEGER PRIMARY KEY, started_utc TEXT NOT NULL, finished_utc TEXT, outcome TEXT, provenance TEXT NOT NULL);
 CREATE TABLE run_case (
   key BLOB PRIMARY KEY, position INTEGER UNIQUE, parameters TEXT NOT NULL,
-  status TEXT NOT NULL CHECK (status IN ('ok', 'failed')), remark TEXT NOT NULL, numbers BLOB NOT NULL,
-  seconds REAL NOT NULL, run INTEGER NOT NULL REFERENCES run (id)) WITHOUT ROWID;
+  status TEXT NOT NULL CHECK (status IN ('ok', 'failed', 'lost')), remark TEXT NOT NULL, numbers BLOB NOT NULL,
+  seconds REAL NOT NULL, run INTEGER NOT NULL REFERENCES run (id), seal BLOB NOT NULL) WITHOUT ROWID;
 CREATE TABLE finding (name TEXT PRIMARY KEY, content TEXT NOT NULL);
 """
 
@@ -96,12 +97,31 @@ class Store:
 
     def add(self, cases: "Iterable[tuple[bytes, int | None, str, Row]]") -> None:
         """Keep computed cases (key, position, spelled parameters, row) in one transaction."""
-        rows = [
-            (key, place, parameters, row.status, row.remark, _pack(row.values, row.errors), row.seconds, self.run)
-            for key, place, parameters, row in cases
-        ]
+        rows = []
+        for key, place, parameters, row in cases:
+            numbers = _pack(row.values, row.errors)
+            seal = _seal(key, place, parameters, row.status, row.remark, numbers)
+            rows.append((key, place, parameters, row.status, row.remark, numbers, row.seconds, self.run, seal))
         with self._writing():
-            self.connection.executemany("INSERT OR IGNORE INTO run_case VALUES (?, ?, ?, ?, ?, ?, ?, ?)", rows)
+            self.connection.executemany("INSERT OR IGNORE INTO run_case VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?)", rows)
+
+    def forget(self, *statuses: str) -> int:
+        """Remove the cases of these statuses, to be computed again; return how many there were."""
+        marks = ", ".join("?" * len(statuses))
+        with self._writing():
+            return self.connection.execute(f"DELETE FROM run_case WHERE status IN ({marks})", statuses).rowcount
+
+    def forget_damaged(self) -> list[int]:
+        """Remove the cases whose content no longer fits its seal (bit rot); return their positions."""
+        found = [
+            (row[0], row[1])
+            for row in self._read(f"SELECT {_SEALED}, seal FROM run_case")
+            if _seal(*row[:-1]) != row[-1]
+        ]
+        if found:
+            with self._writing():
+                self.connection.executemany("DELETE FROM run_case WHERE key = ?", [(key,) for key, _ in found])
+        return [place for _, place in found if place is not None]
 
     def keep_finding(self, name: str, content: Mapping[str, Any]) -> None:
         """Keep the outcome of a search under its name."""
@@ -110,7 +130,7 @@ class Store:
 
     def findings(self) -> dict[str, Any]:
         """Return the outcomes of searches by name."""
-        return {name: json.loads(content) for name, content in self._read("SELECT name, content FROM finding")}
+        return {name: self._parse(content) for name, content in self._read("SELECT name, content FROM finding")}
 
     def done(self) -> dict[int, bytes]:
         """Return the key of every computed position."""
@@ -118,8 +138,8 @@ class Store:
 
     def find(self, key: bytes) -> Stored | None:
         """Return one case by its key."""
-        columns = "key, position, parameters, status, remark, numbers, seconds"
-        for row in self._read(f"SELECT {columns} FROM run_case WHERE key = ?", (key,)):
+        for row in self._read(f"SELECT {_SEALED}, seconds, seal FROM run_case WHERE key = ?", (key,)):
+            self._check_seal(row[:6], row[7])
             both = struct.unpack(f"<{len(row[5]) // 8}d", row[5])
             half = len(both) // 2
             return Stored(row[0], row[1], json.loads(row[2]), row[3], row[4], both[:half], both[half:], row[6])
@@ -127,13 +147,21 @@ class Store:
 
     def rows(self) -> Iterator[tuple[int, str, str, str, bytes]]:
         """Give position, spelled parameters, status, remark and packed numbers of the sampled cases, by position."""
-        columns = "position, parameters, status, remark, numbers"
+        query = f"SELECT {_SEALED}, seal FROM run_case WHERE position IS NOT NULL ORDER BY position"
         try:
-            yield from self.connection.execute(
-                f"SELECT {columns} FROM run_case WHERE position IS NOT NULL ORDER BY position"
-            )
+            for row in self.connection.execute(query):
+                self._check_seal(row[:6], row[6])
+                yield row[1:6]
         except sqlite3.DatabaseError as error:
             raise _damaged(self.path, error) from error
+
+    def _check_seal(self, sealed: Sequence[Any], seal: bytes) -> None:
+        if _seal(*sealed) != seal:
+            case = "a searched case" if sealed[1] is None else f"case {sealed[1]}"
+            raise InputError(
+                f"{self.path}: {case} is damaged (its content does not fit its seal). Run 'hrg study run' with the same"
+                " folder again: it is computed anew."
+            )
 
     def counts(self) -> dict[str, int]:
         """Return how many sampled cases there are of each status."""
@@ -142,7 +170,7 @@ class Store:
     def reasons(self, most: int = 20) -> list[tuple[str, int]]:
         """Return the reasons of failures, the most frequent first."""
         return self._read(
-            "SELECT remark, count(*) FROM run_case WHERE status = 'failed' AND position IS NOT NULL"
+            "SELECT remark, count(*) FROM run_case WHERE status <> 'ok' AND position IS NOT NULL"
             f" GROUP BY remark ORDER BY 2 DESC, 1 LIMIT {most:d}"
         )
 
@@ -157,13 +185,19 @@ class Store:
         if not rows:
             raise InputError(f"{self.path.parent}: its study has not begun yet; run it again.")
         about = dict(zip(columns, rows[0], strict=True))
-        return about | {key: json.loads(about[key]) for key in ("identity", "spec", "instrument", "repeats")}
+        return about | {key: self._parse(about[key]) for key in ("identity", "spec", "instrument", "repeats")}
+
+    def _parse(self, text: str) -> Any:
+        try:
+            return json.loads(text)
+        except (ValueError, TypeError) as error:
+            raise _damaged(self.path, error) from error
 
     def runs(self) -> list[dict[str, Any]]:
         """Return the runs so far."""
         rows = self._read("SELECT id, started_utc, finished_utc, outcome, provenance FROM run ORDER BY id")
         keys = ("id", "started_utc", "finished_utc", "outcome", "provenance")
-        return [dict(zip(keys, row, strict=True)) | {"provenance": json.loads(row[4])} for row in rows]
+        return [dict(zip(keys, row, strict=True)) | {"provenance": self._parse(row[4])} for row in rows]
 
     def describe(self, about: Mapping[str, Any]) -> None:
         """Write what the study is; a later run may change only what no result depends on."""
@@ -179,7 +213,7 @@ class Store:
         """Refuse to go on when the results so far belong to something else; InputError says what changed."""
         old = self._read("SELECT identity FROM study")
         now = json.loads(spell(identity))  # as it would be read back: tuples have become lists
-        changes = list(find_changes({**json.loads(old[0][0]), "base": now["base"]}, now)) if old else []
+        changes = list(find_changes({**self._parse(old[0][0]), "base": now["base"]}, now)) if old else []
         if changes:
             shown = "; ".join(changes[:SHOWN_CHANGES])
             more = f"; and {len(changes) - SHOWN_CHANGES} more" if len(changes) > SHOWN_CHANGES else ""
@@ -222,7 +256,7 @@ def open_store(folder: str | Path) -> Store:
     path = Path(folder) / FILE
     if not path.is_file():
         raise InputError(f"{folder}: there is no study in it (no {FILE}); give the folder of 'hrg study run --out'.")
-    connection = _connect(path)
+    connection = _connect(path, read_only=not os.access(folder, os.W_OK))
     if connection.execute("PRAGMA user_version").fetchone()[0] == 0:
         connection.close()
         raise InputError(f"{folder}: its study has not begun yet; run it again.")
@@ -293,8 +327,12 @@ def memory_store() -> Store:
     return store
 
 
-def _connect(path: Path) -> sqlite3.Connection:
-    connection = sqlite3.connect(path, timeout=30.0)
+def _connect(path: Path, read_only: bool = False) -> sqlite3.Connection:
+    """Open the file; in a folder that cannot be written as it stands there, which needs no file beside it."""
+    if read_only:
+        connection = sqlite3.connect(f"{path.resolve().as_uri()}?immutable=1", uri=True, timeout=30.0)
+    else:
+        connection = sqlite3.connect(path, timeout=30.0)
     try:
         connection.execute("PRAGMA cache_size = -65536")
         complaints = connection.execute("PRAGMA quick_check(1)").fetchone()[0]
@@ -311,7 +349,8 @@ def _connect(path: Path) -> sqlite3.Connection:
     if layout not in (0, LAYOUT):
         connection.close()
         raise InputError(
-            f"{path}: was written by a later version of the workbench (layout {layout}); read it with that one."
+            f"{path}: was written by another version of the workbench (layout {layout}, here {LAYOUT}); read it with that"
+            " one, or run the study again into another folder."
         )
     return connection
 
@@ -330,6 +369,15 @@ def _damaged(path: Path, reason: object) -> InputError:
     return InputError(
         f"{path}: the store is damaged ({reason}). Put a copy back in its place, or move it away and run the study again."
     )
+
+
+_SEALED = "key, position, parameters, status, remark, numbers"
+
+
+def _seal(key: bytes, place: int | None, parameters: str, status: str, remark: str, numbers: bytes) -> bytes:
+    """Return a checksum of what a row says, so that a bit that flips on the disk is noticed."""
+    text = "\0".join((str(place), parameters, status, remark)).encode("utf-8", "surrogatepass")
+    return blake2b(key + text + b"\0" + numbers, digest_size=8).digest()
 
 
 def _pack(values: Sequence[float], errors: Sequence[float]) -> bytes:

@@ -10,7 +10,8 @@ from concurrent.futures import Executor, Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from typing import Any, Protocol
 
-THREADS = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1")
+# One thread each, and no module of the working directory: a signal.py there must not be run by a worker.
+THREADS = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1") | {"PYTHONSAFEPATH": "1"}
 PR_SET_PDEATHSIG = 1
 
 
@@ -93,9 +94,10 @@ class Pool:
     def _start(self) -> None:
         self._processes: set[Any] = set()
         context = multiprocessing.get_context("spawn")
-        self._executor: Executor = ProcessPoolExecutor(
-            self.count, mp_context=context, initializer=become_worker, initargs=(os.getpid(),)
-        )
+        with _environment(THREADS):  # the pool's semaphores start a process that tracks them
+            self._executor: Executor = ProcessPoolExecutor(
+                self.count, mp_context=context, initializer=become_worker, initargs=(os.getpid(),)
+            )
 
 
 def become_worker(parent: int) -> None:

@@ -11,6 +11,7 @@ ten seconds; when a block is complete its mean and the slope of the line through
 which holds until the next block is complete.
 """
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -22,6 +23,7 @@ from compensation.derivative import differentiate
 from compensation.memory import NO_MEMORY, Memory, follow_lag, follow_play
 from compensation.samples import check_time
 from studies.errors import InputError, nearest
+from studies.models.bias_c import CausalBias, write_c
 from studies.models.file import Model, Source, make_part
 from studies.record import COMPENSATED, Record
 
@@ -32,6 +34,7 @@ Array = NDArray[np.float64]
 OUTPUTS = {"bias_deg_per_h": "deg/h", "measured_rate_deg_per_s": "deg/s"}
 WIDENED = 0.05
 BLOCK = 10.0  # s over which the frequency is averaged before it is used
+TEST_ROWS = 80  # of the emitted code
 LEAST_BLOCKS = 3  # and half a window, before a causal rate is known
 
 
@@ -73,9 +76,23 @@ def compensate(model: Model, record: Record, *, extrapolate: bool) -> dict[str, 
 
 def emit_c(model: Model) -> str:
     """Return the model as C99 for firmware, with a table of its own to test it."""
-    from studies.models.bias_c import write_c
-
-    return write_c(model)
+    terms, coefficients = read_terms(model)
+    column = variable_column(model)
+    law = CausalBias(
+        column=column,
+        unit=OUTPUTS[model.compensates],
+        reference=reference_of(model),
+        terms=terms,
+        coefficients=tuple(coefficients.tolist()),
+        memory=memory_of(model),
+        window=model.number("rate_window_s", above=0),
+        lag=model.number("rate_lag_s", least=0),
+        block=block_length(model),
+        blocks=LEAST_BLOCKS,
+        values=model.range_of(column),
+        rates=model.range_of(rate_name(column)),
+    )
+    return write_c(model, law, _test_rows(model))
 
 
 def _predict_centred(model: Model, time: Array, values: Array, extrapolate: bool) -> Array:
@@ -195,6 +212,26 @@ def unit_of_term(output: str, name: str, variable: Variable) -> str:
     a, b = TERMS.get(name, (1, 0))
     factors = [*[unit] * a, *[f"({unit}/s)"] * b]
     return f"{output}/{factors[0]}" if len(factors) == 1 else f"{output}/({'*'.join(factors)})"
+
+
+def _test_rows(model: Model) -> list[tuple[float, ...]]:
+    """Inputs inside the calibrated range, with what Python makes of them."""
+    column, window = variable_column(model), model.number("rate_window_s")
+    (low, high), (r_low, r_high) = model.range_of(column), model.range_of(rate_name(column))
+    time = np.arange(TEST_ROWS) * window / 24
+    middle, speed = (low + high) / 2, 0.4 * max(abs(r_low), abs(r_high))
+    speed = min(speed, 0.3 * (high - low) / time[-1])
+    value = middle + (0.0 if r_low <= 0 <= r_high else (r_low + r_high) / 2) * (time - time[-1] / 2)
+    value = np.round(value + speed * window / 3 * np.sin(time * 3 / window), 9)
+    output = np.round(1.0 + 0.25 * np.cos(0.7 * np.arange(TEST_ROWS)), 9)
+    causal = model if model.number("rate_lag_s") > 0 else _made_causal(model)
+    record = Record({"time_s": time, column: value, model.compensates: output})
+    expected = compensate(causal, record, extrapolate=True)[f"{COMPENSATED}{model.compensates}"]
+    return list(zip(time.tolist(), output.tolist(), value.tolist(), expected.tolist(), strict=True))
+
+
+def _made_causal(model: Model) -> Model:
+    return replace(model, settings={**model.settings, "rate_lag_s": model.number("rate_window_s") / 2})
 
 
 def _reference_key(column: str) -> str:

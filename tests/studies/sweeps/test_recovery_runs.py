@@ -2,7 +2,10 @@
 
 import contextlib
 import json
+import math
+import os
 import signal
+import sqlite3
 import subprocess
 import sys
 import time
@@ -15,7 +18,9 @@ import pytest
 from studies.errors import InputError
 from studies.sweeps.export import export_results
 from studies.sweeps.results import open_results
+from studies.sweeps.row import Row
 from studies.sweeps.run import run_study
+from studies.sweeps.store import claim_store
 from tests.studies.sweeps.processes import environment, rows_of, spec_of, words_of
 
 X = 'name = "user.x"\nlow = 0.0\nhigh = 1.0'
@@ -149,7 +154,7 @@ def test_a_design_that_kills_its_worker_is_found_and_the_rest_is_computed(tmp_pa
     found = json.loads(done.stdout)
     assert (found["done"], found["failed"]) == (8, 1)
     assert "worker process ended" in found["reasons"][0]["reason"]
-    assert [place for place, status, _ in rows_of(tmp_path / "out") if status == "failed"] == [3]
+    assert [place for place, status, _ in rows_of(tmp_path / "out") if status == "lost"] == [3]
 
 
 def test_python_needs_to_be_allowed_and_must_exist(tmp_path, functions, hrg):
@@ -253,3 +258,98 @@ def test_dry_run_says_cases_time_and_memory_and_keeps_nothing(tmp_path, hrg):
     assert found["seconds"] > 0
     assert found["memory_MB"] > 10
     assert not list(tmp_path.iterdir())
+
+
+def test_a_script_without_a_guard_is_told_and_keeps_no_result(tmp_path, functions):
+    """Spawned workers run the script again and die: no NaN is stored as finished; with workers=1 it computes here."""
+    spec = tmp_path / "plain.toml"
+    spec.write_text(
+        'schema = "hrg.study/1"\nname = "plain"\ncard = "free-dome"\n[sampling]\nmethod = "grid"\nsolver = "full"\nbatch = 1\n'
+        '[[parameter]]\nname = "resonator.thickness_mm"\nvalues = [0.8, 0.9, 1.0]\n[[quantity]]\nname = "frequency"\n'
+        'theory = "rayleigh"\n'
+    )
+    script = tmp_path / "script.py"
+
+    def run(workers):
+        script.write_text(
+            f"from studies.sweeps.run import run_study\nresults = run_study({str(spec)!r}, {str(tmp_path / 'out')!r}, workers={workers})\n"
+            "print(results.store.counts())\n"
+        )
+        return subprocess.run(
+            [sys.executable, str(script)], capture_output=True, text=True, timeout=120, env=environment(), check=False
+        )
+
+    refused = run(2)
+    assert refused.returncode != 0
+    assert "MissingEnvironment" in refused.stderr
+    assert "workers=1" in refused.stderr
+    assert rows_of(tmp_path / "out") == []
+    assert "{'ok': 3}" in run(1).stdout
+
+
+def test_a_flipped_bit_is_found_and_its_case_computed_again(tmp_path, functions, hrg):
+    spec = tmp_path / "square.toml"
+    spec.write_text(spec_of("square", 'method = "grid"', 'name = "user.x"\nvalues = [1, 2, 3]'))
+    run = ("study", "run", spec, "--out", tmp_path / "out", "--allow-python")
+    assert hrg(*run).returncode == 0
+    with sqlite3.connect(tmp_path / "out" / "study.sqlite") as store:
+        (numbers,) = store.execute("SELECT numbers FROM run_case WHERE position = 1").fetchone()
+        flipped = bytes([*numbers[:6], numbers[6] ^ 16, *numbers[7:]])
+        store.execute("UPDATE run_case SET numbers = ? WHERE position = 1", (flipped,))
+    store.close()
+    export = hrg("study", "export", tmp_path / "out")
+    assert export.returncode == 2
+    assert "case 1 is damaged" in export.stderr
+    mended = hrg(*run)
+    assert mended.returncode == 0, mended.stderr
+    assert "1 damaged cases are computed again" in mended.stderr
+    assert hrg("study", "export", tmp_path / "out").returncode == 0
+
+
+def test_failed_cases_are_computed_again_when_asked(tmp_path, functions, hrg):
+    spec = tmp_path / "spec.toml"
+    spec.write_text(spec_of("square", 'method = "grid"', 'name = "user.x"\nvalues = [1, 2, 3]'))
+    run = ("study", "run", spec, "--out", tmp_path / "out", "--allow-python", "--json")
+    assert hrg(*run).returncode == 0
+    with sqlite3.connect(tmp_path / "out" / "study.sqlite") as store:
+        store.execute("DELETE FROM run_case WHERE position = 2")
+    store.close()
+    with claim_store(tmp_path / "out") as store:
+        store.begin_run({})
+        store.add([(b"x", 2, "{}", Row("failed", "a passing fault", (math.nan,), (math.nan,), 0.1))])
+    assert json.loads(hrg(*run).stdout)["failed"] == 1
+    assert json.loads(hrg(*run, "--retry-failed").stdout)["failed"] == 0
+
+
+def test_modules_of_the_working_directory_are_not_run_by_workers(tmp_path, monkeypatch):
+    (tmp_path / "signal.py").write_text("open('was_run', 'w').write('x')\nraise SystemExit('mine')\n")
+    monkeypatch.chdir(tmp_path)
+    spec = tmp_path / "spec.toml"
+    spec.write_text(
+        'schema = "hrg.study/1"\nname = "plain"\ncard = "free-dome"\n[sampling]\nmethod = "grid"\nsolver = "full"\nbatch = 1\n'
+        '[[parameter]]\nname = "resonator.thickness_mm"\nvalues = [0.8, 0.9, 1.0]\n[[quantity]]\nname = "frequency"\n'
+        'theory = "rayleigh"\n'
+    )
+    (tmp_path / "bin").mkdir()
+    (tmp_path / "bin" / "hrg.py").write_text("from studies.cli import run\n\nif __name__ == '__main__':\n    run()\n")
+    words = [
+        sys.executable,
+        str(tmp_path / "bin" / "hrg.py"),
+        "study",
+        "run",
+        str(spec),
+        "--out",
+        str(tmp_path / "out"),
+    ]
+    done = subprocess.run([*words, "--workers", "2"], capture_output=True, text=True, env=environment(), check=False)
+    assert done.returncode == 0, done.stderr
+    assert not (tmp_path / "was_run").exists()
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="root may write everywhere")
+def test_a_finished_study_in_a_read_only_folder_can_be_read(tmp_path, functions, hrg):
+    spec = tmp_path / "square.toml"
+    spec.write_text(spec_of("square", 'method = "grid"', 'name = "user.x"\nvalues = [1, 2, 3]'))
+    assert hrg("study", "run", spec, "--out", tmp_path / "out", "--allow-python").returncode == 0
+    (tmp_path / "out").chmod(0o555)
+    assert hrg("study", "export", tmp_path / "out", "--out", tmp_path / "r.csv").returncode == 0

@@ -1,0 +1,114 @@
+"""Files in and out: devices, pipes and links stay what they are; what cannot be a file is named in a sentence."""
+
+import os
+import subprocess
+import sys
+import threading
+
+import pytest
+
+from studies.cli import main
+from studies.errors import InputError
+from studies.files.reading import read_bytes
+from studies.files.writing import write_text
+
+
+def test_a_link_is_followed_and_stays_a_link(tmp_path):
+    (tmp_path / "real.txt").write_text("old")
+    (tmp_path / "link.txt").symlink_to(tmp_path / "real.txt")
+    (tmp_path / "dangling.txt").symlink_to(tmp_path / "new.txt")
+    for name in ("link.txt", "dangling.txt"):
+        write_text(tmp_path / name, "new")
+        assert (tmp_path / name).is_symlink()
+    assert (tmp_path / "real.txt").read_text() == (tmp_path / "new.txt").read_text() == "new"
+
+
+def test_a_pipe_is_written_into_and_stays_a_pipe(tmp_path):
+    pipe, got = tmp_path / "pipe", []
+    os.mkfifo(pipe)
+    reader = threading.Thread(target=lambda: got.append(pipe.read_text()))
+    reader.start()
+    write_text(pipe, "hello")
+    reader.join(timeout=10)
+    assert got == ["hello"]
+    assert pipe.is_fifo()
+    assert os.listdir(tmp_path) == ["pipe"]
+
+
+def test_a_device_is_written_into_and_stays_a_device():
+    before = os.stat("/dev/null").st_rdev
+    write_text("/dev/null", "nothing")
+    assert os.stat("/dev/null").st_rdev == before != 0
+
+
+@pytest.mark.parametrize("name", ["loop", "x" * 300 + ".txt", "a\0b.txt", "folder"])
+def test_what_cannot_be_written_is_named(tmp_path, name):
+    (tmp_path / "loop").symlink_to(tmp_path / "loop")
+    (tmp_path / "folder").mkdir()
+    with pytest.raises(InputError, match=r"cannot be written|is a folder|zero byte"):
+        write_text(str(tmp_path / name), "x")
+    assert sorted(os.listdir(tmp_path)) == ["folder", "loop"]
+
+
+def test_devices_pipes_and_giants_are_not_read(tmp_path):
+    os.mkfifo(tmp_path / "pipe")
+    for path in ("/dev/zero", tmp_path / "pipe"):
+        with pytest.raises(InputError, match="is a device or a pipe"):
+            read_bytes(path)
+    with (tmp_path / "giant.csv").open("wb") as file:
+        file.truncate(3 * 1024**3)
+    with pytest.raises(InputError, match="has 3,221 MB"):
+        read_bytes(tmp_path / "giant.csv")
+    with pytest.raises(InputError, match="cannot be the name of a file"):
+        read_bytes("a\0b")
+
+
+def test_a_hundred_thousand_columns_are_refused_quickly(tmp_path, capsys):
+    names = ",".join(["time_s", *(f"c{k}" for k in range(100_000))])
+    (tmp_path / "wide.csv").write_text(names + "\n" + ",".join(["1"] * 100_001) + "\n")
+    assert main(["fit", "bias", str(tmp_path / "wide.csv")]) == 2
+    assert "unknown column 'c0'" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("shell", "status", "said"),
+    [
+        ("hrg cards --json >&-", 3, "standard output is closed"),
+        ("hrg derive --latex > /dev/full", 3, "No space left on device"),
+        ("PYTHONIOENCODING=ascii hrg tcf free-dome > {folder}/out.txt", 0, ""),
+        ("cd {folder}/gone && rmdir {folder}/gone && hrg modes free-dome --theory rayleigh > /dev/null", 0, ""),
+    ],
+)
+def test_closed_full_and_plain_terminals(tmp_path, shell, status, said):
+    if "/dev/full" in shell and not os.path.exists("/dev/full"):
+        pytest.skip("no /dev/full on this system")
+    (tmp_path / "gone").mkdir()
+    code = "import sys; from studies.cli import run; sys.argv = ['hrg', *sys.argv[1:]]; run()"
+    command = shell.replace("hrg ", f'{sys.executable} -c "{code}" ').replace("{folder}", str(tmp_path))
+    environment = {**os.environ, "PYTHONPATH": os.getcwd()}
+    done = subprocess.run(
+        ["sh", "-c", command], capture_output=True, text=True, env=environment, timeout=120, check=False
+    )
+    assert done.returncode == status, done.stderr
+    assert said in done.stderr
+    assert "Traceback" not in done.stderr
+
+
+def test_a_request_to_end_counts_as_ctrl_c(tmp_path):
+    """SIGTERM during a long study: 130, what was computed is kept, and it can be resumed."""
+    (tmp_path / "study.toml").write_text(
+        'schema = "hrg.study/1"\nname = "long"\ncard = "free-dome"\n[sampling]\nmethod = "sobol"\ncases = 4096\n'
+        'solver = "full"\n[[parameter]]\nname = "resonator.thickness_mm"\nlow = 0.8\nhigh = 1.0\n[[quantity]]\n'
+        'name = "frequency"\n'
+    )
+    code = "import sys; from studies.cli import run; sys.argv = ['hrg', *sys.argv[1:]]; run()"
+    words = ["study", "run", str(tmp_path / "study.toml"), "--out", str(tmp_path / "out"), "--workers", "1"]
+    environment = {**os.environ, "PYTHONPATH": os.getcwd()}
+    process = subprocess.Popen([sys.executable, "-c", code, *words], stderr=subprocess.PIPE, text=True, env=environment)
+    while not (tmp_path / "out" / "study.sqlite").exists():
+        assert process.poll() is None, process.stderr.read()
+    threading.Event().wait(1.0)
+    process.terminate()
+    _, said = process.communicate(timeout=60)
+    assert process.returncode == 130, said
+    assert "Traceback" not in said
