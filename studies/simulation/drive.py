@@ -30,6 +30,8 @@ LUMPS = ("housing", "base", "resonator")
 """Parts of the heat path whose temperature at the start may depart from the settled one."""
 MOST_BOUNDARY_ROWS = 20_000
 MOST_ROWS = 40_000_000
+LEAST_JUMP = 0.5  # K from one row to the next, and
+STEEP = 20.0  # times the usual change near it: a set point that jumps, rather than a ramp
 
 
 @dataclass(frozen=True)
@@ -48,6 +50,8 @@ class Drive:
         How far (K) the "housing", the "base" and the "resonator" depart at the start from having settled at the first value.
     commands : mapping
         Amplitude and voltage squared (V²), quadrature (V), pattern angle (rad) at the rows; what is absent does not move.
+    shift : float, s
+        How much later than its profile says the boundary changes: the clock of a chamber.
     start : float, s
         Since the start of the first run of the campaign.
     """
@@ -57,6 +61,7 @@ class Drive:
     profile: Profile
     initial: Mapping[str, float] = field(default_factory=dict)
     commands: Mapping[str, Array] = field(default_factory=dict)
+    shift: float = 0.0
     start: float = 0.0
 
     def __post_init__(self) -> None:
@@ -70,6 +75,18 @@ class Drive:
     def lumps(self) -> tuple[str, ...]:
         """Parts whose initial temperature is free."""
         return LUMPS if self.boundary == "chamber" else LUMPS[1:]
+
+    @property
+    def imposed(self) -> Profile:
+        """Profile of the boundary with its shift, over all the rows."""
+        if self.shift == 0:
+            return self.profile
+        t, T = self.profile.time + self.shift, self.profile.value
+        if t[0] > self.time[0]:
+            t, T = np.insert(t, 0, self.time[0]), np.insert(T, 0, T[0])
+        if t[-1] < self.time[-1]:
+            t, T = np.append(t, self.time[-1]), np.append(T, T[-1])
+        return Profile(t, T)
 
     def with_initial(self, **initial: float) -> "Drive":
         """Return the drive with another thermal state at the start."""
@@ -137,14 +154,9 @@ def drive_by_record(record: Record, boundary: Boundary | None = None, time: Arra
     if np.count_nonzero(known) < 2:
         raise InputError(f"{record.path}: {COLUMN[boundary]} has fewer than two values.")
     t, T = rows[known], values[known] + ZERO_CELSIUS
-    if len(t) > MOST_BOUNDARY_ROWS:
-        size = int(np.ceil(len(t) / MOST_BOUNDARY_ROWS))
-        edges = np.arange(0, len(t), size)
-        counts = np.diff(np.append(edges, len(t)))
-        means = np.add.reduceat(np.array([t, T]), edges, axis=1) / counts
-        t, T = np.concatenate([[t[0]], means[0], [t[-1]]]), np.concatenate([[means[1, 0]], means[1], [means[1, -1]]])
-        apart = np.diff(t, prepend=-np.inf) > 0
-        t, T = t[apart], T[apart]
+    if boundary == "chamber":
+        t, T = _with_jumps(t, T, _settled_at(record))
+    t, T = _thinned(t, T)
     if t[0] > rows[0]:
         t, T = np.insert(t, 0, rows[0]), np.insert(T, 0, T[0])
     if t[-1] < rows[-1]:
@@ -154,4 +166,42 @@ def drive_by_record(record: Record, boundary: Boundary | None = None, time: Arra
         for name, (column, factor, power) in COMMANDS.items()
         if column in record and np.isfinite(record[column]).all()
     }
-    return Drive(rows if time is None else time, boundary, Profile(t, T), commands=commands if time is None else {})
+    if time is not None:
+        commands = {name: np.interp(time, rows, values) for name, values in commands.items()}
+    return Drive(rows if time is None else time, boundary, Profile(t, T), commands=commands)
+
+
+def _settled_at(record: Record) -> float | None:
+    """Temperature (K) of the housing when the record begins, where it is measured."""
+    if COLUMN["housing"] not in record:
+        return None
+    first = record[COLUMN["housing"]][: max(1, len(record) // 1000)]
+    return float(np.nanmedian(first)) + ZERO_CELSIUS if np.isfinite(first).any() else None
+
+
+def _with_jumps(t: Array, T: Array, settled: float | None) -> tuple[Array, Array]:
+    """Rows of a set point: where it jumps between two rows, it does so at the second, and at the start from `settled`."""
+    step = np.abs(np.diff(T))
+    near = np.array([np.median(step[max(k - 5, 0) : k + 6]) for k in np.flatnonzero(step > LEAST_JUMP)])
+    after = np.flatnonzero(step > LEAST_JUMP)[step[step > LEAST_JUMP] > STEEP * near] + 1
+    t, T = np.insert(t, after, t[after]), np.insert(T, after, T[after - 1])
+    if settled is not None and abs(T[0] - settled) > LEAST_JUMP:
+        t, T = np.insert(t, 0, t[0]), np.insert(T, 0, settled)
+    return t, T
+
+
+def _thinned(t: Array, T: Array) -> tuple[Array, Array]:
+    """Means of rows that are too many, the first and the last kept; jumps stay where they are."""
+    if len(t) <= MOST_BOUNDARY_ROWS:
+        return t, T
+    size = int(np.ceil(len(t) / MOST_BOUNDARY_ROWS))
+    jumps = np.flatnonzero(np.diff(t) == 0) + 1
+    edges = np.unique(np.concatenate([np.arange(0, len(t), size), jumps]))
+    counts = np.diff(np.append(edges, len(t)))
+    means = np.add.reduceat(np.array([t, T]), edges, axis=1) / counts
+    sides = np.sort(np.concatenate([[0], jumps - 1, jumps, [len(t) - 1]])).astype(np.intp)
+    both = np.array([np.concatenate([means[0], t[sides]]), np.concatenate([means[1], T[sides]])])
+    order = np.lexsort((np.concatenate([edges, sides]), both[0]))
+    found = both[:, order]
+    fresh = np.concatenate([[True], (np.diff(found[0]) > 0) | (np.diff(found[1]) != 0)])
+    return found[0, fresh], found[1, fresh]

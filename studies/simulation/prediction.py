@@ -5,7 +5,8 @@ Temperatures and their derivatives come from the network (`thermal.sensitivity`)
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from copy import copy
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -32,6 +33,10 @@ Array = NDArray[np.float64]
 MARGIN = 10.0  # K beyond the boundary in which the frequency stays known: effects and self-heating
 STEP = 1e-3  # of a value, or of its standard deviation: the differences that give derivatives
 INITIAL = "initial."
+SHIFT = "shift"
+SHIFT_STEP = 1.0  # s
+OF_WALL = ("thermal.conductivity_W_per_m_K", "thermal.heat_capacity_J_per_kg_K")
+"""Values of the heat path that the loss of a wall takes as well."""
 LAG = "noise.housing_lag_s"
 
 
@@ -62,7 +67,10 @@ class Prediction:
 
 
 def predict(
-    instrument: "Instrument", drive: Drive, derivatives: Sequence[str] = (), law: "FrequencyLaw | None" = None
+    instrument: "Instrument",
+    drive: Drive,
+    derivatives: "Sequence[str] | Variations" = (),
+    law: "FrequencyLaw | None" = None,
 ) -> Prediction:
     """Predict the record of a run.
 
@@ -70,8 +78,9 @@ def predict(
     ----------
     instrument : Instrument
     drive : Drive
-    derivatives : names
-        Keys of the card ("thermal.mount_conductance_W_per_K"), or "initial.base" (K) and the other lumps of the drive.
+    derivatives : names, or `Variations` of this instrument that several runs share
+        Keys of the card ("thermal.mount_conductance_W_per_K"), "initial.base" (K) and the other lumps of the drive, and
+        "shift" (s).
     law : FrequencyLaw, optional
         One that was built before for this instrument and a range that is wide enough.
 
@@ -82,37 +91,38 @@ def predict(
     """
     if law is None:
         law = law_for(instrument, drive)
-    network = build_network(instrument, boundary=drive.boundary)
+    varied = derivatives if isinstance(derivatives, Variations) else Variations(instrument, law, tuple(derivatives))
+    network = varied.network(drive.boundary)
     rows = observed_rows(instrument, law, tuple(node.name for node in network.nodes))
     boundary: dict[str, Profile] = {drive.boundary: _behind_sensor(instrument, drive)}
     departure = sum(
         (value * lump_shape(network, name) for name, value in drive.initial.items()), np.zeros(network.count)
     )
-    tau = slowest_lag(network, instrument.reference_temperature)
-    values = [_Value(instrument, drive, network, law, name, tau) for name in derivatives]
-    warming = [value for value in values if value.change is not None]
-    changes = [value.change for value in warming if value.change is not None]
-    thermal = respond(network, boundary, drive.time, rows, changes, departure)
+    changes = {name: change for name in varied.names if (change := varied.change(name, drive)) is not None}
+    thermal = respond(network, boundary, drive.time, rows, list(changes.values()), departure)
     found = Temperatures(thermal.temperature, thermal.rate)
     if drive.boundary == "housing":
         found.value[:, 0] = boundary["housing"].at(drive.time)
-    damping = damping_law(instrument, law.lowest, law.highest)
-    columns = read_out(instrument, law, drive, found, tau, damping)
+    columns = read_out(instrument, law, drive, found, varied.lag(drive.boundary), varied.damping)
     check_loss(instrument, columns["inverse_q"])
     slopes = {}
-    for value in values:
+    for name in varied.names:
+        if name == SHIFT:
+            slopes[name] = _slope_of_shift(instrument, drive, varied, law)
+            continue
         along = partial(_still, found)
-        if value.change is not None:
-            k = warming.index(value)
+        if name in changes:
+            k = list(changes).index(name)
             slope = thermal.slope[k]
-            for profile in changes[k].boundaries.values():
-                slope[:, 0] = profile.at(drive.time)
+            if drive.boundary == "housing" and changes[name].boundaries:
+                slope[:, 0] = changes[name].boundaries["housing"].at(drive.time)
             along = partial(found.moved, slope, thermal.rate_slope[k])
-        above, below = (
-            read_out(value.instrument(d), value.law(d), drive, along(d), lag, value.damping(d, damping))
-            for d, lag in zip(value.ends, value.lags, strict=True)
+        below, above = (
+            read_out(side.instrument, side.law, drive, along(side.distance), side.lag(drive.boundary), side.damping)
+            for side in varied.sides(name)
         )
-        slopes[value.name] = {name: (above[name] - below[name]) / value.step for name in columns}
+        step = np.ptp([side.distance for side in varied.sides(name)])
+        slopes[name] = {column: (above[column] - below[column]) / step for column in columns}
     return Prediction(drive, columns, slopes, found.value[:, 0], law, network)
 
 
@@ -128,7 +138,7 @@ def _behind_sensor(instrument: "Instrument", drive: Drive) -> Profile:
     """Temperature that is imposed: of the housing what its sensor will have read, y + τ dy/dt."""
     time_constant = instrument.noise.housing_lag_s
     if drive.boundary == "chamber" or time_constant == 0:
-        return drive.profile
+        return drive.imposed
     return Profile(drive.profile.time, drive.profile.value + time_constant * _slope_of_reading(drive.profile))
 
 
@@ -139,70 +149,127 @@ def _slope_of_reading(read: Profile) -> Array:
     return slope
 
 
+def _slope_of_shift(
+    instrument: "Instrument", drive: Drive, varied: "Variations", law: "FrequencyLaw"
+) -> dict[str, Array]:
+    """Derivative (1/s) of every column by the time of the boundary: a difference, since jumps of the profile move."""
+    here = varied.with_names(())
+    below, above = (
+        predict(instrument, replace(drive, shift=drive.shift + d), here, law).columns for d in (-SHIFT_STEP, SHIFT_STEP)
+    )
+    return {name: (above[name] - below[name]) / (2 * SHIFT_STEP) for name in above}
+
+
 def _still(found: Temperatures, _: float) -> Temperatures:
     return found
 
 
-class _Value:
-    """One value of a card: what a small change of it does to the network, the law and the instrument."""
+@dataclass(frozen=True)
+class Side:
+    """An instrument with one value moved a little, its law, and its networks by boundary."""
 
-    def __init__(
-        self, instrument: "Instrument", drive: Drive, network: Network, law: "FrequencyLaw", name: str, lag: float
-    ) -> None:
-        self.name, self.base, self.base_law = name, instrument, law
-        self.moves = not name.startswith(INITIAL)
-        self.step, self.ends, self.lags = 1.0, (0.5, -0.5), (lag, lag)
-        if not self.moves:
-            self.change: Change | None = no_change(network, initial=lump_shape(network, name.removeprefix(INITIAL)))
-            return
-        self.value, self.step, self.ends = _value_and_ends(instrument, name)
-        self.change = self._change(network, drive)
+    distance: float
+    instrument: "Instrument"
+    law: "FrequencyLaw"
+    damping: DampingLaw | None
+    networks: dict[str, Network] = field(default_factory=dict)
+    lags: dict[str, float] = field(default_factory=dict)
 
-    def instrument(self, distance: float) -> "Instrument":
-        """Return the instrument with the value moved."""
-        return self.base.with_values({self.name: self.value + distance}) if self.moves else self.base
+    def network(self, boundary: str) -> Network:
+        """Return its network, built once."""
+        if boundary not in self.networks:
+            self.networks[boundary] = build_network(self.instrument, boundary=boundary)
+        return self.networks[boundary]
 
-    def law(self, distance: float) -> "FrequencyLaw":
-        """Return the law of that instrument."""
-        table = self.name.partition(".")[0]
-        if not self.moves or table not in ("material", "resonator"):
-            return self.base_law
-        moved = self.instrument(distance)
-        if table == "material":
-            return self.base_law.with_material(moved.material)
-        return law_of(moved, self.base_law.lowest, self.base_law.highest, self.base_law.theory)
+    def lag(self, boundary: str) -> float:
+        """Slowest time constant (s) of the resonator behind its housing, in which effects count."""
+        if not self.instrument.effects:
+            return 1.0
+        if boundary not in self.lags:
+            self.lags[boundary] = slowest_lag(self.network(boundary), self.instrument.reference_temperature)
+        return self.lags[boundary]
 
-    def damping(self, distance: float, base: DampingLaw | None) -> DampingLaw | None:
-        """Return the loss of that instrument."""
-        of_wall = self.name in ("thermal.conductivity_W_per_m_K", "thermal.heat_capacity_J_per_kg_K")
-        if base is None or not (self.name.startswith(("loss.", "material.", "resonator.")) or of_wall):
-            return base
-        return damping_law(self.instrument(distance), self.base_law.lowest, self.base_law.highest)
 
-    def _change(self, network: Network, drive: Drive) -> Change | None:
-        """What the value does to the temperatures; None for nothing."""
-        if self.name == LAG and drive.boundary == "housing":
+class Variations:
+    """An instrument and its neighbours, one value moved to either side; for the derivatives of any number of runs."""
+
+    def __init__(self, instrument: "Instrument", law: "FrequencyLaw", names: Sequence[str]) -> None:
+        self.names = tuple(names)
+        self._here = Side(0.0, instrument, law, damping_law(instrument, law.lowest, law.highest))
+        self._known = {value.name: value for value in instrument.uncertain}
+        self._sides: dict[str, tuple[Side, Side]] = {}
+
+    def with_names(self, names: Sequence[str]) -> "Variations":
+        """Return the same with other names; what has been built is shared."""
+        other = copy(self)
+        other.names = tuple(names)
+        return other
+
+    def network(self, boundary: str) -> Network:
+        """Return the network of the instrument itself."""
+        return self._here.network(boundary)
+
+    @property
+    def damping(self) -> DampingLaw | None:
+        """Its loss over temperature, where the parts of a budget make it."""
+        return self._here.damping
+
+    def lag(self, boundary: str) -> float:
+        """Slowest time constant (s) of its resonator behind the housing."""
+        return self._here.lag(boundary)
+
+    def sides(self, name: str) -> tuple[Side, Side]:
+        """Return the instrument with a value a little below and a little above."""
+        if name not in self._sides:
+            self._sides[name] = self._build(name)
+        return self._sides[name]
+
+    def change(self, name: str, drive: Drive) -> Change | None:
+        """What a value does to the temperatures; None for nothing."""
+        network = self.network(drive.boundary)
+        if name.startswith(INITIAL):
+            return no_change(network, initial=lump_shape(network, name.removeprefix(INITIAL)))
+        if name == LAG and drive.boundary == "housing":
             return no_change(network, {"housing": Profile(drive.profile.time, _slope_of_reading(drive.profile))})
-        if self.name.partition(".")[0] not in ("thermal", "material", "resonator"):
+        if name == SHIFT or name.partition(".")[0] not in ("thermal", "material", "resonator"):
             return None
-        above, below = (build_network(self.instrument(d), boundary=drive.boundary) for d in self.ends)
-        if self.base.effects:  # they count in the resonator's slowest lag
-            T0 = self.base.reference_temperature
-            self.lags = (slowest_lag(above, T0), slowest_lag(below, T0))
-        change = difference(above, below, self.step, temperature=self.base.reference_temperature)
+        below, above = self.sides(name)
+        step, T0 = above.distance - below.distance, self._here.instrument.reference_temperature
+        change = difference(above.network(drive.boundary), below.network(drive.boundary), step, temperature=T0)
         return change if change.moves else None
 
+    def _build(self, name: str) -> tuple[Side, Side]:
+        here = self._here
+        if name.startswith(INITIAL):
+            low, high = (replace(here, distance=d) for d in (-0.05, 0.05))
+            return low, high
+        value, ends = self._value_and_ends(name)
+        table = name.partition(".")[0]
+        sides = []
+        for distance in ends:
+            moved, law = here.instrument.with_values({name: value + distance}), here.law
+            if table == "material":
+                law = law.with_material(moved.material)
+            elif table == "resonator":
+                law = law_of(moved, law.lowest, law.highest, law.theory)
+            damping = here.damping
+            if damping is not None and (table in ("loss", "material", "resonator") or name in OF_WALL):
+                damping = damping_law(moved, law.lowest, law.highest)
+            same = table not in ("thermal", "material", "resonator")
+            known = (here.networks, here.lags) if same else ({}, {})
+            sides.append(Side(distance, moved, law, damping, *known))
+        return sides[0], sides[1]
 
-def _value_and_ends(instrument: "Instrument", name: str) -> tuple[float, float, tuple[float, float]]:
-    """Return a number of the card, a step that is small against it and its uncertainty, and its ends within the bounds."""
-    found = next((one for one in instrument.uncertain if one.name == name), None)
-    if found is None:
-        value = _number(instrument, name)
-        step = STEP * (abs(value) or 1.0)
-        return value, step, (step / 2, -step / 2)
-    step = STEP * (min(found.sd, abs(found.value)) if found.logarithmic else found.sd)
-    ends = np.clip(found.value + np.array([step / 2, -step / 2]), found.low, found.high) - found.value
-    return found.value, float(ends[0] - ends[1]), (float(ends[0]), float(ends[1]))
+    def _value_and_ends(self, name: str) -> tuple[float, tuple[float, float]]:
+        """Return a number of the card and small steps to both sides of it, within its bounds."""
+        found = self._known.get(name)
+        if found is None:
+            value = _number(self._here.instrument, name)
+            step = STEP * (abs(value) or 1.0)
+            return value, (-step / 2, step / 2)
+        step = STEP * (min(found.sd, abs(found.value)) if found.logarithmic else found.sd)
+        ends = np.clip(found.value + np.array([-step / 2, step / 2]), found.low, found.high) - found.value
+        return found.value, (float(ends[0]), float(ends[1]))
 
 
 def _number(instrument: "Instrument", name: str) -> float:

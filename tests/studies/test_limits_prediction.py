@@ -1,5 +1,7 @@
 """The one forward model: its derivatives against differences, and its boundaries against each other."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -88,6 +90,27 @@ def test_the_measured_housing_gives_the_record_that_the_chamber_gives(card, driv
     )
     assert again.columns["frequency_Hz"][late] == pytest.approx(whole.columns["frequency_Hz"][late], abs=2e-3)
     assert again.columns["bias_deg_per_h"][late] == pytest.approx(whole.columns["bias_deg_per_h"][late], abs=5e-3)
+
+
+def test_the_recorded_chamber_gives_the_record_again_with_its_jumps_and_its_start():
+    """The column is sampled, yet a set point that jumps is no ramp, and before the first row the housing says what was."""
+    card = load_card("hrg-30mm")
+    run = simulate_run(card, parse_profile("staircase 20 0 10 1h then ramp 0 20 1"), 0.1, noise=False, theory="shell")
+    found = predict(card, drive_by_record(run.record, "chamber"), law=run.law)
+    reading = predict(card, run.prediction.drive, law=run.law).columns["housing_temperature_degC"]
+    assert found.columns["housing_temperature_degC"] == pytest.approx(reading, abs=2e-5)
+    assert found.columns["frequency_Hz"] == pytest.approx(run.record["frequency_Hz"], abs=2e-5)
+
+
+def test_a_later_chamber_is_the_same_record_later(drive, law):
+    card = load_card("hrg-30mm")
+    moved = predict(card, replace(drive, shift=40.0), ["shift"], law)
+    here = predict(card, drive, law=law).columns["frequency_Hz"]
+    later = TIME > 400.0
+    assert moved.columns["frequency_Hz"][later] == pytest.approx(np.interp(TIME[later] - 40.0, TIME, here), abs=2e-4)
+    slope = np.gradient(moved.columns["frequency_Hz"], TIME)
+    smooth = later & (np.abs(TIME - 3640.0) > 60.0) & (TIME < TIME[-1])
+    assert moved.derivatives["shift"]["frequency_Hz"][smooth] == pytest.approx(-slope[smooth], abs=5e-6)
 
 
 def test_what_is_simulated_is_what_is_predicted(card, drive, law):
