@@ -85,8 +85,9 @@ def _enter(node: inspect.Type, word: str | int, raw: Any) -> inspect.Type | None
             return one.item_type
         if isinstance(word, int) and isinstance(one, inspect.TupleType) and word < len(one.item_types):
             return one.item_types[word]
-        if isinstance(word, str) and isinstance(one, inspect.DictType):
-            return one.value_type
+    tags = [one.tag for one in structs(node) if one.tag_field == word]
+    if tags:
+        return inspect.LiteralType(tuple(str(tag) for tag in tags))
     for struct in structs(node, raw) if isinstance(word, str) else ():
         for field in struct.fields:
             if field.encode_name == word:
@@ -94,9 +95,15 @@ def _enter(node: inspect.Type, word: str | int, raw: Any) -> inspect.Type | None
     return None
 
 
-def is_table(node: inspect.Type | None) -> bool:
-    """Return whether a place holds a table, never a number."""
-    return node is not None and any(isinstance(one, inspect.StructType | inspect.DictType) for one in options(node))
+def holds_number(node: inspect.Type | None) -> bool:
+    """Return whether a place may hold a number."""
+    return node is not None and any(isinstance(one, inspect.FloatType | inspect.IntType) for one in options(node))
+
+
+def holds_value(node: inspect.Type) -> bool:
+    """Return whether a place may hold a number, a text or a truth: neither a table nor tables."""
+    single = inspect.FloatType | inspect.IntType | inspect.StrType | inspect.LiteralType | inspect.BoolType
+    return any(isinstance(one, single) for one in options(node))
 
 
 def known_keys(node: inspect.Type, raw: Any = None) -> list[str]:

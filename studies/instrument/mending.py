@@ -8,7 +8,7 @@ import msgspec
 from msgspec import inspect
 
 from studies.errors import InputError, nearest
-from studies.instrument.keys import Path, describe, find, known_keys, options, structs
+from studies.instrument.keys import Path, describe, find, holds_number, known_keys, options
 
 T = TypeVar("T")
 LARGEST = 1e300
@@ -25,14 +25,14 @@ def read_keys(raw: Any, keys: type[T], where: str) -> T:
     InputError
         An unknown or missing key, a value of the wrong type or out of its bounds.
     """
-    for path, value in _leaves(raw):
-        if isinstance(value, int | float) and not isinstance(value, bool) and not -LARGEST < value < LARGEST:
-            shown = value if isinstance(value, float) else "a number too large for any instrument"
-            raise InputError(f"{spell_place(where, path)} must be a finite number, not {shown}.")
     try:
-        return msgspec.convert(raw, keys)
+        found = msgspec.convert(raw, keys)
     except msgspec.ValidationError as error:
         raise InputError(mend(str(error), raw, keys, where)) from None
+    for path, value in _leaves(raw):
+        if not _is_sound(value):
+            raise InputError(f"{spell_place(where, path)} must be a finite number, not {_short(value)}.")
+    return found
 
 
 def mend(refusal: str, raw: Any, keys: Any, where: str) -> str:
@@ -48,11 +48,15 @@ def mend(refusal: str, raw: Any, keys: Any, where: str) -> str:
     if missing := re.fullmatch(r"Object missing required field `(.*)`", what):
         return f"{spell_table(where, path)}: the key '{missing[1]}' is missing; add it."
     place = spell_place(where, path)
+    if holds_number(node) and not _is_sound(value):
+        return f"{place} must be a finite number, not {_short(value)}."
     if bound := re.fullmatch(r"Expected `(?:float|int)` (>=|<=|>|<) (\S+)", what):
         return f"{place} must be {BOUND[bound[1]]} {float(bound[2]):g}, not {value:g}."
     if re.match(r"Invalid (enum )?value", what):
-        choices = _choices(find(keys, path, raw), find(keys, path[:-1], raw))
-        return f"{place} = {value!r} is unknown{nearest(str(value), choices)}"
+        choices = [
+            str(choice) for one in options(node) if isinstance(one, inspect.LiteralType) for choice in one.values
+        ]
+        return f"{place} = {_short(value)} is unknown{nearest(str(value), choices)}"
     if re.match("Expected `", what):
         return f"{place} must be {_wanted(node)}, not {_short(value)}."
     return f"{spell_table(where, path)}: {what}"
@@ -89,7 +93,7 @@ def _wanted(node: inspect.Type) -> str:
             words.append("true or false")
         elif isinstance(one, inspect.TupleType):
             words.append(f"a list of {len(one.item_types)} numbers")
-        elif isinstance(one, inspect.ListType):
+        elif isinstance(one, inspect.ListType | inspect.VarTupleType):
             inner = plain_words(one.item_type)
             words.append(
                 f"a list of {inner}" if one.min_length is None else f"a list of {one.min_length} or more {inner}"
@@ -107,11 +111,9 @@ def plain_words(node: inspect.Type) -> str:
     return "tables" if isinstance(one, inspect.StructType) else "numbers"
 
 
-def _choices(node: inspect.Type | None, table: inspect.Type | None) -> list[str]:
-    for one in options(node) if node is not None else ():
-        if isinstance(one, inspect.LiteralType):
-            return [str(value) for value in one.values]
-    return [str(one.tag) for one in structs(table)] if table is not None else []
+def _is_sound(value: Any) -> bool:
+    """Whether a value is no number, or a finite one that an instrument can have."""
+    return isinstance(value, bool) or not isinstance(value, int | float) or -LARGEST < value < LARGEST
 
 
 def _leaves(raw: Any, path: Path = ()) -> Iterator[tuple[Path, Any]]:

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from studies.errors import InputError, nearest
-from studies.instrument.keys import describe, known_keys, structs
+from studies.instrument.keys import describe, holds_value, known_keys, structs
 from studies.instrument.mending import read_keys
 from studies.instrument.uncertain import UncertainValue, gather_uncertain, split_spreads
 
@@ -161,7 +161,8 @@ def _names(node: Any, raw: Any, before: str) -> Iterable[str]:
         for field in struct.fields:
             name = f"{before}.{field.encode_name}"
             inner = raw.get(field.encode_name) if isinstance(raw, Mapping) else None
-            if not structs(field.type):
+            below = structs(field.type)
+            if holds_value(field.type):
                 yield name
-            elif inner is not None:
+            elif inner is not None or not any(one.required for table in below for one in table.fields):
                 yield from _names(field.type, inner, name)

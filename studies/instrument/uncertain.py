@@ -17,7 +17,7 @@ from functools import reduce
 from typing import TYPE_CHECKING, Annotated, Any
 
 from studies.errors import InputError
-from studies.instrument.keys import Path, Table, bounds, find, is_table, number, priors
+from studies.instrument.keys import Path, Table, bounds, find, holds_number, number, priors
 from studies.instrument.mending import read_keys, spell_place
 from studies.instrument.units import unit_of
 
@@ -105,14 +105,14 @@ def is_spread(raw: Any) -> bool:
 def split_spreads(raw: Any, keys: Any, where: str) -> tuple[Any, dict[Path, Spread]]:
     """Return a table with plain numbers in the place of those with uncertainties, and these by their paths.
 
-    `keys` is the class of the table: a mapping is a number with its uncertainty where the class has no table.
+    `keys` is the class of the table: a mapping is a number with its uncertainty where the class has a number.
     """
     return _split(raw, keys, raw, where, ())
 
 
 def _split(raw: Any, keys: Any, table: Any, where: str, path: Path) -> tuple[Any, dict[Path, Spread]]:
     if isinstance(raw, Mapping):
-        if path and ("value" in raw or set(raw) <= set(SPREAD_KEYS)) and not is_table(find(keys, path, table)):
+        if set(raw) & set(SPREAD_KEYS) and holds_number(find(keys, path, table)):
             place = spell_place(where, path)
             spread = read_keys(raw, Spread, place)
             if spread.value == 0 and spread.relative_sd:

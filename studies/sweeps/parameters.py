@@ -12,6 +12,7 @@ from studies.errors import InputError, nearest
 from studies.instrument.card import Instrument
 from studies.instrument.dotted import look_up, names
 from studies.instrument.keys import Table
+from studies.instrument.material_values import LAW
 from studies.instrument.registry import possible_keys
 from studies.instrument.tables.material import GIVEN
 
@@ -68,6 +69,8 @@ def _named(instrument: Instrument) -> list[str]:
 
 def _default(instrument: Instrument, table: str, key: str) -> float | str | None:
     """Return the documented default of a key that the card leaves out, None where it follows from other keys."""
+    if f"{table}.{key}".startswith(LAW):
+        return 0.0
     part = instrument.part(table)
     value = getattr(part, key, None) if isinstance(part, Table) else None
     return float(value) if isinstance(value, int | float) and not isinstance(value, bool) else None

@@ -196,9 +196,32 @@ def read_all_of_a_model(path):
     compensate(model, read_record(record), extrapolate=True)
 
 
+EVERY_TABLE = """
+film_emissivity = { value = 0.03, low = 0.01, high = 0.2 }
+[material.deviation.poisson_ratio]
+value = { value = 1e-4, sd = 1e-5 }
+slope_per_K = 1e-7
+[loss]
+inverse_q = { value = 1e-7, relative_sd = 0.3 }
+[[loss.activated]]
+height = 1e-9
+energy_eV = 0.5
+peak_degC = 100.0
+[bias]
+offset_deg_per_h = 1.0
+[noise]
+housing_lag_s = 3.0
+[[effect]]
+name = "second-lag"
+weight = { value = 0.1, sd = 0.02 }
+second_time_constant_s = 2000.0
+"""
+
+
 def documents(tmp_path):
     """Valid TOML documents of every format, by name, with their reader."""
     found = [(f"card {name}", path.read_text(), load_card) for name, path in shipped_cards().items()]
+    found.append(("card with every table", shipped_cards()["hrg-30mm"].read_text() + EVERY_TABLE, load_card))
     model = tmp_path / "model.toml"
     write_model(save_frequency(fit_frequency(T, F), (Source("a.csv", "ab12", 7),), "test"), model)
     found.append(("model", model.read_text(), read_all_of_a_model))

@@ -18,6 +18,7 @@ from studies.instrument.card import build_instrument, load_card, save_card, ship
 from studies.instrument.keys import describe, known_keys, structs
 from studies.instrument.registry import card_tables
 from studies.instrument.units import unit_of
+from studies.sweeps.parameters import find_nominal
 
 HRG = tomllib.loads(shipped_cards()["hrg-30mm"].read_text(encoding="utf-8"))
 LAG = {"name": "second-lag", "weight": 0.1, "second_time_constant_s": 2000.0}
@@ -120,6 +121,9 @@ def test_every_key_of_every_table_is_the_nearest_to_its_own_typo(table):
         ({"resonator": HRG["resonator"] | {"thickness_mm": [[0, 1], [2, 1]]}}, "thickness_mm.1.0 must be at most 1"),
         ({"resonator": {"shape": "meridian", "thickness_mm": 1, "segment": [{"kind": "line", "from_mm": [1, 0]}]}},
          "[[resonator.segment]] number 1: the key 'to_mm' is missing; add it."),
+        ({"resonator": {"shape": 3}}, "[resonator]: shape must be text in quotes, not 3."),
+        ({"loss": {"film": 3}}, "[loss]: film must be a list of tables, not 3."),
+        ({"bias": {"note": {}}}, "[bias]: note must be text in quotes, not {}."),
         ({"resonator": {"radius_mm": 1}}, "[resonator]: the key 'shape' is missing; add it."),
         ({"thermal": {"cells": {"value": 3}}}, "cells: its uncertainty is missing; give sd, relative_sd, or low and high."),
         ({"thermal": {"cells": {"sd": 3}}}, "cells: the key 'value' is missing; add it."),
@@ -218,8 +222,13 @@ def test_the_deviation_of_the_law_is_a_value_of_the_card():
     assert len(prior.names) == len(known.material.prior.names)
     given = silica.with_values({"material.youngs_modulus_GPa": {"value": 73.0, "sd": 0.5}})
     assert "material.deviation.shear_modulus.log_value" not in {one.name for one in given.uncertain}
-    with pytest.raises(InputError, match=r"no coefficient 'shear_modulus\.log_slop_per_K'; did you mean"):
+    with pytest.raises(
+        InputError, match=r"\[material\.deviation\.shear_modulus\]: unknown key .* mean 'log_slope_per_K'"
+    ):
         silica.with_values({"material.deviation.shear_modulus.log_slop_per_K": 1.0})
+    with pytest.raises(InputError, match="coefficients of shear_modulus: must be positive"):
+        silica.with_values({"material.deviation.shear_modulus.log_value": 1e4})
+    assert find_nominal(silica, "material.deviation.shear_modulus.log_value", "study") == 0.0
 
 
 def test_a_value_whose_uncertainty_is_a_part_of_it_may_become_nothing():

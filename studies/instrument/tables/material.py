@@ -32,6 +32,44 @@ GIVEN = {
 }
 
 
+class Factor(Table, frozen=True, kw_only=True):
+    """The property times exp(a + b x + ½ c x²), x = T − T_ref (K)."""
+
+    log_value: float = 0.0
+    log_slope_per_K: float = 0.0
+    log_curvature_per_K2: float = 0.0
+
+
+class Difference(Table, frozen=True, kw_only=True):
+    """The property plus a + b x + ½ c x²."""
+
+    value: float = 0.0
+    slope_per_K: float = 0.0
+    curvature_per_K2: float = 0.0
+
+
+class Deviation(Table, frozen=True, kw_only=True):
+    """What the material departs from its published law by."""
+
+    shear_modulus: Factor | None = None
+    youngs_modulus: Factor | None = None
+    poisson_ratio: Difference | None = None
+    density: Factor | None = None
+    expansion: Difference | None = None
+    conductivity: Factor | None = None
+    heat_capacity: Factor | None = None
+
+    @property
+    def coefficients(self) -> dict[str, float]:
+        """Coefficients by their names in `Material.with_coefficients`."""
+        tables = {name: table for name in self.__struct_fields__ if (table := getattr(self, name)) is not None}
+        return {
+            f"{name}.{key}": number
+            for name, table in tables.items()
+            for key, number in msgspec.structs.asdict(table).items()
+        }
+
+
 class MaterialKeys(Table, frozen=True, kw_only=True):
     """The keys of `[material]`."""
 
@@ -41,7 +79,7 @@ class MaterialKeys(Table, frozen=True, kw_only=True):
     youngs_modulus_GPa: Annotated[float, number(above=0.0)] | None = None
     poisson_ratio: Annotated[float, number(above=-1.0, below=0.5)] | None = None
     density_kg_m3: Annotated[float, number(above=0.0)] | None = None
-    deviation: dict[str, dict[str, float]] = msgspec.field(default_factory=dict)
+    deviation: Deviation | None = None
     note: str = ""
 
 
@@ -62,8 +100,7 @@ def build_material(keys: MaterialKeys, place: Place) -> "Material":
             material = constant_material(keys.name, **given)
         else:
             material = find_material(keys.name, keys.law, own).rescaled(place.reference_temperature, **given)
-        moved = {f"{name}.{key}": number for name, table in keys.deviation.items() for key, number in table.items()}
-        return material.with_coefficients(moved) if moved else material
+        return material if keys.deviation is None else material.with_coefficients(keys.deviation.coefficients)
 
 
 TABLE = CardTable("material", MaterialKeys, build=build_material, required=True)
