@@ -12,30 +12,25 @@ with ∂ ln f/∂ ln h + ∂ ln f/∂ ln r = −1 and h'/h = r'/r = α. For a te
 order in its unevenness, δ ln f = Σ sensitivity (T(s) − T_mean) over the stations of the mode.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.polynomial import Chebyshev
-from numpy.polynomial.chebyshev import chebpts1
 from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import CubicSpline
 
-from shell.curves import Arc
 from shell.elastic import Elastic
 from shell.errors import ShellError
 from shell.levels import Theory
 from shell.materials import Material
 from shell.modes import Mode, solve_modes
 from shell.property import ZERO_CELSIUS, coefficient_names, powers
-from shell.rayleigh import rayleigh_log_derivatives
 from shell.resonator import Resonator
+from shell.shape_factor import ShapeFactor, interpolate_shape, shape_of
 from shell.solution import AlongMeridian
 
 Array = NDArray[np.float64]
-NODES = (5, 8, 12)  # Poisson's ratios tried, until the error is small enough
-CLOSE = 1e-9  # wanted error of ln Φ between them
 REACH = 5.0  # standard deviations of Poisson's ratio that Φ covers beside the law's own range
 WIDEST = 0.04  # and not more than this
 SPACING = 1.0  # K, of the knots of ln f(T)
@@ -58,40 +53,24 @@ class SlopeParts:
         return np.asarray(self.E + self.nu + self.rho + self.h + self.r)
 
 
-@dataclass(frozen=True, eq=False)
-class ShapeFactor:
-    """ln Φ(ν), Φ = f/√(E/ρ) at the reference geometry in 1/m, through full solves at a few Poisson's ratios.
+def slope_parts(material: Material, temperature: ArrayLike, by_nu: Array, by_thickness: Array) -> SlopeParts:
+    """The five parts of d ln f/dT (HRG paper eq. 15) at temperatures (K).
 
-    Attributes
+    Parameters
     ----------
-    resonator : of the solves.
-    lowest, highest : the Poisson's ratios between which it holds.
-    logarithm : polynomial of ln Φ in ν.
-    modes : the solves, at Chebyshev points.
-    ratios : (k,) array, their Poisson's ratios.
-    error : relative, of Φ between them.
-    solver_error : relative, the largest of the solves against the exact solution of their theory.
+    material : Material
+    temperature : array_like, K
+    by_nu, by_thickness : arrays
+        ∂ ln f/∂ν and ∂ ln f/∂ ln h there.
     """
-
-    resonator: Resonator
-    lowest: float
-    highest: float
-    logarithm: Chebyshev
-    modes: tuple[Mode, ...]
-    ratios: Array
-    error: float
-    solver_error: float
-
-    @cached_property
-    def by_nu(self) -> Chebyshev:
-        """∂ ln f/∂ν at constant E, over ν."""
-        return self.logarithm.deriv()
-
-    @cached_property
-    def by_thickness(self) -> Chebyshev:
-        """∂ ln f/∂ ln h over ν."""
-        slopes = [_slopes(mode, self.resonator, float(nu))[1] for mode, nu in zip(self.modes, self.ratios, strict=True)]
-        return _through(slopes, *(self.logarithm.domain if len(slopes) == 1 else (self.lowest, self.highest)))
+    alpha = material.value("expansion", temperature)
+    return SlopeParts(
+        E=0.5 * material.log_slope("youngs_modulus", temperature),
+        nu=np.asarray(by_nu * material.slope("poisson_ratio", temperature)),
+        rho=-0.5 * material.log_slope("density", temperature),
+        h=np.asarray(by_thickness * alpha),
+        r=np.asarray((-1 - by_thickness) * alpha),
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -150,14 +129,8 @@ class FrequencyLaw:
     def parts(self, temperature: ArrayLike) -> SlopeParts:
         """The five parts of d ln f/dT (HRG paper eq. 15)."""
         T = self._check(temperature)
-        alpha, by_h = self.material.value("expansion", T), self.shape.by_thickness(self._nu(T))
-        return SlopeParts(
-            E=0.5 * self.material.log_slope("youngs_modulus", T),
-            nu=np.asarray(self.shape.by_nu(self._nu(T)) * self.material.slope("poisson_ratio", T)),
-            rho=-0.5 * self.material.log_slope("density", T),
-            h=by_h * alpha,
-            r=(-1 - by_h) * alpha,
-        )
+        nu = self._nu(T)
+        return slope_parts(self.material, T, self.shape.by_nu(nu), self.shape.by_thickness(nu))
 
     def derivatives(self, temperature: ArrayLike) -> dict[str, Array]:
         """Derivative of ln f(T) by every coefficient of the material's deviation that acts on it.
@@ -339,58 +312,17 @@ def build_law(
     if lowest == highest:
         elastic = material.elastic(lowest)
         mode = solve(elastic)
-        shape = _tangent(mode, resonator, elastic)
+        shape = shape_of(mode, resonator, elastic)
     else:
         elastic = material.elastic(reference_temperature)
         mode = solve(elastic)
         reach = min(REACH * _ratio_spread(material, T), WIDEST)
         low, high = min(float(nu.min()), elastic.nu) - reach, max(float(nu.max()), elastic.nu) + reach
         if high - low < 1e-9:
-            shape = _tangent(mode, resonator, elastic)
+            shape = shape_of(mode, resonator, elastic)
         else:
-            shape = _through_solves(mode, resonator, elastic, max(low, -0.99), min(high, 0.499), solve)
+            shape = interpolate_shape(mode, resonator, elastic, max(low, -0.99), min(high, 0.499), solve)
     return FrequencyLaw(material, reference_temperature, lowest, highest, theory, harmonic, shape, mode)
-
-
-def _through_solves(
-    unseen: Mode, resonator: Resonator, elastic: Elastic, low: float, high: float, solve: Callable[[Elastic], Mode]
-) -> ShapeFactor:
-    """Interpolate ln Φ; its error is the larger of the last coefficient and what it misses of a mode that it does not use."""
-    speed = 0.5 * np.log(elastic.E / elastic.rho)
-    for count in NODES:
-        ratios = (low + high) / 2 + (high - low) / 2 * chebpts1(count)
-        modes = tuple(solve(replace(elastic, nu=float(nu))) for nu in ratios)
-        polynomial = _through([np.log(mode.frequency) - speed for mode in modes], low, high)
-        missed = abs(float(polynomial(elastic.nu)) + speed - np.log(unseen.frequency))
-        error = max(missed, abs(float(polynomial.coef[-1])))
-        if error <= CLOSE:
-            break
-    solver = max(mode.relative_error_estimate for mode in (unseen, *modes))
-    return ShapeFactor(resonator, low, high, polynomial, modes, ratios, error, solver)
-
-
-def _tangent(mode: Mode, resonator: Resonator, elastic: Elastic) -> ShapeFactor:
-    """Φ about a single solve."""
-    value = float(np.log(mode.frequency) - 0.5 * np.log(elastic.E / elastic.rho))
-    line = Chebyshev([value, _slopes(mode, resonator, elastic.nu)[0]], domain=[elastic.nu - 1, elastic.nu + 1])
-    return ShapeFactor(
-        resonator, elastic.nu, elastic.nu, line, (mode,), np.array([elastic.nu]), 0.0, mode.relative_error_estimate
-    )
-
-
-def _through(values: Sequence[float], low: float, high: float) -> Chebyshev:
-    """Return the polynomial through values at the Chebyshev points of a range."""
-    points = chebpts1(len(values))
-    return Chebyshev(np.polynomial.chebyshev.chebfit(points, values, len(values) - 1), domain=[low, high])
-
-
-def _slopes(mode: Mode, resonator: Resonator, nu: float) -> tuple[float, float]:
-    """Return ∂ ln f/∂ν and ∂ ln f/∂ ln h of a solved mode."""
-    dome = resonator.segments[0]
-    if mode.theory == "rayleigh" and isinstance(dome, Arc):
-        closed = rayleigh_log_derivatives(mode.harmonic, nu, dome.first_angle, dome.last_angle)
-        return closed.nu, closed.h
-    return mode.sensitivities.nu, mode.sensitivities.thickness
 
 
 def _ratio_spread(material: Material, T: Array) -> float:

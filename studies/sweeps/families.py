@@ -15,10 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shell.family import MOST_SOLVES, Axis, Family, FamilyResult, build_family
+from shell.law import slope_parts
 from studies.errors import UNUSABLE_INPUT, InputError
 from studies.instrument.card import ZERO_CELSIUS, Instrument
 from studies.sweeps.parameters import TEMPERATURE, set_parameters
-from studies.sweeps.quantities.tcf import STEEPEST
+from studies.sweeps.quantities.tcf import PARTS, STEEPEST
 from studies.sweeps.row import Row
 
 if TYPE_CHECKING:
@@ -72,14 +73,14 @@ class Families:
 
 @dataclass(frozen=True)
 class _Bodies:
-    """What designs are made of, arrays (m,): T (K), growth of lengths, E (Pa), ν, ρ (kg/m³); and their materials."""
+    """What designs are made of, arrays (m,): T (K), growth of lengths, E (Pa), ν, ρ (kg/m³); each material and its places."""
 
     T: Array
     growth: Array
     E: Array
     nu: Array
     rho: Array
-    materials: "list[Material]"
+    materials: "list[tuple[Material, list[int]]]"
 
 
 def why_not(study: "Study") -> str:
@@ -176,31 +177,20 @@ def _tcf(families: Families, options: "Options", designs: Designs) -> tuple[Arra
     """Return the five parts of d ln f/dT (HRG paper eq. 15) and their sum."""
     bodies = _describe(families.instrument, designs, options["temperature_degC"])
     family, found = families.modes(options, designs, bodies)
-    slopes: dict[tuple[int, float], tuple[float, float, float, float]] = {}
-    places = [(id(material), T) for material, T in zip(bodies.materials, bodies.T.tolist(), strict=True)]
-    for place, material in zip(places, bodies.materials, strict=True):
-        if place not in slopes:
-            slopes[place] = _slopes(material, place[1])
-    E, nu, rho, alpha = np.array([slopes[place] for place in places]).T
-    by_nu, by_h = found.by_nu, found.by_thickness
-    parts = np.stack([0.5 * E, by_nu * nu, -0.5 * rho, by_h * alpha, (-1 - by_h) * alpha], axis=1)
-    level, nothing = STEEPEST * family.theory_error, np.zeros_like(E)
-    of_nu, of_h = (family.error.by_nu + level) * abs(nu), (family.error.by_thickness + level) * abs(alpha)
+    parts, scale = np.empty((len(designs), 5)), np.empty((len(designs), 2))
+    for material, places in bodies.materials:
+        T = bodies.T[places]
+        found_parts = slope_parts(material, T, found.by_nu[places], found.by_thickness[places])
+        parts[places] = np.stack([getattr(found_parts, name) for name in PARTS], axis=1)
+        scale[places] = abs(np.stack([material.slope("poisson_ratio", T), material.value("expansion", T)], axis=1))
+    level, nothing = STEEPEST * family.theory_error, np.zeros(len(designs))
+    of_nu, of_h = (family.error.by_nu + level) * scale[:, 0], (family.error.by_thickness + level) * scale[:, 1]
     # the parts of h and r add up to −alpha whatever the slope by h
     errors = np.stack([of_nu, nothing, of_nu, nothing, of_h, of_h], axis=1)
     return 1e6 * np.column_stack([parts.sum(axis=1), parts]), 1e6 * errors
 
 
 FAST = {"frequency": _frequency, "tcf": _tcf, "bryan-factor": _bryan_factor}
-
-
-def _slopes(material: "Material", T: float) -> tuple[float, float, float, float]:
-    return (
-        float(material.log_slope("youngs_modulus", T)),
-        float(material.slope("poisson_ratio", T)),
-        float(material.log_slope("density", T)),
-        float(material.value("expansion", T)),
-    )
 
 
 def _key(options: "Options") -> tuple[int, int, Any]:
@@ -220,14 +210,13 @@ def _describe(instrument: Instrument, designs: Designs, temperature_degC: float 
     for place, design in enumerate(designs):
         groups.setdefault(tuple(design[name] for name in names), []).append(place)
     constants = np.empty((4, count))
-    materials: list[Material] = [instrument.material] * count
+    materials: list[tuple[Material, list[int]]] = []
     for values, places in groups.items():
         material = set_parameters(instrument, dict(zip(names, values, strict=True))).material
         there = T[places]
         constants[:3, places] = [material.value(name, there) for name in PROPERTIES]
         constants[3, places] = material.growth(there, reference)
-        for place in places:
-            materials[place] = material
+        materials.append((material, places))
     E, nu, rho, growth = constants
     return _Bodies(T, growth, E, nu, rho, materials)
 
