@@ -146,12 +146,16 @@ class FrequencyLaw:
         """Standard deviation of ln f(T) by the material's prior."""
         return self._spread(self.derivatives(temperature))
 
-    def slope_uncertainty(self, temperature: ArrayLike) -> Array:
-        """Standard deviation of d ln f/dT by the material's prior, 1/K."""
+    def slope_derivatives(self, temperature: ArrayLike) -> dict[str, Array]:
+        """Return the derivative of d ln f/dT by every coefficient, as `derivatives` does for ln f."""
         step = 0.05
         T = np.clip(self._check(temperature), self.material.lowest + step, self.material.highest - step)
         ahead, behind = self._derivatives(T + step), self._derivatives(T - step)
-        return self._spread({name: (ahead[name] - behind[name]) / (2 * step) for name in ahead})
+        return {name: (ahead[name] - behind[name]) / (2 * step) for name in ahead}
+
+    def slope_uncertainty(self, temperature: ArrayLike) -> Array:
+        """Standard deviation of d ln f/dT by the material's prior, 1/K."""
+        return self._spread(self.slope_derivatives(temperature))
 
     @property
     def error(self) -> float:

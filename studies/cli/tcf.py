@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from shell.law import FrequencyLaw
 
 MOST_POINTS = 10_000
+LEAST = 0.005  # ppm/°C, that is shown
 
 
 def tcf(
@@ -65,7 +66,7 @@ def tcf(
     at = np.arange(from_degC, to_degC + 1e-9 * step, step)
     T = instrument.material.check(at + 273.15)
     law = law_of(instrument, float(T[0]), float(T[-1]), theory, harmonic)
-    points = _points(law, T)
+    points, moves = _points(law, T), _moves(law, T)
     local = _measured_slopes(instrument.name, measured)
     if json:
         print_json(
@@ -77,6 +78,7 @@ def tcf(
                 "law": instrument.material.law,
                 "relative_error": law.error,
                 "points": points,
+                "prior": moves,
                 "measured": [{"temperature_degC": T, "slope_ppm_per_degC": s} for T, s in local],
             }
         )
@@ -90,6 +92,17 @@ def tcf(
     columns = ["T (°C)", "f (Hz)", "E", "μ", "ρ", "h", "r", "slope"]
     note = f"Slopes in ppm/°C; ± is one standard deviation by the prior of law '{instrument.material.law}'."
     print_table(f"{instrument.name}, n = {harmonic}, {theory}", columns, rows, note)
+    if moves:
+        shown = sorted({0, len(T) // 2, len(T) - 1})
+        print_table(
+            "What the law leaves open, and what one standard deviation of it moves the slope by (ppm/°C)",
+            ["Coefficient", "Standard deviation", *(f"at {at[k]:g} °C" for k in shown)],
+            [
+                [m["coefficient"], f"{m['sd']:.2g}", *(f"{m['moves_slope_ppm_per_degC'][k]:+.2f}" for k in shown)]
+                for m in moves
+                if max(map(abs, m["moves_slope_ppm_per_degC"])) >= LEAST
+            ],
+        )
     if local:
         beside = [[f"{T:.1f}", f"{s:.2f}"] for T, s in local]
         print_table("Measured, between neighbouring points", ["T (°C)", "slope (ppm/°C)"], beside)
@@ -108,6 +121,16 @@ def _points(law: "FrequencyLaw", T: "NDArray[np.float64]") -> "list[dict[str, An
             "parts_ppm_per_degC": {name: 1e6 * float(getattr(parts, name)[k]) for name in ("E", "nu", "rho", "h", "r")},
         }
         for k in range(len(T))
+    ]
+
+
+def _moves(law: "FrequencyLaw", T: "NDArray[np.float64]") -> "list[dict[str, Any]]":
+    """Return what one standard deviation of each open coefficient of the law moves the slope by."""
+    slopes, prior = law.slope_derivatives(T), law.material.prior
+    return [
+        {"coefficient": name, "sd": float(sd), "moves_slope_ppm_per_degC": (1e6 * sd * slopes[name]).tolist()}
+        for name, sd in zip(prior.names, prior.sd, strict=True)
+        if name in slopes
     ]
 
 
