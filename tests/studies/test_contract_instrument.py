@@ -13,6 +13,7 @@ import tomli_w
 
 from studies.cli import COMMANDS as CLI
 from studies.cli import main
+from studies.diagnosis.effects import library
 from studies.errors import InputError
 from studies.instrument.card import build_instrument, load_card, save_card, shipped_cards
 from studies.instrument.keys import describe, known_keys, structs
@@ -141,6 +142,29 @@ def test_an_unusable_value_is_named_with_its_mend(table, words):
         build_instrument(HRG | table, "card.toml")
     assert words in str(caught.value)
     assert str(caught.value).startswith("card.toml")
+
+
+@pytest.mark.parametrize("name", sorted(library()))
+def test_every_effect_needs_a_coefficient_and_keeps_its_bounds(name):
+    effect = library()[name]
+    middle = {
+        one.name: math.sqrt(one.low * one.high) if one.low > 0 else (one.low + one.high) / 2 for one in effect.shape
+    }
+    for response in effect.responses:
+        coefficients = effect.coefficient_names(response)
+        good = {"name": name, "response": response, coefficients[0]: 0.5, **middle}
+        (entry,) = build_instrument(HRG | {"effect": [good]}).effects
+        assert (entry.response, dict(entry.parameters)) == (response, {coefficients[0]: 0.5, **middle})
+        bare = {key: value for key, value in good.items() if key != coefficients[0]}
+        with pytest.raises(InputError, match=f"'{name}' needs a coefficient; add {coefficients[0]}"):
+            build_instrument(HRG | {"effect": [bare]})
+        for one in effect.shape:
+            for bad, word in ((one.low - 1, "at least"), (one.high + 1 + 1e-3 * abs(one.high), "at most")):
+                with pytest.raises(InputError, match=f"number 1: {one.name} must be {word}"):
+                    build_instrument(HRG | {"effect": [good | {one.name: bad}]})
+        if effect.positive:
+            with pytest.raises(InputError, match=f"{coefficients[0]} must be at least 0"):
+                build_instrument(HRG | {"effect": [good | {coefficients[0]: -0.5}]})
 
 
 @pytest.mark.parametrize("name", sorted(shipped_cards()))
