@@ -1,5 +1,6 @@
 """Fixtures of the study tests: user functions in a file, and the command line as a process."""
 
+import signal
 import subprocess
 from pathlib import Path
 
@@ -26,6 +27,11 @@ def hrg():
     return call
 
 
+def heed_interrupts() -> None:
+    """Ctrl-C is ignored by what a background job starts; a test of it must not be."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+
 @pytest.fixture
 def start():
     started: list[subprocess.Popen[str]] = []
@@ -37,6 +43,7 @@ def start():
             stderr=subprocess.PIPE,
             text=True,
             env=environment(**more),
+            preexec_fn=heed_interrupts,
         )
         started.append(process)
         return process
