@@ -37,6 +37,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "study status": ("studies.cli.study:status", "How far a study is, and what failed."),
     "study report": ("studies.cli.study:report", "One page: results, sensitivities, yield, provenance."),
     "study export": ("studies.cli.study:export", "The results as CSV, with the units beside."),
+    "compare": ("studies.cli.compare:compare", "Designs side by side: where cards differ, and what that does."),
     "cards": ("studies.cli.cards:cards", "The instrument cards that ship; what is uncertain in a card."),
     "materials": ("studies.cli.cards:materials", "The materials and their published laws."),
     "doctor": ("studies.cli.doctor:doctor", "Show what this environment has and what it lacks."),

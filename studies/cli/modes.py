@@ -6,6 +6,8 @@ from cyclopts import Parameter
 
 if TYPE_CHECKING:
     from shell.modes import Mode
+    from shell.resonator import Resonator
+    from studies.instrument.card import Instrument
 
 
 def modes(
@@ -59,6 +61,7 @@ def modes(
         resonator, elastic = instrument.at(T)
         found = [m for n in harmonic for m in solve_modes(resonator, elastic, n, count, theory, tolerance)]
     detailed = theory != "rayleigh"
+    share, mean = _material_share(instrument, T), _mean_thickness(resonator)
     if json:
         entries = []
         for m in found:
@@ -72,6 +75,8 @@ def modes(
             }
             if detailed:
                 entry |= {
+                    "material_uncertainty_Hz": share * m.frequency,
+                    "frequency_per_thickness_Hz_per_um": _per_micrometre(m, mean),
                     "modal_mass_kg": m.modal_mass,
                     "sensitivities": asdict(m.sensitivities),
                     "energy_fractions": asdict(m.energy_fractions),
@@ -95,17 +100,39 @@ def modes(
             f"{m.frequency:.4f}",
             f"{m.bryan_factor:.5f}",
             f"{m.relative_error_estimate:.0e}",
+            f"{share * m.frequency:.2g}",
+            f"{_per_micrometre(m, mean):+.3g}" if detailed else "",
         ]
         for m in found
     ]
-    columns = ["n", "index", "kind", "frequency (Hz)", "Bryan factor", "relative error"]
-    note = "The error estimate is against the exact solution of the same theory."
+    columns = ["n", "index", "kind", "f (Hz)", "Bryan", "rel. error", "± Hz", "Hz/µm"]
+    note = (
+        "The relative error is the solver's, against the exact solution of the same theory; ± Hz is what the material's"
+        " published values leave (one standard deviation); Hz/µm of wall thickness."
+    )
     if theory == "rayleigh":
         note = "Rayleigh's closed form ignores the free edge: on a hemisphere it lies several per cent too high."
     print_table(f"{instrument.name} at {T - ZERO_CELSIUS:g} °C, {theory}", columns, rows, note)
     if sensitivities and detailed:
         _print_details(found)
     return 0
+
+
+def _material_share(instrument: "Instrument", T: float) -> float:
+    import numpy as np
+
+    from studies.law import law_of
+
+    return float(law_of(instrument, T, T).uncertainty(np.array([T]))[0])
+
+
+def _mean_thickness(resonator: "Resonator") -> float:
+    return float(sum(h for _, h in resonator.thickness) / len(resonator.thickness))
+
+
+def _per_micrometre(mode: "Mode", thickness: float) -> float:
+    """Return df/dh in Hz/µm, for a wall that grows everywhere by the same part."""
+    return float(mode.frequency * mode.sensitivities.thickness / thickness * 1e-6)
 
 
 def _print_details(found: "list[Mode]") -> None:

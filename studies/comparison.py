@@ -1,0 +1,86 @@
+"""Designs side by side: what differs in their cards, and what that does to modes, slope, settling and loss."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from studies.instrument.card import ZERO_CELSIUS
+
+if TYPE_CHECKING:
+    from studies.instrument.card import Instrument
+
+HARMONICS = (0, 1, 2, 3)
+DRIVE = 2
+UNTOLD = ("schema", "name", "note")
+REFERENCE = "reference_temperature_degC"
+
+
+@dataclass(frozen=True)
+class Figure:
+    """One quantity of one design: value and standard uncertainty, in `unit`; NaN where there is none."""
+
+    name: str
+    unit: str
+    value: float
+    uncertainty: float
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Designs and their figures, in one order; `differing` card keys with their values (None: not in that card)."""
+
+    names: tuple[str, ...]
+    figures: tuple[tuple[Figure, ...], ...]
+    differing: Mapping[str, tuple[Any, ...]]
+
+
+def compare(instruments: "Sequence[Instrument]") -> Comparison:
+    """Compute the figures of designs and find the keys in which their cards differ."""
+    keys = [{REFERENCE: one.reference_temperature - ZERO_CELSIUS, **dict(_flatten(one.content))} for one in instruments]
+    names = dict.fromkeys(name for one in keys for name in one)
+    differing = {name: tuple(one.get(name) for one in keys) for name in names}
+    return Comparison(
+        tuple(one.name for one in instruments),
+        tuple(zip(*(tuple(_figures(one)) for one in instruments), strict=True)),
+        {name: values for name, values in differing.items() if any(value != values[0] for value in values)},
+    )
+
+
+def _figures(instrument: "Instrument") -> Iterator[Figure]:
+    import numpy as np
+
+    from shell.modes import solve_modes
+    from studies.errors import naming
+    from studies.law import law_of
+    from studies.simulation.heat_path import behind_housing, build_network, slowest_lag
+
+    T0, nothing = instrument.reference_temperature, float("nan")
+    with naming(instrument.path):
+        lowest = {n: solve_modes(*instrument.at(T0), n)[0] for n in HARMONICS}
+        law = law_of(instrument, T0 - 1.0, T0 + 1.0)
+    drive, share = lowest[DRIVE], float(law.uncertainty(np.array([T0]))[0])
+    for n, mode in lowest.items():
+        yield Figure(f"frequency, n = {n}", "Hz", mode.frequency, share * mode.frequency)
+    others = [mode.frequency for n, mode in lowest.items() if n != DRIVE]
+    yield Figure(
+        "nearest other mode", "Hz", min(others, key=lambda f: abs(f - drive.frequency)) - drive.frequency, nothing
+    )
+    yield Figure("Bryan factor", "1", drive.bryan_factor, nothing)
+    yield Figure("modal mass", "g", 1e3 * drive.modal_mass, nothing)
+    mean = float(np.mean([h for _, h in instrument.resonator.thickness]))
+    yield Figure(
+        "frequency per thickness", "Hz/µm", drive.frequency * drive.sensitivities.thickness / mean * 1e-6, nothing
+    )
+    at = np.array([T0])
+    yield Figure("slope", "ppm/°C", 1e6 * float(law.slope(at)[0]), 1e6 * float(law.slope_uncertainty(at)[0]))
+    lag = slowest_lag(behind_housing(build_network(instrument)), T0)
+    yield Figure("lag behind the housing", "s", lag, nothing)
+
+
+def _flatten(content: Any, name: str = "") -> Iterator[tuple[str, Any]]:
+    if isinstance(content, Mapping):
+        for key, value in content.items():
+            if name or key not in UNTOLD:
+                yield from _flatten(value, f"{name}.{key}" if name else key)
+    else:
+        yield name, content
