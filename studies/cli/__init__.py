@@ -39,6 +39,8 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "study export": ("studies.cli.study:export", "The results as CSV, with the units beside."),
     "compare": ("studies.cli.compare:compare", "Designs side by side: where cards differ, and what that does."),
     "cards": ("studies.cli.cards:cards", "The instrument cards that ship; what is uncertain in a card."),
+    "card new": ("studies.cli.new:card", "A card of your own to start from."),
+    "study new": ("studies.cli.new:study", "The spec of a study to start from."),
     "materials": ("studies.cli.cards:materials", "The materials and their published laws."),
     "doctor": ("studies.cli.doctor:doctor", "Show what this environment has and what it lacks."),
 }
@@ -116,8 +118,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 GROUPS = {
+    "card": "Make a card of your own.",
     "fit": "Calibrate a compensation model from measured data.",
-    "study": "Parametric studies: run, status, report, export.",
+    "study": "Parametric studies: new, run, status, report, export.",
 }
 
 

@@ -1,0 +1,119 @@
+"""`hrg card new` and `hrg study new`: files of one's own to start from."""
+
+from collections.abc import Iterator
+from typing import Annotated
+
+from cyclopts import Parameter
+
+
+def card(path: str, *, like: str = "hrg-30mm", name: str | None = None) -> int:
+    """Write a card to start from: a shipped one, with every further table that a card may have as comments below.
+
+    Parameters
+    ----------
+    path : str
+        The card (TOML) to write; a file that exists is not overwritten.
+    like : str
+        A shipped card, or the path of one, to start from (hrg cards).
+    name : str
+        Name of the instrument; the file's name unless given.
+    """
+    from pathlib import Path
+
+    from studies.cli.output import say
+    from studies.files.reading import find_shipped, read_bytes
+    from studies.files.writing import write_text
+    from studies.instrument.card import load_card, shipped_cards
+
+    _refuse_existing(path)
+    load_card(like)
+    text = read_bytes(find_shipped(like, shipped_cards(), "card")).decode("utf-8-sig")
+    lines = [line for line in text.splitlines() if not line.startswith("#")]
+    tables = next(k for k, line in enumerate(lines) if line.startswith("["))
+    lines[:tables] = [_renamed(line, name or Path(path).stem) for line in lines[:tables]]
+    lines += [
+        "",
+        "# What else a card may say. Remove the # of a line to set it; what stays away has its documented default.",
+    ]
+    present = {line.strip("[] ").split(".")[0] for line in lines if line.startswith("[")}
+    lines += [f"# {line}".rstrip() for block in _forms(present) for line in ("", *block)]
+    write_text(path, "\n".join(lines) + "\n")
+    load_card(path)
+    say(f"{path}: written, like {like}. Correct it, then: hrg modes {path}")
+    return 0
+
+
+def study(
+    path: str,
+    *,
+    like: str = "dimension-tolerance",
+    card_: Annotated[str | None, Parameter(name="--card")] = None,
+) -> int:
+    """Write the spec of a study to start from.
+
+    Parameters
+    ----------
+    path : str
+        The spec (TOML) to write; a file that exists is not overwritten.
+    like : str
+        A shipped study: frequency-over-temperature, dimension-tolerance, dimension-influence.
+    card_ : str
+        The card that it studies: a shipped one, or a path as seen from the spec.
+    """
+    import tomllib
+
+    import tomli_w
+
+    from studies.cli.output import say
+    from studies.files.reading import find_shipped, read_bytes
+    from studies.files.writing import write_text
+    from studies.sweeps.spec import shipped_specs
+
+    _refuse_existing(path)
+    text = read_bytes(find_shipped(like, shipped_specs(), "study")).decode("utf-8-sig")
+    if card_ is not None:
+        stated = tomllib.loads(text)["card"]
+        old, new = (tomli_w.dumps({"card": one}).rstrip("\n") for one in (stated, card_))
+        text = text.replace(old, new)
+    write_text(path, text)
+    say(f"{path}: written, like {like}. Correct it, then: hrg study run {path} --dry-run")
+    return 0
+
+
+def _refuse_existing(path: str) -> None:
+    from pathlib import Path
+
+    from studies.errors import InputError
+
+    if Path(path).exists():
+        raise InputError(f"{path}: exists and is not overwritten; remove it or choose another name.")
+
+
+def _renamed(line: str, name: str) -> str:
+    import tomli_w
+
+    if line.startswith("name =") or line.startswith("note ="):
+        key = line.partition(" ")[0]
+        return tomli_w.dumps({key: name if key == "name" else "Say here what is measured, printed or assumed."}).rstrip(
+            "\n"
+        )
+    return line
+
+
+def _forms(present: set[str]) -> Iterator[list[str]]:
+    """Yield the form of each table that the card lacks, from the documentation of the table."""
+    import importlib
+    import pkgutil
+
+    from studies.instrument.registry import TABLES
+
+    for module in pkgutil.iter_modules(importlib.import_module(TABLES).__path__):
+        doc = importlib.import_module(f"{TABLES}.{module.name}").__doc__ or ""
+        lines = [line.strip() for line in doc.splitlines()]
+        start = next((k for k, line in enumerate(lines) if line.startswith("[")), len(lines))
+        prose = (
+            k for k in range(start, len(lines)) if not lines[k] and not "".join(lines[k + 1 : k + 2]).startswith("[")
+        )
+        block = lines[start : next(prose, len(lines))]
+        if block and block[0].partition("]")[0].strip("[") not in present:
+            yield block
