@@ -18,17 +18,20 @@ from compensation.errors import CompensationError
 from compensation.wave import StandingWave, turn
 
 Real = NDArray[np.float64]
+FOLLOWING = 0.2
+"""Part of a deviation of the angle that corrects the speed of the frame."""
 
 
 @dataclass(frozen=True)
 class CarrierRun:
-    """Commands after every sample: `time` (s), `rate` (rad/s), `quadrature`, `decay` (1/s), `omega` (rad/s)."""
+    """Commands after every sample: `time` (s), `rate` (rad/s), `quadrature`, `decay` (1/s), `omega` (rad/s), `angle` (rad)."""
 
     time: Real
     rate: Real
     quadrature: Real
     decay: Real
     omega: Real
+    angle: Real
 
 
 def simulate_carrier(
@@ -40,10 +43,11 @@ def simulate_carrier(
     rate: float = 0.0,
     rate_from: float = 0.0,
     angle: float = 0.0,
+    precession: float | None = None,
     readings: int = 16,
     generator: np.random.Generator | None = None,
 ) -> CarrierRun:
-    """Run a gyro in force-to-rebalance mode through every cycle, starting with the wave at its commanded amplitude.
+    """Run a gyro through every cycle, starting with the wave at its commanded amplitude and azimuth.
 
     Parameters
     ----------
@@ -54,6 +58,8 @@ def simulate_carrier(
     seconds : float
     rate, rate_from : float
         Rate (rad/s), applied from the time `rate_from` (s) on.
+    precession : float, optional
+        Whole angle: the wave is free but for this commanded turn of its azimuth (rad/s); else it is held at `angle`.
     readings : int
         Pick-off samples per cycle, about.
     generator : numpy Generator, optional
@@ -79,11 +85,16 @@ def simulate_carrier(
     waiting = [np.array([1 / tau, 0.0, 0.0, 0.0])] * (late + 1)
     maps = {value: _free_motion(wave.carrier(value), h, count) for value in {0.0, rate}}
     steps = round(seconds * loops.sampling)
-    out = np.empty((steps, 4))
+    speed = wave.coupling * rate + wave.harmonic * (precession or 0.0)
+    out, frame, turned = np.empty((steps, 4)), wave.harmonic * angle, np.empty(steps)
+    if precession is not None:
+        K[2] = K_i[2] = 0.0
     at = h * np.arange(count + 1)
     for n in range(steps):
         turning = rate if n * loops.step >= rate_from - 1e-12 else 0.0
-        command = waiting[-1]
+        command = waiting[-1].copy()
+        if precession is not None:
+            command[2] = wave.harmonic * precession
         w = start + nu
         force = 2j * w * G_d @ R @ np.array([command[0], command[2] + 1j * command[3]])
         x = _response(wave.carrier(turning), w, force)
@@ -95,6 +106,15 @@ def simulate_carrier(
             seen = seen + generator.normal(0, noise.pickoff * np.sqrt(1 / (2 * h)), seen.shape)
         carrier = np.exp(-1j * (phase + w * at[1:]))
         X = R.T @ (2 * carrier @ seen / count)
+        if precession is not None:  # the frame follows the wave that is seen, and goes ahead of it to the next interval
+            ahead = float(np.arctan2(X[1].real, X[0].real))
+            X = turn(-ahead) @ X
+            turned[n] = (frame + ahead) / wave.harmonic
+            speed += FOLLOWING * ahead / loops.step
+            frame += ahead + speed * loops.step
+            R = turn(frame)
+        else:
+            turned[n] = angle
         phase += w * loops.step
         error = np.array([X[0].real - 1, X[0].imag, X[1].real, X[1].imag])
         if noise.adc_step:
@@ -108,7 +128,7 @@ def simulate_carrier(
         waiting = [new, *waiting[:-1]]
         nu = -waiting[-1][1]
     t = np.asarray(loops.step * np.arange(1, steps + 1), dtype=float)
-    return CarrierRun(t, -out[:, 2] / wave.coupling, out[:, 3], out[:, 0], start - out[:, 1])
+    return CarrierRun(t, -out[:, 2] / wave.coupling, out[:, 3], out[:, 0], start - out[:, 1], turned)
 
 
 def _free_motion(A: Real, h: float, count: int) -> Real:

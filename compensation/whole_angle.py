@@ -1,8 +1,8 @@
 """Whole angle: the wave turns freely, or at a commanded rate (self-precession), and its azimuth is the output.
 
-    ψ̇ = n k Ω + ½ Δ(1/τ) sin 2(ψ − ψ_τ) + Δω s cos 2(ψ − ψ_ω) + Re u,     ψ = n θ,
+    ψ̇ = n k Ω + ½ Δ(1/τ) sin 2(ψ − ψ_τ) + Δω s cos 2(ψ − ψ_ω) + Re u/a,     ψ = n θ,
 
-s the quadrature that the loop leaves (−q/a) and u the force across the wave: the commanded turn, and what gain ratios,
+s the quadrature that the loop leaves (−q/a), a the amplitude over its command, and u the force across the wave: the commanded turn, and what gain ratios,
 skew and phase errors let through from amplitude drive and quadrature control. Amplitude, phase and quadrature loops are
 `closed_loop` in the frame of the wave, driven by what the turning wave meets; errors of the electronics are kept to first
 order there, and exactly in the measured azimuth.
@@ -24,6 +24,8 @@ from compensation.wave import StandingWave
 Real = NDArray[np.float64]
 TURN = 0.1
 """Largest turn of 2ψ (rad) in one step."""
+Means = tuple[float, float, float, float]
+"""Means over a step: commands of amplitude and quadrature, the quadrature left, the amplitude."""
 WITHOUT_RATE = ("amplitude", "phase", "quadrature")
 
 
@@ -51,7 +53,7 @@ def simulate_whole_angle(
     rate : float or array (N,)
         Rate (rad/s), linear between rows.
     precession : float or array (N,)
-        Commanded turn of the azimuth against the shell (rad/s).
+        Commanded turn of the azimuth against the shell (rad/s), linear between rows.
     angle : float
         Azimuth at the start (rad).
     generator : numpy Generator, optional
@@ -86,7 +88,7 @@ def simulate_whole_angle(
     maps: dict[int, RowMap] = {}
     h = samples * loops.step
     psi = rows.harmonic * angle
-    means = (float(rows.decay(angle)[0]), float(rows.quadrature(angle)[0]), 0.0)
+    means = (float(rows.decay(angle)[0]), float(rows.quadrature(angle)[0]), 0.0, 1.0)
     forcing = course.forcing(0, 0.0, psi, means)
     state = loop.settle(forcing, course.offset(0, psi))
     at = loop.places
@@ -110,7 +112,7 @@ def simulate_whole_angle(
                 offsets = course.offset(n, psi), course.offset(n, psi_end)
                 new = row.map @ row.start(state, ends, offsets, step) + shake
                 sums, waves = new[at["sum"]] / part, new[at["wave_sum"]] / part
-                means = (float(sums[0]), float(sums[3]), float(waves[3]))
+                means = (float(sums[0]), float(sums[3]), float(waves[3]), 1 + float(waves[0]))
                 middle = (psi + psi_end) / 2
                 psi_end = psi + step / 6 * (
                     course.turn(n, begin, psi, means)
@@ -130,7 +132,7 @@ def simulate_whole_angle(
     turned = np.diff(np.append(theta, after / rows.harmonic)) / h
     return LoopRun(
         t,
-        (turned - commanded) / rows.bryan_factor,
+        (turned - (commanded + np.append(commanded[1:], commanded[-1])) / 2) / rows.bryan_factor,
         commands[:, 3],
         commands[:, 0],
         course.start - commands[:, 1],
@@ -185,7 +187,7 @@ class _Course:
         seen = math.atan2((yx * c + yy * s).real, (xx * c + xy * s).real)
         return psi + (seen - psi + math.pi) % (2 * math.pi) - math.pi
 
-    def forces(self, psi: float, command: float, means: tuple[float, float, float]) -> tuple[complex, complex]:
+    def forces(self, psi: float, command: float, means: Means) -> tuple[complex, complex]:
         """The forces along and across the wave that commands (along a, across command + i quadrature) become."""
         along, across = means[0], complex(command, means[1])
         if self.ideal:
@@ -198,15 +200,15 @@ class _Course:
         c, s = math.cos(psi), math.sin(psi)
         return c * x + s * y, c * y - s * x
 
-    def turn(self, row: int, fraction: float, psi: float, means: tuple[float, float, float]) -> float:
+    def turn(self, row: int, fraction: float, psi: float, means: Means) -> float:
         """ψ̇ (rad/s)."""
         _, dc, ds, wc, ws, _, coriolis, command = self.values(row, fraction)
         c, s = math.cos(2 * psi), math.sin(2 * psi)
         damping = dc * s - ds * c
-        detuned = 2 * (wc * c + ws * s) * means[2]
-        return coriolis + damping + detuned + self.forces(psi, command, means)[1].real
+        detuned = 2 * (wc * c + ws * s) * means[2] / means[3]
+        return coriolis + damping + detuned + self.forces(psi, command, means)[1].real / means[3]
 
-    def forcing(self, row: int, fraction: float, psi: float, means: tuple[float, float, float]) -> Real:
+    def forcing(self, row: int, fraction: float, psi: float, means: Means) -> Real:
         """What drives amplitude, phase and quadrature from their commands (1/s)."""
         decay, dc, ds, wc, ws, drift, _, command = self.values(row, fraction)
         c, s = math.cos(2 * psi), math.sin(2 * psi)
@@ -216,7 +218,7 @@ class _Course:
                 -(decay + dc * c + ds * s) + along.real - means[0],
                 drift + wc * c + ws * s + along.imag,
                 0.0,
-                -(wc * s - ws * c) + across.imag - means[1],
+                -(wc * s - ws * c) * means[3] + across.imag - means[1],
             ]
         )
 

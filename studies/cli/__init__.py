@@ -26,6 +26,10 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "fit bias": ("studies.cli.fit_bias:fit_bias", "Bias over frequency and its rate, selected stepwise."),
     "fit thermal": ("studies.cli.fit_thermal:fit_thermal", "Lags of the resonator behind its housing, from records."),
     "fit cross-damping": ("studies.cli.fit_cross_damping:fit_cross_damping", "Cross-damping bias over temperature."),
+    "fit whole-angle": (
+        "studies.cli.fit_whole_angle:fit_whole_angle",
+        "Splits, axes and gains from a whole-angle run.",
+    ),
     "diagnose": ("studies.cli.diagnose:diagnose", "What the simulation gets wrong, why, and what the repair is worth."),
     "derive": ("studies.cli.derive:derive", "The symbolic derivation, as equations, LaTeX or code."),
     "render": ("studies.cli.render:render", "A mode shape as picture, animation, page or mesh."),

@@ -30,6 +30,7 @@ def loop(
     row: float = 1.0,
     rate: float = 0.0,
     profile: str | None = None,
+    both_ways: bool = False,
     seed: int = 0,
     noiseless: bool = False,
     json: bool = False,
@@ -55,6 +56,8 @@ def loop(
         Applied rate in °/s.
     profile : str
         Chamber profile, as for hrg simulate: frequency and loss follow the temperature.
+    both_ways : bool
+        Of a whole-angle run: turn the self-precession back after half of it.
     seed : int
         Seed of the noise.
     noiseless : bool
@@ -92,6 +95,7 @@ def loop(
             row,
             rate,
             profile,
+            both_ways,
             None if noiseless else seed,
         )
         say(f"record: {out}, {rows} rows")
@@ -180,6 +184,7 @@ def _run(
     row: float,
     rate: float,
     profile: str | None,
+    both_ways: bool,
     seed: int | None,
 ) -> int:
     import numpy as np
@@ -200,7 +205,9 @@ def _run(
     else:
         time = np.asarray(row * np.arange(int(hours * 3600 / row * (1 + 1e-12)) + 1), dtype=float)
     generator = None if seed is None else np.random.default_rng(seed)
-    run = run_loops(instrument, time, f, loss, bryan_factor, rate=np.radians(rate), generator=generator)
+    run = run_loops(
+        instrument, time, f, loss, bryan_factor, rate=np.radians(rate), both_ways=both_ways, generator=generator
+    )
     found = columns_of(instrument.loop, run)
     columns = {"time_s": time, **columns, **found}
     if rate:

@@ -164,6 +164,7 @@ def run_loops(
     *,
     rate: ArrayLike = 0.0,
     pattern_angle: ArrayLike | None = None,
+    both_ways: bool = False,
     generator: np.random.Generator | None = None,
 ) -> LoopRun:
     """Run the card's loops over even rows (s), its resonator's frequency (Hz) and loss numbers or rows.
@@ -174,11 +175,14 @@ def run_loops(
         Rate (rad/s).
     pattern_angle : float or array (N,), optional
         Azimuth (rad), at the start in whole-angle mode; that of `[bias]` unless given.
+    both_ways : bool
+        Whether the self-precession turns back after half of the rows.
     """
     loop = require_loop(instrument)
     angle = np.radians(instrument.bias.pattern_angle_deg) if pattern_angle is None else np.asarray(pattern_angle)
     wave = wave_of(instrument, frequency, inverse_q, bryan_factor)
     electronics = electronics_of(loop, wave, instrument.reference_temperature)
+    back = both_ways & (np.arange(len(time)) >= len(time) // 2)
     with naming(f"{instrument.path} [loop]"):
         if loop.mode == "whole-angle":
             return simulate_whole_angle(
@@ -187,7 +191,7 @@ def run_loops(
                 loops_of(loop),
                 time,
                 rate=rate,
-                precession=np.radians(loop.self_precession_deg_per_s),
+                precession=np.radians(loop.self_precession_deg_per_s) * np.where(back, -1.0, 1.0),
                 angle=float(np.ravel(angle)[0]),
                 generator=generator,
             )
