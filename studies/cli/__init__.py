@@ -33,6 +33,8 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "diagnose": ("studies.cli.diagnose:diagnose", "What the simulation gets wrong, why, and what the repair is worth."),
     "derive": ("studies.cli.derive:derive", "The symbolic derivation, as equations, LaTeX or code."),
     "render": ("studies.cli.render:render", "A mode shape as picture, animation, page or mesh."),
+    "scan": ("studies.cli.scan:scan", "Measured faces to wall maps, waves around and splits."),
+    "trim": ("studies.cli.trim:trim", "Measured splits to a plan of cuts."),
     "import": ("studies.cli.import_:import_", "Laboratory files into the record format."),
     "compensate": ("studies.cli.compensate:compensate", "Apply a saved model to a record, or emit it as C."),
     "temperature": ("studies.cli.temperature:temperature", "The resonator's temperature from its own frequency."),

@@ -1,0 +1,217 @@
+r"""The rigid motion from the frame of a measurement to that of the resonator.
+
+Points of a face lie off it by δ; a motion by t and a small rotation ω changes δ by (t + ω x p) · n. The motion with the least
+Σ ρ(δ), ρ robust, is found by repeated linear steps; what the shape does not tell (the azimuth about the axis; the tilts of
+a part of a sphere) stays as it is. A dome's tilt is then taken from its edge: its points must end at one position all around.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import linprog
+from scipy.spatial.transform import Rotation
+
+from shell.curves import Arc
+from shell.errors import ShellError
+from shell.quadrature import Array
+from shell.resonator import Resonator
+from shell.scan.projection import Projector
+
+UNTOLD = 1e-4  # singular value over the largest from which on the shape does not tell a direction of motion
+SAMPLE = 20_000  # points that the motion is found from
+EDGE_SAMPLE = 1_000_000  # and its edge
+SECTORS = 72  # azimuths of the edge
+REACHED = 0.98  # position beyond which points end at the rim
+GIVEN = np.deg2rad(0.1)  # error of an axis that is taken as it is given
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """p -> rotation p + offset. `told` : which of the shifts x, y, z (m) and the turns about x, y the points tell.
+
+    tilt_error : standard error of the turns where the shape does not tell them, rad.
+    """
+
+    rotation: Array
+    offset: Array
+    told: tuple[bool, bool, bool, bool, bool]
+    tilt_error: float = 0.0
+
+    def apply(self, points: Array) -> Array:
+        """Points (count, 3) in the frame of the resonator."""
+        return np.asarray(points @ self.rotation.T + self.offset)
+
+    @property
+    def tilt(self) -> float:
+        """Angle of the axis, rad."""
+        return float(np.arccos(np.clip(self.rotation[2, 2], -1.0, 1.0)))
+
+
+def align(clouds: Sequence[tuple[Array, int]], projector: Projector, names: Sequence[str]) -> Motion:
+    """One motion for clouds of points that share a frame.
+
+    Parameters
+    ----------
+    clouds : (points (count, 3) in m, side) with side -1 for the inner and 1 for the outer face.
+    projector : of the resonator.
+    names : of the clouds, for the messages.
+
+    Raises
+    ------
+    ShellError
+        The points cannot be brought onto the faces; which says how far off they stay.
+    """
+    resonator = projector.resonator
+    samples = [(points[:: max(1, len(points) // SAMPLE)], side) for points, side in clouds]
+    best: tuple[float, Motion] | None = None
+    for start in _starts(samples, resonator):
+        motion, left = _descend(samples, projector, start)
+        if best is None or left < best[0]:
+            best = left, motion
+        if best[0] < 0.02 * float(projector.line.thickness.max()):
+            break
+    assert best is not None
+    motion = best[1]
+    _check(samples, projector, motion, names)
+    if not (motion.told[3] and motion.told[4]):
+        motion = _upright(clouds, projector, motion)
+    return motion
+
+
+def _descend(samples: list[tuple[Array, int]], projector: Projector, start: Motion) -> tuple[Motion, float]:
+    rotation, offset = start.rotation, start.offset
+    size = projector.resonator.size
+    told, left = np.zeros(5, dtype=bool), np.inf
+    for _ in range(25):
+        rows, residual = [], []
+        for points, side in samples:
+            moved = points @ rotation.T + offset
+            n, off = _normals(moved, side, projector)
+            turn = np.cross(moved, n) / size  # (ω x p) · n = ω · (p x n)
+            rows.append(np.concatenate([n, turn[:, :2]], axis=1))
+            residual.append(off)
+        A, d = np.concatenate(rows), np.concatenate(residual)
+        spread = 1.4826 * float(np.median(abs(d - np.median(d)))) + 1e-12
+        weight = 1 / np.maximum(1.0, abs(d - np.median(d)) / (2 * spread))
+        # the mean off the face is form, not motion: it gets a column of its own
+        A = np.column_stack([A, np.ones(len(A))])
+        _, values, turned = np.linalg.svd((A * weight[:, None]).T @ A, hermitian=True)
+        kept = values > UNTOLD * values[0]
+        step = -(turned[kept].T / values[kept]) @ (turned[kept] @ ((A * weight[:, None]).T @ d))
+        told = np.sum(turned[kept] ** 2, axis=0)[:5] > 0.5
+        spin = Rotation.from_rotvec([step[3] / size, step[4] / size, 0.0]).as_matrix()
+        rotation, offset = spin @ rotation, spin @ offset + step[:3]
+        left = spread
+        if np.abs(step[:5]).max() < 1e-9 * size:
+            break
+    return Motion(rotation, offset, tuple(bool(x) for x in told)), left  # type: ignore[arg-type]
+
+
+def _normals(points: Array, side: int, projector: Projector) -> tuple[Array, Array]:
+    """Normals out of the middle surface, and how far points lie off their face along them."""
+    at = projector.place(points)
+    line = projector.line
+    k = np.clip(np.rint(at.position * (len(line.r) - 1)).astype(np.intp), 0, len(line.r) - 1)
+    n = np.stack(
+        [line.normal_r[k] * np.cos(at.azimuth), line.normal_r[k] * np.sin(at.azimuth), line.normal_z[k]], axis=1
+    )
+    return n, at.height - side * at.thickness / 2
+
+
+def _starts(samples: list[tuple[Array, int]], resonator: Resonator) -> list[Motion]:
+    """The frame as it is; else a dome's centre by the sphere through its points and its axis by their mean direction."""
+    unknown = (False,) * 5
+    starts = [Motion(np.eye(3), np.zeros(3), unknown)]
+    points = np.concatenate([points for points, _ in samples])
+    line = resonator.sample(401)
+    dome = resonator.segments[0]
+    if len(resonator.segments) == 1 and isinstance(dome, Arc):
+        A = np.column_stack([2 * points, np.ones(len(points))])
+        center = np.linalg.lstsq(A, (points**2).sum(axis=1), rcond=None)[0][:3]
+        axis = (points - center).mean(axis=0)
+        nominal = float((line.r * (line.z - dome.center[1])).sum())
+        spin = _turn(axis, np.array([0.0, 0.0, np.sign(nominal) or 1.0]))
+        starts.append(Motion(spin, np.array([0.0, 0.0, dome.center[1]]) - spin @ center, unknown))
+    middle = (np.percentile(points, 1, axis=0) + np.percentile(points, 99, axis=0)) / 2
+    wanted = np.array([0.0, 0.0, (line.z.min() + line.z.max()) / 2])
+    starts.append(Motion(np.eye(3), wanted - middle, unknown))
+    flip = np.diag([1.0, -1.0, -1.0])
+    starts.append(Motion(flip, wanted - flip @ middle, unknown))
+    return starts
+
+
+def _turn(one: Array, other: Array) -> Array:
+    """The smallest rotation that takes one direction to another."""
+    one, other = one / np.linalg.norm(one), other / np.linalg.norm(other)
+    axis = np.cross(one, other)
+    sine, cosine = float(np.linalg.norm(axis)), float(one @ other)
+    if sine < 1e-12:
+        return np.eye(3) if cosine > 0 else np.diag([1.0, -1.0, -1.0])
+    return np.asarray(Rotation.from_rotvec(axis / sine * np.arctan2(sine, cosine)).as_matrix())
+
+
+def _check(samples: list[tuple[Array, int]], projector: Projector, motion: Motion, names: Sequence[str]) -> None:
+    for (points, side), name in zip(samples, names, strict=True):
+        _, off = _normals(motion.apply(points), side, projector)
+        h, middle = float(np.median(projector.line.thickness)), float(np.median(off))
+        spread = 1.4826 * float(np.median(abs(off - middle)))
+        if abs(middle + side * h) < 0.3 * h:
+            here, there = ("outer", "inner") if side > 0 else ("inner", "outer")
+            raise ShellError(
+                f"{name}: the points given for the {here} face lie on the {there} one: exchange the files."
+            )
+        if abs(middle) > 0.5 * h or spread > 0.2 * h:
+            raise ShellError(
+                f"{name}: the points cannot be brought onto the face of the card: after the best alignment they lie "
+                f"{1e3 * middle:.3g} mm off and scatter by {1e3 * spread:.3g} mm. Check the card's dimensions, the unit, and "
+                "whether the faces share a frame."
+            )
+
+
+def _upright(clouds: Sequence[tuple[Array, int]], projector: Projector, motion: Motion) -> Motion:
+    """Turn a dome about its centre until its points end at the same position all around.
+
+    The edge is the lowest s = a + b cos θ + c sin θ above all points (a linear programme), so that gaps do no harm; it errs
+    by about the distance between points at the edge. Points that do not reach the rim end where the instrument did, and
+    tell nothing: the axis stays as it was given.
+    """
+    resonator = projector.resonator
+    for _ in range(3):
+        s, theta = _edge(clouds, projector, motion)
+        if len(s) < SECTORS // 2 or s.max() < REACHED:
+            return Motion(motion.rotation, motion.offset, motion.told, GIVEN)
+        A = np.column_stack([np.ones(len(s)), np.cos(theta), np.sin(theta)])
+        found = linprog([1.0, 0.0, 0.0], A_ub=-A, b_ub=-s, bounds=[(None, None)] * 3)
+        if found.x is None:
+            return Motion(motion.rotation, motion.offset, motion.told, GIVEN)
+        tilt = found.x[1:] * resonator.length / resonator.size
+        spin = Rotation.from_rotvec([tilt[1], -tilt[0], 0.0]).as_matrix()
+        center = _center(resonator)
+        # how far the sectors end below the edge: points are so far apart there, SECTORS times closer over the whole circle
+        apart = float(np.median(A @ found.x - s)) * resonator.length / resonator.size / SECTORS
+        motion = Motion(spin @ motion.rotation, spin @ (motion.offset - center) + center, motion.told, 3 * apart)
+    return motion
+
+
+def _edge(clouds: Sequence[tuple[Array, int]], projector: Projector, motion: Motion) -> tuple[Array, Array]:
+    """The last point of every sector: position and azimuth."""
+    s: list[Array] = []
+    theta: list[Array] = []
+    for points, side in clouds:
+        at = projector.place(motion.apply(points[:: max(1, len(points) // EDGE_SAMPLE)]))
+        off = at.height - side * at.thickness / 2
+        scatter = 1.4826 * float(np.median(abs(off - np.median(off))))
+        near = abs(off - np.median(off)) < 10 * scatter + 1e-9
+        x, angle = at.position[near], at.azimuth[near] % (2 * np.pi)
+        sector = np.minimum((angle / (2 * np.pi) * SECTORS).astype(np.intp), SECTORS - 1)
+        order = np.lexsort((x, sector))
+        last = order[np.flatnonzero(np.diff(sector[order], append=SECTORS))]
+        s.append(x[last])
+        theta.append(angle[last])
+    return np.concatenate(s), np.concatenate(theta)
+
+
+def _center(resonator: Resonator) -> Array:
+    dome = resonator.segments[0]
+    return np.array([0.0, 0.0, dome.center[1] if isinstance(dome, Arc) else 0.0])

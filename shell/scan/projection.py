@@ -1,0 +1,96 @@
+"""Where measured points lie on the shell: position along the meridian, azimuth, distance from the middle surface."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from shell.errors import ShellError
+from shell.quadrature import Array
+from shell.resonator import Resonator
+
+FINE = 8001  # samples of the meridian; between them the distance is exact to (spacing)² κ/8
+CELLS = 300  # cells of the table of nearest samples along the longer side
+COARSE = 10  # samples per entry of the table
+CHUNK = 500_000  # points at a time
+
+
+@dataclass(frozen=True, eq=False)
+class Places:
+    """Points on the shell: position 0 ... 1, azimuth (rad), height ζ above the middle surface (m), nominal thickness (m)."""
+
+    position: Array
+    azimuth: Array
+    height: Array
+    thickness: Array
+
+
+class Projector:
+    """Finds the nearest place of the middle surface: a table of the (r, z) plane, then the curve's own tangent and curvature."""
+
+    def __init__(self, resonator: Resonator) -> None:
+        self.resonator = resonator
+        self.line = line = resonator.sample(FINE)
+        reach = 3 * float(line.thickness.max()) + 0.1 * resonator.size
+        self.low = np.array([line.r.min() - reach, line.z.min() - reach])
+        high = np.array([line.r.max() + reach, line.z.max() + reach])
+        self.cell = float((high - self.low).max()) / CELLS
+        self.shape = tuple(int(k) for k in np.ceil((high - self.low) / self.cell)) + np.array([1, 1])
+        i, j = (axis.ravel() for axis in np.meshgrid(*(np.arange(k) for k in self.shape), indexing="ij"))
+        centers = self.low + (np.stack([i, j], axis=1) + 0.5) * self.cell
+        tree = cKDTree(np.stack([line.r, line.z], axis=1)[::COARSE])
+        nearest = COARSE * tree.query(centers, distance_upper_bound=reach)[1]
+        # far from the curve none is found, and any will do
+        self.nearest = np.where(nearest < FINE, nearest, 0).reshape(self.shape)
+        self.step = resonator.length / (FINE - 1)
+
+    def place(self, points: Array) -> Places:
+        """The places of points (count, 3), m."""
+        found = [self._place(points[k : k + CHUNK]) for k in range(0, max(len(points), 1), CHUNK)]
+        return Places(*(np.concatenate(column) for column in zip(*found, strict=True)))
+
+    def _place(self, points: Array) -> tuple[Array, Array, Array, Array]:
+        line, x, y, z = self.line, points[:, 0], points[:, 1], points[:, 2]
+        r = np.hypot(x, y)
+        i, j = (
+            np.clip(((value - low) / self.cell).astype(np.intp), 0, count - 1)
+            for value, low, count in zip((r, z), self.low, self.shape, strict=True)
+        )
+        k = self.nearest[i, j]
+        for _ in range(2):
+            d_r, d_z = r - line.r[k], z - line.z[k]
+            height = d_z * line.tangent_r[k] - d_r * line.tangent_z[k]
+            along = (d_r * line.tangent_r[k] + d_z * line.tangent_z[k]) / (1 + line.curvature[k] * height)
+            s = line.arc_length[k] + along
+            k = np.clip(np.rint(s / self.step).astype(np.intp), 0, FINE - 1)
+        d_r, d_z = r - line.r[k], z - line.z[k]
+        height = d_z * line.tangent_r[k] - d_r * line.tangent_z[k]
+        bent = 1 + line.curvature[k] * height
+        along = (d_r * line.tangent_r[k] + d_z * line.tangent_z[k]) / bent
+        # the curve leaves its tangent by κ s²/2, towards the side where ζ < 0
+        height = height + line.curvature[k] * along**2 * bent / 2
+        position = (line.arc_length[k] + along) / self.resonator.length
+        return position, np.arctan2(y, x), height, line.thickness[k]
+
+
+def check_unit(points: Array, resonator: Resonator, name: str) -> None:
+    """Refuse points whose size is not that of the resonator.
+
+    Raises
+    ------
+    ShellError
+        The largest extent differs by more than a factor of two from the resonator's; the message guesses the unit.
+    """
+    line = resonator.sample(401)
+    nominal = max(2 * float(line.r.max()), float(np.ptp(line.z)))
+    low, high = np.percentile(points[:: max(1, len(points) // 20000)], [0.5, 99.5], axis=0)
+    measured = float((high - low).max())
+    if not 0.45 * nominal < measured < 2.2 * nominal:
+        ratio = measured / nominal
+        guess = {3: "µm read as mm", -3: "m read as mm", 6: "nm read as mm", 1: "cm against mm", -1: "cm against mm"}
+        power = round(np.log10(ratio)) if ratio > 0 else 0
+        hint = f" ({guess[power]}?)" if power in guess else ""
+        raise ShellError(
+            f"{name}: the points span {1e3 * measured:.4g} mm, the resonator of the card {1e3 * nominal:.4g} mm{hint}; "
+            "give the unit of the file, or the right card."
+        )

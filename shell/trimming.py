@@ -1,0 +1,274 @@
+r"""Which masses to take off where, so that a split vanishes and the balance is kept.
+
+A mass μ_j taken off at the azimuth θ_j moves the wave of the split of harmonic n by μ_j w_n exp(2 i n θ_j), w_n > 0, and the
+harmonics of the mass around by μ_j exp(i k θ_j). The least mass that nulls the splits z_n is a linear programme,
+
+    min Σ μ_j,   Σ μ_j w_nj exp(2 i n θ_j) = -φ z_n,   |u_k - Σ μ_j exp(i k θ_j)| <= |u_k|  (k = 1, 2, 3),   0 <= μ_j <= capacity,
+
+u_k the unbalance that is known; where none is, nothing may be added to it. Each round takes the share φ that does not overshoot
+the goal even where the gain of the cuts is `SURE` standard errors too large: removed too much is not put back.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from math import pi, sqrt
+
+import numpy as np
+from scipy.optimize import linprog
+
+from shell.errors import ShellError
+from shell.quadrature import Array
+
+BALANCED = (1, 2, 3)  # harmonics of the mass that must not grow
+SURE = 2.0  # standard errors of the gain that a round leaves room for
+DIRECTIONS = 24  # sides of the polygon that stands for a circle
+MOST_ROUNDS = 6
+
+
+@dataclass(frozen=True)
+class Reading:
+    """A measured split of one harmonic.
+
+    harmonic : n. frequency : f, Hz. wave : (f_fast - f_slow)/f exp(2 i n α_fast). error : standard error of either part of it.
+    """
+
+    harmonic: int
+    frequency: float
+    wave: complex
+    error: float
+
+    @classmethod
+    def of(cls, harmonic: int, frequency: float, split: float, slow_axis: float, error: float) -> "Reading":
+        """From a split and its standard error in Hz and the azimuth of the slower mode's antinode, rad.
+
+        Raises
+        ------
+        ShellError
+            The split is smaller than twice its error: there is nothing that could be cut safely.
+        """
+        if not split > 0 or not error > 0:
+            raise ShellError("a split and its reading error are positive numbers of Hz.")
+        if split < 2 * error:
+            raise ShellError(
+                f"the split of n = {harmonic}, {1e3 * split:.3g} mHz, is not told from its reading error of {1e3 * error:.3g} mHz: "
+                "measure better, do not cut."
+            )
+        return cls(
+            harmonic, frequency, complex(-split / frequency * np.exp(2j * harmonic * slow_axis)), error / frequency
+        )
+
+    @property
+    def hertz(self) -> float:
+        """The split, Hz."""
+        return abs(self.wave) * self.frequency
+
+    @property
+    def slow_axis(self) -> float:
+        """Azimuth of an antinode of the slower mode, rad, in 0 ... π/n."""
+        return float(np.angle(-self.wave) / (2 * self.harmonic) % (pi / self.harmonic))
+
+
+@dataclass(frozen=True, eq=False)
+class Sites:
+    """Where material can be taken off.
+
+    azimuth : rad, (sites,). position : of the meridian, (sites,). capacity : most mass at each, kg, (sites,).
+    gain : w_n of each site per harmonic n, relative split per kg, > 0, n -> (sites,).
+    """
+
+    azimuth: Array
+    position: Array
+    capacity: Array
+    gain: Mapping[int, Array]
+
+
+@dataclass(frozen=True)
+class Cut:
+    """A mass (kg) to take off at an azimuth (rad) and position."""
+
+    azimuth: float
+    position: float
+    mass: float
+
+
+@dataclass(frozen=True)
+class State:
+    """A split as it is expected: most probable wave, and the standard error of either part of it, relative to f."""
+
+    harmonic: int
+    frequency: float
+    wave: complex
+    error: float
+
+    @property
+    def hertz(self) -> float:
+        """The split, Hz."""
+        return abs(self.wave) * self.frequency
+
+    @property
+    def slow_axis(self) -> float:
+        """Azimuth of an antinode of the slower mode, rad, in 0 ... π/n."""
+        return float(np.angle(-self.wave) / (2 * self.harmonic) % (pi / self.harmonic))
+
+    @property
+    def most(self) -> float:
+        """The split that is not exceeded in 95 of 100 cases, Hz."""
+        return self.frequency * float(np.hypot(abs(self.wave) + 1.2 * self.error, 1.9 * self.error))
+
+
+@dataclass(frozen=True)
+class Round:
+    """Cuts that are made without a measurement between them, the share of the splits that they take, and what is left."""
+
+    cuts: tuple[Cut, ...]
+    share: float
+    after: tuple[State, ...]
+    unbalance: Mapping[int, complex]
+
+    @property
+    def mass(self) -> float:
+        """All of it, kg."""
+        return sum(cut.mass for cut in self.cuts)
+
+
+@dataclass(frozen=True)
+class Plan:
+    """Rounds of cuts; the first is to be made as it stands, those after it are what is expected before measuring anew."""
+
+    before: tuple[State, ...]
+    rounds: tuple[Round, ...]
+    unbalance: Mapping[int, complex]
+    goal: float
+
+    @property
+    def mass(self) -> float:
+        """All that is expected to be taken off, kg."""
+        return sum(one.mass for one in self.rounds)
+
+
+def plan_trim(
+    readings: Sequence[Reading],
+    sites: Sites,
+    *,
+    goal: float,
+    removal_error: float = 0.02,
+    gain_error: float = 0.03,
+    unbalance: Mapping[int, complex] | None = None,
+) -> Plan:
+    """Rounds of cuts that bring the splits below the goal.
+
+    Parameters
+    ----------
+    readings : measured splits, one per harmonic.
+    sites : with gains for their harmonics.
+    goal : Hz, of every split.
+    removal_error : relative standard error of the mass of each cut, independent.
+    gain_error : relative standard error that all cuts share: of what a mass does, and of the removal rate.
+    unbalance : k -> u_k = Σ m exp(i k θ) of the resonator, kg, for k of 1 ... 3 as far as known.
+
+    Raises
+    ------
+    ShellError
+        The sites cannot take off what is needed.
+    """
+    if not goal > 0:
+        raise ShellError("the goal is a positive split in Hz.")
+    known = dict(unbalance or {})
+    before = tuple(State(r.harmonic, r.frequency, r.wave, r.error) for r in readings)
+    states, spent, rounds = before, np.zeros(len(sites.azimuth)), []
+    reading_errors = {r.harmonic: r.error for r in readings}
+    for _ in range(MOST_ROUNDS):
+        share = _share(states, goal, removal_error, gain_error)
+        masses = _least_mass(states, sites, share, sites.capacity - spent, known)
+        spent = spent + masses
+        after = []
+        for state in states:
+            moves = masses * sites.gain[state.harmonic] * np.exp(2j * state.harmonic * sites.azimuth)
+            total = complex(moves.sum())
+            # what is left before it is measured: the reading, the error of each cut and that of all
+            spread = (
+                state.error**2 + removal_error**2 * float((abs(moves) ** 2).sum()) / 2 + (gain_error * abs(total)) ** 2
+            )
+            after.append(State(state.harmonic, state.frequency, state.wave + total, sqrt(spread)))
+        known = {k: u - complex(masses @ np.exp(1j * k * sites.azimuth)) for k, u in known.items()}
+        cuts = tuple(
+            Cut(float(a), float(p), float(m))
+            for a, p, m in zip(sites.azimuth, sites.position, masses, strict=True)
+            if m > 1e-6 * masses.max()
+        )
+        rounds.append(Round(cuts, share, tuple(after), dict(known)))
+        if all(state.most <= goal for state in after):
+            break
+        # the next round starts from a new reading of what is expected to be left
+        states = tuple(State(s.harmonic, s.frequency, _typical(s), reading_errors[s.harmonic]) for s in after)
+        if all(state.hertz < max(goal / 2, 2 * state.error * state.frequency) for state in states):
+            break
+    return Plan(before, tuple(rounds), dict(unbalance or {}), goal)
+
+
+def _typical(state: State) -> complex:
+    """A wave of the size that is to be expected after a round: its most probable value, grown by its error."""
+    size = sqrt(abs(state.wave) ** 2 + state.error**2)
+    return state.wave / abs(state.wave) * size if abs(state.wave) > 0 else complex(size)
+
+
+def _share(states: Sequence[State], goal: float, removal_error: float, gain_error: float) -> float:
+    """The largest share that leaves no split on the far side of 0 by more than the goal, `SURE` errors of the gain allowed for."""
+    spread = SURE * sqrt(gain_error**2 + removal_error**2 / 4)
+    shares = [(s.hertz + goal / 2) / (s.hertz * (1 + spread)) for s in states if s.hertz > goal / 2]
+    return min(1.0, *shares) if shares else 1.0
+
+
+def _least_mass(
+    states: Sequence[State], sites: Sites, share: float, capacity: Array, unbalance: Mapping[int, complex]
+) -> Array:
+    count = len(sites.azimuth)
+    rows: list[Array] = []
+    wanted: list[float] = []
+    for state in states:
+        gain = sites.gain[state.harmonic]
+        scale = float(gain.max())
+        column = gain / scale * np.exp(2j * state.harmonic * sites.azimuth)
+        rows += [column.real, column.imag]
+        target = -share * state.wave / scale
+        wanted += [target.real, target.imag]
+    size = max(abs(value) for value in wanted)
+    limits: list[Array] = []
+    bounds: list[float] = []
+    turns = np.exp(-2j * pi * np.arange(DIRECTIONS) / DIRECTIONS)
+    for k in BALANCED:
+        around = np.exp(1j * k * sites.azimuth)
+        u = unbalance.get(k)
+        if u is None or abs(u) < 1e-9 * size:
+            rows += [around.real, around.imag]
+            wanted += [0.0, 0.0]
+            continue
+        # Re((u - Σ μ e^{ikθ}) turn) <= t_k <= |u|, with t_k the unbalance that is left, to be kept small beside the mass
+        for turn in turns:
+            row = np.zeros(count + len(BALANCED))
+            row[:count] = -(around * turn).real
+            row[count + k - 1] = -1.0
+            limits.append(row)
+            bounds.append(-float((u * turn).real) / size)
+    padded = np.zeros((len(rows), count + len(BALANCED)))
+    padded[:, :count] = np.array(rows)
+    most = [(0.0, max(float(c), 0.0) / size) for c in capacity]
+    most += [(0.0, abs(unbalance.get(k, 0.0)) / size) for k in BALANCED]
+    cost = np.concatenate([np.ones(count), np.full(len(BALANCED), 0.05)])
+    found = linprog(
+        cost,
+        A_eq=padded,
+        b_eq=np.array(wanted) / size,
+        A_ub=np.array(limits) if limits else None,
+        b_ub=np.array(bounds) if limits else None,
+        bounds=most,
+    )
+    if found.x is None:
+        room = 1e9 * float(capacity.sum())
+        need = 1e9 * size
+        raise ShellError(
+            f"the cuts would go beyond the wall: about {need:.3g} µg are to be taken off around the antinodes, and the sites "
+            f"({count} of them, {room:.3g} µg in all, at most {1e9 * float(capacity.max()):.3g} µg each) cannot hold this and the balance. "
+            "Allow longer, wider or more cuts."
+        )
+    return np.asarray(np.maximum(found.x[:count], 0.0) * size)

@@ -1,0 +1,130 @@
+"""Measured points of a surface: x y z text, PLY or STL, or a table of departures over position and azimuth."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
+
+from studies.errors import InputError
+
+if TYPE_CHECKING:
+    from numpy import float64
+    from numpy.typing import NDArray
+
+    Array = NDArray[float64]
+
+UNITS = {"m": 1.0, "mm": 1e-3, "um": 1e-6}
+Unit = Literal["m", "mm", "um"]
+MESHES = (".ply", ".stl")
+PORTION = 1_000_000  # lines at a time
+GRID = "position"  # the first cell of a table
+
+
+@dataclass(frozen=True, eq=False)
+class Grid:
+    """How far a face stands out of the material, m, (positions, azimuths); NaN where nothing was measured."""
+
+    position: "Array"
+    azimuth: "Array"
+    values: "Array"
+
+
+def read_cloud(path: str | Path, unit: Unit = "mm") -> "Array | Grid":
+    """Points (count, 3) in m, or a table.
+
+    Text files have x, y, z in the first three columns, apart by blanks, commas, semicolons or tabs; lines that start with #
+    are comments. A table begins with the line `position,0,5,10,…` (azimuths in degrees) and has one line per position (0 ... 1 of the
+    meridian) with the departures of the face in µm, positive out of the material, empty where there is none.
+
+    Raises
+    ------
+    InputError
+        There is no such file, or a line of it is not numbers.
+    """
+    file = Path(path)
+    if not file.is_file():
+        raise InputError(
+            f"{path}: " + ("is a folder; give the name of a file." if file.is_dir() else "there is no such file.")
+        )
+    if file.suffix.lower() in MESHES:
+        return _read_mesh(file) * UNITS[unit]
+    first, skipped = _first_line(file)
+    if first.lower().startswith(GRID):
+        return _read_grid(file, skipped)
+    return _read_text(file, first) * UNITS[unit]
+
+
+def _first_line(path: Path) -> tuple[str, int]:
+    try:
+        with path.open(encoding="utf-8-sig") as lines:
+            for number, line in enumerate(lines):
+                if line.strip() and not line.lstrip().startswith("#"):
+                    return line.strip(), number
+    except UnicodeDecodeError:
+        raise InputError(f"{path}: not UTF-8 text; points are read from x y z text, .ply, .stl or a table.") from None
+    raise InputError(f"{path}: has no points.")
+
+
+def _read_text(path: Path, first: str) -> "Array":
+    import numpy as np
+    import pandas as pd
+
+    separator = next((mark for mark in (";", ",") if mark in first), r"\s+")
+    kept = []
+    try:
+        for part in pd.read_csv(
+            path, sep=separator, header=None, comment="#", usecols=[0, 1, 2], dtype=float, chunksize=PORTION, engine="c"
+        ):
+            values = part.to_numpy()
+            kept.append(values[np.isfinite(values).all(axis=1)])
+    except (ValueError, pd.errors.ParserError) as error:
+        reason = " ".join(str(error).split())
+        raise InputError(
+            f"{path}: is not a table of x y z ({reason}); each line has three numbers, decimals with a point, headings behind #."
+        ) from None
+    points = np.concatenate(kept)
+    if not len(points):
+        raise InputError(f"{path}: has no points.")
+    return np.asarray(points)
+
+
+def _read_mesh(path: Path) -> "Array":
+    import numpy as np
+    import trimesh
+
+    try:
+        loaded = trimesh.load(path, process=False)
+        points = np.asarray(loaded.vertices, dtype=float)
+    except Exception as error:
+        raise InputError(f"{path}: cannot be read as a mesh or point cloud ({error}).") from error
+    if points.ndim != 2 or not len(points):
+        raise InputError(f"{path}: has no points.")
+    if path.suffix.lower() == ".stl":
+        points = np.unique(points, axis=0)  # each corner stands there once per triangle
+    return points
+
+
+def _read_grid(path: Path, skipped: int) -> Grid:
+    import numpy as np
+    import pandas as pd
+
+    try:
+        table = pd.read_csv(path, skiprows=skipped, comment="#", dtype=float, index_col=0)
+        azimuth = np.deg2rad(table.columns.to_numpy(dtype=float))
+    except (ValueError, pd.errors.ParserError) as error:
+        raise InputError(f"{path}: is not a table of departures over position and azimuth ({error}).") from None
+    position = table.index.to_numpy(dtype=float)
+    order = np.argsort(position)
+    if len(position) < 1 or np.any(np.diff(position[order]) <= 0) or position.min() < 0 or position.max() > 1:
+        raise InputError(
+            f"{path}: the positions of a table lie in 0 (start of the meridian) ... 1 (rim), none of them twice."
+        )
+    step = 2 * np.pi / max(len(azimuth), 1)
+    if len(azimuth) < 8 or np.any(abs(np.diff(azimuth) - step) > 0.01 * step):
+        raise InputError(
+            f"{path}: the azimuths do not close the circle: {len(azimuth)} columns ask for steps of {np.rad2deg(step):.4g}°; "
+            "leave out a column that repeats the first at 360°, or fill the missing ones with empty cells."
+        )
+    values = 1e-6 * table.to_numpy()[order]
+    if np.nanmax(abs(values)) > 2e-3:
+        raise InputError(f"{path}: departures of {1e3 * np.nanmax(abs(values)):.3g} mm: the table's cells are in µm.")
+    return Grid(position[order], azimuth, values)

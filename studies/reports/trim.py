@@ -1,0 +1,105 @@
+"""The page of a trimming plan, for a technician: polar pictures before and after, the table of cuts, what to measure."""
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from studies.reports.page import Chapter, Facts, Picture, Table, Text, draw, render_page
+from studies.reports.style import BLUE, GREEN, VERMILION, figure
+
+if TYPE_CHECKING:
+    from shell.trimming import Plan
+
+LEAD = "Cut round 1, let the shell come back to temperature, measure, and plan again: the later rounds are what is expected, not orders."
+
+
+def write_trim_page(path: str, plan: "Plan", payload: dict[str, Any]) -> None:
+    """Write the page, whole or not at all."""
+    from studies.files.writing import write_text
+
+    write_text(path, render_page(f"Trimming plan for {payload['card']}", LEAD, _chapters(plan, payload)))
+
+
+def _chapters(plan: "Plan", payload: dict[str, Any]) -> list[Chapter]:
+    before, last = payload["before"][0], payload["rounds"][-1]["after"][0]
+    facts = Facts([
+        (f"split of n = {before['harmonic']} now", f"{1e3 * before['split_Hz']:.3g} mHz", f"slow axis at {before['slow_axis_deg']:.1f}°"),
+        ("round 1 takes", f"{payload['rounds'][0]['mass_ug']:.3g} µg", f"{len(payload['rounds'][0]['cuts'])} cuts, {100 * payload['rounds'][0]['share']:.0f} % of the split"),
+        ("expected at the end", f"below {1e3 * last['most_Hz']:.2g} mHz", f"goal {1e3 * plan.goal:.2g} mHz, {len(plan.rounds)} rounds"),
+    ])  # fmt: skip
+    measure = [Text(sentence) for sentence in payload["measure"]]
+    kinds = ", ".join(f"{kind} {value:+.2f}" for kind, value in payload["other_cuts"].items())
+    warning = Text(
+        f"Planned as '{payload['cut']}'. The same mass at the rim moves the split, relative to this kind of cut, by: {kinds}. A negative "
+        "number moves it the other way. If round 1 shows another effect than predicted, plan the next with --gain.",
+        "note",
+    )
+    return [
+        Chapter("What to do", [facts, _cuts(payload, 1), *measure, warning]),
+        Chapter("Where", [_polar(plan)]),
+        Chapter("What is expected", [_states(payload), *(_cuts(payload, k) for k in range(2, len(plan.rounds) + 1))]),
+    ]
+
+
+def _cuts(payload: dict[str, Any], number: int) -> Table:
+    one = payload["rounds"][number - 1]
+    rows = [
+        [str(k), f"{c['azimuth_deg']:.2f}", f"{c['height_mm']:.3f}", f"{c['mass_ug']:.3f}", "" if c["depth_um"] is None else f"{c['depth_um']:.3f}", "☐"]
+        for k, c in enumerate(sorted(one["cuts"], key=lambda c: c["azimuth_deg"]), 1)
+    ]  # fmt: skip
+    title = f"Round {number}: cut this" if number == 1 else f"Round {number}, expected: plan anew before cutting"
+    return Table(
+        title,
+        ["cut", "azimuth (°)", "height z (mm)", "mass (µg)", "depth (µm)", "done"],
+        rows,
+        f"{one['mass_ug']:.4g} µg together.",
+    )
+
+
+def _states(payload: dict[str, Any]) -> Table:
+    stages = [
+        ("measured", payload["before"]),
+        *((f"after round {k}", one["after"]) for k, one in enumerate(payload["rounds"], 1)),
+    ]
+    rows = [
+        [label, str(s["harmonic"]), f"{1e3 * s['split_Hz']:.3f}", f"{1e3 * s['error_Hz']:.3f}", f"{1e3 * s['most_Hz']:.3f}", f"{s['slow_axis_deg']:.1f}"]
+        for label, states in stages
+        for s in states
+    ]  # fmt: skip
+    return Table("Splits", ["state", "n", "split (mHz)", "error (mHz)", "95 % below (mHz)", "slow axis (°)"], rows)
+
+
+def _polar(plan: "Plan") -> Picture:
+    """Cuts as wedges on the rim; the split as a rose around it, before and as expected after round 1."""
+    first = plan.rounds[0]
+    theta = np.linspace(0, 2 * np.pi, 721)
+    with figure(1, 2, 4.2, subplot_kw={"projection": "polar"}) as (made, axes):
+        for ax, states, title in zip(
+            axes,
+            (plan.before, first.after),
+            ("Now, with the cuts of round 1", "After round 1, as expected"),
+            strict=True,
+        ):
+            size = max(s.hertz for s in plan.before)
+            ax.plot(theta, np.ones_like(theta), color="#888888", lw=1)
+            for state, colour in zip(states, (VERMILION, BLUE, GREEN, "black"), strict=False):
+                rose = 1 + 0.35 * state.hertz / size * np.cos(2 * state.harmonic * (theta - state.slow_axis))
+                ax.plot(theta, rose, color=colour, lw=1.6, label=f"n = {state.harmonic}: {1e3 * state.hertz:.3g} mHz")
+                for k in range(2 * state.harmonic):
+                    at = state.slow_axis + k * np.pi / state.harmonic
+                    ax.plot([at, at], [0, 0.9], color=colour, lw=0.8, ls="--")
+            if states is plan.before:
+                most = max(cut.mass for cut in first.cuts)
+                for cut in first.cuts:
+                    ax.bar(
+                        cut.azimuth, 0.25 * cut.mass / most + 0.03, width=0.06, bottom=1.0, color="black", alpha=0.75
+                    )
+                    ax.annotate(f"{1e9 * cut.mass:.3g} µg", (cut.azimuth, 1.45), ha="center", va="center", fontsize=8)
+            ax.set_ylim(0, 1.55)
+            ax.set_yticks([])
+            ax.set_title(title, fontsize=10)
+            ax.legend(loc="lower center", bbox_to_anchor=(0.5, -0.28), fontsize=8)
+        caption = (
+            "The rim over azimuth. Waves stand out where the slower mode swings (dashed: its antinodes); black: cuts."
+        )
+        return draw(made, caption, "polar pictures of the split before and after the first round of cuts")

@@ -1,0 +1,251 @@
+"""From measured faces of a card's resonator to its waves, its roundness and the split that they cause."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from math import pi
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shell.errors import ShellError
+from shell.imperfection import CoupledHarmonics, Imperfection, Pair, Split, find_split
+from shell.modes import solve_modes
+from shell.scan.alignment import Motion, align
+from shell.scan.projection import Projector, check_unit
+from shell.scan.survey import Face, survey, survey_map
+from studies.errors import InputError
+from studies.files.clouds import Grid, Unit, read_cloud
+
+if TYPE_CHECKING:
+    from shell.elastic import Elastic
+    from shell.resonator import Resonator
+
+Array = NDArray[np.float64]
+SIDES = {"inner": -1, "outer": 1}
+COVERAGE = 0.9
+DRAWS = 4000
+
+
+@dataclass(frozen=True)
+class Interval:
+    """A value with its 90 % interval."""
+
+    value: float
+    low: float
+    high: float
+
+
+@dataclass(frozen=True)
+class SplitOfScan:
+    """The split of one harmonic by the measured faces.
+
+    split : to first order, most probable. hertz, relative : with intervals. slow_axis : rad, with its interval, or None where
+    the split is not told from 0. error : standard error of either part of the relative split. whole : with all orders.
+    """
+
+    split: Split
+    hertz: Interval
+    relative: Interval
+    slow_axis: Interval | None
+    error: float
+    whole: Split
+
+
+@dataclass(frozen=True)
+class Wave:
+    """A wave around of a face, the wall or the offset at a position: amplitude (m) and azimuth of a crest (rad)."""
+
+    quantity: str
+    order: int
+    position: float
+    amplitude: Interval
+    azimuth: float
+
+
+@dataclass(frozen=True)
+class Roundness:
+    """A circle of a face: peak to valley and rms (m) of the waves from 2 up (1 is eccentricity)."""
+
+    face: str
+    position: float
+    peak_to_valley: float
+    rms: float
+
+
+@dataclass(frozen=True, eq=False)
+class Scan:
+    """Measured faces with what follows from them."""
+
+    faces: dict[str, Face]
+    imperfection: Imperfection
+    splits: tuple[SplitOfScan, ...]
+    waves: tuple[Wave, ...]
+    roundness: tuple[Roundness, ...]
+
+    def map_of(
+        self, quantity: Literal["inner", "outer", "wall", "offset"], rows: int = 60, columns: int = 180
+    ) -> tuple[Array, Array, Array]:
+        """Positions, azimuths and the fitted departure (m) on a grid of what was covered."""
+        low, high = max(f.low for f in self.faces.values()), min(f.high for f in self.faces.values())
+        x, theta = np.linspace(low, high, rows), 2 * pi * np.arange(columns) / columns
+        parts = {name: np.array([face.profile(float(at), theta) for at in x]) for name, face in self.faces.items()}
+        return x, theta, combine(parts, quantity)
+
+
+def combine(parts: "dict[str, Array]", quantity: str) -> Array:
+    """Wall = inner + outer, offset of the middle surface = (outer - inner)/2, of departures out of the material."""
+    if quantity in parts:
+        return parts[quantity]
+    if quantity == "wall":
+        return np.asarray(sum(parts.values()))
+    return np.asarray((parts["outer"] - parts["inner"]) / 2)
+
+
+def scan_faces(
+    resonator: "Resonator",
+    elastic: "Elastic",
+    files: dict[str, str],
+    *,
+    unit: Unit = "mm",
+    frames: Literal["own", "common"] = "own",
+    harmonics: tuple[int, ...] = (1, 2, 3, 4),
+    highest: int = 12,
+    theory: Literal["solid", "shell"] = "solid",
+    say: Callable[[str], None] = lambda _: None,
+) -> Scan:
+    """Read, align and fit the faces, and find the splits.
+
+    Parameters
+    ----------
+    resonator, elastic : of the card at the temperature.
+    files : "inner" and/or "outer" with their paths.
+    unit : of the points.
+    frames : "own" aligns each face by itself; "common" keeps them where they lie to each other.
+    harmonics : n of the splits.
+    highest : wave around up to which the faces are fitted, at least twice the highest harmonic.
+    say : hears what is being done.
+    """
+    if 2 * max(harmonics) > highest:
+        raise InputError(
+            f"the split of n = {max(harmonics)} comes from wave {2 * max(harmonics)}: fit up to it (--highest)."
+        )
+    read = {name: read_cloud(path, unit) for name, path in files.items()}
+    clouds = {name: cloud for name, cloud in read.items() if not isinstance(cloud, Grid)}
+    projector = Projector(resonator) if clouds else None
+    faces: dict[str, Face] = {}
+    for name, points in clouds.items():
+        check_unit(points, resonator, files[name])
+    if clouds and projector is not None:
+        say("aligning the faces")
+        together = [list(clouds)] if frames == "common" else [[name] for name in clouds]
+        motions: dict[str, Motion] = {}
+        for names in together:
+            motion = align([(clouds[name], SIDES[name]) for name in names], projector, [files[name] for name in names])
+            motions |= dict.fromkeys(names, motion)
+        for name, points in clouds.items():
+            say(f"fitting the {name} face: {len(points)} points")
+            faces[name] = survey(points, SIDES[name], motions[name], projector, files[name], highest)
+    for name, cloud in read.items():
+        if isinstance(cloud, Grid):
+            faces[name] = survey_map(cloud.position, cloud.azimuth, cloud.values, SIDES[name], files[name], highest)
+    faces = {name: faces[name] for name in ("inner", "outer") if name in faces}
+    _check_wall(faces, resonator)
+    imperfection = Imperfection(
+        inner=faces["inner"].field if "inner" in faces else None,
+        outer=faces["outer"].field if "outer" in faces else None,
+    )
+    splits = []
+    for n in harmonics:
+        say(f"splitting n = {n}")
+        (mode,) = solve_modes(resonator, elastic, n, theory=theory)
+        splits.append(_split(Pair(mode), CoupledHarmonics(mode, elastic, n + 8), faces, imperfection))
+    return Scan(faces, imperfection, tuple(splits), _waves(faces), _roundness(faces))
+
+
+def _check_wall(faces: dict[str, Face], resonator: "Resonator") -> None:
+    if len(faces) < 2:
+        return
+    x = np.linspace(max(f.low for f in faces.values()), min(f.high for f in faces.values()), 40)
+    theta = 2 * pi * np.arange(72) / 72
+    nominal = resonator.at(x * resonator.length).thickness[:, None]
+    wall = nominal + sum(np.array([face.profile(float(at), theta) for at in x]) for face in faces.values())
+    if np.any(wall <= 0):
+        raise ShellError(
+            "the measured faces cross each other: they are not in one frame or not of one resonator; check the files."
+        )
+
+
+def _split(pair: Pair, coupled: CoupledHarmonics, faces: dict[str, Face], imperfection: Imperfection) -> SplitOfScan:
+    n = pair.mode.harmonic
+    inner, outer = pair.faces
+    covariance = np.zeros((2, 2))
+    for name, face in faces.items():
+        covariance += face.project(outer if name == "outer" else inner, 2 * n)[1]
+    first = find_split(pair, imperfection)
+    relative, axis = polar_intervals(first.wave, covariance, 2 * n)
+    f = pair.mode.frequency
+    hertz = Interval(f * relative.value, f * relative.low, f * relative.high)
+    if axis is not None:
+        half = pi / (2 * n)
+        axis = Interval(first.slow_axis, axis.low + half, axis.high + half)
+        turn = round((axis.value - (axis.low + axis.high) / 2) / (pi / n)) * pi / n
+        axis = Interval(axis.value, axis.low + turn, axis.high + turn)
+    error = float(np.sqrt(np.trace(covariance) / 2))
+    return SplitOfScan(first, hertz, relative, axis, error, coupled.solve(imperfection))
+
+
+def polar_intervals(wave: complex, covariance: Array, fold: int) -> tuple[Interval, Interval | None]:
+    """90 % intervals of |z| and arg z/fold of a complex number with Gaussian errors; no axis where 0 is within its error."""
+    draws = np.random.default_rng(7).standard_normal((DRAWS, 2)) @ np.linalg.cholesky(covariance + 1e-300 * np.eye(2)).T
+    z = wave + draws[:, 0] + 1j * draws[:, 1]
+    tails = [50 * (1 - COVERAGE), 50 * (1 + COVERAGE)]
+    low, high = (float(q) for q in np.percentile(abs(z), tails))
+    told = abs(wave) ** 2 > 6 * float(np.trace(covariance)) / 2
+    size = Interval(abs(wave), low if told else 0.0, high)
+    if not told:
+        return size, None
+    turned = np.angle(z / wave)
+    a, b = (float(q) for q in np.percentile(turned, tails))
+    at = float(np.angle(wave))
+    return size, Interval(at / fold, (at + a) / fold, (at + b) / fold)
+
+
+def _waves(faces: dict[str, Face]) -> tuple[Wave, ...]:
+    """Waves 0 ... 8 of each face, the wall and the offset, at the rim end of what was covered and at its middle."""
+    found = []
+    low, high = max(f.low for f in faces.values()), min(f.high for f in faces.values())
+    for quantity in (*faces, *(("wall", "offset") if len(faces) == 2 else ())):
+        for position in ((low + high) / 2, high):
+            orders = range(min(8, *(f.highest for f in faces.values())) + 1)
+            found += [_wave(faces, quantity, order, position) for order in orders]
+    return tuple(found)
+
+
+def _wave(faces: dict[str, Face], quantity: str, order: int, position: float) -> Wave:
+    factors = {"wall": {"inner": 1.0, "outer": 1.0}, "offset": {"inner": -0.5, "outer": 0.5}}.get(
+        quantity, {quantity: 1.0}
+    )
+    c, covariance = 0j, np.zeros((2, 2))
+    for name, factor in factors.items():
+        one, own = faces[name].at(position, order)
+        c, covariance = c + factor * one, covariance + factor**2 * own
+    if order == 0:
+        sd = 1.645 * float(np.sqrt(covariance[0, 0]))
+        return Wave(quantity, 0, position, Interval(c.real, c.real - sd, c.real + sd), 0.0)
+    size, _ = polar_intervals(c, covariance, order)
+    return Wave(quantity, order, position, size, float(np.angle(c) / order % (2 * pi / order)))
+
+
+def _roundness(faces: dict[str, Face]) -> tuple[Roundness, ...]:
+    theta = 2 * pi * np.arange(720) / 720
+    found = []
+    for name, face in faces.items():
+        for position in np.linspace(face.low, face.high, 11)[1:]:
+            c = face.polynomials(np.array([position]))[0] @ face.coefficients.T
+            c = np.where(np.arange(len(c)) >= 2, c, 0)
+            departure = (c * np.exp(-1j * np.multiply.outer(theta, np.arange(len(c))))).real.sum(axis=1)
+            found.append(
+                Roundness(name, float(position), float(np.ptp(departure)), float(np.sqrt(np.mean(departure**2))))
+            )
+    return tuple(found)

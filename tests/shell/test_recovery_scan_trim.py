@@ -1,0 +1,140 @@
+"""Planted waves come back from three-dimensional points; planted splits are trimmed away."""
+
+from math import pi
+
+import numpy as np
+import pytest
+
+from shell.elastic import Elastic
+from shell.imperfection import CoupledHarmonics, Imperfection, Pair, PointMass, find_split, wave
+from shell.meridian import cylinder, hemisphere
+from shell.modes import solve_modes
+from shell.scan.alignment import align
+from shell.scan.projection import Projector
+from shell.scan.survey import survey
+from shell.trimming import Reading, plan_trim
+from studies.trim import Teeth, rim_sites, tooth_sites
+from tests.generator.scans import dome_points
+
+SILICA = Elastic(72.7e9, 0.17, 2203.0)
+R, H = 15e-3, 0.9e-3
+DOME = hemisphere(radius=R, thickness=H)
+
+
+@pytest.fixture(scope="module")
+def pair():
+    (mode,) = solve_modes(DOME, SILICA, 2)
+    return Pair(mode)
+
+
+@pytest.fixture(scope="module")
+def projector():
+    return Projector(DOME)
+
+
+def test_even_waves_of_both_faces_give_the_published_split(pair, projector):
+    """cos 4θ of the same amplitude on both faces is a wall wave of twice it: 0.36902 of its share of the wall."""
+    rng = np.random.default_rng(11)
+    found = 0j
+    for side in (-1, 1):
+        points = dome_points(rng, 20000, [(4, 0.5e-6, 0.3, 0), (3, 2e-6, 1.0, 3)], side, outliers=1e-3)
+        face = survey(points, side, align([(points, side)], projector, ["face"]), projector, "face")
+        found += face.project(pair.faces[(side + 1) // 2], 4)[0]
+    assert abs(found) == pytest.approx(0.36902 * 1e-6 / H, rel=0.03)
+    assert abs(np.angle(-found * np.exp(-1.2j))) / 4 < np.deg2rad(1.0)
+
+
+def test_frame_noise_and_outliers_are_found(projector):
+    points = dome_points(
+        np.random.default_rng(2), 20000, [(2, 2e-6, 0.0, 2)], 1, outliers=2e-3, tilt_deg=2.0, shift=200e-6
+    )
+    motion = align([(points, 1)], projector, ["face"])
+    assert np.rad2deg(motion.tilt) == pytest.approx(2.0, abs=0.05)
+    face = survey(points, 1, motion, projector, "face")
+    assert face.noise == pytest.approx(100e-9, rel=0.03)
+    assert 20 < face.outliers < 60
+    assert abs(face.at(1.0, 2)[0]) == pytest.approx(2e-6, rel=0.02)
+
+
+def test_a_turned_over_dome_is_put_upright(projector):
+    points = dome_points(np.random.default_rng(3), 20000, [], 1) @ np.diag([1.0, -1.0, -1.0]) + [0.02, 0.01, -0.03]
+    motion = align([(points, 1)], projector, ["face"])
+    assert motion.rotation[2, 2] == pytest.approx(-1.0, abs=1e-3)
+
+
+def test_distances_from_a_cylinder_and_a_dome_are_exact():
+    rng = np.random.default_rng(4)
+    theta, zeta = rng.uniform(0, 2 * pi, 2000), rng.uniform(-0.5e-3, 0.5e-3, 2000)
+    phi = rng.uniform(0.1, pi / 2, 2000)
+    r = R + zeta
+    places = Projector(DOME).place(
+        np.stack([r * np.sin(phi) * np.cos(theta), r * np.sin(phi) * np.sin(theta), r * np.cos(phi)], axis=1)
+    )
+    assert np.abs(places.height - zeta).max() < 1e-11
+    assert np.abs(places.position - phi / (pi / 2)).max() < 1e-8
+    tube = Projector(cylinder(radius=10e-3, thickness=0.6e-3, height=18e-3))
+    z = rng.uniform(1e-3, 17e-3, 2000)
+    places = tube.place(np.stack([(10e-3 + zeta) * np.cos(theta), (10e-3 + zeta) * np.sin(theta), z], axis=1))
+    assert np.abs(abs(places.height) - abs(zeta)).max() < 1e-12
+
+
+def test_four_cuts_null_n_2_and_leave_the_balance(pair):
+    f = pair.mode.frequency
+    plan = plan_trim([Reading.of(2, f, 0.3, 0.4, 1e-4)], rim_sites(DOME, {2: pair}, 2203.0, 0.4), goal=5e-4)
+    first = plan.rounds[0]
+    flaw = Imperfection(masses=tuple(PointMass(-c.mass, c.azimuth) for c in first.cuts))
+    assert find_split(pair, flaw).wave * f == pytest.approx(first.share * 0.3 * np.exp(4j * 0.4), rel=1e-9)
+    for k in (1, 2, 3):
+        assert abs(sum(c.mass * np.exp(1j * k * c.azimuth) for c in first.cuts)) < 1e-9 * first.mass
+    # no plan takes less: every cut lies on an antinode of the slower mode
+    gain = -pair.mass()[1]
+    assert first.mass == pytest.approx(first.share * 0.3 / f / gain, rel=1e-9)
+
+
+def test_known_unbalance_is_used_and_never_raised(pair):
+    # what four antinodes take off wave 1 they take off wave 3 mirrored
+    f, u = pair.mode.frequency, {1: 20e-9 * np.exp(0.7j), 3: 22e-9 * np.exp(1j * (4 * 0.4 - 0.6))}
+    sites = rim_sites(DOME, {2: pair}, 2203.0, 0.4)
+    plan = plan_trim([Reading.of(2, f, 0.3, 0.4, 1e-4)], sites, goal=5e-4, unbalance=u)
+    for k in u:
+        assert abs(plan.rounds[0].unbalance[k]) <= abs(u[k]) * (1 + 1e-6)
+    assert abs(plan.rounds[0].unbalance[1]) < 0.3 * abs(u[1])  # the antinodes on its heavy side give more
+    even = plan_trim([Reading.of(2, f, 0.3, 0.4, 1e-4)], sites, goal=5e-4)
+    assert plan.rounds[0].mass == pytest.approx(even.rounds[0].mass, rel=1e-6)
+
+
+def test_two_harmonics_and_teeth(pair):
+    (three,) = solve_modes(DOME, SILICA, 3)
+    pairs = {2: pair, 3: Pair(three)}
+    readings = [
+        Reading.of(2, pair.mode.frequency, 0.2, 0.4, 1e-4),
+        Reading.of(3, three.frequency, 0.5, 0.1, 1e-4),
+    ]
+    plan = plan_trim(readings, tooth_sites(pairs, Teeth(36, 0.05, 200e-9)), goal=5e-4)
+    first = plan.rounds[0]
+    flaw = Imperfection(masses=tuple(PointMass(-c.mass, c.azimuth) for c in first.cuts))
+    for reading, one in zip(readings, (pair, pairs[3]), strict=True):
+        assert find_split(one, flaw).wave == pytest.approx(-first.share * reading.wave, rel=1e-6)
+    assert all(abs((np.rad2deg(c.azimuth - 0.05) + 5) % 10 - 5) < 1e-6 for c in first.cuts)
+
+
+def test_planted_splits_end_below_half_a_millihertz_in_three_rounds(pair):
+    """Three seeds of tests/benchmarks/bench_trim.py: cuts with 2 % of error, readings with 0.1 mHz, coupled harmonics as nature."""
+    coupled, f = CoupledHarmonics(pair.mode, SILICA), pair.mode.frequency
+    for seed, planted in ((0, 0.02), (1, 0.2), (2, 1.0)):
+        rng = np.random.default_rng(seed)
+        axis = rng.uniform(0, pi / 2)
+        density = wave(4, planted / f / 0.3608, axis)
+        gone = []
+        for _ in range(3):
+            seen = coupled.solve(Imperfection(density=density, masses=tuple(gone))).wave
+            seen += 1e-4 / f * complex(*rng.standard_normal(2))
+            if abs(seen) * f < 3.5e-4:
+                break
+            slow = float(np.angle(-seen) / 4)
+            plan = plan_trim(
+                [Reading.of(2, f, abs(seen) * f, slow, 1e-4)], rim_sites(DOME, {2: pair}, 2203.0, slow), goal=5e-4
+            )
+            for cut in plan.rounds[0].cuts:
+                gone.append(PointMass(-cut.mass * (1 + 0.02 * rng.standard_normal()), cut.azimuth))
+        assert coupled.solve(Imperfection(density=density, masses=tuple(gone))).hertz < 5e-4

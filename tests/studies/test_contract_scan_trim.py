@@ -1,0 +1,141 @@
+"""`hrg scan` and `hrg trim`: their JSON, pages and files, and every refusal with its sentence."""
+
+import csv
+import json
+
+import numpy as np
+import pytest
+
+from studies.cli import main
+from tests.generator.scans import dome_points
+
+OUTER = [(4, 0.4e-6, 0.4, 4), (2, 3e-6, 0.3, 2), (3, 1e-6, 0.1, 3)]
+
+
+@pytest.fixture(scope="module")
+def faces(tmp_path_factory):
+    """Both faces of the card free-dome as text files in mm, each in its own frame."""
+    folder = tmp_path_factory.mktemp("scan")
+    rng = np.random.default_rng(5)
+    paths = {}
+    for name, side, waves in (("inner", -1, [(4, 0.2e-6, 0.9, 4)]), ("outer", 1, OUTER)):
+        paths[name] = folder / f"{name}.asc"
+        np.savetxt(paths[name], 1e3 * dome_points(rng, 8000, waves, side, outliers=1e-3), fmt="%.7f", header="x y z mm")
+    return paths
+
+
+def failing(capsys, *words):
+    assert main([str(word) for word in words]) == 2
+    captured = capsys.readouterr()
+    assert captured.out == ""
+    return captured.err
+
+
+def test_scan_prints_one_object_and_writes_map_and_page(faces, tmp_path, capsys):
+    words = ["scan", "free-dome", faces["inner"], faces["outer"], "--harmonic", 2, "--theory", "shell", "--json"]
+    words += ["--map", tmp_path / "map.csv", "--report", tmp_path / "scan.html"]
+    assert main([str(word) for word in words]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["schema"] == "hrg.scan/1"
+    assert set(found) == {"schema", "card", "temperature_degC", "faces", "splits", "waves", "roundness"}
+    (split,) = found["splits"]
+    assert split["split_Hz"]["low"] < split["split_Hz"]["value"] < split["split_Hz"]["high"]
+    assert abs(found["faces"]["outer"]["noise_um"] - 0.1) < 0.01
+    assert abs(found["faces"]["outer"]["tilt_deg"] - 0.5) < 0.2
+    assert 0 < found["faces"]["outer"]["outliers"] < 40
+    rows = list(csv.DictReader((tmp_path / "map.csv").read_text().splitlines()))
+    assert set(rows[0]) == {"position", "azimuth_deg", "inner_um", "outer_um", "wall_um", "offset_um"}
+    text = (tmp_path / "scan.html").read_text(encoding="utf-8")
+    assert "Roundness" in text
+    assert "<svg" in text or "data:image" in text
+
+
+def test_a_plan_is_one_object_a_table_for_the_machine_and_a_page(tmp_path, capsys):
+    words = ["trim", "free-dome", "--split", "0.12", "--axis", "31", "--json"]
+    words += ["--out", str(tmp_path / "cuts.csv"), "--report", str(tmp_path / "trim.html")]
+    assert main(words) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["schema"] == "hrg.trim/1"
+    first = found["rounds"][0]
+    assert sorted(round(c["azimuth_deg"]) for c in first["cuts"]) == [31, 121, 211, 301]
+    assert 0.9 < first["share"] < 1
+    rows = list(csv.DictReader((tmp_path / "cuts.csv").read_text().splitlines()))
+    assert sum(float(r["mass_ug"]) for r in rows) == pytest.approx(found["mass_ug"], rel=1e-4)
+    assert "Round 1: cut this" in (tmp_path / "trim.html").read_text(encoding="utf-8")
+
+
+def test_a_scan_can_be_trimmed(faces, tmp_path, capsys):
+    main(
+        [
+            "scan",
+            "free-dome",
+            str(faces["inner"]),
+            str(faces["outer"]),
+            "--harmonic",
+            "2",
+            "--theory",
+            "shell",
+            "--json",
+        ]
+    )
+    text = capsys.readouterr().out
+    (tmp_path / "scan.json").write_text(text, encoding="utf-8")
+    assert main(["trim", "free-dome", "--scan", str(tmp_path / "scan.json"), "--goal", "0.02", "--json"]) == 0
+    plan = json.loads(capsys.readouterr().out)
+    assert plan["before"][0]["split_Hz"] == pytest.approx(json.loads(text)["splits"][0]["split_Hz"]["value"])
+
+
+def test_scan_refuses_what_it_cannot_use(faces, tmp_path, capsys):
+    points = np.loadtxt(faces["outer"])
+    wrong = tmp_path / "wrong.asc"
+    np.savetxt(wrong, 1e3 * points)
+    assert "µm read as mm" in failing(capsys, "scan", "free-dome", "none", wrong)
+    assert "exchange the files" in failing(capsys, "scan", "free-dome", faces["outer"], faces["inner"])
+    np.savetxt(wrong, points[np.abs(np.arctan2(points[:, 1], points[:, 0])) > 0.6])
+    assert "gaps between the points are larger" in failing(capsys, "scan", "free-dome", "none", wrong, "--harmonic", 2)
+    np.savetxt(wrong, points * [1.0, 1.15, 1.0])
+    assert "cannot be brought onto the face" in failing(capsys, "scan", "free-dome", "none", wrong, "--harmonic", 2)
+    wrong.write_text("x y z\n1 2 three\n")
+    assert "not a table of x y z" in failing(capsys, "scan", "free-dome", "none", wrong)
+    wrong.write_text("# nothing\n")
+    assert "has no points" in failing(capsys, "scan", "free-dome", "none", wrong)
+    assert "there is no such file" in failing(capsys, "scan", "free-dome", "none", tmp_path / "none.asc")
+    assert "no face is given" in failing(capsys, "scan", "free-dome", "none")
+    assert "--highest" in failing(capsys, "scan", "free-dome", faces["inner"], "--harmonic", 7)
+
+
+def test_a_table_of_departures_must_close_the_circle(tmp_path, capsys):
+    path = tmp_path / "grid.csv"
+
+    def write(angles, unit=1.0):
+        x = np.linspace(0.1, 1, 15)
+        cells = unit * 0.5 * np.cos(4 * (np.deg2rad(angles) - 0.4)) * x[:, None] ** 2
+        lines = ["position," + ",".join(f"{a:g}" for a in angles)]
+        lines += [f"{at:.4f}," + ",".join(f"{c:.5f}" for c in row) for at, row in zip(x, cells, strict=True)]
+        path.write_text("\n".join(lines))
+
+    write(np.arange(0, 360, 7.5))
+    assert main(["scan", "free-dome", "none", str(path), "--harmonic", "2", "--theory", "shell", "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["splits"][0]["slow_axis_deg"]["value"] == pytest.approx(np.rad2deg(0.4), abs=0.01)
+    write(np.arange(0, 361, 7.5))
+    assert "do not close the circle" in failing(capsys, "scan", "free-dome", "none", path)
+    write(np.arange(0, 180, 7.5))
+    assert "do not close the circle" in failing(capsys, "scan", "free-dome", "none", path)
+    write(np.arange(0, 360, 7.5), 1e4)
+    assert "cells are in µm" in failing(capsys, "scan", "free-dome", "none", path)
+
+
+def test_trim_refuses_what_it_should_not_cut(tmp_path, capsys):
+    assert "measure better, do not cut" in failing(capsys, "trim", "free-dome", "--split", "1e-4", "--axis", "3")
+    assert "beyond the wall" in failing(capsys, "trim", "free-dome", "--split", "500", "--axis", "3")
+    assert "1 splits, 0 axes" in failing(capsys, "trim", "free-dome", "--split", "0.1")
+    assert "write k:µg@degrees" in failing(
+        capsys, "trim", "free-dome", "--split", "0.1", "--axis", "3", "--unbalance", "4:3@2"
+    )
+    assert "nearer the rim" in failing(capsys, "trim", "free-dome", "--split", "0.1", "--axis", "3", "--cut", "inner")
+    assert "lies at position 1" in failing(
+        capsys, "trim", "free-dome", "--split", "0.1", "--axis", "3", "--cut", "edge", "--position", "0.9"
+    )
+    (tmp_path / "no.json").write_text("{}")
+    assert "hrg scan --json" in failing(capsys, "trim", "free-dome", "--scan", tmp_path / "no.json")
