@@ -35,6 +35,15 @@ COLUMNS = {
     "pattern_angle_deg": "azimuth of the standing wave",
 }
 COMPENSATED = "compensated_"
+LIMITS = {
+    # what a column can be, by the end of its name: lowest, highest
+    "_Hz": (0.0, 1e12),
+    "_deg_per_h": (-1e10, 1e10),
+    "_deg_per_s": (-1e6, 1e6),
+    "_V": (-1e5, 1e5),
+    "_deg": (-1e9, 1e9),
+    "inverse_q": (0.0, 1.0),
+}
 TABLE_COLUMNS = ("temperature_degC", "frequency_Hz")
 PROFILE_COLUMNS = ("time_s", "chamber_temperature_degC")
 
@@ -92,6 +101,7 @@ def read_record(path: str | Path) -> Record:
         line = table.line(int(backwards[0]) + 1)
         raise InputError(f"{path}, line {line}: time_s does not increase; sort the rows and remove repeated ones.")
     _check_temperatures(table)
+    check_plausible(table.values, lambda row: f"{path}, line {table.line(row)}")
     notes = _read_notes(path, table)
     return Record(table.values, str(path), table.sha256, **notes)  # type: ignore[arg-type]
 
@@ -156,6 +166,23 @@ def write_record(record: Record, path: str | Path, progress: Callable[[int], Non
             file.write(part.to_csv(index=False, header=False, lineterminator="\n").encode())
             if progress is not None:
                 progress(begin + len(part))
+
+
+def check_plausible(columns: "Mapping[str, NDArray[np.float64]]", where: Callable[[int], str]) -> None:
+    """Refuse readings that no instrument gives, naming the first; `where` tells the place of a row."""
+    import numpy as np
+
+    for name, values in columns.items():
+        limits = next((ends for ending, ends in LIMITS.items() if name.endswith(ending)), None)
+        if limits is None:
+            continue
+        outside = np.flatnonzero((values < limits[0]) | (values > limits[1]))
+        if len(outside):
+            row = int(outside[0])
+            raise InputError(
+                f"{where(row)}: {name} = {values[row]:g} cannot be a reading ({limits[0]:g} to {limits[1]:g} can); check its"
+                " unit, or leave the cell empty where the value is missing."
+            )
 
 
 def _check_temperatures(table: Columns) -> None:

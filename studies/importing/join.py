@@ -10,7 +10,7 @@ from studies.errors import InputError
 from studies.importing.clock import drop_repeated, read_times, seconds_between
 from studies.importing.mapping import TABLE_TARGETS, ColumnMap, FileMap, ImportMap
 from studies.importing.raw import RawTable, read_raw
-from studies.record import Record
+from studies.record import Record, check_plausible
 
 if TYPE_CHECKING:
     import datetime
@@ -179,6 +179,7 @@ def convert(table: RawTable, column: ColumnMap) -> "Array":
             f"{table.path}, line {line}: '{column.source}' becomes {values[outside[0]]:g} °C; check unit, scale and offset"
             " in the map."
         )
+    check_plausible({column.target: values}, lambda row: f"{table.path}, line {table.line(row)}, '{column.source}'")
     return np.asarray(values, dtype=float)
 
 

@@ -25,8 +25,15 @@ def export_results(results: "Results", path: str | Path) -> Path:
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(table.columns)
     for row in table.itertuples(index=False, name=None):
-        writer.writerow(["" if cell != cell else repr(cell) if isinstance(cell, float) else cell for cell in row])
+        writer.writerow([_spell(cell) for cell in row])
     write_text(path, text.getvalue())
     beside = Path(path).with_suffix(".units.json")
     write_text(beside, json.dumps(table.attrs, indent=2, ensure_ascii=False) + "\n")
     return beside
+
+
+def _spell(cell: object) -> object:
+    """Write floats with every digit, and texts so that a spreadsheet does not take them for formulas."""
+    if isinstance(cell, float):
+        return "" if cell != cell else repr(cell)
+    return f"'{cell}" if isinstance(cell, str) and cell.startswith(("=", "+", "-", "@", "\t")) else cell

@@ -122,3 +122,32 @@ def test_saved_card_loads_equal_even_from_another_folder(tmp_path):
     (effect,) = again.effects
     assert (effect.name, effect.parameters) == ("second-lag", {"weight": 0.1, "second_time_constant_s": 2000.0})
     assert tomllib.loads(moved.read_text())["schema"] == "hrg.card/1"
+
+
+@pytest.mark.parametrize(
+    ("line", "part"),
+    [
+        ("youngs_modulus_GPa = 72.7e9", "looks like pascal: write 72.7"),
+        ("youngs_modulus_GPa = 5000.0", "no solid is stiffer"),
+        ("density_kg_m3 = 2.203", "looks like g/cm³: write 2203"),
+        ("density_kg_m3 = 2e6", "30 to 30000"),
+    ],
+)
+def test_units_mixed_up_are_named(tmp_path, line, part):
+    card = tmp_path / "card.toml"
+    card.write_text(
+        'schema = "hrg.card/1"\nname = "x"\n[resonator]\nshape = "hemisphere"\nradius_mm = 15.0\nthickness_mm = 0.9\n'
+        f'[material]\nname = "fused-silica"\n{line}\n'
+    )
+    with pytest.raises(InputError, match=part):
+        load_card(card)
+
+
+def test_lengths_a_thousand_times_too_large_are_named(tmp_path):
+    card = tmp_path / "card.toml"
+    card.write_text(
+        'schema = "hrg.card/1"\nname = "x"\n[resonator]\nshape = "hemisphere"\nradius_mm = 15000.0\nthickness_mm = 900.0\n'
+        '[material]\nname = "fused-silica"\n'
+    )
+    with pytest.raises(InputError, match="in mm, not in µm"):
+        load_card(card)

@@ -433,3 +433,25 @@ def test_the_offset_of_a_second_clock_is_offered(tmp_path, offset):
     (line,) = [line for line in draft.text.splitlines() if line.startswith("# clock_offset_s") and "CHECK" in line]
     assert float(line.split("=")[1].split("#")[0]) == pytest.approx(offset, abs=0.5)
     assert "its clock seems to need" in draft.notes[0]
+
+
+@pytest.mark.parametrize(
+    ("header", "value", "part"),
+    [
+        ("bias_deg_per_h", "1e19", "cannot be a reading"),
+        ("frequency_Hz", "-3", "cannot be a reading"),
+        ("inverse_q", "12", "0 to 1"),
+    ],
+)
+def test_what_the_reader_refuses_is_not_imported(tmp_path, header, value, part):
+    """The import refuses, with the line, what a record may not hold; the reader refuses the same."""
+    rows = "".join(f"{k},{value if k == 4 else 0.5}\n" for k in range(9))
+    (tmp_path / "raw.csv").write_text(f"time_s,{header}\n{rows}")
+    with pytest.raises(InputError, match=rf"line 6.*{part}"):
+        read_record(tmp_path / "raw.csv")
+    (tmp_path / "map.toml").write_text(
+        f'schema = "hrg.map/1"\n[[file]]\ntime = "time_s"\ntime_format = "s"\n[[file.column]]\nfrom = "{header}"\n'
+        f'to = "{header}"\nunit = "{next(iter(units_of(header)))}"\n'
+    )
+    with pytest.raises(InputError, match=rf"line 6.*{part}"):
+        import_records([str(tmp_path / "raw.csv")], load_map(tmp_path / "map.toml"))

@@ -45,6 +45,7 @@ COMMANDS = {
     "loop": ["loop", "CARD"],
     "cards": ["cards", "CARD"],
     "modes": ["modes", "CARD"],
+    "compare": ["compare", "free-dome", "CARD"],
     "tcf": ["tcf", "CARD"],
     "thermal": ["thermal", "CARD", "soak 20 1h"],
     "simulate": ["simulate", "CARD", "soak 20 1h", "--out", "OUT"],

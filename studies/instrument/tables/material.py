@@ -24,6 +24,8 @@ from studies.instrument.registry import CardTable, Place
 if TYPE_CHECKING:
     from shell.materials import Material
 
+STIFFEST = 2000.0  # GPa
+LIGHTEST, HEAVIEST = 30.0, 30000.0  # kg/m³
 GIVEN = {
     # key of the card: (property of the material, its unit here in SI)
     "youngs_modulus_GPa": ("youngs_modulus", 1e9),
@@ -81,6 +83,15 @@ class MaterialKeys(Table, frozen=True, kw_only=True):
     density_kg_m3: Annotated[float, number(above=0.0)] | None = None
     deviation: Deviation | None = None
     note: str = ""
+
+    def __post_init__(self) -> None:
+        E, rho = self.youngs_modulus_GPa, self.density_kg_m3
+        if E is not None and E > STIFFEST:
+            hint = f" It looks like pascal: write {E / 1e9:g}." if 1e-3 < E / 1e9 < STIFFEST else ""
+            raise ValueError(f"youngs_modulus_GPa = {E:g}: no solid is stiffer than {STIFFEST:g} GPa.{hint}")
+        if rho is not None and not LIGHTEST <= rho <= HEAVIEST:
+            hint = f" It looks like g/cm³: write {rho * 1000:g}." if LIGHTEST <= rho * 1000 <= HEAVIEST else ""
+            raise ValueError(f"density_kg_m3 = {rho:g}: a solid has {LIGHTEST:g} to {HEAVIEST:g} kg/m³.{hint}")
 
 
 def build_material(keys: MaterialKeys, place: Place) -> "Material":

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import msgspec
 
-from studies.errors import naming
+from studies.errors import InputError, naming
 from studies.instrument.keys import Table, number
 from studies.instrument.registry import CardTable, Place
 
@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from shell.resonator import Resonator, Stem, Support
 
 MM = 1e-3
+SMALLEST, LARGEST = 1e-6, 1.0  # m
 Length = Annotated[float, number(above=0.0)]
 NotNegative = Annotated[float, number(least=0.0)]
 Share = Annotated[float, number(least=0.0, most=1.0)]
@@ -191,7 +192,11 @@ class Meridian(Shape, frozen=True, kw_only=True, tag="meridian"):
 def build_resonator(keys: Shape, place: Place) -> "Resonator":
     """Build the resonator; what the geometry does not allow is named with the card."""
     with naming(place.where):
-        return keys.build()
+        resonator = keys.build()
+    if not SMALLEST <= resonator.size <= LARGEST:
+        hint = " Lengths are in mm, not in µm." if resonator.size > LARGEST else " Lengths are in mm, not in m."
+        raise InputError(f"{place.where}: a resonator of {resonator.size / MM:g} mm is none that can be built.{hint}")
+    return resonator
 
 
 TABLE = CardTable("resonator", Hemisphere | Cylinder | Bell | Meridian, build=build_resonator, required=True)
