@@ -21,6 +21,7 @@ from studies.errors import InputError
 if TYPE_CHECKING:
     from studies.sweeps.case import Case
 
+MOST_MEMORY = 8 * 1024**3  # bytes of address space of the process
 IMPORT_LIMIT = 120.0  # s for the process to start and import the user's module
 
 
@@ -42,6 +43,7 @@ class Child:
         ]
         path = os.pathsep.join([str(Path(__file__).parents[2]), *filter(None, [os.environ.get("PYTHONPATH")])])
         self.function = function
+        self.asked = 0
         self.process = subprocess.Popen(
             command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, env={**os.environ, "PYTHONPATH": path}, bufsize=0
         )
@@ -58,11 +60,14 @@ class Child:
     def ask(self, request: Mapping[str, Any], limit: float) -> float:
         """Send one case and return the number that comes back within `limit` seconds."""
         assert self.process.stdin is not None
+        self.asked += 1
         try:
-            self.process.stdin.write(json.dumps(request).encode() + b"\n")
+            self.process.stdin.write(json.dumps({**request, "request": self.asked}).encode() + b"\n")
         except OSError:
             self.fail("ended its process")
         answer = self.read(limit, "one case")
+        if answer.get("request") != self.asked:
+            self.fail("answered another request than the last")
         if "problem" in answer:
             raise FunctionFailed(answer["problem"])
         return float(answer["value"])
@@ -149,6 +154,7 @@ def serve() -> None:
 
     function, parent = sys.argv[1:3]
     die_with_parent(int(parent))
+    _limit_memory()
     answers = os.fdopen(os.dup(1), "wb", buffering=0)
     os.dup2(2, 1)  # what the function prints must not mix with the answers
     try:
@@ -158,7 +164,20 @@ def serve() -> None:
         return
     answers.write(json.dumps({"source": _hash_source(call)}).encode() + b"\n")
     for line in sys.stdin.buffer:
-        answers.write(json.dumps(_answer(function, call, json.loads(line))).encode() + b"\n")
+        asked = json.loads(line)
+        number = asked.pop("request")
+        answers.write(json.dumps({**_answer(function, call, asked), "request": number}).encode() + b"\n")
+
+
+def _limit_memory() -> None:
+    """Let a function that asks for too much memory fail by itself, before the machine suffers."""
+    try:
+        import resource
+    except ImportError:  # Windows knows no such limit
+        return
+    _, hard = resource.getrlimit(resource.RLIMIT_AS)
+    most = MOST_MEMORY if hard == resource.RLIM_INFINITY else min(MOST_MEMORY, hard)
+    resource.setrlimit(resource.RLIMIT_AS, (most, hard))
 
 
 def _load(function: str) -> Any:

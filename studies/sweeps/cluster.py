@@ -46,7 +46,7 @@ class Cluster:
 
     def submit(self, function: Callable[..., Any], *arguments: Any) -> "Future[Any]":
         """Queue a call on the cluster."""
-        future: Future[Any] = self.executor.submit(function, *arguments)
+        future: Future[Any] = self.executor.submit(call_if_same, self.code, function, *arguments)
         return future
 
     def restart(self) -> bool:
@@ -59,7 +59,7 @@ class Cluster:
         self.client.close(timeout=5)
 
     def _check_versions(self) -> None:
-        ours = describe_code()
+        ours = self.code = describe_code()
         theirs = self.client.run(describe_code)
         others = {address: text for address, text in theirs.items() if text != ours}
         if others:
@@ -68,6 +68,22 @@ class Cluster:
             raise MissingEnvironment(
                 f"worker {address} has {text}, here is {ours}; install the same versions on every machine."
             )
+
+
+def call_if_same(code: str, function: Callable[..., Any], *arguments: Any) -> Any:
+    """Call a function on a worker; one that joined later with another version refuses.
+
+    Raises
+    ------
+    MissingEnvironment
+        The worker's versions differ from those of the study.
+    """
+    here = describe_code()
+    if here != code:
+        raise MissingEnvironment(
+            f"a worker that joined later has {here}, the study has {code}; install the same versions."
+        )
+    return function(*arguments)
 
 
 def describe_code() -> str:

@@ -83,6 +83,7 @@ def run_study(
         damaged = store.forget_damaged()
         if damaged:
             warnings.warn(f"{len(damaged)} damaged cases are computed again (first: case {damaged[0]}).", stacklevel=2)
+        _tell_other_versions(store)
         store.forget("lost", *(["failed"] if retry_failed else []))
         crew = Here() if families else None
         _run(
@@ -201,6 +202,17 @@ def _describe(store: Store, study: Study, design: Design, identity: Mapping[str,
             "repeats": design.inverse.tolist() if len(design.unique) < len(design.values) else [],
         }
     )
+
+
+def _tell_other_versions(store: Store) -> None:
+    """Warn when earlier results come from other versions of what computes: digits may differ between them."""
+    now = describe_environment()["packages"]
+    then = store.runs()[-1]["provenance"].get("packages", now) if store.runs() else now
+    others = [
+        f"{name} {then.get(name)} then, {now[name]} now" for name in ("numpy", "scipy") if then.get(name) != now[name]
+    ]
+    if others:
+        warnings.warn(f"earlier results were computed with {', '.join(others)}; last digits may differ.", stacklevel=3)
 
 
 def _describe_families(families: Families) -> list[Any]:

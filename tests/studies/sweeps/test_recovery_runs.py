@@ -353,3 +353,38 @@ def test_a_finished_study_in_a_read_only_folder_can_be_read(tmp_path, functions,
     assert hrg("study", "run", spec, "--out", tmp_path / "out", "--allow-python").returncode == 0
     (tmp_path / "out").chmod(0o555)
     assert hrg("study", "export", tmp_path / "out", "--out", tmp_path / "r.csv").returncode == 0
+
+
+def test_other_versions_on_resuming_are_said(tmp_path, functions, hrg):
+    spec = tmp_path / "square.toml"
+    spec.write_text(spec_of("square", 'method = "grid"', 'name = "user.x"\nvalues = [1, 2, 3]'))
+    run = ("study", "run", spec, "--out", tmp_path / "out", "--allow-python")
+    assert "computed with" not in hrg(*run).stderr
+    assert "computed with" not in hrg(*run).stderr
+    with sqlite3.connect(tmp_path / "out" / "study.sqlite") as store:
+        store.execute("UPDATE run SET provenance = replace(provenance, ?, ?)", (np.__version__, "1.0.0"))
+    store.close()
+    assert f"numpy 1.0.0 then, {np.__version__} now" in hrg(*run).stderr
+
+
+def test_an_answer_to_another_request_and_too_much_memory_fail_their_case(tmp_path, hrg):
+    """A function that writes an answer of its own into the pipe gains nothing by it; one that asks for 64 GB fails."""
+    (tmp_path / "functions.py").write_text(
+        "import json, os\n"
+        "def liar(instrument, parameters):\n"
+        "    for fd in range(3, 20):\n"
+        "        try:\n"
+        "            os.write(fd, json.dumps({'value': 666.0, 'request': 0}).encode() + b'\\n')\n"
+        "        except OSError:\n"
+        "            pass\n"
+        "    return parameters['user.x'] ** 2\n"
+        "def glutton(instrument, parameters):\n"
+        "    return len(bytearray(64 * 1024**3))\n"
+    )
+    for name, said in (("liar", "another request"), ("glutton", "MemoryError")):
+        spec = tmp_path / f"{name}.toml"
+        spec.write_text(spec_of(name, 'method = "grid"', 'name = "user.x"\nvalues = [2, 3]'))
+        done = hrg("study", "run", spec, "--out", tmp_path / name, "--allow-python", "--json")
+        found = json.loads(done.stdout)
+        assert found["failed"] == 2, done.stdout
+        assert said in found["reasons"][0]["reason"]
