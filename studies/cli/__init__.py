@@ -8,6 +8,7 @@ import os
 import sys
 import warnings
 from collections.abc import Sequence
+from typing import Any
 
 # The solver's matrices are small: threads cost more than they bring. Read by the libraries when numpy is first imported.
 for _name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):
@@ -64,7 +65,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if clash:
         return _complain(clash, 3)
 
-    from cyclopts import App, CycloptsError, Parameter
+    from cyclopts import App, CycloptsError, Group, Parameter
 
     from studies import __version__
     from studies.errors import UNUSABLE_INPUT, MissingEnvironment
@@ -82,17 +83,23 @@ def main(arguments: Sequence[str] | None = None) -> int:
     )
     app.register_install_completion_command(help="Install completion for the shell in use (bash, zsh or fish).")
     groups: dict[str, App] = {}
+    headings = [(Group(title, sort_key=k), names) for k, (title, names) in enumerate(CHAPTERS.items())]
+
+    def chapter(command: str) -> Any:
+        return next((heading for heading, names in headings if command in names), "Commands")
+
     for name, (target, help_line) in COMMANDS.items():
         *group, command = name.split(" ")
         parent = app
         if group:
             if group[0] not in groups:
-                groups[group[0]] = App(name=group[0], help=GROUPS[group[0]])
+                groups[group[0]] = App(name=group[0], help=GROUPS[group[0]], group=chapter(group[0]))
                 app.command(groups[group[0]])
             parent = groups[group[0]]
         # the line stands in lists of commands; a command's own help page shows its whole docstring
         alone = words[: len(group) + 1] == name.split(" ")
-        parent.command(target, name=command, **({} if alone else {"help": help_line}))
+        more = {} if alone else {"help": help_line}
+        parent.command(target, name=command, **(more if group else {**more, "group": chapter(command)}))
     plain = warnings.formatwarning
     warnings.formatwarning = lambda message, *_, **__: f"hrg: warning: {message}\n"
     try:
@@ -123,6 +130,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return int(status) if isinstance(status, int) else 0
 
 
+CHAPTERS = {
+    # of the list of commands
+    "Design a resonator": ("modes", "tcf", "loss", "loop", "compare", "render", "study", "derive"),
+    "Make it": ("scan", "trim", "electrodes"),
+    "Run it": ("simulate", "thermal", "import"),
+    "Explain and accept": ("calibrate", "diagnose", "effects", "acceptance"),
+    "Compensate": ("fit", "compensate", "temperature"),
+    "What there is": ("cards", "card", "materials", "reproduce", "doctor"),
+}
 GROUPS = {
     "card": "Make a card of your own.",
     "fit": "Calibrate a compensation model from measured data.",
