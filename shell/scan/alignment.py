@@ -19,6 +19,7 @@ from shell.resonator import Resonator
 from shell.scan.projection import Projector
 
 UNTOLD = 1e-4  # singular value over the largest from which on the shape does not tell a direction of motion
+SETTLED = 8  # steps after which points count alike, those far off left out
 SAMPLE = 20_000  # points that the motion is found from
 EDGE_SAMPLE = 1_000_000  # and its edge
 SECTORS = 72  # azimuths of the edge
@@ -83,7 +84,7 @@ def _descend(samples: list[tuple[Array, int]], projector: Projector, start: Moti
     rotation, offset = start.rotation, start.offset
     size = projector.resonator.size
     told, left = np.zeros(5, dtype=bool), np.inf
-    for _ in range(25):
+    for count in range(25):
         rows, residual = [], []
         for points, side in samples:
             moved = points @ rotation.T + offset
@@ -93,7 +94,9 @@ def _descend(samples: list[tuple[Array, int]], projector: Projector, start: Moti
             residual.append(off)
         A, d = np.concatenate(rows), np.concatenate(residual)
         spread = 1.4826 * float(np.median(abs(d - np.median(d)))) + 1e-12
-        weight = 1 / np.maximum(1.0, abs(d - np.median(d)) / (2 * spread))
+        far = abs(d - np.median(d)) / spread
+        # weights that fall with the distance find the place; equal ones do not let the form of the face push it aside
+        weight = 1 / np.maximum(1.0, far / 2) if count < SETTLED else np.where(far < 6, 1.0, 0.0)
         # the mean off the face is form, not motion: it gets a column of its own
         A = np.column_stack([A, np.ones(len(A))])
         _, values, turned = np.linalg.svd((A * weight[:, None]).T @ A, hermitian=True)
@@ -103,7 +106,7 @@ def _descend(samples: list[tuple[Array, int]], projector: Projector, start: Moti
         spin = Rotation.from_rotvec([step[3] / size, step[4] / size, 0.0]).as_matrix()
         rotation, offset = spin @ rotation, spin @ offset + step[:3]
         left = spread
-        if np.abs(step[:5]).max() < 1e-9 * size:
+        if count > SETTLED and np.abs(step[:5]).max() < 1e-9 * size:
             break
     return Motion(rotation, offset, tuple(bool(x) for x in told)), left  # type: ignore[arg-type]
 

@@ -1,6 +1,11 @@
-"""`hrg modes`: frequencies, Bryan factors and sensitivities of a card's modes."""
+"""`hrg modes`: frequencies, Bryan factors and sensitivities of a card's modes.
 
-from typing import TYPE_CHECKING, Annotated, Literal
+Where the card has imperfections or charged electrodes, the pairs n >= 1 have `split` in the JSON besides: `split_Hz`, `slow_Hz`, `fast_Hz`,
+`slow_axis_deg` (azimuth of an antinode of the slower mode), `shift_ppm` of the mean, all to first order, and `every_order_split_Hz`; and
+`parts`, split_Hz, slow_axis_deg and shift_ppm by the imperfection, the measured split and the electrodes alone.
+"""
+
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import Parameter
 
@@ -62,6 +67,7 @@ def modes(
         found = [m for n in harmonic for m in solve_modes(resonator, elastic, n, count, theory, tolerance)]
     detailed = theory != "rayleigh"
     share, mean = _material_share(instrument, T), _mean_thickness(resonator)
+    split = _find_splits(instrument, found, T) if detailed else {}
     if json:
         entries = []
         for m in found:
@@ -81,6 +87,8 @@ def modes(
                     "sensitivities": asdict(m.sensitivities),
                     "energy_fractions": asdict(m.energy_fractions),
                 }
+            if id(m) in split:
+                entry["split"] = split[id(m)]
             entries.append(entry)
         print_json(
             {
@@ -113,9 +121,62 @@ def modes(
     if theory == "rayleigh":
         note = "Rayleigh's closed form ignores the free edge: on a hemisphere it lies several per cent too high."
     print_table(f"{instrument.name} at {T - ZERO_CELSIUS:g} °C, {theory}", columns, rows, note)
+    if split:
+        _print_splits(found, split)
     if sensitivities and detailed:
         _print_details(found)
     return 0
+
+
+def _find_splits(instrument: "Instrument", found: "list[Mode]", T: float) -> "dict[int, dict[str, Any]]":
+    """What the card's imperfection and electrodes make of each pair, by the identity of its mode."""
+    from math import degrees
+
+    from studies.splitting import SplitPair, is_imperfect
+
+    if not is_imperfect(instrument):
+        return {}
+    entries: dict[int, dict[str, Any]] = {}
+    for m in found:
+        if m.harmonic < 1:
+            continue
+        whole = SplitPair(instrument, m, T)
+        slow, fast = whole.split.frequencies
+        parts = {"imperfection": whole.imperfection, "measured": whole.measured, "electrodes": whole.electrodes}
+        entries[id(m)] = {
+            "split_Hz": whole.split.hertz,
+            "slow_Hz": slow,
+            "fast_Hz": fast,
+            "slow_axis_deg": degrees(whole.split.slow_axis),
+            "shift_ppm": 1e6 * whole.split.shift,
+            "every_order_split_Hz": whole.of_every_order().hertz,
+            "parts": {
+                name: {"split_Hz": p.hertz, "slow_axis_deg": degrees(p.slow_axis), "shift_ppm": 1e6 * p.shift}
+                for name, p in parts.items()
+            },
+        }
+    return entries
+
+
+def _print_splits(found: "list[Mode]", split: "dict[int, dict[str, Any]]") -> None:
+    from studies.cli.output import print_table
+
+    rows = [
+        [
+            str(m.harmonic),
+            str(m.index),
+            f"{s['slow_Hz']:.5f}",
+            f"{s['fast_Hz']:.5f}",
+            f"{s['split_Hz']:.5f}",
+            f"{s['every_order_split_Hz']:.5f}",
+            f"{s['slow_axis_deg']:.2f}",
+            f"{s['shift_ppm']:+.3f}",
+        ]
+        for m in found
+        if (s := split.get(id(m)))
+    ]
+    columns = ["n", "index", "slow (Hz)", "fast (Hz)", "split (Hz)", "every order", "slow axis (°)", "shift (ppm)"]
+    print_table("Pairs with the card's imperfection and electrodes", columns, rows, "Antinode of the slower mode.")
 
 
 def _material_share(instrument: "Instrument", T: float) -> float:

@@ -1,0 +1,98 @@
+"""`[electrodes]`: electrodes over a face of the shell, their gap and voltages.
+
+[electrodes]
+face = "inner"                       # or outer
+gap_um = 100.0                       # known to ± 5 % unless stated
+count = 16                           # equal electrodes around, the first one centred at azimuth_deg
+coverage = 0.8                       # share of the circle
+azimuth_deg = 0.0
+first = 0.6                          # they lie between these positions of the meridian (1: rim)
+last = 1.0
+voltage_V = 100.0                    # of all; 0: none
+trim_V = [0.0, 30.0]                 # added in squares: what each electrode has besides, in order, 0 where the list ends
+gap_expansion_per_K = 0.0            # (1/g) dg/dT
+[[electrodes.gap_wave]]              # waves of the gap around, relative to it
+order = 1
+amplitude_percent = 2.0
+azimuth_deg = 10.0
+"""
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated, Literal
+
+import numpy as np
+
+from studies.instrument.keys import Table, number
+from studies.instrument.registry import CardTable, Place
+
+if TYPE_CHECKING:
+    from shell.electrodes import Electrodes
+    from shell.imperfection import Pair
+
+
+class GapWave(Table, frozen=True, kw_only=True):
+    """A wave of the gap around."""
+
+    order: Annotated[int, number(least=1, most=40)]
+    amplitude_percent: Annotated[float, number(above=-100.0, below=100.0)]
+    azimuth_deg: float = 0.0
+
+
+class ElectrodeKeys(Table, frozen=True, kw_only=True):
+    """Equal electrodes around a face."""
+
+    face: Literal["inner", "outer"] = "inner"
+    gap_um: Annotated[float, number(above=0.0, relative_sd=0.05)] = 100.0
+    count: Annotated[int, number(least=1, most=256)] = 16
+    coverage: Annotated[float, number(above=0.0, most=1.0)] = 0.8
+    azimuth_deg: float = 0.0
+    first: Annotated[float, number(least=0.0, below=1.0)] = 0.6
+    last: Annotated[float, number(above=0.0, most=1.0)] = 1.0
+    voltage_V: float = 0.0
+    trim_V: tuple[float, ...] = ()
+    gap_expansion_per_K: float = 0.0
+    gap_wave: tuple[GapWave, ...] = ()
+    note: str = ""
+
+    def __post_init__(self) -> None:
+        if not self.first < self.last:
+            raise ValueError(f"first must be below last, not {self.first:g} and {self.last:g}.")
+        if len(self.trim_V) > self.count:
+            raise ValueError(f"trim_V has {len(self.trim_V)} voltages for {self.count} electrodes.")
+
+
+@dataclass(frozen=True)
+class CardElectrodes:
+    """Electrodes of a card; they act on a mode once it is solved."""
+
+    keys: ElectrodeKeys
+    reference_temperature: float
+
+    @property
+    def are_charged(self) -> bool:
+        """Whether any electrode has a voltage."""
+        return bool(self.keys.voltage_V or any(self.keys.trim_V))
+
+    def on(self, pair: "Pair", temperature: float, voltage: float | None = None) -> "Electrodes":
+        """Return them over a mode's face at a temperature (K), with another common voltage if one is given."""
+        from shell.electrodes import Electrodes, ring_of_electrodes
+        from shell.imperfection import wave
+        from shell.imperfection.field import add
+
+        k = self.keys
+        common = k.voltage_V if voltage is None else voltage
+        trims = np.zeros(k.count)
+        trims[: len(k.trim_V)] = k.trim_V
+        volts = np.sqrt(common**2 + trims**2)
+        patches = ring_of_electrodes(k.count, k.coverage, volts.tolist(), np.deg2rad(k.azimuth_deg), k.first, k.last)
+        gap = 1e-6 * k.gap_um * (1 + k.gap_expansion_per_K * (temperature - self.reference_temperature))
+        waves = [wave(w.order, w.amplitude_percent / 100, np.deg2rad(w.azimuth_deg)) for w in k.gap_wave]
+        return Electrodes(pair, patches, gap, add(*waves), k.face)
+
+
+def build(keys: ElectrodeKeys, place: Place) -> CardElectrodes:
+    """Return the electrodes."""
+    return CardElectrodes(keys, place.reference_temperature)
+
+
+TABLE = CardTable("electrodes", ElectrodeKeys, build=build, optional=True)

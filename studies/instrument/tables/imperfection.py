@@ -1,0 +1,150 @@
+"""`[imperfection]`: how the resonator differs from the body of revolution of `[resonator]`.
+
+[[imperfection.wave]]                # waves around, as many as wanted
+of = "wall"                          # wall | outer | inner | offset (of the middle surface) | rim (its edge) | density | modulus
+order = 4                            # crests around
+amplitude_um = 0.3                   # of lengths; density and modulus have amplitude_ppm
+azimuth_deg = 31.0                   # of a crest
+power = 0.0                          # grows as position to this power, 0 where the meridian starts and 1 at the rim
+[[imperfection.mass]]                # small masses, negative where material was taken away
+mass_ug = 5.0
+azimuth_deg = 31.0
+position = 1.0                       # 0 ... 1 of the meridian
+height = 0.0                         # -1 inner face, 0 middle, 1 outer face
+[[imperfection.map]]                 # measured departures over position and azimuth (hrg scan reads the same tables)
+of = "outer"                         # wall | outer | inner | offset
+file = "outer.csv"                   # in µm, beside the card
+[imperfection.split]                 # a split as it was measured at the reference temperature, whatever causes it, beside all that
+harmonic = 2
+split_Hz = 0.12
+slow_axis_deg = 31.0                 # azimuth of an antinode of the slower mode
+"""
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+import numpy as np
+
+from studies.errors import InputError
+from studies.instrument.keys import Table, number
+from studies.instrument.registry import CardTable, Place
+
+if TYPE_CHECKING:
+    from shell.imperfection import Field, Imperfection
+
+LENGTHS = {"wall": "thickness", "outer": "outer", "inner": "inner", "offset": "offset", "rim": "rim"}
+SHARES = {"density": "density", "modulus": "modulus"}
+
+
+class WaveKeys(Table, frozen=True, kw_only=True):
+    """A wave around of a length or of a property of the material."""
+
+    of: Literal["wall", "outer", "inner", "offset", "rim", "density", "modulus"] = "wall"
+    order: Annotated[int, number(least=0, most=40)]
+    amplitude_um: float | None = None
+    amplitude_ppm: float | None = None
+    azimuth_deg: float = 0.0
+    power: Annotated[float, number(least=0.0, most=40.0)] = 0.0
+
+    def __post_init__(self) -> None:
+        right, wrong = ("amplitude_um", "amplitude_ppm") if self.of in LENGTHS else ("amplitude_ppm", "amplitude_um")
+        if getattr(self, right) is None or getattr(self, wrong) is not None:
+            raise ValueError(f"a wave of '{self.of}' has {right}, and no {wrong}.")
+        if self.amplitude_um is not None and abs(self.amplitude_um) > 1000:
+            raise ValueError(f"amplitude_um = {self.amplitude_um:g} is more than a millimetre: it is in µm.")
+
+
+class MassKeys(Table, frozen=True, kw_only=True):
+    """A small mass on the shell."""
+
+    mass_ug: float
+    azimuth_deg: float
+    position: Annotated[float, number(least=0.0, most=1.0)] = 1.0
+    height: Annotated[float, number(least=-1.0, most=1.0)] = 0.0
+
+
+class MapKeys(Table, frozen=True, kw_only=True):
+    """A table of measured departures."""
+
+    of: Literal["wall", "outer", "inner", "offset"]
+    file: str
+
+
+class SplitKeys(Table, frozen=True, kw_only=True):
+    """A measured split of one harmonic."""
+
+    harmonic: Annotated[int, number(least=1, most=12)] = 2
+    split_Hz: Annotated[float, number(least=0.0)]
+    slow_axis_deg: float
+
+
+class ImperfectionKeys(Table, frozen=True, kw_only=True):
+    """Departures from the body of revolution."""
+
+    wave: tuple[WaveKeys, ...] = ()
+    mass: tuple[MassKeys, ...] = ()
+    map: tuple[MapKeys, ...] = ()
+    split: SplitKeys | None = None
+    note: str = ""
+
+
+@dataclass(frozen=True)
+class MeasuredSplit:
+    """A split (Hz) of a harmonic and the azimuth (rad) of an antinode of its slower mode."""
+
+    harmonic: int
+    hertz: float
+    slow_axis: float
+
+
+@dataclass(frozen=True)
+class CardImperfection:
+    """What a card says of its resonator's imperfection: fields and masses in SI units, and a measured split."""
+
+    fields: "Imperfection | None"
+    split: MeasuredSplit | None
+
+
+def build(keys: ImperfectionKeys, place: Place) -> CardImperfection:
+    """Return the imperfection in SI units."""
+    split = None
+    if keys.split is not None:
+        split = MeasuredSplit(keys.split.harmonic, keys.split.split_Hz, float(np.deg2rad(keys.split.slow_axis_deg)))
+    if not (keys.wave or keys.mass or keys.map):
+        return CardImperfection(None, split)
+    from shell.imperfection import Imperfection, PointMass
+    from shell.imperfection.field import add
+
+    gathered: dict[str, Any] = {}
+    for one in keys.wave:
+        name = (LENGTHS | SHARES)[one.of]
+        gathered[name] = add(gathered.get(name), _wave(one))
+    for table in keys.map:
+        name = LENGTHS[table.of]
+        gathered[name] = add(gathered.get(name), _map(table, place))
+    masses = tuple(PointMass(1e-9 * m.mass_ug, np.deg2rad(m.azimuth_deg), m.position, m.height) for m in keys.mass)
+    return CardImperfection(replace(Imperfection(masses=masses), **gathered), split)
+
+
+def _wave(keys: WaveKeys) -> "Field":
+    from shell.imperfection import wave
+
+    size = 1e-6 * (keys.amplitude_um if keys.amplitude_um is not None else keys.amplitude_ppm or 0.0)
+    profile = (lambda x: x**keys.power) if keys.power else None
+    return wave(keys.order, size, np.deg2rad(keys.azimuth_deg), profile)
+
+
+def _map(keys: MapKeys, place: Place) -> "Field":
+    from shell.scan.survey import survey_map
+    from studies.files.clouds import Grid, read_cloud
+
+    path = place.folder / keys.file
+    grid = read_cloud(path)
+    if not isinstance(grid, Grid):
+        raise InputError(
+            f"{path}: {place.where} asks for a table over position and azimuth; hrg scan makes one of points."
+        )
+    return survey_map(grid.position, grid.azimuth, grid.values, 1, str(path)).field
+
+
+TABLE = CardTable("imperfection", ImperfectionKeys, build=build, optional=True)

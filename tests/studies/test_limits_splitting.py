@@ -1,0 +1,160 @@
+"""A card's imperfection and electrodes: they add, they reach modes and studies, and what is wrong in them is named."""
+
+import json
+
+import numpy as np
+import pytest
+
+from shell.modes import solve_modes
+from studies.cli import main
+from studies.errors import InputError
+from studies.instrument.card import load_card
+from studies.splitting import SplitPair, is_imperfect
+from studies.sweeps.case import Case
+from studies.sweeps.quantities import find_quantity
+
+CARD = """
+schema = "hrg.card/1"
+name = "imperfect"
+reference_temperature_degC = 20.0
+[resonator]
+shape = "hemisphere"
+radius_mm = 15.0
+thickness_mm = 0.9
+[material]
+name = "mine"
+youngs_modulus_GPa = 72.7
+poisson_ratio = 0.17
+density_kg_m3 = 2203.0
+"""
+WALL = """
+[[imperfection.wave]]
+of = "wall"
+order = 4
+amplitude_um = { value = 0.3, sd = 0.1 }
+azimuth_deg = 31.0
+"""
+MASS = """
+[[imperfection.mass]]
+mass_ug = 5.0
+azimuth_deg = 12.0
+"""
+SPLIT = """
+[imperfection.split]
+split_Hz = 0.1
+slow_axis_deg = 70.0
+"""
+ELECTRODES = """
+[electrodes]
+gap_um = 100.0
+coverage = 1.0
+first = 0.0
+voltage_V = 100.0
+[[electrodes.gap_wave]]
+order = 4
+amplitude_percent = 1.0
+azimuth_deg = 5.0
+"""
+
+
+def loaded(tmp_path, *tables):
+    path = tmp_path / "card.toml"
+    path.write_text(CARD + "".join(tables), encoding="utf-8")
+    return load_card(path)
+
+
+def split_of(instrument):
+    resonator, elastic = instrument.at(instrument.reference_temperature)
+    (mode,) = solve_modes(resonator, elastic, 2)
+    return SplitPair(instrument, mode, instrument.reference_temperature)
+
+
+def test_each_table_splits_as_published(tmp_path):
+    wall = split_of(loaded(tmp_path, WALL)).split
+    assert wall.relative == pytest.approx(0.36902 * 0.3 / 900, rel=2e-4)
+    assert np.rad2deg(wall.slow_axis) == pytest.approx(31.0, abs=1e-9)  # the thick place is slow
+    mass = split_of(loaded(tmp_path, MASS)).split
+    assert mass.relative == pytest.approx(5e-3 * (1077.2 - 232.77) * 1e-6, rel=1e-4)
+    assert np.rad2deg(mass.slow_axis) == pytest.approx(12.0, abs=1e-9)
+    read = split_of(loaded(tmp_path, SPLIT)).split
+    assert read.hertz == pytest.approx(0.1, rel=1e-12)
+    assert np.rad2deg(read.slow_axis) == pytest.approx(70.0, abs=1e-9)
+    charged = split_of(loaded(tmp_path, ELECTRODES)).split
+    assert charged.shift < -1e-5
+    assert charged.relative == pytest.approx(-0.03 * charged.shift, rel=1e-3)
+    assert np.rad2deg(charged.slow_axis) == pytest.approx(5.0 + 45.0, abs=0.01)  # the narrow gap is soft
+
+
+def test_parts_add_as_waves(tmp_path):
+    alone = [split_of(loaded(tmp_path, table)).split for table in (WALL, MASS, SPLIT, ELECTRODES)]
+    whole = split_of(loaded(tmp_path, WALL, MASS, SPLIT, ELECTRODES))
+    assert whole.split.wave == pytest.approx(sum(s.wave for s in alone), rel=1e-9)
+    assert whole.split.shift == pytest.approx(sum(s.shift for s in alone), rel=1e-9)
+    assert whole.of_every_order().hertz == pytest.approx(whole.split.hertz, rel=2e-4)
+
+
+def test_a_plain_card_is_perfect_and_uncertain_numbers_are_listed(tmp_path):
+    assert not is_imperfect(loaded(tmp_path))
+    assert not [one for one in loaded(tmp_path).uncertain if one.name.startswith(("imperfection", "electrodes"))]
+    names = {one.name: one.sd for one in loaded(tmp_path, WALL, ELECTRODES).uncertain}
+    assert names["imperfection.wave.0.amplitude_um"] == 0.1
+    assert names["electrodes.gap_um"] == 5.0
+
+
+def test_modes_tell_the_split_only_where_there_is_one(tmp_path, capsys):
+    loaded(tmp_path, WALL, MASS)
+    assert main(["modes", str(tmp_path / "card.toml"), "--harmonic", "0", "2", "--json"]) == 0
+    breathing, two = json.loads(capsys.readouterr().out)["modes"]
+    assert "split" not in breathing
+    found = two["split"]
+    assert found["fast_Hz"] - found["slow_Hz"] == pytest.approx(found["split_Hz"], rel=1e-9)
+    assert set(found["parts"]) == {"imperfection", "measured", "electrodes"}
+    assert main(["modes", "free-dome", "--json"]) == 0
+    assert "split" not in json.loads(capsys.readouterr().out)["modes"][0]
+
+
+def test_studies_vary_a_wave_and_ask_for_the_split(tmp_path):
+    instrument = loaded(tmp_path, WALL)
+    quantity = find_quantity("split", "here")
+    options = {"harmonic": 2, "theory": "shell", "order": "first", "temperature_degC": None}
+    found = [
+        quantity.evaluate(Case(instrument.with_values({"imperfection.wave.0.amplitude_um": a}), {}), options)[0].value
+        for a in (0.3, 0.6)
+    ]
+    assert found[1] == pytest.approx(2 * found[0], rel=1e-9)
+    assert [column.name for column in quantity.columns(options)] == ["split_n2_Hz", "slow_axis_n2_deg"]
+
+
+def test_a_map_beside_the_card_is_read(tmp_path):
+    angles = np.arange(0, 360, 10)
+    rows = ["position," + ",".join(str(a) for a in angles)]
+    rows += [
+        f"{x:.3f}," + ",".join(f"{0.3 * np.cos(4 * np.deg2rad(a - 31)):.6f}" for a in angles)
+        for x in np.linspace(0, 1, 12)
+    ]
+    (tmp_path / "wall.csv").write_text("\n".join(rows))
+    instrument = loaded(tmp_path, '[[imperfection.map]]\nof = "wall"\nfile = "wall.csv"\n')
+    assert split_of(instrument).split.relative == pytest.approx(0.36902 * 0.3 / 900, rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("table", "words"),
+    [
+        ('[[imperfection.wave]]\norder = 4\namplitude_ppm = 3\n', "amplitude_um"),
+        ('[[imperfection.wave]]\norder = 4\namplitude_um = 3000\n', "it is in µm"),
+        ('[[imperfection.wave]]\nof = "radius"\norder = 4\namplitude_um = 3\n', "offset"),
+        ('[[imperfection.map]]\nof = "wall"\nfile = "none.csv"\n', "there is no such file"),
+        ("[electrodes]\ngap_um = -3\n", "gap_um"),
+        ("[electrodes]\ncount = 2\ntrim_V = [1, 2, 3]\n", "3 voltages for 2 electrodes"),
+        ("[electrodes]\nfirst = 0.9\nlast = 0.8\n", "first must be below last"),
+    ],
+)  # fmt: skip
+def test_wrong_tables_are_refused(tmp_path, table, words):
+    with pytest.raises(InputError, match=words):
+        loaded(tmp_path, table)
+
+
+def test_a_voltage_beyond_pull_in_names_its_table(tmp_path):
+    instrument = loaded(tmp_path, "[electrodes]\ngap_um = 10.0\nvoltage_V = 2000.0\n")
+    with pytest.raises(InputError, match=r"\[electrodes\].*pull the shell in"):
+        _ = split_of(instrument).split
