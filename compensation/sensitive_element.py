@@ -79,3 +79,39 @@ def tune(k: float, zeta: float, *, q10: float = 1.0) -> SensitiveElement:
     if not 0 < zeta < math.sqrt(0.5):
         raise CompensationError(f"zeta = {zeta:g} must lie between 0 and 0.707.")
     return SensitiveElement(k, k, zeta, zeta, omega=k * math.sqrt(1 - 2 * zeta**2), q10=q10)
+
+
+def translate(
+    frame: float,
+    proof_mass: float,
+    k: tuple[float, float],
+    zeta: tuple[float, float],
+    omega: float,
+    *,
+    q10: float = 1.0,
+) -> SensitiveElement:
+    """Return a translational element: a proof mass in a decoupling frame, eq. (1) of both CVG papers.
+
+    d₁ = d₂ = 1, d₃ = m₂/(m₁ + m₂), g₁ = 2 m₂/(m₁ + m₂), g₂ = 2: along the primary axis frame and proof mass move together,
+    along the secondary axis the proof mass alone.
+
+    Parameters
+    ----------
+    frame, proof_mass : float
+        m₁ of the frame and m₂ within it (kg).
+    k, zeta : (float, float)
+        Natural frequencies (rad/s) and relative damping (1) of the primary and secondary motion.
+    omega, q10 : float
+        Excitation frequency (rad/s) and amplitude (m/s²).
+
+    Raises
+    ------
+    CompensationError
+        A mass that is not positive (the frame may weigh nothing), or what `SensitiveElement` refuses.
+    """
+    if not (frame >= 0 and proof_mass > 0):
+        raise CompensationError(
+            f"the proof mass must be positive and the frame 0 or more, not {proof_mass:g}, {frame:g} kg."
+        )
+    share = proof_mass / (frame + proof_mass)
+    return SensitiveElement(k[0], k[1], zeta[0], zeta[1], omega, q10, d1=1.0, d2=1.0, d3=share, g1=2 * share, g2=2.0)

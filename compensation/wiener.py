@@ -1,166 +1,62 @@
 """Optimal static (Wiener) filter of a gyro's sensor noise, by spectral factorisation.
 
-Equation numbers are those of the paper on demodulated dynamics and optimal noise filtering for CVGs. Spectral
-densities are even rational functions of s, two-sided: variance = ∫ S(jω) dω / 2π. (The paper's criterion (30) lacks
-this 1/2π, which moves no minimum.) An asterisk is s → −s; rate and noise are uncorrelated, as in the paper.
+Equation numbers are those of the paper on demodulated dynamics and optimal noise filtering for CVGs. An asterisk is s → −s.
+(The paper's criterion (30) lacks the 1/2π of `compensation.spectral`, which moves no minimum.)
 
-With S_Ω = N_a/(d_a d_a*), S_φ = N_b/(d_b d_b*), W = n_w/d_w and Δ Δ* = N_a n_w n_w* d_b d_b* + N_b d_a d_a* d_w d_w*,
-equations (32), (34) become G = t d_w d_b / Δ, where t/d_a is the causal part of N_a n_w* d_b* / (d_a Δ*).
+With S_Ω = N_a/(d_a d_a*), S_φ = N_b/(d_b d_b*), W = n_w/d_w and rate and noise uncorrelated, as in the paper's examples,
+Δ Δ* = N_a n_w n_w* d_b d_b* + N_b d_a d_a* d_w d_w*, and (32), (34) become G = t d_w d_b / Δ, where t/d_a is the causal part of
+N_a n_w* d_b* / (d_a Δ*).
 """
 
 from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from compensation.errors import CompensationError
+from compensation.spectral import CrossSpectrum, Spectrum, factorise, multiply, reflect, separate
 from compensation.transfer import TransferFunction
 
 Real = NDArray[np.float64]
-
-
-@dataclass(frozen=True)
-class Spectrum:
-    """An even rational spectral density S(s) = numerator(s) / denominator(s), highest power of s first.
-
-    Raises
-    ------
-    CompensationError
-        When a polynomial has an odd power of s, or S(jω) is negative somewhere.
-    """
-
-    numerator: tuple[float, ...]
-    denominator: tuple[float, ...]
-
-    def __post_init__(self) -> None:
-        for name in ("numerator", "denominator"):
-            coefficients = np.trim_zeros(np.asarray(getattr(self, name), dtype=float), "f")
-            if not len(coefficients) or not np.all(np.isfinite(coefficients)):
-                raise CompensationError(
-                    f"the {name} of a spectral density must have finite coefficients, not all zero."
-                )
-            if np.any(coefficients[-2::-2]):
-                raise CompensationError(f"the {name} of a spectral density must be even in s.")
-            object.__setattr__(self, name, tuple(coefficients.tolist()))
-        corner = np.abs(np.r_[1.0, np.roots(self.numerator), np.roots(self.denominator)])
-        corner = corner[corner > 0]
-        frequency = np.geomspace(corner.min() / 100, corner.max() * 100, 999)
-        if np.any(_sign(self.numerator, frequency) * _sign(self.denominator, frequency) < 0):
-            raise CompensationError("the spectral density is negative at some frequency; check its signs (s² = −ω²).")
-
-    def density(self, frequency: ArrayLike) -> Real:
-        """Return S(jω) at angular frequencies (rad/s)."""
-        s = 1j * np.asarray(frequency, dtype=float)
-        values: Real = (np.polyval(self.numerator, s) / np.polyval(self.denominator, s)).real
-        return values
-
-    @property
-    def variance(self) -> float:
-        """∫ S(jω) dω / 2π; infinite when S does not fall with frequency.
-
-        S is split into a(s)/d(s) + a(−s)/d(−s), d stable; the variance is then the limit of s a(s)/d(s).
-        """
-        if len(self.numerator) >= len(self.denominator):
-            return float("inf")
-        d = factorise(self.denominator)
-        causal = separate(np.array(self.numerator), d, reflect(d))
-        return float(causal[1] / d[0]) if len(d) > 1 else 0.0
-
-
-def rate_spectrum(sigma: float, B: float) -> Spectrum:
-    """S_Ω = σ² B² / (B² − s²), the rate of a moving object of bandwidth B (rad/s): eq. (27); variance σ² B/2."""
-    return Spectrum(((sigma * B) ** 2,), (-1.0, 0.0, B**2))
-
-
-def white_spectrum(gamma: float, sigma: float) -> Spectrum:
-    """S_φ = γ² σ², white sensor noise: eq. (28)."""
-    return Spectrum(((gamma * sigma) ** 2,), (1.0,))
-
-
-def high_pass_spectrum(gamma: float, sigma: float, B: float) -> Spectrum:
-    """S_φ = −γ² σ² s² / (B² − s²), sensor noise above the bandwidth B (rad/s): eq. (29)."""
-    return Spectrum((-((gamma * sigma) ** 2), 0.0, 0.0), (-1.0, 0.0, B**2))
-
-
-def reflect(polynomial: ArrayLike) -> Real:
-    """Return p(−s) for the coefficients of p(s), highest power first."""
-    p = np.array(polynomial, dtype=float)
-    p[-2::-2] *= -1
-    return p
-
-
-def factorise(even: ArrayLike) -> Real:
-    """Return the polynomial d with d(s) d(−s) = ± even(s) and all roots to the left, found from the roots in s².
-
-    Raises
-    ------
-    CompensationError
-        When a root lies on the imaginary axis, where no stable factor exists.
-    """
-    p = np.trim_zeros(np.asarray(even, dtype=float), "f")
-    squares = np.roots(p[::2])
-    # A double root on the axis comes out of the root finder as a pair that is 1e-8 apart.
-    on_axis = (squares.real <= 0) & (np.abs(squares.imag) <= 1e-6 * np.abs(squares))
-    if np.any(on_axis):
-        at = float(np.sqrt(np.abs(squares[on_axis][0])))
-        raise CompensationError(
-            f"a spectral density is zero or infinite at {at:g} rad/s, so it has no stable factor; "
-            "add a little white noise, or give a drift a corner frequency."
-        )
-    factor = np.poly(-np.sqrt(squares.astype(complex))).real
-    return np.asarray(np.sqrt(abs(p[0])) * np.atleast_1d(factor), dtype=float)
-
-
-def separate(numerator: Real, stable: Real, antistable: Real) -> Real:
-    """Return t of numerator / (stable · antistable) = t / stable + (what has only antistable poles).
-
-    t includes the constant part, so it has as many coefficients as `stable` (Wiener–Hopf separation of eq. (34)).
-    """
-    n, m = len(stable) - 1, len(antistable) - 1
-    if len(numerator) > n + m + 1:
-        raise CompensationError("the ratio of spectral densities grows with frequency; the optimum does not exist.")
-    # Solve numerator = t · antistable + b · stable, in units of s in which the coefficients are of order one.
-    scale = float(np.abs(np.r_[np.roots(stable), np.roots(antistable)]).max(initial=0.0)) or 1.0
-    S, U, N = (p * scale ** np.arange(len(p) - 1, -1, -1.0) for p in (stable, antistable, numerator))
-    size = n + m + 1
-    matrix = np.zeros((size, size))
-    for column in range(n + 1):
-        matrix[column : column + m + 1, column] = U
-    for column in range(m):
-        matrix[column + 1 : column + n + 2, n + 1 + column] = S
-    right = np.zeros(size)
-    right[size - len(N) :] = N
-    t = np.asarray(np.linalg.solve(matrix, right)[: n + 1], dtype=float)
-    if len(N) < size:
-        t[0] = 0.0  # the constant part, zero but for rounding
-    return t / scale ** np.arange(n, -1, -1.0)
+UNITY = TransferFunction((1.0,), (1.0,))
 
 
 @dataclass(frozen=True)
 class WienerFilter:
-    """A filter behind a gyro, with the two parts of its error variance.
+    """A filter behind a gyro, with the parts of its error variance.
 
     Attributes
     ----------
     filter : TransferFunction
         G(s).
-    distortion, noise : float
-        Variance (rad²/s²) of (G W − 1) Ω and of G φ; their sum is E ε² of eq. (30).
+    distortion, noise, joint : float
+        Variance (rad²/s²) of (G W − H) Ω and of G φ, and twice their covariance; their sum is E ε² of eq. (30).
     """
 
     filter: TransferFunction
     distortion: float
     noise: float
+    joint: float = 0.0
 
     @property
     def error(self) -> float:
         """E ε² (rad²/s²)."""
-        return self.distortion + self.noise
+        return self.distortion + self.noise + self.joint
 
 
-def design_wiener_filter(gyro: TransferFunction, rate: Spectrum, noise: Spectrum) -> WienerFilter:
-    """Return the causal filter of least error variance behind `gyro`: eqs. (32), (34) with H = R = 1.
+def design_wiener_filter(
+    gyro: TransferFunction,
+    rate: Spectrum,
+    noise: Spectrum,
+    wanted: TransferFunction = UNITY,
+    weight: Spectrum | None = None,
+    cross: CrossSpectrum | None = None,
+) -> WienerFilter:
+    """Return the causal filter of least error variance behind `gyro`: eqs. (31)–(34).
+
+    With D D* = W S_Ω W* + W S_φΩ + S_Ωφ W* + S_φ, Γ Γ* = R and T = Γ H (S_Ω W* + S_φΩ)/D*, the optimum of
+    E R|ε|², ε = (G W − H) Ω + G φ, is G = Γ⁻¹ (T₀ + T₊) D⁻¹.
 
     Parameters
     ----------
@@ -168,35 +64,69 @@ def design_wiener_filter(gyro: TransferFunction, rate: Spectrum, noise: Spectrum
         W(s) from rate to output, stable with real coefficients, such as eq. (25).
     rate, noise : Spectrum
         S_Ω of the rate (rad²/s) and S_φ of the sensor noise at the output; any even rational densities.
+    wanted : TransferFunction
+        H(s), what the filtered output is to be of the rate: 1, or a stable filter, or s for the angular acceleration.
+    weight : Spectrum, optional
+        R(s), the weight of the error over frequency; 1 unless given. A number moves nothing.
+    cross : CrossSpectrum, optional
+        S_φΩ(s) of noise and rate; 0 unless given.
 
     Raises
     ------
     CompensationError
-        When W is not stable or not real, or the densities have no stable factors.
+        When W or H is not stable or not real, or the densities have no stable factors.
     """
     if not gyro.is_real or not gyro.is_stable:
         raise CompensationError("the Wiener filter needs a stable gyro with real coefficients, such as eq. (25).")
+    if not wanted.is_real or not wanted.is_stable:
+        raise CompensationError("what the filter is to deliver, H(s), must be stable with real coefficients.")
     n_w, d_w = np.real(gyro.numerator), np.real(gyro.denominator)
+    n_h, d_h = np.real(wanted.numerator), np.real(wanted.denominator)
     d_a, d_b = factorise(rate.denominator), factorise(noise.denominator)
     # A factor that a density's sign carries, such as −1 in (−1, 0, B²), belongs to the numerator.
     N_a, N_b = _numerator_over(rate, d_a), _numerator_over(noise, d_b)
-    square = np.polyadd(
-        _multiply(N_a, n_w, reflect(n_w), d_b, reflect(d_b)),
-        _multiply(N_b, d_a, reflect(d_a), d_w, reflect(d_w)),
-    )
+    n_g, d_g = (np.ones(1), np.ones(1)) if weight is None else _factor(weight)
+    left, right, N_c = _cross_parts(cross)
+    mirrored = reflect(right)
+    if len(right) % 2 == 0:
+        mirrored = -mirrored  # monic, with roots to the left
+    q = multiply(left, mirrored)
+    both = multiply(d_a, reflect(d_a), d_b, reflect(d_b))
+    # W S_φΩ over the common denominator d_w d_w* d_a d_a* d_b d_b* q q*, and its mirror image
+    coupling = multiply(n_w, N_c, reflect(d_w), both, reflect(left), mirrored, _over(reflect(mirrored), right))
+    square = multiply(N_a, n_w, reflect(n_w), d_b, reflect(d_b), q, reflect(q))
+    for term in (multiply(N_b, d_a, reflect(d_a), d_w, reflect(d_w), q, reflect(q)), coupling, reflect(coupling)):
+        square = np.asarray(np.polyadd(square, term), dtype=float)
+    square[-2::-2] = 0.0
     Delta = factorise(square)
-    t = separate(_multiply(N_a, reflect(n_w), reflect(d_b)), d_a, reflect(Delta))
-    best = TransferFunction(tuple(_multiply(t, d_w, d_b)), tuple(Delta)).cancel()
-    return judge_filter(best, gyro, rate, noise)
+    # T over the stable d_g d_h d_a left and the antistable Δ*
+    inner = multiply(N_a, reflect(n_w), reflect(d_b), reflect(q), left)
+    joint = multiply(N_c, reflect(d_w), reflect(d_a), reflect(d_b), reflect(left), _over(reflect(mirrored), right), d_a)
+    top = multiply(n_g, n_h, np.asarray(np.polyadd(inner, joint), dtype=float))
+    stable = multiply(d_g, d_h, d_a, left)
+    whole, remainder = np.polydiv(top, multiply(stable, reflect(Delta)))
+    causal = separate(np.atleast_1d(remainder), stable, reflect(Delta))
+    t = np.asarray(np.polyadd(multiply(np.atleast_1d(whole), stable), causal), dtype=float)
+    best = TransferFunction(tuple(multiply(t, d_w, d_b, mirrored)), tuple(multiply(n_g, d_h, Delta))).cancel()
+    return judge_filter(best, gyro, rate, noise, wanted, cross)
 
 
-def judge_filter(candidate: TransferFunction, gyro: TransferFunction, rate: Spectrum, noise: Spectrum) -> WienerFilter:
-    """Return any filter behind the gyro with its error variances: eqs. (30), (31)."""
+def judge_filter(
+    candidate: TransferFunction,
+    gyro: TransferFunction,
+    rate: Spectrum,
+    noise: Spectrum,
+    wanted: TransferFunction = UNITY,
+    cross: CrossSpectrum | None = None,
+) -> WienerFilter:
+    """Return any filter behind the gyro with its error variances: eqs. (30), (31), without weight."""
     n, d = np.real(candidate.numerator), np.real(candidate.denominator)
     n_w, d_w = np.real(gyro.numerator), np.real(gyro.denominator)
-    whole = _multiply(d, d_w)
-    deviation = np.asarray(np.polysub(_multiply(n, n_w), whole), dtype=float)
-    return WienerFilter(candidate, _shape(rate, deviation, whole).variance, _shape(noise, n, d).variance)
+    n_h, d_h = np.real(wanted.numerator), np.real(wanted.denominator)
+    whole = multiply(d, d_w, d_h)
+    deviation = np.asarray(np.polysub(multiply(n, n_w, d_h), multiply(d, d_w, n_h)), dtype=float)
+    joint = 0.0 if cross is None else _joint_variance(deviation, whole, n, d, cross)
+    return WienerFilter(candidate, _shape(rate, deviation, whole).variance, _shape(noise, n, d).variance, joint)
 
 
 def renormalise(candidate: TransferFunction, gyro: TransferFunction) -> TransferFunction:
@@ -233,29 +163,48 @@ def derive_wiener_filter(noise: Literal["white", "high-pass"]) -> WienerDerivati
     return WienerDerivation(Delta, optimum, sympy.simplify(optimum / optimum.subs(s, 0)))
 
 
-def _sign(polynomial: tuple[float, ...], frequency: Real) -> Real:
-    """Sign of an even polynomial at jω; 0 where rounding decides it."""
-    terms = np.array(polynomial)[:, None] * (1j * frequency) ** np.arange(len(polynomial) - 1, -1, -1)[:, None]
-    value = np.sum(terms.real, axis=0)
-    return np.where(np.abs(value) > 1e-12 * np.sum(np.abs(terms), axis=0), np.sign(value), 0.0)
-
-
-def _multiply(*polynomials: Real) -> Real:
-    product = np.ones(1)
-    for polynomial in polynomials:
-        product = np.convolve(product, polynomial)
-    return product
-
-
 def _numerator_over(spectrum: Spectrum, factor: Real) -> Real:
     """The numerator that belongs to the denominator factor(s) factor(−s)."""
-    square = _multiply(factor, reflect(factor))
+    square = multiply(factor, reflect(factor))
     return np.array(spectrum.numerator) * float(square[0] / spectrum.denominator[0])
 
 
 def _shape(spectrum: Spectrum, numerator: Real, denominator: Real) -> Spectrum:
     """The density behind a filter, |numerator/denominator|² S, with odd powers that rounding left taken out."""
-    top = _multiply(np.array(spectrum.numerator), numerator, reflect(numerator))
-    bottom = _multiply(np.array(spectrum.denominator), denominator, reflect(denominator))
+    top = multiply(np.array(spectrum.numerator), numerator, reflect(numerator))
+    bottom = multiply(np.array(spectrum.denominator), denominator, reflect(denominator))
     top[-2::-2] = bottom[-2::-2] = 0.0
     return Spectrum(tuple(top), tuple(bottom))
+
+
+def _factor(weight: Spectrum) -> tuple[Real, Real]:
+    """Numerator and denominator of Γ with Γ Γ* = R."""
+    d = factorise(weight.denominator)
+    return factorise(_numerator_over(weight, d)), d
+
+
+def _cross_parts(cross: CrossSpectrum | None) -> tuple[Real, Real, Real]:
+    """The factors of the cross density's denominator to the left and to the right, and its numerator; 1, 1, 0 without one."""
+    if cross is None:
+        return np.ones(1), np.ones(1), np.zeros(1)
+    return *cross.split_poles(), np.asarray(cross.numerator, dtype=float)
+
+
+def _over(one: Real, other: Real) -> Real:
+    """The number that one polynomial is of another with the same roots."""
+    return np.array([one[0] / other[0]])
+
+
+def _joint_variance(deviation: Real, whole: Real, n: Real, d: Real, cross: CrossSpectrum) -> float:
+    """∫ 2 Re{(G W − H) S_φΩ G*} dω/2π."""
+    left, right = cross.split_poles()
+    top = np.trim_zeros(multiply(deviation, np.asarray(cross.numerator, dtype=float), reflect(n)), "f")
+    stable, antistable = multiply(whole, left), multiply(right, reflect(d))
+    fall = len(stable) + len(antistable) - 1 - len(top)
+    if not len(top):
+        return 0.0
+    if fall < 1:
+        return float("inf")
+    # the residues to the left; of a density that falls as 1/s the odd half integrates to nothing
+    residues = separate(top, stable, antistable)[1] / stable[0] if len(stable) > 1 else 0.0
+    return 2 * float(residues - (top[0] / (stable[0] * antistable[0]) / 2 if fall == 1 else 0.0))

@@ -14,16 +14,8 @@ from numpy.typing import NDArray
 from compensation.demodulated import ErrorMap, map_integral_error, measure_rate, relate_rate_to_measured_rate
 from compensation.kalman import expect_mean_nis, model_gyro, run_filter
 from compensation.sensitive_element import tune
-from compensation.wiener import (
-    Spectrum,
-    WienerFilter,
-    design_wiener_filter,
-    high_pass_spectrum,
-    judge_filter,
-    rate_spectrum,
-    renormalise,
-    white_spectrum,
-)
+from compensation.spectral import Spectrum, high_pass_spectrum, rate_spectrum, white_spectrum
+from compensation.wiener import WienerFilter, design_wiener_filter, judge_filter, renormalise
 
 Real = NDArray[np.float64]
 K, ZETA, GAMMA, B = 2 * np.pi * 500.0, 0.025, 0.1, 2 * np.pi * 3.0

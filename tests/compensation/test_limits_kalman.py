@@ -7,7 +7,8 @@ from filterpy.kalman import KalmanFilter
 from compensation.demodulated import relate_rate_to_measured_rate
 from compensation.errors import CompensationError
 from compensation.kalman import LinearModel, expect_mean_nis, model_gyro, run_filter, settle
-from compensation.wiener import design_wiener_filter, rate_spectrum, white_spectrum
+from compensation.spectral import rate_spectrum, white_spectrum
+from compensation.wiener import design_wiener_filter
 
 K, ZETA, STEP = 2 * np.pi * 500, 0.025, 1e-3
 GYRO = model_gyro(K, ZETA, STEP, np.diag([0.0, 2e-6]), 0.01)

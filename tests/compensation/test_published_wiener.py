@@ -8,20 +8,17 @@ import sympy
 
 from compensation.demodulated import relate_rate_to_measured_rate
 from compensation.errors import CompensationError
-from compensation.transfer import TransferFunction
-from compensation.wiener import (
+from compensation.spectral import (
     Spectrum,
-    derive_wiener_filter,
-    design_wiener_filter,
     factorise,
     high_pass_spectrum,
-    judge_filter,
     rate_spectrum,
     reflect,
-    renormalise,
     separate,
     white_spectrum,
 )
+from compensation.transfer import TransferFunction
+from compensation.wiener import derive_wiener_filter, design_wiener_filter, judge_filter, renormalise
 
 K, ZETA, GAMMA, B = 2 * math.pi * 500, 0.025, 0.1, 2 * math.pi * 3
 

@@ -1,0 +1,175 @@
+"""Rational spectral densities: values, variance, stable factors, and the separation of causal parts.
+
+Spectral densities are rational functions of s, two-sided: variance = ∫ S(jω) dω / 2π. Those of one signal are even in s.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from compensation.errors import CompensationError
+
+Real = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Spectrum:
+    """An even rational spectral density S(s) = numerator(s) / denominator(s), highest power of s first.
+
+    Raises
+    ------
+    CompensationError
+        When a polynomial has an odd power of s, or S(jω) is negative somewhere.
+    """
+
+    numerator: tuple[float, ...]
+    denominator: tuple[float, ...]
+
+    def __post_init__(self) -> None:
+        for name in ("numerator", "denominator"):
+            coefficients = np.trim_zeros(np.asarray(getattr(self, name), dtype=float), "f")
+            if not len(coefficients) or not np.all(np.isfinite(coefficients)):
+                raise CompensationError(
+                    f"the {name} of a spectral density must have finite coefficients, not all zero."
+                )
+            if np.any(coefficients[-2::-2]):
+                raise CompensationError(f"the {name} of a spectral density must be even in s.")
+            object.__setattr__(self, name, tuple(coefficients.tolist()))
+        corner = np.abs(np.r_[1.0, np.roots(self.numerator), np.roots(self.denominator)])
+        corner = corner[corner > 0]
+        frequency = np.geomspace(corner.min() / 100, corner.max() * 100, 999)
+        if np.any(_sign(self.numerator, frequency) * _sign(self.denominator, frequency) < 0):
+            raise CompensationError("the spectral density is negative at some frequency; check its signs (s² = −ω²).")
+
+    def density(self, frequency: ArrayLike) -> Real:
+        """Return S(jω) at angular frequencies (rad/s)."""
+        s = 1j * np.asarray(frequency, dtype=float)
+        values: Real = (np.polyval(self.numerator, s) / np.polyval(self.denominator, s)).real
+        return values
+
+    @property
+    def variance(self) -> float:
+        """∫ S(jω) dω / 2π; infinite when S does not fall with frequency.
+
+        S is split into a(s)/d(s) + a(−s)/d(−s), d stable; the variance is then the limit of s a(s)/d(s).
+        """
+        if len(self.numerator) >= len(self.denominator):
+            return float("inf")
+        d = factorise(self.denominator)
+        causal = separate(np.array(self.numerator), d, reflect(d))
+        return float(causal[1] / d[0]) if len(d) > 1 else 0.0
+
+
+def rate_spectrum(sigma: float, B: float) -> Spectrum:
+    """S_Ω = σ² B² / (B² − s²), the rate of a moving object of bandwidth B (rad/s): eq. (27); variance σ² B/2."""
+    return Spectrum(((sigma * B) ** 2,), (-1.0, 0.0, B**2))
+
+
+def white_spectrum(gamma: float, sigma: float) -> Spectrum:
+    """S_φ = γ² σ², white sensor noise: eq. (28)."""
+    return Spectrum(((gamma * sigma) ** 2,), (1.0,))
+
+
+def high_pass_spectrum(gamma: float, sigma: float, B: float) -> Spectrum:
+    """S_φ = −γ² σ² s² / (B² − s²), sensor noise above the bandwidth B (rad/s): eq. (29)."""
+    return Spectrum((-((gamma * sigma) ** 2), 0.0, 0.0), (-1.0, 0.0, B**2))
+
+
+def reflect(polynomial: ArrayLike) -> Real:
+    """Return p(−s) for the coefficients of p(s), highest power first."""
+    p = np.array(polynomial, dtype=float)
+    p[-2::-2] *= -1
+    return p
+
+
+def factorise(even: ArrayLike) -> Real:
+    """Return the polynomial d with d(s) d(−s) = ± even(s) and all roots to the left, found from the roots in s².
+
+    Raises
+    ------
+    CompensationError
+        When a root lies on the imaginary axis, where no stable factor exists.
+    """
+    p = np.trim_zeros(np.asarray(even, dtype=float), "f")
+    squares = np.roots(p[::2])
+    # A double root on the axis comes out of the root finder as a pair that is 1e-8 apart.
+    on_axis = (squares.real <= 0) & (np.abs(squares.imag) <= 1e-6 * np.abs(squares))
+    if np.any(on_axis):
+        at = float(np.sqrt(np.abs(squares[on_axis][0])))
+        raise CompensationError(
+            f"a spectral density is zero or infinite at {at:g} rad/s, so it has no stable factor; "
+            "add a little white noise, or give a drift a corner frequency."
+        )
+    factor = np.poly(-np.sqrt(squares.astype(complex))).real
+    return np.asarray(np.sqrt(abs(p[0])) * np.atleast_1d(factor), dtype=float)
+
+
+def separate(numerator: Real, stable: Real, antistable: Real) -> Real:
+    """Return t of numerator / (stable · antistable) = t / stable + (what has only antistable poles).
+
+    t includes the constant part, so it has as many coefficients as `stable` (Wiener–Hopf separation of eq. (34)).
+    """
+    n, m = len(stable) - 1, len(antistable) - 1
+    if len(numerator) > n + m + 1:
+        raise CompensationError("the ratio of spectral densities grows with frequency; the optimum does not exist.")
+    # Solve numerator = t · antistable + b · stable, in units of s in which the coefficients are of order one.
+    scale = float(np.abs(np.r_[np.roots(stable), np.roots(antistable)]).max(initial=0.0)) or 1.0
+    S, U, N = (p * scale ** np.arange(len(p) - 1, -1, -1.0) for p in (stable, antistable, numerator))
+    size = n + m + 1
+    matrix = np.zeros((size, size))
+    for column in range(n + 1):
+        matrix[column : column + m + 1, column] = U
+    for column in range(m):
+        matrix[column + 1 : column + n + 2, n + 1 + column] = S
+    right = np.zeros(size)
+    right[size - len(N) :] = N
+    t = np.asarray(np.linalg.solve(matrix, right)[: n + 1], dtype=float)
+    if len(N) < size:
+        t[0] = 0.0  # the constant part, zero but for rounding
+    return t / scale ** np.arange(n, -1, -1.0)
+
+
+@dataclass(frozen=True)
+class CrossSpectrum:
+    """A rational cross-spectral density S_φΩ(s) = numerator(s)/denominator(s), of any parity; S_Ωφ(s) = S_φΩ(−s).
+
+    It is E{Ω φ*}, as eq. (31) needs it: noise φ = c(s) Ω that follows the rate has S_φΩ(s) = c(−s) S_Ω(s).
+
+    Poles may lie on both sides of the imaginary axis, none on it.
+    """
+
+    numerator: tuple[float, ...]
+    denominator: tuple[float, ...]
+
+    def split_poles(self) -> tuple[Real, Real]:
+        """Return the factors of the denominator with roots to the left (with its leading factor) and to the right.
+
+        Raises
+        ------
+        CompensationError
+            When a pole lies on the imaginary axis.
+        """
+        p = np.trim_zeros(np.asarray(self.denominator, dtype=float), "f")
+        roots = np.roots(p)
+        if np.any(np.abs(roots.real) <= 1e-9 * np.abs(roots)):
+            raise CompensationError(
+                "a cross-spectral density has a pole on the imaginary axis; give it a corner frequency."
+            )
+        left, right = (np.atleast_1d(np.poly(roots[side]).real) for side in (roots.real < 0, roots.real > 0))
+        return np.asarray(p[0] * left, dtype=float), np.asarray(right, dtype=float)
+
+
+def _sign(polynomial: tuple[float, ...], frequency: Real) -> Real:
+    """Sign of an even polynomial at jω; 0 where rounding decides it."""
+    terms = np.array(polynomial)[:, None] * (1j * frequency) ** np.arange(len(polynomial) - 1, -1, -1)[:, None]
+    value = np.sum(terms.real, axis=0)
+    return np.where(np.abs(value) > 1e-12 * np.sum(np.abs(terms), axis=0), np.sign(value), 0.0)
+
+
+def multiply(*polynomials: Real) -> Real:
+    """Return the product of polynomials, highest power first."""
+    product = np.ones(1)
+    for polynomial in polynomials:
+        product = np.convolve(product, polynomial)
+    return product
