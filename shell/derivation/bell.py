@@ -172,3 +172,13 @@ def equations_of_motion() -> tuple[sp.Expr, sp.Expr]:
     lagrangian = turning_kinetic_energy() - c_0 * (p(t) ** 2 + q(t) ** 2) / 2
     equations = (sp.diff(lagrangian, y.diff(t)).diff(t) - sp.diff(lagrangian, y) for y in (p(t), q(t)))
     return tuple(sp.expand(equation) for equation in equations)
+
+
+@cache
+def printed_precession_factor() -> sp.Expr:
+    """Return k = b/(2 m₀) of m₀ = πρh W and b = πρh V (cos φ + sin φ) as printed, letter by letter of (19).
+
+    It depends on φ, from 0 at the pole to −1/6 at the waist: the integrals are lost, and the Galerkin weights with them.
+    """
+    shape = rayleigh_functions()
+    return sp.simplify(shape.v * (sp.cos(phi) + sp.sin(phi)) / (2 * shape.w))

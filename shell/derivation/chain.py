@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import sympy as sp
 
-from shell.derivation import coriolis, displacements, energies, frequency, inextensional, strains
+from shell.derivation import coriolis, displacements, energies, frequency, inextensional, strains, temperature
 from shell.derivation.displacements import U, V, W
 from shell.derivation.symbols import n, omega, phi, phi_2, t
 
@@ -63,8 +63,8 @@ class Step:
 
 
 def steps(case: Case) -> list[Step]:
-    """Return the whole chain, HRG paper eqs. (1)–(14), for any n, ending with the numbers of one case."""
-    return [*_elasticity(), *_mode(), *_frequency(), *_numbers(case)]
+    """Return the whole chain, HRG paper eqs. (1)–(15), for any n, with the numbers of one case before (15)."""
+    return [*_elasticity(), *_mode(), *_frequency(), *_numbers(case), *_temperature()]
 
 
 def _elasticity() -> list[Step]:
@@ -74,26 +74,34 @@ def _elasticity() -> list[Step]:
     surface = strains.corrected_deformation(displacements.general_displacement())
     shift = strains.rigid_motions()["shift along z"]
     return [
-        Step("1", "Displacements of harmonic n", _name("u v w", *displacements.harmonic_displacement())),
-        Step("2", "Kinetic energy", _name("K", displacements.kinetic_energy(displacements.harmonic_displacement()))),
-        Step("3", "Strain energy per volume", _name("S_V", energies.full_energy_density())),
-        Step("4", "the same of a thin shell, normals staying normal", _name("S_V", energies.thin_energy_density())),
-        Step("5", "Hooke's law", _pair(energies.hooke().items())),
+        Step("1", "Displacements of harmonic n", name_expressions("u v w", *displacements.harmonic_displacement())),
+        Step(
+            "2",
+            "Kinetic energy",
+            name_expressions("K", displacements.kinetic_energy(displacements.harmonic_displacement())),
+        ),
+        Step("3", "Strain energy per volume", name_expressions("S_V", energies.full_energy_density())),
+        Step(
+            "4",
+            "the same of a thin shell, normals staying normal",
+            name_expressions("S_V", energies.thin_energy_density()),
+        ),
+        Step("5", "Hooke's law", pair_up(energies.hooke().items())),
         Step(
             "6",
             "Strains at height z, much smaller than r",
-            _pair((getattr(strain, name), getattr(layer, name)) for name in in_plane),
+            pair_up((getattr(strain, name), getattr(layer, name)) for name in in_plane),
         ),
-        Step("7", "Strain energy per area", _name("S_A", energies.surface_energy_density())),
+        Step("7", "Strain energy per area", name_expressions("S_A", energies.surface_energy_density())),
         Step(
             "8",
             "Strains, curvature changes and twist of the middle surface, from the Kirchhoff hypothesis",
-            _pair(zip(deformation, surface, strict=True)),
+            pair_up(zip(deformation, surface, strict=True)),
         ),
         Step(
             "8 as printed",
             "has ∂w/∂φ for ∂w/∂θ in the twist: its error, and the twist it finds in a shell only shifted along its axis",
-            _name("Δτ τ_shift", strains.printed_twist_defect(), strains.printed_deformation(shift).tau),
+            name_expressions("Δτ τ_shift", strains.printed_twist_defect(), strains.printed_deformation(shift).tau),
         ),
     ]
 
@@ -102,26 +110,32 @@ def _mode() -> list[Step]:
     unknown = [function(phi) for function in (U, V, W)]
     bending = [part.subs(t, 0) for part in inextensional.mode_deformation()[3:]]
     return [
-        Step("9", "No stretching, for harmonic n", _vanish(inextensional.inextensional_conditions())),
-        Step("", "The first condition removes W", _vanish(inextensional.eliminate_normal_displacement())),
+        Step("9", "No stretching, for harmonic n", set_to_zero(inextensional.inextensional_conditions())),
+        Step("", "The first condition removes W", set_to_zero(inextensional.eliminate_normal_displacement())),
         Step(
             "",
             "Their sum, in P = U + V, and their difference, in M = U - V",
-            _vanish(inextensional.decoupled_equations()),
+            set_to_zero(inextensional.decoupled_equations()),
         ),
-        Step("", "Variables separated", _name("(lnP)′ (lnM)′", *inextensional.separated_rates())),
-        Step("", "Integrated in T = tan(φ/2)", _name("lnP lnM", *inextensional.integrate_separated())),
-        Step("", "General solution, each with a factor of its own", _name("P M", *inextensional.general_solution())),
+        Step("", "Variables separated", name_expressions("(lnP)′ (lnM)′", *inextensional.separated_rates())),
+        Step("", "Integrated in T = tan(φ/2)", name_expressions("lnP lnM", *inextensional.integrate_separated())),
+        Step(
+            "",
+            "General solution, each with a factor of its own",
+            name_expressions("P M", *inextensional.general_solution()),
+        ),
         Step(
             "",
             "Powers of φ at the pole: M is infinite there for n > 1, so M = 0 and U = V",
-            _name("p_P p_M", *inextensional.pole_exponents()),
+            name_expressions("p_P p_M", *inextensional.pole_exponents()),
         ),
         Step(
-            "10", "The mode that does not stretch", _pair(zip(unknown, inextensional.inextensional_mode(), strict=True))
+            "10",
+            "The mode that does not stretch",
+            pair_up(zip(unknown, inextensional.inextensional_mode(), strict=True)),
         ),
-        Step("11", "Its displacements", _name("u v w", *inextensional.inextensional_displacement())),
-        Step("", "Its curvature changes and twist", _pair(zip(energies.DEFORMATION[3:], bending, strict=True))),
+        Step("11", "Its displacements", name_expressions("u v w", *inextensional.inextensional_displacement())),
+        Step("", "Its curvature changes and twist", pair_up(zip(energies.DEFORMATION[3:], bending, strict=True))),
     ]
 
 
@@ -130,20 +144,36 @@ def _frequency() -> list[Step]:
         Step(
             "12",
             "Greatest kinetic and potential energy, and their integrals",
-            _name("K_max U_max", frequency.maximum_kinetic_energy(), frequency.maximum_potential_energy())
-            + _name("I J", *frequency.integral_definitions()),
+            name_expressions("K_max U_max", frequency.maximum_kinetic_energy(), frequency.maximum_potential_energy())
+            + name_expressions("I J", *frequency.integral_definitions()),
         ),
-        Step("13", "Frequency, where both energies are equal", _pair([(omega**2, frequency.omega_squared())])),
+        Step("13", "Frequency, where both energies are equal", pair_up([(omega**2, frequency.omega_squared())])),
         Step(
             "",
             "Derivatives of ln f for design",
-            _name("∂lnf/∂lnE ∂lnf/∂ν ∂lnf/∂lnρ ∂lnf/∂lnh ∂lnf/∂lnr ∂lnf/∂φ₂", *frequency.log_derivatives()),
+            name_expressions("∂lnf/∂lnE ∂lnf/∂ν ∂lnf/∂lnρ ∂lnf/∂lnh ∂lnf/∂lnr ∂lnf/∂φ₂", *frequency.log_derivatives()),
         ),
         Step(
             "",
             "Two patterns on a shell turning with Ω, per unit of φ and ρh: mass M and Coriolis coupling 2ΩB; "
             "the standing wave lags by K of the angle turned",
-            _name("M B K", *coriolis.pattern_coefficients(), coriolis.precession_rate()),
+            name_expressions("M B K", *coriolis.pattern_coefficients(), coriolis.precession_rate()),
+        ),
+    ]
+
+
+def _temperature() -> list[Step]:
+    return [
+        Step("15", "Frequency over temperature", name_expressions("f", temperature.frequency_over_temperature())),
+        Step(
+            "",
+            "Its slope d ln f/dT by parts, from E, ν, ρ, h and r",
+            name_expressions("TCF_E TCF_ν TCF_ρ TCF_h TCF_r", *temperature.temperature_parts()),
+        ),
+        Step(
+            "",
+            "their sum in free isotropic expansion α, E = 2 G (1 + ν)",
+            name_expressions("TCF", temperature.free_expansion()),
         ),
     ]
 
@@ -154,23 +184,38 @@ def _numbers(case: Case) -> list[Step]:
     closed = (
         []
         if case.mass.has(sp.Float)
-        else [Step("", "Its integrals and Bryan factor in closed form", _name(names, *values))]
+        else [Step("", "Its integrals and Bryan factor in closed form", name_expressions(names, *values))]
     )
     return [
-        Step(number, f"Frequency in Hz for n = {case.harmonic}", _name("f", frequency.frequency(case.harmonic))),
+        Step(
+            number,
+            f"Frequency in Hz for n = {case.harmonic}",
+            name_expressions("f", frequency.frequency(case.harmonic)),
+        ),
         *closed,
-        Step("", "Its integrals and Bryan factor as numbers", _name(names, *(sp.N(value, 17) for value in values))),
-        Step("", "Derivative of ln f by the rim angle (1/rad)", _name("∂lnf/∂φ₂", sp.N(case.rim_derivative, 17))),
+        Step(
+            "",
+            "Its integrals and Bryan factor as numbers",
+            name_expressions(names, *(sp.N(value, 17) for value in values)),
+        ),
+        Step(
+            "",
+            "Derivative of ln f by the rim angle (1/rad)",
+            name_expressions("∂lnf/∂φ₂", sp.N(case.rim_derivative, 17)),
+        ),
     ]
 
 
-def _name(names: str, *expressions: sp.Expr) -> tuple[sp.Eq, ...]:
-    return _pair(zip((sp.Symbol(name) for name in names.split()), expressions, strict=True))
+def name_expressions(names: str, *expressions: sp.Expr) -> tuple[sp.Eq, ...]:
+    """Return equations of names, parted by spaces, with expressions."""
+    return pair_up(zip((sp.Symbol(name) for name in names.split()), expressions, strict=True))
 
 
-def _vanish(expressions: Iterable[sp.Expr]) -> tuple[sp.Eq, ...]:
-    return _pair((expression, sp.S.Zero) for expression in expressions)
+def set_to_zero(expressions: Iterable[sp.Expr]) -> tuple[sp.Eq, ...]:
+    """Return equations that say that expressions vanish."""
+    return pair_up((expression, sp.S.Zero) for expression in expressions)
 
 
-def _pair(pairs: Iterable[tuple[sp.Expr, sp.Expr]]) -> tuple[sp.Eq, ...]:
+def pair_up(pairs: Iterable[tuple[sp.Expr, sp.Expr]]) -> tuple[sp.Eq, ...]:
+    """Return equations of left with right sides, not worked out."""
     return tuple(sp.Eq(left, right, evaluate=False) for left, right in pairs)

@@ -50,6 +50,17 @@ def rayleigh_log_derivatives(nu):
         "R": $by_r,
         "phi_2": $by_phi_2,
     }
+
+
+def rayleigh_temperature_coefficient(nu, d_ln_E, d_nu, d_ln_rho, d_ln_h, d_ln_R):
+    """Return d ln(frequency)/dT (1/K) and its parts, equation (15), from the slopes of ln E, nu, ln rho, ln h and ln R (1/K).
+
+    A shell that expands freely by alpha has d_ln_rho = -3 alpha and d_ln_h = d_ln_R = alpha.
+    """
+    by = rayleigh_log_derivatives(nu)
+    slopes = {"E": d_ln_E, "nu": d_nu, "rho": d_ln_rho, "h": d_ln_h, "R": d_ln_R}
+    parts = {name: by[name] * slope for name, slope in slopes.items()}
+    return sum(parts.values()), parts
 ''')
 
 C = Template("""\
@@ -87,6 +98,20 @@ void rayleigh_log_derivatives(double nu, double derivative[6])
     derivative[3] = $by_h;
     derivative[4] = $by_r;
     derivative[5] = $by_phi_2;
+}
+
+/* d ln(frequency)/dT (1/K), equation (15), and its parts from E, nu, rho, h and R, from the slopes of ln E, nu, ln rho,
+ * ln h and ln R (1/K). A shell that expands freely by alpha has slopes -3 alpha of ln rho and alpha of ln h and ln R. */
+double rayleigh_temperature_coefficient(double nu, const double slope[5], double part[5])
+{
+    double derivative[6], total = 0.0;
+    int k;
+    rayleigh_log_derivatives(nu, derivative);
+    for (k = 0; k < 5; k++) {
+        part[k] = derivative[k] * slope[k];
+        total += part[k];
+    }
+    return total;
 }
 """)
 

@@ -1,15 +1,21 @@
-"""`hrg derive`: the symbolic derivation of the HRG paper's equations (1)–(14), for people and for design code.
+"""`hrg derive`: the symbolic derivation of the HRG paper's equations (1)–(15), for people and for design code.
 
 Schema hrg.derive/1: `harmonic`, `pole_angle_deg`, `rim_angle_deg`; `I`, `J` and `bryan_factor`, each with its
 `closed_form` (text) and `value`; `d_ln_f_d_rim_angle_per_rad`; `equations`, a list in the order of the derivation
 with `number` in the paper (null where it has none), `title`, and the equations of the step in `latex` and in
 `plain` text; with --code also `code` with its `language` and `text`.
 
+With --bell: schema hrg.derive-bell/1, `equations` as above and `numbers`, the theory's frequencies beside the solver's.
 With --dynamics: schema hrg.derive-dynamics/1, `equations` and, with --code, `code` as above; the numbers are those of the
 CVG paper on demodulated dynamics.
 """
 
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from shell.derivation.chain import Step
 
 MOST_HARMONIC = 100  # the closed forms of higher ones take minutes
 
@@ -17,6 +23,7 @@ MOST_HARMONIC = 100  # the closed forms of higher ones take minutes
 def derive(
     *,
     dynamics: bool = False,
+    bell: bool = False,
     latex: bool = False,
     code: Literal["python", "c"] | None = None,
     harmonic: int = 2,
@@ -24,7 +31,7 @@ def derive(
     rim_angle_deg: float = 90.0,
     json: bool = False,
 ) -> int:
-    """Derive the frequency of the inextensional spherical shell, HRG paper equations (1)-(14).
+    """Derive the frequency of the inextensional spherical shell, HRG paper equations (1)-(15).
 
     Prints the chain of equations for any harmonic n, from the displacements to the frequency, and its
     closed forms for one harmonic and one polar range. With --dynamics, instead, how the standing wave moves: amplitude,
@@ -34,6 +41,9 @@ def derive(
     ----------
     dynamics : bool
         Derive the averaged dynamics of the vibration (Lynch's form, and the CVG paper's equations 7 to 25 from it).
+    bell : bool
+        Derive the theory of the bell (BVG paper, equations 1 to 22), beside what is printed, and hold its frequency against the
+        solver on the card bvg-bell; about 20 seconds.
     latex : bool
         Print a LaTeX fragment (amsmath) instead.
     code : {'python', 'c'}, optional
@@ -49,19 +59,24 @@ def derive(
     """
     from math import radians
 
-    from shell.derivation.chain import Case
+    from shell.derivation.chain import Case, steps
     from shell.derivation.design_code import emit_code
-    from shell.derivation.emit import emit_latex, emit_text
+    from shell.derivation.emit import HRG_TITLE, emit_latex, emit_text
     from shell.rayleigh import rayleigh_integrals
     from studies.cli.output import print_json
     from studies.errors import InputError
 
     if latex and code is not None:
         raise InputError("--latex and --code each print in another form; choose one of them.")
-    if dynamics:
+    if dynamics and bell:
+        raise InputError("--dynamics and --bell are two derivations; choose one of them.")
+    if dynamics or bell:
         if (harmonic, pole_angle_deg, rim_angle_deg) != (2, 0.0, 90.0):
-            raise InputError("--dynamics holds for any harmonic and shape; leave out --harmonic and the angles.")
-        return _derive_dynamics(latex, code, json)
+            which = "--dynamics" if dynamics else "--bell"
+            raise InputError(f"{which} holds for any harmonic and shape; leave out --harmonic and the angles.")
+        if bell and code is not None:
+            raise InputError("--bell has equations and numbers but no design code; leave out --code.")
+        return _derive_bell(latex, json) if bell else _derive_dynamics(latex, code, json)
     if not 0 <= pole_angle_deg < rim_angle_deg < 180:
         raise InputError(
             f"a dome from {pole_angle_deg:g} to {rim_angle_deg:g} degrees has no inextensional mode: the pole angle must "
@@ -86,7 +101,7 @@ def derive(
     elif code is not None:
         print(emit_code(case, code), end="")
     else:
-        print(emit_latex(case) if latex else emit_text(case), end="")
+        print(emit_latex(steps(case), HRG_TITLE) if latex else emit_text(steps(case)), end="")
     return 0
 
 
@@ -114,9 +129,51 @@ def _derive_dynamics(latex: bool, code: Literal["python", "c"] | None, json: boo
     return 0
 
 
+def _derive_bell(latex: bool, json: bool) -> int:
+    import dataclasses
+
+    from shell.derivation.bell_chain import bell_steps
+    from shell.derivation.emit import BELL_TITLE, emit_latex, emit_text
+    from studies.cli.output import print_json, print_table, say
+    from studies.papers.bvg_theory import compare_bell_theory
+
+    say("deriving the bell's equations ...")
+    steps = bell_steps()
+    if latex:
+        print(emit_latex(steps, BELL_TITLE), end="")
+        return 0
+    theory = compare_bell_theory()
+    if json:
+        print_json(
+            {"schema": "hrg.derive-bell/1", "equations": _equations(steps), "numbers": dataclasses.asdict(theory)}
+        )
+        return 0
+    print(emit_text(steps))
+    rows = [
+        [row.name, f"{row.frequency:.6g}", f"{row.precession_factor:.5f}", f"{row.membrane_share:.3g}"]
+        for row in (*theory.rows, theory.free, theory.solid)
+    ]
+    columns = ["pattern", "f (Hz)", "precession factor", "membrane share of the energy"]
+    print_table(f"(21), (22) with these patterns, and the solver: card {theory.card}", columns, rows)
+    return 0
+
+
+def _equations(steps: "Iterable[Step]") -> list[dict[str, Any]]:
+    from shell.derivation.emit import typeset, write_plainly
+
+    return [
+        {
+            "number": step.number or None,
+            "title": step.title,
+            "latex": [typeset(equation) for equation in step.equations],
+            "plain": [write_plainly(equation) for equation in step.equations],
+        }
+        for step in steps
+    ]
+
+
 def _payload(case: Any, pole_angle_deg: float, rim_angle_deg: float) -> dict[str, Any]:
     from shell.derivation.chain import steps
-    from shell.derivation.emit import typeset, write_plainly
 
     return {
         "schema": "hrg.derive/1",
@@ -127,13 +184,5 @@ def _payload(case: Any, pole_angle_deg: float, rim_angle_deg: float) -> dict[str
         "J": {"closed_form": str(case.mass), "value": float(case.mass.evalf(20))},
         "bryan_factor": {"closed_form": str(case.precession), "value": float(case.precession.evalf(20))},
         "d_ln_f_d_rim_angle_per_rad": float(case.rim_derivative.evalf(20)),
-        "equations": [
-            {
-                "number": step.number or None,
-                "title": step.title,
-                "latex": [typeset(equation) for equation in step.equations],
-                "plain": [write_plainly(equation) for equation in step.equations],
-            }
-            for step in steps(case)
-        ],
+        "equations": _equations(steps(case)),
     }

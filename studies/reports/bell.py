@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from studies.papers.bvg import BellTwin, Claims
     from studies.scale import ScaleStudy, StepFigures
 
-SOURCES = ("Su Z., Liu N., Li Q., Sensors 2015, 15, 23684–23705, doi:10.3390/s150923684: equations (23)–(36).",)
+SOURCES = ("Su Z., Liu N., Li Q., Sensors 2015, 15, 23684–23705, doi:10.3390/s150923684: equations (1)–(36).",)
 NAMES = {
     "rough": "rough (33)",
     "bias_compensated": "bias over temperature (34)",

@@ -4,6 +4,7 @@ import dataclasses
 from typing import TYPE_CHECKING, Any
 
 from studies.reports import bell, cross_damping, filters
+from studies.reports.bell_theory import theory_chapters
 
 if TYPE_CHECKING:
     from studies.papers.bvg import BellTwin
@@ -24,19 +25,23 @@ def reproduce_gyro_papers(seeds: int = 20) -> "tuple[list[Chapter], dict[str, An
         Virtual runs for the spread of the cross-damping improvement.
     """
     from studies.papers.bvg import reproduce_bell
+    from studies.papers.bvg_theory import compare_bell_theory, read_planted_rate
     from studies.papers.cvg_cross_damping import reproduce_cross_damping
     from studies.papers.cvg_filters import study_error_map, study_filters
 
     damping, study, chain = reproduce_cross_damping(seeds), study_filters(), reproduce_bell()
+    theory, reading = compare_bell_theory(), read_planted_rate()
     chapters = [
         *cross_damping.twin_chapters(damping),
         *filters.filter_chapters(study, study_error_map(MAP_POINTS)),
+        *theory_chapters(theory, reading),
         *bell.bell_chapters(chain),
     ]
     summary = {
         "cvg_cross_damping": _summarise_damping(damping),
         "cvg_filters": _summarise_filters(study),
         "bvg": _summarise_bell(chain),
+        "bvg_theory": {**dataclasses.asdict(theory), "loop": dataclasses.asdict(reading)},
     }
     return chapters, summary
 

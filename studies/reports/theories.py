@@ -32,7 +32,8 @@ def theories_chapter() -> Chapter:
             Text(
                 f"Rayleigh's closed form, the paper's equation (13), ignores the free edge. At h/R = 0.06 it lies"
                 f" {100 * at.excess:.1f} % above the solid; the excess closes only like √(h/R), with a coefficient that"
-                f" tends to {limit:.2f}. Every other number on this page is of the solid."
+                f" tends to {limit:.2f}. The other frequencies and slopes of silica on this page"
+                " are of the solid."
             ),
             Table("Free hemisphere of 15 mm, n = 2", columns, cells),
             _closing_figure(rows, limit),

@@ -67,6 +67,7 @@ def test_emitted_python_agrees_with_quadrature(case, tmp_path, capsys):
     for shell in random_shells(seed=4):
         assert module.rayleigh_frequency(**shell) == pytest.approx(frequency_by_quadrature(*case, **shell), rel=1e-11)
     check_derivatives(case, module.rayleigh_log_derivatives(0.2))
+    check_temperature(case, *module.rayleigh_temperature_coefficient(0.2, *SLOPES))
     check_bryan_factor(case, module.rayleigh_bryan_factor())
 
 
@@ -89,6 +90,30 @@ def test_emitted_c_compiles_and_agrees_with_quadrature(case, tmp_path, capsys):
     compiled.rayleigh_log_derivatives(ctypes.c_double(0.2), derivative)
     check_derivatives(case, dict(zip(("E", "nu", "rho", "h", "R", "phi_2"), derivative, strict=True)))
     check_bryan_factor(case, compiled.rayleigh_bryan_factor())
+    compiled.rayleigh_temperature_coefficient.restype = ctypes.c_double
+    part = (ctypes.c_double * 5)()
+    total = compiled.rayleigh_temperature_coefficient(ctypes.c_double(0.2), (ctypes.c_double * 5)(*SLOPES), part)
+    check_temperature(case, total, dict(zip(("E", "nu", "rho", "h", "R"), part, strict=True)))
+
+
+SLOPES = (1.5e-4, 3e-5, -1.5e-6, 5e-7, 5e-7)  # of ln E, ν, ln ρ, ln h, ln R, 1/K
+
+
+def check_temperature(case, total, parts):
+    """Equation (15) against the quadrature at shells one kelvin apart."""
+    shell = {"E": 7e10, "nu": 0.2, "rho": 2200.0, "h": 1e-3, "R": 2e-2}
+
+    def log_frequency(kelvin):
+        names = ("E", "nu", "rho", "h", "R")
+        moved = {
+            name: shell[name] + kelvin * slope if name == "nu" else shell[name] * np.exp(kelvin * slope)
+            for name, slope in zip(names, SLOPES, strict=True)
+        }
+        return np.log(frequency_by_quadrature(*case, **moved))
+
+    assert total == pytest.approx(log_frequency(0.5) - log_frequency(-0.5), rel=1e-6)
+    assert total == pytest.approx(sum(parts.values()), rel=1e-12)
+    assert parts["R"] == pytest.approx(-2 * SLOPES[-1], rel=1e-12)
 
 
 def check_derivatives(case, derivative):
@@ -131,7 +156,7 @@ def test_plain_text_walks_through_the_numbered_equations(capsys):
     status, said = speak(capsys)
     assert status == 0
     numbers = re.findall(r"^\((\d+)\)", said.out, flags=re.MULTILINE)
-    assert numbers == [str(k) for k in range(1, 15)]
+    assert numbers == [str(k) for k in range(1, 16)]
     assert max(len(line) for line in said.out.splitlines()) <= 120
     assert "↪" not in said.out
 
@@ -186,3 +211,23 @@ def test_unusable_arguments_end_with_one_sentence(words, capsys):
     assert status == 2
     assert said.out == ""
     assert said.err.startswith("hrg: ")
+
+
+def test_the_bell_is_derived_beside_its_numbers(capsys):
+    status, said = speak(capsys, "--bell", "--json")
+    assert status == 0
+    payload = json.loads(said.out)
+    assert payload["schema"] == "hrg.derive-bell/1"
+    numbers = [step["number"] for step in payload["equations"] if step["number"]]
+    assert numbers == [
+        "1", "3", "5", "6", "7", "7 as printed", "12", "13", "13 as printed", "14", "19", "17, 18", "16 as printed", "20",
+        "20 as printed", "21", "22",
+    ]  # fmt: skip
+    rows = {row["name"]: row["frequency"] for row in payload["numbers"]["rows"]}
+    solid = payload["numbers"]["solid"]["frequency"]
+    assert rows["(19) as printed"] > 100 * solid
+    assert 1 < rows["solved from (17), (18)"] / solid < 1.4
+    for words, mend in ((["--bell", "--dynamics"], "choose one"), (["--bell", "--code", "c"], "leave out --code")):
+        status, said = speak(capsys, *words)
+        assert status == 2
+        assert mend in said.err

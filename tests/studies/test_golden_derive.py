@@ -16,7 +16,7 @@ KEYS = [
     "equations",
     "code",
 ]
-NUMBERS = ["1", "2", "3", "4", "5", "6", "7", "8", "8 as printed", "9", "10", "11", "12", "13", "14"]
+NUMBERS = ["1", "2", "3", "4", "5", "6", "7", "8", "8 as printed", "9", "10", "11", "12", "13", "14", "15"]
 
 
 def test_schema_of_derive_is_kept(capsys):

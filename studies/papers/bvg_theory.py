@@ -1,0 +1,120 @@
+"""The BVG paper's theory of the bell, (16)–(22), in numbers beside the shell solver, and its reading of the rate, (23)–(30)."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from studies.instrument.card import load_card
+
+CARD = "bvg-bell"
+
+
+@dataclass(frozen=True)
+class PatternRow:
+    """One assumed pattern: frequency (Hz), precession factor, and the share of its energy that stretches the wall."""
+
+    name: str
+    frequency: float
+    precession_factor: float
+    membrane_share: float
+
+
+@dataclass(frozen=True)
+class BellTheory:
+    """The two-pattern model with three patterns on one bell, and the solver: `solid` on the card's stem, `free` without."""
+
+    card: str
+    rows: tuple[PatternRow, ...]
+    solid: PatternRow
+    free: PatternRow
+
+
+def compare_bell_theory(card: str = CARD) -> BellTheory:
+    """Hold the pattern (19), the same without its factor cos(5πφ/φ_b), and one that does not stretch against the solver."""
+    from dataclasses import replace
+
+    from shell.bell_theory import (
+        inextensional_functions,
+        rayleigh_functions,
+        rayleigh_functions_without_factor,
+        two_pattern_model,
+    )
+    from shell.modes import solve_modes
+
+    instrument = load_card(card)
+    resonator = instrument.resonator
+    elastic = instrument.material.elastic(instrument.reference_temperature)
+    patterns = (
+        ("(19) as printed", rayleigh_functions),
+        ("(19) without cos(5πφ/φ_b)", rayleigh_functions_without_factor),
+        ("solved from (17), (18)", inextensional_functions),
+    )
+    rows = []
+    for name, pattern in patterns:
+        model = two_pattern_model(resonator, elastic, pattern)
+        rows.append(PatternRow(name, model.frequency, model.bryan_factor, model.membrane_share))
+    solved = []
+    for name, body in (
+        ("solid, on its stem", resonator),
+        ("solid, free", replace(resonator, support="free", stem=None)),
+    ):
+        (mode,) = solve_modes(body, elastic)
+        solved.append(PatternRow(name, mode.frequency, mode.bryan_factor, mode.energy_fractions.membrane))
+    return BellTheory(instrument.name, tuple(rows), solved[0], solved[1])
+
+
+@dataclass(frozen=True)
+class LoopReading:
+    """A planted rate read from the integrated equations (23): open loop (25) and force rebalance (26), rad/s.
+
+    planted, open_loop, rebalance : the rate, and its mean as read.
+    scale_error : relative error of Ω = K A_q (30) with K of the resonator's constants.
+    singular_share : part of the time in which ṗ of (24) is below a tenth of its amplitude.
+    """
+
+    planted: float
+    open_loop: float
+    rebalance: float
+    scale_error: float
+    singular_share: float
+
+
+def read_planted_rate(planted: float = 2.0) -> LoopReading:
+    """Integrate (23) with a coupling c₁ and read the rate back by (25), (26) for amplitudes, and by (30).
+
+    Parameters
+    ----------
+    planted : rate, rad/s.
+    """
+    from scipy.integrate import solve_ivp
+
+    from compensation.loop import BellResonator, read_rate_from_loop, scale_of_rebalance
+    from compensation.motion import demodulate
+
+    bell = BellResonator(m0=2e-3, b=1.1e-3, c0=2e-3 * (2 * np.pi * 4329.0) ** 2, c1=3.0)
+    omega = bell.omega
+    found = {}
+    time = 2 * np.pi / omega / 24 * np.arange(int(0.03 * omega / (2 * np.pi) * 24))
+    for name, rebalance in (("open", 0.0), ("rebalance", 40.0)):
+
+        def slope(t: float, y: np.ndarray, gain: float = rebalance) -> list[float]:
+            p, q, dp, dq = y
+            coupling = 2 * planted * bell.b
+            return [
+                dp,
+                dq,
+                (coupling * dq - bell.c0 * p - bell.c1 * q) / bell.m0,
+                (-gain * dq - coupling * dp - bell.c0 * q - bell.c1 * p) / bell.m0,
+            ]
+
+        start = [0.0, 0.0, omega * 1e-6, 0.0]
+        y = solve_ivp(slope, (0, time[-1]), start, "DOP853", time, rtol=1e-10, atol=1e-16).y
+        at, P = demodulate(time, y[0], omega)
+        _, Q = demodulate(time, y[1], omega)
+        _, F = demodulate(time, -rebalance * y[3], omega)
+        read = read_rate_from_loop(bell, omega, at, P, Q, F if rebalance else None)
+        found[name] = float(np.mean(read[(at > 0.01) & (at < at[-1] - 0.001)]))
+        if rebalance:
+            K = scale_of_rebalance(bell, omega, float(abs(P[-1])))
+            by_scale = K * float(np.real(F[-1] / (1j * P[-1] / abs(P[-1]))))
+    return LoopReading(planted, found["open"], found["rebalance"], by_scale / planted - 1, 2 * np.arcsin(0.1) / np.pi)

@@ -1,0 +1,71 @@
+"""Chapters on the BVG paper's theory, equations (1)–(22), and on its reading of the rate, (23)–(30), for `hrg reproduce`."""
+
+from studies.papers.bvg_theory import BellTheory, LoopReading
+from studies.reports.page import Chapter, Table, Text
+
+EQUATIONS = (
+    ("(1)–(3)", "meridian, domain, principal radii", "hold; in (3) roots and a minus sign are lost: ρ₁ of the hyperbola is negative"),
+    ("(5), (6)", "Hooke's law, strains of the body", "hold"),
+    ("(7)", "equilibrium in shell coordinates", "around, it holds; along the meridian it has σ_φθ sin φ for σ_φυ sin φ, and along meridian and normal terms in ∂ρ₁/∂φ that the divergence of the stress has not (zero on hemisphere and cylinder, not on the hyperbola)"),
+    ("(8)–(12)", "displacement, rate, acceleration", "hold; minus signs and dots are lost"),
+    ("(13)–(15)", "slow, steady rate; inertial force; equations of motion", "the third of (13) lacks −2Ω u̇_φ cos φ and has cos φ for sin φ at u̇_υ; (14) repeats u̇_υ for u̇_φ; with our (7) and (13), (15) follows"),
+    ("(16)", "two patterns", "parity of two components is exchanged: read so, a perfect bell would couple its two patterns (c₁ ≠ 0)"),
+    ("(17)–(19)", "no stretching, and the pattern", "(19) is not without stretching: see the table"),
+    ("(20)", "two-degree-of-freedom equations", "the form holds; the printed m₀, b, c₀ have no integral and are of the first power of the pattern, c₁ has only terms in U, which come from (16): ours are Galerkin integrals, and c₁ = 0"),
+    ("(21), (22)", "k = b/(2m₀), ω² = c₀/m₀", "hold for n = 2"),
+    ("(23)", "the same with forces", "holds"),
+    ("(24)–(26)", "rate from p, q and f_q", "printed with ω² q̇ for ω² q and f_q for f_q/m₀, and singular twice in every period; taken for amplitudes they hold"),
+    ("(27)–(29)", "charge of the piezo elements, displacement, rate from charges", "hold with the mends of (26)"),
+    ("(30), (31)", "Ω = K A_q; scale, null and noise", "hold where the loop rests: K = 1/(4 k m₀ ω P)"),
+)  # fmt: skip
+
+
+def theory_chapters(theory: BellTheory, reading: LoopReading) -> list[Chapter]:
+    """Return the two chapters."""
+    printed, solid = theory.rows[0], theory.solid
+    rows = [
+        [row.name, _hertz(row.frequency), f"{row.precession_factor:.4f}", f"{100 * row.membrane_share:.3g} %"]
+        for row in (*theory.rows, theory.free, theory.solid)
+    ]
+    patterns = Table(
+        f"Card '{theory.card}', n = 2",
+        ["Pattern", "Frequency", "Precession factor", "Energy that stretches the wall"],
+        rows,
+        "First three: (21), (22) with our m₀, b and c₀ of the assumed pattern. A pattern that stretches the wall is as stiff as a"
+        " membrane, (R/h)² stiffer than one that bends it.",
+    )
+    loop = Table(
+        "A planted rate, read back from integrated equations (23) with a coupling c₁",
+        ["Quantity", "Value"],
+        [
+            ["planted", f"{reading.planted:.6g} rad/s"],
+            ["read in open loop, (25)", f"{reading.open_loop:.6g} rad/s"],
+            ["read in force rebalance, (26)", f"{reading.rebalance:.6g} rad/s"],
+            ["Ω = K A_q with K = 1/(4 k m₀ ω P), (30)", f"{1e6 * reading.scale_error:+.0f} ppm"],
+            [
+                "part of the time with ṗ below a tenth of its amplitude, where (24) fails",
+                f"{100 * reading.singular_share:.0f} %",
+            ],
+        ],
+    )
+    return [
+        Chapter(
+            "BVG equations (1)–(22): the theory of the bell",
+            [
+                Text(
+                    f"The pattern (19) is said not to stretch the wall. It does: with it, (22) gives {_hertz(printed.frequency)} where"
+                    f" the solver finds {_hertz(solid.frequency)}, {printed.frequency / solid.frequency:.0f} times as much. The pattern"
+                    " that really solves (17), (18) along the meridian comes close. `hrg derive --bell` shows every equation derived."
+                ),
+                patterns,
+                Table(
+                    "Equation by equation", ["BVG", "What it says", "What we find"], [list(row) for row in EQUATIONS]
+                ),
+            ],
+        ),
+        Chapter("BVG equations (23)–(30): the rate from the loop", [loop]),
+    ]
+
+
+def _hertz(value: float) -> str:
+    return f"{value / 1e3:.4g} kHz"
