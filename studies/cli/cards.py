@@ -7,7 +7,7 @@ if TYPE_CHECKING:
 
 
 def cards(card: str = "", *, json: bool = False) -> int:
-    """List the instrument cards that ship with the package, or the uncertain values of one card.
+    """List the instrument cards that ship with the package, or what one card weighs and its uncertain values.
 
     A number of a card may carry its uncertainty: { value = 0.0118, relative_sd = 0.3 }, { value = ..., sd = ... }, or
     { value = ..., low = ..., high = ... } with hard bounds; sd = 0 makes it exact. Others are as uncertain as their key is
@@ -16,7 +16,7 @@ def cards(card: str = "", *, json: bool = False) -> int:
     Parameters
     ----------
     card : str
-        Path of a card, or the name of one that ships: show its uncertain values.
+        Path of a card, or the name of one that ships: show its mass, moments of inertia and uncertain values.
     json : bool
         Print one JSON object (schema hrg.cards/1; hrg.card-values/1 for one card) instead of a table.
     """
@@ -47,11 +47,13 @@ def cards(card: str = "", *, json: bool = False) -> int:
 def _show_values(card: str, json: bool) -> int:
     from dataclasses import asdict
 
+    from shell.inertia import weigh
     from studies.cli.output import print_json, print_table
     from studies.instrument.card import load_card
 
     instrument = load_card(card)
     values, stated = instrument.uncertain, instrument.stated
+    mass = weigh(instrument.resonator, instrument.material.elastic(instrument.reference_temperature).rho)
     if json:
         print_json(
             {
@@ -59,9 +61,14 @@ def _show_values(card: str, json: bool) -> int:
                 "card": instrument.name,
                 "values": [{**asdict(one), "stated": one.name in stated} for one in values],
                 "correlations": [[*pair, correlation] for pair, correlation in instrument.correlation.items()],
+                "mass_properties": asdict(mass),
             }
         )
         return 0
+    print(
+        f"{instrument.name}: {1e3 * mass.mass:.5g} g, {1e9 * mass.volume:.5g} mm³, centre of mass at z = {1e3 * mass.center:.5g} mm;"
+        f" moments of inertia {1e9 * mass.axial:.5g} g mm² about the axis, {1e9 * mass.transverse:.5g} g mm² across."
+    )
     print(f"{instrument.name}: what is uncertain (± one standard deviation; everything else is exact)")
     tables: dict[str, list[list[str]]] = {}
     for one in values:

@@ -152,8 +152,9 @@ def _short(parts: "Reproduction") -> list[Text]:
     slopes = [value for _, value, _ in physics.laws]
     return [
         Text(
-            f"The coefficients that the paper prints are reproduced to their last digit, and the temperatures of its Table 2 within"
-            f" {_farthest(study):.4f} °C, an error of it (0.0578 at −10 °C) being none of its own printed temperatures' (−10.058). Its"
+            "The two coefficients that the paper prints of its cubic are reproduced to their last digit, and the temperatures of its"
+            f" Table 2 within {_farthest(study):.4f} °C; at −10 °C its own columns differ (−10.058, but an error of 0.0578; ours is"
+            f" {study.error_degC[1]:.4f}). Its"
             " conclusion that higher orders have little effect is not reproduced: a quartic leaves {better.sum_of_squares:.1e} Hz² where the cubic leaves"
             f" {study.fit.sum_of_squares:.2e} Hz², and predicts points left out"
             f" {study.fit.leave_one_out_rms / better.leave_one_out_rms:.1f} times better."
