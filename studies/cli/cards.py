@@ -66,9 +66,9 @@ def _show_values(card: str, json: bool) -> int:
         )
         return 0
     print(
-        f"{instrument.name}: {1e3 * mass.mass:.5g} g, {1e9 * mass.volume:.5g} mm³, centre of mass at z = {1e3 * mass.center:.5g} mm;"
-        f" moments of inertia {1e9 * mass.axial:.5g} g mm² about the axis, {1e9 * mass.transverse:.5g} g mm² across."
+        f"{instrument.name}: {1e3 * mass.mass:.5g} g, {1e9 * mass.volume:.5g} mm³, centre at z = {1e3 * mass.center:.5g} mm;"
     )
+    print(f"moments of inertia {1e9 * mass.axial:.5g} (axis) and {1e9 * mass.transverse:.5g} g mm² (across)")
     print(f"{instrument.name}: what is uncertain (± one standard deviation; everything else is exact)")
     tables: dict[str, list[list[str]]] = {}
     for one in values:
