@@ -1,20 +1,26 @@
 """The split of an instrument's pairs: what its imperfection and its electrodes make of them."""
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from shell.imperfection import CoupledHarmonics, Pair, Split, find_split
+from shell.modes import solve_modes
 from studies.errors import naming
 
 if TYPE_CHECKING:
+    from shell.elastic import Elastic
     from shell.imperfection import Imperfection
     from shell.modes import Mode
+    from shell.resonator import Resonator
     from studies.instrument.card import Instrument
     from studies.instrument.tables.electrodes import CardElectrodes
     from studies.instrument.tables.imperfection import CardImperfection
+
+Array = NDArray[np.float64]
 
 
 def is_imperfect(instrument: "Instrument") -> bool:
@@ -28,17 +34,18 @@ def is_imperfect(instrument: "Instrument") -> bool:
 class SplitPair:
     """A pair of an instrument at a temperature, split by all that its card says.
 
-    imperfection, measured, electrodes : the parts; they add.
+    known : the pair, if it has been made before. imperfection, measured, electrodes : the parts; they add.
     """
 
     instrument: "Instrument"
     mode: "Mode"
     temperature: float
+    known: Pair | None = None
 
     @cached_property
     def pair(self) -> Pair:
         """The perfect pair."""
-        return Pair(self.mode)
+        return self.known or Pair(self.mode)
 
     @cached_property
     def imperfection(self) -> Split:
@@ -91,3 +98,49 @@ class SplitPair:
     @property
     def _nothing(self) -> Split:
         return Split(self.mode.harmonic, self.mode.frequency, 0.0, 0j)
+
+
+@lru_cache(maxsize=8)
+def solved_pair(resonator: "Resonator", elastic: "Elastic", harmonic: int) -> Pair:
+    """The perfect pair of a harmonic, solved once."""
+    return Pair(solve_modes(resonator, elastic, harmonic)[0])
+
+
+@lru_cache(maxsize=64)
+def _softening(pair: Pair, electrodes: "CardElectrodes") -> tuple[float, float]:
+    """Mean shift by the card's own voltages, and per V² on all of the electrodes together, at the reference temperature."""
+    charged = electrodes.on(pair, electrodes.reference_temperature)
+    return charged.soften().shift, float(charged.per_square_volt[0].sum())
+
+
+def reference_split(instrument: "Instrument", harmonic: int = 2) -> SplitPair:
+    """The pair of a harmonic at the card's reference temperature."""
+    resonator, elastic = instrument.at(instrument.reference_temperature)
+    pair = solved_pair(resonator, elastic, harmonic)
+    return SplitPair(instrument, pair.mode, instrument.reference_temperature, pair)
+
+
+def mean_shift(instrument: "Instrument", temperature: Array, voltage_squared: Array | None = None) -> Array | float:
+    """What imperfection and electrodes add to the mean frequency of the n = 2 pair, relative.
+
+    Softening goes as V²/g³ with the gap's expansion; the voltages are the card's, or a common one that is commanded.
+
+    Parameters
+    ----------
+    temperature : array, K
+    voltage_squared : array, V², optional
+        Of the common voltage, in place of the card's.
+    """
+    electrodes: CardElectrodes = instrument.part("electrodes")
+    card: CardImperfection = instrument.part("imperfection")
+    if not electrodes.are_charged and card.fields is None:
+        return 0.0
+    whole = reference_split(instrument)
+    shift: Array | float = whole.imperfection.shift
+    if electrodes.are_charged:
+        with naming(f"{instrument.path} [electrodes]"):
+            own, per_square_volt = _softening(whole.pair, electrodes)
+        commanded = 0.0 if voltage_squared is None else voltage_squared - electrodes.keys.voltage_V**2
+        grown = 1 + electrodes.keys.gap_expansion_per_K * (temperature - instrument.reference_temperature)
+        shift = shift + (own + per_square_volt * commanded) / grown**3
+    return shift

@@ -15,6 +15,7 @@ from compensation.start_up import StartUp, start_up
 from compensation.wave import StandingWave
 from compensation.whole_angle import WITHOUT_RATE, simulate_whole_angle
 from studies.errors import InputError, naming
+from studies.splitting import is_imperfect, reference_split
 
 if TYPE_CHECKING:
     from studies.instrument.card import Instrument
@@ -57,11 +58,20 @@ def wave_of(
         1 / decay,
         split,
         axis,
-        2e-3 * np.pi * loop.frequency_split_mHz,
-        np.radians(loop.frequency_axis_deg),
+        *_frequency_split(instrument, loop, harmonic),
         harmonic,
         bryan_factor,
     )
+
+
+def _frequency_split(instrument: "Instrument", loop: "Loop", harmonic: int) -> tuple[float, float]:
+    """Δω (rad/s) and the axis of the higher frequency (rad): that of [loop], and what imperfection and electrodes make besides."""
+    own = loop.frequency_split_mHz * 1e-3, float(np.radians(loop.frequency_axis_deg))
+    if not is_imperfect(instrument):
+        return 2 * np.pi * own[0], own[1]
+    split = reference_split(instrument, harmonic).split
+    wave = own[0] * np.exp(2j * harmonic * own[1]) + split.frequency * split.wave
+    return float(2 * np.pi * abs(wave)), float(np.angle(wave)) / (2 * harmonic)
 
 
 def electronics_of(loop: "Loop", wave: StandingWave, temperature: float, amplitude: float = 1.0) -> Electronics:

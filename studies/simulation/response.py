@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from studies.errors import InputError, naming
 from studies.simulation.drive import ZERO_CELSIUS, Drive
 from studies.simulation.loop import settled_columns
+from studies.splitting import mean_shift
 from thermal.lag import lag
 from thermal.meridian import cell_names, energy_weights
 
@@ -103,7 +104,8 @@ def read_out(
     by_density = -0.5 * float(law.material.log_slope("density", reference))
     by_ratio = float(law.material.slope("poisson_ratio", reference))
     thermal = np.exp(law.logarithm(warmed) + by_density * kinetic + by_ratio * ratio)
-    frequency = thermal + changes.get("frequency_Hz", 0.0)
+    softened = thermal * (1 + mean_shift(instrument, warmed, drive.commands.get("voltage_squared")))
+    frequency = softened + changes.get("frequency_Hz", 0.0)
     own = instrument.loss.at(warmed - reference) if damping is None else damping.inverse_q(warmed)
     inverse_q = own + changes.get("inverse_q", 0.0)
     wave = None if damping is None or damping.wave is None else damping.wave(warmed)

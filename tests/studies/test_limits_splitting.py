@@ -1,6 +1,7 @@
 """A card's imperfection and electrodes: they add, they reach modes and studies, and what is wrong in them is named."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,9 +10,13 @@ from shell.modes import solve_modes
 from studies.cli import main
 from studies.errors import InputError
 from studies.instrument.card import load_card
-from studies.splitting import SplitPair, is_imperfect
+from studies.simulation.drive import drive_by_profile
+from studies.simulation.loop import wave_of
+from studies.simulation.prediction import predict
+from studies.splitting import SplitPair, is_imperfect, mean_shift
 from studies.sweeps.case import Case
 from studies.sweeps.quantities import find_quantity
+from thermal.profile import Profile
 
 CARD = """
 schema = "hrg.card/1"
@@ -43,6 +48,11 @@ SPLIT = """
 [imperfection.split]
 split_Hz = 0.1
 slow_axis_deg = 70.0
+"""
+HEAT = """
+[thermal]
+heat_capacity_J_per_kg_K = 740.0
+conductivity_W_per_m_K = 1.4
 """
 ELECTRODES = """
 [electrodes]
@@ -158,3 +168,30 @@ def test_a_voltage_beyond_pull_in_names_its_table(tmp_path):
     instrument = loaded(tmp_path, "[electrodes]\ngap_um = 10.0\nvoltage_V = 2000.0\n")
     with pytest.raises(InputError, match=r"\[electrodes\].*pull the shell in"):
         _ = split_of(instrument).split
+
+
+def test_a_simulated_run_is_softened_by_the_volts_and_the_gap(tmp_path):
+    """δf/f = shift V²/V₀² (g₀/g)³ with the gap's own expansion, against a run of the perfect card."""
+    gap = "[electrodes]\ngap_um = 100.0\nvoltage_V = 100.0\ngap_expansion_per_K = 1e-3\n"
+    instrument = loaded(tmp_path, HEAT, gap)
+    shift = split_of(instrument).electrodes.shift
+    T = np.array([instrument.reference_temperature, instrument.reference_temperature + 10.0])
+    assert mean_shift(instrument, T) == pytest.approx([shift, shift / 1.01**3], rel=1e-9)
+    assert mean_shift(instrument, T, np.array([4e4, 1e4])) == pytest.approx([4 * shift, shift / 1.01**3], rel=1e-9)
+    perfect = loaded(tmp_path, HEAT)
+    rows = np.linspace(0.0, 3600.0, 5)
+    drive = replace(
+        drive_by_profile(Profile(rows, np.full(5, 293.15)), rows),
+        commands={"voltage_squared": np.array([1, 1, 4, 4, 0]) * 1e4},
+    )
+    ratio = predict(instrument, drive).columns["frequency_Hz"] / predict(perfect, drive).columns["frequency_Hz"]
+    assert ratio - 1 == pytest.approx([shift, shift, 4 * shift, 4 * shift, 0.0], rel=1e-4, abs=1e-10)
+
+
+def test_the_loop_holds_the_cards_split(tmp_path):
+    loop = "[loop]\nfrequency_split_mHz = 0.0\n"
+    instrument = loaded(tmp_path, WALL, loop)
+    wave = wave_of(instrument, 4599.7, 1e-7, 0.277)
+    split = split_of(instrument).split
+    assert wave.frequency_split == pytest.approx(2 * np.pi * split.hertz, rel=1e-9)
+    assert wave.frequency_axis % (np.pi / 2) == pytest.approx(split.fast_axis, rel=1e-9)
