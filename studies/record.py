@@ -30,6 +30,7 @@ COLUMNS = {
     "rate_deg_per_s": "applied rate",
     "inverse_q": "1/Q of the drive mode",
     "drive_amplitude_V": "commanded vibration amplitude",
+    "vibration_amplitude_V": "measured vibration amplitude, as in a run-down",
     "electrode_bias_V": "polarisation or trim voltage",
     "quadrature_V": "quadrature-control effort",
     "pattern_angle_deg": "azimuth of the standing wave",

@@ -32,6 +32,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
         "Splits, axes and gains from a whole-angle run.",
     ),
     "diagnose": ("studies.cli.diagnose:diagnose", "What the simulation gets wrong, why, and what the repair is worth."),
+    "acceptance": ("studies.cli.acceptance:acceptance", "The tests of IEEE 1431 from records, against limits."),
     "derive": ("studies.cli.derive:derive", "The symbolic derivation, as equations, LaTeX or code."),
     "render": ("studies.cli.render:render", "A mode shape as picture, animation, page or mesh."),
     "scan": ("studies.cli.scan:scan", "Measured faces to wall maps, waves around and splits."),

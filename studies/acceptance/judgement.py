@@ -1,0 +1,111 @@
+"""The acceptance test: what the records give against limits, and what they do not give."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal
+
+from studies.acceptance.limits import Limits
+from studies.acceptance.measure import (
+    Found,
+    Measured,
+    measure_drift,
+    measure_run_down,
+    measure_scale,
+    measure_seal,
+    measure_temperature,
+    measure_warm_up,
+)
+from studies.acceptance.quantities import ELSEWHERE, QUANTITIES, Quantity
+from studies.acceptance.runs import sort_records
+
+if TYPE_CHECKING:
+    from compensation.stability import AllanDeviation, NoiseCoefficients
+    from studies.record import Record
+
+Verdict = Literal["pass", "fail", "undecided", "no limit", "missing"]
+
+
+@dataclass(frozen=True)
+class Line:
+    """One quantity: what was measured, its limit, and the verdict.
+
+    `undecided`: the interval lies on both sides of the limit. `missing`: no record gives it.
+    """
+
+    quantity: Quantity
+    measured: Measured | None
+    limit: float | None
+
+    @property
+    def verdict(self) -> Verdict:
+        """Pass or fail where the whole interval does."""
+        if self.measured is None:
+            return "missing"
+        if self.limit is None:
+            return "no limit"
+        low, high = self.sizes
+        if self.quantity.upper:
+            return "pass" if high <= self.limit else "fail" if low > self.limit else "undecided"
+        return "pass" if low >= self.limit else "fail" if high < self.limit else "undecided"
+
+    @property
+    def sizes(self) -> tuple[float, float]:
+        """Smallest and largest size of the value within its interval."""
+        assert self.measured is not None
+        value = self.measured.value
+        low = self.measured.low if self.measured.low is not None else value
+        high = self.measured.high if self.measured.high is not None else value
+        smallest = 0.0 if low <= 0 <= high else min(abs(low), abs(high))
+        return smallest, max(abs(low), abs(high))
+
+
+@dataclass(frozen=True)
+class Acceptance:
+    """All lines in the order of the standard, the tests that records cannot give, and what was done with every record."""
+
+    lines: tuple[Line, ...]
+    elsewhere: tuple[tuple[str, str, str], ...]
+    used: dict[str, str]
+    band: float | None
+    allan: "AllanDeviation | None"
+    noise: "NoiseCoefficients | None"
+
+    @property
+    def verdict(self) -> Literal["pass", "fail", "incomplete"]:
+        """Fail where one limit is not met; incomplete where one is undecided or without a record; else pass."""
+        kinds = {line.verdict for line in self.lines if line.limit is not None}
+        if "fail" in kinds:
+            return "fail"
+        return "incomplete" if kinds & {"undecided", "missing"} or not kinds else "pass"
+
+
+def judge(records: "Sequence[Record]", limits: Limits, output: str = "bias_deg_per_h") -> Acceptance:
+    """Measure what the records give and set it against the limits.
+
+    Raises
+    ------
+    InputError
+        A record that its test cannot use: a run-down that does not decay, a warm-up that does not settle.
+    """
+    sorted_runs, left = sort_records(records, output)
+    found: Found = measure_seal(records)
+    allan = noise = band = None
+    if "warm-up" in sorted_runs:
+        more, band = measure_warm_up(sorted_runs["warm-up"][0], output, limits.warm_up_band)
+        found |= more
+    if "temperature" in sorted_runs:
+        found |= measure_temperature(sorted_runs["temperature"], output)
+    for record in sorted_runs.get("scale-factor", [])[:1]:
+        found |= measure_scale(record)
+    if "drift" in sorted_runs:
+        more, allan, noise = measure_drift(sorted_runs["drift"], output)
+        found |= more
+    for record in sorted_runs.get("run-down", [])[:1]:
+        found |= measure_run_down(record)
+    lines = tuple(Line(q, found.get(q.key), limits.limits.get(q.key)) for q in QUANTITIES)
+    used: dict[str, str] = {record.path: test for test, group in sorted_runs.items() for record in group}
+    for test in ("warm-up", "scale-factor", "run-down"):
+        for record in sorted_runs.get(test, [])[1:]:
+            used[record.path] = f"{test}, not used: the first record of this test counts"
+    used |= {record.path: "no test: it shows none of them" for record in left}
+    return Acceptance(lines, ELSEWHERE, used, band, allan, noise)

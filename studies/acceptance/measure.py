@@ -1,0 +1,276 @@
+"""A value with its interval for every quantity that the records give."""
+
+import itertools
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import stats
+
+from compensation.coloured import fit_coloured
+from compensation.decimation import average_blocks
+from compensation.linearity import measure_linearity, same_rate
+from compensation.regression import fit_linear
+from compensation.stability import AllanDeviation, NoiseCoefficients, allan_deviation, fit_noise
+from compensation.start_up import fit_run_down
+from studies.acceptance.runs import temperature_column
+from studies.errors import InputError, naming
+
+if TYPE_CHECKING:
+    from studies.record import Record
+
+Real = NDArray[np.float64]
+BLOCK = 100.0
+"""Averaging of the output over temperature (s)."""
+WARM_BLOCK = 10.0
+MOST_POINTS = 100_000
+CONFIDENCE = 0.95
+YEAR = 365.25 * 86400.0
+
+
+@dataclass(frozen=True)
+class Measured:
+    """A value with the ends of its interval, of which None are not known, and the files that it came from."""
+
+    value: float
+    low: float | None
+    high: float | None
+    sources: tuple[str, ...]
+
+
+Found = dict[str, Measured]
+
+
+def measure_drift(records: "Sequence[Record]", output: str) -> tuple[Found, AllanDeviation, NoiseCoefficients]:
+    """Bias, its repeatability, and the noise coefficients of the longest record (12.11)."""
+    means: list[tuple[float, float]] = []
+    for record in records:
+        blocks = average_blocks(record["time_s"], {"output": record[output]}, _block_of(record))
+        y = blocks.columns["output"]
+        with naming(record.path):
+            fit = fit_coloured(np.ones((len(y), 1)), y, ["bias"], [slice(0, len(y))])
+        means.append((float(y.mean()), float(np.sqrt(fit.regression.covariance[0, 0]))))
+    found: Found = {}
+    paths = tuple(record.path for record in records)
+    values = np.array([value for value, _ in means])
+    if len(records) == 1:
+        z = float(stats.norm.ppf(0.5 + CONFIDENCE / 2))
+        value, sd = means[0]
+        found["bias_deg_per_h"] = Measured(value, value - z * sd, value + z * sd, paths)
+    else:
+        spread = float(values.std(ddof=1))
+        reach = float(stats.t.ppf(0.5 + CONFIDENCE / 2, len(values) - 1)) * spread / math.sqrt(len(values))
+        mean = float(values.mean())
+        found["bias_deg_per_h"] = Measured(mean, mean - reach, mean + reach, paths)
+        low, high = _deviation_interval(spread, len(values) - 1)
+        found["bias_repeatability_deg_per_h"] = Measured(spread, low, high, paths)
+    longest = max(records, key=lambda record: record["time_s"][-1] - record["time_s"][0])
+    allan, noise = _stability(longest, output)
+    z = float(stats.norm.ppf(0.5 + CONFIDENCE / 2))
+    for key, value, sd in (
+        ("angle_random_walk_deg_per_rt_h", noise.N / 60, noise.N_uncertainty / 60),
+        ("rate_random_walk_deg_per_h_per_rt_h", noise.K * 60, noise.K_uncertainty * 60),
+    ):
+        found[key] = Measured(value, max(value - z * sd, 0.0), value + z * sd, (longest.path,))
+    found["bias_instability_deg_per_h"] = Measured(*allan.bias_instability, (longest.path,))
+    return found, allan, noise
+
+
+def _stability(record: "Record", output: str) -> tuple[AllanDeviation, NoiseCoefficients]:
+    time, y = record["time_s"], record[output]
+    step = float(np.median(np.diff(time)))
+    width = step * math.ceil(len(y) / MOST_POINTS)
+    with naming(record.path):
+        if width > step or not np.isfinite(y).all() or np.ptp(np.diff(time)) > 1e-3 * step:
+            y = average_blocks(time, {"output": y}, width).columns["output"]
+        allan = allan_deviation(y, width, confidence=CONFIDENCE)
+        return allan, fit_noise(allan)
+
+
+def _deviation_interval(deviation: float, free: int) -> tuple[float, float]:
+    """Return the χ² interval of a standard deviation with its degrees of freedom."""
+    ends = [float(stats.chi2.ppf(0.5 + side * CONFIDENCE / 2, free)) for side in (1, -1)]
+    return deviation * math.sqrt(free / ends[0]), deviation * math.sqrt(free / ends[1])
+
+
+def _block_of(record: "Record") -> float:
+    """Block (s) of a mean: at least ten rows, and at most some thousands of blocks."""
+    time = record["time_s"]
+    return max(10 * float(np.median(np.diff(time))), float(time[-1] - time[0]) / 2000)
+
+
+def measure_temperature(records: "Sequence[Record]", output: str) -> Found:
+    """Bias over temperature and its rate, fitted together, what they leave, and the frequency's slope (12.8)."""
+    columns: dict[str, list[Real]] = {"output": [], "temperature": [], "slope": []}
+    frequencies: list[tuple[Real, Real]] = []
+    runs, start = [], 0
+    for record in records:
+        column = temperature_column(record)
+        if column is None:
+            raise InputError(f"{record.path}: a test over temperature needs a temperature column.")
+        if output in record:
+            blocks = average_blocks(record["time_s"], {"output": record[output], "T": record[column]}, BLOCK)
+            if len(blocks.time) < 10:
+                raise InputError(f"{record.path}: a test over temperature needs ten means over {BLOCK:g} s or more.")
+            T = blocks.columns["T"]
+            columns["output"].append(blocks.columns["output"])
+            columns["temperature"].append(T)
+            columns["slope"].append(np.gradient(T, blocks.time))
+            runs.append(slice(start, start + len(T)))
+            start += len(T)
+        if "frequency_Hz" in record:
+            blocks = average_blocks(record["time_s"], {"f": record["frequency_Hz"], "T": record[column]}, BLOCK)
+            frequencies.append((blocks.columns["T"], blocks.columns["f"]))
+    found: Found = {}
+    paths = tuple(record.path for record in records)
+    if runs:
+        y, T, slope = (np.concatenate(parts) for parts in columns.values())
+        offsets = np.zeros((len(y), len(runs)))
+        for k, rows in enumerate(runs):
+            offsets[rows, k] = 1.0
+        X = np.column_stack([offsets, T - T.mean(), slope])
+        names = [*(f"offset {k + 1}" for k in range(len(runs))), "temperature", "rate of temperature"]
+        with naming(", ".join(paths)):
+            fit = fit_coloured(X, y, names, runs)
+        b, sd = fit.regression.coefficients, np.sqrt(np.diag(fit.regression.covariance))
+        reach = float(stats.t.ppf(0.5 + CONFIDENCE / 2, max(len(y) - X.shape[1], 1)))
+        for key, place in (
+            ("bias_temperature_slope_deg_per_h_per_K", -2),
+            ("bias_temperature_rate_deg_per_h_s_per_K", -1),
+        ):
+            value, width = float(b[place]), reach * float(sd[place])
+            found[key] = Measured(value, value - width, value + width, paths)
+        left = fit.residuals - offsets @ np.array([fit.residuals[rows].mean() for rows in runs])
+        rms, free = float(np.sqrt(np.mean(left**2))), max(len(y) - X.shape[1], 1)
+        low, high = _deviation_interval(rms, free)
+        found["bias_temperature_residual_deg_per_h"] = Measured(rms, low, high, paths)
+    if frequencies:
+        T, f = (np.concatenate(parts) for parts in zip(*frequencies, strict=True))
+        fit_f = fit_linear((T - T.mean())[:, None], f, ["temperature"])
+        scale = 1e6 / float(fit_f.coefficients[0])
+        value, width = float(fit_f.coefficients[1]), 2 * float(fit_f.standard_errors[1])
+        found["frequency_temperature_slope_ppm_per_K"] = Measured(
+            value * scale, (value - width) * scale, (value + width) * scale, paths
+        )
+    return found
+
+
+def measure_scale(record: "Record") -> Found:
+    """Scale factor, its nonlinearity and asymmetry, from the means of constant rates (12.9)."""
+    applied, measured = record["rate_deg_per_s"], record["measured_rate_deg_per_s"]
+    keep = np.isfinite(applied) & np.isfinite(measured)
+    applied, measured = applied[keep], measured[keep]
+    rounded = same_rate(applied)
+    edges = [0, *(np.flatnonzero(np.diff(rounded) != 0) + 1), len(rounded)]
+    levels = []
+    for begin, end in itertools.pairwise(edges):
+        settled = slice(begin + (end - begin) // 4, end)  # the first quarter is the table's and the filter's
+        y = measured[settled]
+        if len(y) >= 8:
+            levels.append((float(applied[settled].mean()), float(y.mean()), float(y.std(ddof=1) / math.sqrt(len(y)))))
+    rates, means, errors = np.array(levels).T if levels else np.zeros((3, 0))
+    if len(np.unique(same_rate(rates))) < 3:
+        raise InputError(f"{record.path}: a scale factor needs three constant rates or more, of eight rows each.")
+    full, source = float(np.abs(rates).max()), (record.path,)
+    with naming(record.path):
+        line = measure_linearity(rates, means)
+        fit = fit_linear(rates[:, None], means, ["rate"])
+    reach = float(stats.t.ppf(0.5 + CONFIDENCE / 2, fit.degrees_of_freedom)) * float(fit.standard_errors[1])
+    error = float(fit.coefficients[1]) - 1
+    found = {"scale_factor_error_ppm": Measured(error * 1e6, (error - reach) * 1e6, (error + reach) * 1e6, source)}
+    z = float(stats.norm.ppf(0.5 + CONFIDENCE / 2))
+    width = z * float(np.max(errors)) / full
+    bend = line.nonlinearity
+    found["scale_factor_nonlinearity_ppm"] = Measured(
+        bend * 1e6, max(bend - width, 0.0) * 1e6, (bend + width) * 1e6, source
+    )
+    positive, negative = rates > 0, rates < 0
+    if positive.any() and negative.any():
+        bias = float(fit.coefficients[0])
+        slopes = [
+            float(np.sum((means[side] - bias) * rates[side]) / np.sum(rates[side] ** 2))
+            for side in (positive, negative)
+        ]
+        sd = [float(np.sqrt(np.sum((errors[s] * rates[s]) ** 2)) / np.sum(rates[s] ** 2)) for s in (positive, negative)]
+        uneven, width = slopes[0] - slopes[1], z * math.hypot(*sd)
+        found["scale_factor_asymmetry_ppm"] = Measured(
+            uneven * 1e6, (uneven - width) * 1e6, (uneven + width) * 1e6, source
+        )
+    return found
+
+
+def measure_warm_up(record: "Record", output: str, band: float | None) -> tuple[Found, float]:
+    """Time from power-on until the means over 50 s stay within the band of the final output (12.5, 12.6).
+
+    The final output is the mean of the last quarter, whose scatter is that of the means: the interval is from where they last
+    were outside by two standard deviations more to where they last were outside by two less.
+    """
+    step = float(np.median(np.diff(record["time_s"])))
+    width = max(WARM_BLOCK, 7 * step)
+    blocks = average_blocks(record["time_s"], {"output": record[output]}, width)
+    y, t = blocks.columns["output"], blocks.time - record["time_s"][0]
+    if len(y) < 20:
+        raise InputError(f"{record.path}: a warm-up needs twenty means over {width:g} s; record longer.")
+    scatter = float(np.std(np.diff(y[3 * len(y) // 4 :]))) / math.sqrt(2)
+    band = band if band is not None else 3 * scatter
+    final = float(y[3 * len(y) // 4 :].mean())
+    departure = np.abs(np.convolve(y - final, np.full(5, 0.2), mode="valid"))
+    t = t[2:-2]
+    margin = 2 * scatter / math.sqrt(5)
+
+    def last_above(level: float) -> float:
+        above = np.flatnonzero(departure > level)
+        return float(t[above[-1]] + width / 2) if len(above) else 0.0
+
+    value, low, high = (last_above(level) for level in (band, band + margin, band - margin))
+    if value > 0.75 * t[-1]:
+        raise InputError(
+            f"{record.path}: the output leaves the band of ±{band:g} deg/h in the last quarter of the record: it has not"
+            " warmed up, or the band is narrower than its noise; record longer or widen [warm_up] band_deg_per_h."
+        )
+    return {"warm_up_time_s": Measured(value, max(low - width / 2, 0.0), high + width / 2, (record.path,))}, band
+
+
+def measure_run_down(record: "Record") -> Found:
+    """Decay time of the amplitude with the drive off, and Q = π f τ (12.14)."""
+    if "vibration_amplitude_V" not in record:
+        raise InputError(f"{record.path}: a run-down needs the column vibration_amplitude_V.")
+    amplitude = record["vibration_amplitude_V"]
+    keep = np.isfinite(amplitude)
+    with naming(record.path):
+        fit = fit_run_down(record["time_s"][keep], amplitude[keep], CONFIDENCE)
+    found = {"run_down_time_s": Measured(fit.tau, fit.low, fit.high, (record.path,))}
+    if "frequency_Hz" in record:
+        scale = math.pi * float(np.nanmean(record["frequency_Hz"]))
+        found["quality_factor"] = Measured(fit.tau * scale, fit.low * scale, fit.high * scale, (record.path,))
+    return found
+
+
+def measure_seal(records: "Sequence[Record]") -> Found:
+    """Growth of 1/Q per year, the change with temperature fitted beside it (an indication for 12.3; the tracer gas is not replaced)."""
+    rows, sources = [], []
+    dated = [record for record in records if record.start is not None and "inverse_q" in record]
+    for record in dated:
+        column, loss = temperature_column(record), record["inverse_q"]
+        T = record[column] if column is not None else np.zeros(len(loss))
+        assert record.start is not None
+        for part in np.array_split(np.flatnonzero(np.isfinite(loss) & np.isfinite(T)), 5):
+            if len(part):
+                at = record.start.timestamp() + float(record["time_s"][part].mean())
+                rows.append((at, float(T[part].mean()), float(loss[part].mean())))
+        sources.append(record.path)
+    if len(dated) < 2:
+        return {}
+    at, T, loss = np.array(rows).T
+    if np.ptp(at) < 86400 or len(rows) < 5:
+        return {}
+    X, names = ((at - at.mean()) / YEAR)[:, None], ["year"]
+    if np.ptp(T) > 0.5:
+        X, names = np.column_stack([X, T - T.mean()]), ["year", "temperature"]
+    fit = fit_linear(X, loss, names)
+    value = float(fit.coefficients[1])
+    reach = float(stats.t.ppf(0.5 + CONFIDENCE / 2, fit.degrees_of_freedom)) * float(fit.standard_errors[1])
+    return {"inverse_q_trend_per_year": Measured(value, value - reach, value + reach, tuple(sources))}

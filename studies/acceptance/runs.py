@@ -1,0 +1,62 @@
+"""Which record serves which test: by what it shows, or by a comment line such as '# test: warm-up'."""
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Literal, get_args
+
+import numpy as np
+
+from studies.errors import InputError, nearest
+from studies.rest import LARGEST_REST, TEMPERATURES
+
+if TYPE_CHECKING:
+    from studies.record import Record
+
+Test = Literal["warm-up", "temperature", "scale-factor", "drift", "run-down"]
+SPAN = 5.0
+"""Span of temperature (K) from which a run at rest is one over temperature."""
+HOUR = 3600.0
+
+
+def test_of(record: "Record", output: str) -> Test | None:
+    """Return the test that a record serves; None when it serves none.
+
+    Raises
+    ------
+    InputError
+        A comment names a test that does not exist.
+    """
+    for comment in record.comments:
+        key, colon, name = (part.strip() for part in comment.partition(":"))
+        if colon and key == "test":
+            if name not in get_args(Test):
+                raise InputError(f"{record.path}: '# {comment}' names no test{nearest(name, get_args(Test))}")
+            return name  # type: ignore[return-value]
+    if "vibration_amplitude_V" in record:
+        return "run-down"
+    turning = "rate_deg_per_s" in record and bool(np.nanmax(np.abs(record["rate_deg_per_s"])) > LARGEST_REST)
+    if turning:
+        return "scale-factor" if "measured_rate_deg_per_s" in record else None
+    column = temperature_column(record)
+    if column is not None and np.nanmax(record[column]) - np.nanmin(record[column]) >= SPAN:
+        return "temperature"
+    if output in record and record["time_s"][-1] - record["time_s"][0] >= HOUR:
+        return "drift"
+    return None
+
+
+def temperature_column(record: "Record") -> str | None:
+    """Return the temperature that a record is judged by: the housing's, the resonator's or the chamber's."""
+    return next((name for name in TEMPERATURES if name in record and np.isfinite(record[name]).any()), None)
+
+
+def sort_records(records: "Sequence[Record]", output: str) -> "tuple[dict[Test, list[Record]], list[Record]]":
+    """Return the records by test, and those that serve none."""
+    found: dict[Test, list[Record]] = {}
+    left: list[Record] = []
+    for record in records:
+        test = test_of(record, output)
+        if test is None:
+            left.append(record)
+        else:
+            found.setdefault(test, []).append(record)
+    return found, left

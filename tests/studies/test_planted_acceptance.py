@@ -1,0 +1,143 @@
+"""`hrg acceptance` finds planted quantities in records, judges them by their intervals, and refuses what it cannot use."""
+
+import datetime
+import json
+
+import numpy as np
+import pytest
+
+from studies.cli import main
+from studies.record import Record, write_record
+
+TRUTH = {
+    "warm_up_time_s": 400 * np.log(20),  # 20 e^{-t/400} reaches 1 deg/h
+    "bias_temperature_slope_deg_per_h_per_K": 0.05,
+    "bias_temperature_rate_deg_per_h_s_per_K": 30.0,
+    "frequency_temperature_slope_ppm_per_K": 80.0,
+    "scale_factor_error_ppm": 50.0,
+    "angle_random_walk_deg_per_rt_h": 0.01,
+    "run_down_time_s": 718.2,
+    "quality_factor": np.pi * 4432 * 718.2,
+}
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """Records with known quantities; the limits that some tests use."""
+    folder, g = tmp_path_factory.mktemp("acceptance"), np.random.default_rng(7)
+
+    def write(name, columns, **more):
+        write_record(Record(columns, instrument="free-dome", **more), folder / f"{name}.csv")
+
+    t = np.arange(0, 20000.0)
+    for k in range(3):
+        start = datetime.datetime(2026, 1 + k, 1, tzinfo=datetime.UTC)
+        bias = 2 + 0.1 * k + g.normal(0, 0.6, t.size)
+        loss = 1e-7 * (1 + 0.02 * k / 12) + g.normal(0, 1e-10, t.size)
+        steady = np.full(t.size, 20.0)
+        write(
+            f"rest{k}",
+            {"time_s": t, "housing_temperature_degC": steady, "bias_deg_per_h": bias, "inverse_q": loss},
+            start=start,
+        )
+    T = 20 + 30 * np.sin(2 * np.pi * t / 10000)
+    bias = 1 + 0.05 * (T - 20) + 30 * np.gradient(T, t) + g.normal(0, 0.6, t.size)
+    f = 4432 * (1 + 80e-6 * (T - 20)) + g.normal(0, 1e-3, t.size)
+    write("cycle", {"time_s": t, "housing_temperature_degC": T, "bias_deg_per_h": bias, "frequency_Hz": f})
+    rate = np.repeat([0.0, 10, 50, 100, 50, 10, 0, -10, -50, -100, -50, -10, 0], 60)
+    read = rate * (1 + 50e-6) + 1e-3 + g.normal(0, 1e-4, rate.size)
+    write("rates", {"time_s": np.arange(rate.size) * 1.0, "rate_deg_per_s": rate, "measured_rate_deg_per_s": read})
+    t = np.arange(0, 2500.0)
+    amplitude = np.exp(-t / 718.2) + g.normal(0, 1e-4, t.size)
+    write("rundown", {"time_s": t, "frequency_Hz": np.full(t.size, 4432.0), "vibration_amplitude_V": amplitude})
+    t = np.arange(0, 7200.0)
+    bias = 2 + 20 * np.exp(-t / 400) + g.normal(0, 0.6, t.size)
+    write("warm", {"time_s": t, "bias_deg_per_h": bias}, comments=("test: warm-up",))
+    return folder
+
+
+def limits(folder, text):
+    path = folder / "limits.toml"
+    path.write_text('schema = "hrg.limits/1"\n[limits]\n' + text + "\n[warm_up]\nband_deg_per_h = 1.0\n")
+    return str(path)
+
+
+def judged(capsys, folder, names, *options):
+    status = main(["acceptance", "free-dome", *(str(folder / f"{name}.csv") for name in names), "--json", *options])
+    said = capsys.readouterr()
+    return status, json.loads(said.out) if status == 0 else None, said.err
+
+
+ALL = ("rest0", "rest1", "rest2", "cycle", "rates", "rundown", "warm")
+
+
+def test_planted_quantities_are_found(folder, capsys):
+    path = limits(
+        folder,
+        "bias_deg_per_h = 5\nbias_temperature_rate_deg_per_h_s_per_K = 20\nangle_random_walk_deg_per_rt_h = 0.01\n"
+        "run_down_time_s = 500",
+    )
+    page = folder / "page.html"
+    status, found, _ = judged(capsys, folder, ALL, "--limits", path, "--report", str(page))
+    assert status == 0
+    assert found["schema"] == "hrg.acceptance/1"
+    lines = {line["key"]: line for line in found["quantities"]}
+    assert [line["section"] for line in found["quantities"]] == [
+        "12.3", "12.5–12.6", "12.8", "12.8", "12.8", "12.8", "12.9", "12.9", "12.9",
+        "12.11", "12.11", "12.11", "12.11", "12.11", "12.14", "12.14",
+    ]  # fmt: skip
+    for key, value in TRUTH.items():
+        width = lines[key]["high"] - lines[key]["low"]
+        assert lines[key]["low"] - width / 2 <= value <= lines[key]["high"] + width / 2, key
+        assert lines[key]["value"] == pytest.approx(value, rel=0.04), key
+    # 1/Q grew by 2 % a year
+    assert lines["inverse_q_trend_per_year"]["value"] == pytest.approx(2e-9, rel=0.2)
+    assert lines["bias_deg_per_h"]["verdict"] == lines["run_down_time_s"]["verdict"] == "pass"
+    assert lines["bias_temperature_rate_deg_per_h_s_per_K"]["verdict"] == "fail"
+    assert lines["angle_random_walk_deg_per_rt_h"]["verdict"] == "undecided"
+    assert lines["scale_factor_error_ppm"]["verdict"] == "no limit"
+    assert found["verdict"] == "fail"
+    assert {one["section"] for one in found["elsewhere"]} == {"12.13", "12.15", "12.18"}
+    text = page.read_text()
+    assert "Acceptance of free-dome: fail" in text
+    assert "12.15" in text
+
+
+def test_a_limit_without_a_record_is_said_and_leaves_the_verdict_open(folder, capsys):
+    path = limits(folder, "run_down_time_s = 500\nscale_factor_error_ppm = 100")
+    status, found, said = judged(capsys, folder, ("rundown",), "--limits", path)
+    assert status == 0
+    assert found["verdict"] == "incomplete"
+    assert "limits scale_factor_error_ppm, which no record gives: a record with rate_deg_per_s" in said
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("bias_deg_per_hour = 5", "unknown key 'bias_deg_per_hour'; did you mean 'bias_deg_per_h'?"),
+        ("bias_deg_per_h = -5", "must be above 0"),
+        ("", "there is no limit"),
+    ],
+)
+def test_unusable_limits_are_refused(folder, capsys, text, message):
+    status, _, said = judged(capsys, folder, ("rundown",), "--limits", limits(folder, text))
+    assert status == 2
+    assert message in said
+
+
+def test_a_run_down_that_does_not_decay_is_refused(folder, tmp_path, capsys):
+    t = np.arange(0, 500.0)
+    amplitude = 1 + np.random.default_rng(1).normal(0, 1e-3, t.size)
+    write_record(Record({"time_s": t, "vibration_amplitude_V": amplitude}), tmp_path / "still.csv")
+    status, _, said = judged(capsys, tmp_path, ("still",))
+    assert status == 2
+    assert "still.csv: the run-down does not decay" in said
+
+
+def test_a_record_that_shows_no_test_is_named(folder, tmp_path, capsys):
+    t = np.arange(0, 500.0)
+    write_record(Record({"time_s": t, "bias_deg_per_h": np.sin(t)}), tmp_path / "short.csv")
+    status, found, said = judged(capsys, tmp_path, ("short",))
+    assert status == 0
+    assert "serves no test" in said
+    assert found["verdict"] == "incomplete"
