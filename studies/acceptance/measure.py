@@ -87,6 +87,12 @@ def _stability(record: "Record", output: str) -> tuple[AllanDeviation, NoiseCoef
         if width > step or not np.isfinite(y).all() or np.ptp(np.diff(time)) > 1e-3 * step:
             y = average_blocks(time, {"output": y}, width).columns["output"]
         allan = allan_deviation(y, width, confidence=CONFIDENCE)
+        # Noise of the angle falls as 1/τ and is no random walk: N, B and K are read where it no longer rules.
+        angle = sum(1 for _ in itertools.takewhile(lambda kind: kind == "phase", allan.noise))
+        if angle:
+            factor = round(allan.tau[min(angle, len(allan.tau) - 1)] / width)
+            later = y[: len(y) // factor * factor].reshape(-1, factor).mean(axis=1)
+            return allan, fit_noise(allan_deviation(later, width * factor, confidence=CONFIDENCE))
         return allan, fit_noise(allan)
 
 
