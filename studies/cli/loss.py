@@ -6,6 +6,7 @@ from cyclopts import Parameter
 
 if TYPE_CHECKING:
     from shell.damping.budget import Budget, Part
+    from studies.instrument.card import Instrument
     from studies.loss import LossModel
 
 MOST_POINTS = 10_000
@@ -66,9 +67,11 @@ def loss(
     model = loss_model(instrument, harmonic, theory, anchor)
     budget = model.budget(T)
     if json:
-        print_json({"schema": "hrg.loss/1", "card": instrument.name, **_describe(model, budget, harmonic, theory)})
+        described = _describe(model, budget, harmonic, theory)
+        print_json({"schema": "hrg.loss/1", "card": instrument.name, **described, "stated": _stated(instrument, model)})
     else:
         _print(instrument.name, model, budget, harmonic, theory)
+        _print_stated(_stated(instrument, model))
     return 0
 
 
@@ -117,6 +120,21 @@ def _anisotropy(model: "LossModel", budget: "Budget") -> "dict[str, Any] | None"
     )
     worst = np.degrees(wave.drift(axis + np.pi / (4 * model.harmonic))) * 3600
     return {"inverse_q_split": split, "damping_axis_deg": np.degrees(axis), "largest_drift_deg_per_h": worst}
+
+
+def _stated(instrument: "Instrument", model: "LossModel") -> "dict[str, Any] | None":
+    """What the card says of 1/Q at its reference temperature beside what the parts explain of it; None where it says nothing."""
+    if "inverse_q" not in instrument.content.get("loss", {}) or model.harmonic != 2:
+        return None
+    stated = instrument.loss.inverse_q
+    budget = model.budget(instrument.reference_temperature)
+    low, high = (float(end[0]) for end in budget.interval)
+    return {
+        "inverse_q": stated,
+        "explained": float(budget.inverse_q[0]) / stated,
+        "explained_low": low / stated,
+        "explained_high": high / stated,
+    }
 
 
 def _part(part: "Part") -> "dict[str, Any]":
@@ -187,6 +205,19 @@ def _print(name: str, model: "LossModel", budget: "Budget", harmonic: int, theor
     print("It is also the least known." if known == first.name else f"Least known: {known}.")
     for sentence in model.left_out:
         print(f"Not in the budget: {sentence}")
+
+
+def _print_stated(stated: "dict[str, Any] | None") -> None:
+    if stated is None:
+        return
+    share, low, high = (100 * stated[key] for key in ("explained", "explained_low", "explained_high"))
+    print(
+        f"The card states Q = {_plain(1 / stated['inverse_q'])}: the parts explain {share:.0f} % of its loss (90 %: {low:.0f} … {high:.0f} %)."
+    )
+    if high < 100:
+        print("More is lost than these parts allow: look for a cause that the card does not have.")
+    elif low > 100:
+        print("Less is lost than these parts say: one of them is too large.")
 
 
 def _plain(value: float) -> str:

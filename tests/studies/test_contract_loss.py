@@ -130,3 +130,21 @@ def test_anchor_of_a_stem(capsys):
     assert status == 0
     found = {part["name"]: part for part in json.loads(out)["parts"]}
     assert 0 < found["anchor"]["inverse_q"][0] < 1e-15
+
+
+@pytest.mark.parametrize(
+    ("quality", "words"),
+    [(4e6, "More is lost than these parts allow"), (2.5e7, "the parts explain"), (9e8, "one of them is too large")],
+)
+def test_a_measured_q_stands_beside_what_the_parts_explain(capsys, tmp_path, quality, words):
+    path = tmp_path / "card.toml"
+    path.write_text(tomli_w.dumps(DOME | {"loss": {"inverse_q": 1 / quality}}), encoding="utf-8")
+    status, out, _ = _run(capsys, str(path), "--json")
+    found = json.loads(out)
+    explained = found["stated"]["explained"]
+    assert status == 0
+    assert found["stated"]["explained_low"] < explained < found["stated"]["explained_high"]
+    at = found["temperature_degC"].index(20.0)
+    assert explained == pytest.approx(found["inverse_q"][at] * quality, rel=1e-9)
+    assert words in _run(capsys, str(path))[1]
+    assert json.loads(_run(capsys, "free-dome", "--json")[1])["stated"] is None
