@@ -115,5 +115,5 @@ def _forms(present: set[str]) -> Iterator[list[str]]:
             k for k in range(start, len(lines)) if not lines[k] and not "".join(lines[k + 1 : k + 2]).startswith("[")
         )
         block = lines[start : next(prose, len(lines))]
-        if block and block[0].partition("]")[0].strip("[") not in present:
+        if block and block[0].partition("]")[0].strip("[").split(".")[0] not in {*present, "posterior"}:
             yield block

@@ -66,6 +66,7 @@ def run(
     from studies.errors import InputError
     from studies.sweeps.run import check_functions, estimate_study, run_study
     from studies.sweeps.spec import read_study
+    from studies.sweeps.validity import find_invalid
 
     if workers is not None and workers < 1:
         raise InputError(f"--workers {workers}: at least one is needed.")
@@ -74,11 +75,15 @@ def run(
     if dry_run:
         study = read_study(spec, card)
         check_functions(study, allow_python)
+        for problem in find_invalid(study):
+            say(f"note: {problem} Such designs fail; the others are computed.")
         estimate = estimate_study(study, workers)
         print_json(_estimate_json(estimate)) if json else print(_estimate_words(estimate))
         return 0
     if out is None:
         raise InputError("--out is missing: name the folder that shall keep the study.")
+    for problem in find_invalid(read_study(spec, card)):
+        say(f"note: {problem} Such designs fail; the others are computed.")
     try:
         results = run_study(
             spec,
@@ -231,7 +236,9 @@ def _estimate_json(estimate: "Estimate") -> dict[str, Any]:
 
 def _estimate_words(estimate: "Estimate") -> str:
     return (
-        f"{estimate.cases} cases in {estimate.batches} batches, {SOLVERS[estimate.solver]}; one takes"
+        f"{estimate.cases} cases in {estimate.batches} batches, {SOLVERS[estimate.solver]}"
+        + (f" ({estimate.why_full})" if estimate.why_full else "")
+        + "; one takes"
         f" {estimate.seconds_each:.3g} s, all about {_duration(estimate.seconds)}; memory about {estimate.memory_MB:.0f} MB."
         " Nothing was kept."
     )

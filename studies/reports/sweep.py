@@ -248,7 +248,7 @@ def _shapes(results: "Results") -> list[Chapter]:
     for title, design in designs.items():
         words = ", ".join(f"{name} = {number(value)}" for name, value in design.items())
         blocks.append(Text(f"{title}: {words or 'the card'}."))
-        blocks += mode_blocks(set_parameters(study.instrument, design), (n,))
+        blocks += mode_blocks(set_parameters(study.instrument, design, study.derived), (n,))
     return [Chapter("Mode shapes", blocks)]
 
 

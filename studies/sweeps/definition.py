@@ -6,6 +6,7 @@ from typing import Any
 
 from studies.instrument.card import Instrument
 from studies.instrument.units import unit_of
+from studies.sweeps.expressions import Derived
 from studies.sweeps.quantity import Column, Quantity
 
 FREE = (
@@ -90,6 +91,7 @@ class Study:
     instrument: Instrument
     sampling: Sampling
     parameters: tuple[Parameter, ...]
+    derived: tuple[Derived, ...]
     asked: tuple[Asked, ...]
     requirements: tuple[Requirement, ...]
     searches: tuple[Search, ...]

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from studies.errors import MissingEnvironment
 from studies.sweeps.canonical import case_key, spell
 from studies.sweeps.design import decode_row
-from studies.sweeps.evaluate import Plan, evaluate_task, lost_row
+from studies.sweeps.evaluate import Plan, evaluate_task, failed_row
 from studies.sweeps.row import Row
 
 if TYPE_CHECKING:
@@ -168,4 +168,4 @@ def _divide(task: _Task, plan: Plan, suspects: deque[_Task], store: "Store", pro
         suspects.appendleft(_Task(task.batches, alone=True, tries=task.tries + 1))
     else:
         reason = "the worker process ended each time it computed this case alone (killed or crashed); the next run tries again."
-        _keep(task, [[lost_row(plan, reason)]], store, progress)
+        _keep(task, [[failed_row(plan, "lost", reason)]], store, progress)

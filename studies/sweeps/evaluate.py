@@ -17,6 +17,7 @@ from studies.sweeps.row import Row
 
 if TYPE_CHECKING:
     from studies.sweeps.definition import Study
+    from studies.sweeps.expressions import Derived
     from studies.sweeps.families import Families
     from studies.sweeps.quantity import Number
 
@@ -30,12 +31,13 @@ class Plan:
     instrument: Instrument
     asked: tuple[tuple[str, Mapping[str, Any], int], ...]
     families: "Families | None" = None
+    derived: "tuple[Derived, ...]" = ()
 
     @classmethod
     def of(cls, study: "Study", families: "Families | None" = None) -> "Plan":
         """Return the plan of a study."""
         asked = tuple((one.quantity.name, one.options, len(one.columns)) for one in study.asked)
-        return cls(study.instrument, asked, families)
+        return cls(study.instrument, asked, families, study.derived)
 
 
 def evaluate_task(plan: Plan, batches: Sequence[Batch]) -> list[list[Row]]:
@@ -53,7 +55,10 @@ def evaluate_case(plan: Plan, parameters: Mapping[str, Any]) -> Row:
     reasons: list[str] = []
     with warnings.catch_warnings(record=True) as heard:
         warnings.simplefilter("always")
-        case = Case(set_parameters(plan.instrument, parameters), parameters)
+        try:
+            case = Case(set_parameters(plan.instrument, parameters, plan.derived), parameters)
+        except UNUSABLE_INPUT as error:
+            return failed_row(plan, "failed", str(error))
         for name, options, width in plan.asked:
             numbers, reason = _evaluate(name, options, width, case)
             values += (number.value for number in numbers)
@@ -65,10 +70,10 @@ def evaluate_case(plan: Plan, parameters: Mapping[str, Any]) -> Row:
     return Row(status, " ".join([*reasons, *remarks]), tuple(values), tuple(errors), seconds)
 
 
-def lost_row(plan: Plan, reason: str) -> Row:
-    """Return the row of a case whose worker did not survive it."""
+def failed_row(plan: Plan, status: str, reason: str) -> Row:
+    """Return the row of a case that cannot be built, or whose worker did not survive it."""
     nothing = (math.nan,) * sum(width for _, _, width in plan.asked)
-    return Row("lost", reason, nothing, nothing, 0.0)
+    return Row(status, reason, nothing, nothing, 0.0)
 
 
 def _evaluate(name: str, options: Mapping[str, Any], width: int, case: Case) -> "tuple[Sequence[Number], str]":

@@ -85,6 +85,8 @@ class _Bodies:
 
 def why_not(study: "Study") -> str:
     """Return why a study cannot be computed through families, or nothing when it can."""
+    if study.derived:
+        return "derived parameters are computed design by design"
     for parameter in study.parameters:
         name = parameter.name
         follows = name == TEMPERATURE or name.startswith((MATERIAL, *ELSEWHERE))

@@ -5,7 +5,7 @@
 quantities that give none of their own. `user.anything` reaches only user functions.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from studies.errors import InputError, nearest
@@ -15,6 +15,7 @@ from studies.instrument.keys import Table
 from studies.instrument.material_values import LAW
 from studies.instrument.registry import possible_keys
 from studies.instrument.tables.material import GIVEN
+from studies.sweeps.expressions import Derived, fill_in
 
 TEMPERATURE = "temperature_degC"
 
@@ -50,10 +51,11 @@ def find_nominal(instrument: Instrument, name: str, where: str) -> float | str |
     return value if isinstance(value, str) else float(value)
 
 
-def set_parameters(instrument: Instrument, values: Mapping[str, Any]) -> Instrument:
-    """Return the instrument with parameters of the card replaced; its resonator and material follow."""
+def set_parameters(instrument: Instrument, values: Mapping[str, Any], derived: Sequence[Derived] = ()) -> Instrument:
+    """Return the instrument with parameters of the card replaced, and those derived from them; the rest follows."""
+    filled = fill_in(instrument, derived, values)
     return instrument.with_values(
-        {name: value for name, value in values.items() if name != TEMPERATURE and not name.startswith("user.")}
+        {name: value for name, value in filled.items() if name != TEMPERATURE and not name.startswith("user.")}
     )
 
 

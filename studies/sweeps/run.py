@@ -15,7 +15,7 @@ from studies.sweeps.definition import FREE, Study
 from studies.sweeps.design import Design, draw, nominal_design
 from studies.sweeps.engine import BATCH, BATCH_VECTORISED, compute, missing_batches
 from studies.sweeps.evaluate import Plan, evaluate_task
-from studies.sweeps.families import Families, choose_solver
+from studies.sweeps.families import Families, choose_solver, why_not
 from studies.sweeps.progress import Silent, shown_progress
 from studies.sweeps.provenance import describe_environment
 from studies.sweeps.results import Results, open_results
@@ -106,7 +106,10 @@ def run_study(
 
 @dataclass(frozen=True)
 class Estimate:
-    """What a study would take: designs, batches, seconds of one design, of all, memory in MB; how designs are solved."""
+    """What a study would take: designs, batches, seconds of one design, of all, memory in MB; how designs are solved.
+
+    `why_full`: what in the spec keeps the designs from being interpolated, where that makes the study slow.
+    """
 
     cases: int
     batches: int
@@ -114,6 +117,7 @@ class Estimate:
     seconds: float
     memory_MB: float
     solver: str
+    why_full: str = ""
 
 
 def estimate_study(study: Study, workers: int | None = None) -> Estimate:
@@ -144,6 +148,7 @@ def estimate_study(study: Study, workers: int | None = None) -> Estimate:
         seconds=training + each * cases / count,
         memory_MB=resident * processes + row * cases / 1e6,
         solver="family" if families else "full",
+        why_full="" if families else why_not(study),
     )
 
 

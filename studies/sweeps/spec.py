@@ -24,6 +24,10 @@ name = "resonator.radius_mm"
 low = 14.99
 high = 15.01
 
+[[derived]]                        # a key that follows from others: numbers, names, + - * / ** and brackets
+name = "resonator.stem.end_mm"
+expression = "4 - radius_mm"
+
 [[quantity]]
 name = "frequency"                 # frequency, tcf, bryan-factor, mode-separation, compensation-residual, ...
 harmonic = 2
@@ -61,6 +65,7 @@ from studies.instrument.card import Instrument, load_card
 from studies.sweeps.definition import Study
 from studies.sweeps.tables import (
     read_asked,
+    read_derived,
     read_parameter,
     read_requirement,
     read_sampling,
@@ -68,10 +73,10 @@ from studies.sweeps.tables import (
     refuse_twins,
     split_tables,
 )
-from studies.sweeps.validity import check_ranges
+from studies.sweeps.validity import check_nominal
 
 SCHEMA = "hrg.study/1"
-KEYS = ("schema", "name", "note", "card", "sampling", "parameter", "quantity", "requirement", "search")
+KEYS = ("schema", "name", "note", "card", "sampling", "parameter", "derived", "quantity", "requirement", "search")
 PARAMETER_KEYS = (
     "name", "low", "high", "tolerance", "values", "count", "distribution", "standard_deviation", "nominal",
 )  # fmt: skip
@@ -100,6 +105,7 @@ def read_study(source: str | Path | Mapping[str, Any], card: str | None = None) 
         text = path.read_text(encoding="utf-8-sig")
     if card is not None:
         content["card"] = card
+        text = f"# computed with --card {card} instead of the card below\n{text}"
     top = Section(content, where, KEYS)
     named = top.text("card")
     beside = folder / named
@@ -115,6 +121,11 @@ def check_study(content: Mapping[str, Any], instrument: Instrument, where: str, 
         read_parameter(part, instrument, sampling.method) for part in top.sections("parameter", PARAMETER_KEYS)
     )
     refuse_twins([parameter.name for parameter in parameters], f"{where} [[parameter]]: the name")
+    derived = tuple(
+        read_derived(part, instrument, [parameter.name for parameter in parameters])
+        for part in top.sections("derived", ("name", "expression"))
+    )
+    refuse_twins([one.name for one in derived], f"{where} [[derived]]: the name")
     asked = tuple(read_asked(part, folder) for part in split_tables(top, "quantity"))
     if not asked:
         raise InputError(f"{where}: a study needs at least one [[quantity]].")
@@ -126,6 +137,7 @@ def check_study(content: Mapping[str, Any], instrument: Instrument, where: str, 
         instrument=instrument,
         sampling=sampling,
         parameters=parameters,
+        derived=derived,
         asked=asked,
         requirements=tuple(
             read_requirement(part, columns)
@@ -139,7 +151,7 @@ def check_study(content: Mapping[str, Any], instrument: Instrument, where: str, 
         text=text,
         folder=folder,
     )
-    check_ranges(study, where)
+    check_nominal(study, where)
     return study
 
 

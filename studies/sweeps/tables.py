@@ -8,6 +8,7 @@ from studies.errors import InputError, nearest
 from studies.files.toml import Section, check_number
 from studies.instrument.card import Instrument
 from studies.sweeps.definition import MOST_CASES, Asked, Parameter, Requirement, Sampling, Search
+from studies.sweeps.expressions import Derived
 from studies.sweeps.parameters import find_nominal
 from studies.sweeps.quantities import find_quantity
 from studies.sweeps.quantity import Column
@@ -62,6 +63,17 @@ def read_parameter(part: Section, instrument: Instrument, method: str) -> Parame
         raise InputError(f"{where}: count goes with method = 'grid'.")
     bounded = deviation is None or any(key in part for key in ("low", "high", "tolerance"))
     return Parameter(name, middle, low, high, distribution, deviation, (), count, bounded)
+
+
+def read_derived(part: Section, instrument: Instrument, parameters: Sequence[str]) -> Derived:
+    """Read one `[[derived]]` table."""
+    name = part.text("name")
+    if name in parameters:
+        raise InputError(f"{part.where}: '{name}' is a parameter too; it cannot be both.")
+    find_nominal(instrument, name, part.where)
+    one = Derived(name, part.text("expression"), f"{part.where} '{name}'")
+    _ = one.names
+    return one
 
 
 def _ends(part: Section, where: str, middle: float, deviation: float | None) -> tuple[float, float]:

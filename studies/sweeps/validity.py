@@ -1,7 +1,7 @@
-"""Whether the ranges of a study stay where card, material and theory are valid."""
+"""Whether the designs of a study stay where card, material and theory are valid."""
 
 from collections.abc import Iterator, Mapping
-from itertools import product
+from itertools import chain, product
 from typing import TYPE_CHECKING, Any
 
 from studies.errors import UNUSABLE_INPUT, InputError
@@ -14,39 +14,56 @@ if TYPE_CHECKING:
 MOST_CORNERS = 6  # parameters up to which all corners of the box are looked at
 
 
-def check_ranges(study: "Study", where: str) -> None:
-    """Build the instrument at both ends of every parameter, and at the corners hold its thickness against the theory.
+def check_nominal(study: "Study", where: str) -> None:
+    """Build the nominal design, and hold its thickness against the theory; temperatures must lie in the law's range.
 
     Raises
     ------
     InputError
-        An end or corner that the card, the material's law or the chosen theory does not allow.
+        A nominal design or a temperature that the card, the material's law or the chosen theory does not allow.
     """
-    for parameter in study.parameters:
-        for value in _extremes(parameter):
-            _build(study, {parameter.name: value}, where)
+    nominal = {parameter.name: parameter.nominal for parameter in study.parameters}
+    problem = _problem(study, nominal)
+    if problem:
+        raise InputError(f"{where}: {problem}")
     _check_temperatures(study, where)
-    thin = [asked.options["theory"] for asked in study.asked if asked.options.get("theory", "solid") != "solid"]
-    if thin:
-        _check_thickness(study, thin[0], where)
+
+
+def find_invalid(study: "Study") -> list[str]:
+    """Return what is wrong with designs at the ends of each parameter and at the corners of the box; they fail as cases."""
+    nominal = {parameter.name: parameter.nominal for parameter in study.parameters}
+    ends = ({**nominal, parameter.name: value} for parameter in study.parameters for value in _extremes(parameter))
+    problems = (_problem(study, {**nominal, **design}) for design in chain(ends, _corners(study)))
+    return list(dict.fromkeys(problem for problem in problems if problem))
+
+
+def _problem(study: "Study", values: Mapping[str, Any]) -> str:
+    """Return what makes a design impossible, or nothing."""
+    from shell.modes import THICKEST_SHELL
+
+    words = ", ".join(
+        f"{name} = {value:g}" if isinstance(value, float) else f"{name} = {value}" for name, value in values.items()
+    )
+    try:
+        instrument = set_parameters(study.instrument, values, study.derived)
+        if any(name.startswith("thermal.") for name in values):
+            _ = instrument.heat_path
+    except UNUSABLE_INPUT as error:
+        return f"with {words or 'the card itself'} the card is not valid: {error}"
+    ratio = float(max(h for _, h in instrument.resonator.thickness) / instrument.resonator.size)
+    theories = [asked.options["theory"] for asked in study.asked if asked.options.get("theory", "solid") != "solid"]
+    if theories and ratio > THICKEST_SHELL:
+        return (
+            f"with {words or 'the card itself'} h/R is {ratio:.3g}, beyond {THICKEST_SHELL:g} up to which theory ="
+            f" '{theories[0]}' is valid; narrow the range or take theory = 'solid'."
+        )
+    return ""
 
 
 def _extremes(parameter: "Parameter") -> tuple[Any, ...]:
     if isinstance(parameter.nominal, str):
         return parameter.values
     return (parameter.low, parameter.high)
-
-
-def _build(study: "Study", values: Mapping[str, Any], where: str) -> float:
-    """Return the largest thickness over size of the design."""
-    words = ", ".join(f"{name} = {value}" for name, value in values.items())
-    try:
-        instrument = set_parameters(study.instrument, values)
-        if any(name.startswith("thermal.") for name in values):
-            _ = instrument.heat_path
-    except UNUSABLE_INPUT as error:
-        raise InputError(f"{where}: with {words} the card is not valid: {error}") from error
-    return float(max(h for _, h in instrument.resonator.thickness) / instrument.resonator.size)
 
 
 def _check_temperatures(study: "Study", where: str) -> None:
@@ -67,16 +84,3 @@ def _corners(study: "Study") -> Iterator[Mapping[str, Any]]:
     names = [p.name for p in geometry]
     for ends in product(*((p.low, p.high) for p in geometry)):
         yield dict(zip(names, ends, strict=True))
-
-
-def _check_thickness(study: "Study", theory: str, where: str) -> None:
-    from shell.modes import THICKEST_SHELL
-
-    for corner in _corners(study):
-        ratio = _build(study, corner, where)
-        if ratio > THICKEST_SHELL:
-            words = ", ".join(f"{name} = {value:g}" for name, value in corner.items())
-            raise InputError(
-                f"{where}: with {words or 'the card itself'} h/R is {ratio:.3g}, beyond {THICKEST_SHELL:g} up to which theory"
-                f" = '{theory}' is valid; narrow the range or take theory = 'solid'."
-            )

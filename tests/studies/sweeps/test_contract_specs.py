@@ -5,7 +5,9 @@ import copy
 import pytest
 
 from studies.errors import InputError
+from studies.sweeps.run import run_study
 from studies.sweeps.spec import read_study, shipped_specs
+from studies.sweeps.validity import find_invalid
 
 GOOD = {
     "card": "hrg-30mm",
@@ -57,8 +59,6 @@ def test_shipped_specs_are_read(name):
         (("parameter", 0, "name"), "material.name", ("values",)),
         (("parameter", 0, "name"), "resonator.radius_mm", ("twice",)),
         (("parameter", 0, "tolerance"), -1.0, ("above 0",)),
-        (("parameter", 0, "tolerance"), 2.0, ("resonator.thickness_mm = -", "not valid")),
-        (("parameter", 0, "tolerance"), 1.0, ("thickness",)),
         (("parameter", 0, "distribution"), "gauss", ("distribution",)),
         (("parameter", 0, "standard_deviation"), 0.1, ("normal",)),
         (("parameter", 0, "low"), 0.1, ("not both",)),
@@ -95,9 +95,66 @@ def test_mistakes_are_named(path, value, parts):
     assert len(str(caught.value)) < 700
 
 
-def test_range_beyond_shell_theory_is_refused_and_solid_is_not():
+def test_ends_and_corners_that_cannot_be_built_are_named_and_do_not_refuse_the_study():
     spec = changed(("parameter", 0), {"name": "resonator.thickness_mm", "low": 0.8, "high": 1.6})
-    with pytest.raises(InputError, match="solid"):
-        read_study(spec)
+    (problem, *_) = find_invalid(read_study(spec))
+    assert "resonator.thickness_mm = 1.6" in problem
+    assert "solid" in problem
     spec["quantity"][0]["theory"] = "solid"
-    assert read_study(spec)
+    assert not find_invalid(read_study(spec))
+    (problem, *_) = find_invalid(read_study(changed(("parameter", 0, "tolerance"), 2.0)))
+    assert "resonator.thickness_mm = -" in problem
+    assert "not valid" in problem
+
+
+STEM = {
+    "schema": "hrg.study/1", "name": "stem", "card": "hrg-30mm", "sampling": {"method": "grid", "solver": "full"},
+    "parameter": [{"name": "resonator.radius_mm", "values": [14.9, 15.0, 15.2]}],
+    "derived": [{"name": "resonator.stem.end_mm", "expression": "-(radius_mm - 10)"}],
+    "quantity": [{"name": "frequency", "theory": "shell"}],
+}  # fmt: skip
+
+
+def test_a_derived_key_follows_its_parameters():
+    """Beside the same designs with both keys written out."""
+    written = {
+        **STEM,
+        "sampling": {"method": "list", "solver": "full"},
+        "parameter": [
+            {"name": "resonator.radius_mm", "values": [14.9, 15.0, 15.2]},
+            {"name": "resonator.stem.end_mm", "values": [-4.9, -5.0, -5.2]},
+        ],
+    }
+    del written["derived"]
+    one, two = (run_study(spec, workers=1).table()["frequency_n2_Hz"].to_numpy() for spec in (STEM, written))
+    assert one == pytest.approx(two, rel=1e-12)
+
+
+def test_a_corner_that_cannot_be_built_is_a_failed_case():
+    spec = {
+        **STEM,
+        "derived": [{"name": "resonator.stem.end_mm", "expression": "radius_mm - 5 - (radius_mm - 15) * 60"}],
+    }
+    spec["derived"][0]["expression"] = "-5 + (radius_mm - 15) * 200"
+    table = run_study(spec, workers=1).table()
+    assert table["status"].tolist() == ["ok", "ok", "failed"]
+
+
+@pytest.mark.parametrize(
+    ("expression", "part"),
+    [
+        ("__import__('os').system('true')", "more than numbers"),
+        ("radius_mm if 1 else 2", "more than numbers"),
+        ("radius_mm +", "is not a formula"),
+        ("radius_m + 4", "neither a parameter nor a key"),
+        ("(radius_mm - 15) ** 0.5 / 0", "cannot be computed"),
+        ("9 ** 9 ** 9", "a power of"),
+        ("x" * 600, "longer than 500"),
+        ("material.name + 1", "no number"),
+    ],
+)
+def test_formulas_are_arithmetic_and_nothing_else(expression, part):
+    with pytest.raises(InputError, match=part.replace("(", r"\(")):
+        read_study({**STEM, "derived": [{"name": "resonator.stem.end_mm", "expression": expression}]})
+    with pytest.raises(InputError, match="both"):
+        read_study({**STEM, "derived": [{"name": "resonator.radius_mm", "expression": "15"}]})

@@ -1,0 +1,149 @@
+"""Parameters that follow from others: `end_mm = "radius_mm + 4"`, arithmetic that is parsed and never run as code.
+
+A name is a parameter of the study or a key of the card by its dotted path; the last part of the path does where only one
+parameter of the study, or one key beside the derived one, ends so.
+"""
+
+import ast
+import math
+import operator
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from studies.errors import InputError, nearest
+
+if TYPE_CHECKING:
+    from studies.instrument.card import Instrument
+
+BINARY: dict[type[ast.operator], Callable[[float, float], float]] = {
+    ast.Add: operator.add,
+    ast.Sub: operator.sub,
+    ast.Mult: operator.mul,
+    ast.Div: operator.truediv,
+    ast.Pow: operator.pow,
+}
+UNARY: dict[type[ast.unaryop], Callable[[float], float]] = {ast.UAdd: operator.pos, ast.USub: operator.neg}
+LONGEST = 500  # characters
+MOST_POWER = 100.0
+
+
+@dataclass(frozen=True)
+class Derived:
+    """A key of the card that follows from others: its `name`, the `text` of the formula, and where it stands."""
+
+    name: str
+    text: str
+    where: str
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The names that the formula uses, in their order."""
+        return tuple(dict.fromkeys(_names(parse(self.text, self.where))))
+
+    def value(self, known: Mapping[str, Any]) -> float:
+        """Return the value for known names.
+
+        Raises
+        ------
+        InputError
+            The arithmetic fails or its result is no finite number.
+        """
+        tree = parse(self.text, self.where)
+        try:
+            found = _evaluate(tree, known)
+        except (ArithmeticError, ValueError) as error:
+            raise InputError(f"{self.where}: '{self.text}' cannot be computed ({error}).") from error
+        if isinstance(found, complex) or not math.isfinite(found):
+            raise InputError(f"{self.where}: '{self.text}' is not a finite number.")
+        return found
+
+
+def parse(text: str, where: str) -> ast.expr:
+    """Return the tree of a formula of numbers, names, + - * / ** and brackets; anything else is refused."""
+    if len(text) > LONGEST:
+        raise InputError(f"{where}: the expression is longer than {LONGEST} characters.")
+    try:
+        tree = ast.parse(text, mode="eval").body
+    except (SyntaxError, ValueError, RecursionError, MemoryError):
+        raise InputError(f"{where}: '{text}' is not a formula; write one such as \"radius_mm + 4\".") from None
+    _check(tree, text, where)
+    return tree
+
+
+def fill_in(instrument: "Instrument", derived: Sequence[Derived], values: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the parameters with the derived ones added, in their order."""
+    filled = dict(values)
+    for one in derived:
+        filled[one.name] = one.value({name: _look_up(instrument, one, name, filled) for name in one.names})
+    return filled
+
+
+def _look_up(instrument: "Instrument", one: Derived, name: str, values: Mapping[str, Any]) -> float:
+    """Return the value of a name: of a parameter, else of the card."""
+    from studies.sweeps.parameters import find_nominal
+
+    beside = f"{one.name.rpartition('.')[0]}.{name}"
+    table = f"{one.name.split('.')[0]}.{name}"
+    ending = [known for known in values if known.endswith(f".{name}")]
+    for candidate in (name, beside, table, *(ending if len(ending) == 1 else [])):
+        if candidate in values:
+            found = values[candidate]
+            break
+    else:
+        for candidate in (name, beside, table):
+            try:
+                found = find_nominal(instrument, candidate, one.where)
+                break
+            except InputError:
+                continue
+        else:
+            raise InputError(
+                f"{one.where}: '{name}' is neither a parameter nor a key of the card{nearest(name, values)}"
+            )
+    if isinstance(found, str) or found is None:
+        raise InputError(f"{one.where}: '{name}' has no number that could be used.")
+    return float(found)
+
+
+def _check(node: ast.expr, text: str, where: str) -> None:
+    if isinstance(node, ast.BinOp) and type(node.op) in BINARY:
+        _check(node.left, text, where)
+        _check(node.right, text, where)
+    elif isinstance(node, ast.UnaryOp) and type(node.op) in UNARY:
+        _check(node.operand, text, where)
+    elif _spell(node) is None and not (
+        isinstance(node, ast.Constant) and isinstance(node.value, int | float) and not isinstance(node.value, bool)
+    ):
+        raise InputError(f"{where}: '{text}' holds more than numbers, names of parameters, + - * / ** and brackets.")
+
+
+def _spell(node: ast.expr) -> str | None:
+    """Return the dotted name that a node is, None where it is none."""
+    if isinstance(node, ast.Name):
+        return node.id
+    if isinstance(node, ast.Attribute) and (before := _spell(node.value)):
+        return f"{before}.{node.attr}"
+    return None
+
+
+def _names(node: ast.expr) -> list[str]:
+    if isinstance(node, ast.BinOp):
+        return [*_names(node.left), *_names(node.right)]
+    if isinstance(node, ast.UnaryOp):
+        return _names(node.operand)
+    name = _spell(node)
+    return [] if name is None else [name]
+
+
+def _evaluate(node: ast.expr, known: Mapping[str, Any]) -> float:
+    if isinstance(node, ast.BinOp):
+        left, right = _evaluate(node.left, known), _evaluate(node.right, known)
+        if isinstance(node.op, ast.Pow) and abs(right) > MOST_POWER:
+            raise ValueError(f"a power of {right:g}")
+        return BINARY[type(node.op)](left, right)
+    if isinstance(node, ast.UnaryOp):
+        return UNARY[type(node.op)](_evaluate(node.operand, known))
+    if isinstance(node, ast.Constant):
+        return float(node.value)  # type: ignore[arg-type]
+    return float(known[str(_spell(node))])
