@@ -35,7 +35,7 @@ def run(
         [[parameter]]: name (a key of the card such as resonator.thickness_mm, or temperature_degC, or user.NAME for a
         function of yours) with tolerance, or low and high, or values; nominal, count, distribution = uniform, normal (with
         standard_deviation), triangular or log-uniform. [[quantity]]: name = bryan-factor, compensation-residual, frequency,
-        mode-separation, python, q, tcf or thermal-time-constants, with harmonic, index, theory, temperature_degC, label and keys of its own.
+        mode-separation, python, q, split, tcf or thermal-time-constants, with harmonic, index, theory, temperature_degC, label and keys of its own.
         [[requirement]]: column with within (of target), or low, high. [[search]]: kind = worst-case with column, or
         inversion with vary and targets. Example and details: python -m pydoc studies.sweeps.spec.
     out : str

@@ -9,13 +9,11 @@ import math
 import operator
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from studies.errors import InputError, nearest
 
-if TYPE_CHECKING:
-    from studies.instrument.card import Instrument
-
+LookUp = Callable[[str], Any]
 BINARY: dict[type[ast.operator], Callable[[float, float], float]] = {
     ast.Add: operator.add,
     ast.Sub: operator.sub,
@@ -71,18 +69,16 @@ def parse(text: str, where: str) -> ast.expr:
     return tree
 
 
-def fill_in(instrument: "Instrument", derived: Sequence[Derived], values: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the parameters with the derived ones added, in their order."""
+def fill_in(derived: Sequence[Derived], values: Mapping[str, Any], in_card: LookUp) -> dict[str, Any]:
+    """Return the parameters with the derived ones added, in their order; `in_card` gives a key of the card by its name."""
     filled = dict(values)
     for one in derived:
-        filled[one.name] = one.value({name: _look_up(instrument, one, name, filled) for name in one.names})
+        filled[one.name] = one.value({name: _look_up(one, name, filled, in_card) for name in one.names})
     return filled
 
 
-def _look_up(instrument: "Instrument", one: Derived, name: str, values: Mapping[str, Any]) -> float:
+def _look_up(one: Derived, name: str, values: Mapping[str, Any], in_card: LookUp) -> float:
     """Return the value of a name: of a parameter, else of the card."""
-    from studies.sweeps.parameters import find_nominal
-
     beside = f"{one.name.rpartition('.')[0]}.{name}"
     table = f"{one.name.split('.')[0]}.{name}"
     ending = [known for known in values if known.endswith(f".{name}")]
@@ -93,7 +89,7 @@ def _look_up(instrument: "Instrument", one: Derived, name: str, values: Mapping[
     else:
         for candidate in (name, beside, table):
             try:
-                found = find_nominal(instrument, candidate, one.where)
+                found = in_card(candidate)
                 break
             except InputError:
                 continue

@@ -53,7 +53,7 @@ def find_nominal(instrument: Instrument, name: str, where: str) -> float | str |
 
 def set_parameters(instrument: Instrument, values: Mapping[str, Any], derived: Sequence[Derived] = ()) -> Instrument:
     """Return the instrument with parameters of the card replaced, and those derived from them; the rest follows."""
-    filled = fill_in(instrument, derived, values)
+    filled = fill_in(derived, values, lambda name: find_nominal(instrument, name, "card"))
     return instrument.with_values(
         {name: value for name, value in filled.items() if name != TEMPERATURE and not name.startswith("user.")}
     )

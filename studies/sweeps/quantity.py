@@ -9,7 +9,7 @@ from studies.errors import InputError
 from studies.files.toml import Section, check_number
 from studies.sweeps.case import Case, Options
 
-SUFFIXES = {"Hz": "_Hz", "ppm/°C": "_ppm_per_degC", "°C": "_degC", "s": "_s", "1": ""}
+SUFFIXES = {"Hz": "_Hz", "ppm/°C": "_ppm_per_degC", "°C": "_degC", "s": "_s", "°": "_deg", "1": ""}
 
 
 class Number(NamedTuple):

@@ -12,7 +12,7 @@ ORDER = choice(("first", "every"), "first order in the imperfection, or every or
 def _columns(options: Options) -> tuple[Column, ...]:
     return (
         Column(mode_stem("split", options), "Hz", f"split, {mode_words(options)}"),
-        Column(mode_stem("slow_axis", options), "deg", f"azimuth of the slower mode, {mode_words(options)}"),
+        Column(mode_stem("slow_axis", options), "°", f"azimuth of the slower mode, {mode_words(options)}"),
     )
 
 
