@@ -13,6 +13,7 @@ between them; that error is then part of the stated one.
 import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from itertools import product
 from math import isfinite
 
 import numpy as np
@@ -33,6 +34,8 @@ FINER = 3.0  # by which the threshold of the grid falls from round to round
 WORTH = 1.5  # more solves in a round than this, without halving the error, mean that the grid has come to its end
 SAFETY = 3.0  # stated errors over the largest seen on designs that the interpolant does not know, and over the solver's
 NOISE = 5e-10  # of a full solve, relative: its iteration and rounding
+AMPLIFIED = 10.0  # what jumps may grow to in an interpolant
+CORNERS = 16  # of the box that judge the interpolant, at most: it is worst there
 MOST_SOLVES = 1000
 
 
@@ -181,7 +184,7 @@ def build_family(
     harmonic, index, theory : which mode (`shell.modes.solve_modes`).
     slopes : whether ∂ ln f/∂ν and ∂ ln f/∂ ln h are wanted.
     tolerance : of the interpolated frequency, relative, against the full solve.
-    most : full solves that may be spent.
+    most : full solves that may be spent, about.
 
     Raises
     ------
@@ -192,10 +195,10 @@ def build_family(
     _check(axes, nu, tolerance, most)
     if theory == "rayleigh":
         raise ShellError("the theory of a family is solid or shell; Rayleigh's closed form needs none.")
-    reached = np.inf
+    count, reached = 0, np.inf
     for solver_tolerance in SOLVER_TOLERANCES:
         solve = _Solve(build, tuple(axes), nu, harmonic, index, theory, slopes, solver_tolerance)
-        polynomial, errors = _interpolate(solve, tolerance, most)
+        polynomial, errors = _interpolate(solve, tolerance, most - count)
         if errors[0] <= tolerance:
             bounds = np.full(4, np.nan)
             bounds[: len(errors)] = errors
@@ -203,12 +206,12 @@ def build_family(
                 tuple(axes), nu, harmonic, index, theory,
                 polynomial, Errors(*bounds), solve.theory_error, solver_tolerance, solve.count,
             )  # fmt: skip
-        reached = min(reached, errors[0])
-        if not solve.jumps:
-            break  # the same elements for all designs: finer ones would be no smoother
+        count, reached = count + solve.count, min(reached, errors[0])
+        if errors[0] > AMPLIFIED * solve.jumps or count >= most:
+            break  # where it is not for the jumps, finer solves would be no smoother
     raise ShellError(
-        f"a polynomial through {most} full solves holds the frequency to {reached:.1g} within these ranges, not to"
-        f" {tolerance:.1g}: narrow the ranges, allow a larger error, or solve each design in full."
+        f"{count} full solves hold the frequency to {reached:.1g} within these ranges, not to {tolerance:.1g}: narrow the"
+        " ranges, allow a larger error, or solve each design in full."
     )
 
 
@@ -226,7 +229,7 @@ class _Solve:
     tolerance: float
     theory_error: float = 0.0
     count: int = 0
-    layouts: set[int] = field(default_factory=set)
+    layouts: set[tuple[tuple[int, ...], ...]] = field(default_factory=set)
 
     @property
     def jumps(self) -> float:
@@ -250,7 +253,7 @@ class _Solve:
         self.theory_error = max(self.theory_error, mode.relative_error_estimate)
         self.count += 1
         assert mode.solution is not None
-        self.layouts.add(mode.solution.vector.size)
+        self.layouts.add(tuple(group.unknowns.shape for group in mode.solution.system.groups))
         found = [np.log(mode.frequency), mode.bryan_factor]
         if self.slopes:
             found += [mode.sensitivities.nu, mode.sensitivities.thickness]
@@ -276,7 +279,9 @@ def _interpolate(solve: _Solve, tolerance: float, most: int) -> tuple[SparsePoly
     truth = np.array([solve(point) for point in unseen])
     threshold, before = tolerance, (np.inf, 1)
     while True:
-        within = solve.jumps <= tolerance and grid.refine(threshold, most - len(unseen))
+        if solve.jumps > tolerance:
+            return grid.polynomial(), np.array([solve.jumps])
+        within = grid.refine(threshold, most - len(unseen))
         polynomial = grid.polynomial()
         errors = SAFETY * abs(polynomial(unseen) - truth).max(axis=0) + NOISE
         errors[0] += solve.jumps
@@ -290,11 +295,13 @@ def _interpolate(solve: _Solve, tolerance: float, most: int) -> tuple[SparsePoly
 
 
 def _unseen(dimensions: int) -> Array:
-    """Points that judge the interpolant: corners, faces and the inside, a third each; the same every time."""
-    rng, each = np.random.default_rng(20), 2 + dimensions
-    inside = rng.uniform(-1, 1, (each, dimensions))
-    faces = np.clip(rng.uniform(-2, 2, (each, dimensions)), -1, 1)
-    return np.vstack([inside, faces, rng.choice([-1.0, 1.0], (each, dimensions))])
+    """Points that judge the interpolant, the same every time: of the inside, of the faces, and the corners or some of them."""
+    rng = np.random.default_rng(20)
+    inside = rng.uniform(-1, 1, (2 + dimensions // 2, dimensions))
+    faces = np.clip(rng.uniform(-2, 2, (2 + dimensions, dimensions)), -1, 1)
+    if 2**dimensions <= CORNERS:
+        return np.vstack([inside, faces, list(product((-1.0, 1.0), repeat=dimensions))])
+    return np.vstack([inside, faces, rng.choice([-1.0, 1.0], (CORNERS, dimensions))])
 
 
 def _varied(axes: Sequence[Axis], nu: Range) -> list[Axis]:
