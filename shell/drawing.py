@@ -11,7 +11,7 @@ from shell.quadrature import Array
 from shell.scene import Scene
 
 ROOM = 0.68  # share of the picture's height for the resonator; the rest is for title and legend
-NODE, ANTINODE = "#d81b60", "#1b1f24"
+NODE, ANTINODE, SLOW, FAST = "#d81b60", "#1b1f24", "#0072b2", "#e69f00"
 
 
 def draw_job(folder: str) -> None:
@@ -94,14 +94,21 @@ def _fill(plotter: Any, scene: Scene, limits: tuple[float, float], first: bool) 
         plotter.add_mesh(marks, color=ANTINODE, point_size=13.0, render_points_as_spheres=True)
         moving.append((marks, scene.points[scene.antinodes], scene.displacement[scene.antinodes]))
         if first:
+            axes = "   blue: slow axes   orange: fast axes" if len(scene.axes) else ""
             plotter.add_text(
-                "red lines: nodes   black dots: antinodes   grey: undeformed",
+                "red lines: nodes   black dots: antinodes   grey: undeformed" + axes,
                 position=(12, 6),
                 font_size=8,
                 color="#5b6470",
             )
-    if scene.title:
-        plotter.add_text(scene.title, position="upper_edge", font_size=10, color="black")
+    for k, line in enumerate(scene.axes):
+        colour = SLOW if 2 * k < len(scene.axes) else FAST
+        plotter.add_mesh(pv.lines_from_points(line), color=colour, line_width=4.0, render_lines_as_tubes=True)
+    title, _, remark = scene.title.partition("\n")
+    if title:
+        plotter.add_text(title, position="upper_edge", font_size=10, color="black")
+    if remark:
+        plotter.add_text(remark.replace(", ", "\n"), position="upper_left", font_size=8, color="#5b6470")
     return moving
 
 

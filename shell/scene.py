@@ -1,6 +1,6 @@
 """What one resonator in a picture is made of."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,13 +25,15 @@ class Scene:
     legend : str
         Quantity and unit of the values.
     title : str
-        A line above the resonator.
+        A line above the resonator; a second line stands below it as a remark.
     nodes : (L, k) array
         Vertex numbers along each nodal line, -1 after its end.
     antinodes : (A,) array
         Vertex numbers.
     opens_up : bool
         Whether the open end is at the larger z, from where it is then seen.
+    axes : (A, 2, 3) array, m
+        Lines across the rim: the axes of the slower mode of a split pair, then as many of the faster one.
     """
 
     points: Array
@@ -43,9 +45,10 @@ class Scene:
     nodes: NDArray[np.int64]
     antinodes: NDArray[np.int64]
     opens_up: bool
+    axes: Array = field(default_factory=lambda: np.zeros((0, 2, 3)))
 
 
-def compose_scene(surface: Surface, values: Array, legend: str, title: str = "") -> Scene:
+def compose_scene(surface: Surface, values: Array, legend: str, title: str = "", axes: Array | None = None) -> Scene:
     """Compose a picture of a mode: nodal meridians and antinodes marked, the swing exaggerated to a visible size."""
     lines = surface.nodes
     nodes = np.full((len(lines), max(map(len, lines), default=0)), -1, dtype=np.int64)
@@ -64,4 +67,5 @@ def compose_scene(surface: Surface, values: Array, legend: str, title: str = "")
         nodes,
         surface.antinodes,
         opens_up,
+        np.zeros((0, 2, 3)) if axes is None else axes,
     )

@@ -30,6 +30,8 @@ def render(
 
     The ending of --out chooses: .png a picture, .webp or .gif a looping animation, .html an interactive page that works
     offline, .glb a mesh in which the mode swings, .stl or .ply the solid for slicers, in mm.
+    A card with an imperfection shows the slower mode of the split pair on its axis, the shell's departures exaggerated in
+    pictures and true in .stl and .ply; lines across the rim are the axes of the slower (blue) and the faster mode (orange).
     Several cards, or one card at several temperatures, stand side by side in pictures and animations on one scale.
     A PNG, WebP or GIF needs OpenGL; without it the exit status is 3 and the message says what to install.
 
@@ -97,7 +99,7 @@ def render(
         ]
         print_json({"schema": "hrg.render/1", "file": out, "bytes": len(data), "modes": modes})
     else:
-        say(f"{out}: {'; '.join(one.title for one in shown)}.")
+        say(f"{out}: {'; '.join(one.title.replace(chr(10), ', ') for one in shown)}.")
     return 0
 
 
@@ -124,7 +126,8 @@ def _solve(
         raise InputError(f"{count} resonators are too many for one {kind} file, which shows {most} at most.")
     wanted: list[float | None] = [*(T + ZERO_CELSIUS for T in temperatures)] or [None]
     instruments = [load_card(card) for card in cards]
-    return [show_mode(one, n, index, T, theory) for one in instruments for T in wanted for n in harmonics]
+    exaggerated = kind not in (".stl", ".ply")  # those are the solid itself
+    return [show_mode(one, n, index, T, theory, exaggerated) for one in instruments for T in wanted for n in harmonics]
 
 
 def _picture(

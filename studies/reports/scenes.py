@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
+    from shell.imperfection import Split
     from shell.modes import Mode
     from shell.resonator import Resonator
     from shell.scene import Scene
@@ -35,13 +36,19 @@ class Shown:
     resonator: "Resonator"
     mode: "Mode"
     surface: "Surface"
+    split: "Split | None" = None
+    exaggeration: float = 0.0
 
     @property
     def title(self) -> str:
-        """Name, harmonic, frequency and temperature in one line."""
+        """Name, harmonic, frequency and temperature in one line; of a split pair the split, and how its shape is exaggerated."""
         kind = f" ({self.mode.label})" if self.mode.label else ""
         celsius = self.temperature - ZERO_CELSIUS
-        return f"{self.instrument.name}, n = {self.mode.harmonic}{kind}, {self.mode.frequency:.2f} Hz at {celsius:g} °C"
+        line = f"{self.instrument.name}, n = {self.mode.harmonic}{kind}, {self.mode.frequency:.2f} Hz at {celsius:g} °C"
+        if self.split is None:
+            return line
+        departures = f", departures x {self.exaggeration:.0f}" if self.exaggeration > 1 else ""
+        return f"{line}\nslower mode, split {1e3 * self.split.hertz:.4g} mHz{departures}"
 
     def values(self, colour: Colour, field: "Field | None" = None) -> "NDArray[np.float64]":
         """Return the coloured quantity on every vertex, in the unit of its legend."""
@@ -59,7 +66,12 @@ class Shown:
         """Return the scene for `shell.render`."""
         from shell.scene import compose_scene
 
-        return compose_scene(self.surface, self.values(colour, field), LEGENDS[colour], self.title)
+        axes = None
+        if self.split is not None:
+            from shell.imperfection.surface import draw_axes
+
+            axes = draw_axes(self.surface, self.split.slow_axis)
+        return compose_scene(self.surface, self.values(colour, field), LEGENDS[colour], self.title, axes)
 
     def colours(self, colour: Colour = "displacement", field: "Field | None" = None) -> "NDArray[np.uint8]":
         """Return the colour of every vertex (N, 4) as bytes, cividis between the smallest and the largest value."""
@@ -87,15 +99,38 @@ def show_mode(
     index: int = 0,
     temperature: float | None = None,
     theory: Literal["solid", "shell"] = "solid",
+    exaggerated: bool = True,
 ) -> Shown:
-    """Solve one mode of an instrument (temperature in K, its reference unless given) and build its surface."""
+    """Solve one mode of an instrument (temperature in K, its reference unless given) and build its surface.
+
+    Of a card with an imperfection it is the slower mode on its axis, the shell's departures `exaggerated` or as they are.
+    """
     from shell.modes import solve_modes
     from shell.surface import build_surface
+    from studies.splitting import is_imperfect
 
     T = instrument.reference_temperature if temperature is None else temperature
     resonator, elastic = instrument.at(T)
     mode = solve_modes(resonator, elastic, harmonic, index + 1, theory, tolerance=1e-4)[index]
-    return Shown(instrument, T, resonator, mode, build_surface(resonator, mode))
+    surface = build_surface(resonator, mode)
+    if harmonic < 1 or not is_imperfect(instrument):
+        return Shown(instrument, T, resonator, mode, surface)
+    return _show_split(instrument, T, resonator, mode, surface, exaggerated)
+
+
+def _show_split(
+    instrument: Instrument, T: float, resonator: "Resonator", mode: "Mode", surface: "Surface", exaggerated: bool
+) -> Shown:
+    """The slower mode of the pair on its own axis, the shell with its departures exaggerated."""
+    from shell.imperfection.surface import depart_surface, turn_surface
+    from studies.splitting import SplitPair
+
+    split = SplitPair(instrument, mode, T).split
+    surface, factor = turn_surface(surface, split.slow_axis), 0.0
+    fields = instrument.part("imperfection").fields
+    if fields is not None:
+        surface, factor = depart_surface(surface, resonator, fields, exaggerated)
+    return Shown(instrument, T, resonator, mode, surface, split, factor)
 
 
 def read_field(path: str | Path) -> Field:

@@ -6,10 +6,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from shell.imperfection.surface import turn_surface
 from shell.modes import solve_modes
 from studies.cli import main
 from studies.errors import InputError
 from studies.instrument.card import load_card
+from studies.reports.scenes import show_mode
 from studies.simulation.drive import drive_by_profile
 from studies.simulation.loop import wave_of
 from studies.simulation.prediction import predict
@@ -195,3 +197,26 @@ def test_the_loop_holds_the_cards_split(tmp_path):
     split = split_of(instrument).split
     assert wave.frequency_split == pytest.approx(2 * np.pi * split.hertz, rel=1e-9)
     assert wave.frequency_axis % (np.pi / 2) == pytest.approx(split.fast_axis, rel=1e-9)
+
+
+def test_the_drawn_shell_departs_where_the_card_says_and_its_mode_lies_on_the_slow_axis(tmp_path):
+    instrument = loaded(tmp_path, WALL.replace('"wall"', '"outer"'))
+    true, shown, perfect = (
+        show_mode(instrument, theory="shell", exaggerated=False),
+        show_mode(instrument, theory="shell"),
+        show_mode(loaded(tmp_path), theory="shell"),
+    )
+    plain = turn_surface(perfect.surface, true.split.slow_axis).points
+    out = np.linalg.norm(true.surface.points, axis=1) - np.linalg.norm(plain, axis=1)
+    outer = np.linalg.norm(plain, axis=1) > 15.4e-3
+    theta = np.arctan2(plain[:, 1], plain[:, 0])
+    expected = 0.3e-6 * np.cos(4 * (theta - np.deg2rad(31.0)))
+    away = outer & (np.hypot(plain[:, 0], plain[:, 1]) > 1e-3)
+    assert out[away] == pytest.approx(expected[away], abs=2e-10)
+    assert np.abs(out[~outer]).max() < 0.31e-6
+    assert shown.exaggeration > 100
+    dots = shown.surface.points[shown.surface.antinodes]
+    slow = np.arctan2(dots[:, 1], dots[:, 0]) % (np.pi / 2)
+    assert slow == pytest.approx(np.full(4, shown.split.slow_axis), abs=1e-6)
+    assert shown.scene().axes.shape == (4, 2, 3)
+    assert perfect.scene().axes.shape == (0, 2, 3)
