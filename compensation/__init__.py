@@ -1,3 +1,9 @@
-"""Compensation models of the four papers, as functions of arrays."""
+"""Compensation models of the four papers, as functions of arrays.
+
+The names of `__init__.pyi` can be taken from here; each is imported when it is first used.
+"""
+
+import lazy_loader
 
 __version__ = "0.1.0"
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -15,7 +15,9 @@ from studies.files.writing import written_whole
 
 if TYPE_CHECKING:
     import numpy as np
+    from matplotlib.figure import Figure
     from numpy.typing import NDArray
+    from pandas import DataFrame
 
 COLUMNS = {
     "time_s": "time since the start of the run",
@@ -49,7 +51,7 @@ TABLE_COLUMNS = ("temperature_degC", "frequency_Hz")
 PROFILE_COLUMNS = ("time_s", "chamber_temperature_degC")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Record:
     """One run: its columns by name, and what its comment lines say of it."""
 
@@ -74,6 +76,30 @@ class Record:
 
     def __len__(self) -> int:
         return len(self.columns["time_s"])
+
+    def __repr__(self) -> str:
+        time = self.columns.get("time_s")
+        span = f" over {(time[-1] - time[0]) / 3600:.3g} h" if time is not None and len(time) > 1 else ""
+        return f"Record({self.path or self.instrument or 'in memory'!s}, {len(self)} rows{span}: {', '.join(self.columns)})"
+
+    def to_frame(self) -> "DataFrame":
+        """Return the columns as a table; what the header says is in its `attrs`."""
+        import pandas as pd
+
+        frame = pd.DataFrame(dict(self.columns))
+        frame.attrs = {"instrument": self.instrument, "source": self.source, "path": self.path}
+        return frame
+
+    def plot(self) -> "Figure":
+        """Draw every column over time."""
+        from studies.reports.preview import draw_columns
+
+        return draw_columns(self.columns)
+
+    def _repr_html_(self) -> str:
+        from html import escape
+
+        return f"<p>{escape(repr(self))}</p>{self.to_frame().describe().to_html()}"
 
     def with_columns(self, more: "Mapping[str, NDArray[np.float64]]") -> "Record":
         """Return a new record with further (or replaced) columns."""

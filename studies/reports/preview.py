@@ -1,6 +1,7 @@
 """The page of an import: what was understood, every column over time."""
 
 from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,8 +9,12 @@ from numpy.typing import NDArray
 from studies.reports import style
 from studies.reports.page import Block, Chapter, Picture, Table, Text, draw, render_page
 
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
 Columns = Mapping[str, NDArray[np.float64]]
 MOST_POINTS = 4000
+FEW = 300  # rows that are drawn as points
 FIRST_ROWS = 5
 
 
@@ -24,20 +29,25 @@ def import_page(records: Mapping[str, Columns], notes: Sequence[str]) -> str:
     return render_page("Preview of an import", lead, chapters)
 
 
-def _figure(columns: Columns) -> Picture:
+def draw_columns(columns: Columns) -> "Figure":
+    """Return a figure with every column over time, or over the first column of a table of settled readings."""
     names = list(columns)
     timed = names[0] == "time_s"
     x, label = (columns["time_s"] / 3600, "Time (h)") if timed else (columns[names[0]], names[0])
     shown = names[1:]
     rows = np.unique(np.linspace(0, len(x) - 1, MOST_POINTS).astype(int))
+    mark = "-" if timed and len(x) >= FEW else "."
     with style.figure(len(shown), height=1.9 * len(shown) + 0.6, squeeze=False, sharex=True) as (figure, axes):
         for axis, name in zip(axes[:, 0], shown, strict=True):
-            axis.plot(
-                x[rows], columns[name][rows], "." if not timed or len(x) < 300 else "-", color=style.BLUE, linewidth=0.9
-            )
+            axis.plot(x[rows], columns[name][rows], mark, color=style.BLUE, linewidth=0.9)
             axis.set_title(name.replace("$", r"\$"), fontsize=9, loc="left")
         axes[-1, 0].set_xlabel(label.replace("$", r"\$"))
-        return draw(figure, "Every column as it was understood.", "Columns over time.")
+        made: Figure = figure
+    return made
+
+
+def _figure(columns: Columns) -> Picture:
+    return draw(draw_columns(columns), "Every column as it was understood.", "Columns over time.")
 
 
 def _ranges(columns: Columns) -> Table:

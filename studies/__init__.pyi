@@ -1,0 +1,22 @@
+from .errors import InputError
+from .instrument.card import Instrument, load_card, save_card
+from .models import read_model, write_model
+from .record import Record, read_record, write_record
+from .sweeps.run import run_study
+from .workbench import compare, simulate
+
+__version__: str
+__all__ = [
+    "InputError",
+    "Instrument",
+    "Record",
+    "compare",
+    "load_card",
+    "read_model",
+    "read_record",
+    "run_study",
+    "save_card",
+    "simulate",
+    "write_model",
+    "write_record",
+]

@@ -1,0 +1,64 @@
+"""The names that packages offer from Python: each is there, imported only when used, and does what the command does."""
+
+import importlib
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+import compensation
+import shell
+import studies
+import thermal
+from studies.cli import main
+from studies.record import read_record
+
+PACKAGES = {"shell": shell, "thermal": thermal, "compensation": compensation, "studies": studies}
+
+
+@pytest.mark.parametrize("package", PACKAGES)
+def test_every_name_is_there_and_listed(package):
+    module = PACKAGES[package]
+    assert 5 < len(module.__all__) < 25
+    for name in module.__all__:
+        assert getattr(module, name).__name__ == name
+    assert set(module.__all__) <= set(dir(module))
+
+
+@pytest.mark.parametrize("package", PACKAGES)
+def test_a_package_alone_imports_nothing_heavy(package):
+    code = f"import {package}, sys; print([m for m in ('numpy', 'scipy', 'sympy', 'pyvista', 'matplotlib') if m in sys.modules])"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"
+
+
+def test_simulate_is_the_command(tmp_path):
+    record = studies.simulate("hrg-30mm", "step 20 -10 1h", rate=0.1, seed=3)
+    assert (
+        main(
+            ["simulate", "hrg-30mm", "step 20 -10 1h", "--rate", "0.1", "--seed", "3", "--out", str(tmp_path / "r.csv")]
+        )
+        == 0
+    )
+    for name, values in read_record(tmp_path / "r.csv").columns.items():
+        assert np.array_equal(values, record[name])
+
+
+def test_records_show_themselves_shortly_and_as_tables_and_pictures():
+    record = studies.simulate(studies.load_card("free-dome"), "step 20 -10 1h", rate=0.1)
+    assert repr(record) == (
+        "Record(free-dome, 361 rows over 1 h: time_s, chamber_temperature_degC, housing_temperature_degC,"
+        " resonator_temperature_degC, frequency_Hz, bias_deg_per_h, inverse_q)"
+    )
+    frame = record.to_frame()
+    assert frame.shape == (361, 7)
+    assert frame.attrs["instrument"] == "free-dome"
+    assert len(record.plot().axes) == 6
+    assert "<table" in record._repr_html_()
+
+
+def test_a_module_that_is_no_name_is_still_a_module():
+    assert importlib.import_module("shell.modes").solve_modes is shell.solve_modes
+    with pytest.raises(AttributeError):
+        _ = shell.no_such_name
