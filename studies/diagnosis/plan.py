@@ -204,7 +204,7 @@ def _shares(truth: str, answers: Sequence[Answer]) -> tuple[dict[str, float], di
 
 def imagine(profiles: Sequence[str], rng: np.random.Generator, card: str | None = None) -> Campaign:
     """Return a campaign without effects through the given chamber profiles, with nominal physics and noise."""
-    from studies.simulation.chamber import load_profile
+    from studies.simulation.chamber import load_schedule
 
     tau = RESONATOR_LAG
     if card is not None:
@@ -215,7 +215,7 @@ def imagine(profiles: Sequence[str], rng: np.random.Generator, card: str | None 
         tau = slowest_lag(build_network(instrument), instrument.reference_temperature)
     records = []
     for number, words in enumerate(profiles):
-        profile = load_profile(words)
+        profile, commands = load_schedule(words)
         step = max(10.0, (profile.end - profile.start) / 20000.0)
         time = np.arange(profile.start, profile.end, step)
         housing = lag(np.asarray(profile.at(time)), step, HOUSING_LAG)
@@ -229,6 +229,7 @@ def imagine(profiles: Sequence[str], rng: np.random.Generator, card: str | None 
                     "frequency_Hz": 5000.0 + 0.4 * x - 4e-4 * x**2 + level["frequency_Hz"],
                     "bias_deg_per_h": 0.1 * x + level["bias_deg_per_h"],
                     "inverse_q": 1e-7 * (1.0 + 1e-3 * x) + level["inverse_q"],
+                    **{name: np.interp(time, profile.time, values) for name, values in commands.items()},
                 },
                 path=f"planned run {number + 1}",
             )

@@ -6,6 +6,11 @@ from typing import TYPE_CHECKING
 from studies.errors import InputError
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    import numpy as np
+    from numpy.typing import NDArray
+
     from studies.instrument.card import Instrument
     from studies.simulation.drive import Boundary, Drive
     from thermal.profile import Profile
@@ -26,10 +31,37 @@ def load_profile(text: str) -> "Profile":
     return Profile(table.values["time_s"], table.values["chamber_temperature_degC"] + ZERO_CELSIUS)
 
 
-def load_drive(text: str, boundary: "Boundary | None" = None, rate: float = 1.0) -> "Profile | Drive":
-    """Read what drives a run: a profile in words or from a file, or a record, of which a measured column is imposed.
+def load_schedule(text: str) -> "tuple[Profile, Mapping[str, NDArray[np.float64]]]":
+    """Read a profile and the commands beside it: drive_amplitude_V, electrode_bias_V, quadrature_V, pattern_angle_deg.
 
-    A profile may have commands beside the chamber: drive_amplitude_V, electrode_bias_V, quadrature_V, pattern_angle_deg.
+    Returns
+    -------
+    Profile, mapping
+        The chamber (K), and each command at the times of the profile, linear between; none for words.
+    """
+    import numpy as np
+
+    from studies.files.columns import read_header
+    from studies.record import PROFILE_COLUMNS, read_record
+    from studies.simulation.drive import COMMAND_COLUMNS
+    from thermal.profile import Profile
+
+    columns = read_header(text) if Path(text).is_file() else []
+    commands = [name for name in columns if name in COMMAND_COLUMNS]
+    if not commands or not set(PROFILE_COLUMNS) <= set(columns):
+        return load_profile(text), {}
+    record = read_record(text)
+    for name in record.columns:
+        if not np.isfinite(record[name]).all():
+            raise InputError(f"{text}: {name} has empty cells; a profile needs every value.")
+    if len(record) < 2:
+        raise InputError(f"{text}: a profile needs at least two rows.")
+    chamber = Profile(record["time_s"], record["chamber_temperature_degC"] + ZERO_CELSIUS)
+    return chamber, {name: record[name] for name in commands}
+
+
+def load_drive(text: str, boundary: "Boundary | None" = None, rate: float = 1.0) -> "Profile | Drive":
+    """Read what drives a run: a profile, with commands or without, or a record, of which a measured column is imposed.
 
     Parameters
     ----------
@@ -43,26 +75,17 @@ def load_drive(text: str, boundary: "Boundary | None" = None, rate: float = 1.0)
     InputError
         A record without that column; a boundary for what is no record.
     """
-    import numpy as np
-
     from studies.files.columns import read_header
     from studies.record import PROFILE_COLUMNS, read_record
     from studies.simulation.drive import COMMAND_COLUMNS, drive_by_record, drive_by_schedule
 
     columns = set(read_header(text)) if Path(text).is_file() else set()
-    if set(PROFILE_COLUMNS) < columns <= {*PROFILE_COLUMNS, *COMMAND_COLUMNS}:
-        record = read_record(text)
-        for name in columns:
-            if not np.isfinite(record[name]).all():
-                raise InputError(f"{text}: {name} has empty cells; a profile needs every value.")
-        if len(record) < 2:
-            raise InputError(f"{text}: a profile needs at least two rows.")
-        return drive_by_schedule(record.columns, rate)
-    if columns - set(PROFILE_COLUMNS):
+    if columns - {*PROFILE_COLUMNS, *COMMAND_COLUMNS} or (columns and not set(PROFILE_COLUMNS) <= columns):
         return drive_by_record(read_record(text), boundary)
     if boundary == "housing":
         raise InputError(f"{text}: only a record has a housing column to impose; leave out --boundary housing.")
-    return load_profile(text)
+    chamber, commands = load_schedule(text)
+    return drive_by_schedule(chamber, commands, rate) if commands else chamber
 
 
 def check_profile(profile: "Profile", instrument: "Instrument") -> None:

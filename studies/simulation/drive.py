@@ -98,20 +98,19 @@ def drive_by_profile(profile: Profile, time: Array) -> Drive:
     return Drive(time, "chamber", profile)
 
 
-def drive_by_schedule(columns: Mapping[str, Array], rate: float) -> Drive:
-    """Impose a chamber profile, and commands beside it, all linear between the rows of a table.
+def drive_by_schedule(profile: Profile, columns: Mapping[str, Array], rate: float) -> Drive:
+    """Impose a chamber profile, and commands beside it, linear between its times.
 
     Parameters
     ----------
     columns : mapping
-        `time_s`, `chamber_temperature_degC`, and any of the commands' columns of a record.
+        Any of the commands' columns of a record, at the times of the profile.
     rate : float
         Rows per second.
     """
-    profile = Profile(columns["time_s"], columns[COLUMN["chamber"]] + ZERO_CELSIUS)
     time = rows_of(profile, rate)
     commands = {
-        name: (np.interp(time, columns["time_s"], columns[column]) * factor) ** power
+        name: (np.interp(time, profile.time, columns[column]) * factor) ** power
         for name, (column, factor, power) in COMMANDS.items()
         if column in columns
     }

@@ -69,3 +69,15 @@ def test_a_hole_in_a_schedule_is_refused(tmp_path, capsys):
     path.write_text(SCHEDULE.replace("600,20,0,22.5", "600,20,,22.5"))
     assert main(["simulate", "free-dome", str(path), "--out", str(tmp_path / "run.csv")]) == 2
     assert "electrode_bias_V has empty cells" in capsys.readouterr().err
+
+
+def test_a_planned_run_moves_the_commanded_drives(tmp_path):
+    from studies.diagnosis.plan import imagine
+
+    path = tmp_path / "schedule.csv"
+    path.write_text(SCHEDULE)
+    (commanded,) = (run.states for run in imagine([str(path)], np.random.default_rng(0)).runs)
+    (plain,) = (run.states for run in imagine(["soak 20 30min"], np.random.default_rng(0)).runs)
+    assert plain.voltage_squared is None
+    assert commanded.voltage_squared.max() == pytest.approx(1e4)
+    assert np.degrees(commanded.pattern_angle.min()) == pytest.approx(11.25)
