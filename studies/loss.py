@@ -1,5 +1,6 @@
 """The loss budget of an instrument: from its card to the causes of loss of one solved mode."""
 
+import cmath
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -12,6 +13,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import ArrayLike, NDArray
 
+    from shell.damping.anchor import Unbalance
     from shell.damping.anisotropy import Complex, Ripple
     from shell.damping.budget import Budget, Cause, Vibration
     from shell.damping.film import Film
@@ -105,8 +107,11 @@ def loss_model(
             ripples += waves
         ripples += _surface_ripple(parts, vibration, causes)
         causes += _others(instrument, parts, spread, left_out)
-        if anchor or parts.unbalance_mg:
-            causes += _anchor(instrument, mode, parts, spread, anchor)
+        first, third = _rim_harmonics(instrument, parts)
+        if anchor or first or third:
+            through_stem, unequal = _anchor(instrument, mode, (first, third), spread, anchor)
+            causes += through_stem
+            ripples += unequal
         elif instrument.resonator.stem is not None and parts.anchor_inverse_q is None:
             left_out.append("anchor: --anchor computes what the stem sends into its base.")
     if not causes:
@@ -297,11 +302,11 @@ def _solve(resonator: "Resonator", elastic: "Elastic", harmonic: int, theory: "T
 
 
 @lru_cache(maxsize=8)
-def _unbalance(resonator: "Resonator", elastic: "Elastic", order: int) -> float:
-    """1/Q per square of the unbalanced mass, 1/kg²."""
+def _unbalance(resonator: "Resonator", elastic: "Elastic") -> "Unbalance":
+    """What an unbalanced rim costs the mode n = 2."""
     from shell.damping.anchor import unbalance_loss
 
-    return unbalance_loss(_solve(resonator, elastic, 2, "solid"), elastic, 1.0, order)
+    return unbalance_loss(_solve(resonator, elastic, 2, "solid"), elastic)
 
 
 def _build_film(keys: "FilmKeys", numbers: Mapping[str, Any]) -> "Film":
@@ -352,22 +357,46 @@ MOUNT_ADVICE = "a longer or thinner stem, a stiffer joint, balance of the rim's 
 
 
 def _anchor(
-    instrument: "Instrument", mode: Any, parts: "LossParts", spread: Mapping[str, float], balanced: bool
-) -> "list[Cause]":
+    instrument: "Instrument", mode: "Mode", rim: tuple[complex, complex], spread: Mapping[str, float], balanced: bool
+) -> "tuple[list[Cause], list[Ripple]]":
     """What the stem sends into a half-space of the resonator's own material: of the balanced mode, and of its imbalance."""
     from shell.damping.anchor import anchor_loss
+    from shell.damping.anisotropy import Ripple
     from shell.damping.budget import constant_cause
 
-    elastic, causes = instrument.material.elastic(instrument.reference_temperature), []
+    elastic, causes, ripples = instrument.material.elastic(instrument.reference_temperature), [], []
     source = "waves in a half-space of the same material, with an absorbing layer"
     if balanced:
-        found = anchor_loss(mode, elastic)
-        causes.append(constant_cause("anchor", found.inverse_q, 0.5, source, MOUNT_ADVICE))
-    if parts.unbalance_mg:
-        loss = (1e-6 * parts.unbalance_mg) ** 2 * _unbalance(instrument.resonator, elastic, parts.unbalance_order)
-        sd = 2 * spread.get("loss.unbalance_mg", 0.0)  # the square of the mass counts
+        causes.append(constant_cause("anchor", anchor_loss(mode, elastic).inverse_q, 0.5, source, MOUNT_ADVICE))
+    if any(rim) and mode.harmonic == 2:
+        found = _unbalance(instrument.resonator, elastic)
+        loss, wave = found.inverse_q(*rim), found.wave(*rim)
+        # the squares of the masses count
+        sd = 2 * max(spread.get(f"loss.{key}", 0.0) for key in ("unbalance_mg", "third_unbalance_mg"))
         causes.append(constant_cause("unbalance", loss, sd, source, MOUNT_ADVICE))
-    return causes
+        if wave:
+            # between a pattern that loses twice the mean and one that loses nothing at most
+            ripples.append(Ripple("unbalance", min(abs(wave) / (2 * loss), 1.0), cmath.phase(wave) / 4, 2.0))
+    return causes, ripples
+
+
+def _rim_harmonics(instrument: "Instrument", parts: "LossParts") -> tuple[complex, complex]:
+    """Σ m exp(iθ) and Σ m exp(3iθ) of the rim (kg): as the card gives them, and of its small masses there."""
+    given = (
+        (parts.unbalance_mg, parts.unbalance_azimuth_deg, 1),
+        (parts.third_unbalance_mg, parts.third_unbalance_azimuth_deg, 3),
+    )
+    first, third = (1e-6 * (mass or 0.0) * cmath.exp(1j * k * math.radians(at)) for mass, at, k in given)
+    imperfection = instrument.part("imperfection")
+    if imperfection is not None and imperfection.fields is not None and instrument.resonator.stem is not None:
+        for one in imperfection.fields.masses:
+            if one.position > ON_RIM:
+                first += one.mass * cmath.exp(1j * one.azimuth)
+                third += one.mass * cmath.exp(3j * one.azimuth)
+    return first, third
+
+
+ON_RIM = 0.95  # position beyond which a small mass moves as the rim does
 
 
 def _relative_sds(instrument: "Instrument") -> dict[str, float]:

@@ -1,6 +1,6 @@
 """Anchor loss: what a mode sends down its stem into the body that the stem stands on."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -43,38 +43,62 @@ def anchor_loss(mode: Mode, elastic: Elastic | VaryingElastic, base: Elastic | N
     return radiating_mode(waves, mode.frequency)
 
 
-def unbalance_loss(
-    mode: Mode, elastic: Elastic | VaryingElastic, mass: float, order: int = 1, base: Elastic | None = None
-) -> float:
-    """1/Q of the force that a mode with n = 2 puts on its stem because the rim is heavier on one side.
+@dataclass(frozen=True)
+class Unbalance:
+    """What an unbalanced rim costs a mode with n = 2: α₁₁, α₃₃ and α₁₃ of 1/Q, per kg².
 
-    The rim carries dm/dθ = (m/π) cos kθ, k = 1 or 3, as a point mass m does; moving with the mode it drives the motion of n = 1,
-    which reaches the base: (K₁ - ω² M₁) v = ω² δM u₂ and 1/Q = -Im(vᵀ ω² δM u₂)/(ω² ∫ ρ |u₂|² dV). The square of m counts.
+    With u_k = Σ m exp(ikθ) of masses on the rim (kg), k = 1 and 3, a pattern with an antinode at θ₀ loses
+
+        1/Q = α₁₁ |u₁|² + α₃₃ |u₃|² + 2 α₁₃ Re(u₁ u₃ exp(-4iθ₀)):
+
+    both harmonics together make the damping differ around.
+    """
+
+    first: float
+    third: float
+    joint: float
+
+    def inverse_q(self, first: complex, third: complex) -> float:
+        """1/Q, the mean over the azimuths of the pattern."""
+        return self.first * abs(first) ** 2 + self.third * abs(third) ** 2
+
+    def wave(self, first: complex, third: complex) -> complex:
+        """Δ(1/Q) exp(4iθ_τ) between the pattern that is damped most, at θ_τ, and the one across."""
+        return 4 * self.joint * first * third
+
+
+def unbalance_loss(mode: Mode, elastic: Elastic | VaryingElastic, base: Elastic | None = None) -> Unbalance:
+    """Loss of a mode with n = 2 through its stem because the rim is heavier on one side.
+
+    Masses that move with the mode push the motion of n = 1, which reaches the base: of a mass density with the wave k around,
+    (K₁ - ω² M₁) v_k = ω² L_k with L_k = (1/2π)(w₂ w₁ ± v₂ v₁ + z₂ z₁) at the rim, + for k = 1 and - for k = 3, and
+    α_kl = -Im(L_kᵀ v_l)/∫ ρ |u₂|² dV.
 
     Parameters
     ----------
     mode : with n = 2, of a resonator on one stem, its rim free.
     elastic, base : as for `anchor_loss`.
-    mass : m, kg.
-    order : k.
 
     Raises
     ------
     ShellError
-        Another harmonic or order, no stem, no free rim.
+        Another harmonic, no stem, no free rim.
     """
     solution = _solved(mode)
-    if solution.system.n != 2 or order not in (1, 3):
-        raise ShellError("the first or third harmonic of the rim's mass couples a mode with n = 2 to the stem.")
+    if solution.system.n != 2:
+        raise ShellError(
+            "the first and third harmonic of the rim's mass couple a mode with n = 2 to the stem, no other."
+        )
     system, waves = _stand(mode, elastic, base, 1)
     assert mode.resonator is not None
     raw = solution.system.constraint @ solution.vector
     radial, around, axial = (float(row @ raw) for row in _rim(mode.resonator, solution.system))
-    drive = (radial, around if order == 1 else -around, axial)
-    rows = _rim(mode.resonator, system)
-    load = mass / (2 * np.pi) * (system.constraint.T @ np.einsum("k,kr->r", drive, rows))
-    v = waves.factor(complex(solution.eigenvalue))((solution.eigenvalue * load).astype(complex))
-    return float(-np.imag(v @ load) / total(solution.kinetic))
+    rows = np.array(_rim(mode.resonator, system)) @ system.constraint
+    loads = np.array([[radial, sign * around, axial] for sign in (1, -1)]) @ rows / (2 * np.pi)
+    solve = waves.factor(complex(solution.eigenvalue))
+    moved = np.array([solve((solution.eigenvalue * load).astype(complex)) for load in loads])
+    alpha = -np.imag(loads @ moved.T) / total(solution.kinetic)
+    return Unbalance(float(alpha[0, 0]), float(alpha[1, 1]), float(alpha[0, 1]))
 
 
 def _solved(mode: Mode) -> Solution:

@@ -148,3 +148,29 @@ def test_a_measured_q_stands_beside_what_the_parts_explain(capsys, tmp_path, qua
     assert explained == pytest.approx(found["inverse_q"][at] * quality, rel=1e-9)
     assert words in _run(capsys, str(path))[1]
     assert json.loads(_run(capsys, "free-dome", "--json")[1])["stated"] is None
+
+
+def test_masses_on_the_rim_unbalance_it(capsys, tmp_path):
+    """A point mass of the card's [[imperfection.mass]] is the same first and third harmonic as given ones, and damps unequally."""
+    stem = {"support": "stem", "stem": {"radius_mm": 2.5, "end_mm": -5.0, "fillet_mm": 0.5}}
+    card = DOME | {"resonator": DOME["resonator"] | stem}
+    given = {
+        "unbalance_mg": 10.0,
+        "unbalance_azimuth_deg": 20.0,
+        "third_unbalance_mg": 10.0,
+        "third_unbalance_azimuth_deg": 20.0,
+    }
+    masses = {"mass": [{"mass_ug": 1e4, "azimuth_deg": 20.0}]}
+    found = []
+    for name, tables in (("keys", {"loss": given}), ("mass", {"imperfection": masses})):
+        path = tmp_path / f"{name}.toml"
+        path.write_text(tomli_w.dumps(card | tables), encoding="utf-8")
+        status, out, _ = _run(capsys, str(path), "--json", "--from", "20", "--to", "20")
+        assert status == 0
+        found.append(json.loads(out))
+    one, other = ({part["name"]: part["inverse_q"][0] for part in payload["parts"]}["unbalance"] for payload in found)
+    assert one > 0
+    assert other == pytest.approx(one, rel=1e-9)
+    around, again = (payload["anisotropy"]["inverse_q_split"][0] for payload in found)
+    assert 0 < around <= 2 * one * (1 + 1e-9)
+    assert again == pytest.approx(around, rel=1e-9)

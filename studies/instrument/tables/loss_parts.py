@@ -10,8 +10,10 @@
     surface_anisotropy = 0.01           # wave 2n around of the surface's loss; × e
     surface_anisotropy_angle_deg = 0.0  # azimuth of its crest; ± 13
     anchor_inverse_q = 1e-9             # what leaves through the mount
-    unbalance_mg = 0.1                  # first harmonic of the rim's mass, as of a point mass; needs a stem
-    unbalance_order = 1                 # 1 or 3
+    unbalance_mg = 0.1                  # first harmonic Σ m exp(iθ) of the rim's mass, on a stem; ± 50 %. Masses of
+    unbalance_azimuth_deg = 0.0         # [[imperfection.mass]] on the rim count besides
+    third_unbalance_mg = 0.0            # the third, Σ m exp(3iθ); ± 50 %. Both together damp the patterns unequally
+    third_unbalance_azimuth_deg = 0.0
 
     [[loss.film]]                       # conducting films; a film of the table (gold, chromium, …) or with its own numbers
     material = "gold"
@@ -91,7 +93,9 @@ class LossParts(Table, frozen=True, kw_only=True):
     surface_anisotropy_angle_deg: Annotated[float, number(sd=13.0)] = 0.0
     anchor_inverse_q: Annotated[float, number(least=0.0, relative_sd=1.0)] | None = None
     unbalance_mg: Annotated[float, number(least=0.0, relative_sd=0.5)] | None = None
-    unbalance_order: Literal[1, 3] = 1
+    unbalance_azimuth_deg: float = 0.0
+    third_unbalance_mg: Annotated[float, number(least=0.0, relative_sd=0.5)] | None = None
+    third_unbalance_azimuth_deg: float = 0.0
     film: tuple[FilmKeys, ...] = ()
     activated: tuple[ActivatedKeys, ...] = ()
 
