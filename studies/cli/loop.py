@@ -135,7 +135,7 @@ def loop(
         "± one standard deviation, from the card's uncertain values; all: with the axes and the split that they share.",
     )
     print_table(
-        "Noise of the held rate by source",
+        "Noise of the rate by source",
         ["source", "deg/h over 1 s", "deg/√h"],
         [[NOISE_NAMES[name], f"{one:.3g}", f"{walk:.3g}"] for name, (one, walk) in study.noise.items()],
         "deg/√h from a mean over 100 s.",

@@ -298,19 +298,34 @@ def _step(bias: Callable[[dict[str, float]], float], value: float, sd: float, ke
 def _noise_of(
     wave: StandingWave, electronics: Electronics, loops: Loops, instrument: "Instrument", names: tuple[str, ...]
 ) -> tuple[float, float]:
-    """Deg/h of a mean of the held rate over 1 s, and deg/√h from a mean over 100 s, of these sources together."""
+    """Deg/h of a mean of the rate over 1 s, and deg/√h from a mean over 100 s, of these sources together."""
     only = Noise(**{name: getattr(electronics.noise, name) for name in names})
-    angle = float(np.radians(instrument.bias.pattern_angle_deg))
-    loop: ClosedLoop = close_loops(wave, Electronics(electronics.pickoff, electronics.drive, only), loops, 0.0, angle)[
-        0
-    ]
+    if require_loop(instrument).mode == "whole-angle":
+        spread = [_free_spread(wave, only, loops, seconds) for seconds in (1.0, 100.0)]
+    else:
+        angle = float(np.radians(instrument.bias.pattern_angle_deg))
+        held = Electronics(electronics.pickoff, electronics.drive, only)
+        spread = _held_spread(close_loops(wave, held, loops, 0.0, angle)[0], (1.0, 100.0))
+    one, hundred = (value / wave.coupling * DEG_PER_H for value in spread)
+    return one, hundred * 10 / 60
+
+
+def _free_spread(wave: StandingWave, noise: Noise, loops: Loops, seconds: float) -> float:
+    """Spread of the mean turn ψ̇ (1/s) of a free wave: forces across it walk, readings at both ends scatter."""
+    walk = noise.thermal**2 + noise.command_variance(loops.sampling) / loops.sampling
+    reading = noise.measurement_variance(loops.sampling) * loops.smoothing / (2 - loops.smoothing)
+    return float(np.sqrt(walk / seconds + 2 * reading / seconds**2))
+
+
+def _held_spread(loop: ClosedLoop, lengths: tuple[float, ...]) -> list[float]:
+    """Spread of the mean rate command (1/s) over rows of these lengths (s), the loops settled before."""
     at = loop.places
-    settled = loop.row(round(100 * loops.sampling)).covariance.copy()
+    settled = loop.row(round(100 * loop.loops.sampling)).covariance.copy()
     settled[at["sum"]] = settled[:, at["sum"]] = settled[at["wave_sum"]] = settled[:, at["wave_sum"]] = 0.0
-    means = []
-    for seconds in (1.0, 100.0):
-        row = loop.row(round(seconds * loops.sampling))
+    spread = []
+    for seconds in lengths:
+        row = loop.row(round(seconds * loop.loops.sampling))
         total = row.map @ settled @ row.map.T + row.covariance
         place = at["sum"].start + 2
-        means.append(np.sqrt(max(total[place, place], 0.0)) / row.samples / wave.coupling * DEG_PER_H)
-    return float(means[0]), float(means[1] * 10 / 60)
+        spread.append(float(np.sqrt(max(total[place, place], 0.0)) / row.samples))
+    return spread

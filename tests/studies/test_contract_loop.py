@@ -79,3 +79,13 @@ def test_uncertainties_of_the_loops_hold_only_where_the_card_has_them(card):
 def test_half_of_the_thermal_noise_is_refused(card, capsys):
     assert main(["loop", card("vibration_um = 1.0\n")]) == 2
     assert "needs both vibration_um and modal_mass_mg" in capsys.readouterr().err
+
+
+def test_noise_of_a_free_wave_is_what_its_run_shows(card, tmp_path, capsys):
+    path = card('mode = "whole-angle"\nvibration_um = 1.0\nmodal_mass_mg = 500.0\n')
+    out = tmp_path / "run.csv"
+    assert main(["loop", path, "--json", "--out", str(out), "--hours", "0.5"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert [margin["paper"] for margin in found["margins"]] == ["GA", "GF", "GQ"]
+    one = next(noise for noise in found["noise"] if noise["source"] == "all")["deg_per_h_over_1s"]
+    assert np.std(read_record(out)["bias_deg_per_h"]) == pytest.approx(one, rel=0.06)
