@@ -50,6 +50,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "card new": ("studies.cli.new:card", "A card of your own to start from."),
     "study new": ("studies.cli.new:study", "The spec of a study to start from."),
     "materials": ("studies.cli.cards:materials", "The materials and their published laws."),
+    "effects": ("studies.cli.effects:effects", "The physical effects that a diagnosis can name and a card can have."),
     "doctor": ("studies.cli.doctor:doctor", "Show what this environment has and what it lacks."),
 }
 EPILOGUE = "Every command that computes takes --json. --debug shows the traceback of an error."

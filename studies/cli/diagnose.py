@@ -7,8 +7,8 @@ def diagnose(
     save: str | None = None,
     report: str | None = None,
     plan: list[str] | None = None,
-    calibrate: bool = False,
-    draws: int = 300,
+    chamber: str | None = None,
+    draws: int = 100,
     seed: int = 0,
     json: bool = False,
 ) -> int:
@@ -29,10 +29,10 @@ def diagnose(
     plan : list[str]
         Chamber profiles of a planned campaign, in words or as files, one a run: predict which effects it could tell
         apart. Further profiles may follow without --plan.
-    calibrate : bool
-        Draw the null of this campaign for the thresholds, instead of the shipped, conservative ones (slower).
+    chamber : str
+        What the chamber can do, such as "rate 3 range -40 85" (K/min, °C): for --plan and for the suggested next run.
     draws : int
-        Number of draws for --calibrate; for --plan, four times the cases of each effect at each SNR (1, 0.3, 0.1).
+        With --plan, four times the cases of each effect at each SNR (1, 0.3, 0.1).
     seed : int
         Of the draws.
     json : bool
@@ -45,16 +45,22 @@ def diagnose(
         os.environ.setdefault(name, "1")
 
     from studies.cli.output import print_json, print_table, say
+    from studies.cli.telling import Told
+    from studies.diagnosis.planning.chamber import parse_chamber
     from studies.errors import InputError
     from studies.files.columns import read_header
     from studies.files.writing import write_text
 
+    limits = None if chamber is None else parse_chamber(chamber)
     if plan:
-        from studies.diagnosis.plan import plan_campaign
+        from studies.diagnosis.planning.plan import plan_campaign
         from studies.reports.plan import headline, plan_page, plan_table
 
         profiles = [*plan, *runs]
-        outlook = plan_campaign(profiles, seed=seed, cases=max(4, min(draws, 2000) // 4), card=card)
+        cases = max(4, min(draws, 2000) // 4)
+        told = Told("plan")
+        outlook = plan_campaign(profiles, seed=seed, cases=cases, card=card, chamber=limits, progress=told)
+        told.done()
         if report is not None:
             write_text(report, plan_page(outlook, profiles))
             say(f"report: {report}")
@@ -67,8 +73,6 @@ def diagnose(
         return 0
     if not runs:
         raise InputError("give the records of one gyro: hrg diagnose RUN.csv [RUN.csv ...].")
-    if draws < 20:
-        raise InputError(f"--draws {draws}: a threshold needs 20 draws or more.")
     if save is not None and card is None:
         raise InputError("--save writes an extended card, so it needs --card CARD to extend.")
 
@@ -108,12 +112,9 @@ def diagnose(
     law = None
     if instrument is not None:
         law = relative_law(instrument, np.concatenate([np.empty(0), *(run.states.housing for run in campaign.runs)]))
-    diagnosis = investigate(
-        campaign,
-        law,
-        draws if calibrate else 0,
-        np.random.default_rng(seed),
-    )
+    told = Told("diagnosis")
+    diagnosis = investigate(campaign, law, progress=told, chamber=limits)
+    told.done()
     if save is not None and instrument is not None:
         save_card(extend(instrument, diagnosis), save)
         say(f"extended model: {save}")

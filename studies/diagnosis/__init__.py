@@ -1,8 +1,9 @@
 """What a simulation gets wrong: a campaign of records against a library of physical effects.
 
-`campaign` puts records on one grid (`checks`, `outliers`); `baseline` is what counts as the simulation; `effects` holds one
-file an effect; `scan`, `null` and `selection` find what is missing beyond chance, `clock` what a reference clock adds;
-`discrepancy` (smooth), `sharp` (bursts, steps, lines) and `patchwork` (effects that only patch up a curve) are the witnesses
-for what no effect explains; `verdict` puts it into words, `gain` measures the worth, `extension` makes a card of it;
-`next_run` and `plan` look ahead.
+`campaign` puts records on one grid (`checks`, `outliers`); `response` says what is diagnosed; `baseline` is what counts as
+the simulation; `noise` and `evidence` weigh linear models by marginal likelihood; `model` joins baseline and effects;
+`scan` looks at every shape of every effect, `search` grows models, `clock` lets a reference clock judge; `witness` looks for
+what no effect explains; `held_out` measures the worth, `verdict` finds the words, `investigate` is the whole of it.
+`table` does the same for steady-state tables, `extension` makes a card of the outcome, `planning` looks ahead.
+All constants are in `calibration.toml`.
 """

@@ -7,9 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from studies.diagnosis.checks import FEWEST_BINS, check_device, check_units
-from studies.diagnosis.effects import RESPONSES
 from studies.diagnosis.outliers import find_outliers
-from studies.diagnosis.states import FloatArray, States, average
+from studies.diagnosis.response import RESPONSES
+from studies.effects.states import FloatArray, States, average
 from studies.errors import InputError
 from studies.record import Record
 
@@ -66,6 +66,11 @@ class Campaign:
     notes: tuple[str, ...] = ()
     skipped: dict[str, str] = field(default_factory=dict)
     outliers: int = 0
+
+    @property
+    def clock_known(self) -> bool:
+        """Whether every run has a reference clock."""
+        return bool(self.runs) and all(run.clock_error is not None for run in self.runs)
 
     @property
     def records(self) -> tuple[int, ...]:

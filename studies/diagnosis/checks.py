@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from studies.diagnosis.states import FloatArray
+from studies.effects.states import FloatArray
 from studies.errors import InputError
 from studies.record import Record
 

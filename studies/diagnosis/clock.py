@@ -1,22 +1,19 @@
-"""What a reference clock says: it tells a drifting clock from an ageing frequency, and finds a drift that noise would hide."""
+"""What a reference clock says: it settles what a record of the frequency alone cannot, a drifting clock or an ageing gyro."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from studies.diagnosis.baseline import Term, fit_at, restricted
 from studies.diagnosis.campaign import Campaign
-from studies.diagnosis.effects import find_effect
-from studies.diagnosis.fit import fit_terms
-from studies.diagnosis.selection import Found, Rival, Selection
-from studies.diagnosis.states import average
-from studies.diagnosis.thermometer import corrected
+from studies.diagnosis.evidence import solve
+from studies.diagnosis.model import Fit, Term, fit
+from studies.diagnosis.search import Hypothesis, Place, Selection
+from studies.effects import Effect, library
+from studies.effects.states import average
 
-CLOCK_PAIR = ("clock-drift", "ageing")
 CLEAR = 4.0
-"""Standard deviations at which a drift of the clock is believed."""
-AGREE = 4.0
-"""Standard deviations within which the record must show the drift that the comparison of the clocks shows."""
+"""Standard deviations at which a drift of the clock is believed, and within which the record must agree."""
 INDEPENDENT = 10.0
 """Neighbouring rows share slow noise: one row in so many counts as independent."""
 
@@ -26,10 +23,9 @@ def clock_slope(campaign: Campaign) -> tuple[float, float] | None:
 
     None where no reference was recorded.
     """
-    errors = [run.clock_error for run in campaign.runs if run.clock_error is not None]
-    if not campaign.runs or len(errors) < len(campaign.runs):
+    if not campaign.clock_known:
         return None
-    error = np.concatenate(errors)
+    error = np.concatenate([run.clock_error for run in campaign.runs if run.clock_error is not None])
     days = np.concatenate([average(run.states.campaign_time, campaign.group) for run in campaign.runs]) / 86400.0
     known = np.isfinite(error)
     if known.sum() < INDEPENDENT:
@@ -40,27 +36,55 @@ def clock_slope(campaign: Campaign) -> tuple[float, float] | None:
     return float(line[0]), float(spread)
 
 
-def clock_drifts(campaign: Campaign) -> bool | None:
-    """Whether the gyro's clock drifts against the reference clock; None where no reference was recorded."""
+def judged(campaign: Campaign, selection: Selection, effects: Sequence[Effect] | None) -> Selection:
+    """Return the selection with what a reference clock settles: which of two equal effects it is, and a drift it shows."""
     slope = clock_slope(campaign)
-    return None if slope is None else abs(slope[0]) > CLEAR * slope[1]
-
-
-def with_clock(selection: Selection, campaign: Campaign) -> Selection:
-    """Return the selection with the drift that a reference clock shows, where the record agrees and nothing names it yet."""
-    slope = clock_slope(campaign)
-    if slope is None or any(found.name in CLOCK_PAIR for found in selection.found):
+    problem = selection.plain.fit.problem
+    chosen = library().values() if effects is None else effects
+    judges = [e for e in chosen if e.judge == "reference_frequency_Hz" and problem.response.column in e.sizes]
+    if slope is None or not judges:
         return selection
     drift, spread = slope
-    evidence = (drift / max(spread, 1e-300)) ** 2
-    if evidence < max(selection.threshold, CLEAR**2):
+    drifts = abs(drift) > CLEAR * spread
+    own = judges[0]
+    pair = {own.name, *own.equivalents.get(problem.response.column, ())}
+    places = list(selection.places)
+    for number, place in enumerate(places):
+        if place.names[0] in pair:
+            wanted = [
+                (n, r)
+                for n, r in zip(place.names, place.rivals, strict=True)
+                if n not in pair or (n == own.name) == drifts
+            ]
+            if wanted:
+                best = max((r for n, r in wanted if n in pair), key=lambda r: r.score, default=wanted[0][1])
+                rivals = (best, *(r for _, r in wanted if r is not best))
+                places[number] = replace(place, rivals=rivals)
+                final = best if len(places) == 1 else selection.final
+                return replace(selection, final=final, places=tuple(places))
+    if not drifts:
         return selection
-    term = Term(find_effect(CLOCK_PAIR[0]), (), 1)
-    fit = corrected(fit_terms(selection.fit.problem, (*selection.fit.terms, term)))
-    # beside a random walk: stationary noise would not let a record wander from run to run
-    walking = fit_at(restricted(fit.problem, kernel="walk"), fit.problem.tau, fit.terms)
-    own, deviation = walking.coefficients[-1], np.sqrt(walking.covariance[-1, -1])
-    if abs(own - drift) > AGREE * np.hypot(deviation, spread):
+    now = selection.final
+    term = Term(own, ())
+    model = fit(problem, now.fit.moved(), (*now.fit.terms, term), 2, np.append(now.fit.solved.scales, 0.1))
+    value, deviation = _own_drift(model)
+    if abs(value - drift) > CLEAR * np.hypot(deviation, spread):
         return selection
-    found = Found(len(fit.terms) - 1, term.name, evidence, (Rival(term.name, evidence, fit),))
-    return replace(selection, fit=fit, found=tuple(sorted((*selection.found, found), key=lambda f: -f.evidence)))
+    added = Hypothesis(model, (*now.price, 0.5 * (drift / spread) ** 2))
+    place = Place(len(model.terms) - 1, (added,), now)
+    return replace(selection, final=added, places=(*selection.places, place))
+
+
+def _own_drift(model: Fit) -> tuple[float, float]:
+    """Return the drift that the record alone shows, Hz per day, and its standard deviation, beside a random walk.
+
+    Without a prior, and beside a walk: stationary noise would not let a record wander from run to run.
+    """
+    linear = model.linear
+    last = int(np.flatnonzero(linear.owner == len(model.terms) - 1)[0])
+    order = [last, *(k for k in range(linear.owner.size) if k != last)]
+    prior, owner = linear.prior[order].copy(), linear.owner[order].copy()
+    prior[0], owner[0] = np.inf, -1
+    free = replace(linear, columns=linear.columns[:, order], prior=prior, owner=owner)
+    found = solve(free, len(model.terms) - 1, model.solved.scales[:-1], [0])
+    return float(found.coefficients[0]), float(np.sqrt(found.covariance[0, 0]))

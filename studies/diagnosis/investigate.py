@@ -1,52 +1,71 @@
 """The diagnosis of a campaign, from records to verdict."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from studies.diagnosis.advice import suggest_next
-from studies.diagnosis.baseline import Law, Problem, choose_kernel, choose_kernel_score, pose, span_of
+from studies.diagnosis import held_out
+from studies.diagnosis.baseline import Baseline, Followed, Lagged, Law, bends_of
 from studies.diagnosis.campaign import Campaign
 from studies.diagnosis.checks import FEWEST_BINS
-from studies.diagnosis.clock import CLOCK_PAIR, clock_drifts, with_clock
-from studies.diagnosis.consistency import consistency
-from studies.diagnosis.discrepancy import Leftover, generic_bases, leftover_evidence, strongest
-from studies.diagnosis.effects import Effect
-from studies.diagnosis.fit import fit_terms, intervals
-from studies.diagnosis.gain import Score, rms, row_residuals, score
-from studies.diagnosis.innovations import find_lines
-from studies.diagnosis.null import bootstrap_levels, draw_null, levels_of, shipped_levels
-from studies.diagnosis.patchwork import patched
+from studies.diagnosis.clock import judged
+from studies.diagnosis.constants import CONSTANTS
+from studies.diagnosis.held_out import Score
+from studies.diagnosis.model import Fit, Problem, fit, pose, settle
+from studies.diagnosis.planning.chamber import Chamber
+from studies.diagnosis.response import RESPONSES
 from studies.diagnosis.scan import applicable, build_bank
-from studies.diagnosis.selection import BESIDE, Found, Selection, scan_model, scan_models, select
-from studies.diagnosis.sharp import sharp_leftover
-from studies.diagnosis.thermometer import Thermometer, read_thermometer, smooth_thermometer
-from studies.diagnosis.verdict import Cause, ResponseResult, Verdict, equivalent_to, overall, probability_of
+from studies.diagnosis.search import Hypothesis, Place, Selection, drop, search
+from studies.diagnosis.verdict import Cause, Interval, ResponseResult, Verdict, overall, weigh
+from studies.diagnosis.witness import Leftover, look
+from studies.effects import Effect
+from studies.effects.states import FloatArray, States
 
-THRESHOLD = 26.0
-"""Net evidence that a cause needs: on the generator, nulls with 1/f noise reached 25 in 2 of 57 campaigns."""
-SPARSE = 60.0
-"""Sampling, s, beyond which thresholds of the frequency grow: the housing between two rows is anyone's guess."""
-LEFT_OVER, LEFT_OVER_SHARE = 30.0, 0.03
-"""Evidence of the generic witness that counts, and its least part of what was explained: no noise model is exact."""
-FURTHER = 50.0
-"""Evidence at which a further cause beside the strongest deserves two thirds of its claim (measured on the generator)."""
-LEAK = 0.002
-"""Part of the evidence in the frequency that a cause in another response must have: its thermometer is not exact."""
 NARROW_RANGE = 1.0
-PREFERENCE = 6.0
-"""How much likelier another thermometer than the corrected frequency must be."""
+"""Kelvin below which a temperature does not vary."""
+VOTERS = 4
+Progress = Callable[[str], None]
+
+
+@dataclass(frozen=True)
+class Thermometer:
+    """The temperature of the resonator as the fitted thermometer response tells it.
+
+    Attributes
+    ----------
+    change, excess : tuples of (N,) arrays
+        Change of frequency over its slope, K, and temperature minus reference, K, run by run on the coarse grid.
+    missed : tuple of (N,) arrays
+        Slow part of what the model leaves, as if it were temperature, K.
+    states : tuple of States
+        Runs on the fine grid with that temperature.
+    """
+
+    change: tuple[FloatArray, ...]
+    excess: tuple[FloatArray, ...]
+    missed: tuple[FloatArray, ...]
+    states: tuple[States, ...]
 
 
 @dataclass(frozen=True)
 class Inquiry:
-    """One response under inquiry: its selection and what the generic witness saw after it."""
+    """One response under inquiry."""
 
     problem: Problem
     selection: Selection
     leftover: Leftover
-    evidence_levels: Mapping[str, float]
+    votes: Mapping[str, float]
+
+    @property
+    def plain(self) -> Fit:
+        """The baseline alone."""
+        return self.selection.plain.fit
+
+    @property
+    def final(self) -> Fit:
+        """With the named effects."""
+        return self.selection.final.fit
 
 
 @dataclass(frozen=True)
@@ -61,10 +80,12 @@ class Diagnosis:
 def investigate(
     campaign: Campaign,
     law: Law | None = None,
-    draws: int = 0,
-    rng: np.random.Generator | None = None,
     effects: Sequence[Effect] | None = None,
-    held_out: bool = True,
+    score_held_out: bool = True,
+    advise: bool = True,
+    progress: Progress | None = None,
+    chamber: Chamber | None = None,
+    baselines: Mapping[str, Callable[[Problem], Baseline]] | None = None,
 ) -> Diagnosis:
     """Find what the baseline leaves, name it, and measure what the extension is worth.
 
@@ -73,191 +94,309 @@ def investigate(
     campaign : Campaign
     law : callable, optional
         Relative frequency law of the card, of temperature in K.
-    draws : int
-        Draws of this campaign's own null for thresholds; 0 takes the shipped, conservative ones.
-    rng : numpy Generator, optional
-        For the draws.
     effects : sequence of Effect, optional
         A smaller library.
-    held_out : bool
-        Measure the gain, the slowest part.
+    score_held_out : bool
+        Measure the gain, and refuse causes that do not pay on rows that the fit has not seen.
+    advise : bool
+        Look for the next run.
+    progress : callable, optional
+        Is told in a few words what comes next.
+    chamber : Chamber, optional
+        What the next run may ask of the chamber.
+    baselines : mapping from response to callable, optional
+        Other baselines than the generic ones.
     """
-    rng = np.random.default_rng(0) if rng is None else rng
+    tell = progress or (lambda words: None)
     inquiries: dict[str, Inquiry] = {}
     thermometer: Thermometer | None = None
-    for response in campaign.responses:
-        problem = _pose_one(campaign, response, inquiries, thermometer, law)
-        if problem is None:
+    for column in (c for c in RESPONSES if c in campaign.responses):
+        rows = sum(int(np.isfinite(run.responses[column]).sum()) for run in campaign.runs)
+        if rows < FEWEST_BINS + 2 * len(campaign.runs):
             continue
-        if response != "frequency_Hz" and "frequency_Hz" in inquiries:
-            problem, thermometer = _best_thermometer(campaign, response, inquiries["frequency_Hz"], problem)
-        threshold = THRESHOLD + LEAK * _explained(inquiries)
-        if response == "frequency_Hz":
-            threshold *= max(1.0, campaign.runs[0].states.step / SPARSE)
-        inquiries[response] = inquire(campaign, problem, draws, rng, effects, threshold)
-        if response == "frequency_Hz":
-            thermometer = read_thermometer(campaign, inquiries[response].selection.fit)
-    causes = merge_causes(inquiries, campaign)
+        tell(f"{RESPONSES[column].word}: baseline, then every effect")
+        make = (baselines or {}).get(column)
+        plain = begin(campaign, column, thermometer, law, make)
+        inquiries[column] = inquire(campaign, plain, effects, score_held_out)
+        if RESPONSES[column].thermometer:
+            thermometer = read_thermometer(campaign, inquiries[column].final)
+    inquiries = _vote(campaign, inquiries, effects, score_held_out)
+    tell("held-out residuals")
+    causes = name_causes(campaign, inquiries)
     results = {
-        response: _result(campaign, inquiries[response], causes, held_out)
-        if response in inquiries
+        column: _result(campaign, inquiries[column], causes, score_held_out)
+        if column in inquiries
         else _too_little("too few values")
-        for response in campaign.responses
+        for column in campaign.responses
     }
-    for response, reason in campaign.skipped.items():
-        results[response] = _too_little(reason)
+    for column, reason in campaign.skipped.items():
+        results[column] = _too_little(reason)
     verdict = overall([result.verdict for result in results.values()])
-    selections = {response: inquiry.selection for response, inquiry in inquiries.items()}
-    advice, run = suggest_next(campaign, verdict, causes, results, selections)
-    return Diagnosis(Verdict(verdict, causes, results, advice, campaign.notes, next_run=run), campaign, inquiries)
+    found = Verdict(verdict, causes, results, None, campaign.notes)
+    if advise:
+        tell("next run")
+        from studies.diagnosis.planning.advice import suggest_next
+
+        text, run = suggest_next(campaign, found, inquiries, chamber)
+        found = replace(found, next_experiment=text, next_run=run)
+    return Diagnosis(found, campaign, inquiries)
 
 
 def _too_little(reason: str) -> ResponseResult:
     return ResponseResult("not-identifiable", None, (None, None), None, "none", remark=reason)
 
 
-def _pose_one(
+def begin(
     campaign: Campaign,
-    response: str,
-    inquiries: Mapping[str, Inquiry],
+    column: str,
     thermometer: Thermometer | None,
-    law: Law | None,
-) -> Problem | None:
-    rows = sum(int(np.isfinite(run.responses[response]).sum()) for run in campaign.runs)
-    if rows < FEWEST_BINS + 2 * len(campaign.runs):
-        return None
-    if thermometer is None:
-        return pose(campaign, response, law=law)
-    readings = thermometer.change if response == "bias_deg_per_h" else thermometer.excess
-    return pose(campaign, response, readings, thermometer.states)
-
-
-def _best_thermometer(
-    campaign: Campaign, response: str, frequency: Inquiry, clean_problem: Problem
-) -> tuple[Problem, Thermometer | None]:
-    """Take the frequency without or with its non-thermal terms, or its fitted model: whichever the response follows.
-
-    Noise of the frequency that is no temperature would otherwise enter the response through the polynomial.
-    """
-    fit = frequency.selection.fit
-    clean = read_thermometer(campaign, fit)
-    if clean is None:
-        return clean_problem, clean
-    others = [smooth_thermometer(campaign, clean, fit.problem.bend)]
-    if any(term.effect.acts_on == "response" for term in fit.terms):
-        others.append(read_thermometer(campaign, fit, clean=False) or clean)
-    best, least = clean_problem, choose_kernel_score(clean_problem) - PREFERENCE
-    for other in others:
-        problem = _pose_one(campaign, response, {}, other, None)
-        if problem is not None and (tried := choose_kernel_score(problem)) < least:
-            best, least = problem, tried
-    return best, clean
-
-
-def inquire(
-    campaign: Campaign,
-    problem: Problem,
-    draws: int,
-    rng: np.random.Generator,
-    effects: Sequence[Effect] | None,
-    threshold: float = THRESHOLD,
-) -> Inquiry:
-    """Select the effects of one response and ask the generic witness about the rest."""
-    problem = choose_kernel(problem)
-    span = span_of(campaign, problem.tau if problem.lagged else 1000.0)
-    usable = applicable(problem, effects)
-    bank = None
-    plain = fit_terms(problem, ())
-    levels = shipped_levels([effect.name for effect in usable])
-    bases = generic_bases(problem)
-    generic_levels: dict[str, float] = {}
-    if draws:
-        bank = build_bank(problem, replace(span, lines=find_lines(plain)), usable)
-        levels = bootstrap_levels(problem, bank, scan_models(plain, bank), draws, rng)
-        noise = draw_null(problem, scan_model(plain), min(draws, 100), rng)
-        generic_levels = {
-            name: float(levels_of(values[None, :])[0])
-            for name, values in leftover_evidence(plain, bases, noise).items()
-        }
-    selection = select(problem, span, levels, threshold, effects, bank)
-    if problem.response == "frequency_Hz" and any(effect.name == CLOCK_PAIR[0] for effect in usable):
-        selection = with_clock(selection, campaign)
-    leftover = strongest(leftover_evidence(selection.fit, bases), generic_levels)
-    if patched(selection.fit):
-        leftover = Leftover(
-            "temperature and time, where the named effects cancel or overlap",
-            max(selection.found[-1].evidence, leftover.evidence),
+    law: Law | None = None,
+    make: Callable[[Problem], Baseline] | None = None,
+) -> Fit:
+    """Return the fitted baseline of one response."""
+    response = RESPONSES[column]
+    problem = pose(campaign, column, 1000.0)
+    states = tuple(run.states for run in campaign.runs)
+    baseline: Baseline
+    if make is not None:
+        baseline = make(problem)
+    elif thermometer is None or response.thermometer:
+        baseline = Lagged(
+            response,
+            states,
+            campaign.group,
+            1000.0,
+            _slope(problem, housing := [s.averaged(campaign.group).excess for s in states]),
+            law=law if response.thermometer else None,
+            bends=bends_of(problem.values, problem.stack(housing), response.powers),
         )
-    sharp = sharp_leftover(selection.fit)
-    if sharp.evidence > max(leftover.evidence, BESIDE * (selection.plain.score - selection.fit.score)):
-        leftover = sharp
-    return Inquiry(problem, selection, leftover, levels)
+    else:
+        reading = thermometer.change if response.bent else thermometer.excess
+        baseline = Followed(
+            response,
+            thermometer.states,
+            campaign.group,
+            reading,
+            thermometer.missed,
+            _slope(problem, reading),
+            bends=bends_of(problem.values, problem.stack(list(reading)), response.powers),
+        )
+    first = settle(problem, baseline)
+    tau = float(getattr(first.baseline, "tau", states[0].tau if thermometer is None else thermometer.states[0].tau))
+    problem = replace(pose(campaign, column, tau), sigma=float(np.sqrt(first.solved.variance)))
+    return fit(problem, first.moved(), (), 2)
 
 
-def _explained(inquiries: Mapping[str, Inquiry]) -> float:
-    frequency = inquiries.get("frequency_Hz")
-    return 0.0 if frequency is None else frequency.selection.plain.score - frequency.selection.fit.score
+def _slope(problem: Problem, reading: Sequence[FloatArray]) -> float:
+    x = problem.stack(list(reading))
+    varies = float(np.ptp(x)) > 1e-9
+    slope = float(np.polyfit(x, problem.values, 1)[0]) if varies else 0.0
+    return slope or float(np.std(problem.values)) / 10.0 or 1.0
 
 
-def has_leftover(inquiry: Inquiry) -> bool:
-    """Whether structure is left: the generic evidence passes its threshold and is not a trifle beside what was explained."""
-    selection = inquiry.selection
-    explained = max(selection.plain.score - selection.fit.score, 0.0)
-    return inquiry.leftover.evidence > max(selection.threshold, LEFT_OVER, LEFT_OVER_SHARE * explained)
+def inquire(campaign: Campaign, plain: Fit, effects: Sequence[Effect] | None, score_held_out: bool) -> Inquiry:
+    """Select the effects of one response, refuse what does not pay, and ask the witnesses about the rest."""
+    bank = build_bank(plain, applicable(plain.problem, plain, effects))
+    selection = search(plain, bank)
+    selection = judged(campaign, selection, effects)
+    if score_held_out:
+        selection = refuse(campaign, selection)
+    return Inquiry(plain.problem, selection, look(plain, selection.final.fit), {})
 
 
-def merge_causes(inquiries: Mapping[str, Inquiry], campaign: Campaign) -> tuple[Cause, ...]:
+def refuse(campaign: Campaign, selection: Selection) -> Selection:
+    """Drop causes, the weakest first, until the extended model is better on rows that it has not seen."""
+    while selection.final.fit.terms:
+        model, plain = selection.final.fit, selection.plain.fit
+        events = any(term.effect.event for term in model.terms)
+        measure = held_out.by_block if events or len(campaign.records) == 1 else held_out.by_record
+        before, after = measure(plain, campaign), measure(model, campaign)
+        if before is None or after is None or after < before:
+            break
+        weakest = max(range(len(model.terms)), key=lambda k: drop(selection.final, k).score)
+        fewer = drop(selection.final, weakest)
+        kept = [place for k, place in enumerate(selection.places) if k != weakest]
+        selection = replace(selection, final=fewer, places=tuple(kept))
+    return selection
+
+
+def read_thermometer(campaign: Campaign, model: Fit) -> Thermometer | None:
+    """Turn the fitted frequency into a thermometer; None where it hardly follows the temperature."""
+    baseline = model.moved()
+    places = [k for k, name in enumerate(model.tangent.names) if name == "slope"]
+    if not isinstance(baseline, Lagged) or not places:
+        return None
+    slope, spread = model.solved.coefficients[places[0]], np.sqrt(model.solved.covariance[places[0], places[0]])
+    if not np.isfinite(spread) or abs(slope) < 3.0 * spread:
+        return None
+    slow = model.slow_part()
+    changes, excesses, missed, states = [], [], [], []
+    for run, view, rest in zip(campaign.runs, baseline.views(), slow, strict=True):
+        x = view.seen.excess
+        known = np.isfinite(rest)
+        filled = np.interp(run.time, run.time[known], rest[known]) if known.any() else np.zeros_like(x)
+        excesses.append(x)
+        changes.append(x + baseline.bend * x**2)
+        missed.append(filled / np.where(np.abs(view.steep) > 0, view.steep, np.inf))
+        states.append(view.seen_fine)
+    return Thermometer(tuple(changes), tuple(excesses), tuple(missed), tuple(states))
+
+
+def _vote(
+    campaign: Campaign, inquiries: dict[str, Inquiry], effects: Sequence[Effect] | None, score_held_out: bool
+) -> dict[str, Inquiry]:
+    """Let the other responses say which explanation of the thermometer suits them; ask them anew where it changes.
+
+    A shift of the frequency that is temperature shows in bias and 1/Q as well, one that is none does not.
+    """
+    column = next((c for c in inquiries if RESPONSES[c].thermometer), None)
+    others = [c for c in inquiries if not RESPONSES[c].thermometer]
+    if column is None or not others or not inquiries[column].selection.places:
+        return inquiries
+    inquiry = inquiries[column]
+    votes: dict[str, float] = {}
+    best = inquiry.selection.places[0]
+    for place in inquiry.selection.places:
+        for name, rival in list(zip(place.names, place.rivals, strict=True))[:VOTERS]:
+            votes[_key(place, name)] = sum(_suits(campaign, rival.fit, inquiries[c]) for c in others)
+    out = dict(inquiries)
+    out[column] = replace(inquiry, votes=votes)
+    place = best
+    ranked = sorted(zip(place.names, place.rivals, strict=True), key=lambda pair: -_voted(votes, place, *pair))
+    if len(inquiry.selection.places) == 1 and ranked[0][0] != place.names[0] and _key(place, ranked[0][0]) in votes:
+        winner = ranked[0][1]
+        selection = replace(inquiry.selection, final=winner)
+        out[column] = replace(inquiry, selection=selection, leftover=look(inquiry.plain, winner.fit), votes=votes)
+        thermometer = read_thermometer(campaign, winner.fit)
+        for c in others:
+            out[c] = inquire(campaign, begin(campaign, c, thermometer), effects, score_held_out)
+    return out
+
+
+def _key(place: Place, name: str) -> str:
+    return f"{place.index} {name}"
+
+
+def _voted(votes: Mapping[str, float], place: Place, name: str, rival: Hypothesis) -> float:
+    least = min(votes.values(), default=0.0)
+    return rival.score + votes.get(_key(place, name), least)
+
+
+def _suits(campaign: Campaign, rival: Fit, other: Inquiry) -> float:
+    """Log evidence of another response, its own causes included, when the thermometer is read by a rival."""
+    thermometer = read_thermometer(campaign, rival)
+    baseline = other.final.baseline
+    if thermometer is None or not isinstance(baseline, Followed):
+        return other.final.log_evidence
+    reading = thermometer.change if other.problem.response.bent else thermometer.excess
+    moved = replace(baseline, states=thermometer.states, reading=reading, missed=thermometer.missed)
+    return fit(other.problem, moved, other.final.terms, 2, other.final.solved.scales).log_evidence
+
+
+def name_causes(campaign: Campaign, inquiries: Mapping[str, Inquiry]) -> tuple[Cause, ...]:
     """List the causes, one entry a physical cause, under the response where its evidence is largest."""
-    causes: list[Cause] = []
-    drifts = clock_drifts(campaign)
-    for response, inquiry in inquiries.items():
-        seen: set[str] = set()
-        for found in inquiry.selection.found:
-            cause = _cause(inquiry, found, response, drifts if response == "frequency_Hz" else None)
-            if cause.effect in seen:
-                continue
-            seen.add(cause.effect)
-            causes.append(cause)
+    causes = [_cause(campaign, inquiry, place) for inquiry in inquiries.values() for place in inquiry.selection.places]
     causes.sort(key=lambda cause: -cause.evidence)
     kept: list[Cause] = []
     for cause in causes:
-        if any(_same_cause(cause, other) or _same_set(cause, other) for other in kept):
-            continue
-        kept.append(cause)
-    return tuple(
-        cause
-        if rank == 0
-        else replace(cause, probability=cause.probability * float(1.0 - np.exp(-cause.evidence / FURTHER)))
-        for rank, cause in enumerate(kept)
-    )
+        if not any(_same(cause, other) for other in kept):
+            kept.append(cause)
+    return tuple(kept)
 
 
-def _cause(inquiry: Inquiry, found: Found, response: str, drifts: bool | None = None) -> Cause:
-    winner = found.rivals[0]
-    equivalent = equivalent_to(found, response, drifts)
-    if drifts is not None and winner.name in CLOCK_PAIR:
-        named = next((r for r in found.rivals if r.name == CLOCK_PAIR[0 if drifts else 1]), None)
-        winner = winner if named is None else named
-    index = found.index if winner.name == found.name else len(winner.fit.terms) - 1
+def _cause(campaign: Campaign, inquiry: Inquiry, place: Place) -> Cause:
+    column = inquiry.problem.response.column
+    scores = [_voted(inquiry.votes, place, n, r) for n, r in zip(place.names, place.rivals, strict=True)]
+    base = min(inquiry.votes.values(), default=0.0)
+    own = max(r.score for r in place.rivals)
+    nothing = place.without.score + (max(scores) - own if inquiry.votes else 0.0) if base else place.without.score
+    members, probability = weigh(place.names, scores, nothing)
+    winner = place.rivals[int(np.argmax(scores))]
+    effect = winner.fit.terms[place.index].effect
+    exact = effect.equivalents.get(column, ())
+    settled = bool(effect.judge or any(_judge_of(n) for n in exact)) and campaign.clock_known
+    names = list(dict.fromkeys([effect.name, *members, *(() if settled else exact)]))
+    if settled:
+        names = [n for n in names if n == effect.name or n not in exact]
     return Cause(
-        winner.name,
-        response,
-        probability_of(found, equivalent, inquiry.selection.threshold, has_leftover(inquiry)),
-        equivalent,
-        intervals(winner.fit, index),
-        winner.evidence,
-        consistency(winner.fit, index),
+        effect.name,
+        column,
+        probability,
+        tuple(sorted(names[1:])),
+        parameters_of(winner.fit, place.index),
+        2.0 * max(max(scores) - nothing, 0.0),
+        peak=peak_of(winner.fit, place.index),
     )
 
 
-def _same_set(one: Cause, two: Cause) -> bool:
-    """Two members of one inseparable set in one response are two forms of one answer."""
-    return one.response == two.response and one.effect in two.equivalent and two.effect in one.equivalent
+def _judge_of(name: str) -> str:
+    from studies.effects import find_effect
+
+    return find_effect(name).judge
 
 
-def _same_cause(one: Cause, two: Cause) -> bool:
-    """The same effect in two responses is one cause when its shape agrees."""
-    if one.response == two.response or one.effect != two.effect:
+def parameters_of(model: Fit, index: int) -> dict[str, Interval]:
+    """Return shape and coefficients of a term with 90 % intervals; of lists the definite member."""
+    term = model.terms[index]
+    places = model.columns_of(index)
+    out: dict[str, Interval] = {}
+    spreads = shape_spread(model, index)
+    for parameter, value, sd in zip(term.effect.shape, term.shape, spreads, strict=True):
+        half = 1.645 * sd
+        if parameter.logarithmic and half > 0:
+            out[parameter.name] = Interval(value, value * float(np.exp(-half)), value * float(np.exp(half)))
+        else:
+            out[parameter.name] = Interval(value, value - half, value + half)
+    begin = 0
+    columns = np.flatnonzero(term.effect.spread > 0)
+    values = model.solved.coefficients[places]
+    deviations = np.sqrt(np.maximum(np.diag(model.solved.covariance)[places], 0.0))
+    for name, coefficient in zip(
+        term.effect.coefficient_names(model.problem.response.column), term.effect.coefficients, strict=True
+    ):
+        at = np.flatnonzero(columns == begin)
+        if at.size:
+            value, half = float(values[at[0]]), 1.645 * float(deviations[at[0]])
+            out[name] = Interval(value, value - half, value + half)
+        begin += len(coefficient.spread)
+    return out
+
+
+def shape_spread(model: Fit, index: int) -> list[float]:
+    """Return the standard deviation of every shape parameter (of its logarithm where it has one), from the curvature."""
+    from studies.diagnosis.model import Term
+
+    term = model.terms[index]
+    out = []
+    for k, parameter in enumerate(term.effect.shape):
+        if parameter.steady:
+            out.append(0.0)
+            continue
+        step = 0.03 if parameter.logarithmic else max(0.01 * abs(term.shape[k]), 0.05)
+        sides = []
+        for sign in (-1.0, 1.0):
+            value = term.shape[k] * float(np.exp(sign * step)) if parameter.logarithmic else term.shape[k] + sign * step
+            shape = (*term.shape[:k], value, *term.shape[k + 1 :])
+            terms = (*model.terms[:index], Term(term.effect, shape), *model.terms[index + 1 :])
+            own = fit(model.problem, model.baseline, terms, 1, model.solved.scales, [model.solved.kind])
+            sides.append(own.log_evidence)
+        bend = (2.0 * model.log_evidence - sides[0] - sides[1]) / step**2
+        out.append(float(1.0 / np.sqrt(bend)) if bend > 0 else step * 10.0)
+    return out
+
+
+def peak_of(model: Fit, index: int) -> float:
+    """Return the largest less the smallest change of the response that a term makes in the record."""
+    places = model.columns_of(index)
+    change = model.linear.columns[:, places] @ model.solved.coefficients[places]
+    return float(np.ptp(change)) if change.size else 0.0
+
+
+def _same(one: Cause, two: Cause) -> bool:
+    """The same effect in two responses is one cause when its place agrees; two members of one set are one answer."""
+    if one.response == two.response:
+        return one.effect in two.equivalent and two.effect in one.equivalent
+    if one.effect not in two.names and two.effect not in one.names:
         return False
     for name in ("time_s", "temperature_degC", "period_s", "run"):
         if name in one.parameters and name in two.parameters:
@@ -268,36 +407,56 @@ def _same_cause(one: Cause, two: Cause) -> bool:
     return True
 
 
-def _result(campaign: Campaign, inquiry: Inquiry, causes: Sequence[Cause], held_out: bool) -> ResponseResult:
-    selection = inquiry.selection
-    response = inquiry.problem.response
-    left = has_leftover(inquiry)
-    base = score(selection.plain, campaign) if held_out else Score(rms(row_residuals(selection.plain, campaign)), None)
-    extended = None
-    if selection.found:
-        extended = (
-            score(selection.fit, campaign) if held_out else Score(rms(row_residuals(selection.fit, campaign)), None)
-        )
+def _result(campaign: Campaign, inquiry: Inquiry, causes: Sequence[Cause], score_held_out: bool) -> ResponseResult:
+    plain, final, left = inquiry.plain, inquiry.final, inquiry.leftover
+
+    def measured(model: Fit) -> Score:
+        if score_held_out:
+            return held_out.score(model, campaign)
+        return Score(held_out.rms(held_out.residuals(model, campaign)), None)
+
+    base = measured(plain)
+    extended = measured(final) if final.terms else None
+    column = inquiry.problem.response.column
+    mine = [cause for cause in causes if cause.response == column and cause.kind == "physics"]
     remark = ""
-    if left:
+    share: float | None = None
+    if final.terms:
+        share = left.share if left.significant else 1.0
+    if left.significant and (share is None or share < CONSTANTS["share_explained"]):
         verdict = "unexplained"
-    elif selection.found:
-        drifts = clock_drifts(campaign) if response == "frequency_Hz" else None
-        ambiguous = any(equivalent_to(found, response, drifts) for found in selection.found)
-        verdict = "not-identifiable" if ambiguous else "explained"
+    elif final.terms:
+        verdict = "not-identifiable" if any(cause.equivalent for cause in mine) else "explained"
     else:
         verdict = "adequate"
         temperature = np.concatenate([run.states.housing for run in campaign.runs])
         if np.ptp(temperature) < NARROW_RANGE:
             verdict, remark = "not-identifiable", f"the temperature varies by {np.ptp(temperature):.2g} K only"
-    noise = (extended or base).residual_rms
+    reached = extended or base
+    white = float(np.sqrt(final.solved.variance * inquiry.problem.noise.rows))
+    wander = white * final.wander_ratio
     return ResponseResult(
         verdict,
-        noise,
+        reached.residual_rms,
         (base.residual_rms, base.held_out_rms),
         None if extended is None else (extended.residual_rms, extended.held_out_rms),
-        "structure" if left else "none",
-        inquiry.leftover.input if left else "",
-        inquiry.leftover.evidence,
+        "structure" if left.significant else "none",
+        left.input if left.significant else "",
+        2.0 * max(left.evidence, 0.0),
+        share,
         remark,
+        white=white,
+        wander=wander,
+        run_shifts=tuple(_run_shifts(final)),
     )
+
+
+def _run_shifts(model: Fit) -> list[float]:
+    """Return the offset of every run about their mean, or the mean residual where runs have none."""
+    values = model.values()
+    own = [value for name, value in values.items() if name.startswith("offset@")]
+    if own:
+        return [float(v - np.mean(own)) for v in own]
+    return [
+        float(np.nanmean(part)) if np.isfinite(part).any() else 0.0 for part in model.problem.unstack(model.residual)
+    ]

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from studies.diagnosis.states import FloatArray
+from studies.effects.states import FloatArray
 
 WINDOW, LIMIT = 11, 6.0
 """Rows of the running median, and robust standard deviations (1.4826 times the median absolute deviation) of the limit."""

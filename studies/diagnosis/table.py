@@ -1,39 +1,30 @@
-"""Diagnosis of a steady-state table: a few soaked points (T, f), like the HRG paper's Table 1.
+"""Diagnosis of a steady-state table: soaked points (T, f), like the HRG paper's Table 1.
 
-No time, no direction, no second run: the question is how far such a table can decide at all. The material law with
-free f₀ and slope is imposed first, then the curvature is freed (the baseline), then every candidate that can act in steady
-state is added, and counted with all its parameters.
+No time and, mostly, no second run: the question is how far such a table can decide at all. The material law with free f₀
+and slope is imposed first, then the curvature is freed (the baseline), then the steady form of every effect that has one is
+weighed by its marginal likelihood, in white noise (at least what rounding leaves) with a wander along the rows: a
+table is measured in some order, and its rows know of each other.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import logsumexp
 from scipy.stats import f as f_distribution
 
 from studies.diagnosis.baseline import Law
-from studies.diagnosis.extension import relative_law
-from studies.diagnosis.fit import Interval
-from studies.diagnosis.states import FloatArray
-from studies.diagnosis.verdict import Cause, ResponseResult, Verdict
+from studies.diagnosis.constants import CONSTANTS
+from studies.diagnosis.verdict import Cause, Interval, ResponseResult, Verdict, weigh
+from studies.effects import Effect, library
+from studies.effects.states import FloatArray
 
 FEWEST_POINTS = 5
-LEVEL = 0.02
-"""A candidate counts when chance would do as well in fewer than two of a hundred tables, over all candidates."""
-INSEPARABLE = 20.0
-"""Candidates whose evidence (n log of the ratio of sums of squares, per parameter counted) is this near are one set."""
-
-
-@dataclass(frozen=True)
-class Candidate:
-    """A steady-state form of an effect: columns for a shape, and the shapes to try."""
-
-    effect: str
-    form: str
-    columns: Callable[[FloatArray, float, float], FloatArray]
-    shapes: Sequence[tuple[float, float]]
-    parameters: int
+MOST_ROWS = 120
+"""Longer tables are averaged over neighbouring rows."""
+TURN = 0.1
+"""Part of the covered range that a table must go back for its order to show a direction."""
 
 
 @dataclass(frozen=True)
@@ -43,7 +34,7 @@ class TableDiagnosis:
     Attributes
     ----------
     temperature, law_residual, baseline_residual, extended_residual : (N,) arrays
-        °C and Hz.
+        °C and Hz, in the order of the rows.
     law_rms, curvature_ratio : float
         rms that the law leaves with f₀ and slope free, Hz; measured over the law's curvature.
     candidates : sequence of (form, sum of squares, leave-one-out rms, evidence)
@@ -75,120 +66,98 @@ class TableDiagnosis:
         }
 
 
-def steady_candidates(T: FloatArray) -> list[Candidate]:
-    """Return the effects that can act in steady state, in the forms that a table could show."""
-    low, high = float(T.min()), float(T.max())
-    spread = high - low
-    corners = [(float(c), 0.0) for c in np.linspace(low + 0.15 * spread, high - 0.15 * spread, 29)]
-    dips = [(float(c), float(w)) for c in np.linspace(low, high, 25) for w in (0.05, 0.1, 0.2, 0.4) * np.array(spread)]
+@dataclass(frozen=True)
+class _Candidate:
+    effect: Effect
+    shape: tuple[float, ...]
+    columns: FloatArray
+    log_evidence: float
+    ssq: float
+    loo: float
+    residual: FloatArray
 
-    def power(*powers: int) -> Callable[[FloatArray, float, float], FloatArray]:
-        return lambda x, _a, _b: np.stack([(x / 10.0) ** p for p in powers], axis=1)
-
-    return [
-        Candidate("curvature", "curvature, third order", power(3), [(0.0, 0.0)], 1),
-        Candidate("curvature", "curvature, third and fourth order", power(3, 4), [(0.0, 0.0)], 2),
-        Candidate("thermometer-scale", "thermometer, error of second and third order", power(3), [(0.0, 0.0)], 1),
-        Candidate("thermometer-scale", "thermometer, error up to fourth order", power(3, 4), [(0.0, 0.0)], 2),
-        Candidate(
-            "mounting-stress",
-            "mounting stress above a bond temperature",
-            lambda x, a, _b: np.maximum(x - a, 0.0)[:, None],
-            corners,
-            2,
-        ),
-        Candidate(
-            "activity-dip",
-            "one spurious mode",
-            lambda x, a, b: (((x - a) / b) / (1 + ((x - a) / b) ** 2))[:, None],
-            dips,
-            3,
-        ),
-        Candidate(
-            "radiation",
-            "incomplete soak with a time constant that depends on temperature",
-            lambda x, a, b: ((x - a) * np.exp(-b * ((x + 273.15) / 293.15) ** 3))[:, None],
-            [(20.0, b) for b in (3.0, 4.0, 5.0, 6.0, 8.0)],
-            2,
-        ),
-    ]
+    @property
+    def words(self) -> str:
+        return self.effect.steady_words.format(*self.shape)
 
 
 def diagnose_table(path: str, card: str | None = None) -> TableDiagnosis:
     """Diagnose a steady-state table, against a card's law or the default law of fused silica."""
+    from studies.diagnosis.extension import relative_law
     from studies.instrument.card import load_card
     from studies.record import read_frequency_table, reading_resolution
 
     data = read_frequency_table(path)
     T, f = data.values["temperature_degC"], data.values["frequency_Hz"]
-    order = np.argsort(T)
-    law = relative_law(load_card("hrg-30mm" if card is None else card), T + 273.15)
-    return study_steady_table(T[order], f[order], reading_resolution(f), law)
+    instrument = load_card("hrg-30mm" if card is None else card)
+    law = relative_law(instrument, T + 273.15)
+    named = f"{instrument.material.name}, law '{instrument.material.law}'" if card else "fused silica, the default law"
+    return study_steady_table(T, f, reading_resolution(f), law, named)
 
 
-def study_steady_table(T: FloatArray, f: FloatArray, resolution: float, law: Law) -> TableDiagnosis:
-    """Diagnose temperatures (°C) and frequencies (Hz) that were read to `resolution` (Hz)."""
-    distinct = np.unique(T).size
+def study_steady_table(
+    T: FloatArray, f: FloatArray, resolution: float, law: Law, law_name: str = "the law"
+) -> TableDiagnosis:
+    """Diagnose temperatures (°C) and frequencies (Hz), in the order of the rows, read to `resolution` (Hz)."""
+    T, f = _averaged(T, f)
     law_values = law(T + 273.15)
     free = np.stack([np.ones_like(T), law_values], axis=1)
-    law_left = _left(free, f)
-    base = np.stack([np.ones_like(T), law_values, T**2], axis=1)
-    left = _left(base, f)
+    middle = float(0.5 * (T.min() + T.max()))
+    x = T - middle
+    base = np.concatenate([free, (x**2)[:, None]], axis=1)
+    law_left, left = _left(free, f), _left(base, f)
+    law_rms, base_rms = (float(np.sqrt(np.mean(part**2))) for part in (law_left, left))
     ratio = _curvature(T, f) / _curvature(T, law_values)
-    law_rms = float(np.sqrt(np.mean(law_left**2)))
+    distinct = np.unique(T).size
     if distinct < FEWEST_POINTS:
         remark = f"{distinct} temperatures; a baseline of three numbers needs five or more to be tested"
-        result = ResponseResult(
-            "not-identifiable", None, (float(np.sqrt(np.mean(left**2))), None), None, "none", remark=remark
-        )
-        return TableDiagnosis(
-            Verdict("not-identifiable", (), {"frequency_Hz": result}, _NEXT),
-            T,
-            law_left,
-            left,
-            left,
-            law_rms,
-            ratio,
-            (),
-            (remark + ".",),
-        )
-    rounding = resolution / np.sqrt(12.0)
-    scored = sorted((_score(c, T, f, base, left, rounding) for c in steady_candidates(T)), key=lambda s: -s.evidence)
-    best = scored[0]
-    floor = max(rounding, 1e-12)
-    beyond = chi2.sf(float(np.sum(left**2)) / floor**2, T.size - 3) < 0.01
-    counts = beyond and best.chance * len(scored) < LEVEL
+        result = ResponseResult("not-identifiable", None, (base_rms, None), None, "none", remark=remark)
+        verdict = Verdict("not-identifiable", (), {"frequency_Hz": result}, _NEXT)
+        return TableDiagnosis(verdict, T, law_left, left, left, law_rms, ratio, (), (remark + ".",))
+    rounding = max(resolution / np.sqrt(12.0), 1e-9 * float(np.abs(f).max()))
+    nothing = _log_evidence(base, np.empty((T.size, 0)), f, rounding)
+    found = [c for effect in library().values() if effect.steady for c in _candidates(effect, x, base, f, rounding)]
+    best = {
+        name: max((c for c in found if c.effect.name == name), key=lambda c: c.log_evidence)
+        for name in {c.effect.name for c in found}
+    }
+    prior = CONSTANTS["log_prior_effect"]
+    ranked = sorted(best.values(), key=lambda c: -c.log_evidence)
+    forms = [
+        (c.words, c.ssq, c.loo, 2.0 * (c.log_evidence - nothing))
+        for c in sorted(_by_words(found), key=lambda c: -c.log_evidence)
+    ]
     base_loo = _leave_one_out(base, f)
-    ext_rms = float(np.sqrt(np.mean(best.residual**2)))
-    sentences = _sentences(T, f, law_rms, law_left, ratio, left, base_loo, rounding)
-    if not counts:
-        result = ResponseResult(
-            "adequate", float(np.sqrt(np.mean(left**2))), (float(np.sqrt(np.mean(left**2))), base_loo), None, "none"
-        )
+    sentences = _sentences(T, f, law_rms, ratio, base_rms, base_loo, rounding, law_name)
+    if not ranked or ranked[0].log_evidence + prior < nothing:
+        result = ResponseResult("adequate", base_rms, (base_rms, base_loo), None, "none")
         verdict = Verdict("adequate", (), {"frequency_Hz": result}, None)
-        residual = left
-    else:
-        result = ResponseResult(
-            "not-identifiable",
-            max(ext_rms, rounding),
-            (float(np.sqrt(np.mean(left**2))), base_loo),
-            (ext_rms, best.loo),
-            "none",
-        )
-        verdict = Verdict("not-identifiable", (_cause(scored, best),), {"frequency_Hz": result}, _NEXT)
-        residual = best.residual
-        sentences += [_set_sentence(scored, best)]
-    return TableDiagnosis(
-        verdict,
-        T,
-        law_left,
-        left,
-        residual,
-        law_rms,
-        ratio,
-        [(s.candidate.form, s.ssq, s.loo, s.evidence) for s in scored],
-        sentences,
+        return TableDiagnosis(verdict, T, law_left, left, left, law_rms, ratio, forms, sentences)
+    winner = ranked[0]
+    members, probability = weigh([c.effect.name for c in ranked], [c.log_evidence + prior for c in ranked], nothing)
+    # in a steady state a scale error of the thermometer and a curvature of the frequency are the same data
+    twins = [c.effect.name for c in ranked if _spans(base, c.columns, winner.columns)]
+    names = list(dict.fromkeys([winner.effect.name, *members, *twins]))
+    size = float(
+        np.ptp(winner.columns @ np.linalg.lstsq(np.concatenate([base, winner.columns], 1), f, rcond=None)[0][3:])
     )
+    spread = 1.645 * float(np.sqrt(winner.ssq / max(T.size - 3 - winner.columns.shape[1], 1)))
+    cause = Cause(
+        winner.effect.name,
+        "frequency_Hz",
+        probability,
+        tuple(sorted(names[1:])),
+        {"peak_to_peak_Hz": Interval(size, max(size - spread, 0.0), size + spread)},
+        2.0 * (winner.log_evidence - nothing),
+        peak=size,
+    )
+    state = "not-identifiable" if len(names) > 1 else "explained"
+    reached = float(np.sqrt(np.mean(winner.residual**2)))
+    result = ResponseResult(state, max(reached, rounding), (base_rms, base_loo), (reached, winner.loo), "none")
+    if len(names) > 1:
+        sentences.append(f"Equally good within what the table can say: {', '.join(names)}.")
+    verdict = Verdict(state, (cause,), {"frequency_Hz": result}, _NEXT)
+    return TableDiagnosis(verdict, T, law_left, left, winner.residual, law_rms, ratio, forms, sentences)
 
 
 _NEXT = (
@@ -197,119 +166,139 @@ _NEXT = (
 )
 
 
-@dataclass(frozen=True)
-class _Scored:
-    candidate: Candidate
-    ssq: float
-    loo: float
-    evidence: float
-    chance: float
-    residual: FloatArray
-    shape: tuple[float, float]
-    coefficients: FloatArray
-    errors: FloatArray
+def _candidates(effect: Effect, x: FloatArray, base: FloatArray, f: FloatArray, rounding: float) -> list[_Candidate]:
+    assert effect.steady is not None
+    assert effect.steady_grid is not None
+    shapes = list(effect.steady_grid(float(x.min()), float(x.max())))
+    out = []
+    for shape in shapes:
+        columns = effect.steady(x, shape)
+        both = np.concatenate([base, columns], axis=1)
+        if columns.shape[1] + 4 > f.size or not np.all(np.linalg.norm(_left(base, columns), axis=0) > 1e-9):
+            continue
+        residual = _left(both, f)
+        value = _log_evidence(base, columns, f, rounding) - float(np.log(len(shapes)))
+        ssq = float(np.sum(residual**2))
+        out.append(_Candidate(effect, tuple(shape), columns, value, ssq, _leave_one_out(both, f), residual))
+    if out and len(out) > 1 and effect.shape:  # one form at many places: the mean over them
+        total = float(logsumexp([c.log_evidence for c in out]))
+        best = max(out, key=lambda c: c.log_evidence)
+        out = [c if c is not best else _Candidate(**{**vars(c), "log_evidence": total}) for c in out]
+    return out
 
 
-def _score(c: Candidate, T: FloatArray, f: FloatArray, base: FloatArray, left: FloatArray, rounding: float) -> _Scored:
-    tried = []
-    for shape in c.shapes:
-        columns = np.concatenate([base, c.columns(T, *shape)], axis=1)
-        tried.append((float(np.sum(_left(columns, f) ** 2)), shape, columns))
-    ssq, shape, columns = min(tried, key=lambda item: item[0])
-    rest = _left(columns, f)
-    freedom = T.size - 3 - c.parameters
-    floor = T.size * rounding**2
-    before = float(np.sum(left**2))
-    # what rounding alone leaves is not counted as success
-    evidence = T.size * np.log((before + floor) / (ssq + floor)) - 2.0 * c.parameters
-    if freedom > 0 and ssq > 0:
-        ratio = (before - ssq) / c.parameters / (max(ssq, freedom * rounding**2) / freedom)
-        chance = float(f_distribution.sf(max(ratio, 0.0), c.parameters, freedom))
-    else:
-        chance = 1.0
-    count = c.columns(T, *shape).shape[1]
-    solution = np.linalg.lstsq(columns, f, rcond=None)[0]
-    spread = np.sqrt(max(ssq / max(freedom, 1), rounding**2))
-    errors = 1.645 * spread * np.sqrt(np.diag(np.linalg.pinv(columns.T @ columns)))
-    return _Scored(
-        c, ssq, _leave_one_out(columns, f), float(evidence), chance, rest, shape, solution[-count:], errors[-count:]
-    )
+def _by_words(found: Sequence[_Candidate]) -> list[_Candidate]:
+    """The best shape of every form, by its words without the place."""
+    best: dict[str, _Candidate] = {}
+    for c in found:
+        key = c.words if c.effect.name in best or "{0:.0f}" in c.effect.steady_words else c.effect.steady_words
+        if key not in best or c.log_evidence > best[key].log_evidence:
+            best[key] = c
+    return list(best.values())
 
 
-def _cause(scored: Sequence[_Scored], best: _Scored) -> Cause:
-    members = {s.candidate.effect for s in scored if s.evidence > best.evidence - INSEPARABLE and s.evidence > 0}
-    members |= {"curvature", "thermometer-scale"} if members & {"curvature", "thermometer-scale"} else set()
-    weight = {
-        name: max(np.exp(0.25 * (s.evidence - best.evidence)) for s in scored if s.candidate.effect == name)
-        for name in {s.candidate.effect for s in scored}
-    }
-    inside = sum(weight[name] for name in members)
-    return Cause(
-        best.candidate.effect,
-        "frequency_Hz",
-        float(0.9 * inside / sum(weight.values())),
-        tuple(sorted(members - {best.candidate.effect})),
-        {
-            name: Interval(float(v), float(v - e), float(v + e))
-            for name, v, e in zip(
-                ("cubic_Hz_per_10K3", "quartic_Hz_per_10K4"), best.coefficients, best.errors, strict=False
-            )
-        }
-        if best.candidate.effect in ("curvature", "thermometer-scale")
-        else {
-            "size_Hz": Interval(
-                float(best.coefficients[0]),
-                float(best.coefficients[0] - best.errors[0]),
-                float(best.coefficients[0] + best.errors[0]),
-            )
-        },
-        best.evidence,
-    )
+def _log_evidence(base: FloatArray, columns: FloatArray, f: FloatArray, rounding: float) -> float:
+    """Log evidence over white noise from rounding upwards, wander along the rows, and the size of the effect."""
+    free = np.linalg.qr(np.concatenate([base / np.linalg.norm(base, axis=0)], axis=1), mode="complete")[0][
+        :, base.shape[1] :
+    ]
+    y = free.T @ f
+    own = free.T @ columns
+    unit = columns / np.maximum(np.sqrt(np.mean(columns**2, axis=0)), 1e-300)
+    own = free.T @ unit
+    rows = np.arange(f.size) / f.size
+    walk = free.T @ np.minimum(rows[:, None], rows[None, :]) @ free
+    most = max(float(np.std(y)), 2.0 * rounding)
+    whites = np.geomspace(rounding, most, 8)
+    wanders = (0.0, 3.0, 30.0) if f.size >= 24 else (0.0,)
+    strong = 0.1 * float(np.ptp(f))
+    sizes = np.geomspace(rounding, max(strong, 10.0 * rounding), 9) if columns.shape[1] else np.array([0.0])
+    values = []
+    for white, wander, size in product(whites, wanders, sizes):
+        covariance = white**2 * (np.eye(y.size) + wander * walk) + size**2 * own @ own.T
+        factor = np.linalg.cholesky(covariance)
+        z = np.linalg.solve(factor, y)
+        values.append(-0.5 * float(z @ z) - float(np.log(np.diag(factor)).sum()))
+    return float(logsumexp(values) - np.log(len(values)))
+
+
+def _spans(base: FloatArray, one: FloatArray, two: FloatArray) -> bool:
+    """Whether two forms are the same data beside the baseline."""
+    a, b = _left(base, one), _left(base, two)
+    return bool(np.linalg.norm(_left(a, b)) < 0.05 * np.linalg.norm(b)) if a.size else False
+
+
+def _averaged(T: FloatArray, f: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the rows in their order, neighbours averaged where there are many."""
+    group = -(-T.size // MOST_ROWS)
+    if group == 1:
+        return T, f
+    places = np.arange(0, T.size, group)
+    counts = np.diff(np.append(places, T.size))
+    return np.add.reduceat(T, places) / counts, np.add.reduceat(f, places) / counts
 
 
 def _sentences(
     T: FloatArray,
     f: FloatArray,
     law_rms: float,
-    law_left: FloatArray,
     ratio: float,
-    left: FloatArray,
+    base_rms: float,
     base_loo: float,
     rounding: float,
+    law_name: str,
 ) -> list[str]:
     slope = float(np.polyfit(T, f, 1)[0])
     out = [
-        f"With the material law imposed and only f0 and slope free, {law_rms:.3f} Hz rms are left, "
-        f"{law_rms / abs(slope):.2f} °C as a thermometer.",
-        f"The measured curvature is {ratio:.1f} times the law's; with the curvature free {np.sqrt(np.mean(left**2)):.3f} Hz rms "
-        f"are left ({base_loo:.3f} Hz leave-one-out), rounding alone would leave {rounding:.4f} Hz.",
+        f"Misfit with the law's curvature fixed ({law_name}): {law_rms:.3f} Hz rms, "
+        f"equivalent to a temperature error of {law_rms / max(abs(slope), 1e-12):.2f} °C.",
+        f"The measured curvature is {ratio:.1f} times the law's. With a free curvature the misfit is {base_rms:.3f} Hz rms "
+        f"({base_loo:.3f} Hz leave-one-out); rounding alone would leave {rounding:.4f} Hz.",
     ]
-    local = np.diff(f) / np.diff(T) / (0.5 * (f[1:] + f[:-1])) * 1e6
-    lowest = int(np.argmin(local))
-    if 0 < lowest < local.size - 1:
-        middle = 0.5 * (T[lowest] + T[lowest + 1])
-        out.append(
-            f"The local slope falls to {local[lowest]:.1f} ppm/°C near {middle:.0f} °C and rises again to "
-            f"{local[-1]:.1f}: the law has no such turn, but its curvature is open to either sign."
-        )
-    if T.size >= 7:
+    order = np.argsort(T, kind="stable")
+    t, g = _merged(T[order], f[order])
+    if t.size >= 5:
+        local = np.diff(g) / np.diff(t) / (0.5 * (g[1:] + g[:-1])) * 1e6
+        lowest = int(np.argmin(local))
+        if t.size <= 30 and 0 < lowest < local.size - 1:
+            middle = 0.5 * (t[lowest] + t[lowest + 1])
+            out.append(
+                f"The local slope falls to {local[lowest]:.1f} ppm/°C near {middle:.0f} °C and rises again to {local[-1]:.1f} ppm/°C."
+            )
+    if 7 <= T.size and t.size >= 7:
         cubic, quartic = (float(np.sum((f - np.polyval(np.polyfit(T, f, p), T)) ** 2)) for p in (3, 4))
         freedom = T.size - 5
-        ratio_f = (cubic - quartic) / (quartic / freedom)
+        ratio_f = (cubic - quartic) / max(quartic / freedom, rounding**2)
+        chance = float(f_distribution.sf(max(ratio_f, 0.0), 1, freedom))
+        said = "a cubic is not sufficient" if chance < 0.05 else "a cubic is sufficient"
         out.append(
-            f"Cubic against quartic: {cubic:.3g} and {quartic:.3g} Hz², F(1, {freedom}) = {ratio_f:.0f}, chance "
-            f"{float(f_distribution.sf(ratio_f, 1, freedom)):.2g}; the cubic is not the end."
+            f"Cubic against quartic: {cubic:.3g} and {quartic:.3g} Hz², F(1, {freedom}) = {ratio_f:.0f}, chance {chance:.2g}; {said}."
         )
+    both = _turns(T)
     out.append(
-        f"{T.size} points approached from one side cannot show hysteresis, ageing or a linear scale error, and leave an "
-        "unsettled soak in the slope."
+        f"{T.size} rows, "
+        + (
+            "approached from both sides: hysteresis is tested; ageing and a linear scale error stay hidden."
+            if both
+            else "approached from one side: they cannot show hysteresis, ageing or a linear scale error, and an unsettled soak "
+            "stays in the slope."
+        )
     )
     return out
 
 
-def _set_sentence(scored: Sequence[_Scored], best: _Scored) -> str:
-    cause = _cause(scored, best)
-    return f"Equally good within what the table can say: {', '.join([cause.effect, *cause.equivalent])}."
+def _merged(T: FloatArray, f: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Average readings at one temperature."""
+    distinct, place = np.unique(T, return_inverse=True)
+    return distinct, np.bincount(place, f) / np.bincount(place)
+
+
+def _turns(T: FloatArray) -> bool:
+    """Whether the rows go up and down again by more than a tenth of their range."""
+    wide = TURN * float(np.ptp(T))
+    back_down = float((np.maximum.accumulate(T) - T).max())
+    back_up = float((T - np.minimum.accumulate(T)).max())
+    return min(back_down, back_up) > wide
 
 
 def _left(columns: FloatArray, f: FloatArray) -> FloatArray:
@@ -319,7 +308,8 @@ def _left(columns: FloatArray, f: FloatArray) -> FloatArray:
 
 
 def _leave_one_out(columns: FloatArray, f: FloatArray) -> float:
-    hat = columns @ np.linalg.pinv(columns, rcond=1e-14)
+    unit = columns / np.linalg.norm(columns, axis=0)
+    hat = unit @ np.linalg.pinv(unit, rcond=1e-14)
     lever = np.clip(np.diag(hat), 0.0, 1.0 - 1e-9)
     return float(np.sqrt(np.mean((_left(columns, f) / (1.0 - lever)) ** 2)))
 

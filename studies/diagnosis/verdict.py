@@ -1,33 +1,36 @@
-"""From scores to words: sets that the data cannot separate, probabilities, and the verdict of each response."""
+"""From evidence to words: sets that the data cannot separate, probabilities, and the verdict of each response."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from studies.diagnosis.consistency import Agreement
-from studies.diagnosis.effects import find_effect
-from studies.diagnosis.fit import Interval
-from studies.diagnosis.next_run import NextRun
-from studies.diagnosis.selection import Found
+from studies.diagnosis.constants import CONSTANTS
+from studies.effects import find_effect
+
+if TYPE_CHECKING:
+    from studies.diagnosis.planning.next_run import NextRun
 
 VERDICTS = ("unexplained", "not-identifiable", "explained", "adequate")
-TEMPER = 1.6
-"""Evidence differences are divided by this: likelihoods of imperfect models are too sure of themselves."""
-MEMBER = 0.06
-"""A rival belongs to the set when its weight is at least this part of the winner's."""
-KIN = 0.15
-"""Part of its evidence by which an effect must be better than one whose formula is nearly the same."""
-BESIDE_UNKNOWN = 0.1
-"""What is left of a claim where structure is left over: one in ten was right on 139 campaigns of the generator."""
-DOUBT = 0.02
-"""Share of answers that are wrong for reasons outside the likelihood."""
+
+
+@dataclass(frozen=True)
+class Interval:
+    """A value with its 90 % interval."""
+
+    value: float
+    low: float
+    high: float
+
+    def as_dict(self) -> dict[str, float]:
+        """Return the object of the contract."""
+        return {"value": self.value, "low": self.low, "high": self.high}
 
 
 @dataclass(frozen=True)
 class Cause:
-    """One named cause, or the set that this data cannot separate."""
+    """One named cause, or the set that this data cannot separate; `kind` is "physics" or "value" (of the card)."""
 
     effect: str
     response: str
@@ -35,25 +38,52 @@ class Cause:
     equivalent: tuple[str, ...]
     parameters: Mapping[str, Interval]
     evidence: float
-    agreement: Agreement = field(default_factory=Agreement)
+    kind: str = "physics"
+    peak: float = 0.0
+    """Largest less smallest change of the response that the effect makes in this campaign, in its unit."""
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The effect and its equals."""
+        return (self.effect, *self.equivalent)
 
     def as_dict(self) -> dict[str, Any]:
         """Return the entry of the contract."""
         return {
+            "kind": self.kind,
             "effect": self.effect,
             "response": self.response,
             "probability": round(self.probability, 4),
             "equivalent": list(self.equivalent),
-            "parameters": {k: {"value": p.value, "low": p.low, "high": p.high} for k, p in self.parameters.items()},
+            "parameters": {name: p.as_dict() for name, p in self.parameters.items()},
             "evidence": self.evidence,
-            "consistency": self.agreement.p,
-            "summary": find_effect(self.effect).summary,
+            "peak_to_peak": self.peak,
+            "summary": find_effect(self.effect).summary if self.kind == "physics" else "a value of the card",
         }
 
 
 @dataclass(frozen=True)
+class Shift:
+    """A value that the baseline moved: the card's, the calibrated one, and how far it went in its own uncertainty."""
+
+    parameter: str
+    card: float
+    value: float
+    low: float
+    high: float
+    shift_sd: float
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the entry of the contract."""
+        return dict(vars(self))
+
+
+@dataclass(frozen=True)
 class ResponseResult:
-    """What was found about one response."""
+    """What was found about one response.
+
+    `noise` is the rms per row of what no model could remove, `white` and `wander` its two parts.
+    """
 
     verdict: str
     noise: float | None
@@ -62,7 +92,12 @@ class ResponseResult:
     left_over: str
     left_over_input: str = ""
     left_over_evidence: float = 0.0
+    explained_share: float | None = None
     remark: str = ""
+    white: float | None = None
+    wander: float | None = None
+    shipped: float | None = None
+    run_shifts: tuple[float, ...] = ()
 
     @property
     def gain(self) -> float | None:
@@ -80,11 +115,16 @@ class ResponseResult:
         out: dict[str, Any] = {
             "verdict": self.verdict,
             "noise": self.noise,
+            "white": self.white,
+            "wander": self.wander,
+            "shipped_rms": self.shipped,
             "baseline": pair(self.baseline),
             "extended": pair(self.extended),
             "gain": self.gain,
+            "explained_share": self.explained_share,
             "left_over": self.left_over,
             "left_over_evidence": self.left_over_evidence,
+            "run_shifts": list(self.run_shifts),
         }
         if self.left_over_input:
             out["left_over_input"] = self.left_over_input
@@ -103,8 +143,9 @@ class Verdict:
     next_experiment: str | None
     notes: tuple[str, ...] = ()
     extended_model: str | None = None
+    next_run: "NextRun | None" = None
+    calibration: tuple[Shift, ...] = ()
     details: Mapping[str, Any] = field(default_factory=dict)
-    next_run: NextRun | None = None
 
     def as_dict(self) -> dict[str, Any]:
         """Return the object of `hrg diagnose --json`."""
@@ -112,11 +153,13 @@ class Verdict:
             "schema": "hrg.diagnosis/1",
             "verdict": self.verdict,
             "causes": [cause.as_dict() for cause in self.causes],
+            "calibration": [shift.as_dict() for shift in self.calibration],
             "responses": {name: result.as_dict() for name, result in self.responses.items()},
             "next_experiment": self.next_experiment,
             "next_run": None if self.next_run is None else self.next_run.as_dict(),
             "extended_model": self.extended_model,
             "notes": list(self.notes),
+            **self.details,
         }
 
 
@@ -125,46 +168,29 @@ def overall(verdicts: Sequence[str]) -> str:
     return next((v for v in VERDICTS if v in verdicts), "not-identifiable")
 
 
-def equivalent_to(found: Found, response: str, clock_drifts: bool | None = None) -> tuple[str, ...]:
-    """Return the other members of the set that the data cannot separate from a selected effect.
+def weigh(names: Sequence[str], scores: Sequence[float], nothing: float) -> tuple[tuple[str, ...], float]:
+    """Return the set of effects that stands for one cause, the likeliest first, and the probability that it holds the truth.
+
+    Weights exp(score / temper) of everything that could stand there. No form is exact: a difference counts less the more
+    evidence there is, by a part of the best one's lead over nothing.
 
     Parameters
     ----------
-    found : Found
-    response : str
-    clock_drifts : bool, optional
-        What a reference clock says: it tells a drifting clock from an ageing frequency.
+    names, scores : sequences
+        Effects that contend for the place and their log posteriors, votes of other responses included.
+    nothing : float
+        Log posterior of the model without any of them.
     """
-    evidence = {rival.name: rival.evidence for rival in found.rivals}
-    return set_beside(found.rivals[0].name, evidence, response, clock_drifts)
-
-
-def set_beside(
-    name: str, evidence: Mapping[str, float], response: str, clock_drifts: bool | None = None
-) -> tuple[str, ...]:
-    """Return what the strongest effect cannot be told from, given the evidence of all that contend."""
-    members = {other for other, own in evidence.items() if np.exp((own - evidence[name]) / (2.0 * TEMPER)) >= MEMBER}
-    kin = (find_effect(name).kin or {}).get(response, ())
-    members |= {other for other, own in evidence.items() if other in kin and own > (1.0 - KIN) * evidence[name]}
-    clock = {"clock-drift", "ageing"}
-    if clock_drifts is None or name not in clock:
-        members |= set((find_effect(name).equivalents or {}).get(response, ()))
-    else:
-        members -= clock
-    members.discard(name)
-    return tuple(sorted(members))
-
-
-def probability_of(found: Found, equivalent: Sequence[str], threshold: float, leftover: bool) -> float:
-    """Return the probability that the truth is in the set.
-
-    Weights exp(evidence / (2 temper)) of all rivals and of chance (at half the threshold); what the likelihood
-    cannot know (a cause outside the library, a wrong noise model) takes a constant share, and most of the claim where
-    structure is left over.
-    """
-    names = {found.rivals[0].name, *equivalent}
-    evidence = np.array([rival.evidence for rival in found.rivals] + [0.5 * threshold])
-    weight = np.exp((evidence - evidence.max()) / (2.0 * TEMPER))
-    inside = sum(w for w, rival in zip(weight, found.rivals, strict=False) if rival.name in names)
-    claim = float(inside / weight.sum()) * (1.0 - DOUBT)
-    return claim * (BESIDE_UNKNOWN if leftover else 1.0)
+    values = np.array(scores, dtype=float)
+    order = np.argsort(-values)
+    lead = max(float(values.max()) - nothing, 0.0)
+    temper = CONSTANTS["temper"] + CONSTANTS["misfit"] * lead
+    weight = np.exp((values - values.max()) / temper)
+    chance = np.exp(-max(lead - CONSTANTS["margin"] / 2.0, 0.0) / CONSTANTS["temper"])
+    members: list[str] = []
+    for k in order:
+        if weight[k] >= CONSTANTS["member"] and names[k] not in members:
+            members.append(names[k])
+    inside = sum(w for w, name in zip(weight, names, strict=True) if name in members)
+    probability = float(inside / (weight.sum() + chance)) * (1.0 - CONSTANTS["doubt"])
+    return tuple(members), probability

@@ -42,7 +42,7 @@ def diagnose_runs() -> Diagnosis:
     """Ask what the model of the device lacks."""
     generator = np.random.default_rng(3)
     records = [make_run(chamber, generator) for chamber in ((20, -10, 30), (20, 40, 0, 20))]
-    return investigate(load_campaign(records), None, 0, generator)
+    return investigate(load_campaign(records))
 
 
 if __name__ == "__main__":

@@ -4,24 +4,30 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from studies.diagnosis.gain import row_residuals
+from studies.diagnosis.held_out import residuals
 from studies.diagnosis.investigate import Diagnosis
-from studies.diagnosis.next_run import NextRun
-from studies.diagnosis.verdict import Cause, Verdict
+from studies.diagnosis.planning.next_run import NextRun
+from studies.diagnosis.response import RESPONSES
+from studies.diagnosis.verdict import Cause, ResponseResult, Verdict
 from studies.reports.page import Block, Chapter, Facts, Picture, Table, Text, draw, render_page
 from studies.reports.style import BLACK, BLUE, ORANGE, VERMILION, figure
 
 if TYPE_CHECKING:
     from studies.diagnosis.table import TableDiagnosis
 
-NAMES = {"frequency_Hz": "frequency", "bias_deg_per_h": "bias", "inverse_q": "1/Q"}
-UNITS = {"frequency_Hz": "Hz", "bias_deg_per_h": "°/h", "inverse_q": "1"}
+NAMES = {column: response.word for column, response in RESPONSES.items()}
 WORDS = {
     "adequate": "The simulation is adequate: nothing beyond noise is left.",
-    "explained": "Explained: the named cause brings the residual down to noise.",
-    "not-identifiable": "Not identifiable: this data cannot decide.",
-    "unexplained": "Unexplained: something is there that no known effect explains.",
+    "explained": "Explained: the named cause removes nine tenths of the structure or more.",
+    "not-identifiable": "Not identifiable: this data cannot decide between several causes.",
+    "unexplained": "Unexplained: there is structure that no known effect explains.",
 }
+
+
+def shown(column: str, value: float | None, digits: int = 3) -> str:
+    """Return a size of a response for people, with its unit."""
+    response = RESPONSES[column]
+    return "—" if value is None else f"{number(value * response.scale, digits)} {response.shown}"
 
 
 def headline(verdict: Verdict) -> str:
@@ -45,7 +51,7 @@ def number(value: float | None, digits: int = 3) -> str:
 
 
 def cause_table(verdict: Verdict) -> Table:
-    """Return the causes with parameters."""
+    """Return the causes with their size in the record and their parameters."""
     rows = []
     for cause in verdict.causes:
         first = True
@@ -55,8 +61,8 @@ def cause_table(verdict: Verdict) -> Table:
                     cause.effect,
                     ", ".join(cause.equivalent) or "—",
                     NAMES[cause.response],
+                    shown(cause.response, cause.peak),
                     f"{cause.probability:.2f}",
-                    f"{cause.evidence:.0f}",
                 ]
                 if first
                 else [""] * 5
@@ -66,36 +72,47 @@ def cause_table(verdict: Verdict) -> Table:
             first = False
     return Table(
         "Causes",
-        ("cause", "or equally", "in", "probability", "evidence", "parameter", "value (90 % interval)"),
+        ("cause", "or equally", "in", "peak to peak", "probability", "parameter", "value (90 % interval)"),
         rows,
-        "Evidence: twice the log-likelihood ratio, net of what chance gains.",
+        "Peak to peak: what the cause changes in this record. Lists of a family are in the saved card.",
     )
 
 
 def response_table(verdict: Verdict) -> Table:
-    """Return every response with its residuals."""
+    """Return every response with its residuals on rows that the fit has not seen."""
     rows = []
     for name, result in verdict.responses.items():
         extended = result.extended or (None, None)
+        scale = RESPONSES[name].scale
+        cells = (result.baseline[1], extended[1], result.noise, result.white, result.wander)
+        left = result.left_over + (f" in {result.left_over_input}" if result.left_over_input else "")
         rows.append(
             [
-                f"{NAMES[name]} ({UNITS[name]})",
+                f"{NAMES[name]} / {RESPONSES[name].shown}",
                 result.verdict,
-                number(result.noise),
-                number(result.baseline[0]),
-                number(result.baseline[1]),
-                number(extended[0]),
-                number(extended[1]),
+                *(number(None if value is None else value * scale) for value in cells),
                 number(result.gain),
-                result.left_over + (f" in {result.left_over_input}" if result.left_over_input else ""),
-                result.remark or "—",
+                "—" if result.explained_share is None else f"{100 * result.explained_share:.1f} %",
+                left if not result.remark else f"{left}; {result.remark}",
             ]
         )
     return Table(
-        "Responses, residual rms",
-        ("response", "verdict", "noise", "baseline", "held out", "extended", "held out", "gain", "left over", "remark"),
+        "Responses: residual rms",
+        (
+            "response",
+            "verdict",
+            "baseline",
+            "with causes",
+            "noise",
+            "white",
+            "wander",
+            "gain",
+            "explained",
+            "left over",
+        ),
         rows,
-        "Gain: baseline over extended residual on runs that were left out of the fit.",
+        "Baseline and with causes: on rows left out of the fit. Noise: what no model removed, its white part a row and its "
+        "wander within a run. Explained: part of the structure that the causes remove.",
     )
 
 
@@ -103,22 +120,27 @@ def diagnosis_page(diagnosis: Diagnosis) -> str:
     """Return the page as HTML."""
     verdict = diagnosis.verdict
     first: list[Block] = [Facts(_facts(verdict))]
-    main = _main_response(verdict)
-    if main is not None and main in diagnosis.inquiries:
-        first.append(before_and_after(diagnosis, main))
+    if diagnosis.inquiries:
+        first.append(ladder(diagnosis))
     if verdict.next_experiment:
         first.append(Text(f"Next experiment: {verdict.next_experiment}", "note"))
+    files = ", ".join(dict.fromkeys(run.label for run in diagnosis.campaign.runs))
+    first.append(Text(f"Files read: {files}."))
+    main = _main_response(verdict)
+    pictures: list[Block] = []
+    if main is not None and main in diagnosis.inquiries:
+        pictures.append(before_and_after(diagnosis, main))
     if verdict.next_run is not None:
-        first.append(next_run_picture(verdict.next_run))
+        pictures.append(next_run_picture(verdict.next_run))
     chapters = [
         Chapter("The answer", first),
+        *([Chapter("The residual, and the next run", pictures)] if pictures else []),
         Chapter(
             "Causes and numbers",
             [
                 *([cause_table(verdict)] if verdict.causes else []),
                 response_table(verdict),
-                *(Text(f"{cause.effect}: {_summary(cause)}") for cause in verdict.causes),
-                *(Text(f"{cause.effect}: {agreement_words(cause)}") for cause in verdict.causes),
+                *(Text(f"{cause.effect}: {_summary(cause)}") for cause in verdict.causes if cause.kind == "physics"),
                 *(Text(note, "note") for note in verdict.notes),
             ],
         ),
@@ -134,39 +156,20 @@ def diagnosis_page(diagnosis: Diagnosis) -> str:
 
 
 METHOD = (
-    "The baseline is calibrated first: the frequency through one thermal lag with free f0, slope and curvature; the bias as a cubic in "
-    "the change of frequency with an offset per run; 1/Q as a quadratic in temperature. Every effect of the library is then "
-    "fitted inside a likelihood of white plus slow noise, its shape polished, and accepted only when its evidence exceeds "
-    "what the best of all signatures gains on pure noise. Smooth functions of time, temperature, rate and drives look "
-    "for what no effect explains. Gains are measured on runs that the fit has not seen."
+    "The baseline is calibrated first: without a card, the frequency through one thermal lag with free f0, slope and curvature, the "
+    "bias as a cubic in the change of frequency with an offset per run, 1/Q as a quadratic in temperature. Every effect of the "
+    "library is a family of curves with a prior on its size. Models with none, one or several of them are compared by their "
+    "marginal likelihood in white noise with a wander; equal ones are named as a set, and the other responses vote. Generic smooth "
+    "functions of time, temperature, rate, history and drives look for what no effect explains. A cause is named only where "
+    "the model with it is better on rows that the fit has not seen."
 )
 
 
 def _summary(cause: Cause) -> str:
-    from studies.diagnosis.effects import find_effect
+    from studies.effects import find_effect
 
     effect = find_effect(cause.effect)
     return f"{effect.summary}. To isolate it: {effect.isolate}. Source: {effect.source}."
-
-
-def agreement_words(cause: Cause) -> str:
-    """Return whether all parts of the record agree about a cause's coefficient."""
-    agreement = cause.agreement
-    if not agreement.by_split:
-        return "no two parts of the record both measure its coefficient."
-    if agreement.p < DISAGREE:
-        return f"{SPLITS[agreement.split]} disagree about its coefficient (p = {agreement.p:.1g})."
-    said = ", ".join(SPLITS[name] for name in agreement.by_split)
-    return f"its coefficient is the same in {said} (p = {agreement.p:.2g})."
-
-
-DISAGREE = 1e-3
-SPLITS = {
-    "hot and cold": "the hot and the cold half",
-    "heating and cooling": "heating and cooling",
-    "early and late": "the early and the late half of the runs",
-    "run and run": "the runs",
-}
 
 
 def next_run_picture(run: NextRun) -> Picture:
@@ -191,17 +194,74 @@ def next_run_picture(run: NextRun) -> Picture:
 
 def _facts(verdict: Verdict) -> list[tuple[str, str, str]]:
     facts = [("verdict", verdict.verdict, WORDS[verdict.verdict])]
-    if verdict.causes:
-        cause = verdict.causes[0]
-        facts.append(("cause", " or ".join([cause.effect, *cause.equivalent]), f"probability {cause.probability:.2f}"))
-        name, p = list(cause.parameters.items())[-1]
-        facts.append(("size", number(p.value), f"{name}, 90 %: {number(p.low)} … {number(p.high)}"))
+    for cause in verdict.causes[:3]:
+        size = shown(cause.response, cause.peak)
+        sure = f"{size} peak to peak in the {NAMES[cause.response]}; probability {cause.probability:.2f}"
+        facts.append(("cause", " or ".join(cause.names), sure))
     main = _main_response(verdict)
     if main is not None:
         result = verdict.responses[main]
-        facts.append(("gain", number(result.gain), f"of the {NAMES[main]}, on runs left out of the fit"))
-        facts.append(("noise", f"{number(result.noise)} {UNITS[main]}", "rms that no model removes"))
+        if result.gain is not None:
+            facts.append(("gain", number(result.gain), f"of the {NAMES[main]}, on rows left out of the fit"))
+        facts.append(("noise", shown(main, result.noise), f"rms of the {NAMES[main]} that no model removes"))
     return facts
+
+
+def ladder(diagnosis: Diagnosis) -> Picture:
+    """Draw what is left of every response: as shipped, calibrated, with the named physics, noise; on held-out rows."""
+    columns = [c for c in diagnosis.verdict.responses if c in diagnosis.inquiries]
+    with figure(1, len(columns), height=3.0, squeeze=False) as (canvas, axes):
+        for axis, column in zip(axes[0], columns, strict=True):
+            response, result = RESPONSES[column], diagnosis.verdict.responses[column]
+            steps = [(word, value) for word, value in rungs(result) if value]
+            values = [value * response.scale for _, value in steps]
+            colours = {"as shipped": BLACK, "calibrated": VERMILION, "with causes": BLUE, "noise": ORANGE}
+            axis.bar(range(len(steps)), values, color=[colours[word] for word, _ in steps], width=0.7)
+            for k, (_, value) in enumerate(steps):
+                label = f"{number(value * response.scale)} {response.shown}"
+                kelvin = as_temperature(diagnosis, column, value)
+                axis.annotate(
+                    label if kelvin is None else f"{label}\n{kelvin}",
+                    (k, values[k]),
+                    ha="center",
+                    va="bottom",
+                    fontsize=8,
+                )
+            axis.set_xticks(range(len(steps)), [word.replace(" ", "\n") for word, _ in steps], fontsize=8)
+            axis.set_ylim(0.0, 1.3 * max(values, default=1.0))
+            axis.set_title(f"{response.word} / {response.shown}", loc="left", fontsize=10)
+            axis.grid(visible=False, axis="x")
+        return draw(
+            canvas,
+            "What is left of each response, rms on rows that the fit has not seen; below it, as an error of temperature.",
+            "Bars of the residual rms of each response from the calibrated simulation to the noise.",
+        )
+
+
+def rungs(result: ResponseResult) -> list[tuple[str, float | None]]:
+    """Return the steps of the ladder, held out where that could be had."""
+
+    def best(pair: tuple[float | None, float | None] | None) -> float | None:
+        return None if pair is None else (pair[1] if pair[1] is not None else pair[0])
+
+    return [
+        ("as shipped", result.shipped),
+        ("calibrated", best(result.baseline)),
+        ("with causes", best(result.extended)),
+        ("noise", result.noise),
+    ]
+
+
+def as_temperature(diagnosis: Diagnosis, column: str, value: float) -> str | None:
+    """Return the error of temperature that a residual of this response amounts to."""
+    slope = abs(diagnosis.inquiries[column].final.values().get("slope", 0.0)) / 10.0
+    return (
+        None
+        if not slope
+        else f"{number(1e3 * value / slope, 2)} mK"
+        if value < slope
+        else f"{number(value / slope, 2)} K"
+    )
 
 
 def _main_response(verdict: Verdict) -> str | None:
@@ -213,30 +273,30 @@ def _main_response(verdict: Verdict) -> str | None:
 
 def before_and_after(diagnosis: Diagnosis, response: str) -> Picture:
     """Draw the residual over the campaign before and, if anything is named, after the extension; the noise as a band."""
-    selection = diagnosis.inquiries[response].selection
-    noise = diagnosis.verdict.responses[response].noise or 0.0
-    strips = [(selection.plain, "before: the simulation with its baseline", VERMILION)]
-    if selection.found:
-        strips.append((selection.fit, "after: with the named causes", BLUE))
-    with figure(len(strips), 1, height=2.3 * len(strips), sharex=True, sharey=True, squeeze=False) as (canvas, grid):
+    inquiry, unit = diagnosis.inquiries[response], RESPONSES[response]
+    noise = (diagnosis.verdict.responses[response].noise or 0.0) * unit.scale
+    strips = [(inquiry.plain, "before: the calibrated simulation", VERMILION)]
+    if inquiry.final.terms:
+        strips.append((inquiry.final, "after: with the named causes", BLUE))
+    with figure(len(strips), 1, height=2.0 * len(strips), sharex=True, sharey=True, squeeze=False) as (canvas, grid):
         axes = grid[:, 0]
-        for axis, (fit, title, colour) in zip(axes, strips, strict=True):
+        for axis, (model, title, colour) in zip(axes, strips, strict=True):
             begin = 0.0
-            for run, rest in zip(diagnosis.campaign.runs, row_residuals(fit, diagnosis.campaign), strict=True):
-                time, values = _thinned(run.row_time, rest)
+            for run, rest in zip(diagnosis.campaign.runs, residuals(model, diagnosis.campaign), strict=True):
+                time, values = _thinned(run.row_time, rest * unit.scale)
                 axis.plot((begin + time - time[0]) / 3600.0, values, color=colour, linewidth=0.6)
                 begin += float(run.row_time[-1] - run.row_time[0])
                 axis.axvline(begin / 3600.0, color="#b0b6bd", linewidth=0.8)
             axis.axhspan(-2 * noise, 2 * noise, color=ORANGE, alpha=0.25, label="noise, ± 2 rms")
             axis.set_title(title, loc="left", fontsize=10)
-            axis.set_ylabel(f"residual / {UNITS[response]}")
+            axis.set_ylabel(f"residual / {unit.shown}")
         axes[0].legend(loc="upper right")
         axes[-1].set_xlabel("time, runs one after the other / h")
-        after = " and after" if selection.found else ""
+        after = " and after" if inquiry.final.terms else ""
         return draw(
             canvas,
             f"Residual of the {NAMES[response]} before{after} the extension.",
-            f"The {NAMES[response]} residual over time before{after} the extension; the last strip has rms {number(noise)}.",
+            f"The {NAMES[response]} residual over time before{after} the extension; the last strip has rms {number(noise)} {unit.shown}.",
         )
 
 
@@ -247,23 +307,20 @@ def _thinned(time: np.ndarray, values: np.ndarray, most: int = 500) -> tuple[np.
 
 def residual_views(diagnosis: Diagnosis, response: str) -> Picture:
     """Draw the baseline's residual against temperature (heating and cooling), rate, frequency and the drives."""
-    campaign, inquiry = diagnosis.campaign, diagnosis.inquiries[response]
-    fit = inquiry.selection.plain
-    problem = fit.problem
-    views = problem.views(problem.tau)
-    rest = problem.values - fit.columns() @ fit.linear.coefficients
-    count = sum(int(mask.sum()) for mask in problem.present)
-    rest = rest[:count]
+    campaign, inquiry, unit = diagnosis.campaign, diagnosis.inquiries[response], RESPONSES[response]
+    fit = inquiry.plain
+    problem, views = fit.problem, fit.tangent.views
+    rest = fit.residual * unit.scale
     inputs: dict[str, np.ndarray] = {
-        "resonator temperature / °C": problem.stack([v.coarse.resonator - 273.15 for v in views])[:count],
-        "rate / (K/h)": 3600.0 * problem.stack([v.coarse.rate for v in views])[:count],
+        "resonator temperature / °C": problem.stack([v.seen.resonator - 273.15 for v in views]),
+        "rate / (K/min)": 60.0 * problem.stack([v.seen.rate for v in views]),
     }
     if "frequency_Hz" in campaign.responses:
-        inputs["frequency / Hz"] = problem.stack([run.responses["frequency_Hz"] for run in campaign.runs])[:count]
+        inputs["frequency / Hz"] = problem.stack([run.responses["frequency_Hz"] for run in campaign.runs])
     for label, drive in (("amplitude / V", "amplitude_squared"), ("electrode voltage / V", "voltage_squared")):
         if all(getattr(v.coarse, drive) is not None for v in views):
-            inputs[label] = np.sqrt(problem.stack([getattr(v.coarse, drive) for v in views])[:count])
-    heating = inputs["rate / (K/h)"] > 0
+            inputs[label] = np.sqrt(problem.stack([getattr(v.coarse, drive) for v in views]))
+    heating = inputs["rate / (K/min)"] > 0
     runs = np.concatenate([np.full(int(mask.sum()), k) for k, mask in enumerate(problem.present)])
     columns = 2
     rows = (len(inputs) + 2) // columns
@@ -282,7 +339,7 @@ def residual_views(diagnosis: Diagnosis, response: str) -> Picture:
         for axis in flat[len(inputs) + 1 :]:
             axis.set_visible(False)
         for axis in flat[::columns]:
-            axis.set_ylabel(f"residual / {UNITS[response]}")
+            axis.set_ylabel(f"residual / {unit.shown}")
         flat[0].legend(markerscale=4)
         return draw(
             canvas,
@@ -294,18 +351,15 @@ def residual_views(diagnosis: Diagnosis, response: str) -> Picture:
 def _rivals(diagnosis: Diagnosis, response: str) -> list[Block]:
     inquiry = diagnosis.inquiries[response]
     blocks: list[Block] = []
-    for found in inquiry.selection.found:
-        rows = [[rival.name, f"{rival.evidence:.1f}"] for rival in found.rivals]
-        blocks.append(
-            Table(f"Who else could stand in the place of {found.rivals[0].name}", ("effect", "evidence"), rows)
-        )
+    for place in inquiry.selection.places:
+        nothing = place.without.score
+        rows = [[n, f"{2.0 * (r.score - nothing):.1f}"] for n, r in zip(place.names, place.rivals, strict=True)]
+        blocks.append(Table(f"Alternatives to {place.names[0]}", ("effect", "evidence"), rows))
     left = inquiry.leftover
-    blocks.append(
-        Text(
-            f"Generic witness: strongest in {left.input or 'nothing'}, evidence {left.evidence:.1f}. "
-            f"Slow noise taken as: {inquiry.problem.kernel}."
+    if left.significant:
+        blocks.append(
+            Text(f"Unmodelled structure: strongest against {left.input}, evidence {2.0 * left.evidence:.0f}.")
         )
-    )
     return blocks
 
 
@@ -323,7 +377,7 @@ def table_chapters(found: "TableDiagnosis") -> list[Chapter]:
     """Return the chapters of a steady-state table: the answer, and who else could have given it."""
     facts = [
         ("verdict", found.verdict.verdict, WORDS[found.verdict.verdict]),
-        ("law imposed", f"{number(found.law_rms)} Hz", "rms left, degrees of freedom counted by points"),
+        ("law imposed", f"{number(1e3 * found.law_rms)} mHz", "misfit rms with the law's curvature fixed"),
         ("curvature", f"{number(found.curvature_ratio)} times", "the measured one over the law's"),
     ]
     rows = [[name, number(ssq), number(loo), number(score)] for name, ssq, loo, score in found.candidates]
@@ -338,6 +392,7 @@ def table_chapters(found: "TableDiagnosis") -> list[Chapter]:
 def table_residuals(found: "TableDiagnosis") -> Picture:
     """Draw what the law, the baseline and the strongest candidate leave of a steady-state table."""
     with figure(1, 1, height=3.2) as (canvas, axis):
+        # lines in the order of the rows, so that a loop shows as one
         axis.plot(found.temperature, found.law_residual, "o-", color=VERMILION, label="law imposed, f₀ and slope free")
         axis.plot(found.temperature, found.baseline_residual, "s-", color=ORANGE, label="baseline: curvature free")
         axis.plot(found.temperature, found.extended_residual, "^-", color=BLACK, label="with the strongest candidate")

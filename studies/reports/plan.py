@@ -4,8 +4,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from studies.diagnosis.plan import Outlook, Plan, effect_of
-from studies.diagnosis.rehearsal import NOTHING, UNEXPLAINED
+from studies.diagnosis.planning.plan import Outlook, Plan, effect_of
+from studies.diagnosis.planning.rehearsal import NOTHING
 from studies.reports.page import Chapter, Facts, Picture, Table, Text, draw, render_page
 from studies.reports.style import figure
 
@@ -30,7 +30,7 @@ def headline(outlook: Outlook) -> str:
         text += f" Not even at SNR {outlook.plans[0].snr:g}: {', '.join(never)}."
     for reason in dict.fromkeys(outlook.close.invisible.values()):
         names = [name for name, why in outlook.close.invisible.items() if why == reason]
-        text += f" Cannot show, {reason}: {', '.join(names)}."
+        text += f" Not testable, {reason}: {', '.join(names)}."
     return text
 
 
@@ -78,7 +78,8 @@ def plan_page(outlook: Outlook, profiles: Sequence[str]) -> str:
     facts = []
     for plan in outlook.plans:
         sure = sum(1 for key in effects if (least := outlook.smallest(key)) is not None and least <= plan.snr)
-        facts.append((f"named nine times in ten, SNR {plan.snr:g}", f"{sure} of {len(effects)}", _size_words(plan.snr)))
+        facts.append((f"named nine times in ten, SNR {plan.snr:g}", f"{sure} of {len(effects)}", _size_words(plan)))
+    facts.append(("chamber time", f"{outlook.close.hours:.3g} h", "of all planned runs"))
     facts.append(("cannot show at all", str(len(outlook.close.invisible)), "a drive that is not stepped, or no change"))
     runs = Table("Planned runs", ("run", "chamber"), [[str(k + 1), words] for k, words in enumerate(profiles)])
     return render_page(
@@ -102,8 +103,9 @@ def plan_page(outlook: Outlook, profiles: Sequence[str]) -> str:
     )
 
 
-def _size_words(snr: float) -> str:
-    return "as large as the noise of one row" if snr == 1.0 else f"{snr:g} of the noise of one row"
+def _size_words(plan: Plan) -> str:
+    sizes = ", ".join(f"{value:.2g} {key.split(' / ')[1]}" for key, value in plan.sizes.items())
+    return f"effects of {sizes} rms"
 
 
 def _ladder(outlook: Outlook) -> Picture:
@@ -123,11 +125,11 @@ def _matrix(plan: Plan) -> Picture:
     """Draw the confusion matrix."""
     keys = sorted(plan.confusion)
     said = {name for shares in plan.confusion.values() for name in shares} | {effect_of(key) for key in keys}
-    names = [*sorted(said - {NOTHING, UNEXPLAINED}), NOTHING, UNEXPLAINED]
+    names = [*sorted(said - {NOTHING}), NOTHING]
     shares = np.array([[plan.confusion[key].get(name, 0.0) for name in names] for key in keys])
     caption = (
         f"Rows the hidden effect, columns the answer, % of {plan.cases} cases at SNR {plan.snr:g}; nothing: it would stay "
-        "unseen; unexplained: seen, but not named."
+        "unseen."
     )
     return _map(shares, keys, names, caption, 55.0)
 

@@ -152,8 +152,8 @@ def _apply_effects(
     """Sum what the card's effects add to the resonator's temperature (K) and to the responses; they need even rows."""
     if not instrument.effects:
         return {}
-    from studies.diagnosis.effects import apply_effects
-    from studies.diagnosis.states import States
+    from studies.effects import apply_effects
+    from studies.effects.states import States
 
     time = drive.time - drive.time[0]
     step = np.diff(time)

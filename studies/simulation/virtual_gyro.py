@@ -139,7 +139,7 @@ def _idle_effects(instrument: "Instrument", drive: Drive) -> tuple[str, ...]:
     """Name the effects whose drive (amplitude, voltage, quadrature, azimuth) the run does not move."""
     if not instrument.effects:
         return ()
-    from studies.diagnosis.effects import find_effect
+    from studies.effects import find_effect
 
     return tuple(
         f"the effect '{effect.name}' adds nothing: a virtual run does not move its drive"

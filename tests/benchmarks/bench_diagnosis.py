@@ -2,14 +2,11 @@
 
     python tests/benchmarks/bench_diagnosis.py cases.jsonl --minutes 5 [--kinds null,effect,faint,alien,without,pair]
         [--seed N] [--names-only]                            append cases
-    python tests/benchmarks/bench_diagnosis.py cases.jsonl --baselines --minutes 5
-                                                             peers on the same cases (extra `peers`)
     python tests/benchmarks/bench_diagnosis.py cases.jsonl --plan-check
                                                              what `--plan` predicts for the same designs
-    python tests/benchmarks/bench_diagnosis.py cases.jsonl --report DIR, FILE.html or FILE.md
+    python tests/benchmarks/bench_diagnosis.py cases.jsonl --report FILE.md
 
-Cases are appended to the file, so that several runs add up; the seed is drawn and printed unless given. Baselines and
-predictions go into files beside it (cases.baselines.jsonl, cases.plan.json) and into the page.
+Cases are appended to the file, so that several runs add up; the seed is drawn and printed unless given.
 """
 
 import argparse
@@ -31,24 +28,17 @@ def main():
     parser.add_argument("--kinds", default=",".join(KINDS))
     parser.add_argument("--seed", type=int, default=None)
     parser.add_argument("--names-only", action="store_true", help="leave out the held-out residuals")
-    parser.add_argument("--baselines", action="store_true", help="run the peers on the cases of the file")
     parser.add_argument("--plan-check", action="store_true", help="predict the confusion of the cases of the file")
     parser.add_argument("--draws", type=int, default=100, help="cases of each effect that --plan-check predicts")
     parser.add_argument("--report", type=Path)
     arguments = parser.parse_args()
     path = arguments.cases
-    if arguments.baselines:
-        from tests.benchmarks.diagnosis.baselines import run_baselines
-
-        run_baselines(path, arguments.minutes)
-    elif arguments.plan_check:
+    if arguments.plan_check:
         from tests.benchmarks.diagnosis.plan_check import check_plan
 
         print(check_plan(path, arguments.draws))
     elif arguments.report:
-        from tests.benchmarks.diagnosis.page import write_report
-
-        print("written:", write_report(path, arguments.report))
+        arguments.report.write_text(summarise(read_cases(path)))
     else:
         seed = int(np.random.SeedSequence().entropy % 2**31) if arguments.seed is None else arguments.seed
         print("seed", seed)

@@ -22,9 +22,9 @@ from scipy.stats import binomtest
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 from studies.diagnosis.campaign import load_campaign
-from studies.diagnosis.effects import find_effect
 from studies.diagnosis.investigate import investigate
-from studies.diagnosis.programme import DRIVES, candidates
+from studies.diagnosis.planning.programme import DRIVES, candidates
+from studies.effects import find_effect
 from tests.generator.designs import cycle, paper_step, ramps, schedule, stairs, up_stairs, wander
 from tests.generator.device import add_run, build
 from tests.generator.hidden import EFFECTS
@@ -60,7 +60,7 @@ def first_run(rng):
 def answer(records):
     """Diagnose; return the strongest set, the verdict, and the suggestion."""
     campaign = load_campaign(records)
-    verdict = investigate(campaign, held_out=False).verdict
+    verdict = investigate(campaign, score_held_out=False).verdict
     cause = verdict.causes[0] if verdict.causes else None
     said = [] if cause is None else [cause.effect, *cause.equivalent]
     return campaign, {"said": said, "verdict": verdict.verdict, "evidence": cause and cause.evidence}, verdict.next_run

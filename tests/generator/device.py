@@ -139,10 +139,10 @@ def run_heat(plan, device, rng, heat=None, starts=None):
 def build(design, family, rng, effects=(), alien="", snr=0.0):
     """Return (records, truth): a campaign with the named effects at the stated SNR each.
 
-    `design` is a name, or a design of its own.
+    `design` is a name, a name with the number of its first runs ("rich/2"), or a design of its own.
     """
     device = Device.draw(rng)
-    plan = design if isinstance(design, dict) else DESIGNS[design]
+    plan = design if isinstance(design, dict) else first_runs(design)
     runs = len(plan["chambers"])
     starts = rng.normal(0.0, 0.3, runs)
     housing, plain, tilt = run_heat(plan, device, rng, None, starts)
@@ -197,6 +197,13 @@ def build(design, family, rng, effects=(), alien="", snr=0.0):
     for c in CHANNELS:
         truth.noise[c] = float(np.sqrt(np.mean(np.concatenate(noise[c]) ** 2)))
     return records, truth
+
+
+def first_runs(design):
+    """Return a design by name, or its first runs: "rich/2"."""
+    name, _, count = design.partition("/")
+    plan = DESIGNS[name]
+    return {key: None if value is None else value[: int(count)] for key, value in plan.items()} if count else plan
 
 
 def add_run(twin, chamber, rng, volts=None, drive=None, angle=None, gap=16.0):
@@ -294,7 +301,8 @@ def _responses(pieces, sizes, world, plan, device, starts):
         out["inverse_q"].append(device.loss[0] + device.loss[1] * x + device.loss[2] * x**2)
     for piece, size in zip(pieces, sizes, strict=True):
         if piece.sensor:
-            sensed = [piece.sensor(h, size) for h in sensed]
+            faulty = piece.sensor_runs
+            sensed = [piece.sensor(h, size) if faulty is None or k in faulty else h for k, h in enumerate(sensed)]
         for channel, signal in (piece.signals or {}).items():
             for k in range(len(temperature)):
                 out[channel][k] = out[channel][k] + size * signal[k]

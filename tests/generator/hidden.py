@@ -17,6 +17,7 @@ class Piece:
     signals: dict | None = None
     heat: Any = None
     sensor: Any = None
+    sensor_runs: tuple | None = None
     start: float = 1.0
     most: float = 1e9
     linear: bool = True
@@ -289,7 +290,45 @@ def mounting_stress(w):
     )
 
 
+def thermometer_lag(w):
+    return Piece(
+        "thermometer-lag",
+        "frequency_Hz",
+        sensor=lambda t, s: follow(t, max(abs(s), 1.0)),
+        start=30.0,
+        most=600.0,
+        linear=False,
+    )
+
+
+def rate_frequency(w):
+    return Piece(
+        "rate-frequency",
+        "frequency_Hz",
+        {"frequency_Hz": [np.gradient(t, STEP) * 1e3 for t in w.temperature]},
+        start=_sign(w.rng) * 0.01,
+    )
+
+
+def clock_offset(w):
+    run = int(w.rng.integers(len(w.time)))
+    grid = w.time[run]
+    return Piece(
+        "clock-offset",
+        "frequency_Hz",
+        sensor=lambda t, s: np.interp(grid - s, grid, t),
+        sensor_runs=(run,),
+        start=_sign(w.rng) * 10.0,
+        most=200.0,
+        linear=False,
+        parameters={"run": run},
+    )
+
+
 EFFECTS = {
+    "thermometer-lag": thermometer_lag,
+    "rate-frequency": rate_frequency,
+    "clock-offset": clock_offset,
     "second-lag": second_lag,
     "rate-bias": rate_bias,
     "hysteresis": hysteresis,

@@ -13,7 +13,7 @@ import tomli_w
 
 from studies.cli import COMMANDS as CLI
 from studies.cli import main
-from studies.diagnosis.effects import library
+from studies.effects import library
 from studies.errors import InputError
 from studies.instrument.card import build_instrument, load_card, save_card, shipped_cards
 from studies.instrument.keys import describe, known_keys, structs

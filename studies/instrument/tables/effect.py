@@ -4,7 +4,7 @@
 name = "second-lag"                # `hrg effects` lists names, parameters and bounds
 response = "frequency_Hz"          # of those that the effect acts on; the first of them unless given
 second_time_constant_s = 20000.0   # every parameter of its shape, within its bounds
-weight = 0.2                       # and at least one of its coefficients
+weight = 0.2                       # and at least one of its coefficients; a list where the effect is a family
 
 Parameters are exact unless the card states their uncertainty.
 """
@@ -20,7 +20,7 @@ from studies.instrument.keys import Table, number
 from studies.instrument.registry import CardTable, Place
 
 if TYPE_CHECKING:
-    from studies.diagnosis.effects import Effect
+    from studies.effects import Effect
 
 
 @dataclass(frozen=True)
@@ -29,12 +29,12 @@ class EffectEntry:
 
     name: str
     response: str
-    parameters: Mapping[str, float]
+    parameters: Mapping[str, float | list[float]]
 
 
 def keys_of(raw: Mapping[str, Any], where: str) -> Any:
     """Return the class of an entry's keys, from what the effect says of itself."""
-    from studies.diagnosis.effects import find_effect
+    from studies.effects import find_effect
 
     name = raw.get("name")
     if not isinstance(name, str):
@@ -55,7 +55,9 @@ def _declare(effect: "Effect", response: str) -> Any:
         fields.append((shape.name, kind, shape.low) if shape.steady else (shape.name, kind))
     coefficients = effect.coefficient_names(response)
     weight: Any = Annotated[float, number(least=0.0)] if effect.positive else float
-    fields += [(key, weight | None, None) for key in coefficients]
+    for key, coefficient in zip(coefficients, effect.coefficients, strict=True):
+        many = Annotated[list[float], msgspec.Meta(min_length=1, max_length=len(coefficient.spread))]
+        fields.append((key, weight | many | None if len(coefficient.spread) > 1 else weight | None, None))
 
     def check(entry: Any) -> None:
         if all(getattr(entry, key) is None for key in coefficients):

@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 
 from studies.diagnosis.campaign import load_campaign
-from studies.diagnosis.effects import library
 from studies.diagnosis.investigate import investigate
+from studies.effects import library
 from tests.generator.designs import DESIGNS
 from tests.generator.device import build
 from tests.generator.hidden import ALIENS, EFFECTS, possible
@@ -77,7 +77,9 @@ def run_case(kind, count, seed, held_out=True, commit=""):
     """Build and diagnose one case; return what was hidden and what was said."""
     records, truth = build_case(kind, count, seed)
     begin = time.perf_counter()
-    found = investigate(load_campaign(records), effects=usable(kind, truth.effects), held_out=held_out).verdict
+    found = investigate(
+        load_campaign(records), effects=usable(kind, truth.effects), score_held_out=held_out, advise=False
+    ).verdict
     return {
         "kind": kind,
         "commit": commit,
@@ -92,9 +94,7 @@ def run_case(kind, count, seed, held_out=True, commit=""):
         "channel": truth.channel,
         "seconds": time.perf_counter() - begin,
         "verdict": found.verdict,
-        "causes": [
-            [c.effect, list(c.equivalent), c.response, c.probability, c.evidence, c.agreement.p] for c in found.causes
-        ],
+        "causes": [[c.effect, list(c.equivalent), c.response, c.probability, c.evidence] for c in found.causes],
         "intervals": [{n: [p.value, p.low, p.high] for n, p in c.parameters.items()} for c in found.causes],
         "responses": {
             k: [r.verdict, r.noise, r.baseline, r.extended, r.left_over_input, r.left_over_evidence]

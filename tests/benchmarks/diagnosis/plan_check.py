@@ -20,10 +20,10 @@ import numpy as np
 from scipy.stats import spearmanr
 
 from studies.diagnosis.campaign import load_campaign
-from studies.diagnosis.plan import predict
-from studies.diagnosis.rehearsal import NOTHING, UNEXPLAINED
+from studies.diagnosis.planning.plan import predict
+from studies.diagnosis.planning.rehearsal import NOTHING
 from tests.benchmarks.diagnosis.cases import current_commit, read_cases
-from tests.benchmarks.diagnosis.scoring import of_kind, said
+from tests.benchmarks.diagnosis.scoring import UNEXPLAINED, of_kind, said
 from tests.generator.device import build
 
 FEWEST = 12

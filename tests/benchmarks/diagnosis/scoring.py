@@ -5,7 +5,7 @@ from collections import Counter, defaultdict
 
 import numpy as np
 
-from studies.diagnosis.effects import find_effect
+from studies.effects import find_effect
 from tests.generator.device import Device
 
 SNR_ROWS = (3.0, 1.0, 0.3)

@@ -1,9 +1,8 @@
-"""The benchmark counts as it says: hand-made cases, and a regression whose terms are planted."""
+"""The benchmark counts as it says: hand-made cases."""
 
 import numpy as np
 import pytest
 
-from tests.benchmarks.diagnosis.baselines import as_cases, merge, stepwise_terms
 from tests.benchmarks.diagnosis.plan_check import agreement, compare, simulated_shares
 from tests.benchmarks.diagnosis.scoring import band, confusion, exact_set, first_right, reliability, said
 
@@ -95,20 +94,3 @@ def test_right_predictions_leave_no_error_beyond_chance_and_wrong_ones_do():
     assert found["beyond"] <= 0.3 * found["entries"]
     shifted = {"rich 1": plan(**{name: {name: 0.9, "nothing": 0.1} for name in NAMES})}
     assert agreement(compare(cases, shifted))["rms"] == pytest.approx(0.3, abs=0.05)
-
-
-def test_stepwise_regression_keeps_the_planted_terms_only():
-    rng = np.random.default_rng(7)
-    terms = {name: rng.standard_normal(400) for name in "abcdef"}
-    fixed = np.ones((400, 1))
-    target = 3.0 + 2.0 * terms["b"] - 0.5 * terms["e"] + 0.1 * rng.standard_normal(400)
-    assert [name for name, _ in stepwise_terms(target, fixed, terms, p_enter=1e-6)] == ["b", "e"]
-
-
-def test_baselines_get_the_inseparable_twin_and_one_entry_an_effect():
-    causes = merge([("ageing", "frequency_Hz", 5.0), ("clock-drift", "frequency_Hz", 9.0), ("jump", "inverse_q", 1.0)])
-    assert [(name, others) for name, others, *_ in causes] == [("clock-drift", ["ageing"]), ("jump", [])]
-    answers = {"effect/1/2": {"lasso": {"causes": causes, "seconds": 0.1}}}
-    answered = as_cases([case(["ageing"]), case(["jump"], seed=3)], answers, "lasso")
-    assert len(answered) == 1
-    assert first_right(answered[0])

@@ -36,7 +36,7 @@ def test_the_residual_is_the_noise(step, hours, before):
     """Also on long records, which are binned, and on records that start in full slew, 10 K from equilibrium."""
     rng = np.random.default_rng(3)
     records = [baseline_record(run, step, hours, before, rng) for run in range(3)]
-    verdict = investigate(load_campaign(records), held_out=True).verdict
+    verdict = investigate(load_campaign(records), advise=False).verdict
     result = verdict.responses["frequency_Hz"]
     assert verdict.verdict == "adequate", verdict.causes
     assert result.noise == pytest.approx(NOISE, rel=0.05)

@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 
-from studies.diagnosis.effects import apply_effect
-from studies.diagnosis.likelihood import KERNELS, NoiseBasis, fit_linear
-from studies.diagnosis.states import States, average, lag, play
+from studies.diagnosis.evidence import Grams, Linear, solve
+from studies.diagnosis.noise import KERNELS, SHARES, Basis, Noise
+from studies.effects import States, apply_effect
+from studies.effects.states import average, lag, play
 
 
 @pytest.mark.parametrize("tau", [40.0, 900.0, 2e4])
@@ -34,29 +35,50 @@ def test_play_is_rate_independent_and_remembers_its_return_points():
     assert out[closed] == pytest.approx(out[opened], abs=0.02)
 
 
-@pytest.mark.parametrize("kernel", KERNELS)
-def test_profiled_likelihood_is_that_of_the_full_covariance(kernel):
+@pytest.mark.parametrize("kind", range(len(KERNELS)))
+def test_evidence_is_that_of_the_full_covariance(kind):
+    """Against the dense formula: flat columns projected out, priors as part of the covariance, σ² integrated."""
     rng = np.random.default_rng(4)
     t = np.sort(rng.choice(np.arange(0.0, 28800.0, 144.0), 90, replace=False))
-    columns = np.stack([np.ones(90), t / 1e4, np.sin(t / 3000.0)], axis=1)
-    y = columns @ [1.0, 0.5, -0.3] + rng.standard_normal(90) + np.cumsum(rng.standard_normal(90)) * 0.1
-    basis = NoiseBasis.of([t], kernel)
-    share = 3.0
-    fit = fit_linear(basis, basis.rotate(y), basis.rotate(columns), [share])
-    covariance = basis.vectors[0] @ np.diag(1.0 + share * basis.walk) @ basis.vectors[0].T
+    flat = np.stack([np.ones(90), t / 1e4], axis=1)
+    ours = np.stack([np.sin(t / 3000.0), np.cos(t / 900.0)], axis=1)
+    y = flat @ [1.0, 0.5] - 0.3 * ours[:, 0] + rng.standard_normal(90) + np.cumsum(rng.standard_normal(90)) * 0.1
+    noise = Noise.of([t], 1.0)
+    prior = np.array([np.inf, np.inf, 2.0, 0.5])
+    model = Linear(y, np.concatenate([flat, ours], axis=1), prior, np.array([-1, -1, 0, 0]), noise, 0.7)
+    share, scale = 5, 0.1
+    found = Grams(model).log_evidence(np.array([scale]), (kind, share)) - noise.prior(kind)[share]
+    basis = noise.bases[kind]
+    covariance = basis.vectors[0] @ np.diag(1.0 + SHARES[share] * basis.walk) @ basis.vectors[0].T
+    covariance += (ours * (scale * prior[2:] / 0.7) ** 2) @ ours.T
+    inverse = np.linalg.inv(covariance)
+    middle = flat.T @ inverse @ flat
+    rest = y @ inverse @ y - y @ inverse @ flat @ np.linalg.solve(middle, flat.T @ inverse @ y)
+    exact = -0.5 * (np.linalg.slogdet(covariance)[1] + np.linalg.slogdet(middle)[1] + 88 * np.log(rest))
+    assert found == pytest.approx(exact, abs=1e-6)
+
+
+def test_a_solution_holds_the_coefficients_of_generalised_least_squares():
+    rng = np.random.default_rng(5)
+    t = np.arange(0.0, 28800.0, 144.0)
+    columns = np.stack([np.ones(200), t / 1e4, np.sin(t / 3000.0)], axis=1)
+    y = columns @ [1.0, 0.5, -0.3] + 0.1 * rng.standard_normal(200)
+    noise = Noise.of([t], 1.0)
+    found = solve(Linear(y, columns, np.full(3, np.inf), np.full(3, -1), noise, 0.1), 0)
+    basis = noise.bases[found.kind]
+    covariance = basis.vectors[0] @ np.diag(1.0 + SHARES[found.share] * basis.walk) @ basis.vectors[0].T
     inverse = np.linalg.inv(covariance)
     exact = np.linalg.solve(columns.T @ inverse @ columns, columns.T @ inverse @ y)
+    assert np.allclose(found.coefficients, exact, rtol=1e-6)
     rest = y - columns @ exact
-    assert np.allclose(fit.coefficients, exact, rtol=1e-6)
-    expected = 90 * np.log(rest @ inverse @ rest) + np.linalg.slogdet(covariance)[1]
-    assert fit.score == pytest.approx(expected, abs=1e-6)
-    variance = rest @ inverse @ rest / 87
-    assert np.allclose(fit.covariance, variance * np.linalg.inv(columns.T @ inverse @ columns), rtol=1e-5)
+    assert np.allclose(
+        found.covariance, rest @ inverse @ rest / 197 * np.linalg.inv(columns.T @ inverse @ columns), rtol=1e-5
+    )
 
 
 def test_walk_kernel_is_brownian_with_a_past():
     t = np.array([0.0, 7200.0, 28800.0])
-    basis = NoiseBasis.of([t])
+    basis = Basis.of([t], "walk")
     covariance = basis.vectors[0] @ np.diag(basis.walk) @ basis.vectors[0].T
     assert np.allclose(covariance, [[0.5, 0.5, 0.5], [0.5, 0.75, 0.75], [0.5, 0.75, 1.5]])
 

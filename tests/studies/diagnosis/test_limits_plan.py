@@ -5,11 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from studies.diagnosis.baseline import pose
-from studies.diagnosis.fit import fit_terms
-from studies.diagnosis.plan import Outlook, Plan, imagine, predict
-from studies.diagnosis.rehearsal import set_stage
-from studies.diagnosis.scan import scan_bank
+from studies.diagnosis.planning.plan import Outlook, Plan, imagine, predict
 from studies.reports.plan import headline, plan_page, plan_table
 
 WORDS = "cycle 20 -15 40 0.5 30min 1"
@@ -52,22 +48,6 @@ def test_an_effect_far_below_the_noise_is_nothing():
 def test_the_baseline_takes_a_part_of_a_cubic_and_is_no_finding_itself(loud):
     assert 0.0 < loud.survives["curvature"] < 1.0
     assert "calibration" not in loud.confusion
-
-
-@pytest.mark.parametrize("response", ["frequency_Hz", "bias_deg_per_h"])
-def test_many_draws_are_scored_as_one_alone(response):
-    """Sums in the place of products with jumps, single precision, and shares of the noise draw by draw change nothing."""
-    campaign = planned(response)
-    fit = fit_terms(pose(campaign, response), ())
-    stage = set_stage(campaign, fit, 26.0, 2500.0)
-    # unit white noise, and a wandering that calls for another share of the slow noise
-    data = np.random.default_rng(8).standard_normal((fit.problem.values.size, 6))
-    data[:, 3:] += np.cumsum(data[:, :3], axis=0) / 5.0
-    rotated = [problem.basis.rotate(data) for problem in stage.bank.problems]
-    together = scan_bank(stage.bank, stage.models, [target.astype(np.float32) for target in rotated])[0]
-    for k in range(data.shape[1]):
-        alone = scan_bank(stage.bank, stage.models, [target[:, k : k + 1] for target in rotated])[0][:, 0]
-        np.testing.assert_allclose(together[:, k], alone, atol=0.02)
 
 
 def test_white_noise_and_slow_noise_make_up_the_whole(loud):

@@ -1,19 +1,17 @@
 """The designed next run: words that simulate, evidence that dense algebra confirms, answers where no run helps."""
 
-import itertools
-
 import numpy as np
 import pytest
 
-from studies.diagnosis.baseline import Term, pose
 from studies.diagnosis.campaign import load_campaign
-from studies.diagnosis.effects import find_effect
-from studies.diagnosis.fit import fit_terms, jacobian_of
-from studies.diagnosis.investigate import investigate
-from studies.diagnosis.next_run import Member, continued, join, loss, own_count
-from studies.diagnosis.programme import candidates, words_of
-from studies.diagnosis.states import average
-from studies.diagnosis.thermometer import corrected
+from studies.diagnosis.investigate import begin, investigate
+from studies.diagnosis.model import Term, fit
+from studies.diagnosis.planning.chamber import limited, parse_chamber
+from studies.diagnosis.planning.next_run import against, covariance_of_noise
+from studies.diagnosis.planning.next_run import follow as continue_model
+from studies.diagnosis.planning.programme import candidates, words_of
+from studies.effects import find_effect
+from studies.errors import InputError
 from studies.record import Record
 from tests.generator.designs import up_stairs
 from tests.generator.device import add_run, build
@@ -38,62 +36,53 @@ def rivals_of(seed, effect, others):
     """Fit the named rivals to one monotone run with an effect."""
     records, _ = build(plan_of_one(up_stairs()), "walk", np.random.default_rng(seed), (effect,), "", 3.0)
     campaign = load_campaign(records)
-    problem = corrected(fit_terms(pose(campaign, "frequency_Hz"), ())).problem
-    return campaign, [fit_terms(problem, [Term(find_effect(name), shape, 1)]) for name, shape in others]
+    plain = begin(campaign, "frequency_Hz", None)
+    return campaign, [fit(plain.problem, plain.baseline, [Term(find_effect(name), shape)], 4) for name, shape in others]
 
 
-def test_expected_evidence_is_that_of_dense_least_squares():
-    """D by whitened projections equals the generalised least squares with the covariance written out."""
-    seed = int(np.random.SeedSequence().entropy % 2**31)
-    print("seed", seed)
-    campaign, (one, two) = rivals_of(seed, "second-lag", [("second-lag", (9000.0,)), ("mounting-stress", (5000.0,))])
-    members = [Member("a", one, None, one), Member("b", two, None, one)]
+def test_expected_evidence_is_what_the_rival_loses():
+    """D against twice the log-likelihood ratio that the rival would lose on the run, its values refitted within their posterior."""
+    campaign, (one, two) = rivals_of(3, "second-lag", [("second-lag", (9000.0,)), ("mounting-stress", (5000.0,))])
     programme = next(p for p in candidates(campaign) if p.kind == "two rates")
-    ahead = [member.follow(programme.states) for member in members]
-    mean = [(member.recorded[0], part[0]) for member, part in zip(members, ahead, strict=True)]
-    columns = members[1].joined(ahead[1][1])
-    found = loss(mean[0], mean[1], columns)
-
-    share, variance = one.linear.share, one.linear.variance
-    times = [run.time for run in campaign.runs] + [average(programme.states.time, campaign.group)]
-    blocks = []
-    for time, present in zip(times, [*one.problem.present, np.ones(times[-1].size, bool)], strict=True):
-        t = time[present] - time[present][0]
-        blocks.append(np.eye(t.size) + share * (np.minimum.outer(t, t) / (8 * 3600.0) + 0.5))
-    blocks.insert(1, np.eye(1))  # the row of the delay's prior
-    covariance = np.zeros((sum(len(b) for b in blocks),) * 2)
-    ends = np.cumsum([0, *map(len, blocks)])
-    for (begin, end), block in zip(itertools.pairwise(ends), blocks, strict=True):
-        covariance[begin:end, begin:end] = variance * block
-    values = [m.fit.columns() @ m.fit.linear.coefficients for m in members]
-    later = [continued(m.fit, programme.states, None) for m in members]
-    rows = times[-1].size
-    difference = np.concatenate(
-        [
-            values[0] - values[1],
-            (later[0].columns() @ later[0].linear.coefficients)[:rows]
-            - (later[1].columns() @ later[1].linear.coefficients)[:rows],
-        ]
-    )
-    tangent = join(
-        np.concatenate([two.columns(), jacobian_of(two)], axis=1),
-        np.concatenate([later[1].columns(), jacobian_of(later[1])], axis=1)[:rows],
-        own_count(two.problem),
-        len(two.problem.states),
-    )
-    scale = np.linalg.norm(tangent, axis=0)
-    white = np.linalg.solve(np.linalg.cholesky(covariance), np.column_stack([tangent / scale, difference]))
-    solution = np.linalg.lstsq(white[:, :-1], white[:, -1], rcond=1e-12)[0]
-    left = white[:, -1] - white[:, :-1] @ solution
-    assert found == pytest.approx(left @ left, rel=1e-3, abs=1e-3)
+    a, b = (continue_model(model, programme.states, None) for model in (one, two))
+    noise = covariance_of_noise(one, a.mean.size, campaign.step)
+    found = against(a, b, noise)
+    # the same by least squares over the rival's values, their posterior as rows of data more
+    factor = np.linalg.cholesky(noise)
+    root = np.linalg.cholesky(b.covariance + 1e-12 * np.diag(np.diag(b.covariance)))
+    rows = np.concatenate([np.linalg.solve(factor, b.columns @ root), np.eye(root.shape[1])])
+    target = np.concatenate([np.linalg.solve(factor, a.mean - b.mean), np.zeros(root.shape[1])])
+    left = target - rows @ np.linalg.lstsq(rows, target, rcond=None)[0]
+    assert found == pytest.approx(left @ left, rel=1e-3)
+    assert found > 0
 
 
 def test_nothing_separates_an_explanation_from_itself():
     campaign, (one,) = rivals_of(5, "second-lag", [("second-lag", (9000.0,))])
-    member, twin = Member("a", one, None, one), Member("b", one, None, one)
     for programme in candidates(campaign)[:3]:
-        ahead, same = member.follow(programme.states), twin.follow(programme.states)
-        assert loss((member.recorded[0], ahead[0]), (twin.recorded[0], same[0]), twin.joined(same[1])) < 1e-9
+        ahead = continue_model(one, programme.states, None)
+        assert against(ahead, ahead, covariance_of_noise(one, ahead.mean.size, campaign.step)) < 1e-9
+
+
+def test_a_model_goes_on_where_it_was():
+    """The mean of a repeated run is the fitted model of the recorded one, its initial state and noise aside."""
+    campaign, (one,) = rivals_of(7, "second-lag", [("second-lag", (9000.0,))])
+    ahead = continue_model(one, candidates(campaign)[0].states, None)
+    fitted = one.linear.columns @ one.solved.coefficients - one.problem.stack(one.tangent.shift)
+    late = ahead.mean.size // 2
+    assert np.allclose(ahead.mean[late:], fitted[late : ahead.mean.size], atol=0.02 * np.ptp(fitted))
+
+
+def test_profiles_keep_to_the_chamber():
+    words = limited("soak -20 60min then soak 40 60min then staircase 40 0 20 30min", 3.0)
+    profile = parse_profile(words)
+    rate = np.abs(np.diff(profile.value)) / np.diff(profile.time)
+    assert rate.max() * 60.0 <= 3.0 + 1e-6
+    assert profile.end == pytest.approx(210 * 60.0, rel=0.02)
+    chamber = parse_chamber("rate 2 range -40 85")
+    assert (chamber.rate, chamber.low, chamber.high) == (2.0, -40.0, 85.0)
+    with pytest.raises(InputError, match="rate 3 range"):
+        parse_chamber("as fast as it can")
 
 
 def test_inseparable_pair_gets_a_measurement_and_no_run():
@@ -107,7 +96,7 @@ def test_inseparable_pair_gets_a_measurement_and_no_run():
         frequency = 5000.0 + 0.4 * x - 4e-4 * x**2 + drift + 0.01 * rng.standard_normal(time.size)
         columns = {"time_s": time, "housing_temperature_degC": housing, "frequency_Hz": frequency}
         records.append(Record({name: values[::4] for name, values in columns.items()}))
-    verdict = investigate(load_campaign(records), held_out=False).verdict
+    verdict = investigate(load_campaign(records), score_held_out=False).verdict
     assert {verdict.causes[0].effect, *verdict.causes[0].equivalent} >= {"ageing", "clock-drift"}
     assert verdict.as_dict()["next_run"] is None
     assert "reference clock" in verdict.next_experiment
@@ -115,11 +104,11 @@ def test_inseparable_pair_gets_a_measurement_and_no_run():
 
 def test_suggested_run_is_part_of_the_answer():
     records, _ = build(plan_of_one(up_stairs()), "white", np.random.default_rng(2))
-    verdict = investigate(load_campaign(records), held_out=False).verdict
+    verdict = investigate(load_campaign(records), score_held_out=False).verdict
     run = verdict.as_dict()["next_run"]
-    assert set(run) == {"profile", "drives", "expected_evidence", "repeat_evidence", "separates"}
-    assert run["expected_evidence"] >= run["repeat_evidence"] > 10.0
-    assert run["profile"].startswith("repeat") or parse_profile(run["profile"]).end > 7 * 3600.0
+    assert set(run) == {"profile", "drives", "expected_evidence", "repeat_evidence", "separates", "hours"}
+    assert run["expected_evidence"] > 10.0
+    assert run["profile"].startswith("repeat") or parse_profile(run["profile"]).end > 3 * 3600.0
     assert run["profile"] in verdict.next_experiment
 
 

@@ -22,7 +22,7 @@ def test_table1_is_not_identifiable_and_says_what_is_known():
     assert 2.5 < found.curvature_ratio < 3.5
     text = " ".join(found.sentences)
     assert "F(1, 2) = 105" in text
-    quartic = next(c for c in found.candidates if c[0] == "curvature, third and fourth order")
+    quartic = next(c for c in found.candidates if c[0] == "curvature up to order 4")
     assert quartic[1] == pytest.approx(4.03e-5, rel=0.02)
     assert quartic[2] == pytest.approx(0.0216, abs=2e-4)
 

@@ -1,0 +1,189 @@
+"""Marginal likelihood of a linear model in coloured noise, for every noise model and every size of its effects.
+
+y = F φ + G γ + noise, φ with a flat prior (the static law), γ ~ N(0, D²) (initial states, delays, the members of an effect's
+family). With σ² integrated out under its scale prior 1/σ² and D counted in the white noise of a row of the grid,
+
+    log p(y | q) = −½ log|A| − ½ Σ log(1 + q walk) − ½ (M − p_F) log r,   A = [F GD]ᵀ W [F GD] + diag(0, 1)
+
+where W are the weights of the noise model and r is what A leaves of yᵀWy. All noise models share one rotation a kind of
+wander, and one Cholesky factor of the bordered matrix [A, b; bᵀ, c] gives determinant and remainder at once.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from studies.diagnosis.noise import KERNELS, SHARES, Noise
+from studies.effects.states import FloatArray
+
+SCALES = 10.0 ** np.arange(-4.0, 0.51, 0.5)
+"""Sizes of an effect, in parts of its strong cases: every half decade as likely as the next."""
+
+
+@dataclass(frozen=True)
+class Linear:
+    """A linear model of stacked rows.
+
+    Attributes
+    ----------
+    target : (M,) array
+    columns : (M, p) array
+    prior : (p,) array
+        Standard deviations of the coefficients; inf where the prior is flat (these come first). Those of an effect are
+        for its strong cases.
+    owner : (p,) int array
+        −1 for the baseline, else the number of the term that a column belongs to.
+    noise : Noise
+    sigma : float
+        White noise of a row of the grid, for the scale of the priors.
+    """
+
+    target: FloatArray
+    columns: FloatArray
+    prior: FloatArray
+    owner: "np.ndarray"
+    noise: Noise
+    sigma: float
+
+    @property
+    def flat(self) -> int:
+        """Number of columns with a flat prior."""
+        return int(np.isinf(self.prior).sum())
+
+    @property
+    def scaled(self) -> FloatArray:
+        """Columns in units of their prior over the noise."""
+        return self.columns * np.where(np.isinf(self.prior), 1.0, self.prior / self.sigma)
+
+
+@dataclass(frozen=True)
+class Solved:
+    """The linear model at its most likely noise and sizes.
+
+    Attributes
+    ----------
+    log_evidence : float
+        Over sizes, at the most likely noise, its prior included.
+    kind, share : int
+        Which wander and which share of it.
+    scales : (terms,) array
+        Size of every term, in parts of its strong cases.
+    coefficients, covariance : (p,), (p, p) arrays
+        Posterior mean and covariance.
+    variance : float
+        σ², of the white noise of a row of the grid.
+    by_noise : (K, S) array
+        Log evidence under every noise model, at these sizes.
+    """
+
+    log_evidence: float
+    kind: int
+    share: int
+    scales: FloatArray
+    coefficients: FloatArray
+    covariance: FloatArray
+    variance: float
+    by_noise: FloatArray = field(repr=False)
+
+
+class Grams:
+    """The bordered matrices [F GD y]ᵀ W [F GD y] of a linear model under every noise model."""
+
+    def __init__(self, model: Linear, kinds: Sequence[int] | None = None) -> None:
+        """Rotate the model once a kind of wander; only `kinds` where they are named."""
+        self.model = model
+        p = model.prior.size
+        table = np.concatenate([model.scaled, model.target[:, None]], axis=1)
+        self.kinds = tuple(range(len(KERNELS))) if kinds is None else tuple(kinds)
+        self.grams = np.empty((len(self.kinds), SHARES.size, p + 1, p + 1))
+        self.constant = np.empty((len(self.kinds), SHARES.size))
+        for k, kind in enumerate(self.kinds):
+            basis = model.noise.bases[kind]
+            rotated = basis.rotate(table)
+            weights = model.noise.weights(kind)
+            for s, w in enumerate(weights):
+                self.grams[k, s] = (rotated * w[:, None]).T @ rotated
+            self.constant[k] = 0.5 * np.log(weights).sum(axis=1) + model.noise.prior(kind)
+
+    def scaling(self, scales: FloatArray) -> FloatArray:
+        """Return the factor of every column, and 1 for the target."""
+        owner = self.model.owner
+        own = np.ones(owner.size + 1)
+        own[:-1][owner >= 0] = scales[owner[owner >= 0]]
+        return own
+
+    def log_evidence(self, scales: FloatArray, at: tuple[int, int] | None = None) -> FloatArray:
+        """Return the log evidence at given sizes, under every noise model (K, S) or under one of them ()."""
+        grams = self.grams if at is None else self.grams[at]
+        factor = self.factor(grams, scales)
+        flat, p = self.model.flat, self.model.prior.size
+        diagonal = np.diagonal(factor, axis1=-2, axis2=-1)
+        rest = np.maximum(diagonal[..., p], 1e-150)
+        freedom = self.model.target.size - flat
+        constant = self.constant if at is None else self.constant[at]
+        return np.asarray(constant - np.log(diagonal[..., :p]).sum(axis=-1) - freedom * np.log(rest))
+
+    def factor(self, grams: FloatArray, scales: FloatArray) -> FloatArray:
+        """Cholesky factor of the bordered matrix with the prior."""
+        own = self.scaling(scales)
+        bordered = grams * own[:, None] * own
+        flat, p = self.model.flat, self.model.prior.size
+        places = np.arange(flat, p)
+        bordered[..., places, places] += 1.0
+        nowhere = np.flatnonzero(~self.model.columns[:, :flat].any(axis=0))  # the offset of a run that is left out
+        bordered[..., nowhere, nowhere] += 1.0
+        every = np.arange(p + 1)
+        bordered[..., every, every] *= 1.0 + 1e-12
+        return np.asarray(np.linalg.cholesky(bordered), dtype=float)
+
+
+def solve(model: Linear, terms: int, scales: FloatArray | None = None, kinds: Sequence[int] | None = None) -> Solved:
+    """Find the most likely noise and sizes, and the coefficients there.
+
+    Parameters
+    ----------
+    model : Linear
+    terms : int
+        Number of effects in it.
+    scales : (terms,) array, optional
+        Sizes to start from.
+    kinds : sequence of int, optional
+        Kinds of wander to look at; all unless given.
+    """
+    grams = Grams(model, kinds)
+    sizes = np.full(terms, 0.1) if scales is None else np.array(scales, dtype=float)
+    marginal = 0.0
+    by_noise = grams.log_evidence(sizes)
+    for _ in range(2 if terms else 0):
+        k, s = _largest(by_noise)
+        marginal = 0.0
+        for term in range(terms):
+            tried = np.array([float(grams.log_evidence(_with(sizes, term, v), (k, s))) for v in SCALES])
+            sizes[term] = SCALES[int(np.argmax(tried))]
+            marginal += float(np.log(np.mean(np.exp(tried - tried.max()))))
+        by_noise = grams.log_evidence(sizes)
+    k, s = _largest(by_noise)
+    factor = grams.factor(grams.grams[k, s], sizes)
+    p = model.prior.size
+    lower, border = factor[:p, :p], factor[p, :p]
+    mean = np.linalg.solve(lower.T, border)
+    inverse = np.linalg.inv(lower)
+    freedom = model.target.size - model.flat
+    variance = float(factor[p, p] ** 2 / max(freedom, 1))
+    units = grams.scaling(sizes)[:-1] * np.where(np.isinf(model.prior), 1.0, model.prior / model.sigma)
+    covariance = variance * (inverse.T @ inverse) * units[:, None] * units
+    best = float(by_noise[k, s]) + marginal
+    return Solved(best, grams.kinds[k], s, sizes, mean * units, covariance, variance, by_noise)
+
+
+def _largest(table: FloatArray) -> tuple[int, int]:
+    """Return row and column of the largest entry."""
+    row, column = divmod(int(np.argmax(table)), table.shape[1])
+    return row, column
+
+
+def _with(values: FloatArray, place: int, value: float) -> FloatArray:
+    out = values.copy()
+    out[place] = value
+    return out

@@ -1,0 +1,193 @@
+"""What a model is worth: residuals on the records' own rows, and on rows that the fit has not seen."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from studies.diagnosis.baseline import Baseline, Followed, Lagged, Tangent
+from studies.diagnosis.campaign import Campaign
+from studies.diagnosis.model import Fit, fit, pose, term_columns
+from studies.effects.states import FloatArray
+
+BLOCKS = 5
+FEWEST = 40
+SETTLED = 0.02
+"""Kelvin by which a refitted initial state may still move."""
+KNOWN_START = 0.5
+"""Part of the initial state's signature in a block from which on it is refitted there."""
+
+
+@dataclass(frozen=True)
+class Score:
+    """Residual rms on the rows of the fit and on rows that it has not seen (None where that cannot be had)."""
+
+    residual_rms: float
+    held_out_rms: float | None
+
+
+def rms(parts: Sequence[FloatArray]) -> float:
+    """Root mean square of what is finite."""
+    values = np.concatenate([part[np.isfinite(part)] for part in parts] or [np.empty(0)])
+    return float(np.sqrt(np.mean(values**2))) if values.size else float("nan")
+
+
+class OnRows:
+    """A fitted model on the records' own rows."""
+
+    def __init__(self, model: Fit, campaign: Campaign) -> None:
+        """Compute its columns on the fine grid."""
+        self.model, self.campaign = model, campaign
+        self.tangent: Tangent = fine(model.baseline, campaign).tangent()
+
+    def columns(self, k: int) -> tuple[FloatArray, FloatArray]:
+        """Return the columns of run `k` on its rows, (rows, p), and what is added to the measured values there."""
+        run, view = self.campaign.runs[k], self.tangent.views[k]
+        parts = [self.tangent.columns[k]]
+        for term in self.model.terms:
+            own = term_columns(term, view, 1, self.model.problem.response.column)
+            parts.append(own[:, np.flatnonzero(term.effect.spread > 0)])
+        table = np.concatenate([*parts, self.tangent.shift[k][:, None]], axis=1)
+        time = run.states.time
+        rows = np.stack([np.interp(run.row_time, time, column) for column in table.T], axis=1)
+        return rows[:, :-1], rows[:, -1]
+
+    def residual(self, k: int, free: Sequence[int] = (), inside: "np.ndarray | None" = None) -> FloatArray:
+        """Return what is left of run `k`; the columns `free` are refitted on the rows `inside`.
+
+        An initial state far from equilibrium bends the law: it is refitted about where it was found.
+        """
+        run = self.campaign.runs[k]
+        inside = np.ones(run.row_time.size, dtype=bool) if inside is None else inside
+        rows, start = self, 0.0
+        for _ in range(4):
+            columns, shift = rows.columns(k)
+            coefficients = self.model.solved.coefficients.copy()
+            coefficients[list(free)] = 0.0
+            rest = (run.row_responses[self.model.problem.response.column] + shift - columns @ coefficients)[inside]
+            known = np.isfinite(rest)
+            if not free or known.sum() <= len(free):
+                return np.asarray(rest)
+            own = columns[inside][:, list(free)]
+            found = np.linalg.lstsq(own[known], rest[known], rcond=None)[0]
+            rest = rest - own @ found
+            places = [n for n, place in enumerate(free) if self.model.tangent.names[place] == f"start@{k}"]
+            if not places or abs(found[places[0]] - start) < SETTLED:
+                break
+            start = float(found[places[0]])
+            rows = self._started(k, start)
+        return np.asarray(rest)
+
+    def _started(self, k: int, start: float) -> "OnRows":
+        """Return the same model with run `k` linearised about another initial state, K."""
+        baseline = self.model.baseline
+        if not isinstance(baseline, Lagged) or baseline.warmer is None:
+            return self
+        fading = baseline.states[k].with_lag(baseline.tau).fading
+        warmer, starts = list(baseline.warmer), list(baseline.starts)
+        warmer[k] = warmer[k] + (start - starts[k]) * fading
+        starts[k] = start
+        moved = replace(baseline, warmer=tuple(warmer), starts=tuple(starts))
+        return OnRows(replace(self.model, baseline=moved), self.campaign)
+
+
+def fine(baseline: Baseline, campaign: Campaign) -> Baseline:
+    """Return the baseline on the fine grid."""
+    if isinstance(baseline, Followed):
+        return replace(
+            baseline,
+            group=1,
+            reading=tuple(_finer(campaign, baseline.reading)),
+            missed=tuple(_finer(campaign, baseline.missed)),
+        )
+    return replace(baseline, group=1)  # type: ignore[type-var]
+
+
+def _finer(campaign: Campaign, parts: Sequence[FloatArray]) -> list[FloatArray]:
+    return [np.interp(run.states.time, run.time, part) for run, part in zip(campaign.runs, parts, strict=True)]
+
+
+def residuals(model: Fit, campaign: Campaign) -> list[FloatArray]:
+    """Return what a model leaves of every run on its own rows."""
+    rows = OnRows(model, campaign)
+    return [rows.residual(k) for k in range(len(campaign.runs))]
+
+
+def own_columns(model: Fit, k: int) -> list[int]:
+    """Return which columns belong to run `k` alone: its offset and its initial state."""
+    return [place for place, name in enumerate(model.tangent.names) if name.endswith(f"@{k}")]
+
+
+def score(model: Fit, campaign: Campaign) -> Score:
+    """Return training and held-out residual.
+
+    One record is left out at a time, the rest is fitted anew; of the record that was left out only its own offset and
+    initial state are refitted. With one record, blocks in time are left out, one thermal constant more on both sides.
+    """
+    training = rms(residuals(model, campaign))
+    if len(campaign.records) > 1:
+        return Score(training, by_record(model, campaign))
+    return Score(training, by_block(model, campaign))
+
+
+def by_record(model: Fit, campaign: Campaign) -> float | None:
+    """Leave one record out at a time."""
+    out = []
+    for record in campaign.records:
+        keep = [np.full(run.time.shape, run.record != record) for run in campaign.runs]
+        rows = _trained(model, campaign, keep)
+        if rows is None:
+            return None
+        out += [
+            rows.residual(k, own_columns(rows.model, k)) for k, run in enumerate(campaign.runs) if run.record == record
+        ]
+    return rms(out)
+
+
+def by_block(model: Fit, campaign: Campaign) -> float | None:
+    """Leave one block of every run out at a time, with a gap on both sides."""
+    gap = getattr(model.baseline, "tau", None) or model.tangent.views[0].fine.tau
+    out = []
+    longest = max(float(np.ptp(run.row_time)) for run in campaign.runs)
+    if longest / BLOCKS < 2.0 * campaign.step or (len(campaign.runs) == 1 and longest < 4.0 * gap):
+        return None
+    for block in range(BLOCKS):
+        ends = [
+            tuple(run.row_time[0] + np.ptp(run.row_time) * part / BLOCKS for part in (block, block + 1))
+            for run in campaign.runs
+        ]
+        keep = [
+            (run.time < low - gap) | (run.time > high + gap)
+            for run, (low, high) in zip(campaign.runs, ends, strict=True)
+        ]
+        rows = _trained(model, campaign, keep)
+        if rows is None:
+            return None
+        for k, run in enumerate(campaign.runs):
+            low, high = ends[k]
+            inside = (run.row_time >= low) & (run.row_time < high + (1e-9 if block < BLOCKS - 1 else 1.0))
+            if inside.any():
+                out.append(rows.residual(k, _start_within(rows, k, inside), inside))
+    return rms(out)
+
+
+def _trained(model: Fit, campaign: Campaign, keep: Sequence["np.ndarray"]) -> OnRows | None:
+    problem = pose(campaign, model.problem.response.column, model.problem.span.tau, keep)
+    if problem.values.size < FEWEST:
+        return None
+    problem = replace(problem, sigma=model.problem.sigma, level=model.problem.level)
+    # the delay that every model tolerates is nothing that rows could teach: it stays where it is
+    baseline = model.baseline
+    if isinstance(baseline, (Lagged, Followed)) and baseline.delay is None:
+        baseline = replace(baseline, delay=model.values()["delay"])
+    return OnRows(fit(problem, baseline, model.terms, 4, model.solved.scales, release=False), campaign)
+
+
+def _start_within(rows: OnRows, k: int, inside: "np.ndarray") -> list[int]:
+    """Return the initial state where a block holds most of it: other rows know next to nothing of it."""
+    names = rows.model.tangent.names
+    if f"start@{k}" not in names:
+        return []
+    place = names.index(f"start@{k}")
+    start = rows.columns(k)[0][:, place]
+    return [place] if np.linalg.norm(start[inside]) >= KNOWN_START * np.linalg.norm(start) else []

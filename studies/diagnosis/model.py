@@ -1,0 +1,316 @@
+"""One response of a campaign, and its model: a baseline with named effects, fitted by evidence."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from studies.diagnosis.baseline import Baseline, Tangent, View
+from studies.diagnosis.campaign import Campaign
+from studies.diagnosis.evidence import Linear, Solved, solve
+from studies.diagnosis.noise import SHARES, Noise
+from studies.diagnosis.response import RESPONSES, Response
+from studies.effects import Effect, Span
+from studies.effects.states import FloatArray, average
+
+
+@dataclass(frozen=True)
+class Term:
+    """An effect with its shape fixed."""
+
+    effect: Effect
+    shape: tuple[float, ...]
+
+    @property
+    def name(self) -> str:
+        """Name of the effect."""
+        return self.effect.name
+
+
+@dataclass(frozen=True)
+class Problem:
+    """The rows of one response on the coarse grid.
+
+    Attributes
+    ----------
+    response : Response
+    present : tuple of bool arrays
+        Which steps of the grid have the response, run by run.
+    values : (M,) array
+        The present values, stacked.
+    noise : Noise
+    sigma : float
+        White noise of a step of the grid, from second differences: no slow effect reaches it.
+    level : float
+        Level of the response, in parts of which sizes count; 1 where they count in its unit.
+    group : int
+        Fine samples to a step.
+    span : Span
+    """
+
+    response: Response
+    present: tuple["np.ndarray", ...]
+    values: FloatArray
+    noise: Noise
+    sigma: float
+    level: float
+    group: int
+    span: Span
+
+    def stack(self, parts: Sequence[FloatArray]) -> FloatArray:
+        """Stack the present rows of arrays given run by run."""
+        return np.concatenate([part[mask] for part, mask in zip(parts, self.present, strict=True)])
+
+    def size(self, effect: Effect) -> float:
+        """Strong cases of an effect in this response, in the unit of its first coefficient."""
+        own = effect.sizes[self.response.column]
+        return own * self.level if self.response.relative and not effect.thermal else own
+
+    def unstack(self, rows: FloatArray) -> list[FloatArray]:
+        """Return stacked rows run by run; missing ones are NaN."""
+        out, begin = [], 0
+        for mask in self.present:
+            own = np.full(mask.shape, np.nan)
+            own[mask] = rows[begin : begin + int(mask.sum())]
+            begin += int(mask.sum())
+            out.append(own)
+        return out
+
+
+def pose(campaign: Campaign, column: str, tau: float, keep: Sequence["np.ndarray"] | None = None) -> Problem:
+    """Set up the rows of one response; `keep` restricts them."""
+    response = RESPONSES[column]
+    present = [np.isfinite(run.responses[column]) for run in campaign.runs]
+    if keep is not None:
+        present = [mask & own for mask, own in zip(present, keep, strict=True)]
+    values = np.concatenate([run.responses[column][m] for run, m in zip(campaign.runs, present, strict=True)])
+    times = [run.time[m] for run, m in zip(campaign.runs, present, strict=True) if m.any()]
+    rows = sum(int(np.isfinite(run.row_responses[column]).sum()) for run in campaign.runs)
+    steps = sum(int(np.isfinite(run.responses[column]).sum()) for run in campaign.runs)
+    level = abs(float(np.median(values))) if response.relative else 1.0
+    return Problem(
+        response,
+        tuple(present),
+        values,
+        Noise.of(times, max(rows / max(steps, 1), 1.0)),
+        white_level(campaign, column),
+        level,
+        campaign.group,
+        span_of(campaign, tau),
+    )
+
+
+def white_level(campaign: Campaign, column: str) -> float:
+    """Return the white noise of a step of the grid, from second differences."""
+    second = np.concatenate([np.diff(run.responses[column], 2) for run in campaign.runs])
+    second = second[np.isfinite(second)]
+    level = 1.4826 * float(np.median(np.abs(second))) / np.sqrt(6.0) if second.size else 0.0
+    if level > 0.0:
+        return float(level)
+    values = np.concatenate([run.responses[column] for run in campaign.runs])
+    return max(1e-9 * float(np.nanmax(np.abs(values))), 1e-300)
+
+
+def span_of(campaign: Campaign, tau: float) -> Span:
+    """Return what a campaign covers."""
+    housing = np.concatenate([run.states.housing for run in campaign.runs])
+    starts = [run.states.campaign_time for run in campaign.runs]
+    return Span(
+        float(np.percentile(housing, 0.5)),
+        float(np.percentile(housing, 99.5)),
+        max(float(np.ptp(run.states.time)) for run in campaign.runs),
+        max(float(t[-1]) for t in starts) - min(float(t[0]) for t in starts),
+        campaign.step,
+        tau,
+        len(campaign.runs),
+        tuple(run.time for run in campaign.runs),
+    )
+
+
+def term_columns(term: Term, view: View, group: int, column: str) -> FloatArray:
+    """Return the columns of an effect for one run on the coarse grid, in units of the response."""
+    effect = term.effect
+    if effect.thermal:
+        states = view.seen_fine if effect.sees_heat else view.fine
+        return average(effect.columns(states, term.shape, column), group) * view.steep[:, None]
+    if effect.fine:
+        return average(effect.columns(view.seen_fine, term.shape, column), group)
+    return effect.columns(view.seen, term.shape, column)
+
+
+@dataclass(frozen=True)
+class Fit:
+    """A model at its most likely noise, sizes and coefficients."""
+
+    problem: Problem
+    baseline: Baseline
+    terms: tuple[Term, ...]
+    tangent: Tangent
+    linear: Linear
+    solved: Solved
+
+    @property
+    def log_evidence(self) -> float:
+        """Log evidence of the model."""
+        return self.solved.log_evidence
+
+    def values(self) -> dict[str, float]:
+        """Values of the baseline by name."""
+        return dict(zip(self.tangent.names, self.solved.coefficients.tolist(), strict=False))
+
+    def columns_of(self, index: int) -> "np.ndarray":
+        """Return the places of a term's columns."""
+        return np.flatnonzero(self.linear.owner == index)
+
+    def coefficients_of(self, index: int) -> FloatArray:
+        """Return one value for each column of a term, zero for those that have no prior."""
+        out = np.zeros(self.terms[index].effect.spread.size)
+        out[used(self.terms[index].effect)] = self.solved.coefficients[self.columns_of(index)]
+        return out
+
+    @cached_property
+    def residual(self) -> FloatArray:
+        """What the model leaves of the stacked rows."""
+        return self.linear.target - self.linear.columns @ self.solved.coefficients
+
+    @cached_property
+    def weights(self) -> FloatArray:
+        """Inverse variances of the rotated rows."""
+        s = self.solved
+        return np.asarray(self.problem.noise.weights(s.kind)[s.share] / s.variance)
+
+    @cached_property
+    def whitened(self) -> FloatArray:
+        """What the model leaves, in independent rows of unit variance."""
+        return self.problem.noise.bases[self.solved.kind].rotate(self.residual) * np.sqrt(self.weights)
+
+    @property
+    def wander_ratio(self) -> float:
+        """Rms of the wander within a run over the white noise of one row of the record."""
+        return float(self.problem.noise.ratio(self.solved.kind)[self.solved.share])
+
+    @property
+    def believed(self) -> bool:
+        """Whether the wander is believed to be noise."""
+        return self.problem.noise.believed(self.solved.kind, self.solved.share)
+
+    def slow_part(self) -> list[FloatArray]:
+        """Return the slow part of what is left, run by run, as the noise model tells it from the white."""
+        basis = self.problem.noise.bases[self.solved.kind]
+        slow = SHARES[self.solved.share] * basis.walk
+        rows = basis.unrotate(basis.rotate(self.residual) * slow / (1.0 + slow))
+        return self.problem.unstack(rows)
+
+    def warmer(self) -> list[FloatArray] | None:
+        """Return what the effects on the temperature add to it, K on the fine grid, run by run."""
+        thermal = [k for k, term in enumerate(self.terms) if term.effect.thermal]
+        if not thermal:
+            return None
+        out = []
+        for view in self.tangent.views:
+            own = np.zeros(view.fine.time.size)
+            for k in thermal:
+                states = view.seen_fine if self.terms[k].effect.sees_heat else view.fine
+                columns = self.terms[k].effect.columns(states, self.terms[k].shape, self.problem.response.column)
+                own += columns @ self.coefficients_of(k)
+            out.append(own)
+        return out
+
+    def moved(self) -> Baseline:
+        """Return the baseline at the values of this fit."""
+        return self.baseline.moved(self.values(), self.warmer())
+
+
+def used(effect: Effect) -> "np.ndarray":
+    """Return which columns of an effect a diagnosis fits: those that have a prior."""
+    return np.flatnonzero(effect.spread > 0)
+
+
+def linearise(problem: Problem, tangent: Tangent, terms: Sequence[Term]) -> Linear:
+    """Return baseline and effects side by side as a linear model of the stacked rows."""
+    columns = [problem.stack(tangent.columns)]
+    prior = [tangent.prior]
+    owner = [np.full(tangent.prior.size, -1)]
+    for index, term in enumerate(terms):
+        places = used(term.effect)
+        own = [term_columns(term, view, problem.group, problem.response.column)[:, places] for view in tangent.views]
+        columns.append(problem.stack(own))
+        prior.append(problem.size(term.effect) * term.effect.spread[places])
+        owner.append(np.full(places.size, index))
+    return Linear(
+        problem.values + problem.stack(tangent.shift),
+        np.concatenate(columns, axis=1),
+        np.concatenate(prior),
+        np.concatenate(owner),
+        problem.noise,
+        problem.sigma,
+    )
+
+
+def fit(
+    problem: Problem,
+    baseline: Baseline,
+    terms: Sequence[Term] = (),
+    rounds: int = 1,
+    scales: FloatArray | None = None,
+    kinds: Sequence[int] | None = None,
+    release: bool = True,
+) -> Fit:
+    """Fit a model; every further round moves the baseline to where the last one ended, as long as that pays.
+
+    Parameters
+    ----------
+    problem : Problem
+    baseline : Baseline
+        Where it is linearised at first.
+    terms : sequence of Term
+    rounds : int
+    scales : array, optional
+        Sizes of the terms to start from.
+    kinds : sequence of int, optional
+        Kinds of wander to look at.
+    release : bool
+        Let go what the baseline holds.
+    """
+    best: Fit | None = None
+    if rounds > 1 and release:
+        baseline = baseline.released()
+    for _ in range(rounds):
+        now = _once(problem, baseline, terms, scales, kinds)
+        if rounds > 1 and (held := baseline.held(now.values())) is not None:
+            baseline, best = held, None
+            now = _once(problem, baseline, terms, now.solved.scales, kinds)
+        settled = best is not None and abs(now.log_evidence - best.log_evidence) < 0.3
+        if best is None or now.log_evidence > best.log_evidence:
+            best = now
+        if settled:
+            break
+        baseline, scales = now.moved(), now.solved.scales
+    assert best is not None
+    return best
+
+
+def _once(
+    problem: Problem, baseline: Baseline, terms: Sequence[Term], scales: FloatArray | None, kinds: Sequence[int] | None
+) -> Fit:
+    tangent = baseline.tangent()
+    linear = linearise(problem, tangent, terms)
+    return Fit(problem, baseline, tuple(terms), tangent, linear, solve(linear, len(terms), scales, kinds))
+
+
+def with_problem(model: Fit, problem: Problem, rounds: int = 1) -> Fit:
+    """Return the same model fitted to other rows."""
+    return fit(problem, model.baseline, model.terms, rounds, model.solved.scales)
+
+
+def settle(problem: Problem, baseline: Baseline, taus: FloatArray | None = None) -> Fit:
+    """Fit a baseline alone, from the best of several lags where it has one."""
+    from studies.diagnosis.baseline import Lagged
+
+    if not isinstance(baseline, Lagged):
+        return fit(problem, baseline, (), 3)
+    starts = np.geomspace(60.0, 2e4, 7) if taus is None else taus
+    tried = [fit(problem, replace(baseline, tau=float(tau)), (), 1) for tau in starts]
+    best = sorted(tried, key=lambda f: -f.log_evidence)[:2]
+    return max((fit(problem, f.moved(), (), 6) for f in best), key=lambda f: f.log_evidence)

@@ -1,0 +1,179 @@
+"""Rehearsal of a diagnosis: effects hidden in planned runs, scanned and weighed by the same evidence as recorded ones.
+
+Under a known noise model the baseline's posterior predictive is Gaussian, so that all cases go through the scan at once: one
+projection, one eigenvalue problem a shape, and the gain of every shape in every case from them.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.special import logsumexp
+
+from studies.diagnosis.constants import CONSTANTS
+from studies.diagnosis.evidence import SCALES
+from studies.diagnosis.model import Fit, Term, term_columns, used
+from studies.diagnosis.scan import Bank, build_bank
+from studies.diagnosis.verdict import weigh
+from studies.effects import Effect, Parameter
+from studies.effects.states import FloatArray
+
+NOTHING = "nothing"
+NOISES = {"white": (0, 0), "slow": (0, 5)}
+"""White noise alone, and with a random walk besides: kind and place of its share."""
+VISIBLE = 1e-4
+"""Part of a signature that must survive the baseline for it to be seen at all."""
+Answer = tuple[str, ...]
+"""What is said, the likeliest first, with its equals."""
+
+
+@dataclass(frozen=True)
+class Stage:
+    """One response of a campaign without effects, ready for hidden ones."""
+
+    model: Fit
+    bank: Bank
+    effects: tuple[Effect, ...]
+    noises: tuple["Scene", ...]
+
+
+@dataclass(frozen=True)
+class Scene:
+    """One noise model: what the baseline takes away, and every shape beside it."""
+
+    kind: int
+    share: int
+    root: FloatArray
+    span: FloatArray
+    moments: FloatArray
+    unit: FloatArray
+    values: FloatArray
+    vectors: FloatArray
+
+
+@dataclass(frozen=True)
+class Hidden:
+    """Cases of one hidden effect at SNR 1 on rows of the grid, with their noise: (M, B) both, one scene each."""
+
+    effect: Effect
+    left: FloatArray
+    noise: FloatArray
+    scene: "np.ndarray"
+    survives: float
+
+
+def set_stage(model: Fit, effects: Sequence[Effect]) -> Stage:
+    """Prepare the baseline of one response for the effects that can act on it."""
+    bank = build_bank(model, effects)
+    return Stage(model, bank, tuple(effects), tuple(_scene(model, bank, *noise) for noise in NOISES.values()))
+
+
+def _scene(model: Fit, bank: Bank, kind: int, share: int) -> Scene:
+    linear, problem = model.linear, model.problem
+    basis, root = problem.noise.bases[kind], np.sqrt(problem.noise.weights(kind)[share])
+    own = basis.rotate(linear.scaled) * root[:, None]
+    rows = np.concatenate([own, np.diag(np.where(np.isinf(linear.prior), 0.0, 1.0))])
+    span = np.linalg.qr(rows)[0][: own.shape[0]]
+    table = bank.rotated[kind].astype(float) * root[:, None]
+    inner = span.T @ table
+    unit = bank.prior / problem.sigma
+    part, below = table.T[bank.columns], inner.T[bank.columns]
+    gram = np.einsum("him,hjm->hij", part, part) - np.einsum("him,hjm->hij", below, below)
+    values, vectors = np.linalg.eigh(gram * unit[:, :, None] * unit[:, None, :])
+    return Scene(kind, share, root, span, table - span @ inner, unit, np.maximum(values, 0.0), vectors)
+
+
+def hide(stage: Stage, effect: Effect, cases: int, rng: np.random.Generator) -> Hidden:
+    """Hide an effect of random shape `cases` times at SNR 1, under white and slow noise by turns."""
+    problem, linear = stage.model.problem, stage.model.linear
+    # the SNR counts what the law, the lag and the initial state cannot absorb; tolerated delays are not among them
+    taken = [k for k, name in enumerate(stage.model.tangent.names) if name not in ("delay", "missed")]
+    columns = linear.columns[:, taken]
+    absorbs = np.linalg.qr(columns / np.maximum(np.linalg.norm(columns, axis=0), 1e-300))[0]
+    grid = list(effect.grid(problem.span, problem.response.column))
+    places = used(effect)
+    signals, shares = [], []
+    for _ in range(cases):
+        shape = list(grid[int(rng.integers(len(grid)))])
+        for k, parameter in enumerate(effect.shape):
+            if not parameter.steady and not effect.once:
+                shape[k] = _jitter(shape[k], parameter, rng)
+        term = Term(effect, tuple(shape))
+        own = [
+            term_columns(term, view, problem.group, problem.response.column)[:, places]
+            for view in stage.model.tangent.views
+        ]
+        columns = problem.stack(own)
+        sizes = rng.standard_normal(places.size) * effect.spread[places]
+        if effect.positive:
+            sizes[0] = abs(sizes[0])
+        signal = columns @ sizes
+        left = signal - absorbs @ (absorbs.T @ signal)
+        share = float(np.linalg.norm(left)) / max(float(np.linalg.norm(signal)), 1e-300)
+        shares.append(share)
+        if share > VISIBLE:
+            signals.append(left / np.linalg.norm(left) * np.sqrt(left.size))
+    rows = problem.values.size
+    survives = float(np.median(shares)) if shares else 0.0
+    if not signals:
+        return Hidden(effect, *(np.empty((rows, 0)),) * 2, np.empty(0, dtype=int), survives)
+    scene = np.arange(len(signals)) % len(stage.noises)
+    noise, level = np.empty((rows, len(signals))), np.empty(len(signals))
+    for n, own_scene in enumerate(stage.noises):
+        mine = np.flatnonzero(scene == n)
+        basis = problem.noise.bases[own_scene.kind]
+        drawn = rng.standard_normal((rows, mine.size)) / own_scene.root[:, None] * problem.sigma
+        noise[:, mine] = basis.unrotate(drawn)
+        white = problem.sigma**2 * problem.noise.rows
+        wander = white * problem.noise.ratio(own_scene.kind)[own_scene.share] ** 2
+        level[mine] = np.sqrt(white + wander)
+    return Hidden(effect, np.stack(signals, axis=1) * level, noise, scene, survives)
+
+
+def _jitter(value: float, parameter: Parameter, rng: np.random.Generator) -> float:
+    moved = (
+        value * float(np.exp(0.2 * rng.standard_normal()))
+        if parameter.logarithmic
+        else value + 0.02 * (parameter.high - parameter.low) * float(rng.uniform(-0.1, 0.1))
+    )
+    return float(np.clip(moved, parameter.low, parameter.high))
+
+
+def rehearse(stage: Stage, hidden: Hidden, snr: float) -> list[Answer]:
+    """Return the answer to every case of a hidden effect at one SNR."""
+    answers: list[Answer] = [(NOTHING,)] * hidden.noise.shape[1]
+    names = np.array([term.name for term in stage.bank.terms])
+    distinct = list(dict.fromkeys(names.tolist()))
+    column = stage.model.problem.response.column
+    for n, scene in enumerate(stage.noises):
+        mine = np.flatnonzero(hidden.scene == n)
+        if not mine.size:
+            continue
+        gains = _gains(stage, scene, snr * hidden.left[:, mine] + hidden.noise[:, mine])
+        total = np.stack([logsumexp(gains[names == name], axis=0) - np.log((names == name).sum()) for name in distinct])
+        for b, case in enumerate(mine):
+            scores = total[:, b] + CONSTANTS["log_prior_effect"]
+            if scores.max() < CONSTANTS["margin"]:
+                continue
+            members, _ = weigh(distinct, scores.tolist(), 0.0)
+            best = next(e for e in stage.effects if e.name == distinct[int(np.argmax(scores))])
+            exact = best.equivalents.get(column, ())
+            answers[case] = tuple(dict.fromkeys([best.name, *members, *exact]))
+    return answers
+
+
+def _gains(stage: Stage, scene: Scene, data: FloatArray) -> FloatArray:
+    """Log evidence of every shape in every case, (H, B)."""
+    linear, problem = stage.model.linear, stage.model.problem
+    target = problem.noise.bases[scene.kind].rotate(data) * scene.root[:, None]
+    inside = scene.span.T @ target
+    least = np.maximum((target**2).sum(axis=0) - (inside**2).sum(axis=0), 1e-300)
+    moment = (scene.moments.T @ target)[stage.bank.columns] * scene.unit[:, :, None]
+    along = np.einsum("hij,hib->hjb", scene.vectors, moment)
+    freedom = linear.target.size - linear.flat
+    parts = []
+    for scale in SCALES**2:
+        explained = np.einsum("hj,hjb->hb", scale / (1.0 + scale * scene.values), along**2)
+        determinant = 0.5 * np.log1p(scale * scene.values).sum(axis=1)
+        parts.append(-determinant[:, None] - 0.5 * freedom * np.log(np.maximum(1.0 - explained / least, 1e-12)))
+    return np.asarray(logsumexp(np.stack(parts), axis=0) - np.log(SCALES.size))

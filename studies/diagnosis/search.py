@@ -1,0 +1,209 @@
+"""Which effects a response has: models grow and are examined again as long as their evidence pays for it.
+
+Every hypothesis is a model: nothing, one effect, several. Its log evidence holds the prior of its effects, of their sizes
+and of their shapes (the mean over the grid of shapes, carried over to the best shape between its points).
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from studies.diagnosis.constants import CONSTANTS
+from studies.diagnosis.model import Fit, Term, fit
+from studies.diagnosis.scan import Bank, Seen, scan
+from studies.effects import Effect, Parameter
+
+MOST_CAUSES = 4
+CONTENDERS = 7
+NEAR = 25.0
+"""A contender's scan may be this far behind the best one's, beside what the misfit of forms allows."""
+
+
+@dataclass(frozen=True)
+class Hypothesis:
+    """A fitted model and its log posterior up to a constant: evidence with the price of effects and shapes.
+
+    `price` holds, for every term, the log prior of the effect and what the choice of its shape costs.
+    """
+
+    fit: Fit
+    price: tuple[float, ...] = ()
+
+    @property
+    def score(self) -> float:
+        """Log posterior, up to the constant that all models of the response share."""
+        return self.fit.log_evidence + sum(self.price)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of its effects."""
+        return tuple(term.name for term in self.fit.terms)
+
+
+@dataclass(frozen=True)
+class Place:
+    """One cause in the final model: the hypotheses that could stand there, best first, and the model without any."""
+
+    index: int
+    rivals: tuple[Hypothesis, ...]
+    without: Hypothesis
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Name of the effect that each rival puts there."""
+        return tuple(rival.fit.terms[self.index].name for rival in self.rivals)
+
+
+@dataclass(frozen=True)
+class Selection:
+    """The outcome of a search: the baseline alone, the final model, and the places of its causes."""
+
+    plain: Hypothesis
+    final: Hypothesis
+    places: tuple[Place, ...] = ()
+    bank: Bank | None = field(default=None, repr=False)
+
+
+def search(plain: Fit, bank: Bank) -> Selection:
+    """Grow a model from a fitted baseline."""
+    start = Hypothesis(plain)
+    now = start
+    while len(now.fit.terms) < MOST_CAUSES:
+        best = max(contenders(now, bank), key=lambda h: h.score, default=None)
+        if best is None or best.score - now.score < needed(start, now):
+            break
+        now = examine(best, bank, start)
+    places = tuple(_place(now, index, bank) for index in range(len(now.fit.terms)))
+    return Selection(start, now, places, bank)
+
+
+def needed(start: Hypothesis, now: Hypothesis) -> float:
+    """Log posterior that a further cause must bring: a margin for noise, and a part of what is explained for misfit."""
+    return CONSTANTS["margin"] + CONSTANTS["further"] * max(now.score - start.score, 0.0)
+
+
+def contenders(base: Hypothesis, bank: Bank, but: Sequence[str] = ()) -> list[Hypothesis]:
+    """Return the models with one effect more whose scans are near the best, each with its shape polished."""
+    taken = {term.name for term in base.fit.terms}
+    seen = [s for s in scan(base.fit, bank) if s.term.name not in but and (s.term.name not in taken)]
+    if not seen or seen[0].gain < -2.0:
+        return []
+    reach = NEAR + 0.5 * max(seen[0].gain, 0.0)
+    return [polish(base, s) for s in seen[:CONTENDERS] if s.gain > seen[0].gain - reach]
+
+
+def polish(base: Hypothesis, seen: Seen) -> Hypothesis:
+    """Add an effect and move its shape to where the evidence is largest."""
+    price = CONSTANTS["log_prior_effect"] + seen.choice
+    model = fit(base.fit.problem, base.fit.moved(), (*base.fit.terms, seen.term), 2, _sizes(base.fit))
+    return Hypothesis(refine(model, len(model.terms) - 1), (*base.price, price))
+
+
+def _sizes(model: Fit) -> np.ndarray:
+    return np.append(model.solved.scales, 0.1)
+
+
+def refine(model: Fit, index: int) -> Fit:
+    """Move the free shape parameters of one term to where the evidence is largest; wrong signs are refused."""
+    term = model.terms[index]
+    free = [(k, p) for k, p in enumerate(term.effect.shape) if not p.steady]
+    best = model
+    for k, parameter in free if free else ():
+        best = _along(best, index, k, parameter)
+    if len(free) > 1:
+        best = _along(best, index, *free[0])
+    best = fit(best.problem, best.moved(), best.terms, 2, best.solved.scales)
+    best = max(best, model, key=lambda f: f.log_evidence)
+    return _signed(best, index)
+
+
+def _signed(model: Fit, index: int) -> Fit:
+    """A coefficient that cannot be negative and is has no evidence."""
+    effect = model.terms[index].effect
+    if effect.positive and model.coefficients_of(index)[0] < 0.0:
+        return replace(model, solved=replace(model.solved, log_evidence=-np.inf))
+    return model
+
+
+def _along(model: Fit, index: int, place: int, parameter: Parameter) -> Fit:
+    """Golden section along one shape parameter, about where it is."""
+    from scipy.optimize import minimize_scalar
+
+    term = model.terms[index]
+    at = term.shape[place]
+    baseline, kinds = model.baseline, [model.solved.kind]
+    best = [model]
+
+    def tried(value: float) -> float:
+        actual = float(np.exp(value)) if parameter.logarithmic else value
+        shape = (*term.shape[:place], actual, *term.shape[place + 1 :])
+        terms = (*model.terms[:index], Term(term.effect, shape), *model.terms[index + 1 :])
+        own = fit(model.problem, baseline, terms, 1, model.solved.scales, kinds)
+        if own.log_evidence > best[0].log_evidence:
+            best[0] = own
+        return -own.log_evidence
+
+    low, high = _bracket(at, term.effect, parameter, model)
+    tolerance = 0.02 * (high - low)
+    minimize_scalar(tried, bounds=(low, high), method="bounded", options={"xatol": tolerance, "maxiter": 12})
+    return best[0]
+
+
+def _bracket(at: float, effect: Effect, parameter: Parameter, model: Fit) -> tuple[float, float]:
+    """As far to both sides as the next points of the grid."""
+    span = model.problem.span
+    column = effect.shape.index(parameter)
+    grid = np.unique([shape[column] for shape in effect.grid(span, model.problem.response.column)])
+    low = grid[grid < at * (1 - 1e-9) if at > 0 else grid < at - 1e-9]
+    high = grid[grid > at * (1 + 1e-9) if at > 0 else grid > at + 1e-9]
+    below = float(low[-1]) if low.size else (at / 1.6 if parameter.logarithmic else at - 1.0)
+    above = float(high[0]) if high.size else (at * 1.6 if parameter.logarithmic else at + 1.0)
+    most = min(parameter.high, parameter.of_run * span.longest_run)
+    below, above = max(below, parameter.low), min(above, most)
+    if above <= below:
+        below, above = min(at, most) * (1 - 1e-6), min(at, most) * (1 + 1e-6) + 1e-9
+    return (float(np.log(below)), float(np.log(above))) if parameter.logarithmic else (below, above)
+
+
+def examine(now: Hypothesis, bank: Bank, start: Hypothesis) -> Hypothesis:
+    """Look at the terms of a grown model again: drop what no longer pays, exchange what another effect does better."""
+    for index in range(len(now.fit.terms) - 1):
+        base = drop(now, index)
+        if base.score > now.score - CONSTANTS["margin"]:
+            return examine(base, bank, start) if len(base.fit.terms) > 1 else base
+        for other in contenders(base, bank):
+            if other.score > now.score + 1.0:
+                now = other
+                break
+    return now
+
+
+def drop(now: Hypothesis, index: int) -> Hypothesis:
+    """Return the model without one of its terms."""
+    terms = (*now.fit.terms[:index], *now.fit.terms[index + 1 :])
+    scales = np.delete(now.fit.solved.scales, index)
+    price = (*now.price[:index], *now.price[index + 1 :])
+    own = fit(now.fit.problem, now.fit.moved(), terms, 3, scales)
+    if not terms:
+        return Hypothesis(own, price)
+    return Hypothesis(own, price)
+
+
+def _place(now: Hypothesis, index: int, bank: Bank) -> Place:
+    """Return who could stand in the place of one term, the others held."""
+    base = drop(now, index)
+    last = _moved_last(now, index)
+    rivals = [last, *(h for h in contenders(base, bank, (now.fit.terms[index].name,)) if np.isfinite(h.score))]
+    rivals.sort(key=lambda h: -h.score)
+    return Place(len(now.fit.terms) - 1, tuple(rivals), base)
+
+
+def _moved_last(now: Hypothesis, index: int) -> Hypothesis:
+    """Return the same model with one term at the end, where rivals have theirs."""
+    order = [k for k in range(len(now.fit.terms)) if k != index] + [index]
+    if order == list(range(len(order))):
+        return now
+    terms = tuple(now.fit.terms[k] for k in order)
+    own = fit(now.fit.problem, now.fit.baseline, terms, 2, now.fit.solved.scales[order])
+    return Hypothesis(own, tuple(now.price[k] for k in order))

@@ -1,0 +1,204 @@
+"""Witnesses for what no named effect explains: generic forms of each input, and what is sharp in time.
+
+A generic form is a family like any effect, with many columns and no physics: smooth in temperature, in temperature and rate,
+in history, in a drive, in time. It is weighed by the same marginal likelihood; its name is where structure is left.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from studies.diagnosis.constants import CONSTANTS
+from studies.diagnosis.model import Fit, Term, fit
+from studies.diagnosis.scan import applicable, build_bank, scan
+from studies.effects import Coefficient, Effect, Parameter, Span
+from studies.effects.states import FloatArray, States, lag, play
+
+TEMPERATURE_ORDERS, TIME_ORDERS = 24, 12
+STRONG = {"frequency_Hz": 1e-4, "bias_deg_per_h": 10.0, "inverse_q": 0.3}
+SHARP_ROWS = 3
+"""Neighbouring rows that are averaged before their tails are counted."""
+
+
+@dataclass(frozen=True)
+class Leftover:
+    """What is left: in which input, with how much log evidence, and how large a part of the structure was explained."""
+
+    input: str
+    evidence: float
+    share: float
+    fit: Fit | None = None
+
+    @property
+    def significant(self) -> bool:
+        """Whether it is more than chance."""
+        return self.evidence > CONSTANTS["margin"] - CONSTANTS["log_prior_unknown"]
+
+
+def _ends(states: States) -> FloatArray:
+    """Temperature over the range of the campaign, about −1 … 1."""
+    return np.asarray(states.excess / 30.0)
+
+
+def _powers(x: FloatArray, orders: int) -> FloatArray:
+    return np.stack([np.cos(k * np.arccos(np.clip(x, -1.0, 1.0))) for k in range(orders)], axis=1)
+
+
+def _generic(
+    name: str,
+    columns: Callable[[States, Sequence[float], str], FloatArray],
+    spread: Sequence[float] | FloatArray,
+    needs: tuple[str, ...] = (),
+) -> Effect:
+    return Effect(
+        name=name,
+        summary="",
+        source="",
+        isolate="",
+        coefficients=(Coefficient("size_{unit}", tuple(float(v) for v in spread)),),
+        columns=columns,
+        grid=lambda span, response: [()],
+        sizes=STRONG,
+        needs=needs,
+    )
+
+
+def generic_forms(span: Span, runs: int) -> list[Effect]:
+    """Return the generic forms of a campaign."""
+    low, high = span.temperature_low, span.temperature_high
+
+    def place(states: States) -> FloatArray:
+        return np.asarray(np.clip((states.resonator - low) / max(high - low, 1e-9), 0.0, 1.0))
+
+    def temperature(states: States, shape: Sequence[float], response: str) -> FloatArray:
+        return np.cos(np.pi * place(states)[:, None] * np.arange(2, TEMPERATURE_ORDERS))
+
+    def rate(states: States, shape: Sequence[float], response: str) -> FloatArray:
+        fast = states.rate / max((high - low) / 3600.0, 1e-12)
+        x = 2.0 * place(states) - 1.0
+        curve = _powers(x, 4)
+        return np.concatenate(
+            [curve * fast[:, None], curve * (fast**2)[:, None], curve * np.abs(fast)[:, None]], axis=1
+        )
+
+    def history(states: States, shape: Sequence[float], response: str) -> FloatArray:
+        wide = high - low
+        loops = play(states.resonator, [wide * part for part in (0.01, 0.03, 0.1, 0.25)])
+        slow = [lag(states.resonator, states.step, span.longest_run * part) for part in (0.01, 0.04, 0.15, 0.6)]
+        return np.asarray((np.concatenate([loops, np.stack(slow, 1)], axis=1) - states.resonator[:, None]) / wide)
+
+    def time(states: States, shape: Sequence[float], response: str) -> FloatArray:
+        t = (states.time - states.time[0]) / max(float(np.ptp(states.time)), 1e-9)
+        waves = np.cos(np.pi * t[:, None] * np.arange(TIME_ORDERS))
+        out = np.zeros((t.size, runs * TIME_ORDERS))
+        out[:, states.run * TIME_ORDERS : (states.run + 1) * TIME_ORDERS] = waves
+        return out
+
+    def drive(field: str) -> Callable[[States, Sequence[float], str], FloatArray]:
+        def columns(states: States, shape: Sequence[float], response: str) -> FloatArray:
+            values = np.asarray(getattr(states, field), dtype=float)
+            unit = values / max(float(np.abs(values).max()), 1e-12)
+            curve = _powers(2.0 * place(states) - 1.0, 4)
+            slow = lag(unit, states.step, states.tau)
+            powers = (
+                [unit, unit**2, unit**3, slow] if field != "pattern_angle" else [np.sin(4 * values), np.cos(4 * values)]
+            )
+            return np.concatenate([curve * power[:, None] for power in powers], axis=1)
+
+        return columns
+
+    orders = np.arange(2, TEMPERATURE_ORDERS)
+    forms = [
+        _generic("temperature", temperature, 2.0 / orders),
+        _generic("rate and temperature", rate, [1.0] * 12),
+        _generic("history of the temperature", history, [1.0] * 8),
+        _generic("time", time, np.tile(1.0 / (1.0 + np.arange(TIME_ORDERS)), runs)),
+    ]
+    for field, word in (
+        ("voltage_squared", "voltage"),
+        ("amplitude_squared", "amplitude"),
+        ("quadrature", "quadrature"),
+        ("pattern_angle", "azimuth"),
+    ):
+        count = 16 if field != "pattern_angle" else 8
+        forms.append(_generic(word, drive(field), [1.0] * count, (field,)))
+    return forms
+
+
+def _step(states: States, shape: Sequence[float], response: str) -> FloatArray:
+    """One step at one moment of one run."""
+    run, moment = shape
+    return np.asarray(np.clip((states.time - moment) / states.step + 0.5, 0.0, 1.0)[:, None] * (states.run == int(run)))
+
+
+STEP = replace(
+    _generic("step", _step, [1.0]),
+    shape=(Parameter("run", 0.0, 1e4, "run", False, True), Parameter("time_s", 0.0, 1e9, "moment", False, True)),
+    grid=lambda span, response: [
+        (float(k), float(t) + span.step / 2) for k, times in enumerate(span.bins) for t in times
+    ],
+)
+
+
+def look(plain: Fit, model: Fit) -> Leftover:
+    """Return the strongest generic form beside a model, and the part of the structure that the model explains.
+
+    Parameters
+    ----------
+    plain : Fit
+        The baseline alone.
+    model : Fit
+        With the named effects.
+    """
+    problem = model.problem
+    forms = applicable(problem, model, generic_forms(problem.span, len(problem.present)))
+    best, name = model, ""
+    baseline, scales = model.baseline, model.solved.scales
+    for form in forms:
+        tried = fit(problem, baseline, (*model.terms, Term(form, ())), 1, np.append(scales, 1e-2))
+        if tried.log_evidence > best.log_evidence:
+            best, name = tried, form.name
+    evidence = best.log_evidence - model.log_evidence
+    step = max((seen.gain for seen in scan(model, build_bank(model, [STEP]), 3)), default=0.0)
+    if step > evidence:
+        name, evidence = "time: a step", step
+    word, tails = sharp(best)
+    if tails > evidence:
+        name, evidence = word, tails
+    if not model.believed and best.believed is False:
+        own = CONSTANTS["margin"] - CONSTANTS["log_prior_unknown"] + 10.0 * np.log(max(model.wander_ratio, 1.0))
+        if own > evidence:
+            name, evidence = "time: it wanders far beyond its white noise", float(own)
+    return Leftover(name, float(evidence), share(plain, model, best), best)
+
+
+def share(plain: Fit, model: Fit, fullest: Fit) -> float:
+    """Return the part of the structure that a model explains, in independent rows of the fullest model's noise."""
+    s = fullest.solved
+    basis = fullest.problem.noise.bases[s.kind]
+    root = np.sqrt(fullest.problem.noise.weights(s.kind)[s.share] / s.variance)
+
+    def left(own: Fit) -> float:
+        return float(np.sum((basis.rotate(own.residual) * root) ** 2))
+
+    before, after, floor = left(plain), left(model), left(fullest)
+    total = max(before - floor, 1e-9)
+    return float(np.clip(1.0 - (after - floor) / total, 0.0, 1.0)) if before > after else 0.0
+
+
+def sharp(model: Fit) -> tuple[str, float]:
+    """Return the log evidence of brief events: tails of the whitened rows against a normal law.
+
+    A mixture of two normal laws, a small part of the rows with a larger variance, against one normal law.
+    """
+    rows = model.whitened / max(float(np.sqrt(np.mean(model.whitened**2))), 1e-300)
+    best = 0.0
+    for part in (0.01, 0.03, 0.1):
+        for wide in (3.0, 5.0, 8.0):
+            narrow = np.sqrt(max((1.0 - part * wide**2 * 0.3) / (1.0 - part), 0.3))
+            mixed = (1 - part) / narrow * np.exp(-0.5 * (rows / narrow) ** 2) + part / wide * np.exp(
+                -0.5 * (rows / wide) ** 2
+            )
+            best = max(best, float(np.sum(np.log(mixed + 1e-300) + 0.5 * rows**2)))
+    return "time: brief events", best - 3.0

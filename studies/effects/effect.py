@@ -1,0 +1,296 @@
+"""One physical hypothesis about what a simulation leaves out, and how it runs forward."""
+
+import importlib
+import pkgutil
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cache
+
+import numpy as np
+
+from studies.effects.states import FloatArray, States
+from studies.errors import InputError, nearest
+
+UNITS = {"frequency_Hz": "Hz", "bias_deg_per_h": "deg_per_h", "inverse_q": "1"}
+AROUND = 293.15
+"""Temperature at which coefficients count that would otherwise hang on the range a campaign covers, K."""
+Shape = Sequence[float]
+Numbers = float | Sequence[float]
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A shape parameter: it enters the signature nonlinearly, between `low` and `high`.
+
+    `steady` ones are chosen from the grid only and are `low` where a card leaves them out; `of_run` bounds it from above by
+    that part of the longest run, besides `high`.
+    """
+
+    name: str
+    low: float
+    high: float
+    meaning: str
+    logarithmic: bool = True
+    steady: bool = False
+    of_run: float = np.inf
+
+    @property
+    def unit(self) -> str:
+        """The unit that the name ends with."""
+        return next((u for u in ("degC", "deg_per_10K", "deg", "K", "s") if self.name.endswith(f"_{u}")), "1")
+
+
+@dataclass(frozen=True)
+class Coefficient:
+    """A linear coefficient: a number, or a list where the effect is a family.
+
+    `name` ends with its unit, `{unit}` standing for that of the response. `spread` are the prior standard deviations of
+    the members of the list, in parts of the effect's size; the first is the definite curve.
+    """
+
+    name: str
+    spread: tuple[float, ...] = (1.0,)
+
+
+@dataclass(frozen=True)
+class Span:
+    """What a campaign covers: the ranges from which shape parameters are drawn."""
+
+    temperature_low: float
+    temperature_high: float
+    longest_run: float
+    campaign_length: float
+    step: float
+    tau: float
+    runs: int
+    bins: tuple[FloatArray, ...] = ()
+
+    @property
+    def temperature_range(self) -> float:
+        """Covered temperature range, K."""
+        return self.temperature_high - self.temperature_low
+
+
+@dataclass(frozen=True)
+class Effect:
+    """One physical effect: a family of signatures with a prior on their size.
+
+    Attributes
+    ----------
+    name, summary, source, isolate, sensor : str
+        Contract name; what happens; where the form comes from; the experiment that would isolate it; the sensor or
+        column that would tell it from its kin, with what that costs ("" where none does).
+    coefficients : tuple of Coefficient
+        One column each, or as many as its `spread` has members.
+    columns : callable (states, shape, response) -> (N, k) array
+        Signature of a unit of each coefficient: a change of resonator temperature in K when the effect `acts_on` the
+        temperature (frequency, bias and 1/Q then follow by themselves), else a change of the response in its own unit.
+    grid : callable (span, response) -> list of shapes
+        Shapes to look at, fine enough for a scan; all equally likely beforehand.
+    sizes : mapping from response to number
+        How large the first coefficient is in strong cases that sources show; smaller sizes are likely as well, down to a
+        ten thousandth, every decade as much. Frequency and 1/Q count in parts of their level. Its keys are the responses
+        on which the effect acts directly.
+    shape : tuple of Parameter
+        Parameters that enter nonlinearly.
+    acts_on : str
+        "temperature" or "response".
+    needs : tuple of str
+        Drives (fields of `States`) that must be measured and must vary.
+    equivalents : mapping from response to names
+        Effects that no record of that response alone can tell from this one, whatever their evidence.
+    judge : str
+        A column of the record that settles whether it is this effect or its equivalent, where it is there.
+    positive : bool
+        Whether its first coefficient cannot be negative.
+    event : bool
+        Whether other runs know nothing of it, so that no held-out run can confirm it.
+    once : bool
+        Whether it happens once in a gyro's life rather than in every run, so that a saved card does not repeat it.
+    fine : bool
+        Whether its columns need the fine grid (lags of fast drives, narrow curves) before they are averaged.
+    sees_heat : bool
+        Whether an effect on the temperature depends on what the others have made of it.
+    steady : callable (temperature - reference, shape) -> (N, k) array, optional
+        What is left of it in a steady state, for tables, with `steady_grid` (low, high) -> shapes, both in K.
+    steady_words : str
+        What such a form means, in words.
+    """
+
+    name: str
+    summary: str
+    source: str
+    isolate: str
+    coefficients: tuple[Coefficient, ...]
+    columns: Callable[[States, Shape, str], FloatArray]
+    grid: Callable[[Span, str], Sequence[tuple[float, ...]]]
+    sizes: Mapping[str, float]
+    sensor: str = ""
+    shape: tuple[Parameter, ...] = ()
+    acts_on: str = "response"
+    needs: tuple[str, ...] = ()
+    equivalents: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    judge: str = ""
+    positive: bool = False
+    event: bool = False
+    once: bool = False
+    fine: bool = False
+    sees_heat: bool = False
+    steady: Callable[[FloatArray, Shape], FloatArray] | None = None
+    steady_grid: Callable[[float, float], Sequence[tuple[float, ...]]] | None = None
+    steady_words: str = ""
+
+    @property
+    def responses(self) -> tuple[str, ...]:
+        """Responses on which it acts directly."""
+        return tuple(self.sizes)
+
+    @property
+    def thermal(self) -> bool:
+        """Whether it changes the temperature of the resonator."""
+        return self.acts_on == "temperature"
+
+    @property
+    def spread(self) -> FloatArray:
+        """Prior standard deviations of all columns over the effect's size."""
+        return np.array([value for coefficient in self.coefficients for value in coefficient.spread])
+
+    def coefficient_names(self, response: str) -> tuple[str, ...]:
+        """Return the names of the coefficients with the unit of `response` filled in."""
+        return tuple(c.name.format(unit=UNITS[response]) for c in self.coefficients)
+
+    def numbers(self, values: FloatArray, response: str) -> dict[str, float | list[float]]:
+        """Return coefficients by name from one value a column."""
+        out: dict[str, float | list[float]] = {}
+        begin = 0
+        for name, coefficient in zip(self.coefficient_names(response), self.coefficients, strict=True):
+            part = [float(v) for v in values[begin : begin + len(coefficient.spread)]]
+            out[name] = part[0] if len(part) == 1 else part
+            begin += len(part)
+        return out
+
+
+@cache
+def library() -> dict[str, Effect]:
+    """Return every effect of the library by name."""
+    folder = importlib.import_module("studies.effects.entries")
+    found: dict[str, Effect] = {}
+    for module in pkgutil.iter_modules(folder.__path__):
+        effect = importlib.import_module(f"{folder.__name__}.{module.name}").EFFECT
+        found[effect.name] = effect
+    return found
+
+
+def find_effect(name: str) -> Effect:
+    """Return the effect called `name`.
+
+    Raises
+    ------
+    InputError
+        If the library has no such effect; the message names the nearest.
+    """
+    try:
+        return library()[name]
+    except KeyError:
+        raise InputError(f"no effect is called '{name}'{nearest(name, library())}") from None
+
+
+def check_effect(name: str, parameters: Mapping[str, Numbers], response: str) -> tuple[list[float], FloatArray]:
+    """Return the shape and one value a column of an effect from the numbers of a card.
+
+    Raises
+    ------
+    InputError
+        If a parameter is unknown, missing, out of its bounds or of the wrong length, or the effect does not act there.
+    """
+    effect = find_effect(name)
+    if response not in effect.responses:
+        raise InputError(f"effect '{name}' does not act on {response}{nearest(response, effect.responses)}")
+    names = effect.coefficient_names(response)
+    known = (*(p.name for p in effect.shape), *names)
+    for key in parameters:
+        if key not in known:
+            raise InputError(f"effect '{name}' has no parameter '{key}'{nearest(key, known)}")
+    missing = [p.name for p in effect.shape if p.name not in parameters and not p.steady]
+    if missing:
+        raise InputError(f"effect '{name}' needs the parameter '{missing[0]}'")
+    if not any(key in parameters for key in names):
+        raise InputError(f"effect '{name}' has no size; give it {' or '.join(names)}")
+    shape = []
+    for p in effect.shape:
+        value = parameters.get(p.name, p.low)
+        if not isinstance(value, (int, float)) or not p.low <= value <= p.high:
+            raise InputError(f"effect '{name}': {p.name} must be a number from {p.low:g} to {p.high:g}, not {value!r}")
+        shape.append(float(value))
+    weights: list[float] = []
+    for key, coefficient in zip(names, effect.coefficients, strict=True):
+        given, most = np.atleast_1d(np.asarray(parameters.get(key, 0.0), dtype=float)), len(coefficient.spread)
+        if given.ndim != 1 or given.size > most:
+            raise InputError(f"effect '{name}': {key} takes a number or a list of at most {most}")
+        weights += [*given.tolist(), *[0.0] * (most - given.size)]
+    return shape, np.array(weights)
+
+
+def apply_effect(
+    name: str, parameters: Mapping[str, Numbers], states: States, response: str | None = None
+) -> tuple[str, FloatArray]:
+    """Run one effect forward.
+
+    Parameters
+    ----------
+    name : str
+        Contract name of the effect.
+    parameters : mapping
+        Shape parameters and coefficients by name, as a diagnosis saves them; absent coefficients are zero.
+    states : States
+        The run, on an even time grid.
+    response : str, optional
+        The response to change; the effect's first one unless given.
+
+    Returns
+    -------
+    target : str
+        "resonator_temperature" or the response.
+    change : (N,) array
+        What must be added to the target, K or the response's unit. Zero where the effect's drive (amplitude, voltage,
+        quadrature, azimuth) is not part of the run: it then stays where it was calibrated.
+
+    Raises
+    ------
+    InputError
+        As `check_effect`.
+    """
+    effect = find_effect(name)
+    response = effect.responses[0] if response is None else response
+    shape, weights = check_effect(name, parameters, response)
+    target = "resonator_temperature" if effect.thermal else response
+    if any(getattr(states, drive) is None for drive in effect.needs):
+        return target, np.zeros_like(states.time)
+    return target, np.asarray(effect.columns(states, shape, response) @ weights)
+
+
+def apply_effects(entries: Sequence[tuple[str, str, Mapping[str, Numbers]]], states: States) -> dict[str, FloatArray]:
+    """Run several effects forward, those on the temperature first: the others see the temperature that they leave.
+
+    Parameters
+    ----------
+    entries : sequence of (name, response, parameters)
+        As `[[effect]]` tables give them.
+    states : States
+        The run, on an even time grid.
+
+    Returns
+    -------
+    changes : dict
+        What must be added to "resonator_temperature" (K) and to each response.
+    """
+    changes: dict[str, FloatArray] = {}
+    warmed = states
+    for stage in range(3):  # on the temperature; on the temperature that these leave; on the responses
+        for name, response, parameters in entries:
+            effect = find_effect(name)
+            if stage == (2 if not effect.thermal else int(effect.sees_heat)):
+                target, change = apply_effect(name, parameters, warmed if stage else states, response)
+                changes[target] = changes.get(target, np.zeros_like(states.time)) + change
+        warmed = replace(states, resonator=states.resonator + changes.get("resonator_temperature", 0.0))
+    return changes

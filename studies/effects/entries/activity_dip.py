@@ -1,0 +1,57 @@
+"""Activity dip: a spurious mode crosses the working mode at one temperature."""
+
+import numpy as np
+
+from studies.effects.effect import Coefficient, Effect, Parameter, Shape, Span
+from studies.effects.states import FloatArray, States
+
+
+def columns(states: States, shape: Shape, response: str) -> FloatArray:
+    """With z = (T − T_d)/w, f shifts by z/(1 + z²), 1/Q by 1/(1 + z²); a stronger coupling mixes and widens the two."""
+    centre, width = shape
+    out = []
+    for ratio in (1.0, 2.0):
+        z = (states.resonator - 273.15 - centre) / (width * ratio)
+        pair = [z / (1.0 + z * z), 1.0 / (1.0 + z * z)]
+        out += pair if response == "frequency_Hz" else pair[::-1]
+    return np.stack(out, axis=1)
+
+
+def grid(span: Span, response: str) -> list[tuple[float, ...]]:
+    """Centres over the covered range, a width apart."""
+    low, high = span.temperature_low - 273.15, span.temperature_high - 273.15
+    widths = [width for width in (0.25, 0.5, 1.0, 2.0) if width < 0.2 * (high - low)]
+    return [
+        (float(centre), width)
+        for width in widths
+        for centre in np.arange(low, high, max(width * 0.8, (high - low) / 80))
+    ]
+
+
+def steady(x: FloatArray, shape: Shape) -> FloatArray:
+    """Dispersion of one crossing."""
+    z = (x - shape[0]) / shape[1]
+    return np.asarray((z / (1.0 + z * z))[:, None])
+
+
+EFFECT = Effect(
+    name="activity-dip",
+    summary="a spurious mode crosses the working mode at one temperature and pulls frequency and damping",
+    source="avoided crossing of two damped modes; Ballato and Tilton, IEEE UFFC 25 (1978) on activity dips",
+    isolate="cross the temperature twice in both directions, then with another amplitude or bias voltage: the dip moves",
+    sensor="1/Q beside the frequency: a dip shows in both at the same temperature",
+    coefficients=(Coefficient("pull_{unit}", (1.0, 0.4, 0.4, 0.2)),),
+    columns=columns,
+    grid=grid,
+    sizes={"frequency_Hz": 1e-4, "inverse_q": 1.0},
+    shape=(
+        Parameter("temperature_degC", -150.0, 250.0, "where the modes cross", False),
+        Parameter("width_K", 0.05, 2.5, "half width of the crossing"),
+    ),
+    fine=True,
+    steady=steady,
+    steady_grid=lambda low, high: [
+        (float(c), float(w)) for c in np.linspace(low, high, 25) for w in np.array([0.05, 0.1, 0.2, 0.4]) * (high - low)
+    ],
+    steady_words="one spurious mode near {0:+.0f} K from the reference",
+)

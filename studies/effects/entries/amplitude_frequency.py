@@ -1,0 +1,28 @@
+"""Amplitude-frequency effect: the spring of a large vibration is not linear."""
+
+from studies.effects.effect import Coefficient, Effect, Shape, Span
+from studies.effects.states import FloatArray, States
+
+
+def columns(states: States, shape: Shape, response: str) -> FloatArray:
+    """Backbone of a cubic (Duffing) spring: δf = κ A², at once."""
+    assert states.amplitude_squared is not None
+    return states.amplitude_squared[:, None]
+
+
+def grid(span: Span, response: str) -> list[tuple[float, ...]]:
+    """No shape parameter."""
+    return [()]
+
+
+EFFECT = Effect(
+    name="amplitude-frequency",
+    summary="the frequency depends on the vibration amplitude: a nonlinear spring",
+    source="Duffing oscillator, Nayfeh and Mook, Nonlinear Oscillations (1979), backbone curve",
+    isolate="step the drive amplitude at constant temperature: an instant change, which the bias does not follow",
+    coefficients=(Coefficient("slope_{unit}_per_V2"),),
+    columns=columns,
+    grid=grid,
+    sizes={"frequency_Hz": 1e-4},
+    needs=("amplitude_squared",),
+)

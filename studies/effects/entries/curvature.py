@@ -1,0 +1,52 @@
+"""Curvature: the frequency law has more bends than the material law knows."""
+
+import numpy as np
+
+from studies.effects.curves import smoothness, waves
+from studies.effects.effect import Coefficient, Effect, Parameter, Shape, Span
+from studies.effects.states import FloatArray, States
+
+
+def columns(states: States, shape: Shape, response: str) -> FloatArray:
+    """Static terms x³ … x⁶ of the frequency, x = T_r − T₀ in units of 10 K, and smooth waves over the covered range."""
+    x = states.excess / 10.0
+    powers = np.stack([x**order for order in range(1, 7)], axis=1)
+    return np.concatenate([powers, waves(states.resonator - 273.15, shape[0], shape[1])], axis=1)
+
+
+def grid(span: Span, response: str) -> list[tuple[float, ...]]:
+    """One smooth curve over the covered range."""
+    return [(span.temperature_low - 273.15, span.temperature_high - 273.15)]
+
+
+def steady(x: FloatArray, shape: Shape) -> FloatArray:
+    """Powers from the third to the named one."""
+    return np.stack([(x / 10.0) ** power for power in range(3, int(shape[0]) + 1)], axis=1)
+
+
+EFFECT = Effect(
+    name="curvature",
+    summary="the frequency has a static dependence on temperature beyond the second order",
+    source="HRG paper eqs. (16)-(18), third order and beyond; knees as a smooth curve",
+    isolate="cover the whole temperature range slowly, in both directions",
+    # the first two are for cards: a baseline has them already
+    coefficients=(
+        Coefficient("slope_{unit}_per_10K", (0.0,)),
+        Coefficient("quadratic_{unit}_per_10K2", (0.0,)),
+        Coefficient("cubic_{unit}_per_10K3"),
+        Coefficient("quartic_{unit}_per_10K4", (0.3,)),
+        Coefficient("quintic_{unit}_per_10K5", (0.1,)),
+        Coefficient("sextic_{unit}_per_10K6", (0.03,)),
+        Coefficient("waves_{unit}", smoothness(5.0)),
+    ),
+    columns=columns,
+    grid=grid,
+    sizes={"frequency_Hz": 2e-5},
+    shape=(
+        Parameter("from_degC", -273.0, 500.0, "lower end of the smooth curve", False, True),
+        Parameter("to_degC", -273.0, 500.0, "upper end of the smooth curve", False, True),
+    ),
+    steady=steady,
+    steady_grid=lambda low, high: [(3.0,), (4.0,)],
+    steady_words="curvature up to order {0:.0f}",
+)

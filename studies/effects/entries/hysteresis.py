@@ -1,0 +1,46 @@
+"""Hysteresis: a response that depends on where the temperature came from, however slowly."""
+
+import numpy as np
+
+from studies.effects.effect import Coefficient, Effect, Parameter, Shape, Span
+from studies.effects.states import FloatArray, States, play
+
+
+def columns(states: States, shape: Shape, response: str) -> FloatArray:
+    """Plays less the temperature itself, K: half widths of 1, 0.4, 0.7, 1.5 and 2.2 times the named one (Prandtl-Ishlinskii)."""
+    radius, start = shape
+    loops = play(states.resonator, [radius * ratio for ratio in RATIOS], start)
+    return np.asarray(loops - states.resonator[:, None])
+
+
+def grid(span: Span, response: str) -> list[tuple[float, ...]]:
+    """Loop half widths from half a percent to a third of the covered range; three initial memories."""
+    radii = span.temperature_range * np.geomspace(0.006, 0.35, 8)
+    return [(float(radius), start) for radius in radii for start in (0.0, -1.0, 1.0)]
+
+
+def steady(x: FloatArray, shape: Shape) -> FloatArray:
+    """A play through the temperatures in the order of the rows."""
+    return np.asarray((play(x, shape[0]) - x)[:, None])
+
+
+RATIOS = (1.0, 0.4, 0.7, 1.5, 2.2)
+
+
+EFFECT = Effect(
+    name="hysteresis",
+    summary="a rate-independent loop: heating and cooling branches differ and stay apart in a soak",
+    source="play operators, Visintin, Differential Models of Hysteresis (1994); Prandtl-Ishlinskii and Preisach loops are sums of plays",
+    isolate="the same cycle at two rates, and soak points approached from both sides: hysteresis does not decay",
+    coefficients=(Coefficient("loop_{unit}_per_K", (1.0, 0.5, 0.6, 0.6, 0.5)),),
+    columns=columns,
+    grid=grid,
+    sizes={"bias_deg_per_h": 2.0, "frequency_Hz": 3e-5, "inverse_q": 0.02},
+    shape=(
+        Parameter("half_width_K", 0.02, 40.0, "half width of the loop in temperature"),
+        Parameter("initial_memory", -1.0, 1.0, "where in its band each run starts", False, True),
+    ),
+    steady=steady,
+    steady_grid=lambda low, high: [(part * (high - low),) for part in (0.01, 0.05, 0.15, 0.4)],
+    steady_words="hysteresis: the direction of approach, in the order of the rows",
+)

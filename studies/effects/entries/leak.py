@@ -1,0 +1,31 @@
+"""Leak: gas enters the housing, and damps."""
+
+from studies.effects.effect import AROUND, Coefficient, Effect, Parameter, Shape, Span
+from studies.effects.states import FloatArray, States
+
+
+def columns(states: States, shape: Shape, response: str) -> FloatArray:
+    """1/Q ∝ P/√T in the free molecular regime: with P ∝ t T in a sealed housing, growth is t (T/T₀)^½; with P ∝ t, −½."""
+    (exponent,) = shape
+    return (states.campaign_time / 86400.0 * (states.resonator / AROUND) ** exponent)[:, None]
+
+
+def grid(span: Span, response: str) -> list[tuple[float, ...]]:
+    """Gas that stays and is warmed with the housing, or that comes and goes at one pressure."""
+    return [(0.5,), (-0.5,)]
+
+
+EFFECT = Effect(
+    name="leak",
+    summary="gas leaks into the housing: the damping grows with time",
+    source="free molecular gas damping, Christian, Vacuum 16 (1966) 175",
+    isolate="store the gyro warm for a known time and repeat the run; heat the getter",
+    sensor="a pressure gauge, or 1/Q before and after warm storage",
+    coefficients=(Coefficient("growth_{unit}_per_day"),),
+    columns=columns,
+    grid=grid,
+    sizes={"inverse_q": 1.0},
+    shape=(Parameter("temperature_exponent", -0.5, 0.5, "0.5 in a sealed housing, -0.5 at one pressure", False, True),),
+    positive=True,
+    event=True,
+)

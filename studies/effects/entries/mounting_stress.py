@@ -1,0 +1,42 @@
+"""Mounting stress: the bond strains the resonator's support and relaxes."""
+
+import numpy as np
+
+from studies.effects.effect import Coefficient, Effect, Parameter, Shape, Span
+from studies.effects.states import FloatArray, States, lag
+
+
+def columns(states: States, shape: Shape, response: str) -> FloatArray:
+    """Maxwell elements: stress ∝ T_r − lag(T_r; τ_s), a mismatch that relaxes with τ_s, a third and three times of it."""
+    strains = [lag(states.resonator, states.step, shape[0] * ratio) for ratio in (1.0, 1.0 / 3.0, 3.0)]
+    return states.resonator[:, None] - np.stack(strains, axis=1)
+
+
+def grid(span: Span, response: str) -> list[tuple[float, ...]]:
+    """Relaxation times from half the thermal one (a shorter one would be the rate) to well beyond a run."""
+    return [(float(tau),) for tau in np.geomspace(max(0.5 * span.tau, 600.0), max(4.0 * span.longest_run, 4000.0), 6)]
+
+
+def steady(x: FloatArray, shape: Shape) -> FloatArray:
+    """A bond that strains the mount on one side of a temperature only."""
+    return np.maximum(x - shape[0], 0.0)[:, None]
+
+
+EFFECT = Effect(
+    name="mounting-stress",
+    summary="thermal mismatch strains the mount and relaxes slowly; frequency shifts that are not temperature",
+    source="viscoelastic bond (Maxwell element) under thermal mismatch strain",
+    isolate="soak for days after a large step and watch f against an independent thermometer on the resonator",
+    sensor="a thermometer on the base or stem: a second lag would show there, a stress would not",
+    coefficients=(Coefficient("stress_{unit}_per_K", (1.0, 0.2, 0.2)),),
+    columns=columns,
+    grid=grid,
+    sizes={"frequency_Hz": 5e-5, "bias_deg_per_h": 2.0},
+    shape=(Parameter("relaxation_time_s", 600.0, 1e6, "time in which the stress relaxes"),),
+    fine=True,
+    steady=steady,
+    steady_grid=lambda low, high: [
+        (float(c),) for c in np.linspace(low + 0.15 * (high - low), high - 0.15 * (high - low), 29)
+    ],
+    steady_words="mounting stress above a bond temperature",
+)

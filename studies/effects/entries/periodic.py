@@ -1,0 +1,48 @@
+"""Periodic disturbance: a line at one period, with harmonics."""
+
+import numpy as np
+
+from studies.effects.effect import Coefficient, Effect, Parameter, Shape, Span
+from studies.effects.states import FloatArray, States
+
+
+def columns(states: States, shape: Shape, response: str) -> FloatArray:
+    """Σ A_h sin(2πht/P) + B_h cos(2πht/P), h = 1 … 3, means over a step; t of the campaign or, after a restart, of the run."""
+    period, restarts = shape
+    phase = 2.0 * np.pi * (states.time if restarts else states.campaign_time) / period
+    waves = [np.sinc(h * states.step / period) * turn(h * phase) for turn in (np.sin, np.cos) for h in (1, 2, 3)]
+    return np.stack(waves, axis=1)
+
+
+def grid(span: Span, response: str) -> list[tuple[float, ...]]:
+    """Periods from 2.5 steps of the grid to a third of a run, spaced finer than a phase slip of 1/4 turn."""
+    slowest, fastest = CYCLES / span.longest_run, 1.0 / (2.5 * span.step)
+    forms: list[tuple[float, ...]] = [
+        (float(1.0 / f), 1.0) for f in np.arange(slowest, fastest, 0.35 / span.longest_run)
+    ]
+    if span.runs > 1:
+        apart = max(0.4 / span.campaign_length, (fastest - slowest) / MOST)
+        forms += [(float(1.0 / f), 0.0) for f in np.arange(slowest, fastest, apart)]
+    return forms
+
+
+CYCLES = 3.0
+"""Periods in the longest run that make a line: with fewer, a wandering response looks the same."""
+MOST = 1500
+
+
+EFFECT = Effect(
+    name="periodic",
+    summary="a disturbance of one period: an air conditioner, a table, a beat of two clocks",
+    source="harmonic regression",
+    isolate="change the period of the chamber's control, or let the table turn at a known rate",
+    sensor="the chamber's air temperature, or the table's angle",
+    coefficients=(Coefficient("sine_{unit}", (1.0, 0.3, 0.1)), Coefficient("cosine_{unit}", (1.0, 0.3, 0.1))),
+    columns=columns,
+    grid=grid,
+    sizes={"bias_deg_per_h": 10.0, "frequency_Hz": 5e-5, "inverse_q": 0.3},
+    shape=(
+        Parameter("period_s", 1.0, 1e7, "period", of_run=1.0 / CYCLES),
+        Parameter("restarts_each_run", 0.0, 1.0, "1 when each run starts with the same phase", False, True),
+    ),
+)

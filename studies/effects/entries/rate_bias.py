@@ -1,0 +1,39 @@
+"""Rate bias: the bias follows the rate of the resonator temperature."""
+
+import numpy as np
+
+from studies.effects.effect import Coefficient, Effect, Shape, Span
+from studies.effects.states import FloatArray, States, lag
+
+
+def columns(states: States, shape: Shape, response: str) -> FloatArray:
+    """B ∝ dT_r/dt, and its product with the temperature as in HRG paper eqs. (21), (22); the same behind 5 min."""
+    late = lag(states.rate, states.step, LATE)
+    return np.stack([states.rate, states.rate * states.excess, late - states.rate], axis=1)
+
+
+def grid(span: Span, response: str) -> list[tuple[float, ...]]:
+    """No shape parameter."""
+    return [()]
+
+
+LATE = 300.0
+"""A gradient takes its time to build up, s."""
+
+
+EFFECT = Effect(
+    name="rate-bias",
+    summary="a temperature gradient across the resonator turns the rate of temperature into bias",
+    source="HRG paper eqs. (21), (22), terms k4 and k7",
+    isolate="ramps at two rates or more; in a soak the bias must decay with the thermal time constant",
+    sensor="two thermometers across the resonator's mount",
+    coefficients=(
+        Coefficient("coefficient_{unit}_per_K_per_s"),
+        Coefficient("product_{unit}_per_K2_per_s", (0.03,)),
+        Coefficient("late_{unit}_per_K_per_s", (0.2,)),
+    ),
+    columns=columns,
+    grid=grid,
+    sizes={"bias_deg_per_h": 1000.0},
+    fine=True,
+)

@@ -1,0 +1,28 @@
+"""Rate frequency: a gradient across the resonator shifts its frequency."""
+
+from studies.effects.effect import Coefficient, Effect, Shape, Span
+from studies.effects.states import FloatArray, States
+
+
+def columns(states: States, shape: Shape, response: str) -> FloatArray:
+    """δf ∝ dT_r/dt: the frequency responds to the gradient that a changing temperature brings."""
+    return states.rate[:, None]
+
+
+def grid(span: Span, response: str) -> list[tuple[float, ...]]:
+    """No shape parameter."""
+    return [()]
+
+
+EFFECT = Effect(
+    name="rate-frequency",
+    summary="the frequency follows the rate of the temperature: a gradient across the resonator, not its mean temperature",
+    source="dynamic temperature coefficient ã dT/dt, Ballato and Vig, Proc. 32nd Frequency Control Symposium (1978) 180",
+    isolate="ramps at two rates or more; the bias, which follows the mean temperature, must not show it",
+    sensor="two thermometers across the resonator's mount",
+    coefficients=(Coefficient("coefficient_{unit}_per_K_per_s"),),
+    columns=columns,
+    grid=grid,
+    sizes={"frequency_Hz": 0.02},
+    fine=True,
+)

@@ -1,0 +1,30 @@
+"""Thermometer lag: the sensor on the housing is slower than the housing."""
+
+from studies.effects.effect import Coefficient, Effect, Shape, Span
+from studies.effects.states import FloatArray, States, lag
+
+
+def columns(states: States, shape: Shape, response: str) -> FloatArray:
+    """The true housing temperature is T_s + τ_s dT_s/dt; behind the resonator's lag τ that adds τ_s (T_s − lag(T_s; τ))/τ."""
+    return ((states.housing - lag(states.housing, states.step, states.tau)) / states.tau)[:, None]
+
+
+def grid(span: Span, response: str) -> list[tuple[float, ...]]:
+    """No shape parameter."""
+    return [()]
+
+
+EFFECT = Effect(
+    name="thermometer-lag",
+    summary="the housing or chamber thermometer is slow, so the resonator seems to run ahead of it",
+    source="first-order sensor, T_true = T_s + τ_s dT_s/dt; thermistor beside a crystal in a temperature-compensated oscillator",
+    isolate="step the chamber and compare with a bare thin-film sensor on the housing",
+    sensor="a fast thermometer on the housing",
+    coefficients=(Coefficient("sensor_time_constant_s"),),
+    columns=columns,
+    grid=grid,
+    sizes={"frequency_Hz": 300.0},
+    acts_on="temperature",
+    positive=True,
+    fine=True,
+)

@@ -1,0 +1,44 @@
+"""Thermometer scale: the housing sensor does not read linearly."""
+
+import numpy as np
+
+from studies.effects.effect import Coefficient, Effect, Shape, Span
+from studies.effects.states import FloatArray, States, lag
+
+
+def columns(states: States, shape: Shape, response: str) -> FloatArray:
+    """The true housing temperature is T_s + Σ e_k x^k, k = 2, 3, 4, x = T_s − T₀ in units of 10 K; it then passes the lag."""
+    x = (states.housing - states.reference) / 10.0
+    return np.stack([lag(x**power, states.step, states.tau) for power in (2, 3, 4)], axis=1)
+
+
+def grid(span: Span, response: str) -> list[tuple[float, ...]]:
+    """No shape parameter."""
+    return [()]
+
+
+def steady(x: FloatArray, shape: Shape) -> FloatArray:
+    """Powers from the third to the named one: the second is the law's curvature."""
+    return np.stack([(x / 10.0) ** power for power in range(3, int(shape[0]) + 1)], axis=1)
+
+
+EFFECT = Effect(
+    name="thermometer-scale",
+    summary="the housing or chamber thermometer has a nonlinear scale error",
+    source="interpolation error of a resistance thermometer, second and third order",
+    isolate="repeat in another chamber or with a second thermometer; fast against slow ramps tell it from a curvature of f",
+    sensor="a second thermometer on the housing",
+    coefficients=(
+        Coefficient("quadratic_K_per_10K2"),
+        Coefficient("cubic_K_per_10K3", (0.3,)),
+        Coefficient("quartic_K_per_10K4", (0.05,)),
+    ),
+    columns=columns,
+    grid=grid,
+    sizes={"frequency_Hz": 0.3},
+    acts_on="temperature",
+    fine=True,
+    steady=steady,
+    steady_grid=lambda low, high: [(3.0,), (4.0,)],
+    steady_words="thermometer, error up to order {0:.0f}",
+)

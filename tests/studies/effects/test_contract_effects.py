@@ -1,0 +1,182 @@
+"""Every effect of the library keeps the same contract; the names are those of the contract."""
+
+import numpy as np
+import pytest
+
+from studies.effects import Span, States, apply_effect, apply_effects, find_effect, library
+from studies.effects.states import lag
+from studies.errors import InputError
+
+NAMES = {
+    "second-lag",
+    "rate-bias",
+    "hysteresis",
+    "ageing",
+    "jump",
+    "activity-dip",
+    "electrostatic-softening",
+    "amplitude-frequency",
+    "curvature",
+    "cross-damping",
+    "self-heating",
+    "loss-peak",
+    "leak",
+    "periodic",
+    "radiation",
+    "clock-drift",
+    "quadrature-leakage",
+    "axis-rotation",
+    "thermometer-scale",
+    "mounting-stress",
+    "thermometer-lag",
+    "rate-frequency",
+    "clock-offset",
+}
+
+
+def make_states(run=0):
+    time = np.arange(0.0, 20000.0, 60.0)
+    housing = 293.15 + 20.0 * np.sin(time / 3000.0) + 5.0 * np.sin(time / 700.0)
+    return States(
+        run,
+        time,
+        time + 86400.0 * run,
+        housing,
+        lag(housing, 60.0, 1500.0),
+        1500.0,
+        293.15,
+        amplitude_squared=1.0 + 0.2 * (time > 9000),
+        voltage_squared=6400.0 + 3000.0 * (time > 12000),
+        quadrature=np.cos(time / 5000.0),
+        pattern_angle=np.full(time.shape, 0.3) + 0.4 * (time > 10000),
+    )
+
+
+SPAN = Span(270.0, 315.0, 20000.0, 106400.0, 60.0, 1500.0, 2, (make_states().time, make_states(1).time))
+
+
+def test_library_has_every_name_of_the_contract():
+    assert set(library()) >= NAMES
+
+
+@pytest.mark.parametrize("name", sorted(library()))
+def test_effect_keeps_the_contract(name):
+    effect = find_effect(name)
+    assert effect.name == name
+    assert effect.acts_on in ("temperature", "response")
+    assert all(getattr(effect, words) for words in ("summary", "source", "isolate"))
+    assert set(effect.responses) <= {"frequency_Hz", "bias_deg_per_h", "inverse_q"}
+    for response in effect.responses:
+        shapes = list(effect.grid(SPAN, response))
+        assert shapes
+        assert effect.sizes[response] > 0
+        for shape in shapes[:: max(1, len(shapes) // 7)]:
+            assert len(shape) == len(effect.shape)
+            for value, parameter in zip(shape, effect.shape, strict=True):
+                assert parameter.low <= value <= parameter.high or parameter.name in ("onset_s",)
+            columns = effect.columns(make_states(), shape, response)
+            assert columns.shape == (make_states().time.size, effect.spread.size)
+            assert np.isfinite(columns).all()
+        for other in effect.equivalents.get(response, ()):
+            assert other in library()
+
+
+@pytest.mark.parametrize("name", sorted(library()))
+def test_forward_run_is_linear_in_its_coefficients(name):
+    effect = find_effect(name)
+    response = effect.responses[0]
+    shape = next(iter(effect.grid(SPAN, response)), ())
+    parameters = {p.name: v for p, v in zip(effect.shape, shape, strict=True)}
+    for key in effect.coefficient_names(response):
+        target, once = apply_effect(name, {**parameters, key: 0.5}, make_states(), response)
+        _, twice = apply_effect(name, {**parameters, key: 1.0}, make_states(), response)
+        assert target == ("resonator_temperature" if effect.acts_on == "temperature" else response)
+        assert np.allclose(twice, 2.0 * once)
+        assert np.isfinite(once).all()
+
+
+def test_forward_run_names_what_is_wrong():
+    with pytest.raises(InputError, match="second-lag"):
+        apply_effect("second-leg", {}, make_states())
+    with pytest.raises(InputError, match="weight"):
+        apply_effect("second-lag", {"wieght": 1.0, "second_time_constant_s": 100.0}, make_states())
+    with pytest.raises(InputError, match="second_time_constant_s"):
+        apply_effect("second-lag", {"weight": 1.0}, make_states())
+    with pytest.raises(InputError, match="does not act on"):
+        apply_effect("rate-bias", {}, make_states(), "inverse_q")
+    with pytest.raises(InputError, match="has no size"):
+        apply_effect("second-lag", {"second_time_constant_s": 100.0}, make_states())
+    with pytest.raises(InputError, match="from 20 to 300000"):
+        apply_effect("second-lag", {"second_time_constant_s": 1e9, "weight": 0.1}, make_states())
+    with pytest.raises(InputError, match="at most 5"):
+        apply_effect("hysteresis", {"half_width_K": 1.0, "loop_deg_per_h_per_K": [1.0] * 6}, make_states())
+
+
+def test_a_number_is_the_first_member_of_a_list():
+    states = make_states()
+    key = "loop_deg_per_h_per_K"
+    _, one = apply_effect("hysteresis", {"half_width_K": 1.0, key: 0.3}, states)
+    _, same = apply_effect("hysteresis", {"half_width_K": 1.0, key: [0.3]}, states)
+    _, more = apply_effect("hysteresis", {"half_width_K": 1.0, key: [0.3, 0.1]}, states)
+    assert np.array_equal(one, same)
+    assert not np.allclose(one, more)
+
+
+def test_slow_sensor_ahead_of_its_device():
+    """Forward, the lag of a sensor undoes itself: lag(T_s + τ_s dT_s/dt; τ), with T_s the lag of the true temperature."""
+    from dataclasses import replace
+
+    t = np.arange(0.0, 20000.0, 5.0)
+    true = 293.15 + 10.0 * np.sin(t / 3000.0)
+    sensed = lag(true, 5.0, 120.0)
+    states = replace(
+        make_states(), time=t, campaign_time=t, housing=sensed, resonator=lag(sensed, 5.0, 900.0), tau=900.0
+    )
+    _, change = apply_effect("thermometer-lag", {"sensor_time_constant_s": 120.0}, states)
+    late = t > 5000.0
+    assert np.allclose((states.resonator + change)[late], lag(true, 5.0, 900.0)[late], atol=0.01)
+
+
+def test_second_lag_is_the_sum_of_two_lags():
+    states = make_states()
+    _, change = apply_effect("second-lag", {"weight": 0.3, "second_time_constant_s": 6000.0}, states)
+    whole = 0.7 * lag(states.housing, 60.0, 1500.0) + 0.3 * lag(states.housing, 60.0, 6000.0)
+    assert np.allclose(states.resonator + change, whole)
+
+
+def test_radiation_settles_on_the_nonlinear_balance():
+    """Against a fourth-order Runge-Kutta integration of τ T′ = (1 − ρ + ρ g)(T_h − T) with a fine step."""
+    states = make_states()
+    share, tau, t0 = 0.4, 1500.0, 293.15
+    _, change = apply_effect("radiation", {"radiated_share": share, "share_of_form": share, "exchange": 1.0}, states)
+    fine = np.arange(0.0, states.time[-1] + 1e-9, 5.0)
+    housing = np.interp(fine, states.time, states.housing)
+
+    def slope(u, y):
+        return (1 - share + share * (u + y) * (u * u + y * y) / (4 * t0**3)) * (u - y) / tau
+
+    y = np.empty_like(fine)
+    y[0] = housing[0]
+    for k in range(1, fine.size):
+        a, b = housing[k - 1], housing[k]
+        middle = 0.5 * (a + b)
+        k1 = slope(a, y[k - 1])
+        k2 = slope(middle, y[k - 1] + 2.5 * k1)
+        k3 = slope(middle, y[k - 1] + 2.5 * k2)
+        k4 = slope(b, y[k - 1] + 5.0 * k3)
+        y[k] = y[k - 1] + 5.0 / 6.0 * (k1 + 2 * k2 + 2 * k3 + k4)
+    wanted = np.interp(states.time, fine, y) - states.resonator
+    assert np.max(np.abs(change - wanted)) < 0.02 * np.max(np.abs(wanted))
+
+
+def test_static_effects_see_the_temperature_that_thermal_effects_leave():
+    from dataclasses import replace
+
+    states = make_states()
+    warm = ("self-heating", "frequency_Hz", {"heating_K_per_V2": 3.0})
+    rate = ("rate-bias", "bias_deg_per_h", {"coefficient_deg_per_h_per_K_per_s": 100.0})
+    changes = apply_effects([rate, warm], states)
+    _, warmer = apply_effect(warm[0], warm[2], states)
+    assert np.allclose(changes["resonator_temperature"], warmer)
+    seen = replace(states, resonator=states.resonator + warmer)
+    assert np.allclose(changes["bias_deg_per_h"], apply_effect(rate[0], rate[2], seen, rate[1])[1])
