@@ -12,11 +12,22 @@ from studies.diagnosis.noise import KERNELS
 from studies.effects import Effect, library
 from studies.effects.states import FloatArray
 
+FEW = 40
+"""An effect with no more shapes than this is scanned with its whole family."""
 LEADING, WIDTH = 0.4, 4
-"""Columns that a scan looks at: those whose prior is at least this part of the widest, and at most so many."""
+"""Of others the columns whose prior is at least this part of the widest, and at most so many."""
 BLOCK = 4000
 VARIES = 1e-3
 """Relative change from which on a drive varies."""
+
+
+@dataclass(frozen=True)
+class Group:
+    """Shapes with the same number of columns: their places in the bank, (H,), those of their columns and priors, (H, w)."""
+
+    terms: "np.ndarray"
+    columns: "np.ndarray"
+    prior: FloatArray
 
 
 @dataclass(frozen=True)
@@ -26,15 +37,12 @@ class Bank:
     Attributes
     ----------
     terms : tuple of Term
-    columns : (H, WIDTH) int array
-        Places of their leading columns; the last place holds zeros.
-    prior : (H, WIDTH) array
+    groups : tuple of Group
     rotated : tuple of (M, C) float32 arrays
     """
 
     terms: tuple[Term, ...]
-    columns: "np.ndarray"
-    prior: FloatArray
+    groups: tuple[Group, ...]
     rotated: tuple["np.ndarray", ...]
 
 
@@ -62,33 +70,33 @@ def _varies(model: Fit, drive: str) -> bool:
 def build_bank(model: Fit, effects: Sequence[Effect]) -> Bank:
     """Compute the leading columns of every shape, with the states that a fitted model sees."""
     problem, column = model.problem, model.problem.response.column
-    terms, places, priors = [], [], []
+    terms: list[Term] = []
     parts: list[FloatArray] = []
+    found: dict[int, list[tuple[int, list[int], FloatArray]]] = {}
     count = 0
     for effect in effects:
-        spread = effect.spread
-        leading = [k for k in np.argsort(-spread, kind="stable") if spread[k] >= LEADING * spread.max()]
+        spread, shapes = effect.spread, effect.grid(problem.span, column)
+        least = 0.0 if len(shapes) <= FEW else LEADING * float(spread.max())
+        leading = [k for k in np.argsort(-spread, kind="stable") if spread[k] >= least and spread[k] > 0]
+        most = len(leading) if len(shapes) <= FEW else WIDTH
         size = problem.size(effect)
-        for shape in effect.grid(problem.span, column):
+        for shape in shapes:
             term = Term(effect, tuple(shape))
             own = problem.stack([term_columns(term, view, problem.group, column) for view in model.tangent.views])
-            kept = [k for k in leading if np.any(own[:, k])][:WIDTH]
+            kept = [k for k in leading if np.any(own[:, k])][:most]
             if not kept:
                 continue
+            places = list(range(count, count + len(kept)))
+            found.setdefault(len(kept), []).append((len(terms), places, size * spread[kept]))
             terms.append(term)
             parts.append(own[:, kept].astype(np.float32))
-            places.append([*range(count, count + len(kept)), *[-1] * (WIDTH - len(kept))])
-            priors.append([*(size * spread[kept]), *[0.0] * (WIDTH - len(kept))])
             count += len(kept)
-    rows = problem.values.size
-    table = np.concatenate([*parts, np.zeros((rows, 1), dtype=np.float32)], axis=1) if parts else np.zeros((rows, 1))
-    rotated = tuple(basis.rotate(table.astype(np.float32)) for basis in problem.noise.bases)
-    return Bank(
-        tuple(terms),
-        np.array(places, dtype=int).reshape(-1, WIDTH) % table.shape[1],
-        np.array(priors, dtype=float).reshape(-1, WIDTH),
-        rotated,
+    table: FloatArray = np.concatenate(parts, axis=1) if parts else np.zeros((problem.values.size, 1))
+    groups = tuple(
+        Group(np.array([f[0] for f in own]), np.array([f[1] for f in own]), np.array([f[2] for f in own]))
+        for own in found.values()
     )
+    return Bank(tuple(terms), groups, tuple(basis.rotate(table) for basis in problem.noise.bases))
 
 
 @dataclass(frozen=True)
@@ -163,18 +171,20 @@ def _gains(model: Fit, bank: Bank, kind: int, share: int) -> FloatArray:
         weighted[:, begin : begin + BLOCK] = part
     inner = span.T.astype(np.float32) @ weighted
     out = np.empty(len(bank.terms))
-    for begin in range(0, out.size, BLOCK):
-        chosen = bank.columns[begin : begin + BLOCK]
-        unit = bank.prior[begin : begin + BLOCK] / linear.sigma
-        part, below = weighted.T[chosen], inner.T[chosen]
-        gram = np.einsum("him,hjm->hij", part, part) - np.einsum("him,hjm->hij", below, below)
-        gram = gram.astype(float) * unit[:, :, None] * unit[:, None, :]
-        values, vectors = np.linalg.eigh(gram)
-        along = np.einsum("hij,hi->hj", vectors, moment[chosen] * unit)
-        values = np.maximum(values, 0.0)[None]
-        size = (SCALES**2)[:, None, None]
-        determinant = 0.5 * np.log1p(size * values).sum(axis=-1)
-        explained = (size * along[None] ** 2 / (1.0 + size * values)).sum(axis=-1)
-        gains = -determinant - 0.5 * freedom * np.log(np.maximum(1.0 - explained / least, 1e-12))
-        out[begin : begin + BLOCK] = logsumexp(gains, axis=0) - np.log(SCALES.size)
+    for group in bank.groups:
+        for begin in range(0, group.terms.size, BLOCK):
+            part = slice(begin, begin + BLOCK)
+            chosen = group.columns[part]
+            unit = group.prior[part] / linear.sigma
+            above, below = weighted.T[chosen], inner.T[chosen]
+            gram = above @ above.transpose(0, 2, 1) - below @ below.transpose(0, 2, 1)
+            gram = gram.astype(float) * unit[:, :, None] * unit[:, None, :]
+            values, vectors = np.linalg.eigh(gram)
+            along = np.einsum("hij,hi->hj", vectors, moment[chosen] * unit)
+            values = np.maximum(values, 0.0)[None]
+            size = (SCALES**2)[:, None, None]
+            determinant = 0.5 * np.log1p(size * values).sum(axis=-1)
+            explained = (size * along[None] ** 2 / (1.0 + size * values)).sum(axis=-1)
+            gains = -determinant - 0.5 * freedom * np.log(np.maximum(1.0 - explained / least, 1e-12))
+            out[group.terms[part]] = logsumexp(gains, axis=0) - np.log(SCALES.size)
     return out

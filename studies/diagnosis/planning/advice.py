@@ -21,7 +21,7 @@ from studies.diagnosis.verdict import Cause, Verdict
 from studies.effects import find_effect
 
 if TYPE_CHECKING:
-    from studies.diagnosis.investigate import Inquiry
+    from studies.diagnosis.inquiry import Inquiry
     from studies.diagnosis.search import Place
 
 CLOSE = 10.0

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from studies.diagnosis.campaign import Campaign, load_campaign
-from studies.diagnosis.investigate import Thermometer, begin, read_thermometer
+from studies.diagnosis.inquiry import Thermometer, begin, read_thermometer
 from studies.diagnosis.model import Fit
 from studies.diagnosis.planning.chamber import Chamber, limited
 from studies.diagnosis.planning.programme import HOUSING_LAG

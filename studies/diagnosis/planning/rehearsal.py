@@ -46,9 +46,7 @@ class Scene:
     root: FloatArray
     span: FloatArray
     moments: FloatArray
-    unit: FloatArray
-    values: FloatArray
-    vectors: FloatArray
+    eigen: tuple[tuple[FloatArray, FloatArray], ...]
 
 
 @dataclass(frozen=True)
@@ -76,11 +74,14 @@ def _scene(model: Fit, bank: Bank, kind: int, share: int) -> Scene:
     span = np.linalg.qr(rows)[0][: own.shape[0]]
     table = bank.rotated[kind].astype(float) * root[:, None]
     inner = span.T @ table
-    unit = bank.prior / problem.sigma
-    part, below = table.T[bank.columns], inner.T[bank.columns]
-    gram = np.einsum("him,hjm->hij", part, part) - np.einsum("him,hjm->hij", below, below)
-    values, vectors = np.linalg.eigh(gram * unit[:, :, None] * unit[:, None, :])
-    return Scene(kind, share, root, span, table - span @ inner, unit, np.maximum(values, 0.0), vectors)
+    eigen = []
+    for group in bank.groups:
+        unit = group.prior / problem.sigma
+        part, below = table.T[group.columns], inner.T[group.columns]
+        gram = part @ part.transpose(0, 2, 1) - below @ below.transpose(0, 2, 1)
+        values, vectors = np.linalg.eigh(gram * unit[:, :, None] * unit[:, None, :])
+        eigen.append((np.maximum(values, 0.0), vectors))
+    return Scene(kind, share, root, span, table - span @ inner, tuple(eigen))
 
 
 def hide(stage: Stage, effect: Effect, cases: int, rng: np.random.Generator) -> Hidden:
@@ -168,12 +169,16 @@ def _gains(stage: Stage, scene: Scene, data: FloatArray) -> FloatArray:
     target = problem.noise.bases[scene.kind].rotate(data) * scene.root[:, None]
     inside = scene.span.T @ target
     least = np.maximum((target**2).sum(axis=0) - (inside**2).sum(axis=0), 1e-300)
-    moment = (scene.moments.T @ target)[stage.bank.columns] * scene.unit[:, :, None]
-    along = np.einsum("hij,hib->hjb", scene.vectors, moment)
+    moments = scene.moments.T @ target
     freedom = linear.target.size - linear.flat
-    parts = []
-    for scale in SCALES**2:
-        explained = np.einsum("hj,hjb->hb", scale / (1.0 + scale * scene.values), along**2)
-        determinant = 0.5 * np.log1p(scale * scene.values).sum(axis=1)
-        parts.append(-determinant[:, None] - 0.5 * freedom * np.log(np.maximum(1.0 - explained / least, 1e-12)))
-    return np.asarray(logsumexp(np.stack(parts), axis=0) - np.log(SCALES.size))
+    out = np.empty((len(stage.bank.terms), data.shape[1]))
+    for group, (values, vectors) in zip(stage.bank.groups, scene.eigen, strict=True):
+        moment = moments[group.columns] * (group.prior / problem.sigma)[:, :, None]
+        along = np.einsum("hij,hib->hjb", vectors, moment)
+        parts = []
+        for scale in SCALES**2:
+            explained = np.einsum("hj,hjb->hb", scale / (1.0 + scale * values), along**2)
+            determinant = 0.5 * np.log1p(scale * values).sum(axis=1)
+            parts.append(-determinant[:, None] - 0.5 * freedom * np.log(np.maximum(1.0 - explained / least, 1e-12)))
+        out[group.terms] = logsumexp(np.stack(parts), axis=0) - np.log(SCALES.size)
+    return out

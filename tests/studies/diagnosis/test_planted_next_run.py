@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from studies.diagnosis.campaign import load_campaign
-from studies.diagnosis.investigate import begin, investigate
+from studies.diagnosis.inquiry import begin
+from studies.diagnosis.investigate import investigate
 from studies.diagnosis.model import Term, fit
 from studies.diagnosis.planning.chamber import limited, parse_chamber
 from studies.diagnosis.planning.next_run import against, covariance_of_noise

@@ -1,0 +1,180 @@
+"""From inquiries to causes: one entry a physical cause, with its equals, its parameters, and what other responses say."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from studies.diagnosis.baseline import Followed
+from studies.diagnosis.campaign import Campaign
+from studies.diagnosis.inquiry import Inquiry, begin, inquire, read_thermometer
+from studies.diagnosis.model import Fit, Term, fit
+from studies.diagnosis.response import RESPONSES
+from studies.diagnosis.search import Hypothesis, Place
+from studies.diagnosis.verdict import Cause, Interval, weigh
+from studies.diagnosis.witness import look
+from studies.effects import Effect, find_effect
+
+VOTERS = 4
+"""Rivals of one place that the other responses are asked about."""
+
+
+def vote(
+    campaign: Campaign, inquiries: dict[str, Inquiry], effects: Sequence[Effect] | None, score_held_out: bool
+) -> dict[str, Inquiry]:
+    """Let the other responses say which explanation of the thermometer suits them; ask them anew where it changes.
+
+    A shift of the frequency that is temperature shows in bias and 1/Q as well, one that is none does not.
+    """
+    column = next((c for c in inquiries if RESPONSES[c].thermometer), None)
+    others = [c for c in inquiries if not RESPONSES[c].thermometer]
+    if column is None or not others or not inquiries[column].selection.places:
+        return inquiries
+    inquiry = inquiries[column]
+    votes: dict[str, float] = {}
+    best = inquiry.selection.places[0]
+    for place in inquiry.selection.places:
+        for name, rival in list(zip(place.names, place.rivals, strict=True))[:VOTERS]:
+            votes[_key(place, name)] = sum(_suits(campaign, rival.fit, inquiries[c]) for c in others)
+    out = dict(inquiries)
+    out[column] = replace(inquiry, votes=votes)
+    place = best
+    ranked = sorted(zip(place.names, place.rivals, strict=True), key=lambda pair: -_voted(votes, place, *pair))
+    if len(inquiry.selection.places) == 1 and ranked[0][0] != place.names[0] and _key(place, ranked[0][0]) in votes:
+        winner = ranked[0][1]
+        selection = replace(inquiry.selection, final=winner)
+        out[column] = replace(inquiry, selection=selection, leftover=look(inquiry.plain, winner.fit), votes=votes)
+        thermometer = read_thermometer(campaign, winner.fit)
+        for c in others:
+            out[c] = inquire(campaign, begin(campaign, c, thermometer), effects, score_held_out)
+    return out
+
+
+def _key(place: Place, name: str) -> str:
+    return f"{place.index} {name}"
+
+
+def _voted(votes: Mapping[str, float], place: Place, name: str, rival: Hypothesis) -> float:
+    least = min(votes.values(), default=0.0)
+    return rival.score + votes.get(_key(place, name), least)
+
+
+def _suits(campaign: Campaign, rival: Fit, other: Inquiry) -> float:
+    """Log evidence of another response, its own causes included, when the thermometer is read by a rival."""
+    thermometer = read_thermometer(campaign, rival)
+    baseline = other.final.baseline
+    if thermometer is None or not isinstance(baseline, Followed):
+        return other.final.log_evidence
+    reading = thermometer.change if other.problem.response.bent else thermometer.excess
+    moved = replace(baseline, states=thermometer.states, reading=reading, missed=thermometer.missed)
+    return fit(other.problem, moved, other.final.terms, 2, other.final.solved.scales).log_evidence
+
+
+def name_causes(campaign: Campaign, inquiries: Mapping[str, Inquiry]) -> tuple[Cause, ...]:
+    """List the causes, one entry a physical cause, under the response where its evidence is largest."""
+    causes = [_cause(campaign, inquiry, place) for inquiry in inquiries.values() for place in inquiry.selection.places]
+    causes.sort(key=lambda cause: -cause.evidence)
+    kept: list[Cause] = []
+    for cause in causes:
+        if not any(_same(cause, other) for other in kept):
+            kept.append(cause)
+    return tuple(kept)
+
+
+def _cause(campaign: Campaign, inquiry: Inquiry, place: Place) -> Cause:
+    column = inquiry.problem.response.column
+    scores = [_voted(inquiry.votes, place, n, r) for n, r in zip(place.names, place.rivals, strict=True)]
+    base = min(inquiry.votes.values(), default=0.0)
+    own = max(r.score for r in place.rivals)
+    nothing = place.without.score + (max(scores) - own if inquiry.votes else 0.0) if base else place.without.score
+    members, probability = weigh(place.names, scores, nothing)
+    winner = place.rivals[int(np.argmax(scores))]
+    effect = winner.fit.terms[place.index].effect
+    exact = effect.equivalents.get(column, ())
+    settled = bool(effect.judge or any(_judge_of(n) for n in exact)) and campaign.clock_known
+    names = list(dict.fromkeys([effect.name, *members, *(() if settled else exact)]))
+    if settled:
+        names = [n for n in names if n == effect.name or n not in exact]
+    return Cause(
+        effect.name,
+        column,
+        probability,
+        tuple(sorted(names[1:])),
+        parameters_of(winner.fit, place.index),
+        2.0 * max(max(scores) - nothing, 0.0),
+        peak=peak_of(winner.fit, place.index),
+    )
+
+
+def _judge_of(name: str) -> str:
+    return find_effect(name).judge
+
+
+def parameters_of(model: Fit, index: int) -> dict[str, Interval]:
+    """Return shape and coefficients of a term with 90 % intervals; of lists the definite member."""
+    term = model.terms[index]
+    places = model.columns_of(index)
+    out: dict[str, Interval] = {}
+    spreads = shape_spread(model, index)
+    for parameter, value, sd in zip(term.effect.shape, term.shape, spreads, strict=True):
+        half = 1.645 * sd
+        if parameter.logarithmic and half > 0:
+            out[parameter.name] = Interval(value, value * float(np.exp(-half)), value * float(np.exp(half)))
+        else:
+            out[parameter.name] = Interval(value, value - half, value + half)
+    begin = 0
+    columns = np.flatnonzero(term.effect.spread > 0)
+    values = model.solved.coefficients[places]
+    deviations = np.sqrt(np.maximum(np.diag(model.solved.covariance)[places], 0.0))
+    for name, coefficient in zip(
+        term.effect.coefficient_names(model.problem.response.column), term.effect.coefficients, strict=True
+    ):
+        at = np.flatnonzero(columns == begin)
+        if at.size:
+            value, half = float(values[at[0]]), 1.645 * float(deviations[at[0]])
+            out[name] = Interval(value, value - half, value + half)
+        begin += len(coefficient.spread)
+    return out
+
+
+def shape_spread(model: Fit, index: int) -> list[float]:
+    """Return the standard deviation of every shape parameter (of its logarithm where it has one), from the curvature."""
+    term = model.terms[index]
+    out = []
+    for k, parameter in enumerate(term.effect.shape):
+        if parameter.steady:
+            out.append(0.0)
+            continue
+        step = 0.03 if parameter.logarithmic else max(0.01 * abs(term.shape[k]), 0.05)
+        sides = []
+        for sign in (-1.0, 1.0):
+            value = term.shape[k] * float(np.exp(sign * step)) if parameter.logarithmic else term.shape[k] + sign * step
+            shape = (*term.shape[:k], value, *term.shape[k + 1 :])
+            terms = (*model.terms[:index], Term(term.effect, shape), *model.terms[index + 1 :])
+            own = fit(model.problem, model.baseline, terms, 1, model.solved.scales, [model.solved.kind])
+            sides.append(own.log_evidence)
+        bend = (2.0 * model.log_evidence - sides[0] - sides[1]) / step**2
+        out.append(float(1.0 / np.sqrt(bend)) if bend > 0 else step * 10.0)
+    return out
+
+
+def peak_of(model: Fit, index: int) -> float:
+    """Return the largest less the smallest change of the response that a term makes in the record."""
+    places = model.columns_of(index)
+    change = model.linear.columns[:, places] @ model.solved.coefficients[places]
+    return float(np.ptp(change)) if change.size else 0.0
+
+
+def _same(one: Cause, two: Cause) -> bool:
+    """The same effect in two responses is one cause when its place agrees; two members of one set are one answer."""
+    if one.response == two.response:
+        return one.effect in two.equivalent and two.effect in one.equivalent
+    if one.effect not in two.names and two.effect not in one.names:
+        return False
+    for name in ("time_s", "temperature_degC", "period_s", "run"):
+        if name in one.parameters and name in two.parameters:
+            a, b = one.parameters[name], two.parameters[name]
+            slack = 300.0 if name == "time_s" else 0.05 * abs(b.value) + 0.5
+            if not (a.low - slack <= b.value <= a.high + slack or b.low - slack <= a.value <= b.high + slack):
+                return False
+    return True

@@ -1,0 +1,154 @@
+"""One response under inquiry: its baseline, the effects that it has, what is left, and what it knows of the temperature."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from studies.diagnosis import held_out
+from studies.diagnosis.baseline import Baseline, Followed, Lagged, Law, bends_of
+from studies.diagnosis.campaign import Campaign
+from studies.diagnosis.clock import judged
+from studies.diagnosis.model import Fit, Problem, fit, pose, settle
+from studies.diagnosis.response import RESPONSES
+from studies.diagnosis.scan import applicable, build_bank
+from studies.diagnosis.search import Selection, drop, search
+from studies.diagnosis.witness import Leftover, look
+from studies.effects import Effect
+from studies.effects.states import FloatArray, States
+
+
+@dataclass(frozen=True)
+class Thermometer:
+    """The temperature of the resonator as the fitted thermometer response tells it.
+
+    Attributes
+    ----------
+    change, excess : tuples of (N,) arrays
+        Change of frequency over its slope, K, and temperature minus reference, K, run by run on the coarse grid.
+    missed : tuple of (N,) arrays
+        Slow part of what the model leaves, as if it were temperature, K.
+    states : tuple of States
+        Runs on the fine grid with that temperature.
+    """
+
+    change: tuple[FloatArray, ...]
+    excess: tuple[FloatArray, ...]
+    missed: tuple[FloatArray, ...]
+    states: tuple[States, ...]
+
+
+@dataclass(frozen=True)
+class Inquiry:
+    """One response under inquiry."""
+
+    problem: Problem
+    selection: Selection
+    leftover: Leftover
+    votes: Mapping[str, float]
+
+    @property
+    def plain(self) -> Fit:
+        """The baseline alone."""
+        return self.selection.plain.fit
+
+    @property
+    def final(self) -> Fit:
+        """With the named effects."""
+        return self.selection.final.fit
+
+
+def begin(
+    campaign: Campaign,
+    column: str,
+    thermometer: Thermometer | None,
+    law: Law | None = None,
+    make: Callable[[Problem], Baseline] | None = None,
+) -> Fit:
+    """Return the fitted baseline of one response."""
+    response = RESPONSES[column]
+    problem = pose(campaign, column, 1000.0)
+    states = tuple(run.states for run in campaign.runs)
+    baseline: Baseline
+    if make is not None:
+        baseline = make(problem)
+    elif thermometer is None or response.thermometer:
+        baseline = Lagged(
+            response,
+            states,
+            campaign.group,
+            1000.0,
+            _slope(problem, housing := [s.averaged(campaign.group).excess for s in states]),
+            law=law if response.thermometer else None,
+            bends=bends_of(problem.values, problem.stack(housing), response.powers),
+        )
+    else:
+        reading = thermometer.change if response.bent else thermometer.excess
+        baseline = Followed(
+            response,
+            thermometer.states,
+            campaign.group,
+            reading,
+            thermometer.missed,
+            _slope(problem, reading),
+            bends=bends_of(problem.values, problem.stack(list(reading)), response.powers),
+        )
+    first = settle(problem, baseline)
+    tau = float(getattr(first.baseline, "tau", states[0].tau if thermometer is None else thermometer.states[0].tau))
+    problem = replace(pose(campaign, column, tau), sigma=float(np.sqrt(first.solved.variance)))
+    return fit(problem, first.moved(), (), 2)
+
+
+def _slope(problem: Problem, reading: Sequence[FloatArray]) -> float:
+    x = problem.stack(list(reading))
+    varies = float(np.ptp(x)) > 1e-9
+    slope = float(np.polyfit(x, problem.values, 1)[0]) if varies else 0.0
+    return slope or float(np.std(problem.values)) / 10.0 or 1.0
+
+
+def inquire(campaign: Campaign, plain: Fit, effects: Sequence[Effect] | None, score_held_out: bool) -> Inquiry:
+    """Select the effects of one response, refuse what does not pay, and ask the witnesses about the rest."""
+    bank = build_bank(plain, applicable(plain.problem, plain, effects))
+    selection = search(plain, bank)
+    selection = judged(campaign, selection, effects)
+    if score_held_out:
+        selection = refuse(campaign, selection)
+    return Inquiry(plain.problem, selection, look(plain, selection.final.fit), {})
+
+
+def refuse(campaign: Campaign, selection: Selection) -> Selection:
+    """Drop causes, the weakest first, until the extended model is better on rows that it has not seen."""
+    while selection.final.fit.terms:
+        model, plain = selection.final.fit, selection.plain.fit
+        events = any(term.effect.event for term in model.terms)
+        measure = held_out.by_block if events or len(campaign.records) == 1 else held_out.by_record
+        before, after = measure(plain, campaign), measure(model, campaign)
+        if before is None or after is None or after < before:
+            break
+        weakest = max(range(len(model.terms)), key=lambda k: drop(selection.final, k).score)
+        fewer = drop(selection.final, weakest)
+        kept = [place for k, place in enumerate(selection.places) if k != weakest]
+        selection = replace(selection, final=fewer, places=tuple(kept))
+    return selection
+
+
+def read_thermometer(campaign: Campaign, model: Fit) -> Thermometer | None:
+    """Turn the fitted frequency into a thermometer; None where it hardly follows the temperature."""
+    baseline = model.moved()
+    places = [k for k, name in enumerate(model.tangent.names) if name == "slope"]
+    if not isinstance(baseline, Lagged) or not places:
+        return None
+    slope, spread = model.solved.coefficients[places[0]], np.sqrt(model.solved.covariance[places[0], places[0]])
+    if not np.isfinite(spread) or abs(slope) < 3.0 * spread:
+        return None
+    slow = model.slow_part()
+    changes, excesses, missed, states = [], [], [], []
+    for run, view, rest in zip(campaign.runs, baseline.views(), slow, strict=True):
+        x = view.seen.excess
+        known = np.isfinite(rest)
+        filled = np.interp(run.time, run.time[known], rest[known]) if known.any() else np.zeros_like(x)
+        excesses.append(x)
+        changes.append(x + baseline.bend * x**2)
+        missed.append(filled / np.where(np.abs(view.steep) > 0, view.steep, np.inf))
+        states.append(view.seen_fine)
+    return Thermometer(tuple(changes), tuple(excesses), tuple(missed), tuple(states))
