@@ -29,7 +29,7 @@ def written_whole(path: str | Path) -> Iterator[IO[bytes]]:
     """
     temporary: Path | None = None
     try:
-        target = Path(path).resolve() if Path(path).is_symlink() else Path(path)
+        target = _follow(Path(path))
         if target.is_dir():
             raise InputError(f"{path}: is a folder; give the name of a file.")
         special = target.exists() and not target.is_file()
@@ -48,8 +48,8 @@ def written_whole(path: str | Path) -> Iterator[IO[bytes]]:
         os.replace(temporary, target)
     except InputError:
         raise
-    except (OSError, RuntimeError) as error:  # RuntimeError: a loop of links
-        reason = getattr(error, "strerror", None) or str(error)
+    except OSError as error:
+        reason = error.strerror or str(error)
         raise InputError(f"{path}: cannot be written ({reason}); choose another place.") from error
     except ValueError as error:
         if "null" not in str(error):
@@ -58,6 +58,14 @@ def written_whole(path: str | Path) -> Iterator[IO[bytes]]:
     finally:
         if temporary is not None:
             temporary.unlink(missing_ok=True)
+
+
+def _follow(path: Path) -> Path:
+    """Return where a link leads to; any other path as it is."""
+    try:
+        return path.resolve() if path.is_symlink() else path
+    except RuntimeError as error:  # a loop of links
+        raise OSError(str(error)) from error
 
 
 def check_folder(path: str | Path) -> Path:
