@@ -1,5 +1,6 @@
 from .errors import InputError
 from .instrument.card import Instrument, load_card, save_card
+from .loss import LossModel, loss_model
 from .models import read_model, write_model
 from .record import Record, read_record, write_record
 from .sweeps.run import run_study
@@ -9,9 +10,11 @@ __version__: str
 __all__ = [
     "InputError",
     "Instrument",
+    "LossModel",
     "Record",
     "compare",
     "load_card",
+    "loss_model",
     "read_model",
     "read_record",
     "run_study",

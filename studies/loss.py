@@ -106,7 +106,7 @@ def loss_model(
             causes += found
             ripples += waves
         ripples += _surface_ripple(parts, vibration, causes)
-        causes += _others(instrument, parts, spread, left_out)
+        causes += _others(vibration, parts, spread, left_out)
         first, third = _rim_harmonics(instrument, parts)
         if anchor or first or third:
             through_stem, unequal = _anchor(instrument, mode, (first, third), spread, anchor)
@@ -330,7 +330,7 @@ def _build_film(keys: "FilmKeys", numbers: Mapping[str, Any]) -> "Film":
 
 
 def _others(
-    instrument: "Instrument", parts: "LossParts", spread: Mapping[str, float], left_out: list[str]
+    vibration: "Vibration", parts: "LossParts", spread: Mapping[str, float], left_out: list[str]
 ) -> "list[Cause]":
     """Gas, activated losses, and what leaves through the mount as the card gives it."""
     from shell.damping.budget import activated_cause, constant_cause, gas_cause
@@ -342,7 +342,7 @@ def _others(
         left_out.append("gas: give pressure_Pa of the sealed housing.")
     elif parts.pressure_Pa > 0:
         sd = spread.get("loss.pressure_Pa", 0.0)
-        causes.append(gas_cause(GASES[parts.gas], parts.pressure_Pa, sd, parts.accommodation))
+        causes.append(gas_cause(vibration, GASES[parts.gas], parts.pressure_Pa, sd, parts.accommodation))
     for number, peak in enumerate(parts.activated):
         sd = spread.get(f"loss.activated.{number}.height", 0.0)
         found = activated_cause(peak.height, peak.energy_eV, peak.peak_degC + ZERO_CELSIUS, sd, "given in the card")

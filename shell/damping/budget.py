@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from shell.damping.anelastic import activated_loss, bulk_loss, surface_loss
 from shell.damping.faces import Surface, free_surfaces, shell_faces
 from shell.damping.film import Film, check_film, film_internal_loss, film_thermoelastic_loss
-from shell.damping.gas import Gas, gas_loss
+from shell.damping.gas import Gas, gas_loss, mean_free_path
 from shell.damping.heat import Heat
 from shell.damping.thermoelastic import heat_flow
 from shell.errors import ShellError
@@ -22,6 +22,7 @@ from shell.solution import Solution, total
 
 NORMAL_90 = 1.6448536269514722  # a 90 % interval is ± this many standard deviations
 STEP = 0.5  # K, for slopes over temperature
+FREE = 10.0  # free path over the radius beyond which molecules count as free
 
 
 @dataclass(frozen=True, eq=False)
@@ -264,10 +265,15 @@ def film_causes(name: str, film: Film, heat: HeatLaw | None, relative: tuple[flo
     return found
 
 
-def gas_cause(gas: Gas, pressure: float, relative_sd: float, accommodation: float = 1.0) -> Cause:
-    """Gas at a pressure (Pa) that holds at the reference temperature, sealed in: p ∝ T."""
+def gas_cause(vibration: Vibration, gas: Gas, pressure: float, relative_sd: float, accommodation: float = 1.0) -> Cause:
+    """Gas at a pressure (Pa, with its relative uncertainty) at the reference temperature, sealed in: p ∝ T.
+
+    The formula itself is uncertain by a tenth where molecules fly far against the radius, else by a half.
+    """
     if not pressure >= 0:
         raise ShellError(f"the gas pressure must be 0 or positive, not {pressure:g} Pa.")
+    flight = mean_free_path(gas, pressure, vibration.reference) if pressure > 0 else np.inf
+    model_sd = 0.1 if flight > FREE * vibration.resonator.size else 0.5
 
     def inverse_q(v: Vibration, T: Array) -> Array:
         return np.array(
@@ -286,7 +292,13 @@ def gas_cause(gas: Gas, pressure: float, relative_sd: float, accommodation: floa
             ]
         )
 
-    return Cause("gas", inverse_q, relative_sd, f"{gas.name} at {pressure:g} Pa, sealed", "pump, bake and getter")
+    return Cause(
+        "gas",
+        inverse_q,
+        float(np.hypot(relative_sd, model_sd)),
+        f"{gas.name} at {pressure:g} Pa, sealed",
+        "pump, bake and getter",
+    )
 
 
 def activated_cause(height: float, energy: float, peak: float, relative_sd: float, source: str) -> Cause:

@@ -9,6 +9,10 @@ both faces of a plate in normal motion with a = 0: 1/Q = 4 √(2/π) p √(M/(R 
 Bao et al., J. Micromech. Microeng. 12 (2002) 341). In a viscous gas the layer of width √(2μ/(ρ_g ω)) shears with the slip between
 the wall and the potential flow that its waves drive, Z = √(ρ_g μ ω/2) on that slip (Stokes). Between the two regimes, where no
 closed form holds, the two are joined by Q² = Q_free² + Q_viscous², and the uncertainty is a half.
+
+A gap to electrodes is not counted. In a period molecules diffuse along a gap d by about √(d √(R T/M)/ω), 1 mm at 0.1 mm and 4 kHz:
+under longer electrodes they are compressed in place, as a spring, and the loss stays of the order of that of a free face. Plates
+that are smaller lose more (Bao et al.).
 """
 
 from dataclasses import dataclass

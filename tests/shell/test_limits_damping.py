@@ -205,7 +205,7 @@ def test_sum_slopes_and_ranking(dome: Mode) -> None:
     vibration = _vibration(dome)
     causes = [
         thermoelastic_cause(vibration, lambda T: GLASS, (0.1, 0.0, 0.0), "steel"),
-        gas_cause(GASES["argon"], 1e-4, 0.1),
+        gas_cause(vibration, GASES["argon"], 1e-4, 0.1),
         activated_cause(1e-8, 0.5, 500.0, 0.3, ""),
     ]
     T = np.array([250.0, 293.15, 330.0])
@@ -214,6 +214,8 @@ def test_sum_slopes_and_ranking(dome: Mode) -> None:
     parts = {part.name: part for part in budget.parts}
     assert budget.inverse_q == pytest.approx(sum(part.inverse_q for part in budget.parts), rel=1e-14)
     assert parts["thermoelastic"].slope == pytest.approx(1 / T, rel=1e-3)
+    assert parts["gas"].relative_sd == pytest.approx(sqrt(0.1**2 + 0.1**2))
+    assert gas_cause(vibration, GASES["air"], 1e3, 0.0).relative_sd == 0.5
     assert parts["gas"].slope == pytest.approx(0.5 / T, rel=2e-3)
     assert parts["activated"].slope[0] == pytest.approx(0.5 / (BOLTZMANN * 250.0**2), rel=1e-3)
     assert parts["thermoelastic"].relative_sd == pytest.approx(sqrt(0.2**2 + 0.02**2), rel=1e-9)
@@ -242,7 +244,7 @@ def test_bad_input_is_said(dome: Mode) -> None:
     with pytest.raises(ShellError, match="5% of the wall"):
         loss_budget(vibration, film_causes("gold", Film(0.1e-3, 78e9, 0.44, 1e-4), None, (0, 0), ""), 293.15)
     with pytest.raises(ShellError, match="pressure must be 0 or positive"):
-        gas_cause(GASES["air"], -1.0, 0.1)
+        gas_cause(vibration, GASES["air"], -1.0, 0.1)
     with pytest.raises(ShellError, match="at least one cause"):
         loss_budget(vibration, [], 293.15)
     with pytest.raises(ShellError, match="height"):

@@ -61,12 +61,28 @@ def test_every_key_of_the_card_makes_its_part(capsys, tmp_path):
         "film chromium, heat",
     }
     assert set(found) == {*wanted, "gas", "mount", "activated"}
-    assert found["gas"]["relative_sd"] == pytest.approx(0.1)
+    assert found["gas"]["relative_sd"] == pytest.approx(np.hypot(0.1, 0.1))
     assert found["mount"]["inverse_q"] == pytest.approx([2e-9])
     assert json.loads(out)["left_out"] == []
     status, out, _ = _run(capsys, str(path))
     assert status == 0
     assert "Attack first: film gold" in out
+
+
+def test_schema_is_kept(capsys, tmp_path):
+    """Golden: hrg.loss/1. A change here needs a new schema number."""
+    path = tmp_path / "card.toml"
+    loss = {"inverse_q": 1e-7, "film": [GOLD | {"anisotropy": 0.01}]}
+    path.write_text(tomli_w.dumps(DOME | {"loss": loss}), encoding="utf-8")
+    found = json.loads(_run(capsys, str(path), "--json")[1])
+    assert list(found) == [
+        "schema", "card", "harmonic", "theory", "frequency_Hz", "temperature_degC", "inverse_q", "inverse_q_low", "inverse_q_high",
+        "q", "slope_per_K", "parts", "attack_first", "least_known", "anisotropy", "left_out", "stated",
+    ]  # fmt: skip
+    assert list(found["parts"][0]) == ["name", "inverse_q", "low", "high", "slope_per_K", "relative_sd", "source"]
+    assert list(found["attack_first"]) == ["part", "q_without", "advice"]
+    assert list(found["anisotropy"]) == ["inverse_q_split", "damping_axis_deg", "largest_drift_deg_per_h"]
+    assert list(found["stated"]) == ["inverse_q", "explained", "explained_low", "explained_high"]
 
 
 def test_uncertain_parts_are_values_of_the_card():
