@@ -3,7 +3,7 @@
 import dataclasses
 from typing import TYPE_CHECKING, Any
 
-from studies.reports import bell, cross_damping, filters
+from studies.reports import bell, cross_damping, filters, loop_claims
 from studies.reports.bell_theory import theory_chapters
 
 if TYPE_CHECKING:
@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from studies.papers.cvg_filters import FilterStudy
     from studies.reports.page import Chapter
 
-SOURCES = (*cross_damping.SOURCES, *filters.SOURCES, *bell.SOURCES)
+SOURCES = (*cross_damping.SOURCES, *filters.SOURCES, *bell.SOURCES, *loop_claims.SOURCES)
 MAP_POINTS = 31
 
 
@@ -28,14 +28,17 @@ def reproduce_gyro_papers(seeds: int = 20) -> "tuple[list[Chapter], dict[str, An
     from studies.papers.bvg_theory import compare_bell_theory, read_planted_rate
     from studies.papers.cvg_cross_damping import reproduce_cross_damping
     from studies.papers.cvg_filters import study_error_map, study_filters
+    from studies.papers.loop_claims import study_claims
 
     damping, study, chain = reproduce_cross_damping(seeds), study_filters(), reproduce_bell()
+    claims = study_claims()
     theory, reading = compare_bell_theory(), read_planted_rate()
     chapters = [
         *cross_damping.twin_chapters(damping),
         *filters.filter_chapters(study, study_error_map(MAP_POINTS)),
         *theory_chapters(theory, reading),
         *bell.bell_chapters(chain),
+        loop_claims.claims_chapter(claims),
     ]
     summary = {
         "cvg_cross_damping": _summarise_damping(damping),
@@ -43,6 +46,7 @@ def reproduce_gyro_papers(seeds: int = 20) -> "tuple[list[Chapter], dict[str, An
         "bvg": _summarise_bell(chain),
         "bvg_theory": {**dataclasses.asdict(theory), "loop": dataclasses.asdict(reading)},
     }
+    summary["loops"] = dataclasses.asdict(claims)
     return chapters, summary
 
 

@@ -1,0 +1,29 @@
+"""The chapter on what is claimed of loops, and what the twin says."""
+
+from typing import TYPE_CHECKING
+
+from studies.reports.page import Chapter, Table, Text
+
+if TYPE_CHECKING:
+    from studies.papers.loop_claims import LoopClaims
+
+SOURCES = (
+    "Lynch D., Vibratory gyro analysis by the method of averaging, St. Petersburg 1995; IEEE Std 1431-2004, Annex B.",
+    "Micromachines 2021, 12, 266 (Q, split, open and closed loop of a quartz gyro); Microsystems & Nanoengineering 2025,"
+    " s41378-025-00872-z (abstract).",
+)
+
+
+def claims_chapter(found: "LoopClaims") -> Chapter:
+    """Return the chapter."""
+    (drift, drift_closed), (mean, mean_closed) = found.drift, found.mean_rate
+    text = (
+        f"One per cent of damping anisotropy at Q = 1e7 drifts by {drift:.3f} deg/h in the twin ({drift_closed:.3f} in closed form);"
+        f" under the earth's 15.041 deg/h a free wave indicates {mean:.3f} deg/h in the mean ({mean_closed:.3f}), and nothing below"
+        " the drift, where it locks."
+    )
+    rows = [[claim.verdict, f"{claim.claim} ({claim.source})", claim.twin] for claim in found.claims]
+    return Chapter(
+        "Loops: what is claimed, and what the twin says",
+        [Text(text), Table("Claims of loops", ["Verdict", "Claim and source", "Twin"], rows)],
+    )
