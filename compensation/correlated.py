@@ -15,7 +15,7 @@ evaluation, once for all runs of equal rows: average long records to some hundre
 """
 
 from collections.abc import Sequence
-from dataclasses import astuple, dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
 
@@ -30,6 +30,7 @@ Array = NDArray[np.float64]
 HOUR = 3600.0
 FLICKER_TIMES = 60.0 * 4.0 ** np.arange(7)
 LEAST, MOST = -7.0, 5.0  # ln of a slow level over the white one, one row each
+KINDS = ("white", "flicker", "walk", "offset")
 USUAL, SPREAD = -1.0, 3.0  # their weak prior, which keeps a level that the rows say nothing about from running away
 
 
@@ -118,15 +119,19 @@ class NoiseRows:
             log_determinant += 2 * len(runs) * float(np.log(np.diag(L)).sum())
         return white.reshape(columns.shape), log_determinant
 
-    def deviance(self, target: Array, columns: Array, precision: Array, noise: Noise) -> float:
-        """Return −2 ln L (see the module) of residuals (M,) beside columns (M, p) of prior precision (p,)."""
+    def deviance(
+        self, target: Array, columns: Array, precision: Array, noise: Noise, mean: Array | None = None
+    ) -> float:
+        """Return −2 ln L (see the module) of residuals (M,) beside columns (M, p) of prior precision and mean (p,)."""
         white, total = self._whiten(np.column_stack([columns, target]), noise)
         X, r = white[:, :-1], white[:, -1]
         total += float(r @ r)
         if X.shape[1]:
-            A, b = X.T @ X, X.T @ r
+            about = np.zeros(X.shape[1]) if mean is None else mean
+            A, b = X.T @ X, X.T @ r + precision * about
             factor = cho_factor(A + np.diag(precision + 1e-12 * (1 + A.diagonal())), lower=True)
-            total += 2 * float(np.log(np.diag(factor[0])).sum()) - float(b @ cho_solve(factor, b))
+            total += float(about @ (precision * about)) + 2 * float(np.log(np.diag(factor[0])).sum())
+            total -= float(b @ cho_solve(factor, b))
         return total
 
 
@@ -135,8 +140,7 @@ def estimate_noise(
     target: Array,
     columns: Array | None = None,
     precision: Array | None = None,
-    start: Noise | None = None,
-    offsets: bool = True,
+    kinds: Sequence[str] = KINDS,
 ) -> Noise:
     """Estimate the levels of the noise by its marginal likelihood.
 
@@ -148,10 +152,8 @@ def estimate_noise(
         What else is unknown, with coefficients of prior mean 0.
     precision : array (p,), optional
         Of that prior; 0, no prior, unless given.
-    start : Noise, optional
-        First levels; from the differences of neighbouring rows when absent.
-    offsets : bool
-        Whether the runs may have offsets of their own; never with one run, where an offset is no noise.
+    kinds : of "white" (always), "flicker", "walk", "offset"
+        What the noise may consist of; one run has no offset, since none is known from another.
 
     Returns
     -------
@@ -162,31 +164,26 @@ def estimate_noise(
     size[size == 0] = 1.0
     lam = np.zeros(X.shape[1]) if precision is None else precision
     X, lam = X / size, lam / size**2
-    step = np.concatenate([np.diff(target[s]) for s in rows.slices])
+    free_part = np.linalg.lstsq(
+        np.vstack([X, np.diag(np.sqrt(lam))]), np.append(target, np.zeros(len(lam))), rcond=None
+    )[0]
+    rest = target - X @ free_part
+    step = np.concatenate([np.diff(rest[s]) for s in rows.slices])
     spread = float(np.median(np.abs(step))) / 0.954 if step.size else 0.0
-    spread = max(spread, 1e-12 * float(np.abs(target).max()), 1e-300)
-    free = 3 if offsets and len(rows.times) > 1 else 2
-    hours = max(float(np.ptp(t)) for t in rows.times) / HOUR
+    spread = max(spread, 1e-14 * float(np.abs(target).max()), 1e-300)
+    free = [kind for kind in KINDS[1:] if kind in kinds and (kind != "offset" or len(rows.times) > 1)]
+    hours = max(max(float(np.ptp(t)) for t in rows.times) / HOUR, 1e-9)
 
     def levels(x: Array) -> Noise:
-        white, slow = spread * np.exp(x[0]), np.exp(x[1:])
-        walk = white * slow[1] / np.sqrt(max(hours, 1e-9))
-        return Noise(float(white), float(white * slow[0]), float(walk), float(white * slow[2]) if free == 3 else 0.0)
+        white = float(spread * np.exp(x[0]))
+        slow = {kind: float(white * np.exp(one)) for kind, one in zip(free, x[1:], strict=True)}
+        slow["walk"] = slow.get("walk", 0.0) / float(np.sqrt(hours))
+        return Noise(white, **slow)
 
     def objective(x: Array) -> float:
-        return rows.deviance(target, X, lam, levels(x)) + float((((x[1:] - USUAL) / SPREAD) ** 2).sum())
+        return rows.deviance(rest, X, lam, levels(x), -free_part) + float((((x[1:] - USUAL) / SPREAD) ** 2).sum())
 
-    first = np.array([-0.3, *[USUAL] * free])
-    if start is not None and start.white > 0:
-        slow = np.array([start.flicker, start.walk * np.sqrt(hours), start.offset][:free]) / start.white
-        first = np.array([np.log(start.white / spread), *np.log(np.clip(slow, np.exp(LEAST), np.exp(MOST)))])
-    bounds = [(-12.0, 12.0), *[(LEAST, MOST)] * free]
-    found = minimize(
-        objective, np.clip(first, *np.array(bounds).T), method="L-BFGS-B", bounds=bounds, options={"ftol": 1e-7}
-    )
+    first = np.array([-0.3, *[USUAL] * len(free)])
+    bounds = [(-12.0, 12.0), *[(LEAST, MOST)] * len(free)]
+    found = minimize(objective, first, method="L-BFGS-B", bounds=bounds, options={"ftol": 1e-9, "eps": 1e-4})
     return levels(found.x)
-
-
-def scaled(noise: Noise, factor: float) -> Noise:
-    """Return the noise in another unit."""
-    return replace(noise, **{k: factor * v for k, v in zip(Noise.__annotations__, astuple(noise), strict=True)})

@@ -31,6 +31,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
         "studies.cli.fit_whole_angle:fit_whole_angle",
         "Splits, axes and gains from a whole-angle run.",
     ),
+    "calibrate": ("studies.cli.calibrate:calibrate", "The card's uncertain values from records, with intervals."),
     "diagnose": ("studies.cli.diagnose:diagnose", "What the simulation gets wrong, why, and what the repair is worth."),
     "acceptance": ("studies.cli.acceptance:acceptance", "The tests of IEEE 1431 from records, against limits."),
     "derive": ("studies.cli.derive:derive", "The symbolic derivation, as equations, LaTeX or code."),

@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from scipy.linalg import block_diag
 from scipy.stats import chi2
 
-from compensation.correlated import HOUR, Noise, NoiseRows, estimate_noise, scaled
+from compensation.correlated import HOUR, Noise, NoiseRows, estimate_noise
 from compensation.errors import CompensationError
 
 Array = NDArray[np.float64]
@@ -95,8 +95,9 @@ def test_the_unit_of_the_signal_does_not_matter():
     rows = NoiseRows.of([EVEN, GAPPED])
     r = draw(rows, Noise(0.2, 0.2), generator)
     one, other = estimate_noise(rows, r), estimate_noise(rows, 1e-9 * r)
-    assert scaled(one, 1e-9).white == pytest.approx(other.white, rel=1e-3)
-    assert scaled(one, 1e-9).flicker == pytest.approx(other.flicker, rel=1e-2)
+    assert 1e-9 * one.white == pytest.approx(other.white, rel=1e-3)
+    assert 1e-9 * one.flicker == pytest.approx(other.flicker, rel=1e-2)
+    assert estimate_noise(rows, r, kinds=("white",)).walk == 0.0
 
 
 def test_rows_that_are_none_are_refused():

@@ -1,0 +1,1 @@
+"""Most probable values of a card, given what is known of them and records of the device."""

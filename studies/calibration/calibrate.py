@@ -1,0 +1,329 @@
+"""A card calibrated against records: the most probable instrument, what is known of it, and how well it predicts."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from studies.calibration.estimates import SILENT, Estimate, estimate, find_groups
+from studies.calibration.fit import Fit, fit
+from studies.calibration.observed import HOUSING, SETTLED, ObservedRun, SettledTable, observe
+from studies.calibration.priors import Priors, gather_priors
+from studies.calibration.problem import Problem, State, wide_law
+from studies.errors import InputError
+from studies.record import Record
+
+if TYPE_CHECKING:
+    from studies.instrument.card import Instrument
+
+Array = NDArray[np.float64]
+Progress = Callable[[str], None]
+UNITS = {"frequency_Hz": "Hz", "bias_deg_per_h": "°/h", "inverse_q": "1", HOUSING: "K", SETTLED: "Hz"}
+CONTRADICTION = 5.0  # runs whose offsets are so much larger than what else the noise makes of a run's mean
+
+
+@dataclass(frozen=True)
+class Rung:
+    """Residuals of one response (its unit, rms of block averages): with the card as shipped, calibrated, and the noise.
+
+    The mean of a run's residual is left out of all three; `offset` is the rms of these means after the calibration.
+    """
+
+    as_shipped: float
+    calibrated: float
+    noise: float
+    offset: float
+
+
+@dataclass(frozen=True)
+class Baseline:
+    """A response as a linear problem about the calibrated values, one array per run (rows are block averages).
+
+    measured − predicted = columns · δ + noise, δ the move of the coordinates from the calibrated point, with prior mean
+    `prior_mean` and standard deviation `prior_sd`.
+
+    Attributes
+    ----------
+    time, residual : per run, arrays (N,)
+    columns : per run, arrays (N, p)
+    names : p; the card's values, then the departures at the start of each run
+    prior_mean, prior_sd : arrays (p,)
+    """
+
+    time: tuple[Array, ...]
+    residual: tuple[Array, ...]
+    columns: tuple[Array, ...]
+    names: tuple[str, ...]
+    prior_mean: Array
+    prior_sd: Array
+
+
+@dataclass(frozen=True)
+class HeldOut:
+    """How one run that the calibration has not seen is predicted: rms of block averages by response.
+
+    Attributes
+    ----------
+    path : of its record
+    chamber, housing : response -> (as shipped, calibrated); from the chamber alone nothing is refitted, from the housing the
+        run's own offset and initial state
+    noise : response -> rms
+    """
+
+    path: str
+    chamber: Mapping[str, tuple[float, float]]
+    housing: Mapping[str, tuple[float, float]]
+    noise: Mapping[str, float]
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """A card and what records say of it.
+
+    Attributes
+    ----------
+    card, instrument : Instrument
+        As shipped; with the most probable values, their posterior widths and correlations.
+    fit : Fit
+    estimates : of every uncertain value
+    groups : names of values that the data cannot separate
+    ladder : response -> Rung
+    held_out : HeldOut, where it was asked for
+    warnings : in sentences
+    """
+
+    card: "Instrument"
+    instrument: "Instrument"
+    fit: Fit
+    estimates: tuple[Estimate, ...]
+    groups: tuple[tuple[str, ...], ...]
+    ladder: Mapping[str, Rung]
+    held_out: HeldOut | None
+    warnings: tuple[str, ...]
+
+    def baseline(self, response: str) -> Baseline:
+        """Return a response as a linear problem, for what else may be in it."""
+        problem, state = self.fit.problem, self.fit.state
+        if response not in problem.responses or response == SETTLED:
+            raise InputError(f"no record was calibrated in {response}; there are {', '.join(problem.responses)}.")
+        rows = problem.rows[response]
+        starts = [
+            f"{name} of run {problem.parts[k].run + 1} ({problem.parts[k].name})" for k, name, _ in problem.starts
+        ]
+        return Baseline(
+            time=rows.times,
+            residual=tuple(state.residual[response][s] for s in rows.slices),
+            columns=tuple(state.slope[response][s] for s in rows.slices),
+            names=(*problem.priors.names, *starts),
+            prior_mean=-state.point,
+            prior_sd=np.ones(problem.count),
+        )
+
+
+def calibrate(
+    instrument: "Instrument",
+    records: Sequence[Record],
+    tables: Sequence[SettledTable] = (),
+    hold_out: int | None = None,
+    exact: Sequence[str] = (),
+    profile: bool = True,
+    progress: Progress = lambda _: None,
+) -> Calibration:
+    """Find the most probable values of a card, given its uncertainties and records of the device.
+
+    Parameters
+    ----------
+    instrument : Instrument
+    records : sequence of Record
+        Runs of one device.
+    tables : sequence of SettledTable
+        Steady-state tables of the same device.
+    hold_out : int, optional
+        Place of a record that a second calibration, without it, predicts.
+    exact : names
+        Values of the card that are not to move.
+    profile : bool
+        Whether intervals follow the likelihood where it is bent.
+
+    Raises
+    ------
+    InputError, ThermalError, ShellError
+        Records or a card that cannot be used.
+    """
+    if not records and not tables:
+        raise InputError("nothing is calibrated without a record or a steady-state table.")
+    runs, tables = observe(records), tuple(tables)
+    problem = _pose(instrument, runs, tables, exact)
+    found = fit(problem, progress=progress)
+    held_out = None
+    if hold_out is not None and len(records) > 1:
+        progress("held-out run")
+        held_out = predict_held_out(instrument, runs, tables, hold_out, exact, found)
+    if profile:
+        progress("intervals")
+    estimates = estimate(found, profile)
+    ladder = _ladder(found)
+    return Calibration(
+        instrument,
+        _calibrated(instrument, found, estimates),
+        found,
+        estimates,
+        find_groups(found),
+        ladder,
+        held_out,
+        _warn(found, estimates, ladder),
+    )
+
+
+def _pose(
+    instrument: "Instrument", runs: tuple[ObservedRun, ...], tables: tuple[SettledTable, ...], exact: Sequence[str]
+) -> Problem:
+    priors = gather_priors(instrument, exact)
+    known = {value.name for value in instrument.uncertain}
+    for name in exact:
+        if name not in known:
+            from studies.errors import nearest
+
+            raise InputError(
+                f"{instrument.path}: '{name}' is no uncertain value of the card{nearest(name, sorted(known))}"
+            )
+    return Problem(instrument, priors, runs, wide_law(instrument, runs, tables), tables)
+
+
+def _calibrated(instrument: "Instrument", found: Fit, estimates: Sequence[Estimate]) -> "Instrument":
+    """The card with posterior values, widths and correlations."""
+    priors: Priors = found.problem.priors
+    count = len(priors.values)
+    C = priors.root @ found.covariance[:count, :count] @ priors.root.T
+    sd = np.sqrt(np.diag(C))
+    R = np.clip(C / np.outer(sd, sd), -1.0, 1.0)
+    np.fill_diagonal(R, 1.0)
+    values = {}
+    for one, prior in zip(estimates, priors.values, strict=True):
+        ends = {"low": prior.low if prior.low != 0.0 else -np.inf, "high": prior.high}
+        hard = {name: end for name, end in ends.items() if np.isfinite(end)}
+        values[one.parameter] = {"value": one.value, "sd": one.sd, **hard}
+    posterior = {"names": [one.parameter for one in estimates], "correlation": R.round(6).tolist()}
+    return instrument.with_values(values).with_table("posterior", posterior)
+
+
+def _ladder(found: Fit) -> dict[str, Rung]:
+    problem = found.problem
+    shipped = problem.evaluate(np.zeros(problem.count), slopes=False)
+    return {
+        name: Rung(
+            _spread(problem, shipped, name),
+            _spread(problem, found.state, name),
+            noise_rms(found, name),
+            float(np.sqrt(np.mean([found.state.residual[name][s].mean() ** 2 for s in problem.rows[name].slices]))),
+        )
+        for name in problem.responses
+    }
+
+
+def _spread(problem: Problem, state: State, name: str) -> float:
+    parts = [state.residual[name][s] - state.residual[name][s].mean() for s in problem.rows[name].slices]
+    return float(np.sqrt(np.mean(np.concatenate(parts) ** 2)))
+
+
+def noise_rms(found: Fit, name: str) -> float:
+    """Rms of the noise about the mean of each run, as the fitted levels have it."""
+    rows, total, count = found.problem.rows[name], 0.0, 0
+    for run, t in enumerate(rows.times):
+        S = rows.covariance(run, found.noise[name])
+        total += float(np.trace(S) - S.mean() * len(t))
+        count += len(t)
+    return float(np.sqrt(total / count))
+
+
+def predict_held_out(
+    instrument: "Instrument",
+    runs: tuple[ObservedRun, ...],
+    tables: tuple[SettledTable, ...],
+    place: int,
+    exact: Sequence[str],
+    whole: Fit,
+) -> HeldOut:
+    """Calibrate without one run and predict it."""
+    seen = tuple(run for k, run in enumerate(runs) if k != place % len(runs))
+    run = runs[place % len(runs)]
+    count = len(whole.problem.priors.values)
+    problem = replace(whole.problem, runs=seen)
+    start = np.concatenate([whole.point[:count], np.zeros(problem.count - count)])
+    values = fit(problem, start).point[:count]
+    inner = replace(whole.problem, runs=(replace(run, outer=None),), tables=())
+    responses = [name for name in inner.responses if name not in (HOUSING, SETTLED)]
+    by_housing = dict.fromkeys(responses, (0.0, 0.0))
+    both = []
+    for at in (np.zeros(count), values):
+        point = np.concatenate([at, np.zeros(inner.count - count)])
+        both.append(_refit_start(inner, point, whole))
+    for name in responses:
+        by_housing[name] = (_spread(inner, both[0], name), _spread(inner, both[1], name))
+    by_chamber: dict[str, tuple[float, float]] = {}
+    if run.outer is not None:
+        alone = replace(run, inner=run.outer, outer=None)
+        outer = replace(whole.problem, runs=(alone,), tables=())
+        points = (np.concatenate([at, np.zeros(outer.count - count)]) for at in (np.zeros(count), values))
+        before, after = (outer.evaluate(point, slopes=False) for point in points)
+        by_chamber = {name: (_rms(before.residual[name]), _rms(after.residual[name])) for name in responses}
+    noise = {name: noise_rms(whole, name) for name in responses}
+    return HeldOut(run.record.path, by_chamber, by_housing, noise)
+
+
+def _refit_start(problem: Problem, point: Array, whole: Fit) -> State:
+    """Residuals with the run's own initial state refitted."""
+    count = len(problem.priors.values)
+    state = problem.evaluate(point)
+    names = problem.responses
+    white = np.concatenate(
+        [
+            problem.rows[n].whiten(
+                np.column_stack([state.slope[n], state.residual[n]]),
+                replace(whole.noise[n], offset=1e3 * whole.noise[n].white),
+            )
+            for n in names
+        ]
+    )
+    J, r = white[:, count:-1], white[:, -1]
+    moved = np.array(point)
+    moved[count:] += np.linalg.solve(J.T @ J + np.eye(J.shape[1]), J.T @ r)
+    return problem.evaluate(moved, slopes=False)
+
+
+def _rms(values: Array) -> float:
+    return float(np.sqrt(np.mean(values**2)))
+
+
+def _warn(found: Fit, estimates: Sequence[Estimate], ladder: Mapping[str, Rung]) -> tuple[str, ...]:
+    warnings = []
+    if not found.converged:
+        warnings.append("the last step of the fit was not small; the values may still move.")
+    rows = found.problem.rows
+    for name, rung in ladder.items():
+        usual = _usual_mean(found, name)
+        if len(rows[name].times) > 1 and rung.offset > CONTRADICTION * usual:
+            warnings.append(
+                f"the runs contradict each other in {name}: after the calibration their means lie {rung.offset:.3g}"
+                f" {UNITS[name]} (rms) from the model, where the noise within a run explains {usual:.2g}; are they of one"
+                " device and one turn-on?"
+            )
+    for name, count in found.outliers.items():
+        if count:
+            warnings.append(f"{count} block(s) of {name} stand out of the noise and count less.")
+    stayed = sum(one.width >= SILENT for one in estimates)
+    told = sum(rows[name].count for name in rows)
+    if len(estimates) > told:
+        warnings.append(
+            f"{len(estimates)} uncertain values, but {told} data: {stayed} of the values stayed at their prior."
+        )
+    return tuple(warnings)
+
+
+def _usual_mean(found: Fit, name: str) -> float:
+    """Standard deviation of a run's mean by the noise without offsets."""
+    rows = found.problem.rows[name]
+    quiet = replace(found.noise[name], offset=0.0)
+    return float(np.sqrt(np.mean([rows.covariance(run, quiet).mean() for run in range(len(rows.times))])))

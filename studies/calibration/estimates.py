@@ -1,0 +1,131 @@
+"""What a fit says of each value: how far it moved, how well it is known, and what it cannot be told apart from."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from studies.calibration.fit import Fit, objective
+from studies.calibration.priors import from_standard, to_standard
+from studies.errors import InputError
+from thermal.errors import ThermalError
+
+Array = NDArray[np.float64]
+NINETY = 1.6448536269514722
+NONLINEAR = ("thermal.", "noise.", "effect.", "resonator.", "bias.damping_")
+"""Values whose intervals are looked at beyond the straight line."""
+BENT = 0.25  # relative departure of the objective at the ends of an interval from its parabola, beyond which it is profiled
+TOLD = 0.5  # posterior over prior width up to which the data has said what the value is
+SILENT = 0.95  # and from which it stayed at its prior
+INSEPARABLE = 0.9  # correlation, of two values that share what is known of them
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """One value of the card.
+
+    Attributes
+    ----------
+    parameter, unit : name of the key, and its unit
+    card, value, low, high : what the card said, the most probable value, and its 90 % interval
+    sd : posterior standard deviation, as a card states it
+    shift_sd : how far it moved, in prior standard deviations
+    width : posterior over prior standard deviation
+    bound : "low" or "high" where the value has reached a hard bound
+    interval : "profile" where the interval follows the likelihood's bend
+    """
+
+    parameter: str
+    unit: str
+    card: float
+    value: float
+    low: float
+    high: float
+    sd: float
+    shift_sd: float
+    width: float
+    bound: str | None
+    interval: str
+
+    @property
+    def told_by(self) -> str:
+        """Who says so: the data, the prior, or both."""
+        return "data" if self.width <= TOLD else "prior" if self.width >= SILENT else "both"
+
+
+def estimate(fit: Fit, profile: bool = True) -> tuple[Estimate, ...]:
+    """Return the estimates of all values of the card."""
+    priors = fit.problem.priors
+    count = len(priors.values)
+    u = fit.point[:count]
+    z, bounds, at = priors.standard(u), priors.bound(u), priors.at(u)
+    C = priors.root @ fit.covariance[:count, :count] @ priors.root.T
+    found = []
+    for k, value in enumerate(priors.values):
+        sd = float(np.sqrt(C[k, k]))
+        ends, kind = (float(z[k]) - NINETY * sd, float(z[k]) + NINETY * sd), "normal"
+        if profile and value.name.startswith(NONLINEAR) and sd < SILENT:
+            ends, kind = _profiled(fit, k, ends)
+        low, high = (float(np.clip(from_standard(value, end), value.low, value.high)) for end in ends)
+        number = at[value.name]
+        width = number * sd * value.sd / value.value if value.logarithmic else sd * value.sd
+        found.append(
+            Estimate(value.name, value.unit, value.value, number, low, high, width, float(z[k]), sd, bounds[k], kind)
+        )
+    return tuple(found)
+
+
+def _profiled(fit: Fit, k: int, ends: tuple[float, float]) -> tuple[tuple[float, float], str]:
+    """Ends of an interval in z, each where the objective has risen by 2.71 along the way of least rise."""
+    problem, priors = fit.problem, fit.problem.priors
+    count = len(priors.values)
+    row = np.zeros(problem.count)
+    row[:count] = priors.root[k]
+    way = fit.covariance @ row / np.sqrt(row @ fit.covariance @ row)  # one standard deviation of value k
+    least = objective(problem, fit.state, fit.noise, fit.rows)
+    limits = priors.values[k]
+    lowest, highest = (to_standard(limits, end) for end in (limits.low, limits.high))
+    centre = float(priors.standard(fit.point[:count])[k])
+
+    def rise(t: float) -> float:
+        try:
+            state = problem.evaluate(fit.point + t * way, slopes=False)
+        except (InputError, ThermalError):
+            return np.inf
+        return objective(problem, state, fit.noise, fit.rows) - least
+
+    found, kind = [], "normal"
+    for sign, end in zip((-1.0, 1.0), ends, strict=True):
+        t = NINETY
+        if not lowest <= end <= highest:
+            found.append(end)
+            continue
+        for _ in range(3):
+            ratio = rise(sign * t) / NINETY**2
+            if abs(ratio - 1) < BENT:
+                break
+            kind = "profile"
+            t *= float(np.clip(1 / np.sqrt(max(ratio, 1e-3)), 0.4, 2.0))
+        found.append(centre + sign * t * (abs(end - centre) / NINETY))
+    return (found[0], found[1]), kind
+
+
+def find_groups(fit: Fit) -> tuple[tuple[str, ...], ...]:
+    """Return groups of values that the data ties together but cannot tell apart: |correlation| above 0.9."""
+    priors = fit.problem.priors
+    count = len(priors.values)
+    C = priors.root @ fit.covariance[:count, :count] @ priors.root.T
+    sd = np.sqrt(np.diag(C))
+    tied = np.abs(C / np.outer(sd, sd)) > INSEPARABLE
+    groups, left = [], set(range(count))
+    while left:
+        group, front = set(), {left.pop()}
+        while front:
+            k = front.pop()
+            group.add(k)
+            near = {int(j) for j in np.flatnonzero(tied[k])} - group
+            front |= near
+            left -= near
+        if len(group) > 1:
+            groups.append(tuple(priors.names[k] for k in sorted(group)))
+    return tuple(groups)

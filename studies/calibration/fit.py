@@ -1,0 +1,161 @@
+"""Most probable values: Gauss–Newton steps in coloured noise that is estimated beside them.
+
+At every step each response's noise has the levels of highest marginal likelihood, the free coordinates integrated out
+(`compensation.correlated`); with rows whitened by it, (JᵀJ + 1) Δ = Jᵀ r − u. Blocks whose innovation stands out by more
+than 5 standard deviations are given the variance that they show: one outlier moves nothing.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from compensation.correlated import KINDS, Noise, NoiseRows, estimate_noise
+from compensation.errors import CompensationError
+from shell.errors import ShellError
+from studies.calibration.observed import SETTLED
+from studies.calibration.problem import Problem, Progress, State
+from studies.errors import InputError
+from thermal.errors import ThermalError
+
+Array = NDArray[np.float64]
+MOST_STEPS = 14
+CLOSE = 0.03  # of a posterior standard deviation, of the largest last move
+OUTLIER = 5.0
+HALVINGS = 5
+UNSEEN = 0.1  # of the noise of one row: a column whose whole length is less tells nothing
+LONGEST_STEP = 3.0  # prior standard deviations, of any coordinate in one step
+
+
+@dataclass(frozen=True)
+class Fit:
+    """The most probable point.
+
+    Attributes
+    ----------
+    problem : Problem
+    state : State, at the point
+    noise, rows : by response: levels, and rows with the variances of outliers enlarged
+    information : array (p, p), JᵀJ of the whitened rows
+    covariance : array (p, p), (JᵀJ + 1)⁻¹
+    outliers : by response, how many blocks stand out
+    steps : how many were taken
+    converged : whether the last one was small
+    """
+
+    problem: Problem
+    state: State
+    noise: Mapping[str, Noise]
+    rows: Mapping[str, NoiseRows]
+    information: Array
+    covariance: Array
+    outliers: Mapping[str, int]
+    steps: int
+    converged: bool
+
+    @property
+    def point(self) -> Array:
+        """Independent coordinates of the most probable values."""
+        return self.state.point
+
+
+def fit(problem: Problem, start: Array | None = None, progress: Progress = lambda _: None) -> Fit:
+    """Find the most probable point.
+
+    Raises
+    ------
+    InputError, ShellError, ThermalError
+        Predictions that are impossible at the card's own values.
+    """
+    state = problem.evaluate(np.zeros(problem.count) if start is None else start)
+    rows = dict(problem.rows)
+    noise: dict[str, Noise] = {}
+    converged, step, outliers = False, 0, dict.fromkeys(problem.responses, 0)
+    for step in range(1, MOST_STEPS + 1):
+        noise = {name: _noise(problem, rows[name], state, name) for name in problem.responses}
+        if step > 2:
+            for name in problem.responses:
+                rows[name], outliers[name] = _spare_outliers(problem.rows[name], state, name, noise[name])
+        J, r = _whitened(problem, state, noise, rows)
+        A = J.T @ J
+        move: Array = np.asarray(np.linalg.solve(A + np.eye(len(A)), J.T @ r - state.point))
+        size = float(np.abs(move / np.sqrt(np.diag(np.linalg.inv(A + np.eye(len(A)))))).max(initial=0.0))
+        progress(f"step {step}: largest move {size:.2g} standard deviations")
+        if size < CLOSE and step > 3:
+            converged = True
+            break
+        move *= min(1.0, LONGEST_STEP / max(float(np.abs(move).max(initial=0.0)), 1e-12))
+        state = _advance(problem, state, move, noise, rows)
+    J, _ = _whitened(problem, state, noise, rows)
+    information = J.T @ J
+    covariance = np.asarray(np.linalg.inv(information + np.eye(len(information))))
+    return Fit(problem, state, noise, rows, information, covariance, outliers, step, converged)
+
+
+def objective(problem: Problem, state: State, noise: Mapping[str, Noise], rows: Mapping[str, NoiseRows]) -> float:
+    """−2 ln of likelihood and prior, up to a constant."""
+    total = float(state.point @ state.point)
+    return total + sum(float(np.sum(rows[n].whiten(state.residual[n], noise[n]) ** 2)) for n in problem.responses)
+
+
+def _noise(problem: Problem, rows: NoiseRows, state: State, name: str) -> Noise:
+    J = state.slope[name]
+    target = state.residual[name] + J @ state.point
+    # Rotated coordinates of unit prior are of unit prior again; those that the rows do not see are left out.
+    U, S, _ = np.linalg.svd(J, full_matrices=False)
+    seen = S > UNSEEN * float(np.median(np.abs(np.diff(state.residual[name]))))
+    kinds = ("white",) if name == SETTLED else KINDS
+    noise = estimate_noise(rows, target, U[:, seen] * S[seen], np.ones(int(seen.sum())), kinds)
+    if name == SETTLED:  # a reading is not better than its last digit
+        rounding = max(table.resolution for table in problem.tables) / np.sqrt(12.0)
+        return replace(noise, white=max(noise.white, rounding))
+    return noise
+
+
+def _spare_outliers(rows: NoiseRows, state: State, name: str, noise: Noise) -> tuple[NoiseRows, int]:
+    """Rows with larger variances where one innovation stands out: its square over 5², times its own white variance."""
+    white = rows.whiten(state.residual[name], noise)
+    spread = 1.4826 * float(np.median(np.abs(white)))
+    ratio = np.maximum((np.abs(white) / (OUTLIER * max(spread, 1.0))) ** 2, 1.0)
+    beyond = int(np.count_nonzero(ratio > 1))
+    if not beyond:
+        return rows, 0
+    stretched = tuple(
+        v * np.where(ratio[s] > 1, 25.0 * ratio[s], 1.0) for v, s in zip(rows.variances, rows.slices, strict=True)
+    )
+    return NoiseRows(rows.times, stretched), beyond
+
+
+def _whitened(
+    problem: Problem, state: State, noise: Mapping[str, Noise], rows: Mapping[str, NoiseRows]
+) -> tuple[Array, Array]:
+    white = [
+        rows[name].whiten(np.column_stack([state.slope[name], state.residual[name]]), noise[name])
+        for name in problem.responses
+    ]
+    both = np.concatenate(white)
+    return both[:, :-1], both[:, -1]
+
+
+def _advance(
+    problem: Problem, state: State, move: Array, noise: Mapping[str, Noise], rows: Mapping[str, NoiseRows]
+) -> State:
+    """Go a step, or half of it until the objective falls."""
+    count = len(problem.priors.values)
+    before = objective(problem, state, noise, rows)
+    part, refused = 1.0, None
+    for _ in range(HALVINGS):
+        trial = state.point + part * move
+        trial = np.concatenate([problem.priors.inside(trial[:count]), trial[count:]])
+        try:
+            reached = problem.evaluate(trial)
+        except (InputError, ShellError, ThermalError, CompensationError) as error:
+            refused = error
+        else:
+            if objective(problem, reached, noise, rows) <= before + 1e-9 * abs(before):
+                return reached
+        part /= 4
+    if refused is not None and part < 1e-3:
+        return replace(state)
+    return state

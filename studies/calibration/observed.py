@@ -1,0 +1,163 @@
+"""What records say, made ready for a fit: rows that are predicted, blocks that are compared, spikes left out."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from compensation.decimation import NEIGHBOURS, find_spikes
+from studies.errors import InputError
+from studies.record import Record
+from studies.simulation.drive import COLUMN, ZERO_CELSIUS, Drive, drive_by_record
+
+Array = NDArray[np.float64]
+Rows = NDArray[np.intp]
+RESPONSES = ("frequency_Hz", "bias_deg_per_h", "inverse_q")
+HOUSING = "housing_temperature_degC"
+SETTLED = "settled_frequency_Hz"
+"""Frequencies of steady-state tables."""
+MOST_ROWS = 2000  # of a run that are predicted
+MOST_BLOCKS = 240  # of a run that are compared
+LEAST_ROWS = 10
+
+
+@dataclass(frozen=True)
+class Blocks:
+    """Means of one column over blocks of rows.
+
+    Attributes
+    ----------
+    rows : of the run's predicted rows, those with a value that is no spike
+    edges : where each block begins in `rows`
+    counts : array, values in each block
+    time, value : arrays, means
+    spikes : number of values left out
+    """
+
+    rows: Rows
+    edges: Rows
+    counts: Array
+    time: Array
+    value: Array
+    spikes: int
+
+    def average(self, column: Array) -> Array:
+        """Means of a predicted column over the same values, along the first axis."""
+        total = np.add.reduceat(column[self.rows], self.edges, axis=0)
+        return np.asarray(total / self.counts.reshape(-1, *[1] * (total.ndim - 1)))
+
+    @property
+    def variance(self) -> Array:
+        """White variance of each block over that of a usual one."""
+        return np.asarray(np.median(self.counts) / self.counts)
+
+
+@dataclass(frozen=True)
+class ObservedRun:
+    """One run.
+
+    Attributes
+    ----------
+    record : Record
+        As read.
+    inner : Drive
+        Drives frequency, bias and 1/Q: by the measured housing, else by the chamber.
+    outer : Drive or None
+        Where both are measured: the chamber, which drives the housing.
+    responses : mapping
+        Blocks of every response that was measured, the housing among them where it has an outer drive.
+    """
+
+    record: Record
+    inner: Drive
+    outer: Drive | None
+    responses: Mapping[str, Blocks]
+
+
+@dataclass(frozen=True)
+class SettledTable:
+    """A steady-state table: temperatures (K) and frequencies (Hz), with the step of its readings (Hz)."""
+
+    path: str
+    temperature: Array
+    frequency: Array
+    resolution: float
+
+
+def read_settled(path: str) -> SettledTable:
+    """Read a steady-state table (HRG paper, Table 1)."""
+    from studies.record import read_frequency_table, reading_resolution
+
+    values = read_frequency_table(path).values
+    f = values["frequency_Hz"]
+    return SettledTable(path, values["temperature_degC"] + ZERO_CELSIUS, f, reading_resolution(f))
+
+
+def observe(records: Sequence[Record]) -> tuple[ObservedRun, ...]:
+    """Make runs ready.
+
+    Raises
+    ------
+    InputError
+        A run without a drive or without a response, or too short.
+    """
+    return tuple(_observe(record) for record in records)
+
+
+def _observe(record: Record) -> ObservedRun:
+    time, columns = _fine_rows(record)
+    if len(time) < LEAST_ROWS:
+        raise InputError(f"{record.path}: {len(time)} rows say nothing; a run needs at least {LEAST_ROWS}.")
+    inner = drive_by_record(record, time=time)
+    outer = None
+    if inner.boundary == "housing" and COLUMN["chamber"] in record and np.isfinite(record[COLUMN["chamber"]]).sum() > 1:
+        outer = drive_by_record(record, "chamber", time=time)
+    wanted = [name for name in RESPONSES if name in columns] + ([HOUSING] if outer is not None else [])
+    responses = {name: blocks for name in wanted if (blocks := _block(time, columns[name])) is not None}
+    if not any(name in responses for name in RESPONSES):
+        raise InputError(
+            f"{record.path}: none of {', '.join(RESPONSES)} has values; there is nothing to calibrate with."
+        )
+    return ObservedRun(record, inner, outer, responses)
+
+
+def _fine_rows(record: Record) -> tuple[Array, dict[str, Array]]:
+    """Rows to predict: those of the record, of very many rows the means of groups of equal duration."""
+    time = record["time_s"]
+    names = [name for name in (*RESPONSES, HOUSING) if name in record]
+    if len(time) <= MOST_ROWS:
+        return time, {name: record[name] for name in names}
+    width = float(np.ptp(time)) / MOST_ROWS
+    group = np.minimum(((time - time[0]) / width).astype(np.intp), MOST_ROWS - 1)
+    present = np.unique(group)
+    means = np.bincount(group, time, MOST_ROWS) / np.maximum(np.bincount(group, minlength=MOST_ROWS), 1)
+    columns = {}
+    for name in names:
+        values = record[name]
+        keep = np.isfinite(values)
+        if np.count_nonzero(keep) >= NEIGHBOURS:
+            keep[keep] = ~find_spikes(values[keep])
+        count = np.bincount(group[keep], minlength=MOST_ROWS)
+        middle = float(np.median(values[keep])) if keep.any() else 0.0
+        total = np.bincount(group[keep], values[keep] - middle, MOST_ROWS)
+        columns[name] = np.where(count > 0, middle + total / np.maximum(count, 1), np.nan)[present]
+    return means[present], columns
+
+
+def _block(time: Array, column: Array) -> Blocks | None:
+    keep = np.isfinite(column)
+    if np.count_nonzero(keep) < LEAST_ROWS:
+        return None
+    spikes = find_spikes(column[keep])
+    rows = np.flatnonzero(keep)[~spikes]
+    width = max(float(np.ptp(time)) / MOST_BLOCKS, 1e-9)
+    group = ((time[rows] - time[0]) / width).astype(np.intp)
+    edges = np.flatnonzero(np.diff(group, prepend=-1) > 0)
+    counts = np.diff(np.append(edges, len(rows))).astype(float)
+
+    def mean(values: Array) -> Array:
+        return np.asarray(np.add.reduceat(values, edges) / counts)
+
+    middle = float(np.median(column[rows]))
+    return Blocks(rows, edges, counts, mean(time[rows]), middle + mean(column[rows] - middle), int(spikes.sum()))

@@ -1,0 +1,204 @@
+"""The least-squares problem of a calibration: predictions of all runs, their derivatives, and what else is free.
+
+Coordinates: the card's uncertain values (`studies.calibration.priors`), then for each run how far its housing, base and
+resonator departed from being settled at the start, all of unit prior variance. Frequency, bias and 1/Q are driven by the
+measured housing where there is one; the chamber then explains the housing.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from compensation.correlated import NoiseRows
+from studies.calibration.observed import HOUSING, RESPONSES, SETTLED, ObservedRun, SettledTable
+from studies.calibration.priors import Priors
+from studies.simulation.drive import Drive
+from studies.simulation.prediction import Prediction, Variations, predict
+
+if TYPE_CHECKING:
+    from shell.law import FrequencyLaw
+    from studies.instrument.card import Instrument
+
+Array = NDArray[np.float64]
+START_SPREAD = 3.0  # K, of the departures at the start
+SHIFT = "shift"
+Progress = Callable[[str], None]
+
+
+@dataclass(frozen=True)
+class Part:
+    """One drive of one run: its prediction, and the responses that it explains."""
+
+    run: int
+    name: str
+    drive: Drive
+    responses: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class State:
+    """Residuals and derivatives of every response at one point, stacked over the runs that have it.
+
+    Attributes
+    ----------
+    point : array (p,), independent coordinates
+    residual : response -> array (M,), measured minus predicted
+    slope : response -> array (M, p) by the coordinates; empty when not asked for
+    """
+
+    point: Array
+    residual: Mapping[str, Array]
+    slope: Mapping[str, Array] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Problem:
+    """An instrument, what is uncertain of it, and the runs."""
+
+    instrument: "Instrument"
+    priors: Priors
+    runs: tuple[ObservedRun, ...]
+    law: "FrequencyLaw"
+    tables: tuple[SettledTable, ...] = ()
+
+    @cached_property
+    def parts(self) -> tuple[Part, ...]:
+        """Drives of all runs in order."""
+        found = []
+        for number, run in enumerate(self.runs):
+            inner = tuple(name for name in RESPONSES if name in run.responses)
+            if inner:
+                found.append(Part(number, "inner", run.inner, inner))
+            if run.outer is not None and HOUSING in run.responses:
+                found.append(Part(number, "outer", run.outer, (HOUSING,)))
+        return tuple(found)
+
+    @cached_property
+    def starts(self) -> tuple[tuple[int, str, float], ...]:
+        """What is free of each run, with its prior standard deviation: departures (K), and the chamber's clock (s)."""
+        found = [(k, f"initial.{lump}", START_SPREAD) for k, part in enumerate(self.parts) for lump in part.drive.lumps]
+        for k, part in enumerate(self.parts):
+            if part.drive.boundary == "chamber":
+                found.append((k, SHIFT, 0.5 * float(np.median(np.diff(part.drive.profile.time)))))
+        return tuple(found)
+
+    @property
+    def count(self) -> int:
+        """Number of coordinates."""
+        return len(self.priors.values) + len(self.starts)
+
+    @cached_property
+    def responses(self) -> tuple[str, ...]:
+        """Responses that any run has, and the settled frequencies of tables."""
+        found = tuple(n for n in (*RESPONSES, HOUSING) if any(n in part.responses for part in self.parts))
+        return (*found, SETTLED) if self.tables else found
+
+    def members(self, response: str) -> tuple[Part, ...]:
+        """Parts that explain a response, in the order of its rows."""
+        return tuple(part for part in self.parts if response in part.responses)
+
+    @cached_property
+    def rows(self) -> Mapping[str, NoiseRows]:
+        """Rows of every response, for its noise."""
+        found = {
+            name: NoiseRows.of(
+                [self.runs[part.run].responses[name].time for part in self.members(name)],
+                [self.runs[part.run].responses[name].variance for part in self.members(name)],
+            )
+            for name in self.responses
+            if name != SETTLED
+        }
+        if self.tables:
+            found[SETTLED] = NoiseRows.of([np.arange(float(len(table.frequency))) for table in self.tables])
+        return found
+
+    def instrument_at(self, point: Array) -> "Instrument":
+        """Return the instrument with the values of a point."""
+        return self.instrument.with_values(self.priors.at(point[: len(self.priors.values)]))
+
+    def law_at(self, instrument: "Instrument") -> "FrequencyLaw":
+        """Return the law of an instrument of this problem."""
+        if any(value.name.startswith("resonator.") for value in self.priors.values):
+            from studies.law import law_of
+
+            return law_of(instrument, self.law.lowest, self.law.highest, self.law.theory)
+        return self.law.with_material(instrument.material)
+
+    def drive_at(self, point: Array, k: int) -> Drive:
+        """Return the drive of a part with the departures of a point."""
+        offset = len(self.priors.values)
+        free = {name: sd * float(point[offset + i]) for i, (part, name, sd) in enumerate(self.starts) if part == k}
+        shift = free.pop(SHIFT, 0.0)
+        initial = {name.removeprefix("initial."): value for name, value in free.items()}
+        return replace(self.parts[k].drive, initial=initial, shift=shift)
+
+    def evaluate(self, point: Array, slopes: bool = True) -> State:
+        """Predict all runs and compare."""
+        values = self.priors.values
+        instrument = self.instrument_at(point)
+        law = self.law_at(instrument)
+        scale = self.priors.slopes(point[: len(values)])
+        residual: dict[str, list[Array]] = {name: [] for name in self.responses}
+        slope: dict[str, list[Array]] = {name: [] for name in self.responses}
+        varied = Variations(instrument, law, self.priors.names)
+        for k, part in enumerate(self.parts):
+            names = [*self.priors.names, *(name for one, name, _ in self.starts if one == k)] if slopes else []
+            prediction = predict(instrument, self.drive_at(point, k), varied.with_names(names), law)
+            for name in part.responses:
+                blocks = self.runs[part.run].responses[name]
+                residual[name].append(blocks.value - blocks.average(prediction.columns[name]))
+                if slopes:
+                    slope[name].append(self._slopes(k, name, prediction, scale))
+        for table in self.tables:
+            residual[SETTLED].append(table.frequency - law.frequency(table.temperature, extrapolate=True))
+            if slopes:
+                slope[SETTLED].append(self._settled_slopes(table, varied, scale))
+        return State(
+            point,
+            {name: np.concatenate(found) for name, found in residual.items()},
+            {name: np.concatenate(found) for name, found in slope.items()} if slopes else {},
+        )
+
+    def _slopes(self, k: int, response: str, prediction: Prediction, scale: Array) -> Array:
+        part, count = self.parts[k], len(self.priors.values)
+        blocks = self.runs[part.run].responses[response]
+        J = np.zeros((len(blocks.value), self.count))
+        if count:
+            columns = np.column_stack([prediction.derivatives[name][response] for name in self.priors.names])
+            J[:, :count] = (blocks.average(columns) * scale) @ self.priors.root
+        for place, (one, name, sd) in enumerate(self.starts):
+            if one == k:
+                J[:, count + place] = sd * blocks.average(prediction.derivatives[name][response])
+        return J
+
+    def _settled_slopes(self, table: SettledTable, varied: Variations, scale: Array) -> Array:
+        columns = np.zeros((len(table.frequency), len(self.priors.values)))
+        for k, name in enumerate(self.priors.names):
+            if name.startswith(("material.", "resonator.")):
+                below, above = varied.sides(name)
+                high, low = (side.law.frequency(table.temperature, extrapolate=True) for side in (above, below))
+                columns[:, k] = (high - low) / (above.distance - below.distance)
+        J = np.zeros((len(table.frequency), self.count))
+        J[:, : len(scale)] = (columns * scale) @ self.priors.root
+        return J
+
+
+def wide_law(
+    instrument: "Instrument",
+    runs: Sequence[ObservedRun],
+    tables: Sequence[SettledTable] = (),
+    margin: float = 30.0,
+) -> "FrequencyLaw":
+    """Build the law over all that the runs reach, and so much more that trial states stay within it."""
+    from studies.law import law_of
+
+    ends = [instrument.reference_temperature, *(float(T) for table in tables for T in table.temperature)]
+    for run in runs:
+        for drive in (run.inner, run.outer):
+            if drive is not None:
+                ends += [float(drive.profile.value.min()), float(drive.profile.value.max())]
+    return law_of(instrument, min(ends) - margin, max(ends) + margin)

@@ -1,0 +1,151 @@
+"""`hrg calibrate`: the card's uncertain values from records, with intervals and shifts.
+
+With --json one object, schema `hrg.calibration/1`:
+`card`, `records`; `values`: `[{parameter, unit, card, value, low, high, shift_sd, width, told_by, bound, interval}]`, `low`
+and `high` a 90 % interval, `shift_sd` the move in prior standard deviations, `width` posterior over prior standard deviation,
+`told_by` "data", "prior" or "both", `bound` "low", "high" or null, `interval` "normal" or "profile"; `inseparable`: groups of
+parameters that the data ties together but cannot tell apart; `responses`: by name `unit`, `as_shipped`, `calibrated`, `noise`
+(rms of block averages about the mean of each run), `run_offset` (rms of these means) and `outliers`; `held_out`: null, or
+`record` and by response `chamber` and `housing` (`as_shipped`, `calibrated`, null where not measured) beside `noise`;
+`converged`; `warnings`; `calibrated_card`: path of the saved card or null.
+"""
+
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from studies.calibration.calibrate import Calibration
+
+
+def calibrate(
+    card: str,
+    *data: str,
+    save: str | None = None,
+    report: str | None = None,
+    hold_out: int = 0,
+    exact: tuple[str, ...] = (),
+    json: bool = False,
+) -> int:
+    """Find the most probable values of a card, given its uncertainties and records of the device.
+
+    Every number of the card that is uncertain may move, within its prior: {{ value = …, relative_sd = … }} in the card, or the
+    documented uncertainty of its key (hrg cards CARD lists them). The noise of every response, the initial temperatures and
+    the offsets of the runs are estimated beside them. Frequency, bias and 1/Q are driven by the measured housing where there
+    is one; with a chamber column the housing is explained too.
+
+    Parameters
+    ----------
+    card : str
+        Path of a card, or the name of one that ships (hrg cards).
+    data : str
+        Records (CSV), the runs of one device, and steady-state tables (temperature_degC,frequency_Hz).
+    save : str
+        Write the calibrated card: most probable values with their posterior widths.
+    report : str
+        Write a page (HTML).
+    hold_out : int
+        Number of the record, from 1, that a second calibration without it predicts; the last of several unless given.
+    exact : str
+        A value that is not to move, such as thermal.film_emissivity; may be given more than once.
+    json : bool
+        Print one JSON object (schema hrg.calibration/1) instead of tables.
+    """
+    from studies.calibration.calibrate import calibrate as run
+    from studies.calibration.observed import read_settled
+    from studies.cli.output import print_json, print_table, say
+    from studies.errors import InputError
+    from studies.files.columns import read_header
+    from studies.files.writing import write_text
+    from studies.instrument.card import load_card, save_card
+    from studies.record import read_record
+
+    if not data:
+        raise InputError("name at least one record (CSV) or steady-state table to calibrate with.")
+    instrument = load_card(card)
+    settled = [path for path in data if "time_s" not in (names := read_header(path)) and "temperature_degC" in names]
+    paths = [path for path in data if path not in settled]
+    if not 0 <= hold_out <= len(paths):
+        raise InputError(f"--hold-out {hold_out}: there are {len(paths)} records, numbered from 1.")
+    records = [read_record(path) for path in paths]
+    tables = [read_settled(path) for path in settled]
+    left = (hold_out or len(records)) - 1 if len(records) > 1 else None
+    found = run(instrument, records, tables, left, exact, progress=say)
+    for warning in found.warnings:
+        say(f"warning: {warning}")
+    if save is not None:
+        save_card(found.instrument, save)
+        say(f"card: {save}")
+    if report is not None:
+        from studies.reports.calibration import calibration_page
+
+        write_text(report, calibration_page(found, list(data)))
+        say(f"report: {report}")
+    if json:
+        print_json(_payload(found, list(data), save))
+        return 0
+    from studies.reports.calibration import held_out_table, ladder_table, separation_sentences, values_table
+
+    for block in (values_table(found), ladder_table(found), held_out_table(found)):
+        if block is not None:
+            print_table(block.caption, block.columns, block.rows, block.note)
+    for sentence in separation_sentences(found):
+        print(sentence)
+    return 0
+
+
+def _payload(found: "Calibration", data: list[str], save: str | None) -> dict[str, Any]:
+    from studies.calibration.calibrate import UNITS
+
+    held = found.held_out
+
+    def pair(values: tuple[float, float] | None) -> dict[str, float] | None:
+        return None if values is None else {"as_shipped": values[0], "calibrated": values[1]}
+
+    return {
+        "schema": "hrg.calibration/1",
+        "card": found.card.name,
+        "records": data,
+        "values": [
+            {
+                "parameter": one.parameter,
+                "unit": one.unit,
+                "card": one.card,
+                "value": one.value,
+                "low": one.low,
+                "high": one.high,
+                "shift_sd": one.shift_sd,
+                "width": one.width,
+                "told_by": one.told_by,
+                "bound": one.bound,
+                "interval": one.interval,
+            }
+            for one in found.estimates
+        ],
+        "inseparable": [list(group) for group in found.groups],
+        "responses": {
+            name: {
+                "unit": UNITS[name],
+                "as_shipped": rung.as_shipped,
+                "calibrated": rung.calibrated,
+                "noise": rung.noise,
+                "run_offset": rung.offset,
+                "outliers": found.fit.outliers[name],
+            }
+            for name, rung in found.ladder.items()
+        },
+        "held_out": None
+        if held is None
+        else {
+            "record": held.path,
+            "responses": {
+                name: {
+                    "chamber": pair(held.chamber.get(name)),
+                    "housing": pair(held.housing.get(name)),
+                    "noise": held.noise[name],
+                }
+                for name in held.noise
+            },
+        },
+        "converged": found.fit.converged,
+        "warnings": list(found.warnings),
+        "calibrated_card": save,
+    }

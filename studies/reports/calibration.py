@@ -1,0 +1,198 @@
+"""The page of a calibration: from the card as shipped to the noise, what moved, and what is left over."""
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from studies.calibration.calibrate import UNITS, Calibration
+from studies.calibration.observed import HOUSING, SETTLED
+from studies.reports import style
+from studies.reports.page import Block, Chapter, Facts, Picture, Table, Text, draw, render_page
+
+if TYPE_CHECKING:
+    from studies.calibration.estimates import Estimate
+
+NAMES = {
+    "frequency_Hz": "Frequency",
+    "bias_deg_per_h": "Zero-rate output",
+    "inverse_q": "1/Q",
+    HOUSING: "Housing temperature",
+    SETTLED: "Settled frequency",
+}
+TOLD = {"data": "the data", "prior": "the prior", "both": "both"}
+
+
+def calibration_page(found: Calibration, data: Sequence[str]) -> str:
+    """Return the page."""
+    moved = sum(abs(one.shift_sd) > 2 for one in found.estimates)
+    lead = (
+        f"The card {found.card.name} against {len(data)} file(s) ({', '.join(data)}): the most probable of its"
+        f" {len(found.estimates)} uncertain values, in noise that was estimated beside them."
+        f" {sum(one.told_by == 'data' for one in found.estimates)} are told by the data,"
+        f" {sum(one.told_by == 'prior' for one in found.estimates)} stayed at their prior; {moved} moved by more than two"
+        " prior standard deviations."
+    )
+    blocks: list[Block] = [
+        _facts(found),
+        *(Text(warning, "warning") for warning in found.warnings),
+        ladder_table(found),
+    ]
+    held = held_out_table(found)
+    chapters = [
+        Chapter("From the card to the noise", [*blocks, _ladder_figure(found), *([held] if held is not None else [])]),
+        Chapter("Values", [values_table(found), *(Text(s) for s in separation_sentences(found)), _shift_figure(found)]),
+        Chapter("What is left over", [_residual_figure(found), noise_table(found)]),
+    ]
+    return render_page("Calibration", lead, chapters)
+
+
+def _facts(found: Calibration) -> Facts:
+    rows = []
+    for name, rung in found.ladder.items():
+        unit = UNITS[name] if UNITS[name] != "1" else ""
+        remark = f"{rung.as_shipped:.3g} {unit} as shipped; noise {rung.noise:.3g} {unit}"
+        rows.append((f"{NAMES[name]}, residual", f"{rung.calibrated:.3g} {unit}", remark))
+    return Facts(rows)
+
+
+def values_table(found: Calibration) -> Table:
+    """Return what became of every uncertain value."""
+    rows = [_value_row(one) for one in sorted(found.estimates, key=lambda one: one.width)]
+    note = (
+        "* follows the bend of the likelihood. Shift: move in prior standard deviations. Width: posterior over"
+        " prior standard deviation; up to 0.5 the data tells the value, from 0.95 it stayed at its prior."
+    )
+    columns = ["Value", "Unit", "Card", "Calibrated", "90 % interval", "Shift", "Width", "Told by"]
+    return Table("Values, best known first", columns, rows, note, sortable=True)
+
+
+def _value_row(one: "Estimate") -> list[str]:
+    bound = f", at its {one.bound} bound" if one.bound else ""
+    star = " *" if one.interval == "profile" else ""
+    return [
+        one.parameter,
+        one.unit,
+        f"{one.card:.5g}",
+        f"{one.value:.5g}",
+        f"{one.low:.5g} … {one.high:.5g}{star}",
+        f"{one.shift_sd:+.2f}",
+        f"{one.width:.3f}",
+        TOLD[one.told_by] + bound,
+    ]
+
+
+def ladder_table(found: Calibration) -> Table:
+    """Return the residuals before and after, beside the noise."""
+    rows = [
+        [
+            NAMES[name],
+            UNITS[name],
+            f"{rung.as_shipped:.4g}",
+            f"{rung.calibrated:.4g}",
+            f"{rung.noise:.4g}",
+            f"{rung.offset:.2g}",
+            str(found.fit.outliers[name]),
+        ]
+        for name, rung in found.ladder.items()
+    ]
+    note = (
+        "Rms of block averages about the mean of each run; offset: rms of these means after the calibration. Frequency, zero-rate"
+        " output and 1/Q follow the measured housing where there is one, the housing its chamber."
+    )
+    columns = ["Response", "Unit", "As shipped", "Calibrated", "Noise", "Offset", "Outliers"]
+    return Table("Residuals", columns, rows, note)
+
+
+def held_out_table(found: Calibration) -> Table | None:
+    """Return how the held-out run was predicted."""
+    held = found.held_out
+    if held is None:
+        return None
+    rows = []
+    for name, noise in held.noise.items():
+        for words, by in (("chamber alone", held.chamber), ("measured housing", held.housing)):
+            if name in by:
+                before, after = by[name]
+                rows.append([NAMES[name], UNITS[name], words, f"{before:.4g}", f"{after:.4g}", f"{noise:.4g}"])
+    note = (
+        f"{held.path or 'The run'} was predicted by a calibration that has not seen it. From the chamber alone nothing is refitted;"
+        " from the housing its own offset and initial state are."
+    )
+    return Table(
+        "Held-out run", ["Response", "Unit", "Predicted from", "As shipped", "Calibrated", "Noise"], rows, note
+    )
+
+
+def noise_table(found: Calibration) -> Table:
+    """Return the levels of the noise."""
+    rows = [
+        [NAMES[name], UNITS[name], *(f"{level:.3g}" for level in (n.white, n.flicker, n.walk, n.offset))]
+        for name, n in found.fit.noise.items()
+    ]
+    note = "White: rms of a block average. Walk: standard deviation after 1 h. Offset: of a run's turn-on."
+    return Table("Noise, estimated", ["Response", "Unit", "White", "Flicker", "Walk", "Offset"], rows, note)
+
+
+def separation_sentences(found: Calibration) -> list[str]:
+    """Return what the data cannot tell apart."""
+    return [f"The data ties these together but cannot tell them apart: {', '.join(group)}." for group in found.groups]
+
+
+def _ladder_figure(found: Calibration) -> Picture:
+    with style.figure(1, len(found.ladder), height=2.5, squeeze=False) as (made, axes):
+        for axis, (name, rung) in zip(axes[0], found.ladder.items(), strict=True):
+            heights = [rung.as_shipped, rung.calibrated]
+            axis.bar(["shipped", "calibrated"], heights, color=[style.SKY, style.BLUE], width=0.6)
+            axis.axhline(rung.noise, color=style.BLACK, linestyle="--", linewidth=1.0)
+            axis.set_yscale("log")
+            axis.set_ylim(0.3 * min(*heights, rung.noise), 3 * max(*heights, rung.noise))
+            axis.set_title(f"{NAMES[name]} ({UNITS[name]})", fontsize=9)
+            axis.tick_params(labelsize=8)
+        words = "Residuals as shipped and calibrated; dashed: the noise."
+        return draw(made, words, words)
+
+
+def _shift_figure(found: Calibration) -> Picture:
+    told = [one for one in found.estimates if one.told_by != "prior"][:30] or list(found.estimates)[:30]
+    with style.figure(height=0.24 * len(told) + 0.9) as (made, axis):
+        place = np.arange(len(told))[::-1]
+        axis.axvspan(-1.645, 1.645, color=style.SKY, alpha=0.18)
+        shifts, widths = [one.shift_sd for one in told], [1.645 * one.width for one in told]
+        axis.errorbar(shifts, place, xerr=widths, fmt="o", markersize=4, capsize=2, color=style.BLUE)
+        axis.axvline(0.0, color=style.BLACK, linewidth=0.8)
+        axis.set_yticks(place, [one.parameter for one in told], fontsize=8)
+        axis.set_xlabel("prior standard deviations from the card")
+        words = "Shifts of the values of which the data says something, with 90 % intervals; shaded: 90 % of the prior."
+        return draw(made, words, words)
+
+
+def _residual_figure(found: Calibration) -> Picture:
+    problem, state = found.fit.problem, found.fit.state
+    names = [name for name in problem.responses if name != SETTLED]
+    colours = (style.BLUE, style.VERMILION, style.GREEN, style.PURPLE, style.ORANGE)
+    if not names:
+        return _settled_figure(found)
+    with style.figure(len(names), 1, height=1.8 * len(names), squeeze=False, sharex=True) as (made, axes):
+        for axis, name in zip(axes[:, 0], names, strict=True):
+            rows, start = problem.rows[name], 0.0
+            for run, (t, s) in enumerate(zip(rows.times, rows.slices, strict=True)):
+                axis.plot((start + t - t[0]) / 3600, state.residual[name][s], linewidth=0.7, color=colours[run % 5])
+                start += t[-1] - t[0] + 600.0
+            axis.axhline(0.0, color=style.BLACK, linewidth=0.6)
+            axis.set_ylabel(f"{NAMES[name]}\n({UNITS[name]})", fontsize=8)
+        axes[-1, 0].set_xlabel("time of the runs one after the other (h)")
+        words = "Measured minus predicted after the calibration, block averages, one colour a run."
+        return draw(made, words, words)
+
+
+def _settled_figure(found: Calibration) -> Picture:
+    problem, residual = found.fit.problem, found.fit.state.residual[SETTLED]
+    T = np.concatenate([table.temperature for table in problem.tables]) - 273.15
+    with style.figure(height=2.4) as (made, axis):
+        axis.plot(T, residual, "o", color=style.BLUE, markersize=4)
+        axis.axhline(0.0, color=style.BLACK, linewidth=0.6)
+        axis.set_xlabel("temperature (°C)")
+        axis.set_ylabel("residual (Hz)")
+        words = "Measured minus calculated settled frequency after the calibration."
+        return draw(made, words, words)

@@ -1,0 +1,76 @@
+"""`hrg calibrate`: its JSON, its files and what it refuses."""
+
+import json
+
+import numpy as np
+import pytest
+
+from studies.cli import main
+from studies.instrument.card import load_card
+from studies.record import write_record
+from studies.simulation.chamber import load_profile
+from studies.simulation.virtual_gyro import simulate_run
+
+VALUE = ["parameter", "unit", "card", "value", "low", "high", "shift_sd", "width", "told_by", "bound", "interval"]
+RESPONSE = ["unit", "as_shipped", "calibrated", "noise", "run_offset", "outliers"]
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory):
+    path = tmp_path_factory.mktemp("calibrate") / "run<1>.csv"
+    true = load_card("hrg-30mm").with_values({"loss.inverse_q": 2e-7, "thermal.chamber_conductance_W_per_K": 0.2})
+    write_record(simulate_run(true, load_profile("ramp 20 0 0.5 then soak 0 1h"), 1 / 60).record, path)
+    return path
+
+
+def test_the_object_the_card_and_the_page(run, tmp_path, capsys):
+    card, page = tmp_path / "calibrated.toml", tmp_path / "page.html"
+    thermal = [v.name for v in load_card("hrg-30mm").uncertain if v.name.startswith(("material.", "bias."))]
+    exact = [word for name in thermal for word in ("--exact", name)]
+    words = ["calibrate", "hrg-30mm", str(run), "--save", str(card), "--report", str(page), "--json", *exact]
+    assert main(words) == 0
+    answer = json.loads(capsys.readouterr().out)
+    assert list(answer) == [
+        "schema", "card", "records", "values", "inseparable", "responses", "held_out", "converged", "warnings",
+        "calibrated_card",
+    ]  # fmt: skip
+    assert answer["schema"] == "hrg.calibration/1"
+    assert answer["card"] == "hrg-30mm"
+    assert answer["held_out"] is None
+    assert answer["calibrated_card"] == str(card)
+    assert all(list(one) == VALUE for one in answer["values"])
+    assert all(list(one) == RESPONSE for one in answer["responses"].values())
+    assert list(answer["responses"]) == ["frequency_Hz", "bias_deg_per_h", "inverse_q", "housing_temperature_degC"]
+    told = {one["parameter"]: one for one in answer["values"]}
+    assert not any(name in told for name in thermal)
+    q = told["loss.inverse_q"]
+    assert q["low"] < q["value"] < q["high"]
+    assert q["value"] == pytest.approx(2e-7, abs=3 * (q["high"] - q["low"]))
+    assert q["told_by"] == "data"
+    assert load_card(card).loss.inverse_q == pytest.approx(q["value"])
+    text = page.read_text(encoding="utf-8")
+    assert "run<1>" not in text
+    assert "run&lt;1&gt;" in text
+
+
+def test_tables_are_for_people(capsys):
+    assert main(["calibrate", "hrg-30mm", "studies/papers/hrg_table1.csv"]) == 0
+    out = capsys.readouterr().out
+    assert "Values, best known first" in out
+    assert "Settled frequency" in out
+
+
+def test_what_cannot_be_calibrated_is_refused(run, tmp_path, capsys):
+    bare = tmp_path / "bare.csv"
+    t = np.arange(0.0, 3600.0, 60.0)
+    bare.write_text("time_s,frequency_Hz\n" + "".join(f"{x:g},4432\n" for x in t), encoding="utf-8")
+    for words, message in (
+        (["calibrate", "hrg-30mm"], "name at least one record"),
+        (["calibrate", "hrg-30mm", str(bare)], "add the column housing_temperature_degC or chamber_temperature_degC"),
+        (["calibrate", "hrg-30mm", str(run), "--hold-out", "3"], "there are 1 records, numbered from 1"),
+        (["calibrate", "hrg-30mm", str(run), "--exact", "thermal.film"], "is no uncertain value of the card"),
+    ):
+        assert main(words) == 2
+        captured = capsys.readouterr()
+        assert message in captured.err
+        assert captured.out == ""

@@ -1,0 +1,183 @@
+"""A calibration against devices that were drawn from their priors: values, noise, unseen runs, and what cannot be known."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from studies.calibration.calibrate import calibrate
+from studies.calibration.observed import HOUSING, SETTLED, read_settled
+from studies.calibration.priors import gather_priors
+from studies.errors import InputError
+from studies.instrument.card import load_card, save_card
+from studies.record import Record
+from studies.simulation.chamber import load_profile
+from studies.simulation.virtual_gyro import simulate_run
+
+PROFILES = ("staircase 20 -10 15 75min", "ramp -10 35 0.5 then soak 35 90min")
+UNSEEN = "cycle 20 -5 30 1 40min 1"
+
+
+def draw(card, seed):
+    priors = gather_priors(card)
+    u = priors.inside(np.random.default_rng(seed).standard_normal(len(priors.values)))
+    return card.with_values(priors.at(u))
+
+
+def measure(card, words, seed, **options):
+    return simulate_run(card, load_profile(words), 1 / 30, seed, **options).record
+
+
+@pytest.fixture(scope="module")
+def card():
+    return load_card("hrg-30mm")
+
+
+@pytest.fixture(scope="module")
+def device(card):
+    return draw(card, 4)
+
+
+@pytest.fixture(scope="module")
+def records(device):
+    return [measure(device, words, seed) for seed, words in enumerate(PROFILES, 1)]
+
+
+@pytest.fixture(scope="module")
+def found(card, records):
+    return calibrate(card, records, hold_out=1)
+
+
+def test_the_residual_is_the_noise_and_the_card_was_far_from_it(found):
+    assert found.fit.converged
+    for name in ("frequency_Hz", "bias_deg_per_h", "inverse_q", HOUSING):
+        rung = found.ladder[name]
+        white = found.fit.rows[name].whiten(found.fit.state.residual[name], found.fit.noise[name])
+        assert float(np.sqrt(np.mean(white**2))) == pytest.approx(1.0, abs=0.1)
+        assert rung.calibrated < 1.2 * rung.noise
+        assert rung.as_shipped > 10 * rung.noise
+
+
+def test_the_intervals_hold_the_device(found, device, card):
+    truth = {value.name: value.value for value in device.uncertain}
+    priors = {value.name: value for value in card.uncertain}
+    inside = [one.low <= truth[one.parameter] <= one.high for one in found.estimates]
+    assert np.mean(inside) > 0.75
+    for one in found.estimates:
+        scale = priors[one.parameter]
+        if one.told_by == "data":
+            size = np.log(one.value / truth[one.parameter]) if scale.logarithmic else one.value - truth[one.parameter]
+            unit = scale.sd / scale.value if scale.logarithmic else scale.sd
+            assert abs(size) < 4.5 * one.width * unit, one.parameter
+
+
+def test_what_the_data_does_not_say_stays_at_its_prior(found):
+    told = {one.parameter: one for one in found.estimates}
+    assert told["bias.damping_axis_deg"].told_by == "prior"
+    assert told["bias.damping_axis_deg"].value == pytest.approx(0.0, abs=1e-6)
+    assert told["loss.inverse_q"].told_by == "data"
+    assert any(
+        "thermal.base_heat_capacity_J_per_K" in g and "thermal.mount_conductance_W_per_K" in g for g in found.groups
+    )
+
+
+def test_the_saved_card_reproduces_the_runs_and_an_unseen_one_to_their_noise(found, device, tmp_path):
+    save_card(found.instrument, tmp_path / "calibrated.toml")
+    saved = load_card(tmp_path / "calibrated.toml")
+    for words in (*PROFILES, UNSEEN):
+        true, again = measure(device, words, 0, noise=False), measure(saved, words, 0, noise=False)
+        noisy = measure(device, words, 9)
+        for name in ("frequency_Hz", "bias_deg_per_h", "inverse_q"):
+            noise = np.sqrt(np.mean((noisy[name] - true[name]) ** 2))
+            assert np.sqrt(np.mean((again[name] - true[name]) ** 2)) < 1.5 * noise, (words, name)
+    widths = {value.name: value.sd for value in saved.uncertain}
+    assert all(widths[one.parameter] == pytest.approx(one.sd, rel=1e-6) for one in found.estimates)
+
+
+def test_a_run_that_was_held_out_is_predicted(found):
+    held = found.held_out
+    assert held is not None
+    for name in ("frequency_Hz", "bias_deg_per_h", "inverse_q"):
+        assert held.housing[name][1] < 0.1 * held.housing[name][0]
+        assert held.chamber[name][1] < 0.1 * held.chamber[name][0]
+
+
+def test_the_baseline_is_the_linear_problem_about_the_calibrated_values(found):
+    base = found.baseline("frequency_Hz")
+    problem = found.fit.problem
+    k = base.names.index("thermal.mount_conductance_W_per_K")
+    step = np.zeros(problem.count)
+    step[k] = 1e-3
+    moved = problem.evaluate(found.fit.point + step, slopes=False).residual["frequency_Hz"]
+    here = np.concatenate(base.residual)
+    assert (here - moved) / 1e-3 == pytest.approx(
+        np.concatenate(base.columns)[:, k], abs=5e-3 * np.abs(np.concatenate(base.columns)[:, k]).max()
+    )
+    assert base.prior_mean == pytest.approx(-found.fit.point)
+    with pytest.raises(InputError, match="no record was calibrated in settled_frequency_Hz"):
+        found.baseline(SETTLED)
+
+
+def test_without_a_housing_the_chamber_drives_and_values_that_stay_are_exact(card, records):
+    bare = [
+        dataclasses.replace(r, columns={k: v for k, v in r.columns.items() if k in ("time_s", "chamber_temperature_degC", "frequency_Hz")})
+        for r in records
+    ]  # fmt: skip
+    fixed = [value.name for value in card.uncertain if value.name.startswith(("bias.", "loss.", "noise."))]
+    found = calibrate(card, bare, exact=fixed, profile=False)
+    assert set(found.ladder) == {"frequency_Hz"}
+    assert not any(one.parameter.startswith("bias.") for one in found.estimates)
+    assert found.ladder["frequency_Hz"].calibrated < 1.3 * found.ladder["frequency_Hz"].noise
+
+
+LAW = ("material.", "loss.inverse_q")
+
+
+def law_only(device, records, **changed):
+    """Runs with frequency alone, calibrated in the law of a device whose other values are known."""
+    fixed = [value.name for value in device.uncertain if not value.name.startswith(LAW)]
+    runs = [r.with_columns(changed) if k == 0 else r for k, r in enumerate(records)]
+    columns = ("time_s", "housing_temperature_degC", "frequency_Hz")
+    bare = [dataclasses.replace(r, columns={name: r.columns[name] for name in columns}) for r in runs]
+    return calibrate(device, bare, exact=fixed, profile=False)
+
+
+def test_runs_that_contradict_each_other_are_named(device, records):
+    away = law_only(device, records, frequency_Hz=records[0]["frequency_Hz"] + 0.5)
+    assert any("the runs contradict each other in frequency_Hz" in warning for warning in away.warnings)
+    assert not law_only(device, records).warnings
+
+
+def test_outliers_do_not_move_the_values(device, records):
+    spoilt = records[0]["frequency_Hz"].copy()
+    spoilt[np.random.default_rng(1).choice(len(spoilt), 6, replace=False)] += 0.5
+    wrong, clean = law_only(device, records, frequency_Hz=spoilt), law_only(device, records)
+    for one, other in zip(wrong.estimates, clean.estimates, strict=True):
+        assert abs(one.shift_sd - other.shift_sd) < other.width + 1e-6, one.parameter
+
+
+def test_the_papers_table_moves_the_law_by_little_more_than_one_standard_deviation(card):
+    """HRG paper, Table 1: a law of slope and curvature within its prior leaves 0.09 Hz, what a parabola cannot follow."""
+    found = calibrate(card, [], [read_settled("studies/papers/hrg_table1.csv")], profile=False)
+    told = {one.parameter.removeprefix("material.deviation."): one for one in found.estimates}
+    assert abs(told["shear_modulus.log_value"].shift_sd) < 0.2  # the thickness was chosen so
+    assert told["shear_modulus.log_slope_per_K"].shift_sd == pytest.approx(-1.2, abs=0.3)
+    assert found.ladder[SETTLED].calibrated == pytest.approx(0.087, abs=0.01)
+    assert any("27 uncertain values, but 7 data" in warning for warning in found.warnings)
+
+
+def test_records_that_say_nothing_are_refused(card):
+    t = np.arange(0.0, 3600.0, 30.0)
+    with pytest.raises(InputError, match="nothing is calibrated without a record"):
+        calibrate(card, [])
+    with pytest.raises(InputError, match="nothing says what drives the run"):
+        calibrate(card, [Record({"time_s": t, "frequency_Hz": 4432.0 + 0 * t}, path="run.csv")])
+    with pytest.raises(InputError, match="there is nothing to calibrate with"):
+        calibrate(card, [Record({"time_s": t, "housing_temperature_degC": 20.0 + 0 * t}, path="run.csv")])
+    with pytest.raises(InputError, match="a run needs at least 10"):
+        calibrate(
+            card, [Record({"time_s": t[:5], "housing_temperature_degC": t[:5], "frequency_Hz": t[:5]}, path="run.csv")]
+        )
+    good = Record({"time_s": t, "housing_temperature_degC": 20.0 + t / 600, "frequency_Hz": 4432.0 + t / 600})
+    with pytest.raises(InputError, match="is no uncertain value of the card; did you mean"):
+        calibrate(card, [good], exact=["thermal.film_emisivity"])
