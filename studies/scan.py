@@ -83,9 +83,7 @@ class Scan:
     waves: tuple[Wave, ...]
     roundness: tuple[Roundness, ...]
 
-    def map_of(
-        self, quantity: Literal["inner", "outer", "wall", "offset"], rows: int = 60, columns: int = 180
-    ) -> tuple[Array, Array, Array]:
+    def map_of(self, quantity: str, rows: int = 60, columns: int = 180) -> tuple[Array, Array, Array]:
         """Positions, azimuths and the fitted departure (m) on a grid of what was covered."""
         low, high = max(f.low for f in self.faces.values()), min(f.high for f in self.faces.values())
         x, theta = np.linspace(low, high, rows), 2 * pi * np.arange(columns) / columns

@@ -51,6 +51,17 @@ class Waves:
         return np.broadcast_to(np.asarray(value, dtype=complex), np.shape(position))
 
 
+@dataclass(frozen=True)
+class _Grown:
+    """A number times a function of the position."""
+
+    factor: complex
+    profile: Callable[[Array], ArrayLike]
+
+    def __call__(self, x: Array) -> Complex:
+        return np.asarray(self.factor * np.asarray(self.profile(x)))
+
+
 def wave(
     order: int, amplitude: float, azimuth: float = 0.0, profile: Callable[[Array], ArrayLike] | None = None
 ) -> Waves:
@@ -66,7 +77,7 @@ def wave(
     if order != int(order) or order < 0:
         raise ShellError(f"the order of a wave around is a whole number from 0 up, not {order!r}.")
     c = complex(amplitude * np.exp(1j * order * azimuth))
-    return Waves({order: c if profile is None else lambda x: c * np.asarray(profile(x))})
+    return Waves({order: c if profile is None else _Grown(c, profile)})
 
 
 @dataclass(frozen=True)

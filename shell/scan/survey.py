@@ -81,11 +81,7 @@ class Face:
     @cached_property
     def field(self) -> Waves:
         """Its waves as a field, constant beyond the covered positions."""
-
-        def profile(c: Complex) -> Callable[[Array], Complex]:
-            return lambda x: self.polynomials(x) @ c
-
-        return Waves({m: profile(c) for m, c in enumerate(self.coefficients)})
+        return Waves({m: _Profile(self, m) for m in range(self.highest + 1)})
 
     def polynomials(self, position: Array) -> Array:
         """P_j at positions, (..., polynomials)."""
@@ -128,6 +124,17 @@ class Face:
         """δ around a circle, m."""
         c = self.polynomials(np.array([position]))[0] @ self.coefficients.T
         return np.asarray((c * np.exp(-1j * np.multiply.outer(azimuth, np.arange(len(c))))).real.sum(axis=1))
+
+
+@dataclass(frozen=True, eq=False)
+class _Profile:
+    """One wave of a face along the meridian."""
+
+    face: Face
+    order: int
+
+    def __call__(self, position: Array) -> Complex:
+        return np.asarray(self.face.polynomials(position) @ self.face.coefficients[self.order])
 
 
 def survey(
@@ -246,7 +253,7 @@ def _finish(
 def _growth(inverse: Array, P: Array, t: Array, count: Array, highest: int) -> float:
     """By how much gaps raise the variance of the worst wave, on average over the outer half, above evenly covered circles."""
     circles = np.linalg.inv((P * count[:, None]).T @ P)
-    L = P[t > 0].mean(axis=0)
+    L = P[t >= min(0.0, float(t.max()))].mean(axis=0)
     k = len(L)
     blocks = np.einsum(
         "i,bij,j->b", L, [inverse[b * k : b * k + k, b * k : b * k + k] for b in range(2 * highest + 1)], L

@@ -38,6 +38,10 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "render": ("studies.cli.render:render", "A mode shape as picture, animation, page or mesh."),
     "scan": ("studies.cli.scan:scan", "Measured faces to wall maps, waves around and splits."),
     "trim": ("studies.cli.trim:trim", "Measured splits to a plan of cuts."),
+    "electrodes": (
+        "studies.cli.electrodes:electrodes",
+        "Softening, split, pull-in and trim voltages of a card's electrodes.",
+    ),
     "import": ("studies.cli.import_:import_", "Laboratory files into the record format."),
     "compensate": ("studies.cli.compensate:compensate", "Apply a saved model to a record, or emit it as C."),
     "temperature": ("studies.cli.temperature:temperature", "The resonator's temperature from its own frequency."),

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from cyclopts import Parameter
 
 if TYPE_CHECKING:
+    from studies.instrument.card import Instrument
     from studies.scan import Interval, Scan
 
 NONE = "none"
@@ -30,6 +31,7 @@ def scan(
     theory: Literal["solid", "shell"] = "solid",
     map_file: Annotated[str | None, Parameter(name="--map")] = None,
     report: str | None = None,
+    save: str | None = None,
     json: bool = False,
 ) -> int:
     """Turn measured points of one or both faces into wall and offset maps, waves around, and frequency splits with intervals.
@@ -63,6 +65,8 @@ def scan(
         CSV to write: position, azimuth and the departures of faces, wall and middle surface.
     report : str
         Page to write: unwrapped maps, waves, roundness, splits.
+    save : str
+        Card to write: this one with the fitted faces as its imperfection, in tables beside it.
     json : bool
         Print one JSON object (schema hrg.scan/1) instead of tables.
     """
@@ -93,6 +97,9 @@ def scan(
 
         write_scan_page(report, found, instrument.name, files)
         say(f"wrote {report}")
+    if save is not None:
+        _save(save, instrument, found)
+        say(f"wrote {save}")
     payload = _payload(found, instrument.name, T - ZERO_CELSIUS, files)
     if json:
         print_json(payload)
@@ -207,6 +214,29 @@ def _payload(found: "Scan", name: str, temperature: float, files: dict[str, str]
         "waves": waves,
         "roundness": roundness,
     }
+
+
+def _save(path: str, instrument: "Instrument", found: "Scan") -> None:
+    """The card with the faces as maps, whose tables are written first."""
+    from pathlib import Path
+
+    import numpy as np
+
+    from studies.files.writing import write_text
+    from studies.instrument.card import save_card
+
+    target, maps = Path(path).resolve(), []
+    for name in found.faces:
+        x, theta, values = found.map_of(name, columns=72)
+        lines = ["position," + ",".join(f"{angle:g}" for angle in np.rad2deg(theta))]
+        lines += [
+            f"{at:.9g}," + ",".join(f"{1e6 * cell:.7g}" for cell in row) for at, row in zip(x, values, strict=True)
+        ]
+        own = target.with_name(f"{target.stem}-{name}.csv")
+        write_text(own, "\n".join(lines) + "\n")
+        maps.append({"of": name, "file": str(own)})
+    table = {**instrument.content.get("imperfection", {}), "map": maps}
+    save_card(instrument.with_table("imperfection", table), path)
 
 
 def _map_csv(found: "Scan") -> str:

@@ -231,10 +231,16 @@ def save_card(instrument: Instrument, path: str | Path) -> None:
     import tomli_w
 
     content = {**instrument.content, "schema": SCHEMA, "name": instrument.name}
+
+    def moved(table: Mapping[str, Any]) -> dict[str, Any]:
+        own = (Path(instrument.path).parent / table["file"]).resolve()
+        return {**table, "file": os.path.relpath(own, Path(path).resolve().parent)}
+
     if "file" in content["material"]:
-        own = (Path(instrument.path).parent / content["material"]["file"]).resolve()
-        moved = os.path.relpath(own, Path(path).resolve().parent)
-        content["material"] = {**content["material"], "file": moved}
+        content["material"] = moved(content["material"])
+    maps = content.get("imperfection", {}).get("map", [])
+    if maps:
+        content["imperfection"] = {**content["imperfection"], "map": [moved(table) for table in maps]}
     write_text(path, tomli_w.dumps(content))
 
 

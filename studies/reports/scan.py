@@ -67,7 +67,7 @@ def _maps(scan: "Scan") -> Picture:
     names = ["wall", "offset"] if len(scan.faces) == 2 else list(scan.faces)
     with figure(len(names), 1, 3.0 * len(names), squeeze=False) as (made, axes):
         for ax, name in zip(axes[:, 0], names, strict=True):
-            x, theta, values = scan.map_of(name)  # type: ignore[arg-type]
+            x, theta, values = scan.map_of(name)
             shown = 1e6 * (values - values.mean(axis=1, keepdims=True))
             most = max(float(abs(shown).max()), 1e-6)
             image = ax.pcolormesh(

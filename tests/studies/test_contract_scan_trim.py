@@ -33,7 +33,7 @@ def failing(capsys, *words):
 
 def test_scan_prints_one_object_and_writes_map_and_page(faces, tmp_path, capsys):
     words = ["scan", "free-dome", faces["inner"], faces["outer"], "--harmonic", 2, "--theory", "shell", "--json"]
-    words += ["--map", tmp_path / "map.csv", "--report", tmp_path / "scan.html"]
+    words += ["--map", tmp_path / "map.csv", "--report", tmp_path / "scan.html", "--save", tmp_path / "scanned.toml"]
     assert main([str(word) for word in words]) == 0
     found = json.loads(capsys.readouterr().out)
     assert found["schema"] == "hrg.scan/1"
@@ -47,6 +47,9 @@ def test_scan_prints_one_object_and_writes_map_and_page(faces, tmp_path, capsys)
     assert set(rows[0]) == {"position", "azimuth_deg", "inner_um", "outer_um", "wall_um", "offset_um"}
     text = (tmp_path / "scan.html").read_text(encoding="utf-8")
     assert "Roundness" in text
+    assert main(["modes", str(tmp_path / "scanned.toml"), "--theory", "shell", "--json"]) == 0
+    (mode,) = json.loads(capsys.readouterr().out)["modes"]
+    assert mode["split"]["split_Hz"] == pytest.approx(split["split_Hz"]["value"], rel=2e-3)
     assert "<svg" in text or "data:image" in text
 
 

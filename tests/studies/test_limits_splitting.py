@@ -1,6 +1,7 @@
 """A card's imperfection and electrodes: they add, they reach modes and studies, and what is wrong in them is named."""
 
 import json
+import pickle
 from dataclasses import replace
 
 import numpy as np
@@ -10,7 +11,7 @@ from shell.imperfection.surface import turn_surface
 from shell.modes import solve_modes
 from studies.cli import main
 from studies.errors import InputError
-from studies.instrument.card import load_card
+from studies.instrument.card import load_card, save_card
 from studies.reports.scenes import show_mode
 from studies.simulation.drive import drive_by_profile
 from studies.simulation.loop import wave_of
@@ -220,3 +221,39 @@ def test_the_drawn_shell_departs_where_the_card_says_and_its_mode_lies_on_the_sl
     assert slow == pytest.approx(np.full(4, shown.split.slow_axis), abs=1e-6)
     assert shown.scene().axes.shape == (4, 2, 3)
     assert perfect.scene().axes.shape == (0, 2, 3)
+
+
+def test_an_imperfect_card_travels_to_workers(tmp_path):
+    instrument = loaded(tmp_path, WALL + "power = 2.0\n", ELECTRODES)
+    assert split_of(pickle.loads(pickle.dumps(instrument))).split.wave == split_of(instrument).split.wave
+
+
+def test_electrodes_null_the_cards_split_and_say_how_far_they_reach(tmp_path, capsys):
+    loaded(tmp_path, "[imperfection.split]\nsplit_Hz = 0.005\nslow_axis_deg = 70.0\n", "[electrodes]\ngap_um = 50.0\n")
+    assert main(["electrodes", str(tmp_path / "card.toml"), "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["schema"] == "hrg.electrodes/1"
+    assert found["pull_in_factor"] is None  # no voltage yet
+    assert found["reach_Hz"] > 0.005
+    assert found["trim"]["left_Hz"] < 1e-9
+    volts = ", ".join(f"{v:.9g}" for v in found["trim"]["voltages_V"])
+    mended = loaded(
+        tmp_path,
+        "[imperfection.split]\nsplit_Hz = 0.005\nslow_axis_deg = 70.0\n",
+        f"[electrodes]\ngap_um = 50.0\ntrim_V = [{volts}]\n",
+    )
+    assert split_of(mended).split.hertz < 1e-8
+    assert main(["electrodes", str(tmp_path / "card.toml"), "--split", "50", "--axis", "3"]) == 2
+    assert "is beyond" in capsys.readouterr().err
+    loaded(tmp_path)
+    assert main(["electrodes", str(tmp_path / "card.toml")]) == 2
+    assert "no table [electrodes]" in capsys.readouterr().err
+
+
+def test_a_saved_card_takes_its_maps_along(tmp_path):
+    (tmp_path / "wall.csv").write_text(
+        "position," + ",".join(str(a) for a in range(0, 360, 30)) + "\n" + "0.5" + ",0.1" * 12 + "\n"
+    )
+    instrument = loaded(tmp_path, '[[imperfection.map]]\nof = "wall"\nfile = "wall.csv"\n')
+    save_card(instrument, tmp_path / "deeper" / "card.toml")
+    assert is_imperfect(load_card(tmp_path / "deeper" / "card.toml"))

@@ -24,6 +24,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from studies.errors import InputError
 from studies.instrument.keys import Table, number
@@ -105,6 +106,17 @@ class CardImperfection:
     split: MeasuredSplit | None
 
 
+@dataclass(frozen=True)
+class Power:
+    """A power of the position."""
+
+    exponent: float
+
+    def __call__(self, position: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return position**exponent."""
+        return np.asarray(position**self.exponent)
+
+
 def build(keys: ImperfectionKeys, place: Place) -> CardImperfection:
     """Return the imperfection in SI units."""
     split = None
@@ -130,8 +142,7 @@ def _wave(keys: WaveKeys) -> "Field":
     from shell.imperfection import wave
 
     size = 1e-6 * (keys.amplitude_um if keys.amplitude_um is not None else keys.amplitude_ppm or 0.0)
-    profile = (lambda x: x**keys.power) if keys.power else None
-    return wave(keys.order, size, np.deg2rad(keys.azimuth_deg), profile)
+    return wave(keys.order, size, np.deg2rad(keys.azimuth_deg), Power(keys.power) if keys.power else None)
 
 
 def _map(keys: MapKeys, place: Place) -> "Field":

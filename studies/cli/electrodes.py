@@ -1,0 +1,125 @@
+"""`hrg electrodes`: what the card's electrodes do to a pair, and the trim voltages that null a split.
+
+With --json one object, schema `hrg.electrodes/1`: `card`, `temperature_degC`, `harmonic`, `frequency_Hz`; `softening_ppm` and `split_Hz`,
+`slow_axis_deg` by the card's voltages; `per_volt_ppm` when all change by one volt; `per_kelvin_ppm` by the expansion of the gap; `pull_in_factor`
+by which all voltages could grow (null without voltages); `reach_Hz`, the split that can be nulled whatever its axis within `limit_V`; `trim`, null unless
+a split was given: {voltages_V, left_Hz, shift_ppm}.
+"""
+
+from typing import Any
+
+
+def electrodes(
+    card: str,
+    *,
+    harmonic: int = 2,
+    split: float | None = None,
+    axis: float | None = None,
+    limit: float = 100.0,
+    temperature: float | None = None,
+    json: bool = False,
+) -> int:
+    """Tell what the card's table [electrodes] does to a pair: softening, split, coefficients, pull-in, trim voltages.
+
+    Parameters
+    ----------
+    card : str
+        Path of a card with a table [electrodes].
+    harmonic : int
+        Harmonic n of the pair.
+    split : float
+        Split in Hz that is to be nulled; that of the whole card unless given, where it has one.
+    axis : float
+        Azimuth in degrees of an antinode of its slower mode.
+    limit : float
+        Largest trim voltage.
+    temperature : float
+        Temperature in °C; the card's reference temperature unless given.
+    json : bool
+        Print one JSON object (schema hrg.electrodes/1) instead of tables.
+    """
+    import math
+
+    import numpy as np
+
+    from shell.electrodes import reach, trim_voltages
+    from shell.modes import solve_modes
+    from studies.cli.output import print_json, print_table, say
+    from studies.errors import InputError, naming
+    from studies.instrument.card import ZERO_CELSIUS, load_card
+    from studies.splitting import SplitPair
+
+    if (split is None) != (axis is None):
+        raise InputError("a split that is to be nulled needs both --split (Hz) and --axis (degrees).")
+    if harmonic < 1:
+        raise InputError(f"--harmonic {harmonic}: pairs have harmonics from 1 up.")
+    if not limit > 0:
+        raise InputError(f"--limit {limit:g}: the largest trim voltage is positive.")
+    instrument = load_card(card)
+    if "electrodes" not in instrument.content:
+        raise InputError(
+            f"{instrument.path}: the card has no table [electrodes]; add it (gap_um, count, coverage, voltage_V)."
+        )
+    T = instrument.reference_temperature if temperature is None else temperature + ZERO_CELSIUS
+    keys = instrument.part("electrodes").keys
+    with naming(f"{instrument.path} [electrodes]"):
+        resonator, elastic = instrument.at(T)
+        (mode,) = solve_modes(resonator, elastic, harmonic)
+        whole = SplitPair(instrument, mode, T)
+        charged = instrument.part("electrodes").on(whole.pair, T)
+        own = charged.soften()
+        if split is not None and axis is not None:
+            wave = complex(-split / mode.frequency * np.exp(2j * harmonic * np.deg2rad(axis)))
+        else:
+            wave = whole.split.wave
+        factor, most = charged.pull_in, reach(charged, limit)
+        asked = split is not None or 0 < abs(wave) <= most  # the card's own split only where it can be nulled
+        trim = trim_voltages(charged, wave, limit) if asked else None
+    payload: dict[str, Any] = {
+        "schema": "hrg.electrodes/1",
+        "card": instrument.name,
+        "temperature_degC": T - ZERO_CELSIUS,
+        "harmonic": harmonic,
+        "frequency_Hz": mode.frequency,
+        "softening_ppm": 1e6 * own.shift,
+        "split_Hz": own.hertz,
+        "slow_axis_deg": math.degrees(own.slow_axis),
+        "per_volt_ppm": 1e6 * charged.per_volt(),
+        "per_kelvin_ppm": 1e6 * charged.per_kelvin(keys.gap_expansion_per_K),
+        "pull_in_factor": factor,
+        "limit_V": limit,
+        "reach_Hz": most * mode.frequency,
+        "trim": None
+        if trim is None
+        else {
+            "voltages_V": list(trim.voltages),
+            "left_Hz": abs(trim.left) * mode.frequency,
+            "shift_ppm": 1e6 * trim.shift,
+        },
+    }
+    if json:
+        print_json(payload)
+        return 0
+    rows = [
+        ["softening by the card's voltages (ppm)", f"{payload['softening_ppm']:+.4f}"],
+        ["split by them (mHz)", f"{1e3 * own.hertz:.4f}"],
+        ["per volt on all electrodes (ppm/V)", f"{payload['per_volt_ppm']:+.4f}"],
+        ["per kelvin by the gap (ppm/K)", f"{payload['per_kelvin_ppm']:+.5f}"],
+        ["voltages can grow before pull-in by", "without end" if math.isinf(factor) else f"{factor:.3g} times"],
+        [f"split that {limit:g} V null, any axis (mHz)", f"{1e3 * payload['reach_Hz']:.3f}"],
+    ]
+    title = f"{instrument.name}, n = {harmonic}, {mode.frequency:.3f} Hz at {T - ZERO_CELSIUS:g} °C"
+    print_table(title, ["electrodes", "value"], rows)
+    if trim is not None:
+        step = 360 / keys.count
+        print_table(
+            f"Trim voltages that null {1e3 * abs(wave) * mode.frequency:.4g} mHz, besides the card's own",
+            ["electrode", "azimuth (°)", "V"],
+            [[str(k), f"{keys.azimuth_deg + step * k:.2f}", f"{v:.3f}"] for k, v in enumerate(trim.voltages) if v > 0],
+            f"They soften the pair by {1e6 * abs(trim.shift):.3g} ppm. Voltages add in squares: trim_V of the card.",
+        )
+    elif abs(wave) > 0:
+        say(
+            f"The card's split of {1e3 * abs(wave) * mode.frequency:.4g} mHz is beyond what {limit:g} V null: hrg trim."
+        )
+    return 0
