@@ -184,7 +184,7 @@ def build_family(
     harmonic, index, theory : which mode (`shell.modes.solve_modes`).
     slopes : whether ∂ ln f/∂ν and ∂ ln f/∂ ln h are wanted.
     tolerance : of the interpolated frequency, relative, against the full solve.
-    most : full solves that may be spent, about.
+    most : full solves that may be spent, about; a finer one counts by the square of its unknowns.
 
     Raises
     ------
@@ -195,10 +195,10 @@ def build_family(
     _check(axes, nu, tolerance, most)
     if theory == "rayleigh":
         raise ShellError("the theory of a family is solid or shell; Rayleigh's closed form needs none.")
-    count, reached = 0, np.inf
+    count, reached, left = 0, np.inf, None
     for solver_tolerance in SOLVER_TOLERANCES:
         solve = _Solve(build, tuple(axes), nu, harmonic, index, theory, slopes, solver_tolerance)
-        polynomial, errors = _interpolate(solve, tolerance, most - count)
+        polynomial, errors = _interpolate(solve, tolerance, most, left)
         if errors[0] <= tolerance:
             bounds = np.full(4, np.nan)
             bounds[: len(errors)] = errors
@@ -207,7 +207,8 @@ def build_family(
                 polynomial, Errors(*bounds), solve.theory_error, solver_tolerance, solve.count,
             )  # fmt: skip
         count, reached = count + solve.count, min(reached, errors[0])
-        if errors[0] > AMPLIFIED * solve.jumps or count >= most:
+        left = (most * solve.work / solve.count if left is None else left) - solve.work
+        if errors[0] > AMPLIFIED * solve.jumps or left <= 0:
             break  # where it is not for the jumps, finer solves would be no smoother
     raise ShellError(
         f"{count} full solves hold the frequency to {reached:.1g} within these ranges, not to {tolerance:.1g}: narrow the"
@@ -229,6 +230,7 @@ class _Solve:
     tolerance: float
     theory_error: float = 0.0
     count: int = 0
+    work: float = 0.0
     layouts: set[tuple[tuple[int, ...], ...]] = field(default_factory=set)
 
     @property
@@ -253,6 +255,7 @@ class _Solve:
         self.theory_error = max(self.theory_error, mode.relative_error_estimate)
         self.count += 1
         assert mode.solution is not None
+        self.work += float(mode.solution.vector.size) ** 2
         self.layouts.add(tuple(group.unknowns.shape for group in mode.solution.system.groups))
         found = [np.log(mode.frequency), mode.bryan_factor]
         if self.slopes:
@@ -272,12 +275,14 @@ class _Solve:
                 raise ShellError(str(warning)) from None
 
 
-def _interpolate(solve: _Solve, tolerance: float, most: int) -> tuple[SparsePolynomial, Array]:
-    """Refine until the stated errors hold the tolerance, or until more solves do not help."""
+def _interpolate(solve: _Solve, tolerance: float, most: int, left: float | None) -> tuple[SparsePolynomial, Array]:
+    """Refine until the stated errors hold the tolerance, or until more solves do not help or no work is left for them."""
     grid = Exploration(solve, solve.dimensions)
     unseen = _unseen(solve.dimensions)
     truth = np.array([solve(point) for point in unseen])
     threshold, before = tolerance, (np.inf, 1)
+    if left is not None:
+        most = int(left * solve.count / solve.work)
     while True:
         if solve.jumps > tolerance:
             return grid.polynomial(), np.array([solve.jumps])
