@@ -22,7 +22,7 @@ GREEK = {
     "thetaz": "θz",
 }
 LATEX = {
-    "epsilon": r"\epsilon", "kappa": r"\kappa", "gamma": r"\gamma", "sigma": r"\sigma", "rho": r"\rho", "theta": r"\theta ",
+    "epsilon": r"\epsilon", "kappa": r"\kappa", "gamma": r"\gamma", "sigma": r"\sigma", "rho": r"\rho", "Omega": r"\Omega", "defect": r"\mathrm{defect}", "theta": r"\theta ",
     "phi": r"\phi ", "upsilon": r"\upsilon ", "phitheta": r"\phi\theta ", "phiz": r"\phi z", "thetaz": r"\theta z",
 }  # fmt: skip
 WORD = re.compile("phi|theta|upsilon|[a-z]")
@@ -52,7 +52,7 @@ TYPESET = {
 }
 IN_WORDS = {
     "φ": r"$\phi$", "θ": r"$\theta$", "∂": r"$\partial$", "ρ": r"$\rho$", "Ω": r"$\Omega$", "υ": r"$\upsilon$",
-    "σ": r"$\sigma$", "ν": r"$\nu$", "α": r"$\alpha$", "π": r"$\pi$", "₀": "$_0$", "₁": "$_1$", "_": r"\_",
+    "σ": r"$\sigma$", "ν": r"$\nu$", "α": r"$\alpha$", "π": r"$\pi$", "₀": "$_0$", "₁": "$_1$", "_": r"\_", "–": "--",
 }  # fmt: skip
 
 
@@ -95,9 +95,7 @@ def _text_of(step: Step) -> str:
 
 
 def _latex_of(step: Step) -> str:
-    words = step.title
-    for letter, command in IN_WORDS.items():
-        words = words.replace(letter, command)
+    words = "".join(IN_WORDS.get(letter, letter) for letter in step.title)
     lines = [typeset(equation) for equation in step.equations]
     tag = rf" \tag{{{step.number}}}" if step.number else r" \notag"
     body = " \\\\\n".join([lines[0] + tag, *(line + r" \notag" for line in lines[1:])])

@@ -218,6 +218,10 @@ def test_the_bell_is_derived_beside_its_numbers(capsys):
     assert status == 0
     payload = json.loads(said.out)
     assert payload["schema"] == "hrg.derive-bell/1"
+    status, said = speak(capsys, "--bell", "--latex")
+    assert status == 0
+    assert said.out.isascii()
+    assert said.out.count("\\begin{gather}") == said.out.count("\\end{gather}") == len(payload["equations"])
     numbers = [step["number"] for step in payload["equations"] if step["number"]]
     assert numbers == [
         "1", "3", "5", "6", "7", "7 as printed", "12", "13", "13 as printed", "14", "19", "17, 18", "16 as printed", "20",
