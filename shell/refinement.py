@@ -30,10 +30,10 @@ def refine(
     density = _density(elastic)
     for level in LEVELS[theory]:
         system = build_system(resonator, n, theory, level)
-        solutions, factor = _solve(system, resonator.size, elastic, count, max(UNDONE * tolerance, 1e-13))
+        solutions, undone, factor = _solve(system, resonator.size, elastic, count, max(UNDONE * tolerance, 1e-13))
         lacking = [estimate_error(resonator, elastic, solution) for solution in solutions]
         lost = [find_loss(solution, factor, density) if thinnest < THIN else 0.0 for solution in solutions]
-        errors = [one + other for one, other in zip(lacking, lost, strict=True)]
+        errors = [sum(parts) for parts in zip(lacking, lost, undone, strict=True)]
         if max(errors) <= tolerance or max(lost) > max(lacking):
             break
     return solutions, errors
@@ -48,8 +48,8 @@ def solve_level(
 
 def _solve(
     system: System, size: float, elastic: Elastic | VaryingElastic, count: int, accuracy: float
-) -> tuple[list[Solution], Factor]:
-    """The modes of one system and the factor of its stiffness over ρ (where ρ is the same everywhere)."""
+) -> tuple[list[Solution], list[float], Factor]:
+    """The modes of one system, what the iteration left undone of each, and the factor of its stiffness over `_density`."""
     constants = tuple(
         find_constants(group.table.position, elastic, group.table.plane_stress) for group in system.groups
     )
@@ -57,9 +57,13 @@ def _solve(
     shift = 1e-2 * constants[0].wave_speed_squared / size**2 if system.rigid_motions else 0.0
     wanted = count + system.rigid_motions
     iteration = _begin(system, elastic, constants, shift)
-    vectors = iteration.converge(wanted, accuracy)
-    found = [Solution(system, constants, vector) for vector in vectors.T[:wanted]]
-    return sorted(found, key=lambda solution: solution.eigenvalue)[system.rigid_motions :], iteration.factor
+    pairs = iteration.converge(wanted, accuracy)
+    found = [
+        (Solution(system, constants, vector), float(undone) / 2)
+        for vector, undone in zip(pairs.vectors.T, pairs.undone, strict=True)
+    ]
+    elastic_ones = sorted(found, key=lambda one: one[0].eigenvalue)[system.rigid_motions :]
+    return [one for one, _ in elastic_ones], [undone for _, undone in elastic_ones], iteration.factor
 
 
 def _begin(
