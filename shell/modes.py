@@ -158,7 +158,7 @@ def solve_modes(
             k,
             sqrt(solution.eigenvalue) / (2 * pi),
             theory,
-            max(error, 1e-13),
+            error,
             solution.bryan_factor,
             _label(solution),
             solution,

@@ -152,6 +152,12 @@ class Resonator:
         """The middle surface at `count` equally spaced arc lengths, both ends included."""
         return self.at(np.linspace(0.0, self.length, count))
 
+    def slope_jumps(self, start: float, stop: float) -> Array:
+        """Changes of dh/ds at the knots of the thickness between two arc lengths (m)."""
+        knots, _, slopes = self._profile
+        inside = (knots[1:-1] > start) & (knots[1:-1] < stop)
+        return np.asarray(np.diff(slopes)[inside])
+
     def scaled(self, factor: float) -> "Resonator":
         """The same resonator with every length multiplied by `factor`: free uniform thermal expansion."""
         stem = self.stem and Stem(

@@ -73,7 +73,7 @@ def stages():
     """Print what one cached solve of one level spends its time on."""
     from shell.eigen import Factor, lowest_vectors
     from shell.solution import Solution, find_constants
-    from shell.surplus import estimate_error
+    from shell.surplus import estimate_errors
 
     print("\nOne level, operators cached (ms):")
     dome = hemisphere(R, H)
@@ -89,7 +89,7 @@ def stages():
         t_vectors, vector = best_time(lambda p=pattern, K=K, M=M: lowest_vectors(p, K, M, 1, 1e-11), 20)
         solution = Solution(system, (constants,), vector[:, 0])
         t_quotient, _ = best_time(lambda s=solution: Solution(s.system, s.constants, s.vector).eigenvalue, 20)
-        t_error, _ = best_time(lambda s=solution: estimate_error(dome, GLASS, s), 20)
+        t_error, _ = best_time(lambda s=solution: estimate_errors(dome, GLASS, [s]), 20)
         print(
             f"  {theory} level {number}, {pattern.size} unknowns: matrices {1e3 * t_matrices:.3f}, factor {1e3 * t_factor:.3f}, "
             f"one step {1e3 * t_step:.3f}, vectors {1e3 * t_vectors:.3f}, Rayleigh quotient {1e3 * t_quotient:.3f}, "

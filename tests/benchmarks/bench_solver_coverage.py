@@ -112,13 +112,17 @@ def finer(level, theory="solid"):
     better = levels[min(place + 2, len(levels) - 1)]
     if place + 2 >= len(levels):
         more = 2 * (place + 3 - len(levels))
-        better = replace(better, through=tuple(k + more for k in better.through), block=better.block + 1, rings=better.rings + 1)
+        better = replace(
+            better, through=tuple(k + more for k in better.through), block=better.block + 1, rings=better.rings + 1
+        )
     return replace(better, split=2 * level.split)
 
 
 def reference(resonator, elastic, n, level):
     """Return frequencies by the finer level."""
-    solutions = solve_level(build_system.__wrapped__(resonator, n, "solid", finer(level)), resonator.size, elastic, MODES, 1e-13)
+    solutions = solve_level(
+        build_system.__wrapped__(resonator, n, "solid", finer(level)), resonator.size, elastic, MODES, 1e-13
+    )
     return np.array([sqrt(one.eigenvalue) / (2 * pi) for one in solutions])
 
 
@@ -139,7 +143,9 @@ def judge(number):
     ratio = error / stated
     k = int(ratio.argmax())
     h = min(value for _, value in resonator.thickness)
-    details = f"n={n} h/R={h / resonator.size:.2e} mode {k} error {error[k]:.1e} stated {stated[k]:.1e} level {level.through}"
+    details = (
+        f"n={n} h/R={h / resonator.size:.2e} mode {k} error {error[k]:.1e} stated {stated[k]:.1e} level {level.through}"
+    )
     warned = any("known to" in str(one.message) for one in said)
     verdict = "within" if ratio.max() <= 1 else "warned" if warned else "missed"
     return verdict, kind, float(ratio.max()), float(error.max()), details
@@ -183,7 +189,10 @@ def main():
     if chosen.independent:
         rows = list(independent(chosen.independent))
         for number, apart, stated, unknowns in rows:
-            print(f"card {number:4d}: differs by {apart:.1e}, stated {stated:.1e} ({unknowns} unknowns in NGSolve)", flush=True)
+            print(
+                f"card {number:4d}: differs by {apart:.1e}, stated {stated:.1e} ({unknowns} unknowns in NGSolve)",
+                flush=True,
+            )
         worst = max(apart / stated for _, apart, stated, _ in rows)
         record("solver against NGSolve", cards=len(rows), worst_ratio=worst, worst=max(row[1] for row in rows))
         return 0
@@ -202,10 +211,18 @@ def main():
     done = sum(verdicts.values())
     covered = (done - verdicts["missed"]) / done
     print(f"cards {chosen.first} ... {number - 1}: {dict(verdicts)}; covered {100 * covered:.2f} %")
-    print(f"error over estimate: median {np.nanmedian(ratios):.2f}, 99 % {np.nanquantile(ratios, 0.99):.2f}; continue with --first {number}")
+    print(
+        f"error over estimate: median {np.nanmedian(ratios):.2f}, 99 % {np.nanquantile(ratios, 0.99):.2f}; continue with --first {number}"
+    )
     record(
-        "coverage of stated errors", cards=done, first=chosen.first, **verdicts, covered=covered,
-        ratio_median=float(np.nanmedian(ratios)), ratio_99=float(np.nanquantile(ratios, 0.99)), seconds=time.process_time(),
+        "coverage of stated errors",
+        cards=done,
+        first=chosen.first,
+        **verdicts,
+        covered=covered,
+        ratio_median=float(np.nanmedian(ratios)),
+        ratio_99=float(np.nanquantile(ratios, 0.99)),
+        seconds=time.process_time(),
     )
     return 0
 

@@ -12,7 +12,13 @@ HISTORY = Path(__file__).with_name("history.jsonl")
 
 def record(benchmark, **figures):
     """Append one line to history.jsonl."""
-    line = {"benchmark": benchmark, "date": datetime.now(UTC).date().isoformat(), "commit": commit(), **machine(), **figures}
+    line = {
+        "benchmark": benchmark,
+        "date": datetime.now(UTC).date().isoformat(),
+        "commit": commit(),
+        **machine(),
+        **figures,
+    }
     with HISTORY.open("a", encoding="utf-8") as file:
         file.write(json.dumps(line, ensure_ascii=False) + "\n")
 
@@ -37,7 +43,9 @@ def machine():
     model = platform.processor() or platform.machine()
     info = Path("/proc/cpuinfo")
     if info.exists():
-        names = [line.split(":", 1)[1].strip() for line in info.read_text().splitlines() if line.startswith("model name")]
+        names = [
+            line.split(":", 1)[1].strip() for line in info.read_text().splitlines() if line.startswith("model name")
+        ]
         model = names[0] if names else model
     return {
         "processor": model,

@@ -7,6 +7,7 @@ from math import log10, pi, sqrt
 
 import numpy as np
 import pytest
+from scipy.linalg import eigh
 
 from shell.assembly import build_system
 from shell.curves import Line
@@ -72,9 +73,9 @@ def random_corner(rng: np.random.Generator) -> tuple[Resonator, Elastic, int]:
 def test_error_estimate_is_true_for_random_designs(
     design: Callable[[np.random.Generator], tuple[Resonator, Elastic, int]], theory: Theory, count: int
 ) -> None:
-    """The estimate of random designs lies between 0.1 and 10 times the distance from a level two steps finer."""
+    """The estimate of random designs lies between 0.8 and 10 times the distance from a level two steps finer."""
     rng = np.random.default_rng(20)
-    ratios = []
+    ratios: list[float] = []
     for _ in range(count):
         resonator, elastic, n = design(rng)
         with warnings.catch_warnings():
@@ -84,8 +85,8 @@ def test_error_estimate_is_true_for_random_designs(
         finer = LEVELS[theory][LEVELS[theory].index(mode.solution.system.level) + 2]
         error = mode.frequency / frequency(resonator, elastic, n, theory, finer) - 1
         assert mode.relative_error_estimate <= 1e-5
-        ratios.append(mode.relative_error_estimate / max(abs(error), 1e-12))  # rounding
-    assert min(ratios) > 0.1
+        ratios.append(mode.relative_error_estimate / max(abs(error), 1e-10))  # the least that is stated is 5e-10
+    assert min(ratios) > 0.8
     assert max(ratios) < 10
 
 
@@ -117,3 +118,55 @@ def test_thin_shells_keep_their_digits(ratio: float) -> None:
     solid, shell = (solve_modes(thin, SILICA, theory=theory, tolerance=2e-8)[0] for theory in ("solid", "shell"))
     assert max(solid.relative_error_estimate, shell.relative_error_estimate) < 2e-8
     assert solid.frequency == pytest.approx(shell.frequency, rel=3e-3 * ratio + 2e-8)
+
+
+@pytest.mark.parametrize(
+    ("resonator", "n", "index"),
+    [
+        (hemisphere(15e-3, 15e-6), 1, 3),  # neighbouring modes answer each other
+        (hemisphere(15e-3, 34e-6, rim_angle=pi), 0, 7),
+        (hemisphere(15e-3, [(0.0, 0.168e-3), (0.95, 0.168e-3), (0.96, 0.336e-3), (1.0, 0.336e-3)]), 9, 1),  # a bead
+        (hemisphere(15e-3, [(0.0, 0.068e-3), (0.3, 0.08e-3), (0.8, 0.05e-3), (1.0, 0.07e-3)]), 4, 2),
+    ],
+    ids=["thin dome", "sphere", "bead", "knots"],
+)
+def test_error_estimate_of_higher_modes_and_of_knots(resonator: Resonator, n: int, index: int) -> None:
+    mode = solve_modes(resonator, SILICA, n, index + 1)[index]
+    assert mode.solution is not None
+    level = mode.solution.system.level
+    one, two, three = level.through
+    finer = replace(level, through=(one + 4, two + 4, three + 4), along=min(level.along + 6, 22), split=2 * level.split)
+    system = build_system(resonator, n, "solid", finer)
+    exact = solve_level(system, resonator.size, SILICA, index + 1, 1e-12)[index]
+    error = abs(mode.frequency * 2 * pi / sqrt(exact.eigenvalue) - 1)
+    assert error <= mode.relative_error_estimate < 30 * max(error, 1e-10)
+
+
+def test_crowded_modes_of_a_thin_sphere_against_its_radial_equation() -> None:
+    """The exact lowest mode of n = 20 at h/R = 1.6e-4, where neighbours lie 1e-3 apart."""
+    (mode,) = solve_modes(hemisphere(15e-3, 15e-3 * 1.6e-4, rim_angle=pi), SILICA, 20)
+    exact = hollow_sphere(20, 15e-3, 15e-3 * 1.6e-4, SILICA)
+    assert hollow_sphere(2, 15e-3, 0.9e-3, SILICA) == pytest.approx(46382.706956214, rel=1e-9)  # the determinant
+    assert abs(mode.frequency / exact - 1) <= mode.relative_error_estimate
+
+
+def hollow_sphere(order: int, R: float, h: float, elastic: Elastic) -> float:
+    """The lowest spheroidal frequency (Hz) of degree l of a hollow sphere: polynomials of degree 6 along r, exact around.
+
+    u = U(r) P_l r + V(r) ∇P_l; energies after Dahlen & Tromp, Theoretical Global Seismology, eq. 8.199.
+    """
+    x, w = np.polynomial.legendre.leggauss(16)
+    r, L = R + h / 2 * x, order * (order + 1)
+    p = np.polynomial.legendre.legvander(x, 6)
+    dp = np.stack([np.polynomial.Legendre.basis(k).deriv()(x) for k in range(7)], axis=1) * 2 / h
+    none, over = np.zeros_like(p), p / r[:, None]
+    U, V, dU, dV = (np.hstack(pair) for pair in ((over, none), (none, over), (dp, none), (none, dp)))
+    F, bulk, G = 2 * U - L * V, elastic.E / (3 * (1 - 2 * elastic.nu)), elastic.G
+    weight = (w * r**2)[:, None]
+
+    strains = ((bulk, dU + F), (G / 3, 2 * dU - F), (G * L, dV - V + U), (G * L * (L - 2), V))
+    motions = ((elastic.rho, U * r[:, None]), (elastic.rho * L, V * r[:, None]))
+    K, M = (np.sum([c * f.T @ (f * weight) for c, f in terms], axis=0) for terms in (strains, motions))
+    q = eigh(K, M)[1][:, 0]
+    stiff, heavy = (sum(c * float(weight[:, 0] @ (f @ q) ** 2) for c, f in terms) for terms in (strains, motions))
+    return sqrt(stiff / heavy) / (2 * pi)  # of sums of squares, for the thin shell's digits
