@@ -14,6 +14,7 @@ from shell.assembly import build_system
 from shell.curves import Arc
 from shell.elastic import Elastic, VaryingElastic
 from shell.errors import ShellError
+from shell.fitted import fit_profile
 from shell.levels import Theory
 from shell.refinement import refine
 from shell.resonator import Resonator
@@ -145,7 +146,10 @@ def solve_modes(
     _check_range(resonator, theory)
     if theory == "rayleigh":
         return _rayleigh(resonator, elastic, harmonic, count)
+    resonator, rest = fit_profile(resonator)
     solutions, errors = refine(resonator, elastic, harmonic, count, theory, tolerance)
+    if rest:
+        errors = [error + rest.error(one.along) for one, error in zip(solutions, errors, strict=True)]
     if max(errors) > tolerance:
         warnings.warn(
             f"the frequency is known to {max(errors):.2g}, {max(errors) / tolerance:.2g} times the tolerance asked for.",

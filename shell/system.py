@@ -29,10 +29,6 @@ PORTION = 16  # elements integrated at a time
 TINY = 160  # unknowns of a dense matrix
 KEPT = 3_000_000  # numbers that a system may keep for the next material (24 MB)
 
-# The memory of one design serves the next: glibc hands freed memory back to the kernel beyond twice the largest block freed
-# so far (at most 32 MB), and its pages then cost up to a quarter of a solve. This block is freed at once and never touched.
-np.empty(31 << 20, dtype=np.uint8)
-
 
 @dataclass(frozen=True, eq=False)
 class ShellPart:
