@@ -3,6 +3,7 @@
 from shell.assembly import build_system
 from shell.eigen import Factor, Iteration, whole_pattern
 from shell.elastic import Elastic, VaryingElastic
+from shell.errors import ShellError
 from shell.levels import LEVELS, Theory
 from shell.resonator import Resonator
 from shell.rounding import THIN, find_loss
@@ -11,6 +12,7 @@ from shell.surplus import estimate_errors
 from shell.system import System
 
 UNDONE = 1e-4  # share of the tolerance, as error of ω², at which the iteration stops: sensitivities feel the root of it
+MEMORY = 1.5e9  # bytes of element matrices beyond which a level is not tried
 FLOOR = 5e-10  # relative error of a frequency by rounding and iteration: measured up to 2.5e-10
 DOUBT = 10.0  # the most by which an estimate is raised for what the one before it missed
 
@@ -33,6 +35,13 @@ def refine(
     before: tuple[list[Solution], list[float]] | None = None
     for level in LEVELS[theory]:
         system = build_system(resonator, n, theory, level)
+        if before and system.memory > MEMORY:
+            break
+        if system.memory > MEMORY:
+            raise ShellError(
+                f"harmonic {n} of this resonator needs {system.memory / 1e9:.1f} GB: it waves too finely for elements of the whole "
+                "section. Ask for a lower harmonic or a shorter or thicker shell."
+            )
         solutions, undone, factor = _solve(system, resonator.size, elastic, count, max(UNDONE * tolerance, 1e-13))
         lacking = estimate_errors(resonator, elastic, solutions)
         if before:

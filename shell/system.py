@@ -198,6 +198,11 @@ class System:
         return numbers < KEPT
 
     @property
+    def memory(self) -> float:
+        """Bytes of the element matrices while a system is solved: stiffness, mass, their factors."""
+        return 32.0 * float(sum(group.unknowns.size * group.unknowns.shape[1] for group in self.groups))
+
+    @property
     def is_tiny(self) -> bool:
         """Whether one dense matrix costs less than the elements one by one."""
         return len(self.groups) == 1 and self.constraint.shape[1] <= TINY
