@@ -53,7 +53,9 @@ def estimate_errors(
     S, C, T = (np.sum(kind, axis=0) for kind in zip(*answers, strict=True))
     values = np.array([solution.eigenvalue for solution in solutions])
     mass = np.array([total(solution.kinetic) for solution in solutions])
-    return [_correction(k, values, mass, S, C, T) / (2 * values[k] * mass[k]) for k in range(len(values))]
+    return [
+        (1 + HIGHER * k) * _correction(k, values, mass, S, C, T) / (2 * values[k] * mass[k]) for k in range(len(values))
+    ]
 
 
 def _correction(k: int, values: Array, mass: Array, S: Array, C: Array, T: Array) -> float:
