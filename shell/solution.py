@@ -272,14 +272,16 @@ def _plane_energies(c: Constants, s: Array, theta: Array, twist: Array) -> tuple
     return np.asarray(lam * (s + theta) ** 2 + 2 * G * (s**2 + theta**2)), np.asarray(G * twist**2)
 
 
-def surface_energies(solution: Solution, number: int) -> tuple[Array, Array]:
+def surface_energies(solution: Solution, number: int, film: Elastic | None = None) -> tuple[Array, Array]:
     """Change of (elastic - ω² kinetic) as the faces of one shell group move outwards by h/2, (elements, stations, 2) each.
 
     The energies at the faces (Hadamard's formula), inner and outer: first of what varies as cos nθ, then as sin nθ. Of a
     solid the faces are free of traction, so their strain energy is that of plane stress; Naghdi's transverse shear does
-    not vanish there and counts.
+    not vanish there and counts. A film of another material on the faces follows their strains, if one is given.
     """
     system, group, c = solution.system, solution.system.groups[number], solution.constants[number]
+    if film:
+        c = find_constants(group.table.position, film, True)
     assert isinstance(group, ShellGroup)
     faces = np.array([-1.0, 1.0])
     u, v, w = (legendre(order, faces) for order in system.level.through)
@@ -289,7 +291,7 @@ def surface_energies(solution: Solution, number: int) -> tuple[Array, Array]:
     e, d = table.strains(q), table.displacements(q)
     at_stations = Constants(c.E[..., None], c.nu[..., None], c.rho[..., None], True)
     cosine, sine = _plane_energies(at_stations, e[:, :, 0], e[:, :, 1], e[:, :, 3])
-    if table.plane_stress:
+    if table.plane_stress and not film:
         transverse = c.lame[1][..., None] * table.transverse_shear
         cosine, sine = cosine + transverse * e[:, :, 4] ** 2, sine + transverse * e[:, :, 5] ** 2
     heavy = solution.eigenvalue * c.rho[..., None]
