@@ -1,5 +1,7 @@
 """Rising polynomial orders: solve one level after the other until its own estimate of the error is small enough."""
 
+import numpy as np
+
 from shell.assembly import build_system
 from shell.eigen import Factor, Iteration, whole_pattern
 from shell.elastic import Elastic, VaryingElastic
@@ -9,12 +11,12 @@ from shell.resonator import Resonator
 from shell.rounding import THIN, find_loss
 from shell.solution import Constants, Solution, find_constants
 from shell.surplus import estimate_errors
-from shell.system import System
+from shell.system import ShellGroup, System
 
 UNDONE = 1e-4  # share of the tolerance, as error of ω², at which the iteration stops: sensitivities feel the root of it
 MEMORY = 1.5e9  # bytes of element matrices beyond which a level is not tried
 FLOOR = 5e-10  # relative error of a frequency by rounding and iteration: measured up to 2.5e-10
-DOUBT = 10.0  # the most by which an estimate is raised for what the one before it missed
+DOUBT = 10.0  # the most by which an estimate is raised for what the one before it missed, and if waves are not resolved
 
 
 def refine(
@@ -49,12 +51,27 @@ def refine(
                 error * _experience(now, former, stated)
                 for error, now, former, stated in zip(lacking, solutions, *before, strict=True)
             ]
+        lacking = [error * (1.0 if _is_resolved(one) else DOUBT) for error, one in zip(lacking, solutions, strict=True)]
         before = solutions, lacking
         lost = [find_loss(solution, factor, density) if thinnest < THIN else 0.0 for solution in solutions]
         errors = [sum(parts) for parts in zip(lacking, lost, undone, strict=True)]
         if max(errors) <= tolerance or max(lost) > max(lacking):
             break
     return solutions, [max(error, FLOOR) for error in errors]
+
+
+def _is_resolved(solution: Solution) -> bool:
+    """Whether the degree follows bending waves of the mode's frequency, k⁴ = 12 ρ (1 - ν²) ω²/(E h²), over its elements.
+
+    Polynomials of degree p begin to converge on a wave over a length L at p = k L/2; before, no surplus tells their error.
+    """
+    for group, c in zip(solution.system.groups, solution.constants, strict=True):
+        if isinstance(group, ShellGroup):
+            section = group.place.section
+            k = (12 * c.rho * (1 - c.nu**2) * solution.eigenvalue / (c.E * section.thickness**2)) ** 0.25
+            if np.max(k * section.ds) > solution.system.level.along:
+                return False
+    return True
 
 
 def _experience(now: Solution, before: Solution, stated: float) -> float:

@@ -35,6 +35,7 @@ from shell.system import ShellGroup, SolidGroup, System
 ALONG = 2  # degrees added along the shell
 # error over surplus where the orders' errors fall by a constant factor: measured 1.2, in one of 50 cards 1.7
 SMOOTH = 1.8
+NAGHDI = 1.45  # and more in shell theory, where only the degrees along the meridian rise
 HIGHER = 0.05  # and by how much more for each mode below: its neighbours above are not known
 TIED = 1.5  # and more beside a corner, whose singularity reaches over
 SINGULAR = 1.5  # what the rule for corners still lacks, measured
@@ -229,7 +230,7 @@ def _extend_shell(resonator: Resonator, group: ShellGroup, n: int, level: Level)
 
 def _count(resonator: Resonator, chain: Chain, level: Level) -> float:
     """How often the surplus of a chain counts: more where faces have corners, of which two more modes take off but a share."""
-    smooth = SMOOTH * (TIED if "tied" in chain.ends else 1.0)
+    smooth = SMOOTH * (TIED if "tied" in chain.ends else 1.0) * (NAGHDI if max(level.through) == 1 else 1.0)
     if all(abs(jump) < SLOPE for jump in resonator.slope_jumps(chain.breaks[0], chain.breaks[-1])):
         return smooth
     order = max(level.through)
