@@ -33,7 +33,7 @@ def test_of(record: "Record", output: str) -> Test | None:
             return name  # type: ignore[return-value]
     if "vibration_amplitude_V" in record:
         return "run-down"
-    turning = "rate_deg_per_s" in record and bool(np.nanmax(np.abs(record["rate_deg_per_s"])) > LARGEST_REST)
+    turning = "rate_deg_per_s" in record and bool(np.any(np.abs(record["rate_deg_per_s"]) > LARGEST_REST))
     if turning:
         return "scale-factor" if "measured_rate_deg_per_s" in record else None
     column = temperature_column(record)

@@ -38,7 +38,8 @@ def loop(
     """Study the loops of a card: stability margins, bias and noise by source, start-up; with --out also a run through them.
 
     The card's table [loop] says how the gyro is read; loss, damping anisotropy and azimuth come from [loss] and [bias]. A
-    loop that is unstable is refused with its margin.
+    loop that is unstable is refused with its margin. A run has what the loops make of the wave; offset, polynomial and
+    effects of the card are those of hrg simulate, where a card's loops count as settled.
 
     Parameters
     ----------
@@ -191,13 +192,13 @@ def _run(
 
     from studies.record import Record, write_record
     from studies.simulation.chamber import load_profile
-    from studies.simulation.loop import columns_of, run_loops
+    from studies.simulation.loop import columns_of, run_loops, without_loop
     from studies.simulation.virtual_gyro import simulate_run
 
     columns: dict[str, Any] = {}
     f, loss = np.array(frequency), np.array(inverse_q)
     if profile is not None:
-        thermal = simulate_run(instrument, load_profile(profile), 1 / row, noise=False).record
+        thermal = simulate_run(without_loop(instrument), load_profile(profile), 1 / row, noise=False).record
         time = thermal["time_s"]
         f, loss = thermal["frequency_Hz"], thermal["inverse_q"]
         names = ("chamber_temperature_degC", "housing_temperature_degC", "resonator_temperature_degC")

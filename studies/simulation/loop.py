@@ -1,7 +1,7 @@
 """The loops of a card's gyro: its standing wave and electronics in SI units, what they say settled, and over a run."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -121,6 +121,11 @@ def require_loop(instrument: "Instrument") -> "Loop":
             f"{instrument.path}: the card has no loops; add a table [loop] (it may be empty: all keys have defaults)."
         )
     return instrument.loop
+
+
+def without_loop(instrument: "Instrument") -> "Instrument":
+    """Return the instrument as it is before its loops read it: frequency and loss are those of the resonator."""
+    return replace(instrument, content={key: value for key, value in instrument.content.items() if key != "loop"})
 
 
 def settled_columns(

@@ -113,7 +113,7 @@ def simulate_run(
         source=f"simulated, rate {rate:g} Hz, " + (f"seed {seed}" if noise else "without noise"),
         resolution={name: step for name, step in resolution.items() if step > 0},
     )
-    return VirtualRun(record, prediction, _idle_effects(instrument, drive))
+    return VirtualRun(record, prediction, (*_idle_effects(instrument, drive), *_held_wave(instrument)))
 
 
 def _observe(
@@ -133,6 +133,12 @@ def _observe(
         "bias_deg_per_h": quantise(bias, levels.bias_resolution_deg_per_h),
         "inverse_q": loss,
     }
+
+
+def _held_wave(instrument: "Instrument") -> tuple[str, ...]:
+    if instrument.loop is None or instrument.loop.mode == "force-rebalance":
+        return ()
+    return ("the wave stands where it is commanded to: hrg loop follows one that turns (mode whole-angle).",)
 
 
 def _idle_effects(instrument: "Instrument", drive: Drive) -> tuple[str, ...]:

@@ -89,3 +89,13 @@ def test_noise_of_a_free_wave_is_what_its_run_shows(card, tmp_path, capsys):
     assert [margin["paper"] for margin in found["margins"]] == ["GA", "GF", "GQ"]
     one = next(noise for noise in found["noise"] if noise["source"] == "all")["deg_per_h_over_1s"]
     assert np.std(read_record(out)["bias_deg_per_h"]) == pytest.approx(one, rel=0.06)
+
+
+def test_a_profile_drives_the_resonator_not_its_reading(card, tmp_path):
+    """What the loops read is the resonator, not what they have read already."""
+    path, out = card("pickoff_phase_deg = 3.0\n"), tmp_path / "run.csv"
+    words = ["--profile", "soak 20 20min", "--row", "10", "--noiseless"]
+    assert main(["loop", path, "--json", "--out", str(out), *words]) == 0
+    record = read_record(out)
+    # the phase error counts once, as 1/cos ε
+    assert record["inverse_q"][-1] == pytest.approx(1e-7 / np.cos(np.radians(3.0)), rel=3e-4)

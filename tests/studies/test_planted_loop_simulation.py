@@ -72,7 +72,7 @@ def test_a_hole_in_a_schedule_is_refused(tmp_path, capsys):
 
 
 def test_a_planned_run_moves_the_commanded_drives(tmp_path):
-    from studies.diagnosis.plan import imagine
+    from studies.diagnosis.planning.plan import imagine
 
     path = tmp_path / "schedule.csv"
     path.write_text(SCHEDULE)
