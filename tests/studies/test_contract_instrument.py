@@ -54,6 +54,12 @@ COMMANDS = {
     "diagnose": ["diagnose", "RUN", "--card", "CARD"],
     "plan": ["diagnose", "--plan", "step 20 -10 5h", "--card", "CARD"],
     "fit thermal": ["fit", "thermal", "RUN", "--card", "CARD"],
+    "fit whole-angle": ["fit", "whole-angle", "RUN", "--card", "CARD"],
+    "acceptance": ["acceptance", "CARD", "RUN"],
+    "calibrate": ["calibrate", "CARD", "RUN"],
+    "electrodes": ["electrodes", "CARD"],
+    "scan": ["scan", "CARD", "RUN"],
+    "trim": ["trim", "CARD", "--split", "0.1", "--axis", "10"],
 }
 
 
