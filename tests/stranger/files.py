@@ -44,6 +44,9 @@ def write_campaign(folder: Path, truth: Truth, runs: list[Run], times: list[np.n
         columns["housing_temperature_degC"] = _text(reading, 3)
         if chamber:
             columns["chamber_temperature_degC"] = _text(np.interp(time, run.time, run.chamber), 2)
+        before = np.searchsorted(run.time, time, side="right") - 1
+        steps = [np.diff(v, append=v[-1]) != 0 for v in run.drive.values()]
+        settling = np.any(steps, axis=0)[before] if steps else np.zeros(len(time), bool)
         for response, noise in truth.noise[i].items():
             values = truth.clean[i][response] + noise
             hit = rng.random(len(time)) < outliers
@@ -52,6 +55,7 @@ def write_campaign(folder: Path, truth: Truth, runs: list[Run], times: list[np.n
             for _ in range(rng.poisson(0.4)):
                 begun = rng.uniform(0, 0.9) * time[-1]
                 values[(time > begun) & (time < begun + rng.uniform(100, 2400))] = np.nan
+            values[settling] = np.nan  # the loop has lost its hold in the seconds in which a drive is changed
             columns[COLUMN[response]] = _text(values, digits[response])
         if reference:
             values = (
@@ -61,8 +65,7 @@ def write_campaign(folder: Path, truth: Truth, runs: list[Run], times: list[np.n
             )
             columns["reference_frequency_Hz"] = _text(values, digits["frequency"])
         for name, values in run.drive.items():
-            at = np.searchsorted(run.time, time, side="right") - 1
-            columns[name] = _text(values[at], 3)
+            columns[name] = _text(values[before], 3)
         lines = ["# source: an independent generator"]
         if begin is not None:
             lines.append(f"# start: {(begin + datetime.timedelta(seconds=run.start)).isoformat()}")
