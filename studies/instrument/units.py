@@ -3,7 +3,7 @@
 import re
 
 SYMBOLS = {"deg": "°", "degC": "°C", "day": "d", "rt": "√"}
-UNIT = re.compile(r"(10)?(per|rt|degC|deg|ppm|day|[GMkmun]?(?:Pa|Hz|W|J|V|eV|N|g|K|s)|[cmunp]?m|pF|h|1)([2-9])?")
+UNIT = re.compile(r"(10)?(per|rt|degC|deg|mrad|ppm|day|[GMkmun]?(?:Pa|Hz|W|J|V|eV|N|g|K|s)|[cmunp]?m|pF|h|1)([2-9])?")
 RATES = {
     # words of a key: one unit, so that what follows belongs to it as a whole
     "deg per h": "°/h",

@@ -99,3 +99,9 @@ def test_a_profile_drives_the_resonator_not_its_reading(card, tmp_path):
     record = read_record(out)
     # the phase error counts once, as 1/cos ε
     assert record["inverse_q"][-1] == pytest.approx(1e-7 / np.cos(np.radians(3.0)), rel=3e-4)
+
+
+def test_keys_of_the_loops_carry_their_units(card):
+    units = {value.name: value.unit for value in load_card(card("")).uncertain}
+    assert units["loop.misalignment_mrad"] == "mrad"
+    assert units["loop.frequency_split_mHz"] == "mHz"
