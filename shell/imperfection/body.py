@@ -6,11 +6,12 @@ from typing import TypeAlias
 
 import numpy as np
 
+from shell.cells import CellTable
+from shell.imperfection.core import Core
 from shell.imperfection.field import values_around
 from shell.imperfection.imperfect import Imperfection
-from shell.imperfection.place import cut, fade
+from shell.imperfection.place import CrossSection, cut, fade
 from shell.imperfection.wall import Part, Wall, deform
-from shell.kernel import energy_weights
 from shell.quadrature import Array, gauss
 from shell.resonator import Resonator
 from shell.solution import Constants
@@ -34,11 +35,12 @@ class Body:
     ) -> None:
         self.systems, self.constants, self.resonator, self.theta = systems, constants, resonator, theta
         self.own = system = systems(n)
+        self._cuts: dict[tuple[int, float, float], CrossSection] = {}
         orders = system.level.through
         eta = gauss(max(orders) + 2)
         faces = flaw.faces(fade(resonator, system))
         self.walls: list[tuple[int, Wall]] = []
-        self.solids: list[tuple[int, Array, Array]] = []
+        self.cores: list[tuple[int, Core]] = []
         for number, (group, c) in enumerate(zip(system.groups, constants, strict=True)):
             if isinstance(group, ShellGroup):
                 everywhere = slice(0, len(group.unknowns))
@@ -53,7 +55,7 @@ class Body:
                     np.ones(theta.size) if field is None else 1 + values_around(field, waves, x, theta)[0][0]
                     for field in (flaw.modulus, flaw.density)
                 )
-                self.solids.append((number, stiff, heavy))
+                self.cores.append((number, Core(self._table(number), c, stiff, heavy, theta)))
         if flaw.rim is not None:
             edge = cut(resonator, system, 1.0, eta[0])
             width = values_around(flaw.rim, flaw.rim.orders, np.ones(1), theta)[0][0]
@@ -74,6 +76,21 @@ class Body:
             density = values_around(line.per_length, line.per_length.orders, np.array([line.position]), theta)[0][0]
             self.masses.append((line.position, line.height, theta, density * radius * 2 * pi / theta.size))
 
+    def _table(self, number: int) -> Callable[[int], CellTable]:
+        def table(harmonic: int) -> CellTable:
+            group = self.systems(harmonic).groups[number]
+            assert isinstance(group, SolidGroup)
+            return group.table
+
+        return table
+
+    def cut(self, harmonic: int, position: float, height: float) -> CrossSection:
+        """A place of the wall at one harmonic."""
+        key = (harmonic, position, height)
+        if key not in self._cuts:
+            self._cuts[key] = cut(self.resonator, self.systems(harmonic), position, np.array([height]))
+        return self._cuts[key]
+
 
 class Forms:
     """K and M of the imperfect body in a growing basis, and the forces that it leaves."""
@@ -81,31 +98,33 @@ class Forms:
     def __init__(self, body: Body, value: float) -> None:
         self.body, self.value = body, value
         self.vectors: list[Vector] = []
-        self.strains: list[list[Array]] = []
-        self.moves: list[list[Array]] = []
+        self.strains = self.moves = np.zeros((0, 0))
+        self.shapes: tuple[list[tuple[int, ...]], list[tuple[int, ...]]] = ([], [])
         self.K = self.M = np.zeros((0, 0))
         self.size = 0.0
 
     def extend(self, fresh: list[Vector]) -> None:
         """Add vectors to the basis."""
         before = len(self.vectors)
+        rows: list[list[Array]] = [[], [], [], []]
         for part, vector in fresh:
-            strain, move = self._fields(part, vector)
+            strains, moves = self._fields(part, vector)
+            self.shapes = ([e.shape for e in strains], [d.shape for d in moves])
+            for row, pieces in zip(rows, (strains, moves, *self._duals(strains, moves)), strict=True):
+                row.append(np.concatenate([piece.ravel() for piece in pieces]))
             self.vectors.append((part, vector))
-            self.strains.append(strain)
-            self.moves.append(move)
-        count = len(self.vectors)
-        K, M = np.zeros((count, count)), np.zeros((count, count))
-        K[:before, :before], M[:before, :before] = self.K, self.M
-        for b in range(before, count):
-            stress, inertia = self._duals(self.strains[b], self.moves[b])
-            for a in range(b + 1):
-                K[a, b] = K[b, a] = sum(float(np.vdot(e, s)) for e, s in zip(self.strains[a], stress, strict=True))
-                M[a, b] = M[b, a] = sum(float(np.vdot(d, f)) for d, f in zip(self.moves[a], inertia, strict=True))
-        self.K, self.M = K, M
+        strain, move, stress, inertia = (np.array(row) for row in rows)
+        self.strains = np.concatenate([self.strains.reshape(-1, strain.shape[1]), strain])
+        self.moves = np.concatenate([self.moves.reshape(-1, move.shape[1]), move])
+        K, M = self.strains @ stress.T, self.moves @ inertia.T
+        for number, core in self.body.cores:
+            spread = [(part, self.body.systems(part.harmonic).spread(vector)[number]) for part, vector in fresh]
+            more = core.extend(spread)
+            K, M = K + more[0], M + more[1]
+        self.K, self.M = _bordered(self.K, K, before), _bordered(self.M, M, before)
 
     def _fields(self, part: Part, vector: Array) -> tuple[list[Array], list[Array]]:
-        """Strains of walls and solids; displacements of walls, solids and masses."""
+        """Strains of walls; displacements of walls and masses."""
         body = self.body
         system = body.systems(part.harmonic)
         unknowns = system.spread(vector)
@@ -114,13 +133,8 @@ class Forms:
             strain, move = wall.move(wall.jets(unknowns[number]), part)
             strains.append(strain)
             moves.append(move)
-        C, S = part.around(body.theta)
-        for number, _, _ in body.solids:
-            table = system.groups[number].table
-            strains.append(_spin(table.strains(unknowns[number]), C, S, (3, 5)))
-            moves.append(_spin(table.displacements(unknowns[number]), C, S, (1,)))
         for position, height, theta, _ in body.masses:
-            u = cut(body.resonator, system, position, np.array([height])).displacements(unknowns)[:, 0]
+            u = body.cut(part.harmonic, position, height).displacements(unknowns)[:, 0]
             one, other = part.around(theta)
             moves.append(np.stack([u[0] * one, u[1] * other, u[2] * one]))
         return strains, moves
@@ -130,17 +144,7 @@ class Forms:
         body = self.body
         stress = [wall.stress(e) for (_, wall), e in zip(body.walls, strains, strict=False)]
         inertia = [wall.rho * wall.volume * d for (_, wall), d in zip(body.walls, moves, strict=False)]
-        system, step = body.own, 2 * pi / body.theta.size
-        first = len(body.walls)
-        for (number, stiff, heavy), e, d in zip(body.solids, strains[first:], moves[first:], strict=False):
-            group, c = system.groups[number], body.constants[number]
-            volume = (group.table.volume * step)[..., None]
-            lam, G = (one[..., None, None] for one in c.lame)
-            found = (G[:, :, None] * energy_weights()[:, None, None]) * e
-            found[:, :, :3] += (lam * e[:, :, :3].sum(axis=2))[:, :, None]
-            stress.append(found * (volume * stiff)[:, :, None])
-            inertia.append(d * (c.rho[..., None, None] * volume * heavy)[:, :, None])
-        masses = moves[first + len(body.solids) :]
+        masses = moves[len(body.walls) :]
         inertia += [m * d for (*_, m), d in zip(body.masses, masses, strict=True)]
         return stress, inertia
 
@@ -148,19 +152,19 @@ class Forms:
         """(K - λ M) of the two folded vectors on the free unknowns of every part, (unknowns, 2) each."""
         columns: list[list[Array]] = [[] for _ in parts]
         for weights in T.T:
-            strains = [
-                sum(w * s[k] for w, s in zip(weights, self.strains, strict=True)) for k in range(len(self.strains[0]))
-            ]
-            moves = [sum(w * d[k] for w, d in zip(weights, self.moves, strict=True)) for k in range(len(self.moves[0]))]
+            strains, moves = (
+                _pieces(weights @ fields, shapes)
+                for fields, shapes in zip((self.strains, self.moves), self.shapes, strict=True)
+            )
             stress, inertia = self._duals(strains, moves)
             force = [self.value * one for one in inertia]
-            for column, load in zip(columns, self._gather(stress, force, parts), strict=True):
+            for column, load in zip(columns, self._gather(stress, force, weights, parts), strict=True):
                 column.append(load)
         found = [np.stack(column, axis=1) for column in columns]
         self.size = max(self.size, max(float(np.abs(one).max()) for one in found))
         return found
 
-    def _gather(self, stress: list[Array], force: list[Array], parts: list[Part]) -> list[Array]:
+    def _gather(self, stress: list[Array], force: list[Array], weights: Array, parts: list[Part]) -> list[Array]:
         body = self.body
         per_part: list[list[Array]] = []
         for part in parts:
@@ -169,22 +173,33 @@ class Forms:
         for (number, wall), s, f in zip(body.walls, stress, force, strict=False):
             for loads, duals in zip(per_part, wall.pull(s, f, parts), strict=True):
                 loads[number] += wall.loads(duals, loads[number].shape)
-        first = len(body.walls)
-        for (number, _, _), s, f in zip(body.solids, stress[first:], force[first:], strict=False):
+        for number, core in body.cores:
             for part, loads in zip(parts, per_part, strict=True):
-                table = body.systems(part.harmonic).groups[number].table
-                C, S = part.around(body.theta)
-                volume = table.volume[:, :, None]
-                loads[number] += table.loads(_project(s, C, S, (3, 5)) / volume, _project(f, C, S, (1,)) / volume)
-        masses = force[first + len(body.solids) :]
+                loads[number] += core.loads(weights, self.value, part)
+        masses = force[len(body.walls) :]
         for (position, height, theta, _), f in zip(body.masses, masses, strict=True):
             for part, loads in zip(parts, per_part, strict=True):
-                here = cut(body.resonator, body.systems(part.harmonic), position, np.array([height]))
+                here = body.cut(part.harmonic, position, height)
                 C, S = part.around(theta)
                 pull = np.array([f[0] @ C, f[1] @ S, f[2] @ C])
                 amplitudes = pull @ here.table.displacement[0, 0, :, 0]
                 loads[here.group][here.element] -= np.outer(here.along[0], amplitudes)
         return [body.systems(part.harmonic).gather(loads) for part, loads in zip(parts, per_part, strict=True)]
+
+
+def _bordered(old: Array, columns: Array, before: int) -> Array:
+    """A symmetric matrix that has grown by columns."""
+    grown = np.zeros((len(columns), len(columns)))
+    grown[:before, :before] = old
+    grown[:, before:] = columns
+    grown[before:, :before] = columns[:before].T
+    grown[before:, before:] = (columns[before:] + columns[before:].T) / 2
+    return grown
+
+
+def _pieces(flat: Array, shapes: list[tuple[int, ...]]) -> list[Array]:
+    ends = np.cumsum([int(np.prod(shape)) for shape in shapes])
+    return [piece.reshape(shape) for piece, shape in zip(np.split(flat, ends[:-1]), shapes, strict=True)]
 
 
 def _load_shape(group: ShellGroup | SolidGroup) -> tuple[int, ...]:
@@ -193,14 +208,3 @@ def _load_shape(group: ShellGroup | SolidGroup) -> tuple[int, ...]:
         return elements, size // 3, 3
     functions = group.table.along.shape[2]
     return elements, functions, size // functions
-
-
-def _spin(fields: Array, C: Array, S: Array, sine: tuple[int, ...]) -> Array:
-    """Fields (cells, 1, components, points) at azimuths: those in `sine` vary as v does."""
-    turned = np.array([S if k in sine else C for k in range(fields.shape[2])])
-    return np.asarray(fields[..., None] * turned[:, None])
-
-
-def _project(fields: Array, C: Array, S: Array, sine: tuple[int, ...]) -> Array:
-    turned = np.array([S if k in sine else C for k in range(fields.shape[2])])
-    return np.asarray(np.einsum("esckq,cq->esck", fields, turned))
