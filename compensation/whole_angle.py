@@ -108,7 +108,10 @@ def simulate_whole_angle(
             shake = row.root @ generator.standard_normal(loop.size) if generator is not None else 0.0
             psi_end = psi + step * course.turn(n, begin, psi, means)
             for _ in range(2):
-                ends = course.forcing(n, begin, psi, means), course.forcing(n, end, psi_end, means)
+                first, last = course.forcing(n, begin, psi, means), course.forcing(n, end, psi_end, means)
+                centre = course.forcing(n, (begin + end) / 2, (psi + psi_end) / 2, means)
+                bow = (2 * centre - first - last) / 3  # gives the straight line the mean of the bent one
+                ends = first + bow, last + bow
                 offsets = course.offset(n, psi), course.offset(n, psi_end)
                 new = row.map @ row.start(state, ends, offsets, step) + shake
                 sums, waves = new[at["sum"]] / part, new[at["wave_sum"]] / part
