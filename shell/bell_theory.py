@@ -64,6 +64,8 @@ Pattern: TypeAlias = Callable[[Resonator, Sequence[Piece]], list[Amplitudes]]
 class TwoPatternModel:
     """BVG paper eq. (20): m₀ p̈ − 2Ωb q̇ + c₀ p = 0, m₀ q̈ + 2Ωb ṗ + c₀ q = 0 (c₁ = 0), for unit amplitude in m.
 
+    Attributes
+    ----------
     mass : m₀, kg.
     coupling : b, kg.
     stiffness : c₀, N/m.

@@ -52,6 +52,8 @@ class Axis:
 class FamilyResult:
     """One mode of m designs: arrays (m,).
 
+    Attributes
+    ----------
     frequency : Hz.
     bryan_factor : precession of the standing wave per angle of rotation.
     by_nu, by_thickness : ∂ ln f/∂ν and ∂ ln f/∂ ln h of the whole profile; NaN unless the family was built with slopes.

@@ -30,6 +30,8 @@ THICKEST = 0.05  # t/h up to which the first order is meant
 class Film:
     """A film on the shell; stem and root stay bare.
 
+    Attributes
+    ----------
     elastic : E, ν, ρ of the film.
     thickness : t in m, a number or a function of the position 0 ... 1 on the meridian.
     faces : "inner", "outer" or "both".

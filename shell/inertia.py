@@ -17,6 +17,8 @@ from shell.system import Group, SolidPart
 class MassProperties:
     """What a body of revolution weighs.
 
+    Attributes
+    ----------
     volume : m³. mass : kg. center : height z of the centre of mass, m.
     axial, transverse : moments of inertia about the axis and about a diameter through the centre of mass, kg m².
     """

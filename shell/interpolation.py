@@ -50,6 +50,8 @@ def tabulate(x: Array, count: int) -> tuple[Array, Array]:
 class SparsePolynomial:
     """The interpolant of a vector function.
 
+    Attributes
+    ----------
     indices : in lexical order.
     surpluses : (terms, outputs).
     """
@@ -83,6 +85,8 @@ class SparsePolynomial:
 class Exploration:
     """A sparse grid that grows where the first output of a function needs it.
 
+    Attributes
+    ----------
     function : point (dimensions,) -> outputs (k,).
     surpluses : of every index evaluated so far.
     """

@@ -33,6 +33,8 @@ FILM_HEAT = ("expansion_per_K", "conductivity_W_per_m_K", "heat_capacity_J_per_k
 class LossModel:
     """The causes of loss of one mode of an instrument.
 
+    Attributes
+    ----------
     vibration : the solved mode.
     causes : what loses energy, with uncertainty and source.
     left_out : sentences on what the budget does not have, and what would bring it in.

@@ -25,6 +25,8 @@ SIDES = ((None, -1.0), (None, 1.0), (-1.0, None), (1.0, None))  # (ξ, η) held 
 class Surface:
     """A free surface of the body as a mode moves it: arrays over quadrature points.
 
+    Attributes
+    ----------
     kind : inner or outer face of the shell, its free edges, the surface of roots, corners and stem.
     position : of the meridian, 0 ... 1, (points,).
     area : dA/π, m², (points,).

@@ -28,6 +28,8 @@ THICKEST = 0.05  # film over wall up to which it follows the face and leaves the
 class Film:
     """A film on the faces of the shell.
 
+    Attributes
+    ----------
     thickness : m.
     E, nu : Young's modulus (Pa) and Poisson ratio.
     loss : its own loss angle φ.

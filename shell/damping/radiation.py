@@ -35,6 +35,8 @@ ITERATIONS = 12  # at one shift
 class Layer:
     """An absorbing layer around a half-space: beyond `start` from the axis and from the surface, `width` wide, m.
 
+    Attributes
+    ----------
     surface : height of the half-space's surface; `below` whether it fills z < surface.
     wavelength : of shear waves in it.
     """

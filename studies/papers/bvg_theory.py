@@ -67,6 +67,8 @@ def compare_bell_theory(card: str = CARD) -> BellTheory:
 class LoopReading:
     """A planted rate read from the integrated equations (23): open loop (25) and force rebalance (26), rad/s.
 
+    Attributes
+    ----------
     planted, open_loop, rebalance : the rate, and its mean as read.
     scale_error : relative error of Ω = K A_q (30) with K of the resonator's constants.
     singular_share : part of the time in which ṗ of (24) is below a tenth of its amplitude.
