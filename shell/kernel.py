@@ -141,6 +141,30 @@ def shell_table(
     )
 
 
+def shell_gradients(section: Section, n: int, through: tuple[Basis, Basis, Basis], eta: tuple[Array, Array]) -> Array:
+    """All derivatives of the displacements that `shell_table` has the strains of, for geometric stiffness.
+
+    Rows ∂_s, ∂_θ, ∂_ζ of u, v, w in the shell's own frame, (elements, stations, 3, 3, points, 2, amplitudes):
+
+    (u_s + κ w)/A, v_s/A, (w_s - κ u)/A;  -(n u + t_r v)/ρ, (n v + t_r u + n_r w)/ρ, -(n w + n_r v)/ρ;  u_ζ, v_ζ, w_ζ.
+    """
+    points, _ = eta
+    h, slope, ds = (_tall(a) for a in (section.thickness, section.thickness_slope, section.ds))
+    t_r, kappa, n_r = _tall(section.tangent_r), _tall(section.curvature), _tall(-section.tangent_z)
+    zeta = h * points[:, None, None] / 2
+    A, rho = 1 + kappa * zeta, _tall(section.r) + n_r * zeta
+    (u, v, w), d_eta, d_xi = _jets(through, [basis.values.shape[1] for basis in through])
+    drift = slope / h * points[:, None, None]
+    u_s, v_s, w_s = (f / ds - drift * g for f, g in zip(d_xi, d_eta, strict=True))
+    rows = (
+        ((u_s + kappa * w) / A, v_s / A, (w_s - kappa * u) / A),
+        (-(n * u + t_r * v) / rho, (n * v + t_r * u + n_r * w) / rho, -(n * w + n_r * v) / rho),
+        tuple(2 / h * d for d in d_eta),
+    )
+    flat = np.stack(np.broadcast_arrays(*(one for row in rows for one in row)), axis=2)
+    return np.asarray(flat.reshape(*flat.shape[:2], 3, 3, *flat.shape[3:]))
+
+
 def lame(E: Array, nu: Array, plane_stress: bool) -> tuple[Array, Array]:
     """Lamé's λ and G; in plane stress λ is replaced by 2 G λ/(λ + 2 G) = E ν/(1 - ν²)."""
     G = E / (2 * (1 + nu))
