@@ -15,7 +15,7 @@ from shell.system import ShellGroup, System
 
 UNDONE = 1e-4  # share of the tolerance, as error of ω², at which the iteration stops: sensitivities feel the root of it
 MEMORY = 1.5e9  # bytes of element matrices beyond which a level is not tried
-FLOOR = 5e-10  # relative error of a frequency by rounding and iteration: measured up to 2.5e-10
+FLOOR = 3e-10  # relative error of a frequency by rounding and iteration: measured up to 2.5e-10
 DOUBT = 10.0  # the most by which an estimate is raised for what the one before it missed, and if waves are not resolved
 
 
@@ -51,13 +51,16 @@ def refine(
                 error * _experience(now, former, stated)
                 for error, now, former, stated in zip(lacking, solutions, *before, strict=True)
             ]
-        lacking = [error * (1.0 if _is_resolved(one) else DOUBT) for error, one in zip(lacking, solutions, strict=True)]
+        lacking = [  # the lowest mode has no short waves to speak of
+            error * (1.0 if not k or _is_resolved(one) else DOUBT)
+            for k, (error, one) in enumerate(zip(lacking, solutions, strict=True))
+        ]
         before = solutions, lacking
         lost = [find_loss(solution, factor, density) if thinnest < THIN else 0.0 for solution in solutions]
         errors = [sum(parts) for parts in zip(lacking, lost, undone, strict=True)]
         if max(errors) <= tolerance or max(lost) > max(lacking):
             break
-    return solutions, [max(error, FLOOR) for error in errors]
+    return solutions, [error + FLOOR for error in errors]
 
 
 def _is_resolved(solution: Solution) -> bool:
