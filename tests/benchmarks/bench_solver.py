@@ -8,6 +8,7 @@ on a body of revolution, split: that split is the mesh's own. A peer that is not
 The peers solve one coarse and one finer mesh of second or third order; the time is mesh, assembly and modes together.
 """
 
+import argparse
 import os
 import re
 import shutil
@@ -19,6 +20,7 @@ from pathlib import Path
 
 import numpy as np
 from bench_modes import forget
+from history import record
 
 from shell.assembly import build_system
 from shell.elastic import Elastic
@@ -284,7 +286,8 @@ def importable(name):
 
 
 def main():
-    """Print the table."""
+    """Print the table and keep the figures in history.jsonl."""
+    argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter).parse_args()
     print(f"threads of BLAS: {os.environ.get('OPENBLAS_NUM_THREADS', 'not limited')}; load {os.getloadavg()[0]:.1f}")
     rows = list(ours())
     for name, needs, solve, sizes in PEERS:
@@ -306,6 +309,7 @@ def main():
         print(
             f"{name:42} {1e3 * seconds:8.2f} ms {seconds / unit:8.2f} {unknowns:9d} {mean:12.4f} {mean / EXACT - 1:9.1e} {split:>9}"
         )
+    record("solvers side by side", milliseconds={name: round(1e3 * seconds, 3) for name, seconds, _, _ in rows})
     stages()
     return 0
 
