@@ -38,8 +38,8 @@ ALONG = 2  # degrees added along the shell
 SMOOTH = 1.8
 NAGHDI = 1.45  # and more in shell theory, where only the degrees along the meridian rise
 HIGHER = 0.05  # and by how much more for each mode below: its neighbours above are not known
-TIED = 1.5  # and more beside a corner, whose singularity reaches over
-SINGULAR = 1.5  # what the rule for corners still lacks, measured
+TIED = 1.2  # and more beside a corner, whose singularity reaches over
+SINGULAR = 1.4  # what the rule for corners still lacks, measured
 SLOPE = 1e-3  # a jump of dh/ds that is felt
 BLUNT = 2.0  # 4 λ of the blunt corner where the slope of the thickness jumps
 
