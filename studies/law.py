@@ -23,3 +23,13 @@ def law_of(
     ratio = replace(material.properties["poisson_ratio"], unsettled=(given.sd, 0.0, 0.0))
     open_one = replace(material, properties={**material.properties, "poisson_ratio": ratio})
     return build_law(instrument.resonator, open_one, T0, lowest, highest, theory, harmonic).with_material(material)
+
+
+def moved_law(law: "FrequencyLaw", instrument: "Instrument") -> "FrequencyLaw":
+    """Return the law of an instrument whose material has moved; solved anew where its Poisson's ratio has left the law's."""
+    from shell.errors import ShellError
+
+    try:
+        return law.with_material(instrument.material)
+    except ShellError:
+        return law_of(instrument, law.lowest, law.highest, law.theory, law.harmonic)

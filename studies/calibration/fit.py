@@ -21,7 +21,9 @@ from thermal.errors import ThermalError
 
 Array = NDArray[np.float64]
 MOST_STEPS = 14
-CLOSE = 0.03  # of a posterior standard deviation, of the largest last move
+CLOSE = 0.2  # of a posterior standard deviation, of the largest last move
+NEAR = 0.5  # the same, where no step makes the fit better: what differences and rounding leave
+SETTLED_NOISE = 1.0  # largest move after which the noise is not estimated anew
 OUTLIER = 5.0
 HALVINGS = 5
 UNSEEN = 0.1  # of the noise of one row: a column whose whole length is less tells nothing
@@ -71,9 +73,10 @@ def fit(problem: Problem, start: Array | None = None, progress: Progress = lambd
     state = problem.evaluate(np.zeros(problem.count) if start is None else start)
     rows = dict(problem.rows)
     noise: dict[str, Noise] = {}
-    converged, step, outliers = False, 0, dict.fromkeys(problem.responses, 0)
+    converged, step, size, outliers = False, 0, np.inf, dict.fromkeys(problem.responses, 0)
     for step in range(1, MOST_STEPS + 1):
-        noise = {name: _noise(problem, rows[name], state, name) for name in problem.responses}
+        if step <= 2 or size > SETTLED_NOISE:
+            noise = {name: _noise(problem, rows[name], state, name) for name in problem.responses}
         if step > 2:
             for name in problem.responses:
                 rows[name], outliers[name] = _spare_outliers(problem.rows[name], state, name, noise[name])
@@ -86,7 +89,11 @@ def fit(problem: Problem, start: Array | None = None, progress: Progress = lambd
             converged = True
             break
         move *= min(1.0, LONGEST_STEP / max(float(np.abs(move).max(initial=0.0)), 1e-12))
-        state = _advance(problem, state, move, noise, rows)
+        reached = _advance(problem, state, move, noise, rows)
+        if reached is None:
+            converged = size < NEAR
+            break
+        state = reached
     J, _ = _whitened(problem, state, noise, rows)
     information = J.T @ J
     covariance = np.asarray(np.linalg.inv(information + np.eye(len(information))))
@@ -140,22 +147,19 @@ def _whitened(
 
 def _advance(
     problem: Problem, state: State, move: Array, noise: Mapping[str, Noise], rows: Mapping[str, NoiseRows]
-) -> State:
-    """Go a step, or half of it until the objective falls."""
+) -> State | None:
+    """Go a step, or a quarter of it until the objective falls; None where it does not."""
     count = len(problem.priors.values)
     before = objective(problem, state, noise, rows)
-    part, refused = 1.0, None
+    part = 1.0
     for _ in range(HALVINGS):
         trial = state.point + part * move
         trial = np.concatenate([problem.priors.inside(trial[:count]), trial[count:]])
         try:
-            reached = problem.evaluate(trial)
-        except (InputError, ShellError, ThermalError, CompensationError) as error:
-            refused = error
-        else:
-            if objective(problem, reached, noise, rows) <= before + 1e-9 * abs(before):
-                return reached
+            reached = problem.evaluate(trial, slopes=False)
+        except (InputError, ShellError, ThermalError, CompensationError):
+            reached = None
+        if reached is not None and objective(problem, reached, noise, rows) < before:
+            return problem.evaluate(trial)
         part /= 4
-    if refused is not None and part < 1e-3:
-        return replace(state)
-    return state
+    return None

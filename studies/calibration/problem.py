@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from compensation.correlated import NoiseRows
 from studies.calibration.observed import HOUSING, RESPONSES, SETTLED, ObservedRun, SettledTable
 from studies.calibration.priors import Priors
+from studies.law import law_of, moved_law
 from studies.simulation.drive import Drive
 from studies.simulation.prediction import Prediction, Variations, predict
 
@@ -123,10 +124,8 @@ class Problem:
     def law_at(self, instrument: "Instrument") -> "FrequencyLaw":
         """Return the law of an instrument of this problem."""
         if any(value.name.startswith("resonator.") for value in self.priors.values):
-            from studies.law import law_of
-
             return law_of(instrument, self.law.lowest, self.law.highest, self.law.theory)
-        return self.law.with_material(instrument.material)
+        return moved_law(self.law, instrument)
 
     def drive_at(self, point: Array, k: int) -> Drive:
         """Return the drive of a part with the departures of a point."""
@@ -194,8 +193,6 @@ def wide_law(
     margin: float = 30.0,
 ) -> "FrequencyLaw":
     """Build the law over all that the runs reach, and so much more that trial states stay within it."""
-    from studies.law import law_of
-
     ends = [instrument.reference_temperature, *(float(T) for table in tables for T in table.temperature)]
     for run in runs:
         for drive in (run.inner, run.outer):

@@ -1,14 +1,25 @@
-"""`hrg fit frequency`: f(T) and its inverse from a steady-state table."""
+"""`hrg fit frequency`: f(T) and its inverse from a steady-state table, or from the settled parts of records.
+
+With --json one object, schema `hrg.fit-frequency/1`; from records it has besides `soaks`: `[{record, start_s, end_s,
+temperature_degC, frequency_Hz, error_Hz, left_K}]`, `left_K` what may be left of the change.
+"""
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from studies.settled import Soak
 
 
 def fit_frequency(
     table: str,
-    *,
+    *more: str,
     order: int = 3,
     reference_temperature: float = 0.0,
     resolution: float | None = None,
     save: str | None = None,
     report: str | None = None,
+    time_constant: float = 3000.0,
+    left: float = 0.05,
     json: bool = False,
 ) -> int:
     """Fit the frequency over temperature by a polynomial and invert it (HRG paper, equations 16 to 18, Table 2).
@@ -16,7 +27,14 @@ def fit_frequency(
     Parameters
     ----------
     table : str
-        A CSV file with the columns temperature_degC,frequency_Hz.
+        A CSV file with the columns temperature_degC,frequency_Hz; or a record, whose settled parts (soaks) are found and become
+        such a table.
+    more : str
+        Further records of the same device.
+    time_constant : float
+        Slowest time constant of the gyro in s, for what is left of a change in a record; hrg fit thermal measures it.
+    left : float
+        What may be left of a change, in K, where a record counts as settled.
     order : int
         Order of the polynomial; the paper takes 3.
     reference_temperature : float
@@ -32,14 +50,31 @@ def fit_frequency(
     """
     from studies.cli.output import print_json, print_table, say
     from studies.errors import naming
+    from studies.files.columns import read_header
     from studies.files.writing import write_text
     from studies.papers.hrg import study_table
     from studies.record import read_frequency_table, reading_resolution
     from studies.reports import frequency as page
 
-    data = read_frequency_table(table)
-    T, f = data.values["temperature_degC"], data.values["frequency_Hz"]
-    step = resolution if resolution is not None else reading_resolution(f)
+    soaks: tuple[Soak, ...] = ()
+    if more or "time_s" in read_header(table):
+        from studies.record import read_record
+        from studies.settled import find_soaks, settled_table
+
+        records = [read_record(path) for path in (table, *more)]
+        soaks = find_soaks(records, time_constant, left)
+        T, f, step = settled_table(soaks, table)
+        sha256 = records[0].sha256
+        for soak in soaks:
+            say(
+                f"settled: {soak.path}, {soak.start:.0f} to {soak.end:.0f} s: {soak.temperature_degC:.3f} °C,"
+                f" {soak.frequency_Hz:.5f} Hz ± {soak.error_Hz:.1g}; at most {soak.left_K:.2g} K left to settle."
+            )
+    else:
+        data = read_frequency_table(table)
+        T, f, sha256 = data.values["temperature_degC"], data.values["frequency_Hz"], data.sha256
+        step = reading_resolution(f)
+    step = resolution if resolution is not None else step
     with naming(table):
         study = study_table(T, f, order, reference_temperature, step)
     if save is not None:
@@ -48,7 +83,7 @@ def fit_frequency(
         from studies.models import Source, write_model
         from studies.models.kinds.frequency import save_frequency
 
-        source = Source(Path(table).name, data.sha256, len(f))
+        source = Source(Path(table).name, sha256, len(f))
         write_model(save_frequency(study.fit, (source,), "hrg-workbench, hrg fit frequency"), save)
         say(f"model: {save}")
     if report is not None:
@@ -70,6 +105,7 @@ def fit_frequency(
                 "calculated_degC": study.calculated_degC,
                 "error_degC": study.error_degC,
                 "recommended_order": study.orders.recommended,
+                **({"soaks": [_describe(soak) for soak in soaks]} if soaks else {}),
             }
         )
         return 0
@@ -77,3 +113,15 @@ def fit_frequency(
         print_table(block.caption, block.columns, block.rows, block.note)
     print(page.order_sentence(study))
     return 0
+
+
+def _describe(soak: "Soak") -> dict[str, str | float]:
+    return {
+        "record": soak.path,
+        "start_s": soak.start,
+        "end_s": soak.end,
+        "temperature_degC": soak.temperature_degC,
+        "frequency_Hz": soak.frequency_Hz,
+        "error_Hz": soak.error_Hz,
+        "left_K": soak.left_K,
+    }

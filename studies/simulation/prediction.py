@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from studies.errors import InputError
 from studies.instrument.dotted import look_up
-from studies.law import law_of
+from studies.law import law_of, moved_law
 from studies.loss import DampingLaw, damping_law
 from studies.simulation.drive import Drive
 from studies.simulation.heat_path import build_network, lump_shape, slowest_lag
@@ -249,7 +249,7 @@ class Variations:
         for distance in ends:
             moved, law = here.instrument.with_values({name: value + distance}), here.law
             if table == "material":
-                law = law.with_material(moved.material)
+                law = moved_law(law, moved)
             elif table == "resonator":
                 law = law_of(moved, law.lowest, law.highest, law.theory)
             damping = here.damping

@@ -1,0 +1,54 @@
+"""Soaks found in a record against the law of the device that made it."""
+
+import json
+
+import numpy as np
+import pytest
+
+from studies.cli import main
+from studies.errors import InputError
+from studies.instrument.card import load_card
+from studies.record import Record, write_record
+from studies.settled import find_soaks
+from studies.simulation.chamber import load_profile
+from studies.simulation.virtual_gyro import simulate_run
+
+
+@pytest.fixture(scope="module")
+def run():
+    return simulate_run(load_card("hrg-30mm"), load_profile("staircase -20 40 20 6h"), 1 / 30, 3)
+
+
+def test_every_soak_is_found_and_lies_on_the_law(run):
+    soaks = find_soaks([run.record])
+    assert [round(soak.temperature_degC) for soak in soaks] == [-20, 0, 20, 40]
+    for soak in soaks:
+        assert soak.left_K <= 0.05
+        exact = float(run.law.frequency(soak.temperature_degC + 273.15))
+        assert abs(soak.frequency_Hz - exact) < 1.5 * soak.error_Hz
+        assert soak.error_Hz < 0.02
+
+
+def test_what_has_not_settled_is_no_soak(run):
+    assert find_soaks([run.record], time_constant=1e6) == ()
+    short = simulate_run(load_card("hrg-30mm"), load_profile("ramp 20 -20 0.5"), 1 / 30, 1).record
+    assert find_soaks([short]) == ()
+    with pytest.raises(InputError, match="must be positive"):
+        find_soaks([short], tolerance=0.0)
+    with pytest.raises(InputError, match="frequency_Hz' is missing"):
+        find_soaks([Record({"time_s": np.arange(100.0), "housing_temperature_degC": np.ones(100)})])
+
+
+def test_the_command_takes_a_record(run, tmp_path, capsys):
+    path = tmp_path / "run.csv"
+    write_record(run.record, path)
+    assert main(["fit", "frequency", str(path), "--order", "2", "--json"]) == 0
+    answer = json.loads(capsys.readouterr().out)
+    assert answer["schema"] == "hrg.fit-frequency/1"
+    assert list(answer["soaks"][0]) == [
+        "record", "start_s", "end_s", "temperature_degC", "frequency_Hz", "error_Hz", "left_K",
+    ]  # fmt: skip
+    slope = float(run.law.slope(273.15) * run.law.frequency(273.15))
+    assert answer["coefficients"][1] == pytest.approx(slope, rel=2e-3)
+    assert main(["fit", "frequency", str(path), "--time-constant", "1e7"]) == 2
+    assert "settled part(s), where a fit over temperature needs several temperatures" in capsys.readouterr().err
