@@ -92,7 +92,6 @@ def draw_tables(generator: np.random.Generator) -> dict[str, Any]:
                 "name": "hysteresis",
                 "response": "bias_deg_per_h",
                 "half_width_K": abs(about(0.5)),
-                "width_scatter": 0.0,
                 "initial_memory": 0.0,
                 "loop_deg_per_h_per_K": about(0.1),
             }

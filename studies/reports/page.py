@@ -120,7 +120,8 @@ def _typeset_cell(text: str) -> str:
 
 def _folded(chapters: Sequence[Chapter]) -> list[bool]:
     """Return which chapters are folded: from the first on that would end below `OPEN_HEIGHT`, never the first two."""
-    reached, folded = 260.0 + 26 * len(chapters), []
+    reached = 260.0 + 26 * len(chapters)
+    folded: list[bool] = []
     for k, chapter in enumerate(chapters):
         reached += 80 + sum(_height(block, k == 0) for block in chapter.blocks)
         folded.append((k > 1 and reached > OPEN_HEIGHT) or any(folded))
