@@ -193,7 +193,7 @@ def _upright(clouds: Sequence[tuple[Array, int]], projector: Projector, motion: 
         center = _center(resonator)
         # how far the sectors end below the edge: points are so far apart there, SECTORS times closer over the whole circle
         apart = float(np.median(A @ found.x - s)) * resonator.length / resonator.size / SECTORS
-        motion = Motion(spin @ motion.rotation, spin @ (motion.offset - center) + center, motion.told, 3 * apart)
+        motion = Motion(spin @ motion.rotation, spin @ (motion.offset - center) + center, motion.told, 4 * apart)
     return motion
 
 
