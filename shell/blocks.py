@@ -37,6 +37,8 @@ class Solid:
 class Mesh:
     """Cells of a solid part with numbered corners and edges.
 
+    Attributes
+    ----------
     grid : r and z at the (p + 1)² Lobatto points, (2, cells, ξ, η).
     vertices : (cells, 4) numbers, order (ξ, η) = (-1, -1), (1, -1), (-1, 1), (1, 1).
     edges : (cells, 4) numbers, the sides η = -1, η = 1 (along ξ), ξ = -1, ξ = 1 (along η).

@@ -25,6 +25,8 @@ R, Z, ZERO = range(3)  # the gradients φ_r, φ_z, φ_0
 class CellTable:
     """Gradients of the functions of solid cells at their quadrature points.
 
+    Attributes
+    ----------
     gradients : φ_r, φ_z, φ/r, (cells, 3, points, functions).
     radius : r of the points, m, (cells, points).
     volume : dr dz times r and the quadrature weights, (cells, 1, points).
@@ -142,6 +144,8 @@ def in_order(degree: int) -> tuple[Index, Index]:
 class Reference:
     """The functions of a cell and those of its sides at points (ξ_i, η_j) of the reference square.
 
+    Attributes
+    ----------
     weights : of the points, (points,).
     along, across : functions of the sides.
     value, by_xi, by_eta : of the functions of the cell, (points, functions).

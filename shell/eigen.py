@@ -28,6 +28,8 @@ MOST = 300  # vectors in all, and four for each mode
 class Pattern:
     """Which unknowns each element has: first the ones of its own, then those it shares with others.
 
+    Attributes
+    ----------
     order : how the unknowns of each element, as they were given, are rearranged to that end.
     own : how many of them are its own.
     skeleton : numbers of the shared ones in an order in which they couple in a narrow band.

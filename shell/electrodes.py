@@ -69,6 +69,8 @@ def ring_of_electrodes(
 class Electrodes:
     """Electrodes with their gap.
 
+    Attributes
+    ----------
     pair : the mode that feels them.
     electrodes : patches with their voltages.
     gap : mean gap, m.

@@ -25,6 +25,8 @@ Orders = tuple[int, int, int]
 class StrainTable:
     """Strains at the quadrature points of elements, per unit of their section amplitudes.
 
+    Attributes
+    ----------
     strain : (elements, stations, 6, points, 2, amplitudes); the axis of length 2 is value and ξ-derivative.
     displacement : (elements, stations, 3, points, amplitudes).
     volume : (elements, stations, points), dr dz times r and the quadrature weights (times π it is a volume in m³).

@@ -33,6 +33,8 @@ class TheoryRangeWarning(UserWarning):
 class Mode:
     """A mode of vibration.
 
+    Attributes
+    ----------
     harmonic : n, the number of waves around.
     index : 0 for the lowest mode of its harmonic.
     frequency : Hz.

@@ -56,6 +56,8 @@ class Contact:
 class Frame:
     """What a root's patches hang on, the same at every level.
 
+    Attributes
+    ----------
     collar : arc length where the shell begins; `widest` : that of the outermost contact.
     corners : for each contact, the arc length of O.
     radii : bounds of the columns of the stem, from its side to the axis.

@@ -53,6 +53,8 @@ def find_constants(position: Array, elastic: Elastic | VaryingElastic, plane_str
 class EnergyFractions:
     """Shares of the strain energy; they add up to 1.
 
+    Attributes
+    ----------
     bending, membrane, shear : of the shell: strains that vary through the thickness, their mean, transverse shear.
     root : of the solid cap, root or corner.
     stem : of the stem.

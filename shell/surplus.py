@@ -84,6 +84,8 @@ Answer: TypeAlias = tuple[Array, Array, Array]
 class ShellExtension:
     """More functions on the elements of a chain, hierarchic along the meridian: those of its two ends, then the others.
 
+    Attributes
+    ----------
     table : with more orders through the thickness and along the meridian.
     is_old : which amplitudes the level has.
     to_old : from the values at the level's nodes.
@@ -132,6 +134,8 @@ class ShellExtension:
 class SolidExtension:
     """Functions of one more degree on the cells of a solid part, at the points of the level.
 
+    Attributes
+    ----------
     table : the new functions.
     products : of the same.
     edges, turned : the edge of the four first ones, and the sign that turns them the same way, (cells, 4).

@@ -297,6 +297,8 @@ class ToFree:
 class Inertia:
     """The mass of all elements: M x = Pᵀ m P x.
 
+    Attributes
+    ----------
     choice : P, from the free unknowns to those of the elements; `starts` : its first rows of the second group and on.
     blocks : m of the elements of every group, (elements, functions, functions), the same for each component of a solid.
     """

@@ -72,6 +72,8 @@ class Reading:
 class Sites:
     """Where material can be taken off.
 
+    Attributes
+    ----------
     azimuth : rad, (sites,). position : of the meridian, (sites,). capacity : most mass at each, kg, (sites,).
     gain : w_n of each site per harmonic n, relative split per kg, > 0, n -> (sites,).
     """

@@ -37,6 +37,8 @@ class LineMass:
 class Imperfection:
     """Small departures from the body of revolution; lengths in m, densities and moduli relative.
 
+    Attributes
+    ----------
     thickness : change of the wall, the middle surface kept.
     outer, inner : how far the outer and the inner face stand out of the material.
     offset : how far the middle surface stands out along its normal, the wall kept (a radius that varies around).

@@ -17,6 +17,8 @@ from shell.system import ShellGroup, System
 class CrossSection:
     """Where a position of the meridian lies among the elements, and the table of strains there, one station.
 
+    Attributes
+    ----------
     group, element : numbers of the group and of the element in it.
     along : values and ξ-derivatives of the functions along the element, (2, functions).
     place, section : the middle surface.

@@ -13,6 +13,8 @@ from shell.imperfection.pair import Pair
 class Split:
     """Two modes where the perfect resonator has a pair.
 
+    Attributes
+    ----------
     harmonic : n.
     frequency : of the perfect pair, Hz.
     shift : of the mean frequency, relative.

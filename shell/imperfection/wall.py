@@ -40,6 +40,8 @@ class Part:
 class Wall:
     """Points of the wall, (elements, stations, heights), at azimuths θ: geometry and material, (points, θ) each.
 
+    Attributes
+    ----------
     elements : which elements of the group these are.
     along : (2, stations, functions) values and ξ-derivatives. through : Legendre modes of u, v, w at the heights.
     ds : ds/dξ of the stations, (elements, stations).

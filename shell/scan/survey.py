@@ -29,6 +29,8 @@ HOLE = 25.0  # growth of a variance by gaps from which on the waves are not told
 class Face:
     """One face: how far it stands out of the material, as waves with their covariance.
 
+    Attributes
+    ----------
     side : -1 inner, 1 outer. low, high : positions that the points cover.
     coefficients : (waves, polynomials), complex a + i b. covariance : of all a and b, m².
     noise : of one point, m. points, outliers : numbers. cells : mean position, azimuth, δ and count of every cell.
