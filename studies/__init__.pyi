@@ -4,7 +4,7 @@ from .loss import LossModel, loss_model
 from .models import read_model, write_model
 from .record import Record, read_record, write_record
 from .sweeps.run import run_study
-from .workbench import compare, simulate
+from .workbench import calibrate, compare, diagnose, simulate
 
 __version__: str
 __all__ = [
@@ -12,7 +12,9 @@ __all__ = [
     "Instrument",
     "LossModel",
     "Record",
+    "calibrate",
     "compare",
+    "diagnose",
     "load_card",
     "loss_model",
     "read_model",

@@ -4,11 +4,18 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from studies.instrument.card import Instrument, load_card
+import numpy as np
+
+from studies.errors import InputError
+from studies.files.columns import read_header
+from studies.instrument.card import ZERO_CELSIUS, Instrument, load_card
 from studies.record import Record, read_record
 
 if TYPE_CHECKING:
+    from studies.calibration.calibrate import Calibration
     from studies.comparison import Comparison
+    from studies.diagnosis.investigate import Diagnosis
+    from studies.diagnosis.table import TableDiagnosis
 
 Card = Instrument | str | Path
 Run = Record | str | Path
@@ -45,6 +52,79 @@ def compare(*cards: Card) -> "Comparison":
     from studies.comparison import compare as compare_designs
 
     return compare_designs([open_card(card) for card in cards])
+
+
+def calibrate(card: Card, *data: Run, hold_out: int | None = None, exact: Sequence[str] = ()) -> "Calibration":
+    """Return the most probable values of a card, given data of one device: `hrg calibrate`.
+
+    Parameters
+    ----------
+    card : Instrument, path, or name of a card that ships
+    data : records or their paths, and paths of steady-state tables
+    hold_out : int, optional
+        Number of the record, from 1, that a second calibration without it predicts; the last of several unless given.
+    exact : names
+        Values of the card that stay fixed.
+
+    Raises
+    ------
+    InputError, ThermalError, ShellError
+        Data or a card that cannot be used.
+    """
+    from studies.calibration.calibrate import calibrate as find_values
+    from studies.calibration.observed import read_settled
+
+    tables = [one for one in data if _is_table(one)]
+    records = open_records([one for one in data if not _is_table(one)])
+    if not data:
+        raise InputError("give at least one record or steady-state table to calibrate with.")
+    if hold_out is not None and not 1 <= hold_out <= len(records):
+        raise InputError(f"hold_out = {hold_out}: there are {len(records)} records, numbered from 1.")
+    left = (hold_out or len(records)) - 1 if len(records) > 1 else None
+    return find_values(open_card(card), records, [read_settled(str(one)) for one in tables], left, exact)
+
+
+def diagnose(*runs: Run, card: Card | None = None) -> "Diagnosis | TableDiagnosis":
+    """Return what a campaign shows and the simulation lacks, with its causes: `hrg diagnose`; `.verdict` is the outcome.
+
+    Parameters
+    ----------
+    runs : records of one gyro or their paths, or the path of one steady-state table
+    card : Instrument, path, or name of a card that ships, optional
+        Its material law is the simulation. With a steady-state table: path or name.
+
+    Raises
+    ------
+    InputError
+        Records that cannot be used together.
+    """
+    from studies.diagnosis.campaign import load_campaign
+    from studies.diagnosis.extension import relative_law
+    from studies.diagnosis.investigate import investigate
+    from studies.diagnosis.table import diagnose_table
+
+    if not runs:
+        raise InputError("give the records of one gyro, or a steady-state table.")
+    if any(_is_table(one) for one in runs):
+        if len(runs) > 1:
+            raise InputError("a steady-state table is diagnosed alone; leave the other files out.")
+        law_card = card.path if isinstance(card, Instrument) else card
+        return diagnose_table(str(runs[0]), None if law_card is None else str(law_card))
+    records = open_records(runs)
+    if card is None:
+        return investigate(load_campaign(records))
+    instrument = open_card(card)
+    campaign = load_campaign(records, instrument.reference_temperature - ZERO_CELSIUS)
+    housing = np.concatenate([run.states.housing for run in campaign.runs])
+    return investigate(campaign, relative_law(instrument, housing))
+
+
+def _is_table(run: Run) -> bool:
+    """Return whether a path is that of a steady-state table (temperature_degC, no time_s)."""
+    if isinstance(run, Record):
+        return False
+    names = read_header(str(run))
+    return "time_s" not in names and "temperature_degC" in names
 
 
 def open_card(card: Card) -> Instrument:

@@ -144,7 +144,7 @@ def _print_law(law: "Material") -> None:
         open_ones = [[name, f"{sd:.2g}", c] for name, sd, c in zip(prior.names, prior.sd, beside, strict=True)]
         note = "p(T) = law(T) exp(a + b x + ½ c x²), x = T − 20 °C: log_value, log_slope, log_curvature; without log, + instead of exp."
         print_table(
-            f"What law '{law.law}' leaves open", ["Coefficient", "Standard deviation", "Correlation"], open_ones, note
+            f"Uncertainty of law '{law.law}'", ["Coefficient", "Standard deviation", "Correlation"], open_ones, note
         )
 
 

@@ -21,9 +21,9 @@ def fit_bias(
     """Fit the bias over the change of frequency and its rate, stepwise (HRG paper, equations 19 to 22).
 
     The records are of a gyro at rest while its temperature changes: time_s, bias_deg_per_h or measured_rate_deg_per_s,
-    and frequency_Hz or, for a gyro whose frequency is not measured, a temperature; that may act behind a lag and a loop,
-    which are taken where they pay. Terms are selected in two ways, shown side by side: as the paper does, and guarded against
-    noise that remembers. Give several runs, cooling and warming: then whole runs are held out.
+    and frequency_Hz or, for a gyro whose frequency is not measured, a temperature; a lag and a hysteresis
+    loop are added where they improve the fit. Terms are selected in two ways, shown side by side: as the paper does, and guarded against
+    autocorrelated noise. Give several runs, cooling and warming: then whole runs are held out.
 
     Parameters
     ----------

@@ -66,7 +66,9 @@ def fit_cross_damping(
             f"a frequency of {carrier:g} Hz with Q = {quality:g} is no resonator; give --frequency and --quality."
         )
     if not abs(calibration_temperature) <= 1000:
-        raise InputError(f"--calibration-temperature {calibration_temperature:g} °C is none; take one of the record.")
+        raise InputError(
+            f"--calibration-temperature {calibration_temperature:g} °C is not a temperature of a gyro: give one within the range of the record, in °C."
+        )
     gathered = gather_rest(records, OUTPUTS)
     with naming(", ".join(data)):
         study = study_cross_damping(

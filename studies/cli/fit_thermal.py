@@ -27,7 +27,7 @@ def fit_thermal(
     data : str
         One or more records (CSV): steps, ramps or cycles.
     card : str
-        A card whose law gives the bend of the frequency over temperature; without it a curvature is fitted.
+        A card whose law gives the curvature of the frequency over temperature; without it a curvature is fitted.
     lags : int
         Number of lags; as many as the records support unless given.
     confidence : float

@@ -95,7 +95,7 @@ def tcf(
     if moves:
         shown = sorted({0, len(T) // 2, len(T) - 1})
         print_table(
-            "What the law leaves open, and what one standard deviation of it moves the slope by (ppm/°C)",
+            "Uncertainty of the law: change of the slope by one standard deviation (ppm/°C)",
             ["Coefficient", "Standard deviation", *(f"at {at[k]:g} °C" for k in shown)],
             [
                 [m["coefficient"], f"{m['sd']:.2g}", *(f"{m['moves_slope_ppm_per_degC'][k]:+.2f}" for k in shown)]

@@ -53,14 +53,14 @@ def bias_page(study: "BiasStudy", source: str, method: Method) -> str:
 
 
 PATH_NOTE = (
-    "The paper's way takes every average for independent of the others. Drift and flicker make neighbours alike, so it finds"
-    " terms in noise alone; the guarded way estimates how long the noise remembers and shares the entry level among the"
-    " candidates that compete. A term enters only after the lower-order terms that it contains. BIC compares steps of one path."
+    "The paper's selection treats all averages as independent. Drift and flicker correlate neighbouring averages, so it finds"
+    " terms in noise alone; the guarded selection estimates the correlation time of the noise and shares the entry level among"
+    " the competing candidates. A term enters only after the lower-order terms that it contains. BIC compares steps of one path."
 )
 WHERE_READ = (
     "N is read where the curve falls like τ^(−1/2) and is by definition its value at τ = 1 s on that line; K where it rises like"
-    f" τ^(+1/2), at τ = 3 s on that line; B is the flat part over {FLAT:.3f}. All three are fitted to the whole curve, so that none"
-    " hangs on one point."
+    f" τ^(+1/2), at τ = 3 s on that line; B is the flat part over {FLAT:.3f}. All three are fitted to the whole curve, so none"
+    " depends on a single point."
 )
 
 
@@ -69,21 +69,21 @@ def verdict(study: "BiasStudy", method: Method) -> str:
     judged = study.by(method)
     if not judged.fit.terms:
         return (
-            "No term is supported by these data: the bias is as well described by a constant. Nothing is gained by"
-            " compensation, and the saved model only takes the mean out."
+            "These data support no term: a constant describes the bias as well. Compensation gains nothing; the saved model"
+            " only removes the mean."
         )
     if judged.held_out is None:
-        return f"Improvement on the fitted data {judged.training_gain:.2f} times. What it is worth elsewhere is unknown: {study.no_held_out}"
+        return f"Improvement on the fitted data {judged.training_gain:.2f} times. Its worth on other data is unknown: {study.no_held_out}"
     held = judged.held_out
     what = "runs" if held.by_runs else "blocks of the same run"
     sentence = (
         f"Improvement {judged.training_gain:.2f} times on the data that were fitted and {held.gain:.2f} times on held-out {what}"
-        f" ({held.coverage:.0%} of the rows lie where the rest has seen {study.runs[0].variable.name} and rate)."
+        f" ({held.coverage:.0%} of the rows lie within the fitted range of {study.runs[0].variable.name} and rate)."
     )
     if held.by_runs and held.gain <= 1:
-        sentence += " Held out, it makes things worse: do not use it before a further run says otherwise."
+        sentence += " On held-out runs it does harm: do not use it unless a further run shows a gain."
     elif not held.by_runs:
-        sentence += " One run cannot show more: record a second one, warming if this one cooled."
+        sentence += " For more, record a second run, warming if this one cooled."
     return sentence
 
 
@@ -168,7 +168,7 @@ def coefficients_table(judged: "Judged", output: str) -> Table:
     unit = fit.variable.unit
     note = (
         f"Valid from {low:.4f} to {high:.4f} {unit} and from {fit.rate_range[0]:.2e} to {fit.rate_range[1]:.2e} {unit}/s."
-        f" The noise remembers with θ = {fit.theta:.3f} (1: white, 0: random walk)."
+        f" The noise is autocorrelated with θ = {fit.theta:.3f} (1: white, 0: random walk)."
     )
     if judged.method == "guarded" and fit.theta < 0.99:
         note += " The selection weighs the drift of the bias down; these least-squares coefficients cannot, hence their errors."
@@ -255,7 +255,7 @@ def runs_figure(study: "BiasStudy", method: Method) -> Picture:
         axes[0, 0].set_ylabel(f"Output ({unit})")
         axes[1, 0].set_ylabel(f"Compensated ({unit})")
         axes[0, 0].legend()
-        caption = "Averages of the output with the model (above) and what is left (below), as in the paper's figure 6."
+        caption = "Averages of the output with the model (above) and residuals (below), as in the paper's figure 6."
         return draw(figure, caption, "Zero-rate output over time before and after compensation.")
 
 

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from compensation.bias import SELECTED_BY_THE_PAPER, TERMS
-from studies.papers.bias_twin import METHODS, PAPER_AFTER, PAPER_BEFORE, Spread, TwinFit, spread
+from studies.papers.bias_twin import METHODS, PAPER_AFTER, PAPER_BEFORE, TwinFit, spread
 from studies.reports import style
 from studies.reports.bias import METHOD, SYMBOLS
 from studies.reports.page import Chapter, Picture, Table, Text, draw
@@ -17,19 +17,20 @@ def twin_chapters(twins: Twins) -> list[Chapter]:
     """Return the chapter on figure 6 of the HRG paper for the page of `hrg reproduce`."""
     paper = _fits(twins, "paper", 1)
     before, after = (np.median([fit.training[k] for fit in paper]) for k in (0, 1))
-    cooling, warming = (spread([getattr(fit, run).gain for fit in paper]) for run in ("cooling", "warming"))
-    mended = spread([fit.warming.gain for fit in _fits(twins, "guarded", 3)])
+    cooling = spread([fit.cooling.gain for fit in paper])
+    mended = sum(fit.warming.gain < 1 for fit in _fits(twins, "guarded", 3))
+    harmed = sum(fit.warming.gain < 1 for fit in paper)
     told = (
         f"The paper fits six of nine terms to one cooling run, and reports that run: {PAPER_BEFORE} → {PAPER_AFTER} °/h,"
         f" {PAPER_BEFORE / PAPER_AFTER:.2f} times. Its data are not printed, so {len(twins)} virtual gyros with typical loss, gradient,"
         f" hysteresis and noise stand for them; nothing was tuned to the paper's figures (median {before:.2g} → {after:.2g} °/h). On"
         f" a second cooling run like the first the same models improve the bias {cooling.median:.2f} times (median). Applied to"
-        f" warming they make {warming.worse:.0%} of the gyros worse than no compensation; of the models of three runs, up and"
-        f" down, with a selection that knows that noise remembers, {mended.worse:.0%} do."
+        f" warming they make {harmed} of the {len(twins)} gyros worse than no compensation. Models fitted to three runs (cooling and"
+        f" warming), selected with autocorrelated noise in mind, made {mended or 'none'} of the {len(twins)} gyros worse."
     )
     return [
         Chapter(
-            "Figure 6: bias compensated, on data that the fit has not seen",
+            "Figure 6: compensated bias on data that the fit has not seen",
             [Text(told), twin_table(twins), twin_figure(twins), terms_table(twins)],
         )
     ]
@@ -42,7 +43,7 @@ def twin_table(twins: Twins) -> Table:
         for runs, label in ((1, "1 cooling"), (3, "cooling, warming, cooling")):
             fits = _fits(twins, method, runs)
             cells = [
-                _words(spread(gains))
+                _words(gains)
                 for gains in (
                     [fit.training_gain for fit in fits],
                     [fit.cooling.gain for fit in fits],
@@ -52,8 +53,8 @@ def twin_table(twins: Twins) -> Table:
             rows.append([f"twins, {METHOD[method]}", label, *cells])
     columns = ["Selection", "Fitted to", "On the training run", "Held out: new cooling run", "Held out: warming run"]
     note = (
-        "How many times smaller the standard deviation of 100 s averages becomes: median (5 %…95 % of the gyros; part of"
-        " them made worse)."
+        "How many times smaller the standard deviation of 100 s averages becomes: median (5 %…95 % of the gyros; how many of"
+        " them became worse)."
     )
     return Table("Improvement of the bias stability", columns, rows, note)
 
@@ -64,7 +65,14 @@ def terms_table(twins: Twins) -> Table:
     for number, name in enumerate(TERMS, 1):
         shares = [np.mean([name in fit.terms for fit in _fits(twins, method, 1)]) for method in METHODS]
         printed = "yes" if name in SELECTED_BY_THE_PAPER else "no"
-        rows.append([f"k{number}", SYMBOLS[name], printed, *(f"{share:.0%}" for share in shares)])
+        rows.append(
+            [
+                f"k{number}",
+                SYMBOLS[name],
+                printed,
+                *(f"{round(share * len(twins))} of {len(twins)}" for share in shares),
+            ]
+        )
     columns = ["", "Term", "in eq. (22)", *(f"twins, {METHOD[method]}" for method in METHODS)]
     return Table("How often a term is selected from one cooling run", columns, rows)
 
@@ -98,6 +106,7 @@ def _fits(twins: Twins, method: str, runs: int) -> list[TwinFit]:
     return [fit for fits in twins for fit in fits if fit.method == method and fit.runs == runs]
 
 
-def _words(gains: Spread) -> str:
-    worse = f"; {gains.worse:.0%} worse" if gains.worse else ""
-    return f"{gains.median:.2f} ({gains.low:.2f}…{gains.high:.2f}{worse})"
+def _words(gains: Sequence[float]) -> str:
+    found, harmed = spread(gains), sum(gain < 1 for gain in gains)
+    worse = f"; {harmed} of {len(gains)} worse" if harmed else ""
+    return f"{found.median:.2f} ({found.low:.2f}…{found.high:.2f}{worse})"

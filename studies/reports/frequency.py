@@ -46,7 +46,7 @@ def _facts(study: "FrequencyStudy") -> Facts:
             ("Slope in the middle", f"{float(fit.slope_ppm(middle)):.2f} ppm/°C", f"at {middle:g} °C"),
             ("Largest temperature error", f"{np.abs(study.error_degC).max():.3f} °C", "actual minus calculated"),
             ("Leave-one-out error", f"{fit.leave_one_out_rms:.4f} Hz", "rms on points the fit has not seen"),
-            ("Order that the readings ask for", name_order(study.orders.recommended), "F-test at the 5 % level"),
+            ("Order supported by the readings", name_order(study.orders.recommended), "F-test at the 5 % level"),
         ]
     )
 
@@ -152,19 +152,19 @@ def order_table(study: "FrequencyStudy") -> Table:
         )
     columns = ["Order", "Free", "SSE (Hz²)", "χ² (rounding)", "Leave-one-out (Hz)", "F against lower", "p"]
     note = "χ² takes rounding to the last digit as the only noise; free is the number of degrees of freedom."
-    return Table("Which order do the readings ask for?", columns, rows, note)
+    return Table("Which order do the readings support?", columns, rows, note)
 
 
 def order_sentence(study: "FrequencyStudy") -> str:
-    """Say which order the readings ask for."""
+    """Say which order the readings support."""
     asked = study.orders.recommended
     chosen = name_order(study.fit.order)
     if asked == study.fit.order:
-        return f"The next order does not improve on the {chosen} significantly: these readings ask for no more."
+        return f"The next order does not improve on the {chosen} significantly: a {chosen} is sufficient for these readings."
     if asked < study.fit.order:
-        return f"The {name_order(asked)} is enough: the {chosen} does not improve on it significantly."
+        return f"A {name_order(asked)} is sufficient: the {chosen} does not improve on it significantly."
     return (
-        f"The {chosen} leaves structure in its residuals: the {name_order(asked)} is significantly better, and its error on points"
+        f"A {chosen} is not sufficient: its residuals show structure. A {name_order(asked)} is significantly better; its error on points"
         f" left out falls from {study.fit.leave_one_out_rms:.4f} to {study.orders.fits[asked - 1].leave_one_out_rms:.4f} Hz."
     )
 

@@ -135,7 +135,7 @@ def _facts(parts: "Reproduction") -> Facts:
                 "largest error of Table 2, as printed",
             ),
             (
-                "Left when the law is imposed",
+                "Misfit with the silica law's curvature fixed",
                 f"{1e3 * parts.diagnosis.law_rms:.0f} mHz rms",
                 "readings are rounded to 10 mHz",
             ),
@@ -148,25 +148,25 @@ def _short(parts: "Reproduction") -> list[Text]:
     better = study.next_fit
     assert better is not None
     away = (physics.slope_ppm[-1] - float(study.fit.slope_ppm(20.0))) / physics.uncertainty_ppm[-1]
-    bends = abs(physics.curvature_measured - physics.curvature_law) / physics.curvature_uncertainty
+    away_curvature = abs(physics.curvature_measured - physics.curvature_law) / physics.curvature_uncertainty
     slopes = [value for _, value, _ in physics.laws]
     return [
         Text(
             "The two coefficients that the paper prints of its cubic are reproduced to their last digit, and the temperatures of its"
             f" Table 2 within {_farthest(study):.4f} °C; at −10 °C its own columns differ (−10.058, but an error of 0.0578; ours is"
             f" {study.error_degC[1]:.4f}). Its"
-            " conclusion that higher orders have little effect is not reproduced: a quartic leaves {better.sum_of_squares:.1e} Hz² where the cubic leaves"
-            f" {study.fit.sum_of_squares:.2e} Hz², and predicts points left out"
+            f" conclusion that higher orders have little effect is not reproduced: the residual sum of squares is {better.sum_of_squares:.1e} Hz² for a quartic, against"
+            f" {study.fit.sum_of_squares:.2e} Hz² for the cubic, and the quartic predicts omitted points"
             f" {study.fit.leave_one_out_rms / better.leave_one_out_rms:.1f} times better."
         ),
         Text(
             f"Physics gives the size of the slope: the prediction at 20 °C lies {abs(away):.1f} standard deviations"
             f" {'above' if away > 0 else 'below'} the measurement, and the published laws of fused silica themselves span"
-            f" {min(slopes):.0f} to {max(slopes):.0f} ppm/°C. It leaves the curvature open: the table bends"
-            f" {parts.diagnosis.curvature_ratio:.2f} times as much as the default law, a parabola through published statements"
+            f" {min(slopes):.0f} to {max(slopes):.0f} ppm/°C. It does not settle the curvature: that of the table is"
+            f" {parts.diagnosis.curvature_ratio:.2f} times that of the default law, a parabola through published statements"
             " about its maximum near 1100 °C. The slope of silica also vanishes near −200 °C, so that not even the sign of the"
             f" second derivative is settled in between: {physics.curvature_law:.2f} ± {physics.curvature_uncertainty:.2f}"
-            f" ppm/°C² is what the sources allow, and the measured {physics.curvature_measured:.2f} lies {bends:.1f} standard"
+            f" ppm/°C² is what the sources allow, and the measured {physics.curvature_measured:.2f} lies {away_curvature:.1f} standard"
             " deviations away. A slope that falls to 25 °C and rises again is beyond a constant curvature."
             " Seven points, each approached once, cannot say whether that is the glass, the thermometer, the mounting or"
             " the soak: a staircase up and down with a second thermometer would.",

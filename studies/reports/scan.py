@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from studies.scan import Scan
 
 
-LEAD = "Measured faces, brought onto the card's resonator and fitted with waves around, and the frequency splits that they cause."
+LEAD = "Measured faces, aligned with the card's resonator and fitted with circumferential harmonics, and the frequency splits that they cause."
 
 
 def write_scan_page(path: str, scan: "Scan", card: str, files: dict[str, str]) -> None:
@@ -23,11 +23,11 @@ def write_scan_page(path: str, scan: "Scan", card: str, files: dict[str, str]) -
 
 def _chapters(scan: "Scan", files: dict[str, str]) -> list[Chapter]:
     main = min(scan.splits, key=lambda one: abs(one.split.harmonic - 2))
-    axis = "not told" if main.slow_axis is None else f"{np.rad2deg(main.slow_axis.value):.1f}°"
+    axis = "undetermined" if main.slow_axis is None else f"{np.rad2deg(main.slow_axis.value):.1f}°"
     facts = Facts(
         [
             (f"split of n = {main.split.harmonic}", f"{1e3 * main.hertz.value:.2f} mHz", f"{1e3 * main.hertz.low:.2f} … {1e3 * main.hertz.high:.2f} mHz"),
-            ("slow axis", axis, "an antinode of the slower mode: mass is to be taken away there"),
+            ("slow axis", axis, "an antinode of the slower mode: remove mass there"),
             ("noise of a point", ", ".join(f"{1e9 * f.noise:.0f} nm" for f in scan.faces.values()), " and ".join(scan.faces)),
         ]
     )  # fmt: skip
@@ -37,7 +37,7 @@ def _chapters(scan: "Scan", files: dict[str, str]) -> list[Chapter]:
     return [
         Chapter("Result", [facts, *([one_face] if len(scan.faces) == 1 else []), _splits(scan)]),
         Chapter("Maps", [_maps(scan)]),
-        Chapter("Waves around", [_waves(scan)]),
+        Chapter("Circumferential harmonics", [_waves(scan)]),
         Chapter("Roundness", [_roundness(scan)]),
         Chapter("Faces", [_faces(scan, files)]),
     ]
@@ -50,7 +50,7 @@ def _splits(scan: "Scan") -> Table:
         rows.append([
             str(one.split.harmonic), f"{one.split.frequency:.3f}", f"{1e3 * one.hertz.value:.3f}",
             f"{1e3 * one.hertz.low:.3f} … {1e3 * one.hertz.high:.3f}",
-            "not told" if axis is None else f"{np.rad2deg(axis.value):.2f}",
+            "undetermined" if axis is None else f"{np.rad2deg(axis.value):.2f}",
             "" if axis is None else f"{np.rad2deg(axis.low):.2f} … {np.rad2deg(axis.high):.2f}",
             f"{1e3 * one.whole.hertz:.3f}", f"{np.rad2deg(one.whole.slow_axis):.2f}",
         ])  # fmt: skip
@@ -59,7 +59,7 @@ def _splits(scan: "Scan") -> Table:
         "Splits that the faces cause",
         columns,
         rows,
-        "First order feels wave 2n alone; every order adds what two waves do together.",
+        "First order: harmonic 2n alone; every order: with the products of two harmonics.",
     )
 
 
@@ -74,7 +74,7 @@ def _maps(scan: "Scan") -> Picture:
                 np.rad2deg(theta), x, shown, cmap="RdBu_r", vmin=-most, vmax=most, shading="nearest", rasterized=True
             )
             made.colorbar(image, ax=ax, label="µm")
-            ax.set(title={"wall": "Wall, mean of each circle taken off", "offset": "Middle surface"}.get(name, f"{name} face"),
+            ax.set(title={"wall": "Wall, mean of each circle removed", "offset": "Middle surface"}.get(name, f"{name} face"),
                    xlabel="azimuth (°)", ylabel="position (1: rim)", xticks=range(0, 361, 45))  # fmt: skip
             ax.grid(False)
         return draw(
@@ -102,17 +102,17 @@ def _waves(scan: "Scan") -> Picture:
             order = np.array([w.order for w in mine])
             ax.bar(order + shift, value, 0.28, color=colour, label=q)
             ax.errorbar(order + shift, value, np.maximum(spread.T, 0), fmt="none", ecolor="black", capsize=2)
-        ax.set(xlabel="wave around", ylabel="amplitude at the rim (µm)", yscale="log")
+        ax.set(xlabel="circumferential harmonic", ylabel="amplitude at the rim (µm)", yscale="log")
         ax.legend()
-        caption = "Waves around at the rim with 90 % intervals; the split of n comes from wave 2n."
-        return draw(made, caption, "bars of wave amplitudes")
+        caption = "Circumferential harmonics at the rim with 90 % intervals; the split of n comes from harmonic 2n."
+        return draw(made, caption, "bars of harmonic amplitudes")
 
 
 def _roundness(scan: "Scan") -> Table:
     rows = [
         [r.face, f"{r.position:.3f}", f"{1e6 * r.peak_to_valley:.3f}", f"{1e6 * r.rms:.3f}"] for r in scan.roundness
     ]
-    note = "Waves 2 and up of the fit; wave 1 is eccentricity of the circle."
+    note = "From harmonic 2 of the fit on; harmonic 1 is the eccentricity of the circle."
     return Table("Roundness of circles", ["face", "position", "peak to valley (µm)", "rms (µm)"], rows, note)
 
 

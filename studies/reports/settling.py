@@ -129,8 +129,8 @@ def soak_sentence(study: "SettlingStudy") -> str:
     return (
         f"Incomplete soak from room temperature flattens the slope: by {abs(largest.slope):.2f} ppm/°C at most here, of"
         f" the {abs(study.measured_slope - study.law_slope):.1f} by which the measured slope lies below the card's law."
-        f" In a linear network it hardly bends the curve (up to"
-        f" {max(abs(soak.curvature) for soak in linear):.4f} ppm/°C², from the law's own bend); radiation leaves"
+        f" In a linear network it hardly curves it (up to"
+        f" {max(abs(soak.curvature) for soak in linear):.4f} ppm/°C², from the law's own curvature); radiation leaves"
         f" {largest.curvature:+.4f} ppm/°C², {against} the {missing:+.3f} that are missing. Points taken one after another"
         f" upwards change the slope by {max((s.slope for s in upwards), key=abs):+.3f} ppm/°C and the curvature by"
         f" {max((s.curvature for s in upwards), key=abs):+.4f} ppm/°C² at most. Soak cannot be the cause of the measured"

@@ -42,7 +42,7 @@ def sweep_page(results: "Results") -> str:
         lead = f"{study.note} {lead}"
     chapters = [
         Chapter("In short", _short(results)),
-        Chapter("What was asked", _asked(results)),
+        Chapter("Definition", _asked(results)),
         *_failures(results),
         Chapter("Results", [_statistics(results), *_over_temperature(results), *_pictures(results), _designs(results)]),
         *influence_chapters(results),
@@ -151,7 +151,7 @@ def _failures(results: "Results") -> list[Chapter]:
         [*map(number, results.design(place).values()), results.remarks[place]]
         for place in results.failed[:MOST_ROWS].tolist()
     ]
-    words = "These designs have no value and nothing was put in its place: every number on this page leaves them out."
+    words = "These designs have no value and are left out of every number on this page."
     heads = [figures.label(p.name, p.unit) for p in results.study.parameters]
     return [
         Chapter(
@@ -179,18 +179,18 @@ def _statistics(results: "Results") -> Table:
         rows[-1].append(f"{n['error']:.1e}" if n["error"] is not None and np.isfinite(n["error"]) else "")
     heads = ["Quantity", "Unit", "Nominal", "Mean", "Standard deviation", "Least", "Greatest", "Numerical error"]
     note = "The numerical error is the largest estimate of the solver for any design, against the exact solution of its theory."
-    return Table("Over all designs that have a value", heads, rows, note)
+    return Table("All designs with a value", heads, rows, note)
 
 
 def _designs(results: "Results") -> Table:
     columns = main_columns(results)
     places = list(range(len(results)))
-    note = "A click on a heading sorts."
+    note = "Click a heading to sort."
     if len(places) > MOST_ROWS:
         order = np.argsort(results.column(columns[0].name), kind="stable")
         order = order[np.isfinite(results.column(columns[0].name)[order])]
         places = [*order[:ENDS].tolist(), *order[-ENDS:].tolist()]
-        note += f" Of {len(results)} designs the {ENDS} with the least and greatest {columns[0].label}; export has all."
+        note += f" Shown: of {len(results)} designs, the {ENDS} with the least and the {ENDS} with the greatest {columns[0].label}; hrg study export writes all."
     rows = []
     for place in places:
         numbers = (results.column(column.name)[place] for column in columns)

@@ -61,7 +61,7 @@ def _slopes(results: "Results", column: "Column") -> list[Block]:
         unit = _slope_unit(column.unit, units[slope.parameter])
         rows.append([slope.parameter, f"{slope.slope:.6g}", f"{slope.uncertainty:.2g}", unit, f"{slope.swing:.6g}"])
     heads = ["Parameter", "Slope", "±", "Unit", f"Swing over the range ({column.unit})"]
-    note = "± holds the curvature beyond the outer levels and the solver's error; a slope within it is none."
+    note = "± holds the curvature beyond the outer levels and the solver's error; a slope smaller than that is not significant."
     return [
         Table(f"Slopes of {column.label} at the nominal design", heads, rows, note, True),
         figures.tornado_figure(found, column),
@@ -77,7 +77,7 @@ def _shares(results: "Results", column: "Column") -> list[Block]:
         [name, f"{slope:.6g}", f"{half:.2g}", _slope_unit(column.unit, units[name]), percent(share)]
         for name, slope, half, share in zip(found.parameters, found.slope, found.half_width, found.share, strict=True)
     ]
-    note = f"A linear law explains {percent(found.r_squared)} of the variance; ± is half a 95 % interval, a slope within it is none."
+    note = f"A linear law explains {percent(found.r_squared)} of the variance; ± is half a 95 % interval; a slope smaller than that is not significant."
     return [
         Table(
             f"Linear influence on {column.label}",

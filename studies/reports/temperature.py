@@ -30,7 +30,7 @@ def temperature_page(
         ("Curve", f"± {facts['curve_uncertainty_K']:.2g} K", "one standard deviation of the fitted f(T)"),
     ]
     note = (
-        "The curve was fitted to settled readings. What the frequency shows is the resonator's own temperature, as the mode"
+        "The curve was fitted to settled readings. The frequency shows the resonator's own temperature, as the mode"
         " weighs it; the housing runs ahead of it while the temperature changes."
     )
     lead = f"The resonator's temperature in {run}, read from its frequency with {model}."

@@ -10,7 +10,7 @@ from studies.reports.style import BLUE, GREEN, VERMILION, figure
 if TYPE_CHECKING:
     from shell.trimming import Plan
 
-LEAD = "Cut round 1, let the shell come back to temperature, measure, and plan again: the later rounds are what is expected, not orders."
+LEAD = "Cut round 1, let the shell return to temperature, measure, and plan again: later rounds are predictions, not instructions."
 
 
 def write_trim_page(path: str, plan: "Plan", payload: dict[str, Any]) -> None:
@@ -47,7 +47,7 @@ def _cuts(payload: dict[str, Any], number: int) -> Table:
         [str(k), f"{c['azimuth_deg']:.2f}", f"{c['height_mm']:.3f}", f"{c['mass_ug']:.3f}", "" if c["depth_um"] is None else f"{c['depth_um']:.3f}", "☐"]
         for k, c in enumerate(sorted(one["cuts"], key=lambda c: c["azimuth_deg"]), 1)
     ]  # fmt: skip
-    title = f"Round {number}: cut this" if number == 1 else f"Round {number}, expected: plan anew before cutting"
+    title = f"Round {number}: cut this" if number == 1 else f"Round {number}, predicted: plan again before cutting"
     return Table(
         title,
         ["cut", "azimuth (°)", "height z (mm)", "mass (µg)", "depth (µm)", "done"],

@@ -91,12 +91,12 @@ def why_not(study: "Study") -> str:
         name = parameter.name
         follows = name == TEMPERATURE or name.startswith((MATERIAL, *ELSEWHERE))
         if not (follows or (name.startswith(DIMENSIONS) and not isinstance(parameter.nominal, str))):
-            return f"the parameter '{name}' is none that a family follows"
+            return f"families do not cover the parameter '{name}'"
     for asked in study.asked:
         if asked.quantity.name not in FAST:
-            return f"the quantity '{asked.columns[0].name}' is none that a family gives"
+            return f"families do not give the quantity '{asked.columns[0].name}'"
         if asked.options["theory"] == "rayleigh":
-            return "families are for theory solid or shell"
+            return "families need the theory solid or shell"
     return ""
 
 

@@ -1,4 +1,4 @@
-"""Curvature: the frequency law has more bends than the material law knows."""
+"""Curvature: the frequency law has more curvature than the material law."""
 
 import numpy as np
 
