@@ -5,9 +5,12 @@ process, and a machine that cannot draw gives a `NoOpenGL` with the remedy.
 """
 
 import io
+import os
+import shutil
 import subprocess
 import sys
 import tempfile
+import threading
 from collections.abc import Sequence
 from dataclasses import fields
 from math import pi
@@ -119,17 +122,29 @@ def _draw(scenes: Scene | Sequence[Scene], view: View, window: tuple[int, int], 
 
 def _run_child(folder: str, seconds: float) -> None:
     job = [sys.executable, "-m", "shell.render", folder]
+    listened, held = os.pipe()  # its other end closes when this process ends, however it ends
     try:
-        done = subprocess.run(job, capture_output=True, timeout=seconds, cwd=Path(__file__).parents[1])
+        done = subprocess.run(job, stdin=listened, capture_output=True, timeout=seconds, cwd=Path(__file__).parents[1])
     except subprocess.TimeoutExpired:
         raise NoOpenGL(
             f"drawing took more than {seconds:.0f} s and was stopped; check the OpenGL of this machine."
         ) from None
+    finally:
+        os.close(listened)
+        os.close(held)
     if done.returncode != 0:
         raise NoOpenGL(REMEDY)
 
 
+def _end_with_parent(folder: str) -> None:
+    """Leave nothing behind when the process that wants the pictures was killed: no work, no folder."""
+    sys.stdin.buffer.read()
+    shutil.rmtree(folder, ignore_errors=True)
+    os._exit(1)
+
+
 if __name__ == "__main__":
+    threading.Thread(target=_end_with_parent, args=(sys.argv[1],), daemon=True).start()
     from shell.drawing import draw_job
 
     draw_job(sys.argv[1])

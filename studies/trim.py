@@ -46,6 +46,8 @@ class Teeth:
 
 
 GROOVE = Groove()
+MOST_TEETH = 1000
+NARROWEST = 1e-6  # m: no tool cuts a groove that is narrower
 
 
 def rim_sites(
@@ -62,13 +64,20 @@ def rim_sites(
 
     Their number is a multiple of 4n for every harmonic, so that the antinodes of each are among them and balance each other.
     """
-    if not (groove.width > 0 and groove.length > 0 and 0 < groove.depth_limit < 1):
-        raise InputError("a cut has a positive width and length, and takes a share of the wall between 0 and 1.")
+    if not (groove.width >= NARROWEST and NARROWEST <= groove.length < np.inf and 0 < groove.depth_limit < 1):
+        raise InputError(
+            f"a cut is at least {1e6 * NARROWEST:g} µm wide and long, and takes a share of the wall between 0 and 1."
+        )
     step = int(np.lcm.reduce([4 * n for n in pairs]))
     azimuth, position, capacity = [], [], []
     for x in heights:
         place = resonator.at([x * resonator.length])
-        room = int(2 * pi * float(place.r[0]) / groove.width)
+        circle = 2 * pi * float(place.r[0])
+        if not groove.width <= circle:
+            raise InputError(
+                f"a cut of {1e3 * groove.width:g} mm is wider than the circle it lies on ({1e3 * circle:.3g} mm)."
+            )
+        room = int(circle / groove.width)
         count = max(step, room // step * step)
         azimuth.append(axis + 2 * pi * np.arange(count) / count)
         position.append(np.full(count, x))
@@ -80,8 +89,8 @@ def rim_sites(
 
 def tooth_sites(pairs: Mapping[int, Pair], teeth: Teeth) -> Sites:
     """One site on every tooth."""
-    if not (teeth.count >= 4 and teeth.limit > 0):
-        raise InputError("teeth are at least 4, and what may be taken off each is a positive mass.")
+    if not (4 <= teeth.count <= MOST_TEETH and 0 < teeth.limit < np.inf and np.isfinite(teeth.azimuth)):
+        raise InputError(f"teeth are 4 to {MOST_TEETH}, and what may be taken off each is a positive mass.")
     around = (teeth.azimuth + 2 * pi * np.arange(teeth.count) / teeth.count) % (2 * pi)
     along = np.ones(teeth.count)
     return Sites(around, along, np.full(teeth.count, teeth.limit), _gains(pairs, along))
@@ -135,8 +144,16 @@ def plan_for_card(
     goal : Hz. heights : positions of the cuts. groove, teeth : what is cut. removal_error, gain_error, unbalance : see `plan_trim`.
     gain : effect of the last round over its prediction, which scales what a mass is taken to do.
     """
-    if not gain > 0:
+    if not 0 < goal < np.inf:
+        raise InputError("the goal is a positive split in Hz.")
+    if not 0 < gain < np.inf:
         raise InputError("the gain is the measured change of the split over the predicted one, a positive number.")
+    if not (0 <= removal_error < 1 and 0 <= gain_error < 1):
+        raise InputError("the relative standard errors of the cuts lie in 0 ... 1 (0.02 is 2 %).")
+    if not all(np.isfinite((split, axis)).all() and 0 <= error < np.inf for _, split, axis, error in measured):
+        raise InputError("the splits and axes are finite numbers, and the reading error is one from 0 up.")
+    if not all(0 <= x <= 1 for x in heights):
+        raise InputError("a position along the meridian lies in 0 ... 1 (rim).")
     pairs = {}
     for n, *_ in measured:
         if n in pairs:

@@ -188,8 +188,17 @@ def run() -> None:
     def end(number: int, frame: object) -> None:
         raise KeyboardInterrupt
 
+    def again(lost: Any) -> None:
+        """An interruption that fell into a callback of the interpreter, which drops what is raised there, comes again."""
+        if issubclass(lost.exc_type, KeyboardInterrupt):
+            signal.signal(signal.SIGALRM, end)
+            signal.setitimer(signal.ITIMER_REAL, 0.02)
+        else:
+            sys.__unraisablehook__(lost)
+
     try:
         signal.signal(signal.SIGTERM, end)
+        sys.unraisablehook = again
         for stream in (sys.stdout, sys.stderr):
             if stream is not None and hasattr(stream, "reconfigure"):
                 stream.reconfigure(errors="backslashreplace")

@@ -1,5 +1,7 @@
 """`hrg diagnose`: what the simulation gets wrong, why, and what the repair is worth."""
 
+from studies.cli.arguments import Seed
+
 
 def diagnose(
     *runs: str,
@@ -9,7 +11,7 @@ def diagnose(
     plan: list[str] | None = None,
     chamber: str | None = None,
     draws: int = 100,
-    seed: int = 0,
+    seed: Seed = 0,
     json: bool = False,
 ) -> int:
     """Name the physical effect that a campaign shows and the simulation lacks, or say that it cannot be told.

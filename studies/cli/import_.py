@@ -57,14 +57,14 @@ def import_(
 
 
 def _draft(raw: tuple[str, ...], path: str, json: bool) -> int:
-    from pathlib import Path
+    import os
 
     from studies.cli.output import print_json, say
     from studies.errors import InputError
     from studies.files.writing import write_text
     from studies.importing.draft import draft_map
 
-    if Path(path).exists():
+    if os.path.exists(path):
         raise InputError(f"{path}: exists and is not overwritten; remove it or choose another name for the draft.")
     draft = draft_map(raw)
     write_text(path, draft.text)

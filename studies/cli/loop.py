@@ -8,6 +8,8 @@ With --json one object, schema `hrg.loop/1`: `card`, `mode`, `temperature_degC`,
 
 from typing import TYPE_CHECKING, Any
 
+from studies.cli.arguments import Seed
+
 if TYPE_CHECKING:
     from studies.simulation.loop import LoopStudy
 
@@ -31,7 +33,7 @@ def loop(
     rate: float = 0.0,
     profile: str | None = None,
     both_ways: bool = False,
-    seed: int = 0,
+    seed: Seed = 0,
     noiseless: bool = False,
     json: bool = False,
 ) -> int:
@@ -73,13 +75,16 @@ def loop(
     from studies.instrument.card import ZERO_CELSIUS, load_card
     from studies.law import law_of
     from studies.loss import settled_loss
+    from studies.simulation.drive import MOST_ROWS
     from studies.simulation.loop import require_loop, study_loops
 
     instrument = load_card(card)
     keys = require_loop(instrument)
     T = instrument.reference_temperature if temperature is None else temperature + ZERO_CELSIUS
-    if not (row > 0 and hours > 0):
-        raise InputError("--row and --hours must be positive.")
+    if not (0 < row < np.inf and 0 < hours < np.inf and np.isfinite(rate)):
+        raise InputError("--row and --hours must be positive, and --rate finite.")
+    if hours * 3600 / row > MOST_ROWS:
+        raise InputError(f"--hours {hours:g} in rows of {row:g} s are more than {MOST_ROWS} rows; take longer rows.")
     law = law_of(instrument, min(T, instrument.reference_temperature) - 5, max(T, instrument.reference_temperature) + 5)
     frequency = float(np.ravel(law.frequency(T))[0])
     inverse_q, instrument = settled_loss(instrument, T)

@@ -81,11 +81,11 @@ def study(
 
 
 def _refuse_existing(path: str) -> None:
-    from pathlib import Path
+    import os
 
     from studies.errors import InputError
 
-    if Path(path).exists():
+    if os.path.lexists(path):
         raise InputError(f"{path}: exists and is not overwritten; remove it or choose another name.")
 
 

@@ -60,6 +60,7 @@ def render(
     json : bool
         Print one JSON object (schema hrg.render/1) instead of a line.
     """
+    import os
     from pathlib import Path
 
     from studies.cli.output import print_json, say
@@ -74,7 +75,7 @@ def render(
         raise InputError("several harmonics go together only in an .html page; make one file for each.")
     if colour == "temperature" and field is None:
         raise InputError("--colour temperature needs --field FIELD.csv (position,temperature_degC along the meridian).")
-    if Path(out).is_dir():
+    if os.path.isdir(out):
         raise InputError(f"--out {out}: is a folder; give the name of a file.")
     along = read_field(field) if field is not None else None
     shown = _solve(card, harmonic, index, temperature, theory, kind)

@@ -7,6 +7,8 @@ With --json one object, schema `hrg.simulate/1`: `card`, `out`, `rows`, `columns
 
 from typing import Literal
 
+from studies.cli.arguments import Seed
+
 
 def simulate(
     card: str,
@@ -14,7 +16,7 @@ def simulate(
     *,
     out: str,
     rate: float = 1.0,
-    seed: int = 0,
+    seed: Seed = 0,
     noiseless: bool = False,
     theory: Literal["solid", "shell"] = "solid",
     boundary: Literal["chamber", "housing"] | None = None,
@@ -54,14 +56,11 @@ def simulate(
     import numpy as np
 
     from studies.cli.output import print_json, say
-    from studies.errors import InputError
     from studies.instrument.card import load_card
     from studies.record import write_record
     from studies.simulation.chamber import load_drive
     from studies.simulation.virtual_gyro import simulate_run
 
-    if seed < 0:
-        raise InputError(f"--seed {seed}: a seed is a whole number from 0 up.")
     instrument = load_card(card)
     run = simulate_run(instrument, load_drive(profile, boundary, rate), rate, seed, not noiseless, theory)
     rows = len(run.record)

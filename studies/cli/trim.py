@@ -223,28 +223,35 @@ def _given(
 
 
 def _from_scan(path: str, harmonic: tuple[int, ...]) -> list[tuple[int, float, float, float]]:
-    from json import JSONDecodeError, loads
+    from json import loads
     from math import radians
 
     from studies.errors import InputError
     from studies.files.reading import read_bytes
+    from studies.files.toml import check_number
 
+    refused = InputError(f'{path}: is not what hrg scan --json writes (schema "hrg.scan/1").')
+    data = read_bytes(path)
     try:
-        content = loads(read_bytes(path))
+        content = loads(data)
         if content["schema"] != "hrg.scan/1":
-            raise KeyError
+            raise refused
         entries = {entry["harmonic"]: entry for entry in content["splits"]}
-    except (JSONDecodeError, UnicodeDecodeError, KeyError, TypeError):
-        raise InputError(f'{path}: is not what hrg scan --json writes (schema "hrg.scan/1").') from None
+    except (ValueError, KeyError, TypeError, RecursionError):
+        raise refused from None
     found = []
     for n in harmonic:
         if n not in entries:
             raise InputError(f"{path}: has no split of n = {n}: it has {', '.join(str(k) for k in entries)}.")
-        entry = entries[n]
-        if entry["slow_axis_deg"] is None:
-            raise InputError(f"{path}: the split of n = {n} is not told from 0: measure better, do not cut.")
-        size = entry["split_Hz"]
-        found.append((n, size["value"], radians(entry["slow_axis_deg"]["value"]), (size["high"] - size["low"]) / 3.29))
+        try:
+            axis, size = entries[n]["slow_axis_deg"], entries[n]["split_Hz"]
+            if axis is None:
+                raise InputError(f"{path}: the split of n = {n} is not told from 0: measure better, do not cut.")
+            numbers = [size["value"], axis["value"], size["low"], size["high"]]
+        except (KeyError, TypeError):
+            raise refused from None
+        split, degrees, low, high = (check_number(x, f"{path}: the split of n = {n}") for x in numbers)
+        found.append((n, split, radians(degrees), (high - low) / 3.29))
     return found
 
 
@@ -261,6 +268,8 @@ def _unbalance(words: tuple[str, ...]) -> dict[int, complex]:
         try:
             k, size, angle = match.groups() if match else ("", "", "")
             found[int(k)] = 1e-9 * float(size) * cmath.exp(1j * int(k) * radians(float(angle)))
+            if not cmath.isfinite(found[int(k)]):
+                raise ValueError
         except ValueError:
             raise InputError(f"--unbalance {word}: write k:µg@degrees, such as 1:120@35, with k 1, 2 or 3.") from None
     return found

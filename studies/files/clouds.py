@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 from studies.errors import InputError
+from studies.files.reading import check_file
 
 if TYPE_CHECKING:
     from numpy import float64
@@ -40,11 +41,7 @@ def read_cloud(path: str | Path, unit: Unit = "mm") -> "Array | Grid":
     InputError
         There is no such file, or a line of it is not numbers.
     """
-    file = Path(path)
-    if not file.is_file():
-        raise InputError(
-            f"{path}: " + ("is a folder; give the name of a file." if file.is_dir() else "there is no such file.")
-        )
+    file = check_file(path)
     if file.suffix.lower() in MESHES:
         return _read_mesh(file) * UNITS[unit]
     first, skipped = _first_line(file)
@@ -88,15 +85,19 @@ def _read_text(path: Path, first: str) -> "Array":
 
 
 def _read_mesh(path: Path) -> "Array":
+    import logging
+
     import numpy as np
     import trimesh
 
+    logging.getLogger("trimesh").setLevel(logging.CRITICAL)  # what it cannot read is said below, in one sentence
     try:
         loaded = trimesh.load(path, process=False)
         points = np.asarray(loaded.vertices, dtype=float)
     except Exception as error:
         raise InputError(f"{path}: cannot be read as a mesh or point cloud ({error}).") from error
-    if points.ndim != 2 or not len(points):
+    points = points[np.isfinite(points).all(axis=1)] if points.ndim == 2 else points[:0]
+    if not len(points):
         raise InputError(f"{path}: has no points.")
     if path.suffix.lower() == ".stl":
         points = np.unique(points, axis=0)  # each corner stands there once per triangle
@@ -125,6 +126,8 @@ def _read_grid(path: Path, skipped: int) -> Grid:
             "leave out a column that repeats the first at 360°, or fill the missing ones with empty cells."
         )
     values = 1e-6 * table.to_numpy()[order]
+    if not np.isfinite(values).any():
+        raise InputError(f"{path}: every cell of the table is empty; there is nothing to fit.")
     if np.nanmax(abs(values)) > 2e-3:
         raise InputError(f"{path}: departures of {1e3 * np.nanmax(abs(values)):.3g} mm: the table's cells are in µm.")
     return Grid(position[order], azimuth, values)

@@ -18,6 +18,16 @@ def read_bytes(path: str | Path, most: int = MOST_BYTES) -> bytes:
         There is no such file, it is a folder, a device or a pipe, it is too large, or it cannot be read.
     """
     try:
+        return check_file(path, most).read_bytes()
+    except InputError:
+        raise
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read ({error.strerror}).") from error
+
+
+def check_file(path: str | Path, most: int = MOST_BYTES) -> Path:
+    """Return the path of a regular file of at most so many bytes; raise as `read_bytes` for anything else."""
+    try:
         about = Path(path).stat()
         if stat.S_ISDIR(about.st_mode):
             raise InputError(f"{path}: is a folder; give the name of a file.")
@@ -28,7 +38,7 @@ def read_bytes(path: str | Path, most: int = MOST_BYTES) -> bytes:
                 f"{path}: has {about.st_size / 1e6:,.0f} MB, and {most / 1e6:,.0f} MB are the most that is read; split it or"
                 " record at a lower rate."
             )
-        return Path(path).read_bytes()
+        return Path(path)
     except InputError:
         raise
     except FileNotFoundError:

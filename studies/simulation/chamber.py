@@ -1,5 +1,6 @@
 """A chamber profile from words (`thermal.profile`) or from a file `time_s,chamber_temperature_degC`; a record as a drive."""
 
+import os
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -23,7 +24,7 @@ def load_profile(text: str) -> "Profile":
     from studies.record import read_profile
     from thermal.profile import Profile, parse_profile
 
-    if Path(text).suffix != ".csv" and not Path(text).is_file():
+    if Path(text).suffix != ".csv" and not os.path.isfile(text):
         return parse_profile(text)
     table = read_profile(text)
     if len(table.values["time_s"]) < 2:
@@ -46,7 +47,7 @@ def load_schedule(text: str) -> "tuple[Profile, Mapping[str, NDArray[np.float64]
     from studies.simulation.drive import COMMAND_COLUMNS
     from thermal.profile import Profile
 
-    columns = read_header(text) if Path(text).is_file() else []
+    columns = read_header(text) if os.path.isfile(text) else []
     commands = [name for name in columns if name in COMMAND_COLUMNS]
     if not commands or not set(PROFILE_COLUMNS) <= set(columns):
         return load_profile(text), {}
@@ -79,7 +80,7 @@ def load_drive(text: str, boundary: "Boundary | None" = None, rate: float = 1.0)
     from studies.record import PROFILE_COLUMNS, read_record
     from studies.simulation.drive import COMMAND_COLUMNS, drive_by_record, drive_by_schedule
 
-    columns = set(read_header(text)) if Path(text).is_file() else set()
+    columns = set(read_header(text)) if os.path.isfile(text) else set()
     if columns - {*PROFILE_COLUMNS, *COMMAND_COLUMNS} or (columns and not set(PROFILE_COLUMNS) <= columns):
         return drive_by_record(read_record(text), boundary)
     if boundary == "housing":

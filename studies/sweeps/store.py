@@ -116,7 +116,7 @@ class Store:
         found = [
             (row[0], row[1])
             for row in self._read(f"SELECT {_SEALED}, seal FROM run_case")
-            if _seal(*row[:-1]) != row[-1]
+            if not _fits(row[:-1], row[-1])
         ]
         if found:
             with self._writing():
@@ -156,7 +156,7 @@ class Store:
             raise _damaged(self.path, error) from error
 
     def _check_seal(self, sealed: Sequence[Any], seal: bytes) -> None:
-        if _seal(*sealed) != seal:
+        if not _fits(sealed, seal):
             case = "a searched case" if sealed[1] is None else f"case {sealed[1]}"
             raise InputError(
                 f"{self.path}: {case} is damaged (its content does not fit its seal). Run 'hrg study run' with the same"
@@ -254,7 +254,7 @@ def open_store(folder: str | Path) -> Store:
         There is no study in the folder, or its store is damaged.
     """
     path = Path(folder) / FILE
-    if not path.is_file():
+    if not os.path.isfile(path):
         raise InputError(f"{folder}: there is no study in it (no {FILE}); give the folder of 'hrg study run --out'.")
     connection = _connect(path, read_only=not os.access(folder, os.W_OK))
     if connection.execute("PRAGMA user_version").fetchone()[0] == 0:
@@ -378,6 +378,14 @@ def _seal(key: bytes, place: int | None, parameters: str, status: str, remark: s
     """Return a checksum of what a row says, so that a bit that flips on the disk is noticed."""
     text = "\0".join((str(place), parameters, status, remark)).encode("utf-8", "surrogatepass")
     return blake2b(key + text + b"\0" + numbers, digest_size=8).digest()
+
+
+def _fits(sealed: Sequence[Any], seal: bytes) -> bool:
+    """Tell whether a row still says what was sealed; one of other types does not."""
+    try:
+        return _seal(*sealed) == seal
+    except (TypeError, AttributeError):
+        return False
 
 
 def _pack(values: Sequence[float], errors: Sequence[float]) -> bytes:

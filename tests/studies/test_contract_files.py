@@ -112,3 +112,21 @@ def test_a_request_to_end_counts_as_ctrl_c(tmp_path):
     _, said = process.communicate(timeout=60)
     assert process.returncode == 130, said
     assert "Traceback" not in said
+
+
+def test_a_request_to_end_that_falls_into_a_callback_is_not_lost():
+    """What is raised in a weak reference's callback, as imports have them, is dropped by the interpreter."""
+    script = (
+        "import os, signal, sys, time, weakref, studies.cli\n"
+        "class A: pass\n"
+        "def work():\n"
+        "    a = A()\n"
+        "    r = weakref.ref(a, lambda _: (os.kill(os.getpid(), signal.SIGTERM), time.sleep(0.01)))\n"
+        "    del a\n"
+        "    time.sleep(20)\n"
+        "studies.cli.main = work\n"
+        "studies.cli.run()\n"
+    )
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, timeout=60, check=False)
+    assert done.returncode == 130
+    assert done.stderr == "hrg: interrupted.\n"

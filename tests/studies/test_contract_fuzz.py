@@ -5,6 +5,7 @@ parser. Whatever a reader is given, it accepts it or raises one of the errors th
 nothing hangs, and no text of a file stands unescaped in a page.
 """
 
+import json
 import signal
 import tomllib
 import traceback
@@ -17,8 +18,11 @@ import pytest
 import tomli_w
 
 from compensation.frequency import fit_frequency
+from studies.acceptance.limits import read_limits
 from studies.cli import main
+from studies.cli.trim import _from_scan
 from studies.errors import UNUSABLE_INPUT, MissingEnvironment
+from studies.files.clouds import read_cloud
 from studies.importing.draft import draft_map
 from studies.importing.join import import_records
 from studies.importing.mapping import load_map
@@ -26,6 +30,7 @@ from studies.instrument.card import load_card, shipped_cards
 from studies.models import Source, compensate, emit_c, read_model, write_model
 from studies.models.kinds.frequency import save_frequency
 from studies.record import read_frequency_table, read_profile, read_record
+from studies.simulation.chamber import load_drive
 from studies.sweeps.spec import read_study, shipped_specs
 
 ALLOWED = (*UNUSABLE_INPUT, MissingEnvironment)
@@ -229,11 +234,34 @@ def documents(tmp_path):
     raw.write_text(raw_text(), encoding="utf-8")
     text = draft_map([str(raw)]).text
     found.append(("map", text, lambda path: import_records([str(raw)], load_map(path))[""]))
+    found.append(("limits", LIMITS, read_limits))
     found += [(f"study {name}", path.read_text(), read_study) for name, path in shipped_specs().items()]
     return found
 
 
+LIMITS = """
+schema = "hrg.limits/1"
+[limits]
+bias_deg_per_h = 5.0
+angle_random_walk_deg_per_rt_h = 0.01
+[warm_up]
+band_deg_per_h = 1.0
+"""
+
+
+def grid_text():
+    rows = [f"{x:.1f}," + ",".join(f"{np.cos(4 * k * np.pi / 6):.3f}" for k in range(12)) for x in (0.2, 0.6, 1.0)]
+    return "position," + ",".join(str(30 * k) for k in range(12)) + "\n" + "\n".join(rows) + "\n"
+
+
+def points_text():
+    return "".join(f"{14 * np.cos(a):.4f},{14 * np.sin(a):.4f},{a:.4f}\n" for a in np.linspace(0, 6, 30))
+
+
+SCAN = {"schema": "hrg.scan/1", "splits": [{"harmonic": 2, "split_Hz": {"value": 0.1, "low": 0.05, "high": 0.2}, "slow_axis_deg": {"value": 3.0}}]}  # fmt: skip
 TABLES = {
+    "grid of departures": (grid_text, read_cloud),
+    "points": (points_text, read_cloud),
     "record": (record_text, read_record),
     "steady-state table": (table_text, read_frequency_table),
     "profile": (lambda: "time_s,chamber_temperature_degC\n0,20\n60,20\n600,-10\n", read_profile),
@@ -339,6 +367,60 @@ def test_mutated_cards_through_the_whole_solver(tmp_path, capsys):
         assert "Traceback" not in told.err
         assert "nan" not in told.out.lower()
     assert len(set(statuses)) == 2
+
+
+def test_mutated_splits_of_a_scan_never_harm(tmp_path):
+    rng, path, harmed, accepted = np.random.default_rng(23), tmp_path / "scan.json", {}, 0
+    for case in range(CASES):
+        text = json.dumps(mutate_content(SCAN, rng, tmp_path / "evaluated"))
+        path.write_bytes(mutate_text(text, rng) if rng.random() < 0.3 else text.encode())
+        accepted += check(lambda file: _from_scan(str(file), (2,)), path, f"scan {case}", harmed)
+    path.write_text("[" * 100_000)
+    accepted += check(lambda file: _from_scan(str(file), (2,)), path, "nested deeply", harmed)
+    assert not harmed
+    assert 0 < accepted < CASES
+
+
+@pytest.mark.parametrize("ending", ["stl", "ply"])
+def test_broken_meshes_are_one_sentence(tmp_path, ending, capfd):
+    path = tmp_path / f"face.{ending}"
+    for text in (
+        "solid x\nfacet normal 0 0 1\nvertex 1\nendsolid",
+        "ply\nformat ascii 1.0\nelement vertex 9\nend_header\n1",
+    ):
+        path.write_text(text)
+        assert main(["scan", "free-dome", str(path)]) == 2
+        told = capfd.readouterr().err
+        assert "Traceback" not in told
+        assert told.count("\n") <= 2
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        "trim free-dome --split 0.05 --axis nan",
+        "trim free-dome --split 0.05 --axis 10 --width-mm 1e-308",
+        "trim free-dome --split 0.05 --axis 10 --width-mm 1e308",
+        "trim free-dome --split 0.05 --axis 10 --goal inf",
+        "trim free-dome --split 0.05 --axis 10 --teeth 1000000000",
+        f"trim free-dome --split 0.05 --axis 10 --unbalance 1:{'9' * 400}@35",
+        "loop hrg-30mm-loops --out run.csv --seed -1",
+        "loop hrg-30mm-loops --out run.csv --hours inf",
+        "loop hrg-30mm-loops --out run.csv --hours 1e9",
+        "diagnose --plan soak_20_2h --seed -1",
+    ],
+)
+def test_impossible_arguments_are_refused(words, capsys, monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    assert main([word.replace("_", " ") for word in words.split(" ")]) == 2
+    assert "hrg: " in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_long_profile_in_words_is_no_file_name():
+    """Words of more letters than a file's name may have."""
+    words = " then ".join(["soak 20 1h", "step 20 30 1h", "step 30 20 1h"] * 20)
+    assert load_drive(words).end == pytest.approx(60 * 3600)
 
 
 def test_text_of_files_is_escaped_in_pages(tmp_path, capsys, monkeypatch):

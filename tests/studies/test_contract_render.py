@@ -1,6 +1,8 @@
 """`hrg render`: every kind of file, side by side, colours with units, and the exits that a user can mend."""
 
 import json
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -120,3 +122,13 @@ def test_the_strain_energy_of_the_picture_is_that_of_the_solver():
     mean = float((surface.energy[surface.triangles].mean(axis=1) * areas).sum() / areas.sum())
     # pure bending: the mean through the thickness is a third of the faces'; membrane strain makes it more
     assert 1.0 < mean * volume / energy < 3.2
+
+
+def test_the_drawing_process_ends_with_the_one_that_wants_it(tmp_path):
+    """Where the parent was killed its end of the pipe closes: no process and no folder stay behind."""
+    folder = tmp_path / "job"
+    folder.mkdir()
+    child = [sys.executable, "-m", "shell.render", str(folder)]
+    done = subprocess.run(child, stdin=subprocess.DEVNULL, capture_output=True, timeout=60, check=False)
+    assert done.returncode == 1
+    assert not folder.exists()

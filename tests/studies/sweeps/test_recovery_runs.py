@@ -304,6 +304,12 @@ def test_a_flipped_bit_is_found_and_its_case_computed_again(tmp_path, functions,
     assert mended.returncode == 0, mended.stderr
     assert "1 damaged cases are computed again" in mended.stderr
     assert hrg("study", "export", tmp_path / "out").returncode == 0
+    with sqlite3.connect(tmp_path / "out" / "study.sqlite") as store:
+        store.execute("UPDATE run_case SET numbers = '{}' WHERE position = 1")  # text where bytes belong
+    store.close()
+    export = hrg("study", "export", tmp_path / "out")
+    assert export.returncode == 2
+    assert "case 1 is damaged" in export.stderr
 
 
 def test_failed_cases_are_computed_again_when_asked(tmp_path, functions, hrg):
