@@ -3,8 +3,11 @@
 import json as json_module
 import math
 import sys
+import textwrap
 from collections.abc import Mapping, Sequence
 from typing import Any
+
+SHORT_WORD = 10  # characters; longer words, such as file names, may be folded inside
 
 
 def print_json(payload: Mapping[str, Any]) -> None:
@@ -18,7 +21,11 @@ def dump_json(payload: Mapping[str, Any]) -> str:
 
 
 def print_table(title: str, columns: Sequence[str], rows: Sequence[Sequence[object]], note: str = "") -> None:
-    """Print a table with numbers aligned to the right; floats must already be formatted text."""
+    """Print a table with numbers aligned to the right; floats must already be formatted text.
+
+    On a narrow terminal columns of text and headings fold, numbers never: where they alone are too wide, lines run over.
+    """
+    from rich.cells import cell_len
     from rich.console import Console
     from rich.table import Table
     from rich.text import Text
@@ -30,12 +37,30 @@ def print_table(title: str, columns: Sequence[str], rows: Sequence[Sequence[obje
         caption_justify="left",
         header_style="bold",
     )
-    for k, column in enumerate(columns):
-        numeric = bool(rows) and all(_looks_numeric(row[k]) for row in rows)
-        table.add_column(Text(column), justify="right" if numeric else "left")
-    for row in rows:
-        table.add_row(*[Text("" if cell is None else str(cell)) for cell in row])
     console = Console(width=None if sys.stdout.isatty() else 160)
+    cells = [["" if cell is None else str(cell) for cell in row] for row in rows]
+    headings, numeric, widths, least = [], [], [], []
+    for k, column in enumerate(columns):
+        inside = [row[k] for row in cells]
+        numeric.append(bool(rows) and all(_looks_numeric(row[k]) for row in rows))
+        if numeric[-1]:
+            least.append(max(map(len, (*inside, *column.split(" ")))))
+            headings.append("\n".join(textwrap.wrap(column, least[-1], break_long_words=False, break_on_hyphens=False)))
+            widths.append(least[-1])
+        else:
+            words = [word for cell in (*inside, column) for word in cell.split()]
+            least.append(max((len(w) for w in words if _looks_numeric(w) or len(w) <= SHORT_WORD), default=1))
+            headings.append(column)
+            widths.append(max((cell_len(line) for cell in (*inside, column) for line in cell.splitlines()), default=1))
+    frame = 3 * len(columns) + 1
+    while sum(widths) + frame > console.width and any(w > low for w, low in zip(widths, least, strict=True)):
+        widest = max((k for k in range(len(widths)) if widths[k] > least[k]), key=lambda k: widths[k])
+        widths[widest] -= 1
+    for heading, number, width in zip(headings, numeric, widths, strict=True):
+        table.add_column(Text(heading), justify="right" if number else "left", width=width, overflow="fold")
+    for row in cells:
+        table.add_row(*map(Text, row))
+    console.width = max(console.width, sum(widths) + frame)
     console.print(table)
 
 

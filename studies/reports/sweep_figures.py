@@ -40,8 +40,12 @@ def spread_figure(results: "Results", column: "Column", limits: "list[Limits]") 
             place = [c.name for c in results.study.columns].index(column.name)
             axes.axvline(results.nominal.values[place], color=style.BLACK, linewidth=1.2, label="nominal design")
         ends = {end for limit in limits if limit.column == column.name for end in (limit.low, limit.high)}
-        for number, end in enumerate(sorted(end for end in ends if np.isfinite(end))):
-            axes.axvline(end, color=style.VERMILION, linestyle="--", label=None if number else "required")
+        near = float(y.max() - y.min())  # what lies farther away than the spread is said, so that the bars stay wide
+        for end in sorted(end for end in ends if np.isfinite(end)):
+            if y.min() - near <= end <= y.max() + near:
+                axes.axvline(end, color=style.VERMILION, linestyle="--", label=f"required: {end:.8g}")
+            else:
+                axes.plot([], [], color=style.VERMILION, linestyle="--", label=f"required: {end:.8g}, off the picture")
         axes.set_xlabel(column_label(column))
         axes.set_ylabel("designs")
         axes.ticklabel_format(axis="x", useOffset=False)
