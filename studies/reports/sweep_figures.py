@@ -50,7 +50,7 @@ def spread_figure(results: "Results", column: "Column", limits: "list[Limits]") 
         axes.set_ylabel("designs")
         axes.ticklabel_format(axis="x", useOffset=False)
         if axes.get_legend_handles_labels()[0]:
-            axes.legend(fontsize=8)
+            axes.legend(fontsize=8, loc="lower left", bbox_to_anchor=(0, 1), ncols=3)
     return draw(made, f"Spread of {column.label} over {len(y)} designs.", f"Histogram of {column.label}.")
 
 
