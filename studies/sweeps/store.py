@@ -185,13 +185,17 @@ class Store:
         if not rows:
             raise InputError(f"{self.path.parent}: its study has not begun yet; run it again.")
         about = dict(zip(columns, rows[0], strict=True))
-        return about | {key: self._parse(about[key]) for key in ("identity", "spec", "instrument", "repeats")}
+        parsed = {key: self._parse(about[key]) for key in ("identity", "spec", "instrument")}
+        return about | parsed | {"repeats": self._parse(about["repeats"], list)}
 
-    def _parse(self, text: str) -> Any:
+    def _parse(self, text: str, kind: type = dict) -> Any:
         try:
-            return json.loads(text)
+            found = json.loads(text)
         except (ValueError, TypeError) as error:
             raise _damaged(self.path, error) from error
+        if not isinstance(found, kind):
+            raise _damaged(self.path, f"{text!r:.60} stands where a JSON {kind.__name__} belongs")
+        return found
 
     def runs(self) -> list[dict[str, Any]]:
         """Return the runs so far."""

@@ -310,6 +310,12 @@ def test_a_flipped_bit_is_found_and_its_case_computed_again(tmp_path, functions,
     export = hrg("study", "export", tmp_path / "out")
     assert export.returncode == 2
     assert "case 1 is damaged" in export.stderr
+    with sqlite3.connect(tmp_path / "out" / "study.sqlite") as store:
+        store.execute("UPDATE run SET provenance = '-1'")
+    store.close()
+    again = hrg(*run)
+    assert again.returncode == 2
+    assert "the store is damaged" in again.stderr
 
 
 def test_failed_cases_are_computed_again_when_asked(tmp_path, functions, hrg):
