@@ -127,6 +127,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         sentence = describe_environment_error(error)
         return _complain(sentence, 3, error if debug else None)
     except Exception as error:
+        if isinstance(error.__cause__, KeyboardInterrupt):  # as compiled modules make of it while they are loaded
+            return _complain("interrupted.", 130)
         return _complain(
             f"internal fault: {type(error).__name__}: {error}. Run again with --debug and report it.",
             1,

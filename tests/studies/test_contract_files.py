@@ -130,3 +130,12 @@ def test_a_request_to_end_that_falls_into_a_callback_is_not_lost():
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, timeout=60, check=False)
     assert done.returncode == 130
     assert done.stderr == "hrg: interrupted.\n"
+
+
+def test_an_interruption_that_a_compiled_module_renames_is_one_still(monkeypatch, capsys):
+    def fail():
+        raise ImportError("initialization failed") from KeyboardInterrupt()
+
+    monkeypatch.setattr("studies.cli.doctor.doctor", fail)
+    assert main(["doctor"]) == 130
+    assert capsys.readouterr().err == "hrg: interrupted.\n"
