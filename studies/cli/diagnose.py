@@ -103,7 +103,7 @@ def diagnose(
         return 0
 
     from studies.diagnosis.campaign import load_campaign
-    from studies.diagnosis.extension import extend, relative_law
+    from studies.diagnosis.extension import extend
     from studies.diagnosis.investigate import investigate
     from studies.instrument.card import load_card, save_card
     from studies.record import read_record
@@ -111,11 +111,10 @@ def diagnose(
     instrument = None if card is None else load_card(card)
     reference = None if instrument is None else instrument.reference_temperature - 273.15
     campaign = load_campaign([read_record(path) for path in runs], reference)
-    law = None
     if instrument is not None:
-        law = relative_law(instrument, np.concatenate([np.empty(0), *(run.states.housing for run in campaign.runs)]))
+        instrument.material.check(np.concatenate([np.empty(0), *(run.states.housing for run in campaign.runs)]))
     told = Told("diagnosis")
-    diagnosis = investigate(campaign, law, progress=told, chamber=limits)
+    diagnosis = investigate(campaign, progress=told, chamber=limits, card=instrument)
     told.done()
     if save is not None and instrument is not None:
         save_card(extend(instrument, diagnosis), save)

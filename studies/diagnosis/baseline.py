@@ -9,7 +9,7 @@ run; 1/Q a quadratic in temperature. No sensor reads at once and no resonator is
 and resonator is part of it.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Protocol
 
@@ -31,8 +31,6 @@ FARTHEST = 2.5
 BENT = 3.0
 """Standard deviation of each bend of the static law over the covered range, in parts of what the response varies by: a law
 that no data bound goes nowhere."""
-Law = Callable[[FloatArray], FloatArray]
-"""The card's frequency at T in K; its scale does not matter."""
 
 
 @dataclass(frozen=True)
@@ -91,6 +89,23 @@ class Baseline(Protocol):
     def released(self) -> "Baseline":
         """Return the baseline with nothing held."""
 
+    def alone(self, states: States) -> "Baseline":
+        """Return the same law for one further run that starts in equilibrium."""
+
+
+class Reading(Baseline, Protocol):
+    """A baseline that computes the temperature and can be read as a thermometer."""
+
+    @property
+    def tau(self) -> float:
+        """Slowest lag of the resonator behind the housing, s."""
+
+    def views(self) -> Sequence[View]:
+        """Every run as it is seen."""
+
+    def change(self, excess: FloatArray) -> FloatArray:
+        """Change of the response from the reference over its slope there, K."""
+
 
 @dataclass(frozen=True)
 class Lagged:
@@ -107,7 +122,6 @@ class Lagged:
     slope: float
     bend: float = 0.0
     warmer: tuple[FloatArray, ...] | None = None
-    law: Law | None = None
     delay: float | None = None
     bends: tuple[float, ...] = ()
     starts: tuple[float, ...] = ()
@@ -129,8 +143,7 @@ class Lagged:
 
     def steepness(self, seen: States) -> FloatArray:
         """Change of the response for one kelvin of the resonator."""
-        own = np.ones_like(seen.time) if self.law is None else law_slope(self.law, seen)
-        return np.asarray(self.slope * (own + 2.0 * self.bend * seen.excess))
+        return np.asarray(self.slope * (1.0 + 2.0 * self.bend * seen.excess))
 
     def tangent(self) -> Tangent:
         """f(T₀ + δ) = law(T₀) + f′(T₀) δ about the temperature that is seen."""
@@ -140,8 +153,7 @@ class Lagged:
         for k, view in enumerate(views):
             seen = view.seen
             x = seen.excess
-            linear = x if self.law is None else scaled_law(self.law, seen)
-            static = [linear / 10.0, (x**2 + seen.spread) / 1e2, (x**3 + 3.0 * x * seen.spread) / 1e3][:powers]
+            static = [x / 10.0, (x**2 + seen.spread) / 1e2, (x**3 + 3.0 * x * seen.spread) / 1e3][:powers]
             offsets = np.ones((x.size, 1))
             if self.response.own_offset:
                 offsets = np.zeros((x.size, runs))
@@ -206,6 +218,14 @@ class Lagged:
     def released(self) -> "Lagged":
         """Let the delay go."""
         return replace(self, delay=None)
+
+    def alone(self, states: States) -> "Lagged":
+        """Return the same law for one further run that starts in equilibrium."""
+        return replace(self, states=(states,), warmer=(np.zeros(states.time.size),), starts=())
+
+    def change(self, excess: FloatArray) -> FloatArray:
+        """Change of the response from the reference over its slope there, K."""
+        return np.asarray(excess + self.bend * excess**2)
 
 
 @dataclass(frozen=True)
@@ -285,22 +305,14 @@ class Followed:
         """Let the delay go."""
         return replace(self, delay=None)
 
+    def alone(self, states: States) -> "Followed":
+        """Return the same law for one further run whose states already hold the thermometer's temperature."""
+        nothing = np.zeros(states.time.size // self.group)
+        return replace(self, states=(states,), reading=(nothing,), missed=(nothing,))
+
 
 def bends_of(values: FloatArray, reading: FloatArray, powers: int) -> tuple[float, ...]:
     """Return prior standard deviations of the second and higher powers, per (10 K)ᵖ."""
     reach = max(float(np.percentile(np.abs(reading), 95)), 1e-3) / 10.0
     size = BENT * max(float(np.std(values)), 1e-300)
     return tuple(size / reach**power for power in range(2, powers + 1))
-
-
-def scaled_law(law: Law, states: States) -> FloatArray:
-    """The material law scaled to a unit slope at the reference, K."""
-    around = np.array([states.reference - 0.5, states.reference + 0.5])
-    slope = float(np.diff(law(around))[0])
-    return np.asarray((law(states.resonator) - law(np.array([states.reference]))[0]) / slope)
-
-
-def law_slope(law: Law, states: States) -> FloatArray:
-    """Slope of the scaled material law, 1 at the reference."""
-    ahead, behind = (replace(states, resonator=states.resonator + side) for side in (0.5, -0.5))
-    return np.asarray(scaled_law(law, ahead) - scaled_law(law, behind))

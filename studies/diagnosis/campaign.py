@@ -54,7 +54,7 @@ class Run:
 
 @dataclass(frozen=True)
 class Campaign:
-    """All runs of one gyro on one grid."""
+    """All runs of one gyro on one grid; `temperature_noise` is that of one reading of the driving temperature, K."""
 
     runs: tuple[Run, ...]
     step: float
@@ -66,6 +66,7 @@ class Campaign:
     notes: tuple[str, ...] = ()
     skipped: dict[str, str] = field(default_factory=dict)
     outliers: int = 0
+    temperature_noise: float = 0.0
 
     @property
     def clock_known(self) -> bool:
@@ -108,6 +109,7 @@ def load_campaign(records: Sequence[Record], reference_degC: float | None = None
     group = -(-rows // -(-rows // FINEST))
     step = sampling * group * -(-rows // FINEST)
     temperature = np.concatenate([table["temperature"] for table in tables])
+    reading = max(_reading_noise(table["temperature"]) for table in tables)
     if not np.isfinite(temperature).any():
         raise InputError(f"{records[0].path}: {source} has no value at all.")
     middle = 0.5 * (np.nanmin(temperature) + np.nanmax(temperature)) + 273.15
@@ -140,8 +142,19 @@ def load_campaign(records: Sequence[Record], reference_degC: float | None = None
             notes.append(f"{drive} is not in every record and is left out.")
             runs = [_without(run, drive) for run in runs]
     return Campaign(
-        tuple(runs), step, group, responses, float(reference), source, timed, tuple(notes), skipped, outliers
+        tuple(runs), step, group, responses, float(reference), source, timed, tuple(notes), skipped, outliers, reading
     )
+
+
+def _reading_noise(temperature: FloatArray) -> float:
+    """Return the noise of one reading, K: from second differences, and at least what its rounding makes."""
+    known = temperature[np.isfinite(temperature)]
+    steps = np.abs(np.diff(known))
+    rounding = float(steps[steps > 1e-9].min()) / np.sqrt(12.0) if (steps > 1e-9).any() else 0.0
+    second = np.diff(known, 2)
+    white = 1.4826 * float(np.median(np.abs(second))) / np.sqrt(6.0) if second.size else 0.0
+    distinct = np.unique(known).size
+    return float(max(white, rounding)) if distinct < 0.5 * known.size else white
 
 
 def _without(run: Run, drive: str) -> Run:

@@ -1,17 +1,18 @@
-"""The extended model: a card with the baseline calibrated and the named effects as `[[effect]]` tables.
+"""The extended model: the card calibrated, with the named effects as `[[effect]]` tables.
 
-Frequency: Young's modulus is rescaled so that the card has the measured f₀, the first two coefficients of `curvature` add the
-rest of slope and curvature, and the mount's conductance is scaled so that the resonator lags its housing as measured. Bias
-and loss: the tables `[bias]` and `[loss]`. Drives that a simulation does not have stay at the campaign's mean.
+The frequency's values are the calibrated ones; bias and loss become the tables `[bias]` and `[loss]`. Drives that a simulation
+does not have stay at the campaign's mean.
 """
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from studies.diagnosis.baseline import Followed, Lagged, Law
+from studies.diagnosis.baseline import Followed
 from studies.diagnosis.investigate import Diagnosis
 from studies.diagnosis.model import Fit
+from studies.diagnosis.simulated import Simulated
 from studies.effects.states import FloatArray
 from studies.errors import InputError
 from studies.law import law_of
@@ -19,8 +20,8 @@ from studies.law import law_of
 if TYPE_CHECKING:
     from studies.instrument.card import Instrument
 
-WELL_CONDUCTING = 2000.0
-"""Conductivity that makes shell, stem and base one lump behind the mount, W/(m K)."""
+Law = Callable[[FloatArray], FloatArray]
+"""A card's frequency over temperature, K; its scale does not matter."""
 
 
 def relative_law(instrument: "Instrument", measured: FloatArray) -> Law:
@@ -55,8 +56,9 @@ def extend(instrument: "Instrument", diagnosis: Diagnosis) -> "Instrument":
     extended = instrument
     clock = next((i.final for i in diagnosis.inquiries.values() if i.problem.response.thermometer), None)
     if clock is not None:
-        extended, law = _calibrate_frequency(extended, clock)
-        effects.append(law)
+        calibrated = clock.moved()
+        if isinstance(calibrated, Simulated):
+            extended = calibrated.instrument
     for column, inquiry in diagnosis.inquiries.items():
         model = inquiry.final
         if column == "bias_deg_per_h":
@@ -92,76 +94,24 @@ def _beside_temperature(model: Fit) -> float:
     return added
 
 
-def _calibrate_frequency(instrument: "Instrument", model: Fit) -> "tuple[Instrument, dict[str, Any]]":
-    baseline = model.baseline
-    if not isinstance(baseline, Lagged):
-        raise InputError("the frequency was not fitted over a temperature, so there is no law to save.")
-    reference = instrument.reference_temperature
-    low = min(float(s.housing.min()) for s in baseline.states) - 1.0
-    high = max(float(s.housing.max()) for s in baseline.states) + 1.0
-    own_law = law_of(instrument, min(low, reference - 5.0), max(high, reference + 5.0))
-    values = model.values()
-    f0 = values["level"] + _beside_temperature(model)
-    factor = (f0 / float(own_law.frequency(np.array([reference]))[0])) ** 2
-    modulus = float(instrument.material.value("youngs_modulus", reference)) * factor
-    extended = instrument.with_values({"material.youngs_modulus_GPa": modulus / 1e9})
-    T = np.linspace(low, high, 61)
-    x = (T - reference) / 10.0
-    measured = values["curvature"] * x**2
-    if baseline.law is None:
-        measured = measured + values["slope"] * x
-    else:
-        ends = baseline.law(np.array([reference - 0.5, reference + 0.5]))
-        at = baseline.law(np.array([reference]))
-        measured = measured + values["slope"] / 10.0 * (baseline.law(T) - at) / (ends[1] - ends[0])
-    own = np.sqrt(factor) * (own_law.frequency(T) - own_law.frequency(np.array([reference])))
-    slope, quadratic = np.linalg.lstsq(np.stack([x, x**2], axis=1), measured - own, rcond=None)[0]
-    law = {
-        "name": "curvature",
-        "response": "frequency_Hz",
-        "from_degC": low - 273.15,
-        "to_degC": high - 273.15,
-        "slope_Hz_per_10K": float(slope),
-        "quadratic_Hz_per_10K2": float(quadratic),
-    }
-    return _calibrate_lag(extended, baseline.tau), law
-
-
-def _calibrate_lag(instrument: "Instrument", tau: float) -> "Instrument":
-    """Scale the mount's conductance and exchange until the resonator's slowest constant behind the housing is `tau`."""
-    from scipy.optimize import brentq
-
-    from studies.simulation.heat_path import build_network, slowest_lag
-
-    # one lag and nothing else: what the gyro has beyond it is an effect, and must not be counted twice
-    lump = {"conductivity_W_per_m_K": WELL_CONDUCTING, "radiation": False, "cells": 1}
-    mount = ("mount_conductance_W_per_K", "mount_exchange_cm2")
-
-    def scaled(log_factor: float) -> "Instrument":
-        factor = float(np.exp(log_factor))
-        given = {key: getattr(instrument.thermal, key) * factor for key in mount}
-        return instrument.with_values({f"thermal.{key}": value for key, value in (lump | given).items()})
-
-    def miss(log_factor: float) -> float:
-        lag = slowest_lag(build_network(scaled(log_factor)), instrument.reference_temperature)
-        return float(np.log(lag / tau))
-
-    low, high = -5.0, 5.0
-    if miss(low) * miss(high) > 0:
-        return scaled(low if abs(miss(low)) < abs(miss(high)) else high)
-    return scaled(float(brentq(miss, low, high, xtol=1e-3)))
-
-
 def _bias_table(model: Fit, clock: Fit | None) -> dict[str, float]:
     values = model.values()
     offsets = [value for name, value in values.items() if name.startswith("offset@")]
     table = {"damping_anisotropy": 0.0, "offset_deg_per_h": float(np.mean(offsets)) + _beside_temperature(model)}
     if clock is not None and isinstance(model.baseline, Followed):
-        slope = clock.values()["slope"]
+        slope = 10.0 * hertz_per_kelvin(clock)
         for power, name in enumerate(("slope", "curvature", "cubic"), 1):
             unit = "Hz" if power == 1 else f"Hz{power}"
             table[f"k{power}_deg_per_h_per_{unit}"] = float(values[name] / slope**power)
     return table
+
+
+def hertz_per_kelvin(clock: Fit) -> float:
+    """Slope of the frequency at the reference."""
+    if isinstance(clock.baseline, Simulated):
+        law, reference = clock.baseline.law, clock.baseline.card.reference_temperature
+        return float(law.frequency(reference) * law.slope(reference))
+    return clock.values()["slope"] / 10.0
 
 
 def _loss_table(model: Fit) -> dict[str, float]:

@@ -2,11 +2,12 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import cast
 
 import numpy as np
 
 from studies.diagnosis import held_out
-from studies.diagnosis.baseline import Baseline, Followed, Lagged, Law, bends_of
+from studies.diagnosis.baseline import Baseline, Followed, Lagged, Reading, bends_of
 from studies.diagnosis.campaign import Campaign
 from studies.diagnosis.clock import judged
 from studies.diagnosis.model import Fit, Problem, fit, pose, settle
@@ -62,8 +63,7 @@ def begin(
     campaign: Campaign,
     column: str,
     thermometer: Thermometer | None,
-    law: Law | None = None,
-    make: Callable[[Problem], Baseline] | None = None,
+    make: Callable[[float], Baseline] | None = None,
 ) -> Fit:
     """Return the fitted baseline of one response."""
     response = RESPONSES[column]
@@ -71,7 +71,7 @@ def begin(
     states = tuple(run.states for run in campaign.runs)
     baseline: Baseline
     if make is not None:
-        baseline = make(problem)
+        baseline = make(problem.sigma)
     elif thermometer is None or response.thermometer:
         baseline = Lagged(
             response,
@@ -79,7 +79,6 @@ def begin(
             campaign.group,
             1000.0,
             _slope(problem, housing := [s.averaged(campaign.group).excess for s in states]),
-            law=law if response.thermometer else None,
             bends=bends_of(problem.values, problem.stack(housing), response.powers),
         )
     else:
@@ -96,6 +95,10 @@ def begin(
     first = settle(problem, baseline)
     tau = float(getattr(first.baseline, "tau", states[0].tau if thermometer is None else thermometer.states[0].tau))
     problem = replace(pose(campaign, column, tau), sigma=float(np.sqrt(first.solved.variance)))
+    if first.baseline.lagged:
+        steep = float(np.median(np.abs(np.concatenate([view.steep for view in first.tangent.views]))))
+        floor = (campaign.temperature_noise * steep / problem.sigma) ** 2
+        problem = replace(problem, noise=replace(problem.noise, floor=floor))
     return fit(problem, first.moved(), (), 2)
 
 
@@ -132,15 +135,21 @@ def refuse(campaign: Campaign, selection: Selection) -> Selection:
     return selection
 
 
+def _follows(model: Fit) -> bool:
+    """Whether the response follows the temperature beyond doubt."""
+    names = model.tangent.names
+    if "slope" not in names:
+        return True
+    place = names.index("slope")
+    spread = float(np.sqrt(model.solved.covariance[place, place]))
+    return bool(np.isfinite(spread) and abs(model.solved.coefficients[place]) >= 3.0 * spread)
+
+
 def read_thermometer(campaign: Campaign, model: Fit) -> Thermometer | None:
     """Turn the fitted frequency into a thermometer; None where it hardly follows the temperature."""
-    baseline = model.moved()
-    places = [k for k, name in enumerate(model.tangent.names) if name == "slope"]
-    if not isinstance(baseline, Lagged) or not places:
+    if not model.baseline.lagged or not _follows(model):
         return None
-    slope, spread = model.solved.coefficients[places[0]], np.sqrt(model.solved.covariance[places[0], places[0]])
-    if not np.isfinite(spread) or abs(slope) < 3.0 * spread:
-        return None
+    baseline = cast("Reading", model.moved())
     slow = model.slow_part()
     changes, excesses, missed, states = [], [], [], []
     for run, view, rest in zip(campaign.runs, baseline.views(), slow, strict=True):
@@ -148,7 +157,7 @@ def read_thermometer(campaign: Campaign, model: Fit) -> Thermometer | None:
         known = np.isfinite(rest)
         filled = np.interp(run.time, run.time[known], rest[known]) if known.any() else np.zeros_like(x)
         excesses.append(x)
-        changes.append(x + baseline.bend * x**2)
+        changes.append(baseline.change(x))
         missed.append(filled / np.where(np.abs(view.steep) > 0, view.steep, np.inf))
         states.append(view.seen_fine)
     return Thermometer(tuple(changes), tuple(excesses), tuple(missed), tuple(states))

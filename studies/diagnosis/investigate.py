@@ -2,27 +2,35 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
+from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.special import erf
 
 from studies.diagnosis import held_out
-from studies.diagnosis.baseline import Baseline, Law
 from studies.diagnosis.campaign import Campaign
 from studies.diagnosis.causes import name_causes, vote
 from studies.diagnosis.checks import FEWEST_BINS
 from studies.diagnosis.constants import CONSTANTS
 from studies.diagnosis.held_out import Score
 from studies.diagnosis.inquiry import Inquiry, Thermometer, begin, inquire, read_thermometer
-from studies.diagnosis.model import Fit, Problem
+from studies.diagnosis.model import Fit
 from studies.diagnosis.planning.advice import suggest_next
 from studies.diagnosis.planning.chamber import Chamber
 from studies.diagnosis.response import RESPONSES
-from studies.diagnosis.verdict import Cause, ResponseResult, Verdict, overall
+from studies.diagnosis.simulated import Simulated, as_shipped, shifts_of, simulate_baseline
+from studies.diagnosis.verdict import Cause, Interval, ResponseResult, Shift, Verdict, overall
 from studies.effects import Effect
 
+FAR = 2.0
+"""Prior standard deviations beyond which a value of the card is wrong."""
 NARROW_RANGE = 1.0
 """Kelvin below which a temperature does not vary."""
 Progress = Callable[[str], None]
+
+if TYPE_CHECKING:
+    from studies.instrument.card import Instrument
 
 
 @dataclass(frozen=True)
@@ -36,21 +44,18 @@ class Diagnosis:
 
 def investigate(
     campaign: Campaign,
-    law: Law | None = None,
     effects: Sequence[Effect] | None = None,
     score_held_out: bool = True,
     advise: bool = True,
     progress: Progress | None = None,
     chamber: Chamber | None = None,
-    baselines: Mapping[str, Callable[[Problem], Baseline]] | None = None,
+    card: "Instrument | None" = None,
 ) -> Diagnosis:
     """Find what the baseline leaves, name it, and measure what the extension is worth.
 
     Parameters
     ----------
     campaign : Campaign
-    law : callable, optional
-        Relative frequency law of the card, of temperature in K.
     effects : sequence of Effect, optional
         A smaller library.
     score_held_out : bool
@@ -61,8 +66,8 @@ def investigate(
         Is told in a few words what comes next.
     chamber : Chamber, optional
         What the next run may ask of the chamber.
-    baselines : mapping from response to callable, optional
-        Other baselines than the generic ones.
+    card : Instrument, optional
+        Its own simulation is then the baseline of the frequency.
     """
     tell = progress or (lambda words: None)
     inquiries: dict[str, Inquiry] = {}
@@ -72,16 +77,20 @@ def investigate(
         if rows < FEWEST_BINS + 2 * len(campaign.runs):
             continue
         tell(f"{RESPONSES[column].word}: baseline, then every effect")
-        make = (baselines or {}).get(column)
-        plain = begin(campaign, column, thermometer, law, make)
+        simulated = card is not None and RESPONSES[column].thermometer
+        make = partial(simulate_baseline, campaign, card) if simulated and card is not None else None
+        plain = begin(campaign, column, thermometer, make)
         inquiries[column] = inquire(campaign, plain, effects, score_held_out)
         if RESPONSES[column].thermometer:
             thermometer = read_thermometer(campaign, inquiries[column].final)
     inquiries = vote(campaign, inquiries, effects, score_held_out)
     tell("held-out residuals")
-    causes = name_causes(campaign, inquiries)
+    shifts = tuple(shift for inquiry in inquiries.values() for shift in shifts_of(inquiry.final))
+    causes = (*wrong_values(shifts), *name_causes(campaign, inquiries))
+    causes = tuple(sorted(causes, key=lambda cause: -cause.evidence))
+    shipped = _shipped(campaign, inquiries)
     results = {
-        column: _result(campaign, inquiries[column], causes, score_held_out)
+        column: _result(campaign, inquiries[column], causes, score_held_out, shipped.get(column))
         if column in inquiries
         else _too_little("too few values")
         for column in campaign.responses
@@ -89,7 +98,7 @@ def investigate(
     for column, reason in campaign.skipped.items():
         results[column] = _too_little(reason)
     verdict = overall([result.verdict for result in results.values()])
-    found = Verdict(verdict, causes, results, None, campaign.notes)
+    found = Verdict(verdict, causes, results, None, campaign.notes, calibration=shifts)
     if advise:
         tell("next run")
         text, run = suggest_next(campaign, found, inquiries, chamber)
@@ -101,7 +110,34 @@ def _too_little(reason: str) -> ResponseResult:
     return ResponseResult("not-identifiable", None, (None, None), None, "none", remark=reason)
 
 
-def _result(campaign: Campaign, inquiry: Inquiry, causes: Sequence[Cause], score_held_out: bool) -> ResponseResult:
+def _shipped(campaign: Campaign, inquiries: Mapping[str, Inquiry]) -> dict[str, float]:
+    for inquiry in inquiries.values():
+        if isinstance(inquiry.plain.baseline, Simulated):
+            own = inquiry.plain.baseline
+            return as_shipped(campaign, replace(own, z=(0.0,) * len(own.z), initial=tuple({} for _ in own.initial)))
+    return {}
+
+
+def wrong_values(shifts: Sequence[Shift]) -> list[Cause]:
+    """Return the card's values that the data move by more than two of their standard deviations."""
+    return [
+        Cause(
+            shift.parameter,
+            "frequency_Hz",
+            float(erf(abs(shift.shift_sd) / np.sqrt(2.0))) * (1.0 - CONSTANTS["doubt"]),
+            (),
+            {shift.parameter: Interval(shift.value, min(shift.low, shift.high), max(shift.low, shift.high))},
+            shift.shift_sd**2,
+            kind="value",
+        )
+        for shift in shifts
+        if abs(shift.shift_sd) > FAR
+    ]
+
+
+def _result(
+    campaign: Campaign, inquiry: Inquiry, causes: Sequence[Cause], score_held_out: bool, shipped: float | None
+) -> ResponseResult:
     plain, final, left = inquiry.plain, inquiry.final, inquiry.leftover
 
     def measured(model: Fit) -> Score:
@@ -121,6 +157,8 @@ def _result(campaign: Campaign, inquiry: Inquiry, causes: Sequence[Cause], score
         verdict = "unexplained"
     elif final.terms:
         verdict = "not-identifiable" if any(cause.equivalent for cause in mine) else "explained"
+    elif any(cause.kind == "value" and cause.response == column for cause in causes):
+        verdict = "explained"
     else:
         verdict = "adequate"
         temperature = np.concatenate([run.states.housing for run in campaign.runs])
@@ -128,7 +166,7 @@ def _result(campaign: Campaign, inquiry: Inquiry, causes: Sequence[Cause], score
             verdict, remark = "not-identifiable", f"the temperature varies by {np.ptp(temperature):.2g} K only"
     reached = extended or base
     white = float(np.sqrt(final.solved.variance * inquiry.problem.noise.rows))
-    wander = white * final.wander_ratio
+    wander = final.wander
     return ResponseResult(
         verdict,
         reached.residual_rms,
@@ -141,6 +179,7 @@ def _result(campaign: Campaign, inquiry: Inquiry, causes: Sequence[Cause], score
         remark,
         white=white,
         wander=wander,
+        shipped=shipped,
         run_shifts=tuple(_run_shifts(final)),
     )
 

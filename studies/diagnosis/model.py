@@ -186,6 +186,12 @@ class Fit:
         return self.problem.noise.bases[self.solved.kind].rotate(self.residual) * np.sqrt(self.weights)
 
     @property
+    def wander(self) -> float:
+        """rms of the wander within a run."""
+        s = self.solved
+        return float(np.sqrt(s.variance * SHARES[s.share] * self.problem.noise.bases[s.kind].within))
+
+    @property
     def wander_ratio(self) -> float:
         """Rms of the wander within a run over the white noise of one row of the record."""
         return float(self.problem.noise.ratio(self.solved.kind)[self.solved.share])
@@ -309,7 +315,7 @@ def settle(problem: Problem, baseline: Baseline, taus: FloatArray | None = None)
     from studies.diagnosis.baseline import Lagged
 
     if not isinstance(baseline, Lagged):
-        return fit(problem, baseline, (), 3)
+        return fit(problem, baseline, (), 8 if baseline.lagged else 3)
     starts = np.geomspace(60.0, 2e4, 7) if taus is None else taus
     tried = [fit(problem, replace(baseline, tau=float(tau)), (), 1) for tau in starts]
     best = sorted(tried, key=lambda f: -f.log_evidence)[:2]

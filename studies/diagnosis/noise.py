@@ -95,10 +95,14 @@ class Noise:
         One a kind, in the order of `KERNELS`.
     rows : float
         Rows of the record to a row of the grid.
+    floor : float
+        Variance that the reading of the thermometer brings into a row of the record, over the white variance of a row of
+        the grid: a wander below it is no surprise either.
     """
 
     bases: tuple[Basis, ...]
     rows: float
+    floor: float = 0.0
 
     @classmethod
     def of(cls, times: Sequence[FloatArray], rows: float) -> "Noise":
@@ -110,8 +114,8 @@ class Noise:
         return np.asarray(1.0 / (1.0 + SHARES[:, None] * self.bases[kind].walk))
 
     def ratio(self, kind: int) -> FloatArray:
-        """Return rms of the wander within a run over the white noise of one row of the record, for every share."""
-        return np.sqrt(SHARES * self.bases[kind].within / self.rows)
+        """Return rms of the wander within a run over the noise of one row of the record, for every share."""
+        return np.sqrt(SHARES * self.bases[kind].within / (self.rows + self.floor))
 
     def prior(self, kind: int) -> FloatArray:
         """Log prior of every share: a wander far above the white noise of a row is not believed to be noise.

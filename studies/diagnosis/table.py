@@ -14,8 +14,8 @@ import numpy as np
 from scipy.special import logsumexp
 from scipy.stats import f as f_distribution
 
-from studies.diagnosis.baseline import Law
 from studies.diagnosis.constants import CONSTANTS
+from studies.diagnosis.extension import Law
 from studies.diagnosis.verdict import Cause, Interval, ResponseResult, Verdict, weigh
 from studies.effects import Effect, library
 from studies.effects.states import FloatArray

@@ -254,7 +254,9 @@ def rungs(result: ResponseResult) -> list[tuple[str, float | None]]:
 
 def as_temperature(diagnosis: Diagnosis, column: str, value: float) -> str | None:
     """Return the error of temperature that a residual of this response amounts to."""
-    slope = abs(diagnosis.inquiries[column].final.values().get("slope", 0.0)) / 10.0
+    inquiry = diagnosis.inquiries[column]
+    steep = np.concatenate([np.abs(view.steep) for view in inquiry.final.tangent.views])
+    slope = float(np.median(steep)) if steep.size else 0.0
     return (
         None
         if not slope

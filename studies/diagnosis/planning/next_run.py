@@ -12,11 +12,11 @@ baseline and a any effect of the library at the size at which it would just be n
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
-from studies.diagnosis.baseline import Baseline, Followed, Lagged
+from studies.diagnosis.baseline import Baseline, Followed, Reading
 from studies.diagnosis.campaign import Campaign
 from studies.diagnosis.constants import CONSTANTS
 from studies.diagnosis.model import Fit, Term, term_columns, used
@@ -137,7 +137,7 @@ def follow(model: Fit, states: States, clock: Fit | None) -> Ahead:
     rows = states.time.size // model.problem.group
     problem = replace(model.problem, present=(np.ones(rows, dtype=bool),))
     alone = replace(model, problem=problem, baseline=baseline, tangent=baseline.tangent())
-    for _ in range(2 if isinstance(baseline, Lagged) else 0):
+    for _ in range(2 if baseline.lagged else 0):
         warmer = alone.warmer()
         if warmer is None:
             break
@@ -172,15 +172,12 @@ def follow(model: Fit, states: States, clock: Fit | None) -> Ahead:
 
 def _alone(model: Fit, states: States, clock: Fit | None) -> Baseline:
     own = model.baseline
-    if isinstance(own, Lagged):
-        return replace(own, states=(states,), warmer=(np.zeros(states.time.size),))
-    if isinstance(own, Followed) and clock is not None and isinstance(clock.baseline, Lagged):
-        ahead = follow(clock, states, None).continued
-        view = ahead.tangent.views[0]
-        x = average(view.seen_fine.excess, own.group)
-        reading = x + clock.baseline.bend * x**2 if own.response.bent else x
-        return replace(own, states=(view.seen_fine,), reading=(reading,), missed=(np.zeros_like(x),))
-    raise TypeError("this baseline cannot be continued")
+    if not isinstance(own, Followed) or clock is None:
+        return own.alone(states)
+    view = follow(clock, states, None).continued.tangent.views[0]
+    x = average(view.seen_fine.excess, own.group)
+    reading = cast("Reading", clock.baseline).change(x) if own.response.bent else x
+    return replace(own.alone(view.seen_fine), reading=(reading,))
 
 
 def covariance_of_noise(model: Fit, rows: int, step: float) -> FloatArray:

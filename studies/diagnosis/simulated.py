@@ -1,0 +1,265 @@
+"""The card's own simulation as the baseline: its uncertain values within their priors, initial states free.
+
+f(record) = f(θ) + Σ ∂f/∂θ δθ by the one forward model (`studies.simulation.predict`), driven by the measured housing or
+chamber. A value counts by z, its distance from the card in prior standard deviations (of its logarithm where it cannot be
+negative), so that every z has the prior 0 ± 1.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from studies.diagnosis.baseline import DELAY, FARTHEST, START, Tangent, View
+from studies.diagnosis.campaign import Campaign
+from studies.diagnosis.response import RESPONSES, Response
+from studies.diagnosis.verdict import Shift
+from studies.effects.states import FloatArray, States, average
+from studies.law import law_of
+from studies.simulation.drive import Boundary, Drive
+from studies.simulation.prediction import Variations, predict
+from thermal.profile import Profile
+
+if TYPE_CHECKING:
+    from shell.law import FrequencyLaw
+    from studies.diagnosis.model import Fit
+    from studies.instrument.card import Instrument
+    from studies.instrument.uncertain import UncertainValue
+
+LUMPS = ("base", "resonator")
+"""Parts of the heat path behind the housing whose initial state is unknown."""
+POINTS = 3
+"""Predictions to a step of the grid; between them lies a straight line."""
+BOLDEST = 1.5
+"""Largest change of a z from one linearisation to the next."""
+SILENT = 1e-4
+"""Part of the noise below which one standard deviation of a value changes nothing."""
+
+
+@dataclass(frozen=True)
+class Simulated:
+    """A card's simulation of one response, linearised at an instrument.
+
+    Attributes
+    ----------
+    response : Response
+    states : tuple of States
+        Measured drives, run by run, on the fine grid.
+    group : int
+    card : Instrument
+        As shipped, with its uncertainties.
+    boundary : str
+    values : tuple of UncertainValue
+        Those that move the response.
+    z : tuple of float
+        Where they are.
+    initial : tuple of mapping
+        Departure of base and resonator at the start of every run, K.
+    """
+
+    response: Response
+    states: tuple[States, ...]
+    group: int
+    card: "Instrument"
+    boundary: Boundary
+    stride: int
+    values: "tuple[UncertainValue, ...]"
+    z: tuple[float, ...]
+    initial: tuple[dict[str, float], ...]
+    warmer: tuple[FloatArray, ...] | None = None
+    delay: float | None = None
+    starts: tuple[float, ...] = field(default=())
+
+    @property
+    def lagged(self) -> bool:
+        """It computes the temperature."""
+        return True
+
+    @cached_property
+    def instrument(self) -> "Instrument":
+        """The card with its values where they are."""
+        moved = {v.name: at(v, z) for v, z in zip(self.values, self.z, strict=True) if z != 0.0}
+        return self.card.with_values(moved)
+
+    @cached_property
+    def law(self) -> "FrequencyLaw":
+        """Its frequency law over the whole range of the material."""
+        material = self.instrument.material
+        return law_of(self.instrument, material.lowest, material.highest)
+
+    @cached_property
+    def varied(self) -> Variations:
+        """The instrument and its neighbours."""
+        names = (*(v.name for v in self.values), *(f"initial.{lump}" for lump in LUMPS))
+        return Variations(self.instrument, self.law, names)
+
+    @cached_property
+    def tau(self) -> float:
+        """Slowest lag of the resonator behind the housing, s."""
+        from studies.simulation.heat_path import slowest_lag
+
+        return slowest_lag(self.varied.network(self.boundary), self.instrument.reference_temperature)
+
+    def drive(self, k: int) -> tuple[Drive, FloatArray]:
+        """What run `k` is driven with, and the times of its predictions."""
+        s = self.states[k]
+        time = s.time[:: self.stride]
+        time = time if time[-1] == s.time[-1] else np.append(time, s.time[-1])
+        commands = {
+            name: np.interp(time, s.time, values)
+            for name in ("amplitude_squared", "voltage_squared", "quadrature", "pattern_angle")
+            if (values := getattr(s, name)) is not None
+        }
+        profile = Profile(s.time, s.housing)
+        return Drive(time, self.boundary, profile, self.initial[k], commands, 0.0, float(s.campaign_time[0])), time
+
+    @cached_property
+    def known(self) -> Tangent:
+        """The linearisation, computed once."""
+        runs = len(self.states)
+        own = ("initial.base", "initial.resonator")
+        shift, columns, views = [], [], []
+        steps = np.array([slope_of(v, z) for v, z in zip(self.values, self.z, strict=True)])
+        reference = self.card.reference_temperature
+        for k, s in enumerate(self.states):
+            drive, time = self.drive(k)
+            found = predict(self.instrument, drive, self.varied, self.law)
+
+            def finely(values: FloatArray, time: FloatArray = time, s: States = s) -> FloatArray:
+                return np.interp(s.time, time, values)
+
+            resonator = finely(found.columns["resonator_temperature_degC"]) + 273.15
+            fine = replace(s, resonator=resonator, tau=self.tau, reference=reference)
+            seen_fine = fine if self.warmer is None else replace(fine, resonator=resonator + self.warmer[k])
+            coarse, seen = fine.averaged(self.group), seen_fine.averaged(self.group)
+            steep = np.asarray(found.law.frequency(seen.resonator) * found.law.slope(seen.resonator))
+            views.append(View(fine, coarse, seen_fine, seen, steep))
+            column = self.response.column
+
+            def slope(name: str, found: object = found, finely: object = finely, column: str = column) -> FloatArray:
+                return average(finely(found.derivatives[name][column]), self.group)  # type: ignore[attr-defined, operator]
+
+            of_values = np.stack([slope(v.name) for v in self.values], axis=1) * steps
+            starts = np.zeros((seen.time.size, 2 * runs))
+            for n, name in enumerate(own):
+                starts[:, n * runs + k] = slope(name)
+            late = -coarse.rate * steep
+            predicted = average(finely(found.columns[column]), self.group)
+            centre = of_values @ np.array(self.z)
+            begin = sum(self.initial[k].get(name.removeprefix("initial."), 0.0) * slope(name) for name in own)
+            shift.append(centre + begin - predicted)
+            if self.delay is not None:
+                shift[-1] = shift[-1] - self.delay * late
+                late = np.zeros_like(late)
+            columns.append(np.concatenate([of_values, starts, late[:, None]], axis=1))
+        names = (
+            *(v.name for v in self.values),
+            *(f"{name}@{k}" for name in own for k in range(runs)),
+            "delay",
+        )
+        prior = np.array([1.0] * len(self.values) + [START] * (2 * runs) + [DELAY])
+        return Tangent(shift, columns, prior, names, views)
+
+    def tangent(self) -> Tangent:
+        """Linearise where it is."""
+        return self.known
+
+    def views(self) -> Sequence[View]:
+        """Every run as it is predicted and as it is seen."""
+        return self.known.views
+
+    def change(self, excess: FloatArray) -> FloatArray:
+        """Change of the response from the reference over its slope there, K."""
+        law, reference = self.law, self.card.reference_temperature
+        zero = float(law.frequency(reference))
+        return np.asarray((law.frequency(reference + excess) - zero) / (zero * float(law.slope(reference))))
+
+    def moved(self, values: dict[str, float], warmer: Sequence[FloatArray] | None) -> "Simulated":
+        """Take over the values, a bold step at most, and the initial states."""
+        z = []
+        for value, old in zip(self.values, self.z, strict=True):
+            new = old + float(np.clip(values[value.name] - old, -BOLDEST, BOLDEST))
+            z.append(to_z(value, float(np.clip(at(value, new), value.low, value.high))))
+        initial = tuple({lump: values[f"initial.{lump}@{k}"] for lump in LUMPS} for k in range(len(self.states)))
+        return replace(self, z=tuple(z), initial=initial, warmer=None if warmer is None else tuple(warmer))
+
+    def held(self, values: dict[str, float]) -> "Simulated | None":
+        """Hold the delay at its limit."""
+        most = FARTHEST * DELAY
+        if self.delay is not None or abs(values["delay"]) <= most:
+            return None
+        return replace(self, delay=most * float(np.sign(values["delay"])))
+
+    def released(self) -> "Simulated":
+        """Let the delay go."""
+        return self if self.delay is None else replace(self, delay=None)
+
+    def alone(self, states: States) -> "Simulated":
+        """Return the same simulation of one further run that starts in equilibrium."""
+        return replace(self, states=(states,), initial=({},), warmer=(np.zeros(states.time.size),))
+
+
+def at(value: "UncertainValue", z: float) -> float:
+    """Return the number of the card at a distance z."""
+    return value.value * float(np.exp(z * value.sd / value.value)) if value.logarithmic else value.value + z * value.sd
+
+
+def to_z(value: "UncertainValue", number: float) -> float:
+    """Return the distance of a number from the card's."""
+    if value.logarithmic:
+        return float(np.log(number / value.value) * value.value / value.sd)
+    return (number - value.value) / value.sd
+
+
+def slope_of(value: "UncertainValue", z: float) -> float:
+    """Return d number / d z."""
+    return at(value, z) * value.sd / value.value if value.logarithmic else value.sd
+
+
+def simulate_baseline(campaign: Campaign, card: "Instrument", noise: float) -> Simulated:
+    """Return the card's simulation of the frequency as shipped; values that do not move it by any noise are left out."""
+    boundary: Boundary = "chamber" if campaign.temperature_source.startswith("chamber") else "housing"
+    own = Simulated(
+        RESPONSES["frequency_Hz"],
+        tuple(run.states for run in campaign.runs),
+        campaign.group,
+        card,
+        boundary,
+        max(1, campaign.group // POINTS),
+        tuple(card.uncertain),
+        (0.0,) * len(card.uncertain),
+        tuple({} for _ in campaign.runs),
+    )
+    columns = np.concatenate(own.known.columns)[:, : len(own.values)]
+    telling = np.ptp(columns, axis=0) + np.abs(columns).max(axis=0) > SILENT * noise
+    values = tuple(v for v, tells in zip(own.values, telling, strict=True) if tells)
+    return replace(own, values=values, z=(0.0,) * len(values))
+
+
+def as_shipped(campaign: Campaign, baseline: Simulated) -> dict[str, float]:
+    """Return what the card as shipped leaves of every response, rms on the grid; of a bias about the mean of each run."""
+    parts: dict[str, list[FloatArray]] = {column: [] for column in campaign.responses}
+    for k, run in enumerate(campaign.runs):
+        drive, time = baseline.drive(k)
+        found = predict(baseline.card, drive, (), baseline.law)
+        for column, own in parts.items():
+            predicted = average(np.interp(run.states.time, time, found.columns[column]), campaign.group)
+            rest = run.responses[column] - predicted
+            own.append(rest - np.nanmean(rest) if RESPONSES[column].own_offset else rest)
+    return {column: float(np.sqrt(np.nanmean(np.concatenate(own) ** 2))) for column, own in parts.items()}
+
+
+def shifts_of(model: "Fit") -> list[Shift]:
+    """Return where a fit has moved the card's values, with 90 % intervals."""
+    baseline = model.baseline
+    if not isinstance(baseline, Simulated):
+        return []
+    out = []
+    deviations = np.sqrt(np.maximum(np.diag(model.solved.covariance), 0.0))
+    for k, value in enumerate(baseline.values):
+        z, sd = float(model.solved.coefficients[k]), float(deviations[k])
+        ends = (at(value, z - 1.645 * sd), at(value, z + 1.645 * sd))
+        out.append(Shift(value.name, value.value, at(value, z), ends[0], ends[1], z))
+    return out

@@ -1,0 +1,79 @@
+"""A card's own simulation as the baseline: nothing, a wrong value, and a hidden effect are told apart; what is saved predicts."""
+
+import json
+
+import numpy as np
+import pytest
+
+from studies.cli import main
+from studies.diagnosis.campaign import load_campaign
+from studies.diagnosis.extension import extend
+from studies.diagnosis.investigate import investigate
+from studies.instrument.card import load_card, save_card
+from studies.record import read_record
+
+PROFILES = ("cycle 20 -15 40 0.5 30min 1", "step 20 -10 3h then ramp -10 30 1 then soak 30 2h")
+UNSEEN = "staircase -15 35 10 45min then soak 20 45min"
+
+
+def simulated(card, folder, capsys, profiles=PROFILES):
+    """Return the records of a card's virtual runs through the profiles."""
+    path = folder / "card.toml"
+    save_card(card, path)
+    records = []
+    for k, words in enumerate(profiles):
+        out = folder / f"run{k}.csv"
+        assert main(["simulate", str(path), words, "--out", str(out), "--rate", "0.05", "--seed", str(k)]) == 0
+        records.append(read_record(str(out)))
+    capsys.readouterr()
+    return records
+
+
+@pytest.fixture(scope="module")
+def shipped():
+    return load_card("hrg-30mm")
+
+
+def test_a_virtual_record_of_the_card_is_adequate(shipped, tmp_path, capsys):
+    verdict = investigate(load_campaign(simulated(shipped, tmp_path, capsys), 20.0), card=shipped, advise=False).verdict
+    assert verdict.verdict == "adequate", verdict.causes
+    assert max(abs(shift.shift_sd) for shift in verdict.calibration) < 1.0
+
+
+def test_a_wrong_value_is_named_as_one(shipped, tmp_path, capsys):
+    """The mount conducts four times what the card says, nearly three of its standard deviations."""
+    own = shipped.thermal.mount_conductance_W_per_K
+    true = shipped.with_values({"thermal.mount_conductance_W_per_K": 4.0 * own, "thermal.mount_exchange_cm2": 40.0})
+    verdict = investigate(load_campaign(simulated(true, tmp_path, capsys), 20.0), card=shipped, advise=False).verdict
+    assert {cause.kind for cause in verdict.causes} == {"value"}
+    assert any(cause.effect.startswith("thermal.mount") for cause in verdict.causes), verdict.causes
+    frequency = verdict.as_dict()["responses"]["frequency_Hz"]
+    assert frequency["verdict"] == "explained"
+    assert frequency["shipped_rms"] > 20.0 * frequency["baseline"]["residual_rms"]
+
+
+def test_a_hidden_effect_is_named_saved_and_predicts_an_unseen_run(shipped, tmp_path, capsys):
+    hidden = [
+        {"name": "rate-bias", "response": "bias_deg_per_h", "coefficient_deg_per_h_per_K_per_s": 600.0},
+        {"name": "hysteresis", "response": "frequency_Hz", "half_width_K": 4.0, "loop_Hz_per_K": 0.02},
+    ]
+    true = shipped.with_table("effect", hidden)
+    diagnosis = investigate(load_campaign(simulated(true, tmp_path, capsys), 20.0), card=shipped, advise=False)
+    found = {name for cause in diagnosis.verdict.causes for name in cause.names}
+    assert {"rate-bias", "hysteresis"} <= found, diagnosis.verdict.causes
+    saved, record = tmp_path / "extended.toml", tmp_path / "unseen.csv"
+    save_card(extend(shipped, diagnosis), saved)
+    save_card(true, tmp_path / "true.toml")
+    for card, out in ((tmp_path / "true.toml", record), (saved, tmp_path / "said.csv")):
+        words = ["simulate", str(card), UNSEEN, "--out", str(out), "--rate", "0.05", "--noiseless", "--json"]
+        assert main(words) == 0
+        json.loads(capsys.readouterr().out)
+    real, said = read_record(str(record)), read_record(str(tmp_path / "said.csv"))
+    shipped_path = tmp_path / "shipped.csv"
+    assert main(["simulate", "hrg-30mm", UNSEEN, "--out", str(shipped_path), "--rate", "0.05", "--noiseless"]) == 0
+    before = read_record(str(shipped_path))
+    for column in ("frequency_Hz", "bias_deg_per_h"):
+        left, was = (np.std(real[column] - other[column]) for other in (said, before))
+        noise = diagnosis.verdict.responses[column].noise
+        assert left < 0.3 * was, column
+        assert left < 3.0 * noise, column
