@@ -87,7 +87,7 @@ def _cause(campaign: Campaign, inquiry: Inquiry, place: Place) -> Cause:
     base = min(inquiry.votes.values(), default=0.0)
     own = max(r.score for r in place.rivals)
     nothing = place.without.score + (max(scores) - own if inquiry.votes else 0.0) if base else place.without.score
-    members, probability = weigh(place.names, scores, nothing)
+    members, probability = weigh(place.names, scores, nothing, inquiry.unknown - inquiry.selection.final.score)
     winner = place.rivals[int(np.argmax(scores))]
     effect = winner.fit.terms[place.index].effect
     exact = effect.equivalents.get(column, ())

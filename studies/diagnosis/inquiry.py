@@ -10,6 +10,7 @@ from studies.diagnosis import held_out
 from studies.diagnosis.baseline import Baseline, Followed, Lagged, Reading, bends_of
 from studies.diagnosis.campaign import Campaign
 from studies.diagnosis.clock import judged
+from studies.diagnosis.constants import CONSTANTS
 from studies.diagnosis.model import Fit, Problem, fit, pose, settle
 from studies.diagnosis.response import RESPONSES
 from studies.diagnosis.scan import applicable, build_bank
@@ -47,6 +48,8 @@ class Inquiry:
     selection: Selection
     leftover: Leftover
     votes: Mapping[str, float]
+    unknown: float = -np.inf
+    """Log posterior of generic structure without any named effect, on the scale of the selection's scores."""
 
     @property
     def plain(self) -> Fit:
@@ -95,11 +98,20 @@ def begin(
     first = settle(problem, baseline)
     tau = float(getattr(first.baseline, "tau", states[0].tau if thermometer is None else thermometer.states[0].tau))
     problem = replace(pose(campaign, column, tau), sigma=float(np.sqrt(first.solved.variance)))
+    row = row_noise(campaign, column)
     if first.baseline.lagged:
         steep = float(np.median(np.abs(np.concatenate([view.steep for view in first.tangent.views]))))
-        floor = (campaign.temperature_noise * steep / problem.sigma) ** 2
-        problem = replace(problem, noise=replace(problem.noise, floor=floor))
+        row = float(np.hypot(row, campaign.temperature_noise * steep))
+    floor = max((row / problem.sigma) ** 2 - problem.noise.rows, 0.0)
+    problem = replace(problem, noise=replace(problem.noise, floor=floor))
     return fit(problem, first.moved(), (), 2)
+
+
+def row_noise(campaign: Campaign, column: str) -> float:
+    """Return the white noise of one row of the record, from second differences."""
+    second = np.concatenate([np.diff(run.row_responses[column], 2) for run in campaign.runs])
+    second = second[np.isfinite(second)]
+    return float(1.4826 * np.median(np.abs(second)) / np.sqrt(6.0)) if second.size else 0.0
 
 
 def _slope(problem: Problem, reading: Sequence[FloatArray]) -> float:
@@ -116,7 +128,15 @@ def inquire(campaign: Campaign, plain: Fit, effects: Sequence[Effect] | None, sc
     selection = judged(campaign, selection, effects)
     if score_held_out:
         selection = refuse(campaign, selection)
-    return Inquiry(plain.problem, selection, look(plain, selection.final.fit), {})
+    leftover = look(plain, selection.final.fit)
+    if not selection.final.fit.terms:
+        return Inquiry(plain.problem, selection, leftover, {})
+    generic = look(selection.plain.fit, selection.plain.fit)
+    unknown = selection.plain.score + generic.evidence + CONSTANTS["log_prior_unknown"]
+    if unknown > selection.final.score and not leftover.significant:
+        # what is named patches up what a generic form says better alone
+        leftover = replace(generic, share=0.0)
+    return Inquiry(plain.problem, selection, leftover, {}, unknown)
 
 
 def refuse(campaign: Campaign, selection: Selection) -> Selection:

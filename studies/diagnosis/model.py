@@ -187,7 +187,7 @@ class Fit:
 
     @property
     def wander(self) -> float:
-        """rms of the wander within a run."""
+        """Rms of the wander within a run."""
         s = self.solved
         return float(np.sqrt(s.variance * SHARES[s.share] * self.problem.noise.bases[s.kind].within))
 

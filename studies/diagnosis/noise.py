@@ -96,8 +96,8 @@ class Noise:
     rows : float
         Rows of the record to a row of the grid.
     floor : float
-        Variance that the reading of the thermometer brings into a row of the record, over the white variance of a row of
-        the grid: a wander below it is no surprise either.
+        Variance of a row of the record beyond that, over the white variance of a row of the grid: what the thermometer's reading
+        brings into it, and what is white from row to row although the means of many rows are not.
     """
 
     bases: tuple[Basis, ...]

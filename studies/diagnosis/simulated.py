@@ -8,7 +8,7 @@ negative), so that every z has the prior 0 ± 1.
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -19,7 +19,7 @@ from studies.diagnosis.verdict import Shift
 from studies.effects.states import FloatArray, States, average
 from studies.law import law_of
 from studies.simulation.drive import Boundary, Drive
-from studies.simulation.prediction import Variations, predict
+from studies.simulation.prediction import Prediction, Variations, predict
 from thermal.profile import Profile
 
 if TYPE_CHECKING:
@@ -34,6 +34,8 @@ POINTS = 3
 """Predictions to a step of the grid; between them lies a straight line."""
 BOLDEST = 1.5
 """Largest change of a z from one linearisation to the next."""
+NEAR = 0.1
+"""Change of z, and K of an initial state, below which the old linearisation is kept."""
 SILENT = 1e-4
 """Part of the noise below which one standard deviation of a value changes nothing."""
 
@@ -70,7 +72,7 @@ class Simulated:
     initial: tuple[dict[str, float], ...]
     warmer: tuple[FloatArray, ...] | None = None
     delay: float | None = None
-    starts: tuple[float, ...] = field(default=())
+    memory: dict[object, Any] = field(default_factory=dict, compare=False, repr=False)
 
     @property
     def lagged(self) -> bool:
@@ -115,6 +117,15 @@ class Simulated:
         profile = Profile(s.time, s.housing)
         return Drive(time, self.boundary, profile, self.initial[k], commands, 0.0, float(s.campaign_time[0])), time
 
+    def predicted(self, k: int) -> tuple[Prediction, FloatArray]:
+        """Prediction of run `k` with its derivatives, and its times; computed once for every point."""
+        key = (k, id(self.states[k]), self.z, tuple(sorted(self.initial[k].items())))
+        if key not in self.memory:
+            drive, time = self.drive(k)
+            self.memory[key] = predict(self.instrument, drive, self.varied, self.law), time
+        found: tuple[Prediction, FloatArray] = self.memory[key]
+        return found
+
     @cached_property
     def known(self) -> Tangent:
         """The linearisation, computed once."""
@@ -124,8 +135,7 @@ class Simulated:
         steps = np.array([slope_of(v, z) for v, z in zip(self.values, self.z, strict=True)])
         reference = self.card.reference_temperature
         for k, s in enumerate(self.states):
-            drive, time = self.drive(k)
-            found = predict(self.instrument, drive, self.varied, self.law)
+            found, time = self.predicted(k)
 
             def finely(values: FloatArray, time: FloatArray = time, s: States = s) -> FloatArray:
                 return np.interp(s.time, time, values)
@@ -183,7 +193,16 @@ class Simulated:
             new = old + float(np.clip(values[value.name] - old, -BOLDEST, BOLDEST))
             z.append(to_z(value, float(np.clip(at(value, new), value.low, value.high))))
         initial = tuple({lump: values[f"initial.{lump}@{k}"] for lump in LUMPS} for k in range(len(self.states)))
-        return replace(self, z=tuple(z), initial=initial, warmer=None if warmer is None else tuple(warmer))
+        warm = None if warmer is None else tuple(warmer)
+        far = max((abs(new - old) for new, old in zip(z, self.z, strict=True)), default=0.0)
+        warmest = max(
+            abs(new[lump] - old.get(lump, 0.0))
+            for new, old in zip(initial, self.initial, strict=True)
+            for lump in LUMPS
+        )
+        if far < NEAR and warmest < NEAR:  # a straight line is as good there
+            return replace(self, warmer=warm)
+        return replace(self, z=tuple(z), initial=initial, warmer=warm)
 
     def held(self, values: dict[str, float]) -> "Simulated | None":
         """Hold the delay at its limit."""

@@ -168,7 +168,9 @@ def overall(verdicts: Sequence[str]) -> str:
     return next((v for v in VERDICTS if v in verdicts), "not-identifiable")
 
 
-def weigh(names: Sequence[str], scores: Sequence[float], nothing: float) -> tuple[tuple[str, ...], float]:
+def weigh(
+    names: Sequence[str], scores: Sequence[float], nothing: float, unknown: float = -np.inf
+) -> tuple[tuple[str, ...], float]:
     """Return the set of effects that stands for one cause, the likeliest first, and the probability that it holds the truth.
 
     Weights exp(score / temper) of everything that could stand there. No form is exact: a difference counts less the more
@@ -180,6 +182,8 @@ def weigh(names: Sequence[str], scores: Sequence[float], nothing: float) -> tupl
         Effects that contend for the place and their log posteriors, votes of other responses included.
     nothing : float
         Log posterior of the model without any of them.
+    unknown : float
+        Log posterior of structure that nobody can name, over that of the whole named model.
     """
     values = np.array(scores, dtype=float)
     order = np.argsort(-values)
@@ -187,10 +191,11 @@ def weigh(names: Sequence[str], scores: Sequence[float], nothing: float) -> tupl
     temper = CONSTANTS["temper"] + CONSTANTS["misfit"] * lead
     weight = np.exp((values - values.max()) / temper)
     chance = np.exp(-max(lead - CONSTANTS["margin"] / 2.0, 0.0) / CONSTANTS["temper"])
+    strange = np.exp(np.clip(unknown / CONSTANTS["temper"], -50.0, 50.0))
     members: list[str] = []
     for k in order:
         if weight[k] >= CONSTANTS["member"] and names[k] not in members:
             members.append(names[k])
     inside = sum(w for w, name in zip(weight, names, strict=True) if name in members)
-    probability = float(inside / (weight.sum() + chance)) * (1.0 - CONSTANTS["doubt"])
+    probability = float(inside / (weight.sum() * (1.0 + strange) + chance)) * (1.0 - CONSTANTS["doubt"])
     return tuple(members), probability
