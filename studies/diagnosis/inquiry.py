@@ -19,6 +19,9 @@ from studies.diagnosis.witness import Leftover, look
 from studies.effects import Effect
 from studies.effects.states import FloatArray, States
 
+ALIKE = 0.005
+"""Relative difference of two held-out residuals that says nothing."""
+
 
 @dataclass(frozen=True)
 class Thermometer:
@@ -144,9 +147,8 @@ def refuse(campaign: Campaign, selection: Selection) -> Selection:
     while selection.final.fit.terms:
         model, plain = selection.final.fit, selection.plain.fit
         events = any(term.effect.event for term in model.terms)
-        measure = held_out.by_block if events or len(campaign.records) == 1 else held_out.by_record
-        before, after = measure(plain, campaign), measure(model, campaign)
-        if before is None or after is None or after < before:
+        by_run = None if events or len(campaign.records) == 1 else held_out.by_record
+        if _pays(plain, model, campaign, by_run):
             break
         weakest = max(range(len(model.terms)), key=lambda k: drop(selection.final, k).score)
         fewer = drop(selection.final, weakest)
@@ -163,6 +165,22 @@ def _follows(model: Fit) -> bool:
     place = names.index("slope")
     spread = float(np.sqrt(model.solved.covariance[place, place]))
     return bool(np.isfinite(spread) and abs(model.solved.coefficients[place]) >= 3.0 * spread)
+
+
+def _pays(plain: Fit, model: Fit, campaign: Campaign, by_run: Callable[[Fit, Campaign], float | None] | None) -> bool:
+    """Whether a model is better on rows that it has not seen.
+
+    A run whose drive no other run moves cannot be foretold by them, nor can an event: then blocks in time decide.
+    """
+    for measure in (by_run, held_out.by_block):
+        if measure is None:
+            continue
+        before, after = measure(plain, campaign), measure(model, campaign)
+        if before is None or after is None:
+            continue
+        if abs(after - before) > ALIKE * before:
+            return after < before
+    return by_run is None
 
 
 def read_thermometer(campaign: Campaign, model: Fit) -> Thermometer | None:

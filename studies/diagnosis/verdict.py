@@ -191,7 +191,7 @@ def weigh(
     temper = CONSTANTS["temper"] + CONSTANTS["misfit"] * lead
     weight = np.exp((values - values.max()) / temper)
     chance = np.exp(-max(lead - CONSTANTS["margin"] / 2.0, 0.0) / CONSTANTS["temper"])
-    strange = np.exp(np.clip(unknown / CONSTANTS["temper"], -50.0, 50.0))
+    strange = np.exp(np.clip(unknown / temper, -50.0, 50.0))
     members: list[str] = []
     for k in order:
         if weight[k] >= CONSTANTS["member"] and names[k] not in members:
