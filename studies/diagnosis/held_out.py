@@ -8,7 +8,6 @@ import numpy as np
 from studies.diagnosis.baseline import Baseline, Followed, Lagged, Tangent
 from studies.diagnosis.campaign import Campaign
 from studies.diagnosis.model import Fit, fit, pose, term_columns
-from studies.diagnosis.simulated import Simulated
 from studies.effects.states import FloatArray
 
 BLOCKS = 5
@@ -179,7 +178,7 @@ def _trained(model: Fit, campaign: Campaign, keep: Sequence["np.ndarray"]) -> On
     problem = replace(problem, sigma=model.problem.sigma, level=model.problem.level)
     # the delay that every model tolerates is nothing that rows could teach: it stays where it is
     baseline = model.baseline
-    if isinstance(baseline, (Lagged, Followed, Simulated)) and baseline.delay is None:
+    if isinstance(baseline, (Lagged, Followed)) and baseline.delay is None:
         baseline = replace(baseline, delay=model.values()["delay"])
     return OnRows(fit(problem, baseline, model.terms, 4, model.solved.scales, release=False), campaign)
 

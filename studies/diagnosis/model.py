@@ -315,7 +315,7 @@ def settle(problem: Problem, baseline: Baseline, taus: FloatArray | None = None)
     from studies.diagnosis.baseline import Lagged
 
     if not isinstance(baseline, Lagged):
-        return fit(problem, baseline, (), 8 if baseline.lagged else 3)
+        return fit(problem, baseline, (), 12 if baseline.lagged else 3)
     starts = np.geomspace(60.0, 2e4, 7) if taus is None else taus
     tried = [fit(problem, replace(baseline, tau=float(tau)), (), 1) for tau in starts]
     best = sorted(tried, key=lambda f: -f.log_evidence)[:2]

@@ -155,30 +155,30 @@ def _gains(model: Fit, bank: Bank, kind: int, share: int) -> FloatArray:
     # columns in units of their prior, with one row more for each prior: least squares is then the posterior
     own = basis.rotate(linear.scaled) * root[:, None] * scales
     rows = np.concatenate([own, np.diag(np.where(np.isinf(linear.prior), 0.0, 1.0))])
-    span = np.linalg.qr(rows)[0][: own.shape[0]]
-    target = basis.rotate(linear.target) * root
-    inside = span.T @ target
-    rest = target - span @ inside
-    least = max(float(target @ target - inside @ inside), 1e-300)
+    span = np.linalg.qr(rows)[0]
+    top = own.shape[0]
+    target = np.append(basis.rotate(linear.target) * root, np.zeros(rows.shape[0] - top))
+    rest = target - span @ (span.T @ target)
+    least = max(float(rest @ rest), 1e-300)
     freedom = linear.target.size - linear.flat
-    left, turn = rest.astype(np.float32), root.astype(np.float32)[:, None]
+    turn, narrow = root.astype(np.float32)[:, None], span.astype(np.float32)
     table = bank.rotated[kind]
-    moment = np.empty(table.shape[1])
-    weighted = np.empty_like(table)
+    beside = np.empty((rows.shape[0], table.shape[1]), dtype=np.float32)
     for begin in range(0, table.shape[1], BLOCK):
+        # what is left of a column may be a thousandth of it: projected before it is squared, in single precision
         part = table[:, begin : begin + BLOCK] * turn
-        moment[begin : begin + BLOCK] = part.T @ left
-        weighted[:, begin : begin + BLOCK] = part
-    inner = span.T.astype(np.float32) @ weighted
+        inside = narrow[:top].T @ part
+        beside[:top, begin : begin + BLOCK] = part - narrow[:top] @ inside
+        beside[top:, begin : begin + BLOCK] = -narrow[top:] @ inside
+    moment = beside.T @ rest.astype(np.float32)
     out = np.empty(len(bank.terms))
     for group in bank.groups:
         for begin in range(0, group.terms.size, BLOCK):
-            part = slice(begin, begin + BLOCK)
-            chosen = group.columns[part]
-            unit = group.prior[part] / linear.sigma
-            above, below = weighted.T[chosen], inner.T[chosen]
-            gram = above @ above.transpose(0, 2, 1) - below @ below.transpose(0, 2, 1)
-            gram = gram.astype(float) * unit[:, :, None] * unit[:, None, :]
+            place = slice(begin, begin + BLOCK)
+            chosen = group.columns[place]
+            unit = group.prior[place] / linear.sigma
+            columns = beside.T[chosen]
+            gram = (columns @ columns.transpose(0, 2, 1)).astype(float) * unit[:, :, None] * unit[:, None, :]
             values, vectors = np.linalg.eigh(gram)
             along = np.einsum("hij,hi->hj", vectors, moment[chosen] * unit)
             values = np.maximum(values, 0.0)[None]
@@ -186,5 +186,5 @@ def _gains(model: Fit, bank: Bank, kind: int, share: int) -> FloatArray:
             determinant = 0.5 * np.log1p(size * values).sum(axis=-1)
             explained = (size * along[None] ** 2 / (1.0 + size * values)).sum(axis=-1)
             gains = -determinant - 0.5 * freedom * np.log(np.maximum(1.0 - explained / least, 1e-12))
-            out[group.terms[part]] = logsumexp(gains, axis=0) - np.log(SCALES.size)
+            out[group.terms[place]] = logsumexp(gains, axis=0) - np.log(SCALES.size)
     return out

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from studies.diagnosis.baseline import DELAY, FARTHEST, START, Tangent, View
+from studies.diagnosis.baseline import START, Tangent, View
 from studies.diagnosis.campaign import Campaign
 from studies.diagnosis.response import RESPONSES, Response
 from studies.diagnosis.verdict import Shift
@@ -71,7 +71,6 @@ class Simulated:
     z: tuple[float, ...]
     initial: tuple[dict[str, float], ...]
     warmer: tuple[FloatArray, ...] | None = None
-    delay: float | None = None
     memory: dict[object, Any] = field(default_factory=dict, compare=False, repr=False)
 
     @property
@@ -155,21 +154,16 @@ class Simulated:
             starts = np.zeros((seen.time.size, 2 * runs))
             for n, name in enumerate(own):
                 starts[:, n * runs + k] = slope(name)
-            late = -coarse.rate * steep
             predicted = average(finely(found.columns[column]), self.group)
             centre = of_values @ np.array(self.z)
             begin = sum(self.initial[k].get(name.removeprefix("initial."), 0.0) * slope(name) for name in own)
             shift.append(centre + begin - predicted)
-            if self.delay is not None:
-                shift[-1] = shift[-1] - self.delay * late
-                late = np.zeros_like(late)
-            columns.append(np.concatenate([of_values, starts, late[:, None]], axis=1))
+            columns.append(np.concatenate([of_values, starts], axis=1))
         names = (
             *(v.name for v in self.values),
             *(f"{name}@{k}" for name in own for k in range(runs)),
-            "delay",
         )
-        prior = np.array([1.0] * len(self.values) + [START] * (2 * runs) + [DELAY])
+        prior = np.array([1.0] * len(self.values) + [START] * (2 * runs))
         return Tangent(shift, columns, prior, names, views)
 
     def tangent(self) -> Tangent:
@@ -205,15 +199,12 @@ class Simulated:
         return replace(self, z=tuple(z), initial=initial, warmer=warm)
 
     def held(self, values: dict[str, float]) -> "Simulated | None":
-        """Hold the delay at its limit."""
-        most = FARTHEST * DELAY
-        if self.delay is not None or abs(values["delay"]) <= most:
-            return None
-        return replace(self, delay=most * float(np.sign(values["delay"])))
+        """Nothing is held: the card's own lag of its sensor has a prior."""
+        return None
 
     def released(self) -> "Simulated":
-        """Let the delay go."""
-        return self if self.delay is None else replace(self, delay=None)
+        """Nothing is held."""
+        return self
 
     def alone(self, states: States) -> "Simulated":
         """Return the same simulation of one further run that starts in equilibrium."""
