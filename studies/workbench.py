@@ -91,7 +91,7 @@ def diagnose(*runs: Run, card: Card | None = None) -> "Diagnosis | TableDiagnosi
     ----------
     runs : records of one gyro or their paths, or the path of one steady-state table
     card : Instrument, path, or name of a card that ships, optional
-        Its material law is the simulation. With a steady-state table: path or name.
+        Its own simulation is the baseline. With a steady-state table: path or name.
 
     Raises
     ------
@@ -99,7 +99,6 @@ def diagnose(*runs: Run, card: Card | None = None) -> "Diagnosis | TableDiagnosi
         Records that cannot be used together.
     """
     from studies.diagnosis.campaign import load_campaign
-    from studies.diagnosis.extension import relative_law
     from studies.diagnosis.investigate import investigate
     from studies.diagnosis.table import diagnose_table
 
@@ -115,8 +114,8 @@ def diagnose(*runs: Run, card: Card | None = None) -> "Diagnosis | TableDiagnosi
         return investigate(load_campaign(records))
     instrument = open_card(card)
     campaign = load_campaign(records, instrument.reference_temperature - ZERO_CELSIUS)
-    housing = np.concatenate([run.states.housing for run in campaign.runs])
-    return investigate(campaign, relative_law(instrument, housing))
+    instrument.material.check(np.concatenate([run.states.housing for run in campaign.runs]))
+    return investigate(campaign, card=instrument)
 
 
 def _is_table(run: Run) -> bool:

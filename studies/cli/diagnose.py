@@ -23,7 +23,7 @@ def diagnose(
     runs : str
         Records (CSV with time_s), or one table with temperature_degC,frequency_Hz.
     card : str
-        The instrument's card: its material law is the simulation.
+        The instrument's card: its own simulation, calibrated within its uncertainties, is what the records are held against.
     save : str
         Write the extended model as a card (TOML); needs --card.
     report : str
