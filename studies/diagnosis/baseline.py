@@ -173,7 +173,7 @@ class Lagged:
             )
         names = (
             *([f"offset@{k}" for k in range(runs)] if self.response.own_offset else ["level"]),
-            *("slope", "curvature", "cubic")[:powers],
+            *("slope", "quadratic", "cubic")[:powers],
             *(f"start@{k}" for k in range(runs)),
             "delay",
             "log lag",
@@ -191,7 +191,7 @@ class Lagged:
     def moved(self, values: dict[str, float], warmer: Sequence[FloatArray] | None) -> "Lagged":
         """Take over slope, bend, lag and what warms the resonator."""
         slope = values["slope"] / 10.0
-        bend = values["curvature"] / 100.0 / slope if slope else 0.0
+        bend = values["quadratic"] / 100.0 / slope if slope else 0.0
         tau = float(np.clip(self.tau * float(np.exp(np.clip(values["log lag"], -0.7, 0.7))), 5.0, 1e5))
         late = values["delay"] if self.delay is None else self.delay
         added = []
@@ -281,7 +281,7 @@ class Followed:
             views.append(View(own, coarse, own, coarse, steep))
         names = (
             *([f"offset@{k}" for k in range(runs)] if self.response.own_offset else ["level"]),
-            *("slope", "curvature", "cubic")[:powers],
+            *("slope", "quadratic", "cubic")[:powers],
             "missed",
             "delay",
         )

@@ -100,7 +100,7 @@ def _bias_table(model: Fit, clock: Fit | None) -> dict[str, float]:
     table = {"damping_anisotropy": 0.0, "offset_deg_per_h": float(np.mean(offsets)) + _beside_temperature(model)}
     if clock is not None and isinstance(model.baseline, Followed):
         slope = 10.0 * hertz_per_kelvin(clock)
-        for power, name in enumerate(("slope", "curvature", "cubic"), 1):
+        for power, name in enumerate(("slope", "quadratic", "cubic"), 1):
             unit = "Hz" if power == 1 else f"Hz{power}"
             table[f"k{power}_deg_per_h_per_{unit}"] = float(values[name] / slope**power)
     return table
@@ -120,5 +120,5 @@ def _loss_table(model: Fit) -> dict[str, float]:
     return {
         "inverse_q": q0,
         "slope_per_K": values["slope"] / 10.0 / q0,
-        "curvature_per_K2": values["curvature"] / 100.0 / q0,
+        "curvature_per_K2": values["quadratic"] / 100.0 / q0,
     }

@@ -105,6 +105,8 @@ class Effect:
         Whether its first coefficient cannot be negative.
     event : bool
         Whether other runs know nothing of it, so that no held-out run can confirm it.
+    by_clock : bool
+        Whether time alone drives it, so that no programme of temperatures and drives shows it better than another.
     once : bool
         Whether it happens once in a gyro's life rather than in every run, so that a saved card does not repeat it.
     fine : bool
@@ -133,6 +135,7 @@ class Effect:
     judge: str = ""
     positive: bool = False
     event: bool = False
+    by_clock: bool = False
     once: bool = False
     fine: bool = False
     sees_heat: bool = False

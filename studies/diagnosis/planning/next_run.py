@@ -231,8 +231,8 @@ def to_detect(campaign: Campaign, models: Mapping[str, Fit], chamber: Chamber | 
     clock = next((m for m in models.values() if m.problem.response.thermometer), None)
     signatures: list[tuple[str, Term, Fit, float, float]] = []
     for column, model in models.items():
-        effects = [e for e in applicable(model.problem, model) if not e.event and e.needs != ("quadrature",)]
-        effects = [e for e in effects if e.name != "periodic"]
+        effects = [e for e in applicable(model.problem, model) if not (e.event or e.by_clock)]
+        effects = [e for e in effects if e.needs != ("quadrature",)]
         for seen in scan(model, build_bank(model, effects), 1):
             weight = float(np.exp(np.clip(seen.gain, -10.0, 30.0) / CONSTANTS["temper"]))
             signatures.append((column, seen.term, model, weight, _energy(model, seen.term)))

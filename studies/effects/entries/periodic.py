@@ -45,4 +45,5 @@ EFFECT = Effect(
         Parameter("period_s", 1.0, 1e7, "period", of_run=1.0 / CYCLES),
         Parameter("restarts_each_run", 0.0, 1.0, "1 when each run starts with the same phase", False, True),
     ),
+    by_clock=True,
 )

@@ -1,8 +1,12 @@
 """Every effect of the library keeps the same contract; the names are those of the contract."""
 
+import ast
+from pathlib import Path
+
 import numpy as np
 import pytest
 
+import studies.diagnosis
 from studies.effects import Span, States, apply_effect, apply_effects, find_effect, library
 from studies.effects.states import lag
 from studies.errors import InputError
@@ -180,3 +184,15 @@ def test_static_effects_see_the_temperature_that_thermal_effects_leave():
     assert np.allclose(changes["resonator_temperature"], warmer)
     seen = replace(states, resonator=states.resonator + warmer)
     assert np.allclose(changes["bias_deg_per_h"], apply_effect(rate[0], rate[2], seen, rate[1])[1])
+
+
+def test_the_engine_knows_no_effect_by_its_name():
+    """Names live in the entries: what a diagnosis must know of an effect is a field of it."""
+    folder = Path(studies.diagnosis.__file__).parent
+    found = [
+        (path.name, node.lineno, node.value)
+        for path in sorted(folder.rglob("*.py"))
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        if isinstance(node, ast.Constant) and node.value in library()
+    ]
+    assert not found
