@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from shell.materials import Material
 
-PHYSICS_VERSION = "1"
+PHYSICS_VERSION = "2"
 """Changes only when a computed result may change; results of another version are never mixed with these."""
 
 

@@ -30,8 +30,8 @@ def over_limit(ratio: float, radius: float, theory: Theory, tolerance: float = 1
 @pytest.mark.parametrize("theory", ["solid", "shell"])
 def test_stated_error_tells_the_digits_that_rounding_takes(theory: Theory) -> None:
     """The layers at the edges take off a share c √(h/R); c follows from h/R where nothing is lost."""
-    (thick, _), (thin, stated) = (over_limit(ratio, RADII[0], theory, 1e-9) for ratio in (1e-3, 1e-4))
-    assert stated < 1e-9  # nothing is lost at 1e-4
+    (thick, _), (thin, stated) = (over_limit(ratio, RADII[0], theory, 1e-8) for ratio in (1e-3, 1e-4))
+    assert stated < 1e-8  # nothing is lost at 1e-4
     c = (1 - thin) / sqrt(1e-4)
     assert (1 - thick) / sqrt(1e-3) == pytest.approx(c, rel=2e-3)  # so the limit and the power are these
     worst = []

@@ -2,6 +2,9 @@
 
 When this fails, a study's results have moved: raise PHYSICS_VERSION in studies/sweeps/canonical.py, so that old and new
 results are never mixed in one store, and add the new numbers here.
+
+1 to 2: the error of Naghdi shells was stated too small, so that the coarsest level passed for 1e-5 (5.4e-6 too high here);
+the next one gives the converged 4595.54058 Hz.
 """
 
 import pytest
@@ -12,7 +15,10 @@ from shell.modes import solve_modes
 from studies.sweeps.canonical import PHYSICS_VERSION
 
 SILICA = Elastic(72.7e9, 0.17, 2203.0)
-GOLDEN = {"1": {"shell": 4595.565413, "solid": 4596.414085}}
+GOLDEN = {
+    "1": {"shell": 4595.565413, "solid": 4596.414085},
+    "2": {"shell": 4595.540583, "solid": 4596.414085},
+}
 
 
 @pytest.mark.parametrize("theory", ["shell", "solid"])
