@@ -21,9 +21,10 @@ from compensation.bias_selection import (
     score_held_out,
     score_path,
 )
-from compensation.decimation import average_blocks, find_spikes
+from compensation.decimation import average_blocks
 from compensation.errors import CompensationError
 from compensation.memory import NO_MEMORY, Memory
+from compensation.spikes import find_spikes
 from compensation.stability import AllanDeviation, NoiseCoefficients, allan_deviation, fit_noise
 from studies.errors import InputError, naming
 from studies.models import Model, compensate, source_of

@@ -19,6 +19,7 @@ ZERO_CELSIUS = 273.15
 MOST_ROWS = 20_000
 """Rows beyond which a run is averaged in blocks before a fit: temperature is slow, and noise averages."""
 LEAST_SPIKE = 1e-3
+"""Part of a column's span by which a spike must stand out: a smooth column has no noise to measure it by."""
 LARGEST_REST = 0.01
 """Applied rate in °/s that still counts as rest: somewhat more than the earth's, 0.0042 °/s."""
 
@@ -34,33 +35,15 @@ class RestData:
     block_s: float
 
 
-def mark_spikes(values: "NDArray[np.float64]") -> "NDArray[np.bool_]":
-    """Mark the readings that their neighbours contradict; missing ones are not marked.
-
-    A smooth column has no noise to measure a spike by; there, one must stand out by a thousandth of the column's span,
-    the spikes themselves left out of it.
-    """
-    import numpy as np
-    from scipy.ndimage import median_filter
-
-    from compensation.decimation import NEIGHBOURS, find_spikes
-
-    marked, rows = np.zeros(len(values), dtype=bool), np.flatnonzero(np.isfinite(values))
-    if len(rows) < NEIGHBOURS:
-        return marked
-    known = values[rows]
-    smooth = median_filter(known, NEIGHBOURS, mode="mirror")
-    marked[rows] = find_spikes(known) & (np.abs(known - smooth) > LEAST_SPIKE * np.ptp(smooth))
-    return marked
-
-
 def drop_spikes(keep: "NDArray[np.bool_]", *columns: "NDArray[np.float64]") -> "NDArray[np.bool_]":
     """Return the rows to keep without those in which a column is contradicted by its neighbours."""
     import numpy as np
 
+    from compensation.spikes import find_spikes
+
     cleaned = keep.copy()
     for column in columns:
-        cleaned &= ~mark_spikes(np.where(keep, column, np.nan))
+        cleaned &= ~find_spikes(np.where(keep, column, np.nan), LEAST_SPIKE)
     return cleaned
 
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from compensation.decimation import NEIGHBOURS, find_spikes
+from compensation.spikes import find_spikes
 from studies.errors import InputError
 from studies.record import Record
 from studies.simulation.drive import COLUMN, ZERO_CELSIUS, Drive, drive_by_record
@@ -135,9 +135,7 @@ def _fine_rows(record: Record) -> tuple[Array, dict[str, Array]]:
     columns = {}
     for name in names:
         values = record[name]
-        keep = np.isfinite(values)
-        if np.count_nonzero(keep) >= NEIGHBOURS:
-            keep[keep] = ~find_spikes(values[keep])
+        keep = np.isfinite(values) & ~find_spikes(values)
         count = np.bincount(group[keep], minlength=MOST_ROWS)
         middle = float(np.median(values[keep])) if keep.any() else 0.0
         total = np.bincount(group[keep], values[keep] - middle, MOST_ROWS)
@@ -149,8 +147,8 @@ def _block(time: Array, column: Array) -> Blocks | None:
     keep = np.isfinite(column)
     if np.count_nonzero(keep) < LEAST_ROWS:
         return None
-    spikes = find_spikes(column[keep])
-    rows = np.flatnonzero(keep)[~spikes]
+    spikes = find_spikes(column)
+    rows = np.flatnonzero(keep & ~spikes)
     width = max(float(np.ptp(time)) / MOST_BLOCKS, 1e-9)
     group = ((time[rows] - time[0]) / width).astype(np.intp)
     edges = np.flatnonzero(np.diff(group, prepend=-1) > 0)

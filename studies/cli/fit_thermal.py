@@ -8,7 +8,7 @@ With --json one object, schema `hrg.fit-thermal/1`: `data`, `confidence`, `estim
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from thermal.identification import Identification
+    from studies.calibration.lags.identification import Identification
 
 UNITS = {"offset": "Hz", "slope": "Hz/K", "curvature": "Hz/K²", "cubic": "Hz/K³"}
 
@@ -35,11 +35,11 @@ def fit_thermal(
     json : bool
         Print one JSON object (schema hrg.fit-thermal/1) instead of a table.
     """
+    from studies.calibration.lags.records import fit_thermal_constants
     from studies.cli.output import print_json, print_table, say
     from studies.errors import InputError
     from studies.instrument.card import load_card
     from studies.record import read_record
-    from studies.thermal_constants import fit_thermal_constants
 
     if not data:
         raise InputError("name at least one record (CSV) with a step, a ramp or a cycle of temperature.")

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-PATH = Path(__file__).parents[1] / "thermal" / "test_recovery_thermal_constants.py"
+PATH = Path(__file__).parents[1] / "studies" / "test_recovery_thermal_constants.py"
 SPEC = importlib.util.spec_from_file_location("planted", PATH)
 planted = importlib.util.module_from_spec(SPEC)
 SPEC.loader.exec_module(planted)

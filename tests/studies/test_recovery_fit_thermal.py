@@ -5,10 +5,10 @@ import json
 import numpy as np
 import pytest
 
+from studies.calibration.lags.records import fit_thermal_constants
 from studies.cli import main
 from studies.errors import InputError
 from studies.record import Record, write_record
-from studies.thermal_constants import fit_thermal_constants
 from thermal.lag import lag
 from thermal.profile import parse_profile
 

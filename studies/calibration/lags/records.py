@@ -5,12 +5,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from compensation.spikes import find_spikes
+from studies.calibration.lags.followers import make_series
+from studies.calibration.lags.housing_run import HousingRun
+from studies.calibration.lags.identification import FrequencyLaw, Identification, identify, identify_lags
 from studies.errors import InputError, naming
 from studies.record import Record
-from studies.rest import mark_spikes
-from thermal.followers import make_series
-from thermal.identification import FrequencyLaw, Identification, identify, identify_lags
-from thermal.run import Run
+from studies.rest import LEAST_SPIKE
 
 if TYPE_CHECKING:
     from studies.instrument.card import Instrument
@@ -53,7 +54,7 @@ def fit_thermal_constants(
         return identify(runs, make_series(*starts, longest=10 * span), law, confidence)
 
 
-def _run(record: Record) -> Run:
+def _run(record: Record) -> HousingRun:
     sensor = next((name for name in SENSORS if name in record), None)
     if sensor is None or "frequency_Hz" not in record:
         raise InputError(
@@ -61,13 +62,13 @@ def _run(record: Record) -> Run:
             f" it has {', '.join(record.columns)}."
         )
     frequency, housing = (
-        np.where(mark_spikes(record[name]), np.nan, record[name]) for name in ("frequency_Hz", sensor)
+        np.where(find_spikes(record[name], LEAST_SPIKE), np.nan, record[name]) for name in ("frequency_Hz", sensor)
     )
     with naming(record.path):
-        return Run(record["time_s"], frequency, housing + ZERO_CELSIUS)
+        return HousingRun(record["time_s"], frequency, housing + ZERO_CELSIUS)
 
 
-def _law(runs: Sequence[Run], instrument: "Instrument | None") -> FrequencyLaw:
+def _law(runs: Sequence[HousingRun], instrument: "Instrument | None") -> FrequencyLaw:
     """A free slope about the middle of what the housing covers, with the card's bend or a free curvature."""
     ends = np.array([f(run.housing_temperature) for run in runs for f in (np.nanmin, np.nanmax)])
     low, high = float(ends.min()), float(ends.max())

@@ -9,15 +9,15 @@ import pytest
 from scipy.constants import Stefan_Boltzmann
 from scipy.signal import lfilter
 
+from compensation.coloured import estimate_wander
+from studies.calibration.lags.followers import Constant, NetworkFollower, make_lags
+from studies.calibration.lags.housing_run import HousingRun, even_rows, row_step
+from studies.calibration.lags.identification import FrequencyLaw, identify, identify_lags, profile_interval
 from thermal.errors import ThermalError
-from thermal.followers import Constant, NetworkFollower, make_lags
-from thermal.identification import FrequencyLaw, identify, identify_lags, profile_interval
 from thermal.lag import lag
 from thermal.network import Boundary, Conductor, Node, Radiator, assemble
 from thermal.profile import Profile, parse_profile
 from thermal.radiative import integrate
-from thermal.run import Run, even_rows, row_step
-from thermal.whitening import estimate_noise
 
 ROOM = 293.15
 SLOPE, CURVATURE = 0.3716, -9.7e-4
@@ -39,7 +39,7 @@ def record(rng, t, T_h, T_r, white=3e-3, walk=0.0, wander=0.0, memory=1500.0, se
     rho = np.exp(-step / memory)
     start = [rho * rng.normal()]
     f += wander * lfilter([np.sqrt(1 - rho**2)], [1.0, -rho], rng.normal(size=t.size), zi=start)[0]
-    return Run(t, f, T_h + sensor * rng.normal(size=t.size))
+    return HousingRun(t, f, T_h + sensor * rng.normal(size=t.size))
 
 
 def one_lag(rng, words=STEPS, step=60.0, tau=1800.0, departure=1.5, **noise):
@@ -202,7 +202,7 @@ def test_holes_are_bridged_with_a_warning():
     T[500:504] = np.nan
     keep = np.ones(run.time.size, dtype=bool)
     keep[700:720] = False
-    fit = identify([Run(run.time[keep], f[keep], T[keep])], make_lags(1000.0), FREE_LAW)
+    fit = identify([HousingRun(run.time[keep], f[keep], T[keep])], make_lags(1000.0), FREE_LAW)
     assert fit.estimates["time_constant_1"].value == pytest.approx(1800.0, rel=0.01)
     assert "the frequency has 2 hole(s), the longest of 1830 s after 5970 s; those rows are left out." in fit.warnings
     assert any("housing temperature has 2 hole(s)" in warning for warning in fit.warnings)
@@ -223,7 +223,7 @@ def test_rows_hold_a_whole_number_of_samples_and_know_their_mean_time():
     assert np.diff(even.time) == pytest.approx(np.full(even.time.size - 1, 20.0))
     assert even.frequency_time[:-1] == pytest.approx(even.time[even.rows[:-1]])
     keep = np.random.default_rng(13).random(run.time.size) > 0.3  # irregular sampling
-    sparse = Run(run.time[keep], run.frequency[keep], run.housing_temperature[keep])
+    sparse = HousingRun(run.time[keep], run.frequency[keep], run.housing_temperature[keep])
     fit = identify([sparse], make_lags(1000.0), FREE_LAW)
     assert covers(fit.estimates["time_constant_1"], 1800.0)
     assert fit.residual.std() < 4e-3
@@ -251,15 +251,15 @@ def test_the_profile_of_an_open_constant_has_an_open_end():
 def test_the_noise_of_a_wandering_level_is_recovered():
     rng = np.random.default_rng(10)
     level = lfilter([0.5], [1.0, -0.9], rng.normal(size=4000))
-    noise = estimate_noise(level + rng.normal(size=4000), np.ones((4000, 1)), np.array([], dtype=np.intp))
+    noise = estimate_wander(np.ones((4000, 1)), level + rng.normal(size=4000), [slice(0, 4000)])
     # ARMA(1, 1) of the sum: (1 − 0.9 B) r has variance 0.25 + 1.81 and lag-one covariance −0.9
     ratio = -0.9 / (0.25 + 1.81)
     smoothing = (1 - np.sqrt(1 - 4 * ratio**2)) / (-2 * ratio)
-    assert 0.88 < noise.wander < 0.95  # never faster than the truth by more than its error; slower by choice
+    assert 0.88 < noise.memory < 0.95  # never faster than the truth by more than its error; slower by choice
     assert noise.smoothing == pytest.approx(smoothing, abs=0.1)
     assert noise.innovation == pytest.approx(np.sqrt(0.9 / smoothing), rel=0.04)
     true_level = 0.5 / (1 - 0.9)
-    stated_level = noise.innovation * (1 - noise.smoothing) / (1 - noise.wander)
+    stated_level = noise.innovation * (1 - noise.smoothing) / (1 - noise.memory)
     assert true_level < stated_level < 2 * true_level
 
 
@@ -267,22 +267,22 @@ def test_unusable_records_are_refused():
     t = np.arange(0.0, 7200.0, 60.0)
     T, f = np.full(t.size, ROOM), np.full(t.size, 4432.0)
     with pytest.raises(ThermalError, match=r"must increase; row 4 \(120 s\) follows 120 s"):
-        Run(np.insert(t, 3, 120.0), np.insert(f, 3, 1.0), np.insert(T, 3, ROOM))
+        HousingRun(np.insert(t, 3, 120.0), np.insert(f, 3, 1.0), np.insert(T, 3, ROOM))
     with pytest.raises(ThermalError, match="in kelvin and must be above 0"):
-        Run(t, f, T - 300.0)
+        HousingRun(t, f, T - 300.0)
     with pytest.raises(ThermalError, match="same number of rows"):
-        Run(t, f[1:], T)
+        HousingRun(t, f[1:], T)
     with pytest.raises(ThermalError, match="time of a run has a missing value"):
-        Run(np.where(t == 60.0, np.nan, t), f, T)
+        HousingRun(np.where(t == 60.0, np.nan, t), f, T)
     with pytest.raises(ThermalError, match="at least 30 rows"):
-        identify([Run(t[:20], f[:20], T[:20])], make_lags(1000.0), FREE_LAW)
+        identify([HousingRun(t[:20], f[:20], T[:20])], make_lags(1000.0), FREE_LAW)
     with pytest.raises(ThermalError, match="without any frequency"):
-        identify([Run(t, np.full(t.size, np.nan), T)], make_lags(1000.0), FREE_LAW)
+        identify([HousingRun(t, np.full(t.size, np.nan), T)], make_lags(1000.0), FREE_LAW)
     with pytest.raises(ThermalError, match="without a run"):
         identify([], make_lags(1000.0), FREE_LAW)
     with pytest.raises(ThermalError, match="confidence lies between 0 and 1"):
-        identify([Run(t, f, T)], make_lags(1000.0), FREE_LAW, confidence=90.0)
+        identify([HousingRun(t, f, T)], make_lags(1000.0), FREE_LAW, confidence=90.0)
     with pytest.raises(ThermalError, match="start of 'tau', 5, must lie between 10 and 20"):
         Constant("tau", 5.0, 10.0, 20.0)
     with pytest.raises(ThermalError, match="too few for"):
-        identify([Run(t[:30], f[:30], T[:30])], make_lags(*np.linspace(100, 900, 8)), FREE_LAW)
+        identify([HousingRun(t[:30], f[:30], T[:30])], make_lags(*np.linspace(100, 900, 8)), FREE_LAW)

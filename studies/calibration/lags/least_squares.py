@@ -8,11 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
+from compensation.coloured import Runs, Wander, runs_between, whiten
+from studies.calibration.lags.followers import Follower
+from studies.calibration.lags.housing_run import EvenRun
 from thermal.errors import ThermalError
-from thermal.followers import Follower
 from thermal.network import Array
-from thermal.run import EvenRun, Rows
-from thermal.whitening import Noise, whiten
 
 POWERS = ("slope", "curvature", "cubic")
 USUAL_SLOPE = 8e-5  # 1/K, relative; where the record itself gives no first guess (HRG paper: about 80 ppm/°C)
@@ -25,7 +25,7 @@ STEP_K = 1e-2  # central differences of departures, K
 
 
 @dataclass(frozen=True)
-class Problem:
+class LagProblem:
     """Parameters in order: follower's constants, free powers of the law, offset; then departures run by run."""
 
     runs: tuple[EvenRun, ...]
@@ -60,11 +60,11 @@ class Problem:
         return np.concatenate([run.frequency for run in self.runs])
 
     @cached_property
-    def breaks(self) -> Rows:
-        """Rows at which a new run or a new stretch of a run begins."""
+    def stretches(self) -> Runs:
+        """Rows of each run, or of each part of a run between holes."""
         starts = np.cumsum([0, *(len(run.rows) for run in self.runs)])
         places = [start + np.concatenate([[0], run.breaks]) for start, run in zip(starts, self.runs, strict=False)]
-        return np.concatenate(places)[1:].astype(np.intp)
+        return runs_between([int(place) for place in np.concatenate(places)[1:]], self.rows)
 
     def is_logarithmic(self, k: int) -> bool:
         """Whether parameter k is the logarithm of its constant."""
@@ -104,10 +104,10 @@ class Problem:
         parameters[len(head) : len(head) + len(law)] = law
         return parameters
 
-    def first_noise(self) -> Noise:
+    def first_noise(self) -> Wander:
         """White noise as large as the differences of neighbouring rows say."""
         spread = float(np.median(np.abs(np.diff(self.frequency)))) / 0.954
-        return Noise(0.0, 0.0, max(spread, 1e-9 * abs(float(self.frequency.mean()))))
+        return Wander(0.0, 0.0, max(spread, 1e-9 * abs(float(self.frequency.mean()))))
 
     def model(self, parameters: Array) -> Array:
         """Frequencies (Hz) of all runs."""
@@ -160,7 +160,7 @@ class Problem:
 
 
 @dataclass(frozen=True)
-class Solution:
+class LagSolution:
     """Parameters with covariance, residuals (Hz) and the Jacobian (unwhitened) of a fit under a given noise."""
 
     parameters: Array
@@ -168,10 +168,10 @@ class Solution:
     residual: Array
     slope: Array
     cost: float
-    noise: Noise
+    noise: Wander
 
 
-def solve(problem: Problem, start: Array, noise: Noise, fixed: dict[int, float] | None = None) -> Solution:
+def solve(problem: LagProblem, start: Array, noise: Wander, fixed: dict[int, float] | None = None) -> LagSolution:
     """Minimise the whitened residuals with weak priors; `fixed` holds parameters by place."""
     fixed = fixed or {}
     free = np.array([k for k in range(problem.count) if k not in fixed])
@@ -188,11 +188,11 @@ def solve(problem: Problem, start: Array, noise: Noise, fixed: dict[int, float] 
 
     def residuals(x: Array) -> Array:
         full = place(x)
-        white = whiten((problem.model(full) - problem.frequency)[:, None], problem.breaks, noise)[:, 0]
+        white = whiten(problem.model(full) - problem.frequency, noise, problem.stretches)
         return np.concatenate([white, prior @ full])
 
     def slopes(x: Array) -> Array:
-        white = whiten(problem.slope(place(x)), problem.breaks, noise)
+        white = whiten(problem.slope(place(x)), noise, problem.stretches)
         J: Array = np.vstack([white, prior])[:, free]
         return J
 
@@ -206,10 +206,10 @@ def solve(problem: Problem, start: Array, noise: Noise, fixed: dict[int, float] 
     covariance = np.zeros((problem.count, problem.count))
     covariance[np.ix_(free, free)] = _invert(np.asarray(result.jac))
     slope = problem.slope(full)
-    return Solution(full, covariance, problem.frequency - problem.model(full), slope, float(2 * result.cost), noise)
+    return LagSolution(full, covariance, problem.frequency - problem.model(full), slope, float(2 * result.cost), noise)
 
 
-def _prior(problem: Problem) -> Array:
+def _prior(problem: LagProblem) -> Array:
     """Rows of weak priors around zero: of the departures, and of the law's bend against its usual slope.
 
     Without the second a relaxation could pass for the square of one that is twice as slow.
@@ -223,7 +223,7 @@ def _prior(problem: Problem) -> Array:
     return rows
 
 
-def _bounds(problem: Problem) -> tuple[Array, Array]:
+def _bounds(problem: LagProblem) -> tuple[Array, Array]:
     low, high = np.full(problem.count, -np.inf), np.full(problem.count, np.inf)
     for k, constant in enumerate(problem.follower.constants):
         ends = np.array([constant.low, constant.high])

@@ -1,8 +1,8 @@
 """Thermal constants from a record of frequency and housing temperature, with honest intervals.
 
-f(t) = f₀ + a₁ x + a₂ x² + a₃ x³ + noise, x = T_r(t) − T_ref, T_r following the housing (`thermal.followers`) from an
-unknown initial state. The noise is white with a wandering level (`thermal.whitening`); the fit is generalised least
-squares with the noise re-estimated by restricted likelihood, and the intervals are those of Student's t.
+f(t) = f₀ + a₁ x + a₂ x² + a₃ x³ + noise, x = T_r(t) − T_ref, T_r following the housing (`followers`) from an
+unknown initial state. The noise is white with a wandering level (`compensation.coloured`); the fit is generalised
+least squares with the noise re-estimated by restricted likelihood, and the intervals are those of Student's t.
 """
 
 from collections.abc import Callable, Sequence
@@ -13,12 +13,12 @@ from scipy.optimize import brentq
 from scipy.stats import f as fisher
 from scipy.stats import t as student
 
+from compensation.coloured import Wander, estimate_wander
+from studies.calibration.lags.followers import Follower, make_series
+from studies.calibration.lags.housing_run import HousingRun, even_rows, row_step
+from studies.calibration.lags.least_squares import LagProblem, LagSolution, solve
 from thermal.errors import ThermalError
-from thermal.fitting import Problem, Solution, solve
-from thermal.followers import Follower, make_series
 from thermal.network import Array
-from thermal.run import Run, even_rows, row_step
-from thermal.whitening import Noise, estimate_noise
 
 ROWS = 2000  # most rows of a run that a fit uses
 PASSES = 2  # fits, each with the noise of the one before; the first under white noise
@@ -90,16 +90,18 @@ class Identification:
     confidence: float
     undetermined: tuple[Direction, ...]
     departures: tuple[Array, ...]
-    noise: Noise
+    noise: Wander
     residual: Array
     criterion: float
     row_step: float
     warnings: tuple[str, ...]
-    problem: Problem = field(repr=False)
-    solution: Solution = field(repr=False)
+    problem: LagProblem = field(repr=False)
+    solution: LagSolution = field(repr=False)
 
 
-def identify(runs: Sequence[Run], follower: Follower, law: FrequencyLaw, confidence: float = 0.9) -> Identification:
+def identify(
+    runs: Sequence[HousingRun], follower: Follower, law: FrequencyLaw, confidence: float = 0.9
+) -> Identification:
     """Fit the follower's constants and the unknown coefficients of the law to one run or several.
 
     Raises
@@ -114,16 +116,16 @@ def identify(runs: Sequence[Run], follower: Follower, law: FrequencyLaw, confide
     step = row_step(runs, ROWS)
     even = tuple(even_rows(run, step) for run in runs)
     coefficients = (law.slope, law.curvature, law.cubic)
-    problem = Problem(even, follower, law.reference_temperature, coefficients)
+    problem = LagProblem(even, follower, law.reference_temperature, coefficients)
     if problem.count >= problem.rows / 2:
         raise ThermalError(
             f"{problem.rows} rows are too few for {problem.count} unknowns; give a longer record or fix constants."
         )
     solution = solve(problem, problem.guess(), problem.first_noise())
     for _ in range(PASSES - 1):
-        noise = estimate_noise(solution.residual, solution.slope, problem.breaks)
+        noise = estimate_wander(solution.slope, solution.residual, problem.stretches)
         solution = solve(problem, solution.parameters, noise)
-    noise = estimate_noise(solution.residual, solution.slope, problem.breaks)
+    noise = estimate_wander(solution.slope, solution.residual, problem.stretches)
     criterion = _refuse_constant(problem, solution, noise)
     return Identification(
         estimates=_estimates(problem, solution, confidence),
@@ -141,7 +143,7 @@ def identify(runs: Sequence[Run], follower: Follower, law: FrequencyLaw, confide
 
 
 def identify_lags(
-    runs: Sequence[Run],
+    runs: Sequence[HousingRun],
     law: FrequencyLaw,
     most: int = 3,
     confidence: float = 0.9,
@@ -166,7 +168,11 @@ def identify_lags(
 
 
 def _best_start(
-    runs: Sequence[Run], law: FrequencyLaw, count: int, make: Callable[..., Follower], fewer: Identification | None
+    runs: Sequence[HousingRun],
+    law: FrequencyLaw,
+    count: int,
+    make: Callable[..., Follower],
+    fewer: Identification | None,
 ) -> Follower:
     """Return the follower whose fit under white noise is closest: the lags found so far and one more."""
     if not runs:
@@ -184,7 +190,7 @@ def _best_start(
     for fraction in FRACTIONS:
         starts = [float(np.clip(tau, 1.01 * shortest, 0.99 * longest)) for tau in (*found, fraction * span)]
         follower = make(*starts, shortest=shortest, longest=longest)
-        problem = Problem(even, follower, law.reference_temperature, (law.slope, law.curvature, law.cubic))
+        problem = LagProblem(even, follower, law.reference_temperature, (law.slope, law.curvature, law.cubic))
         solution = solve(problem, problem.guess(), problem.first_noise())
         values = problem.constants(solution.parameters)
         fitted = [
@@ -195,12 +201,12 @@ def _best_start(
     return min(trials, key=lambda trial: trial[0])[1]
 
 
-def _refuse_constant(problem: Problem, solution: Solution, noise: Noise) -> float:
+def _refuse_constant(problem: LagProblem, solution: LagSolution, noise: Wander) -> float:
     """Return the information criterion, or raise when an offset alone explains the record as well."""
     flat = problem.frequency - problem.frequency.mean()
-    alone = estimate_noise(flat, np.ones((problem.rows, 1)), problem.breaks)
+    alone = estimate_wander(np.ones((problem.rows, 1)), flat, problem.stretches)
 
-    def information(noise: Noise, count: int) -> float:
+    def information(noise: Wander, count: int) -> float:
         variance = noise.innovation**2 * (problem.rows - count) / problem.rows
         return float(problem.rows * np.log(variance) + count * np.log(problem.rows))
 
@@ -213,7 +219,7 @@ def _refuse_constant(problem: Problem, solution: Solution, noise: Noise) -> floa
     return criterion
 
 
-def _estimates(problem: Problem, solution: Solution, confidence: float) -> dict[str, Estimate]:
+def _estimates(problem: LagProblem, solution: LagSolution, confidence: float) -> dict[str, Estimate]:
     quantile = float(student.ppf((1 + confidence) / 2, problem.rows - problem.count))
     errors = np.sqrt(np.diag(solution.covariance))
     scales = problem.scales(solution.parameters)
@@ -230,7 +236,7 @@ def _estimates(problem: Problem, solution: Solution, confidence: float) -> dict[
     return estimates
 
 
-def _undetermined(problem: Problem, solution: Solution) -> tuple[Direction, ...]:
+def _undetermined(problem: LagProblem, solution: LagSolution) -> tuple[Direction, ...]:
     """Directions, in relative changes of the named constants, along which the record bounds nothing."""
     named = len(problem.names) - 1  # the offset comes last and is no thermal constant
     scales = problem.scales(solution.parameters)[:named]

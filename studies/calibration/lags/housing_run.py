@@ -14,7 +14,7 @@ LEAST_ROWS = 30
 
 
 @dataclass(frozen=True)
-class Run:
+class HousingRun:
     """Columns of a run as measured; not-a-number marks a missing value.
 
     Attributes
@@ -68,7 +68,7 @@ class EvenRun:
     warnings: tuple[str, ...]
 
 
-def row_step(runs: Sequence[Run], most: int) -> float:
+def row_step(runs: Sequence[HousingRun], most: int) -> float:
     """Distance (s) of even rows that suits all runs: at most `most` of them, none finer than the finest run."""
     if min(len(run.time) for run in runs) < 2:
         raise ThermalError("a run of one row identifies nothing.")
@@ -78,7 +78,7 @@ def row_step(runs: Sequence[Run], most: int) -> float:
     return finest * max(1.0, float(np.ceil(wanted / finest - 1e-9)))
 
 
-def even_rows(run: Run, step: float) -> EvenRun:
+def even_rows(run: HousingRun, step: float) -> EvenRun:
     """Average a run onto even rows `step` (s) apart; holes in the frequency stay, in the temperature they are bridged.
 
     Averaging commutes with linear lags, so only the law's curvature sees the width of a row, in second order.
