@@ -21,9 +21,9 @@ from thermal.errors import ThermalError
 
 Array = NDArray[np.float64]
 MOST_STEPS = 14
-CLOSE = 0.2  # of a posterior standard deviation, of the largest last move
-NEAR = 0.5  # the same, where no step makes the fit better: what differences and rounding leave
-SETTLED_NOISE = 1.0  # largest move after which the noise is not estimated anew
+CLOSE = 0.05  # fall of the objective that a step still promises: a move of 0.2 standard deviations in any direction
+NEAR = 1.0  # the same, where no step makes the fit better: what differences and rounding leave
+SETTLED_NOISE = 1.0  # the same, below which the noise is not estimated anew
 OUTLIER = 5.0
 HALVINGS = 5
 UNSEEN = 0.1  # of the noise of one row: a column whose whole length is less tells nothing
@@ -83,8 +83,8 @@ def fit(problem: Problem, start: Array | None = None, progress: Progress = lambd
         J, r = _whitened(problem, state, noise, rows)
         A = J.T @ J
         move: Array = np.asarray(np.linalg.solve(A + np.eye(len(A)), J.T @ r - state.point))
-        size = float(np.abs(move / np.sqrt(np.diag(np.linalg.inv(A + np.eye(len(A)))))).max(initial=0.0))
-        progress(f"step {step}: largest move {size:.2g} standard deviations")
+        size = float(move @ (J.T @ r - state.point))
+        progress(f"step {step}: −2 ln L is to fall by {size:.2g}")
         if size < CLOSE and step > 3:
             converged = True
             break

@@ -25,7 +25,7 @@ def draw(card, seed):
 
 
 def measure(card, words, seed, **options):
-    return simulate_run(card, load_profile(words), 1 / 30, seed, **options).record
+    return simulate_run(card, load_profile(words), 1 / 60, seed, **options).record
 
 
 @pytest.fixture(scope="module")
@@ -81,15 +81,20 @@ def test_what_the_data_does_not_say_stays_at_its_prior(found):
     )
 
 
-def test_the_saved_card_reproduces_the_runs_and_an_unseen_one_to_their_noise(found, device, tmp_path):
+def test_the_saved_card_reproduces_the_runs_to_their_noise_and_an_unseen_one_to_twice_that(
+    found, device, records, tmp_path
+):
     save_card(found.instrument, tmp_path / "calibrated.toml")
     saved = load_card(tmp_path / "calibrated.toml")
-    for words in (*PROFILES, UNSEEN):
+    unseen = measure(device, UNSEEN, 9)
+    for words, run in zip((*PROFILES, UNSEEN), (*records, unseen), strict=True):
         true, again = measure(device, words, 0, noise=False), measure(saved, words, 0, noise=False)
-        noisy = measure(device, words, 9)
         for name in ("frequency_Hz", "bias_deg_per_h", "inverse_q"):
-            noise = np.sqrt(np.mean((noisy[name] - true[name]) ** 2))
-            assert np.sqrt(np.mean((again[name] - true[name]) ** 2)) < 1.5 * noise, (words, name)
+            noise, left = run[name] - true[name], run[name] - again[name]
+            if run is unseen:
+                assert np.sqrt(np.mean(left**2)) < 2 * np.sqrt(np.mean(noise**2)), name
+            else:  # where a run's wander begins is its own
+                assert np.std(left) < 1.1 * np.std(noise), (words, name)
     widths = {value.name: value.sd for value in saved.uncertain}
     assert all(widths[one.parameter] == pytest.approx(one.sd, rel=1e-6) for one in found.estimates)
 
