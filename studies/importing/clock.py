@@ -57,7 +57,10 @@ def read_times(table: RawTable, file: "FileMap") -> Times:
         if origin.year == 1900:  # a pattern without a date: what strptime then supplies
             seconds, nights = _unroll_midnights(seconds)
             origin = _combine(file.start, origin)
-            notes += [f"{nights} midnights passed: a day added at each"] if nights else []
+            passed = (
+                "a midnight passed: a day added" if nights == 1 else f"{nights} midnights passed: a day added at each"
+            )
+            notes += [passed] if nights else []
     _check_span(seconds, table, file)
     if file.timezone is not None and origin is not None and origin.tzinfo is None:
         import zoneinfo

@@ -124,7 +124,7 @@ def _report_gaps(one: Series) -> list[str]:
         return [f"{usual}; no gap longer than {one.longest_gap:.6g} s"]
     longest = int(gaps[np.argmax(steps[gaps])])
     return [
-        f"{usual}; {len(gaps)} gaps longer than {one.longest_gap:.6g} s, {float(steps[gaps].sum()):.6g} s together, the"
+        f"{usual}; {len(gaps)} {'gap' if len(gaps) == 1 else 'gaps'} longer than {one.longest_gap:.6g} s, {float(steps[gaps].sum()):.6g} s together, the"
         f" longest of {float(steps[longest]):.6g} s after {float(one.time[longest] - one.time[0]):.6g} s"
     ]
 

@@ -78,7 +78,7 @@ def look_at(path: str) -> Look:
 def _is_unit_line(row: Sequence[str]) -> bool:
     """Tell whether the cells look like units: short, or in brackets."""
     cells = [cell.strip() for cell in row if cell.strip()]
-    units = r"[\[(].*[\])]|°?[CFK]|m?s|min|h|[kM]?Hz|[mkuµ]?V|(m?deg|°)/(s|h)|counts?|-|1|rad(/s)?"
+    units = r"[\[(].*[\])]|(m?deg|m?°)?[ _]?[CFK]|m?s|min|h|[kM]?Hz|[mkuµ]?V|(m?deg|°)/(s|h)|arcsec/s|pp[mb]|counts?|-|1|rad(/s)?"
     return bool(cells) and all(re.fullmatch(units, cell) for cell in cells)
 
 
@@ -98,10 +98,10 @@ def _find_separator(lines: Sequence[str]) -> str:
     """Return the separator that splits most lines into the same number of cells."""
     filled = [line for line in lines if line.strip()]
     best, score = ",", (0.0, 0)
-    for name in (";", "tab", ",", "space"):
+    for name in (";", "tab", "|", ",", "space"):
         widths = [len(_split(line, name)) for line in filled]
         usual = max(set(widths), key=widths.count) if widths else 1
-        if usual > 1 and (found := (round(widths.count(usual) / len(widths), 1), name in (";", "tab"))) > score:
+        if usual > 1 and (found := (round(widths.count(usual) / len(widths), 1), name in (";", "tab", "|"))) > score:
             best, score = name, found
     return best
 

@@ -7,7 +7,7 @@ step_s = 1.0                     # optional: a regular time grid; without it the
 target = "record"                # "record", or "table": settled readings temperature_degC, frequency_Hz without a time
 
 [[file]]                         # one table for each raw file, in the order of the command line
-separator = ";"                  # ";" "," "tab" "space"
+separator = ";"                  # ";" "," "tab" "|" "space"
 decimal = ","                    # "." or ","
 encoding = "utf-8"               # utf-8, utf-16, cp1252, latin-1
 header_line = 1                  # the line with the column names; 0: there is none, the columns are "column 1", "column 2" …
@@ -50,7 +50,7 @@ from studies.files.toml import Section, read_toml
 from studies.importing.units import SETTINGS, TARGETS, Unit, units_of
 
 SCHEMA = "hrg.map/1"
-SEPARATORS = {";": ";", ",": ",", "tab": "\t", "space": r"\s+"}
+SEPARATORS = {";": ";", ",": ",", "tab": "\t", "|": "|", "space": r"\s+"}
 SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0, "days": 86400.0}
 UNIX = {"unix-s": 1.0, "unix-ms": 1e-3, "unix-us": 1e-6, "unix-ns": 1e-9}
 NUMERIC_TIMES = (*SECONDS, *UNIX, "excel-days")

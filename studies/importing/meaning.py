@@ -23,7 +23,7 @@ BIDS: tuple[tuple[str, str, int], ...] = (
     (r"freq", "reference_frequency_Hz", 2),
     (r"applied|table|command\w*[ _]*rate|stimulus|turntable", "rate_deg_per_s", 6),
     (r"bias|zero[ _-]*rate|drift|\bzro", "bias_deg_per_h", 5),
-    (r"rate|omega|gyr|\bw[xyz]\b", "measured_rate_deg_per_s", 4),
+    (r"rate|omega|gyr|\b[gw][xyz]\b", "measured_rate_deg_per_s", 4),
     (r"1/q|inv\w*[ _]*q|^q\b|q[ _-]*fact", "inverse_q", 5),
     (r"quad", "quadrature_V", 5),
     (r"drive|amplitude|ampl", "drive_amplitude_V", 4),
@@ -35,6 +35,7 @@ FITTING_UNIT = 2
 UNIT_WORDS: tuple[tuple[str, str], ...] = (
     (r"kelvin|(^|[^a-z])k($|[^a-z])", "K"),
     (r"°\s*f|deg ?f\b|fahrenheit", "degF"),
+    (r"m(°|deg) ?c\b|millicelsius", "mdegC"),
     (r"°\s*c|deg ?c\b|celsius|(^|[^a-z])c($|[^a-z])", "degC"),
     (r"mhz", "MHz"),
     (r"khz", "kHz"),

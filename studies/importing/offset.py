@@ -1,8 +1,12 @@
 """The offset between two loggers' clocks, from what their columns share.
 
-For every offset d the first column is compared with a straight line in the second, read d later: y₁(t) = a + b y₂(t − d). The
-best d leaves the least sum of squares S; its 90 % interval ends where n′ ln(S/S_min) = 2.71, n′ the number of rows that the
-memory of the residual leaves independent, n (1 − ρ)/(1 + ρ).
+For every offset d the first column is compared with a straight line in the second, read d later: y₁(t) = a + b y₂(t − d), b = 1
+for two columns of one unit: an exponential settling that is later looks like one that is larger. The best d leaves the least
+sum of squares S; its 90 % interval ends where n′ ln(S/S_min) = 2.71, n′ the number of rows that the memory of the residual
+leaves independent, n (1 − ρ)/(1 + ρ).
+
+Both columns are first smoothed by the same kernel: between two rows interpolation would average noise, and every half step
+would look better than a whole one.
 """
 
 import math
@@ -11,10 +15,13 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+from scipy.ndimage import gaussian_filter1d
 from scipy.optimize import minimize_scalar
 
 Array = NDArray[np.float64]
-MOST_ROWS = 2000
+MOST_ROWS = 4000
+SMOOTHED = 2.0  # rows, standard deviation of the kernel
 FARTHEST = 3600.0  # s
 LEAST_CORRELATION = 0.8
 CHI2_90 = 2.71
@@ -30,31 +37,44 @@ class Offset:
     correlation: float
 
 
-def estimate_offset(t1: Array, y1: Array, t2: Array, y2: Array) -> Offset | None:
+def estimate_offset(t1: Array, y1: Array, t2: Array, y2: Array, same_unit: bool = False) -> Offset | None:
     """Return what must be added to the times t2 so that y2 follows y1; None where the two share too little.
 
     Parameters
     ----------
     t1, y1, t2, y2 : arrays
         Two series with times (s) by their own clocks; NaN marks missing values.
+    same_unit : bool
+        Whether both show one quantity in one unit.
     """
-    t1, y1 = _thin(t1, y1)
-    t2, y2 = _known(t2, y2)
+    t1, y1, t2, y2 = *_known(t1, y1), *_known(t2, y2)
     if min(t1.size, t2.size) < 20 or np.ptp(y1) == 0 or np.ptp(y2) == 0:
         return None
-    step = max(float(np.median(np.diff(t1))), float(np.median(np.diff(t2))))
-    reach = min(FARTHEST, 0.4 * min(float(np.ptp(t1)), float(np.ptp(t2))))
+    span = min(float(np.ptp(t1)), float(np.ptp(t2)))
+    step = max(float(np.median(np.diff(t1))), float(np.median(np.diff(t2))), span / MOST_ROWS)
+    t1, y1, t2, y2 = *_smooth(t1, y1, step), *_smooth(t2, y2, step)
+    reach = min(FARTHEST, 0.4 * span)
+    found = _search(t1, y1, t2, y2, reach, step, same_unit)
+    if found is None:
+        return None
+    # Once more with all rows that the found neighbourhood allows: what happened at the start of a run tells most.
+    near = max(abs(found.value), abs(found.low), abs(found.high)) + 20 * step
+    return (_search(t1, y1, t2, y2, near, step, same_unit) or found) if near < reach else found
+
+
+def _search(t1: Array, y1: Array, t2: Array, y2: Array, reach: float, step: float, same_unit: bool) -> Offset | None:
     # The same rows for every offset, so that their sums of squares compare.
     inside = (t1 >= t2[0] + reach) & (t1 <= t2[-1] - reach)
     if np.count_nonzero(inside) < 20:
         return None
-    t, y = t1[inside], y1[inside] - y1[inside].mean()
+    t, y, second = t1[inside], y1[inside] - y1[inside].mean(), CubicSpline(t2, y2)
 
     def left(d: float) -> Array:
-        x = np.interp(t - d, t2, y2)
+        x = np.asarray(second(t - d))
         x = x - x.mean()
         size = float(x @ x)
-        return np.asarray(y - x * float(x @ y) / size) if size > 0 else y
+        slope = 1.0 if same_unit else float(x @ y) / size if size > 0 else 0.0
+        return np.asarray(y - slope * x)
 
     def misfit(d: float) -> float:
         return math.log(max(float(np.sum(left(d) ** 2)), 1e-300))
@@ -77,12 +97,12 @@ def estimate_offset(t1: Array, y1: Array, t2: Array, y2: Array) -> Offset | None
     memory = min(max(float(np.sum(residual[1:] * residual[:-1])) / power, 0.0), 0.99)
     worth = CHI2_90 / max(y.size * (1 - memory) / (1 + memory), 1.0)
     low, high = (_edge(misfit, d, sign, float(found.fun) + worth, step / 50, reach) for sign in (-1.0, 1.0))
-    return Offset(d, low, high, correlation)
+    return Offset(d, low, high, correlation) if max(-low, high) < reach else None
 
 
 def _edge(misfit: Callable[[float], float], d: float, sign: float, limit: float, step: float, reach: float) -> float:
     """Go from d until the misfit passes the limit."""
-    while abs(d) < 2 * reach and misfit(d) < limit:
+    while abs(d) < reach and misfit(d) < limit:
         d += sign * step
         step *= 1.3
     return d
@@ -93,7 +113,7 @@ def _known(t: Array, y: Array) -> tuple[Array, Array]:
     return t[known], y[known]
 
 
-def _thin(t: Array, y: Array) -> tuple[Array, Array]:
-    t, y = _known(t, y)
-    rows = np.unique(np.linspace(0, t.size - 1, MOST_ROWS).astype(int)) if t.size else np.zeros(0, int)
-    return t[rows], y[rows]
+def _smooth(t: Array, y: Array, step: float) -> tuple[Array, Array]:
+    """Put a series on a regular grid and smooth it there."""
+    grid = np.arange(t[0], t[-1] + step / 2, step)
+    return grid, np.asarray(gaussian_filter1d(np.interp(grid, t, y), SMOOTHED, mode="nearest"))

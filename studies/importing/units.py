@@ -40,6 +40,7 @@ _SAME = Unit(lambda x: x, "x")
 _TEMPERATURE = {
     "degC": _SAME,
     "K": Unit(lambda x: x - 273.15, "x - 273.15"),
+    "mdegC": _times(1e-3, "x / 1000"),
     "degF": Unit(lambda x: (x - 32) / 1.8, "(x - 32) / 1.8"),
 }
 _FREQUENCY = {

@@ -2,6 +2,7 @@
 
 import datetime
 import json
+import re
 import sys
 import tomllib
 
@@ -200,7 +201,7 @@ def test_times_that_repeat_or_go_back(tmp_path):
 def test_every_unit_of_every_column_is_right(target):
     """Independent check: the same physical value written in each unit."""
     same = {
-        "degC": 25.0, "K": 298.15, "degF": 77.0,
+        "degC": 25.0, "mdegC": 25e3, "K": 298.15, "degF": 77.0,
         "Hz": 4430.0, "kHz": 4.43, "MHz": 4.43e-3, "rad/s": 4430.0 * 2 * np.pi,
         "period-s": 1 / 4430.0, "period-ms": 1e3 / 4430.0, "period-us": 1e6 / 4430.0,
         "period-counts": 1000 * 10e6 / 4430.0, "gate-counts": 44300.0,
@@ -394,7 +395,7 @@ def test_gaps_are_reported(tmp_path):
     (tmp_path / "raw.csv").write_text("time_s,temp\n" + "\n".join(rows) + "\n")
     record = draft_and_import(tmp_path / "raw.csv", tmp_path)
     assert any(
-        "1 gaps longer than 10 s" in note and "the longest of 501 s after 20 s" in note for note in record.comments
+        "1 gap longer than 10 s" in note and "the longest of 501 s after 20 s" in note for note in record.comments
     )
 
 
@@ -433,6 +434,67 @@ def test_the_offset_of_a_second_clock_is_offered(tmp_path, offset):
     (line,) = [line for line in draft.text.splitlines() if line.startswith("# clock_offset_s") and "CHECK" in line]
     assert float(line.split("=")[1].split("#")[0]) == pytest.approx(offset, abs=0.5)
     assert "its clock seems to need" in draft.notes[0]
+
+
+def test_two_sensors_of_one_step_tell_the_offset_of_their_clocks(tmp_path):
+    """A settling that is later looks like one that is larger, unless both columns are in one unit; the record takes one sensor."""
+    rng = np.random.default_rng(6)
+    t = np.arange(0.0, 18000.0, 10.0)
+
+    def temperature(at):
+        return np.where(at < 300, 25.0, -20 + 45 * (0.7 * np.exp(-(at - 300) / 400) + 0.3 * np.exp(-(at - 300) / 2200)))
+
+    one = temperature(t) + 0.03 * rng.normal(size=t.size)
+    two = temperature(t - 37) + 0.03 * rng.normal(size=t.size)
+    (tmp_path / "one.csv").write_text(
+        "time_s,housing sensor A\n" + "".join(f"{a},{b:.2f}\n" for a, b in zip(t, one, strict=True))
+    )
+    (tmp_path / "two.csv").write_text(
+        "time_s,bias [deg/h],housing sensor B\n"
+        + "".join(f"{a},{rng.normal():.4f},{b:.2f}\n" for a, b in zip(t, two, strict=True))
+    )
+    draft = draft_map([str(tmp_path / "one.csv"), str(tmp_path / "two.csv")])
+    (said,) = draft.notes
+    value, low, high = (
+        float(x) for x in re.findall(r"-?\d+\.?\d*(?:e[+-]?\d+)?(?= s|to| to)", said.split("need")[1])[:3]
+    )
+    assert low <= -37 <= high
+    assert value == pytest.approx(-37, abs=2)
+    assert high - low < 6
+    assert "'housing sensor B' against 'housing sensor A'" in said
+
+
+def test_what_a_file_states_above_its_table_fills_the_draft(tmp_path):
+    rows = [f"{20 + k / 10:.1f}|{k / 100}|{k / 1e4}|{-k / 1e4}|{k / 2e4}" for k in range(30)]
+    head = (
+        "# f nominal = 4.546 kHz; sampling interval 10 s\nT_imu [m°C]|freq dev [ppm]|gx [rad/s]|gy [rad/s]|gz [rad/s]\n"
+    )
+    (tmp_path / "raw.txt").write_text(head + "\n".join(rows) + "\n", encoding="utf-8")
+    (file,) = tomllib.loads(draft_map([str(tmp_path / "raw.txt")]).text)["file"]
+    assert (file["separator"], file["sample_period_s"]) == ("|", 10.0)
+    temperature, frequency, *axes = file["column"]
+    assert temperature["unit"] == "mdegC"
+    assert frequency["nominal_Hz"] == 4546.0
+    assert [axis["axis"] for axis in axes] == ["x", "y", "z"]
+
+
+def test_a_number_that_nobody_stated_is_asked_for(tmp_path):
+    """A nominal frequency of 1 Hz would pass for a result; a file without names gets a form for what was not understood."""
+    rows = [f"{10 * k},{20 + k / 10},{k / 100}" for k in range(30)]
+    (tmp_path / "raw.csv").write_text("time_s,temp,freq dev [ppm]\n" + "\n".join(rows) + "\n")
+    with pytest.raises(InputError, match="nominal_Hz"):
+        draft_and_import(tmp_path / "raw.csv", tmp_path)
+    (tmp_path / "bare.csv").write_text("\n".join(rows) + "\n")
+    assert '# from = "column 3"\n# to = "..."' in draft_map([str(tmp_path / "bare.csv")]).text
+
+
+def test_names_and_units_on_two_lines_of_a_table(tmp_path):
+    rows = "".join(f"03/02/2026 11:00:{k:02d} AM,{20 + k / 10},{4432 + k / 10},{k / 10},\n" for k in range(30))
+    (tmp_path / "raw.csv").write_text(f"Run 17,HRG,,,\nTime,Housing,Freq,ZRO,\n,degC,Hz,deg/h,\n{rows}")
+    draft = draft_map([str(tmp_path / "raw.csv")])
+    (file,) = tomllib.loads(draft.text)["file"]
+    assert [(c["from"], c["unit"]) for c in file["column"]] == [("Housing", "degC"), ("Freq", "Hz"), ("ZRO", "deg/h")]
+    assert draft.left_over == ()
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,118 @@
+"""Which columns of a raw file tell the time, and how it is written there."""
+
+import itertools
+import math
+import re
+from collections.abc import Mapping, Sequence
+
+from studies.importing.look import is_stamp
+from studies.importing.mapping import SECONDS
+
+STAMPS = (
+    "%Y-%m-%d %H:%M:%S",
+    "%Y-%m-%d %H:%M:%S.%f",
+    "%Y/%m/%d %H:%M:%S",
+    "%Y/%m/%d %H:%M:%S.%f",
+    "%d.%m.%Y %H:%M:%S",
+    "%d.%m.%Y %H:%M:%S.%f",
+    "%d.%m.%Y %H:%M",
+    "%d/%m/%Y %H:%M:%S",
+    "%d/%m/%Y %H:%M:%S.%f",
+    "%m/%d/%Y %H:%M:%S",
+    "%m/%d/%Y %H:%M:%S.%f",
+    "%m/%d/%Y %I:%M:%S %p",
+    "%d.%m.%y %H:%M:%S",
+    "%d/%m/%y %H:%M:%S",
+    "%m/%d/%y %H:%M:%S",
+    "%H:%M:%S",
+    "%H:%M:%S.%f",
+)
+TIME_WORDS = r"time|elapsed|zeit|date|datum|clock|stamp|uhr|^t$|^t\s*[ _/\[(]\s*[mµun]?s\b"
+UNIX_BY_SIZE = ((1e9, "unix-s"), (1e12, "unix-ms"), (1e15, "unix-us"), (1e18, "unix-ns"))
+USUAL_STEP = (1e-3, 3600.0)  # s between rows
+
+
+def find_time(
+    names: Sequence[str],
+    cells: Mapping[str, list[str]],
+    hints: Mapping[str, str],
+    numbers: Mapping[str, Sequence[float]],
+    decimal: str,
+    evenly: bool = False,
+) -> tuple[list[str], str, str]:
+    """Return the time columns, their format, and what is doubtful about it; no columns where the rows have no time.
+
+    `evenly` says that the file states the time between its rows: then a column that merely rises is no time.
+    """
+    named = [name for name in names if re.search(TIME_WORDS, name.lower())]
+    stamps = [name for name in names if cells[name] and all(is_stamp(cell) for cell in cells[name] if cell)]
+    stamped = [name for name in (named or stamps) if name in stamps][:2]
+    if stamped:
+        for columns in [stamped, stamped[:1], stamped[1:]] if len(stamped) > 1 else [stamped]:
+            form, unsure = _find_stamp(columns, cells, decimal)
+            if form:
+                return list(columns), form, unsure
+        return stamped[:1], "iso", "no known form fits; write the pattern"
+    rising = [name for name in names if _rises(numbers[name])]
+    if not named and (evenly or not rising):
+        return [], "", "no column is a time; by how many seconds do the rows lie apart?"
+    time = named[0] if named else rising[0]
+    unsure = "" if named else "no column is named time; the first that only rises was taken"
+    values = numbers[time]
+    first = values[0] if values else 0.0
+    for size, form in UNIX_BY_SIZE:
+        if size <= first < 4 * size:
+            return [time], form, unsure
+    hint = hints[time].lower()
+    for pattern, form in (
+        (r"\bms\b|milli|_ms\b", "ms"),
+        (r"\b(us|µs|μs)\b|micro|_us\b", "us"),
+        (r"\bns\b|nano|_ns\b", "ns"),
+        (r"\bmin", "min"),
+        (r"\b(h|hours?|std)\b", "h"),
+        (r"\bdays?\b", "days"),
+    ):
+        if re.search(pattern, hint):
+            return [time], form, unsure
+    if 40000 < first < 60000 and first % 1:
+        return [time], "excel-days", "the values look like Excel's days"
+    if re.search(r"_s\b|\bs\b|sec|sek", hint):
+        return [time], "s", unsure
+    return [time], _likely_unit(values), unsure or "the name states no unit; chosen by the step between rows"
+
+
+def _rises(values: Sequence[float]) -> bool:
+    return len(values) > 2 and all(b > a for a, b in itertools.pairwise(values))
+
+
+def _likely_unit(values: Sequence[float]) -> str:
+    """Return s, or ms, us, ns where seconds would put the rows hours apart."""
+    steps = sorted(b - a for a, b in itertools.pairwise(values))
+    step = steps[len(steps) // 2] if steps else 1.0
+    if USUAL_STEP[0] <= step <= USUAL_STEP[1]:
+        return "s"
+    return min(("s", "ms", "us", "ns"), key=lambda unit: abs(math.log10(max(step, 1e-300) * SECONDS[unit])))
+
+
+def _find_stamp(columns: Sequence[str], cells: Mapping[str, list[str]], decimal: str) -> tuple[str, str]:
+    import pandas as pd
+
+    text = pd.Series([" ".join(stamp) for stamp in zip(*(cells[name] for name in columns), strict=True)], dtype=str)
+    text = text[text.str.strip() != ""]
+    text = text.str.replace(",", ".", regex=False) if decimal == "," else text
+    fitting = [form for form in STAMPS if _fits(text, form)]
+    if not fitting:
+        return ("iso", "") if _fits(text, "ISO8601") else ("", "")
+    unsure = "day and month could be exchanged" if len(fitting) > 1 and "/" in fitting[0] else ""
+    if fitting[0].startswith("%H"):
+        unsure = "no date: give 'start' to place the run in time"
+    return fitting[0], unsure
+
+
+def _fits(text: "object", form: str) -> bool:
+    import pandas as pd
+
+    try:
+        return bool(len(text)) and bool(pd.to_datetime(text, format=form, errors="coerce", utc=True).notna().all())  # type: ignore[arg-type, call-overload]
+    except ValueError:
+        return False
