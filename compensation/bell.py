@@ -13,13 +13,13 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.constants import zero_Celsius
 
 from compensation.errors import CompensationError
 from compensation.fir import smooth
 from compensation.samples import read_columns, require_regular
 
 Real = NDArray[np.float64]
-ZERO_CELSIUS = 273.15
 MARGIN = 0.01
 """Part of a fitted range by which noise may lead out of it before that counts as extrapolation."""
 
@@ -155,4 +155,4 @@ def invert_chain(chain: Chain, rate: ArrayLike, temperature: ArrayLike) -> Real:
 
 
 def _show_celsius(temperature: float) -> str:
-    return f"{temperature - ZERO_CELSIUS:.2f} °C"
+    return f"{temperature - zero_Celsius:.2f} °C"

@@ -9,8 +9,9 @@ from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.constants import zero_Celsius
 
-from compensation.bell import ZERO_CELSIUS, Chain, Curve
+from compensation.bell import Chain, Curve
 from compensation.coloured import correlated_covariance
 from compensation.errors import CompensationError
 from compensation.fir import design_smoother
@@ -59,7 +60,7 @@ def fit_rough(run: Run) -> tuple[float, float, Real]:
 
 def fit_bias(temperature: ArrayLike, rough: ArrayLike, order: int = 2) -> Curve:
     """Fit N(T) to the rough output (rad/s) of a gyro at rest, over temperature (K): eq. (34)."""
-    return _fit_curve(temperature, rough, order, "temperature", ZERO_CELSIUS)
+    return _fit_curve(temperature, rough, order, "temperature", zero_Celsius)
 
 
 def fit_scale_over_rate(bias_compensated: ArrayLike, rate: ArrayLike, order: int = 2) -> Curve:
@@ -78,7 +79,7 @@ def fit_scale_over_temperature(
     T, measured, applied = read_columns(temperature=temperature, rate_compensated=rate_compensated, rate=rate)
     if np.any(applied == 0) or np.any(np.abs(measured) < 0.1 * np.abs(applied)):
         raise CompensationError("the scale over temperature needs a gyro that turns in every row of the run.")
-    return _fit_curve(T, applied / measured, order, "temperature", ZERO_CELSIUS)
+    return _fit_curve(T, applied / measured, order, "temperature", zero_Celsius)
 
 
 def fit_chain(

@@ -14,6 +14,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.constants import zero_Celsius
 
 from compensation.coloured import coloured_covariance, fit_coloured
 from compensation.decimation import average_blocks
@@ -48,7 +49,7 @@ class Variable:
 
 
 FREQUENCY = Variable("frequency", "Hz", "f", 0.0)
-TEMPERATURE = Variable("temperature", "°C", "T", -273.15)
+TEMPERATURE = Variable("temperature", "°C", "T", -zero_Celsius)
 
 
 @dataclass(frozen=True)

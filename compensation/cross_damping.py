@@ -17,6 +17,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.constants import zero_Celsius
 
 from compensation.coloured import correlated_covariance
 from compensation.demodulated import expand_secondary, expand_slow_secondary, relate_rate_to_secondary
@@ -260,8 +261,8 @@ def _check_range(temperature: Real, lowest: float, highest: float, extrapolate: 
     low, high = float(np.min(temperature)), float(np.max(temperature))
     if not extrapolate and (low < lowest or high > highest):
         raise CompensationError(
-            f"the temperature runs from {low - 273.15:.2f} to {high - 273.15:.2f} °C, but the model was fitted between "
-            f"{lowest - 273.15:.2f} and {highest - 273.15:.2f} °C; allow extrapolation or fit a wider record."
+            f"the temperature runs from {low - zero_Celsius:.2f} to {high - zero_Celsius:.2f} °C, but the model was fitted between "
+            f"{lowest - zero_Celsius:.2f} and {highest - zero_Celsius:.2f} °C; allow extrapolation or fit a wider record."
         )
 
 

@@ -18,6 +18,7 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.constants import zero_Celsius
 from scipy.interpolate import CubicSpline
 
 from shell.elastic import Elastic
@@ -25,7 +26,7 @@ from shell.errors import ShellError
 from shell.levels import Theory
 from shell.materials import Material
 from shell.modes import Mode, solve_modes
-from shell.property import ZERO_CELSIUS, coefficient_names, powers
+from shell.property import coefficient_names, powers
 from shell.resonator import Resonator
 from shell.shape_factor import ShapeFactor, interpolate_shape, shape_of
 from shell.solution import AlongMeridian
@@ -218,8 +219,8 @@ class FrequencyLaw:
         T = np.asarray(temperature, dtype=float)
         if T.size and not (T.min() >= self.lowest - 1e-6 and T.max() <= self.highest + 1e-6):
             raise ShellError(
-                f"the resonator reaches {T.min() - ZERO_CELSIUS:.2f} to {T.max() - ZERO_CELSIUS:.2f} °C, but its frequency"
-                f" is known from {self.lowest - ZERO_CELSIUS:.2f} to {self.highest - ZERO_CELSIUS:.2f} °C only."
+                f"the resonator reaches {T.min() - zero_Celsius:.2f} to {T.max() - zero_Celsius:.2f} °C, but its frequency"
+                f" is known from {self.lowest - zero_Celsius:.2f} to {self.highest - zero_Celsius:.2f} °C only."
             )
         return np.asarray(np.clip(T, self.lowest, self.highest))
 
@@ -247,7 +248,7 @@ class FrequencyLaw:
         weights, about = self._elastic_weights(T), self.material.reference
         for name in (name for name in ACTING if name in self.material.properties):
             if name == "expansion":  # ln f holds −∫ α from the reference, and 3/2 ∫ α from where the density is stated
-                at_density = self.material.properties["density"].numbers["at_degC"] + ZERO_CELSIUS
+                at_density = self.material.properties["density"].numbers["at_degC"] + zero_Celsius
                 since = (_integrals(x - about) for x in (T, np.array(at_density), np.array(self.reference_temperature)))
                 moved = [t / 2 - 1.5 * d + r for t, d, r in zip(*since, strict=True)]
             else:

@@ -14,10 +14,11 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.constants import zero_Celsius
 
 from shell.elastic import Elastic
 from shell.errors import ShellError
-from shell.property import FORMS, LISTS, PROPERTIES, ROOM, SIGNED, ZERO_CELSIUS, Array, Property, coefficient_names
+from shell.property import FORMS, LISTS, PROPERTIES, ROOM, SIGNED, Array, Property, coefficient_names
 from shell.quadrature import gauss
 
 ELASTIC = ("shear_modulus", "youngs_modulus", "poisson_ratio")
@@ -121,8 +122,8 @@ class Material:
         T = np.asarray(temperature, dtype=float)
         outside = (T < self.lowest - 1e-9) | (T > self.highest + 1e-9) | ~np.isfinite(T)
         if outside.any():
-            worst = float(T[outside][0]) - ZERO_CELSIUS
-            low, high = self.lowest - ZERO_CELSIUS, self.highest - ZERO_CELSIUS
+            worst = float(T[outside][0]) - zero_Celsius
+            low, high = self.lowest - zero_Celsius, self.highest - zero_Celsius
             raise ShellError(
                 f"{worst:g} °C is outside the range of {self.name}, law '{self.law}' ({low:g} to {high:g} °C);"
                 " choose another temperature or a law that covers it ('hrg materials' lists them)."
@@ -161,7 +162,7 @@ class Material:
             name: replace(self.properties[name], deviation=(a, b, c), reference=self.reference)
             for name, (a, b, c) in changed.items()
         }
-        span = [self.lowest - ZERO_CELSIUS, self.highest - ZERO_CELSIUS]
+        span = [self.lowest - zero_Celsius, self.highest - zero_Celsius]
         for name, found in moved.items():
             _check_sign(f"material '{self.name}', coefficients of {name}", name, found, span)
         return replace(self, properties={**self.properties, **moved})
@@ -203,7 +204,7 @@ class Material:
                 now = float(self.value(name, reference))
                 properties[name] = properties[name].scaled(value / now)
             else:
-                numbers = {"value": value, "at_degC": reference - ZERO_CELSIUS}
+                numbers = {"value": value, "at_degC": reference - zero_Celsius}
                 properties[name] = Property("constant", numbers, source="given value", relative=name not in SIGNED)
         properties = {name: replace(found, reference=reference) for name, found in properties.items()}
         return replace(self, properties=properties, reference=reference)
@@ -211,7 +212,7 @@ class Material:
     def _growth_since_density(self, T: NDArray[np.float64]) -> NDArray[np.float64]:
         if "expansion" not in self.properties:
             return np.ones_like(T)
-        return self.growth(T, self.properties["density"].numbers["at_degC"] + ZERO_CELSIUS)
+        return self.growth(T, self.properties["density"].numbers["at_degC"] + zero_Celsius)
 
     def _lack(self, name: str) -> str:
         return (
@@ -283,7 +284,7 @@ def _read_law(where: str, name: str, law: str, entry: Any) -> Material:
     span = entry["range_degC"]
     if not (isinstance(span, list) and len(span) == 2 and all(_is_number(x) for x in span) and span[0] < span[1]):
         raise ShellError(f"{where}: range_degC must be [lowest, highest], not {span!r}.")
-    low, high = (x + ZERO_CELSIUS for x in span)
+    low, high = (x + zero_Celsius for x in span)
     if low < 0:
         raise ShellError(f"{where}: range_degC begins below absolute zero.")
     found = {p: _read_property(f"{where}: {p}", p, entry[p], span) for p in PROPERTIES if p in entry}
@@ -330,7 +331,7 @@ def _read_property(where: str, name: str, entry: Any, span: list[float]) -> Prop
 
 def _check_sign(where: str, name: str, found: Property, span: list[float]) -> None:
     with np.errstate(over="ignore", invalid="ignore"):  # what overflows is refused below
-        values = found(np.linspace(span[0], span[1], 101) + ZERO_CELSIUS)
+        values = found(np.linspace(span[0], span[1], 101) + zero_Celsius)
     if name == "poisson_ratio" and not ((values > -1) & (values < 0.5)).all():
         raise ShellError(f"{where}: leaves the range -1 to 0.5 within range_degC.")
     if name == "expansion" and not (np.abs(values) < 0.01).all():

@@ -15,10 +15,10 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.constants import zero_Celsius
 
 Array = NDArray[np.float64]
-ZERO_CELSIUS = 273.15
-ROOM = 20.0 + ZERO_CELSIUS
+ROOM = 20.0 + zero_Celsius
 PROPERTIES = {
     "shear_modulus": "Pa",
     "youngs_modulus": "Pa",
@@ -38,11 +38,11 @@ def _constant(T: Array, p: Mapping[str, Any]) -> Array:
 
 
 def _linear(T: Array, p: Mapping[str, Any]) -> Array:
-    return np.asarray(p["value"] * (1 + p["slope"] * (T - ZERO_CELSIUS - p["at_degC"])))
+    return np.asarray(p["value"] * (1 + p["slope"] * (T - zero_Celsius - p["at_degC"])))
 
 
 def _parabola(T: Array, p: Mapping[str, Any]) -> Array:
-    distance = (T - ZERO_CELSIUS - p["maximum_degC"]) / (p["at_degC"] - p["maximum_degC"])
+    distance = (T - zero_Celsius - p["maximum_degC"]) / (p["at_degC"] - p["maximum_degC"])
     return np.asarray(p["value"] * (1 + p["rise"] * (1 - distance**2)))
 
 
@@ -51,7 +51,7 @@ def _table(T: Array, p: Mapping[str, Any]) -> Array:
 
     at = p["temperature_degC"]
     # The law's range is checked in kelvin; rounding on the way back must not lead out of the table.
-    values = PchipInterpolator(at, p["values"])(np.clip(T - ZERO_CELSIUS, at[0], at[-1]))
+    values = PchipInterpolator(at, p["values"])(np.clip(T - zero_Celsius, at[0], at[-1]))
     return np.asarray(p.get("value", 1.0) * values)
 
 

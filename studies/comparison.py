@@ -4,7 +4,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from studies.instrument.card import ZERO_CELSIUS
+from scipy.constants import zero_Celsius
 
 if TYPE_CHECKING:
     from studies.instrument.card import Instrument
@@ -36,7 +36,7 @@ class Comparison:
 
 def compare(instruments: "Sequence[Instrument]") -> Comparison:
     """Compute the figures of designs and find the keys in which their cards differ."""
-    keys = [{REFERENCE: one.reference_temperature - ZERO_CELSIUS, **dict(_flatten(one.content))} for one in instruments]
+    keys = [{REFERENCE: one.reference_temperature - zero_Celsius, **dict(_flatten(one.content))} for one in instruments]
     names = dict.fromkeys(name for one in keys for name in one)
     differing = {name: tuple(one.get(name) for one in keys) for name in names}
     return Comparison(

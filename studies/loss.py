@@ -335,9 +335,10 @@ def _others(
     vibration: "Vibration", parts: "LossParts", spread: Mapping[str, float], left_out: list[str]
 ) -> "list[Cause]":
     """Gas, activated losses, and what leaves through the mount as the card gives it."""
+    from scipy.constants import zero_Celsius
+
     from shell.damping.budget import activated_cause, constant_cause, gas_cause
     from shell.damping.gas import GASES
-    from studies.instrument.card import ZERO_CELSIUS
 
     causes = []
     if parts.pressure_Pa is None:
@@ -347,7 +348,7 @@ def _others(
         causes.append(gas_cause(vibration, GASES[parts.gas], parts.pressure_Pa, sd, parts.accommodation))
     for number, peak in enumerate(parts.activated):
         sd = spread.get(f"loss.activated.{number}.height", 0.0)
-        found = activated_cause(peak.height, peak.energy_eV, peak.peak_degC + ZERO_CELSIUS, sd, "given in the card")
+        found = activated_cause(peak.height, peak.energy_eV, peak.peak_degC + zero_Celsius, sd, "given in the card")
         causes.append(found)
     if parts.anchor_inverse_q is not None:
         sd = spread.get("loss.anchor_inverse_q", 0.0)

@@ -5,6 +5,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from scipy.constants import zero_Celsius
+
 from studies.errors import InputError
 
 if TYPE_CHECKING:
@@ -15,7 +17,6 @@ if TYPE_CHECKING:
     from studies.record import Record
 
 TEMPERATURES = ("housing_temperature_degC", "resonator_temperature_degC", "chamber_temperature_degC")
-ZERO_CELSIUS = 273.15
 MOST_ROWS = 20_000
 """Rows beyond which a run is averaged in blocks before a fit: temperature is slow, and noise averages."""
 LEAST_SPIKE = 1e-3
@@ -51,7 +52,7 @@ def celsius_range(lowest: float, highest: float) -> tuple[float, float]:
     """Return a fitted range (K) in °C so that the readings at its ends lie inside, whatever rounding kelvin brought."""
     ends = []
     for kelvin, outward in ((lowest, -1.0), (highest, 1.0)):
-        exact = kelvin - ZERO_CELSIUS
+        exact = kelvin - zero_Celsius
         short = round(exact, 9)
         ends.append(short if abs(short - exact) < 1e-11 else exact + outward * 1e-9)
     return ends[0], ends[1]
@@ -102,5 +103,5 @@ def gather_rest(records: "Sequence[Record]", outputs: "dict[str, float]") -> Res
             blocks = average_blocks(time, {"output": values, "temperature": temperature}, width)
             time, values, temperature = blocks.time, blocks.columns["output"], blocks.columns["temperature"]
             widest = max(widest, width)
-        runs.append(RestRun(time, values * outputs[output], temperature + ZERO_CELSIUS))
+        runs.append(RestRun(time, values * outputs[output], temperature + zero_Celsius))
     return RestData(tuple(runs), output, column, left_out, widest)

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.constants import zero_Celsius
 
 from compensation.bell import Chain, apply_chain
 from compensation.bell_calibration import Run, fit_chain
@@ -15,7 +16,7 @@ from compensation.samples import is_regular
 from compensation.stability import allan_deviation
 from studies.errors import InputError, naming
 from studies.models.kinds.scale import RAW
-from studies.rest import LARGEST_REST, MOST_ROWS, TEMPERATURES, ZERO_CELSIUS, choose_column, drop_spikes
+from studies.rest import LARGEST_REST, MOST_ROWS, TEMPERATURES, choose_column, drop_spikes
 
 if TYPE_CHECKING:
     from studies.record import Record
@@ -168,7 +169,7 @@ def _read_run(record: "Record", output: str, column: str) -> tuple[Run, int]:
     if np.count_nonzero(complete) < 2:
         raise InputError(f"{record.path}: no rows with {output}, {column} and rate_deg_per_s together.")
     time, raw, temperature, rate = (values[complete] for values in columns)
-    return Run(time, raw, temperature + ZERO_CELSIUS, rate * DEG), int(np.count_nonzero(~complete))
+    return Run(time, raw, temperature + zero_Celsius, rate * DEG), int(np.count_nonzero(~complete))
 
 
 def _thin(run: Run) -> Run:

@@ -5,10 +5,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.constants import zero_Celsius
 
 from studies.errors import InputError
 from studies.files.columns import read_header
-from studies.instrument.card import ZERO_CELSIUS, Instrument, load_card
+from studies.instrument.card import Instrument, load_card
 from studies.record import Record, read_record
 
 if TYPE_CHECKING:
@@ -113,7 +114,7 @@ def diagnose(*runs: Run, card: Card | None = None) -> "Diagnosis | TableDiagnosi
     if card is None:
         return investigate(load_campaign(records))
     instrument = open_card(card)
-    campaign = load_campaign(records, instrument.reference_temperature - ZERO_CELSIUS)
+    campaign = load_campaign(records, instrument.reference_temperature - zero_Celsius)
     instrument.material.check(np.concatenate([run.states.housing for run in campaign.runs]))
     return investigate(campaign, card=instrument)
 

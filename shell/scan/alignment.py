@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import linprog
 from scipy.spatial.transform import Rotation
+from scipy.stats import median_abs_deviation
 
 from shell.curves import Arc
 from shell.errors import ShellError
@@ -93,7 +94,7 @@ def _descend(samples: list[tuple[Array, int]], projector: Projector, start: Moti
             rows.append(np.concatenate([n, turn[:, :2]], axis=1))
             residual.append(off)
         A, d = np.concatenate(rows), np.concatenate(residual)
-        spread = 1.4826 * float(np.median(abs(d - np.median(d)))) + 1e-12
+        spread = float(median_abs_deviation(d, scale="normal")) + 1e-12
         far = abs(d - np.median(d)) / spread
         # weights that fall with the distance find the place; equal ones do not let the form of the face push it aside
         weight = 1 / np.maximum(1.0, far / 2) if count < SETTLED else np.where(far < 6, 1.0, 0.0)
@@ -158,7 +159,7 @@ def _check(samples: list[tuple[Array, int]], projector: Projector, motion: Motio
     for (points, side), name in zip(samples, names, strict=True):
         _, off = _normals(motion.apply(points), side, projector)
         h, middle = float(np.median(projector.line.thickness)), float(np.median(off))
-        spread = 1.4826 * float(np.median(abs(off - middle)))
+        spread = float(median_abs_deviation(off, scale="normal"))
         if abs(middle + side * h) < 0.3 * h:
             here, there = ("outer", "inner") if side > 0 else ("inner", "outer")
             raise ShellError(
@@ -204,7 +205,7 @@ def _edge(clouds: Sequence[tuple[Array, int]], projector: Projector, motion: Mot
     for points, side in clouds:
         at = projector.place(motion.apply(points[:: max(1, len(points) // EDGE_SAMPLE)]))
         off = at.height - side * at.thickness / 2
-        scatter = 1.4826 * float(np.median(abs(off - np.median(off))))
+        scatter = float(median_abs_deviation(off, scale="normal"))
         near = abs(off - np.median(off)) < 10 * scatter + 1e-9
         x, angle = at.position[near], at.azimuth[near] % (2 * np.pi)
         sector = np.minimum((angle / (2 * np.pi) * SECTORS).astype(np.intp), SECTORS - 1)

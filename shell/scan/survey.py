@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from scipy.stats import median_abs_deviation
 
 from shell.curves import Arc
 from shell.errors import ShellError
@@ -160,7 +161,7 @@ def survey(
     rough = _fit(x, theta, off, np.ones(len(off)), low, high, highest, degree)
     for _ in range(3):
         left = off - _evaluate(rough, x, theta, low, high, highest, degree)
-        scatter = 1.4826 * float(np.median(abs(left - np.median(left))))
+        scatter = float(median_abs_deviation(left, scale="normal"))
         good = abs(left - np.median(left)) < OUTLIER * max(scatter, 1e-10)
         rough = _fit(x[good], theta[good], off[good], np.ones(good.sum()), low, high, highest, degree)
     limit = OUTLIER * max(scatter, 1e-10)
@@ -198,7 +199,7 @@ def survey_map(
     rough = _fit(x, theta, off, np.ones(len(off)), low, high, highest, degree)
     for _ in range(4):
         left = off - _evaluate(rough, x, theta, low, high, highest, degree)
-        scatter = 1.4826 * float(np.median(abs(left - np.median(left))))
+        scatter = float(median_abs_deviation(left, scale="normal"))
         good = abs(left - np.median(left)) <= OUTLIER * max(scatter, 1e-10)
         rough = _fit(x[good], theta[good], off[good], np.ones(good.sum()), low, high, highest, degree)
     x, theta, left = x[good], theta[good], left[good]

@@ -5,11 +5,12 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.constants import zero_Celsius
 
 from compensation.spikes import find_spikes
 from studies.errors import InputError
 from studies.record import Record
-from studies.simulation.drive import COLUMN, ZERO_CELSIUS, Drive, drive_by_record
+from studies.simulation.drive import COLUMN, Drive, drive_by_record
 
 Array = NDArray[np.float64]
 Rows = NDArray[np.intp]
@@ -91,7 +92,7 @@ def read_settled(path: str) -> SettledTable:
 
     values = read_frequency_table(path).values
     f = values["frequency_Hz"]
-    return SettledTable(path, values["temperature_degC"] + ZERO_CELSIUS, f, reading_resolution(f))
+    return SettledTable(path, values["temperature_degC"] + zero_Celsius, f, reading_resolution(f))
 
 
 def observe(records: Sequence[Record]) -> tuple[ObservedRun, ...]:

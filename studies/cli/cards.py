@@ -90,6 +90,8 @@ def materials(name: str = "", *, json: bool = False) -> int:
     json : bool
         Print one JSON object instead of a table.
     """
+    from scipy.constants import zero_Celsius
+
     from shell.materials import read_materials
     from studies.cli.output import print_json, print_table
     from studies.errors import InputError, nearest
@@ -109,7 +111,7 @@ def materials(name: str = "", *, json: bool = False) -> int:
     rows = []
     for key, laws in chosen.items():
         for k, law in enumerate(laws.values()):
-            low, high = law.lowest - 273.15, law.highest - 273.15
+            low, high = law.lowest - zero_Celsius, law.highest - zero_Celsius
             lacking = ", ".join(_lacking(law)) or "nothing"
             rows.append([key if k == 0 else "", law.law, f"{low:g} to {high:g}", lacking, law.source])
     print_table(
@@ -153,10 +155,12 @@ def _correlated(prior: "Prior", k: int) -> list[int]:
 
 
 def _describe(law: "Material") -> "dict[str, Any]":
+    from scipy.constants import zero_Celsius
+
     return {
         "name": law.name,
         "law": law.law,
-        "range_degC": [law.lowest - 273.15, law.highest - 273.15],
+        "range_degC": [law.lowest - zero_Celsius, law.highest - zero_Celsius],
         "source": law.source,
         "note": law.note,
         "lacks": _lacking(law),

@@ -42,6 +42,8 @@ def diagnose(
     """
     import os
 
+    from scipy.constants import zero_Celsius
+
     # many small matrices: threads of the linear algebra would wait for each other longer than they compute
     for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
         os.environ.setdefault(name, "1")
@@ -109,7 +111,7 @@ def diagnose(
     from studies.record import read_record
 
     instrument = None if card is None else load_card(card)
-    reference = None if instrument is None else instrument.reference_temperature - 273.15
+    reference = None if instrument is None else instrument.reference_temperature - zero_Celsius
     campaign = load_campaign([read_record(path) for path in runs], reference)
     if instrument is not None:
         instrument.material.check(np.concatenate([np.empty(0), *(run.states.housing for run in campaign.runs)]))

@@ -41,12 +41,13 @@ def electrodes(
     import math
 
     import numpy as np
+    from scipy.constants import zero_Celsius
 
     from shell.electrodes import reach, trim_voltages
     from shell.modes import solve_modes
     from studies.cli.output import print_json, print_table, say
     from studies.errors import InputError, naming
-    from studies.instrument.card import ZERO_CELSIUS, load_card
+    from studies.instrument.card import load_card
     from studies.splitting import SplitPair
 
     if (split is None) != (axis is None):
@@ -60,7 +61,7 @@ def electrodes(
         raise InputError(
             f"{instrument.path}: the card has no table [electrodes]; add it (gap_um, count, coverage, voltage_V)."
         )
-    T = instrument.reference_temperature if temperature is None else temperature + ZERO_CELSIUS
+    T = instrument.reference_temperature if temperature is None else temperature + zero_Celsius
     keys = instrument.part("electrodes").keys
     with naming(f"{instrument.path} [electrodes]"):
         resonator, elastic = instrument.at(T)
@@ -78,7 +79,7 @@ def electrodes(
     payload: dict[str, Any] = {
         "schema": "hrg.electrodes/1",
         "card": instrument.name,
-        "temperature_degC": T - ZERO_CELSIUS,
+        "temperature_degC": T - zero_Celsius,
         "harmonic": harmonic,
         "frequency_Hz": mode.frequency,
         "softening_ppm": 1e6 * own.shift,
@@ -108,7 +109,7 @@ def electrodes(
         ["voltages can grow before pull-in by", "without end" if math.isinf(factor) else f"{factor:.3g} times"],
         [f"split that {limit:g} V null, any axis (mHz)", f"{1e3 * payload['reach_Hz']:.3f}"],
     ]
-    title = f"{instrument.name}, n = {harmonic}, {mode.frequency:.3f} Hz at {T - ZERO_CELSIUS:g} °C"
+    title = f"{instrument.name}, n = {harmonic}, {mode.frequency:.3f} Hz at {T - zero_Celsius:g} °C"
     print_table(title, ["electrodes", "value"], rows)
     if trim is not None:
         step = 360 / keys.count

@@ -46,6 +46,8 @@ def fit_cross_damping(
     """
     import math
 
+    from scipy.constants import zero_Celsius
+
     from studies.cli.output import print_json, print_table, say
     from studies.cross_damping import study_cross_damping
     from studies.errors import InputError, naming
@@ -75,7 +77,7 @@ def fit_cross_damping(
             gathered.runs,
             k=2 * math.pi * carrier,
             zeta=1 / (2 * quality),
-            calibration_temperature=calibration_temperature + 273.15,
+            calibration_temperature=calibration_temperature + zero_Celsius,
             order=order,
         )
     model = save_cross_damping(
@@ -110,6 +112,7 @@ def _summarise(study: "CrossDampingStudy", data: "RestData") -> dict[str, Any]:
     import math
 
     import numpy as np
+    from scipy.constants import zero_Celsius
 
     from studies.models.kinds.cross_damping import OUTPUTS
 
@@ -119,7 +122,7 @@ def _summarise(study: "CrossDampingStudy", data: "RestData") -> dict[str, Any]:
         "temperature": data.temperature_column,
         "frequency_Hz": model.k / (2 * math.pi),
         "quality": 1 / (2 * model.zeta),
-        "calibration_temperature_degC": round(model.calibration_temperature - 273.15, 9),
+        "calibration_temperature_degC": round(model.calibration_temperature - zero_Celsius, 9),
         "coefficients": model.coefficients,
         "standard_errors": np.sqrt(np.diag(model.covariance)),
         "training": _change(study.training.rows, unit),

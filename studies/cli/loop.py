@@ -69,10 +69,11 @@ def loop(
         Print one JSON object (schema hrg.loop/1) instead of tables.
     """
     import numpy as np
+    from scipy.constants import zero_Celsius
 
     from studies.cli.output import print_json, print_table, say
     from studies.errors import InputError
-    from studies.instrument.card import ZERO_CELSIUS, load_card
+    from studies.instrument.card import load_card
     from studies.law import law_of
     from studies.loss import settled_loss
     from studies.simulation.drive import MOST_ROWS
@@ -80,7 +81,7 @@ def loop(
 
     instrument = load_card(card)
     keys = require_loop(instrument)
-    T = instrument.reference_temperature if temperature is None else temperature + ZERO_CELSIUS
+    T = instrument.reference_temperature if temperature is None else temperature + zero_Celsius
     if not (0 < row < np.inf and 0 < hours < np.inf and np.isfinite(rate)):
         raise InputError("--row and --hours must be positive, and --rate finite.")
     if hours * 3600 / row > MOST_ROWS:
@@ -110,7 +111,7 @@ def loop(
             "schema": "hrg.loop/1",
             "card": instrument.name,
             "mode": keys.mode,
-            "temperature_degC": T - ZERO_CELSIUS,
+            "temperature_degC": T - zero_Celsius,
             "frequency_Hz": frequency,
             "quality_factor": 1 / inverse_q,
             "bryan_factor": law.bryan_factor,

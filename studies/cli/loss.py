@@ -55,10 +55,11 @@ def loss(
         Print one JSON object (schema hrg.loss/1) instead of tables.
     """
     import numpy as np
+    from scipy.constants import zero_Celsius
 
     from studies.cli.output import print_json
     from studies.errors import InputError
-    from studies.instrument.card import ZERO_CELSIUS, load_card
+    from studies.instrument.card import load_card
     from studies.loss import loss_model
 
     if not step > 0 or not to_degC >= from_degC:
@@ -70,7 +71,7 @@ def loss(
             f"--from {from_degC:g} --to {to_degC:g} --step {step:g}: more than {MOST_POINTS} temperatures; take a longer step."
         )
     instrument = load_card(card)
-    T = instrument.material.check(np.arange(from_degC, to_degC + 1e-9 * step, step) + ZERO_CELSIUS)
+    T = instrument.material.check(np.arange(from_degC, to_degC + 1e-9 * step, step) + zero_Celsius)
     model = loss_model(instrument, harmonic, theory, anchor)
     budget = model.budget(T)
     if json:
@@ -83,12 +84,14 @@ def loss(
 
 
 def _describe(model: "LossModel", budget: "Budget", harmonic: int, theory: str) -> "dict[str, Any]":
+    from scipy.constants import zero_Celsius
+
     low, high = budget.interval
     return {
         "harmonic": harmonic,
         "theory": theory,
         "frequency_Hz": model.frequency,
-        "temperature_degC": budget.temperatures - 273.15,
+        "temperature_degC": budget.temperatures - zero_Celsius,
         "inverse_q": budget.inverse_q,
         "inverse_q_low": low,
         "inverse_q_high": high,
@@ -159,13 +162,14 @@ def _part(part: "Part") -> "dict[str, Any]":
 
 def _print(name: str, model: "LossModel", budget: "Budget", harmonic: int, theory: str) -> None:
     import numpy as np
+    from scipy.constants import zero_Celsius
 
     from studies.cli.output import print_table
 
     low, high = budget.interval
     rows = [
         [
-            f"{T - 273.15:.1f}",
+            f"{T - zero_Celsius:.1f}",
             _plain(1 / total),
             f"{_plain(1 / most)} … {_plain(1 / least)}",
             f"{1e9 * total:.3g}",
@@ -193,15 +197,15 @@ def _print(name: str, model: "LossModel", budget: "Budget", harmonic: int, theor
                 part.source,
             ]
         )
-    degrees = [f"{budget.temperatures[k] - 273.15:.0f} °C" for k in shown]
-    note = f"1/Q in 1e-9; share, 90 % interval and slope at {budget.temperatures[middle] - 273.15:.0f} °C."
+    degrees = [f"{budget.temperatures[k] - zero_Celsius:.0f} °C" for k in shown]
+    note = f"1/Q in 1e-9; share, 90 % interval and slope at {budget.temperatures[middle] - zero_Celsius:.0f} °C."
     print_table("Parts", ["part", "share", *degrees, "90 %", "%/°C", "source"], table, note)
     around = _anisotropy(model, budget)
     if around is not None:
         columns = ["T (°C)", "Δ(1/Q) (1e-9)", "axis (°)", "drift at most (°/h)"]
         fields = ("inverse_q_split", "damping_axis_deg", "largest_drift_deg_per_h")
         lines = [
-            [f"{T - 273.15:.1f}", f"{1e9 * split:.3g}", f"{axis:.2f}", f"{drift:.4g}"]
+            [f"{T - zero_Celsius:.1f}", f"{1e9 * split:.3g}", f"{axis:.2f}", f"{drift:.4g}"]
             for T, split, axis, drift in zip(budget.temperatures, *(around[field] for field in fields), strict=True)
         ]
         print_table("Around the axis", columns, lines, "Axis: azimuth of the pattern that is damped most.")

@@ -49,10 +49,12 @@ def modes(
     """
     from dataclasses import asdict
 
+    from scipy.constants import zero_Celsius
+
     from shell.modes import solve_modes
     from studies.cli.output import print_json, print_table
     from studies.errors import InputError, naming
-    from studies.instrument.card import ZERO_CELSIUS, load_card
+    from studies.instrument.card import load_card
 
     if count < 1:
         raise InputError(f"--count {count}: at least one mode must be asked for.")
@@ -61,7 +63,7 @@ def modes(
     if not 0 < tolerance < 1:
         raise InputError(f"--tolerance {tolerance:g}: it is a relative error between 0 and 1.")
     instrument = load_card(card)
-    T = instrument.reference_temperature if temperature is None else temperature + ZERO_CELSIUS
+    T = instrument.reference_temperature if temperature is None else temperature + zero_Celsius
     with naming(instrument.path):
         resonator, elastic = instrument.at(T)
         found = [m for n in harmonic for m in solve_modes(resonator, elastic, n, count, theory, tolerance)]
@@ -94,7 +96,7 @@ def modes(
             {
                 "schema": "hrg.modes/1",
                 "card": instrument.name,
-                "temperature_degC": T - ZERO_CELSIUS,
+                "temperature_degC": T - zero_Celsius,
                 "theory": theory,
                 "modes": entries,
             }
@@ -120,7 +122,7 @@ def modes(
     )
     if theory == "rayleigh":
         note = "Rayleigh's closed form ignores the free edge: on a hemisphere it lies several per cent too high."
-    print_table(f"{instrument.name} at {T - ZERO_CELSIUS:g} °C, {theory}", columns, rows, note)
+    print_table(f"{instrument.name} at {T - zero_Celsius:g} °C, {theory}", columns, rows, note)
     if split:
         _print_splits(found, split)
     if sensitivities and detailed:

@@ -63,6 +63,8 @@ def render(
     import os
     from pathlib import Path
 
+    from scipy.constants import zero_Celsius
+
     from studies.cli.output import print_json, say
     from studies.errors import InputError
     from studies.files.writing import written_whole
@@ -91,7 +93,7 @@ def render(
         modes = [
             {
                 "card": one.instrument.name,
-                "temperature_degC": one.temperature - 273.15,
+                "temperature_degC": one.temperature - zero_Celsius,
                 "harmonic": one.mode.harmonic,
                 "index": one.mode.index,
                 "frequency_Hz": one.mode.frequency,
@@ -113,8 +115,10 @@ def _solve(
     kind: str,
 ) -> "list[Shown]":
     """Solve every mode that is to be shown: cards × temperatures × harmonics."""
+    from scipy.constants import zero_Celsius
+
     from studies.errors import InputError
-    from studies.instrument.card import ZERO_CELSIUS, load_card
+    from studies.instrument.card import load_card
     from studies.reports.scenes import show_mode
 
     if not cards:
@@ -125,7 +129,7 @@ def _solve(
     most = MOST if kind in (".png", ".webp", ".gif") else 1
     if count > most:
         raise InputError(f"{count} resonators are too many for one {kind} file, which shows {most} at most.")
-    wanted: list[float | None] = [*(T + ZERO_CELSIUS for T in temperatures)] or [None]
+    wanted: list[float | None] = [*(T + zero_Celsius for T in temperatures)] or [None]
     instruments = [load_card(card) for card in cards]
     exaggerated = kind not in (".stl", ".ply")  # those are the solid itself
     return [show_mode(one, n, index, T, theory, exaggerated) for one in instruments for T in wanted for n in harmonics]
@@ -151,6 +155,8 @@ def _picture(
 
 
 def _page(shown: "Sequence[Shown]") -> bytes:
+    from scipy.constants import zero_Celsius
+
     from studies.reports.mode_picture import view_blocks
     from studies.reports.page import Chapter, Table, render_page
 
@@ -160,7 +166,7 @@ def _page(shown: "Sequence[Shown]") -> bytes:
         for one in shown
     ]
     table = Table("Modes of this page", ["n", "Index", "Frequency (Hz)", "Bryan factor"], rows)
-    lead = f"Mode shapes of {first.instrument.name} at {first.temperature - 273.15:g} °C, {first.mode.theory} theory."
+    lead = f"Mode shapes of {first.instrument.name} at {first.temperature - zero_Celsius:g} °C, {first.mode.theory} theory."
     return render_page(first.instrument.name, lead, [Chapter("Mode shapes", [*view_blocks(shown), table])]).encode()
 
 

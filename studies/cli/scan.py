@@ -70,9 +70,11 @@ def scan(
     json : bool
         Print one JSON object (schema hrg.scan/1) instead of tables.
     """
+    from scipy.constants import zero_Celsius
+
     from studies.cli.output import print_json, print_table, say
     from studies.errors import InputError, naming
-    from studies.instrument.card import ZERO_CELSIUS, load_card
+    from studies.instrument.card import load_card
     from studies.scan import scan_faces
 
     files = {name: path for name, path in (("inner", inner), ("outer", outer)) if path != NONE}
@@ -81,7 +83,7 @@ def scan(
     if min(harmonic) < 1:
         raise InputError(f"--harmonic {min(harmonic)}: pairs have harmonics from 1 up.")
     instrument = load_card(card)
-    T = instrument.reference_temperature if temperature is None else temperature + ZERO_CELSIUS
+    T = instrument.reference_temperature if temperature is None else temperature + zero_Celsius
     with naming(instrument.path):
         resonator, elastic = instrument.at(T)
     found = scan_faces(
@@ -100,7 +102,7 @@ def scan(
     if save is not None:
         _save(save, instrument, found)
         say(f"wrote {save}")
-    payload = _payload(found, instrument.name, T - ZERO_CELSIUS, files)
+    payload = _payload(found, instrument.name, T - zero_Celsius, files)
     if json:
         print_json(payload)
         return 0

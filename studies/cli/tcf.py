@@ -48,6 +48,7 @@ def tcf(
         Print one JSON object (schema hrg.tcf/1) instead of a table.
     """
     import numpy as np
+    from scipy.constants import zero_Celsius
 
     from studies.cli.output import print_json, print_table
     from studies.errors import InputError
@@ -64,7 +65,7 @@ def tcf(
         )
     instrument = load_card(card)
     at = np.arange(from_degC, to_degC + 1e-9 * step, step)
-    T = instrument.material.check(at + 273.15)
+    T = instrument.material.check(at + zero_Celsius)
     law = law_of(instrument, float(T[0]), float(T[-1]), theory, harmonic)
     points, moves = _points(law, T), _moves(law, T)
     local = _measured_slopes(instrument.name, measured)
@@ -110,11 +111,13 @@ def tcf(
 
 
 def _points(law: "FrequencyLaw", T: "NDArray[np.float64]") -> "list[dict[str, Any]]":
+    from scipy.constants import zero_Celsius
+
     parts = law.parts(T)
     f, slope, spread = law.frequency(T), 1e6 * parts.total, 1e6 * law.slope_uncertainty(T)
     return [
         {
-            "temperature_degC": float(T[k]) - 273.15,
+            "temperature_degC": float(T[k]) - zero_Celsius,
             "frequency_Hz": float(f[k]),
             "slope_ppm_per_degC": float(slope[k]),
             "uncertainty_ppm_per_degC": float(spread[k]),

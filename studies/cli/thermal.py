@@ -32,11 +32,12 @@ def thermal(card: str, profile: str, *, rows: int = 13, json: bool = False) -> i
         Print one JSON object (schema hrg.thermal/1) instead of tables.
     """
     import numpy as np
+    from scipy.constants import zero_Celsius
 
     from studies.cli.output import print_json, print_table
     from studies.errors import InputError
     from studies.instrument.card import load_card
-    from studies.simulation.chamber import ZERO_CELSIUS, check_profile, load_profile
+    from studies.simulation.chamber import check_profile, load_profile
     from studies.simulation.heat_path import build_network, build_shell_and_stem
     from thermal.balance import check_energy
     from thermal.radiative import simulate
@@ -57,7 +58,7 @@ def thermal(card: str, profile: str, *, rows: int = 13, json: bool = False) -> i
     mean = shell_weights(transient.nodes, instrument.heat_path.cells.volume)
     picks = [[float(node == name) for node in transient.nodes] for name in shown]
     rim = [float(node == transient.nodes[-1]) for node in transient.nodes]
-    T = transient.observe(time, np.array([*picks, mean, rim])) - ZERO_CELSIUS
+    T = transient.observe(time, np.array([*picks, mean, rim])) - zero_Celsius
     names = [*shown, "shell", "rim"]
     energy = check_energy(network, {"chamber": chamber}, transient)
     influence = _influence(network, T0)
@@ -72,13 +73,13 @@ def thermal(card: str, profile: str, *, rows: int = 13, json: bool = False) -> i
                 "slowest_time_constant_sensitivity": influence,
                 "energy_balance_error": energy.error,
                 "time_s": time,
-                "chamber_temperature_degC": chamber.at(time) - ZERO_CELSIUS,
+                "chamber_temperature_degC": chamber.at(time) - zero_Celsius,
                 "temperature_degC": {name: T[:, k] for k, name in enumerate(names)},
             }
         )
         return 0
     print_table(
-        f"{instrument.name}: time constants at {T0 - ZERO_CELSIUS:g} °C (s)",
+        f"{instrument.name}: time constants at {T0 - zero_Celsius:g} °C (s)",
         ["network", "slowest", "second", "third"],
         [
             [label, *(f"{tau:.0f}" for tau in (*modes.time_constants[:3], *[np.nan] * 3)[:3])]
@@ -95,7 +96,7 @@ def thermal(card: str, profile: str, *, rows: int = 13, json: bool = False) -> i
         ["time (s)", "chamber", *names],
         [
             [f"{t:.0f}", f"{c:.3f}", *(f"{value:.3f}" for value in row)]
-            for t, c, row in zip(time, chamber.at(time) - ZERO_CELSIUS, T, strict=True)
+            for t, c, row in zip(time, chamber.at(time) - zero_Celsius, T, strict=True)
         ],
         f"Energy balance closed to {energy.error:.0e} of the heat that flowed; 'shell' is its mean.",
     )

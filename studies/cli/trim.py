@@ -98,15 +98,16 @@ def trim(
         Print one JSON object (schema hrg.trim/1) instead of tables.
     """
     import numpy as np
+    from scipy.constants import zero_Celsius
 
     from studies.cli.output import print_json, print_table, say
     from studies.errors import naming
-    from studies.instrument.card import ZERO_CELSIUS, load_card
+    from studies.instrument.card import load_card
     from studies.trim import Groove, Teeth, other_cuts, plan_for_card
 
     measured = _from_scan(scan, harmonic) if scan is not None else _given(split, axis, harmonic, reading_error)
     instrument = load_card(card)
-    T = instrument.reference_temperature if temperature is None else temperature + ZERO_CELSIUS
+    T = instrument.reference_temperature if temperature is None else temperature + zero_Celsius
     groove = Groove(1e-3 * width_mm, 1e-3 * length_mm, depth_limit)
     with naming(instrument.path):
         resonator, elastic = instrument.at(T)
@@ -123,7 +124,7 @@ def trim(
     payload: dict[str, Any] = {
         "schema": "hrg.trim/1",
         "card": instrument.name,
-        "temperature_degC": T - ZERO_CELSIUS,
+        "temperature_degC": T - zero_Celsius,
         "goal_Hz": goal,
         "cut": cut,
         "before": [_state(s) for s in plan.before],

@@ -5,6 +5,8 @@ from dataclasses import dataclass
 from math import pi
 from typing import TYPE_CHECKING
 
+from scipy.constants import zero_Celsius
+
 from studies.record import COLUMNS
 
 if TYPE_CHECKING:
@@ -39,7 +41,7 @@ def _over(numerator: float, words: str) -> Unit:
 _SAME = Unit(lambda x: x, "x")
 _TEMPERATURE = {
     "degC": _SAME,
-    "K": Unit(lambda x: x - 273.15, "x - 273.15"),
+    "K": Unit(lambda x: x - zero_Celsius, "x - 273.15"),
     "mdegC": _times(1e-3, "x / 1000"),
     "degF": Unit(lambda x: (x - 32) / 1.8, "(x - 32) / 1.8"),
 }

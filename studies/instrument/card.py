@@ -12,6 +12,8 @@ from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
+from scipy.constants import zero_Celsius
+
 from studies.errors import InputError, nearest
 from studies.files.reading import find_shipped, list_shipped
 from studies.files.toml import read_toml
@@ -35,7 +37,6 @@ if TYPE_CHECKING:
     from thermal.resonator import HeatPath
 
 SCHEMA = "hrg.card/1"
-ZERO_CELSIUS = 273.15
 
 
 class Head(Table, frozen=True, kw_only=True):
@@ -221,7 +222,7 @@ def build_instrument(content: Mapping[str, Any], path: str = "card") -> Instrume
         if key not in known:
             raise InputError(f"{path}: unknown key '{key}'{nearest(key, known)}")
     head = read_keys({key: content[key] for key in Head.__struct_fields__ if key in content}, Head, path)
-    reference = head.reference_temperature_degC + ZERO_CELSIUS
+    reference = head.reference_temperature_degC + zero_Celsius
     bare = Instrument(head.name, reference, {}, head.note, content, path)
     return _reread(bare, content, set(card_tables()))
 

@@ -9,8 +9,9 @@ from importlib.resources import files
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.constants import zero_Celsius
 
-from compensation.bell import ZERO_CELSIUS, Chain, Curve, invert_chain
+from compensation.bell import Chain, Curve, invert_chain
 from compensation.bell_calibration import Run, fit_chain
 from compensation.fir import design_smoother
 from compensation.linearity import measure_linearity
@@ -48,9 +49,9 @@ def read_printed_chain() -> Chain:
         null=float(row["rough"][0]),
         scale=float(row["rough"][1]) * DEG,
         rough_covariance=np.zeros((2, 2)),
-        bias=curve(row["bias"] * DEG, ZERO_CELSIUS),
+        bias=curve(row["bias"] * DEG, zero_Celsius),
         scale_over_rate=curve(row["scale_over_rate"] * DEG ** np.array([1.0, 0.0, -1.0]), 0.0),
-        scale_over_temperature=curve(row["scale_over_temperature"], ZERO_CELSIUS),
+        scale_over_temperature=curve(row["scale_over_temperature"], zero_Celsius),
         taps=np.empty(0),
         sampling=STEP,
     )
@@ -67,7 +68,7 @@ def simulate_runs(generator: np.random.Generator, random_walk: float = RANDOM_WA
         White noise of the rate (°/√h).
     """
     gyro = read_printed_chain()
-    sweep = (ZERO_CELSIUS + np.linspace(LOWEST, HIGHEST, round(SWEEP / STEP))).astype(np.float64)
+    sweep = (zero_Celsius + np.linspace(LOWEST, HIGHEST, round(SWEEP / STEP))).astype(np.float64)
     plateaus = np.repeat(np.arange(-360.0, 361.0, 40.0) * DEG, round(DWELL / STEP)).astype(np.float64)
 
     def run(rate: Real, temperature: Real) -> Run:
@@ -78,7 +79,7 @@ def simulate_runs(generator: np.random.Generator, random_walk: float = RANDOM_WA
         return Run(time, invert_chain(gyro, rate, temperature) + noise, temperature, rate)
 
     return (
-        run(plateaus, np.full(len(plateaus), ZERO_CELSIUS + ROOM)),
+        run(plateaus, np.full(len(plateaus), zero_Celsius + ROOM)),
         run(np.zeros(len(sweep)), sweep),
         run(np.full(len(sweep), 300 * DEG), sweep),
     )
@@ -138,7 +139,7 @@ def examine_claims() -> Claims:
     from scipy.optimize import brentq
 
     gyro = read_printed_chain()
-    sweep = ZERO_CELSIUS + np.linspace(LOWEST, HIGHEST, 2001)
+    sweep = zero_Celsius + np.linspace(LOWEST, HIGHEST, 2001)
     rates = np.linspace(-360, 360, 2001) * DEG
     curved = measure_linearity(rates, gyro.scale_over_rate.value(rates)).nonlinearity
     over_rate = float(gyro.scale_over_rate.value(-361.4 * DEG))
@@ -149,7 +150,7 @@ def examine_claims() -> Claims:
         (float(np.std(gyro.bias.value(sweep))) / DEG, _removed("deviation_at_rest")),
         (float(np.std(gyro.scale_over_temperature.value(sweep))) * 300, _removed("deviation_turning")),
         curved,
-        (over_rate / DEG, over_rate * float(gyro.scale_over_temperature.value(ZERO_CELSIUS + ROOM)) / DEG),
+        (over_rate / DEG, over_rate * float(gyro.scale_over_temperature.value(zero_Celsius + ROOM)) / DEG),
         float(before / 60 / np.sqrt(STEP)),
         tuple((rows * STEP, reduce_white(taps, rows)) for rows in (1, 10, 100, 1000)),
         float(cutoff),

@@ -9,6 +9,7 @@ from importlib.resources import files
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.constants import zero_Celsius
 
 from compensation.cross_damping import RestRun, evaluate_cross_damping, fit_cross_damping, simulate_bias
 from compensation.improvement import Change, compare_outputs
@@ -52,7 +53,7 @@ def make_profile(soak_h: float = 1.0, slope_K_per_min: float = 1.0) -> tuple[Rea
         time += [time[-1] + ramp, time[-1] + ramp + soak_h * 3600]
         temperature += [corner, corner]
     at = np.arange(0.0, time[-1], STEP)
-    return at, np.interp(at, time, temperature) + 273.15
+    return at, np.interp(at, time, temperature) + zero_Celsius
 
 
 def simulate_rest(

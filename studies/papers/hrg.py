@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.constants import zero_Celsius
 
 from compensation.frequency import FrequencyFit, OrderComparison, compare_orders, fit_frequency
 
@@ -19,7 +20,6 @@ if TYPE_CHECKING:
     from studies.instrument.card import Instrument
 
 Array = NDArray[np.float64]
-ZERO_CELSIUS = 273.15
 RESOLUTION = 0.01  # Hz, last printed digit of Table 1
 CARD = "hrg-30mm"
 
@@ -147,9 +147,9 @@ def compare_physics(study: FrequencyStudy, instrument: "Instrument") -> PhysicsC
     from shell.materials import read_materials
     from studies.law import law_of
 
-    T = study.temperature_degC + ZERO_CELSIUS
+    T = study.temperature_degC + zero_Celsius
     law = law_of(instrument, float(T.min()), float(T.max()))
-    at = np.append(study.local_degC, 20.0) + ZERO_CELSIUS
+    at = np.append(study.local_degC, 20.0) + zero_Celsius
     laws = []
     for material in read_materials()[instrument.material.name].values():
         one = build_law(instrument.resonator, material, instrument.reference_temperature, at[-1], at[-1])

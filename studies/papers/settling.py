@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.constants import zero_Celsius
 
 from shell.law import FrequencyLaw
 from studies.law import law_of
@@ -27,7 +28,6 @@ if TYPE_CHECKING:
     from studies.instrument.card import Instrument
 
 Array = NDArray[np.float64]
-ZERO_CELSIUS = 273.15
 ROOM_degC = 20.0
 STEPS_degC = (-10.0, 40.0)
 POINTS_degC = np.arange(-20.0, 41.0, 10.0)
@@ -96,8 +96,8 @@ def identify_mount(instrument: "Instrument") -> float:
         changed = instrument.with_values({"thermal.mount_conductance_W_per_K": conductance})
         network = build_network(changed, radiation=True)
         row = shell_weights(tuple(node.name for node in network.nodes), weights)
-        room = ROOM_degC + ZERO_CELSIUS
-        left = [step_remaining(network, room, T + ZERO_CELSIUS, row, [FAST])[0] for T in STEPS_degC]
+        room = ROOM_degC + zero_Celsius
+        left = [step_remaining(network, room, T + zero_Celsius, row, [FAST])[0] for T in STEPS_degC]
         return float(np.mean(left))
 
     return identify_conductance(remaining, REMAINING)
@@ -120,7 +120,7 @@ def study_settling(instrument: "Instrument", hours: tuple[float, ...] = (4.0, 4.
         for name in NETWORKS[:2]
     ]
     T, f = printed_table1()
-    settled = law.frequency(POINTS_degC + ZERO_CELSIUS)
+    settled = law.frequency(POINTS_degC + zero_Celsius)
     return SettlingStudy(
         tuple(curves), tuple(soaks), *_slope_and_curvature(T, f), *_slope_and_curvature(POINTS_degC, settled)
     )
@@ -136,7 +136,7 @@ def _networks(instrument: "Instrument") -> tuple[Network, Network, Network]:
 
 def _curve(name: str, network: Network, weights: Array, law: FrequencyLaw, target_degC: float) -> StepCurve:
     time = np.linspace(0.0, END, 721)
-    room, target = ROOM_degC + ZERO_CELSIUS, target_degC + ZERO_CELSIUS
+    room, target = ROOM_degC + zero_Celsius, target_degC + zero_Celsius
     row = shell_weights(tuple(node.name for node in network.nodes), weights)
     left = step_remaining(network, room, target, row, time)
     return StepCurve(name, target_degC, time, left, law.frequency(target + (room - target) * left))
@@ -146,14 +146,14 @@ def _soak(protocol: str, name: str, network: Network, weights: Array, law: Frequ
     """Read every point after `hours`."""
     row = shell_weights(tuple(node.name for node in network.nodes), weights)
     reach = _reach_from_room if protocol == PROTOCOLS[0] else _reach_upwards
-    settled, read = law.frequency(POINTS_degC + ZERO_CELSIUS), law.frequency(reach(network, row, 3600 * hours))
+    settled, read = law.frequency(POINTS_degC + zero_Celsius), law.frequency(reach(network, row, 3600 * hours))
     with_soak, without = _slope_and_curvature(POINTS_degC, read), _slope_and_curvature(POINTS_degC, settled)
     return SoakResult(protocol, name, hours, read - settled, with_soak[0] - without[0], with_soak[1] - without[1])
 
 
 def _reach_from_room(network: Network, row: Array, soak: float) -> Array:
     """Temperatures (K) that the points reach when each starts from room temperature, as in the paper's Figure 3."""
-    room, points = ROOM_degC + ZERO_CELSIUS, POINTS_degC + ZERO_CELSIUS
+    room, points = ROOM_degC + zero_Celsius, POINTS_degC + zero_Celsius
     left = [0.0 if T == room else step_remaining(network, room, T, row, [soak])[0] for T in points]
     return np.asarray(points + (room - points) * np.array(left))
 
@@ -161,7 +161,7 @@ def _reach_from_room(network: Network, row: Array, soak: float) -> Array:
 def _reach_upwards(network: Network, row: Array, soak: float) -> Array:
     """Temperatures (K) that the points reach when they follow each other, the first one settled."""
     times = soak * np.arange(len(POINTS_degC) + 1)
-    corners = Profile(np.repeat(times, 2)[1:-1], np.repeat(POINTS_degC + ZERO_CELSIUS, 2))
+    corners = Profile(np.repeat(times, 2)[1:-1], np.repeat(POINTS_degC + zero_Celsius, 2))
     transient = simulate(network, {boundary.name: corners for boundary in network.boundaries})
     return transient.observe(times[1:], row[None, :])[:, 0]
 
@@ -173,5 +173,5 @@ def _slope_and_curvature(T: Array, f: Array) -> tuple[float, float]:
 
 
 def _law(instrument: "Instrument") -> FrequencyLaw:
-    low, high = POINTS_degC[[0, -1]] + ZERO_CELSIUS
+    low, high = POINTS_degC[[0, -1]] + zero_Celsius
     return law_of(instrument, low - 5, high + 5)

@@ -5,6 +5,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.constants import zero_Celsius
 
 from studies.reports import style
 from studies.reports.page import Block, Chapter, Facts, Picture, Table, Text, draw, render_page
@@ -201,9 +202,9 @@ def draw_steps(chain: "Chain", runs: "tuple[Run, Run, Run]") -> Picture:
     rates, rest, turning = runs
     with style.figure(1, 3, height=3.2) as (made, axes):
         for panel, run, x, label in (
-            (axes[0], rest, rest.temperature - 273.15, "temperature (°C)"),
+            (axes[0], rest, rest.temperature - zero_Celsius, "temperature (°C)"),
             (axes[1], rates, rates.rate / DEG, "applied rate (°/s)"),
-            (axes[2], turning, turning.temperature - 273.15, "temperature (°C)"),
+            (axes[2], turning, turning.temperature - zero_Celsius, "temperature (°C)"),
         ):
             result = apply_chain(
                 replace(chain, taps=np.empty(0)), run.time, run.output, run.temperature, extrapolate=True

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.constants import zero_Celsius
 
 from studies.calibration.calibrate import UNITS, Calibration
 from studies.calibration.observed import HOUSING, SETTLED
@@ -188,7 +189,7 @@ def _residual_figure(found: Calibration) -> Picture:
 
 def _settled_figure(found: Calibration) -> Picture:
     problem, residual = found.fit.problem, found.fit.state.residual[SETTLED]
-    T = np.concatenate([table.temperature for table in problem.tables]) - 273.15
+    T = np.concatenate([table.temperature for table in problem.tables]) - zero_Celsius
     with style.figure(height=2.4) as (made, axis):
         axis.plot(T, residual, "o", color=style.BLUE, markersize=4)
         axis.axhline(0.0, color=style.BLACK, linewidth=0.6)

@@ -3,6 +3,7 @@
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.constants import zero_Celsius
 
 from studies.models.kinds.cross_damping import OUTPUTS
 from studies.reports import style
@@ -126,7 +127,7 @@ def coefficients_table(study: "CrossDampingStudy") -> Table:
         ]
         for i, (value, error) in enumerate(zip(model.coefficients, np.sqrt(np.diag(model.covariance)), strict=True))
     ]
-    at = model.calibration_temperature - 273.15
+    at = model.calibration_temperature - zero_Celsius
     columns = ["Coefficient", "Value", "Standard error", "Unit", "Over zeta_0"]
     note = "The errors allow for white noise plus a random walk of the bias."
     return Table(f"Cross-damping about {at:g} °C", columns, rows, note)
@@ -158,8 +159,10 @@ def curve_figure(study: "CrossDampingStudy") -> Picture:
     spread = 1.645 * np.sqrt(np.einsum("ni,ij,nj->n", powers, model.covariance, powers)) / abs(size)
     middle = powers @ model.coefficients / size
     with style.figure(height=3.0) as (made, axes):
-        axes.fill_between(T - 273.15, middle - spread, middle + spread, color=style.SKY, alpha=0.4, label="90 % band")
-        axes.plot(T - 273.15, middle, color=style.BLUE, label="fitted")
+        axes.fill_between(
+            T - zero_Celsius, middle - spread, middle + spread, color=style.SKY, alpha=0.4, label="90 % band"
+        )
+        axes.plot(T - zero_Celsius, middle, color=style.BLUE, label="fitted")
         axes.set_xlabel("temperature (°C)")
         axes.set_ylabel("ζ₁₂ over its value at calibration")
         axes.legend()
@@ -180,7 +183,7 @@ def draw_runs(runs: "tuple[RestRun, ...]", model: "CrossDampingModel", unit: flo
             hours = (run.time[rows] - run.time[0]) / 3600 + begin
             begin = hours[-1]
             after = model.compensate(run.time, run.rate, run.temperature, extrapolate=True)[rows]
-            upper.plot(hours, run.temperature[rows] - 273.15, color=style.VERMILION)
+            upper.plot(hours, run.temperature[rows] - zero_Celsius, color=style.VERMILION)
             lower.plot(
                 hours, run.rate[rows] / unit, color=style.ORANGE, linewidth=0.8, label=None if i else "uncompensated"
             )

@@ -3,6 +3,7 @@
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.constants import zero_Celsius
 
 from studies.diagnosis.held_out import residuals
 from studies.diagnosis.investigate import Diagnosis
@@ -314,7 +315,7 @@ def residual_views(diagnosis: Diagnosis, response: str) -> Picture:
     problem, views = fit.problem, fit.tangent.views
     rest = fit.residual * unit.scale
     inputs: dict[str, np.ndarray] = {
-        "resonator temperature / °C": problem.stack([v.seen.resonator - 273.15 for v in views]),
+        "resonator temperature / °C": problem.stack([v.seen.resonator - zero_Celsius for v in views]),
         "rate / (K/min)": 60.0 * problem.stack([v.seen.rate for v in views]),
     }
     if "frequency_Hz" in campaign.responses:

@@ -3,6 +3,8 @@
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+from scipy.constants import zero_Celsius
+
 from studies.reports.page import Block, Text
 
 if TYPE_CHECKING:
@@ -24,7 +26,7 @@ def view_blocks(shown: "Sequence[Shown]") -> list[Block]:
 
     first = shown[0]
     caption = (
-        f"{first.instrument.name} at {first.temperature - 273.15:g} °C: modes from the {first.mode.theory} solver, on the"
+        f"{first.instrument.name} at {first.temperature - zero_Celsius:g} °C: modes from the {first.mode.theory} solver, on the"
         " solid of the card with its thickness, rim and stem. The displacement is exaggerated."
     )
     blocks: list[Block] = []

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from scipy.constants import zero_Celsius
 
 from compensation.frequency import fit_frequency
 from studies.papers import hrg
@@ -222,7 +223,7 @@ def _physics(physics: "PhysicsComparison", study: "FrequencyStudy") -> list[Bloc
     slope = physics.parts
     numbers = 1e6 * np.stack([slope.E, slope.nu, slope.rho, slope.h, slope.r], axis=1)
     rows = [
-        [f"{T - hrg.ZERO_CELSIUS:.0f}", *(f"{part:+.2f}" for part in parts), f"{total:.2f} ± {sd:.1f}", measured]
+        [f"{T - zero_Celsius:.0f}", *(f"{part:+.2f}" for part in parts), f"{total:.2f} ± {sd:.1f}", measured]
         for T, parts, total, sd, measured in zip(
             physics.temperature, numbers, physics.slope_ppm, physics.uncertainty_ppm, _measured(study), strict=True
         )

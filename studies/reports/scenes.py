@@ -4,8 +4,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
+from scipy.constants import zero_Celsius
+
 from studies.errors import InputError
-from studies.instrument.card import ZERO_CELSIUS, Instrument
+from studies.instrument.card import Instrument
 
 if TYPE_CHECKING:
     import numpy as np
@@ -43,7 +45,7 @@ class Shown:
     def title(self) -> str:
         """Name, harmonic, frequency and temperature in one line; of a split pair the split, and how its shape is exaggerated."""
         kind = f" ({self.mode.label})" if self.mode.label else ""
-        celsius = self.temperature - ZERO_CELSIUS
+        celsius = self.temperature - zero_Celsius
         line = f"{self.instrument.name}, n = {self.mode.harmonic}{kind}, {self.mode.frequency:.2f} Hz at {celsius:g} °C"
         if self.split is None:
             return line

@@ -4,6 +4,8 @@ import os
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from scipy.constants import zero_Celsius
+
 from studies.errors import InputError
 
 if TYPE_CHECKING:
@@ -16,8 +18,6 @@ if TYPE_CHECKING:
     from studies.simulation.drive import Boundary, Drive
     from thermal.profile import Profile
 
-ZERO_CELSIUS = 273.15
-
 
 def load_profile(text: str) -> "Profile":
     """Read a profile from a CSV file, when there is one of that name, else from words; kelvin in the result."""
@@ -29,7 +29,7 @@ def load_profile(text: str) -> "Profile":
     table = read_profile(text)
     if len(table.values["time_s"]) < 2:
         raise InputError(f"{text}: a profile needs at least two rows.")
-    return Profile(table.values["time_s"], table.values["chamber_temperature_degC"] + ZERO_CELSIUS)
+    return Profile(table.values["time_s"], table.values["chamber_temperature_degC"] + zero_Celsius)
 
 
 def load_schedule(text: str) -> "tuple[Profile, Mapping[str, NDArray[np.float64]]]":
@@ -57,7 +57,7 @@ def load_schedule(text: str) -> "tuple[Profile, Mapping[str, NDArray[np.float64]
             raise InputError(f"{text}: {name} has empty cells; a profile needs every value.")
     if len(record) < 2:
         raise InputError(f"{text}: a profile needs at least two rows.")
-    chamber = Profile(record["time_s"], record["chamber_temperature_degC"] + ZERO_CELSIUS)
+    chamber = Profile(record["time_s"], record["chamber_temperature_degC"] + zero_Celsius)
     return chamber, {name: record[name] for name in commands}
 
 

@@ -6,6 +6,7 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.constants import zero_Celsius
 
 from studies.errors import InputError
 from studies.record import Record
@@ -13,7 +14,6 @@ from thermal.profile import Profile
 
 Array = NDArray[np.float64]
 Boundary = Literal["chamber", "housing"]
-ZERO_CELSIUS = 273.15
 COLUMN: dict[Boundary, str] = {
     "chamber": "chamber_temperature_degC",
     "housing": "housing_temperature_degC",
@@ -152,7 +152,7 @@ def drive_by_record(record: Record, boundary: Boundary | None = None, time: Arra
     known = np.isfinite(values)
     if np.count_nonzero(known) < 2:
         raise InputError(f"{record.path}: {COLUMN[boundary]} has fewer than two values.")
-    t, T = rows[known], values[known] + ZERO_CELSIUS
+    t, T = rows[known], values[known] + zero_Celsius
     if boundary == "chamber":
         t, T = _with_jumps(t, T, _settled_at(record))
     t, T = _thinned(t, T)
@@ -175,7 +175,7 @@ def _settled_at(record: Record) -> float | None:
     if COLUMN["housing"] not in record:
         return None
     first = record[COLUMN["housing"]][: max(1, len(record) // 1000)]
-    return float(np.nanmedian(first)) + ZERO_CELSIUS if np.isfinite(first).any() else None
+    return float(np.nanmedian(first)) + zero_Celsius if np.isfinite(first).any() else None
 
 
 def _with_jumps(t: Array, T: Array, settled: float | None) -> tuple[Array, Array]:

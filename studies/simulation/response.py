@@ -13,9 +13,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.constants import zero_Celsius
 
 from studies.errors import InputError, naming
-from studies.simulation.drive import ZERO_CELSIUS, Drive
+from studies.simulation.drive import Drive
 from studies.simulation.loop import settled_columns
 from studies.splitting import mean_shift
 from thermal.lag import lag
@@ -124,7 +125,7 @@ def read_out(
     read["bias_deg_per_h"] = read["bias_deg_per_h"] + changes.get("bias_deg_per_h", 0.0)
     return {
         "housing_temperature_degC": _read_housing(instrument, drive, housing),
-        "resonator_temperature_degC": warmed - ZERO_CELSIUS,
+        "resonator_temperature_degC": warmed - zero_Celsius,
         **read,
     }
 
@@ -140,10 +141,10 @@ def check_loss(instrument: "Instrument", inverse_q: Array) -> None:
 def _read_housing(instrument: "Instrument", drive: Drive, housing: Array) -> Array:
     time_constant = instrument.noise.housing_lag_s
     if drive.boundary == "housing":
-        return drive.profile.at(drive.time) - ZERO_CELSIUS
+        return drive.profile.at(drive.time) - zero_Celsius
     if time_constant == 0 or len(housing) < 2:
-        return housing - ZERO_CELSIUS
-    return lag(drive.time, housing, time_constant) - ZERO_CELSIUS
+        return housing - zero_Celsius
+    return lag(drive.time, housing, time_constant) - zero_Celsius
 
 
 def _apply_effects(

@@ -5,10 +5,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.constants import zero_Celsius
 
 from studies.instrument.tables.noise import SILENT
 from studies.record import Record
-from studies.simulation.chamber import ZERO_CELSIUS, check_profile
+from studies.simulation.chamber import check_profile
 from studies.simulation.drive import COLUMN, COMMANDS, Drive, drive_by_profile, rows_of
 from studies.simulation.noise import bias_noise, frequency_noise, quantise, white_noise
 from studies.simulation.prediction import Prediction, law_for, predict
@@ -89,12 +90,12 @@ def simulate_run(
     prediction = predict(instrument, drive, law=law or law_for(instrument, drive, theory=theory))
     true = dict(prediction.columns)
     if not noise:
-        true["housing_temperature_degC"] = prediction.housing - ZERO_CELSIUS
+        true["housing_temperature_degC"] = prediction.housing - zero_Celsius
     columns = {"time_s": drive.time.copy()}
     if drive.boundary == "chamber":
-        columns[COLUMN["chamber"]] = drive.profile.at(drive.time) - ZERO_CELSIUS
+        columns[COLUMN["chamber"]] = drive.profile.at(drive.time) - zero_Celsius
     else:
-        true["housing_temperature_degC"] = drive.profile.at(drive.time) - ZERO_CELSIUS
+        true["housing_temperature_degC"] = drive.profile.at(drive.time) - zero_Celsius
     columns |= _observe(true, levels, rate, np.random.default_rng(seed), sensed=drive.boundary == "chamber")
     columns |= {name: true[name] for name in ("quadrature_V", "pattern_angle_deg") if name in true}
     for name, (column, factor, power) in COMMANDS.items():

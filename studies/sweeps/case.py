@@ -4,7 +4,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from studies.instrument.card import ZERO_CELSIUS, Instrument
+from scipy.constants import zero_Celsius
+
+from studies.instrument.card import Instrument
 
 if TYPE_CHECKING:
     from shell.levels import Theory
@@ -34,7 +36,7 @@ class Case:
         given = options.get("temperature_degC")
         if given is None:
             given = self.parameters.get("temperature_degC")
-        return self.instrument.reference_temperature if given is None else float(given) + ZERO_CELSIUS
+        return self.instrument.reference_temperature if given is None else float(given) + zero_Celsius
 
     def modes(self, harmonic: int, count: int, theory: "Theory", temperature: float) -> "tuple[Mode, ...]":
         """Return at least the `count` lowest modes at a uniform temperature (K), solved once for all quantities."""

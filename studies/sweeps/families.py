@@ -13,11 +13,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.constants import zero_Celsius
 
 from shell.family import MOST_SOLVES, Axis, Family, FamilyResult, build_family
 from shell.law import slope_parts
 from studies.errors import UNUSABLE_INPUT, InputError
-from studies.instrument.card import ZERO_CELSIUS, Instrument
+from studies.instrument.card import Instrument
 from studies.sweeps.parameters import TEMPERATURE, set_parameters
 from studies.sweeps.quantities.tcf import PARTS, STEEPEST
 from studies.sweeps.row import Row
@@ -203,10 +204,10 @@ def _describe(instrument: Instrument, designs: Designs, temperature_degC: float 
     """Return what designs are made of; one material for all that share its parameters."""
     count, reference = len(designs), instrument.reference_temperature
     if temperature_degC is None:
-        T = np.array([design.get(TEMPERATURE, reference - ZERO_CELSIUS) for design in designs], dtype=float)
+        T = np.array([design.get(TEMPERATURE, reference - zero_Celsius) for design in designs], dtype=float)
     else:
         T = np.full(count, temperature_degC)
-    T = T + ZERO_CELSIUS
+    T = T + zero_Celsius
     names = [name for name in designs[0] if name.startswith(MATERIAL)]
     groups: dict[tuple[Any, ...], list[int]] = {}
     for place, design in enumerate(designs):
@@ -242,6 +243,6 @@ def _ends(study: "Study", design: "Design") -> list[dict[str, Any]]:
             choices[p.name] = np.linspace(*_range(study, design, k), TEMPERATURES).tolist()
         elif p.name.startswith(MATERIAL):
             choices[p.name] = p.values if isinstance(p.nominal, str) else _range(study, design, k)
-    reference = study.instrument.reference_temperature - ZERO_CELSIUS
+    reference = study.instrument.reference_temperature - zero_Celsius
     choices[TEMPERATURE] = [*choices.get(TEMPERATURE, [reference]), *fixed]
     return [dict(zip(choices, values, strict=True)) for values in product(*choices.values())]

@@ -8,6 +8,8 @@ quantities that give none of their own. `user.anything` reaches only user functi
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from scipy.constants import zero_Celsius
+
 from studies.errors import InputError, nearest
 from studies.instrument.card import Instrument
 from studies.instrument.dotted import look_up, names
@@ -31,7 +33,7 @@ def find_nominal(instrument: Instrument, name: str, where: str) -> float | str |
     if name.startswith("user.") and len(name) > len("user."):
         return None
     if name == TEMPERATURE:
-        return instrument.reference_temperature - 273.15
+        return instrument.reference_temperature - zero_Celsius
     try:
         value = look_up(instrument.content, name)
     except (LookupError, ValueError, TypeError):

@@ -4,8 +4,9 @@ from collections.abc import Iterator, Mapping
 from itertools import chain, product
 from typing import TYPE_CHECKING, Any
 
+from scipy.constants import zero_Celsius
+
 from studies.errors import UNUSABLE_INPUT, InputError
-from studies.instrument.card import ZERO_CELSIUS
 from studies.sweeps.parameters import TEMPERATURE, set_parameters
 
 if TYPE_CHECKING:
@@ -71,7 +72,7 @@ def _check_temperatures(study: "Study", where: str) -> None:
     ends = [float(T) for T in given if T is not None]
     ends += [T for p in study.parameters if p.name == TEMPERATURE for T in (p.low, p.high)]
     try:
-        study.instrument.material.check([T + ZERO_CELSIUS for T in ends])
+        study.instrument.material.check([T + zero_Celsius for T in ends])
     except UNUSABLE_INPUT as error:
         raise InputError(f"{where}: {error}") from error
 

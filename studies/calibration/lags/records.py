@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.constants import zero_Celsius
 
 from compensation.spikes import find_spikes
 from studies.calibration.lags.followers import make_series
@@ -16,7 +17,6 @@ from studies.rest import LEAST_SPIKE
 if TYPE_CHECKING:
     from studies.instrument.card import Instrument
 
-ZERO_CELSIUS = 273.15
 SENSORS = ("housing_temperature_degC", "chamber_temperature_degC")
 
 
@@ -65,7 +65,7 @@ def _run(record: Record) -> HousingRun:
         np.where(find_spikes(record[name], LEAST_SPIKE), np.nan, record[name]) for name in ("frequency_Hz", sensor)
     )
     with naming(record.path):
-        return HousingRun(record["time_s"], frequency, housing + ZERO_CELSIUS)
+        return HousingRun(record["time_s"], frequency, housing + zero_Celsius)
 
 
 def _law(runs: Sequence[HousingRun], instrument: "Instrument | None") -> FrequencyLaw:

@@ -1,6 +1,7 @@
 """Activity dip: a spurious mode crosses the working mode at one temperature."""
 
 import numpy as np
+from scipy.constants import zero_Celsius
 
 from studies.effects.effect import Coefficient, Effect, Parameter, Shape, Span
 from studies.effects.states import FloatArray, States
@@ -11,7 +12,7 @@ def columns(states: States, shape: Shape, response: str) -> FloatArray:
     centre, width = shape
     out = []
     for ratio in (1.0, 2.0):
-        z = (states.resonator - 273.15 - centre) / (width * ratio)
+        z = (states.resonator - zero_Celsius - centre) / (width * ratio)
         pair = [z / (1.0 + z * z), 1.0 / (1.0 + z * z)]
         out += pair if response == "frequency_Hz" else pair[::-1]
     return np.stack(out, axis=1)
@@ -19,7 +20,7 @@ def columns(states: States, shape: Shape, response: str) -> FloatArray:
 
 def grid(span: Span, response: str) -> list[tuple[float, ...]]:
     """Centres over the covered range, a width apart."""
-    low, high = span.temperature_low - 273.15, span.temperature_high - 273.15
+    low, high = span.temperature_low - zero_Celsius, span.temperature_high - zero_Celsius
     widths = [width for width in (0.25, 0.5, 1.0, 2.0) if width < 0.2 * (high - low)]
     return [
         (float(centre), width)

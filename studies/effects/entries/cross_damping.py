@@ -1,6 +1,7 @@
 """Cross-damping: the damping axes do not follow the wave, and their coupling changes with temperature."""
 
 import numpy as np
+from scipy.constants import zero_Celsius
 
 from studies.effects.curves import ORDERS, smoothness, waves
 from studies.effects.effect import Coefficient, Effect, Parameter, Shape, Span
@@ -13,7 +14,7 @@ def columns(states: States, shape: Shape, response: str) -> FloatArray:
     resonator = lag(states.resonator, states.step, pole) if pole > 0 else states.resonator
     x = (resonator - states.reference) / 10.0
     powers = [np.ones_like(x), x, x**2, x**3, *(x**order for order in range(4, 8))]
-    curve = np.concatenate([np.stack(powers, axis=1), waves(resonator - 273.15, low, high)], axis=1)
+    curve = np.concatenate([np.stack(powers, axis=1), waves(resonator - zero_Celsius, low, high)], axis=1)
     if states.pattern_angle is None or axis < 0:
         return np.asarray(curve * FIXED)
     return np.asarray(curve * np.sin(4.0 * (states.pattern_angle - np.radians(axis)))[:, None])
@@ -21,7 +22,7 @@ def columns(states: States, shape: Shape, response: str) -> FloatArray:
 
 def grid(span: Span, response: str) -> list[tuple[float, ...]]:
     """At once and behind a slow loop; axes a tenth of a period apart, and -1 where the wave stands still."""
-    ends = span.temperature_low - 273.15, span.temperature_high - 273.15
+    ends = span.temperature_low - zero_Celsius, span.temperature_high - zero_Celsius
     return [(*ends, pole, axis) for pole in (0.0, 60.0) for axis in (-1.0, *np.arange(0.0, 45.0, 5.0).tolist())]
 
 

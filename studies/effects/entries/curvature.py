@@ -1,6 +1,7 @@
 """Curvature: the frequency law has more curvature than the material law."""
 
 import numpy as np
+from scipy.constants import zero_Celsius
 
 from studies.effects.curves import smoothness, waves
 from studies.effects.effect import Coefficient, Effect, Parameter, Shape, Span
@@ -11,12 +12,12 @@ def columns(states: States, shape: Shape, response: str) -> FloatArray:
     """Static terms x³ … x⁶ of the frequency, x = T_r − T₀ in units of 10 K, and smooth waves over the covered range."""
     x = states.excess / 10.0
     powers = np.stack([x**order for order in range(3, 7)], axis=1)
-    return np.concatenate([powers, waves(states.resonator - 273.15, shape[0], shape[1])], axis=1)
+    return np.concatenate([powers, waves(states.resonator - zero_Celsius, shape[0], shape[1])], axis=1)
 
 
 def grid(span: Span, response: str) -> list[tuple[float, ...]]:
     """One smooth curve over the covered range."""
-    return [(span.temperature_low - 273.15, span.temperature_high - 273.15)]
+    return [(span.temperature_low - zero_Celsius, span.temperature_high - zero_Celsius)]
 
 
 def steady(x: FloatArray, shape: Shape) -> FloatArray:

@@ -1,6 +1,7 @@
 """Loss peak: a Debye relaxation damps the resonator around one temperature."""
 
 import numpy as np
+from scipy.constants import zero_Celsius
 
 from studies.effects.effect import Coefficient, Effect, Parameter, Shape, Span
 from studies.effects.states import FloatArray, States
@@ -9,14 +10,14 @@ from studies.effects.states import FloatArray, States
 def columns(states: States, shape: Shape, response: str) -> FloatArray:
     """2 ωτ/(1 + ω²τ²) = 1/cosh(ln ωτ); with an activated τ, ln ωτ = (T_p/T)(T_p − T)/w about the peak."""
     centre, width = shape
-    peak = centre + 273.15
+    peak = centre + zero_Celsius
     z = (peak / states.resonator) * (peak - states.resonator) / width
     return np.asarray((1.0 / np.cosh(np.clip(z, -50.0, 50.0)))[:, None])
 
 
 def grid(span: Span, response: str) -> list[tuple[float, ...]]:
     """Peaks over the covered range."""
-    low, high = span.temperature_low - 273.15, span.temperature_high - 273.15
+    low, high = span.temperature_low - zero_Celsius, span.temperature_high - zero_Celsius
     return [
         (float(centre), width)
         for width in (2.5, 4.0, 7.0, 12.0, 20.0)

@@ -38,6 +38,8 @@ and its axis from the parts and not from `[bias]`.
 
 from typing import Annotated, Literal
 
+from scipy.constants import zero_Celsius
+
 from studies.instrument.keys import Table, number
 from studies.instrument.registry import CardTable
 
@@ -77,7 +79,7 @@ class ActivatedKeys(Table, frozen=True, kw_only=True):
 
     height: Annotated[float, number(least=0.0, relative_sd=0.5)]
     energy_eV: Positive
-    peak_degC: Annotated[float, number(above=-273.15)]
+    peak_degC: Annotated[float, number(above=-zero_Celsius)]
 
 
 class LossParts(Table, frozen=True, kw_only=True):

@@ -9,12 +9,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.constants import zero_Celsius
 
 from studies.errors import InputError
 from studies.models.c_source import head, polynomial, self_test
 from studies.models.file import Model, Part, Source, make_part
 from studies.record import COMPENSATED, Record
-from studies.rest import ZERO_CELSIUS, celsius_range
+from studies.rest import celsius_range
 
 if TYPE_CHECKING:
     from compensation.cross_damping import CrossDampingModel
@@ -35,7 +36,7 @@ def save_cross_damping(
         compensates=output,
         parts=(make_part("cross-damping", names, fit.coefficients, units, fit.covariance),),
         settings={
-            "calibration_temperature_degC": fit.calibration_temperature - ZERO_CELSIUS,
+            "calibration_temperature_degC": fit.calibration_temperature - zero_Celsius,
             "frequency_Hz": fit.k / (2 * math.pi),
             "relative_damping": fit.zeta,
             "g2": fit.g2,
@@ -58,12 +59,12 @@ def load_cross_damping(model: Model) -> "CrossDampingModel":
     return CrossDampingModel(
         coefficients=np.array(part.values),
         covariance=np.array(part.covariance) if part.covariance else np.full((len(part.values),) * 2, np.nan),
-        calibration_temperature=model.number("calibration_temperature_degC") + ZERO_CELSIUS,
+        calibration_temperature=model.number("calibration_temperature_degC") + zero_Celsius,
         k=2 * math.pi * model.number("frequency_Hz", above=0),
         zeta=model.number("relative_damping", above=0),
         g2=model.number("g2", above=0),
-        lowest=low + ZERO_CELSIUS,
-        highest=high + ZERO_CELSIUS,
+        lowest=low + zero_Celsius,
+        highest=high + zero_Celsius,
         noise=math.nan,
     )
 
@@ -82,7 +83,7 @@ def compensate(model: Model, record: Record, *, extrapolate: bool) -> dict[str, 
     if np.count_nonzero(known) < 2:
         raise InputError(f"the column '{column}' has fewer than two values; nothing can be compensated.")
     predicted = load_cross_damping(model).predict(
-        record["time_s"][known], temperature[known] + ZERO_CELSIUS, extrapolate=True
+        record["time_s"][known], temperature[known] + zero_Celsius, extrapolate=True
     )
     compensated = np.full(len(record), np.nan)
     compensated[known] = record[output][known] - predicted / OUTPUTS[output]
@@ -136,7 +137,7 @@ def _test_rows(model: Model) -> list[tuple[float, ...]]:
     steps = np.array([0.0, *np.resize([1.0, 2.0, 4.0, 2.0, 0.5], 23)])
     temperature = np.round((low + high) / 2 + 0.45 * (high - low) * np.sin(0.5 * np.arange(24)), 9)
     fit = load_cross_damping(model)
-    error = fit.predict(np.cumsum(steps), temperature + ZERO_CELSIUS, extrapolate=True) / OUTPUTS[model.compensates]
+    error = fit.predict(np.cumsum(steps), temperature + zero_Celsius, extrapolate=True) / OUTPUTS[model.compensates]
     return list(zip(steps.tolist(), temperature.tolist(), error.tolist(), strict=True))
 
 

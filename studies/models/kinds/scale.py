@@ -10,12 +10,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.constants import zero_Celsius
 
 from studies.errors import InputError
 from studies.models.c_source import head, polynomial
 from studies.models.file import Model, Part, Source, make_part
 from studies.record import COMPENSATED, Record
-from studies.rest import ZERO_CELSIUS, celsius_range
+from studies.rest import celsius_range
 
 if TYPE_CHECKING:
     from compensation.bell import Chain, Curve
@@ -70,7 +71,7 @@ def load_scale(model: Model) -> "Chain":
     for name in (column, RATE):
         if name not in model.validity:
             raise InputError(f"{model.path or 'model'} [validity]: the range of '{name}' is missing; add it.")
-    low, high = (value + ZERO_CELSIUS for value in model.range_of(column))
+    low, high = (value + zero_Celsius for value in model.range_of(column))
     slow, fast = (value * DEG for value in model.range_of(RATE))
     taps = model.settings.get("fir_taps", ())
     if isinstance(taps, str | float):
@@ -80,9 +81,9 @@ def load_scale(model: Model) -> "Chain":
         null=_coefficient(model, rough, "null"),
         scale=_rough_scale(model, rough) * DEG,
         rough_covariance=np.diag([1.0, DEG]) @ errors @ np.diag([1.0, DEG]),
-        bias=_load_curve(model, "bias", 1.0, 0.0, ZERO_CELSIUS, (low, high)),
+        bias=_load_curve(model, "bias", 1.0, 0.0, zero_Celsius, (low, high)),
         scale_over_rate=_load_curve(model, "scale_over_rate", 1.0, 1.0, 0.0, (slow, fast)),
-        scale_over_temperature=_load_curve(model, "scale_over_temperature", 0.0, 0.0, ZERO_CELSIUS, (low, high)),
+        scale_over_temperature=_load_curve(model, "scale_over_temperature", 0.0, 0.0, zero_Celsius, (low, high)),
         taps=np.array(taps, dtype=float),
         sampling=model.number("sampling_s", least=0),
     )
@@ -114,7 +115,7 @@ def compensate(model: Model, record: Record, *, extrapolate: bool) -> dict[str, 
         chain,
         record["time_s"][complete],
         record[output][complete],
-        record[column][complete] + ZERO_CELSIUS,
+        record[column][complete] + zero_Celsius,
         extrapolate=extrapolate,
     )
     compensated[complete] = result.filtered / DEG

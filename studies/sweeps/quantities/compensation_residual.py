@@ -1,6 +1,7 @@
 """What a polynomial compensation leaves of the frequency over temperature (HRG paper eqs. 16-18, Table 2)."""
 
 import numpy as np
+from scipy.constants import zero_Celsius
 
 from studies.errors import InputError
 from studies.sweeps.case import Case, Options
@@ -25,7 +26,7 @@ def _evaluate(case: Case, options: Options) -> tuple[Number, ...]:
     from compensation.frequency import fit_frequency
 
     T = np.linspace(options["from_degC"], options["to_degC"], options["points"])
-    f = np.array([case.modes(options["harmonic"], 1, options["theory"], x + 273.15)[0].frequency for x in T])
+    f = np.array([case.modes(options["harmonic"], 1, options["theory"], x + zero_Celsius)[0].frequency for x in T])
     fit = fit_frequency(T, f, options["order"], float(np.mean(T)))
     return (
         Number(float(np.sqrt(np.mean(fit.residuals**2)))),
