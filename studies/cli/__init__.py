@@ -10,9 +10,10 @@ import warnings
 from collections.abc import Sequence
 from typing import Any
 
-# The solver's matrices are small: threads cost more than they bring. Read by the libraries when numpy is first imported.
-for _name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):
-    os.environ.setdefault(_name, "1")
+from studies.threads import ONE_THREAD
+
+for _name, _count in ONE_THREAD.items():  # read by the libraries when numpy is first imported
+    os.environ.setdefault(_name, _count)
 
 COMMANDS: dict[str, tuple[str, str]] = {
     # name: (module:function, one line of help)

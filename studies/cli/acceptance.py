@@ -8,18 +8,20 @@ for more than records), `records` (path: the test that it served), `warm_up_band
 
 from typing import TYPE_CHECKING, Any
 
+from studies.cli.output import Answer, answers
+
 if TYPE_CHECKING:
     from studies.acceptance.judgement import Acceptance
 
 
+@answers("hrg.acceptance/1")
 def acceptance(
     card: str,
     *runs: str,
     limits: str | None = None,
     output: str = "bias_deg_per_h",
     report: str | None = None,
-    json: bool = False,
-) -> int:
+) -> Answer:
     """Judge a gyro by its records: warm-up, temperature, scale factor, drift with Allan deviation, run-down.
 
     Each record serves the test that it shows: at rest over temperature, at rest for an hour, several applied rates, a free
@@ -39,12 +41,10 @@ def acceptance(
         Column that is judged as zero-rate output, such as compensated_bias_deg_per_h.
     report : str
         Write a page (HTML).
-    json : bool
-        Print one JSON object (schema hrg.acceptance/1) instead of a table.
     """
     from studies.acceptance.judgement import judge
     from studies.acceptance.limits import Limits, read_limits
-    from studies.cli.output import print_json, print_table, say
+    from studies.cli.output import print_table, say
     from studies.errors import InputError
     from studies.files.writing import write_text
     from studies.instrument.card import load_card
@@ -70,15 +70,12 @@ def acceptance(
 
         write_text(report, acceptance_page(found, instrument.name, records, output))
         say(f"report: {report}")
-    if json:
-        print_json(_payload(found, instrument.name, report))
-        return 0
+    yield _payload(found, instrument.name, report)
     from studies.reports.acceptance import quantities_table
 
     table = quantities_table(found)
     print_table(table.caption, table.columns, table.rows, table.note)
     print(f"verdict: {found.verdict}")
-    return 0
 
 
 def _payload(found: "Acceptance", name: str, report: str | None) -> dict[str, Any]:

@@ -12,10 +12,13 @@ parameters that the data ties together but cannot tell apart; `responses`: by na
 
 from typing import TYPE_CHECKING, Any
 
+from studies.cli.output import Answer, answers
+
 if TYPE_CHECKING:
     from studies.calibration.calibrate import Calibration
 
 
+@answers("hrg.calibration/1")
 def calibrate(
     card: str,
     *data: str,
@@ -23,8 +26,7 @@ def calibrate(
     report: str | None = None,
     hold_out: int = 0,
     exact: tuple[str, ...] = (),
-    json: bool = False,
-) -> int:
+) -> Answer:
     """Find the most probable values of a card, given its uncertainties and records of the device.
 
     Every number of the card that is uncertain may move, within its prior: {{ value = …, relative_sd = … }} in the card, or the
@@ -46,12 +48,10 @@ def calibrate(
         Number of the record, from 1, that a second calibration without it predicts; the last of several unless given.
     exact : str
         A value that is not to move, such as thermal.film_emissivity; may be given more than once.
-    json : bool
-        Print one JSON object (schema hrg.calibration/1) instead of tables.
     """
     from studies.calibration.calibrate import calibrate as run
     from studies.calibration.observed import read_settled
-    from studies.cli.output import print_json, print_table, say
+    from studies.cli.output import print_table, say
     from studies.errors import InputError
     from studies.files.columns import read_header
     from studies.files.writing import write_text
@@ -79,9 +79,7 @@ def calibrate(
 
         write_text(report, calibration_page(found, list(data)))
         say(f"report: {report}")
-    if json:
-        print_json(_payload(found, list(data), save))
-        return 0
+    yield _payload(found, list(data), save)
     from studies.reports.calibration import held_out_table, ladder_table, separation_sentences, values_table
 
     for block in (values_table(found), ladder_table(found), held_out_table(found)):
@@ -89,7 +87,6 @@ def calibrate(
             print_table(block.caption, block.columns, block.rows, block.note)
     for sentence in separation_sentences(found):
         print(sentence)
-    return 0
 
 
 def _payload(found: "Calibration", data: list[str], save: str | None) -> dict[str, Any]:

@@ -2,11 +2,14 @@
 
 from typing import TYPE_CHECKING, Any
 
+from studies.cli.output import Answer, answers
+
 if TYPE_CHECKING:
     from shell.materials import Material, Prior
 
 
-def cards(card: str = "", *, json: bool = False) -> int:
+@answers("hrg.cards/1; hrg.card-values/1 for one card")
+def cards(card: str = "") -> Answer:
     """List the instrument cards that ship with the package, or what one card weighs and its uncertain values.
 
     A number of a card may carry its uncertainty: { value = 0.0118, relative_sd = 0.3 }, { value = ..., sd = ... }, or
@@ -17,54 +20,45 @@ def cards(card: str = "", *, json: bool = False) -> int:
     ----------
     card : str
         Path of a card, or the name of one that ships: show its mass, moments of inertia and uncertain values.
-    json : bool
-        Print one JSON object (schema hrg.cards/1; hrg.card-values/1 for one card) instead of a table.
     """
-    from studies.cli.output import print_json, print_table
+    from studies.cli.output import print_table
     from studies.instrument.card import load_card, shipped_cards
 
     if card:
-        return _show_values(card, json)
+        return (yield from _show_values(card))
     found = [load_card(path) for path in shipped_cards().values()]
-    if json:
-        entries = [
-            {
-                "name": card.name,
-                "shape": card.keys("resonator").shape,
-                "material": card.material.name,
-                "note": card.note,
-                "path": card.path,
-            }
-            for card in found
-        ]
-        print_json({"schema": "hrg.cards/1", "cards": entries})
-        return 0
+    entries = [
+        {
+            "name": card.name,
+            "shape": card.keys("resonator").shape,
+            "material": card.material.name,
+            "note": card.note,
+            "path": card.path,
+        }
+        for card in found
+    ]
+    yield {"schema": "hrg.cards/1", "cards": entries}
     rows = [[c.name, c.keys("resonator").shape, c.material.name, c.note] for c in found]
     print_table("Cards", ["Name", "Shape", "Material", "What is printed, what is illustrative"], rows)
-    return 0
 
 
-def _show_values(card: str, json: bool) -> int:
+def _show_values(card: str) -> Answer:
     from dataclasses import asdict
 
     from shell.inertia import weigh
-    from studies.cli.output import print_json, print_table
+    from studies.cli.output import print_table
     from studies.instrument.card import load_card
 
     instrument = load_card(card)
     values, stated = instrument.uncertain, instrument.stated
     mass = weigh(instrument.resonator, instrument.material.elastic(instrument.reference_temperature).rho)
-    if json:
-        print_json(
-            {
-                "schema": "hrg.card-values/1",
-                "card": instrument.name,
-                "values": [{**asdict(one), "stated": one.name in stated} for one in values],
-                "correlations": [[*pair, correlation] for pair, correlation in instrument.correlation.items()],
-                "mass_properties": asdict(mass),
-            }
-        )
-        return 0
+    yield {
+        "schema": "hrg.card-values/1",
+        "card": instrument.name,
+        "values": [{**asdict(one), "stated": one.name in stated} for one in values],
+        "correlations": [[*pair, correlation] for pair, correlation in instrument.correlation.items()],
+        "mass_properties": asdict(mass),
+    }
     print(
         f"{instrument.name}: {1e3 * mass.mass:.5g} g, {1e9 * mass.volume:.5g} mm³, centre at z = {1e3 * mass.center:.5g} mm;"
     )
@@ -80,34 +74,29 @@ def _show_values(card: str, json: bool) -> int:
     return 0
 
 
-def materials(name: str = "", *, json: bool = False) -> int:
+@answers("hrg.materials-list/1")
+def materials(name: str = "") -> Answer:
     """List the materials and their published laws.
 
     Parameters
     ----------
     name : str
         Show one material's laws with their properties, sources and ranges.
-    json : bool
-        Print one JSON object instead of a table.
     """
     from scipy.constants import zero_Celsius
 
     from shell.materials import read_materials
-    from studies.cli.output import print_json, print_table
+    from studies.cli.output import print_table
     from studies.errors import InputError, nearest
 
     table = read_materials()
     if name and name not in table:
         raise InputError(f"unknown material '{name}'{nearest(name, table)}")
     chosen = {key: laws for key, laws in table.items() if name in ("", key)}
-    if json:
-        print_json(
-            {
-                "schema": "hrg.materials-list/1",
-                "materials": [_describe(law) for laws in chosen.values() for law in laws.values()],
-            }
-        )
-        return 0
+    yield {
+        "schema": "hrg.materials-list/1",
+        "materials": [_describe(law) for laws in chosen.values() for law in laws.values()],
+    }
     rows = []
     for key, laws in chosen.items():
         for k, law in enumerate(laws.values()):
@@ -123,7 +112,6 @@ def materials(name: str = "", *, json: bool = False) -> int:
     if name:
         for law in chosen[name].values():
             _print_law(law)
-    return 0
 
 
 def _print_law(law: "Material") -> None:

@@ -1,20 +1,24 @@
-"""`hrg compare`: designs side by side."""
+"""`hrg compare`: designs side by side.
+
+With --json one object, schema `hrg.compare/1`: `cards`, `figures` (name, unit, values, uncertainties), `differing` (card key to
+its values, null where a card has none).
+"""
 
 import math
 
+from studies.cli.output import Answer, answers
 
-def compare(*card: str, json: bool = False) -> int:
+
+@answers("hrg.compare/1")
+def compare(*card: str) -> Answer:
     """Show designs side by side: where their cards differ, and what that does to modes, slope and settling.
 
     Parameters
     ----------
     card : str
         Two or more cards: paths, or names of those that ship (hrg cards).
-    json : bool
-        Print one JSON object (schema hrg.compare/1) instead of tables: `cards`, `figures` (name, unit, values,
-        uncertainties), `differing` (card key to its values, null where a card has none).
     """
-    from studies.cli.output import print_json, print_table
+    from studies.cli.output import print_table
     from studies.comparison import compare as compare_designs
     from studies.errors import InputError
     from studies.instrument.card import load_card
@@ -22,18 +26,16 @@ def compare(*card: str, json: bool = False) -> int:
     if len(card) < 2:
         raise InputError("name two cards or more: hrg compare A.toml B.toml.")
     found = compare_designs([load_card(one) for one in card])
-    if json:
-        figures = [
-            {
-                "name": row[0].name,
-                "unit": row[0].unit,
-                "values": [one.value for one in row],
-                "uncertainties": [one.uncertainty for one in row],
-            }
-            for row in found.figures
-        ]
-        print_json({"schema": "hrg.compare/1", "cards": found.names, "figures": figures, "differing": found.differing})
-        return 0
+    figures = [
+        {
+            "name": row[0].name,
+            "unit": row[0].unit,
+            "values": [one.value for one in row],
+            "uncertainties": [one.uncertainty for one in row],
+        }
+        for row in found.figures
+    ]
+    yield {"schema": "hrg.compare/1", "cards": found.names, "figures": figures, "differing": found.differing}
     names = [f"{name} ({k})" if found.names.count(name) > 1 else name for k, name in enumerate(found.names, 1)]
     rows = []
     for row in found.figures:
@@ -48,7 +50,6 @@ def compare(*card: str, json: bool = False) -> int:
         print_table("Where the cards differ", ["Key", *names], differing)
     else:
         print("The cards say the same.")
-    return 0
 
 
 def _with_uncertainty(value: float, uncertainty: float) -> str:

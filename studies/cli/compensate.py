@@ -2,6 +2,8 @@
 
 from typing import TYPE_CHECKING
 
+from studies.cli.output import Answer, answers
+
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
@@ -9,6 +11,7 @@ if TYPE_CHECKING:
 AVERAGE = 100.0  # s
 
 
+@answers("hrg.compensate/1")
 def compensate(
     model: str,
     run: str | None = None,
@@ -17,8 +20,7 @@ def compensate(
     out: str | None = None,
     extrapolate: bool = False,
     emit: str | None = None,
-    json: bool = False,
-) -> int:
+) -> Answer:
     """Write a record again with compensated_… columns, from a model that one of the hrg fit commands saved.
 
     The model refuses values that its fit has not seen.
@@ -35,13 +37,11 @@ def compensate(
         Apply the model outside the range of its fit too.
     emit : str
         Write the model as C99 source for firmware.
-    json : bool
-        Print one JSON object (schema hrg.compensate/1) instead of text.
     """
     import numpy as np
 
     from studies import models
-    from studies.cli.output import print_json, say
+    from studies.cli.output import say
     from studies.errors import InputError
     from studies.files.writing import write_text
     from studies.record import COMPENSATED, read_record, write_record
@@ -75,24 +75,19 @@ def compensate(
                     "stability_after": _stability(record["time_s"], after),
                     "rows_not_compensated": int(np.count_nonzero(missing)),
                 }
-    if json:
-        print_json(
-            {
-                "schema": "hrg.compensate/1",
-                "model": model,
-                "kind": loaded.kind,
-                "run": run,
-                "out": out,
-                "columns": columns,
-            }
-        )
-        return 0
+    yield {
+        "schema": "hrg.compensate/1",
+        "model": model,
+        "kind": loaded.kind,
+        "run": run,
+        "out": out,
+        "columns": columns,
+    }
     for name, facts in columns.items():
         from_what = "" if facts["stability_before"] is None else f"{facts['stability_before']:.4g} -> "
         print(f"{out}: {name}; standard deviation of {AVERAGE:g} s averages {from_what}{facts['stability_after']:.4g}")
         if facts["rows_not_compensated"]:
             print(f"{facts['rows_not_compensated']} rows stay empty: an input of the model is missing there.")
-    return 0
 
 
 def _stability(time: "NDArray[np.float64]", values: "NDArray[np.float64]") -> float:

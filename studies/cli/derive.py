@@ -12,6 +12,8 @@ CVG paper on demodulated dynamics.
 
 from typing import TYPE_CHECKING, Any, Literal
 
+from studies.cli.output import Answer, answers
+
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
@@ -20,6 +22,7 @@ if TYPE_CHECKING:
 MOST_HARMONIC = 100  # the closed forms of higher ones take minutes
 
 
+@answers("hrg.derive/1")
 def derive(
     *,
     dynamics: bool = False,
@@ -29,8 +32,7 @@ def derive(
     harmonic: int = 2,
     pole_angle_deg: float = 0.0,
     rim_angle_deg: float = 90.0,
-    json: bool = False,
-) -> int:
+) -> Answer:
     """Derive the frequency of the inextensional spherical shell, HRG paper equations (1)-(15).
 
     Prints the chain of equations for any harmonic n, from the displacements to the frequency, and its
@@ -54,8 +56,6 @@ def derive(
         Polar angle where the shell starts; above 0 the pole is open.
     rim_angle_deg : float
         Polar angle where the shell ends.
-    json : bool
-        Print one JSON object (schema hrg.derive/1) instead: every equation in LaTeX, the numbers, the code if asked.
     """
     from math import radians
 
@@ -63,7 +63,6 @@ def derive(
     from shell.derivation.design_code import emit_code
     from shell.derivation.emit import HRG_TITLE, emit_latex, emit_text
     from shell.rayleigh import rayleigh_integrals
-    from studies.cli.output import print_json
     from studies.errors import InputError
 
     if latex and code is not None:
@@ -76,7 +75,7 @@ def derive(
             raise InputError(f"{which} holds for any harmonic and shape; leave out --harmonic and the angles.")
         if bell and code is not None:
             raise InputError("--bell has equations and numbers but no design code; leave out --code.")
-        return _derive_bell(latex, json) if bell else _derive_dynamics(latex, code, json)
+        return (yield from _derive_bell(latex) if bell else _derive_dynamics(latex, code))
     if not 0 <= pole_angle_deg < rim_angle_deg < 180:
         raise InputError(
             f"a dome from {pole_angle_deg:g} to {rim_angle_deg:g} degrees has no inextensional mode: the pole angle must "
@@ -95,46 +94,42 @@ def derive(
                 f"from {pole_angle_deg:g} to {rim_angle_deg:g} degrees the closed forms of harmonic {harmonic} cancel"
                 " to nothing; take a wider cap."
             )
-    if json:
-        text = {} if code is None else {"code": {"language": code, "text": emit_code(case, code)}}
-        print_json(_payload(case, pole_angle_deg, rim_angle_deg) | text)
-    elif code is not None:
+    text = {} if code is None else {"code": {"language": code, "text": emit_code(case, code)}}
+    yield _payload(case, pole_angle_deg, rim_angle_deg) | text
+    if code is not None:
         print(emit_code(case, code), end="")
     else:
         print(emit_latex(steps(case), HRG_TITLE) if latex else emit_text(steps(case)), end="")
-    return 0
 
 
-def _derive_dynamics(latex: bool, code: Literal["python", "c"] | None, json: bool) -> int:
+def _derive_dynamics(latex: bool, code: Literal["python", "c"] | None) -> Answer:
     from compensation.derivation import chain
     from compensation.derivation.design_code import emit_code
-    from studies.cli.output import print_json
 
-    if json:
-        text = {} if code is None else {"code": {"language": code, "text": emit_code(code)}}
-        equations = [
-            {
-                "number": step.number or None,
-                "title": step.title,
-                "latex": [chain.typeset(equation) for equation in step.equations],
-                "plain": [chain.write_plainly(equation) for equation in step.equations],
-            }
-            for step in chain.steps()
-        ]
-        print_json({"schema": "hrg.derive-dynamics/1", "equations": equations} | text)
-    elif code is not None:
+    text = {} if code is None else {"code": {"language": code, "text": emit_code(code)}}
+    equations = [
+        {
+            "number": step.number or None,
+            "title": step.title,
+            "latex": [chain.typeset(equation) for equation in step.equations],
+            "plain": [chain.write_plainly(equation) for equation in step.equations],
+        }
+        for step in chain.steps()
+    ]
+    yield {"schema": "hrg.derive-dynamics/1", "equations": equations} | text
+    if code is not None:
         print(emit_code(code), end="")
     else:
         print(chain.emit_latex() if latex else chain.emit_text(), end="")
     return 0
 
 
-def _derive_bell(latex: bool, json: bool) -> int:
+def _derive_bell(latex: bool) -> Answer:
     import dataclasses
 
     from shell.derivation.bell_chain import bell_steps
     from shell.derivation.emit import BELL_TITLE, emit_latex, emit_text
-    from studies.cli.output import print_json, print_table, say
+    from studies.cli.output import print_table, say
     from studies.papers.bvg_theory import compare_bell_theory
 
     say("deriving the bell's equations ...")
@@ -143,11 +138,7 @@ def _derive_bell(latex: bool, json: bool) -> int:
         print(emit_latex(steps, BELL_TITLE), end="")
         return 0
     theory = compare_bell_theory()
-    if json:
-        print_json(
-            {"schema": "hrg.derive-bell/1", "equations": _equations(steps), "numbers": dataclasses.asdict(theory)}
-        )
-        return 0
+    yield {"schema": "hrg.derive-bell/1", "equations": _equations(steps), "numbers": dataclasses.asdict(theory)}
     print(emit_text(steps))
     rows = [
         [row.name, f"{row.frequency:.6g}", f"{row.precession_factor:.5f}", f"{row.membrane_share:.3g}"]

@@ -1,8 +1,10 @@
 """`hrg diagnose`: what the simulation gets wrong, why, and what the repair is worth."""
 
 from studies.cli.arguments import Seed
+from studies.cli.output import Answer, answers
 
 
+@answers("hrg.diagnosis/1, with --plan hrg.plan/1")
 def diagnose(
     *runs: str,
     card: str | None = None,
@@ -12,8 +14,7 @@ def diagnose(
     chamber: str | None = None,
     draws: int = 100,
     seed: Seed = 0,
-    json: bool = False,
-) -> int:
+) -> Answer:
     """Name the physical effect that a campaign shows and the simulation lacks, or say that it cannot be told.
 
     Give the records of one gyro (several runs are better than one), or a steady-state table.
@@ -37,18 +38,10 @@ def diagnose(
         With --plan, four times the cases of each effect at each SNR (1, 0.3, 0.1).
     seed : int
         Of the draws.
-    json : bool
-        Print one JSON object (schema hrg.diagnosis/1, with --plan hrg.plan/1) instead of text.
     """
-    import os
-
     from scipy.constants import zero_Celsius
 
-    # many small matrices: threads of the linear algebra would wait for each other longer than they compute
-    for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
-        os.environ.setdefault(name, "1")
-
-    from studies.cli.output import print_json, print_table, say
+    from studies.cli.output import print_table, say
     from studies.cli.telling import Told
     from studies.diagnosis.planning.chamber import parse_chamber
     from studies.errors import InputError
@@ -68,9 +61,7 @@ def diagnose(
         if report is not None:
             write_text(report, plan_page(outlook, profiles))
             say(f"report: {report}")
-        if json:
-            print_json(outlook.as_dict())
-            return 0
+        yield outlook.as_dict()
         print(headline(outlook))
         block = plan_table(outlook)
         print_table(block.caption, block.columns, block.rows, block.note)
@@ -98,9 +89,7 @@ def diagnose(
         if report is not None:
             write_text(report, page.table_page(found, tables[0]))
             say(f"report: {report}")
-        if json:
-            print_json(found.as_dict())
-            return 0
+        yield found.as_dict()
         print(page.table_text(found))
         return 0
 
@@ -124,9 +113,7 @@ def diagnose(
     if report is not None:
         write_text(report, page.diagnosis_page(diagnosis))
         say(f"report: {report}")
-    if json:
-        print_json({**diagnosis.verdict.as_dict(), "extended_model": save})
-        return 0
+    yield {**diagnosis.verdict.as_dict(), "extended_model": save}
     print(page.headline(diagnosis.verdict))
     for block in (page.cause_table(diagnosis.verdict), page.response_table(diagnosis.verdict)):
         if block.rows:
@@ -135,4 +122,3 @@ def diagnose(
         print(f"Note: {note}")
     if diagnosis.verdict.next_experiment:
         print(f"Next: {diagnosis.verdict.next_experiment}")
-    return 0

@@ -1,15 +1,14 @@
 """`hrg doctor`: what this environment has and what it lacks."""
 
+from studies.cli.output import Answer, answers
 
-def doctor(*, json: bool = False) -> int:
+
+@answers("hrg.doctor/1")
+def doctor() -> Answer:
     """Show versions, OpenGL and the optional parts, with the remedy for what is missing.
 
     Exit status 3 when pictures cannot be drawn.
 
-    Parameters
-    ----------
-    json : bool
-        Print one JSON object (schema hrg.doctor/1) instead of a table.
     """
     import platform
     import shutil
@@ -17,7 +16,7 @@ def doctor(*, json: bool = False) -> int:
 
     from shell.render import can_draw
     from studies.cli.guard import PACKAGES, package_home
-    from studies.cli.output import print_json, print_table
+    from studies.cli.output import print_table
 
     checks = [("Python", True, platform.python_version(), "")]
     for name in (
@@ -51,16 +50,8 @@ def doctor(*, json: bool = False) -> int:
         found = shutil.which(command)
         checks.append((name, True, found or "not found (optional)", "" if found else brings))
     healthy = all(ok for _, ok, _, _ in checks)
-    if json:
-        fields = ("name", "ok", "found", "remedy")
-        print_json(
-            {
-                "schema": "hrg.doctor/1",
-                "healthy": healthy,
-                "checks": [dict(zip(fields, c, strict=True)) for c in checks],
-            }
-        )
-    else:
-        rows = [[name, "ok" if ok else "missing", found, remedy] for name, ok, found, remedy in checks]
-        print_table("Environment", ["Part", "State", "Found", "Remedy"], rows)
-    return 0 if healthy else 3
+    fields = ("name", "ok", "found", "remedy")
+    described = [dict(zip(fields, c, strict=True)) for c in checks]
+    yield {"schema": "hrg.doctor/1", "healthy": healthy, "checks": described}, 0 if healthy else 3
+    rows = [[name, "ok" if ok else "missing", found, remedy] for name, ok, found, remedy in checks]
+    print_table("Environment", ["Part", "State", "Found", "Remedy"], rows)

@@ -2,27 +2,26 @@
 
 from typing import TYPE_CHECKING, Any
 
+from studies.cli.output import Answer, answers
+
 if TYPE_CHECKING:
     from studies.effects import Effect
 
 
-def effects(name: str = "", *, json: bool = False) -> int:
+@answers("hrg.effects/1")
+def effects(name: str = "") -> Answer:
     """List the physical effects that a diagnosis can name and an `[[effect]]` table of a card can have.
 
     Parameters
     ----------
     name : str
         Show one effect: parameters, units, bounds, drives, source, isolating experiment.
-    json : bool
-        Print one JSON object (schema hrg.effects/1) instead of a table.
     """
-    from studies.cli.output import print_json, print_table
+    from studies.cli.output import print_table
     from studies.effects import find_effect, library
 
     chosen = [find_effect(name)] if name else list(library().values())
-    if json:
-        print_json({"schema": "hrg.effects/1", "effects": [describe(effect) for effect in chosen]})
-        return 0
+    yield {"schema": "hrg.effects/1", "effects": [describe(effect) for effect in chosen]}
     if not name:
         rows = [[e.name, ", ".join(_words(e)), e.summary] for e in chosen]
         print_table("Effects", ["Name", "Acts on", "What happens"], rows, "hrg effects NAME shows one of them in full.")
@@ -38,7 +37,6 @@ def effects(name: str = "", *, json: bool = False) -> int:
     if effect.sensor:
         print(f"Sensor that would show it: {effect.sensor}.")
     print(f"Source: {effect.source}.")
-    return 0
 
 
 DRIVES = {

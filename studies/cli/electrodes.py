@@ -8,7 +8,10 @@ a split was given: {voltages_V, left_Hz, shift_ppm}.
 
 from typing import Any
 
+from studies.cli.output import Answer, answers
 
+
+@answers("hrg.electrodes/1")
 def electrodes(
     card: str,
     *,
@@ -17,8 +20,7 @@ def electrodes(
     axis: float | None = None,
     limit: float = 100.0,
     temperature: float | None = None,
-    json: bool = False,
-) -> int:
+) -> Answer:
     """Tell what the card's table [electrodes] does to a pair: softening, split, coefficients, pull-in, trim voltages.
 
     Parameters
@@ -35,8 +37,6 @@ def electrodes(
         Largest trim voltage.
     temperature : float
         Temperature in °C; the card's reference temperature unless given.
-    json : bool
-        Print one JSON object (schema hrg.electrodes/1) instead of tables.
     """
     import math
 
@@ -45,7 +45,7 @@ def electrodes(
 
     from shell.electrodes import reach, trim_voltages
     from shell.modes import solve_modes
-    from studies.cli.output import print_json, print_table, say
+    from studies.cli.output import print_table, say
     from studies.errors import InputError, naming
     from studies.instrument.card import load_card
     from studies.splitting import SplitPair
@@ -98,9 +98,7 @@ def electrodes(
             "shift_ppm": 1e6 * trim.shift,
         },
     }
-    if json:
-        print_json(payload)
-        return 0
+    yield payload
     rows = [
         ["softening by the card's voltages (ppm)", f"{payload['softening_ppm']:+.4f}"],
         ["split by them (mHz)", f"{1e3 * own.hertz:.4f}"],
@@ -123,4 +121,3 @@ def electrodes(
         say(
             f"The card's split of {1e3 * abs(wave) * mode.frequency:.4g} mHz is beyond what {limit:g} V null: hrg trim."
         )
-    return 0

@@ -2,10 +2,13 @@
 
 from typing import TYPE_CHECKING, Any, Literal
 
+from studies.cli.output import Answer, answers
+
 if TYPE_CHECKING:
     from studies.bias import BiasStudy, Judged, Spectrum
 
 
+@answers("hrg.fit-bias/1")
 def fit_bias(
     *data: str,
     method: Literal["guarded", "paper"] = "guarded",
@@ -16,8 +19,7 @@ def fit_bias(
     save: str | None = None,
     emit: str | None = None,
     report: str | None = None,
-    json: bool = False,
-) -> int:
+) -> Answer:
     """Fit the bias over the change of frequency and its rate, stepwise (HRG paper, equations 19 to 22).
 
     The records are of a gyro at rest while its temperature changes: time_s, bias_deg_per_h or measured_rate_deg_per_s,
@@ -45,11 +47,9 @@ def fit_bias(
         Write the model as C99 source for firmware.
     report : str
         Write a page (HTML).
-    json : bool
-        Print one JSON object (schema hrg.fit-bias/1) instead of tables.
     """
     from studies.bias import study_bias
-    from studies.cli.output import print_json, print_table, say
+    from studies.cli.output import print_table, say
     from studies.errors import InputError
     from studies.files.writing import write_text
     from studies.models import emit_c, write_model
@@ -72,9 +72,7 @@ def fit_bias(
     if report is not None:
         write_text(report, page.bias_page(study, ", ".join(data), method))
         say(f"report: {report}")
-    if json:
-        print_json(_payload(study, method, data))
-        return 0
+    yield _payload(study, method, data)
     tables = [
         page.path_table(study.by(method)),
         page.coefficients_table(study.by(method), study.output),
@@ -84,7 +82,6 @@ def fit_bias(
     for block in tables:
         print_table(block.caption, block.columns, block.rows, block.note)
     print(page.verdict(study, method))
-    return 0
 
 
 def _payload(study: "BiasStudy", method: str, data: tuple[str, ...]) -> dict[str, Any]:

@@ -2,6 +2,8 @@
 
 from typing import TYPE_CHECKING, Any
 
+from studies.cli.output import Answer, answers
+
 if TYPE_CHECKING:
     from compensation.improvement import Change
     from studies.cross_damping import CrossDampingStudy
@@ -9,6 +11,7 @@ if TYPE_CHECKING:
     from studies.rest import RestData
 
 
+@answers("hrg.fit-cross-damping/1")
 def fit_cross_damping(
     *data: str,
     frequency: float | None = None,
@@ -17,8 +20,7 @@ def fit_cross_damping(
     calibration_temperature: float = 20.0,
     save: str | None = None,
     report: str | None = None,
-    json: bool = False,
-) -> int:
+) -> Answer:
     """Fit the cross-damping of a cylindrical gyro over temperature (CVG cross-damping paper, equations 9 and 10).
 
     The records are of a gyro at rest: time_s, a temperature, and bias_deg_per_h or measured_rate_deg_per_s.
@@ -41,14 +43,12 @@ def fit_cross_damping(
         Write the model (TOML), for hrg compensate.
     report : str
         Write a page (HTML).
-    json : bool
-        Print one JSON object (schema hrg.fit-cross-damping/1) instead of tables.
     """
     import math
 
     from scipy.constants import zero_Celsius
 
-    from studies.cli.output import print_json, print_table, say
+    from studies.cli.output import print_table, say
     from studies.cross_damping import study_cross_damping
     from studies.errors import InputError, naming
     from studies.files.writing import write_text
@@ -97,14 +97,11 @@ def fit_cross_damping(
     if report is not None:
         write_text(report, page.cross_damping_page(study, gathered, ", ".join(data)))
         say(f"report: {report}")
-    if json:
-        print_json({"schema": "hrg.fit-cross-damping/1", "records": list(data), **_summarise(study, gathered)})
-        return 0
+    yield {"schema": "hrg.fit-cross-damping/1", "records": list(data), **_summarise(study, gathered)}
     for block in (page.coefficients_table(study), page.improvement_table(study, gathered)):
         print_table(block.caption, block.columns, block.rows, block.note)
     if not study.is_useful:
         print(page.USELESS)
-    return 0
 
 
 def _summarise(study: "CrossDampingStudy", data: "RestData") -> dict[str, Any]:

@@ -6,10 +6,13 @@ temperature_degC, frequency_Hz, error_Hz, left_K}]`, `left_K` what may be left o
 
 from typing import TYPE_CHECKING
 
+from studies.cli.output import Answer, answers
+
 if TYPE_CHECKING:
     from studies.settled import Soak
 
 
+@answers("hrg.fit-frequency/1")
 def fit_frequency(
     table: str,
     *more: str,
@@ -20,8 +23,7 @@ def fit_frequency(
     report: str | None = None,
     time_constant: float = 3000.0,
     left: float = 0.05,
-    json: bool = False,
-) -> int:
+) -> Answer:
     """Fit the frequency over temperature by a polynomial and invert it (HRG paper, equations 16 to 18, Table 2).
 
     Parameters
@@ -45,10 +47,8 @@ def fit_frequency(
         Write the model (TOML), for hrg compensate.
     report : str
         Write a page (HTML).
-    json : bool
-        Print one JSON object (schema hrg.fit-frequency/1) instead of tables.
     """
-    from studies.cli.output import print_json, print_table, say
+    from studies.cli.output import print_table, say
     from studies.errors import naming
     from studies.files.columns import read_header
     from studies.files.writing import write_text
@@ -90,29 +90,24 @@ def fit_frequency(
         write_text(report, page.frequency_page(study, table))
         say(f"report: {report}")
     fit = study.fit
-    if json:
-        print_json(
-            {
-                "schema": "hrg.fit-frequency/1",
-                "table": table,
-                "order": fit.order,
-                "reference_temperature_degC": fit.reference_temperature_degC,
-                "coefficients": fit.coefficients,
-                "standard_errors": fit.standard_errors,
-                "resolution_Hz": fit.resolution,
-                "sum_of_squares_Hz2": fit.sum_of_squares,
-                "leave_one_out_Hz": fit.leave_one_out_rms,
-                "calculated_degC": study.calculated_degC,
-                "error_degC": study.error_degC,
-                "recommended_order": study.orders.recommended,
-                **({"soaks": [_describe(soak) for soak in soaks]} if soaks else {}),
-            }
-        )
-        return 0
+    yield {
+        "schema": "hrg.fit-frequency/1",
+        "table": table,
+        "order": fit.order,
+        "reference_temperature_degC": fit.reference_temperature_degC,
+        "coefficients": fit.coefficients,
+        "standard_errors": fit.standard_errors,
+        "resolution_Hz": fit.resolution,
+        "sum_of_squares_Hz2": fit.sum_of_squares,
+        "leave_one_out_Hz": fit.leave_one_out_rms,
+        "calculated_degC": study.calculated_degC,
+        "error_degC": study.error_degC,
+        "recommended_order": study.orders.recommended,
+        **({"soaks": [_describe(soak) for soak in soaks]} if soaks else {}),
+    }
     for block in (page.coefficients_table(study), page.inverse_table(study), page.order_table(study)):
         print_table(block.caption, block.columns, block.rows, block.note)
     print(page.order_sentence(study))
-    return 0
 
 
 def _describe(soak: "Soak") -> dict[str, str | float]:

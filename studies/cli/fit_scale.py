@@ -1,6 +1,9 @@
 """`hrg fit scale`: bias and scale of a bell-shaped gyro, step by step."""
 
+from studies.cli.output import Answer, answers
 
+
+@answers("hrg.fit-scale/1")
 def fit_scale(
     *data: str,
     cutoff: float = 1.0,
@@ -8,8 +11,7 @@ def fit_scale(
     no_filter: bool = False,
     save: str | None = None,
     report: str | None = None,
-    json: bool = False,
-) -> int:
+) -> Answer:
     """Fit null, bias over temperature, scale over rate and over temperature (BVG paper, equations 32 to 36).
 
     Three records, in any order, each with time_s, rate_deg_per_s (the applied rate), a temperature, and
@@ -30,12 +32,10 @@ def fit_scale(
         Write the model (TOML), for hrg compensate.
     report : str
         Write a page (HTML).
-    json : bool
-        Print one JSON object (schema hrg.fit-scale/1) instead of tables.
     """
     import dataclasses
 
-    from studies.cli.output import print_json, print_table, say
+    from studies.cli.output import print_table, say
     from studies.errors import InputError
     from studies.files.writing import write_text
     from studies.models import source_of, write_model
@@ -62,30 +62,26 @@ def fit_scale(
     if report is not None:
         write_text(report, page.scale_page(study, ", ".join(data)))
         say(f"report: {report}")
-    if json:
-        print_json(
-            {
-                "schema": "hrg.fit-scale/1",
-                "records": list(data),
-                "output": study.output,
-                "temperature": study.temperature_column,
-                "parts": {
-                    part.name: {
-                        name: {"value": value, "standard_error": error, "unit": unit}
-                        for name, value, error, unit in zip(
-                            part.names, part.values, part.standard_errors, part.units, strict=True
-                        )
-                    }
-                    for part in model.parts
-                },
-                "steps": [dataclasses.asdict(figures) for figures in study.figures],
-                "error_before_deg_per_s": study.error_before,
-                "error_held_out_deg_per_s": study.error_held_out,
-                "filter_delay_s": study.chain.delay,
-                "rows_left_out": study.left_out,
+    yield {
+        "schema": "hrg.fit-scale/1",
+        "records": list(data),
+        "output": study.output,
+        "temperature": study.temperature_column,
+        "parts": {
+            part.name: {
+                name: {"value": value, "standard_error": error, "unit": unit}
+                for name, value, error, unit in zip(
+                    part.names, part.values, part.standard_errors, part.units, strict=True
+                )
             }
-        )
-        return 0
+            for part in model.parts
+        },
+        "steps": [dataclasses.asdict(figures) for figures in study.figures],
+        "error_before_deg_per_s": study.error_before,
+        "error_held_out_deg_per_s": study.error_held_out,
+        "filter_delay_s": study.chain.delay,
+        "rows_left_out": study.left_out,
+    }
     for block in (
         page.coefficients_table(study.chain, study.output),
         page.steps_table(study.figures, "After each step"),
@@ -95,4 +91,3 @@ def fit_scale(
         f"Rate error on blocks left out of the fit: {study.error_before:.4f} °/s rough,"
         f" {study.error_held_out:.4f} °/s compensated (before the filter)."
     )
-    return 0

@@ -7,15 +7,16 @@ With --json one object, schema `hrg.fit-thermal/1`: `data`, `confidence`, `estim
 
 from typing import TYPE_CHECKING, Any
 
+from studies.cli.output import Answer, answers
+
 if TYPE_CHECKING:
     from studies.calibration.lags.identification import Identification
 
 UNITS = {"offset": "Hz", "slope": "Hz/K", "curvature": "Hz/K²", "cubic": "Hz/K³"}
 
 
-def fit_thermal(
-    *data: str, card: str | None = None, lags: int | None = None, confidence: float = 0.9, json: bool = False
-) -> int:
+@answers("hrg.fit-thermal/1")
+def fit_thermal(*data: str, card: str | None = None, lags: int | None = None, confidence: float = 0.9) -> Answer:
     """Identify how the resonator lags behind its housing, with intervals, and say what the records cannot tell.
 
     The records need time_s, frequency_Hz and housing_temperature_degC (or chamber_temperature_degC). The initial state of
@@ -32,11 +33,9 @@ def fit_thermal(
         Number of lags; as many as the records support unless given.
     confidence : float
         Of the intervals.
-    json : bool
-        Print one JSON object (schema hrg.fit-thermal/1) instead of a table.
     """
     from studies.calibration.lags.records import fit_thermal_constants
-    from studies.cli.output import print_json, print_table, say
+    from studies.cli.output import print_table, say
     from studies.errors import InputError
     from studies.instrument.card import load_card
     from studies.record import read_record
@@ -55,9 +54,7 @@ def fit_thermal(
             f"note: the residual ({wandering:.2g} Hz) is {wandering / white:.1f} times its white part: the noise wanders, or"
             " the gyro is more than this chain of lags; then the constants are effective ones, outside their intervals."
         )
-    if json:
-        print_json(_payload(found, list(data)))
-        return 0
+    yield _payload(found, list(data))
     rows = []
     for name, estimate in found.estimates.items():
         unit = UNITS.get(name, "s" if name.startswith("time_constant") else "")
@@ -69,7 +66,6 @@ def fit_thermal(
     print_table("Thermal constants", ["constant", "value", "low", "high", "unit"], rows, note)
     for direction in found.undetermined:
         print(f"the records leave this combination open: {direction}")
-    return 0
 
 
 def _payload(found: "Identification", data: list[str]) -> "dict[str, Any]":

@@ -6,6 +6,8 @@ With --json one object, schema `hrg.fit-whole-angle/1`: `data`, `confidence`, `e
 
 from typing import TYPE_CHECKING
 
+from studies.cli.output import Answer, answers
+
 if TYPE_CHECKING:
     from compensation.wave_fit import WaveFit
 
@@ -23,6 +25,7 @@ KEYS = {
 }
 
 
+@answers("hrg.fit-whole-angle/1")
 def fit_whole_angle(
     run: str,
     *,
@@ -31,8 +34,7 @@ def fit_whole_angle(
     quadrature_volts_per_hertz: float | None = None,
     confidence: float = 0.95,
     save: str | None = None,
-    json: bool = False,
-) -> int:
+) -> Answer:
     """Fit damping and frequency split with their axes, gain ratio and phase error to a whole-angle run, with intervals.
 
     The record needs time_s, pattern_angle_deg (unwrapped) and bias_deg_per_h or measured_rate_deg_per_s (the indicated rate,
@@ -54,13 +56,11 @@ def fit_whole_angle(
         Of the intervals.
     save : str
         Write the card with the values found and their uncertainties.
-    json : bool
-        Print one JSON object (schema hrg.fit-whole-angle/1) instead of a table.
     """
     import numpy as np
 
     from compensation.wave_fit import fit_whole_angle as fit
-    from studies.cli.output import print_json, print_table, say
+    from studies.cli.output import print_table, say
     from studies.errors import InputError, naming
     from studies.instrument.card import load_card, save_card
     from studies.law import law_of
@@ -121,25 +121,20 @@ def fit_whole_angle(
             instrument = instrument.with_table("loop", {"mode": "whole-angle"})
         save_card(instrument.with_values(values), save)
         say(f"card: {save}")
-    if json:
-        print_json(
-            {
-                "schema": "hrg.fit-whole-angle/1",
-                "data": run,
-                "confidence": confidence,
-                "estimates": estimates,
-                "undetermined": list(found.undetermined),
-                "saved": save,
-            }
-        )
-        return 0
+    yield {
+        "schema": "hrg.fit-whole-angle/1",
+        "data": run,
+        "confidence": confidence,
+        "estimates": estimates,
+        "undetermined": list(found.undetermined),
+        "saved": save,
+    }
     rows = [[key, *(f"{e[name]:.5g}" for name in ("value", "low", "high"))] for key, e in estimates.items()]
     print_table(
         "Whole-angle run", ["key of the card", "value", "low", "high"], rows, f"Intervals of {100 * confidence:g} %."
     )
     for sentence in found.undetermined:
         print(f"not told: {sentence}")
-    return 0
 
 
 KEYS_OF_CARD = tuple(key for key, _ in KEYS.values() if key != "bias.offset_deg_per_h")

@@ -4,6 +4,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
+from studies.cli.output import Answer, answers
+
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
@@ -15,14 +17,14 @@ if TYPE_CHECKING:
     Columns = Mapping[str, NDArray[np.float64]]
 
 
+@answers("hrg.import/1, with --draft hrg.import-draft/1")
 def import_(
     *raw: str,
     map_: Annotated[str | None, Parameter(name="--map")] = None,
     out: str | None = None,
     draft: str | None = None,
     preview: str | None = None,
-    json: bool = False,
-) -> int:
+) -> Answer:
     """Bring laboratory files into the record format, or draft the map that says how.
 
     First 'hrg import RAW --draft MAP.toml', then read and correct the map, then 'hrg import RAW --map MAP.toml --out RUN.csv'.
@@ -42,24 +44,22 @@ def import_(
         Write a map drafted from the files instead; a file that exists is not overwritten.
     preview : str
         Write a page (HTML) that shows what was understood: every column over time, gaps, changes.
-    json : bool
-        Print one JSON object (schema hrg.import/1): rows, columns, missing values, notes.
     """
     from studies.errors import InputError
 
     if not raw:
         raise InputError("the raw file is missing: 'hrg import RAW --draft MAP.toml' drafts a map from it.")
     if draft is not None and map_ is None and out is None:
-        return _draft(raw, draft, json)
+        return (yield from _draft(raw, draft))
     if draft is not None or map_ is None or out is None:
         raise InputError("give either --draft MAP.toml, or both --map MAP.toml and --out RUN.csv.")
-    return _import(raw, map_, out, preview, json)
+    return (yield from _import(raw, map_, out, preview))
 
 
-def _draft(raw: tuple[str, ...], path: str, json: bool) -> int:
+def _draft(raw: tuple[str, ...], path: str) -> Answer:
     import os
 
-    from studies.cli.output import print_json, say
+    from studies.cli.output import say
     from studies.errors import InputError
     from studies.files.writing import write_text
     from studies.importing.draft import draft_map
@@ -68,20 +68,17 @@ def _draft(raw: tuple[str, ...], path: str, json: bool) -> int:
         raise InputError(f"{path}: exists and is not overwritten; remove it or choose another name for the draft.")
     draft = draft_map(raw)
     write_text(path, draft.text)
-    if json:
-        print_json({"schema": "hrg.import-draft/1", "map": path, "mapped": draft.mapped, "left_over": draft.left_over})
-        return 0
+    yield {"schema": "hrg.import-draft/1", "map": path, "mapped": draft.mapped, "left_over": draft.left_over}
     for note in draft.notes:
         say(note)
     say(
         f"{path}: drafted. Mapped: {', '.join(draft.mapped) or 'nothing'}. Left over: {', '.join(draft.left_over) or 'nothing'}."
     )
     say("Read it, correct what is marked with CHECK, then run hrg import with --map and --out.")
-    return 0
 
 
-def _import(raw: tuple[str, ...], path: str, out: str, preview: str | None, json: bool) -> int:
-    from studies.cli.output import print_json, say
+def _import(raw: tuple[str, ...], path: str, out: str, preview: str | None) -> Answer:
+    from studies.cli.output import say
     from studies.files.writing import write_text
     from studies.importing.join import import_records
     from studies.importing.mapping import load_map
@@ -90,7 +87,7 @@ def _import(raw: tuple[str, ...], path: str, out: str, preview: str | None, json
 
     import_map = load_map(path)
     if import_map.is_table:
-        return _import_table(raw, import_map, out, preview, json)
+        return (yield from _import_table(raw, import_map, out, preview))
     records = import_records(raw, import_map)
     files = {axis: _with_axis(out, axis) for axis in records}
     for axis, record in records.items():
@@ -100,21 +97,18 @@ def _import(raw: tuple[str, ...], path: str, out: str, preview: str | None, json
             preview, import_page({files[axis]: record.columns for axis, record in records.items()}, record.comments)
         )
         say(f"preview: {preview}")
-    if json:
-        described = [_payload(files[axis], record.columns, record.comments) for axis, record in records.items()]
-        first = next(iter(records.values()))
-        start = first.start.isoformat() if first.start else None
-        more = {"axes": {axis: files[axis] for axis in records}} if len(records) > 1 else {}
-        print_json({"schema": "hrg.import/1", "start": start, **described[0], **more})
-        return 0
+    described = [_payload(files[axis], record.columns, record.comments) for axis, record in records.items()]
+    first = next(iter(records.values()))
+    start = first.start.isoformat() if first.start else None
+    more = {"axes": {axis: files[axis] for axis in records}} if len(records) > 1 else {}
+    yield {"schema": "hrg.import/1", "start": start, **described[0], **more}
     for axis, record in records.items():
         _show(files[axis], record.columns)
     print("\n".join(record.comments))
-    return 0
 
 
-def _import_table(raw: tuple[str, ...], import_map: "ImportMap", out: str, preview: str | None, json: bool) -> int:
-    from studies.cli.output import print_json, say
+def _import_table(raw: tuple[str, ...], import_map: "ImportMap", out: str, preview: str | None) -> Answer:
+    from studies.cli.output import say
     from studies.errors import InputError
     from studies.files.writing import write_text
     from studies.importing.join import import_table
@@ -129,12 +123,9 @@ def _import_table(raw: tuple[str, ...], import_map: "ImportMap", out: str, previ
     if preview is not None:
         write_text(preview, import_page({out: columns}, notes))
         say(f"preview: {preview}")
-    if json:
-        print_json({"schema": "hrg.import/1", "start": None, **_payload(out, columns, notes)})
-        return 0
+    yield {"schema": "hrg.import/1", "start": None, **_payload(out, columns, notes)}
     _show(out, columns)
     print("\n".join(notes))
-    return 0
 
 
 def _with_axis(out: str, axis: str) -> str:

@@ -9,6 +9,7 @@ With --json one object, schema `hrg.loop/1`: `card`, `mode`, `temperature_degC`,
 from typing import TYPE_CHECKING, Any
 
 from studies.cli.arguments import Seed
+from studies.cli.output import Answer, answers
 
 if TYPE_CHECKING:
     from studies.simulation.loop import LoopStudy
@@ -23,6 +24,7 @@ NOISE_NAMES = {
 }
 
 
+@answers("hrg.loop/1")
 def loop(
     card: str,
     *,
@@ -35,8 +37,7 @@ def loop(
     both_ways: bool = False,
     seed: Seed = 0,
     noiseless: bool = False,
-    json: bool = False,
-) -> int:
+) -> Answer:
     """Study the loops of a card: stability margins, bias and noise by source, start-up; with --out also a run through them.
 
     The card's table [loop] says how the gyro is read; loss, damping anisotropy and azimuth come from [loss] and [bias]. A
@@ -65,13 +66,11 @@ def loop(
         Seed of the noise.
     noiseless : bool
         Leave out noise.
-    json : bool
-        Print one JSON object (schema hrg.loop/1) instead of tables.
     """
     import numpy as np
     from scipy.constants import zero_Celsius
 
-    from studies.cli.output import print_json, print_table, say
+    from studies.cli.output import print_table, say
     from studies.errors import InputError
     from studies.instrument.card import load_card
     from studies.law import law_of
@@ -106,18 +105,16 @@ def loop(
             None if noiseless else seed,
         )
         say(f"record: {out}, {rows} rows")
-    if json:
-        head = {
-            "schema": "hrg.loop/1",
-            "card": instrument.name,
-            "mode": keys.mode,
-            "temperature_degC": T - zero_Celsius,
-            "frequency_Hz": frequency,
-            "quality_factor": 1 / inverse_q,
-            "bryan_factor": law.bryan_factor,
-        }
-        print_json({**head, **_payload(study), "out": out, "rows": rows})
-        return 0
+    head = {
+        "schema": "hrg.loop/1",
+        "card": instrument.name,
+        "mode": keys.mode,
+        "temperature_degC": T - zero_Celsius,
+        "frequency_Hz": frequency,
+        "quality_factor": 1 / inverse_q,
+        "bryan_factor": law.bryan_factor,
+    }
+    yield {**head, **_payload(study), "out": out, "rows": rows}
     print_table(
         f"Loops of {instrument.name}: {keys.mode}, {frequency:.2f} Hz, Q = {1 / inverse_q:.3g}, τ = {float(study.wave.tau):.4g} s",
         ["loop", "paper", "gain 1 at Hz", "phase margin °", "gain margin dB", "turns over at Hz"],
@@ -147,7 +144,6 @@ def loop(
         [[NOISE_NAMES[name], f"{one:.3g}", f"{walk:.3g}"] for name, (one, walk) in study.noise.items()],
         "deg/√h from a mean over 100 s.",
     )
-    return 0
 
 
 def _paper(name: str) -> str:

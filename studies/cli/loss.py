@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import Parameter
 
+from studies.cli.output import Answer, answers
+
 if TYPE_CHECKING:
     from shell.damping.budget import Budget, Part
     from studies.instrument.card import Instrument
@@ -19,6 +21,7 @@ if TYPE_CHECKING:
 MOST_POINTS = 10_000
 
 
+@answers("hrg.loss/1")
 def loss(
     card: str,
     *,
@@ -28,8 +31,7 @@ def loss(
     harmonic: int = 2,
     theory: Literal["solid", "shell"] = "solid",
     anchor: bool = False,
-    json: bool = False,
-) -> int:
+) -> Answer:
     """Show Q over temperature, where its loss comes from, and which part to attack first.
 
     Heat through the wall, loss of the bulk and of the surface follow from geometry and material; films, gas, activated losses,
@@ -51,13 +53,10 @@ def loss(
         solid (three-dimensional) or shell (Naghdi).
     anchor : bool
         Compute what a stem sends into the body that it stands on (a second or two).
-    json : bool
-        Print one JSON object (schema hrg.loss/1) instead of tables.
     """
     import numpy as np
     from scipy.constants import zero_Celsius
 
-    from studies.cli.output import print_json
     from studies.errors import InputError
     from studies.instrument.card import load_card
     from studies.loss import loss_model
@@ -74,13 +73,10 @@ def loss(
     T = instrument.material.check(np.arange(from_degC, to_degC + 1e-9 * step, step) + zero_Celsius)
     model = loss_model(instrument, harmonic, theory, anchor)
     budget = model.budget(T)
-    if json:
-        described = _describe(model, budget, harmonic, theory)
-        print_json({"schema": "hrg.loss/1", "card": instrument.name, **described, "stated": _stated(instrument, model)})
-    else:
-        _print(instrument.name, model, budget, harmonic, theory)
-        _print_stated(_stated(instrument, model))
-    return 0
+    described = _describe(model, budget, harmonic, theory)
+    yield {"schema": "hrg.loss/1", "card": instrument.name, **described, "stated": _stated(instrument, model)}
+    _print(instrument.name, model, budget, harmonic, theory)
+    _print_stated(_stated(instrument, model))
 
 
 def _describe(model: "LossModel", budget: "Budget", harmonic: int, theory: str) -> "dict[str, Any]":

@@ -9,12 +9,15 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import Parameter
 
+from studies.cli.output import Answer, answers
+
 if TYPE_CHECKING:
     from shell.modes import Mode
     from shell.resonator import Resonator
     from studies.instrument.card import Instrument
 
 
+@answers("hrg.modes/1")
 def modes(
     card: str,
     *,
@@ -24,8 +27,7 @@ def modes(
     theory: Literal["solid", "shell", "rayleigh"] = "solid",
     tolerance: float = 1e-5,
     sensitivities: bool = False,
-    json: bool = False,
-) -> int:
+) -> Answer:
     """Compute the lowest modes of a resonator: frequency, Bryan factor, energies, sensitivities.
 
     Parameters
@@ -44,15 +46,13 @@ def modes(
         Relative error that the frequency may have against its own theory.
     sensitivities : bool
         Show how each frequency follows E, nu, rho, thickness and radius, and where its energy is.
-    json : bool
-        Print one JSON object (schema hrg.modes/1) instead of a table.
     """
     from dataclasses import asdict
 
     from scipy.constants import zero_Celsius
 
     from shell.modes import solve_modes
-    from studies.cli.output import print_json, print_table
+    from studies.cli.output import print_table
     from studies.errors import InputError, naming
     from studies.instrument.card import load_card
 
@@ -70,38 +70,34 @@ def modes(
     detailed = theory != "rayleigh"
     share, mean = _material_share(instrument, T), _mean_thickness(resonator)
     split = _find_splits(instrument, found, T) if detailed else {}
-    if json:
-        entries = []
-        for m in found:
-            entry = {
-                "harmonic": m.harmonic,
-                "index": m.index,
-                "label": m.label,
-                "frequency_Hz": m.frequency,
-                "bryan_factor": m.bryan_factor,
-                "relative_error_estimate": m.relative_error_estimate,
+    entries = []
+    for m in found:
+        entry = {
+            "harmonic": m.harmonic,
+            "index": m.index,
+            "label": m.label,
+            "frequency_Hz": m.frequency,
+            "bryan_factor": m.bryan_factor,
+            "relative_error_estimate": m.relative_error_estimate,
+        }
+        if detailed:
+            entry |= {
+                "material_uncertainty_Hz": share * m.frequency,
+                "frequency_per_thickness_Hz_per_um": _per_micrometre(m, mean),
+                "modal_mass_kg": m.modal_mass,
+                "sensitivities": asdict(m.sensitivities),
+                "energy_fractions": asdict(m.energy_fractions),
             }
-            if detailed:
-                entry |= {
-                    "material_uncertainty_Hz": share * m.frequency,
-                    "frequency_per_thickness_Hz_per_um": _per_micrometre(m, mean),
-                    "modal_mass_kg": m.modal_mass,
-                    "sensitivities": asdict(m.sensitivities),
-                    "energy_fractions": asdict(m.energy_fractions),
-                }
-            if id(m) in split:
-                entry["split"] = split[id(m)]
-            entries.append(entry)
-        print_json(
-            {
-                "schema": "hrg.modes/1",
-                "card": instrument.name,
-                "temperature_degC": T - zero_Celsius,
-                "theory": theory,
-                "modes": entries,
-            }
-        )
-        return 0
+        if id(m) in split:
+            entry["split"] = split[id(m)]
+        entries.append(entry)
+    yield {
+        "schema": "hrg.modes/1",
+        "card": instrument.name,
+        "temperature_degC": T - zero_Celsius,
+        "theory": theory,
+        "modes": entries,
+    }
     rows = [
         [
             str(m.harmonic),
@@ -127,7 +123,6 @@ def modes(
         _print_splits(found, split)
     if sensitivities and detailed:
         _print_details(found)
-    return 0
 
 
 def _find_splits(instrument: "Instrument", found: "list[Mode]", T: float) -> "dict[int, dict[str, Any]]":

@@ -1,13 +1,56 @@
 """How every command speaks: a table for people, one JSON object for programs, nothing else on stdout."""
 
+import functools
+import inspect
 import json as json_module
 import math
 import sys
 import textwrap
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Callable, Generator, Mapping, Sequence
+from typing import Annotated, Any
+
+from cyclopts import Parameter
+
+Payload = Mapping[str, Any]
+Answer = Generator[Payload | tuple[Payload, int], None, Any]
+"""What a command is: see `answers`."""
 
 SHORT_WORD = 10  # characters; longer words, such as file names, may be folded inside
+
+
+def answers(schema: str) -> Callable[[Callable[..., Answer]], Callable[..., int]]:
+    """Give a command the flag --json, with the schema of its object.
+
+    A command works, yields once the object for programs, with an exit status beside it where that is not 0, and then
+    prints the same for people; with --json the object is printed and the rest does not run. A command that prints in another
+    form, such as code, returns before it yields.
+    """
+
+    def give(command: Callable[..., Answer]) -> Callable[..., int]:
+        @functools.wraps(command)
+        def run(*arguments: Any, json: bool = False, **options: Any) -> int:
+            steps = command(*arguments, **options)
+            try:
+                answer = next(steps)
+            except StopIteration as ended:
+                return int(ended.value or 0)
+            payload, status = answer if isinstance(answer, tuple) else (answer, 0)
+            if json:
+                steps.close()
+                print_json(payload)
+            else:
+                next(steps, None)
+            return status
+
+        flag = Annotated[bool, Parameter(help=f"Print one JSON object (schema {schema}) instead of text.")]
+        own = inspect.signature(command)
+        last = inspect.Parameter("json", inspect.Parameter.KEYWORD_ONLY, default=False, annotation=flag)
+        signature = own.replace(parameters=[*own.parameters.values(), last], return_annotation=int)
+        run.__signature__ = signature  # type: ignore[attr-defined]
+        run.__annotations__ = {**command.__annotations__, "json": flag, "return": int}
+        return run
+
+    return give
 
 
 def print_json(payload: Mapping[str, Any]) -> None:

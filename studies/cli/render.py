@@ -4,6 +4,8 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 from cyclopts import Parameter
 
+from studies.cli.output import Answer, answers
+
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
@@ -13,6 +15,7 @@ KINDS = (".png", ".webp", ".gif", ".html", ".glb", ".stl", ".ply")
 MOST = 4  # resonators in one picture
 
 
+@answers("hrg.render/1")
 def render(
     *card: str,
     out: str,
@@ -24,8 +27,7 @@ def render(
     field: str | None = None,
     view: Literal["oblique", "axis", "side"] = "oblique",
     swing_mm: float | None = None,
-    json: bool = False,
-) -> int:
+) -> Answer:
     """Show a mode shape: the real solid, its nodes (red) and antinodes (black dots), the undeformed shape in grey.
 
     The ending of --out chooses: .png a picture, .webp or .gif a looping animation, .html an interactive page that works
@@ -57,15 +59,13 @@ def render(
         oblique into the open end, along the axis, or from the side.
     swing_mm : float
         Displacement at the antinode in mesh files; unless given, .stl and .ply are undeformed and .glb swings visibly.
-    json : bool
-        Print one JSON object (schema hrg.render/1) instead of a line.
     """
     import os
     from pathlib import Path
 
     from scipy.constants import zero_Celsius
 
-    from studies.cli.output import print_json, say
+    from studies.cli.output import say
     from studies.errors import InputError
     from studies.files.writing import written_whole
     from studies.reports.scenes import read_field
@@ -89,21 +89,18 @@ def render(
         data = _mesh(shown[0], kind, colour, along, swing_mm)
     with written_whole(out) as file:
         file.write(data)
-    if json:
-        modes = [
-            {
-                "card": one.instrument.name,
-                "temperature_degC": one.temperature - zero_Celsius,
-                "harmonic": one.mode.harmonic,
-                "index": one.mode.index,
-                "frequency_Hz": one.mode.frequency,
-            }
-            for one in shown
-        ]
-        print_json({"schema": "hrg.render/1", "file": out, "bytes": len(data), "modes": modes})
-    else:
-        say(f"{out}: {'; '.join(one.title.replace(chr(10), ', ') for one in shown)}.")
-    return 0
+    modes = [
+        {
+            "card": one.instrument.name,
+            "temperature_degC": one.temperature - zero_Celsius,
+            "harmonic": one.mode.harmonic,
+            "index": one.mode.index,
+            "frequency_Hz": one.mode.frequency,
+        }
+        for one in shown
+    ]
+    yield {"schema": "hrg.render/1", "file": out, "bytes": len(data), "modes": modes}
+    say(f"{out}: {'; '.join(one.title.replace(chr(10), ', ') for one in shown)}.")
 
 
 def _solve(

@@ -2,6 +2,8 @@
 
 from typing import TYPE_CHECKING
 
+from studies.cli.output import Answer, answers
+
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
@@ -13,7 +15,8 @@ if TYPE_CHECKING:
 GYROS = 12
 
 
-def reproduce(*, out: str = "report", json: bool = False) -> int:
+@answers("?")
+def reproduce(*, out: str = "report") -> Answer:
     """Recompute the papers' tables and figures from their data and from virtual gyros, beside what first principles predict.
 
     Writes report.html, summary.json, table1.csv and table2.csv.
@@ -22,10 +25,8 @@ def reproduce(*, out: str = "report", json: bool = False) -> int:
     ----------
     out : str
         Folder for the files; made when it does not exist.
-    json : bool
-        Print the content of summary.json on standard output.
     """
-    from studies.cli.output import dump_json, print_json
+    from studies.cli.output import dump_json
     from studies.files.writing import check_folder, write_text
     from studies.reports.mode_picture import mode_blocks
     from studies.reports.reproduce import reproduce_page, summarise
@@ -46,9 +47,7 @@ def reproduce(*, out: str = "report", json: bool = False) -> int:
     write_text(folder / "table2.csv", _csv(columns))
     write_text(folder / "summary.json", dump_json(summary))
     write_text(folder / "report.html", page)
-    if json:
-        print_json(summary)
-        return 0
+    yield summary
     sensitivity = summary["sensitivity_ppm_per_degC"]
     print(
         f"slope at 20 °C: measured {sensitivity['measured']:.1f}, predicted {sensitivity['simulated']:.1f}"
@@ -56,7 +55,6 @@ def reproduce(*, out: str = "report", json: bool = False) -> int:
         f" {max(abs(study.error_degC)):.3f} °C."
     )
     print(f"report: {folder / 'report.html'}")
-    return 0
 
 
 def _reproduce() -> "Reproduction":

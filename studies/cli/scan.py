@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import Parameter
 
+from studies.cli.output import Answer, answers
+
 if TYPE_CHECKING:
     from studies.instrument.card import Instrument
     from studies.scan import Interval, Scan
@@ -18,6 +20,7 @@ if TYPE_CHECKING:
 NONE = "none"
 
 
+@answers("hrg.scan/1")
 def scan(
     card: str,
     inner: str,
@@ -32,8 +35,7 @@ def scan(
     map_file: Annotated[str | None, Parameter(name="--map")] = None,
     report: str | None = None,
     save: str | None = None,
-    json: bool = False,
-) -> int:
+) -> Answer:
     """Turn measured points of one or both faces into wall and offset maps, waves around, and frequency splits with intervals.
 
     Points are x y z text (comments behind #), .ply or .stl; or a table over position and azimuth: first line
@@ -67,12 +69,10 @@ def scan(
         Page to write: unwrapped maps, waves, roundness, splits.
     save : str
         Card to write: this one with the fitted faces as its imperfection, in tables beside it.
-    json : bool
-        Print one JSON object (schema hrg.scan/1) instead of tables.
     """
     from scipy.constants import zero_Celsius
 
-    from studies.cli.output import print_json, print_table, say
+    from studies.cli.output import print_table, say
     from studies.errors import InputError, naming
     from studies.instrument.card import load_card
     from studies.scan import scan_faces
@@ -103,9 +103,7 @@ def scan(
         _save(save, instrument, found)
         say(f"wrote {save}")
     payload = _payload(found, instrument.name, T - zero_Celsius, files)
-    if json:
-        print_json(payload)
-        return 0
+    yield payload
     print_table(
         f"{instrument.name}: splits by the measured {' and '.join(found.faces)} face{'s' if len(files) > 1 else ''}",
         ["n", "split (Hz)", "90 %", "slow axis (°)", "90 %", "with every order (Hz)", "axis (°)"],
@@ -152,7 +150,6 @@ def scan(
             for w in found.waves if w.quantity == quantity and w.position == rim
         ],
     )  # fmt: skip
-    return 0
 
 
 def _payload(found: "Scan", name: str, temperature: float, files: dict[str, str]) -> dict[str, Any]:

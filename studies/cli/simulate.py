@@ -8,8 +8,10 @@ With --json one object, schema `hrg.simulate/1`: `card`, `out`, `rows`, `columns
 from typing import Literal
 
 from studies.cli.arguments import Seed
+from studies.cli.output import Answer, answers
 
 
+@answers("hrg.simulate/1")
 def simulate(
     card: str,
     profile: str,
@@ -20,8 +22,7 @@ def simulate(
     noiseless: bool = False,
     theory: Literal["solid", "shell"] = "solid",
     boundary: Literal["chamber", "housing"] | None = None,
-    json: bool = False,
-) -> int:
+) -> Answer:
     """Run a virtual gyro through a chamber profile, or as a record was driven, and write the record.
 
     The card's optional tables [thermal], [loss], [bias], [loop], [noise] and [[effect]] say what the gyro is like; all have
@@ -50,12 +51,10 @@ def simulate(
         Of the shell: solid (three-dimensional) or shell (Naghdi).
     boundary : str
         Column of a record that is imposed: chamber or housing.
-    json : bool
-        Print one JSON object (schema hrg.simulate/1) instead of a sentence.
     """
     import numpy as np
 
-    from studies.cli.output import print_json, say
+    from studies.cli.output import say
     from studies.instrument.card import load_card
     from studies.record import write_record
     from studies.simulation.chamber import load_drive
@@ -86,13 +85,10 @@ def simulate(
         "interpolation_relative_error": run.law.interpolation_error,
         "warnings": list(run.warnings),
     }
-    if json:
-        print_json(summary)
-        return 0
+    yield summary
     span = float(np.ptp(run.record["resonator_temperature_degC"]))
     print(
         f"{out}: {rows} rows over {run.record['time_s'][-1] - run.record['time_s'][0]:g} s; the resonator's temperature"
         f" covers {span:.2f} °C; the frequency law lies within {run.law.interpolation_error:.0e} of the solver, the"
         f" solver within {run.law.solver_error:.0e} of its theory."
     )
-    return 0

@@ -2,6 +2,8 @@
 
 from typing import TYPE_CHECKING, Any
 
+from studies.cli.output import Answer, answers
+
 if TYPE_CHECKING:
     from studies.sweeps.results import Results
     from studies.sweeps.run import Estimate
@@ -9,6 +11,7 @@ if TYPE_CHECKING:
 SOLVERS = {"full": "each solved in full", "family": "interpolated between full solves"}
 
 
+@answers("hrg.study-status/1, with --dry-run hrg.study-estimate/1")
 def run(
     spec: str,
     *,
@@ -20,8 +23,7 @@ def run(
     retry_failed: bool = False,
     dry_run: bool = False,
     quiet: bool = False,
-    json: bool = False,
-) -> int:
+) -> Answer:
     """Run a parametric study, or resume it; what is computed is never computed twice nor lost.
 
     Exit status 4 means that it is finished and some cases failed: their reasons are in the results.
@@ -54,15 +56,8 @@ def run(
         Say how many cases, how long and how much memory; keep nothing.
     quiet : bool
         Show no progress.
-    json : bool
-        Print one JSON object (schema hrg.study-status/1; with --dry-run hrg.study-estimate/1).
     """
-    import os
-
-    for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
-        os.environ.setdefault(name, "1")  # before numpy is imported: the same digits here as in a worker
-
-    from studies.cli.output import print_json, say
+    from studies.cli.output import say
     from studies.errors import InputError
     from studies.sweeps.run import check_functions, estimate_study, run_study
     from studies.sweeps.spec import read_study
@@ -78,7 +73,8 @@ def run(
         for problem in find_invalid(study):
             say(f"note: {problem} Such designs fail; the others are computed.")
         estimate = estimate_study(study, workers)
-        print_json(_estimate_json(estimate)) if json else print(_estimate_words(estimate))
+        yield {"schema": "hrg.study-estimate/1", **vars(estimate)}
+        print(_estimate_words(estimate))
         return 0
     if out is None:
         raise InputError("--out is missing: name the folder that shall keep the study.")
@@ -98,13 +94,10 @@ def run(
     except KeyboardInterrupt:
         say(f"hrg: interrupted; what was computed is kept in {out}. Run the same command again to resume.")
         return 130
-    if json:
-        print_json(_status(results, out, running=False))
-    else:
-        failed = _failed(results)
-        print(f"{results.total} cases computed, {failed} failed. Next: hrg study report {out}, hrg study export {out}.")
-        _print_reasons(results)
-    return 4 if _failed(results) else 0
+    failed = _failed(results)
+    yield _status(results, out, running=False), 4 if failed else 0
+    print(f"{results.total} cases computed, {failed} failed. Next: hrg study report {out}, hrg study export {out}.")
+    _print_reasons(results)
 
 
 def _failed(results: "Results") -> int:
@@ -112,35 +105,32 @@ def _failed(results: "Results") -> int:
     return sum(counts.values()) - counts.get("ok", 0)
 
 
-def status(folder: str, *, json: bool = False) -> int:
+@answers("hrg.study-status/1")
+def status(folder: str) -> Answer:
     """Show how far a study is, what failed and why; also while it runs.
 
     Parameters
     ----------
     folder : str
         Folder of the study (hrg study run --out).
-    json : bool
-        Print one JSON object (schema hrg.study-status/1).
     """
-    from studies.cli.output import print_json, print_table
+    from studies.cli.output import print_table
     from studies.sweeps.results import open_results
     from studies.sweeps.store import is_running
 
     results = open_results(folder)
     found = _status(results, folder, is_running(folder))
-    if json:
-        print_json(found)
-        return 0
+    yield found
     rows = [
         [key.replace("_", " "), _words(found[key])]
         for key in ("state", "cases", "done", "failed", "seconds_each", "runs")
     ]
     print_table(results.study.name, ["what", "value"], rows, results.study.note.strip("-"))
     _print_reasons(results)
-    return 0
 
 
-def report(folder: str, *, out: str | None = None, json: bool = False) -> int:
+@answers("hrg.study-report/1")
+def report(folder: str, *, out: str | None = None) -> Answer:
     """Write one self-contained HTML page: what was asked, results, pictures, sensitivities, yield, provenance.
 
     Parameters
@@ -149,12 +139,9 @@ def report(folder: str, *, out: str | None = None, json: bool = False) -> int:
         Folder of the study (hrg study run --out).
     out : str
         The page; report.html in the folder unless given.
-    json : bool
-        Print one JSON object (schema hrg.study-report/1) with the numbers behind the page.
     """
     from pathlib import Path
 
-    from studies.cli.output import print_json
     from studies.files.writing import write_text
     from studies.reports.sweep import summarise, sweep_page
     from studies.sweeps.results import open_results
@@ -162,14 +149,12 @@ def report(folder: str, *, out: str | None = None, json: bool = False) -> int:
     results = open_results(folder)
     page = Path(out) if out else Path(folder) / "report.html"
     write_text(page, sweep_page(results))
-    if json:
-        print_json({**summarise(results), "report": str(page)})
-    else:
-        print(f"report: {page}")
-    return 0
+    yield {**summarise(results), "report": str(page)}
+    print(f"report: {page}")
 
 
-def export(folder: str, *, out: str | None = None, json: bool = False) -> int:
+@answers("hrg.study-export/1")
+def export(folder: str, *, out: str | None = None) -> Answer:
     """Write the results as CSV, and the unit of every column as JSON beside it.
 
     Parameters
@@ -178,29 +163,23 @@ def export(folder: str, *, out: str | None = None, json: bool = False) -> int:
         Folder of the study (hrg study run --out).
     out : str
         The CSV file; results.csv in the folder unless given.
-    json : bool
-        Print one JSON object (schema hrg.study-export/1) that names the files and the columns.
     """
     from pathlib import Path
 
-    from studies.cli.output import print_json
     from studies.sweeps.export import export_results
     from studies.sweeps.results import open_results
 
     results = open_results(folder)
     path = Path(out) if out else Path(folder) / "results.csv"
     units = export_results(results, path)
-    if json:
-        payload = {
-            "schema": "hrg.study-export/1",
-            "table": str(path),
-            "units_file": str(units),
-            "rows": len(results),
-        }
-        print_json({**payload, "columns": results.table().attrs["units"]})
-    else:
-        print(f"{len(results)} cases: {path}; units: {units}")
-    return 0
+    payload = {
+        "schema": "hrg.study-export/1",
+        "table": str(path),
+        "units_file": str(units),
+        "rows": len(results),
+    }
+    yield {**payload, "columns": results.table().attrs["units"]}
+    print(f"{len(results)} cases: {path}; units: {units}")
 
 
 def _status(results: "Results", folder: str, running: bool) -> dict[str, Any]:
@@ -228,10 +207,6 @@ def _print_reasons(results: "Results") -> None:
     reasons = results.store.reasons(8)
     if reasons:
         print_table("Failed cases", ["cases", "reason"], [[str(count), reason] for reason, count in reasons])
-
-
-def _estimate_json(estimate: "Estimate") -> dict[str, Any]:
-    return {"schema": "hrg.study-estimate/1", **vars(estimate)}
 
 
 def _estimate_words(estimate: "Estimate") -> str:

@@ -4,6 +4,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import Parameter
 
+from studies.cli.output import Answer, answers
+
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
@@ -14,6 +16,7 @@ MOST_POINTS = 10_000
 LEAST = 0.005  # ppm/°C, that is shown
 
 
+@answers("hrg.tcf/1")
 def tcf(
     card: str,
     *,
@@ -23,8 +26,7 @@ def tcf(
     harmonic: int = 2,
     theory: Literal["solid", "shell", "rayleigh"] = "solid",
     measured: str | None = None,
-    json: bool = False,
-) -> int:
+) -> Answer:
     """Show the frequency over temperature, its slope in ppm/°C, and the slope's parts from E, μ, ρ, h and r.
 
     Parameters
@@ -44,13 +46,11 @@ def tcf(
     measured : str
         A steady-state table (temperature_degC,frequency_Hz) whose local slopes stand beside; with the card hrg-30mm it is
         the HRG paper's Table 1 unless another is given.
-    json : bool
-        Print one JSON object (schema hrg.tcf/1) instead of a table.
     """
     import numpy as np
     from scipy.constants import zero_Celsius
 
-    from studies.cli.output import print_json, print_table
+    from studies.cli.output import print_table
     from studies.errors import InputError
     from studies.instrument.card import load_card
     from studies.law import law_of
@@ -69,21 +69,17 @@ def tcf(
     law = law_of(instrument, float(T[0]), float(T[-1]), theory, harmonic)
     points, moves = _points(law, T), _moves(law, T)
     local = _measured_slopes(instrument.name, measured)
-    if json:
-        print_json(
-            {
-                "schema": "hrg.tcf/1",
-                "card": instrument.name,
-                "theory": theory,
-                "harmonic": harmonic,
-                "law": instrument.material.law,
-                "relative_error": law.error,
-                "points": points,
-                "prior": moves,
-                "measured": [{"temperature_degC": T, "slope_ppm_per_degC": s} for T, s in local],
-            }
-        )
-        return 0
+    yield {
+        "schema": "hrg.tcf/1",
+        "card": instrument.name,
+        "theory": theory,
+        "harmonic": harmonic,
+        "law": instrument.material.law,
+        "relative_error": law.error,
+        "points": points,
+        "prior": moves,
+        "measured": [{"temperature_degC": T, "slope_ppm_per_degC": s} for T, s in local],
+    }
     rows = [
         [f"{p['temperature_degC']:.1f}", f"{p['frequency_Hz']:.3f}"]
         + [f"{p['parts_ppm_per_degC'][k]:+.2f}" for k in ("E", "nu", "rho", "h", "r")]
@@ -107,7 +103,6 @@ def tcf(
     if local:
         beside = [[f"{T:.1f}", f"{s:.2f}"] for T, s in local]
         print_table("Measured, between neighbouring points", ["T (°C)", "slope (ppm/°C)"], beside)
-    return 0
 
 
 def _points(law: "FrequencyLaw", T: "NDArray[np.float64]") -> "list[dict[str, Any]]":

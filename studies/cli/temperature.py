@@ -1,11 +1,12 @@
 """`hrg temperature`: the resonator's temperature from its own frequency."""
 
+from studies.cli.output import Answer, answers
+
 AVERAGE = 100.0  # s
 
 
-def temperature(
-    model: str, run: str, /, *, out: str | None = None, report: str | None = None, json: bool = False
-) -> int:
+@answers("hrg.temperature/1")
+def temperature(model: str, run: str, /, *, out: str | None = None, report: str | None = None) -> Answer:
     """Turn the frequency of a record into the resonator's temperature (HRG paper, equation 18, Table 2 and Figure 5).
 
     No thermometer is needed: the resonator is its own. The record is written again with a column
@@ -21,12 +22,10 @@ def temperature(
         Where the record with the temperature goes.
     report : str
         Write a page (HTML) with the temperature over time.
-    json : bool
-        Print one JSON object (schema hrg.temperature/1) instead of text.
     """
     import numpy as np
 
-    from studies.cli.output import print_json, say
+    from studies.cli.output import say
     from studies.errors import InputError, naming
     from studies.files.writing import write_text
     from studies.models import read_model
@@ -38,8 +37,6 @@ def temperature(
         raise InputError(
             f"{model}: a model of kind '{loaded.kind}'; one of kind 'frequency' is needed (hrg fit frequency)."
         )
-    if out is None and report is None and not json:
-        raise InputError("nothing to do: give --out FILE, --report FILE.html or --json.")
     record = read_record(run)
     with naming(run):
         found = find_temperature(loaded, record["frequency_Hz"])
@@ -66,9 +63,7 @@ def temperature(
 
         write_text(report, temperature_page(record, found, run, model, facts))
         say(f"report: {report}")
-    if json:
-        print_json({"schema": "hrg.temperature/1", "model": model, "run": run, "out": out, **facts})
-        return 0
+    yield {"schema": "hrg.temperature/1", "model": model, "run": run, "out": out, **facts}
     print(
         f"{run}: the resonator went from {facts['lowest_degC']:.3f} to {facts['highest_degC']:.3f} °C;"
         f" the curve is certain to {facts['curve_uncertainty_K']:.2g} K (one standard deviation)."
@@ -79,4 +74,3 @@ def temperature(
         )
     if facts["rows_without_frequency"]:
         print(f"{facts['rows_without_frequency']} rows have no frequency and stay empty.")
-    return 0

@@ -8,11 +8,14 @@ relative change per relative change of each constant; `energy_balance_error`, re
 
 from typing import TYPE_CHECKING, Any
 
+from studies.cli.output import Answer, answers
+
 if TYPE_CHECKING:
     from thermal.network import Network
 
 
-def thermal(card: str, profile: str, *, rows: int = 13, json: bool = False) -> int:
+@answers("hrg.thermal/1")
+def thermal(card: str, profile: str, *, rows: int = 13) -> Answer:
     """Show time constants, what decides them, and the temperatures of housing, base, stem and shell in time.
 
     The heat path is the card's table [thermal] with its defaults (studies/instrument/tables/thermal.py).
@@ -28,13 +31,11 @@ def thermal(card: str, profile: str, *, rows: int = 13, json: bool = False) -> i
         for example "step 20 -10 5h then ramp -10 40 1". The gyro has settled at its first temperature.
     rows : int
         Rows of the table, evenly spaced in time.
-    json : bool
-        Print one JSON object (schema hrg.thermal/1) instead of tables.
     """
     import numpy as np
     from scipy.constants import zero_Celsius
 
-    from studies.cli.output import print_json, print_table
+    from studies.cli.output import print_table
     from studies.errors import InputError
     from studies.instrument.card import load_card
     from studies.simulation.chamber import check_profile, load_profile
@@ -62,22 +63,18 @@ def thermal(card: str, profile: str, *, rows: int = 13, json: bool = False) -> i
     names = [*shown, "shell", "rim"]
     energy = check_energy(network, {"chamber": chamber}, transient)
     influence = _influence(network, T0)
-    if json:
-        print_json(
-            {
-                "schema": "hrg.thermal/1",
-                "card": instrument.name,
-                "radiation": not network.is_linear,
-                "time_constants_s": whole.time_constants,
-                "shell_and_stem_time_constants_s": alone.time_constants,
-                "slowest_time_constant_sensitivity": influence,
-                "energy_balance_error": energy.error,
-                "time_s": time,
-                "chamber_temperature_degC": chamber.at(time) - zero_Celsius,
-                "temperature_degC": {name: T[:, k] for k, name in enumerate(names)},
-            }
-        )
-        return 0
+    yield {
+        "schema": "hrg.thermal/1",
+        "card": instrument.name,
+        "radiation": not network.is_linear,
+        "time_constants_s": whole.time_constants,
+        "shell_and_stem_time_constants_s": alone.time_constants,
+        "slowest_time_constant_sensitivity": influence,
+        "energy_balance_error": energy.error,
+        "time_s": time,
+        "chamber_temperature_degC": chamber.at(time) - zero_Celsius,
+        "temperature_degC": {name: T[:, k] for k, name in enumerate(names)},
+    }
     print_table(
         f"{instrument.name}: time constants at {T0 - zero_Celsius:g} °C (s)",
         ["network", "slowest", "second", "third"],
@@ -100,7 +97,6 @@ def thermal(card: str, profile: str, *, rows: int = 13, json: bool = False) -> i
         ],
         f"Energy balance closed to {energy.error:.0e} of the heat that flowed; 'shell' is its mean.",
     )
-    return 0
 
 
 def _influence(network: "Network", T0: float) -> "dict[str, Any]":

@@ -11,12 +11,15 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import Parameter
 
+from studies.cli.output import Answer, answers
+
 if TYPE_CHECKING:
     from shell.trimming import Plan, State
 
 MANY = Parameter(consume_multiple=True)
 
 
+@answers("hrg.trim/1")
 def trim(
     card: str,
     *,
@@ -41,8 +44,7 @@ def trim(
     temperature: float | None = None,
     out: str | None = None,
     report: str | None = None,
-    json: bool = False,
-) -> int:
+) -> Answer:
     """Plan the cuts that null measured splits with the least mass, keep the balance, and do not overshoot.
 
     Cut the first round, measure, and plan again with the new splits; the later rounds are what is expected. What material does
@@ -94,13 +96,11 @@ def trim(
         CSV of the cuts to write, for the machine.
     report : str
         Page to write, for the technician.
-    json : bool
-        Print one JSON object (schema hrg.trim/1) instead of tables.
     """
     import numpy as np
     from scipy.constants import zero_Celsius
 
-    from studies.cli.output import print_json, print_table, say
+    from studies.cli.output import print_table, say
     from studies.errors import naming
     from studies.instrument.card import load_card
     from studies.trim import Groove, Teeth, other_cuts, plan_for_card
@@ -161,9 +161,7 @@ def trim(
 
         write_trim_page(report, plan, payload)
         say(f"wrote {report}")
-    if json:
-        print_json(payload)
-        return 0
+    yield payload
     print_table(
         f"{instrument.name}: cuts",
         ["round", "azimuth (°)", "height (mm)", "mass (µg)", "depth (µm)"],
@@ -185,7 +183,6 @@ def trim(
     )  # fmt: skip
     for sentence in payload["measure"]:
         say(sentence)
-    return 0
 
 
 def measure_between(plan: "Plan") -> list[str]:

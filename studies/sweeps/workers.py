@@ -10,8 +10,10 @@ from concurrent.futures import Executor, Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from typing import Any, Protocol
 
+from studies.threads import ONE_THREAD
+
 # One thread each, and no module of the working directory: a signal.py there must not be run by a worker.
-THREADS = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1") | {"PYTHONSAFEPATH": "1"}
+ENVIRONMENT = {**ONE_THREAD, "PYTHONSAFEPATH": "1"}
 PR_SET_PDEATHSIG = 1
 
 
@@ -72,7 +74,7 @@ class Pool:
     def submit(self, function: Callable[..., Any], *arguments: Any) -> "Future[Any]":
         """Queue a call; processes start as calls need them."""
         before = set(multiprocessing.active_children())
-        with _environment(THREADS):  # must stand before numpy is imported in a new process
+        with _environment(ENVIRONMENT):  # must stand before numpy is imported in a new process
             future = self._executor.submit(function, *arguments)
         self._processes |= set(multiprocessing.active_children()) - before
         return future
@@ -94,7 +96,7 @@ class Pool:
     def _start(self) -> None:
         self._processes: set[Any] = set()
         context = multiprocessing.get_context("spawn")
-        with _environment(THREADS):  # the pool's semaphores start a process that tracks them
+        with _environment(ENVIRONMENT):  # the pool's semaphores start a process that tracks them
             self._executor: Executor = ProcessPoolExecutor(
                 self.count, mp_context=context, initializer=become_worker, initargs=(os.getpid(),)
             )
