@@ -155,6 +155,18 @@ def settle_rebalance(
     )
 
 
+def leak_quadrature(quadrature: ArrayLike, phase: ArrayLike, coupling: float = 1.0) -> Real:
+    """Rate (rad/s) that the quadrature's force shows in the rate's channel, ε q/(n k); the loop indicates its negative.
+
+    Parameters
+    ----------
+    quadrature : q, as `LoopRun` has it (1/s).
+    phase : ε, phase errors of pick-off and drive together (rad).
+    coupling : n k.
+    """
+    return np.asarray(np.asarray(quadrature) * np.asarray(phase) / coupling)
+
+
 def _dynamics(rows: StandingWave, rate: Real, angle: Real) -> NDArray[np.complex128]:
     """Return A (N, 2, 2) of the averaged wave in the frame at each azimuth, about the mean frequency."""
     damped = np.asarray(rows.damping_split) / 2 * np.exp(2j * rows.harmonic * (np.asarray(rows.damping_axis) - angle))

@@ -67,19 +67,21 @@ class StandingWave:
 
     def decay(self, angle: ArrayLike) -> Real:
         """1/τ of a wave at the azimuth θ (1/s): 1/τ + ½ Δ(1/τ) cos 2n(θ − θ_τ)."""
-        return np.asarray(1 / self.tau + self.damping_split / 2 * np.cos(self._twice(angle, self.damping_axis)))
+        along = see_along(angle, self.damping_axis, self.harmonic)
+        return np.asarray(1 / self.tau + self.damping_split / 2 * along)
 
     def drift(self, angle: ArrayLike) -> Real:
         """Rate (rad/s) that damping feigns at the azimuth θ: Δ(1/τ)/(2 n k) sin 2n(θ − θ_τ)."""
-        return np.asarray(self.damping_split / (2 * self.coupling) * np.sin(self._twice(angle, self.damping_axis)))
+        across = see_across(angle, self.damping_axis, self.harmonic)
+        return feign_rate(self.damping_split * across, self.harmonic, self.bryan_factor)
 
     def quadrature(self, angle: ArrayLike) -> Real:
         """Growth of the quadrature over the amplitude at the azimuth θ (1/s): ½ Δω sin 2n(θ − θ_ω)."""
-        return np.asarray(self.frequency_split / 2 * np.sin(self._twice(angle, self.frequency_axis)))
+        return np.asarray(self.frequency_split / 2 * see_across(angle, self.frequency_axis, self.harmonic))
 
     def detuning(self, angle: ArrayLike) -> Real:
         """Angular frequency of a wave at the azimuth θ less the mean (rad/s): ½ Δω cos 2n(θ − θ_ω)."""
-        return np.asarray(self.frequency_split / 2 * np.cos(self._twice(angle, self.frequency_axis)))
+        return np.asarray(self.frequency_split / 2 * see_along(angle, self.frequency_axis, self.harmonic))
 
     def mean_rate(self, rate: float) -> float:
         """Mean indicated rate (rad/s) of a free wave: sign(Ω) √(Ω² − Ω_d²), and 0 where it locks, |Ω| ≤ Ω_d.
@@ -107,8 +109,20 @@ class StandingWave:
         turning = 2 * self.coupling * rate * TURN
         return np.asarray(np.block([[np.zeros((2, 2)), np.eye(2)], [-stiffness, turning - damping]]))
 
-    def _twice(self, angle: ArrayLike, axis: ArrayLike) -> Real:
-        return np.asarray(2 * self.harmonic * (np.asarray(angle, dtype=float) - np.asarray(axis, dtype=float)))
+
+def see_across(angle: ArrayLike, axis: ArrayLike, harmonic: int = 2) -> Real:
+    """Sin 2n(θ − θ_axis): what a wave at the azimuth θ (rad) meets of a split across itself, as rate or quadrature."""
+    return np.asarray(np.sin(2 * harmonic * (np.asarray(angle, dtype=float) - np.asarray(axis, dtype=float))))
+
+
+def see_along(angle: ArrayLike, axis: ArrayLike, harmonic: int = 2) -> Real:
+    """Cos 2n(θ − θ_axis): what it meets of a split along itself, as decay or frequency."""
+    return np.asarray(np.cos(2 * harmonic * (np.asarray(angle, dtype=float) - np.asarray(axis, dtype=float))))
+
+
+def feign_rate(across: ArrayLike, harmonic: int, bryan_factor: float) -> Real:
+    """Rate (rad/s) that a damping split across the wave, Δ(1/τ) sin 2n(θ − θ_τ) (1/s), feigns: its part 1/(2 n k)."""
+    return np.asarray(across) / (2 * harmonic * bryan_factor)
 
 
 def split(axis: ArrayLike) -> Real:

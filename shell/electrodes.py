@@ -280,6 +280,18 @@ def reach(electrodes: Electrodes, limit: float) -> float:
     return float(support.min()) * limit**2
 
 
+def soften_at_gap(per_square_volt: float, voltage_squared: ArrayLike, gap: ArrayLike = 1.0) -> Array:
+    """S V²/g³: relative change of f by a voltage on all electrodes together.
+
+    Parameters
+    ----------
+    per_square_volt : s, per V² at the gap for which it was found (the sum of `Electrodes.per_square_volt`).
+    voltage_squared : V², a number or an array.
+    gap : g over that gap.
+    """
+    return np.asarray(per_square_volt * np.asarray(voltage_squared) / np.asarray(gap, dtype=float) ** 3)
+
+
 def uniform_softening(frequency: ArrayLike, rho: float, h: float, gap: float, voltage: float) -> Array:
     """δf/f = -½ ε₀ V²/(g³ ρ h ω²) of a full ring with mode factor 1, the estimate on the back of an envelope."""
     omega = 2 * pi * np.asarray(frequency, dtype=float)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from shell.electrodes import soften_at_gap
 from shell.imperfection import CoupledHarmonics, Pair, Split, find_split
 from shell.modes import solve_modes
 from studies.errors import naming
@@ -141,6 +142,6 @@ def mean_shift(instrument: "Instrument", temperature: Array, voltage_squared: Ar
         with naming(f"{instrument.path} [electrodes]"):
             own, per_square_volt = _softening(whole.pair, electrodes)
         commanded = 0.0 if voltage_squared is None else voltage_squared - electrodes.keys.voltage_V**2
-        grown = 1 + electrodes.keys.gap_expansion_per_K * (temperature - instrument.reference_temperature)
-        shift = shift + (own + per_square_volt * commanded) / grown**3
+        gap = 1 + electrodes.keys.gap_expansion_per_K * (temperature - instrument.reference_temperature)
+        shift = shift + soften_at_gap(own, 1.0, gap) + soften_at_gap(per_square_volt, commanded, gap)
     return shift

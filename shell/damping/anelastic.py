@@ -1,9 +1,11 @@
 """Loss inside the material: of its bulk, of its damaged surface, and of processes that heat activates."""
 
-from math import cosh
+import numpy as np
+from numpy.typing import ArrayLike
 
 from shell.damping.faces import Surface
 from shell.errors import ShellError
+from shell.quadrature import Array
 
 BOLTZMANN = 8.617333262e-5  # eV/K
 
@@ -25,7 +27,7 @@ def surface_loss(depth: float, surfaces: tuple[Surface, ...], strain_energy: flo
     return depth * sum(surface.integrate(surface.energy) for surface in surfaces) / strain_energy
 
 
-def activated_loss(height: float, energy: float, peak: float, temperature: float) -> float:
+def activated_loss(height: float, energy: float, peak: float, temperature: ArrayLike) -> Array:
     """Debye peak 1/Q = 2 H ωτ/(1 + (ωτ)²) with τ = τ₀ exp(E/(k T)); it is highest at T_p, where ωτ = 1.
 
     Parameters
@@ -33,9 +35,19 @@ def activated_loss(height: float, energy: float, peak: float, temperature: float
     height : H, 1/Q at the peak.
     energy : activation energy E, eV.
     peak : T_p at the mode's frequency, K.
-    temperature : K.
+    temperature : K, a number or an array.
     """
     if not (energy > 0 and peak > 0):
         raise ShellError("an activated loss needs a positive activation energy and peak temperature.")
-    z = energy / BOLTZMANN * (1 / temperature - 1 / peak)
-    return height / cosh(min(abs(z), 300.0))
+    z = energy / BOLTZMANN * (1 / np.asarray(temperature, dtype=float) - 1 / peak)
+    return np.asarray(height / np.cosh(np.minimum(np.abs(z), 300.0)))
+
+
+def activation_energy(peak: float, width: float) -> float:
+    """E = k T_p²/w, eV: ln ωτ = (E/k)(1/T - 1/T_p) changes by one over the width w about the peak.
+
+    Parameters
+    ----------
+    peak, width : T_p and w, K.
+    """
+    return BOLTZMANN * peak**2 / width

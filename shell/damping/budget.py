@@ -307,7 +307,7 @@ def activated_cause(height: float, energy: float, peak: float, relative_sd: floa
         raise ShellError(f"the height of an activated loss must be 0 or positive, not {height:g}.")
     return Cause(
         "activated",
-        lambda v, T: np.array([activated_loss(height, energy, peak, float(t)) for t in T]),
+        lambda v, T: activated_loss(height, energy, peak, T),
         relative_sd,
         source,
         "another glass (OH, alkali), or a working temperature away from the peak",

@@ -19,9 +19,11 @@ from dataclasses import dataclass
 from math import pi, sqrt
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from shell.damping.faces import Surface
 from shell.errors import ShellError
+from shell.quadrature import Array
 
 R = 8.314462618  # J/(mol K)
 
@@ -100,7 +102,17 @@ def free_molecular_loss(
         face.integrate(normal * face.moved[2] ** 2 + along * (face.moved[0] ** 2 + face.moved[1] ** 2))
         for face in faces
     )
-    return pressure * sqrt(gas.molar_mass / (R * temperature)) * hit / (omega * kinetic)
+    return float(free_impedance(pressure, gas.molar_mass, temperature)) * hit / (omega * kinetic)
+
+
+def free_impedance(pressure: ArrayLike, molar_mass: float, temperature: ArrayLike) -> Array:
+    """P √(M/(R T)), kg/(m² s): what free molecules take from a face per velocity, up to a number of the wall.
+
+    Parameters
+    ----------
+    pressure : Pa. molar_mass : kg/mol. temperature : K; numbers or arrays.
+    """
+    return np.asarray(np.asarray(pressure) * np.sqrt(molar_mass / (R * np.asarray(temperature, dtype=float))))
 
 
 def viscous_loss(

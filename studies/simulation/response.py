@@ -165,6 +165,7 @@ def _apply_effects(
     def onto(values: Array) -> Array:
         return values if even is time else np.interp(even, time, values)
 
+    standing = {"pattern_angle": np.full(len(time), np.radians(instrument.bias.pattern_angle_deg))}
     states = States(
         run=0,
         time=even,
@@ -173,7 +174,7 @@ def _apply_effects(
         resonator=onto(resonator),
         tau=tau,
         reference=instrument.reference_temperature,
-        **{name: onto(values) for name, values in drive.commands.items()},
+        **{name: onto(values) for name, values in (standing | dict(drive.commands)).items()},
     )
     with naming(f"{instrument.path} [[effect]]"):
         changes = apply_effects([(one.name, one.response, one.parameters) for one in instrument.effects], states)

@@ -143,7 +143,7 @@ def _held_wave(instrument: "Instrument") -> tuple[str, ...]:
 
 
 def _idle_effects(instrument: "Instrument", drive: Drive) -> tuple[str, ...]:
-    """Name the effects whose drive (amplitude, voltage, quadrature, azimuth) the run does not move."""
+    """Name the effects whose drive (amplitude, voltage, quadrature) the run does not have; an azimuth it always has."""
     if not instrument.effects:
         return ()
     from studies.effects import find_effect
@@ -152,5 +152,5 @@ def _idle_effects(instrument: "Instrument", drive: Drive) -> tuple[str, ...]:
         f"the effect '{effect.name}' adds nothing: a virtual run does not move its drive"
         f" ({', '.join(find_effect(effect.name).needs)})."
         for effect in instrument.effects
-        if any(need not in drive.commands for need in find_effect(effect.name).needs)
+        if any(need not in (*drive.commands, "pattern_angle") for need in find_effect(effect.name).needs)
     )

@@ -2,15 +2,16 @@
 
 import numpy as np
 
+from compensation.wave import see_across, see_along
 from studies.effects.effect import Coefficient, Effect, Parameter, Shape, Span
 from studies.effects.states import FloatArray, States
 
 
 def columns(states: States, shape: Shape, response: str) -> FloatArray:
-    """B = D sin 4(θ − ψ(T)) with ψ = ψ₀ + ψ₁ x, x = T_r − T₀ in units of 10 K: sine and cosine part."""
+    """B = D sin 4(θ − ψ(T)) with ψ = ψ₀ + ψ₁ x, x = T_r − T₀ in units of 10 K: what a wave meets of a split, across and along."""
     assert states.pattern_angle is not None
-    angle = 4.0 * (states.pattern_angle - np.radians(shape[0]) * states.excess / 10.0)
-    return np.stack([np.sin(angle), np.cos(angle)], axis=1)
+    axis = np.radians(shape[0]) * states.excess / 10.0
+    return np.stack([see_across(states.pattern_angle, axis), see_along(states.pattern_angle, axis)], axis=1)
 
 
 def grid(span: Span, response: str) -> list[tuple[float, ...]]:

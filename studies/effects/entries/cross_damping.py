@@ -3,21 +3,28 @@
 import numpy as np
 from scipy.constants import zero_Celsius
 
+from compensation.cross_damping import simulate_bias
+from compensation.wave import see_across
 from studies.effects.curves import ORDERS, smoothness, waves
 from studies.effects.effect import Coefficient, Effect, Parameter, Shape, Span
-from studies.effects.states import FloatArray, States, lag
+from studies.effects.states import FloatArray, States
 
 
 def columns(states: States, shape: Shape, response: str) -> FloatArray:
-    """B ∝ ζ₁₂(T) sin 4(θ − θ_τ) behind the loop's pole: orders 4 … 7 of x = T_r − T₀ in units of 10 K, and smooth waves."""
+    """B ∝ ζ₁₂(T) sin 4(θ − θ_τ) through the loop's eq. (9): orders 0 … 7 of x = T_r − T₀ in units of 10 K, and smooth waves."""
     low, high, pole, axis = shape
-    resonator = lag(states.resonator, states.step, pole) if pole > 0 else states.resonator
-    x = (resonator - states.reference) / 10.0
-    powers = [np.ones_like(x), x, x**2, x**3, *(x**order for order in range(4, 8))]
-    curve = np.concatenate([np.stack(powers, axis=1), waves(resonator - zero_Celsius, low, high)], axis=1)
-    if states.pattern_angle is None or axis < 0:
-        return np.asarray(curve * FIXED)
-    return np.asarray(curve * np.sin(4.0 * (states.pattern_angle - np.radians(axis)))[:, None])
+    x = states.excess / 10.0
+    curve = np.concatenate([x[:, None] ** np.arange(8), waves(states.resonator - zero_Celsius, low, high)], axis=1)
+    if axis < 0:
+        curve = curve * FIXED
+    elif states.pattern_angle is None:
+        return np.zeros_like(curve)
+    else:
+        curve = curve * see_across(states.pattern_angle, np.radians(axis))[:, None]
+    if not pole:
+        return curve
+    k, zeta = 1e3 / pole, 1e-3  # eq. (9) is a lag 1/(kζ) with the gain 2k/g₂
+    return np.stack([simulate_bias(states.time, column, k, zeta, 2.0 * k) for column in curve.T], axis=1)
 
 
 def grid(span: Span, response: str) -> list[tuple[float, ...]]:

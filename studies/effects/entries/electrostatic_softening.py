@@ -1,13 +1,14 @@
 """Electrostatic softening: the electrodes' field acts as a negative spring."""
 
+from shell.electrodes import soften_at_gap
 from studies.effects.effect import Coefficient, Effect, Shape, Span
 from studies.effects.states import FloatArray, States
 
 
 def columns(states: States, shape: Shape, response: str) -> FloatArray:
-    """δf = −k V², at once."""
+    """δf = −k V², at once, as of the electrodes of a card at a gap that stays."""
     assert states.voltage_squared is not None
-    return -states.voltage_squared[:, None]
+    return soften_at_gap(-1.0, states.voltage_squared)[:, None]
 
 
 def grid(span: Span, response: str) -> list[tuple[float, ...]]:

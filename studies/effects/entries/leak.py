@@ -1,13 +1,15 @@
 """Leak: gas enters the housing, and damps."""
 
+from shell.damping.gas import free_impedance
 from studies.effects.effect import AROUND, Coefficient, Effect, Parameter, Shape, Span
 from studies.effects.states import FloatArray, States
 
 
 def columns(states: States, shape: Shape, response: str) -> FloatArray:
-    """1/Q ∝ P/√T in the free molecular regime: with P ∝ t T in a sealed housing, growth is t (T/T₀)^½; with P ∝ t, −½."""
+    """1/Q ∝ p √(M/(R T)) of free molecules, as in a loss budget: with p ∝ t T in a sealed housing t (T/T₀)^½, with p ∝ t −½."""
     (exponent,) = shape
-    return (states.campaign_time / 86400.0 * (states.resonator / AROUND) ** exponent)[:, None]
+    pressure = states.campaign_time / 86400.0 * (states.resonator / AROUND) ** (exponent + 0.5)
+    return (free_impedance(pressure, 1.0, states.resonator) / free_impedance(1.0, 1.0, AROUND))[:, None]
 
 
 def grid(span: Span, response: str) -> list[tuple[float, ...]]:

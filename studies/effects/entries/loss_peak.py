@@ -3,16 +3,15 @@
 import numpy as np
 from scipy.constants import zero_Celsius
 
+from shell.damping.anelastic import activated_loss, activation_energy
 from studies.effects.effect import Coefficient, Effect, Parameter, Shape, Span
 from studies.effects.states import FloatArray, States
 
 
 def columns(states: States, shape: Shape, response: str) -> FloatArray:
-    """2 ωτ/(1 + ω²τ²) = 1/cosh(ln ωτ); with an activated τ, ln ωτ = (T_p/T)(T_p − T)/w about the peak."""
-    centre, width = shape
-    peak = centre + zero_Celsius
-    z = (peak / states.resonator) * (peak - states.resonator) / width
-    return np.asarray((1.0 / np.cosh(np.clip(z, -50.0, 50.0)))[:, None])
+    """2 ωτ/(1 + ω²τ²) = 1/cosh(ln ωτ) of an activated τ, as in a loss budget; E = k T_p²/w."""
+    peak, width = shape[0] + zero_Celsius, shape[1]
+    return activated_loss(1.0, activation_energy(peak, width), peak, states.resonator)[:, None]
 
 
 def grid(span: Span, response: str) -> list[tuple[float, ...]]:

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from compensation.rebalance import leak_quadrature
 from studies.effects.effect import Coefficient, Effect, Shape, Span
 from studies.effects.states import FloatArray, States
 
@@ -9,7 +10,7 @@ from studies.effects.states import FloatArray, States
 def columns(states: States, shape: Shape, response: str) -> FloatArray:
     """B = V_q (φ₀ + φ₁ x), x = T_r − T₀ in units of 10 K."""
     assert states.quadrature is not None
-    return np.stack([states.quadrature, states.quadrature * states.excess / 10.0], axis=1)
+    return np.stack([leak_quadrature(states.quadrature, phase) for phase in (1.0, states.excess / 10.0)], axis=1)
 
 
 def grid(span: Span, response: str) -> list[tuple[float, ...]]:

@@ -15,6 +15,7 @@ from typing import Annotated
 import numpy as np
 from numpy.typing import NDArray
 
+from compensation.wave import feign_rate, see_across
 from studies.instrument.keys import Table, number
 from studies.instrument.registry import CardTable
 
@@ -85,9 +86,9 @@ class Bias(Table, frozen=True, kw_only=True):
         if wave is None:
             axis = np.exp(2j * harmonic * np.radians(self.damping_axis_deg))
             wave = np.asarray(self.damping_anisotropy * inverse_q * axis)
-        spread = np.pi * frequency * np.imag(np.exp(2j * harmonic * theta) * np.conj(wave))  # Δ(1/τ) sin 2n(θ − θ_τ)
-        damping = DEG_PER_H * spread / (2 * harmonic * bryan_factor)
-        return np.asarray(self.polynomial(change, rate) + damping)
+        split, axis = np.pi * frequency * np.abs(wave), np.angle(wave) / (2 * harmonic)  # Δ(1/τ) and θ_τ
+        drift = feign_rate(split * see_across(theta, axis, harmonic), harmonic, bryan_factor)
+        return np.asarray(self.polynomial(change, rate) + DEG_PER_H * drift)
 
     def polynomial(self, change: Array, rate: Array) -> Array:
         """Return the offset and Σ k fⁱ ḟʲ (deg/h) of the change of frequency (Hz) and its rate (Hz/s)."""

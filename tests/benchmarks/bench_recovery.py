@@ -1,0 +1,48 @@
+"""Every effect of the library in every response: hidden, diagnosed with the card, saved, and held against a chamber profile that is new.
+
+    python tests/benchmarks/bench_recovery.py [--only NAME ...] [--times 20] [--moved] [--record]
+
+Residual of the saved card on the new run over its noise, 1 being the noise; the target is 1.10 in every response. `--moved`: the
+device also differs from the card that the diagnosis is given, by one standard deviation of four values of heat path and law.
+"""
+
+import argparse
+import time
+
+from tests.benchmarks import history
+from tests.benchmarks.diagnosis.unseen import HIDDEN, MOVED, RESPONSES, TIMES, recover
+
+LIMIT = 1.1
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--only", nargs="*", default=())
+    parser.add_argument("--times", type=float, default=TIMES)
+    parser.add_argument("--moved", action="store_true")
+    parser.add_argument("--record", action="store_true")
+    given = parser.parse_args()
+    cases = [key for key in HIDDEN if not given.only or key[0] in given.only]
+    found, began = [], time.process_time()
+    print(f"{'effect':24} {'response':15} {'verdict':16} named  " + "".join(f"{r:>18}" for r in RESPONSES) + "  causes")
+    for name, response in cases:
+        one = recover(name, response, given.times, moved=MOVED if given.moved else None)
+        found.append(one)
+        ratios = "".join(f"{one.before[r]:9.1f} →{one.after[r]:7.2f}" for r in RESPONSES)
+        line = f"{name:24} {response:15} {one.verdict:16} {'yes' if one.named else 'NO':5} {ratios}  {', '.join(one.names)}"
+        print(line, flush=True)
+    named = sum(one.named for one in found)
+    within = {r: sum(one.after[r] <= LIMIT for one in found) for r in RESPONSES}
+    every = sum(max(one.after.values()) <= LIMIT for one in found)
+    print(
+        f"{named} of {len(found)} named; within 10 % of the noise: " + ", ".join(f"{r} {n}" for r, n in within.items())
+    )
+    print(f"in every response: {every} of {len(found)}; {time.process_time() - began:.0f} s of processor time")
+    if given.record:
+        history.record(
+            "recovery", cases=len(found), times=given.times, moved=given.moved, named=named, within=within, every=every
+        )
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,181 @@
+"""An effect hidden in a card's own virtual runs, diagnosed, saved, and held against runs through a chamber profile that is new.
+
+Every (effect, response) of the library stands in `HIDDEN` with the shape it has and the drives that its runs move; `TIMES` the
+noise is the rms of what it adds to its response in the recorded runs.
+"""
+
+from dataclasses import dataclass, replace
+from datetime import UTC, datetime, timedelta
+
+import numpy as np
+
+from studies.diagnosis.campaign import load_campaign
+from studies.diagnosis.extension import extend
+from studies.diagnosis.investigate import investigate
+from studies.effects import find_effect, library
+from studies.instrument.card import load_card
+from studies.simulation.chamber import load_profile
+from studies.simulation.drive import COMMANDS, drive_by_profile, rows_of
+from studies.simulation.virtual_gyro import simulate_run
+
+CARD = "hrg-30mm"
+PROFILES = ("cycle 20 -15 40 0.5 30min 1", "step 20 -10 3h then ramp -10 30 1 then soak 30 2h")
+UNSEEN = "cycle 20 35 -10 1 20min 2"
+RATE = 1 / 30
+GAP = 86400.0
+RESPONSES = ("frequency_Hz", "bias_deg_per_h", "inverse_q")
+TIMES = 20.0
+BIAS = {"bias.k1_deg_per_h_per_Hz": 0.5, "bias.damping_anisotropy": 0.0}
+"""The bias follows the temperature; the wave's own anisotropy is 0, so that its azimuth may move without a second cause."""
+COMMANDED = {
+    "amplitude_squared": (1.0, 1.2, 0.8, 1.1),
+    "voltage_squared": (80.0, 100.0, 60.0, 90.0),
+    "quadrature": (0.5, 1.5, -0.5, 1.0),
+    "pattern_angle": (0.0, 15.0, 30.0, 40.0),
+}
+"""Levels of a commanded drive, in the unit of its column."""
+HIDDEN = {
+    ("second-lag", "frequency_Hz"): {"second_time_constant_s": 9000.0, "weight": 1.0},
+    ("rate-bias", "bias_deg_per_h"): {"coefficient_deg_per_h_per_K_per_s": 1.0},
+    ("hysteresis", "bias_deg_per_h"): {"half_width_K": 4.0, "loop_deg_per_h_per_K": 1.0},
+    ("hysteresis", "frequency_Hz"): {"half_width_K": 4.0, "loop_Hz_per_K": 1.0},
+    ("hysteresis", "inverse_q"): {"half_width_K": 4.0, "loop_1_per_K": 1.0},
+    ("ageing", "frequency_Hz"): {"onset_s": 9000.0, "drift_Hz": 1.0},
+    ("ageing", "bias_deg_per_h"): {"onset_s": 9000.0, "drift_deg_per_h": 1.0},
+    ("ageing", "inverse_q"): {"onset_s": 9000.0, "drift_1": 1.0},
+    ("jump", "frequency_Hz"): {"run": 0.0, "time_s": 9000.0, "step_Hz": 1.0},
+    ("jump", "bias_deg_per_h"): {"run": 0.0, "time_s": 9000.0, "step_deg_per_h": 1.0},
+    ("jump", "inverse_q"): {"run": 0.0, "time_s": 9000.0, "step_1": 1.0},
+    ("activity-dip", "frequency_Hz"): {"temperature_degC": 8.0, "width_K": 1.5, "pull_Hz": 1.0},
+    ("activity-dip", "inverse_q"): {"temperature_degC": 8.0, "width_K": 1.5, "pull_1": 1.0},
+    ("electrostatic-softening", "frequency_Hz"): {"softening_Hz_per_V2": 1.0},
+    ("amplitude-frequency", "frequency_Hz"): {"slope_Hz_per_V2": 1.0},
+    ("curvature", "frequency_Hz"): {"from_degC": -15.0, "to_degC": 40.0, "cubic_Hz_per_10K3": 1.0},
+    ("cross-damping", "bias_deg_per_h"): {
+        "from_degC": -15.0,
+        "to_degC": 40.0,
+        "axis_deg": -1.0,
+        "quartic_deg_per_h_per_10K4": 1.0,
+        "quintic_deg_per_h_per_10K5": 0.3,
+    },
+    ("self-heating", "frequency_Hz"): {"heating_K_per_V2": 1.0},
+    ("loss-peak", "inverse_q"): {"temperature_degC": 8.0, "width_K": 6.0, "peak_1": 1.0},
+    ("leak", "inverse_q"): {"temperature_exponent": 0.5, "growth_1_per_day": 1.0},
+    ("periodic", "bias_deg_per_h"): {"period_s": 1700.0, "sine_deg_per_h": 1.0},
+    ("periodic", "frequency_Hz"): {"period_s": 1700.0, "sine_Hz": 1.0},
+    ("periodic", "inverse_q"): {"period_s": 1700.0, "sine_1": 1.0},
+    ("radiation", "frequency_Hz"): {"exchange": 1.0, "radiated_share": 1.0},
+    ("clock-drift", "frequency_Hz"): {"drift_Hz_per_day": 1.0},
+    ("quadrature-leakage", "bias_deg_per_h"): {"leakage_deg_per_h_per_V": 1.0},
+    ("axis-rotation", "bias_deg_per_h"): {"rotation_deg_per_10K": 4.0, "sine_deg_per_h": 1.0},
+    ("thermometer-scale", "frequency_Hz"): {"cubic_K_per_10K3": 1.0},
+    ("mounting-stress", "frequency_Hz"): {"relaxation_time_s": 6000.0, "stress_Hz_per_K": 1.0},
+    ("mounting-stress", "bias_deg_per_h"): {"relaxation_time_s": 6000.0, "stress_deg_per_h_per_K": 1.0},
+    ("thermometer-lag", "frequency_Hz"): {"sensor_time_constant_s": 1.0},
+    ("rate-frequency", "frequency_Hz"): {"coefficient_Hz_per_K_per_s": 1.0},
+    ("clock-offset", "frequency_Hz"): {"run": 0.0, "offset_s": 1.0},
+    ("clock-offset", "bias_deg_per_h"): {"run": 0.0, "offset_s": 1.0},
+}
+MOVED = (
+    "thermal.mount_conductance_W_per_K",
+    "thermal.chamber_conductance_W_per_K",
+    "material.deviation.shear_modulus.log_slope_per_K",
+    "bias.k2_deg_per_h_per_Hz2",
+)
+"""Values of the device that are one of their standard deviations away from what the card says, where that is asked for."""
+
+
+@dataclass(frozen=True)
+class Recovery:
+    """What came of one hidden effect.
+
+    `names` of all causes; `named` whether it is among them; of each response over its noise: `before` what the shipped card
+    leaves of the new run, `after` what the saved one leaves; 1 is the noise itself.
+    """
+
+    effect: str
+    response: str
+    names: tuple[str, ...]
+    named: bool
+    verdict: str
+    before: dict
+    after: dict
+    saved: object
+    diagnosis: object
+
+
+def run_drive(words, start, commanded, turn):
+    """Return the drive of one run, its commands stepping through their levels."""
+    profile = load_profile(words)
+    time = rows_of(profile, RATE)
+    commands = {}
+    for name in commanded:
+        levels = COMMANDED[name]
+        _, factor, power = COMMANDS[name]
+        held = np.minimum((6 * time / time[-1]).astype(int), 5)
+        commands[name] = (np.roll(np.resize(levels, 6), turn)[held] * factor) ** power
+    return replace(drive_by_profile(profile, time), commands=commands, start=start)
+
+
+def recover(name, response, times=TIMES, seed=0, moved=None):
+    """Hide, diagnose, save, and predict a new run from its chamber alone.
+
+    `moved`: names of values of the device that differ from the card that the diagnosis is given, by a standard deviation.
+    """
+    effect = find_effect(name)
+    card = load_card(CARD).with_values(BIAS)
+    device = card.with_values({v.name: v.value + v.sd for v in card.uncertain if v.name in (moved or ())})
+    commanded = (
+        ["pattern_angle"] if name == "cross-damping" and HIDDEN[name, response]["axis_deg"] >= 0 else effect.needs
+    )
+    starts = [k * GAP for k in range(len(PROFILES) + 1)]
+    drives = [run_drive(w, s, commanded, k) for k, (w, s) in enumerate(zip((*PROFILES, UNSEEN), starts, strict=True))]
+    law = simulate_run(device, drives[0], noise=False).law
+
+    def simulate(instrument, k, noise=True, law=law):
+        return simulate_run(instrument, drives[k], seed=100 * seed + k, noise=noise, law=law).record
+
+    bare = [simulate(device, k, noise=False) for k in range(3)]
+    quiet = [simulate(device, k) for k in range(3)]
+    noise = {column: rms([q[column] - b[column] for q, b in zip(quiet, bare, strict=True)]) for column in RESPONSES}
+    shape = HIDDEN[name, response]
+    keys = effect.coefficient_names(response)
+
+    def hiding(size):
+        sized = {key: value * size if key in keys else value for key, value in shape.items()}
+        return device.with_table("effect", [{"name": name, "response": response, **sized}])
+
+    runs = [0] if effect.once else [0, 1]
+    column = "frequency_Hz" if effect.thermal and response != "inverse_q" else response
+    size = 1e-6
+    for _ in range(3):
+        added = rms([simulate(hiding(size), k, noise=False)[column] - bare[k][column] for k in runs])
+        size *= times * noise[column] / added
+    hidden = hiding(size)
+    records = []
+    for k in range(2):
+        record = simulate(hidden if k in runs else device, k)
+        records.append(
+            replace(record, start=datetime(2026, 1, 1, tzinfo=UTC) + timedelta(seconds=starts[k]), path=f"run{k}")
+        )
+    diagnosis = investigate(load_campaign(records, card.reference_temperature - 273.15), card=card, advise=False)
+    saved = extend(card, diagnosis)
+    truth = simulate(device if effect.once else hidden, 2, noise=False)
+    figures = {}
+    for words, instrument in (("before", card), ("after", saved)):
+        said = simulate(instrument, 2, noise=False, law=None)
+        left = {c: float(np.sqrt(np.mean((said[c] - truth[c]) ** 2))) for c in RESPONSES}
+        figures[words] = {c: float(np.hypot(1.0, left[c] / noise[c])) for c in RESPONSES}
+    names = tuple(dict.fromkeys(n for cause in diagnosis.verdict.causes for n in cause.names))
+    return Recovery(
+        name, response, names, name in names, diagnosis.verdict.verdict, **figures, saved=saved, diagnosis=diagnosis
+    )
+
+
+def rms(parts):
+    return float(np.sqrt(np.mean(np.concatenate(parts) ** 2)))
+
+
+def lacking():
+    """Return the effects and responses of the library that nobody hides here."""
+    return {(e.name, r) for e in library().values() for r in e.responses} - set(HIDDEN)
