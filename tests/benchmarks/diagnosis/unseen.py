@@ -86,6 +86,28 @@ MOVED = (
 
 
 @dataclass(frozen=True)
+class Hidden:
+    """A card, records of a device that has one effect more, and the device's next run, noiseless, with what drives it.
+
+    `noise`: rms of the noise in the records, by response.
+    """
+
+    effect: str
+    response: str
+    card: object
+    records: list
+    next_drive: object
+    truth: object
+    noise: dict
+
+    def left(self, instrument):
+        """Return the residual that an instrument leaves of the next run over its noise, by response; 1 is the noise."""
+        said = simulate_run(instrument, self.next_drive, noise=False).record
+        left = {c: float(np.sqrt(np.mean((said[c] - self.truth[c]) ** 2))) for c in RESPONSES}
+        return {c: float(np.hypot(1.0, left[c] / self.noise[c])) for c in RESPONSES}
+
+
+@dataclass(frozen=True)
 class Recovery:
     """What came of one hidden effect.
 
@@ -117,14 +139,14 @@ def run_drive(words, start, commanded, turn):
     return replace(drive_by_profile(profile, time), commands=commands, start=start)
 
 
-def recover(name, response, times=TIMES, seed=0, moved=None):
-    """Hide, diagnose, save, and predict a new run from its chamber alone.
+def hide(name, response, times=TIMES, seed=0, moved=()):
+    """Hide an effect in records of a device.
 
     `moved`: names of values of the device that differ from the card that the diagnosis is given, by a standard deviation.
     """
     effect = find_effect(name)
     card = load_card(CARD).with_values(BIAS)
-    device = card.with_values({v.name: v.value + v.sd for v in card.uncertain if v.name in (moved or ())})
+    device = card.with_values({v.name: v.value + v.sd for v in card.uncertain if v.name in moved})
     commanded = (
         ["pattern_angle"] if name == "cross-damping" and HIDDEN[name, response]["axis_deg"] >= 0 else effect.needs
     )
@@ -147,7 +169,7 @@ def recover(name, response, times=TIMES, seed=0, moved=None):
 
     runs = [0] if effect.once else [0, 1]
     column = "frequency_Hz" if effect.thermal and response != "inverse_q" else response
-    size = 1e-6
+    size = 1e-4 if effect.thermal else 1e-2 * noise[column]
     for _ in range(3):
         added = rms([simulate(hiding(size), k, noise=False)[column] - bare[k][column] for k in runs])
         size *= times * noise[column] / added
@@ -158,17 +180,27 @@ def recover(name, response, times=TIMES, seed=0, moved=None):
         records.append(
             replace(record, start=datetime(2026, 1, 1, tzinfo=UTC) + timedelta(seconds=starts[k]), path=f"run{k}")
         )
-    diagnosis = investigate(load_campaign(records, card.reference_temperature - 273.15), card=card, advise=False)
-    saved = extend(card, diagnosis)
     truth = simulate(device if effect.once else hidden, 2, noise=False)
-    figures = {}
-    for words, instrument in (("before", card), ("after", saved)):
-        said = simulate(instrument, 2, noise=False, law=None)
-        left = {c: float(np.sqrt(np.mean((said[c] - truth[c]) ** 2))) for c in RESPONSES}
-        figures[words] = {c: float(np.hypot(1.0, left[c] / noise[c])) for c in RESPONSES}
+    return Hidden(name, response, card, records, drives[2], truth, noise)
+
+
+def recover(name, response, times=TIMES, seed=0, moved=()):
+    """Hide, diagnose, save, and predict a new run from its chamber alone."""
+    hidden = hide(name, response, times, seed, moved)
+    card = hidden.card
+    diagnosis = investigate(load_campaign(hidden.records, card.reference_temperature - 273.15), card=card, advise=False)
+    saved = extend(card, diagnosis)
     names = tuple(dict.fromkeys(n for cause in diagnosis.verdict.causes for n in cause.names))
     return Recovery(
-        name, response, names, name in names, diagnosis.verdict.verdict, **figures, saved=saved, diagnosis=diagnosis
+        name,
+        response,
+        names,
+        name in names,
+        diagnosis.verdict.verdict,
+        hidden.left(card),
+        hidden.left(saved),
+        saved,
+        diagnosis,
     )
 
 
