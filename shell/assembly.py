@@ -29,14 +29,19 @@ class Layout:
     solids: tuple[tuple[Solid, tuple[tuple[int, int], ...]], ...]
 
 
-@lru_cache(maxsize=6)
-def build_system(resonator: Resonator, n: int, theory: Theory, level: Level, alongside: tuple[int, ...] = ()) -> System:
-    """Lay out, number and tabulate a resonator; cached, since only the material changes with temperature.
+def lay_system(resonator: Resonator, n: int, theory: Theory, level: Level, alongside: tuple[int, ...] = ()) -> System:
+    """Lay out, number and tabulate a resonator.
 
     The elements suit the harmonics `alongside` too, and are the same for all of them.
     """
     rigid = 0 if resonator.support != "free" or n > 1 else 2
     return assemble(resonator, lay_resonator(resonator, n, level, alongside), n, level, rigid)
+
+
+@lru_cache(maxsize=8)
+def build_system(resonator: Resonator, n: int, theory: Theory, level: Level) -> System:
+    """The system of a resonator, kept for the next material or temperature, since only the material changes with them."""
+    return lay_system(resonator, n, theory, level)
 
 
 def assemble(resonator: Resonator, layout: Layout, n: int, level: Level, rigid_motions: int = 0) -> System:
@@ -88,13 +93,13 @@ def lay_resonator(resonator: Resonator, n: int, level: Level, alongside: tuple[i
             last = "tied"
     chains: list[Chain] = []
     for joint in kinks:
-        corner, (before, after) = lay_corner(resonator, joint, level.rings)
+        corner, (before, after) = lay_corner(resonator, joint, level.rings, not whole_section)
         if not before > start:
             raise ShellError(
                 f"the corner or clamp that ends at {mm(start)} of the meridian overlaps the next, which begins at "
                 f"{mm(before)}: lengthen the segment between them or take less of it for the clamp."
             )
-        chains.append(lay_chain(resonator, start, before, (first, "tied"), highest, level.split))
+        chains.append(lay_chain(resonator, start, before, (first, "tied"), highest, level))
         solids.append((corner, ((len(chains) - 1, 1), (len(chains), 0))))
         start, first = after, "tied"
     if not stop > start:
@@ -102,7 +107,7 @@ def lay_resonator(resonator: Resonator, n: int, level: Level, alongside: tuple[i
             f"the corner or clamp that ends at {mm(start)} of the meridian overlaps the one that begins at {mm(stop)}: "
             "lengthen the last segment."
         )
-    chains.append(lay_chain(resonator, start, stop, (first, last), highest, level.split))
+    chains.append(lay_chain(resonator, start, stop, (first, last), highest, level))
     return Layout(tuple(chains), tuple(solids))
 
 

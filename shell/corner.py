@@ -8,13 +8,14 @@ import numpy as np
 from shell.blocks import Solid
 from shell.errors import ShellError
 from shell.layout import SMOOTH_JOINT
-from shell.patches import Cell, Part, Patch, Path, rings, shrinking, straight, whole
+from shell.patches import Cell, Part, Patch, Path, narrowed, rings, shrinking, straight, whole
 from shell.quadrature import Array
 from shell.resonator import MeridianPoints, Resonator
 
 Spot = tuple[float, float]
 
 COLLAR = 1.5  # width of the solid strip beside a corner, in thicknesses
+NARROW = 0.15  # share of it that the cell at a stiff tie takes
 
 
 def find_kinks(resonator: Resonator) -> list[int]:
@@ -27,13 +28,18 @@ def find_kinks(resonator: Resonator) -> list[int]:
     return kinks
 
 
-def lay_corner(resonator: Resonator, joint: int, ring_count: int) -> tuple[Solid, tuple[float, float]]:
+def lay_corner(
+    resonator: Resonator, joint: int, ring_count: int, stiff_ties: bool = False
+) -> tuple[Solid, tuple[float, float]]:
     """Patches of one corner, and the arc lengths where the shell ends before it and begins after it.
 
     Both faces are continued straight until they meet. The kite between the inner meeting point I, the two cross-sections
     through I and the outer meeting point O is one patch, with a strip of shell on either side:
 
         strip | kite | strip,  all three refined towards I.
+
+    A Naghdi shell keeps its thickness where it is tied (`stiff_ties`), which the stresses at the faces there feel: the strips
+    end in a narrow cell.
     """
     s = resonator.joints[joint]
     turn = _turn(resonator.at([s], joint), resonator.at([s], joint + 1))
@@ -54,6 +60,8 @@ def lay_corner(resonator: Resonator, joint: int, ring_count: int) -> tuple[Solid
         "corner",
     )
     ends = (_strip_end(resonator, joint, s_1, -1), _strip_end(resonator, joint + 1, s_2, 1))
+    if stiff_ties:
+        cells = narrowed(cells, NARROW)
     strips = (
         _strip(resonator, joint, s_1, ends[0], inner, cells),
         _strip(resonator, joint + 1, s_2, ends[1], inner, cells),

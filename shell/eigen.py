@@ -221,10 +221,10 @@ class Iteration:
                 rest = rest - basis[:, :used] @ share
                 T[:used, first:used] += share
             block, link = self._orthonormal(rest)
-            theta, turn = np.linalg.eigh((T[:used, :used] + T[:used, :used].T) / 2)
-            theta, turn = theta[::-1], turn[:, ::-1]
             is_last = not block[0].shape[1] or used + block[0].shape[1] > most
-            if used >= count:
+            if used >= max(count, 2 * wide) or (is_last and used >= count):
+                theta, turn = _eigenpairs((T[:used, :used] + T[:used, :used].T) / 2)
+                theta, turn = theta[::-1], turn[:, ::-1]
                 undone = _undone(theta, np.linalg.norm(link @ turn[first:used, :count], axis=0), count)
                 if is_last or np.max(undone) < accuracy:
                     break
@@ -240,7 +240,7 @@ class Iteration:
         # one solve leaves little but the inextensional modes of a thin shell (two at most) in every column
         columns, right = _set_apart(x)
         loaded = self.mass @ columns
-        squares, axes = np.linalg.eigh(columns.T @ loaded)
+        squares, axes = _eigenpairs(columns.T @ loaded)
         kept = squares > 1e-14 * squares[-1]
         scale = np.sqrt(squares[kept])
         axes = axes[:, kept]
@@ -261,8 +261,21 @@ def _undone(theta: Array, residual: Array, count: int) -> Array:
 def _set_apart(x: Array) -> tuple[Array, Array]:
     """An orthonormal basis of the columns, and their coefficients in it."""
     reflectors, tau, _, _ = lapack.dgeqrf(x)
-    right = np.triu(reflectors[: x.shape[1]])
+    right = reflectors[: x.shape[1]] * _upper(x.shape[1])
     return np.asarray(lapack.dorgqr(reflectors, tau)[0]), right
+
+
+def _eigenpairs(matrix: Array) -> tuple[Array, Array]:
+    """Eigenvalues, rising, and eigenvectors of a small symmetric matrix."""
+    values, vectors, fault = lapack.dsyevd(matrix)
+    if fault:
+        raise ShellError("the eigenvalues of the subspace did not converge.")
+    return np.asarray(values), np.asarray(vectors)
+
+
+@lru_cache(maxsize=16)
+def _upper(size: int) -> Array:
+    return np.triu(np.ones((size, size)))
 
 
 @lru_cache(maxsize=16)

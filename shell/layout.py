@@ -6,12 +6,12 @@ from typing import Literal
 
 import numpy as np
 
+from shell.levels import Level
 from shell.resonator import Resonator
 
 End = Literal["pole", "free", "clamped", "tied"]
 
 SMOOTH_JOINT = 1e-6  # rad; a larger change of the tangent is a kink and gets a solid corner
-LONGEST = 1.6  # element length over the radius
 
 
 @dataclass(frozen=True)
@@ -23,12 +23,12 @@ class Chain:
     ends: tuple[End, End]
 
 
-def lay_chain(resonator: Resonator, start: float, stop: float, ends: tuple[End, End], n: int, split: int = 1) -> Chain:
+def lay_chain(resonator: Resonator, start: float, stop: float, ends: tuple[End, End], n: int, level: Level) -> Chain:
     """Break the meridian between two arc lengths into elements.
 
     The edge of a shell carries two layers: the three-dimensional one, about 2 h wide, and the bending layer, about
     5 √(h R). A jump of curvature carries the bending layer on both sides. Each gets its own element where it fits.
-    `split` cuts every element into that many.
+    The level says how long one may be, and into how many each is cut.
     """
     length = stop - start
     joints = [s for s in resonator.joints if start + 1e-9 * length < s < stop - 1e-9 * length]
@@ -45,15 +45,20 @@ def lay_chain(resonator: Resonator, start: float, stop: float, ends: tuple[End, 
     for width, s in sorted(wanted):
         if min(abs(s - other) for other in firm) > 0.4 * width and start < s < stop:
             firm = sorted([*firm, s])
-    longest = LONGEST * resonator.size * min(1.0, 4 / max(n, 1))
+    longest = level.longest * resonator.size * crowding(n)
     breaks: list[float] = [start]
     for one, two in pairwise(firm):
-        pieces = split * int(np.ceil((two - one) / longest - 1e-9))
+        pieces = level.split * int(np.ceil((two - one) / longest - 1e-9))
         breaks += np.linspace(one, two, pieces + 1)[1:].tolist()
     bounds = np.array(resonator._starts)
     middles = (np.array(breaks[1:]) + np.array(breaks[:-1])) / 2
     segments = np.clip(np.searchsorted(bounds, middles, side="right") - 1, 0, len(resonator.segments) - 1)
     return Chain(tuple(breaks), tuple(int(k) for k in segments), ends)
+
+
+def crowding(n: int) -> float:
+    """By how much shorter elements are for a high harmonic, which decays like r^n towards a pole."""
+    return min(1.0, 4 / max(n, 1))
 
 
 def _layers(resonator: Resonator, edge: float, inward: int, end: End) -> list[tuple[float, float]]:

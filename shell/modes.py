@@ -10,7 +10,7 @@ from math import pi, sqrt
 
 import numpy as np
 
-from shell.assembly import build_system
+from shell.assembly import lay_system
 from shell.curves import Arc
 from shell.elastic import Elastic, VaryingElastic
 from shell.errors import ShellError
@@ -181,9 +181,7 @@ def _by_thickness(resonator: Resonator, solution: Solution, theory: Theory) -> f
     )  # its cube over (h/R)² is what is neglected
     found: dict[float, float] = {0.0: solution.eigenvalue}
     for change in (-step, step):
-        system = build_system.__wrapped__(
-            resonator.thickened(1 + change), solution.system.n, theory, solution.system.level
-        )
+        system = lay_system(resonator.thickened(1 + change), solution.system.n, theory, solution.system.level)
         same = [
             a.unknowns.shape == b.unknowns.shape for a, b in zip(system.groups, solution.system.groups, strict=True)
         ]

@@ -84,6 +84,13 @@ def rings(steps: tuple[float, ...]) -> tuple[Cell, ...]:
     return tuple(cells)
 
 
+def narrowed(cells: tuple[Cell, ...], width: float) -> tuple[Cell, ...]:
+    """The cells pressed towards y = 0, and one of such a width beside the whole side y = 1."""
+    stay = 1 - width
+    pressed = [((a, stay * b), (c, stay * d), (e, stay * f), (g, stay * h)) for (a, b), (c, d), (e, f), (g, h) in cells]
+    return (*pressed, ((0.0, 1 - width), (1.0, 1 - width), (0.0, 1.0), (1.0, 1.0)))
+
+
 def shrinking(count: int, ratio: float = SHRINK) -> tuple[float, ...]:
     """The steps 1, q, q², ... of `count` rings."""
     return tuple(ratio**k for k in range(count + 1))

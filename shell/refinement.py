@@ -1,12 +1,17 @@
 """Rising polynomial orders: solve one level after the other until its own estimate of the error is small enough."""
 
+from dataclasses import replace
+from math import ceil, e, exp, hypot, log, pi
+
 import numpy as np
 
 from shell.assembly import build_system
-from shell.eigen import Factor, Iteration, whole_pattern
+from shell.eigen import ElementMass, Factor, Iteration, whole_pattern
 from shell.elastic import Elastic, VaryingElastic
 from shell.errors import ShellError
-from shell.levels import LEVELS, Theory
+from shell.layout import crowding
+from shell.levels import FIRST, KINDS, LONGEST, ROUGH, Kind, Level, Theory
+from shell.quadrature import Array
 from shell.resonator import Resonator
 from shell.rounding import THIN, find_loss
 from shell.solution import Constants, Solution, find_constants
@@ -17,6 +22,11 @@ UNDONE = 1e-4  # share of the tolerance, as error of ω², at which the iteratio
 MEMORY = 1.5e9  # bytes of element matrices beyond which a level is not tried
 FLOOR = 3e-10  # relative error of a frequency by rounding and iteration: measured up to 2.5e-10
 DOUBT = 10.0  # the most by which an estimate is raised for what the one before it missed, and if waves are not resolved
+PART = 0.25  # of the tolerance, that one kind of error may take where the sum is too large
+LOOSE = 3e-4  # tolerance from which on the rough level is the first
+HALF_WAVES = 0.8  # along the meridian for each mode; the others twist and stretch
+AT_ONCE = 2.5  # by which elements are cut at most before the modes are solved anew
+DEEP = 0.7  # wavenumber times thickness beyond which the first order through the thickness is not enough
 
 
 def refine(
@@ -30,12 +40,14 @@ def refine(
     """The `count` lowest elastic modes of the first level whose estimated errors lie within `tolerance`, and these errors.
 
     An error has two parts: what the level lacks, and what the arithmetic loses in a thin shell; where the second is the
-    larger, a finer level would only lose more.
+    larger, a finer level would only lose more. The next level is finer in what most of the error comes from.
     """
     thinnest = min(value for _, value in resonator.thickness) / resonator.size
     density = _density(elastic)
-    before: tuple[list[Solution], list[float]] | None = None
-    for level in LEVELS[theory]:
+    level = _first_level(resonator, n, count, theory, tolerance)
+    before: tuple[list[Solution], Array] | None = None
+    raised: set[Kind] = set()
+    while True:
         system = build_system(resonator, n, theory, level)
         if before and system.memory > MEMORY:
             break
@@ -45,40 +57,95 @@ def refine(
                 "section. Ask for a lower harmonic or a shorter or thicker shell."
             )
         solutions, undone, factor = _solve(system, resonator.size, elastic, count, max(UNDONE * tolerance, 1e-13))
+        if not before and (shorter := _cut(solutions[1:], level, tolerance)) < level.longest / 1.2:
+            level = replace(level, longest=shorter)
+            continue
         lacking = estimate_errors(resonator, elastic, solutions)
         if before:
-            lacking = [
-                error * _experience(now, former, stated)
-                for error, now, former, stated in zip(lacking, solutions, *before, strict=True)
+            lacking *= [
+                _experience(now, former, float(sum(stated[KINDS.index(kind)] for kind in raised)))
+                for now, former, stated in zip(solutions, before[0], before[1].T, strict=True)
             ]
-        lacking = [  # the lowest mode has no short waves to speak of
-            error * (1.0 if not k or _is_resolved(one) else DOUBT)
-            for k, (error, one) in enumerate(zip(lacking, solutions, strict=True))
-        ]
+        lacking *= [1.0 if not k or _is_resolved(one) else DOUBT for k, one in enumerate(solutions)]
         before = solutions, lacking
         lost = [find_loss(solution, factor, density) if thinnest < THIN else 0.0 for solution in solutions]
-        errors = [sum(parts) for parts in zip(lacking, lost, undone, strict=True)]
-        if max(errors) <= tolerance or max(lost) > max(lacking):
+        errors = [sum(parts) for parts in zip(lacking.sum(axis=0).tolist(), lost, undone, strict=True)]
+        if max(errors) <= tolerance or max(lost) > lacking.sum(axis=0).max():
             break
+        largest = lacking.max(axis=1)
+        raised = {
+            kind for kind, part in zip(KINDS, largest, strict=True) if part > min(PART * tolerance, largest.max())
+        }
+        finer = level.raised(theory, raised)
+        if finer == level:
+            break
+        level = finer
     return solutions, [error + FLOOR for error in errors]
 
 
-def _is_resolved(solution: Solution) -> bool:
-    """Whether the degree follows bending waves of the mode's frequency, k⁴ = 12 ρ (1 - ν²) ω²/(E h²), over its elements.
+def _first_level(resonator: Resonator, n: int, count: int, theory: Theory, tolerance: float) -> Level:
+    """The level to begin with: rough for loose tolerances, finer for the short waves that many modes and high harmonics have."""
+    level = (ROUGH if tolerance >= LOOSE else FIRST)[theory]
+    k = HALF_WAVES * pi * (count - 1) / resonator.length
+    level = replace(level, longest=_in_parts(_most(level, tolerance) / max(k, 1e-9) / (resonator.size * crowding(n))))
+    if hypot(k, n / resonator.size) * max(value for _, value in resonator.thickness) > DEEP and tolerance < LOOSE:
+        level = level.raised(theory, {"through"})
+    return level
 
-    Polynomials of degree p begin to converge on a wave over a length L at p = k L/2; before, no surplus tells their error.
+
+def _cut(solutions: list[Solution], level: Level, tolerance: float) -> float:
+    """The longest element, over the radius, on which the degree follows the waves of these modes."""
+    longest = level.longest
+    for solution in solutions:
+        for group, k in zip(solution.system.groups, _wavenumbers(solution), strict=True):
+            if isinstance(group, ShellGroup):
+                radians = np.max(2 * group.place.section.ds * k)
+                longest = min(longest, level.longest * _most(level, tolerance) / max(float(radians), 1e-9))
+    return _in_parts(max(longest, level.longest / AT_ONCE))  # waves that are not resolved seem shorter than they are
+
+
+def _most(level: Level, tolerance: float) -> float:
+    """What k L a degree p follows: the best polynomial on a wave is off by (e k L/(4 p))^(2 p) in the energy."""
+    p = level.along
+    return 4 * p / e * exp(log(max(tolerance, 1e-5)) / (2 * p))
+
+
+def _in_parts(longest: float) -> float:
+    """A whole part of the usual length, so that neighbouring designs have the same elements."""
+    return LONGEST / max(1, ceil(LONGEST / longest - 1e-9))
+
+
+def _wavenumbers(solution: Solution) -> list[Array]:
+    """Wavenumbers along the meridian, 1/m, of bending waves of the mode's frequency at the stations of every chain:
+
+    k⁴ = 12 ρ (1 - ν²) ω²/(E h²), of which n/r runs around.
     """
+    found = []
     for group, c in zip(solution.system.groups, solution.constants, strict=True):
         if isinstance(group, ShellGroup):
             section = group.place.section
-            k = (12 * c.rho * (1 - c.nu**2) * solution.eigenvalue / (c.E * section.thickness**2)) ** 0.25
-            if np.max(k * section.ds) > solution.system.level.along:
-                return False
-    return True
+            k = np.sqrt(12 * c.rho * (1 - c.nu**2) * solution.eigenvalue / (c.E * section.thickness**2))
+            found.append(np.sqrt(np.maximum(k - (solution.system.n / section.r) ** 2, 0.0)))
+        else:
+            found.append(np.zeros(1))
+    return found
+
+
+def _is_resolved(solution: Solution) -> bool:
+    """Whether the degree follows bending waves over its elements.
+
+    Polynomials of degree p begin to converge on a wave over a length L at p = k L/2; before, no surplus tells their error.
+    """
+    along = solution.system.level.along
+    return all(
+        np.max(k * group.place.section.ds) <= along
+        for group, k in zip(solution.system.groups, _wavenumbers(solution), strict=True)
+        if isinstance(group, ShellGroup)
+    )
 
 
 def _experience(now: Solution, before: Solution, stated: float) -> float:
-    """By how much the level before was farther off than it said; 1 if it was not."""
+    """By how much what was raised since was farther off than was said; 1 if it was not."""
     return min(max(abs(before.eigenvalue / now.eigenvalue - 1) / 2 / stated, 1.0), DOUBT)
 
 
@@ -116,8 +183,14 @@ def _begin(
     uniform, rho = isinstance(elastic, Elastic), _density(elastic)
     if uniform and system.is_tiny:
         trace, shear, mass = system.whole
-        lam, G = (field[0, 0] / rho for field in constants[0].lame)
-        return Iteration(Factor(whole_pattern(len(mass)), [lam * trace + G * shear + shift * mass]), mass)
+        one, two = (float(field[0, 0]) / rho for field in constants[0].lame)
+        return Iteration(Factor(whole_pattern(len(mass)), [one * trace + two * shear + shift * mass]), mass)
+    if uniform and system.is_plain:
+        one, two = (float(field[0, 0]) / rho for field in constants[0].lame)
+        stiffness = [one * trace + two * shear + shift * mass for trace, shear, mass in system.bare]
+        return Iteration(
+            Factor(system.pattern, stiffness), ElementMass(system.pattern, [mass for _, _, mass in system.bare])
+        )
     lam, G, density = (
         [field / rho for field in fields] for fields in zip(*((*one.lame, one.rho) for one in constants), strict=True)
     )

@@ -27,6 +27,7 @@ from shell.quadrature import Array
 Pair: TypeAlias = tuple[Array, Array]
 PORTION = 16  # elements integrated at a time
 TINY = 160  # unknowns of a dense matrix
+FEW = 12  # elements that are handled one by one
 KEPT = 3_000_000  # numbers that a system may keep for the next material (24 MB)
 
 
@@ -246,6 +247,21 @@ class System:
     def _choice(self) -> csr_matrix:
         """From the free unknowns to those of all elements."""
         return self.constraint[np.concatenate([group.unknowns.ravel() for group in self.groups])]
+
+    @property
+    def is_plain(self) -> bool:
+        """Whether it is one short chain, whose element matrices are kept on the free unknowns."""
+        return (
+            len(self.groups) == 1 and isinstance(self.groups[0], ShellGroup) and len(self.maps) <= FEW and self.is_small
+        )
+
+    @cached_property
+    def bare(self) -> list[tuple[Array, Array, Array]]:
+        """Element matrices of a plain system per unit λ, G and ρ, on the free unknowns in the order of `pattern`."""
+        (group,) = self.groups
+        assert isinstance(group, ShellGroup)
+        trace, shear, mass = group.units
+        return [(at.restrict(trace[k]), at.restrict(shear[k]), at.restrict(mass[k])) for k, at in enumerate(self.maps)]
 
     @cached_property
     def whole(self) -> Array:

@@ -21,7 +21,7 @@ import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.linalg import SuperLU, splu
 
-from shell.assembly import build_system
+from shell.assembly import lay_system
 from shell.elastic import Elastic, VaryingElastic
 from shell.errors import ShellError
 from shell.imperfection.body import Body, Forms, Vector
@@ -83,7 +83,7 @@ class CoupledHarmonics:
     def system(self, k: int) -> System:
         """The elements of the perfect resonator at one harmonic, the same for all."""
         if k not in self._systems:
-            self._systems[k] = build_system.__wrapped__(self.resonator, k, self.theory, self.level, self.together)
+            self._systems[k] = lay_system(self.resonator, k, self.theory, self.level, self.together)
         return self._systems[k]
 
     @cached_property

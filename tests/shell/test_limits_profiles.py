@@ -5,7 +5,7 @@ from math import pi, sqrt
 import numpy as np
 import pytest
 
-from shell.assembly import build_system
+from shell.assembly import lay_system
 from shell.elastic import Elastic
 from shell.fitted import Fitted, fit_profile
 from shell.levels import LEVELS
@@ -26,7 +26,7 @@ def measured(points: int, noise: float, h: float = 0.9e-3) -> Resonator:
 
 def point_by_point(resonator: Resonator, n: int) -> float:
     """The frequency (Hz) with elements that break at every point of the profile."""
-    (solution,) = solve_level(build_system.__wrapped__(resonator, n, "solid", LEVELS["solid"][0]), R, SILICA, 1, 1e-11)
+    (solution,) = solve_level(lay_system(resonator, n, "solid", LEVELS["solid"][0]), R, SILICA, 1, 1e-11)
     return sqrt(solution.eigenvalue) / (2 * pi)
 
 
