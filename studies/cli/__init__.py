@@ -37,6 +37,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "acceptance": ("studies.cli.acceptance:acceptance", "The tests of IEEE 1431 from records, against limits."),
     "derive": ("studies.cli.derive:derive", "The symbolic derivation, as equations, LaTeX or code."),
     "render": ("studies.cli.render:render", "A mode shape as picture, animation, page or mesh."),
+    "mesh": ("studies.cli.mesh:mesh", "The solid as a quadratic mesh for a finite-element program."),
     "scan": ("studies.cli.scan:scan", "Measured faces to wall maps, waves around and splits."),
     "trim": ("studies.cli.trim:trim", "Measured splits to a plan of cuts."),
     "electrodes": (
@@ -142,7 +143,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 CHAPTERS = {
     # of the list of commands
-    "Design a resonator": ("modes", "tcf", "loss", "loop", "compare", "render", "study", "derive"),
+    "Design a resonator": ("modes", "tcf", "loss", "loop", "compare", "render", "mesh", "study", "derive"),
     "Make it": ("scan", "trim", "electrodes"),
     "Run it": ("simulate", "thermal", "import"),
     "Explain and accept": ("calibrate", "diagnose", "effects", "acceptance"),

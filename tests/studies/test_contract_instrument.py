@@ -50,6 +50,7 @@ COMMANDS = {
     "thermal": ["thermal", "CARD", "soak 20 1h"],
     "simulate": ["simulate", "CARD", "soak 20 1h", "--out", "OUT"],
     "render": ["render", "CARD", "--out", "OUT.ply"],
+    "mesh": ["mesh", "CARD", "--out", "OUT.msh"],
     "study": ["study", "run", "STUDY", "--out", "OUT", "--card", "CARD"],
     "diagnose": ["diagnose", "RUN", "--card", "CARD"],
     "plan": ["diagnose", "--plan", "step 20 -10 5h", "--card", "CARD"],

@@ -132,3 +132,19 @@ def test_the_drawing_process_ends_with_the_one_that_wants_it(tmp_path):
     done = subprocess.run(child, stdin=subprocess.DEVNULL, capture_output=True, timeout=60, check=False)
     assert done.returncode == 1
     assert not folder.exists()
+
+
+def test_a_mesh_for_another_program_says_what_it_holds(tmp_path, capsys):
+    assert main(["mesh", "hrg-30mm", "--out", str(tmp_path / "solid.msh"), "--around", "16", "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["schema"] == "hrg.mesh/1"
+    text = (tmp_path / "solid.msh").read_text()
+    assert text.split("$Nodes\n")[1].splitlines()[0] == str(found["nodes"])
+    assert found["held_nodes"] > 0
+    for words, part in (
+        (["--out", "solid.stl"], ".msh"),
+        (["--out", "solid.inp", "--complete"], "--complete"),
+        (["--out", "solid.msh", "--layers", "99"], "16 elements"),
+    ):
+        assert main(["mesh", "hrg-30mm", *words]) == 2
+        assert part in capsys.readouterr().err

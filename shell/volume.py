@@ -1,0 +1,268 @@
+"""The solid as a conforming mesh of quadratic elements, for other finite-element programs.
+
+The section is cut into quadrilaterals of nine nodes, which divide the solver's own elements: every cross-section of the
+shell has the same number of layers, so that shell, roots and corners meet node on node. Turned around the axis they become
+hexahedra, and wedges where a side lies on the axis. All nodes lie on the true surfaces; between them these are parabolas.
+
+>>> mesh = build_volume(resonator, layers=2, around=48).serendipity()
+"""
+
+from dataclasses import dataclass, replace
+from math import pi
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
+
+from shell.assembly import build_system
+from shell.blocks import Boundary, Mesh
+from shell.errors import ShellError
+from shell.layout import Chain
+from shell.levels import Level
+from shell.quadrature import Array, nodal
+from shell.resonator import Resonator
+from shell.system import ShellGroup, SolidGroup
+
+Index = NDArray[np.intp]
+
+LEVEL = Level((3, 3, 3), 9, 8, 1)  # cells of degree 8 carry the shape of fillets; one ring around a sharp corner
+# places (ξ, η, θ) on the lattice 0, 1, 2 of a turned quadrilateral, in the order that VTK and Abaqus share
+HEXAHEDRON = (
+    "000 200 220 020 002 202 222 022 100 210 120 010 102 212 122 012 001 201 221 021 011 211 101 121 110 112 111"
+)
+WEDGE = "000 202 200 020 222 220 102 201 100 122 221 120 010 212 210 112 211 110"  # its side ξ = 0 lies on the axis
+
+
+@dataclass(frozen=True, eq=False)
+class Volume:
+    """A mesh of quadratic elements.
+
+    Attributes
+    ----------
+    nodes : (N, 3) array, m
+        Places; the axis of the resonator is z.
+    hexahedra : (H, 27 or 20) array
+        Node numbers in VTK's order: corners, edges, then faces and middle.
+    wedges : (W, 18 or 15) array
+        The same for the elements on the axis.
+    held_quadrilaterals, held_triangles : (Q, 9 or 8), (T, 6) arrays
+        Faces that the support holds: corners, edges, middle.
+    """
+
+    nodes: Array
+    hexahedra: Index
+    wedges: Index
+    held_quadrilaterals: Index
+    held_triangles: Index
+
+    @property
+    def is_complete(self) -> bool:
+        """Whether faces and insides have nodes of their own."""
+        return bool(self.hexahedra.shape[1] == 27)
+
+    @property
+    def held(self) -> Index:
+        """Numbers of the held nodes."""
+        return np.unique(np.concatenate([self.held_quadrilaterals.ravel(), self.held_triangles.ravel()]))
+
+    def serendipity(self) -> "Volume":
+        """The same elements with nodes on corners and edges only: 20 and 15."""
+        hexahedra, wedges, faces = self.hexahedra[:, :20], self.wedges[:, :15], self.held_quadrilaterals[:, :8]
+        kept, numbers = np.unique(np.concatenate([hexahedra.ravel(), wedges.ravel()]), return_inverse=True)
+        cut = hexahedra.size
+        return replace(
+            self,
+            nodes=self.nodes[kept],
+            hexahedra=numbers[:cut].reshape(hexahedra.shape),
+            wedges=numbers[cut:].reshape(wedges.shape),
+            held_quadrilaterals=np.searchsorted(kept, faces),
+            held_triangles=np.searchsorted(kept, self.held_triangles),
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Pieces:
+    """The section in quadrilaterals of 3 x 3 nodes: points (2, N), numbers (Q, 3, 3), and whether a node's side is held."""
+
+    points: Array
+    quadrilaterals: Index
+    held: NDArray[np.bool_]
+
+
+def build_volume(resonator: Resonator, layers: int = 2, around: int = 48, spacing: float | None = None) -> Volume:
+    """Mesh a resonator with complete quadratic elements.
+
+    Parameters
+    ----------
+    resonator : geometry.
+    layers : elements through the thickness; more where two solid parts need a multiple.
+    around : elements around the axis.
+    spacing : longest element along the meridian, m; a sixth of the radius unless given.
+
+    Raises
+    ------
+    ShellError
+        The numbers are out of range, or the section cannot be cut that way.
+    """
+    if not (1 <= layers <= 16 and 8 <= around <= 720):
+        raise ShellError("a mesh has 1 to 16 elements through the thickness and 8 to 720 around.")
+    spacing = resonator.size / 6 if spacing is None else spacing
+    if not 0 < spacing < np.inf or resonator.length / spacing > 2000:
+        raise ShellError("the spacing along the meridian must be positive, and at least 1/2000 of its length.")
+    return _turn(_cut_section(resonator, layers, spacing), around, resonator.size)
+
+
+def _cut_section(resonator: Resonator, layers: int, spacing: float) -> Pieces:
+    system = build_system(resonator, 2, "solid", LEVEL)
+    solids = [group.place for group in system.groups if isinstance(group, SolidGroup)]
+    crossing = [_cells_across(place.boundary) for place in solids]
+    common = int(np.lcm.reduce(crossing)) if crossing else 1
+    layers = common * int(np.ceil(layers / common))
+    grids: list[Array] = []  # (2, 2a + 1, 2b + 1) points of elements divided into a x b
+    held: list[NDArray[np.bool_]] = []
+    for group in system.groups:
+        if isinstance(group, ShellGroup):
+            found = _divide_chain(resonator, group.place.chain, layers, spacing)
+            grids += found
+            held += [np.zeros(grid.shape[1:], dtype=bool) for grid in found]
+    for place, count in zip(solids, crossing, strict=True):
+        _divide_cells(place.mesh, place.boundary, layers // count, grids, held)
+    return _join(grids, held)
+
+
+def _cells_across(boundary: Boundary) -> int:
+    """How many cells of a solid part lie on the cross-section that it shares with the shell."""
+    return max((int(np.isfinite(eta).sum()) - 1 for eta in boundary.heights), default=1)
+
+
+def _divide_chain(resonator: Resonator, chain: Chain, layers: int, spacing: float) -> list[Array]:
+    grids = []
+    eta = np.linspace(-1.0, 1.0, 2 * layers + 1)
+    for start, stop, segment in zip(chain.breaks[:-1], chain.breaks[1:], chain.segments, strict=True):
+        count = int(np.ceil((stop - start) / spacing - 1e-9))
+        place = resonator.at(np.linspace(start, stop, 2 * count + 1), segment)
+        zeta = np.multiply.outer(place.thickness / 2, eta)
+        r = place.r[:, None] + zeta * place.normal_r[:, None]
+        grids.append(np.array([r, place.z[:, None] + zeta * place.normal_z[:, None]]))
+    return grids
+
+
+def _divide_cells(
+    mesh: Mesh, boundary: Boundary, count: int, grids: list[Array], held: list[NDArray[np.bool_]]
+) -> None:
+    along = nodal(mesh.grid.shape[2] - 1, np.linspace(-1.0, 1.0, 2 * count + 1)).values
+    outside = np.bincount(mesh.edges.ravel()) == 1
+    a, b = mesh.pairs.T
+    fixed = outside & boundary.held[a] & boundary.held[b]
+    for cell in range(len(mesh.vertices)):
+        grids.append(np.einsum("ia,gab,jb->gij", along, mesh.grid[:, cell], along))
+        marks = np.zeros((2 * count + 1, 2 * count + 1), dtype=bool)
+        for edge, side in zip(mesh.edges[cell], (marks[:, 0], marks[:, -1], marks[0], marks[-1]), strict=True):
+            side[:] = side | fixed[edge]
+        held.append(marks)
+
+
+def _join(grids: list[Array], held: list[NDArray[np.bool_]]) -> Pieces:
+    """Number the points that coincide once, and cut every grid into 3 x 3 nodes."""
+    points = np.concatenate([grid.reshape(2, -1) for grid in grids], axis=1)
+    shortest = min(min(np.hypot(*np.diff(grid, axis=axis)).min() for axis in (1, 2)) for grid in grids)
+    pairs = cKDTree(points.T).query_pairs(1e-3 * shortest, output_type="ndarray")
+    size = points.shape[1]
+    links = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(size, size))
+    count, numbers = connected_components(links, directed=False)
+    first = np.zeros(count, dtype=np.intp)
+    first[numbers[::-1]] = np.arange(size)[::-1]
+    marks = np.zeros(count, dtype=bool)
+    np.logical_or.at(marks, numbers, np.concatenate([one.ravel() for one in held]))
+    pieces, start = [], 0
+    for grid in grids:
+        rows, columns = grid.shape[1:]
+        own = numbers[start : start + rows * columns].reshape(rows, columns)
+        start += own.size
+        pieces += [own[i : i + 3, j : j + 3] for i in range(0, rows - 1, 2) for j in range(0, columns - 1, 2)]
+    return Pieces(points[:, first], np.array(pieces), marks)
+
+
+def _turn(section: Pieces, around: int, size: float) -> Volume:
+    r, z = section.points
+    on_axis: NDArray[np.bool_] = np.asarray(r < 1e-7 * size)
+    r = np.where(on_axis, 0.0, r)
+    quads = _right_handed(section.quadrilaterals, r, z)
+    inner = on_axis[quads]
+    axial: NDArray[np.bool_] = np.all(_sides(inner), axis=2)  # (side, quadrilateral)
+    touching = inner.any(axis=(1, 2))
+    if np.any(axial.sum(axis=0) != touching):
+        raise ShellError("an element meets the axis with a corner instead of a side.")
+    widths = np.where(on_axis, 1, 2 * around)
+    first = np.cumsum(widths) - widths
+    theta = pi * np.arange(2 * around) / around
+    spin = np.stack([np.cos(theta), np.sin(theta)], axis=1)
+    spin[abs(spin) < 1e-15] = 0.0
+    rings = [
+        np.column_stack([r[k] * spin[: widths[k]], np.full(widths[k], z[k])]) for k in range(len(r))
+    ]  # a point of the axis stays one node
+    wedges = np.array(
+        [
+            _axis_first(quad, int(side))
+            for quad, side in zip(quads[touching], np.argmax(axial, axis=0)[touching], strict=True)
+        ]
+    )
+    lattice = _Lattice(first, on_axis, around)
+    edges = _held_edges(section, quads, on_axis)
+    off = ~np.any(on_axis[edges], axis=1)
+    return Volume(
+        np.concatenate(rings),
+        lattice.elements(quads[~touching], HEXAHEDRON),
+        lattice.elements(wedges.reshape(-1, 3, 3), WEDGE),
+        lattice.elements(edges[off][:, :, None], "000 002 202 200 001 102 201 100 101"),
+        lattice.elements(edges[~off][:, :, None], "000 202 200 102 201 100"),
+    )
+
+
+def _sides(pieces: NDArray[Any]) -> NDArray[Any]:
+    """The sides η = -1, η = 1, ξ = -1, ξ = 1 of pieces (Q, 3, 3): (4, Q, 3)."""
+    return np.stack([pieces[:, :, 0], pieces[:, :, 2], pieces[:, 0, :], pieces[:, 2, :]])
+
+
+def _right_handed(quads: Index, r: Array, z: Array) -> Index:
+    """Turn quadrilaterals so that (ξ, η, θ) is a right-handed frame: clockwise with r to the right and z up."""
+    corners = quads[:, [0, 2, 2, 0], [0, 0, 2, 2]]
+    x, y = r[corners], z[corners]
+    area = np.sum(x * np.roll(y, -1, axis=1) - np.roll(x, -1, axis=1) * y, axis=1)
+    return np.asarray(np.where((area > 0)[:, None, None], quads[:, ::-1], quads))
+
+
+def _axis_first(quad: Index, side: int) -> Index:
+    """Turn a quadrilateral, keeping its sense, until its side on the axis is ξ = 0."""
+    return np.asarray(np.rot90(quad, {2: 0, 0: 3, 3: 2, 1: 1}[side]))
+
+
+def _held_edges(section: Pieces, quads: Index, on_axis: NDArray[np.bool_]) -> Index:
+    """The held edges (E, 3) of the section's outline; one that meets the axis begins there."""
+    edges = _sides(quads).reshape(-1, 3)
+    ends = np.sort(edges[:, [0, 2]], axis=1)
+    _, which, count = np.unique(ends, axis=0, return_inverse=True, return_counts=True)
+    found = edges[(count[which.ravel()] == 1) & section.held[edges].all(axis=1) & ~on_axis[edges].all(axis=1)]
+    return np.asarray(np.where(on_axis[found[:, 2]][:, None], found[:, ::-1], found))
+
+
+@dataclass(frozen=True, eq=False)
+class _Lattice:
+    """Node numbers of the turned section: `first` of each point of the section, one node where it lies on the axis."""
+
+    first: Index
+    on_axis: NDArray[np.bool_]
+    around: int
+
+    def elements(self, pieces: Index, order: str) -> Index:
+        """Elements (pieces x around, nodes) from numbers (pieces, ξ, η) of the section, in an order of places (ξ, η, θ)."""
+        i, j, k = np.array([[int(digit) for digit in place] for place in order.split()]).T
+        if not len(pieces):
+            return np.zeros((0, len(i)), dtype=np.intp)
+        points = pieces[:, i, j]  # (pieces, nodes)
+        angle = (2 * np.arange(self.around)[:, None] + k) % (2 * self.around)  # (around, nodes)
+        numbers = self.first[points][:, None, :] + np.where(self.on_axis[points][:, None, :], 0, angle)
+        return np.asarray(numbers.reshape(-1, len(i)))

@@ -1,0 +1,101 @@
+"""`hrg mesh`: the solid as a quadratic mesh for another finite-element program."""
+
+from typing import Annotated
+
+from cyclopts import Parameter
+
+from studies.cli.output import Answer, answers
+
+KINDS = (".vtu", ".msh", ".inp")
+
+
+@answers("hrg.mesh/1")
+def mesh(
+    card: str,
+    *,
+    out: str,
+    layers: int = 2,
+    around: int = 48,
+    spacing_mm: Annotated[float | None, Parameter(show_default=False)] = None,
+    complete: bool = False,
+    temperature: Annotated[float | None, Parameter(show_default=False)] = None,
+) -> Answer:
+    """Mesh the solid for a finite-element program: shell, roots, fillets, corners and stem, node on node.
+
+    The elements are quadratic hexahedra, and wedges on the axis; all nodes lie on the true surfaces. The ending of --out
+    chooses: .vtu for VTK and ParaView, .msh for Gmsh (format 2.2), .inp for Abaqus and CalculiX. Lengths are in m. What
+    the support holds is the group or set "held" (in .vtu: the point data "held"). The mesh of free-dome as it comes gives n = 2
+    in CalculiX 0.5 % too high, with --around 72 --spacing-mm 1.5 0.2 %.
+
+    Parameters
+    ----------
+    card : str
+        Path of a card, or the name of one that ships (hrg cards).
+    out : str
+        File to write.
+    layers : int
+        Elements through the thickness.
+    around : int
+        Elements around the axis.
+    spacing_mm : float
+        Longest element along the meridian; a sixth of the radius unless given.
+    complete : bool
+        Nodes in the middle of faces and elements too: 27 and 18 a piece instead of 20 and 15.
+    temperature : float
+        Temperature in °C; the card's reference temperature unless given.
+    """
+    import os
+    from pathlib import Path
+    from typing import cast
+
+    from scipy.constants import zero_Celsius
+
+    from shell.inertia import weigh
+    from shell.volume import build_volume
+    from shell.volume_files import VolumeKind, encode_volume
+    from studies.cli.output import say
+    from studies.errors import InputError, naming
+    from studies.files.writing import written_whole
+    from studies.instrument.card import load_card
+
+    kind = Path(out).suffix.lower()
+    if kind not in KINDS:
+        raise InputError(f"--out {out}: the ending must be one of {', '.join(KINDS)}.")
+    if os.path.isdir(out):
+        raise InputError(f"--out {out}: is a folder; give the name of a file.")
+    if complete and kind == ".inp":
+        raise InputError(
+            "--complete: an .inp file has elements of 20 and 15 nodes only; leave it out, or take .msh or .vtu."
+        )
+    instrument = load_card(card)
+    T = instrument.reference_temperature if temperature is None else temperature + zero_Celsius
+    with naming(instrument.path):
+        resonator, elastic = instrument.at(T)
+        found = build_volume(resonator, layers, around, None if spacing_mm is None else 1e-3 * spacing_mm)
+    found = found if complete else found.serendipity()
+    data = encode_volume(found, cast("VolumeKind", kind[1:]))
+    with written_whole(out) as file:
+        file.write(data)
+    exact = weigh(resonator, elastic.rho)
+    yield {
+        "schema": "hrg.mesh/1",
+        "card": instrument.name,
+        "temperature_degC": T - zero_Celsius,
+        "file": out,
+        "bytes": len(data),
+        "nodes": len(found.nodes),
+        "hexahedra": len(found.hexahedra),
+        "wedges": len(found.wedges),
+        "held_nodes": len(found.held),
+        "volume_mm3": 1e9 * exact.volume,
+        "mass_g": 1e3 * exact.mass,
+    }
+    say(
+        f"{out}: {len(found.nodes):,} nodes, {len(found.hexahedra):,} hexahedra, {len(found.wedges):,} wedges, "
+        f"{len(found.held):,} nodes held. The solid has {1e9 * exact.volume:.6g} mm³ and {1e3 * exact.mass:.5g} g."
+        + (
+            " The [imperfection] of the card is not in it."
+            if instrument.part("imperfection").fields is not None
+            else ""
+        )
+    )
