@@ -25,7 +25,7 @@ MARGIN = 0.01
 
 
 @dataclass(frozen=True)
-class Curve:
+class PolynomialCurve:
     """y = Σ cᵢ (x − reference)ⁱ between `lowest` and `highest` x, with the covariance of c."""
 
     coefficients: Real
@@ -51,7 +51,7 @@ class Curve:
 
 
 @dataclass(frozen=True)
-class Chain:
+class BellChain:
     """The fitted steps (33)–(36) and the filter.
 
     Attributes
@@ -62,11 +62,11 @@ class Chain:
         S₁ (rad/s per count).
     rough_covariance : array (2, 2)
         Covariance of null and scale.
-    bias : Curve
+    bias : PolynomialCurve
         N(T), rad/s over kelvin: eq. (34).
-    scale_over_rate : Curve
+    scale_over_rate : PolynomialCurve
         Rate (rad/s) over rate (rad/s): eq. (35).
-    scale_over_temperature : Curve
+    scale_over_temperature : PolynomialCurve
         Factor (1) over kelvin: eq. (36).
     taps : array
         FIR coefficients, empty for none.
@@ -77,9 +77,9 @@ class Chain:
     null: float
     scale: float
     rough_covariance: Real
-    bias: Curve
-    scale_over_rate: Curve
-    scale_over_temperature: Curve
+    bias: PolynomialCurve
+    scale_over_rate: PolynomialCurve
+    scale_over_temperature: PolynomialCurve
     taps: Real
     sampling: float
 
@@ -101,13 +101,13 @@ class ChainOutput:
 
 
 def apply_chain(
-    chain: Chain, time: ArrayLike, output: ArrayLike, temperature: ArrayLike, *, extrapolate: bool = False
+    chain: BellChain, time: ArrayLike, output: ArrayLike, temperature: ArrayLike, *, extrapolate: bool = False
 ) -> ChainOutput:
     """Return the rate after each step of eq. (32), and after the filter.
 
     Parameters
     ----------
-    chain : Chain
+    chain : BellChain
         The fitted steps.
     time, output, temperature : array (N,)
         Times (s), raw output (counts) and temperature (K).
@@ -137,7 +137,7 @@ def apply_chain(
     return ChainOutput(rough, straight, linear, steady, smooth(steady, chain.taps))
 
 
-def invert_chain(chain: Chain, rate: ArrayLike, temperature: ArrayLike) -> Real:
+def invert_chain(chain: BellChain, rate: ArrayLike, temperature: ArrayLike) -> Real:
     """Return the raw output (counts) that the chain, without its filter, turns into this rate (rad/s).
 
     The quadratic (35) is inverted on its rising branch; this makes the twin of a gyro that the chain describes.

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.constants import zero_Celsius
 
-from compensation.bell import Chain, Curve
+from compensation.bell import BellChain, PolynomialCurve
 from compensation.coloured import correlated_covariance
 from compensation.errors import CompensationError
 from compensation.fir import design_smoother
@@ -23,7 +23,7 @@ Fitted = TypeVar("Fitted")
 
 
 @dataclass(frozen=True)
-class Run:
+class BellRun:
     """One calibration run: time (s), raw output (counts), temperature (K), applied rate (rad/s); arrays (N,)."""
 
     time: Real
@@ -37,7 +37,7 @@ class Run:
             object.__setattr__(self, name, values)
 
 
-def fit_rough(run: Run) -> tuple[float, float, Real]:
+def fit_rough(run: BellRun) -> tuple[float, float, Real]:
     """Fit null N₁ (counts) and scale S₁ (rad/s per count) to a run at rest and turning: eq. (33).
 
     The output is regressed on the rate, whose values are exact; with the paper's two plateaus the line passes through
@@ -58,12 +58,12 @@ def fit_rough(run: Run) -> tuple[float, float, Real]:
     return float(null), float(1 / slope), to_scale @ covariance @ to_scale.T
 
 
-def fit_bias(temperature: ArrayLike, rough: ArrayLike, order: int = 2) -> Curve:
+def fit_bias(temperature: ArrayLike, rough: ArrayLike, order: int = 2) -> PolynomialCurve:
     """Fit N(T) to the rough output (rad/s) of a gyro at rest, over temperature (K): eq. (34)."""
     return _fit_curve(temperature, rough, order, "temperature", zero_Celsius)
 
 
-def fit_scale_over_rate(bias_compensated: ArrayLike, rate: ArrayLike, order: int = 2) -> Curve:
+def fit_scale_over_rate(bias_compensated: ArrayLike, rate: ArrayLike, order: int = 2) -> PolynomialCurve:
     """Fit the applied rate over the measured one (both rad/s), at one temperature: eq. (35).
 
     The measured rate carries the noise here. It flattens the line by noise² over the variance of the rates: 1e-7 for
@@ -74,7 +74,7 @@ def fit_scale_over_rate(bias_compensated: ArrayLike, rate: ArrayLike, order: int
 
 def fit_scale_over_temperature(
     temperature: ArrayLike, rate_compensated: ArrayLike, rate: ArrayLike, order: int = 2
-) -> Curve:
+) -> PolynomialCurve:
     """Fit the factor that brings the output (rad/s) to the applied rate (rad/s), over temperature (K): eq. (36)."""
     T, measured, applied = read_columns(temperature=temperature, rate_compensated=rate_compensated, rate=rate)
     if np.any(applied == 0) or np.any(np.abs(measured) < 0.1 * np.abs(applied)):
@@ -83,26 +83,26 @@ def fit_scale_over_temperature(
 
 
 def fit_chain(
-    rates: Run,
-    rest: Run,
-    turning: Run,
+    rates: BellRun,
+    rest: BellRun,
+    turning: BellRun,
     *,
-    rough: Run | None = None,
+    rough: BellRun | None = None,
     cutoff: float | None = 1.0,
     order: int = 50,
     sampling: float | None = None,
-) -> Chain:
+) -> BellChain:
     """Fit all steps in the paper's order.
 
     Parameters
     ----------
-    rates : Run
+    rates : BellRun
         Several applied rates at one temperature: eq. (35).
-    rest : Run
+    rest : BellRun
         The gyro at rest over temperature: eq. (34).
-    turning : Run
+    turning : BellRun
         One rate over temperature: eq. (36).
-    rough : Run, optional
+    rough : BellRun, optional
         A run at rest and turning for (33); `rates` when left out.
     cutoff : float or None
         Cut-off (Hz) of the FIR filter; None for no filter.
@@ -125,19 +125,21 @@ def fit_chain(
         "scale over temperature (36)", fit_scale_over_temperature, turning.temperature, constant, turning.rate
     )
     if cutoff is None:
-        return Chain(null, scale, covariance, bias, over_rate, over_temperature, np.empty(0), 0.0)
+        return BellChain(null, scale, covariance, bias, over_rate, over_temperature, np.empty(0), 0.0)
     step = require_regular(rest.time, "the FIR filter") if sampling is None else sampling
-    return Chain(null, scale, covariance, bias, over_rate, over_temperature, design_smoother(step, cutoff, order), step)
+    return BellChain(
+        null, scale, covariance, bias, over_rate, over_temperature, design_smoother(step, cutoff, order), step
+    )
 
 
-def _fit_curve(x: ArrayLike, y: ArrayLike, order: int, name: str, reference: float) -> Curve:
+def _fit_curve(x: ArrayLike, y: ArrayLike, order: int, name: str, reference: float) -> PolynomialCurve:
     fit = fit_polynomial(x, y, order, name)
     scaled, _ = fit.about(reference)
     # The same change of variable carries the covariance that allows for correlated residuals.
     change = np.column_stack([_about(fit.centre, fit.half_span, power, reference, order) for power in range(order + 1)])
     covariance = change @ correlated_covariance(fit.regression) @ change.T
     values = np.asarray(x, dtype=float)
-    return Curve(scaled, covariance, reference, float(values.min()), float(values.max()))
+    return PolynomialCurve(scaled, covariance, reference, float(values.min()), float(values.max()))
 
 
 def _about(centre: float, half_span: float, power: int, reference: float, order: int) -> Real:

@@ -205,7 +205,7 @@ def term_columns(
     return np.column_stack(columns) if columns else np.empty((f.size, 0))
 
 
-class Design:
+class BiasDesign:
     """Several runs below each other: `constants` (m, runs), `candidates` (m, names), `bias` (m,), `rows` per run.
 
     The candidates are the nine terms of eq. (21), and the play where the runs have one.
@@ -239,7 +239,7 @@ class Design:
 
 
 def fit_terms(
-    design: Design,
+    design: BiasDesign,
     terms: tuple[str, ...],
     theta: float | None = None,
     selection: Selection | None = None,

@@ -16,7 +16,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from compensation.bias import PARENTS, TERMS, BiasFit, BiasRun, Design, fit_terms
+from compensation.bias import PARENTS, TERMS, BiasDesign, BiasFit, BiasRun, fit_terms
 from compensation.coloured import estimate_theta, whiten
 from compensation.errors import CompensationError
 from compensation.memory import NO_MEMORY, Memory
@@ -104,7 +104,7 @@ def choose_memory(prepare: Callable[[Memory], Sequence[BiasRun]]) -> Memory:
     for lag, play in product(LAGS, PLAYS):
         memory = Memory(lag, play * span)
         runs = plain if memory == NO_MEMORY else prepare(memory)
-        design = Design(runs, float(plain[0].state[0]))
+        design = BiasDesign(runs, float(plain[0].state[0]))
         X = np.column_stack([design.constants, design.candidates])
         theta = estimate_theta(X, design.bias, design.rows, CAUTION) if theta is None else theta
         white, bias = whiten(X, theta, design.rows), whiten(design.bias, theta, design.rows)
@@ -141,7 +141,7 @@ def score_held_out(runs: Sequence[BiasRun], method: Method = "guarded") -> HeldO
 
 def _select(pieces: Sequence[BiasRun], method: Method, reference: float | None, *, by_runs: bool) -> BiasFit:
     reference = float(pieces[0].state[0]) if reference is None else reference
-    design = Design(pieces, reference)
+    design = BiasDesign(pieces, reference)
     names = design.names
     everything = np.column_stack([design.constants, design.candidates])
     theta = estimate_theta(everything, design.bias, design.rows, CAUTION)
@@ -202,7 +202,7 @@ def score_path(runs: Sequence[BiasRun], selection: Selection) -> tuple[float, ..
     """
     by_runs = len(runs) > 1
     folds = _folds(runs, by_runs)
-    designs = [Design(fold.rest, float(runs[0].state[0])) for fold in folds]
+    designs = [BiasDesign(fold.rest, float(runs[0].state[0])) for fold in folds]
     scores = []
     for step in (selection.start, *selection.steps):
         fits = [fit_terms(design, step.terms, theta=1.0) for design in designs]  # θ matters to no prediction

@@ -43,7 +43,7 @@ class Channels:
 
 
 @dataclass(frozen=True)
-class Noise:
+class LoopNoise:
     """Noise by source, as it enters the loops; everything over the commanded amplitude.
 
     `pickoff` (1/√Hz, one-sided density at the carrier), `adc_step` and `dac_step` (steps of a demodulated sample, 1, and of
@@ -93,4 +93,4 @@ class Electronics:
 
     pickoff: Channels = Channels()
     drive: Channels = Channels()
-    noise: Noise = Noise()
+    noise: LoopNoise = LoopNoise()

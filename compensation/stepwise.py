@@ -22,7 +22,7 @@ OWN_PART = 1e-7
 
 
 @dataclass(frozen=True)
-class Step:
+class SelectionStep:
     """One step: the `term` that was added (or removed), its F and p, and the model that this leaves.
 
     `criterion` is BIC = m ln(SSE/m) + p ln m; smaller is better.
@@ -41,8 +41,8 @@ class Step:
 class Selection:
     """The path of a stepwise selection, its final `terms`, and why candidates were `refused` from the start."""
 
-    start: Step
-    steps: tuple[Step, ...]
+    start: SelectionStep
+    steps: tuple[SelectionStep, ...]
     terms: tuple[str, ...]
     refused: Mapping[str, str]
 
@@ -92,7 +92,7 @@ def select_stepwise(
     search = _Search(forced, candidates, y, tuple(names), parents or {})
     refused = {name: why for name in names if (why := search.refusal(name))}
     chosen: list[str] = []
-    steps: list[Step] = []
+    steps: list[SelectionStep] = []
     for _ in range(10 * len(names)):
         step = search.addition(chosen, refused, enter, shared) or search.removal(chosen, remove)
         if step is None:
@@ -132,7 +132,9 @@ class _Search:
         rest = self._residual(chosen, self.R[:, -1])
         return float(rest @ rest)
 
-    def addition(self, chosen: Sequence[str], refused: Mapping[str, str], level: float, shared: bool) -> Step | None:
+    def addition(
+        self, chosen: Sequence[str], refused: Mapping[str, str], level: float, shared: bool
+    ) -> SelectionStep | None:
         """Return the step that adds the candidate with the largest F, if its p-value is below the level."""
         ready = [
             name
@@ -149,7 +151,7 @@ class _Search:
         allowed = level / len(ready) if shared else level
         return self.step(True, name, F, p, [*chosen, name]) if p < allowed else None
 
-    def removal(self, chosen: Sequence[str], level: float) -> Step | None:
+    def removal(self, chosen: Sequence[str], level: float) -> SelectionStep | None:
         """Return the step that removes the term with the smallest F, if its p-value is above the level."""
         free = [n for n in chosen if not any(n in self.parents.get(other, ()) for other in chosen)]
         tests = [(*self._test([c for c in chosen if c != name], chosen), name) for name in free]
@@ -158,12 +160,12 @@ class _Search:
         F, p, name = min(tests)
         return self.step(False, name, F, p, [c for c in chosen if c != name]) if p > level else None
 
-    def step(self, added: bool, term: str, F: float, p: float, terms: Sequence[str]) -> Step:
+    def step(self, added: bool, term: str, F: float, p: float, terms: Sequence[str]) -> SelectionStep:
         """Describe the model that a step leaves."""
         sse = self.sum_of_squares(terms)
         size = self.forced + len(terms)
         criterion = self.rows * math.log(max(sse, 1e-300) / self.rows) + size * math.log(self.rows)
-        return Step(added, term, F, p, sse, criterion, tuple(terms))
+        return SelectionStep(added, term, F, p, sse, criterion, tuple(terms))
 
     def _test(self, small: Sequence[str], large: Sequence[str]) -> tuple[float, float]:
         without, within = self.sum_of_squares(small), self.sum_of_squares(large)

@@ -34,7 +34,7 @@ LEAST_CONTRAST = 0.05
 
 
 @dataclass(frozen=True)
-class Estimate:
+class WaveEstimate:
     """A value with its standard deviation and the ends of its interval."""
 
     value: float
@@ -51,7 +51,7 @@ class WaveFit:
     `frequency_axis` (rad), `gain_ratio` δ, `skew` κ (rad), `phase_error` ε (rad), `rate` (rad/s, what is left of the rate).
     """
 
-    estimates: dict[str, Estimate]
+    estimates: dict[str, WaveEstimate]
     undetermined: tuple[str, ...]
     confidence: float
 
@@ -149,7 +149,7 @@ def fit_whole_angle(
     if W is not None:
         estimates |= _polar("frequency", *W, harmonic)
     estimates = _widen(estimates, harmonic, coupling)
-    found = {name: Estimate(value, sd, value - z * sd, value + z * sd) for name, (value, sd) in estimates.items()}
+    found = {name: WaveEstimate(value, sd, value - z * sd, value + z * sd) for name, (value, sd) in estimates.items()}
     return WaveFit(found, tuple(undetermined), confidence)
 
 

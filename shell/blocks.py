@@ -83,7 +83,7 @@ def mesh_solid(solid: Solid, degree: int) -> Mesh:
 
 
 @dataclass(frozen=True, eq=False)
-class Boundary:
+class Support:
     """What holds the vertices of a mesh: on the axis, held, or on the cross-section of a tie (η there, NaN elsewhere)."""
 
     on_axis: NDArray[np.bool_]
@@ -96,12 +96,12 @@ class Boundary:
         return [self.on_axis, self.held, *(np.isfinite(eta) for eta in self.heights)]
 
 
-def find_boundary(mesh: Mesh, solid: Solid, ties: tuple[Tie, ...]) -> Boundary:
+def find_boundary(mesh: Mesh, solid: Solid, ties: tuple[Tie, ...]) -> Support:
     """Where the vertices of a solid part lie."""
     size = float(np.ptp(mesh.points, axis=1).max())
     held = np.array([solid.held(float(r), float(z)) for r, z in mesh.points.T])
     heights = tuple(_thickness_coordinate(tie.place, mesh.points, size) for tie in ties)
-    return Boundary(mesh.points[0] < 1e-9 * size, held, heights)
+    return Support(mesh.points[0] < 1e-9 * size, held, heights)
 
 
 def number_functions(mesh: Mesh, degree: int) -> tuple[Index, Array, int]:
@@ -125,7 +125,7 @@ def number_functions(mesh: Mesh, degree: int) -> tuple[Index, Array, int]:
     return numbers[:, i, j], signs[:, i, j], start + cells * inside**2
 
 
-def constrain(mesh: Mesh, boundary: Boundary, ties: tuple[Tie, ...], degree: int, n: int, start: int) -> Rows:
+def constrain(mesh: Mesh, boundary: Support, ties: tuple[Tie, ...], degree: int, n: int, start: int) -> Rows:
     """Constraints of vertices and edges: the axis, what is held, and what follows a cross-section of the shell."""
     inside = degree - 1
     count = mesh.points.shape[1]
@@ -150,13 +150,13 @@ def constrain(mesh: Mesh, boundary: Boundary, ties: tuple[Tie, ...], degree: int
     return rows
 
 
-def open_edges(mesh: Mesh, boundary: Boundary) -> NDArray[np.bool_]:
+def open_edges(mesh: Mesh, boundary: Support) -> NDArray[np.bool_]:
     """The edges that are neither on the axis nor held nor tied."""
     a, b = mesh.pairs.T
     return np.asarray(~np.any([where[a] & where[b] for where in boundary.kinds], axis=0))
 
 
-def surface_sides(mesh: Mesh, boundary: Boundary) -> tuple[tuple[int, int], ...]:
+def surface_sides(mesh: Mesh, boundary: Support) -> tuple[tuple[int, int], ...]:
     """The sides (cell, side) that no other cell shares, that are not tied and do not lie on the axis."""
     a, b = mesh.pairs.T
     outside = np.bincount(mesh.edges.ravel()) == 1

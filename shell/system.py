@@ -8,7 +8,7 @@ from typing import TypeAlias
 import numpy as np
 from scipy.sparse import csr_matrix
 
-from shell.blocks import Boundary, Mesh
+from shell.blocks import Mesh, Support
 from shell.cells import CellTable, cell_mass, cell_stiffness
 from shell.constraints import Index
 from shell.eigen import Pattern, find_pattern
@@ -44,7 +44,7 @@ class SolidPart:
     """Where the cells of a solid part lie, and the signs (cells, functions) that turn their edges the same way."""
 
     mesh: Mesh
-    boundary: Boundary
+    boundary: Support
     signs: Array
 
 

@@ -26,7 +26,7 @@ MOST_ROUNDS = 6
 
 
 @dataclass(frozen=True)
-class Reading:
+class SplitReading:
     """A measured split of one harmonic.
 
     harmonic : n. frequency : f, Hz. wave : (f_fast - f_slow)/f exp(2 i n α_fast). error : standard error of either part of it.
@@ -38,7 +38,7 @@ class Reading:
     error: float
 
     @classmethod
-    def of(cls, harmonic: int, frequency: float, split: float, slow_axis: float, error: float) -> "Reading":
+    def of(cls, harmonic: int, frequency: float, split: float, slow_axis: float, error: float) -> "SplitReading":
         """From a split and its standard error in Hz and the azimuth of the slower mode's antinode, rad.
 
         Raises
@@ -94,7 +94,7 @@ class Cut:
 
 
 @dataclass(frozen=True)
-class State:
+class ExpectedSplit:
     """A split as it is expected: most probable wave, and the standard error of either part of it, relative to f."""
 
     harmonic: int
@@ -124,7 +124,7 @@ class Round:
 
     cuts: tuple[Cut, ...]
     share: float
-    after: tuple[State, ...]
+    after: tuple[ExpectedSplit, ...]
     unbalance: Mapping[int, complex]
 
     @property
@@ -134,10 +134,10 @@ class Round:
 
 
 @dataclass(frozen=True)
-class Plan:
+class TrimPlan:
     """Rounds of cuts; the first is to be made as it stands, those after it are what is expected before measuring anew."""
 
-    before: tuple[State, ...]
+    before: tuple[ExpectedSplit, ...]
     rounds: tuple[Round, ...]
     unbalance: Mapping[int, complex]
     goal: float
@@ -149,14 +149,14 @@ class Plan:
 
 
 def plan_trim(
-    readings: Sequence[Reading],
+    readings: Sequence[SplitReading],
     sites: Sites,
     *,
     goal: float,
     removal_error: float = 0.02,
     gain_error: float = 0.03,
     unbalance: Mapping[int, complex] | None = None,
-) -> Plan:
+) -> TrimPlan:
     """Rounds of cuts that bring the splits below the goal.
 
     Parameters
@@ -176,7 +176,7 @@ def plan_trim(
     if not goal > 0:
         raise ShellError("the goal is a positive split in Hz.")
     known = dict(unbalance or {})
-    before = tuple(State(r.harmonic, r.frequency, r.wave, r.error) for r in readings)
+    before = tuple(ExpectedSplit(r.harmonic, r.frequency, r.wave, r.error) for r in readings)
     states, spent, rounds = before, np.zeros(len(sites.azimuth)), []
     reading_errors = {r.harmonic: r.error for r in readings}
     for _ in range(MOST_ROUNDS):
@@ -191,7 +191,7 @@ def plan_trim(
             spread = (
                 state.error**2 + removal_error**2 * float((abs(moves) ** 2).sum()) / 2 + (gain_error * abs(total)) ** 2
             )
-            after.append(State(state.harmonic, state.frequency, state.wave + total, sqrt(spread)))
+            after.append(ExpectedSplit(state.harmonic, state.frequency, state.wave + total, sqrt(spread)))
         known = {k: u - complex(masses @ np.exp(1j * k * sites.azimuth)) for k, u in known.items()}
         cuts = tuple(
             Cut(float(a), float(p), float(m))
@@ -202,19 +202,19 @@ def plan_trim(
         if all(state.most <= goal for state in after):
             break
         # the next round starts from a new reading of what is expected to be left
-        states = tuple(State(s.harmonic, s.frequency, _typical(s), reading_errors[s.harmonic]) for s in after)
+        states = tuple(ExpectedSplit(s.harmonic, s.frequency, _typical(s), reading_errors[s.harmonic]) for s in after)
         if all(state.hertz < max(goal / 2, 2 * state.error * state.frequency) for state in states):
             break
-    return Plan(before, tuple(rounds), dict(unbalance or {}), goal)
+    return TrimPlan(before, tuple(rounds), dict(unbalance or {}), goal)
 
 
-def _typical(state: State) -> complex:
+def _typical(state: ExpectedSplit) -> complex:
     """A wave of the size that is to be expected after a round: its most probable value, grown by its error."""
     size = sqrt(abs(state.wave) ** 2 + state.error**2)
     return state.wave / abs(state.wave) * size if abs(state.wave) > 0 else complex(size)
 
 
-def _share(states: Sequence[State], goal: float, removal_error: float, gain_error: float) -> float:
+def _share(states: Sequence[ExpectedSplit], goal: float, removal_error: float, gain_error: float) -> float:
     """The largest share that leaves no split on the far side of 0 by more than the goal, `SURE` errors of the gain allowed for."""
     spread = SURE * sqrt(gain_error**2 + removal_error**2 / 4)
     shares = [(s.hertz + goal / 2) / (s.hertz * (1 + spread)) for s in states if s.hertz > goal / 2]
@@ -222,7 +222,7 @@ def _share(states: Sequence[State], goal: float, removal_error: float, gain_erro
 
 
 def _least_mass(
-    states: Sequence[State], sites: Sites, share: float, capacity: Array, unbalance: Mapping[int, complex]
+    states: Sequence[ExpectedSplit], sites: Sites, share: float, capacity: Array, unbalance: Mapping[int, complex]
 ) -> Array:
     count = len(sites.azimuth)
     rows: list[Array] = []

@@ -18,7 +18,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from shell.assembly import build_system
-from shell.blocks import Boundary, Mesh
+from shell.blocks import Support, Mesh
 from shell.errors import ShellError
 from shell.layout import Chain
 from shell.levels import Level
@@ -133,7 +133,7 @@ def _cut_section(resonator: Resonator, layers: int, spacing: float) -> Pieces:
     return _join(grids, held)
 
 
-def _cells_across(boundary: Boundary) -> int:
+def _cells_across(boundary: Support) -> int:
     """How many cells of a solid part lie on the cross-section that it shares with the shell."""
     return max((int(np.isfinite(eta).sum()) - 1 for eta in boundary.heights), default=1)
 
@@ -151,7 +151,7 @@ def _divide_chain(resonator: Resonator, chain: Chain, layers: int, spacing: floa
 
 
 def _divide_cells(
-    mesh: Mesh, boundary: Boundary, count: int, grids: list[Array], held: list[NDArray[np.bool_]]
+    mesh: Mesh, boundary: Support, count: int, grids: list[Array], held: list[NDArray[np.bool_]]
 ) -> None:
     along = nodal(mesh.grid.shape[2] - 1, np.linspace(-1.0, 1.0, 2 * count + 1)).values
     outside = np.bincount(mesh.edges.ravel()) == 1

@@ -61,7 +61,7 @@ class Judged:
 
 
 @dataclass(frozen=True)
-class Spectrum:
+class Stability:
     """Allan deviation of an output with the noise coefficients read off it."""
 
     allan: AllanDeviation
@@ -81,8 +81,8 @@ class BiasStudy:
     runs: tuple[BiasRun, ...]
     judged: tuple[Judged, ...]
     model: Model
-    before: Spectrum | None
-    after: Spectrum | None
+    before: Stability | None
+    after: Stability | None
     allan_step: float
     no_held_out: str
 
@@ -172,11 +172,11 @@ def study_bias(
     return BiasStudy(output, column, tuple(runs), tuple(judged), model, spectra[0], spectra[1], step, why)
 
 
-def _spectrum(values: Array, step: float) -> Spectrum | None:
+def _spectrum(values: Array, step: float) -> Stability | None:
     if values.size < FEWEST_FOR_ALLAN:
         return None
     allan = allan_deviation(values, step)
-    return Spectrum(allan, fit_noise(allan))
+    return Stability(allan, fit_noise(allan))
 
 
 def choose_width(records: Sequence[Record]) -> float:

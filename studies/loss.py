@@ -15,8 +15,8 @@ if TYPE_CHECKING:
 
     from shell.damping.anchor import Unbalance
     from shell.damping.anisotropy import Complex, Ripple
-    from shell.damping.budget import Budget, Cause, Vibration
-    from shell.damping.film import Film
+    from shell.damping.budget import Budget, LossCause, Vibration
+    from shell.damping.film import LossyFilm
     from shell.damping.heat import Heat
     from shell.elastic import Elastic
     from shell.levels import Theory
@@ -43,7 +43,7 @@ class LossModel:
     """
 
     vibration: "Vibration"
-    causes: "tuple[Cause, ...]"
+    causes: "tuple[LossCause, ...]"
     left_out: tuple[str, ...]
     ripples: "tuple[Ripple, ...]"
     bryan_factor: float
@@ -89,7 +89,7 @@ def loss_model(
     parts: LossParts = instrument.part("loss", "loss_parts")
     spread = _relative_sds(instrument)
     heat, lacking = _heat_law(instrument)
-    causes: list[Cause] = []
+    causes: list[LossCause] = []
     left_out: list[str] = []
     ripples: list[Ripple] = []
     with naming(f"{instrument.path} [loss]"):
@@ -169,7 +169,7 @@ def settled_loss(instrument: "Instrument", temperature: float) -> "tuple[float, 
 NODE_STEP = 4.0  # K, for the narrowest activated peaks
 
 
-def _thermoelastic(instrument: "Instrument", vibration: "Vibration", heat: "Callable[[float], Heat]") -> "Cause":
+def _thermoelastic(instrument: "Instrument", vibration: "Vibration", heat: "Callable[[float], Heat]") -> "LossCause":
     from shell.damping.budget import thermoelastic_cause
 
     T0, material = instrument.reference_temperature, instrument.material
@@ -208,7 +208,7 @@ def _heat_law(instrument: "Instrument") -> "tuple[Callable[[float], Heat] | None
 
 def _of_material(
     instrument: "Instrument", parts: "LossParts", spread: Mapping[str, float], left_out: list[str]
-) -> "list[Cause]":
+) -> "list[LossCause]":
     """Loss of the bulk and of the surface, from the card or the table."""
     from shell.damping.budget import bulk_cause, surface_cause
     from shell.damping.sources import known_losses
@@ -244,7 +244,7 @@ def _film(
     where: str,
     name: str,
     spread: Mapping[str, float],
-) -> "tuple[list[Cause], list[Ripple]]":
+) -> "tuple[list[LossCause], list[Ripple]]":
     """A film's causes of loss, and how they vary around."""
     from shell.damping.anisotropy import Ripple, film_weight
     from shell.damping.budget import film_causes
@@ -278,7 +278,7 @@ def _film(
         return causes, waves
 
 
-def _renamed(causes: "list[Cause]", waves: "list[Ripple]", number: int) -> "tuple[list[Cause], list[Ripple]]":
+def _renamed(causes: "list[LossCause]", waves: "list[Ripple]", number: int) -> "tuple[list[LossCause], list[Ripple]]":
     """Tell a second film of the same material apart by its number."""
     return (
         [replace(cause, name=f"{cause.name} ({number})") for cause in causes],
@@ -286,7 +286,7 @@ def _renamed(causes: "list[Cause]", waves: "list[Ripple]", number: int) -> "tupl
     )
 
 
-def _surface_ripple(parts: "LossParts", vibration: "Vibration", causes: "Sequence[Cause]") -> "list[Ripple]":
+def _surface_ripple(parts: "LossParts", vibration: "Vibration", causes: "Sequence[LossCause]") -> "list[Ripple]":
     from shell.damping.anisotropy import Ripple, surface_weight
 
     if parts.surface_anisotropy is None or not any(cause.name == "surface" for cause in causes):
@@ -311,15 +311,15 @@ def _unbalance(resonator: "Resonator", elastic: "Elastic") -> "Unbalance":
     return unbalance_loss(_solve(resonator, elastic, 2, "solid"), elastic)
 
 
-def _build_film(keys: "FilmKeys", numbers: Mapping[str, Any]) -> "Film":
-    from shell.damping.film import Film
+def _build_film(keys: "FilmKeys", numbers: Mapping[str, Any]) -> "LossyFilm":
+    from shell.damping.film import LossyFilm
     from shell.damping.heat import Heat
 
     heat = None
     if all(numbers[key] is not None for key in FILM_HEAT):
         capacity = numbers["density_kg_m3"] * numbers["heat_capacity_J_per_kg_K"]
         heat = Heat(numbers["expansion_per_K"], capacity, numbers["conductivity_W_per_m_K"])
-    return Film(
+    return LossyFilm(
         1e-9 * keys.thickness_nm,
         1e9 * numbers["youngs_modulus_GPa"],
         numbers["poisson_ratio"],
@@ -333,7 +333,7 @@ def _build_film(keys: "FilmKeys", numbers: Mapping[str, Any]) -> "Film":
 
 def _others(
     vibration: "Vibration", parts: "LossParts", spread: Mapping[str, float], left_out: list[str]
-) -> "list[Cause]":
+) -> "list[LossCause]":
     """Gas, activated losses, and what leaves through the mount as the card gives it."""
     from scipy.constants import zero_Celsius
 
@@ -361,7 +361,7 @@ MOUNT_ADVICE = "a longer or thinner stem, a stiffer joint, balance of the rim's 
 
 def _anchor(
     instrument: "Instrument", mode: "Mode", rim: tuple[complex, complex], spread: Mapping[str, float], balanced: bool
-) -> "tuple[list[Cause], list[Ripple]]":
+) -> "tuple[list[LossCause], list[Ripple]]":
     """What the stem sends into a half-space of the resonator's own material: of the balanced mode, and of its imbalance."""
     from shell.damping.anchor import anchor_loss
     from shell.damping.anisotropy import Ripple

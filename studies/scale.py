@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.constants import zero_Celsius
 
-from compensation.bell import Chain, apply_chain
-from compensation.bell_calibration import Run, fit_chain
+from compensation.bell import BellChain, apply_chain
+from compensation.bell_calibration import BellRun, fit_chain
 from compensation.decimation import average_blocks
 from compensation.linearity import measure_linearity, same_rate
 from compensation.samples import is_regular
@@ -57,8 +57,8 @@ class ScaleStudy:
     `averaged` tells that a run was long and the fit, and this error, are of its block averages.
     """
 
-    chain: Chain
-    runs: tuple[Run, Run, Run]
+    chain: BellChain
+    runs: tuple[BellRun, BellRun, BellRun]
     output: str
     temperature_column: str
     left_out: int
@@ -68,7 +68,7 @@ class ScaleStudy:
     averaged: bool
 
 
-def judge_steps(chain: Chain, rates: Run, rest: Run, turning: Run) -> list[StepFigures]:
+def judge_steps(chain: BellChain, rates: BellRun, rest: BellRun, turning: BellRun) -> list[StepFigures]:
     """Return the figures of merit after each step, on any three runs; after the filter only where rows are even."""
     runs = (rates, rest, turning)
     even = all(is_regular(run.time) for run in runs)
@@ -112,7 +112,7 @@ def study_scale(records: "Sequence[Record]", cutoff: float | None, order: int) -
     """
     output = choose_column(records, RAW, "a fit of the scale")
     column = choose_column(records, TEMPERATURES, "a fit of the scale over temperature")
-    sorted_runs: dict[str, tuple[Run, str]] = {}
+    sorted_runs: dict[str, tuple[BellRun, str]] = {}
     left_out = 0
     for record in records:
         run, missing = _read_run(record, output, column)
@@ -148,7 +148,7 @@ KINDS = {
 }
 
 
-def _classify(run: Run, path: str) -> str:
+def _classify(run: BellRun, path: str) -> str:
     several, at_rest, turning = KINDS
     swept = float(np.ptp(run.temperature)) > SWEPT
     if np.ptp(run.rate) > max(LARGEST_REST * DEG, STEADY * np.max(np.abs(run.rate))):
@@ -160,7 +160,7 @@ def _classify(run: Run, path: str) -> str:
     return at_rest if abs(np.mean(run.rate)) <= LARGEST_REST * DEG else turning
 
 
-def _read_run(record: "Record", output: str, column: str) -> tuple[Run, int]:
+def _read_run(record: "Record", output: str, column: str) -> tuple[BellRun, int]:
     if "rate_deg_per_s" not in record:
         raise InputError(f"{record.path}: the column 'rate_deg_per_s' is missing; add the applied rate, 0 at rest.")
     columns = [record["time_s"], record[output], record[column], record["rate_deg_per_s"]]
@@ -169,10 +169,10 @@ def _read_run(record: "Record", output: str, column: str) -> tuple[Run, int]:
     if np.count_nonzero(complete) < 2:
         raise InputError(f"{record.path}: no rows with {output}, {column} and rate_deg_per_s together.")
     time, raw, temperature, rate = (values[complete] for values in columns)
-    return Run(time, raw, temperature + zero_Celsius, rate * DEG), int(np.count_nonzero(~complete))
+    return BellRun(time, raw, temperature + zero_Celsius, rate * DEG), int(np.count_nonzero(~complete))
 
 
-def _thin(run: Run) -> Run:
+def _thin(run: BellRun) -> BellRun:
     """Return a long run as block averages for the fit, without the blocks in which the applied rate changes."""
     if len(run.time) <= MOST_ROWS:
         return run
@@ -188,10 +188,10 @@ def _thin(run: Run) -> Run:
     blocks = average_blocks(run.time, columns, width)
     mean = blocks.columns
     steady = mean["square"] - mean["level"] ** 2 <= 1e-9 * np.max(level**2, initial=1e-30)
-    return Run(*(values[steady] for values in (blocks.time, mean["output"], mean["temperature"], mean["rate"])))
+    return BellRun(*(values[steady] for values in (blocks.time, mean["output"], mean["temperature"], mean["rate"])))
 
 
-def _hold_out(runs: tuple[Run, Run, Run]) -> tuple[float, float]:
+def _hold_out(runs: tuple[BellRun, BellRun, BellRun]) -> tuple[float, float]:
     """Rms error (°/s) of the rough and of the compensated rate on fifths of every run that the fit has not seen."""
     before, after = [], []
     for block in range(BLOCKS):
@@ -205,12 +205,14 @@ def _hold_out(runs: tuple[Run, Run, Run]) -> tuple[float, float]:
     return errors[0], errors[1]
 
 
-def _cut(run: Run, block: int) -> tuple[Run, Run]:
+def _cut(run: BellRun, block: int) -> tuple[BellRun, BellRun]:
     """The run without one fifth, and that fifth."""
     chosen = np.array_split(np.arange(len(run.time)), BLOCKS)[block]
     inside = np.zeros(len(run.time), dtype=bool)
     inside[chosen] = True
-    parts = [Run(run.time[rows], run.output[rows], run.temperature[rows], run.rate[rows]) for rows in (~inside, inside)]
+    parts = [
+        BellRun(run.time[rows], run.output[rows], run.temperature[rows], run.rate[rows]) for rows in (~inside, inside)
+    ]
     return parts[0], parts[1]
 
 

@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 from shell.errors import ShellError
 from shell.imperfection import CoupledHarmonics, Imperfection, Pair, Split, find_split
 from shell.modes import solve_modes
-from shell.scan.alignment import Motion, align
+from shell.scan.alignment import RigidMotion, align
 from shell.scan.projection import Projector, check_unit
 from shell.scan.survey import Face, survey, survey_map
 from studies.errors import InputError
-from studies.files.clouds import Grid, Unit, read_cloud
+from studies.files.clouds import FaceGrid, Unit, read_cloud
 
 if TYPE_CHECKING:
     from shell.elastic import Elastic
@@ -28,7 +28,7 @@ DRAWS = 4000
 
 
 @dataclass(frozen=True)
-class Interval:
+class ScanInterval:
     """A value with its 90 % interval."""
 
     value: float
@@ -45,9 +45,9 @@ class SplitOfScan:
     """
 
     split: Split
-    hertz: Interval
-    relative: Interval
-    slow_axis: Interval | None
+    hertz: ScanInterval
+    relative: ScanInterval
+    slow_axis: ScanInterval | None
     error: float
     whole: Split
 
@@ -59,7 +59,7 @@ class Wave:
     quantity: str
     order: int
     position: float
-    amplitude: Interval
+    amplitude: ScanInterval
     azimuth: float
 
 
@@ -129,7 +129,7 @@ def scan_faces(
             f"the split of n = {max(harmonics)} comes from wave {2 * max(harmonics)}: fit up to it (--highest)."
         )
     read = {name: read_cloud(path, unit) for name, path in files.items()}
-    clouds = {name: cloud for name, cloud in read.items() if not isinstance(cloud, Grid)}
+    clouds = {name: cloud for name, cloud in read.items() if not isinstance(cloud, FaceGrid)}
     projector = Projector(resonator) if clouds else None
     faces: dict[str, Face] = {}
     for name, points in clouds.items():
@@ -137,7 +137,7 @@ def scan_faces(
     if clouds and projector is not None:
         say("aligning the faces")
         together = [list(clouds)] if frames == "common" else [[name] for name in clouds]
-        motions: dict[str, Motion] = {}
+        motions: dict[str, RigidMotion] = {}
         for names in together:
             motion = align([(clouds[name], SIDES[name]) for name in names], projector, [files[name] for name in names])
             motions |= dict.fromkeys(names, motion)
@@ -145,7 +145,7 @@ def scan_faces(
             say(f"fitting the {name} face: {len(points)} points")
             faces[name] = survey(points, SIDES[name], motions[name], projector, files[name], highest)
     for name, cloud in read.items():
-        if isinstance(cloud, Grid):
+        if isinstance(cloud, FaceGrid):
             faces[name] = survey_map(cloud.position, cloud.azimuth, cloud.values, SIDES[name], files[name], highest)
     faces = {name: faces[name] for name in ("inner", "outer") if name in faces}
     _check_wall(faces, resonator)
@@ -183,30 +183,30 @@ def _split(pair: Pair, coupled: CoupledHarmonics, faces: dict[str, Face], imperf
     first = find_split(pair, imperfection)
     relative, axis = polar_intervals(first.wave, covariance, 2 * n)
     f = pair.mode.frequency
-    hertz = Interval(f * relative.value, f * relative.low, f * relative.high)
+    hertz = ScanInterval(f * relative.value, f * relative.low, f * relative.high)
     if axis is not None:
         half = pi / (2 * n)
-        axis = Interval(first.slow_axis, axis.low + half, axis.high + half)
+        axis = ScanInterval(first.slow_axis, axis.low + half, axis.high + half)
         turn = round((axis.value - (axis.low + axis.high) / 2) / (pi / n)) * pi / n
-        axis = Interval(axis.value, axis.low + turn, axis.high + turn)
+        axis = ScanInterval(axis.value, axis.low + turn, axis.high + turn)
     error = float(np.sqrt(np.trace(covariance) / 2))
     return SplitOfScan(first, hertz, relative, axis, error, coupled.solve(imperfection))
 
 
-def polar_intervals(wave: complex, covariance: Array, fold: int) -> tuple[Interval, Interval | None]:
+def polar_intervals(wave: complex, covariance: Array, fold: int) -> tuple[ScanInterval, ScanInterval | None]:
     """90 % intervals of |z| and arg z/fold of a complex number with Gaussian errors; no axis where 0 is within its error."""
     draws = np.random.default_rng(7).standard_normal((DRAWS, 2)) @ np.linalg.cholesky(covariance + 1e-300 * np.eye(2)).T
     z = wave + draws[:, 0] + 1j * draws[:, 1]
     tails = [50 * (1 - COVERAGE), 50 * (1 + COVERAGE)]
     low, high = (float(q) for q in np.percentile(abs(z), tails))
     told = abs(wave) ** 2 > 6 * float(np.trace(covariance)) / 2
-    size = Interval(abs(wave), low if told else 0.0, high)
+    size = ScanInterval(abs(wave), low if told else 0.0, high)
     if not told:
         return size, None
     turned = np.angle(z / wave)
     a, b = (float(q) for q in np.percentile(turned, tails))
     at = float(np.angle(wave))
-    return size, Interval(at / fold, (at + a) / fold, (at + b) / fold)
+    return size, ScanInterval(at / fold, (at + a) / fold, (at + b) / fold)
 
 
 def _waves(faces: dict[str, Face]) -> tuple[Wave, ...]:
@@ -230,7 +230,7 @@ def _wave(faces: dict[str, Face], quantity: str, order: int, position: float) ->
         c, covariance = c + factor * one, covariance + factor**2 * own
     if order == 0:
         sd = 1.645 * float(np.sqrt(covariance[0, 0]))
-        return Wave(quantity, 0, position, Interval(c.real, c.real - sd, c.real + sd), 0.0)
+        return Wave(quantity, 0, position, ScanInterval(c.real, c.real - sd, c.real + sd), 0.0)
     size, _ = polar_intervals(c, covariance, order)
     return Wave(quantity, order, position, size, float(np.angle(c) / order % (2 * pi / order)))
 

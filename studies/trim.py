@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from shell.errors import ShellError
 from shell.imperfection import Pair
 from shell.modes import solve_modes
-from shell.trimming import Plan, Reading, Sites, plan_trim
+from shell.trimming import Sites, SplitReading, TrimPlan, plan_trim
 from studies.errors import InputError
 
 if TYPE_CHECKING:
@@ -134,7 +134,7 @@ def plan_for_card(
     gain_error: float = 0.03,
     gain: float = 1.0,
     unbalance: Mapping[int, complex] | None = None,
-) -> tuple[Plan, Sites]:
+) -> tuple[TrimPlan, Sites]:
     """A plan for splits measured on a card's resonator.
 
     Parameters
@@ -159,7 +159,7 @@ def plan_for_card(
         if n in pairs:
             raise InputError(f"the split of n = {n} is given twice.")
         pairs[n] = Pair(solve_modes(resonator, elastic, n)[0])
-    readings = [Reading.of(n, pairs[n].mode.frequency, split, axis, error) for n, split, axis, error in measured]
+    readings = [SplitReading.of(n, pairs[n].mode.frequency, split, axis, error) for n, split, axis, error in measured]
     largest = max(readings, key=lambda reading: reading.hertz)
     sites = (
         tooth_sites(pairs, teeth)

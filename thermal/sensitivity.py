@@ -25,7 +25,7 @@ BEND_STEP = 0.5  # K, half the central difference of a capacity over temperature
 
 
 @dataclass(frozen=True)
-class Change:
+class NetworkChange:
     """How a network changes with one value: derivatives of its matrices; all zero unless given.
 
     Attributes
@@ -53,17 +53,19 @@ class Change:
 
 def no_change(
     network: Network, boundaries: Mapping[str, Profile] | None = None, initial: Array | None = None
-) -> Change:
+) -> NetworkChange:
     """Return a change that leaves the network as it is: of the boundaries or of the initial state alone."""
     n, N = network.count, len(network.names)
     zero = np.zeros((N, N))
-    return Change(zero, zero, np.zeros(n), np.zeros(n), boundaries or {}, initial)
+    return NetworkChange(zero, zero, np.zeros(n), np.zeros(n), boundaries or {}, initial)
 
 
-def difference(above: Network, below: Network, step: float, time: float = 0.0, temperature: float = 293.15) -> Change:
+def difference(
+    above: Network, below: Network, step: float, time: float = 0.0, temperature: float = 293.15
+) -> NetworkChange:
     """Change from two networks of the same nodes built half a `step` above and below a value."""
     C1, C0 = (network.capacities(np.full(network.count, temperature)) for network in (above, below))
-    return Change(
+    return NetworkChange(
         (above.conduction - below.conduction) / step,
         (above.radiation - below.radiation) / step,
         np.log(C1 / C0) / step,
@@ -72,7 +74,7 @@ def difference(above: Network, below: Network, step: float, time: float = 0.0, t
 
 
 @dataclass(frozen=True)
-class Response:
+class ObservedSums:
     """Sums of node temperatures at the rows, and their derivatives.
 
     Attributes
@@ -92,9 +94,9 @@ def respond(
     boundaries: Mapping[str, Profile],
     time: ArrayLike,
     weights: Array,
-    changes: Sequence[Change] = (),
+    changes: Sequence[NetworkChange] = (),
     departure: Array | None = None,
-) -> Response:
+) -> ObservedSums:
     """Temperatures of a network at the rows, with derivatives by every change.
 
     Parameters
@@ -119,8 +121,8 @@ def respond(
     T, rate = _observe(swept, boundaries, rows, weights)
     if not changes:
         empty = np.zeros((0, *T.shape))
-        return Response(T, rate, empty, empty)
-    return Response(T, rate, *_Slopes(swept, steady, changes).at(rows, weights))
+        return ObservedSums(T, rate, empty, empty)
+    return ObservedSums(T, rate, *_Slopes(swept, steady, changes).at(rows, weights))
 
 
 def _observe(swept: Sweep, boundaries: Mapping[str, Profile], rows: Array, weights: Array) -> tuple[Array, Array]:
@@ -152,7 +154,7 @@ def _observe_block(swept: Sweep, boundaries: Mapping[str, Profile], rows: Array,
 class _Slopes:
     """Derivatives at all moments of the grid, found by sweeping."""
 
-    def __init__(self, swept: Sweep, steady: Array, changes: Sequence[Change]) -> None:
+    def __init__(self, swept: Sweep, steady: Array, changes: Sequence[NetworkChange]) -> None:
         self.swept = swept
         network, linear = swept.network, swept.linear
         n = self.count = network.count
@@ -177,7 +179,7 @@ class _Slopes:
                 return
         raise SweepError("the derivatives of the temperatures do not converge; the radiation is too strong.")
 
-    def _hold(self, change: Change) -> Array:
+    def _hold(self, change: NetworkChange) -> Array:
         """Changes of the boundaries at all moments, (3, K, boundaries)."""
         grid, names = self.swept.grid, [b.name for b in self.swept.network.boundaries]
         held = np.zeros((*grid.moments.shape, len(names)))
@@ -185,7 +187,7 @@ class _Slopes:
             held[..., names.index(name)] = hold({name: profile}, (name,), grid.knots, measured=True)[..., 0]
         return held
 
-    def _force(self, change: Change) -> Array:
+    def _force(self, change: NetworkChange) -> Array:
         """What one change does at fixed temperatures (W), (3, K, n)."""
         swept, n = self.swept, self.count
         push = np.zeros_like(self.flow)
@@ -214,7 +216,7 @@ class _Slopes:
         return np.moveaxis(slope, 1, 0), np.moveaxis(rate, 1, 0)
 
 
-def _initial_slope(network: Network, steady: Array, change: Change) -> Array:
+def _initial_slope(network: Network, steady: Array, change: NetworkChange) -> Array:
     """∂T(0)/∂p (n,), of the steady state before the profiles begin and of the departure from it."""
     n = network.count
     held = np.zeros(len(network.names))

@@ -7,7 +7,7 @@ import numpy as np
 from shell.assembly import assemble, lay_resonator
 from shell.blocks import mesh_solid
 from shell.damping.base import lay_half_space
-from shell.damping.radiation import Radiating, Waves, assemble_waves, radiating_mode
+from shell.damping.radiation import Radiating, RadiatingBody, assemble_waves, radiating_mode
 from shell.elastic import Elastic, VaryingElastic
 from shell.errors import ShellError
 from shell.modes import Mode
@@ -107,7 +107,7 @@ def _solved(mode: Mode) -> Solution:
     return mode.solution
 
 
-def _stand(mode: Mode, elastic: Elastic | VaryingElastic, base: Elastic | None, n: int) -> tuple[System, Waves]:
+def _stand(mode: Mode, elastic: Elastic | VaryingElastic, base: Elastic | None, n: int) -> tuple[System, RadiatingBody]:
     """The resonator on its half-space, for motion of harmonic n at the mode's frequency."""
     resonator, solution = mode.resonator, _solved(mode)
     assert resonator is not None

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import ArrayLike
 
-from shell.damping.faces import Surface
+from shell.damping.faces import FreeFaces
 from shell.errors import ShellError
 from shell.quadrature import Array
 
@@ -15,7 +15,7 @@ def bulk_loss(coefficient: float, exponent: float, frequency: float) -> float:
     return float(coefficient * frequency**exponent)
 
 
-def surface_loss(depth: float, surfaces: tuple[Surface, ...], strain_energy: float) -> float:
+def surface_loss(depth: float, surfaces: tuple[FreeFaces, ...], strain_energy: float) -> float:
     """1/Q = (d φ_s) ∫ σ : ε dA / ∫ σ : ε dV, energy of the mode at its surfaces, which a ratio S/V misses threefold in bending.
 
     Parameters

@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from shell.damping.budget import Budget
-from shell.damping.faces import Surface
-from shell.damping.film import Film
+from shell.damping.faces import FreeFaces
+from shell.damping.film import LossyFilm
 from shell.errors import ShellError
 from shell.quadrature import Array
 
@@ -77,7 +77,7 @@ def map_wave(theta: ArrayLike, values: ArrayLike, order: int) -> tuple[float, fl
     return float(np.hypot(cosine, sine) / fitted[0]), float(np.arctan2(sine, cosine) / order)
 
 
-def film_weight(film: Film, faces: tuple[Surface, ...]) -> float:
+def film_weight(film: LossyFilm, faces: tuple[FreeFaces, ...]) -> float:
     """κ of a film's own loss: its normal strains against its twist."""
     lam, G = film.E * film.nu / (1 - film.nu**2), film.E / (2 * (1 + film.nu))
     return _weight(
@@ -93,7 +93,7 @@ def film_weight(film: Film, faces: tuple[Surface, ...]) -> float:
     )
 
 
-def surface_weight(surfaces: tuple[Surface, ...]) -> float:
+def surface_weight(surfaces: tuple[FreeFaces, ...]) -> float:
     """κ of the surface's loss; on roots the shears γ_12 and γ_23, about the axis, are those that vary as sine."""
     pairs = []
     for surface in surfaces:

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from shell.damping.anelastic import activated_loss, bulk_loss, surface_loss
-from shell.damping.faces import Surface, free_surfaces, shell_faces
-from shell.damping.film import Film, check_film, film_internal_loss, film_thermoelastic_loss
+from shell.damping.faces import FreeFaces, free_surfaces, shell_faces
+from shell.damping.film import LossyFilm, check_film, film_internal_loss, film_thermoelastic_loss
 from shell.damping.gas import Gas, gas_loss, mean_free_path
 from shell.damping.heat import Heat
 from shell.damping.thermoelastic import heat_flow
@@ -45,12 +45,12 @@ class Vibration:
         return cls(mode.solution, mode.resonator, material, reference)
 
     @cached_property
-    def faces(self) -> tuple[Surface, Surface]:
+    def faces(self) -> tuple[FreeFaces, FreeFaces]:
         """Inner and outer face."""
         return shell_faces(self.solution)
 
     @cached_property
-    def surfaces(self) -> tuple[Surface, ...]:
+    def surfaces(self) -> tuple[FreeFaces, ...]:
         """All free surfaces."""
         return free_surfaces(self.solution, self.resonator)
 
@@ -82,7 +82,7 @@ HeatLaw = Callable[[float], Heat]
 
 
 @dataclass(frozen=True)
-class Cause:
+class LossCause:
     """One cause of loss: its name, 1/Q at temperatures (K), relative standard uncertainty, source.
 
     `advice` says what lowers it.
@@ -96,7 +96,7 @@ class Cause:
 
 
 @dataclass(frozen=True, eq=False)
-class Part:
+class LossPart:
     """One part of a budget over its temperatures: 1/Q and d ln(1/Q)/dT (1/K), with relative uncertainty and source."""
 
     name: str
@@ -117,7 +117,7 @@ class Budget:
     """1/Q of one mode over temperatures (K), and its parts, largest first."""
 
     temperatures: Array
-    parts: tuple[Part, ...]
+    parts: tuple[LossPart, ...]
 
     @property
     def inverse_q(self) -> Array:
@@ -143,12 +143,12 @@ class Budget:
         return np.asarray(sum(part.slope * part.inverse_q for part in self.parts) / self.inverse_q)
 
     @property
-    def first(self) -> Part:
+    def first(self) -> LossPart:
         """The part to attack first: the largest on the mean."""
         return self.parts[0]
 
     @property
-    def least_known(self) -> Part:
+    def least_known(self) -> LossPart:
         """The part whose uncertainty is largest."""
         return max(self.parts, key=lambda part: float(np.mean(part.inverse_q)) * part.relative_sd)
 
@@ -159,7 +159,7 @@ class Budget:
             return np.asarray(1 / rest)
 
 
-def loss_budget(vibration: Vibration, causes: Sequence[Cause], temperatures: ArrayLike) -> Budget:
+def loss_budget(vibration: Vibration, causes: Sequence[LossCause], temperatures: ArrayLike) -> Budget:
     """Sum the causes over temperatures (K).
 
     Raises
@@ -177,13 +177,13 @@ def loss_budget(vibration: Vibration, causes: Sequence[Cause], temperatures: Arr
         now, before, after = np.split(cause.inverse_q(vibration, everywhere), 3)
         with np.errstate(divide="ignore", invalid="ignore"):
             slope = np.where(now > 0, (after - before) / (high - low) / now, 0.0)
-        parts.append(Part(cause.name, now, slope, cause.relative_sd, cause.source, cause.advice))
+        parts.append(LossPart(cause.name, now, slope, cause.relative_sd, cause.source, cause.advice))
     return Budget(T, tuple(sorted(parts, key=lambda part: -float(np.mean(part.inverse_q)))))
 
 
 def thermoelastic_cause(
     vibration: Vibration, heat: HeatLaw, relative: tuple[float, float, float], source: str
-) -> Cause:
+) -> LossCause:
     """Heat through the wall; `relative` are the relative uncertainties of expansion, capacity and conductivity."""
     T = vibration.reference
     at = heat(T)
@@ -203,12 +203,12 @@ def thermoelastic_cause(
         return np.array(found)
 
     advice = "a wall thinner or thicker than the heat's path, or a material that expands less"
-    return Cause("thermoelastic", inverse_q, float(np.hypot(sd, 0.02)), source, advice)
+    return LossCause("thermoelastic", inverse_q, float(np.hypot(sd, 0.02)), source, advice)
 
 
-def bulk_cause(coefficient: float, exponent: float, relative_sd: float, source: str) -> Cause:
+def bulk_cause(coefficient: float, exponent: float, relative_sd: float, source: str) -> LossCause:
     """Loss of the material's volume, c f^b."""
-    return Cause(
+    return LossCause(
         "bulk",
         lambda v, T: np.array([bulk_loss(coefficient, exponent, omega / (2 * np.pi)) for omega in v.omega(T)]),
         relative_sd,
@@ -217,9 +217,9 @@ def bulk_cause(coefficient: float, exponent: float, relative_sd: float, source: 
     )
 
 
-def surface_cause(depth: float, relative_sd: float, source: str) -> Cause:
+def surface_cause(depth: float, relative_sd: float, source: str) -> LossCause:
     """Loss of the damaged surface, of depth times loss (m)."""
-    return Cause(
+    return LossCause(
         "surface",
         lambda v, T: np.full(len(T), surface_loss(depth, v.surfaces, v.strain_energy)),
         relative_sd,
@@ -228,7 +228,9 @@ def surface_cause(depth: float, relative_sd: float, source: str) -> Cause:
     )
 
 
-def film_causes(name: str, film: Film, heat: HeatLaw | None, relative: tuple[float, float], source: str) -> list[Cause]:
+def film_causes(
+    name: str, film: LossyFilm, heat: HeatLaw | None, relative: tuple[float, float], source: str
+) -> list[LossCause]:
     """A film's own loss, and the heat between it and the wall where both materials' heat is known.
 
     `relative` are the relative uncertainties of thickness and of the film's loss.
@@ -239,7 +241,7 @@ def film_causes(name: str, film: Film, heat: HeatLaw | None, relative: tuple[flo
         return np.full(len(T), film_internal_loss(film, v.faces, v.strain_energy))
 
     found = [
-        Cause(
+        LossCause(
             f"film {name}",
             internal,
             float(np.hypot(*relative)),
@@ -260,12 +262,14 @@ def film_causes(name: str, film: Film, heat: HeatLaw | None, relative: tuple[flo
 
         sd = float(np.hypot(relative[0], 0.2))  # films differ from the bulk whose constants they are given
         found.append(
-            Cause(f"film {name}, heat", thermoelastic, sd, source, "a thinner film, or a metal that expands less")
+            LossCause(f"film {name}, heat", thermoelastic, sd, source, "a thinner film, or a metal that expands less")
         )
     return found
 
 
-def gas_cause(vibration: Vibration, gas: Gas, pressure: float, relative_sd: float, accommodation: float = 1.0) -> Cause:
+def gas_cause(
+    vibration: Vibration, gas: Gas, pressure: float, relative_sd: float, accommodation: float = 1.0
+) -> LossCause:
     """Gas at a pressure (Pa, with its relative uncertainty) at the reference temperature, sealed in: p ∝ T.
 
     The formula itself is uncertain by a tenth where molecules fly far against the radius, else by a half.
@@ -292,7 +296,7 @@ def gas_cause(vibration: Vibration, gas: Gas, pressure: float, relative_sd: floa
             ]
         )
 
-    return Cause(
+    return LossCause(
         "gas",
         inverse_q,
         float(np.hypot(relative_sd, model_sd)),
@@ -301,11 +305,11 @@ def gas_cause(vibration: Vibration, gas: Gas, pressure: float, relative_sd: floa
     )
 
 
-def activated_cause(height: float, energy: float, peak: float, relative_sd: float, source: str) -> Cause:
+def activated_cause(height: float, energy: float, peak: float, relative_sd: float, source: str) -> LossCause:
     """A Debye peak of height 1/Q at T_p (K) with an activation energy (eV)."""
     if not height >= 0:
         raise ShellError(f"the height of an activated loss must be 0 or positive, not {height:g}.")
-    return Cause(
+    return LossCause(
         "activated",
         lambda v, T: activated_loss(height, energy, peak, T),
         relative_sd,
@@ -314,11 +318,11 @@ def activated_cause(height: float, energy: float, peak: float, relative_sd: floa
     )
 
 
-def constant_cause(name: str, inverse_q: float, relative_sd: float, source: str, advice: str = "") -> Cause:
+def constant_cause(name: str, inverse_q: float, relative_sd: float, source: str, advice: str = "") -> LossCause:
     """A loss that does not change with temperature."""
     if not inverse_q >= 0:
         raise ShellError(f"the loss '{name}' must be 0 or positive, not {inverse_q:g}.")
-    return Cause(name, lambda v, T: np.full(len(T), inverse_q), relative_sd, source, advice)
+    return LossCause(name, lambda v, T: np.full(len(T), inverse_q), relative_sd, source, advice)
 
 
 def _interval(value: Array, relative_sd: Array | float) -> tuple[Array, Array]:

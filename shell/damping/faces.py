@@ -22,7 +22,7 @@ SIDES = ((None, -1.0), (None, 1.0), (-1.0, None), (1.0, None))  # (ξ, η) held 
 
 
 @dataclass(frozen=True, eq=False)
-class Surface:
+class FreeFaces:
     """A free surface of the body as a mode moves it: arrays over quadrature points.
 
     Attributes
@@ -55,9 +55,9 @@ class Surface:
         return float(np.sum(density * self.area))
 
 
-def shell_faces(solution: Solution) -> tuple[Surface, Surface]:
+def shell_faces(solution: Solution) -> tuple[FreeFaces, FreeFaces]:
     """The inner and the outer face of the shell, without roots and corners; free of traction, so in plane stress."""
-    found: tuple[list[Surface], list[Surface]] = ([], [])
+    found: tuple[list[FreeFaces], list[FreeFaces]] = ([], [])
     for group, c, q in zip(solution.system.groups, solution.constants, solution.unknowns, strict=True):
         if not isinstance(group, ShellGroup):
             continue
@@ -72,7 +72,7 @@ def shell_faces(solution: Solution) -> tuple[Surface, Surface]:
             s, theta, twist = (strain[:, :, row, k] for row in (0, 1, 3))
             energy = lam * (s + theta) ** 2 + G * (2 * s**2 + 2 * theta**2 + twist**2)
             found[k].append(
-                Surface(
+                FreeFaces(
                     name,  # type: ignore[arg-type]
                     section.position.ravel(),
                     area[..., k].ravel(),
@@ -87,9 +87,9 @@ def shell_faces(solution: Solution) -> tuple[Surface, Surface]:
     return inner, outer
 
 
-def free_surfaces(solution: Solution, resonator: Resonator) -> tuple[Surface, ...]:
+def free_surfaces(solution: Solution, resonator: Resonator) -> tuple[FreeFaces, ...]:
     """Every free surface: both faces, free edges, and the open sides of roots, corners and stem."""
-    found: list[Surface] = [*shell_faces(solution)]
+    found: list[FreeFaces] = [*shell_faces(solution)]
     for group, c, q in zip(solution.system.groups, solution.constants, solution.unknowns, strict=True):
         if isinstance(group, ShellGroup):
             found += [
@@ -100,7 +100,7 @@ def free_surfaces(solution: Solution, resonator: Resonator) -> tuple[Surface, ..
     return tuple(found)
 
 
-def _edge(solution: Solution, resonator: Resonator, group: ShellGroup, c: Constants, q: Array, end: int) -> Surface:
+def _edge(solution: Solution, resonator: Resonator, group: ShellGroup, c: Constants, q: Array, end: int) -> FreeFaces:
     """The face across the thickness where the shell ends."""
     level = solution.system.level
     element = slice(0, 1) if end == 0 else slice(len(q) - 1, len(q))
@@ -116,7 +116,7 @@ def _edge(solution: Solution, resonator: Resonator, group: ShellGroup, c: Consta
     return _surface("edge", table, there, q[element], area)
 
 
-def _sides(solution: Solution, group: SolidGroup, c: Constants, q: Array) -> list[Surface]:
+def _sides(solution: Solution, group: SolidGroup, c: Constants, q: Array) -> list[FreeFaces]:
     """The open sides of solid cells, without what is held."""
     mesh, boundary = group.place.mesh, group.place.boundary
     degree = mesh.grid.shape[2] - 1
@@ -146,13 +146,13 @@ def _sides(solution: Solution, group: SolidGroup, c: Constants, q: Array) -> lis
     return found
 
 
-def _surface(kind: Kind, table: StrainTable | CellTable, c: Constants, q: Array, area: Array) -> Surface:
+def _surface(kind: Kind, table: StrainTable | CellTable, c: Constants, q: Array, area: Array) -> FreeFaces:
     strain, moved = table.strains(q), table.displacements(q)
     stress = c.stress(table, strain)
     E, nu = (np.broadcast_to(field[..., None], area.shape).ravel() for field in (c.E, c.nu))
     position = np.broadcast_to(table.position[..., None], area.shape).ravel()
     energy = np.sum(stress * strain, axis=2).ravel()
-    return Surface(kind, position, area.ravel(), _points(strain), energy, _points(moved), E, nu)
+    return FreeFaces(kind, position, area.ravel(), _points(strain), energy, _points(moved), E, nu)
 
 
 def _rows(field: Array) -> Array:
@@ -165,8 +165,8 @@ def _points(field: Array) -> Array:
     return np.moveaxis(field, 2, 0).reshape(field.shape[2], -1)
 
 
-def _join(parts: list[Surface]) -> Surface:
+def _join(parts: list[FreeFaces]) -> FreeFaces:
     fields = ("position", "area", "strain", "energy", "moved", "E", "nu")
-    return Surface(
+    return FreeFaces(
         parts[0].kind, *(np.concatenate([getattr(part, name) for part in parts], axis=-1) for name in fields)
     )

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from shell.damping.faces import Surface
+from shell.damping.faces import FreeFaces
 from shell.damping.heat import Heat
 from shell.errors import ShellError, mm
 from shell.quadrature import Array
@@ -25,7 +25,7 @@ THICKEST = 0.05  # film over wall up to which it follows the face and leaves the
 
 
 @dataclass(frozen=True)
-class Film:
+class LossyFilm:
     """A film on the faces of the shell.
 
     Attributes
@@ -61,13 +61,13 @@ class Film:
                 f"a film lies on inner, outer or both faces, not on {', '.join(sorted(unknown)) or 'none'}."
             )
 
-    def carries(self, face: Surface) -> Array:
+    def carries(self, face: FreeFaces) -> Array:
         """Covered share at the points of a face."""
         there = (face.position >= self.span[0]) & (face.position <= self.span[1])
         return np.asarray(self.coverage * there * (face.kind in self.faces))
 
 
-def check_film(film: Film, wall: float) -> None:
+def check_film(film: LossyFilm, wall: float) -> None:
     """Refuse a film that is not thin against the thinnest wall (m)."""
     if film.thickness >= wall:
         raise ShellError(
@@ -80,14 +80,14 @@ def check_film(film: Film, wall: float) -> None:
         )
 
 
-def film_energy(film: Film, face: Surface) -> Array:
+def film_energy(film: LossyFilm, face: FreeFaces) -> Array:
     """σ_f : ε of the film per volume of film, plane stress, at the points of a face (J/m³)."""
     s, theta, twist = face.strain[0], face.strain[1], face.strain[3]
     lam, G = film.E * film.nu / (1 - film.nu**2), film.E / (2 * (1 + film.nu))
     return np.asarray(lam * (s + theta) ** 2 + G * (2 * s**2 + 2 * theta**2 + twist**2))
 
 
-def film_internal_loss(film: Film, faces: tuple[Surface, ...], strain_energy: float) -> float:
+def film_internal_loss(film: LossyFilm, faces: tuple[FreeFaces, ...], strain_energy: float) -> float:
     """1/Q of the film's own loss.
 
     Parameters
@@ -101,7 +101,7 @@ def film_internal_loss(film: Film, faces: tuple[Surface, ...], strain_energy: fl
 
 
 def film_thermoelastic_loss(
-    film: Film, faces: tuple[Surface, ...], strain_energy: float, wall: Heat, temperature: float, omega: float
+    film: LossyFilm, faces: tuple[FreeFaces, ...], strain_energy: float, wall: Heat, temperature: float, omega: float
 ) -> float:
     """1/Q of the heat that flows between film and wall (formula above), at a temperature (K) and ω (rad/s)."""
     if film.heat is None or film.thickness == 0:
@@ -123,7 +123,7 @@ def exchange(thickness: float, film: Heat, wall: Heat, omega: float) -> float:
     return float(np.real(a * b / (a + b)))
 
 
-def thickness_power(film: Film, wall: Heat, omega: float) -> float:
+def thickness_power(film: LossyFilm, wall: Heat, omega: float) -> float:
     """Power of the thickness with which the heat's loss grows: 2 of a thin film, whose heat meets no resistance within."""
     if film.heat is None:
         raise ShellError("a film without heat constants has no thermoelastic loss.")

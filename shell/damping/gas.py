@@ -21,7 +21,7 @@ from math import pi, sqrt
 import numpy as np
 from numpy.typing import ArrayLike
 
-from shell.damping.faces import Surface
+from shell.damping.faces import FreeFaces
 from shell.errors import ShellError
 from shell.quadrature import Array
 
@@ -57,7 +57,7 @@ GASES = {
 
 
 def gas_loss(
-    faces: tuple[Surface, ...],
+    faces: tuple[FreeFaces, ...],
     kinetic: float,
     harmonic: int,
     gas: Gas,
@@ -87,7 +87,7 @@ def gas_loss(
 
 
 def free_molecular_loss(
-    faces: tuple[Surface, ...],
+    faces: tuple[FreeFaces, ...],
     kinetic: float,
     gas: Gas,
     pressure: float,
@@ -116,7 +116,7 @@ def free_impedance(pressure: ArrayLike, molar_mass: float, temperature: ArrayLik
 
 
 def viscous_loss(
-    faces: tuple[Surface, ...],
+    faces: tuple[FreeFaces, ...],
     kinetic: float,
     harmonic: int,
     gas: Gas,

@@ -65,7 +65,7 @@ class Radiating:
 
 
 @dataclass(frozen=True, eq=False)
-class Waves:
+class RadiatingBody:
     """Complex stiffness and mass of body and base on free unknowns, and the body's part of the mass."""
 
     stiffness: csc_matrix
@@ -91,7 +91,7 @@ class Waves:
         return Radiating(float(np.sqrt(eigenvalue.real) / (2 * np.pi)), inverse_q, body / m_r)
 
 
-def radiating_mode(waves: Waves, frequency: float) -> Radiating:
+def radiating_mode(waves: RadiatingBody, frequency: float) -> Radiating:
     """The mode nearest to a frequency (Hz) that moves the body.
 
     Raises
@@ -119,7 +119,7 @@ def radiating_mode(waves: Waves, frequency: float) -> Radiating:
     )
 
 
-def assemble_waves(system: System, materials: Sequence[Elastic], bases: Sequence[Mask], layer: Layer) -> Waves:
+def assemble_waves(system: System, materials: Sequence[Elastic], bases: Sequence[Mask], layer: Layer) -> RadiatingBody:
     """Stiffness and mass of body and base.
 
     Parameters
@@ -134,7 +134,7 @@ def assemble_waves(system: System, materials: Sequence[Elastic], bases: Sequence
     for group, base in zip(system.groups, bases, strict=True):
         for k, elements in enumerate(_matrices(group, materials, base, layer, system.n)):
             total[k] = total[k] + _spread(group.unknowns, elements, size)
-    return Waves(*(csc_matrix(P.T @ one @ P) for one in total))
+    return RadiatingBody(*(csc_matrix(P.T @ one @ P) for one in total))
 
 
 def _matrices(

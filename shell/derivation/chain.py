@@ -11,7 +11,7 @@ from shell.derivation.symbols import n, omega, phi, phi_2, t
 
 
 @dataclass(frozen=True)
-class Case:
+class DerivedCase:
     """One harmonic and one polar range (exact angles, rad) for which the integrals are worked out."""
 
     harmonic: int = 2
@@ -19,7 +19,7 @@ class Case:
     end: sp.Expr = sp.pi / 2
 
     @classmethod
-    def from_degrees(cls, harmonic: int, start: float, end: float) -> "Case":
+    def from_degrees(cls, harmonic: int, start: float, end: float) -> "DerivedCase":
         """Return the case of a range in degrees: multiples of 30° exactly, others with enough digits to subtract.
 
         The closed forms of a small cap are small differences, and nested radicals of 7.5° help nobody.
@@ -62,7 +62,7 @@ class Step:
     equations: tuple[sp.Eq, ...]
 
 
-def steps(case: Case) -> list[Step]:
+def steps(case: DerivedCase) -> list[Step]:
     """Return the whole chain, HRG paper eqs. (1)–(15), for any n, with the numbers of one case before (15)."""
     return [*_elasticity(), *_mode(), *_frequency(), *_numbers(case), *_temperature()]
 
@@ -178,7 +178,7 @@ def _temperature() -> list[Step]:
     ]
 
 
-def _numbers(case: Case) -> list[Step]:
+def _numbers(case: DerivedCase) -> list[Step]:
     number, names = "14" if case.harmonic == 2 else "", f"I_{case.harmonic} J_{case.harmonic} K_{case.harmonic}"
     values = (case.bending, case.mass, case.precession)
     closed = (

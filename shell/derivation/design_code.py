@@ -10,7 +10,7 @@ from typing import Literal
 import sympy as sp
 
 from shell.derivation import frequency
-from shell.derivation.chain import Case
+from shell.derivation.chain import DerivedCase
 from shell.derivation.symbols import n, r
 
 PYTHON = Template('''\
@@ -116,7 +116,7 @@ double rayleigh_temperature_coefficient(double nu, const double slope[5], double
 """)
 
 
-def emit_code(case: Case, language: Literal["python", "c"]) -> str:
+def emit_code(case: DerivedCase, language: Literal["python", "c"]) -> str:
     """Return a module of Python or of C with the frequency, the Bryan factor and the derivatives of ln f."""
     template, write = (PYTHON, sp.pycode) if language == "python" else (C, sp.ccode)
     given = {

@@ -29,7 +29,7 @@ GIVEN = np.deg2rad(0.1)  # error of an axis that is taken as it is given
 
 
 @dataclass(frozen=True, eq=False)
-class Motion:
+class RigidMotion:
     """p -> rotation p + offset. `told` : which of the shifts x, y, z (m) and the turns about x, y the points tell.
 
     tilt_error : standard error of the turns where the shape does not tell them, rad.
@@ -50,7 +50,7 @@ class Motion:
         return float(np.arccos(np.clip(self.rotation[2, 2], -1.0, 1.0)))
 
 
-def align(clouds: Sequence[tuple[Array, int]], projector: Projector, names: Sequence[str]) -> Motion:
+def align(clouds: Sequence[tuple[Array, int]], projector: Projector, names: Sequence[str]) -> RigidMotion:
     """One motion for clouds of points that share a frame.
 
     Parameters
@@ -66,7 +66,7 @@ def align(clouds: Sequence[tuple[Array, int]], projector: Projector, names: Sequ
     """
     resonator = projector.resonator
     samples = [(points[:: max(1, len(points) // SAMPLE)], side) for points, side in clouds]
-    best: tuple[float, Motion] | None = None
+    best: tuple[float, RigidMotion] | None = None
     for start in _starts(samples, resonator):
         motion, left = _descend(samples, projector, start)
         if best is None or left < best[0]:
@@ -81,7 +81,7 @@ def align(clouds: Sequence[tuple[Array, int]], projector: Projector, names: Sequ
     return motion
 
 
-def _descend(samples: list[tuple[Array, int]], projector: Projector, start: Motion) -> tuple[Motion, float]:
+def _descend(samples: list[tuple[Array, int]], projector: Projector, start: RigidMotion) -> tuple[RigidMotion, float]:
     rotation, offset = start.rotation, start.offset
     size = projector.resonator.size
     told, left = np.zeros(5, dtype=bool), np.inf
@@ -109,7 +109,7 @@ def _descend(samples: list[tuple[Array, int]], projector: Projector, start: Moti
         left = spread
         if count > SETTLED and np.abs(step[:5]).max() < 1e-9 * size:
             break
-    return Motion(rotation, offset, tuple(bool(x) for x in told)), left  # type: ignore[arg-type]
+    return RigidMotion(rotation, offset, tuple(bool(x) for x in told)), left  # type: ignore[arg-type]
 
 
 def _normals(points: Array, side: int, projector: Projector) -> tuple[Array, Array]:
@@ -123,10 +123,10 @@ def _normals(points: Array, side: int, projector: Projector) -> tuple[Array, Arr
     return n, at.height - side * at.thickness / 2
 
 
-def _starts(samples: list[tuple[Array, int]], resonator: Resonator) -> list[Motion]:
+def _starts(samples: list[tuple[Array, int]], resonator: Resonator) -> list[RigidMotion]:
     """The frame as it is; else a dome's centre by the sphere through its points and its axis by their mean direction."""
     unknown = (False,) * 5
-    starts = [Motion(np.eye(3), np.zeros(3), unknown)]
+    starts = [RigidMotion(np.eye(3), np.zeros(3), unknown)]
     points = np.concatenate([points for points, _ in samples])
     line = resonator.sample(401)
     dome = resonator.segments[0]
@@ -136,12 +136,12 @@ def _starts(samples: list[tuple[Array, int]], resonator: Resonator) -> list[Moti
         axis = (points - center).mean(axis=0)
         nominal = float((line.r * (line.z - dome.center[1])).sum())
         spin = _turn(axis, np.array([0.0, 0.0, np.sign(nominal) or 1.0]))
-        starts.append(Motion(spin, np.array([0.0, 0.0, dome.center[1]]) - spin @ center, unknown))
+        starts.append(RigidMotion(spin, np.array([0.0, 0.0, dome.center[1]]) - spin @ center, unknown))
     middle = (np.percentile(points, 1, axis=0) + np.percentile(points, 99, axis=0)) / 2
     wanted = np.array([0.0, 0.0, (line.z.min() + line.z.max()) / 2])
-    starts.append(Motion(np.eye(3), wanted - middle, unknown))
+    starts.append(RigidMotion(np.eye(3), wanted - middle, unknown))
     flip = np.diag([1.0, -1.0, -1.0])
-    starts.append(Motion(flip, wanted - flip @ middle, unknown))
+    starts.append(RigidMotion(flip, wanted - flip @ middle, unknown))
     return starts
 
 
@@ -155,7 +155,7 @@ def _turn(one: Array, other: Array) -> Array:
     return np.asarray(Rotation.from_rotvec(axis / sine * np.arctan2(sine, cosine)).as_matrix())
 
 
-def _check(samples: list[tuple[Array, int]], projector: Projector, motion: Motion, names: Sequence[str]) -> None:
+def _check(samples: list[tuple[Array, int]], projector: Projector, motion: RigidMotion, names: Sequence[str]) -> None:
     for (points, side), name in zip(samples, names, strict=True):
         _, off = _normals(motion.apply(points), side, projector)
         h, middle = float(np.median(projector.line.thickness)), float(np.median(off))
@@ -173,7 +173,7 @@ def _check(samples: list[tuple[Array, int]], projector: Projector, motion: Motio
             )
 
 
-def _upright(clouds: Sequence[tuple[Array, int]], projector: Projector, motion: Motion) -> Motion:
+def _upright(clouds: Sequence[tuple[Array, int]], projector: Projector, motion: RigidMotion) -> RigidMotion:
     """Turn a dome about its centre until its points end at the same position all around.
 
     The edge is the lowest s = a + b cos θ + c sin θ above all points (a linear programme), so that gaps do no harm; it errs
@@ -184,21 +184,21 @@ def _upright(clouds: Sequence[tuple[Array, int]], projector: Projector, motion: 
     for _ in range(3):
         s, theta = _edge(clouds, projector, motion)
         if len(s) < SECTORS // 2 or s.max() < REACHED:
-            return Motion(motion.rotation, motion.offset, motion.told, GIVEN)
+            return RigidMotion(motion.rotation, motion.offset, motion.told, GIVEN)
         A = np.column_stack([np.ones(len(s)), np.cos(theta), np.sin(theta)])
         found = linprog([1.0, 0.0, 0.0], A_ub=-A, b_ub=-s, bounds=[(None, None)] * 3)
         if found.x is None:
-            return Motion(motion.rotation, motion.offset, motion.told, GIVEN)
+            return RigidMotion(motion.rotation, motion.offset, motion.told, GIVEN)
         tilt = found.x[1:] * resonator.length / resonator.size
         spin = Rotation.from_rotvec([tilt[1], -tilt[0], 0.0]).as_matrix()
         center = _center(resonator)
         # how far the sectors end below the edge: points are so far apart there, SECTORS times closer over the whole circle
         apart = float(np.median(A @ found.x - s)) * resonator.length / resonator.size / SECTORS
-        motion = Motion(spin @ motion.rotation, spin @ (motion.offset - center) + center, motion.told, 4 * apart)
+        motion = RigidMotion(spin @ motion.rotation, spin @ (motion.offset - center) + center, motion.told, 4 * apart)
     return motion
 
 
-def _edge(clouds: Sequence[tuple[Array, int]], projector: Projector, motion: Motion) -> tuple[Array, Array]:
+def _edge(clouds: Sequence[tuple[Array, int]], projector: Projector, motion: RigidMotion) -> tuple[Array, Array]:
     """The last point of every sector: position and azimuth."""
     s: list[Array] = []
     theta: list[Array] = []

@@ -18,7 +18,7 @@ from shell.errors import ShellError
 from shell.imperfection.field import Complex, Waves, fourier
 from shell.imperfection.pair import Density
 from shell.quadrature import Array, legendre
-from shell.scan.alignment import Motion
+from shell.scan.alignment import RigidMotion
 from shell.scan.projection import CHUNK, Projector
 
 ROWS, COLUMNS = 72, 288  # cells along the meridian and around
@@ -47,7 +47,7 @@ class Face:
     points: int
     outliers: int
     cells: tuple[Array, Array, Array, Array]
-    motion: Motion | None
+    motion: RigidMotion | None
     span: tuple[float, float] | None = None
 
     @property
@@ -141,7 +141,7 @@ class _Profile:
 
 
 def survey(
-    points: Array, side: int, motion: Motion, projector: Projector, name: str, highest: int = 12, degree: int = 7
+    points: Array, side: int, motion: RigidMotion, projector: Projector, name: str, highest: int = 12, degree: int = 7
 ) -> Face:
     """The waves of a face from its points (count, 3), m, in their own frame.
 
@@ -214,7 +214,7 @@ def _finish(
     span: tuple[float, float],
     size: tuple[int, int],
     numbers: tuple[int, int],
-    motion: Motion | None,
+    motion: RigidMotion | None,
     name: str,
     turning: tuple[float, float] | None = None,
 ) -> Face:

@@ -15,7 +15,7 @@ from studies.acceptance.measure import (
     measure_temperature,
     measure_warm_up,
 )
-from studies.acceptance.quantities import ELSEWHERE, QUANTITIES, Quantity
+from studies.acceptance.quantities import ELSEWHERE, QUANTITIES, TestedQuantity
 from studies.acceptance.runs import sort_records
 
 if TYPE_CHECKING:
@@ -26,13 +26,13 @@ Verdict = Literal["pass", "fail", "undecided", "no limit", "missing"]
 
 
 @dataclass(frozen=True)
-class Line:
+class JudgedQuantity:
     """One quantity: what was measured, its limit, and the verdict.
 
     `undecided`: the interval lies on both sides of the limit. `missing`: no record gives it.
     """
 
-    quantity: Quantity
+    quantity: TestedQuantity
     measured: Measured | None
     limit: float | None
 
@@ -63,7 +63,7 @@ class Line:
 class Acceptance:
     """All lines in the order of the standard, the tests that records cannot give, and what was done with every record."""
 
-    lines: tuple[Line, ...]
+    lines: tuple[JudgedQuantity, ...]
     elsewhere: tuple[tuple[str, str, str], ...]
     used: dict[str, str]
     band: float | None
@@ -102,7 +102,7 @@ def judge(records: "Sequence[Record]", limits: Limits, output: str = "bias_deg_p
         found |= more
     for record in sorted_runs.get("run-down", [])[:1]:
         found |= measure_run_down(record)
-    lines = tuple(Line(q, found.get(q.key), limits.limits.get(q.key)) for q in QUANTITIES)
+    lines = tuple(JudgedQuantity(q, found.get(q.key), limits.limits.get(q.key)) for q in QUANTITIES)
     used: dict[str, str] = {record.path: test for test, group in sorted_runs.items() for record in group}
     for test in ("warm-up", "scale-factor", "run-down"):
         for record in sorted_runs.get(test, [])[1:]:

@@ -14,7 +14,7 @@ from pathlib import Path
 
 from studies.acceptance.quantities import BY_KEY
 from studies.errors import InputError
-from studies.files.toml import Section, read_toml
+from studies.files.toml import TomlTable, read_toml
 
 SCHEMA = "hrg.limits/1"
 
@@ -36,7 +36,7 @@ def read_limits(path: str | Path) -> Limits:
     InputError
         A quantity that no acceptance test has, or a limit that is not a positive number.
     """
-    top = Section(read_toml(path, SCHEMA), str(path), ("schema", "limits", "warm_up"))
+    top = TomlTable(read_toml(path, SCHEMA), str(path), ("schema", "limits", "warm_up"))
     section = top.section("limits", BY_KEY)
     limits = {key: section.number(key, above=0.0) for key in section.values}
     if not limits:

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 
 @dataclass(frozen=True)
-class Quantity:
+class TestedQuantity:
     """One number of the test: its key in a file of limits, section of the standard, words, unit, and which side is good.
 
     `needs` says what record gives it; of an `upper` limit the size of the value must stay below it, of a lower one above.
@@ -26,36 +26,40 @@ RUN_DOWN = "a record with vibration_amplitude_V while the drive is off"
 SEAL = "two records or more with inverse_q and '# start', a day or more apart"
 
 QUANTITIES = (
-    Quantity("inverse_q_trend_per_year", "12.3", "growth of 1/Q, as a leak makes it", "1/year", SEAL),
-    Quantity("warm_up_time_s", "12.5–12.6", "warm-up time, into the band of the final output", "s", WARM),
-    Quantity("bias_temperature_slope_deg_per_h_per_K", "12.8", "bias over temperature", "deg/h/K", THERMAL),
-    Quantity(
+    TestedQuantity("inverse_q_trend_per_year", "12.3", "growth of 1/Q, as a leak makes it", "1/year", SEAL),
+    TestedQuantity("warm_up_time_s", "12.5–12.6", "warm-up time, into the band of the final output", "s", WARM),
+    TestedQuantity("bias_temperature_slope_deg_per_h_per_K", "12.8", "bias over temperature", "deg/h/K", THERMAL),
+    TestedQuantity(
         "bias_temperature_rate_deg_per_h_s_per_K", "12.8", "bias over rate of temperature", "deg/h/(K/s)", THERMAL
     ),
-    Quantity(
+    TestedQuantity(
         "bias_temperature_residual_deg_per_h", "12.8", "what both leave, rms of means over 100 s", "deg/h", THERMAL
     ),
-    Quantity("frequency_temperature_slope_ppm_per_K", "12.8", "frequency over temperature", "ppm/K", THERMAL),
-    Quantity("scale_factor_error_ppm", "12.9", "scale factor less one", "ppm", RATES),
-    Quantity("scale_factor_nonlinearity_ppm", "12.9", "largest departure from the line, of full scale", "ppm", RATES),
-    Quantity(
+    TestedQuantity("frequency_temperature_slope_ppm_per_K", "12.8", "frequency over temperature", "ppm/K", THERMAL),
+    TestedQuantity("scale_factor_error_ppm", "12.9", "scale factor less one", "ppm", RATES),
+    TestedQuantity(
+        "scale_factor_nonlinearity_ppm", "12.9", "largest departure from the line, of full scale", "ppm", RATES
+    ),
+    TestedQuantity(
         "scale_factor_asymmetry_ppm", "12.9", "scale factor of positive less that of negative rates", "ppm", RATES
     ),
-    Quantity("bias_deg_per_h", "12.11", "bias", "deg/h", REST),
-    Quantity(
+    TestedQuantity("bias_deg_per_h", "12.11", "bias", "deg/h", REST),
+    TestedQuantity(
         "bias_repeatability_deg_per_h",
         "12.11",
         "bias from run to run, standard deviation",
         "deg/h",
         REST + ", twice or more",
     ),
-    Quantity("angle_random_walk_deg_per_rt_h", "12.11", "angle random walk", "deg/√h", REST),
-    Quantity(
+    TestedQuantity("angle_random_walk_deg_per_rt_h", "12.11", "angle random walk", "deg/√h", REST),
+    TestedQuantity(
         "bias_instability_deg_per_h", "12.11", "bias instability, lowest Allan deviation over 0.664", "deg/h", REST
     ),
-    Quantity("rate_random_walk_deg_per_h_per_rt_h", "12.11", "rate random walk", "deg/h/√h", REST),
-    Quantity("run_down_time_s", "12.14", "run-down time, to 1/e of the amplitude", "s", RUN_DOWN, upper=False),
-    Quantity("quality_factor", "12.14", "Q, from the run-down", "", RUN_DOWN + ", and its frequency_Hz", upper=False),
+    TestedQuantity("rate_random_walk_deg_per_h_per_rt_h", "12.11", "rate random walk", "deg/h/√h", REST),
+    TestedQuantity("run_down_time_s", "12.14", "run-down time, to 1/e of the amplitude", "s", RUN_DOWN, upper=False),
+    TestedQuantity(
+        "quality_factor", "12.14", "Q, from the run-down", "", RUN_DOWN + ", and its frequency_Hz", upper=False
+    ),
 )
 BY_KEY = {quantity.key: quantity for quantity in QUANTITIES}
 

@@ -59,7 +59,7 @@ def derive(
     """
     from math import radians
 
-    from shell.derivation.chain import Case, steps
+    from shell.derivation.chain import DerivedCase, steps
     from shell.derivation.design_code import emit_code
     from shell.derivation.emit import HRG_TITLE, emit_latex, emit_text
     from shell.rayleigh import rayleigh_integrals
@@ -86,7 +86,7 @@ def derive(
             f"--harmonic {harmonic}: closed forms are derived up to n = {MOST_HARMONIC}; choose a lower one."
         )
     shape = rayleigh_integrals(harmonic, radians(pole_angle_deg), radians(rim_angle_deg))
-    case = Case.from_degrees(harmonic, pole_angle_deg, rim_angle_deg)
+    case = DerivedCase.from_degrees(harmonic, pole_angle_deg, rim_angle_deg)
     # On a cap of a thousandth of a degree a hundred digits do not suffice to evaluate the closed forms.
     for closed, integral in ((case.bending, shape.I), (case.mass, shape.J)):
         if abs(complex(closed.evalf(20)) / integral - 1) > 1e-9:

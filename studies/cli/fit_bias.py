@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any, Literal
 from studies.cli.output import Answer, answers
 
 if TYPE_CHECKING:
-    from studies.bias import BiasStudy, Judged, Spectrum
+    from studies.bias import BiasStudy, Judged, Stability
 
 
 @answers("hrg.fit-bias/1")
@@ -147,7 +147,7 @@ def _judged(judged: "Judged") -> dict[str, Any]:
     }
 
 
-def _spectrum(spectrum: "Spectrum") -> dict[str, Any]:
+def _spectrum(spectrum: "Stability") -> dict[str, Any]:
     noise, allan = spectrum.noise, spectrum.allan
     return {
         "tau_s": allan.tau, "deviation": allan.deviation, "low": allan.low, "high": allan.high,

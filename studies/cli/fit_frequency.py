@@ -80,10 +80,10 @@ def fit_frequency(
     if save is not None:
         from pathlib import Path
 
-        from studies.models import Source, write_model
+        from studies.models import ModelSource, write_model
         from studies.models.kinds.frequency import save_frequency
 
-        source = Source(Path(table).name, sha256, len(f))
+        source = ModelSource(Path(table).name, sha256, len(f))
         write_model(save_frequency(study.fit, (source,), "hrg-workbench, hrg fit frequency"), save)
         say(f"model: {save}")
     if report is not None:

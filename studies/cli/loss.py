@@ -14,7 +14,7 @@ from cyclopts import Parameter
 from studies.cli.output import Answer, answers
 
 if TYPE_CHECKING:
-    from shell.damping.budget import Budget, Part
+    from shell.damping.budget import Budget, LossPart
     from studies.instrument.card import Instrument
     from studies.loss import LossModel
 
@@ -143,7 +143,7 @@ def _stated(instrument: "Instrument", model: "LossModel") -> "dict[str, Any] | N
     }
 
 
-def _part(part: "Part") -> "dict[str, Any]":
+def _part(part: "LossPart") -> "dict[str, Any]":
     low, high = part.interval
     return {
         "name": part.name,

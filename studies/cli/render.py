@@ -9,7 +9,7 @@ from studies.cli.output import Answer, answers
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from studies.reports.scenes import Field, Shown
+    from studies.reports.scenes import ShellTemperature, Shown
 
 KINDS = (".png", ".webp", ".gif", ".html", ".glb", ".stl", ".ply")
 MOST = 4  # resonators in one picture
@@ -136,7 +136,7 @@ def _picture(
     shown: "Sequence[Shown]",
     kind: str,
     colour: Literal["displacement", "energy", "temperature"],
-    field: "Field | None",
+    field: "ShellTemperature | None",
     view: Literal["oblique", "axis", "side"],
 ) -> bytes:
     from shell.render import NoOpenGL, render_animation, render_png
@@ -171,7 +171,7 @@ def _mesh(
     one: "Shown",
     kind: str,
     colour: Literal["displacement", "energy", "temperature"],
-    field: "Field | None",
+    field: "ShellTemperature | None",
     swing_mm: float | None,
 ) -> bytes:
     from shell.mesh import encode_animation, encode_mesh

@@ -15,7 +15,7 @@ from studies.cli.output import Answer, answers
 
 if TYPE_CHECKING:
     from studies.instrument.card import Instrument
-    from studies.scan import Interval, Scan
+    from studies.scan import Scan, ScanInterval
 
 NONE = "none"
 
@@ -155,7 +155,7 @@ def scan(
 def _payload(found: "Scan", name: str, temperature: float, files: dict[str, str]) -> dict[str, Any]:
     import numpy as np
 
-    def of(interval: "Interval | None", factor: float) -> dict[str, float] | None:
+    def of(interval: "ScanInterval | None", factor: float) -> dict[str, float] | None:
         if interval is None:
             return None
         return {key: factor * getattr(interval, key) for key in ("value", "low", "high")}

@@ -6,7 +6,7 @@ from studies.cli.output import Answer, answers
 
 if TYPE_CHECKING:
     from studies.sweeps.results import Results
-    from studies.sweeps.run import Estimate
+    from studies.sweeps.run import Effort
 
 SOLVERS = {"full": "each solved in full", "family": "interpolated between full solves"}
 
@@ -209,7 +209,7 @@ def _print_reasons(results: "Results") -> None:
         print_table("Failed cases", ["cases", "reason"], [[str(count), reason] for reason, count in reasons])
 
 
-def _estimate_words(estimate: "Estimate") -> str:
+def _estimate_words(estimate: "Effort") -> str:
     return (
         f"{estimate.cases} cases in {estimate.batches} batches, {SOLVERS[estimate.solver]}"
         + (f" ({estimate.why_full})" if estimate.why_full else "")

@@ -14,7 +14,7 @@ from cyclopts import Parameter
 from studies.cli.output import Answer, answers
 
 if TYPE_CHECKING:
-    from shell.trimming import Plan, State
+    from shell.trimming import ExpectedSplit, TrimPlan
 
 MANY = Parameter(consume_multiple=True)
 
@@ -185,7 +185,7 @@ def trim(
         say(sentence)
 
 
-def measure_between(plan: "Plan") -> list[str]:
+def measure_between(plan: "TrimPlan") -> list[str]:
     """What to measure between the rounds, and what to make of it."""
     found = []
     for k, one in enumerate(plan.rounds[:-1], 1):
@@ -273,7 +273,7 @@ def _unbalance(words: tuple[str, ...]) -> dict[int, complex]:
     return found
 
 
-def _state(state: "State") -> dict[str, Any]:
+def _state(state: "ExpectedSplit") -> dict[str, Any]:
     from math import degrees
 
     return {

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from compensation.frequency import fit_frequency
 from studies.instrument.card import load_card
-from studies.models import Source, compensate, emit_c
+from studies.models import ModelSource, compensate, emit_c
 from studies.models.kinds.frequency import save_frequency
 from studies.simulation.chamber import load_profile
 from studies.simulation.virtual_gyro import simulate_run
@@ -32,7 +32,7 @@ def calibrate_and_apply() -> Outcome:
     record = staircase.record
     settled = np.searchsorted(record["time_s"], STEP * np.arange(1, 8)) - 1
     T, f = record["housing_temperature_degC"][settled], record["frequency_Hz"][settled]
-    model = save_frequency(fit_frequency(T, f), (Source("staircase", "", len(T)),), "example")
+    model = save_frequency(fit_frequency(T, f), (ModelSource("staircase", "", len(T)),), "example")
     result = compensate(model, ramp, extrapolate=True)
     return Outcome(_spread(ramp["frequency_Hz"]), _spread(result["compensated_frequency_Hz"]), emit_c(model))
 

@@ -19,7 +19,7 @@ RADIUS = 15e-3
 WANTED = 5000.0  # Hz
 
 
-class Design(NamedTuple):
+class DesignedWall(NamedTuple):
     """Thickness (m) by Rayleigh's formula and by the solver, and the frequency (Hz) that the solver gives the first."""
 
     by_formula: float
@@ -27,7 +27,7 @@ class Design(NamedTuple):
     frequency: float
 
 
-def choose_thickness() -> Design:
+def choose_thickness() -> DesignedWall:
     """Solve f(h) = 5 kHz for a free hemisphere, n = 2."""
     formula = frequency(sp.Integer(2))
     print("HRG paper, eq. (14):  f =", formula)
@@ -44,7 +44,7 @@ def choose_thickness() -> Design:
 
     by_formula = brentq(lambda h: float(in_hertz(h)) - WANTED, 0.2e-3, 3e-3)
     by_solver = brentq(lambda h: solved(h) - WANTED, by_formula, 1.5 * by_formula, xtol=1e-9)
-    return Design(by_formula, by_solver, solved(by_formula))
+    return DesignedWall(by_formula, by_solver, solved(by_formula))
 
 
 if __name__ == "__main__":

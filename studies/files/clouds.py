@@ -21,7 +21,7 @@ GRID = "position"  # the first cell of a table
 
 
 @dataclass(frozen=True, eq=False)
-class Grid:
+class FaceGrid:
     """How far a face stands out of the material, m, (positions, azimuths); NaN where nothing was measured."""
 
     position: "Array"
@@ -29,7 +29,7 @@ class Grid:
     values: "Array"
 
 
-def read_cloud(path: str | Path, unit: Unit = "mm") -> "Array | Grid":
+def read_cloud(path: str | Path, unit: Unit = "mm") -> "Array | FaceGrid":
     """Points (count, 3) in m, or a table.
 
     Text files have x, y, z in the first three columns, apart by blanks, commas, semicolons or tabs; lines that start with #
@@ -104,7 +104,7 @@ def _read_mesh(path: Path) -> "Array":
     return points
 
 
-def _read_grid(path: Path, skipped: int) -> Grid:
+def _read_grid(path: Path, skipped: int) -> FaceGrid:
     import numpy as np
     import pandas as pd
 
@@ -130,4 +130,4 @@ def _read_grid(path: Path, skipped: int) -> Grid:
         raise InputError(f"{path}: every cell of the table is empty; there is nothing to fit.")
     if np.nanmax(abs(values)) > 2e-3:
         raise InputError(f"{path}: departures of {1e3 * np.nanmax(abs(values)):.3g} mm: the table's cells are in µm.")
-    return Grid(position[order], azimuth, values)
+    return FaceGrid(position[order], azimuth, values)

@@ -35,7 +35,7 @@ def read_toml(path: str | Path, schema: str | None = None) -> dict[str, Any]:
     return content
 
 
-class Section:
+class TomlTable:
     """One table of a TOML file, from which keys are taken by name and type until none may be left."""
 
     def __init__(self, values: Mapping[str, Any], where: str, known: Collection[str]) -> None:
@@ -71,19 +71,19 @@ class Section:
             raise InputError(f"{self.where}: {key} = '{value}' is unknown{nearest(value, choices)}")
         return value
 
-    def section(self, key: str, known: Collection[str]) -> "Section":
+    def section(self, key: str, known: Collection[str]) -> "TomlTable":
         """Take a sub-table."""
         value = self._take(key, None)
         if not isinstance(value, Mapping):
             raise InputError(f"{self.where}: {key} must be a table ([{key}]), not {value!r}.")
-        return Section(value, f"{self.where} [{key}]", known)
+        return TomlTable(value, f"{self.where} [{key}]", known)
 
-    def sections(self, key: str, known: Collection[str]) -> "list[Section]":
+    def sections(self, key: str, known: Collection[str]) -> "list[TomlTable]":
         """Take an array of tables; empty when the key is absent."""
         value = self.values.get(key, [])
         if not isinstance(value, list) or not all(isinstance(item, Mapping) for item in value):
             raise InputError(f"{self.where}: {key} must be an array of tables ([[{key}]]).")
-        return [Section(item, f"{self.where} [[{key}]] number {k}", known) for k, item in enumerate(value, 1)]
+        return [TomlTable(item, f"{self.where} [[{key}]] number {k}", known) for k, item in enumerate(value, 1)]
 
     def raw(self, key: str, default: Any = None) -> Any:
         """Take a value of any type, to be checked by the caller."""

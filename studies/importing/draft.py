@@ -15,7 +15,7 @@ from studies.importing.timing import TIME_WORDS, find_time
 from studies.importing.units import units_of
 
 if TYPE_CHECKING:
-    from studies.importing.join import Series
+    from studies.importing.join import ClockedFile
 
 MOST_SETTLED = 500  # rows of a table of settled readings
 
@@ -109,7 +109,7 @@ def _find_offsets(paths: Sequence[str], files: list[list[str]]) -> list[str]:
     return notes
 
 
-def _source_of(series: "Series", target: str) -> str:
+def _source_of(series: "ClockedFile", target: str) -> str:
     return next(f"'{column.source}'" for column in series.file.columns if column.target == target)
 
 

@@ -24,7 +24,7 @@ USUAL_GAP = 10.0  # sampling steps that a gap may have before nothing is interpo
 
 
 @dataclass(frozen=True)
-class Series:
+class ClockedFile:
     """One raw file after its own map: times by its clock, converted columns, and what was changed, in words."""
 
     file: FileMap
@@ -113,7 +113,7 @@ def _check_count(paths: Sequence[str], import_map: ImportMap) -> None:
         raise InputError(f"{import_map.path}: describes {wanted} raw files, but {len(paths)} are given.")
 
 
-def _report_gaps(one: Series) -> list[str]:
+def _report_gaps(one: ClockedFile) -> list[str]:
     """Say where the sampling of a file has gaps."""
     steps = np.diff(one.time)
     if not len(steps):
@@ -129,7 +129,7 @@ def _report_gaps(one: Series) -> list[str]:
     ]
 
 
-def read_series(path: str, file: FileMap) -> Series:
+def read_series(path: str, file: FileMap) -> ClockedFile:
     """Read one raw file: its clock corrected, its columns converted, rows without a time left out."""
     table = read_raw(path, file)
     times, rows = drop_repeated(table, read_times(table, file), file.repeated_times)
@@ -141,7 +141,7 @@ def read_series(path: str, file: FileMap) -> Series:
         *times.notes,
         *_report_overloads(table, file),
     )
-    return Series(file, str(path), times.seconds, times.origin, columns, notes)
+    return ClockedFile(file, str(path), times.seconds, times.origin, columns, notes)
 
 
 def _name_clock(file: FileMap) -> str:
@@ -220,7 +220,7 @@ def _bin_means(t: "Array", v: "Array", grid: "Array") -> "Array":
     return np.asarray(np.divide(total, count, out=np.full(len(grid), np.nan), where=count > 0))
 
 
-def _lay_grid(base: Series, import_map: ImportMap) -> "Array":
+def _lay_grid(base: ClockedFile, import_map: ImportMap) -> "Array":
     """Return the times of the record by the first file's clock: its own, or a regular grid over its range."""
     if import_map.step is None:
         return base.time
@@ -232,7 +232,7 @@ def _lay_grid(base: Series, import_map: ImportMap) -> "Array":
     return np.asarray(base.time[0] + import_map.step * np.arange(int(count)))
 
 
-def shift_between(base: Series, other: Series) -> float:
+def shift_between(base: ClockedFile, other: ClockedFile) -> float:
     """Return what must be added to the other file's times to bring them onto the first file's clock."""
     if base.origin is None and other.origin is None:
         return 0.0

@@ -46,7 +46,7 @@ from pathlib import Path
 from typing import Literal, cast
 
 from studies.errors import InputError, nearest
-from studies.files.toml import Section, read_toml
+from studies.files.toml import TomlTable, read_toml
 from studies.importing.units import SETTINGS, TARGETS, Unit, units_of
 
 SCHEMA = "hrg.map/1"
@@ -153,7 +153,7 @@ def load_map(path: str | Path) -> ImportMap:
     InputError
         Unknown keys, units or columns, missing or impossible values: the message names the place and the mend.
     """
-    top = Section(read_toml(path, SCHEMA), str(path), ("schema", "instrument", "source", "step_s", "target", "file"))
+    top = TomlTable(read_toml(path, SCHEMA), str(path), ("schema", "instrument", "source", "step_s", "target", "file"))
     is_table = top.text("target", "record", ("record", "table")) == "table"
     files = tuple(_read_file(section, is_table) for section in top.sections("file", FILE_KEYS))
     if not files:
@@ -173,7 +173,7 @@ def load_map(path: str | Path) -> ImportMap:
     return ImportMap(files, step, _text(top, "instrument"), _text(top, "source"), is_table, str(path))
 
 
-def _read_file(section: Section, is_table: bool) -> FileMap:
+def _read_file(section: TomlTable, is_table: bool) -> FileMap:
     where = section.where
     targets = TABLE_TARGETS if is_table else TARGETS
     columns = tuple(_read_column(part, targets) for part in section.sections("column", COLUMN_KEYS))
@@ -218,7 +218,7 @@ def _read_file(section: Section, is_table: bool) -> FileMap:
     )
 
 
-def _read_column(section: Section, targets: Sequence[str]) -> ColumnMap:
+def _read_column(section: TomlTable, targets: Sequence[str]) -> ColumnMap:
     target = section.text("to")
     if target not in targets:
         what = "table" if targets is TABLE_TARGETS else "record"
@@ -244,7 +244,7 @@ def _read_column(section: Section, targets: Sequence[str]) -> ColumnMap:
     return ColumnMap(section.text("from"), target, unit, scale, offset, sign, resample, settings, axis)
 
 
-def _read_time(section: Section) -> tuple[str, ...]:
+def _read_time(section: TomlTable) -> tuple[str, ...]:
     value = section.raw("time")
     names = [value] if isinstance(value, str) else value
     if not isinstance(names, list) or not names or not all(isinstance(name, str) for name in names):
@@ -252,7 +252,7 @@ def _read_time(section: Section) -> tuple[str, ...]:
     return tuple(names)
 
 
-def _read_time_format(section: Section) -> str:
+def _read_time_format(section: TomlTable) -> str:
     found = section.text("time_format")
     if "%" not in found and found not in TIME_FORMATS:
         raise InputError(
@@ -262,14 +262,14 @@ def _read_time_format(section: Section) -> str:
     return found
 
 
-def _read_missing(section: Section) -> tuple[str, ...]:
+def _read_missing(section: TomlTable) -> tuple[str, ...]:
     cells = section.raw("missing", [])
     if not isinstance(cells, list) or not all(isinstance(cell, str) for cell in cells):
         raise InputError(f"{section.where}: missing must be a list of texts, such as ['---'], not {cells!r}.")
     return tuple(cells)
 
 
-def _read_start(section: Section) -> datetime.datetime | None:
+def _read_start(section: TomlTable) -> datetime.datetime | None:
     if "start" not in section:
         return None
     value = section.raw("start")
@@ -283,7 +283,7 @@ def _read_start(section: Section) -> datetime.datetime | None:
     return value
 
 
-def _read_timezone(section: Section) -> str | None:
+def _read_timezone(section: TomlTable) -> str | None:
     if "timezone" not in section:
         return None
     import zoneinfo
@@ -299,12 +299,12 @@ def _read_timezone(section: Section) -> str | None:
     return name
 
 
-def _line(section: Section, key: str, default: int, least: int = 1) -> int:
+def _line(section: TomlTable, key: str, default: int, least: int = 1) -> int:
     value = section.raw(key, default)
     if isinstance(value, bool) or not isinstance(value, int) or not least <= value <= 10**9:
         raise InputError(f"{section.where}: {key} must be a line number from {least} up, not {value!r}.")
     return value
 
 
-def _text(section: Section, key: str) -> str:
+def _text(section: TomlTable, key: str) -> str:
     return " ".join(section.text(key).split()) if key in section else ""

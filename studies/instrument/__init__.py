@@ -2,7 +2,7 @@
 
 To add a table `[loop]`, or keys to a table that exists, add one file to `studies/instrument/tables/`:
 
-    class Loop(Table, frozen=True, kw_only=True):                                                   # keys = fields, in the units of their names
+    class Loop(Keys, frozen=True, kw_only=True):                                                   # keys = fields, in the units of their names
         \"\"\"What the table says.\"\"\"
 
         bandwidth_Hz: Annotated[float, number(above=0.0, relative_sd=0.3)] = 50.0   # bounds, and the documented uncertainty

@@ -19,7 +19,7 @@ from studies.files.reading import find_shipped, list_shipped
 from studies.files.toml import read_toml
 from studies.files.writing import write_text
 from studies.instrument.dotted import replaced
-from studies.instrument.keys import Table, number
+from studies.instrument.keys import Keys, number
 from studies.instrument.mending import read_keys
 from studies.instrument.registry import Place, ReadTable, card_tables, read_table
 from studies.instrument.uncertain import UncertainValue
@@ -32,14 +32,14 @@ if TYPE_CHECKING:
     from studies.instrument.tables.effect import EffectEntry
     from studies.instrument.tables.loop import Loop
     from studies.instrument.tables.loss import Loss
-    from studies.instrument.tables.noise import Noise
+    from studies.instrument.tables.noise import NoiseKeys
     from studies.instrument.tables.thermal import Thermal
     from thermal.resonator import HeatPath
 
 SCHEMA = "hrg.card/1"
 
 
-class Head(Table, frozen=True, kw_only=True):
+class Head(Keys, frozen=True, kw_only=True):
     """The keys of a card outside its tables."""
 
     schema: str
@@ -116,9 +116,9 @@ class Instrument:
         return self.part("loop") if "loop" in self.content else None
 
     @property
-    def noise(self) -> "Noise":
+    def noise(self) -> "NoiseKeys":
         """What a record is read with."""
-        found: Noise = self.part("noise")
+        found: NoiseKeys = self.part("noise")
         return found
 
     @property

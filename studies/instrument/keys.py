@@ -15,7 +15,7 @@ Path = tuple[str | int, ...]
 T = TypeVar("T")
 
 
-class Table(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+class Keys(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """A table of a card; its fields are the keys, in the units of their names."""
 
 

@@ -17,7 +17,7 @@ from functools import reduce
 from typing import TYPE_CHECKING, Annotated, Any
 
 from studies.errors import InputError
-from studies.instrument.keys import Path, Table, bounds, find, holds_number, number, priors
+from studies.instrument.keys import Keys, Path, bounds, find, holds_number, number, priors
 from studies.instrument.mending import read_keys, spell_place
 from studies.instrument.units import unit_of
 
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 LONGEST_DRAW = 10_000
 
 
-class Spread(Table, frozen=True, kw_only=True):
+class Spread(Keys, frozen=True, kw_only=True):
     """A number with its uncertainty, as a card writes it."""
 
     value: float

@@ -23,11 +23,11 @@ from numpy import isinf
 from compensation.errors import CompensationError
 from studies.errors import InputError, nearest
 from studies.models import kinds
-from studies.models.file import Model, Part, Source, format_model, make_part, read_model, write_model
+from studies.models.file import Model, ModelPart, ModelSource, format_model, make_part, read_model, write_model
 from studies.record import COMPENSATED, Record
 
 __all__ = [
-    "Model", "Part", "Source", "compensate", "emit_c", "format_model", "make_part", "model_kinds", "read_model",
+    "Model", "ModelPart", "ModelSource", "compensate", "emit_c", "format_model", "make_part", "model_kinds", "read_model",
     "source_of", "write_model",
 ]  # fmt: skip
 
@@ -37,11 +37,11 @@ def model_kinds() -> list[str]:
     return sorted(m.name.replace("_", "-") for m in iter_modules(kinds.__path__))
 
 
-def source_of(record: Record) -> Source:
+def source_of(record: Record) -> ModelSource:
     """Return what a model keeps of a record that it was fitted to: file name, hash of its bytes, rows."""
     from pathlib import Path
 
-    return Source(Path(record.path).name, record.sha256, len(record))
+    return ModelSource(Path(record.path).name, record.sha256, len(record))
 
 
 def compensate(model: Model, record: Record, *, extrapolate: bool = False) -> Record:

@@ -33,7 +33,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from studies.errors import InputError
-from studies.files.toml import Section, check_number, read_toml
+from studies.files.toml import TomlTable, check_number, read_toml
 from studies.files.writing import write_text
 
 if TYPE_CHECKING:
@@ -46,7 +46,7 @@ KEYS = ("schema", "kind", "compensates", "made_by", "settings", "validity", "par
 
 
 @dataclass(frozen=True)
-class Part:
+class ModelPart:
     """Coefficients that were fitted together: names, values, units (k,) and covariance (k, k), or none ()."""
 
     name: str
@@ -67,7 +67,7 @@ class Part:
 
 
 @dataclass(frozen=True)
-class Source:
+class ModelSource:
     """A record that a model was fitted to."""
 
     path: str
@@ -81,14 +81,14 @@ class Model:
 
     kind: str
     compensates: str
-    parts: tuple[Part, ...]
+    parts: tuple[ModelPart, ...]
     settings: Mapping[str, Setting] = field(default_factory=dict)
     validity: Mapping[str, tuple[float, float]] = field(default_factory=dict)
-    sources: tuple[Source, ...] = ()
+    sources: tuple[ModelSource, ...] = ()
     made_by: str = ""
     path: str = ""
 
-    def part(self, name: str) -> Part:
+    def part(self, name: str) -> ModelPart:
         """Return the part of that name.
 
         Raises
@@ -155,10 +155,10 @@ def make_part(
     values: "Sequence[float] | NDArray[np.float64]",
     units: Sequence[str],
     covariance: "NDArray[np.float64] | None" = None,
-) -> Part:
+) -> ModelPart:
     """Build a part from arrays."""
     rows = () if covariance is None else tuple(tuple(float(v) for v in row) for row in covariance)
-    return Part(name, tuple(names), tuple(float(v) for v in values), tuple(units), rows)
+    return ModelPart(name, tuple(names), tuple(float(v) for v in values), tuple(units), rows)
 
 
 def write_model(model: Model, path: str | Path) -> None:
@@ -204,7 +204,7 @@ def read_model(path: str | Path) -> Model:
     InputError
         Not such a file: the message names the key and the mend.
     """
-    top = Section(read_toml(path, SCHEMA), str(path), KEYS)
+    top = TomlTable(read_toml(path, SCHEMA), str(path), KEYS)
     parts = tuple(_read_part(section) for section in top.sections("part", ("name", "coefficients", "covariance")))
     if not parts:
         raise InputError(f"{path}: a model needs at least one [[part]] with coefficients.")
@@ -215,7 +215,7 @@ def read_model(path: str | Path) -> Model:
         settings=_read_settings(top),
         validity=_read_validity(top),
         sources=tuple(
-            Source(s.text("path"), s.text("sha256"), int(s.number("rows", least=0)))
+            ModelSource(s.text("path"), s.text("sha256"), int(s.number("rows", least=0)))
             for s in top.sections("source", ("path", "sha256", "rows"))
         ),
         made_by=top.text("made_by", ""),
@@ -223,7 +223,7 @@ def read_model(path: str | Path) -> Model:
     )
 
 
-def _read_settings(top: Section) -> dict[str, Setting]:
+def _read_settings(top: TomlTable) -> dict[str, Setting]:
     settings: dict[str, Setting] = {}
     if "settings" not in top:
         return settings
@@ -239,7 +239,7 @@ def _read_settings(top: Section) -> dict[str, Setting]:
     return settings
 
 
-def _read_validity(top: Section) -> dict[str, tuple[float, float]]:
+def _read_validity(top: TomlTable) -> dict[str, tuple[float, float]]:
     ranges: dict[str, tuple[float, float]] = {}
     if "validity" not in top:
         return ranges
@@ -255,7 +255,7 @@ def _read_validity(top: Section) -> dict[str, tuple[float, float]]:
     return ranges
 
 
-def _read_part(section: Section) -> Part:
+def _read_part(section: TomlTable) -> ModelPart:
     coefficients = section.sections("coefficients", ("name", "value", "unit"))
     if not coefficients:
         raise InputError(f"{section.where}: 'coefficients' needs at least one {{name, value, unit}}.")
@@ -271,7 +271,7 @@ def _read_part(section: Section) -> Part:
     rows = tuple(tuple(check_number(v, f"{section.where}: covariance") for v in row) for row in covariance)
     if any(row[k] < 0 for k, row in enumerate(rows)):
         raise InputError(f"{section.where}: covariance has a negative variance on its diagonal.")
-    return Part(
+    return ModelPart(
         section.text("name"),
         names,
         tuple(c.number("value") for c in coefficients),

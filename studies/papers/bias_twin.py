@@ -50,7 +50,7 @@ class TwinFit:
 
 
 @dataclass(frozen=True)
-class Spread:
+class GyroSpread:
     """Median and the 5 % and 95 % points over the gyros, and the part of them that got worse."""
 
     low: float
@@ -134,10 +134,10 @@ def study_twin(seed: int) -> tuple[TwinFit, ...]:
     return tuple(fits)
 
 
-def spread(gains: Sequence[float]) -> Spread:
+def spread(gains: Sequence[float]) -> GyroSpread:
     """Summarise improvements over many gyros."""
     low, median, high = np.percentile(gains, [5, 50, 95]).tolist()
-    return Spread(low, median, high, float(np.mean(np.asarray(gains) < 1)))
+    return GyroSpread(low, median, high, float(np.mean(np.asarray(gains) < 1)))
 
 
 @cache

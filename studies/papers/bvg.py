@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.constants import zero_Celsius
 
-from compensation.bell import Chain, Curve, invert_chain
-from compensation.bell_calibration import Run, fit_chain
+from compensation.bell import BellChain, PolynomialCurve, invert_chain
+from compensation.bell_calibration import BellRun, fit_chain
 from compensation.fir import design_smoother
 from compensation.linearity import measure_linearity
 from studies.scale import StepFigures, judge_steps
@@ -36,16 +36,16 @@ PRINTED = {
 }
 
 
-def read_printed_chain() -> Chain:
+def read_printed_chain() -> BellChain:
     """Return the chain with the printed coefficients (rough scale 0.0242, as eq. (33) has it), valid everywhere."""
     text = (files("studies.papers") / "bvg_compensation.csv").read_text(encoding="utf-8")
     lines = [line.split(",") for line in text.splitlines() if line and not line.startswith(("#", "quantity"))]
     row = {name: np.array([float(value) for value in values]) for name, *values in lines}
 
-    def curve(coefficients: Real, reference: float) -> Curve:
-        return Curve(coefficients, np.zeros((3, 3)), reference, -np.inf, np.inf)
+    def curve(coefficients: Real, reference: float) -> PolynomialCurve:
+        return PolynomialCurve(coefficients, np.zeros((3, 3)), reference, -np.inf, np.inf)
 
-    return Chain(
+    return BellChain(
         null=float(row["rough"][0]),
         scale=float(row["rough"][1]) * DEG,
         rough_covariance=np.zeros((2, 2)),
@@ -57,7 +57,7 @@ def read_printed_chain() -> Chain:
     )
 
 
-def simulate_runs(generator: np.random.Generator, random_walk: float = RANDOM_WALK) -> tuple[Run, Run, Run]:
+def simulate_runs(generator: np.random.Generator, random_walk: float = RANDOM_WALK) -> tuple[BellRun, BellRun, BellRun]:
     """Return virtual runs: rates ±360 °/s at 25 °C, rest and 300 °/s over −45…55 °C.
 
     Parameters
@@ -71,12 +71,12 @@ def simulate_runs(generator: np.random.Generator, random_walk: float = RANDOM_WA
     sweep = (zero_Celsius + np.linspace(LOWEST, HIGHEST, round(SWEEP / STEP))).astype(np.float64)
     plateaus = np.repeat(np.arange(-360.0, 361.0, 40.0) * DEG, round(DWELL / STEP)).astype(np.float64)
 
-    def run(rate: Real, temperature: Real) -> Run:
+    def run(rate: Real, temperature: Real) -> BellRun:
         white = random_walk * 60 / np.sqrt(STEP) * generator.standard_normal(len(rate))
         wander = WANDER * np.sqrt(STEP / 3600) * np.cumsum(generator.standard_normal(len(rate)))
         noise = (white + wander) / 3600 * DEG / gyro.scale
         time = (STEP * np.arange(len(rate))).astype(np.float64)
-        return Run(time, invert_chain(gyro, rate, temperature) + noise, temperature, rate)
+        return BellRun(time, invert_chain(gyro, rate, temperature) + noise, temperature, rate)
 
     return (
         run(plateaus, np.full(len(plateaus), zero_Celsius + ROOM)),
@@ -89,8 +89,8 @@ def simulate_runs(generator: np.random.Generator, random_walk: float = RANDOM_WA
 class BellTwin:
     """The fitted chain, its figures step by step on the runs fitted and on runs not seen, and the printed claims tested."""
 
-    chain: Chain
-    runs: tuple[Run, Run, Run]
+    chain: BellChain
+    runs: tuple[BellRun, BellRun, BellRun]
     fitted: list[StepFigures]
     held_out: list[StepFigures]
     claims: "Claims"

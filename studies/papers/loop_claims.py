@@ -10,7 +10,7 @@ from typing import Literal
 import numpy as np
 
 from compensation.controllers import Loops, find_margins
-from compensation.electronics import Channels, Electronics, Noise
+from compensation.electronics import Channels, Electronics, LoopNoise
 from compensation.rebalance import settle_rebalance
 from compensation.wave import from_quality
 from compensation.wave_fit import fit_whole_angle
@@ -118,7 +118,7 @@ def _stability() -> Claim:
 def _resolution(seed: int) -> Claim:
     """The split that half an hour of self-precession shows in the quadrature control."""
     wave = from_quality(FREQUENCY, 1e6, damping_anisotropy=0.01, frequency_split=RESOLVED_Hz, frequency_axis=0.2)
-    electronics = Electronics(noise=Noise(pickoff=1e-5, adc_step=1e-5))
+    electronics = Electronics(noise=LoopNoise(pickoff=1e-5, adc_step=1e-5))
     time = 2.0 * np.arange(900)
     precession = np.radians(0.5) * np.where(time < 900, 1.0, -1.0)
     run = simulate_whole_angle(

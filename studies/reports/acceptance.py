@@ -9,7 +9,7 @@ from studies.reports import style
 from studies.reports.page import Block, Chapter, Facts, Picture, Table, Text, draw, render_page
 
 if TYPE_CHECKING:
-    from studies.acceptance.judgement import Acceptance, Line
+    from studies.acceptance.judgement import Acceptance, JudgedQuantity
     from studies.record import Record
 
 WORDS = {"pass": "every limit is met", "fail": "a limit is not met", "incomplete": "not all limits could be judged"}
@@ -57,7 +57,7 @@ def quantities_table(found: "Acceptance") -> Table:
     )
 
 
-def _interval(line: "Line") -> str:
+def _interval(line: "JudgedQuantity") -> str:
     assert line.measured is not None
     low, high = line.measured.low, line.measured.high
     if low is None or high is None:

@@ -11,8 +11,8 @@ from studies.reports import style
 from studies.reports.page import Block, Chapter, Facts, Picture, Table, Text, draw, render_page
 
 if TYPE_CHECKING:
-    from compensation.bell import Chain, Curve
-    from compensation.bell_calibration import Run
+    from compensation.bell import BellChain, PolynomialCurve
+    from compensation.bell_calibration import BellRun
     from studies.papers.bvg import BellTwin, Claims
     from studies.scale import ScaleStudy, StepFigures
 
@@ -111,7 +111,7 @@ def steps_table(figures: "Sequence[StepFigures]", caption: str) -> Table:
     return Table(caption, columns, rows, note)
 
 
-def coefficients_table(chain: "Chain", output: str) -> Table:
+def coefficients_table(chain: "BellChain", output: str) -> Table:
     """Return the coefficients with their standard errors, in °C and °/s."""
     raw = "counts" if output == "output_counts" else "°/s"
     errors = np.sqrt(np.diag(chain.rough_covariance))
@@ -119,7 +119,7 @@ def coefficients_table(chain: "Chain", output: str) -> Table:
         ["rough (33)", "null", f"{chain.null:.6g}", f"{errors[0]:.1e}", raw],
         ["rough (33)", "scale", f"{chain.scale / DEG:.6g}", f"{errors[1] / DEG:.1e}", f"°/s per {raw}"],
     ]
-    curves: list[tuple[str, Curve, float, float, tuple[str, ...]]] = [
+    curves: list[tuple[str, PolynomialCurve, float, float, tuple[str, ...]]] = [
         ("bias (34)", chain.bias, 1.0, 0.0, ("°/s", "°/s/°C", "°/s/°C²")),
         ("scale over rate (35)", chain.scale_over_rate, 1.0, 1.0, ("°/s", "ratio", "s/°")),
         ("scale over temperature (36)", chain.scale_over_temperature, 0.0, 0.0, ("ratio", "per °C", "per °C²")),
@@ -195,7 +195,7 @@ def claim_blocks(claims: "Claims") -> list[Block]:
     return [Table("Printed claims", ["Claim", "Printed", "Ours", "Verdict"], rows, note)]
 
 
-def draw_steps(chain: "Chain", runs: "tuple[Run, Run, Run]") -> Picture:
+def draw_steps(chain: "BellChain", runs: "tuple[BellRun, BellRun, BellRun]") -> Picture:
     """Draw the error of the rate before and after: at rest and turning over temperature, and over the applied rate."""
     from compensation.bell import apply_chain
 
@@ -230,7 +230,7 @@ def draw_steps(chain: "Chain", runs: "tuple[Run, Run, Run]") -> Picture:
     )
 
 
-def draw_allan(chain: "Chain", rest: "Run") -> Picture:
+def draw_allan(chain: "BellChain", rest: "BellRun") -> Picture:
     """Draw the Allan deviation at rest after the rough step, after the chain, and after the filter (figure 19)."""
     from compensation.bell import apply_chain
     from compensation.stability import allan_deviation

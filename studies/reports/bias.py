@@ -13,7 +13,7 @@ from studies.reports.page import Block, Chapter, Facts, Picture, Table, Text, dr
 
 if TYPE_CHECKING:
     from compensation.memory import Memory
-    from studies.bias import BiasStudy, Judged, Spectrum
+    from studies.bias import BiasStudy, Judged, Stability
 
 SOURCES = (
     "Wang X. et al., Sensors 2012, 12, 6434 (the HRG paper), eqs. (19)–(22).",
@@ -220,7 +220,7 @@ def noise_table(study: "BiasStudy") -> Table:
     n_scale, k_scale, n_unit, k_unit = (1 / 60, 60.0, "°/√h", "°/h/√h") if hours else (1.0, 1.0, "°/√s", "°/s/√s")
     unit = OUTPUTS[study.output].replace("deg", "°")
 
-    def row(label: str, spectrum: "Spectrum") -> list[str]:
+    def row(label: str, spectrum: "Stability") -> list[str]:
         noise, (flat, low, high) = spectrum.noise, spectrum.allan.bias_instability
         cells = [
             _measured(noise.N * n_scale, noise.N_uncertainty * n_scale),

@@ -52,7 +52,7 @@ class Shown:
         departures = f", departures x {self.exaggeration:.0f}" if self.exaggeration > 1 else ""
         return f"{line}\nslower mode, split {1e3 * self.split.hertz:.4g} mHz{departures}"
 
-    def values(self, colour: Colour, field: "Field | None" = None) -> "NDArray[np.float64]":
+    def values(self, colour: Colour, field: "ShellTemperature | None" = None) -> "NDArray[np.float64]":
         """Return the coloured quantity on every vertex, in the unit of its legend."""
         import numpy as np
 
@@ -64,7 +64,7 @@ class Shown:
             raise InputError("the colour 'temperature' needs a field along the meridian: give --field FIELD.csv.")
         return np.interp(self.surface.position, field.position, field.temperature)
 
-    def scene(self, colour: Colour = "displacement", field: "Field | None" = None) -> "Scene":
+    def scene(self, colour: Colour = "displacement", field: "ShellTemperature | None" = None) -> "Scene":
         """Return the scene for `shell.render`."""
         from shell.scene import compose_scene
 
@@ -75,7 +75,7 @@ class Shown:
             axes = draw_axes(self.surface, self.split.slow_axis)
         return compose_scene(self.surface, self.values(colour, field), LEGENDS[colour], self.title, axes)
 
-    def colours(self, colour: Colour = "displacement", field: "Field | None" = None) -> "NDArray[np.uint8]":
+    def colours(self, colour: Colour = "displacement", field: "ShellTemperature | None" = None) -> "NDArray[np.uint8]":
         """Return the colour of every vertex (N, 4) as bytes, cividis between the smallest and the largest value."""
         import matplotlib as mpl
         import numpy as np
@@ -88,7 +88,7 @@ class Shown:
 
 
 @dataclass(frozen=True, eq=False)
-class Field:
+class ShellTemperature:
     """A temperature (°C) along the meridian, position 0 ... 1, linear between the points."""
 
     position: "NDArray[np.float64]"
@@ -135,7 +135,7 @@ def _show_split(
     return Shown(instrument, T, resonator, mode, surface, split, factor)
 
 
-def read_field(path: str | Path) -> Field:
+def read_field(path: str | Path) -> ShellTemperature:
     """Read a temperature along the meridian: a table `position,temperature_degC` with rising positions.
 
     Raises
@@ -153,4 +153,4 @@ def read_field(path: str | Path) -> Field:
         raise InputError(f"{path}: a temperature field needs every value.")
     if (np.diff(position) <= 0).any() or position[0] < 0 or position[-1] > 1:
         raise InputError(f"{path}: position must rise within 0 (start of the meridian) to 1 (rim).")
-    return Field(position, temperature)
+    return ShellTemperature(position, temperature)

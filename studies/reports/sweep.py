@@ -16,7 +16,7 @@ from studies.sweeps.sensitivity import linear_shares, local_slopes, sobol_indice
 from studies.sweeps.tolerance import find_yield, resolve_limits
 
 if TYPE_CHECKING:
-    from studies.sweeps.definition import Parameter
+    from studies.sweeps.definition import StudyParameter
     from studies.sweeps.quantity import Column
     from studies.sweeps.results import Results
     from studies.sweeps.tolerance import Yield
@@ -289,14 +289,14 @@ def _limits(results: "Results") -> list[Any]:
         return []
 
 
-def _range(parameter: "Parameter") -> str:
+def _range(parameter: "StudyParameter") -> str:
     if parameter.values:
         words = ", ".join(number(value) for value in parameter.values[:8])
         return words + (f", … ({len(parameter.values)})" if len(parameter.values) > 8 else "")
     return f"{number(parameter.low)} … {number(parameter.high)}"
 
 
-def _distribution(parameter: "Parameter") -> str:
+def _distribution(parameter: "StudyParameter") -> str:
     if parameter.values:
         return "values"
     if parameter.distribution == "normal":

@@ -12,7 +12,7 @@ from studies.sweeps.sensitivity import linear_shares, local_slopes, sobol_indice
 from studies.sweeps.tolerance import find_reach, find_yield, resolve_limits
 
 if TYPE_CHECKING:
-    from studies.sweeps.definition import Parameter
+    from studies.sweeps.definition import StudyParameter
     from studies.sweeps.quantity import Column
     from studies.sweeps.results import Results
 
@@ -129,7 +129,7 @@ def _yield_cells(results: "Results", requirements: Any) -> list[str]:
     return [percent(found.share), between, str(found.unknown)]
 
 
-def _reach(parameter: "Parameter", part: float) -> str:
+def _reach(parameter: "StudyParameter", part: float) -> str:
     nominal = float(parameter.nominal)
     low, high = (nominal + part * (end - nominal) for end in (parameter.low, parameter.high))
     return f"{figures.label(parameter.name, parameter.unit)} {low:.8g} … {high:.8g}"

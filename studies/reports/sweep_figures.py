@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from studies.sweeps.quantity import Column
     from studies.sweeps.results import Results
     from studies.sweeps.sensitivity import LocalSlope, SobolIndices
-    from studies.sweeps.tolerance import Limits
+    from studies.sweeps.tolerance import RequirementLimits
 
 MOST_POINTS = 4000  # drawn in a scatter; more only make the page heavy
 COLOURS = (style.BLUE, style.VERMILION, style.GREEN, style.PURPLE, style.ORANGE, style.SKY)
@@ -30,7 +30,7 @@ def column_label(column: "Column") -> str:
     return column.label + ("" if column.unit == "1" else f" ({column.unit})")
 
 
-def spread_figure(results: "Results", column: "Column", limits: "list[Limits]") -> Picture:
+def spread_figure(results: "Results", column: "Column", limits: "list[RequirementLimits]") -> Picture:
     """Draw the histogram of a column, with the nominal design and the limits asked for."""
     y = results.column(column.name)
     y = y[np.isfinite(y)]

@@ -8,19 +8,19 @@ from studies.reports.page import Chapter, Facts, Picture, Table, Text, draw, ren
 from studies.reports.style import BLUE, GREEN, VERMILION, figure
 
 if TYPE_CHECKING:
-    from shell.trimming import Plan
+    from shell.trimming import TrimPlan
 
 LEAD = "Cut round 1, let the shell return to temperature, measure, and plan again: later rounds are predictions, not instructions."
 
 
-def write_trim_page(path: str, plan: "Plan", payload: dict[str, Any]) -> None:
+def write_trim_page(path: str, plan: "TrimPlan", payload: dict[str, Any]) -> None:
     """Write the page, whole or not at all."""
     from studies.files.writing import write_text
 
     write_text(path, render_page(f"Trimming plan for {payload['card']}", LEAD, _chapters(plan, payload)))
 
 
-def _chapters(plan: "Plan", payload: dict[str, Any]) -> list[Chapter]:
+def _chapters(plan: "TrimPlan", payload: dict[str, Any]) -> list[Chapter]:
     before, last = payload["before"][0], payload["rounds"][-1]["after"][0]
     facts = Facts([
         (f"split of n = {before['harmonic']} now", f"{1e3 * before['split_Hz']:.3g} mHz", f"slow axis at {before['slow_axis_deg']:.1f}°"),
@@ -69,7 +69,7 @@ def _states(payload: dict[str, Any]) -> Table:
     return Table("Splits", ["state", "n", "split (mHz)", "error (mHz)", "95 % below (mHz)", "slow axis (°)"], rows)
 
 
-def _polar(plan: "Plan") -> Picture:
+def _polar(plan: "TrimPlan") -> Picture:
     """Cuts as wedges on the rim; the split as a rose around it, before and as expected after round 1."""
     first = plan.rounds[0]
     theta = np.linspace(0, 2 * np.pi, 721)

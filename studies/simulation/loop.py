@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from compensation.closed_loop import ClosedLoop
 from compensation.controllers import Loops, Margin, require_stable
-from compensation.electronics import Channels, Electronics, Noise, thermal_noise
+from compensation.electronics import Channels, Electronics, LoopNoise, thermal_noise
 from compensation.rebalance import LoopRun, close_loops, settle_rebalance, simulate_rebalance
 from compensation.start_up import StartUp, start_up
 from compensation.wave import StandingWave
@@ -91,7 +91,7 @@ def electronics_of(loop: "Loop", wave: StandingWave, temperature: float, amplitu
     if loop.vibration_um is not None and loop.modal_mass_mg is not None:
         thermal = thermal_noise(wave, temperature, 1e-6 * loop.modal_mass_mg, 1e-6 * loop.vibration_um * amplitude)
     volts = loop.amplitude_V * amplitude
-    noise = Noise(
+    noise = LoopNoise(
         pickoff=1e-6 * loop.pickoff_noise_uV_per_rt_Hz / volts,
         adc_step=1e-6 * loop.adc_step_uV / volts,
         dac_step=2 * full / 2**loop.dac_bits / amplitude,
@@ -214,7 +214,7 @@ def run_loops(
 
 
 @dataclass(frozen=True)
-class Source:
+class BiasSource:
     """One source of bias: what it makes (deg/h), and one standard deviation of it from the card's uncertain values."""
 
     name: str
@@ -232,7 +232,7 @@ class LoopStudy:
 
     wave: StandingWave
     settled: dict[str, float]
-    sources: tuple[Source, ...]
+    sources: tuple[BiasSource, ...]
     noise: dict[str, tuple[float, float]]
     margins: tuple[Margin, ...]
     start: StartUp
@@ -272,7 +272,9 @@ def study_loops(instrument: "Instrument", frequency: float, inverse_q: float, br
     )
 
 
-def _sources(instrument: "Instrument", frequency: float, inverse_q: float, bryan_factor: float) -> tuple[Source, ...]:
+def _sources(
+    instrument: "Instrument", frequency: float, inverse_q: float, bryan_factor: float
+) -> tuple[BiasSource, ...]:
     """Bias of each source: what goes when its keys are 0; its spread: the card's uncertain values, moved by their sd."""
 
     def bias(values: dict[str, float]) -> float:
@@ -285,13 +287,15 @@ def _sources(instrument: "Instrument", frequency: float, inverse_q: float, bryan
     sources = []
     for name, keys in ERRORS.items():
         effects = [_step(bias, spread[key].value, spread[key].sd, key) for key in keys if key in spread]
-        sources.append(Source(name, total - bias(dict.fromkeys(keys, 0.0)), float(np.hypot.reduce([0.0, *effects]))))
+        sources.append(
+            BiasSource(name, total - bias(dict.fromkeys(keys, 0.0)), float(np.hypot.reduce([0.0, *effects])))
+        )
     axes = [
         key for key in ("bias.damping_axis_deg", "loop.frequency_axis_deg", "loop.frequency_split_mHz") if key in spread
     ]
     shared = [_step(bias, spread[key].value, spread[key].sd, key) for key in axes]
     everything = [*(source.sd for source in sources), *shared]
-    return (*sources, Source("all", total, float(np.hypot.reduce([0.0, *everything]))))
+    return (*sources, BiasSource("all", total, float(np.hypot.reduce([0.0, *everything]))))
 
 
 def _step(bias: Callable[[dict[str, float]], float], value: float, sd: float, key: str) -> float:
@@ -304,7 +308,7 @@ def _noise_of(
     wave: StandingWave, electronics: Electronics, loops: Loops, instrument: "Instrument", names: tuple[str, ...]
 ) -> tuple[float, float]:
     """Deg/h of a mean of the rate over 1 s, and deg/√h from a mean over 100 s, of these sources together."""
-    only = Noise(**{name: getattr(electronics.noise, name) for name in names})
+    only = LoopNoise(**{name: getattr(electronics.noise, name) for name in names})
     if require_loop(instrument).mode == "whole-angle":
         spread = [_free_spread(wave, only, loops, seconds) for seconds in (1.0, 100.0)]
     else:
@@ -315,7 +319,7 @@ def _noise_of(
     return one, hundred * 10 / 60
 
 
-def _free_spread(wave: StandingWave, noise: Noise, loops: Loops, seconds: float) -> float:
+def _free_spread(wave: StandingWave, noise: LoopNoise, loops: Loops, seconds: float) -> float:
     """Spread of the mean turn ψ̇ (1/s) of a free wave: forces across it walk, readings at both ends scatter."""
     walk = noise.thermal**2 + noise.command_variance(loops.sampling) / loops.sampling
     reading = noise.measurement_variance(loops.sampling) * loops.smoothing / (2 - loops.smoothing)

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from scipy.fft import irfft, next_fast_len
 
 if TYPE_CHECKING:
-    from studies.instrument.tables.noise import Noise
+    from studies.instrument.tables.noise import NoiseKeys
 
 Array = NDArray[np.float64]
 
@@ -29,12 +29,12 @@ class NoiseLevels:
         return noise
 
 
-def frequency_noise(noise: "Noise") -> NoiseLevels:
+def frequency_noise(noise: "NoiseKeys") -> NoiseLevels:
     """Noise of the frequency, Hz."""
     return NoiseLevels(noise.frequency_white_Hz, noise.frequency_flicker_Hz, noise.frequency_walk_Hz)
 
 
-def bias_noise(noise: "Noise") -> NoiseLevels:
+def bias_noise(noise: "NoiseKeys") -> NoiseLevels:
     """Noise of the zero-rate output, deg/h; one hour has 3600 s."""
     return NoiseLevels(
         60.0 * noise.bias_white_deg_per_rt_h,

@@ -22,7 +22,7 @@ from studies.simulation.heat_path import build_network, lump_shape, slowest_lag
 from studies.simulation.response import Temperatures, check_loss, observed_rows, read_out
 from thermal.network import Network
 from thermal.profile import Profile
-from thermal.sensitivity import Change, difference, no_change, respond
+from thermal.sensitivity import NetworkChange, difference, no_change, respond
 
 if TYPE_CHECKING:
     from shell.law import FrequencyLaw
@@ -224,7 +224,7 @@ class Variations:
             self._sides[name] = self._build(name)
         return self._sides[name]
 
-    def change(self, name: str, drive: Drive) -> Change | None:
+    def change(self, name: str, drive: Drive) -> NetworkChange | None:
         """What a value does to the temperatures; None for nothing."""
         network = self.network(drive.boundary)
         if name.startswith(INITIAL):

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from shell.law import FrequencyLaw
     from shell.levels import Theory
     from studies.instrument.card import Instrument
-    from studies.instrument.tables.noise import Noise
+    from studies.instrument.tables.noise import NoiseKeys
 
 Array = NDArray[np.float64]
 DIGITS = {
@@ -118,7 +118,7 @@ def simulate_run(
 
 
 def _observe(
-    true: dict[str, Array], levels: "Noise", rate: float, generator: np.random.Generator, sensed: bool
+    true: dict[str, Array], levels: "NoiseKeys", rate: float, generator: np.random.Generator, sensed: bool
 ) -> dict[str, Array]:
     """Return the columns as they are read: noise and rounding. A housing that was imposed has been read already."""
     count = len(true["frequency_Hz"])

@@ -19,7 +19,7 @@ MOST_CASES = 20_000_000
 
 
 @dataclass(frozen=True)
-class Parameter:
+class StudyParameter:
     """What is varied, in the unit of its name; `nominal` is text where `values` are.
 
     A normal parameter that is not `bounded` has no ends: `low` and `high` are then three standard deviations away.
@@ -90,7 +90,7 @@ class Study:
     note: str
     instrument: Instrument
     sampling: Sampling
-    parameters: tuple[Parameter, ...]
+    parameters: tuple[StudyParameter, ...]
     derived: tuple[Derived, ...]
     asked: tuple[Asked, ...]
     requirements: tuple[Requirement, ...]

@@ -11,7 +11,7 @@ from studies.errors import InputError
 from studies.sweeps.definition import MOST_CASES
 
 if TYPE_CHECKING:
-    from studies.sweeps.definition import Parameter, Study
+    from studies.sweeps.definition import Study, StudyParameter
 
 Array = NDArray[np.float64]
 LEVELS = (-1.0, -0.5, 0.5, 1.0)  # of one parameter at a time, in half ranges about the nominal value
@@ -91,13 +91,13 @@ def _grid(study: "Study") -> Array:
     return np.stack([x.ravel() for x in np.meshgrid(*axes, indexing="ij")], axis=1)
 
 
-def _axis(parameter: "Parameter") -> Array:
+def _axis(parameter: "StudyParameter") -> Array:
     if isinstance(parameter.nominal, str):
         return np.arange(len(parameter.values), dtype=float)
     return np.array(parameter.values, dtype=float)
 
 
-def _spread(parameter: "Parameter") -> Array:
+def _spread(parameter: "StudyParameter") -> Array:
     if parameter.distribution == "log-uniform":
         return np.geomspace(parameter.low, parameter.high, parameter.count or 2)
     return np.linspace(parameter.low, parameter.high, parameter.count or 2)
@@ -155,7 +155,7 @@ def _scale(study: "Study", unit: Array) -> Array:
     return np.stack([_quantile(p, unit[:, k]) for k, p in enumerate(study.parameters)], axis=1)
 
 
-def _quantile(parameter: "Parameter", p: Array) -> Array:
+def _quantile(parameter: "StudyParameter", p: Array) -> Array:
     from scipy import stats
 
     low, high, middle = parameter.low, parameter.high, float(parameter.nominal)

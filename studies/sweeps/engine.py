@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from studies.errors import MissingEnvironment
 from studies.sweeps.canonical import case_key, spell
 from studies.sweeps.design import decode_row
-from studies.sweeps.evaluate import Plan, evaluate_task, failed_row
+from studies.sweeps.evaluate import WorkPlan, evaluate_task, failed_row
 from studies.sweeps.row import Row
 
 if TYPE_CHECKING:
@@ -92,7 +92,7 @@ def missing_batches(study: "Study", design: "Design", base: str, store: "Store",
 
 
 def compute(
-    plan: Plan, batches: "Batches | deque[Batch]", workers: "Workers", store: "Store", progress: "Progress"
+    plan: WorkPlan, batches: "Batches | deque[Batch]", workers: "Workers", store: "Store", progress: "Progress"
 ) -> None:
     """Evaluate all batches and keep their rows; returns when every case is in the store.
 
@@ -143,7 +143,7 @@ def _any_alone(running: dict[Future[Any], _Task]) -> bool:
     return any(task.alone for task in running.values())
 
 
-def _submit(task: _Task, plan: Plan, workers: "Workers", running: dict[Future[Any], _Task]) -> None:
+def _submit(task: _Task, plan: WorkPlan, workers: "Workers", running: dict[Future[Any], _Task]) -> None:
     batches = [[item.parameters for item in batch] for batch in task.batches]
     running[workers.submit(evaluate_task, plan, batches)] = task
 
@@ -158,7 +158,7 @@ def _keep(task: _Task, rows: list[list[Row]], store: "Store", progress: "Progres
     progress.advance(len(pairs), sum(row.status != "ok" for _, row in pairs))
 
 
-def _divide(task: _Task, plan: Plan, suspects: deque[_Task], store: "Store", progress: "Progress") -> None:
+def _divide(task: _Task, plan: WorkPlan, suspects: deque[_Task], store: "Store", progress: "Progress") -> None:
     """Put what a lost worker had into the queue of suspects; a case alone that loses it again and again is noted as lost."""
     if not task.alone:
         suspects.extend(_Task([batch], alone=True) for batch in task.batches)

@@ -25,7 +25,7 @@ Batch = Sequence[Mapping[str, Any]]
 
 
 @dataclass(frozen=True)
-class Plan:
+class WorkPlan:
     """What a worker must know of a study; without families small, so that it travels with every task."""
 
     instrument: Instrument
@@ -34,20 +34,20 @@ class Plan:
     derived: "tuple[Derived, ...]" = ()
 
     @classmethod
-    def of(cls, study: "Study", families: "Families | None" = None) -> "Plan":
+    def of(cls, study: "Study", families: "Families | None" = None) -> "WorkPlan":
         """Return the plan of a study."""
         asked = tuple((one.quantity.name, one.options, len(one.columns)) for one in study.asked)
         return cls(study.instrument, asked, families, study.derived)
 
 
-def evaluate_task(plan: Plan, batches: Sequence[Batch]) -> list[list[Row]]:
+def evaluate_task(plan: WorkPlan, batches: Sequence[Batch]) -> list[list[Row]]:
     """Evaluate several batches of parameters by name; called in a worker."""
     if plan.families is not None:
         return [plan.families.evaluate(batch) for batch in batches]
     return [[evaluate_case(plan, parameters) for parameters in batch] for batch in batches]
 
 
-def evaluate_case(plan: Plan, parameters: Mapping[str, Any]) -> Row:
+def evaluate_case(plan: WorkPlan, parameters: Mapping[str, Any]) -> Row:
     """Evaluate every quantity of one design; one that cannot be computed fails the case and leaves NaN."""
     began = time.perf_counter()
     values: list[float] = []
@@ -70,7 +70,7 @@ def evaluate_case(plan: Plan, parameters: Mapping[str, Any]) -> Row:
     return Row(status, " ".join([*reasons, *remarks]), tuple(values), tuple(errors), seconds)
 
 
-def failed_row(plan: Plan, status: str, reason: str) -> Row:
+def failed_row(plan: WorkPlan, status: str, reason: str) -> Row:
     """Return the row of a case that cannot be built, or whose worker did not survive it."""
     nothing = (math.nan,) * sum(width for _, _, width in plan.asked)
     return Row(status, reason, nothing, nothing, 0.0)

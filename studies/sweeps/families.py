@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from shell.materials import Material
     from shell.resonator import Resonator
     from studies.sweeps.case import Options
-    from studies.sweeps.definition import Parameter, Study
+    from studies.sweeps.definition import Study, StudyParameter
     from studies.sweeps.design import Design
 
 Array = NDArray[np.float64]
@@ -224,7 +224,7 @@ def _describe(instrument: Instrument, designs: Designs, temperature_degC: float 
     return _Bodies(T, growth, E, nu, rho, materials)
 
 
-def _is_dimension(parameter: "Parameter") -> bool:
+def _is_dimension(parameter: "StudyParameter") -> bool:
     return parameter.name.startswith(DIMENSIONS)
 
 

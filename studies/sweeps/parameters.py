@@ -13,7 +13,7 @@ from scipy.constants import zero_Celsius
 from studies.errors import InputError, nearest
 from studies.instrument.card import Instrument
 from studies.instrument.dotted import look_up, names
-from studies.instrument.keys import Table
+from studies.instrument.keys import Keys
 from studies.instrument.material_values import LAW
 from studies.instrument.registry import possible_keys
 from studies.instrument.tables.material import GIVEN
@@ -76,5 +76,5 @@ def _default(instrument: Instrument, table: str, key: str) -> float | str | None
     if f"{table}.{key}".startswith(LAW):
         return 0.0
     part = instrument.part(table)
-    value = getattr(part, key, None) if isinstance(part, Table) else None
+    value = getattr(part, key, None) if isinstance(part, Keys) else None
     return float(value) if isinstance(value, int | float) and not isinstance(value, bool) else None

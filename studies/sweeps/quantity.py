@@ -6,7 +6,7 @@ from math import nan
 from typing import Any, NamedTuple
 
 from studies.errors import InputError
-from studies.files.toml import Section, check_number
+from studies.files.toml import TomlTable, check_number
 from studies.sweeps.case import Case, Options
 
 SUFFIXES = {"Hz": "_Hz", "ppm/°C": "_ppm_per_degC", "°C": "_degC", "s": "_s", "°": "_deg", "1": ""}
@@ -38,7 +38,7 @@ class Option:
     """One key of a `[[quantity]]` table: what it means and how it is read and checked."""
 
     meaning: str
-    read: Callable[[Section, str], Any]
+    read: Callable[[TomlTable, str], Any]
 
 
 @dataclass(frozen=True)
@@ -64,7 +64,7 @@ class Quantity:
 def whole(default: int, meaning: str, least: int = 0, most: int = 100) -> Option:
     """Return an option that is a whole number."""
 
-    def read(section: Section, key: str) -> int:
+    def read(section: TomlTable, key: str) -> int:
         value = section.raw(key, default)
         if isinstance(value, bool) or not isinstance(value, int) or not least <= value <= most:
             raise InputError(f"{section.where}: {key} must be a whole number from {least} to {most}, not {value!r}.")
@@ -76,7 +76,7 @@ def whole(default: int, meaning: str, least: int = 0, most: int = 100) -> Option
 def number(default: float | None, meaning: str, **bounds: float) -> Option:
     """Return an option that is a number; without a default it may be left out (None)."""
 
-    def read(section: Section, key: str) -> float | None:
+    def read(section: TomlTable, key: str) -> float | None:
         if default is None and key not in section:
             return None
         return check_number(section.raw(key, default), f"{section.where}: {key}", **bounds)

@@ -14,7 +14,7 @@ from studies.sweeps.canonical import PHYSICS_VERSION, digest, spell_material
 from studies.sweeps.definition import FREE, Study
 from studies.sweeps.design import Design, draw, nominal_design
 from studies.sweeps.engine import BATCH, BATCH_VECTORISED, compute, missing_batches
-from studies.sweeps.evaluate import Plan, evaluate_task
+from studies.sweeps.evaluate import WorkPlan, evaluate_task
 from studies.sweeps.families import Families, choose_solver, why_not
 from studies.sweeps.progress import Silent, shown_progress
 from studies.sweeps.provenance import describe_environment
@@ -91,7 +91,7 @@ def run_study(
             study,
             design,
             identity["base"],
-            Plan.of(study, families),
+            WorkPlan.of(study, families),
             crew or _hire(workers, scheduler),
             show_progress,
         )
@@ -105,7 +105,7 @@ def run_study(
 
 
 @dataclass(frozen=True)
-class Estimate:
+class Effort:
     """What a study would take: designs, batches, seconds of one design, of all, memory in MB; how designs are solved.
 
     `why_full`: what in the spec keeps the designs from being interpolated, where that makes the study slow.
@@ -120,14 +120,14 @@ class Estimate:
     why_full: str = ""
 
 
-def estimate_study(study: Study, workers: int | None = None) -> Estimate:
+def estimate_study(study: Study, workers: int | None = None) -> Effort:
     """Evaluate the nominal design here, keep nothing, and say what the whole study would take on these workers."""
     import resource
 
     began = time.perf_counter()
     design, parameters = draw(study), nominal_design(study)
     families = choose_solver(study, design)
-    plan = Plan.of(study, families)
+    plan = WorkPlan.of(study, families)
     if families is None:
         count, size, trials = workers or cores(), BATCH, 1
         evaluate_task(plan, [[parameters]])  # the first time imports and builds what later cases share
@@ -141,7 +141,7 @@ def estimate_study(study: Study, workers: int | None = None) -> Estimate:
     resident = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
     processes = 1 if families else 1 + count
     row = 8 * (len(study.parameters) + 2 * len(study.columns)) + 200
-    return Estimate(
+    return Effort(
         cases=cases,
         batches=-(-cases // (study.sampling.batch or size)),
         seconds_each=each,
@@ -233,7 +233,9 @@ def _describe_families(families: Families) -> list[Any]:
     ]
 
 
-def _run(store: Store, study: Study, design: Design, base: str, plan: Plan, crew: Workers, show_progress: bool) -> None:
+def _run(
+    store: Store, study: Study, design: Design, base: str, plan: WorkPlan, crew: Workers, show_progress: bool
+) -> None:
     outcome = "stopped"
     store.begin_run(describe_environment())
     try:

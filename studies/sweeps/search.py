@@ -17,8 +17,8 @@ from studies.sweeps.engine import Batch, compute, make_item
 from studies.sweeps.progress import Silent
 
 if TYPE_CHECKING:
-    from studies.sweeps.definition import Parameter, Search, Study
-    from studies.sweeps.evaluate import Plan
+    from studies.sweeps.definition import Search, Study, StudyParameter
+    from studies.sweeps.evaluate import WorkPlan
     from studies.sweeps.store import Store, Stored
     from studies.sweeps.workers import Workers
 
@@ -34,7 +34,7 @@ class SearchFailed(RuntimeError):
 class Explorer:
     """Designs of a study by their parameters, computed when the store lacks them."""
 
-    def __init__(self, study: "Study", base: str, plan: "Plan", workers: "Workers", store: "Store") -> None:
+    def __init__(self, study: "Study", base: str, plan: "WorkPlan", workers: "Workers", store: "Store") -> None:
         self.study, self.base, self.plan, self.workers, self.store = study, base, plan, workers, store
         self.columns = [column.name for column in study.columns]
 
@@ -60,7 +60,7 @@ class Explorer:
         return values
 
 
-def run_searches(study: "Study", base: str, plan: "Plan", workers: "Workers", store: "Store") -> None:
+def run_searches(study: "Study", base: str, plan: "WorkPlan", workers: "Workers", store: "Store") -> None:
     """Compute the nominal design and every search of a study, and keep what they find."""
     explorer = Explorer(study, base, plan, workers, store)
     explorer.cases([nominal_design(study)])
@@ -159,7 +159,7 @@ def invert(explorer: Explorer, search: "Search") -> dict[str, Any]:
 SEARCHES = {"worst-case": find_worst_case, "inversion": invert}
 
 
-def _starts(free: "Sequence[Parameter]") -> Array:
+def _starts(free: "Sequence[StudyParameter]") -> Array:
     """Return the middle and the corners of the unit box; with many parameters the middles of its faces instead."""
     d = len(free)
     middle = np.array([_share(p, float(p.nominal)) for p in free])
@@ -169,13 +169,13 @@ def _starts(free: "Sequence[Parameter]") -> Array:
     return np.array([middle, *faces])
 
 
-def _place(study: "Study", free: "Sequence[Parameter]", x: Array) -> dict[str, Any]:
+def _place(study: "Study", free: "Sequence[StudyParameter]", x: Array) -> dict[str, Any]:
     """Return the design at shares 0 ... 1 of the free parameters' ranges, the others nominal."""
     moved = {p.name: float(p.low + share * (p.high - p.low)) for p, share in zip(free, x, strict=True)}
     return {**nominal_design(study), **moved}
 
 
-def _share(parameter: "Parameter", value: float) -> float:
+def _share(parameter: "StudyParameter", value: float) -> float:
     return (value - parameter.low) / (parameter.high - parameter.low)
 
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from studies.errors import InputError
 
 if TYPE_CHECKING:
-    from studies.sweeps.definition import Parameter
+    from studies.sweeps.definition import StudyParameter
     from studies.sweeps.results import Results
 
 Array = NDArray[np.float64]
@@ -132,7 +132,7 @@ def local_slopes(results: "Results", column: str) -> list[LocalSlope]:
     return slopes
 
 
-def _slope(parameter: "Parameter", x: Array, y: Array, error: float) -> LocalSlope:
+def _slope(parameter: "StudyParameter", x: Array, y: Array, error: float) -> LocalSlope:
     fine = _derivative(x, y)
     inner = [0, 2, 3]
     rough = _derivative(x[inner], y[inner])

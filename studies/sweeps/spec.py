@@ -60,7 +60,7 @@ from typing import Any
 
 from studies.errors import InputError
 from studies.files.reading import find_shipped, list_shipped
-from studies.files.toml import Section, read_toml
+from studies.files.toml import TomlTable, read_toml
 from studies.instrument.card import Instrument, load_card
 from studies.sweeps.definition import Study
 from studies.sweeps.tables import (
@@ -106,7 +106,7 @@ def read_study(source: str | Path | Mapping[str, Any], card: str | None = None) 
     if card is not None:
         content["card"] = card
         text = f"# computed with --card {card} instead of the card below\n{text}"
-    top = Section(content, where, KEYS)
+    top = TomlTable(content, where, KEYS)
     named = top.text("card")
     beside = folder / named
     instrument = load_card(beside if card is None and named.endswith(".toml") else named)
@@ -115,7 +115,7 @@ def read_study(source: str | Path | Mapping[str, Any], card: str | None = None) 
 
 def check_study(content: Mapping[str, Any], instrument: Instrument, where: str, folder: str, text: str) -> Study:
     """Make a study from its content and its instrument, as read from a spec or from a store."""
-    top = Section(content, where, KEYS)
+    top = TomlTable(content, where, KEYS)
     sampling = read_sampling(top)
     parameters = tuple(
         read_parameter(part, instrument, sampling.method) for part in top.sections("parameter", PARAMETER_KEYS)

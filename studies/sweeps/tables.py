@@ -5,9 +5,9 @@ from pathlib import Path
 from typing import Any
 
 from studies.errors import InputError, nearest
-from studies.files.toml import Section, check_number
+from studies.files.toml import TomlTable, check_number
 from studies.instrument.card import Instrument
-from studies.sweeps.definition import MOST_CASES, Asked, Parameter, Requirement, Sampling, Search
+from studies.sweeps.definition import MOST_CASES, Asked, Requirement, Sampling, Search, StudyParameter
 from studies.sweeps.expressions import Derived
 from studies.sweeps.parameters import find_nominal
 from studies.sweeps.quantities import find_quantity
@@ -18,7 +18,7 @@ DISTRIBUTIONS = ("uniform", "normal", "triangular", "log-uniform")
 SOLVERS = ("auto", "full", "family")
 
 
-def read_sampling(top: Section) -> Sampling:
+def read_sampling(top: TomlTable) -> Sampling:
     """Read the `[sampling]` table."""
     part = top.section("sampling", ("method", "cases", "seed", "batch", "solver"))
     method = part.text("method", choices=METHODS)
@@ -35,7 +35,7 @@ def read_sampling(top: Section) -> Sampling:
     return Sampling(method, cases, _whole(part, "seed", 0, 0, 2**63), batch, part.text("solver", "auto", SOLVERS))
 
 
-def read_parameter(part: Section, instrument: Instrument, method: str) -> Parameter:
+def read_parameter(part: TomlTable, instrument: Instrument, method: str) -> StudyParameter:
     """Read one `[[parameter]]` table."""
     name = part.text("name")
     where = f"{part.where} '{name}'"
@@ -62,10 +62,10 @@ def read_parameter(part: Section, instrument: Instrument, method: str) -> Parame
     if method != "grid" and "count" in part:
         raise InputError(f"{where}: count goes with method = 'grid'.")
     bounded = deviation is None or any(key in part for key in ("low", "high", "tolerance"))
-    return Parameter(name, middle, low, high, distribution, deviation, (), count, bounded)
+    return StudyParameter(name, middle, low, high, distribution, deviation, (), count, bounded)
 
 
-def read_derived(part: Section, instrument: Instrument, parameters: Sequence[str]) -> Derived:
+def read_derived(part: TomlTable, instrument: Instrument, parameters: Sequence[str]) -> Derived:
     """Read one `[[derived]]` table."""
     name = part.text("name")
     if name in parameters:
@@ -76,7 +76,7 @@ def read_derived(part: Section, instrument: Instrument, parameters: Sequence[str
     return one
 
 
-def _ends(part: Section, where: str, middle: float, deviation: float | None) -> tuple[float, float]:
+def _ends(part: TomlTable, where: str, middle: float, deviation: float | None) -> tuple[float, float]:
     """Return the ends of a parameter; a normal one without ends is shown over three standard deviations."""
     if "tolerance" in part:
         if "low" in part or "high" in part:
@@ -95,7 +95,7 @@ def _ends(part: Section, where: str, middle: float, deviation: float | None) -> 
     return low, high
 
 
-def _listed(part: Section, name: str, where: str, found: float | str | None, method: str) -> Parameter:
+def _listed(part: TomlTable, name: str, where: str, found: float | str | None, method: str) -> StudyParameter:
     if method not in ("grid", "list"):
         raise InputError(f"{where}: values go with method = 'grid' or 'list'; with '{method}' give low and high.")
     values = part.raw("values")
@@ -106,15 +106,15 @@ def _listed(part: Section, name: str, where: str, found: float | str | None, met
             raise InputError(f"{where}: give values or {key}, not both.")
     if all(isinstance(value, str) for value in values):
         nominal = part.text("nominal", found if isinstance(found, str) else values[0])
-        return Parameter(name, nominal, 0.0, float(len(values) - 1), values=tuple(values))
+        return StudyParameter(name, nominal, 0.0, float(len(values) - 1), values=tuple(values))
     numbers = tuple(check_number(value, f"{where}: values") for value in values)
     if method == "grid":
         refuse_twins([f"{value:.17g}" for value in numbers], f"{where}: the value")
     nominal_number = part.number("nominal", found if isinstance(found, float) else numbers[len(numbers) // 2])
-    return Parameter(name, nominal_number, min(numbers), max(numbers), values=numbers)
+    return StudyParameter(name, nominal_number, min(numbers), max(numbers), values=numbers)
 
 
-def split_tables(top: Section, key: str) -> list[Mapping[str, Any]]:
+def split_tables(top: TomlTable, key: str) -> list[Mapping[str, Any]]:
     """Return an array of tables whose keys depend on their name, each with where it stands under the empty key."""
     tables = top.raw(key, [])
     if not isinstance(tables, list) or not all(isinstance(table, Mapping) for table in tables):
@@ -130,7 +130,7 @@ def read_asked(table: Mapping[str, Any], folder: str) -> Asked:
         raise InputError(f'{where}: the line name = "..." is missing; add it.')
     quantity = find_quantity(name, where)
     known = ("name", "label", *quantity.options)
-    part = Section({key: value for key, value in table.items() if key}, f"{where} '{name}'", known)
+    part = TomlTable({key: value for key, value in table.items() if key}, f"{where} '{name}'", known)
     options = {key: option.read(part, key) for key, option in quantity.options.items()}
     label = part.text("label", "-")
     try:
@@ -144,7 +144,7 @@ def read_asked(table: Mapping[str, Any], folder: str) -> Asked:
     return Asked(quantity, options, columns)
 
 
-def read_requirement(part: Section, columns: Sequence[str]) -> Requirement:
+def read_requirement(part: TomlTable, columns: Sequence[str]) -> Requirement:
     """Read one `[[requirement]]` table."""
     column = part.text("column", choices=columns)
     low, high = (part.number(key) if key in part else None for key in ("low", "high"))
@@ -156,7 +156,7 @@ def read_requirement(part: Section, columns: Sequence[str]) -> Requirement:
     return Requirement(column, low, high, target, within)
 
 
-def read_search(part: Section, columns: Sequence[str], parameters: Sequence[Parameter]) -> Search:
+def read_search(part: TomlTable, columns: Sequence[str], parameters: Sequence[StudyParameter]) -> Search:
     """Read one `[[search]]` table."""
     kind = part.text("kind", choices=("worst-case", "inversion"))
     numeric = [p.name for p in parameters if not isinstance(p.nominal, str)]
@@ -179,7 +179,7 @@ def read_search(part: Section, columns: Sequence[str], parameters: Sequence[Para
     return Search(kind, "", tuple(vary), wanted)
 
 
-def _whole(part: Section, key: str, default: int | None, least: int, most: int) -> int:
+def _whole(part: TomlTable, key: str, default: int | None, least: int, most: int) -> int:
     value = part.raw(key, default)
     if isinstance(value, bool) or not isinstance(value, int) or not least <= value <= most:
         raise InputError(f"{part.where}: {key} must be a whole number from {least} to {most}, not {value!r}.")

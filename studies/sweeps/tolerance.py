@@ -16,7 +16,7 @@ RANDOM = ("latin-hypercube", "sobol", "sensitivity")
 
 
 @dataclass(frozen=True)
-class Limits:
+class RequirementLimits:
     """What a requirement asks of a column; an end that is open is infinite."""
 
     column: str
@@ -35,7 +35,7 @@ class Yield:
         where the designs are no sample, such as a grid.
     """
 
-    limits: tuple[Limits, ...]
+    limits: tuple[RequirementLimits, ...]
     cases: int
     passed: int
     unknown: int
@@ -59,18 +59,18 @@ class Reach:
     inside: int
 
 
-def resolve_limits(results: "Results", requirement: "Requirement") -> Limits:
+def resolve_limits(results: "Results", requirement: "Requirement") -> RequirementLimits:
     """Return the limits of a requirement; without a target they lie about the nominal design's value."""
     if requirement.within is None:
         low = -np.inf if requirement.low is None else requirement.low
-        return Limits(requirement.column, low, np.inf if requirement.high is None else requirement.high)
+        return RequirementLimits(requirement.column, low, np.inf if requirement.high is None else requirement.high)
     target = requirement.target
     if target is None:
         place = [column.name for column in results.study.columns].index(requirement.column)
         target = results.nominal.values[place] if results.nominal is not None else np.nan
     if not np.isfinite(target):
         raise InputError(f"the nominal design has no {requirement.column}; give the requirement a target.")
-    return Limits(requirement.column, target - requirement.within, target + requirement.within)
+    return RequirementLimits(requirement.column, target - requirement.within, target + requirement.within)
 
 
 def find_yield(results: "Results", requirements: "tuple[Requirement, ...]") -> Yield:
@@ -109,7 +109,7 @@ def find_reach(results: "Results", requirements: "tuple[Requirement, ...]") -> R
     return Reach(part, int((distance < part).sum()))
 
 
-def _judge(results: "Results", limits: tuple[Limits, ...]) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+def _judge(results: "Results", limits: tuple[RequirementLimits, ...]) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
     """Return which cases meet all limits, and of which that is unknown: no known value fails, but one lacks."""
     values = np.array([results.column(limit.column) for limit in limits])
     known = np.isfinite(values)

@@ -10,7 +10,7 @@ from studies.errors import UNUSABLE_INPUT, InputError
 from studies.sweeps.parameters import TEMPERATURE, set_parameters
 
 if TYPE_CHECKING:
-    from studies.sweeps.definition import Parameter, Study
+    from studies.sweeps.definition import Study, StudyParameter
 
 MOST_CORNERS = 6  # parameters up to which all corners of the box are looked at
 
@@ -61,7 +61,7 @@ def _problem(study: "Study", values: Mapping[str, Any]) -> str:
     return ""
 
 
-def _extremes(parameter: "Parameter") -> tuple[Any, ...]:
+def _extremes(parameter: "StudyParameter") -> tuple[Any, ...]:
     if isinstance(parameter.nominal, str):
         return parameter.values
     return (parameter.low, parameter.high)

@@ -8,7 +8,7 @@ import time
 import numpy as np
 
 from compensation.controllers import Loops
-from compensation.electronics import Channels, Electronics, Noise
+from compensation.electronics import Channels, Electronics, LoopNoise
 from compensation.rebalance import simulate_rebalance
 from compensation.wave import from_quality
 from compensation.wave_fit import fit_whole_angle
@@ -23,7 +23,9 @@ def main() -> None:
         4432.0, 1e7, damping_anisotropy=0.01, damping_axis=0.2, frequency_split=5e-3, frequency_axis=0.1
     )
     electronics = Electronics(
-        Channels(0.01, 0.002, 0.003, 0.001, 0.01), Channels(-0.02, 0.001, 0.002, 5e-4, 0.02), Noise(1e-6, 1e-5, 5e-5)
+        Channels(0.01, 0.002, 0.003, 0.001, 0.01),
+        Channels(-0.02, 0.001, 0.002, 5e-4, 0.02),
+        LoopNoise(1e-6, 1e-5, 5e-5),
     )
     rows = np.arange(0.0, 36000.0)
     begin = time.process_time()

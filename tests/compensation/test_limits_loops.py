@@ -8,7 +8,7 @@ import pytest
 from compensation.carrier import simulate_carrier
 from compensation.closed_loop import ClosedLoop
 from compensation.controllers import Loops, find_margins
-from compensation.electronics import Channels, Electronics, Noise, thermal_noise
+from compensation.electronics import Channels, Electronics, LoopNoise, thermal_noise
 from compensation.errors import CompensationError
 from compensation.rebalance import settle_rebalance, simulate_rebalance
 from compensation.start_up import fit_run_down, start_up
@@ -123,7 +123,7 @@ def test_angle_random_walk_of_thermal_noise():
     """A rate loop hides nothing of it: σ/(n k) per √s, Leland (2001) and others; 4000 rows of 1 s."""
     wave = from_quality(4432.0, 1e6)
     level = thermal_noise(wave, 293.0, 1e-4, 1e-7)
-    electronics = Electronics(noise=Noise(thermal=level))
+    electronics = Electronics(noise=LoopNoise(thermal=level))
     run = simulate_rebalance(wave, electronics, Loops(), np.arange(0.0, 4000.0), generator=np.random.default_rng(3))
     assert np.std(run.rate) == pytest.approx(level / wave.coupling, rel=0.05)
 
@@ -133,7 +133,7 @@ def test_quantisation_is_the_noise_that_is_said():
     frequency, sample = 4432.07, 8 / 4432.07
     loops = Loops(8.0, 15.0, 15.0, 10.0, sampling=1 / sample, delay=sample, demodulator=100.0)
     wave = from_quality(frequency, 1e3)
-    electronics = Electronics(noise=Noise(pickoff=3e-5, adc_step=2e-3))
+    electronics = Electronics(noise=LoopNoise(pickoff=3e-5, adc_step=2e-3))
     true = simulate_carrier(wave, electronics, loops, 20.0, generator=np.random.default_rng(1)).rate[1000:]
     time = sample * np.arange(10000)
     said = simulate_rebalance(

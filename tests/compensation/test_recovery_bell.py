@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from compensation.bell import Chain, Curve, apply_chain, invert_chain
+from compensation.bell import BellChain, PolynomialCurve, apply_chain, invert_chain
 from compensation.bell_calibration import (
-    Run,
+    BellRun,
     fit_bias,
     fit_chain,
     fit_rough,
@@ -20,13 +20,13 @@ from compensation.polynomial import fit_polynomial
 DEG = np.pi / 180
 NONE = np.zeros((3, 3))
 EVERYWHERE = (-1e9, 1e9)
-PRINTED = Chain(
+PRINTED = BellChain(
     null=-703.3858,
     scale=0.0242 * DEG,
     rough_covariance=np.zeros((2, 2)),
-    bias=Curve(np.array([0.1673, -0.0056, 2.52e-5]) * DEG, NONE, 273.15, *EVERYWHERE),
-    scale_over_rate=Curve(np.array([-0.12 * DEG, 0.99, 5.89e-6 / DEG]), NONE, 0.0, *EVERYWHERE),
-    scale_over_temperature=Curve(np.array([0.9979, -1.83e-5, -1.26e-7]), NONE, 273.15, *EVERYWHERE),
+    bias=PolynomialCurve(np.array([0.1673, -0.0056, 2.52e-5]) * DEG, NONE, 273.15, *EVERYWHERE),
+    scale_over_rate=PolynomialCurve(np.array([-0.12 * DEG, 0.99, 5.89e-6 / DEG]), NONE, 0.0, *EVERYWHERE),
+    scale_over_temperature=PolynomialCurve(np.array([0.9979, -1.83e-5, -1.26e-7]), NONE, 273.15, *EVERYWHERE),
     taps=np.empty(0),
     sampling=0.1,
 )
@@ -44,7 +44,7 @@ def make_runs(generator, noise, rows=4000, dwell=200):
     def run(rate, temperature):
         counts = invert_chain(PRINTED, rate, temperature)
         counts = counts + noise / 0.0242 * generator.standard_normal(len(rate))
-        return Run(STEP * np.arange(len(rate)), counts, temperature, rate)
+        return BellRun(STEP * np.arange(len(rate)), counts, temperature, rate)
 
     return (
         run(plateaus, np.full(len(plateaus), 298.15)),
@@ -87,7 +87,7 @@ def test_rough_step_of_two_plateaus_passes_both_means():
     generator = np.random.default_rng(4)
     rate = np.repeat([0.0, 100 * DEG], 300)
     counts = invert_chain(PRINTED, rate, np.full(600, 298.15)) + generator.standard_normal(600)
-    null, scale, _ = fit_rough(Run(STEP * np.arange(600), counts, np.full(600, 298.15), rate))
+    null, scale, _ = fit_rough(BellRun(STEP * np.arange(600), counts, np.full(600, 298.15), rate))
     assert null == pytest.approx(np.mean(counts[:300]), rel=1e-10)
     assert scale == pytest.approx(100 * DEG / (np.mean(counts[300:]) - null), rel=1e-10)
 
@@ -182,7 +182,9 @@ def test_jitter_of_the_rate_table_does_not_split_a_plateau():
 
 
 def replace(run, **columns):
-    return Run(**{name: columns.get(name, getattr(run, name)) for name in ("time", "output", "temperature", "rate")})
+    return BellRun(
+        **{name: columns.get(name, getattr(run, name)) for name in ("time", "output", "temperature", "rate")}
+    )
 
 
 RATES, REST, TURNING = make_runs(np.random.default_rng(8), 0.06)

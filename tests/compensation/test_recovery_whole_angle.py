@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 
 from compensation.controllers import Loops
-from compensation.electronics import Channels, Electronics, Noise
+from compensation.electronics import Channels, Electronics, LoopNoise
 from compensation.errors import CompensationError
 from compensation.wave import from_quality
 from compensation.wave_fit import fit_whole_angle
 from compensation.whole_angle import simulate_whole_angle
 
-NOISE = Noise(pickoff=1e-6, adc_step=1e-5, dac_step=5e-5, thermal=3e-9)
+NOISE = LoopNoise(pickoff=1e-6, adc_step=1e-5, dac_step=5e-5, thermal=3e-9)
 
 
 def run_and_fit(wave, electronics, precession, seed, step=2.0, seconds=5400.0):
@@ -76,7 +76,7 @@ def test_parameters_within_two_per_cent_and_covered(seed):
 def test_quadrature_of_a_precessing_wave_resolves_a_split_of_a_third_of_a_millihertz():
     """0.32 mHz was resolved on a micro-shell (Microsystems & Nanoengineering 2025, s41378-025-00872-z)."""
     wave = from_quality(4432.0, 1e6, damping_anisotropy=0.01, frequency_split=3e-4, frequency_axis=0.2)
-    fit = run_and_fit(wave, Electronics(noise=Noise(pickoff=1e-5, adc_step=1e-5)), both_ways, 1, seconds=1800.0)
+    fit = run_and_fit(wave, Electronics(noise=LoopNoise(pickoff=1e-5, adc_step=1e-5)), both_ways, 1, seconds=1800.0)
     found = fit.estimates["frequency_split"]
     assert found.value / (2 * np.pi) == pytest.approx(3e-4, rel=0.1)
     assert found.low > 0.5 * found.value

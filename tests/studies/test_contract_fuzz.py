@@ -27,7 +27,7 @@ from studies.importing.draft import draft_map
 from studies.importing.join import import_records
 from studies.importing.mapping import load_map
 from studies.instrument.card import load_card, shipped_cards
-from studies.models import Source, compensate, emit_c, read_model, write_model
+from studies.models import ModelSource, compensate, emit_c, read_model, write_model
 from studies.models.kinds.frequency import save_frequency
 from studies.record import read_frequency_table, read_profile, read_record
 from studies.simulation.chamber import load_drive
@@ -228,7 +228,7 @@ def documents(tmp_path):
     found = [(f"card {name}", path.read_text(), load_card) for name, path in shipped_cards().items()]
     found.append(("card with every table", shipped_cards()["hrg-30mm"].read_text() + EVERY_TABLE, load_card))
     model = tmp_path / "model.toml"
-    write_model(save_frequency(fit_frequency(T, F), (Source("a.csv", "ab12", 7),), "test"), model)
+    write_model(save_frequency(fit_frequency(T, F), (ModelSource("a.csv", "ab12", 7),), "test"), model)
     found.append(("model", model.read_text(), read_all_of_a_model))
     raw = tmp_path / "raw.csv"
     raw.write_text(raw_text(), encoding="utf-8")

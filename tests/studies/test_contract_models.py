@@ -11,7 +11,7 @@ import pytest
 
 from compensation.frequency import fit_frequency
 from studies.errors import InputError
-from studies.models import Source, compensate, emit_c, format_model, model_kinds, read_model, write_model
+from studies.models import ModelSource, compensate, emit_c, format_model, model_kinds, read_model, write_model
 from studies.models.kinds.frequency import find_temperature, save_frequency
 from studies.record import Record
 
@@ -21,7 +21,7 @@ F = 4424.9 + 0.3716 * T - 9.7e-4 * T**2 + 1.5e-5 * T**3 + 0.01 * np.cos(5 * T)
 
 @pytest.fixture
 def model():
-    return save_frequency(fit_frequency(T, F), (Source('a "b" */ ü.csv', "ab12", 7),), "test")
+    return save_frequency(fit_frequency(T, F), (ModelSource('a "b" */ ü.csv', "ab12", 7),), "test")
 
 
 def compile_c(source, folder):

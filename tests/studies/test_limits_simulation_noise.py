@@ -4,7 +4,7 @@ import allantools
 import numpy as np
 import pytest
 
-from studies.instrument.tables.noise import Noise
+from studies.instrument.tables.noise import NoiseKeys
 from studies.simulation.noise import (
     NoiseLevels,
     bias_noise,
@@ -45,7 +45,7 @@ def test_flicker_noise_is_flat_at_its_level():
 
 def test_levels_of_the_rate_output_are_in_the_units_of_gyro_data_sheets():
     """Angle random walk N: N/√τ with τ in h; rate random walk K: K √(τ/3)."""
-    levels = Noise(bias_white_deg_per_rt_h=0.02, bias_flicker_deg_per_h=0.0, bias_walk_deg_per_h_per_rt_h=0.5)
+    levels = NoiseKeys(bias_white_deg_per_rt_h=0.02, bias_flicker_deg_per_h=0.0, bias_walk_deg_per_h_per_rt_h=0.5)
     both = bias_noise(levels)
     rng = np.random.default_rng(3)
     white = NoiseLevels(white=both.white).draw(400_000, 1.0, rng)

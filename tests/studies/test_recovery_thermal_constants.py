@@ -12,7 +12,7 @@ from scipy.signal import lfilter
 from compensation.coloured import estimate_wander
 from studies.calibration.lags.followers import Constant, NetworkFollower, make_lags
 from studies.calibration.lags.housing_run import HousingRun, even_rows, row_step
-from studies.calibration.lags.identification import FrequencyLaw, identify, identify_lags, profile_interval
+from studies.calibration.lags.identification import FrequencyPolynomial, identify, identify_lags, profile_interval
 from thermal.errors import ThermalError
 from thermal.lag import lag
 from thermal.network import Boundary, Conductor, Node, Radiator, assemble
@@ -21,7 +21,7 @@ from thermal.radiative import integrate
 
 ROOM = 293.15
 SLOPE, CURVATURE = 0.3716, -9.7e-4
-FREE_LAW = FrequencyLaw(ROOM, slope=None, curvature=None)
+FREE_LAW = FrequencyPolynomial(ROOM, slope=None, curvature=None)
 STEPS = "step 20 -10 4h then step -10 40 4h"
 
 
@@ -172,7 +172,7 @@ def test_a_relaxation_tells_the_time_constant_and_not_the_law():
     assert fit.estimates["slope"].value is None
     assert any("slope" in direction.parts for direction in fit.undetermined)
     given = identify(
-        [one_lag(rng, "soak 20 5h", departure=5.0)], make_lags(900.0), FrequencyLaw(ROOM, SLOPE, CURVATURE)
+        [one_lag(rng, "soak 20 5h", departure=5.0)], make_lags(900.0), FrequencyPolynomial(ROOM, SLOPE, CURVATURE)
     )
     assert given.undetermined == ()
     assert given.departures[0][0] == pytest.approx(5.0, abs=0.05)
@@ -189,8 +189,8 @@ def test_nothing_is_identified_from_a_constant_record(noise):
 def test_several_runs_share_the_constants_and_not_the_initial_state():
     rng = np.random.default_rng(4)
     runs = [one_lag(rng, "step 20 -10 4h", departure=d) for d in (1.5, -3.0)]
-    fit = identify(runs, make_lags(1000.0), FrequencyLaw(ROOM, None))
-    law = FrequencyLaw(ROOM, None, None)
+    fit = identify(runs, make_lags(1000.0), FrequencyPolynomial(ROOM, None))
+    law = FrequencyPolynomial(ROOM, None, None)
     assert identify(runs, make_lags(1000.0), law).departures[0][0] == pytest.approx(1.5, abs=0.1)
     assert fit.departures[1][0] == pytest.approx(-3.0, abs=0.3)
 
@@ -241,7 +241,7 @@ def test_the_profile_of_an_open_constant_has_an_open_end():
     """A lag far shorter than the rows: any still shorter one explains the record as well."""
     t, T_h = housing(STEPS, 60.0)
     run = record(np.random.default_rng(9), t, T_h, lag(t, T_h, 12.0), white=2.0)
-    fit = identify([run], make_lags(100.0, shortest=1e-3), FrequencyLaw(ROOM, SLOPE, CURVATURE))
+    fit = identify([run], make_lags(100.0, shortest=1e-3), FrequencyPolynomial(ROOM, SLOPE, CURVATURE))
     assert fit.estimates["time_constant_1"].value is None
     low, high = profile_interval(fit, "time_constant_1")
     assert low < 3.0

@@ -6,7 +6,7 @@ import pytest
 from thermal.network import Boundary, Conductor, Network, Node, Part, Radiator, Source, assemble
 from thermal.profile import Profile, parse_profile
 from thermal.radiative import integrate, simulate
-from thermal.sensitivity import Change, difference, no_change, respond
+from thermal.sensitivity import NetworkChange, difference, no_change, respond
 from thermal.sweeping import SweepError, sweep
 
 VALUES = {"air": 0.1, "mount": 0.012, "exchange": 1e-3, "film": 8e-5, "base": 25.0, "shell": 2.0, "power": 5e-3}
@@ -34,7 +34,7 @@ def build(values: dict[str, float], boundary: str = "chamber", bend: float = 1e-
     return assemble(parts)
 
 
-def change(name: str, boundary: str = "chamber") -> Change:
+def change(name: str, boundary: str = "chamber") -> NetworkChange:
     step = 1e-3 * VALUES[name]
     above, below = (build({**VALUES, name: VALUES[name] + part * step}, boundary) for part in (0.5, -0.5))
     return difference(above, below, step)

@@ -93,7 +93,7 @@ def make_lags(*starts: float, shortest: float = 10.0, longest: float = 1e5) -> L
 
 
 @dataclass(frozen=True)
-class Series:
+class LagSeries:
     """Lags in series, part of whose heat is radiated: the end of a chain of lumps.
 
     τ_j dT_j/dt = (1 − ρ + ρ g_j)(T_{j−1} − T_j), g_j = (T_{j−1} + T_j)(T_{j−1}² + T_j²)/(4 T₀³), T_0 = T_h, T_r the last:
@@ -129,10 +129,10 @@ class Series:
 
 def make_series(
     *starts: float, reference_temperature: float = 293.15, shortest: float = 10.0, longest: float = 1e5
-) -> Series:
+) -> LagSeries:
     """Lags in series with these starting time constants (s), a tenth of the heat radiated at first."""
     taus = [Constant(f"time_constant_{j}", tau, shortest, longest) for j, tau in enumerate(starts, 1)]
-    return Series((*taus, Constant("radiated_share", 0.1, -0.5, 1.0)), reference_temperature)
+    return LagSeries((*taus, Constant("radiated_share", 0.1, -0.5, 1.0)), reference_temperature)
 
 
 def _radiating_lag(time: Array, drive: Array, tau: float, share: float, cube: float, start: float) -> Array:

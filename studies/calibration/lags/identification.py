@@ -30,7 +30,7 @@ EVIDENCE = 10.0  # how far the information criterion must fall before something 
 
 
 @dataclass(frozen=True)
-class FrequencyLaw:
+class FrequencyPolynomial:
     """Coefficients of f(T) about a reference temperature (K); None is unknown and fitted.
 
     Attributes
@@ -46,7 +46,7 @@ class FrequencyLaw:
 
 
 @dataclass(frozen=True)
-class Estimate:
+class LagEstimate:
     """A constant with its interval; `value` is None where the record does not determine it.
 
     `standard_error` is relative for a constant that is fitted in its logarithm.
@@ -86,7 +86,7 @@ class Identification:
     warnings : what was missing in the record
     """
 
-    estimates: dict[str, Estimate]
+    estimates: dict[str, LagEstimate]
     confidence: float
     undetermined: tuple[Direction, ...]
     departures: tuple[Array, ...]
@@ -100,7 +100,7 @@ class Identification:
 
 
 def identify(
-    runs: Sequence[HousingRun], follower: Follower, law: FrequencyLaw, confidence: float = 0.9
+    runs: Sequence[HousingRun], follower: Follower, law: FrequencyPolynomial, confidence: float = 0.9
 ) -> Identification:
     """Fit the follower's constants and the unknown coefficients of the law to one run or several.
 
@@ -144,7 +144,7 @@ def identify(
 
 def identify_lags(
     runs: Sequence[HousingRun],
-    law: FrequencyLaw,
+    law: FrequencyPolynomial,
     most: int = 3,
     confidence: float = 0.9,
     make: Callable[..., Follower] = make_series,
@@ -169,7 +169,7 @@ def identify_lags(
 
 def _best_start(
     runs: Sequence[HousingRun],
-    law: FrequencyLaw,
+    law: FrequencyPolynomial,
     count: int,
     make: Callable[..., Follower],
     fewer: Identification | None,
@@ -219,7 +219,7 @@ def _refuse_constant(problem: LagProblem, solution: LagSolution, noise: Wander) 
     return criterion
 
 
-def _estimates(problem: LagProblem, solution: LagSolution, confidence: float) -> dict[str, Estimate]:
+def _estimates(problem: LagProblem, solution: LagSolution, confidence: float) -> dict[str, LagEstimate]:
     quantile = float(student.ppf((1 + confidence) / 2, problem.rows - problem.count))
     errors = np.sqrt(np.diag(solution.covariance))
     scales = problem.scales(solution.parameters)
@@ -228,11 +228,11 @@ def _estimates(problem: LagProblem, solution: LagSolution, confidence: float) ->
         value, error = solution.parameters[k], errors[k]
         low, high = value - quantile * error, value + quantile * error
         if error > VAGUE * scales[k]:
-            estimates[name] = Estimate(None, 0.0 if problem.is_logarithmic(k) else -np.inf, np.inf, float(error))
+            estimates[name] = LagEstimate(None, 0.0 if problem.is_logarithmic(k) else -np.inf, np.inf, float(error))
             continue
         if problem.is_logarithmic(k):
             value, low, high = np.exp([value, low, high])
-        estimates[name] = Estimate(float(value), float(low), float(high), float(error))
+        estimates[name] = LagEstimate(float(value), float(low), float(high), float(error))
     return estimates
 
 

@@ -9,7 +9,7 @@ from scipy.constants import zero_Celsius
 from compensation.spikes import find_spikes
 from studies.calibration.lags.followers import make_series
 from studies.calibration.lags.housing_run import HousingRun
-from studies.calibration.lags.identification import FrequencyLaw, Identification, identify, identify_lags
+from studies.calibration.lags.identification import FrequencyPolynomial, Identification, identify, identify_lags
 from studies.errors import InputError, naming
 from studies.record import Record
 from studies.rest import LEAST_SPIKE
@@ -68,16 +68,16 @@ def _run(record: Record) -> HousingRun:
         return HousingRun(record["time_s"], frequency, housing + zero_Celsius)
 
 
-def _law(runs: Sequence[HousingRun], instrument: "Instrument | None") -> FrequencyLaw:
+def _law(runs: Sequence[HousingRun], instrument: "Instrument | None") -> FrequencyPolynomial:
     """A free slope about the middle of what the housing covers, with the card's bend or a free curvature."""
     ends = np.array([f(run.housing_temperature) for run in runs for f in (np.nanmin, np.nanmax)])
     low, high = float(ends.min()), float(ends.max())
     middle = (low + high) / 2
     if instrument is None:
-        return FrequencyLaw(middle, slope=None, curvature=None)
+        return FrequencyPolynomial(middle, slope=None, curvature=None)
     from studies.law import law_of
 
     law = law_of(instrument, low - 10, high + 10)
     T = np.linspace(law.lowest, law.highest, 61)
     cubic = np.polynomial.Polynomial.fit(T - middle, law.frequency(T), 3).convert().coef
-    return FrequencyLaw(middle, slope=None, curvature=float(cubic[2]), cubic=float(cubic[3]))
+    return FrequencyPolynomial(middle, slope=None, curvature=float(cubic[2]), cubic=float(cubic[3]))

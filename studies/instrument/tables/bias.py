@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from compensation.wave import feign_rate, see_across
-from studies.instrument.keys import Table, number
+from studies.instrument.keys import Keys, number
 from studies.instrument.registry import CardTable
 
 Array = NDArray[np.float64]
@@ -35,7 +35,7 @@ TERMS = {
 }
 
 
-class Bias(Table, frozen=True, kw_only=True):
+class Bias(Keys, frozen=True, kw_only=True):
     """Zero-rate output: offset, damping anisotropy, and the paper's polynomial in f and its rate."""
 
     offset_deg_per_h: Annotated[float, number(sd=10.0)] = 0.0

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import msgspec
 
 from studies.errors import InputError
-from studies.instrument.keys import Table, number
+from studies.instrument.keys import Keys, number
 from studies.instrument.registry import CardTable, Place
 
 if TYPE_CHECKING:
@@ -64,7 +64,7 @@ def _declare(effect: "Effect", response: str) -> Any:
             raise ValueError(f"the effect '{effect.name}' needs a coefficient; add {' or '.join(coefficients)}.")
 
     return msgspec.defstruct(
-        "Entry", fields, bases=(Table,), namespace={"__post_init__": check}, frozen=True, kw_only=True
+        "Entry", fields, bases=(Keys,), namespace={"__post_init__": check}, frozen=True, kw_only=True
     )
 
 

@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import numpy as np
 
-from studies.instrument.keys import Table, number
+from studies.instrument.keys import Keys, number
 from studies.instrument.registry import CardTable, Place
 
 if TYPE_CHECKING:
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from shell.imperfection import Pair
 
 
-class GapWave(Table, frozen=True, kw_only=True):
+class GapWave(Keys, frozen=True, kw_only=True):
     """A wave of the gap around."""
 
     order: Annotated[int, number(least=1, most=40)]
@@ -38,7 +38,7 @@ class GapWave(Table, frozen=True, kw_only=True):
     azimuth_deg: float = 0.0
 
 
-class ElectrodeKeys(Table, frozen=True, kw_only=True):
+class ElectrodeKeys(Keys, frozen=True, kw_only=True):
     """Equal electrodes around a face."""
 
     face: Literal["inner", "outer"] = "inner"

@@ -27,7 +27,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from studies.errors import InputError
-from studies.instrument.keys import Table, number
+from studies.instrument.keys import Keys, number
 from studies.instrument.registry import CardTable, Place
 
 if TYPE_CHECKING:
@@ -37,7 +37,7 @@ LENGTHS = {"wall": "thickness", "outer": "outer", "inner": "inner", "offset": "o
 SHARES = {"density": "density", "modulus": "modulus"}
 
 
-class WaveKeys(Table, frozen=True, kw_only=True):
+class WaveKeys(Keys, frozen=True, kw_only=True):
     """A wave around of a length or of a property of the material."""
 
     of: Literal["wall", "outer", "inner", "offset", "rim", "density", "modulus"] = "wall"
@@ -55,7 +55,7 @@ class WaveKeys(Table, frozen=True, kw_only=True):
             raise ValueError(f"amplitude_um = {self.amplitude_um:g} is more than a millimetre: it is in µm.")
 
 
-class MassKeys(Table, frozen=True, kw_only=True):
+class MassKeys(Keys, frozen=True, kw_only=True):
     """A small mass on the shell."""
 
     mass_ug: float
@@ -64,14 +64,14 @@ class MassKeys(Table, frozen=True, kw_only=True):
     height: Annotated[float, number(least=-1.0, most=1.0)] = 0.0
 
 
-class MapKeys(Table, frozen=True, kw_only=True):
+class MapKeys(Keys, frozen=True, kw_only=True):
     """A table of measured departures."""
 
     of: Literal["wall", "outer", "inner", "offset"]
     file: str
 
 
-class SplitKeys(Table, frozen=True, kw_only=True):
+class SplitKeys(Keys, frozen=True, kw_only=True):
     """A measured split of one harmonic."""
 
     harmonic: Annotated[int, number(least=1, most=12)] = 2
@@ -79,7 +79,7 @@ class SplitKeys(Table, frozen=True, kw_only=True):
     slow_axis_deg: float
 
 
-class ImperfectionKeys(Table, frozen=True, kw_only=True):
+class ImperfectionKeys(Keys, frozen=True, kw_only=True):
     """Departures from the body of revolution."""
 
     wave: tuple[WaveKeys, ...] = ()
@@ -147,11 +147,11 @@ def _wave(keys: WaveKeys) -> "Field":
 
 def _map(keys: MapKeys, place: Place) -> "Field":
     from shell.scan.survey import survey_map
-    from studies.files.clouds import Grid, read_cloud
+    from studies.files.clouds import FaceGrid, read_cloud
 
     path = place.folder / keys.file
     grid = read_cloud(path)
-    if not isinstance(grid, Grid):
+    if not isinstance(grid, FaceGrid):
         raise InputError(
             f"{path}: {place.where} asks for a table over position and azimuth; hrg scan makes one of points."
         )

@@ -31,13 +31,13 @@ vibration_um, modal_mass_mg           # with both, thermomechanical noise is kno
 
 from typing import Annotated, Literal
 
-from studies.instrument.keys import Table, number
+from studies.instrument.keys import Keys, number
 from studies.instrument.registry import CardTable
 
 Band = Annotated[float, number(above=0.0)]
 
 
-class Loop(Table, frozen=True, kw_only=True):
+class Loop(Keys, frozen=True, kw_only=True):
     """Loops of the gyro and the errors of their electronics, in the units of the keys."""
 
     mode: Literal["force-rebalance", "whole-angle"] = "force-rebalance"

@@ -11,11 +11,11 @@ from typing import Annotated
 import numpy as np
 from numpy.typing import NDArray
 
-from studies.instrument.keys import Table, number
+from studies.instrument.keys import Keys, number
 from studies.instrument.registry import CardTable
 
 
-class Loss(Table, frozen=True, kw_only=True):
+class Loss(Keys, frozen=True, kw_only=True):
     """1/Q = q₀ (1 + a x + b x²), x = T − T_ref (K)."""
 
     inverse_q: Annotated[float, number(above=0.0, relative_sd=1.0)] = 1e-7

@@ -40,7 +40,7 @@ from typing import Annotated, Literal
 
 from scipy.constants import zero_Celsius
 
-from studies.instrument.keys import Table, number
+from studies.instrument.keys import Keys, number
 from studies.instrument.registry import CardTable
 
 Positive = Annotated[float, number(above=0.0)]
@@ -48,7 +48,7 @@ Share = Annotated[float, number(least=0.0, most=1.0)]
 Gas = Literal["air", "nitrogen", "argon", "hydrogen"]
 
 
-class FilmKeys(Table, frozen=True, kw_only=True):
+class FilmKeys(Keys, frozen=True, kw_only=True):
     """A film on the faces."""
 
     material: str
@@ -74,7 +74,7 @@ class FilmKeys(Table, frozen=True, kw_only=True):
             )
 
 
-class ActivatedKeys(Table, frozen=True, kw_only=True):
+class ActivatedKeys(Keys, frozen=True, kw_only=True):
     """A loss that heat activates."""
 
     height: Annotated[float, number(least=0.0, relative_sd=0.5)]
@@ -82,7 +82,7 @@ class ActivatedKeys(Table, frozen=True, kw_only=True):
     peak_degC: Annotated[float, number(above=-zero_Celsius)]
 
 
-class LossParts(Table, frozen=True, kw_only=True):
+class LossParts(Keys, frozen=True, kw_only=True):
     """What a loss budget is made of beside geometry and material."""
 
     pressure_Pa: Annotated[float, number(least=0.0, relative_sd=0.5)] | None = None

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Annotated
 import msgspec
 
 from studies.errors import InputError, naming
-from studies.instrument.keys import Table, number
+from studies.instrument.keys import Keys, number
 from studies.instrument.registry import CardTable, Place
 
 if TYPE_CHECKING:
@@ -34,7 +34,7 @@ GIVEN = {
 }
 
 
-class Factor(Table, frozen=True, kw_only=True):
+class PropertyFactor(Keys, frozen=True, kw_only=True):
     """The property times exp(a + b x + ½ c x²), x = T − T_ref (K)."""
 
     log_value: float = 0.0
@@ -42,7 +42,7 @@ class Factor(Table, frozen=True, kw_only=True):
     log_curvature_per_K2: float = 0.0
 
 
-class Difference(Table, frozen=True, kw_only=True):
+class Difference(Keys, frozen=True, kw_only=True):
     """The property plus a + b x + ½ c x²."""
 
     value: float = 0.0
@@ -50,16 +50,16 @@ class Difference(Table, frozen=True, kw_only=True):
     curvature_per_K2: float = 0.0
 
 
-class Deviation(Table, frozen=True, kw_only=True):
+class Deviation(Keys, frozen=True, kw_only=True):
     """What the material departs from its published law by."""
 
-    shear_modulus: Factor | None = None
-    youngs_modulus: Factor | None = None
+    shear_modulus: PropertyFactor | None = None
+    youngs_modulus: PropertyFactor | None = None
     poisson_ratio: Difference | None = None
-    density: Factor | None = None
+    density: PropertyFactor | None = None
     expansion: Difference | None = None
-    conductivity: Factor | None = None
-    heat_capacity: Factor | None = None
+    conductivity: PropertyFactor | None = None
+    heat_capacity: PropertyFactor | None = None
 
     @property
     def coefficients(self) -> dict[str, float]:
@@ -72,7 +72,7 @@ class Deviation(Table, frozen=True, kw_only=True):
         }
 
 
-class MaterialKeys(Table, frozen=True, kw_only=True):
+class MaterialKeys(Keys, frozen=True, kw_only=True):
     """The keys of `[material]`."""
 
     name: str

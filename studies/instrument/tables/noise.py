@@ -17,13 +17,13 @@ housing_resolution_degC = 0.0
 
 from typing import Annotated
 
-from studies.instrument.keys import Table, number
+from studies.instrument.keys import Keys, number
 from studies.instrument.registry import CardTable
 
 Level = Annotated[float, number(least=0.0)]
 
 
-class Noise(Table, frozen=True, kw_only=True):
+class NoiseKeys(Keys, frozen=True, kw_only=True):
     """Noise levels, the housing sensor's lag, and the rounding of the record."""
 
     frequency_white_Hz: Level = 2e-3
@@ -41,7 +41,7 @@ class Noise(Table, frozen=True, kw_only=True):
     note: str = ""
 
 
-SILENT = Noise(**{key: 0.0 for key in Noise.__struct_fields__ if key != "note"})  # type: ignore[arg-type]
+SILENT = NoiseKeys(**{key: 0.0 for key in NoiseKeys.__struct_fields__ if key != "note"})  # type: ignore[arg-type]
 """No noise, no lag, no rounding."""
 
-TABLE = CardTable("noise", Noise)
+TABLE = CardTable("noise", NoiseKeys)

@@ -5,11 +5,11 @@ names = ["thermal.mount_conductance_W_per_K", "thermal.base_heat_capacity_J_per_
 correlation = [[1.0, 0.9], [0.9, 1.0]]                                                # of their normal coordinates
 """
 
-from studies.instrument.keys import Table
+from studies.instrument.keys import Keys
 from studies.instrument.registry import CardTable
 
 
-class Posterior(Table, frozen=True, kw_only=True):
+class Posterior(Keys, frozen=True, kw_only=True):
     """Correlations of uncertain values."""
 
     names: tuple[str, ...] = ()

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import msgspec
 
 from studies.errors import InputError, naming
-from studies.instrument.keys import Table, number
+from studies.instrument.keys import Keys, number
 from studies.instrument.registry import CardTable, Place
 
 if TYPE_CHECKING:
@@ -22,7 +22,7 @@ Thickness = Length | Annotated[list[tuple[Share, Length]], msgspec.Meta(min_leng
 Point = tuple[float, float]
 
 
-class StemKeys(Table, frozen=True, kw_only=True):
+class StemKeys(Keys, frozen=True, kw_only=True):
     """`[resonator.stem]`: a solid cylinder on the axis, clamped at `end_mm`; with side "both" at [inner, outer]."""
 
     radius_mm: Length
@@ -43,7 +43,7 @@ class StemKeys(Table, frozen=True, kw_only=True):
         return Stem(radius=self.radius_mm * MM, ends=ends, fillet=self.fillet_mm * MM, side=self.side)
 
 
-class Shape(Table, frozen=True, kw_only=True, tag_field="shape"):
+class Shape(Keys, frozen=True, kw_only=True, tag_field="shape"):
     """What every shape has: a number, or [position, value] pairs that are joined linearly from 0 (start) to 1 (rim)."""
 
     thickness_mm: Thickness
@@ -150,14 +150,14 @@ class Bell(Stemmed, frozen=True, kw_only=True, tag="bell"):
         )
 
 
-class LineKeys(Table, frozen=True, kw_only=True, tag_field="kind", tag="line"):
+class LineKeys(Keys, frozen=True, kw_only=True, tag_field="kind", tag="line"):
     """A straight piece of a meridian, [r, z] to [r, z]."""
 
     from_mm: Point
     to_mm: Point
 
 
-class ArcKeys(Table, frozen=True, kw_only=True, tag_field="kind", tag="arc"):
+class ArcKeys(Keys, frozen=True, kw_only=True, tag_field="kind", tag="arc"):
     """A circular piece of a meridian about `center_mm`."""
 
     from_mm: Point

@@ -21,14 +21,14 @@ uncertainties: what is known before a thermal record has been seen.
 
 from typing import Annotated
 
-from studies.instrument.keys import Table, number
+from studies.instrument.keys import Keys, number
 from studies.instrument.registry import CardTable
 
 IDENTIFIED_MOUNT = 0.0118  # W/K, for the card hrg-30mm; see studies.papers.settling
 Length = Annotated[float, number(above=0.0)]
 
 
-class Thermal(Table, frozen=True, kw_only=True):
+class Thermal(Keys, frozen=True, kw_only=True):
     """Constants of the heat path; what is None follows from geometry and material."""
 
     film_emissivity: Annotated[float, number(least=0.0, most=1.0, relative_sd=1.0)] = 0.03

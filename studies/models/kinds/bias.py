@@ -24,7 +24,7 @@ from compensation.memory import NO_MEMORY, Memory, follow_lag, follow_play
 from compensation.samples import check_time
 from studies.errors import InputError, nearest
 from studies.models.bias_c import CausalBias, write_c
-from studies.models.file import Model, Source, make_part
+from studies.models.file import Model, ModelSource, make_part
 from studies.record import COMPENSATED, Record
 
 if TYPE_CHECKING:
@@ -39,7 +39,7 @@ LEAST_BLOCKS = 3  # and half a window, before a causal rate is known
 
 
 def save_bias(
-    fit: "BiasFit", run: "BiasRun", output: str, column: str, sources: tuple[Source, ...], made_by: str
+    fit: "BiasFit", run: "BiasRun", output: str, column: str, sources: tuple[ModelSource, ...], made_by: str
 ) -> Model:
     """Return a fitted bias model; `run` tells how the rate was taken, `output` the column fitted, `column` over which."""
     units = [OUTPUTS[output], *(unit_of_term(OUTPUTS[output], name, fit.variable) for name in fit.terms)]

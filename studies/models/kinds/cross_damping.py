@@ -13,7 +13,7 @@ from scipy.constants import zero_Celsius
 
 from studies.errors import InputError
 from studies.models.c_source import head, polynomial, self_test
-from studies.models.file import Model, Part, Source, make_part
+from studies.models.file import Model, ModelPart, ModelSource, make_part
 from studies.record import COMPENSATED, Record
 from studies.rest import celsius_range
 
@@ -25,7 +25,7 @@ OUTPUTS = {"bias_deg_per_h": math.radians(1 / 3600), "measured_rate_deg_per_s": 
 
 
 def save_cross_damping(
-    fit: "CrossDampingModel", output: str, temperature_column: str, sources: tuple[Source, ...], made_by: str
+    fit: "CrossDampingModel", output: str, temperature_column: str, sources: tuple[ModelSource, ...], made_by: str
 ) -> Model:
     """Return a fitted ζ₁₂(T) as a model that compensates the column `output`."""
     order = len(fit.coefficients) - 1
@@ -141,7 +141,7 @@ def _test_rows(model: Model) -> list[tuple[float, ...]]:
     return list(zip(steps.tolist(), temperature.tolist(), error.tolist(), strict=True))
 
 
-def _part(model: Model) -> Part:
+def _part(model: Model) -> ModelPart:
     part = model.part("cross-damping")
     expected = tuple(f"zeta_{i}" for i in range(len(part.values)))
     if part.names != expected:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from studies.errors import InputError
 from studies.models.c_source import head, polynomial, self_test
-from studies.models.file import Model, Source, make_part
+from studies.models.file import Model, ModelSource, make_part
 from studies.record import COMPENSATED, Record
 
 if TYPE_CHECKING:
@@ -23,7 +23,7 @@ WIDENED = 0.05
 GRID = 2001
 
 
-def save_frequency(fit: "FrequencyFit", sources: tuple[Source, ...], made_by: str) -> Model:
+def save_frequency(fit: "FrequencyFit", sources: tuple[ModelSource, ...], made_by: str) -> Model:
     """Return a fitted curve as a model."""
     names = ["f0", *(f"a{k}" for k in range(1, fit.order + 1))]
     units = ["Hz", "Hz/degC", *(f"Hz/degC^{k}" for k in range(2, fit.order + 1))]

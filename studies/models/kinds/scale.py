@@ -14,12 +14,12 @@ from scipy.constants import zero_Celsius
 
 from studies.errors import InputError
 from studies.models.c_source import head, polynomial
-from studies.models.file import Model, Part, Source, make_part
+from studies.models.file import Model, ModelPart, ModelSource, make_part
 from studies.record import COMPENSATED, Record
 from studies.rest import celsius_range
 
 if TYPE_CHECKING:
-    from compensation.bell import Chain, Curve
+    from compensation.bell import BellChain, PolynomialCurve
 
 DEG = math.radians(1.0)
 RAW = ("output_counts", "measured_rate_deg_per_s")
@@ -28,7 +28,7 @@ RATE = "measured_rate_deg_per_s"
 
 
 def save_scale(
-    chain: "Chain", output: str, temperature_column: str, sources: tuple[Source, ...], made_by: str
+    chain: "BellChain", output: str, temperature_column: str, sources: tuple[ModelSource, ...], made_by: str
 ) -> Model:
     """Return a fitted chain as a model that compensates the column `output`."""
     raw = "counts" if output == "output_counts" else "deg/s"
@@ -63,9 +63,9 @@ def save_scale(
     )
 
 
-def load_scale(model: Model) -> "Chain":
+def load_scale(model: Model) -> "BellChain":
     """Return the chain that a model file holds."""
-    from compensation.bell import Chain
+    from compensation.bell import BellChain
 
     rough, column = model.part("rough"), _temperature_column(model)
     for name in (column, RATE):
@@ -77,7 +77,7 @@ def load_scale(model: Model) -> "Chain":
     if isinstance(taps, str | float):
         raise InputError(f"{model.path or 'model'} [settings]: fir_taps must be a list of numbers, [] for no filter.")
     errors = np.array(rough.covariance) if rough.covariance else np.zeros((2, 2))
-    return Chain(
+    return BellChain(
         null=_coefficient(model, rough, "null"),
         scale=_rough_scale(model, rough) * DEG,
         rough_covariance=np.diag([1.0, DEG]) @ errors @ np.diag([1.0, DEG]),
@@ -165,7 +165,7 @@ double hrg_rate(double output, double temperature_degC) {{
 {smoother}"""
 
 
-def _save_curve(name: str, curve: "Curve", y: float, x: float, units: Sequence[str]) -> Part:
+def _save_curve(name: str, curve: "PolynomialCurve", y: float, x: float, units: Sequence[str]) -> ModelPart:
     """A curve in degrees: y and x are the powers of an angle in its value and its variable."""
     order = len(curve.coefficients) - 1
     size = DEG ** (x * np.arange(order + 1) - y)
@@ -175,25 +175,27 @@ def _save_curve(name: str, curve: "Curve", y: float, x: float, units: Sequence[s
     return make_part(name, names, size * curve.coefficients, [*units, *more][: order + 1], covariance)
 
 
-def _load_curve(model: Model, name: str, y: float, x: float, reference: float, limits: tuple[float, float]) -> "Curve":
-    from compensation.bell import Curve
+def _load_curve(
+    model: Model, name: str, y: float, x: float, reference: float, limits: tuple[float, float]
+) -> "PolynomialCurve":
+    from compensation.bell import PolynomialCurve
 
     part = model.part(name)
     if part.names != tuple(f"c{i}" for i in range(len(part.values))):
         raise InputError(f"{model.path or 'model'} [[part]] {name}: the coefficients must be c0, c1, …, in this order.")
     size = DEG ** (y - x * np.arange(len(part.values)))
     covariance = np.array(part.covariance) if part.covariance else np.zeros((len(part.values),) * 2)
-    return Curve(size * np.array(part.values), size[:, None] * covariance * size, reference, *limits)
+    return PolynomialCurve(size * np.array(part.values), size[:, None] * covariance * size, reference, *limits)
 
 
-def _rough_scale(model: Model, rough: Part) -> float:
+def _rough_scale(model: Model, rough: ModelPart) -> float:
     scale = _coefficient(model, rough, "scale")
     if scale == 0:
         raise InputError(f"{model.path}: [[part]] rough: scale is 0, so that the output would not count; correct it.")
     return scale
 
 
-def _coefficient(model: Model, part: Part, name: str) -> float:
+def _coefficient(model: Model, part: ModelPart, name: str) -> float:
     if name not in part.names:
         raise InputError(f"{model.path or 'model'} [[part]] {part.name}: the coefficient '{name}' is missing.")
     return part[name]

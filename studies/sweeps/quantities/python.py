@@ -5,13 +5,13 @@ It is named by module path, `function = "package.module:name"` or `"file.py:name
 """
 
 from studies.errors import InputError
-from studies.files.toml import Section
+from studies.files.toml import TomlTable
 from studies.sweeps.case import Case, Options
 from studies.sweeps.quantity import Column, Number, Option, Quantity, number
 
 
 def _text(default: str | None, meaning: str) -> Option:
-    def read(section: Section, key: str) -> str:
+    def read(section: TomlTable, key: str) -> str:
         return section.text(key, default)
 
     return Option(meaning, read)

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from studies.cli import study as cli
-from studies.files.toml import Section
+from studies.files.toml import TomlTable
 from studies.instrument.card import load_card
 from studies.sweeps.case import Case
 from studies.sweeps.quantities import library
@@ -16,7 +16,7 @@ COMPUTED = sorted(name for name in library() if name != "python")
 
 
 def options_of(name, **given):
-    section = Section(given, "test", tuple(library()[name].options))
+    section = TomlTable(given, "test", tuple(library()[name].options))
     return {key: option.read(section, key) for key, option in library()[name].options.items()}
 
 

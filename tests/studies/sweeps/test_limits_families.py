@@ -5,7 +5,7 @@ import pytest
 from studies.errors import InputError
 from studies.instrument.card import shipped_cards
 from studies.sweeps.design import draw
-from studies.sweeps.evaluate import Plan, evaluate_case
+from studies.sweeps.evaluate import WorkPlan, evaluate_case
 from studies.sweeps.families import Families, choose_solver
 from studies.sweeps.run import estimate_study, run_study
 from studies.sweeps.spec import read_study
@@ -47,7 +47,7 @@ def results(spec):
 
 
 def test_designs_lie_within_their_stated_error_of_the_full_solve(results):
-    plan = Plan.of(results.study)
+    plan = WorkPlan.of(results.study)
     assert results.about["identity"]["solver"] != "full"
     for place in (0, 100, 299):
         full = evaluate_case(plan, results.design(place))
@@ -96,7 +96,7 @@ def vary(card):
 def test_every_shipped_card_has_a_family(card):
     results = run_study(vary(card))
     assert results.about["identity"]["solver"] != "full"
-    plan = Plan.of(results.study)
+    plan = WorkPlan.of(results.study)
     for place in (3, 40):
         full = evaluate_case(plan, results.design(place))
         assert abs(results.values[place, 0] - full.values[0]) < results.errors[place, 0] + full.errors[0]
