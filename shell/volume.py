@@ -18,7 +18,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from shell.assembly import build_system
-from shell.blocks import Support, Mesh
+from shell.blocks import Mesh, Support
 from shell.errors import ShellError
 from shell.layout import Chain
 from shell.levels import Level
@@ -150,9 +150,7 @@ def _divide_chain(resonator: Resonator, chain: Chain, layers: int, spacing: floa
     return grids
 
 
-def _divide_cells(
-    mesh: Mesh, boundary: Support, count: int, grids: list[Array], held: list[NDArray[np.bool_]]
-) -> None:
+def _divide_cells(mesh: Mesh, boundary: Support, count: int, grids: list[Array], held: list[NDArray[np.bool_]]) -> None:
     along = nodal(mesh.grid.shape[2] - 1, np.linspace(-1.0, 1.0, 2 * count + 1)).values
     outside = np.bincount(mesh.edges.ravel()) == 1
     a, b = mesh.pairs.T
