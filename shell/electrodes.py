@@ -18,7 +18,6 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.optimize import linprog
 
 from shell.errors import ShellError
 from shell.imperfection.field import Complex, Field, values_around
@@ -252,6 +251,8 @@ def trim_voltages(electrodes: Electrodes, wave: complex, limit: float) -> Trim:
     ShellError
         The split lies beyond what the electrodes reach within the limit.
     """
+    from scipy.optimize import linprog
+
     means, waves = electrodes.per_square_volt
     scale = float(abs(waves).max())
     sought = linprog(

@@ -15,11 +15,11 @@ order in its unevenness, δ ln f = Σ sensitivity (T(s) − T_mean) over the sta
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.constants import zero_Celsius
-from scipy.interpolate import CubicSpline
 
 from shell.elastic import Elastic
 from shell.errors import ShellError
@@ -30,6 +30,9 @@ from shell.property import coefficient_names, powers
 from shell.resonator import Resonator
 from shell.shape_factor import ShapeFactor, interpolate_shape, shape_of
 from shell.solution import AlongMeridian
+
+if TYPE_CHECKING:
+    from scipy.interpolate import CubicSpline
 
 Array = NDArray[np.float64]
 REACH = 5.0  # standard deviations of Poisson's ratio that Φ covers beside the law's own range
@@ -240,7 +243,9 @@ class FrequencyLaw:
         return np.linspace(low, high, 9 + int((high - low) / SPACING))
 
     @cached_property
-    def _spline(self) -> CubicSpline:
+    def _spline(self) -> "CubicSpline":
+        from scipy.interpolate import CubicSpline
+
         return CubicSpline(self._knots, self._exact(self._knots))
 
     def _derivatives(self, T: Array) -> dict[str, Array]:

@@ -13,7 +13,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.integrate import quad
 
 from shell.errors import ShellError
 
@@ -166,6 +165,8 @@ def rayleigh_integrals(n: int, phi_1: float = 0.0, phi_2: float = pi / 2) -> Ray
     ShellError
         For n below 2, angles that are not 0 ≤ phi_1 < phi_2 < π, or a cap too small for double precision.
     """
+    from scipy.integrate import quad
+
     if int(n) != n or n < 2:
         raise ShellError(f"Rayleigh's mode needs a whole harmonic n of at least 2, not {n}; n = 0, 1 move rigidly.")
     if not 0 <= phi_1 < phi_2 < pi:

@@ -24,13 +24,6 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 
-def is_imperfect(instrument: "Instrument") -> bool:
-    """Whether the card says anything that could split a pair."""
-    card: CardImperfection = instrument.part("imperfection")
-    electrodes: CardElectrodes = instrument.part("electrodes")
-    return card.fields is not None or card.split is not None or electrodes.are_charged
-
-
 @dataclass(frozen=True)
 class SplitPair:
     """A pair of an instrument at a temperature, split by all that its card says.

@@ -12,7 +12,6 @@ from typing import Protocol, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.interpolate import make_interp_spline
 
 from shell.errors import ShellError
 from shell.quadrature import Array
@@ -156,6 +155,8 @@ class Map:
         if len(self.position) == 1:
             return np.broadcast_to(self._waves[0, order], np.shape(x))
         degree = min(3, len(self.position) - 1)
+        from scipy.interpolate import make_interp_spline
+
         return np.asarray(make_interp_spline(self.position, self._waves[:, order], degree)(x))
 
     @cached_property

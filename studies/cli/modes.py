@@ -2,7 +2,8 @@
 
 Where the card has imperfections or charged electrodes, the pairs n >= 1 have `split` in the JSON besides: `split_Hz`, `slow_Hz`, `fast_Hz`,
 `slow_axis_deg` (azimuth of an antinode of the slower mode), `shift_ppm` of the mean, all to first order, and `every_order_split_Hz`; and
-`parts`, split_Hz, slow_axis_deg and shift_ppm by the imperfection, the measured split and the electrodes alone.
+`parts`, split_Hz, slow_axis_deg and shift_ppm by the imperfection, the measured split and the electrodes alone. With `--spin` the lowest modes of
+n >= 2 in the solid theory have `spin`: `rate_deg_per_s`, `lower_wave_Hz` and `upper_wave_Hz`, and `shift_ppm` of their mean with its parts.
 """
 
 from typing import TYPE_CHECKING, Annotated, Any, Literal
@@ -27,6 +28,7 @@ def modes(
     theory: Literal["solid", "shell", "rayleigh"] = "solid",
     tolerance: float = 1e-5,
     sensitivities: bool = False,
+    spin: float | None = None,
 ) -> Answer:
     """Compute the lowest modes of a resonator: frequency, Bryan factor, energies, sensitivities.
 
@@ -46,6 +48,8 @@ def modes(
         Relative error that the frequency may have against its own theory.
     sensitivities : bool
         Show how each frequency follows E, nu, rho, thickness and radius, and where its energy is.
+    spin : float
+        Rate of spin about the axis in °/s: the two waves that run around, and what the second order of the rate does to both.
     """
     from dataclasses import asdict
 
@@ -53,6 +57,7 @@ def modes(
 
     from shell.modes import solve_modes
     from studies.cli.output import print_table
+    from studies.cli.spin import print_spin, spin_pairs
     from studies.errors import InputError, naming
     from studies.instrument.card import load_card
 
@@ -70,6 +75,7 @@ def modes(
     detailed = theory != "rayleigh"
     share, mean = _material_share(instrument, T), _mean_thickness(resonator)
     split = _find_splits(instrument, found, T) if detailed else {}
+    spinning = {} if spin is None else spin_pairs(found, elastic, spin)
     entries = []
     for m in found:
         entry = {
@@ -90,6 +96,8 @@ def modes(
             }
         if id(m) in split:
             entry["split"] = split[id(m)]
+        if id(m) in spinning:
+            entry["spin"] = spinning[id(m)]
         entries.append(entry)
     yield {
         "schema": "hrg.modes/1",
@@ -121,6 +129,8 @@ def modes(
     print_table(f"{instrument.name} at {T - zero_Celsius:g} °C, {theory}", columns, rows, note)
     if split:
         _print_splits(found, split)
+    if spinning:
+        print_spin(found, spinning)
     if sensitivities and detailed:
         _print_details(found)
 
@@ -129,10 +139,12 @@ def _find_splits(instrument: "Instrument", found: "list[Mode]", T: float) -> "di
     """What the card's imperfection and electrodes make of each pair, by the identity of its mode."""
     from math import degrees
 
-    from studies.splitting import SplitPair, is_imperfect
+    from studies.instrument.imperfect import is_imperfect
 
     if not is_imperfect(instrument):
         return {}
+    from studies.splitting import SplitPair
+
     entries: dict[int, dict[str, Any]] = {}
     for m in found:
         if m.harmonic < 1:

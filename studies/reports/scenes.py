@@ -109,7 +109,7 @@ def show_mode(
     """
     from shell.modes import solve_modes
     from shell.surface import build_surface
-    from studies.splitting import is_imperfect
+    from studies.instrument.imperfect import is_imperfect
 
     T = instrument.reference_temperature if temperature is None else temperature
     resonator, elastic = instrument.at(T)

@@ -15,7 +15,8 @@ from compensation.start_up import StartUp, start_up
 from compensation.wave import StandingWave
 from compensation.whole_angle import WITHOUT_RATE, simulate_whole_angle
 from studies.errors import InputError, naming
-from studies.splitting import is_imperfect, reference_split
+from studies.instrument.imperfect import is_imperfect
+from studies.splitting import reference_split
 
 if TYPE_CHECKING:
     from studies.instrument.card import Instrument

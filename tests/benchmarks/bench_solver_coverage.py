@@ -111,7 +111,7 @@ def finer(level):
         through=tuple(k + 4 for k in level.through),
         along=min(level.along + 5, 22),
         block=level.block + 2,
-        rings=level.rings + 3,
+        rings=min(level.rings + 3, 11),  # smaller cells are points in double precision
         split=2 * level.split,
     )
 
@@ -197,6 +197,8 @@ def main():
         if time.process_time() > chosen.seconds:
             break
         verdict, kind, ratio, error, details = judge(number)
+        if not number % 50:
+            print(f"{number:5d} at {time.process_time():.0f} s", flush=True)
         verdicts[verdict] += 1
         ratios.append(ratio)
         errors.append(error)

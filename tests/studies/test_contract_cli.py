@@ -60,6 +60,8 @@ def test_an_error_of_a_real_process_is_status_2_without_traceback():
         (["tcf", "hrg-30mm", "--from", "-300", "--theory", "shell"], "outside the range"),
         (["tcf", "hrg-30mm", "--step", "0"], "step"),
         (["modes", "hrg-30mm", "--count", "0"], "count"),
+        (["modes", "free-dome", "--spin", "nan"], "--spin"),
+        (["modes", "free-dome", "--spin", "100", "--theory", "shell"], "--spin"),
         (["materials", "fused-silca"], "fused-silica"),
         (["fit", "frequency", "none.csv"], "no such file"),
         (["fit", "frequency", "studies/papers/hrg_table1.csv", "--order", "7"], "order"),
@@ -86,6 +88,16 @@ def test_json_is_one_object_and_nothing_else():
     found = json.loads(done.stdout)
     assert found["schema"] == "hrg.fit-frequency/1"
     assert len(found["coefficients"]) == 4
+
+
+def test_spin_parts_the_waves_of_a_pair_by_bryan(capsys):
+    assert main(["modes", "free-dome", "--harmonic", "0", "2", "--spin", "360", "--json"]) == 0
+    axial, pair = json.loads(capsys.readouterr().out)["modes"]
+    spin = pair["spin"]
+    assert "spin" not in axial
+    assert spin["upper_wave_Hz"] - spin["lower_wave_Hz"] == pytest.approx(2 * 2 * pair["bryan_factor"], rel=1e-9)
+    mean = (spin["upper_wave_Hz"] + spin["lower_wave_Hz"]) / 2
+    assert mean - pair["frequency_Hz"] == pytest.approx(1e-6 * spin["shift_ppm"] * pair["frequency_Hz"], rel=1e-3)
 
 
 def test_a_foreign_package_of_our_name_is_status_3(tmp_path):
