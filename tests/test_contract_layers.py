@@ -55,6 +55,7 @@ def test_no_imports_run_in_a_circle():
     assert len(order) == len(MODULES)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", sorted(n for n in MODULES if not n.startswith("studies.examples")))
 def test_heavy_packages_are_imported_where_they_are_needed(name):
     lazy = LAZY if name.split(".")[1:2] == ["derivation"] else LAZY | {"sympy"}

@@ -38,9 +38,10 @@ def test_the_first_block_holds_the_two_commands():
     assert len(lines) == 2
     assert lines[0].startswith("python -m pip install .")
     assert "hrg reproduce" in lines[0]
-    assert lines[1].endswith("python -m pytest")
+    assert lines[1].endswith("python -m pytest -n auto")
 
 
+@pytest.mark.slow
 def test_commands_of_the_first_hour_run_in_order(folder, monkeypatch, capsys):
     monkeypatch.chdir(folder)
     assert len(COMMANDS) > 20

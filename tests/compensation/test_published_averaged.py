@@ -14,6 +14,7 @@ def vanishes(expression):
     return sp.simplify(sp.expand_trig(sp.expand(expression))) == 0
 
 
+@pytest.mark.slow
 def test_lynch_form():
     """IEEE Std 1431 Annex B / Lynch (1995), in n θ, azimuth in the sense of the precession, Δω axis at the stiffer mode."""
     T, W = 2 * (psi - psi_tau), 2 * (psi - psi_omega)

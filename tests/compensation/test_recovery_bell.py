@@ -92,6 +92,7 @@ def test_rough_step_of_two_plateaus_passes_both_means():
     assert scale == pytest.approx(100 * DEG / (np.mean(counts[300:]) - null), rel=1e-10)
 
 
+@pytest.mark.slow
 def test_intervals_cover():
     """95 % intervals of every step, given the steps before it, hold what noise-free data would give."""
     runs, held = 200, {"rough": np.zeros(2), "bias": np.zeros(3), "rate": np.zeros(3), "temperature": np.zeros(3)}

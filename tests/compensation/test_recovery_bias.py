@@ -32,6 +32,7 @@ def make_run(rng, planted=PLANTED, white=0.3, walk=0.0, amplitude=-17.0):
     return prepare_run(TIME, f + 0.003 * rng.normal(size=TIME.size), 2.0 + truth + noise)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("white", "walk"), [(0.3, 0.0), (0.3, 0.01)])
 def test_planted_coefficients_are_covered_by_the_stated_intervals(white, walk):
     """With a random walk the naive interval of the same coefficient fails; the autocorrelation-respecting one holds."""

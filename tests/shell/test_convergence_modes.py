@@ -66,6 +66,7 @@ def random_corner(rng: np.random.Generator) -> tuple[Resonator, Elastic, int]:
     return resonator, Elastic(7e10, rng.uniform(0, 0.4), 2500.0), n
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("design", "theory", "count"),
     [(random_design, "solid", 50), (random_corner, "solid", 15), (random_design, "shell", 30)],

@@ -94,6 +94,7 @@ def solve(build, family, values, nu):
     )[family.index]
 
 
+@pytest.mark.slow
 def test_errors_stay_below_the_stated_ones(built):
     build, family = built
     values, nu = draw(family, 8, 6, 11)
@@ -109,6 +110,7 @@ def test_errors_stay_below_the_stated_ones(built):
     assert family.error.frequency <= 3e-6
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["dome", "stem"])
 def test_frequency_holds_both_errors_together_against_finer_solves(kind):
     """What is stated to a user is the family's error and the theory's: together they hold the converged frequency."""

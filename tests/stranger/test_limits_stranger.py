@@ -44,6 +44,7 @@ def snr_again(truth):
     return np.std(fit.fun * 1e-3) / np.std(noise - basis @ (basis.T @ noise))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "snr"), [("curvature", 3.0), ("second-lag", 6.0), ("mounting-stress", 1.0)])
 def test_stated_snr_is_found_again_from_all_rows(tmp_path, name, snr):
     truth = make_campaign(11, "effect", name, snr, runs=2, folder=tmp_path)
@@ -52,6 +53,7 @@ def test_stated_snr_is_found_again_from_all_rows(tmp_path, name, snr):
     assert snr_again(truth) == pytest.approx(stated, rel=0.1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("kind", "name"), [*(("effect", n) for n in EFFECTS), *(("alien", n) for n in ALIENS), ("pair", "jump+leak")]
 )

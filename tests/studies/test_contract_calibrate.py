@@ -23,6 +23,7 @@ def run(tmp_path_factory):
     return path
 
 
+@pytest.mark.slow
 def test_the_object_the_card_and_the_page(run, tmp_path, capsys):
     card, page = tmp_path / "calibrated.toml", tmp_path / "page.html"
     thermal = [v.name for v in load_card("hrg-30mm").uncertain if v.name.startswith(("material.", "bias."))]

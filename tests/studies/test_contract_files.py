@@ -70,6 +70,7 @@ def test_a_hundred_thousand_columns_are_refused_quickly(tmp_path, capsys):
     assert "unknown column 'c0'" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("shell", "status", "said"),
     [
@@ -94,6 +95,7 @@ def test_closed_full_and_plain_terminals(tmp_path, shell, status, said):
     assert "Traceback" not in done.stderr
 
 
+@pytest.mark.slow
 def test_a_request_to_end_counts_as_ctrl_c(tmp_path):
     """SIGTERM during a long study: 130, what was computed is kept, and it can be resumed."""
     (tmp_path / "study.toml").write_text(

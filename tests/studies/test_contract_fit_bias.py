@@ -149,6 +149,7 @@ def make_thermometer_gyro(seed, cooling, loop=0.0, lag=200.0):
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("loop", [0.0, 1.5])
 def test_a_gyro_without_a_frequency_is_fitted_over_its_temperature(tmp_path, capsys, loop):
     """Law, lag and loop planted by another integrator; judged on an unseen run by what noise leaves: 1.5/√10."""

@@ -76,6 +76,7 @@ def places(tmp_path_factory):
     return folder
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("typo", TYPOS)
 @pytest.mark.parametrize("command", COMMANDS)
 def test_a_typo_in_any_table_is_named_by_every_command_that_loads_the_card(places, capsys, command, typo):
@@ -337,6 +338,7 @@ def test_the_uncertain_values_of_a_card_are_listed(capsys):
     assert max(map(len, capsys.readouterr().out.splitlines())) <= 82
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", sorted(shipped_cards()))
 def test_every_shipped_card_works_with_every_command(tmp_path, capsys, name):
     commands = (

@@ -25,6 +25,7 @@ def run_notebook(name, folder):
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["design", "measured"])
 def test_a_notebook_runs(name, tmp_path, monkeypatch):
     root = files("studies").joinpath("..")

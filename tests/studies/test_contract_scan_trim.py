@@ -31,6 +31,7 @@ def failing(capsys, *words):
     return captured.err
 
 
+@pytest.mark.slow
 def test_scan_prints_one_object_and_writes_map_and_page(faces, tmp_path, capsys):
     words = ["scan", "free-dome", faces["inner"], faces["outer"], "--harmonic", 2, "--theory", "shell", "--json"]
     words += ["--map", tmp_path / "map.csv", "--report", tmp_path / "scan.html", "--save", tmp_path / "scanned.toml"]

@@ -56,6 +56,7 @@ def names_of(card, drive):
     return [*(value.name for value in card.uncertain), *(f"initial.{lump}" for lump in drive.lumps)]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("boundary", ["chamber", "housing"])
 def test_every_derivative_against_central_differences(card, drive, law, measured, boundary):
     drive = drive if boundary == "chamber" else measured

@@ -92,6 +92,7 @@ def test_a_field_along_the_meridian_shifts_the_mode_as_its_weights_say(card, law
     assert abs(by_solver) > 5e-5
 
 
+@pytest.mark.slow
 def test_an_elinvar_whose_slope_vanishes_keeps_a_sound_resonator_temperature():
     """The cylinder of 3J53: the slope is a small difference, and the mean temperature must not be divided by it."""
     made = simulate_run(load_card("cvg-25mm"), load_profile("step 20 0 2h"), 0.1, noise=False, theory="shell")

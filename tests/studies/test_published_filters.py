@@ -29,6 +29,7 @@ def test_wiener_filters_are_the_printed_ones():
         assert case.optimum.error < case.renormalised.error < case.rate_variance
 
 
+@pytest.mark.slow
 def test_noise_left_by_the_wiener_filter_is_what_its_spectrum_says(study):
     """Of one record of 1.5 s, so to 10 % only."""
     assert study.figure5.noise_after == pytest.approx(np.sqrt(study.wiener[0].renormalised.noise), rel=0.1)

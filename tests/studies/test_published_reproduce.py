@@ -26,6 +26,7 @@ def summary(folder):
     return json.loads((folder / "summary.json").read_text(encoding="utf-8"))
 
 
+@pytest.mark.slow
 def test_all_files_appear_and_nothing_else(folder):
     assert sorted(p.name for p in folder.iterdir()) == ["report.html", "summary.json", "table1.csv", "table2.csv"]
 

@@ -48,6 +48,7 @@ def found(card, records):
     return calibrate(card, records, hold_out=1)
 
 
+@pytest.mark.slow
 def test_the_residual_is_the_noise_and_the_card_was_far_from_it(found):
     assert found.fit.converged
     for name in ("frequency_Hz", "bias_deg_per_h", "inverse_q", HOUSING):
@@ -118,6 +119,7 @@ def test_the_baseline_is_the_linear_problem_about_the_calibrated_values(found):
         found.baseline(SETTLED)
 
 
+@pytest.mark.slow
 def test_without_a_housing_the_chamber_drives_and_values_that_stay_are_exact(card, records):
     bare = [
         dataclasses.replace(r, columns={k: v for k, v in r.columns.items() if k in ("time_s", "chamber_temperature_degC", "frequency_Hz")})
@@ -142,12 +144,14 @@ def law_only(device, records, **changed):
     return calibrate(device, bare, exact=fixed, profile=False)
 
 
+@pytest.mark.slow
 def test_runs_that_contradict_each_other_are_named(device, records):
     away = law_only(device, records, frequency_Hz=records[0]["frequency_Hz"] + 0.5)
     assert any("the runs contradict each other in frequency_Hz" in warning for warning in away.warnings)
     assert not law_only(device, records).warnings
 
 
+@pytest.mark.slow
 def test_outliers_do_not_move_the_values(device, records):
     spoilt = records[0]["frequency_Hz"].copy()
     spoilt[np.random.default_rng(1).choice(len(spoilt), 6, replace=False)] += 0.5

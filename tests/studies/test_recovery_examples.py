@@ -35,6 +35,7 @@ def test_there_is_one_for_each_part_of_the_workbench():
     assert names == ["chamber_run", "compensate_run", "design_code", "diagnose_run", "tolerance_study"]
 
 
+@pytest.mark.slow
 def test_design_by_formula_is_far_off_and_by_solver_is_not(tmp_path):
     text = run_example("design_code", tmp_path)
     formula, truly = numbers(r"formula: ([\d.]+) mm, which truly gives ([\d.]+) Hz", text)
@@ -71,6 +72,7 @@ def test_the_compensation_leaves_only_the_lag(tmp_path):
     assert before > 15 * after
 
 
+@pytest.mark.slow
 def test_the_diagnosis_names_what_was_planted(tmp_path):
     text = run_example("diagnose_run", tmp_path)
     assert text.splitlines()[0] == "explained"

@@ -51,6 +51,7 @@ def covers(estimate, truth):
     return estimate.low <= truth <= estimate.high
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "noise",
     [{"white": 3e-3}, {"white": 3e-3, "walk": 2e-4}, {"white": 1e-3, "wander": 3e-3, "memory": 400.0}],
@@ -79,6 +80,7 @@ def test_the_number_of_lags_is_what_the_record_supports():
     assert [name for name in one.estimates if name.startswith("time_constant")] == ["time_constant_1"]
 
 
+@pytest.mark.slow
 def test_lags_in_series_and_their_radiated_share_are_found():
     """Two lumps in a row, each with 40 % of its conductance by radiation at 20 °C, by the implicit integrator."""
     t, T_h = housing("step 20 -40 4h then step -40 60 4h", 60.0)
@@ -140,6 +142,7 @@ def radiative_record(rng):
     return record(rng, t, T_h, T_r, walk=1e-4, sensor=0.0)
 
 
+@pytest.mark.slow
 def test_radiation_and_conduction_are_told_apart_by_a_cold_and_a_hot_step():
     follower = NetworkFollower((CONDUCTANCE, EXCHANGE), radiating, "shell", 1)
     scores = []
@@ -178,6 +181,7 @@ def test_a_relaxation_tells_the_time_constant_and_not_the_law():
     assert given.departures[0][0] == pytest.approx(5.0, abs=0.05)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("noise", [{"walk": 0.0}, {"walk": 3e-4}, {"wander": 5e-3}], ids=["white", "walk", "wander"])
 def test_nothing_is_identified_from_a_constant_record(noise):
     for seed in range(5):

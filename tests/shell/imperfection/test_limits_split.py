@@ -58,6 +58,7 @@ def test_a_perfect_dome_on_a_stem_does_not_split_and_even_departures_only_shift(
     assert thicker.shift > 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["thickness", "outer", "inner", "offset", "density", "modulus", "rim"])
 @pytest.mark.parametrize("n", [1, 2, 3, 4])
 def test_first_order_is_the_limit_of_the_coupled_harmonics(name, n):

@@ -29,6 +29,7 @@ def run(capsys, *words):
     return status, out, err
 
 
+@pytest.mark.slow
 def test_json_keeps_the_contract(campaign, capsys, tmp_path):
     _, paths = campaign
     page = tmp_path / "page.html"
@@ -143,6 +144,7 @@ def test_ten_samples_decide_nothing(campaign, capsys, tmp_path):
     assert "values" in found["responses"]["frequency_Hz"]["remark"]
 
 
+@pytest.mark.slow
 def test_constant_and_missing_channels_are_said(campaign, capsys, tmp_path):
     records, _ = campaign
     dead = columns_of(records[0])
@@ -154,6 +156,7 @@ def test_constant_and_missing_channels_are_said(campaign, capsys, tmp_path):
     assert found["responses"]["bias_deg_per_h"]["noise"] is not None
 
 
+@pytest.mark.slow
 def test_one_run_with_an_hour_gap_and_a_repeated_file(campaign, capsys, tmp_path):
     records, _ = campaign
     time = records[0].columns["time_s"]
@@ -165,6 +168,7 @@ def test_one_run_with_an_hour_gap_and_a_repeated_file(campaign, capsys, tmp_path
     assert found["verdict"] in VERDICTS
 
 
+@pytest.mark.slow
 def test_constant_temperature_is_not_identifiable(capsys, tmp_path):
     rng = np.random.default_rng(5)
     time = np.arange(0.0, 20000.0, 20.0)
@@ -184,6 +188,7 @@ def test_constant_temperature_is_not_identifiable(capsys, tmp_path):
     assert "K only" in found["responses"]["frequency_Hz"]["remark"]
 
 
+@pytest.mark.slow
 def test_plan_predicts_and_names_what_cannot_show(capsys):
     status, out, _ = run(capsys, "--plan", "cycle 20 -15 40 0.5 20min 1", "--draws", "20", "--json")
     assert status == 0
@@ -194,6 +199,7 @@ def test_plan_predicts_and_names_what_cannot_show(capsys):
     assert all(abs(sum(said.values()) - 1.0) < 1e-9 for said in plan["confusion"].values())
 
 
+@pytest.mark.slow
 def test_every_second_value_missing_and_two_rows(campaign, capsys, tmp_path):
     records, _ = campaign
     half = columns_of(records[0])

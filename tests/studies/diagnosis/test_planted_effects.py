@@ -42,6 +42,7 @@ def names_of(cause):
     return {cause.effect, *cause.equivalent}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("key", sorted(EFFECTS))
 def test_hidden_effect_is_named(key):
     name, family = key.split("@")[0], FAMILIES[seed_of(key) % len(FAMILIES)]
@@ -61,12 +62,14 @@ def test_every_effect_of_the_library_is_hidden_here():
     assert {key.split("@")[0] for key in EFFECTS} == set(library())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("family", FAMILIES)
 def test_null_campaigns_are_adequate(family):
     verdict, _ = diagnose("rich/2", family, seed=seed_of("null", family))
     assert verdict.verdict == "adequate", verdict.causes
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("alien", ["rate-square@bias", "volt-temperature", "fringes@bias", "chirp@bias", "volts@loss"])
 def test_aliens_are_not_explained(alien):
     """Structure that no file of the library knows must not be called explained."""
@@ -74,6 +77,7 @@ def test_aliens_are_not_explained(alien):
     assert verdict.verdict == "unexplained", verdict.causes
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["quadrature-leakage", "periodic", "electrostatic-softening"])
 def test_effect_without_its_file_is_not_explained_by_another(name):
     effects = [e for e in library().values() if e.name != name]
@@ -81,6 +85,7 @@ def test_effect_without_its_file_is_not_explained_by_another(name):
     assert verdict.verdict == "unexplained", verdict.causes
 
 
+@pytest.mark.slow
 def test_wandering_noise_is_no_line():
     """A bias that wanders with six knots a run: noise, or unexplained, but no periodic disturbance."""
     for family in ("white", "walk"):
@@ -88,6 +93,7 @@ def test_wandering_noise_is_no_line():
         assert not [c for c in verdict.causes if c.effect == "periodic" and c.probability > 0.5], verdict.causes
 
 
+@pytest.mark.slow
 def test_two_effects_are_both_found():
     verdict, truth = diagnose("rich/2", "white", ("hysteresis", "amplitude-frequency"), seed=5000)
     found = set().union(*(names_of(cause) for cause in verdict.causes))
@@ -112,6 +118,7 @@ def test_generator_knows_nothing_of_the_diagnosis():
             assert not any(module.startswith(("studies.diagnosis", "studies.effects")) for module in modules), path
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("hidden", ["clock-drift", "ageing"])
 def test_reference_clock_tells_a_drifting_clock_from_ageing(hidden):
     seed = 7000
@@ -148,6 +155,7 @@ def test_reference_clock_finds_a_drift_that_the_record_hides():
     assert not investigate(only_frequency(alone), score_held_out=False, advise=False).verdict.causes
 
 
+@pytest.mark.slow
 def test_damping_that_falls_is_no_leak():
     """A leak only adds gas: 1/Q that falls with time must have another name, or none."""
     records, _ = build("plain/3", "white", np.random.default_rng(9500), ("leak",), snr=1.0)

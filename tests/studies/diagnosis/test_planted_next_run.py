@@ -103,6 +103,7 @@ def test_inseparable_pair_gets_a_measurement_and_no_run():
     assert "reference clock" in verdict.next_experiment
 
 
+@pytest.mark.slow
 def test_suggested_run_is_part_of_the_answer():
     records, _ = build(plan_of_one(up_stairs()), "white", np.random.default_rng(2))
     verdict = investigate(load_campaign(records), score_held_out=False).verdict

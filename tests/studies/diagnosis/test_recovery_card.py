@@ -34,12 +34,14 @@ def shipped():
     return load_card("hrg-30mm")
 
 
+@pytest.mark.slow
 def test_a_virtual_record_of_the_card_is_adequate(shipped, tmp_path, capsys):
     verdict = investigate(load_campaign(simulated(shipped, tmp_path, capsys), 20.0), card=shipped, advise=False).verdict
     assert verdict.verdict == "adequate", verdict.causes
     assert max(abs(shift.shift_sd) for shift in verdict.calibration) < 1.0
 
 
+@pytest.mark.slow
 def test_a_wrong_value_is_named_as_one(shipped, tmp_path, capsys):
     """The glass stiffens with temperature by four standard deviations of its law more than the card says."""
     name = "material.deviation.shear_modulus.log_slope_per_K"
@@ -55,6 +57,7 @@ def test_a_wrong_value_is_named_as_one(shipped, tmp_path, capsys):
     assert frequency["shipped_rms"] > 20.0 * frequency["baseline"]["residual_rms"]
 
 
+@pytest.mark.slow
 def test_a_hidden_effect_is_named_saved_and_predicts_an_unseen_run(shipped, tmp_path, capsys):
     hidden = [
         {"name": "rate-bias", "response": "bias_deg_per_h", "coefficient_deg_per_h_per_K_per_s": 600.0},

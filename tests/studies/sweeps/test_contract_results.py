@@ -117,6 +117,7 @@ def cluster():
         process.wait(30)
 
 
+@pytest.mark.slow
 def test_two_dask_workers_give_the_same_bits_and_a_lost_scheduler_is_resumable(cluster, results, tmp_path, functions):
     address, scheduler = cluster
     spec = tmp_path / "study.toml"

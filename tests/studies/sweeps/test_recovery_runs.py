@@ -62,6 +62,7 @@ def alive(pids: set[int]) -> set[int]:
     return left
 
 
+@pytest.mark.slow
 def test_many_kills_lose_nothing_kept_and_leave_no_process(tmp_path, functions, start, hrg):
     slow, log = write_slow(tmp_path, 240), tmp_path / "log"
     log.touch()
@@ -103,6 +104,7 @@ def test_many_kills_lose_nothing_kept_and_leave_no_process(tmp_path, functions, 
     assert (tmp_path / "out" / "results.csv").read_bytes() == (tmp_path / "whole" / "results.csv").read_bytes()
 
 
+@pytest.mark.slow
 def test_second_runner_is_refused_and_interrupt_is_resumable(tmp_path, functions, start, hrg):
     slow, log = write_slow(tmp_path, 20000), tmp_path / "log"
     command = ["study", "run", slow, "--out", tmp_path / "out", "--workers", 2, "--allow-python"]
@@ -125,6 +127,7 @@ def test_second_runner_is_refused_and_interrupt_is_resumable(tmp_path, functions
     assert 0 < state["done"] < 20000
 
 
+@pytest.mark.slow
 def test_failures_keep_their_reason_and_do_not_stop_the_rest(tmp_path, functions, hrg):
     spec = tmp_path / "moody.toml"
     values = 'name = "user.x"\nvalues = [0, 1, 2, 3, 4, 5, 6]'
@@ -211,6 +214,7 @@ def test_damaged_store_is_named_and_kept(tmp_path, functions, hrg, damage):
     assert path.exists()
 
 
+@pytest.mark.slow
 def test_full_disk_keeps_what_was_written_and_says_so(tmp_path, functions, hrg):
     spec = tmp_path / "square.toml"
     spec.write_text(
@@ -260,6 +264,7 @@ def test_dry_run_says_cases_time_and_memory_and_keeps_nothing(tmp_path, hrg):
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.slow
 def test_a_script_without_a_guard_is_told_and_keeps_no_result(tmp_path, functions):
     """Spawned workers run the script again and die: no NaN is stored as finished; with workers=1 it computes here."""
     spec = tmp_path / "plain.toml"
@@ -287,6 +292,7 @@ def test_a_script_without_a_guard_is_told_and_keeps_no_result(tmp_path, function
     assert "{'ok': 3}" in run(1).stdout
 
 
+@pytest.mark.slow
 def test_a_flipped_bit_is_found_and_its_case_computed_again(tmp_path, functions, hrg):
     spec = tmp_path / "square.toml"
     spec.write_text(spec_of("square", 'method = "grid"', 'name = "user.x"\nvalues = [1, 2, 3]'))
@@ -367,6 +373,7 @@ def test_a_finished_study_in_a_read_only_folder_can_be_read(tmp_path, functions,
     assert hrg("study", "export", tmp_path / "out", "--out", tmp_path / "r.csv").returncode == 0
 
 
+@pytest.mark.slow
 def test_other_versions_on_resuming_are_said(tmp_path, functions, hrg):
     spec = tmp_path / "square.toml"
     spec.write_text(spec_of("square", 'method = "grid"', 'name = "user.x"\nvalues = [1, 2, 3]'))
@@ -379,6 +386,7 @@ def test_other_versions_on_resuming_are_said(tmp_path, functions, hrg):
     assert f"numpy 1.0.0 then, {np.__version__} now" in hrg(*run).stderr
 
 
+@pytest.mark.slow
 def test_an_answer_to_another_request_and_too_much_memory_fail_their_case(tmp_path, hrg):
     """A function that writes an answer of its own into the pipe gains nothing by it; one that asks for 64 GB fails."""
     (tmp_path / "functions.py").write_text(
