@@ -241,8 +241,8 @@ def _pool(folds: Sequence[_Fold], fits: Sequence[BiasFit], *, by_runs: bool, eve
             compensated.append(averages[1] - averages[1].mean())
     if not raw:
         raise NoHeldOut(
-            "no held-out part lies inside the range of frequency and rate of the rest; record a second run over the "
-            "same temperatures."
+            f"no held-out part lies inside the range of {folds[0].held_out.variable.name} and its rate in the rest; record two"
+            " runs of each kind, such as two coolings and two warmings over the same temperatures, or cycles."
         )
     before, after = np.concatenate(raw), np.concatenate(compensated)
     possible = sum(_averages(fold.held_out.bias, fold.held_out).size for fold in folds)

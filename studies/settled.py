@@ -76,7 +76,7 @@ def settled_table(soaks: Sequence[Soak], where: str) -> tuple[Array, Array, floa
     T, f = np.array([s.temperature_degC for s in soaks]), np.array([s.frequency_Hz for s in soaks])
     if np.count_nonzero(np.diff(np.sort(T)) > 0.5) < 1:
         raise InputError(
-            f"{where}: {len(soaks)} settled part(s), where a fit over temperature needs several temperatures; soak longer, or"
+            f"{where}: {len(soaks)} settled {'part' if len(soaks) == 1 else 'parts'}, where a fit over temperature needs several temperatures; soak longer, or"
             " allow more to be left (--left), or give a shorter --time-constant."
         )
     return T, f, float(np.sqrt(12.0) * max(s.error_Hz for s in soaks))

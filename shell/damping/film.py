@@ -75,7 +75,7 @@ def check_film(film: LossyFilm, wall: float) -> None:
         )
     if film.thickness > THICKEST * wall:
         raise ShellError(
-            f"the film ({mm(film.thickness)}) is more than {THICKEST:.0%} of the wall ({mm(wall)}): the mode would change;"
+            f"the film ({mm(film.thickness)}) is more than {100 * THICKEST:.0f} % of the wall ({mm(wall)}): the mode would change;"
             " make it a wall of its own."
         )
 

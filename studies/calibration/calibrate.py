@@ -312,7 +312,9 @@ def _warn(found: Fit, estimates: Sequence[Estimate], ladder: Mapping[str, Rung])
             )
     for name, count in found.outliers.items():
         if count:
-            warnings.append(f"{count} block(s) of {name} stand out of the noise and count less.")
+            warnings.append(
+                f"{count} {'block' if count == 1 else 'blocks'} of {name} stood out of the noise and counted less."
+            )
     stayed = sum(one.width >= SILENT for one in estimates)
     told = sum(rows[name].count for name in rows)
     if len(estimates) > told:

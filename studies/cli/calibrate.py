@@ -82,7 +82,7 @@ def calibrate(
     yield _payload(found, list(data), save)
     from studies.reports.calibration import held_out_table, ladder_table, separation_sentences, values_table
 
-    for block in (values_table(found), ladder_table(found), held_out_table(found)):
+    for block in (values_table(found, touched=True), ladder_table(found), held_out_table(found)):
         if block is not None:
             print_table(block.caption, block.columns, block.rows, block.note)
     for sentence in separation_sentences(found):

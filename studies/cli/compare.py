@@ -55,7 +55,7 @@ def compare(*card: str) -> Answer:
 def _with_uncertainty(value: float, uncertainty: float) -> str:
     """Write a value to the second digit of its uncertainty."""
     if not uncertainty > 0:
-        return f"{value:.6g}"
+        return f"{value:.4g}" if abs(value) < 1e4 else f"{value:.0f}"
     digits = max(1 - math.floor(math.log10(uncertainty)), 0)
     return f"{value:.{digits}f} ± {uncertainty:.{digits}f}"
 

@@ -87,7 +87,10 @@ def compensate(
         from_what = "" if facts["stability_before"] is None else f"{facts['stability_before']:.4g} -> "
         print(f"{out}: {name}; standard deviation of {AVERAGE:g} s averages {from_what}{facts['stability_after']:.4g}")
         if facts["rows_not_compensated"]:
-            print(f"{facts['rows_not_compensated']} rows stay empty: an input of the model is missing there.")
+            print(
+                f"{facts['rows_not_compensated']} rows stay empty: an input is missing there, or too few samples for its rate"
+                " lie before them."
+            )
 
 
 def _stability(time: "NDArray[np.float64]", values: "NDArray[np.float64]") -> float:

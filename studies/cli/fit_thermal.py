@@ -5,6 +5,7 @@ With --json one object, schema `hrg.fit-thermal/1`: `data`, `confidence`, `estim
 `initial_departure_K` per run, `residual_rms_Hz`, `row_step_s` of the averaged rows, `warnings`.
 """
 
+import math
 from typing import TYPE_CHECKING, Any
 
 from studies.cli.output import Answer, answers
@@ -36,6 +37,7 @@ def fit_thermal(*data: str, card: str | None = None, lags: int | None = None, co
     """
     from studies.calibration.lags.records import fit_thermal_constants
     from studies.cli.output import print_table, say
+    from studies.cli.telling import Told
     from studies.errors import InputError
     from studies.instrument.card import load_card
     from studies.record import read_record
@@ -45,7 +47,9 @@ def fit_thermal(*data: str, card: str | None = None, lags: int | None = None, co
     if not 0 < confidence < 1:
         raise InputError(f"--confidence {confidence:g}: a confidence lies between 0 and 1, such as 0.9.")
     records = [read_record(path) for path in data]
-    found = fit_thermal_constants(records, load_card(card) if card else None, lags, confidence)
+    told = Told("lags")
+    found = fit_thermal_constants(records, load_card(card) if card else None, lags, confidence, told)
+    told.done()
     for warning in found.warnings:
         say(f"warning: {warning}")
     white, wandering = found.noise.innovation, float(found.residual.std())
@@ -61,11 +65,18 @@ def fit_thermal(*data: str, card: str | None = None, lags: int | None = None, co
         if estimate.value is None:
             rows.append([name, "not determined", "", "", unit])
         else:
-            rows.append([name, *(f"{x:.7g}" for x in (estimate.value, estimate.low, estimate.high)), unit])
+            rows.append([name, *_to_its_digits(estimate.value, estimate.low, estimate.high), unit])
     note = f"Intervals of {100 * confidence:g} %; rows of {found.row_step:g} s; residual {found.residual.std():.2g} Hz."
     print_table("Thermal constants", ["constant", "value", "low", "high", "unit"], rows, note)
     for direction in found.undetermined:
         print(f"the records leave this combination open: {direction}")
+
+
+def _to_its_digits(value: float, low: float, high: float) -> list[str]:
+    """Write a value and its interval to the second digit of the interval's width."""
+    width = high - low
+    digits = max(1 - math.floor(math.log10(width)), 0) if math.isfinite(width) and width > 0 else 6
+    return [f"{x:.{digits}f}" for x in (value, low, high)]
 
 
 def _payload(found: "Identification", data: list[str]) -> "dict[str, Any]":

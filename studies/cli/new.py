@@ -36,7 +36,13 @@ def card(path: str, *, like: str = "hrg-30mm", name: str | None = None) -> int:
         "# What else a card may say. Remove the # of a line to set it; what stays away has its documented default.",
     ]
     present = {line.strip("[] ").split(".")[0] for line in lines if line.startswith("[")}
-    lines += [f"# {line}".rstrip() for block in _forms(present) for line in ("", *block)]
+    headings: set[str] = set()
+    for block in _forms(present):
+        heading = block[0].partition("]")[0] + "]"
+        again = heading in headings and not heading.startswith("[[")
+        headings.add(heading)
+        more = [f"more keys of {heading}", *block[1:]] if again else block  # a table may be opened once
+        lines += [f"# {line}".rstrip() for line in ("", *more)]
     write_text(path, "\n".join(lines) + "\n")
     load_card(path)
     say(f"{path}: written, like {like}. Correct it, then: hrg modes {path}")

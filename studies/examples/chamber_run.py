@@ -26,4 +26,4 @@ if __name__ == "__main__":
     run = run_chamber()
     print(f"{CHAMBER}: from {run['frequency_Hz'][0]:.3f} to {run['frequency_Hz'][-1]:.3f} Hz")
     for left in (0.05, 0.01):
-        print(f"  within {left:.0%} of the change after {settling_time(run, left) / 60:.0f} min")
+        print(f"  within {100 * left:.0f} % of the change after {settling_time(run, left) / 60:.0f} min")

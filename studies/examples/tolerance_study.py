@@ -30,5 +30,5 @@ if __name__ == "__main__":
         f"{len(f)} designs, {len(found.failed)} failed: {f.mean():.1f} Hz on average, from {f.min():.1f} to {f.max():.1f} Hz"
     )
     print(
-        f"within limits: {share.passed} of {share.cases}; the true share lies between {share.low:.1%} and {share.high:.1%}"
+        f"within limits: {share.passed} of {share.cases}; the true share lies between {100 * (share.low or 0.0):.1f} and {100 * (share.high or 0.0):.1f} %"
     )

@@ -78,7 +78,7 @@ def verdict(study: "BiasStudy", method: Method) -> str:
     what = "runs" if held.by_runs else "blocks of the same run"
     sentence = (
         f"Improvement {judged.training_gain:.2f} times on the data that were fitted and {held.gain:.2f} times on held-out {what}"
-        f" ({held.coverage:.0%} of the rows lie within the fitted range of {study.runs[0].variable.name} and rate)."
+        f" ({100 * held.coverage:.0f} % of the rows lie within the fitted range of {study.runs[0].variable.name} and rate)."
     )
     if held.by_runs and held.gain <= 1:
         sentence += " On held-out runs it does harm: do not use it unless a further run shows a gain."
@@ -204,7 +204,7 @@ def gain_table(study: "BiasStudy") -> Table:
                     f"{held.before:.4g}",
                     f"{held.after:.4g}",
                     f"{held.gain:.2f}",
-                    f"{held.coverage:.0%}",
+                    f"{100 * held.coverage:.0f} %",
                 ]
             )
     columns = ["Selection", "Terms", "On", f"Before ({unit})", f"After ({unit})", "Times better", "Rows in range"]

@@ -28,7 +28,7 @@ def calibration_page(found: Calibration, data: Sequence[str]) -> str:
     """Return the page."""
     moved = sum(abs(one.shift_sd) > 2 for one in found.estimates)
     lead = (
-        f"The card {found.card.name} against {len(data)} file(s) ({', '.join(data)}): the most probable of its"
+        f"The card {found.card.name} against {len(data)} {'file' if len(data) == 1 else 'files'} ({', '.join(data)}): the most probable of its"
         f" {len(found.estimates)} uncertain values, in noise that was estimated beside them."
         f" {sum(one.told_by == 'data' for one in found.estimates)} are told by the data,"
         f" {sum(one.told_by == 'prior' for one in found.estimates)} stayed at their prior; {moved} moved by more than two"
@@ -57,13 +57,17 @@ def _facts(found: Calibration) -> Facts:
     return Facts(rows)
 
 
-def values_table(found: Calibration) -> Table:
-    """Return what became of every uncertain value."""
-    rows = [_value_row(one) for one in sorted(found.estimates, key=lambda one: one.width)]
+def values_table(found: Calibration, touched: bool = False) -> Table:
+    """Return what became of every uncertain value, or of those alone that the data touched."""
+    silent = [one for one in found.estimates if touched and one.width > 0.9995 and abs(one.shift_sd) < 0.005]
+    kept = [one for one in found.estimates if one not in silent]
+    rows = [_value_row(one) for one in sorted(kept, key=lambda one: one.width)]
     note = (
         "* follows the bend of the likelihood. Shift: move in prior standard deviations. Width: posterior over"
         " prior standard deviation; up to 0.5 the data tells the value, from 0.95 it stayed at its prior."
     )
+    if silent:
+        note += f" {len(silent)} more values are as the card has them: nothing in these data depends on them."
     columns = ["Value", "Unit", "Card", "Calibrated", "90 % interval", "Shift", "Width", "Told by"]
     return Table("Values, best known first", columns, rows, note, sortable=True)
 

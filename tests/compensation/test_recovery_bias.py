@@ -102,7 +102,7 @@ def test_a_cooling_run_says_nothing_of_a_warming_one():
     rng = np.random.default_rng(5)
     fit = fit_bias([make_run(rng)])
     warming = make_run(rng, amplitude=17.0)
-    with pytest.raises(NoHeldOut, match="second run"):
+    with pytest.raises(NoHeldOut, match="two runs of each kind"):
         score_runs(fit, [warming])
     assert score_runs(fit, [warming], extrapolate=True).coverage == 1.0
 

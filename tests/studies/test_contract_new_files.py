@@ -27,6 +27,8 @@ def test_the_lines_of_the_forms_can_be_set(tmp_path):
     path = tmp_path / "mine.toml"
     assert main(["card", "new", str(path)]) == 0
     lines = path.read_text(encoding="utf-8").splitlines()
+    headings = [line for line in lines if line.startswith("# [") and not line.startswith("# [[")]
+    assert len(headings) == len({line.partition("]")[0] for line in headings}), "TOML opens a table once"
     tried = 0
     for table in ("bias", "noise", "loss"):
         start = lines.index(next(line for line in lines if line.startswith(f"# [{table}]")))

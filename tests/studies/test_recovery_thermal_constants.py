@@ -208,8 +208,8 @@ def test_holes_are_bridged_with_a_warning():
     keep[700:720] = False
     fit = identify([HousingRun(run.time[keep], f[keep], T[keep])], make_lags(1000.0), FREE_LAW)
     assert fit.estimates["time_constant_1"].value == pytest.approx(1800.0, rel=0.01)
-    assert "the frequency has 2 hole(s), the longest of 1830 s after 5970 s; those rows are left out." in fit.warnings
-    assert any("housing temperature has 2 hole(s)" in warning for warning in fit.warnings)
+    assert "the frequency has 2 holes, the longest of 1830 s after 5970 s; those rows are left out." in fit.warnings
+    assert any("housing temperature has 2 holes" in warning for warning in fit.warnings)
 
 
 def test_a_fast_record_is_averaged_first():

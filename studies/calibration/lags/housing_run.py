@@ -129,6 +129,6 @@ def _describe_holes(places: Rows, time: Array, what: str, mend: str) -> Sequence
     widths = time[places[holes + 1]] - time[places[holes]]
     k = int(np.argmax(widths))
     return (
-        f"the {what} has {holes.size} hole(s), the longest of {widths[k]:.6g} s after "
+        f"the {what} has {holes.size} {'hole' if holes.size == 1 else 'holes'}, the longest of {widths[k]:.6g} s after "
         f"{time[places[holes[k]]]:.6g} s; {mend}.",
     )

@@ -148,6 +148,7 @@ def identify_lags(
     most: int = 3,
     confidence: float = 0.9,
     make: Callable[..., Follower] = make_series,
+    progress: Callable[[str], None] = lambda _: None,
 ) -> Identification:
     """Identify as many lags as the record supports, each further one paid for by the information criterion.
 
@@ -156,9 +157,12 @@ def identify_lags(
     make : callable
         From starting time constants (s) and the bounds `shortest` and `longest` to a follower: `make_series` for lags in
         series with radiation, `make_lags` for lags side by side.
+    progress : callable
+        Told in words what comes next.
     """
     best: Identification | None = None
     for count in range(1, most + 1):
+        progress(f"{count} in series" if count > 1 else "one")
         trial = identify(runs, _best_start(runs, law, count, make, best), law, confidence)
         if best is not None and trial.criterion > best.criterion - EVIDENCE:
             break

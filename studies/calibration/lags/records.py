@@ -1,6 +1,6 @@
 """Thermal constants of a resonator from records of its frequency and its housing's temperature."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -21,7 +21,11 @@ SENSORS = ("housing_temperature_degC", "chamber_temperature_degC")
 
 
 def fit_thermal_constants(
-    records: Sequence[Record], instrument: "Instrument | None" = None, lags: int | None = None, confidence: float = 0.9
+    records: Sequence[Record],
+    instrument: "Instrument | None" = None,
+    lags: int | None = None,
+    confidence: float = 0.9,
+    progress: Callable[[str], None] = lambda _: None,
 ) -> Identification:
     """Identify the lags of the resonator behind its housing, each run with an initial state of its own.
 
@@ -36,6 +40,8 @@ def fit_thermal_constants(
         Number of lags; as many as the record supports, up to three, when absent.
     confidence : float
         Of the intervals.
+    progress : callable
+        Told in words what comes next.
 
     Raises
     ------
@@ -48,7 +54,7 @@ def fit_thermal_constants(
     law = _law(runs, instrument)
     with naming(", ".join(record.path or "record" for record in records)):
         if lags is None:
-            return identify_lags(runs, law, confidence=confidence)
+            return identify_lags(runs, law, confidence=confidence, progress=progress)
         span = max(float(np.ptp(run.time)) for run in runs)
         starts = span / 6 * 0.3 ** np.arange(lags)
         return identify(runs, make_series(*starts, longest=10 * span), law, confidence)
