@@ -9,7 +9,7 @@ import json
 import os
 import sqlite3
 import struct
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -185,6 +185,7 @@ class Store:
         if not rows:
             raise InputError(f"{self.path.parent}: its study has not begun yet; run it again.")
         about = dict(zip(columns, rows[0], strict=True))
+        self._check_kinds(about, {"created_utc": _is_time, "cases": _is_count, "spec_text": _is_text, "folder": _is_text})
         parsed = {key: self._parse(about[key]) for key in ("identity", "spec", "instrument")}
         return about | parsed | {"repeats": self._parse(about["repeats"], list)}
 
@@ -201,7 +202,16 @@ class Store:
         """Return the runs so far."""
         rows = self._read("SELECT id, started_utc, finished_utc, outcome, provenance FROM run ORDER BY id")
         keys = ("id", "started_utc", "finished_utc", "outcome", "provenance")
-        return [dict(zip(keys, row, strict=True)) | {"provenance": self._parse(row[4])} for row in rows]
+        kinds = {"started_utc": _is_time, "finished_utc": _is_time_or_none, "outcome": _is_text_or_none}
+        found = [dict(zip(keys, row, strict=True)) for row in rows]
+        for one in found:
+            self._check_kinds(one, kinds)
+        return [one | {"provenance": self._parse(one["provenance"])} for one in found]
+
+    def _check_kinds(self, row: Mapping[str, Any], kinds: Mapping[str, Callable[[Any], bool]]) -> None:
+        for key, fits in kinds.items():
+            if not fits(row[key]):
+                raise _damaged(self.path, f"{row[key]!r:.60} stands where {key} belongs")
 
     def describe(self, about: Mapping[str, Any]) -> None:
         """Write what the study is; a later run may change only what no result depends on."""
@@ -390,6 +400,29 @@ def _fits(sealed: Sequence[Any], seal: bytes) -> bool:
         return _seal(*sealed) == seal
     except (TypeError, AttributeError):
         return False
+
+
+def _is_text(value: Any) -> bool:
+    return isinstance(value, str)
+
+
+def _is_text_or_none(value: Any) -> bool:
+    return value is None or isinstance(value, str)
+
+
+def _is_count(value: Any) -> bool:
+    return isinstance(value, int) and value > 0
+
+
+def _is_time(value: Any) -> bool:
+    try:
+        return datetime.fromisoformat(value).tzinfo is not None
+    except (TypeError, ValueError):
+        return False
+
+
+def _is_time_or_none(value: Any) -> bool:
+    return value is None or _is_time(value)
 
 
 def _pack(values: Sequence[float], errors: Sequence[float]) -> bytes:

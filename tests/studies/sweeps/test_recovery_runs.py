@@ -20,7 +20,7 @@ from studies.sweeps.export import export_results
 from studies.sweeps.results import open_results
 from studies.sweeps.row import Row
 from studies.sweeps.run import run_study
-from studies.sweeps.store import claim_store
+from studies.sweeps.store import claim_store, memory_store
 from tests.studies.sweeps.processes import environment, rows_of, spec_of, words_of
 
 X = 'name = "user.x"\nlow = 0.0\nhigh = 1.0'
@@ -212,6 +212,32 @@ def test_damaged_store_is_named_and_kept(tmp_path, functions, hrg, damage):
         with pytest.raises(InputError, match="damaged"):
             use()
     assert path.exists()
+
+
+def test_notes_of_other_kinds_are_a_damaged_store(tmp_path, functions):
+    spec = tmp_path / "square.toml"
+    spec.write_text(spec_of("square", 'method = "grid"', 'name = "user.x"\nvalues = [1, 2]'))
+    store = memory_store()
+    with contextlib.closing(run_study(spec, None, workers=1, allow_python=True)) as results:
+        results.store.connection.backup(store.connection)
+    damages = [
+        ("study", "cases", "3\x01"),
+        ("study", "cases", -3),
+        ("study", "created_utc", "2\x1126-11-22T06:00:00+00:00"),
+        ("study", "spec_text", b"name"),
+        ("study", "folder", b"out"),
+        ("run", "started_utc", "2026-11-22T06:61:00+00:00"),
+        ("run", "started_utc", b"2026"),
+        ("run", "finished_utc", "x"),
+        ("run", "outcome", b"done"),
+    ]
+    for table, key, value in damages:
+        assert store.about()["cases"] == 2
+        assert len(store.runs()) == 1
+        store.connection.execute(f"UPDATE {table} SET {key} = ?", (value,))
+        with pytest.raises(InputError, match=f"damaged.*{key}"):
+            store.about() if table == "study" else store.runs()
+        store.connection.rollback()
 
 
 @pytest.mark.slow
