@@ -22,6 +22,7 @@ from shell.sampling import ShapePatch, sample_shape
 from shell.solution import AlongMeridian, EnergyFractions, Solution, total
 
 THEORIES = ("solid", "shell", "rayleigh")
+MOST_HARMONIC = 100  # waves shorter than any wall is thin; beyond, the meshes outgrow memory
 THICKEST_SHELL = 0.1  # h/R up to which shell theory has been held against the solid
 
 
@@ -206,6 +207,8 @@ def _check_arguments(harmonic: int, count: int, theory: str, tolerance: float) -
         raise ShellError(f"the theory is one of {', '.join(THEORIES)}, not {theory!r}.")
     if harmonic != int(harmonic) or harmonic < 0:
         raise ShellError(f"the harmonic is a whole number from 0 up, not {harmonic!r}.")
+    if harmonic > MOST_HARMONIC and theory != "rayleigh":
+        raise ShellError(f"the solver goes up to harmonic n = {MOST_HARMONIC}, not {harmonic}; choose a lower one.")
     if count < 1:
         raise ShellError(f"at least one mode must be asked for, not {count}.")
     if not 0 < tolerance < 1:

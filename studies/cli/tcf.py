@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from shell.law import FrequencyLaw
 
 MOST_POINTS = 10_000
+MOST_HARMONIC = 50  # a law of a higher one takes minutes
 LEAST = 0.005  # ppm/°C, that is shown
 
 
@@ -62,6 +63,10 @@ def tcf(
     if not (to_degC - from_degC) / step < MOST_POINTS:
         raise InputError(
             f"--from {from_degC:g} --to {to_degC:g} --step {step:g}: more than {MOST_POINTS} temperatures; take a longer step."
+        )
+    if harmonic > MOST_HARMONIC and theory != "rayleigh":
+        raise InputError(
+            f"--harmonic {harmonic}: the law over temperature is solved up to n = {MOST_HARMONIC}; hrg modes goes higher."
         )
     instrument = load_card(card)
     at = np.arange(from_degC, to_degC + 1e-9 * step, step)

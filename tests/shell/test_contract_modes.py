@@ -106,6 +106,7 @@ def test_a_tolerance_out_of_reach_is_said() -> None:
     ("options", "message"),
     [
         ({"harmonic": -1}, "harmonic"),
+        ({"harmonic": 101}, "up to harmonic n = 100"),
         ({"count": 0}, "at least one mode"),
         ({"theory": "beam"}, "solid, shell, rayleigh"),
         ({"tolerance": 0.0}, "tolerance"),
