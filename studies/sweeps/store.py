@@ -185,7 +185,9 @@ class Store:
         if not rows:
             raise InputError(f"{self.path.parent}: its study has not begun yet; run it again.")
         about = dict(zip(columns, rows[0], strict=True))
-        self._check_kinds(about, {"created_utc": _is_time, "cases": _is_count, "spec_text": _is_text, "folder": _is_text})
+        self._check_kinds(
+            about, {"created_utc": _is_time, "cases": _is_count, "spec_text": _is_text, "folder": _is_text}
+        )
         parsed = {key: self._parse(about[key]) for key in ("identity", "spec", "instrument")}
         return about | parsed | {"repeats": self._parse(about["repeats"], list)}
 
