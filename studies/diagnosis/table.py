@@ -8,7 +8,6 @@ table is measured in some order, and its rows know of each other.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import product
 
 import numpy as np
 from scipy.special import logsumexp
@@ -16,6 +15,7 @@ from scipy.stats import f as f_distribution
 
 from studies.diagnosis.constants import CONSTANTS
 from studies.diagnosis.extension import Law
+from studies.diagnosis.table_noise import Scale, make_scale
 from studies.diagnosis.verdict import Cause, Interval, ResponseResult, Verdict, weigh
 from studies.effects import Effect, library
 from studies.effects.states import FloatArray
@@ -23,6 +23,8 @@ from studies.effects.states import FloatArray
 FEWEST_POINTS = 5
 MOST_ROWS = 120
 """Longer tables are averaged over neighbouring rows."""
+WANDERING = 3.0
+"""Residual over white noise from which a table is not called adequate."""
 TURN = 0.1
 """Part of the covered range that a table must go back for its order to show a direction."""
 
@@ -115,8 +117,9 @@ def study_steady_table(
         verdict = Verdict("not-identifiable", (), {"frequency_Hz": result}, _NEXT)
         return TableDiagnosis(verdict, T, law_left, left, left, law_rms, ratio, (), (remark + ".",))
     rounding = max(resolution / np.sqrt(12.0), 1e-9 * float(np.abs(f).max()))
-    nothing = _log_evidence(base, np.empty((T.size, 0)), f, rounding)
-    found = [c for effect in library().values() if effect.steady for c in _candidates(effect, x, base, f, rounding)]
+    scale = make_scale(base, f, rounding)
+    nothing = scale.log_evidence(np.empty((T.size, 0)))
+    found = [c for effect in library().values() if effect.steady for c in _candidates(effect, x, base, f, scale)]
     best = {
         name: max((c for c in found if c.effect.name == name), key=lambda c: c.log_evidence)
         for name in {c.effect.name for c in found}
@@ -130,8 +133,16 @@ def study_steady_table(
     base_loo = _leave_one_out(base, f)
     sentences = _sentences(T, f, law_rms, ratio, base_rms, base_loo, rounding, law_name)
     if not ranked or ranked[0].log_evidence + prior < nothing:
-        result = ResponseResult("adequate", base_rms, (base_rms, base_loo), None, "none")
-        verdict = Verdict("adequate", (), {"frequency_Hz": result}, None)
+        white = scale.white()
+        wanders = base_rms > WANDERING * white
+        state = "not-identifiable" if wanders else "adequate"
+        if wanders:
+            sentences.append(
+                f"The rows wander: {base_rms:.3g} Hz rms is left where neighbouring rows agree to {white:.2g} Hz. A drift"
+                " between the rows and a slow effect of temperature look alike in one table."
+            )
+        result = ResponseResult(state, base_rms, (base_rms, base_loo), None, "structure" if wanders else "none")
+        verdict = Verdict(state, (), {"frequency_Hz": result}, _NEXT if wanders else None)
         return TableDiagnosis(verdict, T, law_left, left, left, law_rms, ratio, forms, sentences)
     winner = ranked[0]
     members, probability = weigh([c.effect.name for c in ranked], [c.log_evidence + prior for c in ranked], nothing)
@@ -155,7 +166,7 @@ def study_steady_table(
     reached = float(np.sqrt(np.mean(winner.residual**2)))
     result = ResponseResult(state, max(reached, rounding), (base_rms, base_loo), (reached, winner.loo), "none")
     if len(names) > 1:
-        sentences.append(f"Equally good within what the table can say: {', '.join(names)}.")
+        sentences.append(f"The table cannot separate these: {', '.join(names)}.")
     verdict = Verdict(state, (cause,), {"frequency_Hz": result}, _NEXT)
     return TableDiagnosis(verdict, T, law_left, left, winner.residual, law_rms, ratio, forms, sentences)
 
@@ -166,7 +177,7 @@ _NEXT = (
 )
 
 
-def _candidates(effect: Effect, x: FloatArray, base: FloatArray, f: FloatArray, rounding: float) -> list[_Candidate]:
+def _candidates(effect: Effect, x: FloatArray, base: FloatArray, f: FloatArray, scale: Scale) -> list[_Candidate]:
     assert effect.steady is not None
     assert effect.steady_grid is not None
     shapes = list(effect.steady_grid(float(x.min()), float(x.max())))
@@ -177,7 +188,7 @@ def _candidates(effect: Effect, x: FloatArray, base: FloatArray, f: FloatArray, 
         if columns.shape[1] + 4 > f.size or not np.all(np.linalg.norm(_left(base, columns), axis=0) > 1e-9):
             continue
         residual = _left(both, f)
-        value = _log_evidence(base, columns, f, rounding) - float(np.log(len(shapes)))
+        value = scale.log_evidence(columns) - float(np.log(len(shapes)))
         ssq = float(np.sum(residual**2))
         out.append(_Candidate(effect, tuple(shape), columns, value, ssq, _leave_one_out(both, f), residual))
     if out and len(out) > 1 and effect.shape:  # one form at many places: the mean over them
@@ -195,31 +206,6 @@ def _by_words(found: Sequence[_Candidate]) -> list[_Candidate]:
         if key not in best or c.log_evidence > best[key].log_evidence:
             best[key] = c
     return list(best.values())
-
-
-def _log_evidence(base: FloatArray, columns: FloatArray, f: FloatArray, rounding: float) -> float:
-    """Log evidence over white noise from rounding upwards, wander along the rows, and the size of the effect."""
-    free = np.linalg.qr(np.concatenate([base / np.linalg.norm(base, axis=0)], axis=1), mode="complete")[0][
-        :, base.shape[1] :
-    ]
-    y = free.T @ f
-    own = free.T @ columns
-    unit = columns / np.maximum(np.sqrt(np.mean(columns**2, axis=0)), 1e-300)
-    own = free.T @ unit
-    rows = np.arange(f.size) / f.size
-    walk = free.T @ np.minimum(rows[:, None], rows[None, :]) @ free
-    most = max(float(np.std(y)), 2.0 * rounding)
-    whites = np.geomspace(rounding, most, 8)
-    wanders = (0.0, 3.0, 30.0) if f.size >= 24 else (0.0,)
-    strong = 0.1 * float(np.ptp(f))
-    sizes = np.geomspace(rounding, max(strong, 10.0 * rounding), 9) if columns.shape[1] else np.array([0.0])
-    values = []
-    for white, wander, size in product(whites, wanders, sizes):
-        covariance = white**2 * (np.eye(y.size) + wander * walk) + size**2 * own @ own.T
-        factor = np.linalg.cholesky(covariance)
-        z = np.linalg.solve(factor, y)
-        values.append(-0.5 * float(z @ z) - float(np.log(np.diag(factor)).sum()))
-    return float(logsumexp(values) - np.log(len(values)))
 
 
 def _spans(base: FloatArray, one: FloatArray, two: FloatArray) -> bool:
@@ -280,8 +266,8 @@ def _sentences(
         + (
             "approached from both sides: hysteresis is tested; ageing and a linear scale error stay hidden."
             if both
-            else "approached from one side: they cannot show hysteresis, ageing or a linear scale error, and an unsettled soak "
-            "stays in the slope."
+            else "approached from one side: they cannot tell hysteresis from a curve, nor show ageing or a linear scale error, and an"
+            " unsettled soak stays in the slope."
         )
     )
     return out

@@ -1,5 +1,6 @@
 """The page of a diagnosis: verdict, cause, size, gain and a picture first; the evidence after it."""
 
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -42,7 +43,8 @@ def headline(verdict: Verdict) -> str:
 
 def name_cause(cause: Cause) -> str:
     """Return a cause, or its set, with response and probability."""
-    names = " or ".join([cause.effect, *cause.equivalent])
+    *others, last = [cause.effect, *cause.equivalent]
+    names = f"one of {', '.join(others)} and {last}" if len(others) > 1 else " or ".join([*others, last])
     return f"{names} in the {NAMES[cause.response]} (probability {cause.probability:.2f})"
 
 
@@ -368,12 +370,13 @@ def _rivals(diagnosis: Diagnosis, response: str) -> list[Block]:
 
 def table_text(found: "TableDiagnosis") -> str:
     """Return the diagnosis of a steady-state table as text."""
-    return "\n".join([headline(found.verdict), *found.sentences])
+    following = [f"Next: {found.verdict.next_experiment}"] if found.verdict.next_experiment else []
+    return "\n".join([headline(found.verdict), *found.sentences, *following])
 
 
 def table_page(found: "TableDiagnosis", path: str) -> str:
     """Return the page of a steady-state table as HTML."""
-    return render_page(f"Diagnosis of {path}", headline(found.verdict), table_chapters(found))
+    return render_page(f"Diagnosis of {Path(path).name}", headline(found.verdict), table_chapters(found))
 
 
 def table_chapters(found: "TableDiagnosis") -> list[Chapter]:
@@ -386,8 +389,10 @@ def table_chapters(found: "TableDiagnosis") -> list[Chapter]:
     rows = [[name, number(ssq), number(loo), number(score)] for name, ssq, loo, score in found.candidates]
     columns = ("candidate", "sum of squares / Hz²", "leave-one-out / Hz", "evidence")
     candidates = Table("Candidates on top of the baseline", columns, rows)
+    following = found.verdict.next_experiment
+    note = [Text(f"Next experiment: {following}", "note")] if following else []
     return [
-        Chapter("The answer", [Facts(facts), table_residuals(found), *(Text(s) for s in found.sentences)]),
+        Chapter("The answer", [Facts(facts), *note, table_residuals(found), *(Text(s) for s in found.sentences)]),
         Chapter("Candidates", [candidates]),
     ]
 
