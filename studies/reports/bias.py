@@ -290,7 +290,7 @@ def _facts(study: "BiasStudy", method: Method) -> Block:
         (
             "Held out",
             "unknown" if held is None else f"{held.gain:.2f} times",
-            "needs a second run" if held is None else f"{held.before:.3g} → {held.after:.3g} {unit}",
+            "needs two runs of a kind" if held is None else f"{held.before:.3g} → {held.after:.3g} {unit}",
         ),
         (
             "Terms",

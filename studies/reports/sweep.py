@@ -9,7 +9,7 @@ from studies.errors import UNUSABLE_INPUT, InputError
 from studies.reports import sweep_figures as figures
 from studies.reports.page import Block, Chapter, Facts, Table, Text, render_page
 from studies.reports.sweep_analysis import influence_chapters, search_chapters, tolerance_chapters
-from studies.reports.sweep_cells import main_columns, number, percent, short
+from studies.reports.sweep_cells import main_columns, number, percent, short, spread, to_error
 from studies.sweeps.design import nominal_design
 from studies.sweeps.parameters import TEMPERATURE, set_parameters
 from studies.sweeps.sensitivity import linear_shares, local_slopes, sobol_indices
@@ -173,7 +173,9 @@ def _statistics(results: "Results") -> Table:
             [
                 column.label,
                 column.unit,
-                *(number(n[key]) for key in ("nominal", "mean", "deviation", "least", "greatest")),
+                *(to_error(n[key], n["error"]) for key in ("nominal", "mean")),
+                spread(n["deviation"], n["mean"]),
+                *(to_error(n[key], n["error"]) for key in ("least", "greatest")),
             ]
         )
         rows[-1].append(f"{n['error']:.1e}" if n["error"] is not None and np.isfinite(n["error"]) else "")

@@ -21,6 +21,21 @@ def number(value: Any) -> str:
     return "" if value is None or np.isnan(value) else f"{value:.8g}"
 
 
+def to_error(value: float | None, error: float | None) -> str:
+    """Return a number to the second digit of its numerical error."""
+    if value is None or error is None or not np.isfinite(value) or not 0 < error < np.inf:
+        return number(value)
+    digits = int(np.clip(1 - np.floor(np.log10(error)), 0, 12))
+    return f"{value:.{digits}f}" if abs(value) < 1e9 else number(value)
+
+
+def spread(deviation: float | None, mean: float | None) -> str:
+    """Return three digits of a standard deviation, 0 for what rounding leaves."""
+    if deviation is None or np.isnan(deviation):
+        return ""
+    return f"{deviation:.3g}" if mean is None or deviation > 1e-12 * abs(mean) else "0"
+
+
 def short(value: float | None) -> str:
     """Return six digits of a number, nothing for nothing."""
     return "" if value is None or np.isnan(value) else f"{value:.6g}"
