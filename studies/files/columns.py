@@ -26,6 +26,11 @@ LARGEST = 1e20
 """No reading of an instrument, time or count is larger; what is larger would overflow in its powers."""
 # Anything but plain decimal numbers, commas and line ends: 'nan', quotes, comments, blanks.
 _UNUSUAL = re.compile(rb"[^0-9eE+.,\r\n-]")
+_SOMETHING = re.compile(rb"\S")
+HEAD = 1 << 20
+"""Bytes in which comments and header are looked for first."""
+ROWS_AT_ONCE = 200_000
+"""Rows that are parsed at once, so that a large table costs its bytes and its numbers and little more."""
 
 
 @dataclass(frozen=True)
@@ -64,10 +69,10 @@ def read_columns(
     InputError
         Anything that is not such a table: the message names file, line or column, and the mend.
     """
-    data = _read_text_bytes(path)
+    data = _check_text(path, read_bytes(path))
     comments, header, header_line, body_start = _split_head(path, data)
     names = _check_names(path, header, header_line, known, required, prefixes)
-    if body_start >= len(data) or not data[body_start:].strip():
+    if not _SOMETHING.search(data, body_start):
         raise InputError(f"{path}: the table has a header but no rows; add one line per measurement.")
     values = _parse_fast(data, body_start, names)
     if values is None:
@@ -79,13 +84,19 @@ def read_columns(
 
 def read_header(path: str | Path) -> list[str]:
     """Return the column names of a table without reading its numbers."""
-    _, header, _, _ = _split_head(path, _read_text_bytes(path))
+    head = read_bytes(path, first=HEAD)
+    if len(head) == HEAD:  # whole lines only
+        head = head[: head.rfind(b"\n") + 1]
+    try:
+        _, header, _, _ = _split_head(path, _check_text(path, head))
+    except InputError:
+        _, header, _, _ = _split_head(path, _check_text(path, read_bytes(path)))
     return [name.strip() for name in header]
 
 
-def _read_text_bytes(path: str | Path) -> bytes:
-    """Read the file and make sure that it is UTF-8 text with something in it."""
-    data = read_bytes(path).removeprefix(codecs.BOM_UTF8)
+def _check_text(path: str | Path, data: bytes) -> bytes:
+    """Make sure that a file is UTF-8 text with something in it, and take its byte-order mark off."""
+    data = data.removeprefix(codecs.BOM_UTF8)
     if b"\0" in data:
         raise InputError(f"{path}: not a text table (it holds zero bytes); export it as CSV in UTF-8.")
     if not data.isascii():
@@ -94,7 +105,7 @@ def _read_text_bytes(path: str | Path) -> bytes:
         except UnicodeDecodeError as error:
             line = data.count(b"\n", 0, error.start) + 1
             raise InputError(f"{path}, line {line}: not UTF-8 text; save the file as UTF-8 (CSV).") from None
-    if not data.strip():
+    if not _SOMETHING.search(data):
         raise InputError(f"{path}: the file is empty; it needs a header line and rows of numbers.")
     return data
 
@@ -152,6 +163,7 @@ def _check_names(
 
 def _parse_fast(data: bytes, start: int, names: list[str]) -> "dict[str, NDArray[np.float64]] | None":
     """Parse a clean table quickly; None when anything is unusual and the careful way must decide."""
+    import numpy as np
     import pandas as pd
 
     rows = data.count(b"\n", start) + (not data.endswith(b"\n"))
@@ -159,8 +171,9 @@ def _parse_fast(data: bytes, start: int, names: list[str]) -> "dict[str, NDArray
         return None
     body = io.BytesIO(data)
     body.seek(start)
+    table, done = np.empty((len(names), rows)), 0
     try:
-        frame = pd.read_csv(
+        with pd.read_csv(
             body,
             names=names,
             header=None,
@@ -169,12 +182,14 @@ def _parse_fast(data: bytes, start: int, names: list[str]) -> "dict[str, NDArray
             na_values=[""],
             skip_blank_lines=False,
             index_col=False,
-        )
+            chunksize=ROWS_AT_ONCE,
+        ) as parts:
+            for part in parts:
+                table[:, done : done + len(part)] = part.to_numpy().T
+                done += len(part)
     except ValueError:
         return None
-    if len(frame) != rows:
-        return None
-    return {name: frame[name].to_numpy() for name in names}
+    return dict(zip(names, table, strict=True)) if done == rows else None
 
 
 def _parse_by_line(path: str | Path, body: str, names: list[str], first_line: int) -> "dict[str, NDArray[np.float64]]":

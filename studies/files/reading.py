@@ -6,11 +6,11 @@ from pathlib import Path
 from studies.errors import InputError, nearest
 
 MOST_BYTES = 2 * 1024**3
-"""A record at 200 Hz over a month is smaller; a table of numbers takes about four times its file in memory."""
+"""A record at 200 Hz over a month is smaller; a table of numbers takes about twice its file in memory."""
 
 
-def read_bytes(path: str | Path, most: int = MOST_BYTES) -> bytes:
-    """Return the content of a regular file of at most so many bytes.
+def read_bytes(path: str | Path, most: int = MOST_BYTES, first: int = -1) -> bytes:
+    """Return the content, or its first bytes, of a regular file of at most so many bytes.
 
     Raises
     ------
@@ -18,7 +18,8 @@ def read_bytes(path: str | Path, most: int = MOST_BYTES) -> bytes:
         There is no such file, it is a folder, a device or a pipe, it is too large, or it cannot be read.
     """
     try:
-        return check_file(path, most).read_bytes()
+        with check_file(path, most).open("rb") as file:
+            return file.read(first)
     except InputError:
         raise
     except OSError as error:
