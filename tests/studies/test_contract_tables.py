@@ -1,6 +1,7 @@
 """Contract: a file that is not a record, a table or a profile is refused with its line or column, and nothing is guessed."""
 
 import datetime
+import tracemalloc
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from studies.errors import InputError
+from studies.files import columns
 from studies.files.writing import written_whole
 from studies.record import (
     Record,
@@ -165,3 +167,19 @@ def test_unwritable_place_is_refused(tmp_path):
 
     with pytest.raises(InputError, match="cannot be written"):
         write()
+
+
+def test_a_large_table_costs_its_bytes_and_its_numbers(tmp_path, monkeypatch):
+    path, rows = tmp_path / "run.csv", 60_000
+    write_record(Record({"time_s": np.arange(rows) / 7, "frequency_Hz": 4432 + np.sin(np.arange(rows))}, ""), path)
+    whole = read_record(path)
+    monkeypatch.setattr(columns, "ROWS_AT_ONCE", 7001)
+    tracemalloc.start()
+    try:
+        parts = read_record(path)
+        peak = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    for name, values in whole.columns.items():
+        np.testing.assert_array_equal(parts[name], values)
+    assert peak < 1.4 * (path.stat().st_size + 16 * rows)
