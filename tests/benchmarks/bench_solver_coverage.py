@@ -109,7 +109,7 @@ def finer(level):
     return replace(
         level,
         through=tuple(k + 4 for k in level.through),
-        along=min(level.along + 5, 22),
+        along=min(level.along + 2, 22),
         block=level.block + 2,
         rings=min(level.rings + 3, 11),  # smaller cells are points in double precision
         split=2 * level.split,
