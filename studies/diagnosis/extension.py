@@ -12,7 +12,7 @@ import numpy as np
 from studies.diagnosis.baseline import Followed
 from studies.diagnosis.investigate import Diagnosis
 from studies.diagnosis.model import Fit
-from studies.diagnosis.simulated import Simulated
+from studies.diagnosis.simulated import RATE_TERMS, Simulated
 from studies.effects.states import FloatArray
 from studies.errors import InputError
 from studies.law import law_of
@@ -62,7 +62,9 @@ def extend(instrument: "Instrument", diagnosis: Diagnosis) -> "Instrument":
     for column, inquiry in diagnosis.inquiries.items():
         model = inquiry.final
         if column == "bias_deg_per_h":
-            extended = extended.with_table("bias", _bias_table(model, clock))
+            stated = instrument.content.get("bias", {})
+            by_rate = {key: stated[key] for key in RATE_TERMS if key in stated} if clock is not None else {}
+            extended = extended.with_table("bias", _bias_table(model, clock) | by_rate)
         if column == "inverse_q":
             extended = extended.with_table("loss", _loss_table(model))
         effects += [_entry(model, k) for k, term in enumerate(model.terms) if not term.effect.once]

@@ -19,7 +19,7 @@ from studies.diagnosis.model import Fit
 from studies.diagnosis.planning.advice import suggest_next
 from studies.diagnosis.planning.chamber import Chamber
 from studies.diagnosis.response import RESPONSES
-from studies.diagnosis.simulated import Simulated, as_shipped, shifts_of, simulate_baseline
+from studies.diagnosis.simulated import Simulated, as_shipped, shifts_of, simulate_baseline, without_rate_terms
 from studies.diagnosis.verdict import Cause, Interval, ResponseResult, Shift, Verdict, overall
 from studies.effects import Effect
 
@@ -69,7 +69,7 @@ def investigate(
     card : Instrument, optional
         Its own simulation is then the baseline of the frequency.
     """
-    tell = progress or (lambda words: None)
+    tell, measured = progress or (lambda words: None), campaign
     inquiries: dict[str, Inquiry] = {}
     thermometer: Thermometer | None = None
     for column in (c for c in RESPONSES if c in campaign.responses):
@@ -79,6 +79,11 @@ def investigate(
         tell(f"{RESPONSES[column].word}: baseline, then every effect")
         simulated = card is not None and RESPONSES[column].thermometer
         make = partial(simulate_baseline, campaign, card) if simulated and card is not None else None
+        if column == "bias_deg_per_h":
+            clock = next(
+                (i.final.baseline for i in inquiries.values() if isinstance(i.final.baseline, Simulated)), None
+            )
+            campaign = campaign if clock is None else without_rate_terms(campaign, clock)
         plain = begin(campaign, column, thermometer, make)
         inquiries[column] = inquire(campaign, plain, effects, score_held_out)
         if RESPONSES[column].thermometer:
@@ -88,7 +93,7 @@ def investigate(
     shifts = tuple(shift for inquiry in inquiries.values() for shift in shifts_of(inquiry.final))
     causes = (*wrong_values(shifts), *name_causes(campaign, inquiries))
     causes = tuple(sorted(causes, key=lambda cause: -cause.evidence))
-    shipped = _shipped(campaign, inquiries)
+    shipped = _shipped(measured, inquiries)
     results = {
         column: _result(campaign, inquiries[column], causes, score_held_out, shipped.get(column))
         if column in inquiries

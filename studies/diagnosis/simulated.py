@@ -17,6 +17,7 @@ from studies.diagnosis.campaign import Campaign
 from studies.diagnosis.response import RESPONSES, Response
 from studies.diagnosis.verdict import Shift
 from studies.effects.states import FloatArray, States, average
+from studies.instrument.tables.bias import TERMS
 from studies.law import law_of
 from studies.simulation.drive import Boundary, Drive
 from studies.simulation.prediction import Prediction, Variations, predict
@@ -36,6 +37,8 @@ BOLDEST = 1.5
 """Largest change of a z from one linearisation to the next."""
 NEAR = 0.1
 """Change of z, and K of an initial state, below which the old linearisation is kept."""
+RATE_TERMS = tuple(key for key, (_, by_rate) in TERMS.items() if by_rate)
+"""Terms of the bias in the rate of the frequency."""
 SILENT = 1e-4
 """Part of the noise below which one standard deviation of a value changes nothing."""
 
@@ -246,6 +249,27 @@ def simulate_baseline(campaign: Campaign, card: "Instrument", noise: float) -> S
     telling = np.ptp(columns, axis=0) + np.abs(columns).max(axis=0) > SILENT * noise
     values = tuple(v for v, tells in zip(own.values, telling, strict=True) if tells)
     return replace(own, values=values, z=(0.0,) * len(values))
+
+
+def without_rate_terms(campaign: Campaign, baseline: Simulated) -> Campaign:
+    """Take what the card says of the bias by rate (k4 to k9) out of the records: the static terms are free, these are stated."""
+    stated = dict(baseline.card.content.get("bias", {}))
+    static = {key: value for key, value in stated.items() if key not in RATE_TERMS}
+    if len(static) == len(stated) or "bias_deg_per_h" not in campaign.responses:
+        return campaign
+    still = baseline.instrument.with_table("bias", static)
+    runs = []
+    for k, run in enumerate(campaign.runs):
+        drive, time = baseline.drive(k)
+        whole, rest = (
+            predict(card, drive, (), baseline.law).columns["bias_deg_per_h"] for card in (baseline.instrument, still)
+        )
+        by_rate = whole - rest
+        fine = average(np.interp(run.states.time, time, by_rate), campaign.group)
+        responses = run.responses | {"bias_deg_per_h": run.responses["bias_deg_per_h"] - fine}
+        own = run.row_responses["bias_deg_per_h"] - np.interp(run.row_time, time, by_rate)
+        runs.append(replace(run, responses=responses, row_responses=run.row_responses | {"bias_deg_per_h": own}))
+    return replace(campaign, runs=tuple(runs))
 
 
 def as_shipped(campaign: Campaign, baseline: Simulated) -> dict[str, float]:

@@ -9,6 +9,7 @@ from studies.cli import main
 from studies.diagnosis.campaign import load_campaign
 from studies.diagnosis.extension import extend
 from studies.diagnosis.investigate import investigate
+from studies.diagnosis.simulated import simulate_baseline, without_rate_terms
 from studies.instrument.card import load_card, save_card
 from studies.record import read_record
 
@@ -39,6 +40,29 @@ def test_a_virtual_record_of_the_card_is_adequate(shipped, tmp_path, capsys):
     verdict = investigate(load_campaign(simulated(shipped, tmp_path, capsys), 20.0), card=shipped, advise=False).verdict
     assert verdict.verdict == "adequate", verdict.causes
     assert max(abs(shift.shift_sd) for shift in verdict.calibration) < 1.0
+
+
+def test_what_the_card_says_of_the_bias_by_rate_is_not_found_as_an_effect(shipped, tmp_path, capsys):
+    """The free terms of a bias are static; a card's own k4 was once left in the record and named rate-bias."""
+    stated = shipped.with_table("bias", {"k1_deg_per_h_per_Hz": 0.2, "k4_deg_per_h_s_per_Hz": 300.0})
+    static = shipped.with_table("bias", {"k1_deg_per_h_per_Hz": 0.2})
+    both = []
+    for card in (stated, static):
+        save_card(card, tmp_path / "card.toml")
+        words = ["simulate", str(tmp_path / "card.toml"), PROFILES[1], "--rate", "0.05", "--noiseless"]
+        assert main([*words, "--out", str(tmp_path / "run.csv")]) == 0
+        both.append(load_campaign([read_record(str(tmp_path / "run.csv"))], 20.0))
+    capsys.readouterr()
+    left = without_rate_terms(both[0], simulate_baseline(both[0], stated, 1e-3))
+    (with_rate,), (cleaned,), (without,) = (campaign.runs for campaign in (both[0], left, both[1]))
+    by_rate = with_rate.responses["bias_deg_per_h"] - without.responses["bias_deg_per_h"]
+    size = np.nanmax(by_rate) - np.nanmin(by_rate)
+    assert size > 0.5
+    rest = cleaned.responses["bias_deg_per_h"] - without.responses["bias_deg_per_h"]
+    assert np.nanmax(np.abs(rest)) < 0.05 * size
+    own = cleaned.row_responses["bias_deg_per_h"] - without.row_responses["bias_deg_per_h"]
+    assert np.nanmax(np.abs(own)) < 0.1 * size
+    assert left.runs[0].responses["frequency_Hz"] is with_rate.responses["frequency_Hz"]
 
 
 @pytest.mark.slow
