@@ -6,7 +6,11 @@ from typing import TYPE_CHECKING, Any
 
 from scipy.constants import zero_Celsius
 
+from studies.shown import Shown
+
 if TYPE_CHECKING:
+    from pandas import DataFrame
+
     from studies.instrument.card import Instrument
 
 HARMONICS = (0, 1, 2, 3)
@@ -25,13 +29,28 @@ class Figure:
     uncertainty: float
 
 
-@dataclass(frozen=True)
-class Comparison:
+@dataclass(frozen=True, repr=False)
+class Comparison(Shown):
     """Designs and their figures, in one order; `differing` card keys with their values (None: not in that card)."""
 
     names: tuple[str, ...]
     figures: tuple[tuple[Figure, ...], ...]
     differing: Mapping[str, tuple[Any, ...]]
+
+    def __repr__(self) -> str:
+        return f"Comparison({', '.join(self.names)}: {len(self.figures)} quantities, {len(self.differing)} keys differ)"
+
+    def to_frame(self) -> "DataFrame":
+        """Return one row a quantity, one column a design; uncertainties stand in columns of their own."""
+        import pandas as pd
+
+        rows = [
+            {"quantity": row[0].name, "unit": row[0].unit}
+            | {name: one.value for name, one in zip(self.names, row, strict=True)}
+            | {f"± {name}": one.uncertainty for name, one in zip(self.names, row, strict=True)}
+            for row in self.figures
+        ]
+        return pd.DataFrame(rows).set_index("quantity")
 
 
 def compare(instruments: "Sequence[Instrument]") -> Comparison:

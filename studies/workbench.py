@@ -1,8 +1,8 @@
 """The workbench from Python, by the names that the command line uses: cards, profiles and records by path, name or object."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy.constants import zero_Celsius
@@ -52,7 +52,7 @@ def compare(*cards: Card) -> "Comparison":
     """Return designs side by side: `hrg compare`."""
     from studies.comparison import compare as compare_designs
 
-    return compare_designs([open_card(card) for card in cards])
+    return compare_designs([open_card(card) for card in _flat(cards)])
 
 
 def calibrate(card: Card, *data: Run, hold_out: int | None = None, exact: Sequence[str] = ()) -> "Calibration":
@@ -75,6 +75,7 @@ def calibrate(card: Card, *data: Run, hold_out: int | None = None, exact: Sequen
     from studies.calibration.calibrate import calibrate as find_values
     from studies.calibration.observed import read_settled
 
+    data = tuple(_flat(data))
     tables = [one for one in data if _is_table(one)]
     records = open_records([one for one in data if not _is_table(one)])
     if not data:
@@ -103,6 +104,7 @@ def diagnose(*runs: Run, card: Card | None = None) -> "Diagnosis | TableDiagnosi
     from studies.diagnosis.investigate import investigate
     from studies.diagnosis.table import diagnose_table
 
+    runs = tuple(_flat(runs))
     if not runs:
         raise InputError("give the records of one gyro, or a steady-state table.")
     if any(_is_table(one) for one in runs):
@@ -117,6 +119,15 @@ def diagnose(*runs: Run, card: Card | None = None) -> "Diagnosis | TableDiagnosi
     campaign = load_campaign(records, instrument.reference_temperature - zero_Celsius)
     instrument.material.check(np.concatenate([run.states.housing for run in campaign.runs]))
     return investigate(campaign, card=instrument)
+
+
+def _flat(given: Iterable[Any]) -> Iterator[Any]:
+    """Yield what was given one by one, or as lists."""
+    for one in given:
+        if isinstance(one, list | tuple):
+            yield from one
+        else:
+            yield one
 
 
 def _is_table(run: Run) -> bool:

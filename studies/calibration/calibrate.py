@@ -14,8 +14,11 @@ from studies.calibration.priors import Priors, gather_priors
 from studies.calibration.problem import Problem, State, wide_law
 from studies.errors import InputError
 from studies.record import Record
+from studies.shown import Shown
 
 if TYPE_CHECKING:
+    from pandas import DataFrame
+
     from studies.instrument.card import Instrument
 
 Array = NDArray[np.float64]
@@ -78,8 +81,8 @@ class HeldOut:
     noise: Mapping[str, float]
 
 
-@dataclass(frozen=True)
-class Calibration:
+@dataclass(frozen=True, repr=False)
+class Calibration(Shown):
     """A card and what records say of it.
 
     Attributes
@@ -102,6 +105,31 @@ class Calibration:
     ladder: Mapping[str, Rung]
     held_out: HeldOut | None
     warnings: tuple[str, ...]
+
+    def __repr__(self) -> str:
+        told = sum(one.told_by == "data" for one in self.estimates)
+        residuals = ", ".join(f"{name} {rung.calibrated:.3g}" for name, rung in self.ladder.items())
+        return f"Calibration({self.card.name}: {told} of {len(self.estimates)} values told by the data; residuals {residuals})"
+
+    def to_frame(self) -> "DataFrame":
+        """Return one row an uncertain value, best known first: card, value, interval, shift, width, told by."""
+        import pandas as pd
+
+        rows = [
+            {
+                "parameter": one.parameter,
+                "unit": one.unit,
+                "card": one.card,
+                "value": one.value,
+                "low": one.low,
+                "high": one.high,
+                "shift_sd": one.shift_sd,
+                "width": one.width,
+                "told_by": one.told_by,
+            }
+            for one in sorted(self.estimates, key=lambda one: one.width)
+        ]
+        return pd.DataFrame(rows).set_index("parameter")
 
     def baseline(self, response: str) -> Baseline:
         """Return a response as a linear problem, for what else may be in it."""

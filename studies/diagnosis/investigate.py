@@ -22,6 +22,7 @@ from studies.diagnosis.response import RESPONSES
 from studies.diagnosis.simulated import Simulated, as_shipped, shifts_of, simulate_baseline, without_rate_terms
 from studies.diagnosis.verdict import Cause, Interval, ResponseResult, Shift, Verdict, overall
 from studies.effects import Effect
+from studies.shown import Shown
 
 FAR = 2.0
 """Prior standard deviations beyond which a value of the card is wrong."""
@@ -30,16 +31,25 @@ NARROW_RANGE = 1.0
 Progress = Callable[[str], None]
 
 if TYPE_CHECKING:
+    from pandas import DataFrame
+
     from studies.instrument.card import Instrument
 
 
-@dataclass(frozen=True)
-class Diagnosis:
+@dataclass(frozen=True, repr=False)
+class Diagnosis(Shown):
     """A verdict with the fits behind it, for pages and extended models."""
 
     verdict: Verdict
     campaign: Campaign
     inquiries: Mapping[str, Inquiry]
+
+    def __repr__(self) -> str:
+        return f"Diagnosis({self.verdict})"
+
+    def to_frame(self) -> "DataFrame":
+        """Return one row a response."""
+        return self.verdict.to_frame()
 
 
 def investigate(

@@ -8,6 +8,7 @@ table is measured in some order, and its rows know of each other.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.special import logsumexp
@@ -19,6 +20,10 @@ from studies.diagnosis.table_noise import Scale, make_scale
 from studies.diagnosis.verdict import Cause, Interval, ResponseResult, Verdict, weigh
 from studies.effects import Effect, library
 from studies.effects.states import FloatArray
+from studies.shown import Shown
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
 
 FEWEST_POINTS = 5
 MOST_ROWS = 120
@@ -29,8 +34,8 @@ TURN = 0.1
 """Part of the covered range that a table must go back for its order to show a direction."""
 
 
-@dataclass(frozen=True)
-class TableDiagnosis:
+@dataclass(frozen=True, repr=False)
+class TableDiagnosis(Shown):
     """What a table decides, and what it leaves open.
 
     Attributes
@@ -53,6 +58,16 @@ class TableDiagnosis:
     curvature_ratio: float
     candidates: Sequence[tuple[str, float, float, float]]
     sentences: Sequence[str]
+
+    def __repr__(self) -> str:
+        return f"TableDiagnosis({self.verdict})"
+
+    def to_frame(self) -> "DataFrame":
+        """Return one row a form that was weighed: sum of squares (Hz²), leave-one-out rms (Hz), evidence."""
+        import pandas as pd
+
+        columns = ["form", "sum_of_squares_Hz2", "leave_one_out_Hz", "evidence"]
+        return pd.DataFrame([*self.candidates], columns=columns).set_index("form")
 
     def as_dict(self) -> dict[str, object]:
         """Return the object of `hrg diagnose --json`."""

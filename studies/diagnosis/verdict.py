@@ -10,6 +10,8 @@ from studies.diagnosis.constants import CONSTANTS
 from studies.effects import find_effect
 
 if TYPE_CHECKING:
+    from pandas import DataFrame
+
     from studies.diagnosis.planning.next_run import NextRun
 
 VERDICTS = ("unexplained", "not-identifiable", "explained", "adequate")
@@ -146,6 +148,22 @@ class Verdict:
     next_run: "NextRun | None" = None
     calibration: tuple[Shift, ...] = ()
     details: Mapping[str, Any] = field(default_factory=dict)
+
+    def __str__(self) -> str:
+        causes = "; ".join(
+            f"{' or '.join(cause.names)} in {cause.response}, probability {cause.probability:.2f}"
+            for cause in self.causes
+        )
+        return f"{self.verdict}: {causes}" if causes else self.verdict
+
+    def to_frame(self) -> "DataFrame":
+        """Return one row a response: verdict, noise, residuals without and with the causes, gain."""
+        import pandas as pd
+
+        rows = {name: result.as_dict() for name, result in self.responses.items()}
+        table = pd.json_normalize(list(rows.values())) if rows else pd.DataFrame()
+        table.index = pd.Index(rows, name="response")
+        return table
 
     def as_dict(self) -> dict[str, Any]:
         """Return the object of `hrg diagnose --json`."""

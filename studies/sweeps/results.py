@@ -137,6 +137,13 @@ class Results:
         table.attrs = {"study": self.study.name, "units": units}
         return table
 
+    def to_frame(self) -> "pd.DataFrame":
+        """Return `table()`, by the name that every result has."""
+        return self.table()
+
+    def __repr__(self) -> str:
+        return f"Results({self.study.name}: {len(self)} of {self.total} cases, {len(self.failed)} failed)"
+
     def close(self) -> None:
         """Close the store."""
         self.store.close()

@@ -3,6 +3,7 @@
 import importlib
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ import pytest
 import compensation
 import shell
 import studies
+import studies.papers
 import thermal
 from studies.cli import main
 from studies.record import read_record
@@ -56,6 +58,30 @@ def test_records_show_themselves_shortly_and_as_tables_and_pictures():
     assert frame.attrs["instrument"] == "free-dome"
     assert len(record.plot().axes) == 6
     assert "<table" in record._repr_html_()
+
+
+def test_results_show_themselves_shortly_and_as_tables(tmp_path):
+    table = str(Path(studies.papers.__file__).parent / "hrg_table1.csv")
+    comparison = studies.compare(["free-dome", "hrg-30mm"])
+    calibration = studies.calibrate("hrg-30mm", [table])
+    spec = {"schema": "hrg.study/1", "name": "s", "card": "free-dome", "sampling": {"method": "grid"}}
+    spec |= {
+        "parameter": [{"name": "resonator.radius_mm", "values": [15.0]}],
+        "quantity": [{"name": "frequency", "theory": "shell"}],
+    }
+    study = studies.run_study(spec, out=tmp_path / "s", workers=1)
+    shown = (
+        (comparison, "Comparison(free-dome, hrg-30mm:"),
+        (calibration, "Calibration(hrg-30mm: "),
+        (studies.diagnose([table]), "TableDiagnosis(not-identifiable: "),
+        (study, "Results(s: 1 of 1 cases, 0 failed)"),
+    )
+    for one, begins in shown:
+        assert repr(one).startswith(begins)
+        assert len(repr(one)) < 400
+        assert len(one.to_frame()) > 0
+        assert one is study or "<table" in one._repr_html_()
+    assert comparison.to_frame().loc["frequency, n = 2", "hrg-30mm"] == pytest.approx(4432.09, abs=0.1)
 
 
 def test_a_module_that_is_no_name_is_still_a_module():
