@@ -24,8 +24,8 @@ from compensation.wave import StandingWave
 Real = NDArray[np.float64]
 TURN = 0.1
 """Largest turn of 2ψ (rad) in one step."""
-Means = tuple[float, float, float, float]
-"""Means over a step: commands of amplitude and quadrature, the quadrature left, the amplitude."""
+Means = tuple[float, float, float, float, float]
+"""Means over a step: commands of amplitude and quadrature, the quadrature left, the amplitude, its phase (rad)."""
 WITHOUT_RATE = ("amplitude", "phase", "quadrature")
 
 
@@ -88,7 +88,7 @@ def simulate_whole_angle(
     maps: dict[int, RowMap] = {}
     h = samples * loops.step
     psi = rows.harmonic * angle
-    means = (float(rows.decay(angle)[0]), float(rows.quadrature(angle)[0]), 0.0, 1.0)
+    means = (float(rows.decay(angle)[0]), float(rows.quadrature(angle)[0]), 0.0, 1.0, 0.0)
     forcing = course.forcing(0, 0.0, psi, means)
     state = loop.settle(forcing, course.offset(0, psi))
     at = loop.places
@@ -115,7 +115,7 @@ def simulate_whole_angle(
                 offsets = course.offset(n, psi), course.offset(n, psi_end)
                 new = row.map @ row.start(state, ends, offsets, step) + shake
                 sums, waves = new[at["sum"]] / part, new[at["wave_sum"]] / part
-                means = (float(sums[0]), float(sums[3]), float(waves[3]), 1 + float(waves[0]))
+                means = (float(sums[0]), float(sums[3]), float(waves[3]), 1 + float(waves[0]), float(waves[1]))
                 middle = (psi + psi_end) / 2
                 psi_end = psi + step / 6 * (
                     course.turn(n, begin, psi, means)
@@ -209,7 +209,8 @@ class _Course:
         c, s = math.cos(2 * psi), math.sin(2 * psi)
         damping = dc * s - ds * c
         detuned = 2 * (wc * c + ws * s) * means[2] / means[3]
-        return coriolis + damping + detuned + self.forces(psi, command, means)[1].real / means[3]
+        across = self.forces(psi, command, means)[1]
+        return coriolis + damping + detuned + (across.real + across.imag * means[4]) / means[3]
 
     def forcing(self, row: int, fraction: float, psi: float, means: Means) -> Real:
         """What drives amplitude, phase and quadrature from their commands (1/s)."""

@@ -80,7 +80,7 @@ def fit_whole_angle(
     if quadrature_volts_per_hertz is None and loop is not None:
         quadrature_volts_per_hertz = loop.quadrature_V_per_Hz
     record = read_record(run)
-    rate = record["bias_deg_per_h"] / 3600 if "bias_deg_per_h" in record else record["measured_rate_deg_per_s"]
+    rate = record["measured_rate_deg_per_s"] if "measured_rate_deg_per_s" in record else record["bias_deg_per_h"] / 3600
     frequency = record.columns.get("frequency_Hz")
     quadrature = None
     if "quadrature_V" in record:

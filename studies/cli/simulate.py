@@ -25,6 +25,9 @@ def simulate(
 ) -> Answer:
     """Run a virtual gyro through a chamber profile, or as a record was driven, and write the record.
 
+    A card with [loop] in mode whole-angle has a wave that turns: with the applied rate, its self-precession, and what damping
+    and electronics make of it; a record or profile with pattern_angle_deg says where it stands instead.
+
     The card's optional tables [thermal], [loss], [bias], [loop], [noise] and [[effect]] say what the gyro is like; all have
     defaults (studies/instrument/tables).
 
@@ -34,7 +37,7 @@ def simulate(
         Path of a card, or the name of one that ships (hrg cards).
     profile : str
         A CSV file (time_s,chamber_temperature_degC, linear between its rows; drive_amplitude_V, electrode_bias_V,
-        quadrature_V or pattern_angle_deg beside them command the drives), or words in quotes with temperatures in °C,
+        quadrature_V or pattern_angle_deg beside them command the drives, rate_deg_per_s is applied), or words in quotes with temperatures in °C,
         durations as 5h, 30min or 90s, and rates in K/min: "soak T DURATION", "step FROM TO DURATION",
         "ramp FROM TO RATE", "staircase FROM TO STEP HOLD", "cycle START FIRST SECOND RATE HOLD COUNT", joined by "then";
         for example "step 20 -10 5h then ramp -10 40 1". Or a record: its housing column, else its chamber column, is

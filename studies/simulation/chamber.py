@@ -33,7 +33,7 @@ def load_profile(text: str) -> "Profile":
 
 
 def load_schedule(text: str) -> "tuple[Profile, Mapping[str, NDArray[np.float64]]]":
-    """Read a profile and the commands beside it: drive_amplitude_V, electrode_bias_V, quadrature_V, pattern_angle_deg.
+    """Read a profile and the commands beside it: drive_amplitude_V, electrode_bias_V, quadrature_V, pattern_angle_deg, rate_deg_per_s.
 
     Returns
     -------

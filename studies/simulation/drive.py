@@ -25,7 +25,9 @@ COMMANDS = {
     "quadrature": ("quadrature_V", 1.0, 1),
     "pattern_angle": ("pattern_angle_deg", np.pi / 180.0, 1),
 }
-COMMAND_COLUMNS = tuple(column for column, _, _ in COMMANDS.values())
+RATE = "rate_deg_per_s"
+COMMAND_COLUMNS = (*(column for column, _, _ in COMMANDS.values()), RATE)
+"""Columns beside the chamber's that a profile may have."""
 LUMPS = ("housing", "base", "resonator")
 """Parts of the heat path whose temperature at the start may depart from the settled one."""
 MOST_BOUNDARY_ROWS = 20_000
@@ -54,6 +56,8 @@ class Drive:
         How much later than its profile says the boundary changes: the clock of a chamber.
     start : float, s
         Since the start of the first run of the campaign.
+    rate : array (N,), rad/s, or None
+        That is applied, at the rows.
     """
 
     time: Array
@@ -63,6 +67,7 @@ class Drive:
     commands: Mapping[str, Array] = field(default_factory=dict)
     shift: float = 0.0
     start: float = 0.0
+    rate: Array | None = None
 
     def __post_init__(self) -> None:
         for name in self.initial:
@@ -104,7 +109,7 @@ def drive_by_schedule(profile: Profile, columns: Mapping[str, Array], rate: floa
     Parameters
     ----------
     columns : mapping
-        Any of the commands' columns of a record, at the times of the profile.
+        Any of the commands' columns of a record and the applied rate, at the times of the profile.
     rate : float
         Rows per second.
     """
@@ -114,7 +119,8 @@ def drive_by_schedule(profile: Profile, columns: Mapping[str, Array], rate: floa
         for name, (column, factor, power) in COMMANDS.items()
         if column in columns
     }
-    return Drive(time, "chamber", profile, commands=commands)
+    rate_applied = np.radians(np.interp(time, profile.time, columns[RATE])) if RATE in columns else None
+    return Drive(time, "chamber", profile, commands=commands, rate=rate_applied)
 
 
 def rows_of(profile: Profile, rate: float) -> Array:
@@ -167,7 +173,10 @@ def drive_by_record(record: Record, boundary: Boundary | None = None, time: Arra
     }
     if time is not None:
         commands = {name: np.interp(time, rows, values) for name, values in commands.items()}
-    return Drive(rows if time is None else time, boundary, Profile(t, T), commands=commands)
+    turned = None
+    if RATE in record and np.isfinite(record[RATE]).all():
+        turned = np.radians(record[RATE] if time is None else np.interp(time, rows, record[RATE]))
+    return Drive(rows if time is None else time, boundary, Profile(t, T), commands=commands, rate=turned)
 
 
 def _settled_at(record: Record) -> float | None:

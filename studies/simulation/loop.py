@@ -11,6 +11,7 @@ from compensation.closed_loop import ClosedLoop
 from compensation.controllers import Loops, Margin, require_stable
 from compensation.electronics import Channels, Electronics, LoopNoise, thermal_noise
 from compensation.rebalance import LoopRun, close_loops, settle_rebalance, simulate_rebalance
+from compensation.settled_turn import read_turning, turn_settled
 from compensation.start_up import StartUp, start_up
 from compensation.wave import StandingWave
 from compensation.whole_angle import WITHOUT_RATE, simulate_whole_angle
@@ -136,28 +137,41 @@ def settled_columns(
     bryan_factor: float,
     pattern_angle: ArrayLike | None = None,
     damping: NDArray[np.complex128] | None = None,
+    time: Array | None = None,
+    rate: ArrayLike = 0.0,
 ) -> dict[str, Array]:
-    """Return what the settled loops of a card record at rest, without the offset and polynomial of `[bias]`.
+    """Return what the settled loops of a card record, without the offset and polynomial of `[bias]`.
 
     Parameters
     ----------
     frequency, inverse_q : arrays (N,), Hz and 1
         Of the resonator.
     pattern_angle : array (N,), optional
-        Azimuth (rad); that of `[bias]` unless given.
+        Azimuth (rad). Unless given, that of `[bias]`, from which a whole-angle wave turns over the time.
     damping : array (N,), optional
         Of the parts of a loss budget; see `wave_of`.
+    time : array (N,), optional, s
+        Of the rows; a whole-angle wave turns only with it.
+    rate : float or array (N,)
+        Rate (rad/s); `bias_deg_per_h` is what is indicated, with it.
 
     Returns
     -------
     dict
         `frequency_Hz`, `bias_deg_per_h`, `inverse_q`, `quadrature_V`, `pattern_angle_deg`.
     """
-    angle = np.radians(instrument.bias.pattern_angle_deg) if pattern_angle is None else np.asarray(pattern_angle)
+    loop, start = require_loop(instrument), float(np.radians(instrument.bias.pattern_angle_deg))
+    angle = np.broadcast_to(np.asarray(start if pattern_angle is None else pattern_angle), np.shape(frequency))
     wave = wave_of(instrument, frequency, inverse_q, bryan_factor, damping=damping)
-    electronics = electronics_of(require_loop(instrument), wave, instrument.reference_temperature)
-    run = settle_rebalance(wave, electronics, 0.0, np.broadcast_to(angle, np.shape(frequency)))
-    return columns_of(require_loop(instrument), run)
+    electronics = electronics_of(loop, wave, instrument.reference_temperature)
+    precession = np.radians(loop.self_precession_deg_per_s)
+    if loop.mode == "force-rebalance":
+        run = settle_rebalance(wave, electronics, rate, angle)
+    elif pattern_angle is None and time is not None:
+        run = turn_settled(wave, electronics, time, rate=rate, precession=precession, angle=start)
+    else:
+        run = read_turning(wave, electronics, angle, rate=rate, precession=precession)
+    return columns_of(loop, run)
 
 
 def columns_of(loop: "Loop", run: LoopRun) -> dict[str, Array]:

@@ -17,7 +17,7 @@ from scipy.constants import zero_Celsius
 
 from studies.errors import InputError, naming
 from studies.simulation.drive import Drive
-from studies.simulation.loop import settled_columns
+from studies.simulation.loop import DEG_PER_H, settled_columns
 from studies.splitting import mean_shift
 from thermal.lag import lag
 from thermal.meridian import cell_names, energy_weights
@@ -117,12 +117,17 @@ def read_out(
     if instrument.loop is None:
         read["bias_deg_per_h"] = instrument.bias.at(
             change, slope, frequency, inverse_q, law.bryan_factor, pattern_angle=angle, wave=wave
-        )
+        ) + changes.get("bias_deg_per_h", 0.0)
     else:
         check_loss(instrument, inverse_q)
-        read = settled_columns(instrument, frequency, inverse_q, law.bryan_factor, angle, wave)
-        read["bias_deg_per_h"] = read["bias_deg_per_h"] + instrument.bias.polynomial(change, slope)
-    read["bias_deg_per_h"] = read["bias_deg_per_h"] + changes.get("bias_deg_per_h", 0.0)
+        applied = 0.0 if drive.rate is None else drive.rate
+        felt = instrument.bias.polynomial(change, slope) + changes.get("bias_deg_per_h", 0.0)
+        free = instrument.loop.mode == "whole-angle"  # such a wave turns with all that feigns a rate
+        rate_felt = applied + felt / DEG_PER_H if free else applied
+        read = settled_columns(
+            instrument, frequency, inverse_q, law.bryan_factor, angle, wave, time=drive.time, rate=rate_felt
+        )
+        read["bias_deg_per_h"] = read["bias_deg_per_h"] - applied * DEG_PER_H + (0.0 if free else felt)
     return {
         "housing_temperature_degC": _read_housing(instrument, drive, housing),
         "resonator_temperature_degC": warmed - zero_Celsius,

@@ -10,7 +10,7 @@ from scipy.constants import zero_Celsius
 from studies.instrument.tables.noise import SILENT
 from studies.record import Record
 from studies.simulation.chamber import check_profile
-from studies.simulation.drive import COLUMN, COMMANDS, Drive, drive_by_profile, rows_of
+from studies.simulation.drive import COLUMN, COMMANDS, RATE, Drive, drive_by_profile, rows_of
 from studies.simulation.noise import bias_noise, frequency_noise, quantise, white_noise
 from studies.simulation.prediction import Prediction, law_for, predict
 from thermal.profile import Profile
@@ -101,6 +101,9 @@ def simulate_run(
     for name, (column, factor, power) in COMMANDS.items():
         if name in drive.commands:
             columns[column] = drive.commands[name] ** (1 / power) / factor
+    if drive.rate is not None:
+        columns[RATE] = np.degrees(drive.rate)
+        columns["measured_rate_deg_per_s"] = columns[RATE] + columns["bias_deg_per_h"] / 3600
     for name, values in columns.items():
         columns[name] = np.round(values, DIGITS.get(name, COMMAND_DIGITS))
     resolution = {
@@ -114,7 +117,7 @@ def simulate_run(
         source=f"simulated, rate {rate:g} Hz, " + (f"seed {seed}" if noise else "without noise"),
         resolution={name: step for name, step in resolution.items() if step > 0},
     )
-    return VirtualRun(record, prediction, (*_idle_effects(instrument, drive), *_held_wave(instrument)))
+    return VirtualRun(record, prediction, _idle_effects(instrument, drive))
 
 
 def _observe(
@@ -134,12 +137,6 @@ def _observe(
         "bias_deg_per_h": quantise(bias, levels.bias_resolution_deg_per_h),
         "inverse_q": loss,
     }
-
-
-def _held_wave(instrument: "Instrument") -> tuple[str, ...]:
-    if instrument.loop is None or instrument.loop.mode == "force-rebalance":
-        return ()
-    return ("the wave stands where it is commanded to: hrg loop follows one that turns (mode whole-angle).",)
 
 
 def _idle_effects(instrument: "Instrument", drive: Drive) -> tuple[str, ...]:

@@ -1,0 +1,183 @@
+"""A wave that turns freely while its loops stay settled: whole angle over hours, without the loops' samples.
+
+The measured azimuth θ obeys
+
+    θ̇ = g(θ) [k (Ω + B(θ)) + c(θ) p],
+
+B the rate that settled loops would have to hold there (`rebalance`), p the commanded turn, c the share of a force across the
+wave that arrives there through the drives (over the amplitude that the pick-offs make the loop hold), g how much of a turn the pick-offs show. What the loops make of their own lag,
+about the turn of 2 n θ within their response, is left out; `whole_angle` has it.
+"""
+
+import cmath
+import math
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.interpolate import CubicHermiteSpline
+
+from compensation.electronics import Electronics
+from compensation.errors import CompensationError
+from compensation.rebalance import PHYSICAL, LoopRun, settle_rebalance, spread_over_rows
+from compensation.wave import StandingWave
+
+Real = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+TURN = 0.3
+"""Largest turn of 2 n θ (rad) in one step."""
+AZIMUTHS, HARMONICS = 16, 5
+"""Azimuths at which B, g and c are taken, and terms of e^{2 i n θ} that are kept of them."""
+TIMES = 200
+"""Times at which B is taken; it is linear between them."""
+
+
+def turn_settled(
+    wave: StandingWave,
+    electronics: Electronics,
+    time: ArrayLike,
+    *,
+    rate: ArrayLike = 0.0,
+    precession: ArrayLike = 0.0,
+    angle: float = 0.0,
+) -> LoopRun:
+    """Return what settled loops say of a wave that turns, without noise.
+
+    Parameters
+    ----------
+    wave : StandingWave
+        Its values numbers, or arrays (N,).
+    time : array (N,)
+        Increasing times (s), any sampling.
+    rate, precession : float or array (N,)
+        Rate and commanded turn of the azimuth against the shell (rad/s), linear between rows.
+    angle : float
+        True azimuth at the start (rad).
+
+    Returns
+    -------
+    LoopRun
+        `angle` measured, unwrapped; `rate` the indicated rate, what is not commanded of the turn over k.
+    """
+    t = np.asarray(time, dtype=float)
+    if t.ndim != 1 or not (np.diff(t) > 0).all():
+        raise CompensationError("the times of a run must increase.")
+    rows = spread_over_rows(wave, len(t))
+    turning, commanded = (np.broadcast_to(np.asarray(x, dtype=float), t.shape) for x in (rate, precession))
+    theta = _integrate(rows, electronics, t, turning, commanded, _seen(electronics, wave.harmonic, angle))
+    return read_turning(rows, electronics, theta, rate=turning, precession=commanded, time=t)
+
+
+def read_turning(
+    wave: StandingWave,
+    electronics: Electronics,
+    angle: Real,
+    *,
+    rate: ArrayLike = 0.0,
+    precession: ArrayLike = 0.0,
+    time: Real | None = None,
+) -> LoopRun:
+    """Return what settled loops say of a wave that turns through measured azimuths, array (N,), rad."""
+    held = settle_rebalance(wave, electronics, 0.0, angle)
+    shown, arriving = _channels(electronics, wave.harmonic)
+    e, k = np.exp(2j * wave.harmonic * angle), wave.bryan_factor
+    moved = _value(shown, e) * k * (np.asarray(rate) + held.rate) + _value(arriving, e) * np.asarray(precession)
+    return replace(held, time=held.time if time is None else time, rate=(moved - precession) / k, angle=angle)
+
+
+def _pickoff(electronics: Electronics, n: int) -> Real:
+    """The pick-offs' plane as the phase loop sees it."""
+    return np.asarray((electronics.pickoff.matrix(n) * np.exp(-1j * electronics.pickoff.phase)).real)
+
+
+def _seen(electronics: Electronics, n: int, angle: float) -> float:
+    """The measured azimuth of a true one."""
+    x, y = _pickoff(electronics, n) @ [math.cos(n * angle), math.sin(n * angle)]
+    off = math.atan2(y, x) - n * angle
+    return angle + ((off + math.pi) % (2 * math.pi) - math.pi) / n
+
+
+def _channels(electronics: Electronics, n: int) -> tuple[Complex, Complex]:
+    """Of g, and of g c: the terms over e^{2 i n θ}, from those at even measured azimuths."""
+    psi = np.pi * np.arange(AZIMUTHS) / AZIMUTHS
+    ahead, across = np.array([np.cos(psi), np.sin(psi)]), np.array([-np.sin(psi), np.cos(psi)])
+    pickoff = _pickoff(electronics, n)
+    true = np.linalg.solve(pickoff, ahead)
+    g = np.linalg.det(pickoff) * (true**2).sum(axis=0)
+    drive = (electronics.drive.matrix(n) * np.exp(1j * electronics.pickoff.phase)) @ across
+    # of a force, over the amplitude that the pick-offs show as the commanded one
+    arrives = (true[0] * drive[1] - true[1] * drive[0]).real / (true**2).sum(axis=0)
+    return _terms(g), _terms(g * arrives)
+
+
+def _terms(values: Real) -> Complex:
+    """Terms c_0 ... of Re Σ c_j e^{2 i j ψ} through values at even ψ in 0 ... π, over the last axis."""
+    found = np.fft.rfft(values, axis=-1)[..., :HARMONICS] * (2 / AZIMUTHS)
+    found[..., 0] /= 2
+    return np.asarray(found)
+
+
+def _value(terms: Complex, e: Complex) -> Real:
+    return np.asarray(np.real(sum(c * e**j for j, c in enumerate(terms))))
+
+
+def _integrate(
+    rows: StandingWave,
+    electronics: Electronics,
+    t: Real,
+    rate: Real,
+    command: Real,
+    angle: float,
+) -> Real:
+    """The azimuth at the rows: Runge-Kutta steps of what departs from the turn that rate and command would make alone."""
+    k, n = rows.bryan_factor, rows.harmonic
+    shown, arriving = _channels(electronics, n)
+    picked = np.unique(np.linspace(0, len(t) - 1, min(len(t), TIMES)).round().astype(int))
+    azimuths = np.pi * np.arange(AZIMUTHS) / AZIMUTHS / n
+    many = {name: np.repeat(np.asarray(getattr(rows, name))[picked], AZIMUTHS) for name in PHYSICAL}
+    there = StandingWave(harmonic=n, bryan_factor=k, **many)
+    held = settle_rebalance(there, electronics, 0.0, np.tile(azimuths, len(picked)))
+    drift = _terms(held.rate.reshape(-1, AZIMUTHS))
+    known = k * rate + command
+    swept = np.concatenate([[0.0], np.cumsum((known[1:] + known[:-1]) / 2 * np.diff(t))])
+    strayed = k * float(np.abs(drift).sum(axis=1).max())
+    speed = 2 * n * (np.abs(k * rate) + np.abs(command) + strayed)
+    phase = np.concatenate([[0.0], np.cumsum(np.maximum(speed[1:], speed[:-1]) * np.diff(t))])
+    count = max(math.ceil(phase[-1] / TURN), min(len(t) - 1, TIMES))
+    # even in the phase, and in time where nothing turns
+    measure = phase / (phase[-1] or 1.0) + 1e-3 * (t - t[0]) / (t[-1] - t[0])
+    steps = np.interp(np.linspace(0.0, measure[-1], count + 1), measure, t)
+    halves = np.sort(np.concatenate([steps, (steps[1:] + steps[:-1]) / 2]))
+    at = [np.interp(halves, t, values).tolist() for values in (rate, command, swept)]
+    parts = [np.interp(halves, t[picked], one.real) + 1j * np.interp(halves, t[picked], one.imag) for one in drift.T]
+    drifts = np.array(parts).T.tolist()
+    g, gc = shown.tolist(), arriving.tolist()
+    pure = abs(g[0] - 1) + sum(map(abs, g[1:])) + abs(gc[0] - 1) + sum(map(abs, gc[1:])) < 1e-12
+
+    def stray(place: int, departed: float) -> float:
+        """Of the departure: its rate of change."""
+        e = cmath.exp(2j * n * (angle + at[2][place] + departed))
+        b = _series(drifts[place], e)
+        if pure:
+            return k * b
+        omega, p = at[0][place], at[1][place]
+        return float(_series(g, e) * k * (omega + b) + _series(gc, e) * p - k * omega - p)
+
+    departed, slopes = [0.0], [stray(0, 0.0)]
+    for step in range(count):
+        place, h, y = 2 * step, steps[step + 1] - steps[step], departed[-1]
+        one = slopes[-1]
+        two = stray(place + 1, y + h / 2 * one)
+        three = stray(place + 1, y + h / 2 * two)
+        four = stray(place + 2, y + h * three)
+        departed.append(y + h / 6 * (one + 2 * two + 2 * three + four))
+        slopes.append(stray(place + 2, departed[-1]))
+    return np.asarray(angle + swept + CubicHermiteSpline(steps, departed, slopes)(t))
+
+
+def _series(terms: list[complex], e: complex) -> float:
+    """Re Σ c_j e^j by Horner's rule."""
+    found = 0j
+    for c in reversed(terms):
+        found = found * e + c
+    return float(found.real)

@@ -1,0 +1,87 @@
+"""`hrg simulate` of a whole-angle card: the wave turns with the rate, with its self-precession and by its own drift."""
+
+import numpy as np
+import pytest
+
+from compensation.controllers import Loops
+from compensation.electronics import Channels, Electronics
+from compensation.settled_turn import turn_settled
+from compensation.wave import from_quality
+from compensation.whole_angle import simulate_whole_angle
+from studies.cli import main
+from studies.instrument.card import load_card, shipped_cards
+from studies.record import read_record
+
+CARD = """
+[loss]
+inverse_q = 1e-6
+[bias]
+damping_anisotropy = 0.03
+damping_axis_deg = 10.0
+pattern_angle_deg = 0.0
+[loop]
+mode = "whole-angle"
+frequency_split_mHz = 0.0
+"""
+K = 0.27562  # Bryan factor of the solid free dome
+
+
+def simulated(tmp_path, lines, schedule):
+    card, out, path = tmp_path / "card.toml", tmp_path / "run.csv", tmp_path / "schedule.csv"
+    card.write_text(shipped_cards()["free-dome"].read_text() + lines)
+    path.write_text(schedule)
+    assert main(["simulate", str(card), str(path), "--out", str(out), "--noiseless", "--rate", "0.1"]) == 0
+    return load_card(card), read_record(out)
+
+
+def test_the_pattern_turns_with_the_applied_rate(tmp_path, capsys):
+    schedule = "time_s,chamber_temperature_degC,rate_deg_per_s\n0,20,0\n100,20,0\n101,20,10\n1000,20,10\n"
+    _, record = simulated(tmp_path, CARD.replace("0.03", "0.0"), schedule)
+    t, angle = record["time_s"], record["pattern_angle_deg"]
+    assert angle[t <= 100] == pytest.approx(0.0, abs=1e-9)
+    assert angle[-1] - angle[t == 200][0] == pytest.approx(K * 10 * 800, rel=1e-3)
+    assert record["rate_deg_per_s"][-1] == 10
+    assert record["measured_rate_deg_per_s"][-1] == pytest.approx(10, rel=1e-9)
+    assert capsys.readouterr().err == ""
+
+
+@pytest.mark.parametrize(("rate", "factor"), [(400.0, 1.0), (120.0, 1.0), (20.0, 0.0)])
+def test_a_slow_wave_locks_and_a_fast_one_turns_at_the_root_of_the_squares(tmp_path, rate, factor):
+    """θ̇ = k (Ω + Ω_d sin 4(θ - θ_τ)), Ω_d = Δ(1/τ)/(4 k): k √(Ω² - Ω_d²) on average, and nothing below Ω_d."""
+    degrees = rate / 3600
+    schedule = f"time_s,chamber_temperature_degC,rate_deg_per_s\n0,20,{degrees}\n360000,20,{degrees}\n"
+    card, record = simulated(tmp_path, CARD, schedule)
+    drift = 0.03 * np.pi * record["frequency_Hz"][0] * card.loss.inverse_q / (4 * K)
+    most = np.degrees(drift) * 3600  # deg/h
+    assert 60 < most < 120
+    t, angle = record["time_s"], record["pattern_angle_deg"]
+    if factor:
+        periods = np.flatnonzero(np.diff(np.floor(angle / 90)))  # whole periods of 4 θ
+        mean = (angle[periods[-1]] - angle[periods[0]]) / (t[periods[-1]] - t[periods[0]])
+        assert mean == pytest.approx(K * np.sqrt(rate**2 - most**2) / 3600, rel=0.01)
+    else:
+        assert abs(angle[-1] - angle[len(angle) // 2]) < 1e-3
+        assert record["measured_rate_deg_per_s"][-1] == pytest.approx(0.0, abs=1e-6)
+
+
+def test_self_precession_is_taken_out_of_the_rate(tmp_path):
+    lines = CARD + "self_precession_deg_per_s = 0.5\n"
+    _, record = simulated(tmp_path, lines, "time_s,chamber_temperature_degC\n0,20\n3600,20\n")
+    assert record["pattern_angle_deg"][-1] == pytest.approx(1800.0, rel=1e-3)
+    bias = record["bias_deg_per_h"]
+    assert np.std(bias) == pytest.approx(np.max(bias) / np.sqrt(2), rel=0.02)  # a sine of the azimuth
+    assert abs(np.mean(bias)) < 0.03 * np.max(bias)
+
+
+def test_settled_turning_is_the_loops_own_run_without_their_lag():
+    """Every error of the electronics, against the loops sample by sample: to second order in the errors."""
+    time = np.arange(0.0, 1200.0, 2.0)
+    wave = from_quality(4432.0, 1e6, damping_anisotropy=0.02, damping_axis=0.2, frequency_split=5e-3, frequency_axis=0.1)
+    errors = Electronics(Channels(0.004, 0.002, 0.003, 0.001, 0.004), Channels(-0.005, 0.001, 0.002, 5e-4, 0.006))
+    for precession in (0.0, 1e-3):
+        loops = simulate_whole_angle(wave, errors, Loops(), time, rate=7e-5, precession=precession, angle=0.1)
+        settled = turn_settled(wave, errors, time, rate=7e-5, precession=precession, angle=0.1)
+        ideal = turn_settled(wave, Electronics(), time, rate=7e-5, precession=precession, angle=0.1)
+        made = np.ptp(loops.angle - ideal.angle)
+        assert made > 1e-2
+        assert np.abs(settled.angle - loops.angle).max() < 0.02 * made
