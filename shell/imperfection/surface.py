@@ -5,7 +5,7 @@ from math import pi
 
 import numpy as np
 
-from shell.imperfection.field import Field
+from shell.imperfection.field import Complex
 from shell.imperfection.imperfect import Imperfection
 from shell.quadrature import Array
 from shell.resonator import Resonator
@@ -22,34 +22,49 @@ def turn_surface(surface: Surface, angle: float) -> Surface:
     return replace(surface, points=surface.points @ turn.T, displacement=surface.displacement @ turn.T)
 
 
-def depart_surface(
-    surface: Surface, resonator: Resonator, imperfection: Imperfection, exaggerated: bool = True
-) -> tuple[Surface, float]:
-    """The surface with the departures of its faces and rim, exaggerated to a visible size or as they are, and the factor.
+def find_departures(
+    resonator: Resonator, imperfection: Imperfection, x: Array, r: Array, z: Array
+) -> dict[int, Complex]:
+    """How far points of the section (position x, r, z) depart outwards and upwards: waves m to (2, points), m.
 
     What is not a shape (density, modulus, masses) is not seen.
     """
     inner, outer = imperfection.faces()
-    x = surface.position
-    theta = np.arctan2(surface.points[:, 1], surface.points[:, 0])
-    r = np.hypot(surface.points[:, 0], surface.points[:, 1])
     place = resonator.at(np.clip(x, 0.0, 1.0) * resonator.length)
-    height = (r - place.r) * place.normal_r + (surface.points[:, 2] - place.z) * place.normal_z
+    height = (r - place.r) * place.normal_r + (z - place.z) * place.normal_z
     through = np.clip(2 * height / place.thickness, -1.0, 1.0)
-    along_normal, along_tangent = np.zeros(len(x)), np.zeros(len(x))
-    for field, share in ((inner, -(1 - through) / 2), (outer, (1 + through) / 2)):
-        if field is not None:
-            along_normal += share * _at(field, x, theta)
-    if imperfection.rim is not None:
-        along_tangent += np.where(x > 1 - 1e-6, _at(imperfection.rim, np.ones(len(x)), theta), 0.0)
-    largest = float(np.max(np.hypot(along_normal, along_tangent)))
+    normal, tangent = (np.array(way) for way in ((place.normal_r, place.normal_z), (place.tangent_r, place.tangent_z)))
+    found: dict[int, Complex] = {}
+    edge = np.where(x > 1 - 1e-6, 1.0, 0.0)
+    for field, way in (
+        (inner, -(1 - through) / 2 * normal),
+        (outer, (1 + through) / 2 * normal),
+        (imperfection.rim, edge * tangent),
+    ):
+        for m in field.orders if field is not None else ():
+            assert field is not None
+            at = x if field is not imperfection.rim else np.ones(len(x))
+            found[m] = found.get(m, 0j) + field.wave(m, at) * np.where(r > 0, way, 0.0)
+    return found
+
+
+def depart_surface(
+    surface: Surface, resonator: Resonator, imperfection: Imperfection, exaggerated: bool = True
+) -> tuple[Surface, float]:
+    """The surface with the departures of its faces and rim, exaggerated to a visible size or as they are, and the factor."""
+    theta = np.arctan2(surface.points[:, 1], surface.points[:, 0])
+    r, z = np.hypot(surface.points[:, 0], surface.points[:, 1]), surface.points[:, 2]
+    moved = np.zeros((2, len(r)))
+    for m, wave in find_departures(resonator, imperfection, surface.position, r, z).items():
+        moved += (wave * np.exp(-1j * m * theta)).real
+    largest = float(np.max(np.hypot(*moved)))
     if largest == 0:
         return surface, 0.0
-    factor = DEPARTURE * float(place.thickness.min()) / largest if exaggerated else 1.0
-    out = factor * (along_normal * place.normal_r + along_tangent * place.tangent_r)
-    up = factor * (along_normal * place.normal_z + along_tangent * place.tangent_z)
-    moved = np.stack([out * np.cos(theta), out * np.sin(theta), up], axis=1)
-    return replace(surface, points=surface.points + np.where(r[:, None] > 0, moved, 0.0)), factor
+    thinnest = float(resonator.at(np.clip(surface.position, 0.0, 1.0) * resonator.length).thickness.min())
+    factor = DEPARTURE * thinnest / largest if exaggerated else 1.0
+    out, up = factor * moved
+    shift = np.stack([out * np.cos(theta), out * np.sin(theta), up], axis=1)
+    return replace(surface, points=surface.points + shift), factor
 
 
 def draw_axes(surface: Surface, slow_axis: float) -> Array:
@@ -60,11 +75,3 @@ def draw_axes(surface: Surface, slow_axis: float) -> Array:
     angles = np.concatenate([slow_axis + shift + np.arange(n) * pi / n for shift in (0.0, pi / (2 * n))])
     ends = radius * np.stack([np.cos(angles), np.sin(angles)], axis=1)
     return np.stack([np.column_stack([sign * ends, np.full(2 * n, z)]) for sign in (-1, 1)], axis=1)
-
-
-def _at(field: Field, x: Array, theta: Array) -> Array:
-    """Values of a field at places, position by position with its azimuth."""
-    found = np.zeros(len(x))
-    for m in field.orders:
-        found += (field.wave(m, x) * np.exp(-1j * m * theta)).real
-    return found

@@ -1,6 +1,7 @@
 """The mode shapes of an instrument as blocks of a report: a view to turn, a picture where that cannot be, or the remedy."""
 
 from collections.abc import Sequence
+from math import degrees
 from typing import TYPE_CHECKING
 
 from scipy.constants import zero_Celsius
@@ -22,13 +23,24 @@ def mode_blocks(instrument: "Instrument", harmonics: Sequence[int] = (2, 3)) -> 
 def view_blocks(shown: "Sequence[Shown]") -> list[Block]:
     """Return the interactive view of modes of one instrument at one temperature."""
     from shell.render import NoOpenGL, render_png
-    from studies.reports.webgl import view_modes
+    from studies.reports.webgl import Drawn, view_modes
 
     first = shown[0]
     caption = (
         f"{first.instrument.name} at {first.temperature - zero_Celsius:g} °C: modes from the {first.mode.theory} solver, on the"
         " solid of the card with its thickness, rim and stem. The displacement is exaggerated."
     )
+    for one in shown:
+        if one.split is not None:
+            larger = (
+                f"; the departures of the shape are drawn {one.exaggeration:.3g} times as large"
+                if one.exaggeration
+                else ""
+            )
+            caption += (
+                f" n = {one.mode.harmonic}: the slower mode of the pair, which is split by {1e3 * one.split.hertz:.4g} mHz, on its"
+                f" axis at {degrees(one.split.slow_axis):.4g}°{larger}."
+            )
     blocks: list[Block] = []
     try:
         png = render_png(first.scene())
@@ -37,5 +49,6 @@ def view_blocks(shown: "Sequence[Shown]") -> list[Block]:
         blocks.append(Text(f"The still picture of the mode is missing: {error}", "warning"))
     lobes = 2 * first.mode.harmonic
     alt = f"The resonator with its rim bent into {lobes} lobes, nodes between them."
-    view = view_modes(first.resonator, [one.mode for one in shown], first.title, png, alt, caption)
+    splits = [None if one.split is None else Drawn(one.split, one.imperfection, one.exaggeration) for one in shown]
+    view = view_modes(first.resonator, [one.mode for one in shown], first.title, png, alt, caption, splits)
     return [view, *blocks]

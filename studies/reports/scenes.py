@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from shell.imperfection import Split
+    from shell.imperfection import Imperfection, Split
     from shell.modes import Mode
     from shell.resonator import Resonator
     from shell.scene import Scene
@@ -40,6 +40,11 @@ class Shown:
     surface: "Surface"
     split: "Split | None" = None
     exaggeration: float = 0.0
+
+    @property
+    def imperfection(self) -> "Imperfection | None":
+        """What its shape departs by."""
+        return self.instrument.part("imperfection").fields if self.split is not None else None
 
     @property
     def title(self) -> str:

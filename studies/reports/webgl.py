@@ -7,6 +7,7 @@ so the normals of the swinging surface are exact and a mode takes about 20 kB. W
 import base64
 import hashlib
 from collections.abc import Sequence
+from dataclasses import dataclass
 from importlib.resources import files
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
@@ -16,15 +17,32 @@ import numpy as np
 from studies.reports.page import Embedded
 
 if TYPE_CHECKING:
+    from shell.imperfection import Imperfection, Split
     from shell.modes import Mode
     from shell.outline import Outline
     from shell.resonator import Resonator
 
+HIGHEST = 12  # wave of the departures that is drawn
 KINK = np.radians(35.0)  # where the outline turns by more than this, the shading breaks
 
 
+@dataclass(frozen=True, eq=False)
+class Drawn:
+    """How a split pair is drawn: its slower mode on its axis, both axes, the departures of the shape times a factor."""
+
+    split: "Split"
+    imperfection: "Imperfection | None"
+    exaggeration: float
+
+
 def view_modes(
-    resonator: "Resonator", modes: "Sequence[Mode]", title: str, png: bytes | None, alt: str, caption: str = ""
+    resonator: "Resonator",
+    modes: "Sequence[Mode]",
+    title: str,
+    png: bytes | None,
+    alt: str,
+    caption: str = "",
+    splits: "Sequence[Drawn | None]" = (),
 ) -> Embedded:
     """Return an interactive view of several modes of one resonator.
 
@@ -36,11 +54,15 @@ def view_modes(
     png : the picture that stands in where WebGL2 is missing and on paper; None where none could be drawn.
     alt : what the picture shows, in words.
     caption : below the view.
+    splits : of every mode, where it is one of a split pair.
     """
     from jinja2 import Environment, StrictUndefined
 
     size = resonator.size
-    described = [_describe(resonator, mode, size) for mode in modes]
+    described = [
+        _describe(resonator, mode, size, split)
+        for mode, split in zip(modes, splits or [None] * len(modes), strict=True)
+    ]
     middle, reach = _bounds(resonator)
     start, rim = resonator.at([0.0]), resonator.at([resonator.length])
     data = {
@@ -63,7 +85,7 @@ def view_modes(
     return Embedded(html, caption)
 
 
-def _describe(resonator: "Resonator", mode: "Mode", size: float) -> dict[str, Any]:
+def _describe(resonator: "Resonator", mode: "Mode", size: float, drawn: Drawn | None) -> dict[str, Any]:
     from shell.outline import trace_outlines
 
     outlines = trace_outlines(resonator, size / 40, mode)
@@ -77,8 +99,40 @@ def _describe(resonator: "Resonator", mode: "Mode", size: float) -> dict[str, An
         "runs": [len(members) for _, members in runs],
         "points": base64.b64encode(points.astype("<f4").tobytes()).decode(),
         "most": most,
+        **(_imperfect(resonator, runs, size, drawn) if drawn else {}),
         "energy_legend": f"{most * 1e-12:.3g} J/m³ strain-energy density for 1 µm at the antinode",
     }
+
+
+def _imperfect(
+    resonator: "Resonator",
+    runs: "list[tuple[Outline, np.ndarray[Any, np.dtype[np.int64]]]]",
+    size: float,
+    drawn: Drawn,
+) -> dict[str, Any]:
+    """The slow axis (rad), where the axes lie on the rim, and the departures: for each wave and point its parts along r and z."""
+    from shell.imperfection.surface import find_departures
+
+    rim = resonator.at([resonator.length])
+    found: dict[str, Any] = {
+        "axis": drawn.split.slow_axis,
+        "rim": [float(rim.r[0] + rim.thickness[0] / 2) / size, float(rim.z[0]) / size],
+    }
+    if drawn.imperfection is None or not drawn.exaggeration:
+        return found
+    x, r, z = (
+        np.concatenate([getattr(line, name)[members] for line, members in runs]) for name in ("position", "r", "z")
+    )
+    waves = {
+        m: wave
+        for m, wave in find_departures(resonator, drawn.imperfection, x, r, z).items()
+        if m <= HIGHEST and np.abs(wave).max() > 0
+    }
+    parts = np.array([[wave[0].real, wave[0].imag, wave[1].real, wave[1].imag] for wave in waves.values()])
+    scaled = np.moveaxis(parts, 2, 0) * (drawn.exaggeration / size)
+    found["orders"] = list(waves)
+    found["departures"] = base64.b64encode(scaled.astype("<f4").tobytes()).decode()
+    return found
 
 
 def _columns(line: "Outline", members: "np.ndarray[Any, np.dtype[np.int64]]", size: float) -> "np.ndarray[Any, Any]":
