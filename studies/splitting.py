@@ -79,7 +79,7 @@ class SplitPair:
             return self.split
         _, elastic = self.instrument.at(self.temperature)
         with naming(f"{self.instrument.path} [imperfection]"):
-            own = CoupledHarmonics(self.mode, elastic).solve(self._fields)
+            own = _coupled(self.mode, elastic).solve(self._fields)
         rest = (self.measured, self.electrodes)
         shift, wave = own.shift + sum(p.shift for p in rest), own.wave + sum(p.wave for p in rest)
         return Split(self.mode.harmonic, self.mode.frequency, float(shift), complex(wave))
@@ -98,6 +98,21 @@ class SplitPair:
 def solved_pair(resonator: "Resonator", elastic: "Elastic", harmonic: int) -> Pair:
     """The perfect pair of a harmonic, solved once."""
     return Pair(solve_modes(resonator, elastic, harmonic)[0])
+
+
+_PREPARED: dict[tuple[object, ...], CoupledHarmonics] = {}
+MOST_PREPARED = 4
+
+
+def _coupled(mode: "Mode", elastic: "Elastic") -> CoupledHarmonics:
+    """The coupled harmonics of a pair, prepared once for all imperfections of one perfect resonator."""
+    assert mode.solution is not None
+    key = (mode.resonator, elastic, mode.harmonic, mode.index, mode.theory, mode.solution.system.level)
+    if key not in _PREPARED:
+        if len(_PREPARED) >= MOST_PREPARED:
+            _PREPARED.clear()
+        _PREPARED[key] = CoupledHarmonics(mode, elastic)
+    return _PREPARED[key]
 
 
 @lru_cache(maxsize=64)

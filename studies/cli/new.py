@@ -62,7 +62,7 @@ def study(
     path : str
         The spec (TOML) to write; a file that exists is not overwritten.
     like : str
-        A shipped study: frequency-over-temperature, dimension-tolerance, dimension-influence.
+        A shipped study: frequency-over-temperature, dimension-tolerance, dimension-influence, split-tolerance.
     card_ : str
         The card that it studies: a shipped one, or a path as seen from the spec.
     """

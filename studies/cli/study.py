@@ -31,15 +31,15 @@ def run(
     Parameters
     ----------
     spec : str
-        Path of a spec, or the name of one that ships: frequency-over-temperature, dimension-tolerance, dimension-influence.
-        A spec is a TOML file. At its top: schema = "hrg.study/1", name, card (a shipped one, or a path beside the spec).
+        Path of a spec, or the name of one that ships: frequency-over-temperature, dimension-tolerance, dimension-influence,
+        split-tolerance. A spec is a TOML file. At its top: schema = "hrg.study/1", name, card (a shipped one, or a path beside the spec).
         [sampling]: method = grid, list, latin-hypercube, sobol, sensitivity or one-at-a-time; cases, seed, batch, solver.
         [[parameter]]: name (a key of the card such as resonator.thickness_mm, or temperature_degC, or user.NAME for a
         function of yours) with tolerance, or low and high, or values; nominal, count, distribution = uniform, normal (with
         standard_deviation), triangular or log-uniform. [[quantity]]: name = bryan-factor, compensation-residual, frequency,
         mode-separation, python, q, split, tcf or thermal-time-constants, with harmonic, index, theory, temperature_degC, label and keys of its own.
-        [[requirement]]: column with within (of target), or low, high. [[search]]: kind = worst-case with column, or
-        inversion with vary and targets. Example and details: python -m pydoc studies.sweeps.spec.
+        [[requirement]]: column with within (of target), or low, high. [[search]]: kind = worst-case with column,
+        inversion with vary and targets, or tolerance with share (which tolerances that share of designs keeps). Example and details: python -m pydoc studies.sweeps.spec.
     out : str
         Folder for the study's store; needed except with --dry-run. Running again with the same folder resumes.
     workers : int
@@ -98,6 +98,21 @@ def run(
     yield _status(results, out, running=False), 4 if failed else 0
     print(f"{results.total} cases computed, {failed} failed. Next: hrg study report {out}, hrg study export {out}.")
     _print_reasons(results)
+    _print_tolerances(results)
+
+
+def _print_tolerances(results: "Results") -> None:
+    from studies.cli.output import print_table
+    from studies.reports.sweep_analysis import describe_tolerances, tell_tolerance
+
+    for found in results.store.findings().values():
+        if found.get("kind") == "tolerance" and "failed" not in found:
+            heading = f"Tolerances that {100 * found['share']:g} % of designs keep"
+            print_table(
+                heading, ["parameter", "asked", "found"], describe_tolerances(results, found), tell_tolerance(found)
+            )
+        elif found.get("kind") == "tolerance":
+            print(f"No tolerances were found: {found['failed']}")
 
 
 def _failed(results: "Results") -> int:

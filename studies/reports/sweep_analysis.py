@@ -148,7 +148,7 @@ def search_chapters(results: "Results") -> list[Chapter]:
         elif "failed" in found:
             blocks.append(Text(f"The search for {name_search(search)} failed: {found['failed']}", "warning"))
         else:
-            blocks += _worst_case(results, found) if search.kind == "worst-case" else _inversion(results, found)
+            blocks += SEARCHES[search.kind](results, found)
     return [Chapter("Searches", blocks)] if blocks else []
 
 
@@ -174,3 +174,39 @@ def _inversion(results: "Results", found: Mapping[str, Any]) -> list[Block]:
     if found["condition"] and found["condition"] > 1e3:
         words += f" The targets hardly tell the parameters apart (condition {found['condition']:.1e})."
     return [Table("Design by inversion", ["Column", "Wanted", "Found"], rows), Text(words, kind)]
+
+
+def _tolerances(results: "Results", found: Mapping[str, Any]) -> list[Block]:
+    rows = describe_tolerances(results, found)
+    head = f"Tolerances with which {100 * found['share']:g} % of designs meet the requirements"
+    note = (
+        f"{tell_tolerance(found)} Every one of the {found['cases']} drawn designs is moved along its line through the nominal one;"
+        " the interval is that of a quantile of so many draws, 90 %."
+    )
+    return [Table(head, ["Parameter", "Asked", "Found"], rows, note)]
+
+
+def describe_tolerances(results: "Results", found: Mapping[str, Any]) -> list[list[str]]:
+    """Rows of parameter, the tolerance that was asked, and the one that was found."""
+    asked = {p.name: p for p in results.study.parameters}
+    rows = []
+    for one in found["tolerances"]:
+        p = asked[one["name"]]
+        label = figures.label(p.name, p.unit)
+        if p.standard_deviation is not None:
+            rows.append([label, f"σ = {number(p.standard_deviation)}", f"σ = {one['standard_deviation']:.4g}"])
+        else:
+            rows.append([label, f"{number(p.low)} … {number(p.high)}", f"{one['low']:.6g} … {one['high']:.6g}"])
+    return rows
+
+
+def tell_tolerance(found: Mapping[str, Any]) -> str:
+    """Say by which factor tolerances may be wider, in a sentence."""
+    low, high = found["low"], found["high"]
+    return (
+        f"{100 * found['share']:g} % of designs meet the requirements where the tolerances are {found['factor']:.3g} times those of"
+        f" the study ({low:.3g} … {high:.3g})."
+    )
+
+
+SEARCHES = {"worst-case": _worst_case, "inversion": _inversion, "tolerance": _tolerances}

@@ -74,12 +74,13 @@ class Requirement:
 
 @dataclass(frozen=True)
 class Search:
-    """A worst case of a column over the box, or an inversion to target values."""
+    """A worst case of a column over the box, an inversion to target values, or the tolerances that a share of designs keep."""
 
     kind: str
     column: str = ""
     vary: tuple[str, ...] = ()
     targets: Mapping[str, float] = field(default_factory=dict)
+    share: float = 0.0
 
 
 @dataclass(frozen=True)

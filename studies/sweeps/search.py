@@ -1,4 +1,4 @@
-"""Searches beyond the sampled designs: the worst case over a box, and the design that has wanted values.
+"""Searches beyond the sampled designs: the worst case over a box, the design that has wanted values, the tolerances to ask for.
 
 Every design that a search looks at is kept in the store under its key, and the search takes the same path every time:
 resumed, it walks over what is already there.
@@ -12,18 +12,20 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from studies.sweeps.design import nominal_design
+from studies.sweeps.design import decode_row, draw, nominal_design
 from studies.sweeps.engine import Batch, compute, make_item
 from studies.sweeps.progress import Silent
+from studies.sweeps.tolerance import place_limits
 
 if TYPE_CHECKING:
-    from studies.sweeps.definition import Search, Study, StudyParameter
+    from studies.sweeps.definition import Requirement, Search, Study, StudyParameter
     from studies.sweeps.evaluate import WorkPlan
     from studies.sweeps.store import Store, Stored
     from studies.sweeps.workers import Workers
 
 Array = NDArray[np.float64]
 STEP = 1e-2  # of a range, for differences: large against the solver's noise
+MOST_FACTORS = 20  # factors of the tolerances that are tried
 MOST_CORNERS = 6  # parameters up to which every corner of the box is computed
 
 
@@ -75,6 +77,8 @@ def run_searches(study: "Study", base: str, plan: "WorkPlan", workers: "Workers"
 def name_search(search: "Search") -> str:
     """Return the name under which a search's outcome is kept."""
     targets = ", ".join(f"{column} = {value:.10g}" for column, value in search.targets.items())
+    if search.kind == "tolerance":
+        return f"tolerances of {', '.join(search.vary)} that {100 * search.share:g} % keep"
     if search.kind == "inversion":
         return f"{targets} by {', '.join(search.vary)}"
     return f"extremes of {search.column}"
@@ -156,7 +160,85 @@ def invert(explorer: Explorer, search: "Search") -> dict[str, Any]:
     }
 
 
-SEARCHES = {"worst-case": find_worst_case, "inversion": invert}
+def find_tolerance(explorer: Explorer, search: "Search") -> dict[str, Any]:
+    """Find by which factor the tolerances may be wider (or must be narrower) for a share of designs to meet the requirements.
+
+    Every sampled design moves along its line through the nominal one. How far it then is on its way to its limit is taken to go
+    as the factor, which gives the next one; a split goes so to first order. The interval is that of a quantile of so many draws.
+    """
+    from scipy.stats import binom
+
+    study = explorer.study
+    nominal, rows = nominal_design(study), draw(study).values
+    drawn = [decode_row(study, row.tolist()) for row in rows]
+    columns = [requirement.column for requirement in study.requirements]
+    middle = explorer.values([nominal], columns)[0]
+    limits = [_ends_of(one, value) for one, value in zip(study.requirements, middle, strict=True)]
+    for column, value, (low, high) in zip(columns, middle, limits, strict=True):
+        if not low <= value <= high:
+            raise SearchFailed(f"the nominal design itself has {column} = {value:g}, beyond its limits")
+    count, factor, bounds = len(drawn), 1.0, [0.0, np.inf]
+    for _ in range(MOST_FACTORS):
+        designs = [_scaled(design, nominal, search.vary, factor) for design in drawn]
+        values = explorer.values(designs, columns)
+        used = np.max([place_limits(*one) for one in zip(values.T, middle, *np.transpose(limits), strict=True)], axis=0)
+        used = np.sort(used)
+        passed = int((used <= 1).sum())
+        rank = min(int(np.ceil(search.share * count)), count) - 1
+        if not used[rank] > 0:
+            raise SearchFailed("the designs do not come nearer to their limits, however wide the tolerances")
+        bounds[0 if used[rank] <= 1 else 1] = factor
+        if abs(used[rank] - 1) < 1e-3 or bounds[1] - bounds[0] < 1e-3 * factor:
+            break
+        proposed = factor / float(used[rank])
+        inside = bounds[0] < proposed < bounds[1]
+        factor = proposed if inside else (bounds[0] + min(bounds[1], 4 * factor)) / 2
+    ends = binom(count, search.share).ppf([0.05, 0.95])
+    low, high = (factor / float(used[int(np.clip(end, 0, count - 1))]) for end in (ends[1], ends[0]))
+    return {
+        "share": search.share,
+        "factor": factor,
+        "low": low,
+        "high": high,
+        "passed": passed,
+        "cases": count,
+        "limits": {
+            c: [float(end) if np.isfinite(end) else None for end in ends_]
+            for c, ends_ in zip(columns, limits, strict=True)
+        },
+        "tolerances": [_tolerance(p, factor) for p in study.parameters if p.name in search.vary],
+    }
+
+
+def _ends_of(requirement: "Requirement", nominal: float) -> tuple[float, float]:
+    """The limits of a requirement; about the nominal value unless it has a target."""
+    if requirement.within is not None:
+        target = nominal if requirement.target is None else requirement.target
+        return target - requirement.within, target + requirement.within
+    low = -np.inf if requirement.low is None else requirement.low
+    return low, np.inf if requirement.high is None else requirement.high
+
+
+def _scaled(
+    design: Mapping[str, Any], nominal: Mapping[str, Any], vary: Sequence[str], factor: float
+) -> dict[str, Any]:
+    """The design at a factor of its distance from the nominal one."""
+    return {
+        name: float(nominal[name] + factor * (value - nominal[name])) if name in vary else value
+        for name, value in design.items()
+    }
+
+
+def _tolerance(parameter: "StudyParameter", factor: float) -> dict[str, Any]:
+    """What a parameter's tolerance becomes."""
+    middle = float(parameter.nominal)
+    if parameter.standard_deviation is not None:
+        return {"name": parameter.name, "standard_deviation": factor * parameter.standard_deviation}
+    ends = [middle + factor * (end - middle) for end in (parameter.low, parameter.high)]
+    return {"name": parameter.name, "low": ends[0], "high": ends[1]}
+
+
+SEARCHES = {"worst-case": find_worst_case, "inversion": invert, "tolerance": find_tolerance}
 
 
 def _starts(free: "Sequence[StudyParameter]") -> Array:

@@ -48,6 +48,11 @@ column = "frequency_n2_Hz"
 kind = "inversion"                 # the parameters that give wanted values
 vary = ["resonator.thickness_mm", "resonator.radius_mm"]
 targets = { frequency_n2_Hz = 4432.07, tcf_n2_ppm_per_degC = 79.5 }
+
+[[search]]
+kind = "tolerance"                 # how much wider or narrower all tolerances are with which a share of designs meets the requirements
+share = 0.95
+# vary = ["resonator.radius_mm"]   # these parameters alone; all unless given
 ```
 
 `grid` takes every combination, `list` the rows of equally long `values`, `sensitivity` the design of Saltelli for Sobol
@@ -73,6 +78,7 @@ from studies.sweeps.tables import (
     refuse_twins,
     split_tables,
 )
+from studies.sweeps.tolerance import check_sample
 from studies.sweeps.validity import check_nominal
 
 SCHEMA = "hrg.study/1"
@@ -131,6 +137,10 @@ def check_study(content: Mapping[str, Any], instrument: Instrument, where: str, 
         raise InputError(f"{where}: a study needs at least one [[quantity]].")
     columns = [column.name for one in asked for column in one.columns]
     refuse_twins(columns, f"{where} [[quantity]]: give one of them another label; the column")
+    searches = tuple(
+        read_search(part, columns, parameters)
+        for part in top.sections("search", ("kind", "column", "vary", "targets", "share"))
+    )
     study = Study(
         name=top.text("name", Path(where).stem),
         note=top.text("note", "-"),
@@ -143,15 +153,14 @@ def check_study(content: Mapping[str, Any], instrument: Instrument, where: str, 
             read_requirement(part, columns)
             for part in top.sections("requirement", ("column", "low", "high", "target", "within"))
         ),
-        searches=tuple(
-            read_search(part, columns, parameters)
-            for part in top.sections("search", ("kind", "column", "vary", "targets"))
-        ),
+        searches=searches,
         content=content,
         text=text,
         folder=folder,
     )
     check_nominal(study, where)
+    if any(search.kind == "tolerance" for search in searches):
+        check_sample(study, where)
     return study
 
 

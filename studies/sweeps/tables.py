@@ -156,22 +156,39 @@ def read_requirement(part: TomlTable, columns: Sequence[str]) -> Requirement:
     return Requirement(column, low, high, target, within)
 
 
+SEARCH_KEYS = {"worst-case": ("column",), "inversion": ("vary", "targets"), "tolerance": ("share", "vary")}
+
+
+def _words(keys: Sequence[str]) -> str:
+    return " and ".join(keys)
+
+
 def read_search(part: TomlTable, columns: Sequence[str], parameters: Sequence[StudyParameter]) -> Search:
     """Read one `[[search]]` table."""
-    kind = part.text("kind", choices=("worst-case", "inversion"))
+    kind = part.text("kind", choices=("worst-case", "inversion", "tolerance"))
     numeric = [p.name for p in parameters if not isinstance(p.nominal, str)]
+    for key in ("vary", "targets", "column", "share"):
+        if key in part and key not in SEARCH_KEYS[kind]:
+            raise InputError(
+                f"{part.where}: a search of the kind '{kind}' takes no {key}; it takes {_words(SEARCH_KEYS[kind])}."
+            )
     if kind == "worst-case":
-        if "vary" in part or "targets" in part:
-            raise InputError(f"{part.where}: a worst case takes column only; it varies every parameter.")
         return Search(kind, part.text("column", choices=columns))
-    vary, targets = part.raw("vary"), part.raw("targets")
-    if not isinstance(vary, list) or not vary or not isinstance(targets, Mapping) or not targets:
+    vary, targets = part.raw("vary", numeric if kind == "tolerance" else None), part.raw("targets", {})
+    if (
+        not isinstance(vary, list)
+        or not vary
+        or not isinstance(targets, Mapping)
+        or (kind == "inversion" and not targets)
+    ):
         raise InputError(f"{part.where}: an inversion needs vary = [parameters] and targets = {{ column = value }}.")
     for name in vary:
         if name not in numeric:
             raise InputError(
                 f"{part.where}: vary: '{name}' is not a parameter of this study{nearest(str(name), numeric)}"
             )
+    if kind == "tolerance":
+        return Search(kind, "", tuple(vary), {}, part.number("share", above=0.0, below=1.0))
     for column in targets:
         if column not in columns:
             raise InputError(f"{part.where}: targets: there is no column '{column}'{nearest(column, columns)}")

@@ -76,7 +76,9 @@ def test_self_precession_is_taken_out_of_the_rate(tmp_path):
 def test_settled_turning_is_the_loops_own_run_without_their_lag():
     """Every error of the electronics, against the loops sample by sample: to second order in the errors."""
     time = np.arange(0.0, 1200.0, 2.0)
-    wave = from_quality(4432.0, 1e6, damping_anisotropy=0.02, damping_axis=0.2, frequency_split=5e-3, frequency_axis=0.1)
+    wave = from_quality(
+        4432.0, 1e6, damping_anisotropy=0.02, damping_axis=0.2, frequency_split=5e-3, frequency_axis=0.1
+    )
     errors = Electronics(Channels(0.004, 0.002, 0.003, 0.001, 0.004), Channels(-0.005, 0.001, 0.002, 5e-4, 0.006))
     for precession in (0.0, 1e-3):
         loops = simulate_whole_angle(wave, errors, Loops(), time, rate=7e-5, precession=precession, angle=0.1)

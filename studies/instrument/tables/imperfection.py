@@ -6,6 +6,8 @@ order = 4                            # crests around
 amplitude_um = 0.3                   # of lengths; density and modulus have amplitude_ppm
 azimuth_deg = 31.0                   # of a crest
 power = 0.0                          # grows as position to this power, 0 where the meridian starts and 1 at the rim
+[imperfection.wall]                  # the low waves of the wall by their parts, Σ c_m cos mθ + s_m sin mθ, beside those: for studies
+cosine_4_um = 0.0                    # cosine_1_um ... sine_4_um
 [[imperfection.mass]]                # small masses, negative where material was taken away
 mass_ug = 5.0
 azimuth_deg = 31.0
@@ -79,10 +81,35 @@ class SplitKeys(Keys, frozen=True, kw_only=True):
     slow_axis_deg: float
 
 
+class WallKeys(Keys, frozen=True, kw_only=True):
+    """Parts of the wall's waves 1 to 4, even along the meridian."""
+
+    cosine_1_um: float = 0.0
+    sine_1_um: float = 0.0
+    cosine_2_um: float = 0.0
+    sine_2_um: float = 0.0
+    cosine_3_um: float = 0.0
+    sine_3_um: float = 0.0
+    cosine_4_um: float = 0.0
+    sine_4_um: float = 0.0
+
+    def __post_init__(self) -> None:
+        for name in self.__struct_fields__:
+            if abs(getattr(self, name)) > 1000:
+                raise ValueError(f"{name} = {getattr(self, name):g} is more than a millimetre: it is in µm.")
+
+    @property
+    def waves(self) -> dict[int, complex]:
+        """Order to c + i s, m, of those that are not 0."""
+        parts = {m: 1e-6 * complex(getattr(self, f"cosine_{m}_um"), getattr(self, f"sine_{m}_um")) for m in range(1, 5)}
+        return {m: part for m, part in parts.items() if part}
+
+
 class ImperfectionKeys(Keys, frozen=True, kw_only=True):
     """Departures from the body of revolution."""
 
     wave: tuple[WaveKeys, ...] = ()
+    wall: WallKeys = WallKeys()
     mass: tuple[MassKeys, ...] = ()
     map: tuple[MapKeys, ...] = ()
     split: SplitKeys | None = None
@@ -122,15 +149,17 @@ def build(keys: ImperfectionKeys, place: Place) -> CardImperfection:
     split = None
     if keys.split is not None:
         split = MeasuredSplit(keys.split.harmonic, keys.split.split_Hz, float(np.deg2rad(keys.split.slow_axis_deg)))
-    if not (keys.wave or keys.mass or keys.map):
+    if not (keys.wave or keys.mass or keys.map or keys.wall.waves):
         return CardImperfection(None, split)
-    from shell.imperfection import Imperfection, PointMass
+    from shell.imperfection import Imperfection, PointMass, Waves
     from shell.imperfection.field import add
 
     gathered: dict[str, Any] = {}
     for one in keys.wave:
         name = (LENGTHS | SHARES)[one.of]
         gathered[name] = add(gathered.get(name), _wave(one))
+    if keys.wall.waves:
+        gathered["thickness"] = add(gathered.get("thickness"), Waves(keys.wall.waves))
     for table in keys.map:
         name = LENGTHS[table.of]
         gathered[name] = add(gathered.get(name), _map(table, place))

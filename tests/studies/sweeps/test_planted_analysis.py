@@ -9,6 +9,7 @@ from studies.errors import InputError
 from studies.sweeps.run import run_study
 from studies.sweeps.search import name_search
 from studies.sweeps.sensitivity import linear_shares, local_slopes, sobol_indices
+from studies.sweeps.spec import read_study
 from studies.sweeps.tolerance import find_reach, find_yield
 
 
@@ -159,3 +160,39 @@ def test_worst_case_and_inversion(tmp_path, functions):
     assert inverse["values"] == pytest.approx({"tilt": 0.425, "bowl": 0.4925}, rel=1e-6)
     assert not impossible["reached"]
     assert impossible["at_limit"] == ["user.x"]
+
+
+def test_tolerances_that_a_share_keeps(tmp_path, functions):
+    """The size of two independent normal parts is distributed as Rayleigh's law: 95 % lie below σ √(2 ln 20)."""
+    functions.write_text("def size(i, p):\n    return 2 * (p['user.x'] ** 2 + p['user.y'] ** 2) ** 0.5\n")
+    normal = {"nominal": 0.0, "distribution": "normal", "standard_deviation": 3.0}
+    spec = {
+        "card": "hrg-30mm",
+        "sampling": {"method": "latin-hypercube", "cases": 400, "seed": 3},
+        "parameter": [{"name": "user.x", **normal}, {"name": "user.y", **normal}],
+        "quantity": [{"name": "python", "function": f"{functions}:size"}],
+        "requirement": [{"column": "size", "high": 0.5}],
+        "search": [{"kind": "tolerance", "share": 0.95}],
+    }
+    (found,) = run_study(spec, workers=1, allow_python=True).store.findings().values()
+    deviation = 0.25 / math.sqrt(2 * math.log(20))
+    assert found["low"] < deviation / 3 < found["high"]
+    assert found["factor"] == pytest.approx(deviation / 3, rel=0.05)
+    assert found["tolerances"][0]["standard_deviation"] == pytest.approx(3 * found["factor"])
+    assert found["passed"] == 380
+
+
+def test_a_search_for_tolerances_needs_draws_and_something_to_keep(functions):
+    spec = {
+        "card": "hrg-30mm",
+        "sampling": {"method": "grid"},
+        "parameter": [{"name": "resonator.radius_mm", "tolerance": 0.01, "count": 2}],
+        "quantity": [{"name": "frequency"}],
+        "search": [{"kind": "tolerance", "share": 0.95}],
+    }
+    with pytest.raises(InputError, match="designs that are drawn"):
+        read_study(spec)
+    spec["sampling"] = {"method": "sobol", "cases": 8}
+    del spec["parameter"][0]["count"]
+    with pytest.raises(InputError, match="needs a \\[\\[requirement\\]\\]"):
+        read_study(spec)
