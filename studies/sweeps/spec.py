@@ -78,8 +78,7 @@ from studies.sweeps.tables import (
     refuse_twins,
     split_tables,
 )
-from studies.sweeps.tolerance import check_sample
-from studies.sweeps.validity import check_nominal
+from studies.sweeps.validity import check_nominal, check_sample
 
 SCHEMA = "hrg.study/1"
 KEYS = ("schema", "name", "note", "card", "sampling", "parameter", "derived", "quantity", "requirement", "search")

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from studies.errors import InputError
 
 if TYPE_CHECKING:
-    from studies.sweeps.definition import Requirement, Study
+    from studies.sweeps.definition import Requirement
     from studies.sweeps.results import Results
 
 RANDOM = ("latin-hypercube", "sobol", "sensitivity")
@@ -107,17 +107,6 @@ def find_reach(results: "Results", requirements: "tuple[Requirement, ...]") -> R
         return Reach(None, len(good))
     part = float(distance[~good].min())
     return Reach(part, int((distance < part).sum()))
-
-
-def check_sample(study: "Study", where: str) -> None:
-    """Raise when a study gives a search for tolerances no sample or nothing to keep."""
-    if study.sampling.method not in RANDOM[:2]:
-        raise InputError(
-            f"{where}: a search for tolerances needs designs that are drawn: method = 'latin-hypercube' or 'sobol', not"
-            f" '{study.sampling.method}'."
-        )
-    if not study.requirements:
-        raise InputError(f"{where}: a search for tolerances needs a [[requirement]] that the designs shall keep.")
 
 
 def place_limits(values: NDArray[np.float64], nominal: float, low: float, high: float) -> NDArray[np.float64]:

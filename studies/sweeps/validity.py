@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from studies.sweeps.definition import Study, StudyParameter
 
 MOST_CORNERS = 6  # parameters up to which all corners of the box are looked at
+DRAWN = ("latin-hypercube", "sobol")
 
 
 def check_nominal(study: "Study", where: str) -> None:
@@ -85,3 +86,14 @@ def _corners(study: "Study") -> Iterator[Mapping[str, Any]]:
     names = [p.name for p in geometry]
     for ends in product(*((p.low, p.high) for p in geometry)):
         yield dict(zip(names, ends, strict=True))
+
+
+def check_sample(study: "Study", where: str) -> None:
+    """Raise when a study gives a search for tolerances no sample or nothing to keep."""
+    if study.sampling.method not in DRAWN:
+        raise InputError(
+            f"{where}: a search for tolerances needs designs that are drawn: method = 'latin-hypercube' or 'sobol', not"
+            f" '{study.sampling.method}'."
+        )
+    if not study.requirements:
+        raise InputError(f"{where}: a search for tolerances needs a [[requirement]] that the designs shall keep.")
