@@ -141,6 +141,7 @@ def estimate_noise(
     columns: Array | None = None,
     precision: Array | None = None,
     kinds: Sequence[str] = KINDS,
+    near: Noise | None = None,
 ) -> Noise:
     """Estimate the levels of the noise by its marginal likelihood.
 
@@ -154,6 +155,8 @@ def estimate_noise(
         Of that prior; 0, no prior, unless given.
     kinds : of "white" (always), "flicker", "walk", "offset"
         What the noise may consist of; one run has no offset, since none is known from another.
+    near : Noise, optional
+        Levels from which the search begins: those of residuals that were much the same.
 
     Returns
     -------
@@ -184,6 +187,10 @@ def estimate_noise(
         return rows.deviance(rest, X, lam, levels(x), -free_part) + float((((x[1:] - USUAL) / SPREAD) ** 2).sum())
 
     first = np.array([-0.3, *[USUAL] * len(free)])
+    if near is not None and near.white > 0:
+        slow = {kind: getattr(near, kind) * (np.sqrt(hours) if kind == "walk" else 1.0) / near.white for kind in free}
+        first = np.log([near.white / spread, *(max(one, np.exp(LEAST)) for one in slow.values())])
+        first[1:] = np.clip(first[1:], LEAST, MOST)
     bounds = [(-12.0, 12.0), *[(LEAST, MOST)] * len(free)]
     found = minimize(objective, first, method="L-BFGS-B", bounds=bounds, options={"ftol": 1e-9, "eps": 1e-4})
     return levels(found.x)

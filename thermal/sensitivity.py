@@ -172,10 +172,11 @@ class _Slopes:
         S = np.zeros((*everything.shape[:2], len(changes), n))
         for _ in range(MOST_SWEEPS):
             last = S
-            S, self.rate = swept.grid.answer(forcing + self._beyond(S, held), start)
+            push = forcing + self._beyond(S, held)
+            S = swept.grid.answer(push, start)
             size = np.abs(S).max(axis=(0, 1, 3))
             if (np.abs(S - last).max(axis=(0, 1, 3)) <= RELATIVE_TOLERANCE * size).all():
-                self.slope = S
+                self.slope, self.rate = S, swept.grid.rates(push, start)
                 return
         raise SweepError("the derivatives of the temperatures do not converge; the radiation is too strong.")
 

@@ -69,21 +69,27 @@ class Grid:
             weights += [decay, even - slanted, slanted]
         return tuple(weights)
 
-    def answer(self, power: Array, start: Array) -> tuple[Array, Array]:
-        """Temperatures and their rates at all moments, (3, K, p, n), for power (W) at all moments, from `start` (p, n)."""
-        shapes, rate = self.modes.shapes, 1 / self.modes.time_constants
-        u = power @ shapes
+    def answer(self, power: Array, start: Array) -> Array:
+        """Temperatures at all moments, (3, K, p, n), for power (W) at all moments, from `start` (p, n)."""
+        return np.asarray(self._states(power @ self.modes.shapes, start) @ self.modes.shapes.T)
+
+    def rates(self, power: Array, start: Array) -> Array:
+        """Rates (K/s) of the same temperatures."""
+        u = power @ self.modes.shapes
+        return np.asarray((u - self._states(u, start) / self.modes.time_constants) @ self.modes.shapes.T)
+
+    def _states(self, u: Array, start: Array) -> Array:
+        """Amplitudes of the modes at all moments, for the power in each of them."""
         shift = (2 * u[1] - u[0] - u[2]) / 3  # straight lines of the parabola's mean
         u0, u1 = u[0] + shift, u[2] + shift
         decay2, near2, far2, decay, near, far = (w[:, None, :] for w in self._weights)
         forced = near * u0 + far * u1
         x = np.empty((len(forced) + 1, *forced.shape[1:]))
-        x[0] = (start * self.modes.capacity) @ shapes
+        x[0] = (start * self.modes.capacity) @ self.modes.shapes
         for k in range(len(forced)):
             x[k + 1] = decay[k] * x[k] + forced[k]
         half = decay2 * x[:-1] + near2 * u0 + far2 * (u0 + u1) / 2
-        states = np.array([x[:-1], half, x[1:]])
-        return states @ shapes.T, (u - rate * states) @ shapes.T
+        return np.array([x[:-1], half, x[1:]])
 
 
 @dataclass(frozen=True)
@@ -152,12 +158,12 @@ def run_sweeps(network: Network, boundaries: Mapping[str, Profile], initial: Arr
     T1 = np.array([first.evaluate(t) for t in moments])
     T, delta, rate = T1, np.zeros_like(T1), np.zeros_like(T1)
     for _ in range(MOST_SWEEPS if not network.is_linear else 0):
-        delta, rate = (
-            part[:, :, 0] for part in grid.answer(_beyond(network, linear, T, held, power)[:, :, None], start)
-        )
+        beyond = _beyond(network, linear, T, held, power)[:, :, None]
+        delta = grid.answer(beyond, start)[:, :, 0]
         last, T = T, T1 + delta
         change = np.abs(T - last).max()
         if change < SWEEP_TOLERANCE:
+            rate = grid.rates(beyond, start)[:, :, 0]
             break
         if not change < 1e4:
             raise SweepError("the radiation is too strong to be swept; integrate the network instead.")

@@ -76,7 +76,7 @@ def fit(problem: Problem, start: Array | None = None, progress: Progress = lambd
     converged, step, size, outliers = False, 0, np.inf, dict.fromkeys(problem.responses, 0)
     for step in range(1, MOST_STEPS + 1):
         if step <= 2 or size > SETTLED_NOISE:
-            noise = {name: _noise(problem, rows[name], state, name) for name in problem.responses}
+            noise = {name: _noise(problem, rows[name], state, name, noise.get(name)) for name in problem.responses}
         if step > 2:
             for name in problem.responses:
                 rows[name], outliers[name] = _spare_outliers(problem.rows[name], state, name, noise[name])
@@ -106,14 +106,14 @@ def objective(problem: Problem, state: State, noise: Mapping[str, Noise], rows: 
     return total + sum(float(np.sum(rows[n].whiten(state.residual[n], noise[n]) ** 2)) for n in problem.responses)
 
 
-def _noise(problem: Problem, rows: NoiseRows, state: State, name: str) -> Noise:
+def _noise(problem: Problem, rows: NoiseRows, state: State, name: str, near: Noise | None) -> Noise:
     J = state.slope[name]
     target = state.residual[name] + J @ state.point
     # Rotated coordinates of unit prior are of unit prior again; those that the rows do not see are left out.
     U, S, _ = np.linalg.svd(J, full_matrices=False)
     seen = S > UNSEEN * float(np.median(np.abs(np.diff(state.residual[name]))))
     kinds = ("white",) if name == SETTLED else KINDS
-    noise = estimate_noise(rows, target, U[:, seen] * S[seen], np.ones(int(seen.sum())), kinds)
+    noise = estimate_noise(rows, target, U[:, seen] * S[seen], np.ones(int(seen.sum())), kinds, near)
     if name == SETTLED:  # a reading is not better than its last digit
         rounding = max(table.resolution for table in problem.tables) / np.sqrt(12.0)
         return replace(noise, white=max(noise.white, rounding))
@@ -148,7 +148,7 @@ def _whitened(
 def _advance(
     problem: Problem, state: State, move: Array, noise: Mapping[str, Noise], rows: Mapping[str, NoiseRows]
 ) -> State | None:
-    """Go a step, or a quarter of it until the objective falls; None where it does not."""
+    """Go a step, or a quarter of it until the objective falls; None where it does not. The whole step is the usual one."""
     count = len(problem.priors.values)
     before = objective(problem, state, noise, rows)
     part = 1.0
@@ -156,10 +156,10 @@ def _advance(
         trial = state.point + part * move
         trial = np.concatenate([problem.priors.inside(trial[:count]), trial[count:]])
         try:
-            reached = problem.evaluate(trial, slopes=False)
+            reached = problem.evaluate(trial, slopes=part == 1)
         except (InputError, ShellError, ThermalError, CompensationError):
             reached = None
         if reached is not None and objective(problem, reached, noise, rows) < before:
-            return problem.evaluate(trial)
+            return reached if part == 1 else problem.evaluate(trial)
         part /= 4
     return None
