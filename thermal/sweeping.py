@@ -27,7 +27,7 @@ from thermal.transient import Transient, propagate
 MOST_SWEEPS = 60
 SWEEP_TOLERANCE = 1e-7  # K
 LONGEST_ROW = 60.0  # s, between which what radiation adds is a parabola
-MOST_CORNERS = 1500  # of profiles whose every corner is a knot; a measured column of more rows is averaged for δ
+MOST_CORNERS = 200  # of profiles whose every corner is a knot; a measured column of more rows is averaged for δ
 
 
 class SweepError(ThermalError):

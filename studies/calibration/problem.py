@@ -26,7 +26,8 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 START_SPREAD = 3.0  # K, of the departures at the start
-SHIFT = "shift"
+SHIFT, JUMP = "shift", "jump."
+MOST_JUMPS = 24  # of a run whose times are free, each for itself
 Progress = Callable[[str], None]
 
 
@@ -80,11 +81,19 @@ class Problem:
 
     @cached_property
     def starts(self) -> tuple[tuple[int, str, float], ...]:
-        """What is free of each run, with its prior standard deviation: departures (K), and the chamber's clock (s)."""
+        """What is free of each run, with its prior standard deviation: departures (K), and the chamber's clock (s).
+
+        Of a set point that jumped between two rows, the time of each jump is free: it was up to a row earlier.
+        """
         found = [(k, f"initial.{lump}", START_SPREAD) for k, part in enumerate(self.parts) for lump in part.drive.lumps]
         for k, part in enumerate(self.parts):
             if part.drive.boundary == "chamber":
-                found.append((k, SHIFT, 0.5 * float(np.median(np.diff(part.drive.profile.time)))))
+                row = float(np.median(np.diff(part.drive.profile.time)))
+                jumps = part.drive.profile.jumps
+                if 0 < len(jumps) <= MOST_JUMPS:
+                    found += [(k, f"{JUMP}{i}", row / np.sqrt(3)) for i in range(len(jumps))]
+                else:
+                    found.append((k, SHIFT, 0.5 * row))
         return tuple(found)
 
     @property
@@ -132,8 +141,9 @@ class Problem:
         offset = len(self.priors.values)
         free = {name: sd * float(point[offset + i]) for i, (part, name, sd) in enumerate(self.starts) if part == k}
         shift = free.pop(SHIFT, 0.0)
+        jumps = {int(name.removeprefix(JUMP)): free.pop(name) for name in [*free] if name.startswith(JUMP)}
         initial = {name.removeprefix("initial."): value for name, value in free.items()}
-        return replace(self.parts[k].drive, initial=initial, shift=shift)
+        return replace(self.parts[k].drive, initial=initial, shift=shift, jumps=jumps)
 
     def evaluate(self, point: Array, slopes: bool = True) -> State:
         """Predict all runs and compare."""

@@ -54,6 +54,8 @@ class Drive:
         Amplitude and voltage squared (V²), quadrature (V), pattern angle (rad) at the rows; what is absent does not move.
     shift : float, s
         How much later than its profile says the boundary changes: the clock of a chamber.
+    jumps : mapping
+        The same of single jumps of the profile, in their order from 0: between which two rows they were is all that is known.
     start : float, s
         Since the start of the first run of the campaign.
     rate : array (N,), rad/s, or None
@@ -66,6 +68,7 @@ class Drive:
     initial: Mapping[str, float] = field(default_factory=dict)
     commands: Mapping[str, Array] = field(default_factory=dict)
     shift: float = 0.0
+    jumps: Mapping[int, float] = field(default_factory=dict)
     start: float = 0.0
     rate: Array | None = None
 
@@ -83,10 +86,12 @@ class Drive:
 
     @property
     def imposed(self) -> Profile:
-        """Profile of the boundary with its shift, over all the rows."""
-        if self.shift == 0:
+        """Profile of the boundary with its shifts, over all the rows."""
+        if self.shift == 0 and not any(self.jumps.values()):
             return self.profile
         t, T = self.profile.time + self.shift, self.profile.value
+        for k, later in self.jumps.items():
+            t, T = _move_jump(t, T, k, later)
         if t[0] > self.time[0]:
             t, T = np.insert(t, 0, self.time[0]), np.insert(T, 0, T[0])
         if t[-1] < self.time[-1]:
@@ -96,6 +101,21 @@ class Drive:
     def with_initial(self, **initial: float) -> "Drive":
         """Return the drive with another thermal state at the start."""
         return replace(self, initial={**self.initial, **initial})
+
+
+def _move_jump(t: Array, T: Array, k: int, later: float) -> tuple[Array, Array]:
+    """Rows with the jump of number k moved, at most halfway to its neighbours; rows that it passes get its other value."""
+    after = np.flatnonzero(np.diff(t) == 0) + 1
+    at = int(after[k])
+    low = t[0] if k == 0 else (t[after[k - 1]] + t[at]) / 2
+    high = t[-1] if k == len(after) - 1 else (t[after[k + 1]] + t[at]) / 2
+    time = float(np.clip(t[at] + later, low, high))
+    rest, values = np.delete(t, [at - 1, at]), np.delete(T, [at - 1, at])
+    values[(rest >= time) & (rest < t[at])] = T[at]
+    values[(rest <= time) & (rest > t[at])] = T[at - 1]
+    rest, values = rest[rest != time], values[rest != time]
+    place = int(np.searchsorted(rest, time))
+    return np.insert(rest, place, [time, time]), np.insert(values, place, T[at - 1 : at + 1])
 
 
 def drive_by_profile(profile: Profile, time: Array) -> Drive:

@@ -33,8 +33,8 @@ Array = NDArray[np.float64]
 MARGIN = 10.0  # K beyond the boundary in which the frequency stays known: effects and self-heating
 STEP = 1e-3  # of a value, or of its standard deviation: the differences that give derivatives
 INITIAL = "initial."
-SHIFT = "shift"
-SHIFT_STEP = 1.0  # s
+SHIFT, JUMP = "shift", "jump."
+SHIFT_STEP = 0.5  # s
 OF_WALL = ("thermal.conductivity_W_per_m_K", "thermal.heat_capacity_J_per_kg_K")
 """Values of the heat path that the loss of a wall takes as well."""
 LAG = "noise.housing_lag_s"
@@ -79,8 +79,8 @@ def predict(
     instrument : Instrument
     drive : Drive
     derivatives : names, or `Variations` of this instrument that several runs share
-        Keys of the card ("thermal.mount_conductance_W_per_K"), "initial.base" (K) and the other lumps of the drive, and
-        "shift" (s).
+        Keys of the card ("thermal.mount_conductance_W_per_K"), "initial.base" (K) and the other lumps of the drive,
+        "shift" (s), and "jump.0" (s) and the other jumps of its profile.
     law : FrequencyLaw, optional
         One that was built before for this instrument and a range that is wide enough.
 
@@ -107,11 +107,10 @@ def predict(
     check_loss(instrument, columns["inverse_q"])
     slopes = {}
     for name in varied.names:
-        if name == SHIFT:
-            slopes[name] = _slope_of_shift(instrument, drive, varied, law)
-            continue
         along = partial(_still, found)
-        if name in changes:
+        if name == SHIFT or name.startswith(JUMP):
+            along = partial(found.moved, *_slope_of_timing(network, drive, name, rows, departure))
+        elif name in changes:
             k = list(changes).index(name)
             slope = thermal.slope[k]
             if drive.boundary == "housing" and changes[name].boundaries:
@@ -149,15 +148,20 @@ def _slope_of_reading(read: Profile) -> Array:
     return slope
 
 
-def _slope_of_shift(
-    instrument: "Instrument", drive: Drive, varied: "Variations", law: "FrequencyLaw"
-) -> dict[str, Array]:
-    """Derivative (1/s) of every column by the time of the boundary: a difference, since jumps of the profile move."""
-    here = varied.with_names(())
+def _slope_of_timing(network: Network, drive: Drive, name: str, rows: Array, departure: Array) -> tuple[Array, Array]:
+    """Derivatives of `Temperatures` by the time of the boundary or of one of its jumps (K/s, K/s²): differences."""
+
+    def moved(step: float) -> Drive:
+        if name == SHIFT:
+            return replace(drive, shift=drive.shift + step)
+        k = int(name.removeprefix(JUMP))
+        return replace(drive, jumps={**drive.jumps, k: drive.jumps.get(k, 0.0) + step})
+
     below, above = (
-        predict(instrument, replace(drive, shift=drive.shift + d), here, law).columns for d in (-SHIFT_STEP, SHIFT_STEP)
+        respond(network, {drive.boundary: moved(step).imposed}, drive.time, rows, departure=departure)
+        for step in (-SHIFT_STEP, SHIFT_STEP)
     )
-    return {name: (above[name] - below[name]) / (2 * SHIFT_STEP) for name in above}
+    return (above.temperature - below.temperature) / (2 * SHIFT_STEP), (above.rate - below.rate) / (2 * SHIFT_STEP)
 
 
 def _still(found: Temperatures, _: float) -> Temperatures:
@@ -231,7 +235,7 @@ class Variations:
             return no_change(network, initial=lump_shape(network, name.removeprefix(INITIAL)))
         if name == LAG and drive.boundary == "housing":
             return no_change(network, {"housing": Profile(drive.profile.time, _slope_of_reading(drive.profile))})
-        if name == SHIFT or name.partition(".")[0] not in ("thermal", "material", "resonator"):
+        if name.partition(".")[0] not in ("thermal", "material", "resonator"):
             return None
         below, above = self.sides(name)
         step, T0 = above.distance - below.distance, self._here.instrument.reference_temperature
@@ -240,7 +244,7 @@ class Variations:
 
     def _build(self, name: str) -> tuple[Side, Side]:
         here = self._here
-        if name.startswith(INITIAL):
+        if name == SHIFT or name.startswith((INITIAL, JUMP)):
             low, high = (replace(here, distance=d) for d in (-0.05, 0.05))
             return low, high
         value, ends = self._value_and_ends(name)
