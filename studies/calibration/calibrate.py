@@ -224,7 +224,8 @@ def _calibrated(instrument: "Instrument", found: Fit, estimates: Sequence[Estima
     """The card with posterior values, widths and correlations."""
     priors: Priors = found.problem.priors
     count = len(priors.values)
-    C = priors.root @ found.covariance[:count, :count] @ priors.root.T
+    moves = priors.slopes(found.point[:count])
+    C = moves @ found.covariance[:count, :count] @ moves.T
     sd = np.sqrt(np.diag(C))
     R = np.clip(C / np.outer(sd, sd), -1.0, 1.0)
     np.fill_diagonal(R, 1.0)

@@ -7,12 +7,13 @@ from numpy.typing import NDArray
 
 from studies.calibration.fit import Fit, objective
 from studies.calibration.priors import from_standard, to_standard
+from studies.calibration.wave import Polar
 from studies.errors import InputError
 from thermal.errors import ThermalError
 
 Array = NDArray[np.float64]
 NINETY = 1.6448536269514722
-NONLINEAR = ("thermal.", "noise.", "effect.", "resonator.", "bias.damping_")
+NONLINEAR = ("thermal.", "noise.", "effect.", "resonator.")
 """Values whose intervals are looked at beyond the straight line."""
 BENT = 0.25  # relative departure of the objective at the ends of an interval from its parabola, beyond which it is profiled
 TOLD = 0.5  # posterior over prior width up to which the data has said what the value is
@@ -60,8 +61,27 @@ def estimate(fit: Fit, profile: bool = True) -> tuple[Estimate, ...]:
     u = fit.point[:count]
     z, bounds, at = priors.standard(u), priors.bound(u), priors.at(u)
     C = priors.root @ fit.covariance[:count, :count] @ priors.root.T
-    found = []
+    found, polar = [], _polar(fit)
     for k, value in enumerate(priors.values):
+        if k in polar:
+            one, z_moved = polar[k], to_standard(value, polar[k].value)
+            width = (one.value / value.value if value.logarithmic else 1.0) * one.width * value.sd
+            found.append(
+                Estimate(
+                    value.name,
+                    value.unit,
+                    value.value,
+                    one.value,
+                    one.low,
+                    one.high,
+                    width,
+                    z_moved,
+                    one.width,
+                    None,
+                    "profile",
+                )
+            )
+            continue
         sd = float(np.sqrt(C[k, k]))
         ends, kind = (float(z[k]) - NINETY * sd, float(z[k]) + NINETY * sd), "normal"
         if profile and value.name.startswith(NONLINEAR) and sd < SILENT:
@@ -73,6 +93,16 @@ def estimate(fit: Fit, profile: bool = True) -> tuple[Estimate, ...]:
             Estimate(value.name, value.unit, value.value, number, low, high, width, float(z[k]), sd, bounds[k], kind)
         )
     return tuple(found)
+
+
+def _polar(fit: Fit) -> dict[int, Polar]:
+    """Length and axis of the damping's anisotropy by their places, from what the data says of its components."""
+    wave, pair = fit.problem.priors.wave, fit.problem.priors.pair
+    if wave is None:
+        return {}
+    mine = np.ix_(pair, pair)
+    information = np.linalg.inv(fit.covariance[mine]) - np.eye(2)
+    return dict(zip(pair, wave.posterior(information, fit.point[pair]), strict=True))
 
 
 def _profiled(fit: Fit, k: int, ends: tuple[float, float]) -> tuple[tuple[float, float], str]:

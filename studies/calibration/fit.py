@@ -20,7 +20,7 @@ from studies.errors import InputError
 from thermal.errors import ThermalError
 
 Array = NDArray[np.float64]
-MOST_STEPS = 14
+MOST_STEPS = 20
 CLOSE = 0.05  # fall of the objective that a step still promises: a move of 0.2 standard deviations in any direction
 NEAR = 1.0  # the same, where no step makes the fit better: what differences and rounding leave
 SETTLED_NOISE = 1.0  # the same, below which the noise is not estimated anew

@@ -2,7 +2,8 @@
 
 A value v of mean v₀ and standard deviation s is v₀ + s z, or v₀ exp(s z/v₀) where its logarithm is normal; z of values
 that go together, such as slope and curvature of a material's law, have a correlation R = L Lᵀ, and z = L u with u of
-independent unit normals. A value that is even between its bounds is taken as normal within them.
+independent unit normals. A value that is even between its bounds is taken as normal within them. Length and axis of the
+damping's anisotropy are moved by their components (`studies.calibration.wave`).
 """
 
 from collections.abc import Sequence
@@ -11,6 +12,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
+
+from studies.calibration.wave import ANISOTROPY, AXIS, Wave
 
 if TYPE_CHECKING:
     from studies.instrument.card import Instrument
@@ -21,15 +24,21 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Priors:
-    """Uncertain values of a card, and the root L of their prior correlation."""
+    """Uncertain values of a card, and the root L of their prior correlation; the coordinates of `wave` are components."""
 
     values: tuple["UncertainValue", ...]
     root: Array
+    wave: Wave | None = None
 
     @property
     def names(self) -> tuple[str, ...]:
         """Names of the values."""
         return tuple(value.name for value in self.values)
+
+    @property
+    def pair(self) -> list[int]:
+        """Places of the length and the axis whose coordinates are components; none without."""
+        return [] if self.wave is None else [self.names.index(name) for name in (ANISOTROPY, AXIS)]
 
     def standard(self, u: Array) -> Array:
         """Coordinates z of unit prior variance from independent ones."""
@@ -43,15 +52,22 @@ class Priors:
 
     def at(self, u: Array) -> dict[str, float]:
         """Values of the card."""
-        return {
-            value.name: float(np.clip(from_standard(value, z), value.low, value.high))
-            for value, z in zip(self.values, self.standard(u), strict=True)
+        z = self.standard(u)
+        found = {
+            v.name: float(np.clip(from_standard(v, one), v.low, v.high)) for v, one in zip(self.values, z, strict=True)
         }
+        if self.wave is not None:
+            length, axis = self.wave.at(*z[self.pair])
+            found |= {ANISOTROPY: float(np.clip(length, self.wave.length.low, self.wave.length.high)), AXIS: axis}
+        return found
 
     def slopes(self, u: Array) -> Array:
-        """∂value/∂z at these coordinates."""
+        """∂value/∂u at these coordinates, (p, p)."""
         at = self.at(u)
-        return np.array([at[v.name] * v.sd / v.value if v.logarithmic else v.sd for v in self.values])
+        own = np.diag([at[v.name] * v.sd / v.value if v.logarithmic else v.sd for v in self.values])
+        if self.wave is not None:
+            own[np.ix_(self.pair, self.pair)] = self.wave.slopes(*self.standard(u)[self.pair])
+        return np.asarray(own @ self.root)
 
     def bound(self, u: Array) -> tuple[str | None, ...]:
         """Which bound each value has reached."""
@@ -64,6 +80,7 @@ class Priors:
     @property
     def _ends(self) -> tuple[Array, Array]:
         ends = np.array([[to_standard(v, v.low), to_standard(v, v.high)] for v in self.values]).reshape(-1, 2)
+        ends[self.pair] = [-np.inf, np.inf]
         return ends[:, 0], ends[:, 1]
 
 
@@ -90,9 +107,19 @@ def gather_priors(instrument: "Instrument", exact: Sequence[str] = ()) -> Priors
     for i, one in enumerate(values):
         for j, other in enumerate(values[:i]):
             R[i, j] = R[j, i] = correlation.get((one.name, other.name), correlation.get((other.name, one.name), 0.0))
+    known = {value.name: value for value in values}
+    wave = (
+        Wave(known[ANISOTROPY], known[AXIS])
+        if {ANISOTROPY, AXIS} <= set(known) and known[ANISOTROPY].logarithmic
+        else None
+    )
+    if wave is not None:
+        pair = [k for k, value in enumerate(values) if value.name in (ANISOTROPY, AXIS)]
+        R[pair], R[:, pair] = 0.0, 0.0
+        R[pair, pair] = 1.0
     low, vectors = np.linalg.eigh(R)
     R = (vectors * np.maximum(low, 1e-10)) @ vectors.T
-    return Priors(values, np.linalg.cholesky(R))
+    return Priors(values, np.linalg.cholesky(R), wave)
 
 
 def _idle(instrument: "Instrument") -> set[str]:

@@ -178,7 +178,7 @@ class Problem:
         J = np.zeros((len(blocks.value), self.count))
         if count:
             columns = np.column_stack([prediction.derivatives[name][response] for name in self.priors.names])
-            J[:, :count] = (blocks.average(columns) * scale) @ self.priors.root
+            J[:, :count] = blocks.average(columns) @ scale
         for place, (one, name, sd) in enumerate(self.starts):
             if one == k:
                 J[:, count + place] = sd * blocks.average(prediction.derivatives[name][response])
@@ -192,7 +192,7 @@ class Problem:
                 high, low = (side.law.frequency(table.temperature, extrapolate=True) for side in (above, below))
                 columns[:, k] = (high - low) / (above.distance - below.distance)
         J = np.zeros((len(table.frequency), self.count))
-        J[:, : len(scale)] = (columns * scale) @ self.priors.root
+        J[:, : len(scale)] = columns @ scale
         return J
 
 

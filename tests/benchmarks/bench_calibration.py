@@ -1,8 +1,8 @@
 """Calibrations of devices that were drawn from the priors of the shipped cards.
 
-    python tests/benchmarks/bench_calibration.py [--first 0] [--devices 54] [--rate 0.0333]
+    python tests/benchmarks/bench_calibration.py [--first 0] [--devices 54] [--rate 0.033]
 
-Device k is drawn from the card k modulo 4 with seed k, runs through two profiles, and is calibrated from the undrawn card. A line for
+Set points jump between two rows. Device k is drawn from the card k modulo 4 with seed k, runs through two profiles, and is calibrated from the undrawn card. A line for
 each, then: residual over what the same fit leaves of the noise that is really in the records (targets: within 3 %), how often 90 %
 intervals hold the device (86 to 94 %), and how often the next run, predicted from its chamber alone, is within twice its noise (90 %);
 the noise of that run is what is really in it ("drawn"), and the rms of eight such draws ("usual"), since wander differs from run to run.
@@ -10,6 +10,7 @@ the noise of that run is what is really in it ("drawn"), and the rms of eight su
 
 import argparse
 import time
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,7 +33,7 @@ RESPONSES = ("frequency_Hz", "bias_deg_per_h", "inverse_q")
 def measure(seed: int, rate: float) -> dict[str, list[float]]:
     """Draw, run, calibrate and predict one device."""
     card = load_card(CARDS[seed % 4])
-    priors = gather_priors(card)
+    priors = replace(gather_priors(card), wave=None)
     device = card.with_values(priors.at(priors.inside(np.random.default_rng(seed).standard_normal(len(priors.values)))))
     runs = [simulate_run(device, load_profile(words), rate, 100 * seed + k) for k, words in enumerate(PROFILES)]
     true = [
@@ -104,7 +105,7 @@ def main() -> None:
     parser = argparse.ArgumentParser()
     parser.add_argument("--first", type=int, default=0)
     parser.add_argument("--devices", type=int, default=54)
-    parser.add_argument("--rate", type=float, default=1 / 30)
+    parser.add_argument("--rate", type=float, default=0.033)
     given = parser.parse_args()
     found = [measure(seed, given.rate) for seed in range(given.first, given.first + given.devices)]
     total = {key: [x for one in found for x in one[key]] for key in found[0]}

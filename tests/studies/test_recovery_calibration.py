@@ -19,7 +19,7 @@ UNSEEN = "cycle 20 -5 30 1 40min 1"
 
 
 def draw(card, seed):
-    priors = gather_priors(card)
+    priors = dataclasses.replace(gather_priors(card), wave=None)
     u = priors.inside(np.random.default_rng(seed).standard_normal(len(priors.values)))
     return card.with_values(priors.at(u))
 
@@ -74,8 +74,9 @@ def test_the_intervals_hold_the_device(found, device, card):
 
 def test_what_the_data_does_not_say_stays_at_its_prior(found):
     told = {one.parameter: one for one in found.estimates}
-    assert told["bias.damping_axis_deg"].told_by == "prior"
-    assert told["bias.damping_axis_deg"].value == pytest.approx(0.0, abs=1e-6)
+    axis = told["bias.damping_axis_deg"]
+    assert axis.told_by != "data"
+    assert axis.low == pytest.approx(-axis.high, rel=0.1)  # a pattern that stands does not tell its sign
     assert told["loss.inverse_q"].told_by == "data"
     assert any(
         "thermal.base_heat_capacity_J_per_K" in g and "thermal.mount_conductance_W_per_K" in g for g in found.groups
