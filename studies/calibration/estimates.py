@@ -1,6 +1,7 @@
 """What a fit says of each value: how far it moved, how well it is known, and what it cannot be told apart from."""
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,6 +11,9 @@ from studies.calibration.priors import from_standard, to_standard
 from studies.calibration.wave import Polar
 from studies.errors import InputError
 from thermal.errors import ThermalError
+
+if TYPE_CHECKING:
+    from studies.instrument.uncertain import UncertainValue
 
 Array = NDArray[np.float64]
 NINETY = 1.6448536269514722
@@ -57,52 +61,65 @@ class Estimate:
 def estimate(fit: Fit, profile: bool = True) -> tuple[Estimate, ...]:
     """Return the estimates of all values of the card."""
     priors = fit.problem.priors
-    count = len(priors.values)
-    u = fit.point[:count]
-    z, bounds, at = priors.standard(u), priors.bound(u), priors.at(u)
-    C = priors.root @ fit.covariance[:count, :count] @ priors.root.T
-    found, polar = [], _polar(fit)
+    polar, best, mean, covariance = _over_the_wave(fit)
+    z, bounds, at = priors.standard(best), priors.bound(best), priors.at(best)
+    middle = priors.standard(mean)
+    C = priors.root @ covariance @ priors.root.T
+    found = []
     for k, value in enumerate(priors.values):
         if k in polar:
-            one, z_moved = polar[k], to_standard(value, polar[k].value)
-            width = (one.value / value.value if value.logarithmic else 1.0) * one.width * value.sd
-            found.append(
-                Estimate(
-                    value.name,
-                    value.unit,
-                    value.value,
-                    one.value,
-                    one.low,
-                    one.high,
-                    width,
-                    z_moved,
-                    one.width,
-                    None,
-                    "profile",
-                )
-            )
+            found.append(_told_polar(value, polar[k]))
             continue
         sd = float(np.sqrt(C[k, k]))
-        ends, kind = (float(z[k]) - NINETY * sd, float(z[k]) + NINETY * sd), "normal"
+        ends, kind = (float(middle[k]) - NINETY * sd, float(middle[k]) + NINETY * sd), "normal"
         if profile and value.name.startswith(NONLINEAR) and sd < SILENT:
             ends, kind = _profiled(fit, k, ends)
         low, high = (float(np.clip(from_standard(value, end), value.low, value.high)) for end in ends)
         number = at[value.name]
         width = number * sd * value.sd / value.value if value.logarithmic else sd * value.sd
         found.append(
-            Estimate(value.name, value.unit, value.value, number, low, high, width, float(z[k]), sd, bounds[k], kind)
+            Estimate(
+                value.name,
+                value.unit,
+                value.value,
+                number,
+                min(low, number),
+                max(high, number),
+                width,
+                float(z[k]),
+                sd,
+                bounds[k],
+                kind,
+            )
         )
     return tuple(found)
 
 
-def _polar(fit: Fit) -> dict[int, Polar]:
-    """Length and axis of the damping's anisotropy by their places, from what the data says of its components."""
-    wave, pair = fit.problem.priors.wave, fit.problem.priors.pair
-    if wave is None:
-        return {}
-    mine = np.ix_(pair, pair)
-    information = np.linalg.inv(fit.covariance[mine]) - np.eye(2)
-    return dict(zip(pair, wave.posterior(information, fit.point[pair]), strict=True))
+def _over_the_wave(fit: Fit) -> tuple[dict[int, Polar], Array, Array, Array]:
+    """Most probable coordinates, their mean and covariance, with length and axis of the damping's anisotropy by their places.
+
+    The components have the posterior that length and axis give them; the other values follow: they depend on the components
+    as in the normal distribution of the fit.
+    """
+    priors = fit.problem.priors
+    count = len(priors.values)
+    point, C, pair = fit.point[:count], fit.covariance[:count, :count], priors.pair
+    if priors.wave is None:
+        return {}, point, point, C
+    own = np.linalg.inv(C[np.ix_(pair, pair)])
+    found = priors.wave.posterior(own - np.eye(2), point[pair])
+    gain = C[:, pair] @ own
+    polar = dict(zip(pair, (found.length, found.axis), strict=True))
+    best, mean = (point + gain @ (there - point[pair]) for there in (found.best, found.mean))
+    return polar, best, mean, C + gain @ (found.covariance - C[np.ix_(pair, pair)]) @ gain.T
+
+
+def _told_polar(value: "UncertainValue", one: Polar) -> Estimate:
+    sd = one.width * value.sd * (one.value / value.value if value.logarithmic else 1.0)
+    shift = to_standard(value, one.value)
+    return Estimate(
+        value.name, value.unit, value.value, one.value, one.low, one.high, sd, shift, one.width, None, "profile"
+    )
 
 
 def _profiled(fit: Fit, k: int, ends: tuple[float, float]) -> tuple[tuple[float, float], str]:

@@ -36,6 +36,17 @@ class Polar:
 
 
 @dataclass(frozen=True)
+class Posterior:
+    """Length and axis; (x, y) at the most probable of them, their mean and covariance."""
+
+    length: Polar
+    axis: Polar
+    best: Array
+    mean: Array
+    covariance: Array
+
+
+@dataclass(frozen=True)
 class Wave:
     """Priors of length and axis; coordinates (x, y) of unit variance of a = mean + spread_a x, b = spread_b y."""
 
@@ -70,7 +81,7 @@ class Wave:
         turn = np.array([[np.cos(phi), np.sin(phi)], np.array([-np.sin(phi), np.cos(phi)]) / (A * PER_DEGREE)])
         return np.asarray(turn * [spread_a, spread_b])
 
-    def posterior(self, information: Array, mean: Array) -> tuple[Polar, Polar]:
+    def posterior(self, information: Array, mean: Array) -> Posterior:
         """Length and axis, from the data's information on (x, y) and the mean that it has beside the unit prior.
 
         Parameters
@@ -99,10 +110,20 @@ class Wave:
         weight /= weight.sum()
         best = np.unravel_index(int(np.argmax(polar + 1e-9 * (angle > 0))), polar.shape)
         spread = self.length.sd / self.length.value
-        return (
+        middle = np.array([(weight * x).sum(), (weight * y).sum()])
+        away = np.array([x - middle[0], y - middle[1]])
+        return Posterior(
             _summed(A, weight, float(A[best]), _deviation(log, weight) / spread),
-            _summed(self.axis.value + angle, weight, self.axis.value + float(angle[best]), _deviation(angle, weight) / self.axis.sd),
-        )  # fmt: skip
+            _summed(
+                self.axis.value + angle,
+                weight,
+                self.axis.value + float(angle[best]),
+                _deviation(angle, weight) / self.axis.sd,
+            ),
+            np.array([x[best], y[best]]),
+            middle,
+            np.einsum("iab,jab,ab->ij", away, away, weight),
+        )
 
 
 def _deviation(values: Array, weight: Array) -> float:
@@ -113,7 +134,6 @@ def _deviation(values: Array, weight: Array) -> float:
 def _summed(values: Array, weight: Array, best: float, width: float) -> Polar:
     order = np.argsort(values, axis=None)
     total = np.cumsum(weight.ravel()[order])
-    low, high = (
-        float(values.ravel()[order][min(np.searchsorted(total, part), total.size - 1)]) for part in (FIVE, NINETY_FIVE)
-    )
+    ordered = values.ravel()[order]
+    low, high = (float(ordered[min(int(np.searchsorted(total, part)), total.size - 1)]) for part in (FIVE, NINETY_FIVE))
     return Polar(best, min(low, best), max(high, best), min(width, 1.0))
