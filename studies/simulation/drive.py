@@ -54,12 +54,12 @@ class Drive:
         Amplitude and voltage squared (V²), quadrature (V), pattern angle (rad) at the rows; what is absent does not move.
     shift : float, s
         How much later than its profile says the boundary changes: the clock of a chamber.
-    jumps : mapping
-        The same of single jumps of the profile, in their order from 0: between which two rows they were is all that is known.
     start : float, s
         Since the start of the first run of the campaign.
     rate : array (N,), rad/s, or None
         That is applied, at the rows.
+    jumps : mapping
+        How much later (s) single jumps of the profile are, in their order from 0: between which two rows they were is all that is known.
     """
 
     time: Array
@@ -68,9 +68,9 @@ class Drive:
     initial: Mapping[str, float] = field(default_factory=dict)
     commands: Mapping[str, Array] = field(default_factory=dict)
     shift: float = 0.0
-    jumps: Mapping[int, float] = field(default_factory=dict)
     start: float = 0.0
     rate: Array | None = None
+    jumps: Mapping[int, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         for name in self.initial:
