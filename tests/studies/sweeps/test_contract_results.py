@@ -132,7 +132,7 @@ def test_two_dask_workers_give_the_same_bits_and_a_lost_scheduler_is_resumable(c
     run = subprocess.Popen(
         words, stderr=subprocess.PIPE, text=True, env=environment(HRG_TEST_LOG=str(tmp_path / "log"))
     )
-    until = time.monotonic() + 60
+    until = time.monotonic() + 240
     while run.poll() is None and time.monotonic() < until and not rows_of(tmp_path / "out"):
         time.sleep(0.1)
     scheduler.kill()

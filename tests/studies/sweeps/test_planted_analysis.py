@@ -14,7 +14,7 @@ from studies.sweeps.tolerance import find_reach, find_yield
 
 
 def study(folder, function, sampling, *parameters, **more):
-    quantity = {"name": "python", "function": f"{folder / 'functions.py'}:{function}", "time_limit_s": 5.0}
+    quantity = {"name": "python", "function": f"{folder / 'functions.py'}:{function}", "time_limit_s": 60.0}
     spec = {"card": "hrg-30mm", "sampling": sampling, "parameter": list(parameters), "quantity": [quantity], **more}
     return run_study(spec, workers=1, allow_python=True)
 
