@@ -21,7 +21,7 @@ from thermal.sweeping import MOST_SWEEPS, Sweep, SweepError, capacity_ratio, her
 from thermal.transient import BLOCK
 
 RELATIVE_TOLERANCE = 1e-7  # of the derivatives, at the last sweep
-BEND_STEP = 0.5  # K, half the central difference of a capacity over temperature
+CAPACITY_STEP = 0.5  # K, half the central difference of a capacity over temperature
 
 
 @dataclass(frozen=True)
@@ -164,8 +164,8 @@ class _Slopes:
         self.ratio = capacity_ratio(network, linear, everything) if self.varies else np.ones(n)
         self.flow = self.ratio * (swept.power - outflow(network, everything)[..., :n])  # C₀ dT/dt
         if self.varies:
-            warm, cold = (capacity_ratio(network, linear, everything + d) for d in (BEND_STEP, -BEND_STEP))
-            self.bend = (np.log(cold) - np.log(warm)) / (2 * BEND_STEP)  # d ln C/dT
+            warm, cold = (capacity_ratio(network, linear, everything + d) for d in (CAPACITY_STEP, -CAPACITY_STEP))
+            self.log_slope = (np.log(cold) - np.log(warm)) / (2 * CAPACITY_STEP)  # d ln C/dT
         held = np.stack([self._hold(change) for change in changes], axis=2)
         forcing = np.stack([self._force(change) for change in changes], axis=2) - held @ linear.conduction[n:, :n]
         start = np.stack([_initial_slope(network, steady, change) for change in changes])
@@ -208,7 +208,7 @@ class _Slopes:
             result -= (self.cube[:, :, None] * both) @ network.radiation[:, :n]
         if self.varies:
             drained = result - both @ linear.conduction[:, :n]
-            result += (self.ratio[:, :, None] - 1) * drained - (self.flow * self.bend)[:, :, None] * S
+            result += (self.ratio[:, :, None] - 1) * drained - (self.flow * self.log_slope)[:, :, None] * S
         return result
 
     def at(self, rows: Array, weights: Array) -> tuple[Array, Array]:

@@ -189,9 +189,9 @@ def measure_scale(record: "Record") -> Found:
     found = {"scale_factor_error_ppm": Measured(error * 1e6, (error - reach) * 1e6, (error + reach) * 1e6, source)}
     z = float(stats.norm.ppf(0.5 + CONFIDENCE / 2))
     width = z * float(np.max(errors)) / full
-    bend = line.nonlinearity
+    departure = line.nonlinearity
     found["scale_factor_nonlinearity_ppm"] = Measured(
-        bend * 1e6, max(bend - width, 0.0) * 1e6, (bend + width) * 1e6, source
+        departure * 1e6, max(departure - width, 0.0) * 1e6, (departure + width) * 1e6, source
     )
     positive, negative = rates > 0, rates < 0
     if positive.any() and negative.any():

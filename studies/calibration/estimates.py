@@ -37,7 +37,7 @@ class Estimate:
     shift_sd : how far it moved, in prior standard deviations
     width : posterior over prior standard deviation
     bound : "low" or "high" where the value has reached a hard bound
-    interval : "profile" where the interval follows the likelihood's bend
+    interval : "profile" where the interval follows the likelihood's curvature
     """
 
     parameter: str

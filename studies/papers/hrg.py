@@ -160,7 +160,7 @@ def compare_physics(study: FrequencyStudy, instrument: "Instrument") -> PhysicsC
 
     moved, prior = law.derivatives(T), law.material.prior
     acting = [k for k, name in enumerate(prior.names) if name in moved]
-    bends = np.array([curvature(moved[prior.names[k]]) for k in acting])
+    curvatures = np.array([curvature(moved[prior.names[k]]) for k in acting])
     return PhysicsComparison(
         instrument,
         at,
@@ -169,7 +169,7 @@ def compare_physics(study: FrequencyStudy, instrument: "Instrument") -> PhysicsC
         laws,
         curvature(np.log(study.frequency)),
         curvature(law.logarithm(T)),
-        float(np.sqrt(bends @ prior.covariance[np.ix_(acting, acting)] @ bends)),
+        float(np.sqrt(curvatures @ prior.covariance[np.ix_(acting, acting)] @ curvatures)),
     )
 
 

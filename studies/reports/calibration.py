@@ -63,7 +63,7 @@ def values_table(found: Calibration, touched: bool = False) -> Table:
     kept = [one for one in found.estimates if one not in silent]
     rows = [_value_row(one) for one in sorted(kept, key=lambda one: one.width)]
     note = (
-        "* follows the bend of the likelihood. Shift: move in prior standard deviations. Width: posterior over"
+        "* follows the curvature of the likelihood. Shift: move in prior standard deviations. Width: posterior over"
         " prior standard deviation; up to 0.5 the data tells the value, from 0.95 it stayed at its prior."
     )
     if silent:

@@ -210,7 +210,7 @@ def solve(problem: LagProblem, start: Array, noise: Wander, fixed: dict[int, flo
 
 
 def _prior(problem: LagProblem) -> Array:
-    """Rows of weak priors around zero: of the departures, and of the law's bend against its usual slope.
+    """Rows of weak priors around zero: of the departures, and of the law's curvature against its usual slope.
 
     Without the second a relaxation could pass for the square of one that is twice as slow.
     """

@@ -75,7 +75,7 @@ def _run(record: Record) -> HousingRun:
 
 
 def _law(runs: Sequence[HousingRun], instrument: "Instrument | None") -> FrequencyPolynomial:
-    """A free slope about the middle of what the housing covers, with the card's bend or a free curvature."""
+    """A free slope about the middle of what the housing covers, with the card's curvature or a free one."""
     ends = np.array([f(run.housing_temperature) for run in runs for f in (np.nanmin, np.nanmax)])
     low, high = float(ends.min()), float(ends.max())
     middle = (low + high) / 2
