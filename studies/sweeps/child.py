@@ -150,6 +150,7 @@ def check_function(function: str) -> str:
 
 def serve() -> None:
     """Answer requests until standard input ends (runs in the child process)."""
+    from studies.instrument.card import build_instrument
     from studies.sweeps.workers import die_with_parent
 
     function, parent = sys.argv[1:3]
@@ -166,7 +167,8 @@ def serve() -> None:
     for line in sys.stdin.buffer:
         asked = json.loads(line)
         number = asked.pop("request")
-        answers.write(json.dumps({**_answer(function, call, asked), "request": number}).encode() + b"\n")
+        answer = _answer(function, call, build_instrument, asked)
+        answers.write(json.dumps({**answer, "request": number}).encode() + b"\n")
 
 
 def _limit_memory() -> None:
@@ -213,14 +215,12 @@ def _hash_source(call: Any) -> str:
     return hashlib.blake2b(content, digest_size=16).hexdigest()
 
 
-def _answer(function: str, call: Any, request: dict[str, Any]) -> dict[str, Any]:
+def _answer(function: str, call: Any, build: Any, request: dict[str, Any]) -> dict[str, Any]:
     import math
-
-    from studies.instrument.card import build_instrument
 
     parameters = request.pop("parameters")
     try:
-        value = call(build_instrument(**request), parameters)
+        value = call(build(**request), parameters)
         if isinstance(value, bool) or (not isinstance(value, int | float) and not hasattr(value, "__float__")):
             return {"problem": f"{function} returned {value!r:.80}, not a number."}
         value = float(value)

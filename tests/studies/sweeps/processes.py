@@ -77,9 +77,9 @@ def rows_of(folder: Path) -> list[tuple[int, str, bytes]]:
         connection.close()
 
 
-def spec_of(function: str, sampling: str, *parameters: str, more: str = "") -> str:
+def spec_of(function: str, sampling: str, *parameters: str, more: str = "", limit: float = 30.0) -> str:
     tables = "".join(f"[[parameter]]\n{parameter}\n" for parameter in parameters)
     return (
         f'schema = "hrg.study/1"\nname = "test"\ncard = "hrg-30mm"\n[sampling]\n{sampling}\n{tables}'
-        f'[[quantity]]\nname = "python"\nfunction = "functions.py:{function}"\ntime_limit_s = 1.0\n{more}'
+        f'[[quantity]]\nname = "python"\nfunction = "functions.py:{function}"\ntime_limit_s = {limit}\n{more}'
     )

@@ -131,13 +131,13 @@ def test_second_runner_is_refused_and_interrupt_is_resumable(tmp_path, functions
 def test_failures_keep_their_reason_and_do_not_stop_the_rest(tmp_path, functions, hrg):
     spec = tmp_path / "moody.toml"
     values = 'name = "user.x"\nvalues = [0, 1, 2, 3, 4, 5, 6]'
-    spec.write_text(spec_of("moody", 'method = "grid"', values))
+    spec.write_text(spec_of("moody", 'method = "grid"', values, limit=3.0))
     done = hrg("study", "run", spec, "--out", tmp_path / "out", "--workers", 2, "--allow-python", "--json")
     assert done.returncode == 4, done.stderr
     found = json.loads(done.stdout)
     assert (found["cases"], found["done"], found["failed"]) == (7, 7, 5)
     reasons = " ".join(entry["reason"] for entry in found["reasons"])
-    for part in ("one is not welcome", "time limit of 1 s", "ended its process", "not a finite number", "not a number"):
+    for part in ("one is not welcome", "time limit of 3 s", "ended its process", "not a finite number", "not a number"):
         assert part in reasons
     assert [status for _, status, _ in sorted(rows_of(tmp_path / "out"))] == ["ok", *["failed"] * 5, "ok"]
     again = hrg("study", "run", spec, "--out", tmp_path / "out", "--allow-python")
@@ -185,7 +185,7 @@ def test_changed_spec_card_or_function_is_refused_with_what_changed(tmp_path, fu
     for old, new, part in (
         ("[1, 2]", "[1, 3]", "parameter[1].values[2]: 2 -> 3"),
         ('"hrg-30mm"', '"cvg-25mm"', "card.material.name"),
-        ("time_limit_s = 1.0", "time_limit_s = 3.0", "time_limit_s: 1.0 -> 3.0"),
+        ("time_limit_s = 30.0", "time_limit_s = 3.0", "time_limit_s: 30.0 -> 3.0"),
     ):
         spec.write_text(text.replace(old, new))
         with pytest.raises(InputError) as caught:
