@@ -52,7 +52,9 @@ LEVELS: dict[str, tuple[Level, ...]] = {
     ),
     "shell": tuple(
         Level((1, 1, 0), along, *solid, split)
-        for along, solid, split in zip((8, 12, 16, 20, 20), ((6, 3), (7, 5), *_SOLID[2:]), (1, 1, 1, 1, 2), strict=True)
+        for along, solid, split in zip(
+            (10, 12, 16, 20, 20), ((5, 3), (6, 3), (8, 5), *_SOLID[3:]), (1, 1, 1, 1, 2), strict=True
+        )
     ),
 }
 FIRST = {theory: levels[0] for theory, levels in LEVELS.items()}

@@ -1,24 +1,20 @@
 """What a family of designs costs, how many designs it gives in a second, and whether its errors hold; run by hand.
 
-    OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 python tests/benchmarks/bench_family.py [CHECKED [NAME …]]
+    OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 python tests/benchmarks/bench_family.py [--checked 300] [NAME …]
 
 `free`: a hemisphere of radius 15 mm, thickness ± 11 %; `free-wide`: thickness by a factor of 4, to two tolerances; `free-N`:
 N thicknesses along the meridian ± 2 %, linear between them; `free-6-wide` ± 10 %. The shipped cards with solid parts:
 dimensions ± 2 %, and `…-wide` ± 10 %. ν 0.14 … 0.20 everywhere. Every checked design, a third of them corners of the box, is
-solved in full at the tolerance of the family's own solves. Seconds are those of the process. With `--out FILE.json` the
-figures are added to a file, with commit and machine.
+solved in full at the tolerance of the family's own solves. Seconds are those of the process. Figures go to history.jsonl.
 """
 
 import argparse
-import json
 import os
-import platform
-import subprocess
 import time
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
+from history import record
 
 from shell.elastic import Elastic
 from shell.errors import ShellError
@@ -155,33 +151,18 @@ def main():
     """Measure the boxes that are named, or all of them."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     known = boxes()
-    parser.add_argument("checked", nargs="?", type=int, default=300, help="designs solved in full (300)")
+    parser.add_argument("--checked", type=int, default=300, help="designs solved in full (300)")
     parser.add_argument("names", nargs="*", help=f"of {', '.join(known)}; all of them unless given")
-    parser.add_argument("--out", type=Path, help="file to which the figures are added")
     given = parser.parse_args()
     unknown = set(given.names) - set(known)
     if unknown:
         parser.error(f"unknown: {', '.join(sorted(unknown))}; known: {', '.join(known)}")
     print(f"threads of BLAS: {os.environ.get('OPENBLAS_NUM_THREADS', 'not limited')}; load {os.getloadavg()[0]:.1f}")
-    figures = {}
     for name in given.names or known:
         build, axes, tolerance = known[name]
-        figures[name] = measure(build, axes, tolerance, given.checked)
-        say(name, tolerance, figures[name])
-    if given.out:
-        history = json.loads(given.out.read_text()) if given.out.exists() else []
-        commit = subprocess.run(
-            ["git", "rev-parse", "--short", "HEAD"], capture_output=True, text=True, check=False
-        ).stdout
-        history.append(
-            {
-                "commit": commit.strip(),
-                "machine": f"{platform.machine()}, {os.cpu_count()} cores, {platform.python_version()}",
-                "date": time.strftime("%Y-%m-%d"),
-                "figures": figures,
-            }
-        )
-        given.out.write_text(json.dumps(history, indent=1) + "\n")
+        figures = measure(build, axes, tolerance, given.checked)
+        say(name, tolerance, figures)
+        record("families of designs", box=name, tolerance=tolerance, **figures)
 
 
 if __name__ == "__main__":
