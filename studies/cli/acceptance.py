@@ -76,6 +76,12 @@ def acceptance(
     table = quantities_table(found)
     print_table(table.caption, table.columns, table.rows, table.note)
     print(f"verdict: {found.verdict}")
+    missing: dict[str, list[str]] = {}
+    for line in found.lines:
+        if line.measured is None:
+            missing.setdefault(line.quantity.needs, []).append(line.quantity.words)
+    for needs, words in missing.items():
+        print(f"missing: {'; '.join(words)}: {needs}.")
 
 
 def _payload(found: "Acceptance", name: str, report: str | None) -> dict[str, Any]:

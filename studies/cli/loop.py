@@ -134,15 +134,15 @@ def loop(
     )
     print_table(
         "Bias by source, settled",
-        ["source", "deg/h", "± deg/h"],
+        ["source", "°/h", "± °/h"],
         [[s.name, f"{s.bias:.4g}", f"{s.sd:.2g}"] for s in study.sources],
         "± one standard deviation, from the card's uncertain values; all: with the axes and the split that they share.",
     )
     print_table(
         "Noise of the rate by source",
-        ["source", "deg/h over 1 s", "deg/√h"],
+        ["source", "°/h over 1 s", "°/√h"],
         [[NOISE_NAMES[name], f"{one:.3g}", f"{walk:.3g}"] for name, (one, walk) in study.noise.items()],
-        "deg/√h from a mean over 100 s.",
+        "°/√h from a mean over 100 s.",
     )
 
 

@@ -18,9 +18,9 @@ def check_units(records: Sequence[Record], tables: Sequence[dict[str, FloatArray
     """Raise InputError when a column can hardly be in the unit that its name says."""
     for record, table in zip(records, tables, strict=True):
         where = record.path or "record"
-        if "frequency_Hz" in table and not 100.0 < (value := float(np.nanmedian(table["frequency_Hz"]))) < 1e6:
+        if "frequency_Hz" in table and not 100.0 < (value := float(np.nanmedian(table["frequency_Hz"]))) < 1e9:
             raise InputError(
-                f"{where}: frequency_Hz is about {value:g}; a resonator vibrates at 100 Hz to 1 MHz. Is it in another unit?"
+                f"{where}: frequency_Hz is about {value:g}; a resonator vibrates at 100 Hz to 1 GHz. Is it in another unit?"
             )
         if "inverse_q" in table and not 0.0 < (value := float(np.nanmedian(table["inverse_q"]))) < 0.1:
             raise InputError(

@@ -39,7 +39,7 @@ def quantities_table(found: "Acceptance") -> Table:
             line.quantity.words,
             f"{line.measured.value:.4g}",
             _interval(line),
-            line.quantity.unit,
+            line.quantity.unit.replace("deg", "°"),
             "" if line.limit is None else f"{'≤' if line.quantity.upper else '≥'} {line.limit:g}",
             line.verdict,
         ]
@@ -48,7 +48,7 @@ def quantities_table(found: "Acceptance") -> Table:
     ]
     note = "A limit is met, or not, where the whole interval is; of an upper limit the size of the value counts."
     if found.band is not None:
-        note += f" Warm-up: into ±{found.band:.3g} deg/h about the final output."
+        note += f" Warm-up: into ±{found.band:.3g} °/h about the final output."
     return Table(
         "Measured, in the order of IEEE Std 1431",
         ["Section", "Quantity", "Value", "95 % interval", "Unit", "Limit", "Verdict"],
@@ -88,8 +88,8 @@ def _drift(found: "Acceptance") -> list[Block]:
     assert found.noise is not None
     noise = found.noise
     text = (
-        f"Angle random walk {noise.N / 60:.3g} deg/√h, bias instability {found.allan.bias_instability[0]:.3g} deg/h (lowest"
-        f" point over 0.664), rate random walk {noise.K * 60:.3g} deg/h/√h. Misfit {noise.misfit:.2g}: about 1 where these"
+        f"Angle random walk {noise.N / 60:.3g} °/√h, bias instability {found.allan.bias_instability[0]:.3g} °/h (lowest"
+        f" point over 0.664), rate random walk {noise.K * 60:.3g} °/h/√h. Misfit {noise.misfit:.2g}: about 1 where these"
         " three kinds of noise explain the curve."
     )
     return [_allan_figure(found), Text(text)]
@@ -107,7 +107,7 @@ def _allan_figure(found: "Acceptance") -> Picture:
         tau = np.geomspace(allan.tau[0], allan.tau[-1], 100)
         axes.loglog(tau, noise.deviation(tau), "--", color=style.VERMILION, label="fit N, B, K")
         axes.set_xlabel("averaging time τ (s)")
-        axes.set_ylabel("Allan deviation (deg/h)")
+        axes.set_ylabel("Allan deviation (°/h)")
         axes.legend()
     return draw(
         made, "Allan deviation of the longest drift record.", "Allan deviation over averaging time, both logarithmic."
