@@ -17,6 +17,7 @@ from studies.acceptance.measure import (
 )
 from studies.acceptance.quantities import ELSEWHERE, QUANTITIES, TestedQuantity
 from studies.acceptance.runs import sort_records
+from studies.acceptance.service import measure_life, measure_storage, measure_transfer
 
 if TYPE_CHECKING:
     from compensation.stability import AllanDeviation, NoiseCoefficients
@@ -102,9 +103,14 @@ def judge(records: "Sequence[Record]", limits: Limits, output: str = "bias_deg_p
         found |= more
     for record in sorted_runs.get("run-down", [])[:1]:
         found |= measure_run_down(record)
+    for record in sorted_runs.get("transfer", [])[:1]:
+        found |= measure_transfer(record)
+    for record in sorted_runs.get("angle-storage", [])[:1]:
+        found |= measure_storage(record)
+    found |= measure_life(sorted_runs.get("drift", []), output)
     lines = tuple(JudgedQuantity(q, found.get(q.key), limits.limits.get(q.key)) for q in QUANTITIES)
     used: dict[str, str] = {record.path: test for test, group in sorted_runs.items() for record in group}
-    for test in ("warm-up", "scale-factor", "run-down"):
+    for test in ("warm-up", "scale-factor", "run-down", "transfer", "angle-storage"):
         for record in sorted_runs.get(test, [])[1:]:
             used[record.path] = f"{test}, not used: the first record of this test counts"
     used |= {record.path: "no test: it shows none of them" for record in left}

@@ -23,6 +23,9 @@ THERMAL = "a record at rest over temperatures that span 5 °C or more"
 RATES = "a record with rate_deg_per_s of three rates or more, both signs, and measured_rate_deg_per_s"
 REST = "a record of an hour or more at rest and at one temperature (within 5 °C)"
 RUN_DOWN = "a record with vibration_amplitude_V while the drive is off"
+SHAKEN = "a record of a swept or shaken rate, rate_deg_per_s and measured_rate_deg_per_s at even rows"
+STORED = "a record with pattern_angle_deg of a whole-angle gyro and a gap where its power was off, marked '# test: angle-storage'"
+LIFE = "three records or more at rest with '# start', over the stated life"
 SEAL = "two records or more with inverse_q and '# start', a day or more apart"
 
 QUANTITIES = (
@@ -56,16 +59,19 @@ QUANTITIES = (
         "bias_instability_deg_per_h", "12.11", "bias instability, lowest Allan deviation over 0.664", "deg/h", REST
     ),
     TestedQuantity("rate_random_walk_deg_per_h_per_rt_h", "12.11", "rate random walk", "deg/h/√h", REST),
+    TestedQuantity("angle_storage_error_deg", "12.13", "angle after an interruption less that foretold", "deg", STORED),
     TestedQuantity("run_down_time_s", "12.14", "run-down time, to 1/e of the amplitude", "s", RUN_DOWN, upper=False),
     TestedQuantity(
         "quality_factor", "12.14", "Q, from the run-down", "", RUN_DOWN + ", and its frequency_Hz", upper=False
     ),
+    TestedQuantity("bandwidth_Hz", "12.15", "bandwidth, where the gain has fallen by 3 dB", "Hz", SHAKEN, upper=False),
+    TestedQuantity("delay_ms", "12.15", "delay of the output within half of the band", "ms", SHAKEN),
+    TestedQuantity("bias_trend_deg_per_h_per_year", "12.18", "bias over the time of the records", "deg/h/year", LIFE),
 )
 BY_KEY = {quantity.key: quantity for quantity in QUANTITIES}
 
 ELSEWHERE = (
     # section, test, what would be needed
-    ("12.13", "angle storage", "the angle before and after a power interruption, of a whole-angle gyro"),
-    ("12.15", "transfer function", "records of sinusoidal rates over the band, with the phase of the table"),
-    ("12.18", "life", "records over the stated life"),
+    ("12.3", "leak rate", "a leak detector with its tracer gas: records show the growth of 1/Q alone"),
+    ("12.18", "life", "records until its end: a trend over shorter runs is an indication"),
 )

@@ -11,10 +11,12 @@ from studies.rest import LARGEST_REST, TEMPERATURES
 if TYPE_CHECKING:
     from studies.record import Record
 
-Test = Literal["warm-up", "temperature", "scale-factor", "drift", "run-down"]
+Test = Literal["warm-up", "temperature", "scale-factor", "drift", "run-down", "transfer", "angle-storage"]
 SPAN = 5.0
 """Span of temperature (K) from which a run at rest is one over temperature."""
 HOUR = 3600.0
+MOVING = 0.5
+"""Part of the rows from which on an applied rate that changes is swept or shaken, not held at levels."""
 
 
 def test_of(record: "Record", output: str) -> Test | None:
@@ -35,7 +37,10 @@ def test_of(record: "Record", output: str) -> Test | None:
         return "run-down"
     turning = "rate_deg_per_s" in record and bool(np.any(np.abs(record["rate_deg_per_s"]) > LARGEST_REST))
     if turning:
-        return "scale-factor" if "measured_rate_deg_per_s" in record else None
+        if "measured_rate_deg_per_s" not in record:
+            return None
+        moving = np.diff(record["rate_deg_per_s"]) != 0
+        return "transfer" if np.mean(moving) > MOVING else "scale-factor"
     column = temperature_column(record)
     if column is not None and np.nanmax(record[column]) - np.nanmin(record[column]) >= SPAN:
         return "temperature"

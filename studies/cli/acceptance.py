@@ -22,11 +22,11 @@ def acceptance(
     output: str = "bias_deg_per_h",
     report: str | None = None,
 ) -> Answer:
-    """Judge a gyro by its records: warm-up, temperature, scale factor, drift with Allan deviation, run-down.
+    """Judge a gyro by its records: warm-up, temperature, scale factor, drift with Allan deviation, run-down, transfer function.
 
-    Each record serves the test that it shows: at rest over temperature, at rest for an hour, several applied rates, a free
-    decay of vibration_amplitude_V. A line '# test: warm-up' (or temperature, scale-factor, drift, run-down) above its header
-    decides otherwise; a warm-up is taken only from a record so marked. Every value has a 95 % interval; a limit is met, or
+    Each record serves the test that it shows: at rest over temperature, at rest for an hour, several applied rates, a swept rate,
+    a free decay of vibration_amplitude_V. A line '# test: warm-up' (or temperature, scale-factor, drift, run-down, transfer,
+    angle-storage) above its header decides otherwise; warm-up and angle storage are taken only from records so marked. Every value has a 95 % interval; a limit is met, or
     not, where the whole interval is.
 
     Parameters

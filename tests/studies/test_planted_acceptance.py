@@ -84,12 +84,16 @@ def test_planted_quantities_are_found(folder, capsys):
     lines = {line["key"]: line for line in found["quantities"]}
     assert [line["section"] for line in found["quantities"]] == [
         "12.3", "12.5–12.6", "12.8", "12.8", "12.8", "12.8", "12.9", "12.9", "12.9",
-        "12.11", "12.11", "12.11", "12.11", "12.11", "12.14", "12.14",
+        "12.11", "12.11", "12.11", "12.11", "12.11", "12.13", "12.14", "12.14", "12.15", "12.15", "12.18",
     ]  # fmt: skip
     for key, value in TRUTH.items():
         width = lines[key]["high"] - lines[key]["low"]
         assert lines[key]["low"] - width / 2 <= value <= lines[key]["high"] + width / 2, key
         assert lines[key]["value"] == pytest.approx(value, rel=0.04), key
+    # 0.1 deg/h a month
+    trend = lines["bias_trend_deg_per_h_per_year"]
+    assert trend["low"] < 1.2 < trend["high"]
+    assert trend["value"] == pytest.approx(1.2, rel=0.1)
     # 1/Q grew by 2 % a year
     assert lines["inverse_q_trend_per_year"]["value"] == pytest.approx(2e-9, rel=0.2)
     assert lines["bias_deg_per_h"]["verdict"] == lines["run_down_time_s"]["verdict"] == "pass"
@@ -97,7 +101,7 @@ def test_planted_quantities_are_found(folder, capsys):
     assert lines["angle_random_walk_deg_per_rt_h"]["verdict"] == "undecided"
     assert lines["scale_factor_error_ppm"]["verdict"] == "no limit"
     assert found["verdict"] == "fail"
-    assert {one["section"] for one in found["elsewhere"]} == {"12.13", "12.15", "12.18"}
+    assert {one["section"] for one in found["elsewhere"]} == {"12.3", "12.18"}
     text = page.read_text()
     assert "Acceptance of free-dome: fail" in text
     assert "12.15" in text
@@ -141,3 +145,38 @@ def test_a_record_that_shows_no_test_is_named(folder, tmp_path, capsys):
     assert status == 0
     assert "serves no test" in said
     assert found["verdict"] == "incomplete"
+
+
+def test_bandwidth_and_delay_of_a_shaken_gyro(folder, capsys):
+    """A lag of first order falls by 3 dB at its corner; its delay is the slope of its phase below half of that."""
+    g, rate, corner = np.random.default_rng(3), 200.0, 10.0
+    from scipy import signal
+
+    applied = signal.lfilter(*signal.butter(2, 40.0, fs=rate), g.normal(0, 30, 20000))
+    lag = np.exp(-2 * np.pi * corner / rate)
+    measured = signal.lfilter([1 - lag], [1, -lag], applied) + g.normal(0, 0.05, applied.size)
+    columns = {"time_s": np.arange(applied.size) / rate, "rate_deg_per_s": applied, "measured_rate_deg_per_s": measured}
+    write_record(Record(columns, instrument="free-dome"), folder / "shaken.csv")
+    _, found, _ = judged(capsys, folder, ("shaken",))
+    lines = {line["key"]: line for line in found["quantities"]}
+    assert found["records"] == {str(folder / "shaken.csv"): "transfer"}
+    assert lines["bandwidth_Hz"]["value"] == pytest.approx(corner, rel=0.03)
+    assert lines["bandwidth_Hz"]["low"] < lines["bandwidth_Hz"]["value"] < lines["bandwidth_Hz"]["high"]
+    f, H = signal.freqz([1 - lag], [1, -lag], np.linspace(0.05, 5.0, 100), fs=rate)
+    assert lines["delay_ms"]["value"] == pytest.approx(-1e3 * np.polyfit(2 * np.pi * f, np.angle(H), 1)[0], rel=0.02)
+
+
+def test_the_angle_kept_without_power(folder, capsys):
+    g, time = np.random.default_rng(0), np.concatenate([np.arange(300.0), np.arange(900.0, 1200.0)])
+    angle = 3.0 + 1e-3 * time + g.normal(0, 1e-3, time.size) + np.where(time > 600, 0.25, 0.0)
+    columns = {"time_s": time, "pattern_angle_deg": angle}
+    write_record(Record(columns, instrument="free-dome", comments=("test: angle-storage",)), folder / "stored.csv")
+    _, found, _ = judged(capsys, folder, ("stored",))
+    (line,) = (one for one in found["quantities"] if one["key"] == "angle_storage_error_deg")
+    assert line["low"] < 0.25 < line["high"]
+    assert line["high"] - line["low"] < 0.01
+    whole = {"time_s": np.arange(600.0), "pattern_angle_deg": np.zeros(600)}
+    write_record(Record(whole, instrument="free-dome", comments=("test: angle-storage",)), folder / "whole.csv")
+    status, _, said = judged(capsys, folder, ("whole",))
+    assert status == 2
+    assert "needs a gap" in said
