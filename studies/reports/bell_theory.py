@@ -19,6 +19,40 @@ EQUATIONS = (
     ("(30), (31)", "Ω = K A_q; scale, null and noise", "hold where the loop rests: K = 1/(4 k m₀ ω P)"),
 )  # fmt: skip
 
+# (20): the printed coefficient as far as its copy shows it, ours, and what stands between them. In the copy the fraction bars, most minus
+# signs and the marks of derivatives are lost: a blank between two terms is a sign that is lost, ′ a derivative where the text says so.
+COEFFICIENTS = (
+    (
+        "m₀",
+        "ρ h π W(φ)",
+        "π ρ ∫ h (U² + V² + W²) r ds",
+        "first power of one component, no integral: kg/m² times a displacement",
+    ),
+    (
+        "b",
+        "ρ h π V(φ) (cos φ + sin φ)",
+        "2 π ρ ∫ h V (−U cos φ − W sin φ) r ds",
+        "first power; of the products V U and V W that Coriolis' force makes, V alone is left",
+    ),
+    (
+        "c₀",
+        "π { G (W′ sin φ + 2V) / ((ρ₂ + υ)² sin φ) + 1/((ρ₂ + υ) sin φ) [ 2G (W′ sin φ + 2V)/(ρ₂ + υ) + 2G (2V sin φ 4W)/((ρ₂ + υ) sin φ)"
+        " + 6G (½ W cos φ/((ρ₂ + υ) sin φ) + ½ W/(ρ₁ + υ)) cos φ + (2V/(ρ₁ + υ) + (2 sin φ V 4W)/((ρ₂ + υ) sin φ)) λ ]"
+        " + 1/(ρ₁ + υ) [ G (2V′ W sin φ 4U + …) … ], G (W cos φ/((ρ₂ + υ) sin φ) + W/(ρ₁ + υ)) (dρ₁/dφ)/(ρ₁ + υ)² }",
+        "π ∫ { E h/(1−ν²) [ε_s² + ε_θ² + 2ν ε_s ε_θ + (1−ν)/2 γ²] + E h³/(12(1−ν²)) [κ_s² + κ_θ² + 2ν κ_s κ_θ + …] } r ds",
+        "stresses of one point of the wall (Pa/m per metre of amplitude), neither multiplied with the pattern nor integrated over the"
+        " wall; no power of h, so that no bending is in it",
+    ),
+    (
+        "c₁",
+        "π [ 10 G U cos φ/((ρ₂ + υ) sin φ) + 2λ (U/(ρ₁ + υ) U cos φ/((ρ₂ + υ) sin φ))/((ρ₂ + υ) sin φ)"
+        " + 2G U (dρ₁/dφ)/((ρ₂ + υ)(ρ₁ + υ)² sin φ) + 2G (W cos φ/((ρ₂ + υ) sin φ) W/(ρ₁ + υ)) + … ]",
+        "zero",
+        "between two patterns a quarter of a wave apart every integral around vanishes on a body of revolution; the terms come from the"
+        " parity exchanged in (16)",
+    ),
+)  # fmt: skip
+
 
 def theory_chapters(theory: BellTheory, reading: LoopReading) -> list[Chapter]:
     """Return the two chapters."""
@@ -60,6 +94,19 @@ def theory_chapters(theory: BellTheory, reading: LoopReading) -> list[Chapter]:
                     " edge. The command hrg derive --bell shows every equation derived."
                 ),
                 patterns,
+                Table(
+                    "The coefficients of (20), printed and ours",
+                    [
+                        "",
+                        "Printed, as far as the copy shows it",
+                        "Ours (U, V, W as (19) reads)",
+                        "What stands between them",
+                    ],
+                    [list(row) for row in COEFFICIENTS],
+                    "U along the meridian, V around, W along the normal, the parity of (16) mended; ε, κ, γ the strains (5), (6) of the pattern."
+                    " In the copy fraction bars, most minus signs and marks of derivatives are lost: two terms with a blank between them lack"
+                    " their sign; … stands for what cannot be put together.",
+                ),
                 Table(
                     "Equation by equation", ["BVG", "What it says", "What we find"], [list(row) for row in EQUATIONS]
                 ),

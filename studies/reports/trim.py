@@ -23,12 +23,12 @@ def write_trim_page(path: str, plan: "TrimPlan", payload: dict[str, Any]) -> Non
 def _chapters(plan: "TrimPlan", payload: dict[str, Any]) -> list[Chapter]:
     before, last = payload["before"][0], payload["rounds"][-1]["after"][0]
     facts = Facts([
-        (f"split of n = {before['harmonic']} now", f"{1e3 * before['split_Hz']:.3g} mHz", f"slow axis at {before['slow_axis_deg']:.1f}°"),
-        ("round 1 takes", f"{payload['rounds'][0]['mass_ug']:.3g} µg", f"{len(payload['rounds'][0]['cuts'])} cuts, {100 * payload['rounds'][0]['share']:.0f} % of the split"),
-        ("expected at the end", f"below {1e3 * last['most_Hz']:.2g} mHz", f"goal {1e3 * plan.goal:.2g} mHz, {len(plan.rounds)} rounds"),
+        (f"Split of n = {before['harmonic']} now", f"{1e3 * before['split_Hz']:.3g} mHz", f"slow axis at {before['slow_axis_deg']:.1f}°"),
+        ("Round 1 takes", f"{payload['rounds'][0]['mass_ug']:.3g} µg", f"{len(payload['rounds'][0]['cuts'])} cuts, {100 * payload['rounds'][0]['share']:.0f} % of the split"),
+        ("Expected at the end", f"below {1e3 * last['most_Hz']:.2g} mHz", f"goal {1e3 * plan.goal:.2g} mHz, {len(plan.rounds)} rounds"),
     ])  # fmt: skip
     measure = [Text(sentence) for sentence in payload["measure"]]
-    kinds = ", ".join(f"{kind} {value:+.2f}" for kind, value in payload["other_cuts"].items())
+    kinds = ", ".join(f"{kind} {value:+.2f}" for kind, value in payload["other_cuts"].items()).replace("-", "−")
     warning = Text(
         f"Planned as '{payload['cut']}'. The same mass at the rim moves the split, relative to this kind of cut, by: {kinds}. A negative "
         "number moves it the other way. If round 1 shows another effect than predicted, plan the next with --gain.",
@@ -50,7 +50,7 @@ def _cuts(payload: dict[str, Any], number: int) -> Table:
     title = f"Round {number}: cut this" if number == 1 else f"Round {number}, predicted: plan again before cutting"
     return Table(
         title,
-        ["cut", "azimuth (°)", "height z (mm)", "mass (µg)", "depth (µm)", "done"],
+        ["Cut", "Azimuth (°)", "Height z (mm)", "Mass (µg)", "Depth (µm)", "Done"],
         rows,
         f"{one['mass_ug']:.4g} µg together.",
     )
@@ -66,7 +66,7 @@ def _states(payload: dict[str, Any]) -> Table:
         for label, states in stages
         for s in states
     ]  # fmt: skip
-    return Table("Splits", ["state", "n", "split (mHz)", "error (mHz)", "95 % below (mHz)", "slow axis (°)"], rows)
+    return Table("Splits", ["State", "n", "Split (mHz)", "Error (mHz)", "95 % below (mHz)", "Slow axis (°)"], rows)
 
 
 def _polar(plan: "TrimPlan") -> Picture:
@@ -94,7 +94,10 @@ def _polar(plan: "TrimPlan") -> Picture:
                     ax.bar(
                         cut.azimuth, 0.25 * cut.mass / most + 0.03, width=0.06, bottom=1.0, color="black", alpha=0.75
                     )
-                    ax.annotate(f"{1e9 * cut.mass:.3g} µg", (cut.azimuth, 1.45), ha="center", va="center", fontsize=8)
+                    ax.annotate(
+                        f"{1e9 * cut.mass:.3g} µg", (cut.azimuth, 0.62), ha="center", va="center", fontsize=8,
+                        bbox={"facecolor": "white", "edgecolor": "none", "pad": 1.0},
+                    )  # fmt: skip
             ax.set_ylim(0, 1.55)
             ax.set_yticks([])
             ax.set_title(title, fontsize=10)
