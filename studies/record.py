@@ -4,7 +4,7 @@ Columns keep the names of the file, which carry their units; missing values are 
 """
 
 import datetime
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -104,6 +104,23 @@ class Record:
     def with_columns(self, more: "Mapping[str, NDArray[np.float64]]") -> "Record":
         """Return a new record with further (or replaced) columns."""
         return replace(self, columns={**self.columns, **more})
+
+
+def place_in_time(records: Sequence[Record]) -> tuple[list[float], bool]:
+    """Return when each run starts (s) since the first of them, and whether the records say so; else one follows the other."""
+    starts = [record.start for record in records]
+    if all(start is not None for start in starts):
+        try:
+            moments = [start.timestamp() for start in starts if start is not None]
+        except (OverflowError, OSError):
+            moments = []
+        if len(set(moments)) == len(records):
+            return [moment - min(moments) for moment in moments], True
+    offsets, now = [], 0.0
+    for record in records:
+        offsets.append(now)
+        now += float(record["time_s"][-1] - record["time_s"][0])
+    return offsets, False
 
 
 def read_record(path: str | Path) -> Record:

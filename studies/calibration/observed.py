@@ -1,7 +1,7 @@
 """What records say, made ready for a fit: rows that are predicted, blocks that are compared, spikes left out."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,7 +9,7 @@ from scipy.constants import zero_Celsius
 
 from compensation.spikes import find_spikes
 from studies.errors import InputError
-from studies.record import Record
+from studies.record import Record, place_in_time
 from studies.simulation.drive import COLUMN, Drive, drive_by_record
 
 Array = NDArray[np.float64]
@@ -103,17 +103,18 @@ def observe(records: Sequence[Record]) -> tuple[ObservedRun, ...]:
     InputError
         A run without a drive or without a response, or too short.
     """
-    return tuple(_observe(record) for record in records)
+    starts, _ = place_in_time(records)
+    return tuple(_observe(record, start) for record, start in zip(records, starts, strict=True))
 
 
-def _observe(record: Record) -> ObservedRun:
+def _observe(record: Record, start: float) -> ObservedRun:
     time, columns = _fine_rows(record)
     if len(time) < LEAST_ROWS:
         raise InputError(f"{record.path}: {len(time)} rows say nothing; a run needs at least {LEAST_ROWS}.")
-    inner = drive_by_record(record, time=time)
+    inner = replace(drive_by_record(record, time=time), start=start)
     outer = None
     if inner.boundary == "housing" and COLUMN["chamber"] in record and np.isfinite(record[COLUMN["chamber"]]).sum() > 1:
-        outer = drive_by_record(record, "chamber", time=time)
+        outer = replace(drive_by_record(record, "chamber", time=time), start=start)
     wanted = [name for name in RESPONSES if name in columns] + ([HOUSING] if outer is not None else [])
     responses = {name: blocks for name in wanted if (blocks := _block(time, columns[name])) is not None}
     if not any(name in responses for name in RESPONSES):

@@ -4,7 +4,7 @@ from studies.cli.arguments import Seed
 from studies.cli.output import Answer, answers
 
 
-@answers("hrg.diagnosis/1, with --plan hrg.plan/1")
+@answers("hrg.diagnosis/1, with --plan hrg.plan/1, with --device hrg.fleet/1")
 def diagnose(
     *runs: str,
     card: str | None = None,
@@ -14,6 +14,8 @@ def diagnose(
     chamber: str | None = None,
     draws: int = 100,
     seed: Seed = 0,
+    device: list[str] | None = None,
+    fleet: str | None = None,
 ) -> Answer:
     """Name the physical effect that a campaign shows and the simulation lacks, or say that it cannot be told.
 
@@ -38,6 +40,11 @@ def diagnose(
         With --plan, four times the cases of each effect at each SNR (1, 0.3, 0.1).
     seed : int
         Of the draws.
+    device : list[str]
+        A device of a fleet and its records, such as A=a1.csv,a2.csv; once for each device of one design: what they share,
+        and which of them is not like the others.
+    fleet : str
+        The same as a file (TOML): a table [devices] with lines such as A = ["a1.csv", "a2.csv"], beside the records.
     """
     from scipy.constants import zero_Celsius
 
@@ -66,6 +73,26 @@ def diagnose(
         block = plan_table(outlook)
         print_table(block.caption, block.columns, block.rows, block.note)
         return 0
+    if device or fleet is not None:
+        from studies.diagnosis.fleet import diagnose_fleet, read_fleet
+        from studies.instrument.card import load_card
+        from studies.reports import fleet as fleet_pages
+
+        if runs or save is not None:
+            raise InputError("a fleet has its records behind --device and saves no card; leave the rest out.")
+        told = Told("fleet")
+        design = None if card is None else load_card(card)
+        whole = diagnose_fleet(read_fleet(device or [], fleet), design, progress=told)
+        told.done()
+        if report is not None:
+            write_text(report, fleet_pages.fleet_page(whole))
+            say(f"report: {report}")
+        yield whole.as_dict()
+        print(fleet_pages.headline(whole))
+        for block in (fleet_pages.share_table(whole), fleet_pages.device_table(whole), fleet_pages.value_table(whole)):
+            if block.rows:
+                print_table(block.caption, block.columns, block.rows, block.note)
+        return
     if not runs:
         raise InputError("give the records of one gyro: hrg diagnose RUN.csv [RUN.csv ...].")
     if save is not None and card is None:
@@ -101,14 +128,16 @@ def diagnose(
 
     instrument = None if card is None else load_card(card)
     reference = None if instrument is None else instrument.reference_temperature - zero_Celsius
-    campaign = load_campaign([read_record(path) for path in runs], reference)
+    records = [read_record(path) for path in runs]
+    campaign = load_campaign(records, reference)
     if instrument is not None:
         instrument.material.check(np.concatenate([np.empty(0), *(run.states.housing for run in campaign.runs)]))
     told = Told("diagnosis")
     diagnosis = investigate(campaign, progress=told, chamber=limits, card=instrument)
+    extended = None if save is None or instrument is None else extend(instrument, diagnosis, records, told)
     told.done()
-    if save is not None and instrument is not None:
-        save_card(extend(instrument, diagnosis), save)
+    if save is not None and extended is not None:
+        save_card(extended, save)
         say(f"extended model: {save}")
     if report is not None:
         write_text(report, page.diagnosis_page(diagnosis))

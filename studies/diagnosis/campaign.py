@@ -11,7 +11,7 @@ from studies.diagnosis.outliers import find_outliers
 from studies.diagnosis.response import RESPONSES
 from studies.effects.states import FloatArray, States, average
 from studies.errors import InputError
-from studies.record import Record
+from studies.record import Record, place_in_time
 
 TEMPERATURES = ("housing_temperature_degC", "chamber_temperature_degC", "resonator_temperature_degC")
 COMMANDS = ("drive_amplitude_V", "electrode_bias_V", "quadrature_V", "pattern_angle_deg")
@@ -99,7 +99,7 @@ def load_campaign(records: Sequence[Record], reference_degC: float | None = None
     if outliers:
         notes.append(f"{outliers} outlying values were left out.")
     responses, skipped = _usable_responses(records, tables)
-    offsets, timed = _place_in_time(records)
+    offsets, timed = place_in_time(records)
     if not timed and len(records) > 1:
         notes.append("the records do not all say when they start: taken one after the other, gaps unknown.")
     spans = [float(table["time_s"][-1] - table["time_s"][0]) for table in tables]
@@ -245,22 +245,6 @@ def _usable_responses(
     if not usable and not skipped:
         raise InputError(f"{records[0].path or 'record'}: a diagnosis needs frequency_Hz, bias_deg_per_h or inverse_q.")
     return tuple(usable), skipped
-
-
-def _place_in_time(records: Sequence[Record]) -> tuple[list[float], bool]:
-    starts = [record.start for record in records]
-    if all(start is not None for start in starts):
-        try:
-            moments = [start.timestamp() for start in starts if start is not None]
-        except (OverflowError, OSError):
-            moments = []
-        if len(set(moments)) == len(records):
-            return [moment - min(moments) for moment in moments], True
-    offsets, now = [], 0.0
-    for record in records:
-        offsets.append(now)
-        now += float(record["time_s"][-1] - record["time_s"][0])
-    return offsets, False
 
 
 def _stretches(table: dict[str, FloatArray]) -> list[tuple[int, int]]:

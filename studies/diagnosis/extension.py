@@ -1,126 +1,141 @@
-"""The extended model: the card calibrated, with the named effects as `[[effect]]` tables.
+"""The extended model: the card with the named effects as `[[effect]]` tables, calibrated against the records by the one simulation.
 
-The frequency's values are the calibrated ones; bias and loss become the tables `[bias]` and `[loss]`. Drives that a simulation
-does not have stay at the campaign's mean.
+The diagnosis says which effects there are and of what shape; what all values are together, those of bias, loss and of the way
+from the chamber to the housing among them, is for `studies.calibration`, so that what is saved predicts as it was fitted.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from studies.diagnosis.baseline import Followed
+from studies.diagnosis.campaign import Campaign, Run
 from studies.diagnosis.investigate import Diagnosis
-from studies.diagnosis.model import Fit
-from studies.diagnosis.simulated import RATE_TERMS, Simulated
+from studies.diagnosis.model import Fit, Term, fit, used
+from studies.diagnosis.search import refine
+from studies.effects import Effect, find_effect
 from studies.effects.states import FloatArray
 from studies.errors import InputError
-from studies.law import law_of
+from studies.record import Record
 
 if TYPE_CHECKING:
     from studies.instrument.card import Instrument
 
-Law = Callable[[FloatArray], FloatArray]
-"""A card's frequency over temperature, K; its scale does not matter."""
 
+def extend(
+    instrument: "Instrument",
+    diagnosis: Diagnosis,
+    records: Sequence[Record],
+    progress: Callable[[str], None] = lambda words: None,
+) -> "Instrument":
+    """Return a new instrument that predicts what was diagnosed.
 
-def relative_law(instrument: "Instrument", measured: FloatArray) -> Law:
-    """Return the card's frequency over temperature (K), continued beyond its range for the trial states of a fit.
-
-    Raises
-    ------
-    ShellError
-        If a measured temperature, K, lies outside the law's range.
-    """
-    material = instrument.material
-    material.check(measured)
-    law = law_of(instrument, material.lowest, material.highest)
-
-    def frequency(temperature: FloatArray) -> FloatArray:
-        return law.frequency(temperature, extrapolate=True)
-
-    return frequency
-
-
-def extend(instrument: "Instrument", diagnosis: Diagnosis) -> "Instrument":
-    """Return a new instrument that predicts what the diagnosis measured.
+    Parameters
+    ----------
+    instrument : Instrument
+        The card that the records were held against.
+    diagnosis : Diagnosis
+    records : sequence of Record
+        Those that were diagnosed.
+    progress : callable, optional
+        Is told what comes next.
 
     Raises
     ------
     InputError
         If the diagnosis has no fitted response.
     """
+    from studies.calibration.calibrate import calibrate
+
     if not diagnosis.inquiries:
         raise InputError("nothing could be fitted, so there is no extended model to save.")
-    effects: list[dict[str, Any]] = []
-    extended = instrument
-    clock = next((i.final for i in diagnosis.inquiries.values() if i.problem.response.thermometer), None)
-    if clock is not None:
-        calibrated = clock.moved()
-        if isinstance(calibrated, Simulated):
-            extended = calibrated.instrument
+    progress("calibrating what is saved")
+    entries = [own for own in instrument.content.get("effect", []) if _is_in_the_baseline(own)]
     for column, inquiry in diagnosis.inquiries.items():
-        model = inquiry.final
-        if column == "bias_deg_per_h":
-            stated = instrument.content.get("bias", {})
-            by_rate = {key: stated[key] for key in RATE_TERMS if key in stated} if clock is not None else {}
-            extended = extended.with_table("bias", _bias_table(model, clock) | by_rate)
-        if column == "inverse_q":
-            extended = extended.with_table("loss", _loss_table(model))
-        effects += [_entry(model, k) for k, term in enumerate(model.terms) if not term.effect.once]
-    return extended.with_table("effect", effects)
+        model = prune(inquiry.final)
+        entries += [entry_of(model, k, column) for k, term in enumerate(model.terms) if not term.effect.once]
+    extended = instrument.with_table("effect", entries)
+    return calibrate(extended, without_events(diagnosis, records), profile=False, progress=progress).instrument
 
 
-def _entry(model: Fit, index: int) -> dict[str, Any]:
-    term, column = model.terms[index], model.problem.response.column
+def _is_in_the_baseline(entry: dict[str, Any]) -> bool:
+    """Whether the card's own effect is part of what the diagnosis started from: that of the frequency."""
+    effect = find_effect(entry["name"])
+    return effect.thermal or entry.get("response", effect.responses[0]) == "frequency_Hz"
+
+
+def prune(model: Fit) -> Fit:
+    """Return the model with families cut down to the members that pay: the others would add their uncertainty to predictions."""
+    for index in range(len(model.terms)):
+        term = model.terms[index]
+        places = used(term.effect)
+        known = model.coefficients_of(index)[places] / np.sqrt(
+            np.maximum(np.diag(model.solved.covariance)[model.columns_of(index)], 1e-300)
+        )
+        fewer = model
+        for place in places[np.argsort(np.abs(known))]:
+            effect = fewer.terms[index].effect
+            if used(effect).size == 1 or (effect.positive and place == 0):
+                continue
+            terms = list(fewer.terms)
+            terms[index] = Term(_without_member(effect, int(place)), term.shape)
+            tried = fit(fewer.problem, fewer.baseline, terms, 1, fewer.solved.scales)
+            if tried.log_evidence >= fewer.log_evidence:
+                fewer = tried
+        if fewer is not model:
+            model = refine(fewer, index)
+    return model
+
+
+def _without_member(effect: Effect, place: int) -> Effect:
+    """Return the effect with one column less to fit."""
+    coefficients, begin = [], 0
+    for own in effect.coefficients:
+        spread = list(own.spread)
+        if begin <= place < begin + len(spread):
+            spread[place - begin] = 0.0
+        begin += len(spread)
+        coefficients.append(replace(own, spread=tuple(spread)))
+    return replace(effect, coefficients=tuple(coefficients))
+
+
+def entry_of(model: Fit, index: int, column: str) -> dict[str, Any]:
+    """Return the `[[effect]]` table of a fitted term, without the coefficients that are 0."""
+    term = model.terms[index]
     values = model.coefficients_of(index)
     entry: dict[str, Any] = {"name": term.name, "response": column}
     entry |= {p.name: float(value) for p, value in zip(term.effect.shape, term.shape, strict=True)}
     if term.effect.sees_heat:  # the fit knew the temperature with it; a simulation has to solve for it
         entry[term.effect.shape[0].name] = float(np.clip(values[0], 0.0, 1.0))
-    return entry | term.effect.numbers(values, column)
+    return entry | {key: value for key, value in term.effect.numbers(values, column).items() if np.any(value)}
 
 
-def _beside_temperature(model: Fit) -> float:
-    """What effects of drives add at the campaign's mean drive, and what events leave at its end."""
-    added = 0.0
-    for k, term in enumerate(model.terms):
-        if term.effect.thermal:
-            continue
-        places = model.columns_of(k)
-        change = model.linear.columns[:, places] @ model.solved.coefficients[places]
-        if term.effect.needs:
-            added += float(change.mean())
-        elif term.effect.once:
-            added += float(change[-1])
-    return added
+def without_events(diagnosis: Diagnosis, records: Sequence[Record]) -> list[Record]:
+    """Return the records as they would be had what happens once happened before them all: a jump that stays is there from the start."""
+    out = []
+    for number, record in enumerate(records, 1):
+        runs = [run for run in diagnosis.campaign.runs if run.label == (record.path or f"run {number}")]
+        columns: dict[str, FloatArray] = {}
+        for column, inquiry in diagnosis.inquiries.items():
+            for k, term in enumerate(inquiry.final.terms):
+                if term.effect.once and column in record:
+                    values = columns.setdefault(column, np.array(record[column]))
+                    _take_away(inquiry.final, k, diagnosis.campaign, runs, record, values)
+        out.append(record.with_columns(columns) if columns else record)
+    return out
 
 
-def _bias_table(model: Fit, clock: Fit | None) -> dict[str, float]:
-    values = model.values()
-    offsets = [value for name, value in values.items() if name.startswith("offset@")]
-    table = {"damping_anisotropy": 0.0, "offset_deg_per_h": float(np.mean(offsets)) + _beside_temperature(model)}
-    if clock is not None and isinstance(model.baseline, Followed):
-        slope = 10.0 * hertz_per_kelvin(clock)
-        for power, name in enumerate(("slope", "quadratic", "cubic"), 1):
-            unit = "Hz" if power == 1 else f"Hz{power}"
-            table[f"k{power}_deg_per_h_per_{unit}"] = float(values[name] / slope**power)
-    return table
-
-
-def hertz_per_kelvin(clock: Fit) -> float:
-    """Slope of the frequency at the reference."""
-    if isinstance(clock.baseline, Simulated):
-        law, reference = clock.baseline.law, clock.baseline.card.reference_temperature
-        return float(law.frequency(reference) * law.slope(reference))
-    return clock.values()["slope"] / 10.0
-
-
-def _loss_table(model: Fit) -> dict[str, float]:
-    values = model.values()
-    q0 = values["level"] + _beside_temperature(model)
-    return {
-        "inverse_q": q0,
-        "slope_per_K": values["slope"] / 10.0 / q0,
-        "curvature_per_K2": values["quadratic"] / 100.0 / q0,
-    }
+def _take_away(
+    model: Fit, index: int, campaign: Campaign, runs: Sequence[Run], record: Record, values: FloatArray
+) -> None:
+    """Take what an event made of a response from the rows of some runs, and add what it leaves behind."""
+    places = model.columns_of(index)
+    change = model.problem.unstack(model.linear.columns[:, places] @ model.solved.coefficients[places])
+    end = change[-1][np.isfinite(change[-1])]
+    last = float(end[-1]) if end.size and not model.terms[index].effect.thermal else 0.0
+    time = record["time_s"] - record["time_s"][0]
+    for run, own in zip(campaign.runs, change, strict=True):
+        if any(run is one for one in runs):
+            known, inside = np.isfinite(own), (time >= run.row_time[0]) & (time <= run.row_time[-1])
+            values[inside] += last - np.interp(time[inside], run.time[known], own[known])

@@ -15,7 +15,7 @@ from scipy.special import logsumexp
 from scipy.stats import f as f_distribution
 
 from studies.diagnosis.constants import CONSTANTS
-from studies.diagnosis.extension import Law
+from studies.diagnosis.relative_law import Law
 from studies.diagnosis.table_noise import Scale, make_scale
 from studies.diagnosis.verdict import Cause, Interval, ResponseResult, Verdict, weigh
 from studies.effects import Effect, library
@@ -100,7 +100,7 @@ class _Candidate:
 
 def diagnose_table(path: str, card: str | None = None) -> TableDiagnosis:
     """Diagnose a steady-state table, against a card's law or the default law of fused silica."""
-    from studies.diagnosis.extension import relative_law
+    from studies.diagnosis.relative_law import relative_law
     from studies.instrument.card import load_card
     from studies.record import read_frequency_table, reading_resolution
 

@@ -189,7 +189,7 @@ def recover(name, response, times=TIMES, seed=0, moved=()):
     hidden = hide(name, response, times, seed, moved)
     card = hidden.card
     diagnosis = investigate(load_campaign(hidden.records, card.reference_temperature - 273.15), card=card, advise=False)
-    saved = extend(card, diagnosis)
+    saved = extend(card, diagnosis, hidden.records)
     names = tuple(dict.fromkeys(n for cause in diagnosis.verdict.causes for n in cause.names))
     return Recovery(
         name,

@@ -88,11 +88,12 @@ def test_a_hidden_effect_is_named_saved_and_predicts_an_unseen_run(shipped, tmp_
         {"name": "hysteresis", "response": "frequency_Hz", "half_width_K": 4.0, "loop_Hz_per_K": 0.02},
     ]
     true = shipped.with_table("effect", hidden)
-    diagnosis = investigate(load_campaign(simulated(true, tmp_path, capsys), 20.0), card=shipped, advise=False)
+    records = simulated(true, tmp_path, capsys)
+    diagnosis = investigate(load_campaign(records, 20.0), card=shipped, advise=False)
     found = {name for cause in diagnosis.verdict.causes for name in cause.names}
     assert {"rate-bias", "hysteresis"} <= found, diagnosis.verdict.causes
     saved, record = tmp_path / "extended.toml", tmp_path / "unseen.csv"
-    save_card(extend(shipped, diagnosis), saved)
+    save_card(extend(shipped, diagnosis, records), saved)
     save_card(true, tmp_path / "true.toml")
     for card, out in ((tmp_path / "true.toml", record), (saved, tmp_path / "said.csv")):
         words = ["simulate", str(card), UNSEEN, "--out", str(out), "--rate", "0.05", "--noiseless", "--json"]
