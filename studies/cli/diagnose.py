@@ -74,24 +74,9 @@ def diagnose(
         print_table(block.caption, block.columns, block.rows, block.note)
         return 0
     if device or fleet is not None:
-        from studies.diagnosis.fleet import diagnose_fleet, read_fleet
-        from studies.instrument.card import load_card
-        from studies.reports import fleet as fleet_pages
-
         if runs or save is not None:
             raise InputError("a fleet has its records behind --device and saves no card; leave the rest out.")
-        told = Told("fleet")
-        design = None if card is None else load_card(card)
-        whole = diagnose_fleet(read_fleet(device or [], fleet), design, progress=told)
-        told.done()
-        if report is not None:
-            write_text(report, fleet_pages.fleet_page(whole))
-            say(f"report: {report}")
-        yield whole.as_dict()
-        print(fleet_pages.headline(whole))
-        for block in (fleet_pages.share_table(whole), fleet_pages.device_table(whole), fleet_pages.value_table(whole)):
-            if block.rows:
-                print_table(block.caption, block.columns, block.rows, block.note)
+        yield from _fleet(device or [], fleet, card, report)
         return
     if not runs:
         raise InputError("give the records of one gyro: hrg diagnose RUN.csv [RUN.csv ...].")
@@ -151,3 +136,26 @@ def diagnose(
         print(f"Note: {note}")
     if diagnosis.verdict.next_experiment:
         print(f"Next: {diagnosis.verdict.next_experiment}")
+
+
+def _fleet(devices: list[str], manifest: str | None, card: str | None, report: str | None) -> Answer:
+    """Diagnose devices of one design together."""
+    from studies.cli.output import print_table, say
+    from studies.cli.telling import Told
+    from studies.diagnosis.fleet import diagnose_fleet, read_fleet
+    from studies.files.writing import write_text
+    from studies.instrument.card import load_card
+    from studies.reports import fleet as page
+
+    told = Told("fleet")
+    design = None if card is None else load_card(card)
+    whole = diagnose_fleet(read_fleet(devices, manifest), design, progress=told)
+    told.done()
+    if report is not None:
+        write_text(report, page.fleet_page(whole))
+        say(f"report: {report}")
+    yield whole.as_dict()
+    print(page.headline(whole))
+    for block in (page.share_table(whole), page.device_table(whole), page.value_table(whole)):
+        if block.rows:
+            print_table(block.caption, block.columns, block.rows, block.note)

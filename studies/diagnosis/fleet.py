@@ -6,7 +6,7 @@ are gathered over the devices d, above nothing being there, and five kinds of an
     all           log π + Σ_d [S_d(e) − log π + alike_d]            one cause of the design pays its prior π once
     all but k     the same over d ≠ k + what else k has + log ω      the device k differs
     k alone       S_k(e) + log ω
-    each its own  Σ_d [max_e S_d(e) + log ω] over the devices that have any
+    each its own  Σ_d [max_e S_d(e) + log ω] over the devices where it would be named
     none          0
 
 where alike_d says how well the size in d agrees with that in the others. So a set which one device cannot separate is separated by another. A device is odd, too, when a value of it (a size of
@@ -311,7 +311,7 @@ def compare(response: str, scores: Mapping[str, Mapping[str, Standing]]) -> Shar
     prior, different = CONSTANTS["log_prior_effect"], CONSTANTS["log_prior_odd"]
     names = sorted({name for of in scores.values() for name in of})
     best = {device: max((one.score for one in of.values()), default=0.0) for device, of in scores.items()}
-    having = [device for device, score in best.items() if score > 0.0]
+    having = [device for device, score in best.items() if score > CONSTANTS["margin"]]
     answers: dict[Answer, float] = {("none", None, ""): 0.0}
     if len(having) > 1:
         answers["own", None, ""] = sum(best[device] + different for device in having)
