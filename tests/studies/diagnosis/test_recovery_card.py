@@ -1,5 +1,6 @@
 """A card's own simulation as the baseline: nothing, a wrong value, and a hidden effect are told apart; what is saved predicts."""
 
+import numpy as np
 import pytest
 
 from studies.cli import main
