@@ -241,7 +241,7 @@ def test_bad_input_is_said(dome: Mode) -> None:
     thick = LossyFilm(1e-3, 78e9, 0.44, 1e-4)
     with pytest.raises(ShellError, match="thicker than the wall"):
         loss_budget(vibration, film_causes("gold", thick, None, (0, 0), ""), 293.15)
-    with pytest.raises(ShellError, match="5% of the wall"):
+    with pytest.raises(ShellError, match="5 % of the wall"):
         loss_budget(vibration, film_causes("gold", LossyFilm(0.1e-3, 78e9, 0.44, 1e-4), None, (0, 0), ""), 293.15)
     with pytest.raises(ShellError, match="pressure must be 0 or positive"):
         gas_cause(vibration, GASES["air"], -1.0, 0.1)
