@@ -13,6 +13,7 @@ from studies.calibration.observed import HOUSING, SETTLED, ObservedRun, SettledT
 from studies.calibration.priors import Priors, gather_priors
 from studies.calibration.problem import Problem, State, wide_law
 from studies.errors import InputError
+from studies.plausible import check_card_frequency
 from studies.record import Record
 from studies.shown import Shown
 
@@ -182,6 +183,11 @@ def calibrate(
     """
     if not records and not tables:
         raise InputError("nothing is calibrated without a record or a steady-state table.")
+    for record in records:
+        if "frequency_Hz" in record:
+            check_card_frequency(instrument, record["frequency_Hz"], record.path)
+    for table in tables:
+        check_card_frequency(instrument, table.frequency, table.path)
     runs, tables = observe(records), tuple(tables)
     problem = _pose(instrument, runs, tables, exact)
     found = fit(problem, progress=progress)

@@ -39,7 +39,7 @@ def temperature(model: str, run: str, /, *, out: str | None = None, report: str 
         )
     record = read_record(run)
     with naming(run):
-        found = find_temperature(loaded, record["frequency_Hz"])
+        found = find_temperature(loaded, record["frequency_Hz"], run)
     known = np.isfinite(found)
     if not known.any():
         raise InputError(f"{run}: the column 'frequency_Hz' has no value.")

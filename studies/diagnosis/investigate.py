@@ -22,6 +22,7 @@ from studies.diagnosis.response import RESPONSES
 from studies.diagnosis.simulated import Simulated, as_shipped, shifts_of, simulate_baseline, without_rate_terms
 from studies.diagnosis.verdict import Cause, Interval, ResponseResult, Shift, Verdict, overall
 from studies.effects import Effect
+from studies.plausible import check_card_frequency
 from studies.shown import Shown
 
 FAR = 2.0
@@ -80,6 +81,10 @@ def investigate(
         Its own simulation is then the baseline of the frequency.
     """
     tell, measured = progress or (lambda words: None), campaign
+    if card is not None:
+        for run in campaign.runs:
+            if "frequency_Hz" in run.responses:
+                check_card_frequency(card, run.responses["frequency_Hz"], run.label)
     inquiries: dict[str, Inquiry] = {}
     thermometer: Thermometer | None = None
     for column in (c for c in RESPONSES if c in campaign.responses):

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from studies.errors import InputError
 from studies.models.c_source import head, polynomial, self_test
 from studies.models.file import Model, ModelSource, make_part
+from studies.plausible import check_model_frequency
 from studies.record import COMPENSATED, Record
 
 if TYPE_CHECKING:
@@ -52,6 +53,11 @@ def compensate(model: Model, record: Record, *, extrapolate: bool) -> dict[str, 
             " 'hrg temperature MODEL RUN.csv --out FILE' turns it into the resonator's temperature, over which"
             " 'hrg fit bias --over temperature' compensates the other outputs."
         )
+    if "frequency_Hz" in record and not extrapolate:
+        ends = np.sort(evaluate(model, np.linspace(*model.range_of(VARIABLE), 201)))
+        check_model_frequency(
+            record["frequency_Hz"], ends[0], ends[-1], record.path or "record", model.path or "the model"
+        )
     T = record["housing_temperature_degC"]
     model.check_range(VARIABLE, T, extrapolate)
     f0 = model.part("frequency").values[0]
@@ -64,7 +70,7 @@ def evaluate(model: Model, temperature_degC: Array) -> Array:
     return np.asarray(np.polynomial.polynomial.polyval(shift, model.part("frequency").values))
 
 
-def find_temperature(model: Model, frequency: Array) -> Array:
+def find_temperature(model: Model, frequency: Array, path: str = "record") -> Array:
     """Return the temperature (°C) whose frequency this is, HRG paper Table 2; NaN where no frequency is given.
 
     Raises
@@ -81,6 +87,7 @@ def find_temperature(model: Model, frequency: Array) -> Array:
             " the same frequency there and it cannot be inverted; fit a narrower range of temperature or another order."
         )
     ends = np.sort(evaluate(model, np.array([low, high])))
+    check_model_frequency(frequency, float(ends[0]), float(ends[1]), path, model.path or "the model")
     known = np.isfinite(frequency)
     outside = known & ((frequency < ends[0]) | (frequency > ends[1]))
     if np.any(outside):

@@ -1,0 +1,83 @@
+"""Whether a record is of the gyro that a card or a model stands for: a question, with the sentence that confirms it."""
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from studies.errors import InputError
+
+if TYPE_CHECKING:
+    from studies.instrument.card import Instrument
+
+Array = NDArray[np.float64]
+ALIKE = 0.03  # relative: what trimming, temperature and small errors of dimensions make of a frequency
+SPREADS = 6.0  # standard deviations of the card's own frequency
+SAME_GYRO = 0.01  # relative: one gyro over temperature, beyond the range of its model
+
+
+def check_card_frequency(instrument: "Instrument", frequency: Array, path: str) -> None:
+    """Ask whether a record is of the card's gyro where its frequency lies far from the card's.
+
+    Raises
+    ------
+    InputError
+        Further than 3 %, and than 6 standard deviations of what the card's uncertain values allow.
+    """
+    known = frequency[np.isfinite(frequency)]
+    if not known.size:
+        return
+    read, own = float(np.median(known)), _frequency(instrument)
+    away = abs(float(np.log(max(read, 1e-9) / own)))
+    if away <= ALIKE:
+        return
+    spread = _spread(instrument, own)
+    if away <= SPREADS * spread:
+        return
+    T = instrument.reference_temperature - 273.15
+    raise InputError(
+        f"{path}: frequency_Hz is near {read:.5g} Hz, but the card {instrument.name} rings at {own:.5g} Hz at {T:g} °C,"
+        f" known to {100 * spread:.2g} %: is this a record of that gyro? If it is, say so in the card, with a dimension"
+        f" that is as uncertain: [resonator] thickness_mm = {{ value = …, relative_sd = {np.ceil(50 * away) / 100:g} }}."
+    )
+
+
+def check_model_frequency(frequency: Array, lowest: float, highest: float, path: str, model: str) -> None:
+    """Ask whether a record is of the gyro that a frequency model was fitted to.
+
+    Raises
+    ------
+    InputError
+        More than 1 % beyond the model's frequencies.
+    """
+    known = frequency[np.isfinite(frequency)]
+    if not known.size:
+        return
+    read = float(np.median(known))
+    if lowest * (1 - SAME_GYRO) <= read <= highest * (1 + SAME_GYRO):
+        return
+    raise InputError(
+        f"{path}: frequency_Hz is near {read:.5g} Hz, but {model} was fitted to a gyro of {lowest:.5g} to {highest:.5g} Hz:"
+        " is this a record of that gyro? If it is, fit a model to its own records (hrg fit frequency)."
+    )
+
+
+def _frequency(instrument: "Instrument") -> float:
+    from studies.law import law_of
+
+    T = instrument.reference_temperature
+    return float(law_of(instrument, T, T).frequency(T))
+
+
+def _spread(instrument: "Instrument", own: float) -> float:
+    """Relative standard deviation of the card's frequency, by its material's law and by the numbers that it states."""
+    from studies.law import law_of
+
+    T = instrument.reference_temperature
+    squares = float(law_of(instrument, T, T).uncertainty(np.array([T]))[0]) ** 2
+    for value in instrument.uncertain:
+        if value.name.startswith(("resonator.", "material.")) and ".deviation." not in value.name:
+            moved = min(value.value + value.sd, value.high)
+            moved = moved if moved > value.value else max(value.value - value.sd, value.low)
+            squares += float(np.log(_frequency(instrument.with_values({value.name: moved})) / own)) ** 2
+    return float(np.sqrt(squares))

@@ -1,0 +1,63 @@
+"""A record of another gyro than the card's or the model's is a question, with the sentence that confirms it."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from studies.calibration.calibrate import calibrate
+from studies.diagnosis.campaign import load_campaign
+from studies.diagnosis.investigate import investigate
+from studies.errors import InputError
+from studies.instrument.card import load_card
+from studies.models import compensate
+from studies.models.kinds.frequency import find_temperature, save_frequency
+from studies.plausible import check_card_frequency
+from studies.record import Record
+from studies.simulation.chamber import load_profile
+from studies.simulation.virtual_gyro import simulate_run
+
+QUESTION = "is this a record of that gyro\\? If it is, "
+
+
+@pytest.fixture(scope="module")
+def card():
+    return load_card("hrg-30mm")
+
+
+@pytest.fixture(scope="module")
+def record(card):
+    """A record at 5000 Hz of a card of 4432 Hz."""
+    made = simulate_run(card, load_profile("ramp -10 35 0.5"), 1 / 60, 1).record
+    return dataclasses.replace(made.with_columns({"frequency_Hz": made["frequency_Hz"] * 5000 / 4432}), path="run.csv")
+
+
+def test_calibrate_and_diagnose_ask(card, record):
+    with pytest.raises(
+        InputError, match="run.csv: frequency_Hz is near .* the card hrg-30mm rings at 4432.*" + QUESTION
+    ):
+        calibrate(card, [record])
+    with pytest.raises(InputError, match="run.csv: frequency_Hz is near .*" + QUESTION + "say so in the card"):
+        investigate(load_campaign([record]), card=card)
+
+
+def test_what_the_card_says_is_uncertain_confirms(card, record):
+    unsure = card.with_values({"resonator.thickness_mm": {"value": 0.8558278, "relative_sd": 0.07}})
+    check_card_frequency(unsure, record["frequency_Hz"], "run.csv")
+    check_card_frequency(card, np.array([4432.0 * 1.02, np.nan]), "run.csv")
+    check_card_frequency(card, np.array([np.nan]), "run.csv")
+
+
+def test_compensate_and_temperature_ask(record):
+    from compensation.frequency import fit_frequency
+
+    T = np.linspace(-20, 40, 7)
+    model = save_frequency(fit_frequency(T, 4424.9 + 0.3716 * T, 1), (), "test")
+    with pytest.raises(
+        InputError, match="run.csv: frequency_Hz is near .*" + QUESTION + "fit a model to its own records"
+    ):
+        compensate(model, record)
+    with pytest.raises(InputError, match="run.csv: frequency_Hz is near .*" + QUESTION):
+        find_temperature(model, record["frequency_Hz"], "run.csv")
+    own = Record({"time_s": T, "housing_temperature_degC": T / 2, "frequency_Hz": 4424.9 + 0.1858 * T})
+    assert compensate(model, own)["compensated_frequency_Hz"] == pytest.approx(4424.9, abs=1e-3)
