@@ -82,9 +82,9 @@ def investigate(
     """
     tell, measured = progress or (lambda words: None), campaign
     if card is not None:
-        for run in campaign.runs:
-            if "frequency_Hz" in run.responses:
-                check_card_frequency(card, run.responses["frequency_Hz"], run.label)
+        for seen in campaign.runs:
+            if "frequency_Hz" in seen.responses:
+                check_card_frequency(card, seen.responses["frequency_Hz"], seen.label)
     inquiries: dict[str, Inquiry] = {}
     thermometer: Thermometer | None = None
     for column in (c for c in RESPONSES if c in campaign.responses):

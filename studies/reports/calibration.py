@@ -67,7 +67,12 @@ def values_table(found: Calibration, touched: bool = False) -> Table:
         " prior standard deviation; up to 0.5 the data tells the value, from 0.95 it stayed at its prior."
     )
     if silent:
-        note += f" {len(silent)} more values are as the card has them: nothing in these data depends on them."
+        more = (
+            "1 more value is as the card has it"
+            if len(silent) == 1
+            else f"{len(silent)} more values are as the card has them"
+        )
+        note += f" {more}: nothing in these data depends on {'it' if len(silent) == 1 else 'them'}."
     columns = ["Value", "Unit", "Card", "Calibrated", "90 % interval", "Shift", "Width", "Told by"]
     return Table("Values, best known first", columns, rows, note, sortable=True)
 
