@@ -1,6 +1,6 @@
 """What a simulation gets wrong: a campaign of records against a library of physical effects.
 
-`campaign` puts records on one grid (`checks`, `outliers`); `response` says what is diagnosed; `baseline` is what counts as
+`campaign` puts records on one grid (`checks`); `response` says what is diagnosed; `baseline` is what counts as
 the simulation; `noise` and `evidence` weigh linear models by marginal likelihood; `model` joins baseline and effects;
 `scan` looks at every shape of every effect, `search` grows models, `clock` lets a reference clock judge; `witness` looks for
 what no effect explains, `held_out` measures the worth; `inquiry` is all that for one response, `causes` joins the responses,

@@ -6,12 +6,13 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from compensation.spikes import find_spikes
 from studies.diagnosis.checks import FEWEST_BINS, check_device, check_units
-from studies.diagnosis.outliers import find_outliers
 from studies.diagnosis.response import RESPONSES
 from studies.effects.states import FloatArray, States, average
 from studies.errors import InputError
 from studies.record import Record, place_in_time
+from studies.rest import LEAST_SPIKE
 
 TEMPERATURES = ("housing_temperature_degC", "chamber_temperature_degC", "resonator_temperature_degC")
 COMMANDS = ("drive_amplitude_V", "electrode_bias_V", "quadrature_V", "pattern_angle_deg")
@@ -82,7 +83,7 @@ class Campaign:
 def load_campaign(records: Sequence[Record], reference_degC: float | None = None) -> Campaign:
     """Check several records of one gyro and put them on one even grid.
 
-    Outlying rows (see `find_outliers`) are left out of fit and score alike.
+    Outlying rows (see `find_spikes`) are left out of fit and score alike.
 
     Raises
     ------
@@ -217,7 +218,7 @@ def _remove_outliers(table: dict[str, FloatArray]) -> int:
     for name in ("temperature", *RESPONSES, "reference_frequency_Hz"):
         if name not in table:
             continue
-        outlying = find_outliers(table[name])
+        outlying = find_spikes(table[name], LEAST_SPIKE if name == "temperature" else 0.0)
         table[name][outlying] = np.nan
         count += int(outlying.sum())
     return count

@@ -11,6 +11,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from scipy.constants import zero_Celsius
 
 from studies.diagnosis.baseline import START, Tangent, View
 from studies.diagnosis.campaign import Campaign
@@ -142,7 +143,7 @@ class Simulated:
             def finely(values: FloatArray, time: FloatArray = time, s: States = s) -> FloatArray:
                 return np.interp(s.time, time, values)
 
-            resonator = finely(found.columns["resonator_temperature_degC"]) + 273.15
+            resonator = finely(found.columns["resonator_temperature_degC"]) + zero_Celsius
             fine = replace(s, resonator=resonator, tau=self.tau, reference=reference)
             seen_fine = fine if self.warmer is None else replace(fine, resonator=resonator + self.warmer[k])
             coarse, seen = fine.averaged(self.group), seen_fine.averaged(self.group)

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.constants import zero_Celsius
 from scipy.special import logsumexp
 from scipy.stats import f as f_distribution
 
@@ -107,7 +108,7 @@ def diagnose_table(path: str, card: str | None = None) -> TableDiagnosis:
     data = read_frequency_table(path)
     T, f = data.values["temperature_degC"], data.values["frequency_Hz"]
     instrument = load_card("hrg-30mm" if card is None else card)
-    law = relative_law(instrument, T + 273.15)
+    law = relative_law(instrument, T + zero_Celsius)
     named = f"{instrument.material.name}, law '{instrument.material.law}'" if card else "fused silica, the default law"
     return study_steady_table(T, f, reading_resolution(f), law, named)
 
@@ -117,7 +118,7 @@ def study_steady_table(
 ) -> TableDiagnosis:
     """Diagnose temperatures (°C) and frequencies (Hz), in the order of the rows, read to `resolution` (Hz)."""
     T, f = _averaged(T, f)
-    law_values = law(T + 273.15)
+    law_values = law(T + zero_Celsius)
     free = np.stack([np.ones_like(T), law_values], axis=1)
     middle = float(0.5 * (T.min() + T.max()))
     x = T - middle

@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 from typing import Any, cast
 
 import numpy as np
+from scipy.constants import zero_Celsius
 
 from studies.diagnosis.baseline import Baseline, Followed, Reading
 from studies.diagnosis.campaign import Campaign
@@ -108,7 +109,7 @@ def as_next_run(scored: Scored, repeat: float | None, expected: bool = True) -> 
         scored.pair if expected else None,
         programme.hours,
         programme.states.time / 3600.0,
-        programme.chamber - 273.15,
+        programme.chamber - zero_Celsius,
     )
 
 

@@ -12,6 +12,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
+from scipy.constants import zero_Celsius
 
 from studies.diagnosis.campaign import Campaign, load_campaign
 from studies.diagnosis.inquiry import Thermometer, begin, read_thermometer
@@ -249,7 +250,7 @@ def imagine(profiles: Sequence[str], rng: np.random.Generator, card: str | None 
             Record(
                 {
                     "time_s": time - time[0],
-                    "housing_temperature_degC": housing - 273.15 + 0.003 * rng.standard_normal(time.size),
+                    "housing_temperature_degC": housing - zero_Celsius + 0.003 * rng.standard_normal(time.size),
                     "frequency_Hz": 5000.0 + 0.4 * x - 4e-4 * x**2 + level["frequency_Hz"],
                     "bias_deg_per_h": 0.1 * x + level["bias_deg_per_h"],
                     "inverse_q": 1e-7 * (1.0 + 1e-3 * x) + level["inverse_q"],

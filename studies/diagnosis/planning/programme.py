@@ -4,12 +4,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from scipy.constants import zero_Celsius
 
 from studies.diagnosis.campaign import Campaign
 from studies.diagnosis.planning.chamber import Chamber, limited
 from studies.effects.states import FloatArray, States, lag
 
-ZERO_CELSIUS = 273.15
 HOUSING_LAG = 600.0
 """The housing behind the chamber's air, s, where the housing is measured."""
 NEXT_DAY = 16 * 3600.0
@@ -140,7 +140,7 @@ def candidates(campaign: Campaign, stepped: Sequence[str] = (), chamber: Chamber
     spans = [float(np.ptp(run.states.time)) for run in campaign.runs]
     duration = float(np.clip(600.0 * round(float(np.median(spans)) / 600.0), SHORTEST, LONGEST))
     begin = max(float(run.states.campaign_time[-1]) for run in campaign.runs) + NEXT_DAY
-    housing = np.concatenate([run.states.housing for run in campaign.runs]) - ZERO_CELSIUS
+    housing = np.concatenate([run.states.housing for run in campaign.runs]) - zero_Celsius
     low, high = float(np.ceil(housing.min())), float(np.floor(housing.max()))
     if high - low < NARROW:
         low, high = low - WIDENED, high + WIDENED

@@ -1,9 +1,9 @@
-"""Outliers: found on flat and on steep ground and at both ends; smooth curves, steps and plain noise have none."""
+"""Spikes: found on flat and on steep ground and at both ends; smooth curves, steps and plain noise have none."""
 
 import numpy as np
 import pytest
 
-from studies.diagnosis.outliers import find_outliers
+from compensation.spikes import find_spikes
 
 ROWS = np.arange(600.0)
 SHAPES = {
@@ -18,21 +18,21 @@ SHAPES = {
 
 
 @pytest.mark.parametrize("shape", SHAPES)
-def test_smooth_shapes_have_no_outliers(shape):
-    assert not find_outliers(SHAPES[shape]).any()
+def test_smooth_shapes_have_no_spikes(shape):
+    assert not find_spikes(SHAPES[shape]).any()
     noise = 1e-3 * np.random.default_rng(1).standard_normal(ROWS.size)
-    assert not find_outliers(SHAPES[shape] + noise * np.ptp(SHAPES[shape])).any()
+    assert not find_spikes(SHAPES[shape] + noise * np.ptp(SHAPES[shape])).any()
 
 
 @pytest.mark.parametrize("slope", [0.0, 0.1, 3.0])
-def test_outliers_are_found_however_steep_the_record(slope):
+def test_spikes_are_found_however_steep_the_record(slope):
     values = slope * ROWS + 0.01 * np.random.default_rng(2).standard_normal(ROWS.size)
     places = [0, 3, 40, 200, 311, 598]
     values[places] += [0.3, -0.4, 0.2, -0.2, 0.3, 0.4]
-    assert np.flatnonzero(find_outliers(values)).tolist() == places
+    assert np.flatnonzero(find_spikes(values)).tolist() == places
 
 
 def test_gaussian_noise_has_next_to_none():
-    """Six deviations are passed by 2e-9 of Gaussian rows."""
-    found = sum(int(find_outliers(np.random.default_rng(k).standard_normal(600)).sum()) for k in range(100))
+    """Eight robust deviations are passed by 1e-15 of Gaussian rows."""
+    found = sum(int(find_spikes(np.random.default_rng(k).standard_normal(600)).sum()) for k in range(100))
     assert found <= 1
