@@ -189,8 +189,10 @@ def test_constant_temperature_is_not_identifiable(capsys, tmp_path):
 
 
 @pytest.mark.slow
-def test_plan_predicts_and_names_what_cannot_show(capsys):
-    status, out, _ = run(capsys, "--plan", "cycle 20 -15 40 0.5 20min 1", "--draws", "20", "--json")
+@pytest.mark.parametrize("profile", ["cycle 20 -15 40 0.5 20min 1", "step 20 -10 5h"])
+def test_plan_predicts_and_names_what_cannot_show(capsys, profile):
+    """One step alone ended in an internal fault."""
+    status, out, _ = run(capsys, "--plan", profile, "--draws", "8", "--json")
     assert status == 0
     plan = json.loads(out)
     assert plan["schema"] == "hrg.plan/1"

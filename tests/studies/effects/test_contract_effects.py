@@ -1,12 +1,14 @@
 """Every effect of the library keeps the same contract; the names are those of the contract."""
 
 import ast
+import json
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import studies.diagnosis
+from studies.cli import main
 from studies.effects import Span, States, apply_effect, apply_effects, find_effect, library
 from studies.effects.states import lag
 from studies.errors import InputError
@@ -196,3 +198,17 @@ def test_the_engine_knows_no_effect_by_its_name():
         if isinstance(node, ast.Constant) and node.value in library()
     ]
     assert not found
+
+
+def test_the_command_lists_every_effect_and_shows_one_in_full(capsys):
+    """Names, parameters with units and bounds, what drives it, where it is from, and the run that isolates it."""
+    assert main(["effects", "--json"]) == 0
+    listed = json.loads(capsys.readouterr().out)
+    assert listed["schema"] == "hrg.effects/1"
+    assert {entry["name"] for entry in listed["effects"]} == set(library())
+    assert main(["effects", "hysteresis"]) == 0
+    said = " ".join(capsys.readouterr().out.split())
+    for part in ("half_width_K", "0.02 to 40", "loop_deg_per_h_per_K", "To isolate it", "Source", "frequency_Hz"):
+        assert part in said
+    assert main(["effects", "histeresis"]) == 2
+    assert "hysteresis" in capsys.readouterr().err
