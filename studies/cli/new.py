@@ -81,9 +81,19 @@ def study(
         stated = tomllib.loads(text)["card"]
         old, new = (tomli_w.dumps({"card": one}).rstrip("\n") for one in (stated, card_))
         text = text.replace(old, new)
-    write_text(path, text)
+    write_text(path, "\n".join([text.rstrip("\n"), "", *_study_form()]) + "\n")
     say(f"{path}: written, like {like}. Correct it, then: hrg study run {path} --dry-run")
     return 0
+
+
+def _study_form() -> list[str]:
+    """Return everything that a study may say, as comments, from the documentation of the spec."""
+    import studies.sweeps.spec
+
+    lines = (studies.sweeps.spec.__doc__ or "").splitlines()
+    first, last = (k for k, line in enumerate(lines) if line.startswith("```"))
+    form = ["What a study may say, by an example:", "", *lines[first + 3 : last]]
+    return [f"# {line}".rstrip() for line in form]
 
 
 def _refuse_existing(path: str) -> None:

@@ -48,6 +48,9 @@ def test_the_lines_of_the_forms_can_be_set(tmp_path):
 def test_a_new_study_is_valid_with_another_card(tmp_path, like):
     assert main(["study", "new", str(tmp_path / "s.toml"), "--like", like, "--card", "free-dome"]) == 0
     assert read_study(tmp_path / "s.toml").instrument.name == "free-dome"
+    text = (tmp_path / "s.toml").read_text(encoding="utf-8")
+    for heading in ("# [[derived]]", "# [[requirement]]", "# [[search]]", "# [sampling]"):
+        assert heading in text
 
 
 def test_nothing_is_overwritten(tmp_path, capsys):
