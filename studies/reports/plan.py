@@ -87,7 +87,7 @@ def plan_page(outlook: Outlook, profiles: Sequence[str]) -> str:
         headline(outlook),
         [
             Chapter("In short", [Facts(facts), _ladder(outlook), runs]),
-            Chapter("Every effect", [plan_table(outlook)]),
+            Chapter("Every effect", [plan_table(outlook), *_sensor_table(outlook.close)]),
             Chapter("What would be said", [_matrix(outlook.close)]),
             Chapter(
                 "How it was predicted",
@@ -101,6 +101,15 @@ def plan_page(outlook: Outlook, profiles: Sequence[str]) -> str:
             ),
         ],
     )
+
+
+def _sensor_table(plan: Plan) -> list[Table]:
+    """Return what would part the sets without chamber time."""
+    if not plan.sensors:
+        return []
+    rows = [[sensor, str(len(pairs)), ", ".join(pairs)] for sensor, pairs in plan.sensors.items()]
+    note = f"Sets at SNR {plan.snr:g}. A sensor costs no chamber hour; the first parts the most sets."
+    return [Table("Instead of a further run: sensors that part sets", ("sensor", "sets", "which"), rows, note)]
 
 
 def _size_words(plan: Plan) -> str:

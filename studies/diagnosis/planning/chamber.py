@@ -56,6 +56,8 @@ def limited(words: str, rate: float) -> str:
         match piece.split():
             case ["soak", level, hold]:
                 at = _to(out, at, float(level), hold, rate)
+            case ["step", first, last, hold]:
+                at = _to(out, _to(out, at, float(first), "", rate), float(last), hold, rate)
             case ["staircase", first, last, step, hold]:
                 begin, end, height = float(first), float(last), abs(float(step))
                 count = round(abs(end - begin) / height)
@@ -76,7 +78,9 @@ def limited(words: str, rate: float) -> str:
 
 def _to(out: list[str], at: float | None, level: float, hold: str, rate: float) -> float:
     """Go to a level and stay there, the way counted in the stay."""
-    minutes = float(hold.removesuffix("min")) if hold else 0.0
+    from thermal.profile import parse_profile
+
+    minutes = parse_profile(f"soak {level:g} {hold}").end / 60.0 if hold else 0.0
     if at is not None and abs(level - at) > 1e-9:
         out.append(f"ramp {at:g} {level:g} {rate:g}")
         minutes -= abs(level - at) / rate

@@ -24,10 +24,13 @@ from studies.diagnosis.response import RESPONSES
 from studies.diagnosis.scan import applicable
 from studies.effects import library
 from studies.effects.states import lag
+from studies.errors import InputError
 from studies.record import Record
 
 RESONATOR_LAG = 2500.0
 LADDER, SURE = (1.0, 0.3, 0.1), 0.9
+OFTEN = 0.05
+"""Share of the cases from which on a set is worth a sensor."""
 NOISE = {"frequency_Hz": 0.01, "bias_deg_per_h": 0.1, "inverse_q": 1e-9}
 
 
@@ -71,6 +74,18 @@ class Plan:
         shares = {word: said.get(name, 0.0) for word, name in known.items()}
         return {**shares, "wrong": max(1.0 - sum(shares.values()), 0.0)}
 
+    @property
+    def sensors(self) -> dict[str, list[str]]:
+        """What would part sets without a further run: each sensor with the pairs that it parts, the most useful first."""
+        found: dict[str, set[str]] = {}
+        for key, others in self.sets.items():
+            for other in (name for name, share in others.items() if share >= OFTEN):
+                pair = " / ".join(sorted((effect_of(key), other)))
+                for name in (effect_of(key), other):
+                    if sensor := library()[name].sensor:
+                        found.setdefault(sensor, set()).add(pair)
+        return {sensor: sorted(found[sensor]) for sensor in sorted(found, key=lambda s: (-len(found[s]), s))}
+
     def as_dict(self) -> dict[str, Any]:
         """Return the object for `--json`."""
         return {
@@ -85,6 +100,7 @@ class Plan:
             "invisible": self.invisible,
             "size_at_snr": self.sizes,
             "chamber_hours": self.hours,
+            "sensors": self.sensors,
         }
 
 
@@ -149,7 +165,29 @@ def plan_campaign(
     rng = np.random.default_rng(seed)
     if chamber is not None:
         profiles = [limited(words, chamber.rate) for words in profiles]
+        for words in profiles:
+            require_reach(chamber, words)
     return predict(imagine(profiles, rng, card), snrs, cases, rng, progress)
+
+
+def require_reach(chamber: Chamber, words: str) -> None:
+    """Raise when a planned profile leaves what the chamber reaches, or, from a file, is faster than it."""
+    from studies.simulation.chamber import load_profile
+
+    profile = load_profile(words)
+    values, time = profile.value - zero_Celsius, profile.time
+    fastest = float(np.max(np.abs(np.diff(values)) / np.maximum(np.diff(time), 1e-9))) * 60.0
+    if fastest > 1.001 * chamber.rate:
+        raise InputError(
+            f'"{words}" asks for {fastest:.3g} K/min, but the chamber does {chamber.rate:g}; use slower ramps there.'
+        )
+    low, high = float(values.min()), float(values.max())
+    allowed = chamber.within(low, high)
+    if low < allowed[0] - 1e-6 or high > allowed[1] + 1e-6:
+        raise InputError(
+            f'"{words}" runs from {low:g} to {high:g} °C, but the chamber reaches {allowed[0]:g} to {allowed[1]:g} °C;'
+            " plan within its range, or state another one with --chamber."
+        )
 
 
 def predict(
@@ -243,7 +281,9 @@ def imagine(profiles: Sequence[str], rng: np.random.Generator, card: str | None 
         profile, commands = load_schedule(words)
         step = max(10.0, (profile.end - profile.start) / 20000.0)
         time = np.arange(profile.start, profile.end, step)
-        housing = lag(np.asarray(profile.at(time)), step, HOUSING_LAG)
+        chamber = np.asarray(profile.at(time))
+        chamber[0] = profile.value[0]  # settled there, also where the set point jumps at once
+        housing = lag(chamber, step, HOUSING_LAG)
         x = lag(housing, step, tau) - 293.15
         level = {name: value * rng.standard_normal(time.size) for name, value in NOISE.items()}
         records.append(

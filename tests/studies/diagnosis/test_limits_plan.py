@@ -5,8 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from studies.diagnosis.planning.plan import Outlook, Plan, imagine, predict
+from studies.diagnosis.planning.chamber import limited, parse_chamber
+from studies.diagnosis.planning.plan import Outlook, Plan, imagine, predict, require_reach
+from studies.errors import InputError
 from studies.reports.plan import headline, plan_page, plan_table
+from thermal.profile import parse_profile
 
 WORDS = "cycle 20 -15 40 0.5 30min 1"
 
@@ -24,6 +27,37 @@ def test_clock_drift_and_ageing_are_always_a_set(loud):
     for effect, twin in (("clock-drift", "ageing"), ("ageing", "clock-drift")):
         assert loud.confusion[effect][effect] > 0
         assert loud.sets[effect][twin] == pytest.approx(loud.confusion[effect][effect])
+
+
+def test_a_reference_clock_parts_what_no_run_does(loud):
+    clock = next(pairs for sensor, pairs in loud.sensors.items() if "reference clock" in sensor)
+    assert "ageing / clock-drift" in clock
+    assert len(next(iter(loud.sensors.values()))) == max(map(len, loud.sensors.values()))
+
+
+def test_a_plan_beyond_the_chamber_is_refused():
+    chamber = parse_chamber("rate 3 range -40 85")
+    require_reach(chamber, "ramp 20 -10 3")
+    with pytest.raises(InputError, match="reaches -40 to 85"):
+        require_reach(chamber, "soak -60 5h")
+    with pytest.raises(InputError, match="10 K/min"):
+        require_reach(chamber, "ramp 20 60 10")
+
+
+@pytest.mark.parametrize(
+    "words", ["step 20 -10 5h", "soak 20 1h then soak -35 5400s", "step 20 -10 5h then ramp -10 40 9"]
+)
+def test_words_of_every_form_keep_to_the_chamber(words):
+    profile = parse_profile(limited(words, 3.0))
+    assert (np.abs(np.diff(profile.value)) <= 3.001 / 60.0 * np.diff(profile.time)).all()
+    assert (profile.value[0], profile.value[-1]) == (parse_profile(words).value[0], parse_profile(words).value[-1])
+
+
+def test_a_planned_step_starts_where_the_gyro_has_settled():
+    """The set point jumps at once; the housing has not."""
+    housing = imagine(["step 20 -10 5h"], np.random.default_rng(1)).runs[0].states.housing - 273.15
+    assert housing[0] == pytest.approx(20.0, abs=0.5)
+    assert housing[-1] == pytest.approx(-10.0, abs=0.1)
 
 
 def test_effects_without_their_drive_cannot_show(loud):
