@@ -4,7 +4,7 @@ Every case has a key, the hash of card, material, quantities, physics version an
 kill -9 at any moment. A second runner on the same folder is refused by a lock that ends with its process.
 """
 
-import fcntl
+import fcntl  # POSIX only, as pyproject.toml declares
 import json
 import os
 import sqlite3
