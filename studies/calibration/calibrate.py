@@ -350,11 +350,12 @@ def _warn(found: Fit, estimates: Sequence[Estimate], ladder: Mapping[str, Rung])
             warnings.append(
                 f"{count} {'block' if count == 1 else 'blocks'} of {name} stood out of the noise and counted less."
             )
-    stayed = sum(one.width >= SILENT for one in estimates)
+    stayed = [one.parameter for one in estimates if one.width >= SILENT]
     told = sum(rows[name].count for name in rows)
     if len(estimates) > told:
         warnings.append(
-            f"{len(estimates)} uncertain values, but {told} data: {stayed} of the values stayed at their prior."
+            f"{len(estimates)} uncertain values, but {told} data: {len(stayed)} of the values stayed at their prior:"
+            f" {', '.join(stayed)}."
         )
     return tuple(warnings)
 
