@@ -116,6 +116,9 @@ def span_of(campaign: Campaign, tau: float) -> Span:
     """Return what a campaign covers."""
     housing = np.concatenate([run.states.housing for run in campaign.runs])
     starts = [run.states.campaign_time for run in campaign.runs]
+    angles = [run.states.pattern_angle for run in campaign.runs]
+    known = [angle for angle in angles if angle is not None]
+    turns = bool(known) and len(known) == len(angles) and float(np.ptp(np.concatenate(known))) > 1e-3
     return Span(
         float(np.percentile(housing, 0.5)),
         float(np.percentile(housing, 99.5)),
@@ -125,6 +128,7 @@ def span_of(campaign: Campaign, tau: float) -> Span:
         tau,
         len(campaign.runs),
         tuple(run.time for run in campaign.runs),
+        turns,
     )
 
 

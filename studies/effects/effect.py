@@ -64,6 +64,8 @@ class Span:
     tau: float
     runs: int
     bins: tuple[FloatArray, ...] = ()
+    turns: bool = False
+    """Whether the wave stands at several azimuths."""
 
     @property
     def temperature_range(self) -> float:

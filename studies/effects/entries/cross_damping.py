@@ -30,7 +30,8 @@ def columns(states: States, shape: Shape, response: str) -> FloatArray:
 def grid(span: Span, response: str) -> list[tuple[float, ...]]:
     """At once and behind a slow loop; axes a tenth of a period apart, and -1 where the wave stands still."""
     ends = span.temperature_low - zero_Celsius, span.temperature_high - zero_Celsius
-    return [(*ends, pole, axis) for pole in (0.0, 60.0) for axis in (-1.0, *np.arange(0.0, 45.0, 5.0).tolist())]
+    axes = (-1.0, *np.arange(0.0, 45.0, 5.0).tolist()) if span.turns else (-1.0,)
+    return [(*ends, pole, axis) for pole in (0.0, 60.0) for axis in axes]
 
 
 FIXED = np.array([0.0] * 4 + [1.0] * (4 + ORDERS - 1))

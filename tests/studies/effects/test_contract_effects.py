@@ -58,7 +58,7 @@ def make_states(run=0):
     )
 
 
-SPAN = Span(270.0, 315.0, 20000.0, 106400.0, 60.0, 1500.0, 2, (make_states().time, make_states(1).time))
+SPAN = Span(270.0, 315.0, 20000.0, 106400.0, 60.0, 1500.0, 2, (make_states().time, make_states(1).time), turns=True)
 
 
 def test_library_has_every_name_of_the_contract():
