@@ -183,12 +183,12 @@ def calibrate(
     """
     if not records and not tables:
         raise InputError("nothing is calibrated without a record or a steady-state table.")
+    runs, tables = observe(records), tuple(tables)
     for record in records:
         if "frequency_Hz" in record:
             check_card_frequency(instrument, record["frequency_Hz"], record.path)
     for table in tables:
         check_card_frequency(instrument, table.frequency, table.path)
-    runs, tables = observe(records), tuple(tables)
     problem = _pose(instrument, runs, tables, exact)
     found = fit(problem, progress=progress)
     held_out = None
