@@ -81,9 +81,14 @@ def name_causes(campaign: Campaign, inquiries: Mapping[str, Inquiry]) -> tuple[C
     return tuple(kept)
 
 
+def scores_of(inquiry: Inquiry, place: Place) -> list[float]:
+    """Return the log posterior of every rival of a place, with what the other responses say of it."""
+    return [_voted(inquiry.votes, place, n, r) for n, r in zip(place.names, place.rivals, strict=True)]
+
+
 def _cause(campaign: Campaign, inquiry: Inquiry, place: Place) -> Cause:
     column = inquiry.problem.response.column
-    scores = [_voted(inquiry.votes, place, n, r) for n, r in zip(place.names, place.rivals, strict=True)]
+    scores = scores_of(inquiry, place)
     base = min(inquiry.votes.values(), default=0.0)
     own = max(r.score for r in place.rivals)
     nothing = place.without.score + (max(scores) - own if inquiry.votes else 0.0) if base else place.without.score

@@ -209,7 +209,8 @@ def weigh(
     temper = CONSTANTS["temper"] + CONSTANTS["misfit"] * lead
     weight = np.exp((values - values.max()) / temper)
     chance = np.exp(-max(lead - CONSTANTS["margin"] / 2.0, 0.0) / CONSTANTS["temper"])
-    strange = np.exp(np.clip(unknown / temper, -50.0, 50.0))
+    # a generic form must be the better one by as much as the named form may be inexact before it counts for more
+    strange = np.exp(np.clip(unknown / (temper if unknown > 0 else CONSTANTS["temper"]), -50.0, 50.0))
     members: list[str] = []
     for k in order:
         if weight[k] >= CONSTANTS["member"] and names[k] not in members:

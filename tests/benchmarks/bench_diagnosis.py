@@ -4,6 +4,8 @@
         [--seed N] [--names-only]                            append cases
     python tests/benchmarks/bench_diagnosis.py cases.jsonl --plan-check
                                                              what `--plan` predicts for the same designs
+    python tests/benchmarks/bench_diagnosis.py cases.jsonl --calibrate
+                                                             rewrite studies/diagnosis/calibration.toml from the cases
     python tests/benchmarks/bench_diagnosis.py cases.jsonl --report FILE.md
 
 Cases are appended to the file, so that several runs add up; the seed is drawn and printed unless given.
@@ -30,10 +32,15 @@ def main():
     parser.add_argument("--names-only", action="store_true", help="leave out the held-out residuals")
     parser.add_argument("--plan-check", action="store_true", help="predict the confusion of the cases of the file")
     parser.add_argument("--draws", type=int, default=100, help="cases of each effect that --plan-check predicts")
+    parser.add_argument("--calibrate", action="store_true", help="fit the engine's constants on the cases of the file")
     parser.add_argument("--report", type=Path)
     arguments = parser.parse_args()
     path = arguments.cases
-    if arguments.plan_check:
+    if arguments.calibrate:
+        from tests.benchmarks.diagnosis.calibrate import write_constants
+
+        print(write_constants(read_cases(path)))
+    elif arguments.plan_check:
         from tests.benchmarks.diagnosis.plan_check import check_plan
 
         print(check_plan(path, arguments.draws))

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from studies.diagnosis.campaign import load_campaign
+from studies.diagnosis.causes import scores_of
 from studies.diagnosis.investigate import investigate
 from studies.effects import library
 from tests.generator.designs import DESIGNS
@@ -27,7 +28,10 @@ def draw_case(kind, count, rng):
     Kinds: `null` hides nothing; `effect` one effect; `faint` one effect at low SNR, where plans are decided; `without` one
     effect that is taken out of the library; `alien` what no library knows; `pair` two effects.
     """
-    design = list(DESIGNS)[count % len(DESIGNS)]
+    name = list(DESIGNS)[count % len(DESIGNS)]
+    runs = len(DESIGNS[name]["chambers"])
+    # one and two runs are the usual case
+    design = f"{name}/{int(rng.integers(1, runs + 1))}"
     family = FAMILIES[(count // len(DESIGNS)) % len(FAMILIES)]
     names = [name for name in EFFECTS if possible(name, design)]
     if kind == "null":
@@ -77,9 +81,10 @@ def run_case(kind, count, seed, held_out=True, commit=""):
     """Build and diagnose one case; return what was hidden and what was said."""
     records, truth = build_case(kind, count, seed)
     begin = time.perf_counter()
-    found = investigate(
+    diagnosis = investigate(
         load_campaign(records), effects=usable(kind, truth.effects), score_held_out=held_out, advise=False
-    ).verdict
+    )
+    found = diagnosis.verdict
     return {
         "kind": kind,
         "commit": commit,
@@ -94,6 +99,7 @@ def run_case(kind, count, seed, held_out=True, commit=""):
         "channel": truth.channel,
         "seconds": time.perf_counter() - begin,
         "verdict": found.verdict,
+        "places": [place for inquiry in diagnosis.inquiries.values() for place in contended(inquiry)],
         "causes": [[c.effect, list(c.equivalent), c.response, c.probability, c.evidence] for c in found.causes],
         "intervals": [{n: [p.value, p.low, p.high] for n, p in c.parameters.items()} for c in found.causes],
         "responses": {
@@ -104,6 +110,20 @@ def run_case(kind, count, seed, held_out=True, commit=""):
         "size": {k: v.get("size") for k, v in truth.parameters.items()},
         "parameters": truth.parameters,
     }
+
+
+def contended(inquiry):
+    """What contends for every place of a response: names and scores, nothing, generic structure; for the constants."""
+    return [
+        {
+            "response": inquiry.problem.response.column,
+            "names": list(place.names),
+            "scores": scores_of(inquiry, place),
+            "nothing": place.without.score,
+            "unknown": inquiry.unknown - inquiry.selection.final.score,
+        }
+        for place in inquiry.selection.places
+    ]
 
 
 def collect(path, minutes, kinds, seed, held_out=True):

@@ -1,0 +1,60 @@
+"""Fit the engine's constants on cases of the tests' generator, and write them with their provenance.
+
+`temper` and `misfit` are the most likely ones for the hidden names among the rivals of their places, `margin` is what the
+strongest effect reaches in nulls at most, `doubt` the share of sure answers that are wrong all the same.
+"""
+
+import re
+from pathlib import Path
+
+import numpy as np
+from scipy.optimize import minimize
+
+import studies.diagnosis
+from tests.benchmarks.diagnosis.cases import current_commit
+
+FILE = Path(studies.diagnosis.__file__).parent / "calibration.toml"
+SURE = 0.95
+
+
+def fit_constants(cases):
+    """Return the fitted constants by name."""
+    places = [
+        (place, next((n for n in place["names"] if n in case["truth"]), None))
+        for case in cases
+        if case["kind"] in ("effect", "pair")
+        for place in case.get("places", [])
+    ]
+    known = [(place, name) for place, name in places if name is not None]
+
+    def minus_log(parameters):
+        temper, misfit = np.exp(parameters)
+        total = 0.0
+        for place, name in known:
+            scores = np.array(place["scores"])
+            lead = max(scores.max() - place["nothing"], 0.0)
+            weight = np.exp((scores - scores.max()) / (temper + misfit * lead))
+            total -= np.log(weight[place["names"].index(name)] / weight.sum())
+        # beliefs to begin with: a handful of cases must not make the engine surer than forms are exact
+        return total + 0.5 * (np.log(temper / 1.6) / 0.5) ** 2 + 0.5 * (np.log(misfit / 0.05) / 0.5) ** 2
+
+    temper, misfit = np.exp(minimize(minus_log, np.log([1.6, 0.05]), method="Nelder-Mead").x)
+    sure = [c for case in cases if case["kind"] in ("effect", "pair", "null") for c in _claims(case) if c[0] > SURE]
+    wrong = sum(not right for _, right in sure)
+    return {"temper": float(temper), "misfit": float(misfit), "doubt": (wrong + 0.5) / (len(sure) + 1.0)}
+
+
+def _claims(case):
+    return [(c[3], any(t in [c[0], *c[1]] for t in case["truth"])) for c in case["causes"]]
+
+
+def write_constants(cases):
+    """Rewrite the fitted values, commit and number of cases in the engine's file; return them."""
+    found = fit_constants(cases)
+    text = FILE.read_text()
+    for name, value in found.items():
+        text = re.sub(rf"(\[constant\.{name}\]\nvalue = )[^\n]*", rf"\g<1>{value:.3g}", text)
+    text = re.sub(r"(?m)^commit = .*$", f'commit = "{current_commit()}"', text)
+    text = re.sub(r"(?m)^cases = .*$", f"cases = {len(cases)}", text)
+    FILE.write_text(text)
+    return found
