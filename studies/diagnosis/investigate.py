@@ -173,7 +173,9 @@ def _result(
     share: float | None = None
     if final.terms:
         share = left.share if left.significant else 1.0
-    if left.significant and (share is None or share < CONSTANTS["share_explained"]):
+    # a name that a generic form beats by more than forms are inexact patches the structure up, it does not explain it
+    patched = bool(mine) and max(cause.probability for cause in mine) < CONSTANTS["believed"]
+    if left.significant and (share is None or share < CONSTANTS["share_explained"] or patched):
         verdict = "unexplained"
     elif final.terms:
         verdict = "not-identifiable" if any(cause.equivalent for cause in mine) else "explained"

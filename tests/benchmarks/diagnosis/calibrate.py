@@ -1,16 +1,17 @@
 """Fit the engine's constants on cases of the tests' generator, and write them with their provenance.
 
-`temper` and `misfit` are the most likely ones for the hidden names among the rivals of their places, `margin` is what the
-strongest effect reaches in nulls at most, `doubt` the share of sure answers that are wrong all the same.
+`temper` is the most likely one for the hidden names among the rivals of their places, `doubt` the share of sure answers that are
+wrong all the same. The others are beliefs, with their reasons beside them.
 """
 
 import re
 from pathlib import Path
 
 import numpy as np
-from scipy.optimize import minimize
+from scipy.optimize import minimize_scalar
 
 import studies.diagnosis
+from studies.diagnosis.constants import CONSTANTS
 from tests.benchmarks.diagnosis.cases import current_commit
 
 FILE = Path(studies.diagnosis.__file__).parent / "calibration.toml"
@@ -27,21 +28,19 @@ def fit_constants(cases):
     ]
     known = [(place, name) for place, name in places if name is not None]
 
-    def minus_log(parameters):
-        temper, misfit = np.exp(parameters)
+    def minus_log(log_temper):
         total = 0.0
         for place, name in known:
             scores = np.array(place["scores"])
             lead = max(scores.max() - place["nothing"], 0.0)
-            weight = np.exp((scores - scores.max()) / (temper + misfit * lead))
+            weight = np.exp((scores - scores.max()) / (np.exp(log_temper) + CONSTANTS["misfit"] * lead))
             total -= np.log(weight[place["names"].index(name)] / weight.sum())
-        # beliefs to begin with: a handful of cases must not make the engine surer than forms are exact
-        return total + 0.5 * (np.log(temper / 1.6) / 0.5) ** 2 + 0.5 * (np.log(misfit / 0.05) / 0.5) ** 2
+        return total
 
-    temper, misfit = np.exp(minimize(minus_log, np.log([1.6, 0.05]), method="Nelder-Mead").x)
+    temper = np.exp(minimize_scalar(minus_log, bounds=(0.0, 2.0), method="bounded").x)
     sure = [c for case in cases if case["kind"] in ("effect", "pair", "null") for c in _claims(case) if c[0] > SURE]
     wrong = sum(not right for _, right in sure)
-    return {"temper": float(temper), "misfit": float(misfit), "doubt": (wrong + 0.5) / (len(sure) + 1.0)}
+    return {"temper": float(temper), "doubt": (wrong + 0.5) / (len(sure) + 1.0)}
 
 
 def _claims(case):
