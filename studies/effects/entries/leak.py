@@ -1,15 +1,22 @@
 """Leak: gas enters the housing, and damps."""
 
+import numpy as np
+
 from shell.damping.gas import free_impedance
 from studies.effects.effect import AROUND, Coefficient, Effect, Parameter, Shape, Span
 from studies.effects.states import FloatArray, States
 
 
 def columns(states: States, shape: Shape, response: str) -> FloatArray:
-    """1/Q ∝ p √(M/(R T)) of free molecules, as in a loss budget: with p ∝ t T in a sealed housing t (T/T₀)^½, with p ∝ t −½."""
+    """1/Q ∝ p √(M/(R T)) of free molecules, as in a loss budget: with p ∝ t T in a sealed housing t (T/T₀)^½, with p ∝ t −½.
+
+    Through a hole p ∝ t; where diffusion feeds it, outgassing, p ∝ √t.
+    """
     (exponent,) = shape
-    pressure = states.campaign_time / 86400.0 * (states.resonator / AROUND) ** (exponent + 0.5)
-    return (free_impedance(pressure, 1.0, states.resonator) / free_impedance(1.0, 1.0, AROUND))[:, None]
+    days = states.campaign_time / 86400.0
+    warm = (states.resonator / AROUND) ** (exponent + 0.5)
+    rest = free_impedance(1.0, 1.0, AROUND)
+    return np.stack([free_impedance(p * warm, 1.0, states.resonator) / rest for p in (days, np.sqrt(days))], axis=1)
 
 
 def grid(span: Span, response: str) -> list[tuple[float, ...]]:
@@ -20,10 +27,10 @@ def grid(span: Span, response: str) -> list[tuple[float, ...]]:
 EFFECT = Effect(
     name="leak",
     summary="gas leaks into the housing: the damping grows with time",
-    source="free molecular gas damping, Christian, Vacuum 16 (1966) 175",
+    source="free molecular gas damping, Christian, Vacuum 16 (1966) 175; diffusion-limited outgassing ∝ t^-1/2, O'Hanlon",
     isolate="store the gyro warm for a known time and repeat the run; heat the getter",
     sensor="a pressure gauge, or 1/Q before and after warm storage",
-    coefficients=(Coefficient("growth_{unit}_per_day"),),
+    coefficients=(Coefficient("growth_{unit}_per_day"), Coefficient("outgassing_{unit}_per_root_day", (0.3,))),
     columns=columns,
     grid=grid,
     sizes={"inverse_q": 1.0},

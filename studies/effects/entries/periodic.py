@@ -9,9 +9,9 @@ from studies.effects.states import FloatArray, States
 def columns(states: States, shape: Shape, response: str) -> FloatArray:
     """Σ A_h sin(2πht/P) + B_h cos(2πht/P), h = 1 … 3, means over a step; t of the campaign or, after a restart, of the run."""
     period, restarts = shape
-    phase = 2.0 * np.pi * (states.time if restarts else states.campaign_time) / period
-    waves = [np.sinc(h * states.step / period) * turn(h * phase) for turn in (np.sin, np.cos) for h in (1, 2, 3)]
-    return np.stack(waves, axis=1)
+    turn = np.exp(2j * np.pi * (states.time if restarts else states.campaign_time) / period)
+    waves = np.stack([turn, turn**2, turn**3], axis=1) * np.sinc(np.arange(1, 4) * states.step / period)
+    return np.concatenate([waves.imag, waves.real], axis=1)
 
 
 def grid(span: Span, response: str) -> list[tuple[float, ...]]:
