@@ -1,0 +1,215 @@
+"""Hide effects in cards, run `hrg simulate`, and ask the diagnosis with the plain card: what is right, by SNR.
+
+    python tests/benchmarks/bench_card_effects.py cases.jsonl --minutes 5 [--seed N] [--plain]    append cases and sum up
+
+Every case: a shipped card, one to four runs of chamber programmes in words, one effect of the library with a shape and
+coefficients off any grid, scaled to its SNR in 120 s means after a least-squares baseline; one case in four hides nothing.
+`--plain` hides nothing in all of them.
+"""
+
+import argparse
+import contextlib
+import io
+import json
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
+
+from studies.cli import main as hrg
+from studies.diagnosis.campaign import load_campaign
+from studies.diagnosis.investigate import investigate
+from studies.diagnosis.model import span_of
+from studies.effects import library
+from studies.errors import InputError
+from studies.instrument.card import load_card, save_card
+from studies.record import read_record
+from tests.benchmarks.diagnosis.scoring import short_rate
+
+CARDS = ("hrg-30mm", "cvg-25mm", "bvg-bell", "hrg-30mm-loops")
+SNRS = (3.0, 6.0, 12.0, 1.0)
+RATE = 0.05
+MEAN = 6
+"""Rows to 120 s."""
+DRIVES = {"amplitude_squared": "drive_amplitude_V", "voltage_squared": "electrode_bias_V"}
+DRIVES |= {"quadrature": "quadrature_V", "pattern_angle": "pattern_angle_deg"}
+RANGES = {"drive_amplitude_V": (0.7, 1.4), "electrode_bias_V": (60.0, 110.0)}
+RANGES |= {"quadrature_V": (-2.0, 2.0), "pattern_angle_deg": (0.0, 80.0)}
+
+
+def draw_profile(rng, path, commanded):
+    """Write one chamber programme with held levels and ramps, and its commanded drives."""
+    levels = rng.uniform(-20.0, 45.0, int(rng.integers(2, 5)))
+    time_s, temperature = [0.0], [20.0]
+    for level in levels:
+        ramp = abs(level - temperature[-1]) / rng.uniform(0.3, 2.0) * 60.0
+        for length in (max(ramp, 60.0), rng.uniform(2400.0, 7200.0)):
+            time_s.append(time_s[-1] + length)
+            temperature.append(level)
+    fine = np.arange(0.0, time_s[-1], 60.0)
+    columns = {"time_s": fine, "chamber_temperature_degC": np.interp(fine, time_s, temperature)}
+    for name in commanded:
+        held = rng.uniform(*RANGES[name], 40)
+        columns[name] = held[np.searchsorted(np.cumsum(rng.uniform(1200, 4000, 40)), fine) % 40]
+    np.savetxt(path, np.stack(list(columns.values()), 1), "%.4f", ",", header=",".join(columns), comments="")
+
+
+def run(card, folder, profiles, seed, noiseless=False):
+    """Return the records of `hrg simulate`."""
+    save_card(card, folder / "card.toml")
+    records = []
+    for k, profile in enumerate(profiles):
+        out = str(folder / f"run{k}.csv")
+        words = ["simulate", str(folder / "card.toml"), str(profile), "--out", out, "--rate", str(RATE)]
+        words += ["--noiseless"] if noiseless else ["--seed", str(seed + k)]
+        with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()):
+            if hrg(words):
+                raise InputError("not simulated")
+        records.append(read_record(out))
+    return records
+
+
+def means(values):
+    """Means over 120 s."""
+    return values[: len(values) // MEAN * MEAN].reshape(-1, MEAN).mean(axis=1)
+
+
+def left(records, parts, response):
+    """What a static law, a lag, initial states and offsets leave of parts given run by run."""
+    rows = []
+    for k, record in enumerate(records):
+        x = means(record["resonator_temperature_degC"]) / 30.0
+        t = means(record["time_s"])
+        own = [x, x**2, np.gradient(x), np.gradient(x) * x, *([x**3] if response == "bias_deg_per_h" else [])]
+        starts = np.zeros((x.size, 2 * len(records)))
+        starts[:, k] = 1.0
+        starts[:, len(records) + k] = np.exp(-t / 1500.0)
+        rows.append(np.concatenate([np.stack(own, 1), starts], axis=1))
+    basis = np.linalg.qr(np.concatenate(rows))[0]
+    target = np.concatenate([means(part) for part in parts])
+    return float(np.sqrt(np.mean((target - basis @ (basis.T @ target)) ** 2)))
+
+
+def draw_effect(rng, name, response, span):
+    """Draw shape and coefficients of an effect."""
+    effect = library()[name]
+    grid = list(effect.grid(span, response))
+    shape = list(grid[int(rng.integers(len(grid)))])
+    for k, p in enumerate(effect.shape):
+        if p.logarithmic and not p.steady:
+            shape[k] = float(np.clip(shape[k] * np.exp(0.15 * rng.standard_normal()), p.low, p.high))
+    values = rng.standard_normal(effect.spread.size) * effect.spread
+    values[0] = abs(values[0]) + 0.5 * effect.spread[0]
+    return shape, values
+
+
+def entry(name, response, shape, values):
+    """The `[[effect]]` table."""
+    effect = library()[name]
+    table = {"name": name, "response": response}
+    table |= {p.name: float(v) for p, v in zip(effect.shape, shape, strict=True)}
+    return table | effect.numbers(values, response)
+
+
+def make_case(seed, plain):
+    """Return (card, records, truth) of a case."""
+    rng = np.random.default_rng(seed)
+    chosen = CARDS[int(rng.integers(len(CARDS)))]
+    card = load_card(chosen)
+    acting = [(name, r) for name, effect in library().items() for r in effect.sizes if name != "clock-offset"]
+    name, response = acting[int(rng.integers(len(acting)))]
+    effect, snr = library()[name], SNRS[int(rng.integers(len(SNRS)))]
+    hidden = not plain and seed % 4 != 0
+    with tempfile.TemporaryDirectory() as place:
+        folder = Path(place)
+        profiles = [folder / f"profile{k}.csv" for k in range(int(rng.integers(1, 5)))]
+        for path in profiles:
+            draw_profile(rng, path, [DRIVES[n] for n in effect.needs] if hidden else [])
+        if not hidden:
+            return chosen, card, run(card, folder, profiles, seed), "", "", 0.0
+        clean = run(card, folder, profiles, seed, True)
+        noisy = run(card, folder, profiles, seed)
+        noise = left(clean, [n[response] - c[response] for n, c in zip(noisy, clean, strict=True)], response)
+        shape, values = draw_effect(rng, name, response, span_of(load_campaign(noisy), 1000.0))
+        level = abs(float(np.median(clean[0][response]))) if response != "bias_deg_per_h" and not effect.thermal else 1.0
+        values = values * effect.sizes[response] * level * 0.03
+        for _ in range(2):
+            true = card.with_table("effect", [entry(name, response, shape, values)])
+            there = run(true, folder, profiles, seed, True)
+            size = left(clean, [a[response] - c[response] for a, c in zip(there, clean, strict=True)], response) / noise
+            values = values * snr / max(size, 1e-9)
+        true = card.with_table("effect", [entry(name, response, shape, values)])
+        return chosen, card, run(true, folder, profiles, seed), name, response, snr
+
+
+def answer(seed, plain):
+    """Make and diagnose one case, with the card and, where nothing is hidden, without."""
+    chosen, card, records, name, response, snr = make_case(seed, plain)
+    campaign = load_campaign(records)
+    begin = time.process_time()
+    found = investigate(campaign, card=card, advise=False).verdict
+    case = {"seed": seed, "card": chosen, "runs": len(records), "hidden": name, "response": response, "snr": snr}
+    case |= {"seconds": time.process_time() - begin, "verdict": found.verdict, "names": [c.effect for c in found.causes]}
+    case["sets"] = [[*c.names] for c in found.causes if c.kind == "physics"]
+    case["stated"] = [c.probability for c in found.causes if c.kind == "physics"]
+    case["values"] = [c.effect for c in found.causes if c.kind == "value"]
+    case["left"] = {k: r.left_over_input for k, r in found.responses.items()}
+    if not name:
+        case["alone"] = investigate(campaign, advise=False, score_held_out=True).verdict.verdict
+    return case
+
+
+def summarise(cases):
+    """Rates with 90 % bands."""
+    lines = []
+
+    def row(label, chosen, holds):
+        lines.append(f"{label:44} {short_rate(sum(bool(holds(c)) for c in chosen), len(chosen))}")
+
+    def equals(name):
+        return {name, *(e for own in library()[name].equivalents.values() for e in own)}
+
+    def hit(c):
+        return any(equals(c["hidden"]) & set(names) for names in c["sets"])
+
+    nulls = [c for c in cases if not c["hidden"]]
+    for card in CARDS:
+        row(f"nothing hidden, {card}: adequate", [c for c in nulls if c["card"] == card], lambda c: c["verdict"] == "adequate")
+    row("nothing hidden: adequate", nulls, lambda c: c["verdict"] == "adequate")
+    row("nothing hidden, no card: adequate", nulls, lambda c: c["alone"] == "adequate")
+    for snr in sorted(SNRS):
+        own = [c for c in cases if c["hidden"] and c["snr"] == snr]
+        row(f"SNR {snr:g}: in the strongest set", own, lambda c: c["sets"] and equals(c["hidden"]) & set(c["sets"][0]))
+        row("    right class", own, lambda c: c["verdict"] in ("explained", "not-identifiable") and hit(c) and len(c["sets"]) == 1)
+        row("    unexplained", own, lambda c: c["verdict"] == "unexplained")
+    hidden = [c for c in cases if c["hidden"]]
+    row("a value of the card named beside", hidden, lambda c: c["values"])
+    row("something named that is not there", hidden, lambda c: any(not equals(c["hidden"]) & set(s) for s in c["sets"]))
+    return "\n".join(lines)
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("cases", type=Path)
+    parser.add_argument("--minutes", type=float, default=5.0)
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--plain", action="store_true", help="hide nothing")
+    given = parser.parse_args()
+    end, seed = time.process_time() + 60 * given.minutes, given.seed
+    with given.cases.open("a") as file:
+        while time.process_time() < end:
+            try:
+                file.write(json.dumps(answer(seed, given.plain), default=float) + "\n")
+            except InputError as error:
+                print(f"seed {seed}: {error}")
+            file.flush()
+            seed += 1
+    print(summarise([json.loads(line) for line in given.cases.read_text().splitlines()]))
+
+
+if __name__ == "__main__":
+    main()
