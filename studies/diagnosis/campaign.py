@@ -21,6 +21,10 @@ FINEST = 20
 LONGEST_GAP = 900.0
 UNKNOWN_HEAT = 50.0
 """Area between temperature and line, K s, that a gap may hide: 50 mK of the resonator at a time constant of 1000 s."""
+HOLE = 2.0
+"""Steps of the grid between neighbours, in parts of the usual, that make a hole."""
+ASIDE = 0.1
+"""Part of a step by which the rows of a step beside a hole may lie off its centre."""
 
 
 @dataclass(frozen=True)
@@ -324,7 +328,10 @@ def _grid_run(
 
 
 def _bin(column: FloatArray, time: FloatArray, slot: np.ndarray, grid: FloatArray) -> FloatArray:
-    """Mean over each step of the grid, moved along the slope from the rows' mean time to the centre."""
+    """Mean over each step of the grid, moved along the slope from the rows' mean time to the centre.
+
+    A step beside a hole, where the slope is not known well enough, stands only if its rows are centred.
+    """
     present = np.isfinite(column)
     weight = np.bincount(slot[present], minlength=grid.size)
     full = weight >= max(1.0, 0.34 * float(np.median(weight[weight > 0]))) if weight.any() else weight > 0
@@ -333,9 +340,16 @@ def _bin(column: FloatArray, time: FloatArray, slot: np.ndarray, grid: FloatArra
         lead = np.bincount(slot[present], time[present], grid.size) / weight - grid
     mean[~full] = np.nan
     known = np.flatnonzero(full)
-    if known.size > 3:
-        slope = np.gradient(mean[known], (grid + lead)[known])
-        mean[known] -= slope * lead[known]
+    if known.size < 2:
+        return np.asarray(mean)
+    gap = np.diff(known)
+    slopes = np.diff(mean[known]) / np.diff((grid + lead)[known])
+    slopes[gap > HOLE * np.median(gap)] = np.nan
+    around = np.stack([np.append(np.nan, slopes), np.append(slopes, np.nan)])
+    stands = np.isfinite(around).all(axis=0) | (np.abs(lead[known]) <= ASIDE * (grid[1] - grid[0]))
+    there = np.isfinite(around)
+    slope = np.where(there, around, 0.0).sum(axis=0) / np.maximum(there.sum(axis=0), 1)
+    mean[known] = np.where(stands, mean[known] - slope * lead[known], np.nan)
     return np.asarray(mean)
 
 
