@@ -7,23 +7,30 @@ import numpy as np
 
 from studies.diagnosis.baseline import Baseline, Followed, Lagged, Tangent
 from studies.diagnosis.campaign import Campaign
-from studies.diagnosis.model import Fit, fit, pose, term_columns
+from studies.diagnosis.model import Fit, fit, inexact_columns, pose, term_columns
 from studies.effects.states import FloatArray
 
 BLOCKS = 5
 FEWEST = 40
 SETTLED = 0.02
 """Kelvin by which a refitted initial state may still move."""
+NEIGHBOUR = 0.1
+"""Part of the covered range within which rows that are held out must find the temperature of rows of the fit: a law is not
+asked about temperatures that it has never seen."""
 KNOWN_START = 0.5
 """Part of the initial state's signature in a block from which on it is refitted there."""
 
 
 @dataclass(frozen=True)
 class Score:
-    """Residual rms on the rows of the fit and on rows that it has not seen (None where that cannot be had)."""
+    """Residual rms on the rows of the fit and on rows that it has not seen (None where that cannot be had).
+
+    `foretold` is the part of the rows that the second is about: those at temperatures that rows of the fit know.
+    """
 
     residual_rms: float
     held_out_rms: float | None
+    foretold: float = 1.0
 
 
 def rms(parts: Sequence[FloatArray]) -> float:
@@ -47,6 +54,7 @@ class OnRows:
         for term in self.model.terms:
             own = term_columns(term, view, 1, self.model.problem.response.column)
             parts.append(own[:, np.flatnonzero(term.effect.spread > 0)])
+        parts += [inexact_columns(term, view, self.model.problem, 1) for term in self.model.terms if term.about]
         table = np.concatenate([*parts, self.tangent.shift[k][:, None]], axis=1)
         time = run.states.time
         rows = np.stack([np.interp(run.row_time, time, column) for column in table.T], axis=1)
@@ -78,6 +86,18 @@ class OnRows:
             rows = self._started(k, start)
         return np.asarray(rest)
 
+    def temperature(self, k: int) -> FloatArray:
+        """Return the temperature of run `k` on its rows, K."""
+        run = self.campaign.runs[k]
+        return np.interp(run.row_time, run.states.time, self.tangent.views[k].seen.resonator)
+
+    def known(self, keep: Sequence["np.ndarray"]) -> FloatArray:
+        """Return the temperatures of the steps of the grid that were kept, sorted, K."""
+        parts = []
+        for run, view, own in zip(self.campaign.runs, self.tangent.views, keep, strict=True):
+            parts.append(np.interp(run.time[own], run.states.time, view.seen.resonator))
+        return np.sort(np.concatenate(parts))
+
     def _started(self, k: int, start: float) -> "OnRows":
         """Return the same model with run `k` linearised about another initial state, K."""
         baseline = self.model.baseline
@@ -104,7 +124,12 @@ def fine(baseline: Baseline, campaign: Campaign) -> Baseline:
 
 
 def _finer(campaign: Campaign, parts: Sequence[FloatArray]) -> list[FloatArray]:
-    return [np.interp(run.states.time, run.time, part) for run, part in zip(campaign.runs, parts, strict=True)]
+    from scipy.interpolate import interp1d
+
+    return [
+        interp1d(run.time, part, axis=0, bounds_error=False, fill_value=(part[0], part[-1]))(run.states.time)
+        for run, part in zip(campaign.runs, parts, strict=True)
+    ]
 
 
 def residuals(model: Fit, campaign: Campaign) -> list[FloatArray]:
@@ -122,32 +147,60 @@ def score(model: Fit, campaign: Campaign) -> Score:
     """Return training and held-out residual.
 
     One record is left out at a time, the rest is fitted anew; of the record that was left out only its own offset and
-    initial state are refitted. With one record, blocks in time are left out, one thermal constant more on both sides.
+    initial state are refitted. With one record, blocks in time are left out, one thermal constant more on both sides. Rows
+    at temperatures that the rest does not come near are not asked for.
     """
     training = rms(residuals(model, campaign))
-    if len(campaign.records) > 1:
-        return Score(training, by_record(model, campaign))
-    return Score(training, by_block(model, campaign))
+    parts = _by_record(model, campaign) if len(campaign.records) > 1 else _by_block(model, campaign)
+    return Score(training, _rms_or_none(parts), _share(parts))
 
 
 def by_record(model: Fit, campaign: Campaign) -> float | None:
     """Leave one record out at a time."""
-    out = []
+    return _rms_or_none(_by_record(model, campaign))
+
+
+def by_block(model: Fit, campaign: Campaign) -> float | None:
+    """Leave one block of every run out at a time, with a gap on both sides."""
+    return _rms_or_none(_by_block(model, campaign))
+
+
+Parts = list[tuple[FloatArray, "np.ndarray"]]
+"""What is left of rows that were held out, and which of them lie at known temperatures."""
+
+
+def _rms_or_none(parts: Parts | None) -> float | None:
+    value = rms([rest[near] for rest, near in parts or []])
+    return value if np.isfinite(value) else None
+
+
+def _share(parts: Parts | None) -> float:
+    if not parts:
+        return 1.0
+    finite = [np.isfinite(rest) for rest, _ in parts]
+    asked = sum(int((own & near).sum()) for own, (_, near) in zip(finite, parts, strict=True))
+    return asked / max(sum(int(own.sum()) for own in finite), 1)
+
+
+def _by_record(model: Fit, campaign: Campaign) -> Parts | None:
+    out: Parts = []
     for record in campaign.records:
         keep = [np.full(run.time.shape, run.record != record) for run in campaign.runs]
         rows = _trained(model, campaign, keep)
         if rows is None:
             return None
+        known = rows.known(keep)
         out += [
-            rows.residual(k, own_columns(rows.model, k)) for k, run in enumerate(campaign.runs) if run.record == record
+            (rows.residual(k, own_columns(rows.model, k)), _near(rows.temperature(k), known))
+            for k, run in enumerate(campaign.runs)
+            if run.record == record
         ]
-    return rms(out)
+    return out
 
 
-def by_block(model: Fit, campaign: Campaign) -> float | None:
-    """Leave one block of every run out at a time, with a gap on both sides."""
+def _by_block(model: Fit, campaign: Campaign) -> Parts | None:
     gap = getattr(model.baseline, "tau", None) or model.tangent.views[0].fine.tau
-    out = []
+    out: Parts = []
     longest = max(float(np.ptp(run.row_time)) for run in campaign.runs)
     if longest / BLOCKS < 2.0 * campaign.step or (len(campaign.runs) == 1 and longest < 4.0 * gap):
         return None
@@ -163,12 +216,24 @@ def by_block(model: Fit, campaign: Campaign) -> float | None:
         rows = _trained(model, campaign, keep)
         if rows is None:
             return None
+        known = rows.known(keep)
         for k, run in enumerate(campaign.runs):
             low, high = ends[k]
             inside = (run.row_time >= low) & (run.row_time < high + (1e-9 if block < BLOCKS - 1 else 1.0))
             if inside.any():
-                out.append(rows.residual(k, _start_within(rows, k, inside), inside))
-    return rms(out)
+                rest = rows.residual(k, _start_within(rows, k, inside), inside)
+                out.append((rest, _near(rows.temperature(k)[inside], known)))
+    return out
+
+
+def _near(temperature: FloatArray, known: FloatArray) -> "np.ndarray":
+    """Which temperatures have a known one within a part of the range that both cover."""
+    if not known.size:
+        return np.zeros(temperature.shape, dtype=bool)
+    range_ = max(known[-1], temperature.max()) - min(known[0], temperature.min())
+    after = np.clip(np.searchsorted(known, temperature), 1, max(known.size - 1, 1))
+    nearest = np.minimum(np.abs(temperature - known[after - 1]), np.abs(temperature - known[np.minimum(after, known.size - 1)]))
+    return np.asarray(nearest <= NEIGHBOUR * range_)
 
 
 def _trained(model: Fit, campaign: Campaign, keep: Sequence["np.ndarray"]) -> OnRows | None:
