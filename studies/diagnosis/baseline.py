@@ -236,8 +236,9 @@ class Followed:
     ----------
     reading : tuple of arrays
         Its reading, K on the coarse grid.
-    missed : tuple of arrays
-        What the thermometer's own model cannot explain, K: temperature or not, the data decide.
+    missed : tuple of (n, m) arrays
+        What the thermometer's own model cannot explain, and what effects on the thermometer itself add to it, K: temperature
+        or not, the data decide.
     slope : float
         Change of the response for one kelvin, for the prior of the two.
     """
@@ -257,8 +258,8 @@ class Followed:
         return False
 
     def tangent(self) -> Tangent:
-        """Columns of the polynomial, the missed part, and a delay against the thermometer."""
-        runs, powers = len(self.states), self.response.powers
+        """Columns of the polynomial, the missed parts, and a delay against the thermometer."""
+        runs, powers, missed = len(self.states), self.response.powers, self.missed[0].shape[1]
         shift, columns, views = [], [], []
         for k, own in enumerate(self.states):
             coarse = own.averaged(self.group)
@@ -274,20 +275,18 @@ class Followed:
             if self.delay is not None:
                 shift[-1] = -self.delay * late
                 late = np.zeros_like(late)
-            columns.append(
-                np.concatenate([offsets, np.stack(static, 1), self.missed[k][:, None], late[:, None]], axis=1)
-            )
+            columns.append(np.concatenate([offsets, np.stack(static, 1), self.missed[k], late[:, None]], axis=1))
             steep = np.full(u.size, self.slope)
             views.append(View(own, coarse, own, coarse, steep))
         names = (
             *([f"offset@{k}" for k in range(runs)] if self.response.own_offset else ["level"]),
             *("slope", "quadratic", "cubic")[:powers],
-            "missed",
+            *(f"missed {m}" for m in range(missed)),
             "delay",
         )
         size = max(abs(self.slope), 1e-300)
         bends = self.bends or (np.inf,) * (powers - 1)
-        prior = np.array([np.inf] * (len(names) - 1 - powers) + [*bends, 1.5 * size, FOLLOWED_DELAY])
+        prior = np.array([np.inf] * (len(names) - missed - powers) + [*bends, *[1.5 * size] * missed, FOLLOWED_DELAY])
         return Tangent(shift, columns, prior, names, views)
 
     def moved(self, values: dict[str, float], warmer: Sequence[FloatArray] | None) -> "Followed":
@@ -308,7 +307,9 @@ class Followed:
     def alone(self, states: States) -> "Followed":
         """Return the same law for one further run whose states already hold the thermometer's temperature."""
         nothing = np.zeros(states.time.size // self.group)
-        return replace(self, states=(states,), reading=(nothing,), missed=(nothing,))
+        return replace(
+            self, states=(states,), reading=(nothing,), missed=(np.zeros((nothing.size, self.missed[0].shape[1])),)
+        )
 
 
 def bends_of(values: FloatArray, reading: FloatArray, powers: int) -> tuple[float, ...]:

@@ -8,7 +8,7 @@ import numpy as np
 from studies.diagnosis.baseline import Followed
 from studies.diagnosis.campaign import Campaign
 from studies.diagnosis.inquiry import Inquiry, begin, inquire, read_thermometer
-from studies.diagnosis.model import Fit, Term, fit
+from studies.diagnosis.model import Fit, fit
 from studies.diagnosis.response import RESPONSES
 from studies.diagnosis.search import Hypothesis, Place
 from studies.diagnosis.verdict import Cause, Interval, weigh
@@ -155,7 +155,7 @@ def shape_spread(model: Fit, index: int) -> list[float]:
         for sign in (-1.0, 1.0):
             value = term.shape[k] * float(np.exp(sign * step)) if parameter.logarithmic else term.shape[k] + sign * step
             shape = (*term.shape[:k], value, *term.shape[k + 1 :])
-            terms = (*model.terms[:index], Term(term.effect, shape), *model.terms[index + 1 :])
+            terms = (*model.terms[:index], replace(term, shape=shape), *model.terms[index + 1 :])
             own = fit(model.problem, model.baseline, terms, 1, model.solved.scales, [model.solved.kind])
             sides.append(own.log_evidence)
         bend = (2.0 * model.log_evidence - sides[0] - sides[1]) / step**2

@@ -127,7 +127,9 @@ def _finer(campaign: Campaign, parts: Sequence[FloatArray]) -> list[FloatArray]:
     from scipy.interpolate import interp1d
 
     return [
-        interp1d(run.time, part, axis=0, bounds_error=False, fill_value=(part[0], part[-1]))(run.states.time)
+        np.asarray(
+            interp1d(run.time, part, axis=0, bounds_error=False, fill_value=(part[0], part[-1]))(run.states.time), float
+        )
         for run, part in zip(campaign.runs, parts, strict=True)
     ]
 
@@ -232,7 +234,9 @@ def _near(temperature: FloatArray, known: FloatArray) -> "np.ndarray":
         return np.zeros(temperature.shape, dtype=bool)
     range_ = max(known[-1], temperature.max()) - min(known[0], temperature.min())
     after = np.clip(np.searchsorted(known, temperature), 1, max(known.size - 1, 1))
-    nearest = np.minimum(np.abs(temperature - known[after - 1]), np.abs(temperature - known[np.minimum(after, known.size - 1)]))
+    nearest = np.minimum(
+        np.abs(temperature - known[after - 1]), np.abs(temperature - known[np.minimum(after, known.size - 1)])
+    )
     return np.asarray(nearest <= NEIGHBOUR * range_)
 
 

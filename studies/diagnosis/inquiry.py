@@ -31,8 +31,9 @@ class Thermometer:
     ----------
     change, excess : tuples of (N,) arrays
         Change of frequency over its slope, K, and temperature minus reference, K, run by run on the coarse grid.
-    missed : tuple of (N,) arrays
-        Slow part of what the model leaves, as if it were temperature, K.
+    missed : tuple of (N, m) arrays
+        What may be temperature or not, as if it were, K: the slow part of what the model leaves, then every named effect
+        on the frequency itself.
     states : tuple of States
         Runs on the fine grid with that temperature.
     """
@@ -135,7 +136,7 @@ def inquire(campaign: Campaign, plain: Fit, effects: Sequence[Effect] | None, sc
     if not selection.final.fit.terms:
         return Inquiry(plain.problem, selection, leftover, {})
     generic = look(selection.plain.fit, selection.plain.fit)
-    unknown = selection.plain.score + generic.evidence + CONSTANTS["log_prior_unknown"]
+    unknown = selection.plain.score + generic.smooth + CONSTANTS["log_prior_unknown"]
     if unknown > selection.final.score and not leftover.significant:
         # what is named patches up what a generic form says better alone
         leftover = replace(generic, share=0.0)
@@ -143,17 +144,18 @@ def inquire(campaign: Campaign, plain: Fit, effects: Sequence[Effect] | None, sc
 
 
 def refuse(campaign: Campaign, selection: Selection) -> Selection:
-    """Drop causes, the weakest first, until the extended model is better on rows that it has not seen."""
+    """Drop causes, the weakest first, until the model needs each of them on rows that it has not seen."""
     while selection.final.fit.terms:
-        model, plain = selection.final.fit, selection.plain.fit
-        events = any(term.effect.event for term in model.terms)
-        by_run = None if events or len(campaign.records) == 1 else held_out.by_record
-        if _pays(plain, model, campaign, by_run):
+        fewer = [drop(selection.final, k) for k in range(len(selection.final.fit.terms))]
+        for k in sorted(range(len(fewer)), key=lambda k: -fewer[k].score):
+            event = selection.final.fit.terms[k].effect.event
+            by_run = None if event or len(campaign.records) == 1 else held_out.by_record
+            if not _pays(fewer[k].fit, selection.final.fit, campaign, by_run):
+                kept = [place for n, place in enumerate(selection.places) if n != k]
+                selection = replace(selection, final=fewer[k], places=tuple(kept))
+                break
+        else:
             break
-        weakest = max(range(len(model.terms)), key=lambda k: drop(selection.final, k).score)
-        fewer = drop(selection.final, weakest)
-        kept = [place for k, place in enumerate(selection.places) if k != weakest]
-        selection = replace(selection, final=fewer, places=tuple(kept))
     return selection
 
 
@@ -188,14 +190,15 @@ def read_thermometer(campaign: Campaign, model: Fit) -> Thermometer | None:
     if not model.baseline.lagged or not _follows(model):
         return None
     baseline = cast("Reading", model.moved())
-    slow = model.slow_part()
+    slow, beside = model.slow_part(), model.beside_temperature()
     changes, excesses, missed, states = [], [], [], []
-    for run, view, rest in zip(campaign.runs, baseline.views(), slow, strict=True):
+    for k, (run, view, rest) in enumerate(zip(campaign.runs, baseline.views(), slow, strict=True)):
         x = view.seen.excess
         known = np.isfinite(rest)
         filled = np.interp(run.time, run.time[known], rest[known]) if known.any() else np.zeros_like(x)
         excesses.append(x)
         changes.append(baseline.change(x))
-        missed.append(filled / np.where(np.abs(view.steep) > 0, view.steep, np.inf))
+        parts = np.stack([filled, *(own[k] for own in beside)], axis=1)
+        missed.append(parts / np.where(np.abs(view.steep) > 0, view.steep, np.inf)[:, None])
         states.append(view.seen_fine)
     return Thermometer(tuple(changes), tuple(excesses), tuple(missed), tuple(states))

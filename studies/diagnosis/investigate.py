@@ -27,6 +27,8 @@ from studies.shown import Shown
 
 FAR = 2.0
 """Prior standard deviations beyond which a value of the card is wrong."""
+FORETOLD = 0.95
+"""Part of the rows below which it is said that held-out residuals are not about all."""
 NARROW_RANGE = 1.0
 """Kelvin below which a temperature does not vary."""
 Progress = Callable[[str], None]
@@ -169,24 +171,15 @@ def _result(
     extended = measured(final) if final.terms else None
     column = inquiry.problem.response.column
     mine = [cause for cause in causes if cause.response == column and cause.kind == "physics"]
-    remark = ""
-    share: float | None = None
-    if final.terms:
-        share = left.share if left.significant else 1.0
-    # a name that a generic form beats by more than forms are inexact patches the structure up, it does not explain it
-    patched = bool(mine) and max(cause.probability for cause in mine) < CONSTANTS["believed"]
-    if left.significant and (share is None or share < CONSTANTS["share_explained"] or patched):
-        verdict = "unexplained"
-    elif final.terms:
-        verdict = "not-identifiable" if any(cause.equivalent for cause in mine) else "explained"
-    elif any(cause.kind == "value" and cause.response == column for cause in causes):
-        verdict = "explained"
-    else:
-        verdict = "adequate"
-        temperature = np.concatenate([run.states.housing for run in campaign.runs])
-        if np.ptp(temperature) < NARROW_RANGE:
-            verdict, remark = "not-identifiable", f"the temperature varies by {np.ptp(temperature):.2g} K only"
+    share = (left.share if left.significant else 1.0) if final.terms else None
+    named = bool(mine) or any(cause.kind == "value" and cause.response == column for cause in causes)
+    verdict, remarks = _judge(campaign, inquiry, mine, share, named)
     reached = extended or base
+    if reached.foretold < FORETOLD and reached.held_out_rms is not None:
+        remarks.append(
+            f"held-out residuals are of {100 * reached.foretold:.0f} % of the rows: the others lie at temperatures that the "
+            "rest of the record does not cover"
+        )
     white = float(np.sqrt(final.solved.variance * inquiry.problem.noise.rows))
     wander = final.wander
     return ResponseResult(
@@ -198,12 +191,48 @@ def _result(
         left.input if left.significant else "",
         2.0 * max(left.evidence, 0.0),
         share,
-        remark,
+        "; ".join(remarks),
         white=white,
         wander=wander,
         shipped=shipped,
         run_shifts=tuple(_run_shifts(final)),
     )
+
+
+def _judge(
+    campaign: Campaign, inquiry: Inquiry, mine: Sequence[Cause], share: float | None, named: bool
+) -> tuple[str, list[str]]:
+    """Return the verdict of one response, and what must be said with it."""
+    left, final = inquiry.leftover, inquiry.final
+    clean = share is None or share >= CONSTANTS["share_explained"]
+    # a name that a generic form beats by more than forms are inexact patches the structure up, it does not explain it
+    patched = bool(mine) and max(cause.probability for cause in mine) < CONSTANTS["believed"]
+    if left.wander and clean:
+        return "not-identifiable", [
+            f"what is left wanders by {final.wander_ratio:.0f} times the white noise of a row: noise of that kind or a cause "
+            "that acts slowly, this record cannot tell"
+        ]
+    if left.significant and (share is None or not clean or patched):
+        return "unexplained", []
+    if final.terms:
+        return "not-identifiable" if any(cause.equivalent for cause in mine) else "explained", []
+    if named:
+        return "explained", []
+    temperature = np.concatenate([run.states.housing for run in campaign.runs])
+    if np.ptp(temperature) < NARROW_RANGE:
+        return "not-identifiable", [f"the temperature varies by {np.ptp(temperature):.2g} K only"]
+    response = inquiry.problem.response
+    shifts = np.array(_run_shifts(final))
+    apart = float(np.sqrt(np.mean(shifts**2)))
+    white = float(np.sqrt(final.solved.variance))
+    if not response.own_offset and apart > CONSTANTS["wander_usual"] * np.hypot(final.wander, white):
+        text = (
+            f"the runs lie {apart * response.scale:.3g} {response.shown} (rms) apart, {apart / max(final.wander, white):.0f} "
+            "times what is left within them: ageing, a clock, handling, or a wander between them"
+        )
+        starts = "" if campaign.timed else "; start times ('# start' in the records) would tell which"
+        return "not-identifiable", [text + starts]
+    return "adequate", []
 
 
 def _run_shifts(model: Fit) -> list[float]:

@@ -8,19 +8,26 @@ import numpy as np
 
 from studies.diagnosis.baseline import Baseline, Tangent, View
 from studies.diagnosis.campaign import Campaign
+from studies.diagnosis.constants import CONSTANTS
 from studies.diagnosis.evidence import Linear, Solved, solve
 from studies.diagnosis.noise import SHARES, Noise
 from studies.diagnosis.response import RESPONSES, Response
 from studies.effects import Effect, Span
-from studies.effects.states import FloatArray, average
+from studies.effects.states import FloatArray, average, lag
 
 
 @dataclass(frozen=True)
 class Term:
-    """An effect with its shape fixed."""
+    """An effect with its shape fixed.
+
+    `about` are the coefficients about which it is known to be inexact, none before it has been fitted; a form that is not
+    `named` has none.
+    """
 
     effect: Effect
     shape: tuple[float, ...]
+    about: tuple[float, ...] = ()
+    named: bool = True
 
     @property
     def name(self) -> str:
@@ -143,6 +150,28 @@ def term_columns(term: Term, view: View, group: int, column: str) -> FloatArray:
     return effect.columns(view.seen, term.shape, column)
 
 
+def inexact_columns(term: Term, view: View, problem: Problem, group: int) -> FloatArray:
+    """Return what a form may miss of an effect for one run: no form is exact.
+
+    The world's loop is not a play, its leak not linear, its peak not the textbook's: e(t), what the effect was found to do,
+    may change slowly with temperature and time, e · P₁(x), e · P₂(x), e · P₃(x), e · u, and come late, lag(e) − e, each by a
+    small part of it. x is the temperature over the covered range, u the time over the run. The discrepancy of Kennedy and
+    O'Hagan, J. R. Statist. Soc. B 63 (2001) 425, one for every hypothesis, so that it needs no second name.
+    """
+    span = problem.span
+    curve = term_columns(term, view, group, problem.response.column)[:, used(term.effect)] @ np.array(term.about)
+    seen = view.seen if group > 1 else view.seen_fine
+    x = np.clip(2.0 * (seen.resonator - span.temperature_low) / max(span.temperature_range, 1e-9) - 1.0, -1.2, 1.2)
+    u = 2.0 * (seen.time - seen.time[0]) / max(span.longest_run, 1e-9) - 1.0
+    late = lag(curve, seen.step, max(LATE * span.tau, seen.step)) - curve
+    factors = np.stack([x, 1.5 * x**2 - 0.5, 2.5 * x**3 - 1.5 * x, u], axis=1)
+    return np.concatenate([curve[:, None] * factors, late[:, None] / LATE], axis=1)
+
+
+LATE = 0.1
+"""Delay of what a form may miss, in parts of the thermal lag."""
+
+
 @dataclass(frozen=True)
 class Fit:
     """A model at its most likely noise, sizes and coefficients."""
@@ -172,6 +201,25 @@ class Fit:
         out = np.zeros(self.terms[index].effect.spread.size)
         out[used(self.terms[index].effect)] = self.solved.coefficients[self.columns_of(index)]
         return out
+
+    def known(self, index: int) -> Term:
+        """Return a term with what was found of it, about which it may be inexact."""
+        term = self.terms[index]
+        if not term.named:
+            return term
+        return replace(term, about=tuple(self.solved.coefficients[self.columns_of(index)].tolist()))
+
+    @property
+    def consistent(self) -> bool:
+        """Whether every effect still does at least half of what its inexactness was counted about."""
+        for index, term in enumerate(self.terms):
+            if term.about:
+                places = self.columns_of(index)
+                before = self.linear.columns[:, places] @ np.array(term.about)
+                now = self.linear.columns[:, places] @ self.solved.coefficients[places]
+                if float(before @ now) < 0.5 * float(before @ before):
+                    return False
+        return True
 
     @cached_property
     def residual(self) -> FloatArray:
@@ -212,6 +260,21 @@ class Fit:
         rows = basis.unrotate(basis.rotate(self.residual) * slow / (1.0 + slow))
         return self.problem.unstack(rows)
 
+    def beside_temperature(self) -> list[list[FloatArray]]:
+        """Return what every effect on the response itself adds to it, effect by effect and run by run."""
+        out = []
+        for k, term in enumerate(self.terms):
+            if not term.effect.thermal:
+                column, places = self.problem.response.column, used(term.effect)
+                out.append(
+                    [
+                        term_columns(term, view, self.problem.group, column)[:, places]
+                        @ self.solved.coefficients[self.columns_of(k)]
+                        for view in self.tangent.views
+                    ]
+                )
+        return out
+
     def warmer(self) -> list[FloatArray] | None:
         """Return what the effects on the temperature add to it, K on the fine grid, run by run."""
         thermal = [k for k, term in enumerate(self.terms) if term.effect.thermal]
@@ -248,6 +311,12 @@ def linearise(problem: Problem, tangent: Tangent, terms: Sequence[Term]) -> Line
         columns.append(problem.stack(own))
         prior.append(problem.size(term.effect) * term.effect.spread[places])
         owner.append(np.full(places.size, index))
+    for term in terms:
+        if term.about:
+            own = [inexact_columns(term, view, problem, problem.group) for view in tangent.views]
+            columns.append(problem.stack(own))
+            prior.append(np.full(own[0].shape[1], CONSTANTS["inexact"]))
+            owner.append(np.full(own[0].shape[1], -1))
     return Linear(
         problem.values + problem.stack(tangent.shift),
         np.concatenate(columns, axis=1),
@@ -291,12 +360,18 @@ def fit(
         if rounds > 1 and (held := baseline.held(now.values())) is not None:
             baseline, best = held, None
             now = _once(problem, baseline, terms, now.solved.scales, kinds)
+        if not now.consistent:
+            if best is not None:
+                break
+            terms = [replace(term, about=()) for term in terms]
+            now = _once(problem, baseline, terms, now.solved.scales, kinds)
         settled = best is not None and abs(now.log_evidence - best.log_evidence) < 0.3
         if best is None or now.log_evidence > best.log_evidence:
             best = now
         if settled:
             break
         baseline, scales = now.moved(), now.solved.scales
+        terms = [now.known(index) for index in range(len(terms))]
     assert best is not None
     return best
 

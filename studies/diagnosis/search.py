@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from studies.diagnosis.constants import CONSTANTS
-from studies.diagnosis.model import Fit, Term, fit
+from studies.diagnosis.model import Fit, fit
 from studies.diagnosis.scan import Bank, Seen, scan
 from studies.effects import Effect, Parameter
 
@@ -138,7 +138,7 @@ def _along(model: Fit, index: int, place: int, parameter: Parameter) -> Fit:
     def tried(value: float) -> float:
         actual = float(np.exp(value)) if parameter.logarithmic else value
         shape = (*term.shape[:place], actual, *term.shape[place + 1 :])
-        terms = (*model.terms[:index], Term(term.effect, shape), *model.terms[index + 1 :])
+        terms = (*model.terms[:index], replace(term, shape=shape), *model.terms[index + 1 :])
         own = fit(model.problem, baseline, terms, 1, model.solved.scales, kinds)
         if own.log_evidence > best[0].log_evidence:
             best[0] = own

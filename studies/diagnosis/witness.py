@@ -21,6 +21,9 @@ SHARP_ROWS = 3
 """Neighbouring rows that are averaged before their tails are counted."""
 
 
+WANDER = "time: it wanders far beyond its white noise"
+
+
 @dataclass(frozen=True)
 class Leftover:
     """What is left: in which input, with how much log evidence, and how large a part of the structure was explained."""
@@ -29,6 +32,10 @@ class Leftover:
     evidence: float
     share: float
     fit: Fit | None = None
+    smooth: float = 0.0
+    """Log evidence of the strongest smooth form."""
+    wander: bool = False
+    """Whether it is nothing but a wander larger than noise is believed to be."""
 
     @property
     def significant(self) -> bool:
@@ -156,10 +163,10 @@ def look(plain: Fit, model: Fit) -> Leftover:
     best, name = model, ""
     baseline, scales = model.baseline, model.solved.scales
     for form in forms:
-        tried = fit(problem, baseline, (*model.terms, Term(form, ())), 1, np.append(scales, 1e-2))
+        tried = fit(problem, baseline, (*model.terms, Term(form, (), named=False)), 1, np.append(scales, 1e-2))
         if tried.log_evidence > best.log_evidence:
             best, name = tried, form.name
-    evidence = best.log_evidence - model.log_evidence
+    evidence = smooth = best.log_evidence - model.log_evidence
     step = max((seen.gain for seen in scan(model, build_bank(model, [STEP]), 3)), default=0.0)
     if step > evidence:
         name, evidence = "time: a step", step
@@ -168,14 +175,17 @@ def look(plain: Fit, model: Fit) -> Leftover:
         name, evidence = word, tails
     if not model.believed and best.believed is False:
         own = CONSTANTS["margin"] - CONSTANTS["log_prior_unknown"] + 10.0 * np.log(max(model.wander_ratio, 1.0))
-        if own > evidence:
-            name, evidence = "time: it wanders far beyond its white noise", float(own)
-    return Leftover(name, float(evidence), share(plain, model, best), best)
+        if evidence < CONSTANTS["margin"] - CONSTANTS["log_prior_unknown"]:
+            return Leftover(WANDER, float(own), share(plain, model, best), best, float(smooth), True)
+    return Leftover(name, float(evidence), share(plain, model, best), best, float(smooth))
 
 
 def share(plain: Fit, model: Fit, fullest: Fit) -> float:
-    """Return the part of the structure that a model explains, in independent rows of the fullest model's noise."""
-    s = fullest.solved
+    """Return the part of the structure that a model explains, in independent rows of its noise.
+
+    Where that is no noise that one believes, of the noise that the fullest model leaves.
+    """
+    s = model.solved if model.believed else fullest.solved
     basis = fullest.problem.noise.bases[s.kind]
     root = np.sqrt(fullest.problem.noise.weights(s.kind)[s.share] / s.variance)
 
@@ -192,7 +202,9 @@ def sharp(model: Fit) -> tuple[str, float]:
 
     A mixture of two normal laws, a small part of the rows with a larger variance, against one normal law.
     """
-    rows = model.whitened / max(float(np.sqrt(np.mean(model.whitened**2))), 1e-300)
+    # back in time: in the independent rows a line of the spectrum would be brief
+    white = model.problem.noise.bases[model.solved.kind].unrotate(model.whitened)
+    rows = white / max(float(np.sqrt(np.mean(white**2))), 1e-300)
     best = 0.0
     for part in (0.01, 0.03, 0.1):
         for wide in (3.0, 5.0, 8.0):

@@ -135,7 +135,9 @@ def make_case(seed, plain):
         noisy = run(card, folder, profiles, seed)
         noise = left(clean, [n[response] - c[response] for n, c in zip(noisy, clean, strict=True)], response)
         shape, values = draw_effect(rng, name, response, span_of(load_campaign(noisy), 1000.0))
-        level = abs(float(np.median(clean[0][response]))) if response != "bias_deg_per_h" and not effect.thermal else 1.0
+        level = (
+            abs(float(np.median(clean[0][response]))) if response != "bias_deg_per_h" and not effect.thermal else 1.0
+        )
         values = values * effect.sizes[response] * level * 0.03
         for _ in range(2):
             true = card.with_table("effect", [entry(name, response, shape, values)])
@@ -153,7 +155,11 @@ def answer(seed, plain):
     begin = time.process_time()
     found = investigate(campaign, card=card, advise=False).verdict
     case = {"seed": seed, "card": chosen, "runs": len(records), "hidden": name, "response": response, "snr": snr}
-    case |= {"seconds": time.process_time() - begin, "verdict": found.verdict, "names": [c.effect for c in found.causes]}
+    case |= {
+        "seconds": time.process_time() - begin,
+        "verdict": found.verdict,
+        "names": [c.effect for c in found.causes],
+    }
     case["sets"] = [[*c.names] for c in found.causes if c.kind == "physics"]
     case["stated"] = [c.probability for c in found.causes if c.kind == "physics"]
     case["values"] = [c.effect for c in found.causes if c.kind == "value"]
@@ -178,13 +184,21 @@ def summarise(cases):
 
     nulls = [c for c in cases if not c["hidden"]]
     for card in CARDS:
-        row(f"nothing hidden, {card}: adequate", [c for c in nulls if c["card"] == card], lambda c: c["verdict"] == "adequate")
+        row(
+            f"nothing hidden, {card}: adequate",
+            [c for c in nulls if c["card"] == card],
+            lambda c: c["verdict"] == "adequate",
+        )
     row("nothing hidden: adequate", nulls, lambda c: c["verdict"] == "adequate")
     row("nothing hidden, no card: adequate", nulls, lambda c: c["alone"] == "adequate")
     for snr in sorted(SNRS):
         own = [c for c in cases if c["hidden"] and c["snr"] == snr]
         row(f"SNR {snr:g}: in the strongest set", own, lambda c: c["sets"] and equals(c["hidden"]) & set(c["sets"][0]))
-        row("    right class", own, lambda c: c["verdict"] in ("explained", "not-identifiable") and hit(c) and len(c["sets"]) == 1)
+        row(
+            "    right class",
+            own,
+            lambda c: c["verdict"] in ("explained", "not-identifiable") and hit(c) and len(c["sets"]) == 1,
+        )
         row("    unexplained", own, lambda c: c["verdict"] == "unexplained")
     hidden = [c for c in cases if c["hidden"]]
     row("a value of the card named beside", hidden, lambda c: c["values"])

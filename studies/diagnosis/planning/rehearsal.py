@@ -88,7 +88,7 @@ def hide(stage: Stage, effect: Effect, cases: int, rng: np.random.Generator) -> 
     """Hide an effect of random shape `cases` times at SNR 1, under white and slow noise by turns."""
     problem, linear = stage.model.problem, stage.model.linear
     # the SNR counts what the law, the lag and the initial state cannot absorb; tolerated delays are not among them
-    taken = [k for k, name in enumerate(stage.model.tangent.names) if name not in ("delay", "missed")]
+    taken = [k for k, name in enumerate(stage.model.tangent.names) if not name.startswith(("delay", "missed"))]
     columns = linear.columns[:, taken]
     absorbs = np.linalg.qr(columns / np.maximum(np.linalg.norm(columns, axis=0), 1e-300))[0]
     grid = list(effect.grid(problem.span, problem.response.column))
