@@ -23,7 +23,7 @@ UNKNOWN_HEAT = 50.0
 """Area between temperature and line, K s, that a gap may hide: 50 mK of the resonator at a time constant of 1000 s."""
 HOLE = 2.0
 """Steps of the grid between neighbours, in parts of the usual, that make a hole."""
-ASIDE = 0.1
+ASIDE = 0.02
 """Part of a step by which the rows of a step beside a hole may lie off its centre."""
 
 
