@@ -12,7 +12,7 @@ import numpy as np
 
 from studies.diagnosis.campaign import Campaign, Run
 from studies.diagnosis.investigate import Diagnosis
-from studies.diagnosis.model import Fit, Term, fit, used
+from studies.diagnosis.model import Fit, fit, used
 from studies.diagnosis.search import refine
 from studies.effects import Effect, find_effect
 from studies.effects.states import FloatArray
@@ -66,7 +66,13 @@ def _is_in_the_baseline(entry: dict[str, Any]) -> bool:
 
 
 def prune(model: Fit) -> Fit:
-    """Return the model with families cut down to the members that pay: the others would add their uncertainty to predictions."""
+    """Return the model with families cut down to the members that pay: the others would add their uncertainty to predictions.
+
+    What forms may miss is no part of a card: it is left out first.
+    """
+    exact = [replace(term, about=(), named=False) for term in model.terms]
+    if exact:
+        model = fit(model.problem, model.baseline, exact, 1, model.solved.scales)
     for index in range(len(model.terms)):
         term = model.terms[index]
         places = used(term.effect)
@@ -79,7 +85,7 @@ def prune(model: Fit) -> Fit:
             if used(effect).size == 1 or (effect.positive and place == 0):
                 continue
             terms = list(fewer.terms)
-            terms[index] = Term(_without_member(effect, int(place)), term.shape)
+            terms[index] = replace(term, effect=_without_member(effect, int(place)))
             tried = fit(fewer.problem, fewer.baseline, terms, 1, fewer.solved.scales)
             if tried.log_evidence >= fewer.log_evidence:
                 fewer = tried
