@@ -249,7 +249,8 @@ def _trained(model: Fit, campaign: Campaign, keep: Sequence["np.ndarray"]) -> On
     baseline = model.baseline
     if isinstance(baseline, (Lagged, Followed)) and baseline.delay is None:
         baseline = replace(baseline, delay=model.values()["delay"])
-    return OnRows(fit(problem, baseline, model.terms, 4, model.solved.scales, release=False), campaign)
+    terms = [term if term.about else replace(term, named=False) for term in model.terms]  # exact where it was
+    return OnRows(fit(problem, baseline, terms, 4, model.solved.scales, release=False), campaign)
 
 
 def _start_within(rows: OnRows, k: int, inside: "np.ndarray") -> list[int]:

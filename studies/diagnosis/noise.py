@@ -20,7 +20,7 @@ from studies.effects.states import FloatArray
 
 WALK_TIME = 8 * 3600.0
 WALKED_BEFORE = 0.5
-SHARES = np.array([0.0, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0, 400.0, 2000.0, 2e4])
+SHARES = np.array([0.0, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0, 400.0, 2000.0, 6000.0, 2e4])
 KERNELS = ("walk", "flicker", "relaxing", "slowly relaxing")
 """Kinds of wander: random walk; 1/f; one relaxation of 10 min; one of 45 min."""
 
