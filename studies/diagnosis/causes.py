@@ -8,7 +8,7 @@ import numpy as np
 from studies.diagnosis.baseline import Followed
 from studies.diagnosis.campaign import Campaign
 from studies.diagnosis.inquiry import Inquiry, begin, inquire, read_thermometer
-from studies.diagnosis.model import Fit, fit
+from studies.diagnosis.model import Fit, exact_forms, fit
 from studies.diagnosis.response import RESPONSES
 from studies.diagnosis.search import Hypothesis, Place
 from studies.diagnosis.verdict import Cause, Interval, weigh
@@ -105,7 +105,7 @@ def _cause(campaign: Campaign, inquiry: Inquiry, place: Place) -> Cause:
         column,
         probability,
         tuple(sorted(names[1:])),
-        parameters_of(winner.fit, place.index),
+        parameters_of(exact_forms(winner.fit), place.index),
         2.0 * max(max(scores) - nothing, 0.0),
         peak=peak_of(winner.fit, place.index),
     )

@@ -70,9 +70,9 @@ def prune(model: Fit) -> Fit:
 
     What forms may miss is no part of a card: it is left out first.
     """
-    exact = [replace(term, about=(), named=False) for term in model.terms]
-    if exact:
-        model = fit(model.problem, model.baseline, exact, 1, model.solved.scales)
+    terms = [replace(term, about=(), named=False) for term in model.terms]
+    if terms:
+        model = fit(model.problem, model.baseline, terms, 1, model.solved.scales)
     for index in range(len(model.terms)):
         term = model.terms[index]
         places = used(term.effect)

@@ -26,6 +26,7 @@ from studies.diagnosis.campaign import load_campaign
 from studies.diagnosis.constants import CONSTANTS
 from studies.diagnosis.inquiry import Inquiry
 from studies.diagnosis.investigate import Diagnosis, investigate
+from studies.diagnosis.model import exact_forms
 from studies.diagnosis.scan import build_bank, scan
 from studies.diagnosis.search import drop, polish
 from studies.diagnosis.verdict import Interval
@@ -271,7 +272,7 @@ def _scores(inquiry: Inquiry, names: Sequence[str]) -> dict[str, Standing]:
     out = {}
     bank = build_bank(base.fit, [find_effect(name) for name in names if _acts(inquiry, name)])
     for seen in scan(base.fit, bank):
-        model = (own := polish(base, seen)).fit
+        model = exact_forms((own := polish(base, seen)).fit)
         places = model.columns_of(len(model.terms) - 1)
         value, C = model.solved.coefficients[places], model.solved.covariance[np.ix_(places, places)]
         size = float(np.sqrt(np.mean((model.linear.columns[:, places] @ value) ** 2)))

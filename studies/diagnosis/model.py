@@ -384,6 +384,14 @@ def _once(
     return Fit(problem, baseline, tuple(terms), tangent, linear, solve(linear, len(terms), scales, kinds))
 
 
+def exact_forms(model: Fit) -> Fit:
+    """Return a model with its forms taken at their word: for numbers that belong to the forms themselves."""
+    if not any(term.about for term in model.terms):
+        return model
+    terms = [replace(term, about=(), named=False) for term in model.terms]
+    return fit(model.problem, model.baseline, terms, 1, model.solved.scales)
+
+
 def with_problem(model: Fit, problem: Problem, rounds: int = 1) -> Fit:
     """Return the same model fitted to other rows."""
     return fit(problem, model.baseline, model.terms, rounds, model.solved.scales)
