@@ -111,7 +111,7 @@ def test_what_no_source_states_is_left_out_and_said():
         ({"pressure_Pa": -1.0}, "pressure_Pa must be at least 0, not -1."),
         ({"gas": "xenon"}, "gas = 'xenon' is unknown"),
         ({"film": [GOLD | {"thickness_nm": 2e6}]}, "thicker than the wall (0.9 mm): film thickness is in nm."),
-        ({"film": [GOLD | {"thickness_nm": 1e5}]}, "more than 5% of the wall"),
+        ({"film": [GOLD | {"thickness_nm": 1e5}]}, "more than 5 % of the wall"),
         ({"film": [{"material": "gold", "thickness_nm": 100.0}]}, "no source states loss of the film 'gold'; add it."),
         (
             {"film": [{"material": "ti", "thickness_nm": 9.0}]},

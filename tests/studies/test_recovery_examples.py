@@ -58,7 +58,7 @@ def test_the_tolerance_study(tmp_path):
 def test_the_chamber_run_settles_as_the_paper_describes(tmp_path):
     """HRG paper, figure 3: fast until about 9000 s, settled at about 15 000 s."""
     text = run_example("chamber_run", tmp_path)
-    (fast,), (settled,) = (numbers(rf"within {share}% of the change after (\d+) min", text) for share in (5, 1))
+    (fast,), (settled,) = (numbers(rf"within {share} % of the change after (\d+) min", text) for share in (5, 1))
     assert 6000 < 60 * fast < 12000
     assert 9000 < 60 * settled < 17000
 
