@@ -14,6 +14,8 @@ BLOCKS = 5
 FEWEST = 40
 SETTLED = 0.02
 """Kelvin by which a refitted initial state may still move."""
+WARMEST = 60.0
+"""Kelvin by which a run may start away from equilibrium."""
 NEIGHBOUR = 0.1
 """Part of the covered range within which rows that are held out must find the temperature of rows of the fit: a law is not
 asked about temperatures that it has never seen."""
@@ -67,7 +69,7 @@ class OnRows:
         """
         run = self.campaign.runs[k]
         inside = np.ones(run.row_time.size, dtype=bool) if inside is None else inside
-        rows, start = self, 0.0
+        rows, start, names = self, 0.0, self.model.tangent.names
         for _ in range(4):
             columns, shift = rows.columns(k)
             coefficients = self.model.solved.coefficients.copy()
@@ -77,9 +79,9 @@ class OnRows:
             if not free or known.sum() <= len(free):
                 return np.asarray(rest)
             own = columns[inside][:, list(free)]
-            found = np.linalg.lstsq(own[known], rest[known], rcond=None)[0]
+            found = _within(own[known], rest[known], np.array([names[place] == f"start@{k}" for place in free]))
             rest = rest - own @ found
-            places = [n for n, place in enumerate(free) if self.model.tangent.names[place] == f"start@{k}"]
+            places = [n for n, place in enumerate(free) if names[place] == f"start@{k}"]
             if not places or abs(found[places[0]] - start) < SETTLED:
                 break
             start = float(found[places[0]])
@@ -109,6 +111,17 @@ class OnRows:
         starts[k] = start
         moved = replace(baseline, warmer=tuple(warmer), starts=tuple(starts))
         return OnRows(replace(self.model, baseline=moved), self.campaign)
+
+
+def _within(columns: FloatArray, rest: FloatArray, starts: "np.ndarray") -> FloatArray:
+    """Least squares, with initial states no further from equilibrium than any gyro is put into a chamber."""
+    found = np.linalg.lstsq(columns, rest, rcond=None)[0]
+    limited = np.where(starts, np.clip(found, -WARMEST, WARMEST), found)
+    if np.any(limited != found):
+        limited[~starts] = np.linalg.lstsq(
+            columns[:, ~starts], rest - columns[:, starts] @ limited[starts], rcond=None
+        )[0]
+    return np.asarray(limited)
 
 
 def fine(baseline: Baseline, campaign: Campaign) -> Baseline:
