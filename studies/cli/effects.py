@@ -62,10 +62,11 @@ def parameters(effect: "Effect") -> list[dict[str, str]]:
         }
         for p in effect.shape
     ]
-    for name, coefficient in zip(effect.coefficient_names(effect.responses[0]), effect.coefficients, strict=True):
+    names = effect.coefficient_names(effect.responses[0])
+    for name, coefficient in zip(names, effect.coefficients, strict=True):
         many = len(coefficient.spread)
         kind = "coefficient" if many == 1 else f"coefficient, or a list of {many}"
-        bounds = "0 and above" if effect.positive else "any"
+        bounds = "0 and above" if effect.positive and name == names[0] else "any"
         rows.append({"name": name, "kind": kind, "bounds": bounds, "meaning": "size; the unit is that of the name"})
     return rows
 

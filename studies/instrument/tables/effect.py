@@ -54,8 +54,9 @@ def _declare(effect: "Effect", response: str) -> Any:
         kind = Annotated[float, number(least=shape.low, most=shape.high)]
         fields.append((shape.name, kind, shape.low) if shape.steady else (shape.name, kind))
     coefficients = effect.coefficient_names(response)
-    weight: Any = Annotated[float, number(least=0.0)] if effect.positive else float
     for key, coefficient in zip(coefficients, effect.coefficients, strict=True):
+        positive = effect.positive and key == coefficients[0]
+        weight: Any = Annotated[float, number(least=0.0)] if positive else float
         many = Annotated[list[float], msgspec.Meta(min_length=1, max_length=len(coefficient.spread))]
         fields.append((key, weight | many | None if len(coefficient.spread) > 1 else weight | None, None))
 

@@ -12,6 +12,7 @@ from studies.cli import main
 from studies.effects import Span, States, apply_effect, apply_effects, find_effect, library
 from studies.effects.states import lag
 from studies.errors import InputError
+from studies.instrument.card import load_card, save_card
 
 NAMES = {
     "second-lag",
@@ -212,3 +213,14 @@ def test_the_command_lists_every_effect_and_shows_one_in_full(capsys):
         assert part in said
     assert main(["effects", "histeresis"]) == 2
     assert "hysteresis" in capsys.readouterr().err
+
+
+def test_of_a_positive_effect_only_the_first_coefficient_cannot_be_negative(tmp_path):
+    """What a diagnosis saves of a leak, a hole with less outgassing than a straight line says, must load."""
+    card = load_card("hrg-30mm")
+    leak = {"name": "leak", "response": "inverse_q", "temperature_exponent": 0.5}
+    slowing = card.with_table("effect", [leak | {"growth_1_per_day": 2e-8, "outgassing_1_per_root_day": -1e-9}])
+    save_card(slowing, tmp_path / "card.toml")
+    assert load_card(tmp_path / "card.toml").content["effect"][0]["outgassing_1_per_root_day"] == -1e-9
+    with pytest.raises(InputError, match="at least 0"):
+        card.with_table("effect", [leak | {"growth_1_per_day": -2e-8}])
