@@ -71,10 +71,10 @@ def loop(
     from scipy.constants import zero_Celsius
 
     from studies.cli.output import print_table, say
+    from studies.damping_law import settled_loss
     from studies.errors import InputError
     from studies.instrument.card import load_card
     from studies.law import law_of
-    from studies.loss import settled_loss
     from studies.simulation.drive import MOST_ROWS
     from studies.simulation.loop import require_loop, study_loops
 

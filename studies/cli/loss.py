@@ -15,8 +15,8 @@ from studies.cli.output import Answer, answers
 
 if TYPE_CHECKING:
     from shell.damping.budget import Budget, LossPart
-    from studies.instrument.card import Instrument
     from studies.loss import LossModel
+    from studies.loss_account import DampingAround, StatedLoss
 
 MOST_POINTS = 10_000
 
@@ -31,6 +31,7 @@ def loss(
     harmonic: int = 2,
     theory: Literal["solid", "shell"] = "solid",
     anchor: bool = False,
+    report: str | None = None,
 ) -> Answer:
     """Show Q over temperature, where its loss comes from, and which part to attack first.
 
@@ -53,13 +54,17 @@ def loss(
         solid (three-dimensional) or shell (Naghdi).
     anchor : bool
         Compute what a stem sends into the body that it stands on (a second or two).
+    report : str
+        Write a page (HTML).
     """
     import numpy as np
     from scipy.constants import zero_Celsius
 
+    from studies.cli.output import say
     from studies.errors import InputError
     from studies.instrument.card import load_card
     from studies.loss import loss_model
+    from studies.loss_account import damping_around, stated_loss
 
     if not step > 0 or not to_degC >= from_degC:
         raise InputError(
@@ -73,18 +78,36 @@ def loss(
     T = instrument.material.check(np.arange(from_degC, to_degC + 1e-9 * step, step) + zero_Celsius)
     model = loss_model(instrument, harmonic, theory, anchor)
     budget = model.budget(T)
-    described = _describe(model, budget, harmonic, theory)
-    yield {"schema": "hrg.loss/1", "card": instrument.name, **described, "stated": _stated(instrument, model)}
-    _print(instrument.name, model, budget, harmonic, theory)
-    _print_stated(_stated(instrument, model))
+    around, stated = damping_around(model, budget), stated_loss(instrument, model)
+    if report is not None:
+        from studies.files.writing import write_text
+        from studies.reports.loss import loss_page
+
+        write_text(report, loss_page(instrument, model, budget, theory))
+        say(f"report: {report}")
+    described = _describe(model, budget, theory)
+    yield {
+        "schema": "hrg.loss/1",
+        "card": instrument.name,
+        **described,
+        "anisotropy": _around(around),
+        "left_out": list(model.left_out),
+        "stated": _stated(stated),
+    }
+    _print(instrument.name, model, budget, theory)
+    if around is not None:
+        _print_around(budget, around)
+    _print_advice(model, budget)
+    if stated is not None:
+        _print_stated(stated)
 
 
-def _describe(model: "LossModel", budget: "Budget", harmonic: int, theory: str) -> "dict[str, Any]":
+def _describe(model: "LossModel", budget: "Budget", theory: str) -> "dict[str, Any]":
     from scipy.constants import zero_Celsius
 
     low, high = budget.interval
     return {
-        "harmonic": harmonic,
+        "harmonic": model.harmonic,
         "theory": theory,
         "frequency_Hz": model.frequency,
         "temperature_degC": budget.temperatures - zero_Celsius,
@@ -100,46 +123,29 @@ def _describe(model: "LossModel", budget: "Budget", harmonic: int, theory: str) 
             "advice": budget.first.advice,
         },
         "least_known": budget.least_known.name,
-        "anisotropy": _anisotropy(model, budget),
-        "left_out": list(model.left_out),
     }
 
 
-def _anisotropy(model: "LossModel", budget: "Budget") -> "dict[str, Any] | None":
-    """What varies around: Δ(1/Q), the axis that is damped most, and the largest drift of the wave; None where nothing does."""
+def _around(found: "DampingAround | None") -> "dict[str, Any] | None":
     import numpy as np
 
-    from compensation.wave import StandingWave
-    from shell.damping.anisotropy import describe_wave
-
-    if not model.ripples:
+    if found is None:
         return None
-    split, axis = describe_wave(model.wave(budget), model.harmonic)
-    omega = model.vibration.omega(budget.temperatures)
-    wave = StandingWave(
-        omega,
-        2 / (omega * budget.inverse_q),
-        omega * split / 2,
-        axis,
-        harmonic=model.harmonic,
-        bryan_factor=model.bryan_factor,
-    )
-    worst = np.degrees(wave.drift(axis + np.pi / (4 * model.harmonic))) * 3600
-    return {"inverse_q_split": split, "damping_axis_deg": np.degrees(axis), "largest_drift_deg_per_h": worst}
-
-
-def _stated(instrument: "Instrument", model: "LossModel") -> "dict[str, Any] | None":
-    """What the card says of 1/Q at its reference temperature beside what the parts explain of it; None where it says nothing."""
-    if "inverse_q" not in instrument.content.get("loss", {}) or model.harmonic != 2:
-        return None
-    stated = instrument.loss.inverse_q
-    budget = model.budget(instrument.reference_temperature)
-    low, high = (float(end[0]) for end in budget.interval)
     return {
-        "inverse_q": stated,
-        "explained": float(budget.inverse_q[0]) / stated,
-        "explained_low": low / stated,
-        "explained_high": high / stated,
+        "inverse_q_split": found.split,
+        "damping_axis_deg": np.degrees(found.axis),
+        "largest_drift_deg_per_h": found.drift,
+    }
+
+
+def _stated(found: "StatedLoss | None") -> "dict[str, Any] | None":
+    if found is None:
+        return None
+    return {
+        "inverse_q": found.inverse_q,
+        "explained": found.explained,
+        "explained_low": found.low,
+        "explained_high": found.high,
     }
 
 
@@ -156,7 +162,7 @@ def _part(part: "LossPart") -> "dict[str, Any]":
     }
 
 
-def _print(name: str, model: "LossModel", budget: "Budget", harmonic: int, theory: str) -> None:
+def _print(name: str, model: "LossModel", budget: "Budget", theory: str) -> None:
     import numpy as np
     from scipy.constants import zero_Celsius
 
@@ -175,7 +181,7 @@ def _print(name: str, model: "LossModel", budget: "Budget", harmonic: int, theor
             budget.temperatures, budget.inverse_q, low, high, 100 * budget.slope, strict=True
         )
     ]
-    title = f"{name}, n = {harmonic}, {model.frequency:.1f} Hz, {theory}"
+    title = f"{name}, n = {model.harmonic}, {model.frequency:.1f} Hz, {theory}"
     print_table(title, ["T (°C)", "Q", "90 %", "1/Q (1e-9)", "1/Q (%/°C)"], rows)
     middle = int(np.argmin(abs(budget.temperatures - model.vibration.reference)))
     shown = sorted({0, middle, len(budget.temperatures) - 1})
@@ -196,15 +202,28 @@ def _print(name: str, model: "LossModel", budget: "Budget", harmonic: int, theor
     degrees = [f"{budget.temperatures[k] - zero_Celsius:.0f} °C" for k in shown]
     note = f"1/Q in 1e-9; share, 90 % interval and slope at {budget.temperatures[middle] - zero_Celsius:.0f} °C."
     print_table("Parts", ["part", "share", *degrees, "90 %", "%/°C", "source"], table, note)
-    around = _anisotropy(model, budget)
-    if around is not None:
-        columns = ["T (°C)", "Δ(1/Q) (1e-9)", "axis (°)", "drift at most (°/h)"]
-        fields = ("inverse_q_split", "damping_axis_deg", "largest_drift_deg_per_h")
-        lines = [
-            [f"{T - zero_Celsius:.1f}", f"{1e9 * split:.3g}", f"{axis:.2f}", f"{drift:.4g}"]
-            for T, split, axis, drift in zip(budget.temperatures, *(around[field] for field in fields), strict=True)
-        ]
-        print_table("Around the axis", columns, lines, "Axis: azimuth of the pattern that is damped most.")
+
+
+def _print_around(budget: "Budget", around: "DampingAround") -> None:
+    import numpy as np
+    from scipy.constants import zero_Celsius
+
+    from studies.cli.output import print_table
+
+    columns = ["T (°C)", "Δ(1/Q) (1e-9)", "axis (°)", "drift at most (°/h)"]
+    lines = [
+        [f"{T - zero_Celsius:.1f}", f"{1e9 * split:.3g}", f"{axis:.2f}", f"{drift:.4g}"]
+        for T, split, axis, drift in zip(
+            budget.temperatures, around.split, np.degrees(around.axis), around.drift, strict=True
+        )
+    ]
+    print_table("Around the axis", columns, lines, "Axis: azimuth of the pattern that is damped most.")
+
+
+def _print_advice(model: "LossModel", budget: "Budget") -> None:
+    import numpy as np
+
+    middle = int(np.argmin(abs(budget.temperatures - model.vibration.reference)))
     without, first = float(budget.without(budget.first.name)[middle]), budget.first
     gain = "nothing known would be left" if not np.isfinite(without) else f"without it Q would be {_plain(without)}"
     print(f"Attack first: {first.name}; {gain}. {_sentence(first.advice)}")
@@ -214,17 +233,13 @@ def _print(name: str, model: "LossModel", budget: "Budget", harmonic: int, theor
         print(f"Not in the budget: {sentence}")
 
 
-def _print_stated(stated: "dict[str, Any] | None") -> None:
-    if stated is None:
-        return
-    share, low, high = (100 * stated[key] for key in ("explained", "explained_low", "explained_high"))
+def _print_stated(stated: "StatedLoss") -> None:
+    share, low, high = (100 * part for part in (stated.explained, stated.low, stated.high))
     print(
-        f"The card states Q = {_plain(1 / stated['inverse_q'])}: the parts explain {share:.0f} % of its loss (90 %: {low:.0f} … {high:.0f} %)."
+        f"The card states Q = {_plain(1 / stated.inverse_q)}: the parts explain {share:.0f} % of its loss (90 %: {low:.0f} … {high:.0f} %)."
     )
-    if high < 100:
-        print("More is lost than these parts allow: look for a cause that the card does not have.")
-    elif low > 100:
-        print("Less is lost than these parts say: one of them is too large.")
+    if stated.verdict:
+        print(stated.verdict)
 
 
 def _plain(value: float) -> str:

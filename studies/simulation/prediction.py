@@ -13,10 +13,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from studies.damping_law import DampingLaw, damping_law
 from studies.errors import InputError
 from studies.instrument.dotted import look_up
 from studies.law import law_of, moved_law
-from studies.loss import DampingLaw, damping_law
 from studies.simulation.drive import Drive
 from studies.simulation.heat_path import build_network, lump_shape, slowest_lag
 from studies.simulation.response import Temperatures, check_loss, observed_rows, read_out

@@ -190,3 +190,20 @@ def test_masses_on_the_rim_unbalance_it(capsys, tmp_path):
     around, again = (payload["anisotropy"]["inverse_q_split"][0] for payload in found)
     assert 0 < around <= 2 * one * (1 + 1e-9)
     assert again == pytest.approx(around, rel=1e-9)
+
+
+def test_the_page_says_what_to_attack_first_and_what_each_part_is_worth(capsys, tmp_path):
+    path, page = tmp_path / "card.toml", tmp_path / "loss.html"
+    loss = {"inverse_q": 2.5e-7, "film": [GOLD | {"anisotropy": 0.01}]}
+    path.write_text(tomli_w.dumps(DOME | {"name": "<dome>", "loss": loss}), encoding="utf-8")
+    status, out, _ = _run(capsys, str(path), "--report", str(page), "--json")
+    assert status == 0
+    found, text = json.loads(out), page.read_text(encoding="utf-8")
+    assert "Loss budget of &lt;dome&gt;" in text
+    for chapter in ("In short", "What each part is worth", "Over temperature", "Where on the wall", "Around the axis"):
+        assert f">{chapter}<" in text
+    assert "Attack first: film gold." in text
+    at = found["temperature_degC"].index(20.0)
+    assert f"without it Q = {found['attack_first']['q_without'][at]:.3g}".replace("e+0", "e") in text
+    assert found["left_out"][0][1:] in text
+    assert _run(capsys, str(path), "--report", str(page), "--from", "20", "--to", "20")[0] == 0

@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 
+from studies.damping_law import damping_law, settled_loss
 from studies.instrument.card import build_instrument
 from studies.instrument.tables.bias import Bias
-from studies.loss import damping_law, loss_model, settled_loss
+from studies.loss import loss_model
 from studies.simulation.virtual_gyro import simulate_run
 from thermal.profile import Profile
 
