@@ -8,9 +8,13 @@ import os
 import sys
 import warnings
 from collections.abc import Sequence
-from typing import Any
 
+from studies import interruption
 from studies.threads import ONE_THREAD
+
+TYPE_CHECKING = False  # `typing` takes as long to load as all the rest here, and until `run` nobody heeds Ctrl-C
+if TYPE_CHECKING:
+    from cyclopts import App, Group
 
 for _name, _count in ONE_THREAD.items():  # read by the libraries when numpy is first imported
     os.environ.setdefault(_name, _count)
@@ -65,19 +69,36 @@ EPILOGUE = "Every command that computes takes --json. --debug shows the tracebac
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command and return its exit status."""
-    from studies.cli.guard import find_name_clash
-
     words = list(sys.argv[1:] if arguments is None else arguments)
     debug = "--debug" in words
     words = [word for word in words if word != "--debug"]
-    clash = find_name_clash()
-    if clash:
-        return _complain(clash, 3)
+    plain = warnings.formatwarning
+    warnings.formatwarning = lambda message, *_, **__: f"hrg: warning: {message}\n"
+    try:
+        from studies.cli.guard import find_name_clash
 
-    from cyclopts import App, CycloptsError, Group, Parameter
+        clash = find_name_clash()
+        if clash:
+            return _complain(clash, 3)
+        status = _command_line(words)(words)
+    except KeyboardInterrupt:
+        return _complain("interrupted.", 130)
+    except BrokenPipeError:
+        sys.stderr.close()
+        return 0
+    except Exception as error:
+        if interruption.has_made(error):  # as compiled modules do while they are loaded
+            return _complain("interrupted.", 130)
+        return _complain(*_judge(error, words), error if debug else None)
+    finally:
+        warnings.formatwarning = plain
+    return int(status) if isinstance(status, int) else 0
+
+
+def _command_line(words: Sequence[str]) -> "App":
+    from cyclopts import App, Group, Parameter
 
     from studies import __version__
-    from studies.errors import UNUSABLE_INPUT, MissingEnvironment
 
     app = App(
         name="hrg",
@@ -94,7 +115,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     groups: dict[str, App] = {}
     headings = [(Group(title, sort_key=k), names) for k, (title, names) in enumerate(CHAPTERS.items())]
 
-    def chapter(command: str) -> Any:
+    def chapter(command: str) -> "Group | str":
         return next((heading for heading, names in headings if command in names), "Commands")
 
     for name, (target, help_line) in COMMANDS.items():
@@ -106,39 +127,28 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 app.command(groups[group[0]])
             parent = groups[group[0]]
         # the line stands in lists of commands; a command's own help page shows its whole docstring
-        alone = words[: len(group) + 1] == name.split(" ")
-        more = {} if alone else {"help": help_line}
+        more = {} if words[: len(group) + 1] == name.split(" ") else {"help": help_line}
         parent.command(target, name=command, **(more if group else {**more, "group": chapter(command)}))
-    plain = warnings.formatwarning
-    warnings.formatwarning = lambda message, *_, **__: f"hrg: warning: {message}\n"
-    try:
-        status = app(words)
-    except CycloptsError as error:
-        asked = " ".join(["hrg", *_command_words(words), "--help"])
-        return _complain(f"{' '.join(str(error).split())} See '{asked}'.", 2, error if debug else None)
-    except UNUSABLE_INPUT as error:
-        return _complain(str(error), 2, error if debug else None)
-    except MissingEnvironment as error:
-        return _complain(str(error), 3, error if debug else None)
-    except KeyboardInterrupt:
-        return _complain("interrupted.", 130)
-    except BrokenPipeError:
-        sys.stderr.close()
-        return 0
-    except (OSError, MemoryError, UnicodeError) as error:
-        sentence = describe_environment_error(error)
-        return _complain(sentence, 3, error if debug else None)
-    except Exception as error:
-        if isinstance(error.__cause__, KeyboardInterrupt):  # as compiled modules make of it while they are loaded
-            return _complain("interrupted.", 130)
-        return _complain(
-            f"internal fault: {type(error).__name__}: {error}. Run again with --debug and report it.",
-            1,
-            error if debug else None,
-        )
-    finally:
-        warnings.formatwarning = plain
-    return int(status) if isinstance(status, int) else 0
+    return app
+
+
+def _judge(error: Exception, words: Sequence[str]) -> tuple[str, int]:
+    """Return the sentence that a user reads of an error, and the exit status."""
+    from cyclopts import CycloptsError
+
+    from studies.errors import UNUSABLE_INPUT, MissingEnvironment
+
+    match error:
+        case CycloptsError():
+            asked = " ".join(["hrg", *_command_words(words), "--help"])
+            return f"{' '.join(str(error).split())} See '{asked}'.", 2
+        case _ if isinstance(error, UNUSABLE_INPUT):
+            return str(error), 2
+        case MissingEnvironment():
+            return str(error), 3
+        case OSError() | MemoryError() | UnicodeError():
+            return describe_environment_error(error), 3
+    return f"internal fault: {type(error).__name__}: {error}. Run again with --debug and report it.", 1
 
 
 CHAPTERS = {
@@ -187,22 +197,8 @@ def describe_environment_error(error: BaseException) -> str:
 
 def run() -> None:
     """Entry point of the console script: a request to end counts as Ctrl-C, and a terminal shows what it can."""
-    import signal
-
-    def end(number: int, frame: object) -> None:
-        raise KeyboardInterrupt
-
-    def again(lost: Any) -> None:
-        """An interruption that fell into a callback of the interpreter, which drops what is raised there, comes again."""
-        if issubclass(lost.exc_type, KeyboardInterrupt):
-            signal.signal(signal.SIGALRM, end)
-            signal.setitimer(signal.ITIMER_REAL, 0.02)
-        else:
-            sys.__unraisablehook__(lost)
-
     try:
-        signal.signal(signal.SIGTERM, end)
-        sys.unraisablehook = again
+        interruption.heed()
         for stream in (sys.stdout, sys.stderr):
             if stream is not None and hasattr(stream, "reconfigure"):
                 stream.reconfigure(errors="backslashreplace")
@@ -216,4 +212,6 @@ def run() -> None:
         os._exit(0)  # who reads has gone; nothing is left to tell
     except OSError as error:
         status = _complain(describe_environment_error(error), 3)
+    finally:
+        interruption.let_be()
     sys.exit(status)

@@ -9,7 +9,7 @@ import json
 import os
 import sqlite3
 import struct
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -26,20 +26,21 @@ if TYPE_CHECKING:
 
 FILE = "study.sqlite"
 LOCK = "lock"
-LAYOUT = 2  # of the tables; sqlite's user_version
+LAYOUT = 3  # of the tables; sqlite's user_version
 SHOWN_CHANGES = 6
 TABLES = """
 CREATE TABLE study (
   id INTEGER PRIMARY KEY CHECK (id = 1), created_utc TEXT NOT NULL, identity TEXT NOT NULL, spec TEXT NOT NULL,
   spec_text TEXT NOT NULL, instrument TEXT NOT NULL, folder TEXT NOT NULL, cases INTEGER NOT NULL,
-  repeats TEXT NOT NULL);
+  repeats TEXT NOT NULL, seal BLOB NOT NULL);
 CREATE TABLE run (
-  id INTEGER PRIMARY KEY, started_utc TEXT NOT NULL, finished_utc TEXT, outcome TEXT, provenance TEXT NOT NULL);
+  id INTEGER PRIMARY KEY, started_utc TEXT NOT NULL, finished_utc TEXT, outcome TEXT, provenance TEXT NOT NULL,
+  seal BLOB NOT NULL);
 CREATE TABLE run_case (
   key BLOB PRIMARY KEY, position INTEGER UNIQUE, parameters TEXT NOT NULL,
   status TEXT NOT NULL CHECK (status IN ('ok', 'failed', 'lost')), remark TEXT NOT NULL, numbers BLOB NOT NULL,
   seconds REAL NOT NULL, run INTEGER NOT NULL REFERENCES run (id), seal BLOB NOT NULL) WITHOUT ROWID;
-CREATE TABLE finding (name TEXT PRIMARY KEY, content TEXT NOT NULL);
+CREATE TABLE finding (name TEXT PRIMARY KEY, content TEXT NOT NULL, seal BLOB NOT NULL);
 """
 
 
@@ -82,17 +83,22 @@ class Store:
 
     def begin_run(self, provenance: Mapping[str, Any]) -> None:
         """Note that a run starts, and on what."""
+        about = (_now(), None, None, spell(provenance))
         with self._writing():
             cursor = self.connection.execute(
-                "INSERT INTO run (started_utc, provenance) VALUES (?, ?)", (_now(), spell(provenance))
+                f"INSERT INTO run ({_RUN}, seal) VALUES (?, ?, ?, ?, ?)", (*about, _seal(*about))
             )
         self.run = int(cursor.lastrowid or 0)
 
     def end_run(self, outcome: str) -> None:
         """Note how the run ended."""
+        [(started, *_, provenance)] = self._read(f"SELECT {_RUN} FROM run WHERE id = ?", (self.run,))
+        finished = _now()
+        seal = _seal(started, finished, outcome, provenance)
         with self._writing():
             self.connection.execute(
-                "UPDATE run SET finished_utc = ?, outcome = ? WHERE id = ?", (_now(), outcome, self.run)
+                "UPDATE run SET finished_utc = ?, outcome = ?, seal = ? WHERE id = ?",
+                (finished, outcome, seal, self.run),
             )
 
     def add(self, cases: "Iterable[tuple[bytes, int | None, str, Row]]") -> None:
@@ -113,11 +119,8 @@ class Store:
 
     def forget_damaged(self) -> list[int]:
         """Remove the cases whose content no longer fits its seal (bit rot); return their positions."""
-        found = [
-            (row[0], row[1])
-            for row in self._read(f"SELECT {_SEALED}, seal FROM run_case")
-            if not _fits(row[:-1], row[-1])
-        ]
+        rows = self._read(f"SELECT {_SEALED}, seal FROM run_case")
+        found = [(row[0], row[1]) for row in rows if _seal(*row[:-1]) != row[-1]]
         if found:
             with self._writing():
                 self.connection.executemany("DELETE FROM run_case WHERE key = ?", [(key,) for key, _ in found])
@@ -125,12 +128,13 @@ class Store:
 
     def keep_finding(self, name: str, content: Mapping[str, Any]) -> None:
         """Keep the outcome of a search under its name."""
+        said = (name, spell(content))
         with self._writing():
-            self.connection.execute("INSERT OR REPLACE INTO finding VALUES (?, ?)", (name, spell(content)))
+            self.connection.execute("INSERT OR REPLACE INTO finding VALUES (?, ?, ?)", (*said, _seal(*said)))
 
     def findings(self) -> dict[str, Any]:
         """Return the outcomes of searches by name."""
-        return {name: self._parse(content) for name, content in self._read("SELECT name, content FROM finding")}
+        return {name: self._parse(content) for name, content in self._read_sealed("name, content", "finding")}
 
     def done(self) -> dict[int, bytes]:
         """Return the key of every computed position."""
@@ -156,7 +160,7 @@ class Store:
             raise _damaged(self.path, error) from error
 
     def _check_seal(self, sealed: Sequence[Any], seal: bytes) -> None:
-        if not _fits(sealed, seal):
+        if _seal(*sealed) != seal:
             case = "a searched case" if sealed[1] is None else f"case {sealed[1]}"
             raise InputError(
                 f"{self.path}: {case} is damaged (its content does not fit its seal). Run 'hrg study run' with the same"
@@ -180,14 +184,10 @@ class Store:
 
     def about(self) -> dict[str, Any]:
         """Return what the study is: identity, spec, instrument, number of cases, when it was made."""
-        columns = ("created_utc", "identity", "spec", "spec_text", "instrument", "folder", "cases", "repeats")
-        rows = self._read(f"SELECT {', '.join(columns)} FROM study")
+        rows = self._read_sealed(", ".join(_STUDY), "study")
         if not rows:
             raise InputError(f"{self.path.parent}: its study has not begun yet; run it again.")
-        about = dict(zip(columns, rows[0], strict=True))
-        self._check_kinds(
-            about, {"created_utc": _is_time, "cases": _is_count, "spec_text": _is_text, "folder": _is_text}
-        )
+        about = dict(zip(_STUDY, rows[0], strict=True))
         parsed = {key: self._parse(about[key]) for key in ("identity", "spec", "instrument")}
         return about | parsed | {"repeats": self._parse(about["repeats"], list)}
 
@@ -202,34 +202,26 @@ class Store:
 
     def runs(self) -> list[dict[str, Any]]:
         """Return the runs so far."""
-        rows = self._read("SELECT id, started_utc, finished_utc, outcome, provenance FROM run ORDER BY id")
-        keys = ("id", "started_utc", "finished_utc", "outcome", "provenance")
-        kinds = {"started_utc": _is_time, "finished_utc": _is_time_or_none, "outcome": _is_text_or_none}
-        found = [dict(zip(keys, row, strict=True)) for row in rows]
-        for one in found:
-            self._check_kinds(one, kinds)
+        keys = ("started_utc", "finished_utc", "outcome", "provenance")
+        found = [dict(zip(keys, row, strict=True)) for row in self._read_sealed(_RUN, "run")]
         return [one | {"provenance": self._parse(one["provenance"])} for one in found]
-
-    def _check_kinds(self, row: Mapping[str, Any], kinds: Mapping[str, Callable[[Any], bool]]) -> None:
-        for key, fits in kinds.items():
-            if not fits(row[key]):
-                raise _damaged(self.path, f"{row[key]!r:.60} stands where {key} belongs")
 
     def describe(self, about: Mapping[str, Any]) -> None:
         """Write what the study is; a later run may change only what no result depends on."""
-        values = [about[key] if key in ("spec_text", "folder", "cases") else spell(about[key]) for key in _ABOUT]
+        values = [about[key] if key in ("spec_text", "folder", "cases") else spell(about[key]) for key in _STUDY[1:]]
+        old = self._read("SELECT created_utc FROM study")
+        row = [old[0][0] if old else _now(), *values]
         with self._writing():
             self.connection.execute(
-                f"INSERT INTO study (id, created_utc, {', '.join(_ABOUT)}) VALUES (1, ?, ?, ?, ?, ?, ?, ?, ?)"
-                f" ON CONFLICT (id) DO UPDATE SET {', '.join(f'{key} = excluded.{key}' for key in _ABOUT)}",
-                [_now(), *values],
+                f"INSERT OR REPLACE INTO study (id, {', '.join(_STUDY)}, seal) VALUES (1, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
+                [*row, _seal(*row)],
             )
 
     def check_same(self, identity: Mapping[str, Any]) -> None:
         """Refuse to go on when the results so far belong to something else; InputError says what changed."""
-        old = self._read("SELECT identity FROM study")
+        old = self._read_sealed(", ".join(_STUDY), "study")
         now = json.loads(spell(identity))  # as it would be read back: tuples have become lists
-        changes = list(find_changes({**self._parse(old[0][0]), "base": now["base"]}, now)) if old else []
+        changes = list(find_changes({**self._parse(old[0][1]), "base": now["base"]}, now)) if old else []
         if changes:
             shown = "; ".join(changes[:SHOWN_CHANGES])
             more = f"; and {len(changes) - SHOWN_CHANGES} more" if len(changes) > SHOWN_CHANGES else ""
@@ -237,6 +229,13 @@ class Store:
                 f"{self.path.parent}: holds results of a study that differs: {shown}{more}. Take another folder with"
                 " --out, or undo the change."
             )
+
+    def _read_sealed(self, columns: str, table: str) -> list[Any]:
+        """Return rows that still say what was sealed."""
+        rows = self._read(f"SELECT {columns}, seal FROM {table}")
+        if any(_seal(*row[:-1]) != row[-1] for row in rows):
+            raise _damaged(self.path, f"what it says of the {table} does not fit its seal")
+        return [row[:-1] for row in rows]
 
     def _read(self, query: str, values: Sequence[Any] = ()) -> list[Any]:
         try:
@@ -258,7 +257,8 @@ class Store:
             raise _damaged(self.path, error) from error
 
 
-_ABOUT = ("identity", "spec", "spec_text", "instrument", "folder", "cases", "repeats")
+_STUDY = ("created_utc", "identity", "spec", "spec_text", "instrument", "folder", "cases", "repeats")
+_RUN = "started_utc, finished_utc, outcome, provenance"
 
 
 def open_store(folder: str | Path) -> Store:
@@ -390,41 +390,9 @@ def _damaged(path: Path, reason: object) -> InputError:
 _SEALED = "key, position, parameters, status, remark, numbers"
 
 
-def _seal(key: bytes, place: int | None, parameters: str, status: str, remark: str, numbers: bytes) -> bytes:
+def _seal(*row: bytes | str | int | None) -> bytes:
     """Return a checksum of what a row says, so that a bit that flips on the disk is noticed."""
-    text = "\0".join((str(place), parameters, status, remark)).encode("utf-8", "surrogatepass")
-    return blake2b(key + text + b"\0" + numbers, digest_size=8).digest()
-
-
-def _fits(sealed: Sequence[Any], seal: bytes) -> bool:
-    """Tell whether a row still says what was sealed; one of other types does not."""
-    try:
-        return _seal(*sealed) == seal
-    except (TypeError, AttributeError):
-        return False
-
-
-def _is_text(value: Any) -> bool:
-    return isinstance(value, str)
-
-
-def _is_text_or_none(value: Any) -> bool:
-    return value is None or isinstance(value, str)
-
-
-def _is_count(value: Any) -> bool:
-    return isinstance(value, int) and value > 0
-
-
-def _is_time(value: Any) -> bool:
-    try:
-        return datetime.fromisoformat(value).tzinfo is not None
-    except (TypeError, ValueError):
-        return False
-
-
-def _is_time_or_none(value: Any) -> bool:
-    return value is None or _is_time(value)
+    return blake2b(repr(row).encode(), digest_size=8).digest()
 
 
 def _pack(values: Sequence[float], errors: Sequence[float]) -> bytes:

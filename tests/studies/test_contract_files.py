@@ -134,6 +134,29 @@ def test_a_request_to_end_that_falls_into_a_callback_is_not_lost():
     assert done.stderr == "hrg: interrupted.\n"
 
 
+def test_a_request_to_end_that_is_swallowed_comes_again_but_leaves_clearing_up_alone():
+    """Compiled modules clear errors that they do not expect; what clears up after an interruption takes its time."""
+    script = (
+        "import os, signal, time, studies.cli\n"
+        "signal.signal(signal.SIGINT, signal.SIG_DFL)  # a job in the background ignores it\n"
+        "def work():\n"
+        "    try:\n"
+        "        os.kill(os.getpid(), signal.SIGINT)\n"
+        "        time.sleep(0.01)\n"
+        "    except KeyboardInterrupt:\n"
+        "        pass\n"
+        "    try:\n"
+        "        time.sleep(20)\n"
+        "    finally:\n"
+        "        time.sleep(1.5)\n"
+        "        print('cleared up')\n"
+        "studies.cli.main = work\n"
+        "studies.cli.run()\n"
+    )
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, timeout=60, check=False)
+    assert (done.returncode, done.stdout, done.stderr) == (130, "cleared up\n", "hrg: interrupted.\n")
+
+
 def test_an_interruption_that_a_compiled_module_renames_is_one_still(monkeypatch, capsys):
     def fail():
         raise ImportError("initialization failed") from KeyboardInterrupt()

@@ -222,12 +222,14 @@ def test_notes_of_other_kinds_are_a_damaged_store(tmp_path, functions):
         results.store.connection.backup(store.connection)
     damages = [
         ("study", "cases", "3\x01"),
+        ("study", "cases", 3),
         ("study", "cases", -3),
         ("study", "created_utc", "2\x1126-11-22T06:00:00+00:00"),
         ("study", "spec_text", b"name"),
         ("study", "folder", b"out"),
         ("run", "started_utc", "2026-11-22T06:61:00+00:00"),
         ("run", "started_utc", b"2026"),
+        ("run", "started_utc", "2026-11-22T06:00:01+00:00"),
         ("run", "finished_utc", "x"),
         ("run", "outcome", b"done"),
     ]
@@ -235,7 +237,7 @@ def test_notes_of_other_kinds_are_a_damaged_store(tmp_path, functions):
         assert store.about()["cases"] == 2
         assert len(store.runs()) == 1
         store.connection.execute(f"UPDATE {table} SET {key} = ?", (value,))
-        with pytest.raises(InputError, match=f"damaged.*{key}"):
+        with pytest.raises(InputError, match=f"damaged.*{table}"):
             store.about() if table == "study" else store.runs()
         store.connection.rollback()
 
@@ -406,9 +408,8 @@ def test_other_versions_on_resuming_are_said(tmp_path, functions, hrg):
     run = ("study", "run", spec, "--out", tmp_path / "out", "--allow-python")
     assert "computed with" not in hrg(*run).stderr
     assert "computed with" not in hrg(*run).stderr
-    with sqlite3.connect(tmp_path / "out" / "study.sqlite") as store:
-        store.execute("UPDATE run SET provenance = replace(provenance, ?, ?)", (np.__version__, "1.0.0"))
-    store.close()
+    with claim_store(tmp_path / "out") as store:
+        store.begin_run(json.loads(json.dumps(store.runs()[-1]["provenance"]).replace(np.__version__, "1.0.0")))
     assert f"numpy 1.0.0 then, {np.__version__} now" in hrg(*run).stderr
 
 
