@@ -159,6 +159,18 @@ class ClosedLoop:
         state[kept] = np.linalg.solve(left, F[np.ix_(kept, given)] @ state[given])
         return state
 
+    def answer_step(self, channel: str, samples: int, count: int) -> tuple[Real, Real]:
+        """Return times (s) and what a channel commands against a forcing of 1 that sets in at 0, every `samples` samples."""
+        at, k = self.places, CHANNELS.index(channel)
+        state, F = np.zeros(self.size), self.row(samples).map
+        state[at["forcing"].start + k] = 1.0
+        found = np.zeros(count + 1)
+        for n in range(1, count + 1):
+            state[at["sum"]] = state[at["wave_sum"]] = 0.0
+            state = F @ state
+            found[n] = -state[at["sent"].start + k]
+        return np.asarray(self.loops.step * samples * np.arange(count + 1.0)), found
+
     def row(self, samples: int) -> "RowMap":
         """Return the map of a row of this many samples."""
         F, noise = self.sample

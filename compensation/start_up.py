@@ -45,7 +45,8 @@ def start_up(
     """Start the vibration from almost nothing: nothing is linearised here.
 
     Ż = −Z/τ − i (ν − ω + ω_n) Z + u, Z the amplitude in the phase of the oscillator, u the drive in its phase, at most
-    `headroom` times what holds the amplitude. The phase loop reads arg Z at any amplitude, and its integral starts at 0.
+    `headroom` times what holds the amplitude. The phase loop reads arg Z at any amplitude, its integral starts at 0, and what
+    swings at the start is a quarter cycle off.
 
     Parameters
     ----------
@@ -82,7 +83,7 @@ def start_up(
     most, smoothing, (late, rest) = headroom / tau, slow.smoothing, slow.late
     steps = math.ceil(seconds / T)
     course = np.empty((steps, 3))
-    Z, seen = complex(amplitude, 0.0), complex(amplitude, 0.0)
+    Z, seen = complex(0.0, amplitude), complex(0.0, amplitude)
     drive_integral = phase_integral = 0.0
     waiting = [(0.0, 0.0)] * (late + (rest > 0) + 1)
     for n in range(steps):

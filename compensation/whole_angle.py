@@ -76,14 +76,7 @@ def simulate_whole_angle(
     rows = spread_over_rows(wave, len(t))
     turning, commanded = (np.broadcast_to(np.asarray(x, dtype=float), t.shape) for x in (rate, precession))
     course = _Course(rows, electronics, turning, commanded * rows.harmonic)
-    loop = ClosedLoop(
-        np.diag([-1 / float(np.mean(np.asarray(wave.tau)))] * 2).astype(complex),
-        np.eye(2, dtype=complex),
-        np.eye(2, dtype=complex),
-        loops,
-        electronics,
-        turning=True,
-    )
+    loop = close_without_rate(wave, electronics, loops)
     loop.require_stable()
     maps: dict[int, RowMap] = {}
     h = samples * loops.step
@@ -141,6 +134,13 @@ def simulate_whole_angle(
         course.start - commands[:, 1],
         theta,
     )
+
+
+def close_without_rate(wave: StandingWave, electronics: Electronics, loops: Loops) -> ClosedLoop:
+    """Return the loops of amplitude, phase and quadrature closed in the frame of a turning wave, errors of the electronics left out."""
+    decay = float(np.mean(1 / np.asarray(wave.tau)))
+    ideal = np.eye(2, dtype=complex)
+    return ClosedLoop(np.asarray(-decay * ideal, dtype=complex), ideal, ideal, loops, electronics, turning=True)
 
 
 @dataclass

@@ -12,16 +12,8 @@ from studies.cli.arguments import Seed
 from studies.cli.output import Answer, answers
 
 if TYPE_CHECKING:
-    from studies.simulation.loop import LoopStudy
-
-NOISE_NAMES = {
-    "pickoff": "pick-off noise",
-    "adc_step": "ADC steps",
-    "dac_step": "DAC steps",
-    "drive": "drive noise",
-    "thermal": "thermomechanical",
-    "all": "all",
-}
+    from studies.record import Record
+    from studies.simulation.loop_study import LoopStudy
 
 
 @answers("hrg.loop/1")
@@ -37,6 +29,7 @@ def loop(
     both_ways: bool = False,
     seed: Seed = 0,
     noiseless: bool = False,
+    report: str | None = None,
 ) -> Answer:
     """Study the loops of a card: stability margins, bias and noise by source, start-up; with --out also a run through them.
 
@@ -66,6 +59,8 @@ def loop(
         Seed of the noise.
     noiseless : bool
         Leave out noise.
+    report : str
+        Write a page (HTML).
     """
     import numpy as np
     from scipy.constants import zero_Celsius
@@ -76,7 +71,8 @@ def loop(
     from studies.instrument.card import load_card
     from studies.law import law_of
     from studies.simulation.drive import MOST_ROWS
-    from studies.simulation.loop import require_loop, study_loops
+    from studies.simulation.loop import require_loop
+    from studies.simulation.loop_study import study_loops
 
     instrument = load_card(card)
     keys = require_loop(instrument)
@@ -89,9 +85,9 @@ def loop(
     frequency = float(np.ravel(law.frequency(T))[0])
     inverse_q, instrument = settled_loss(instrument, T)
     study = study_loops(instrument, frequency, inverse_q, law.bryan_factor)
-    rows = None
+    run = None
     if out is not None:
-        rows = _run(
+        run = _run(
             instrument,
             law.bryan_factor,
             frequency,
@@ -104,7 +100,13 @@ def loop(
             both_ways,
             None if noiseless else seed,
         )
-        say(f"record: {out}, {rows} rows")
+        say(f"record: {out}, {len(run)} rows")
+    if report is not None:
+        from studies.files.writing import write_text
+        from studies.reports.loop import loop_page
+
+        write_text(report, loop_page(study, T - zero_Celsius, run))
+        say(f"report: {report}")
     head = {
         "schema": "hrg.loop/1",
         "card": instrument.name,
@@ -114,36 +116,14 @@ def loop(
         "quality_factor": 1 / inverse_q,
         "bryan_factor": law.bryan_factor,
     }
-    yield {**head, **_payload(study), "out": out, "rows": rows}
-    print_table(
-        f"Loops of {instrument.name}: {keys.mode}, {frequency:.2f} Hz, Q = {1 / inverse_q:.3g}, τ = {float(study.wave.tau):.4g} s",
-        ["loop", "paper", "gain 1 at Hz", "phase margin °", "gain margin dB", "turns over at Hz"],
-        [
-            [
-                m.loop,
-                m_paper,
-                f"{m.crossover:.3g}",
-                f"{np.degrees(m.phase):.0f}",
-                f"{20 * np.log10(m.gain):.1f}",
-                f"{m.reversal:.3g}",
-            ]
-            for m, m_paper in ((m, _paper(m.loop)) for m in study.margins)
-        ],
-        f"From rest with {keys.drive_headroom:g} times the holding drive: locked after {study.start.locked:.3g} s,"
-        f" amplitude within 1 % after {study.start.ready:.4g} s.",
+    yield {**head, **_payload(study), "out": out, "rows": None if run is None else len(run)}
+    from studies.reports.loop import margins_table, noise_table, sources_table
+
+    print(
+        f"Loops of {instrument.name}: {keys.mode}, {frequency:.2f} Hz, Q = {1 / inverse_q:.3g}, τ = {float(study.wave.tau):.4g} s"
     )
-    print_table(
-        "Bias by source, settled",
-        ["source", "°/h", "± °/h"],
-        [[s.name, f"{s.bias:.4g}", f"{s.sd:.2g}"] for s in study.sources],
-        "± one standard deviation, from the card's uncertain values; all: with the axes and the split that they share.",
-    )
-    print_table(
-        "Noise of the rate by source",
-        ["source", "°/h over 1 s", "°/√h"],
-        [[NOISE_NAMES[name], f"{one:.3g}", f"{walk:.3g}"] for name, (one, walk) in study.noise.items()],
-        "°/√h from a mean over 100 s.",
-    )
+    for table in (margins_table(study), sources_table(study), noise_table(study)):
+        print_table(table.caption, table.columns, table.rows, table.note)
 
 
 def _paper(name: str) -> str:
@@ -189,7 +169,7 @@ def _run(
     profile: str | None,
     both_ways: bool,
     seed: int | None,
-) -> int:
+) -> "Record":
     import numpy as np
 
     from studies.record import Record, write_record
@@ -217,5 +197,6 @@ def _run(
         columns["rate_deg_per_s"] = np.full(len(time), rate)
         columns["measured_rate_deg_per_s"] = columns.pop("bias_deg_per_h") / 3600
     source = f"loops, {instrument.loop.mode}, " + ("without noise" if seed is None else f"seed {seed}")
-    write_record(Record(columns, instrument=instrument.name, source=source), out)
-    return len(time)
+    record = Record(columns, instrument=instrument.name, source=source, path=out)
+    write_record(record, out)
+    return record

@@ -1,20 +1,17 @@
 """The loops of a card's gyro: its standing wave and electronics in SI units, what they say settled, and over a run."""
 
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from compensation.closed_loop import ClosedLoop
-from compensation.controllers import Loops, Margin, require_stable
+from compensation.controllers import Loops
 from compensation.electronics import Channels, Electronics, LoopNoise, thermal_noise
-from compensation.rebalance import LoopRun, close_loops, settle_rebalance, simulate_rebalance
+from compensation.rebalance import LoopRun, settle_rebalance, simulate_rebalance
 from compensation.settled_turn import read_turning, turn_settled
-from compensation.start_up import StartUp, start_up
 from compensation.wave import StandingWave
-from compensation.whole_angle import WITHOUT_RATE, simulate_whole_angle
+from compensation.whole_angle import simulate_whole_angle
 from studies.errors import InputError, naming
 from studies.instrument.imperfect import is_imperfect
 from studies.splitting import reference_split
@@ -25,16 +22,6 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 DEG_PER_H = float(np.degrees(1.0)) * 3600.0
-ERRORS = {
-    # source of bias: keys of the card that are 0 without it
-    "damping anisotropy": ("bias.damping_anisotropy",),
-    "turn of the drives": ("loop.misalignment_mrad",),
-    "gain ratios": ("loop.pickoff_gain_ratio", "loop.drive_gain_ratio"),
-    "phase errors on the quadrature": ("loop.pickoff_phase_deg", "loop.drive_phase_deg"),
-    "phase differences": ("loop.pickoff_phase_difference_deg", "loop.drive_phase_difference_deg"),
-    "skewed axes": ("loop.pickoff_skew_mrad", "loop.drive_skew_mrad"),
-}
-NOISES = ("pickoff", "adc_step", "dac_step", "drive", "thermal")
 
 
 def wave_of(
@@ -226,130 +213,3 @@ def run_loops(
                 generator=generator,
             )
         return simulate_rebalance(wave, electronics, loops_of(loop), time, rate=rate, angle=angle, generator=generator)
-
-
-@dataclass(frozen=True)
-class BiasSource:
-    """One source of bias: what it makes (deg/h), and one standard deviation of it from the card's uncertain values."""
-
-    name: str
-    bias: float
-    sd: float
-
-
-@dataclass(frozen=True)
-class LoopStudy:
-    """What the loops of a card are like at one temperature.
-
-    `settled` the columns at rest; `sources` of bias; `noise` by source: deg/h of a mean over 1 s, and angle random walk
-    (deg/√h) from a mean over 100 s; `margins`; `start` from rest.
-    """
-
-    wave: StandingWave
-    settled: dict[str, float]
-    sources: tuple[BiasSource, ...]
-    noise: dict[str, tuple[float, float]]
-    margins: tuple[Margin, ...]
-    start: StartUp
-
-
-def study_loops(instrument: "Instrument", frequency: float, inverse_q: float, bryan_factor: float) -> LoopStudy:
-    """Return margins, bias by source, noise by source and start of a card's loops.
-
-    Raises
-    ------
-    InputError
-        The card has no `[loop]`, or a loop is unstable.
-    """
-    loop = require_loop(instrument)
-    wave = wave_of(instrument, frequency, inverse_q, bryan_factor)
-    electronics = electronics_of(loop, wave, instrument.reference_temperature)
-    loops = loops_of(loop)
-    decay = float(1 / np.asarray(wave.tau))
-    names = Loops.NAMES if loop.mode == "force-rebalance" else WITHOUT_RATE
-    with naming(f"{instrument.path} [loop]"):
-        margins = require_stable(loops, decay, names)
-        start = start_up(1 / decay, loops, headroom=loop.drive_headroom, offset=2 * np.pi * loop.start_offset_Hz)
-        noise = {
-            name: _noise_of(wave, electronics, loops, instrument, (name,))
-            for name in NOISES
-            if getattr(electronics.noise, name) > 0
-        }
-        noise["all"] = _noise_of(wave, electronics, loops, instrument, NOISES)
-    settled = settled_columns(instrument, np.array([frequency]), np.array([inverse_q]), bryan_factor)
-    return LoopStudy(
-        wave,
-        {name: float(values[0]) for name, values in settled.items()},
-        _sources(instrument, frequency, inverse_q, bryan_factor),
-        noise,
-        margins,
-        start,
-    )
-
-
-def _sources(
-    instrument: "Instrument", frequency: float, inverse_q: float, bryan_factor: float
-) -> tuple[BiasSource, ...]:
-    """Bias of each source: what goes when its keys are 0; its spread: the card's uncertain values, moved by their sd."""
-
-    def bias(values: dict[str, float]) -> float:
-        moved = instrument.with_values(values)
-        column = settled_columns(moved, np.array([frequency]), np.array([inverse_q]), bryan_factor)
-        return float(column["bias_deg_per_h"][0])
-
-    total = bias({})
-    spread = {value.name: value for value in instrument.uncertain}
-    sources = []
-    for name, keys in ERRORS.items():
-        effects = [_step(bias, spread[key].value, spread[key].sd, key) for key in keys if key in spread]
-        sources.append(
-            BiasSource(name, total - bias(dict.fromkeys(keys, 0.0)), float(np.hypot.reduce([0.0, *effects])))
-        )
-    axes = [
-        key for key in ("bias.damping_axis_deg", "loop.frequency_axis_deg", "loop.frequency_split_mHz") if key in spread
-    ]
-    shared = [_step(bias, spread[key].value, spread[key].sd, key) for key in axes]
-    everything = [*(source.sd for source in sources), *shared]
-    return (*sources, BiasSource("all", total, float(np.hypot.reduce([0.0, *everything]))))
-
-
-def _step(bias: Callable[[dict[str, float]], float], value: float, sd: float, key: str) -> float:
-    """Return how the bias changes when a value of the card moves by one standard deviation."""
-    least = 0.0 if key.endswith(("anisotropy", "mHz")) else -np.inf
-    return abs(bias({key: value + sd}) - bias({key: max(value - sd, least)})) / 2
-
-
-def _noise_of(
-    wave: StandingWave, electronics: Electronics, loops: Loops, instrument: "Instrument", names: tuple[str, ...]
-) -> tuple[float, float]:
-    """Deg/h of a mean of the rate over 1 s, and deg/√h from a mean over 100 s, of these sources together."""
-    only = LoopNoise(**{name: getattr(electronics.noise, name) for name in names})
-    if require_loop(instrument).mode == "whole-angle":
-        spread = [_free_spread(wave, only, loops, seconds) for seconds in (1.0, 100.0)]
-    else:
-        angle = float(np.radians(instrument.bias.pattern_angle_deg))
-        held = Electronics(electronics.pickoff, electronics.drive, only)
-        spread = _held_spread(close_loops(wave, held, loops, 0.0, angle)[0], (1.0, 100.0))
-    one, hundred = (value / wave.coupling * DEG_PER_H for value in spread)
-    return one, hundred * 10 / 60
-
-
-def _free_spread(wave: StandingWave, noise: LoopNoise, loops: Loops, seconds: float) -> float:
-    """Spread of the mean turn ψ̇ (1/s) of a free wave: forces across it walk, readings at both ends scatter."""
-    walk = noise.thermal**2 + noise.command_variance(loops.sampling) / loops.sampling
-    reading = noise.measurement_variance(loops.sampling) * loops.smoothing / (2 - loops.smoothing)
-    return float(np.sqrt(walk / seconds + 2 * reading / seconds**2))
-
-
-def _held_spread(loop: ClosedLoop, lengths: tuple[float, ...]) -> list[float]:
-    """Spread of the mean rate command (1/s) over rows of these lengths (s), the loops settled before."""
-    at = loop.places
-    settled = loop.row(round(100 * loop.loops.sampling)).covariance.copy()
-    settled[at["sum"]] = settled[:, at["sum"]] = settled[at["wave_sum"]] = settled[:, at["wave_sum"]] = 0.0
-    spread = []
-    for seconds in lengths:
-        row = loop.row(round(seconds * loop.loops.sampling))
-        total = row.map @ settled @ row.map.T + row.covariance
-        place = at["sum"].start + 2
-        spread.append(float(np.sqrt(max(total[place, place], 0.0)) / row.samples))
-    return spread

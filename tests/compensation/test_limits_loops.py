@@ -10,7 +10,7 @@ from compensation.closed_loop import ClosedLoop
 from compensation.controllers import Loops, find_margins
 from compensation.electronics import Channels, Electronics, LoopNoise, thermal_noise
 from compensation.errors import CompensationError
-from compensation.rebalance import settle_rebalance, simulate_rebalance
+from compensation.rebalance import close_loops, settle_rebalance, simulate_rebalance
 from compensation.start_up import fit_run_down, start_up
 from compensation.wave import from_quality
 from compensation.whole_angle import simulate_whole_angle
@@ -179,6 +179,26 @@ def test_settled_loops_are_where_the_simulation_comes_to_rest():
     for name in ("rate", "quadrature", "decay"):
         assert getattr(run, name)[-1] == pytest.approx(getattr(settled, name)[0], rel=1e-6)
     assert run.omega[-1] - wave.omega == pytest.approx(settled.omega[0] - wave.omega, rel=1e-5)
+
+
+@pytest.mark.parametrize(("name", "channel"), [("amplitude", 0), ("rate", 2), ("quadrature", 3)])
+def test_answer_to_a_step_is_the_recursion_of_the_controllers(name, channel):
+    """Held plant, low pass and PI of the docstring of `controllers`, stepped one by one, the command one sample late."""
+    wave, loops = from_quality(4432.0, 1e5), Loops(delay=1e-3)
+    loop, _ = close_loops(wave, Electronics(), loops, 0.0, 0.3)
+    time, answer = loop.answer_step(name, 5, 200)
+    K, K_i = loops.gains(name)
+    T, decay, x, y, integral, waiting, found = loops.step, 1 / wave.tau, 0.0, 0.0, 0.0, [0.0, 0.0], [0.0]
+    for _ in range(1000):
+        y += loops.smoothing * (x - y)
+        u = -(K * y + integral)
+        integral += K_i * T * y
+        waiting = [u, *waiting[:-1]]
+        x = x * np.exp(-decay * T) + (1 - np.exp(-decay * T)) / decay * (1.0 + waiting[-1])
+        found.append(-u)
+    assert time[1] == pytest.approx(5e-3)
+    assert answer == pytest.approx(np.array(found)[::5], abs=1e-9)
+    assert answer[-1] == pytest.approx(1.0, abs=0.1 if name == "amplitude" else 1e-3)
 
 
 def test_start_at_full_drive_takes_what_the_closed_form_says():

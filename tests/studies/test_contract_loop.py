@@ -105,3 +105,28 @@ def test_keys_of_the_loops_carry_their_units(card):
     units = {value.name: value.unit for value in load_card(card("")).uncertain}
     assert units["loop.misalignment_mrad"] == "mrad"
     assert units["loop.frequency_split_mHz"] == "mHz"
+
+
+@pytest.mark.parametrize(
+    ("mode", "loops"), [("force-rebalance", ("GA", "GF", "GR", "GQ")), ("whole-angle", ("GA", "GF", "GQ"))]
+)
+def test_the_page_shows_margins_drift_noise_start_and_run(card, tmp_path, capsys, mode, loops):
+    path, page = card(f'mode = "{mode}"\nself_precession_deg_per_s = 0.5\n'), tmp_path / "loop.html"
+    out = str(tmp_path / "run.csv")
+    assert main(["loop", path, "--json", "--report", str(page), "--out", out, "--hours", "0.1"]) == 0
+    text = page.read_text(encoding="utf-8")
+    for chapter in (
+        "In short",
+        "Where drift comes from",
+        "Noise of the rate",
+        "Margins",
+        "Answer to a step",
+        "Start-up",
+    ):
+        assert f">{chapter}<" in text
+    assert all(f">{paper}<" in text for paper in loops)
+    assert (">GR<" in text) == (mode == "force-rebalance")
+    assert "A run through the loops" in text
+    found = json.loads(capsys.readouterr().out)
+    assert f"{found['noise'][-1]['deg_per_rt_h']:.3g} °/√h" in text
+    assert "Attack first: loop.pickoff_phase_deg" in text  # 0.5° on the quadrature of 5 mHz

@@ -1,0 +1,273 @@
+"""What the loops of a card are like at one temperature: margins, steps, bias by source and azimuth, noise by source, start-up."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from compensation.closed_loop import ClosedLoop
+from compensation.controllers import Loops, Margin, require_stable
+from compensation.electronics import Electronics, LoopNoise
+from compensation.rebalance import close_loops
+from compensation.start_up import StartUp, start_up
+from compensation.wave import StandingWave
+from compensation.whole_angle import WITHOUT_RATE, close_without_rate
+from studies.errors import naming
+from studies.simulation.loop import DEG_PER_H, electronics_of, loops_of, require_loop, settled_columns, wave_of
+
+if TYPE_CHECKING:
+    from studies.instrument.card import Instrument
+
+Array = NDArray[np.float64]
+ERRORS = {
+    # source of bias: keys of the card that are 0 without it
+    "damping anisotropy": ("bias.damping_anisotropy",),
+    "turn of the drives": ("loop.misalignment_mrad",),
+    "gain ratios": ("loop.pickoff_gain_ratio", "loop.drive_gain_ratio"),
+    "phase errors on the quadrature": ("loop.pickoff_phase_deg", "loop.drive_phase_deg"),
+    "phase differences": ("loop.pickoff_phase_difference_deg", "loop.drive_phase_difference_deg"),
+    "skewed axes": ("loop.pickoff_skew_mrad", "loop.drive_skew_mrad"),
+}
+SHARED = ("bias.damping_axis_deg", "loop.frequency_axis_deg", "loop.frequency_split_mHz")
+"""Values that several sources share."""
+NOISES = ("pickoff", "adc_step", "dac_step", "drive", "thermal")
+SETTLING = 6.0
+"""Of a loop after a jump, over its bandwidth (s Hz)."""
+
+
+@dataclass(frozen=True)
+class BiasSource:
+    """One source of bias: what it makes (deg/h), and one standard deviation of it from the card's uncertain values."""
+
+    name: str
+    bias: float
+    sd: float
+
+
+@dataclass(frozen=True)
+class BiasSlope:
+    """What an uncertain value of the card does to the bias: the value, its standard deviation, deg/h per its unit."""
+
+    key: str
+    value: float
+    sd: float
+    slope: float
+
+    @property
+    def effect(self) -> float:
+        """Deg/h by one standard deviation."""
+        return abs(self.slope) * self.sd
+
+
+@dataclass(frozen=True)
+class LoopStudy:
+    """What the loops of a card are like at one temperature.
+
+    `frequency` (Hz), `inverse_q` and `bryan_factor` are of the resonator; `settled` the columns at rest; `sources` of bias;
+    `noise` by source: deg/h of a mean over 1 s, and angle random walk (deg/√h) from a mean over 100 s; `margins`; `start`
+    from rest.
+    """
+
+    instrument: "Instrument"
+    frequency: float
+    inverse_q: float
+    bryan_factor: float
+    wave: StandingWave
+    electronics: Electronics
+    loops: Loops
+    settled: dict[str, float]
+    sources: tuple[BiasSource, ...]
+    noise: dict[str, tuple[float, float]]
+    margins: tuple[Margin, ...]
+    start: StartUp
+
+    @property
+    def decay(self) -> float:
+        """1/τ, 1/s."""
+        return float(1 / np.asarray(self.wave.tau))
+
+    @property
+    def angle(self) -> float:
+        """Azimuth of the wave at the start, rad."""
+        return float(np.radians(self.instrument.bias.pattern_angle_deg))
+
+    def closed(self) -> ClosedLoop:
+        """Return the loops closed about the wave."""
+        return _close(self.instrument, self.wave, self.electronics, self.loops)
+
+
+def study_loops(instrument: "Instrument", frequency: float, inverse_q: float, bryan_factor: float) -> LoopStudy:
+    """Return margins, bias by source, noise by source and start of a card's loops.
+
+    Raises
+    ------
+    InputError
+        The card has no `[loop]`, or a loop is unstable.
+    """
+    loop = require_loop(instrument)
+    wave = wave_of(instrument, frequency, inverse_q, bryan_factor)
+    electronics, loops = electronics_of(loop, wave, instrument.reference_temperature), loops_of(loop)
+    decay = float(1 / np.asarray(wave.tau))
+    names = Loops.NAMES if loop.mode == "force-rebalance" else WITHOUT_RATE
+    with naming(f"{instrument.path} [loop]"):
+        margins = require_stable(loops, decay, names)
+        _close(instrument, wave, electronics, loops).require_stable()
+        start = start_up(1 / decay, loops, headroom=loop.drive_headroom, offset=2 * np.pi * loop.start_offset_Hz)
+        noise = {
+            name: (float(over[0]), float(over[1]) * 10 / 60)
+            for name, over in _noise(instrument, wave, electronics, loops, (1.0, 100.0)).items()
+        }
+    settled = settled_columns(instrument, np.array([frequency]), np.array([inverse_q]), bryan_factor)
+    return LoopStudy(
+        instrument,
+        frequency,
+        inverse_q,
+        bryan_factor,
+        wave,
+        electronics,
+        loops,
+        {name: float(values[0]) for name, values in settled.items()},
+        _sources(instrument, frequency, inverse_q, bryan_factor),
+        noise,
+        margins,
+        start,
+    )
+
+
+def noise_over(study: LoopStudy, seconds: tuple[float, ...]) -> dict[str, Array]:
+    """Return the standard deviation (deg/h) of means of the rate over these times, by source and of all."""
+    return _noise(study.instrument, study.wave, study.electronics, study.loops, seconds)
+
+
+def answer_steps(study: LoopStudy, points: int = 300) -> dict[str, tuple[Array, Array]]:
+    """Return what each loop commands, over what it should, after what it holds has jumped at 0: times (s) and answers."""
+    loop = study.closed()
+    return {
+        margin.loop: loop.answer_step(
+            margin.loop, max(round(SETTLING / margin.crossover * study.loops.sampling / points), 1), points
+        )
+        for margin in study.margins
+    }
+
+
+def bias_around(study: LoopStudy, azimuths: Array) -> dict[str, Array]:
+    """Return the bias (deg/h) over the azimuth of the wave (rad): of each source that makes any, and of all."""
+
+    def bias(values: dict[str, float]) -> Array:
+        count = len(azimuths)
+        return settled_columns(
+            study.instrument.with_values(values),
+            np.full(count, study.frequency),
+            np.full(count, study.inverse_q),
+            study.bryan_factor,
+            azimuths,
+        )["bias_deg_per_h"]
+
+    total = bias({})
+    parts = {name: total - bias(dict.fromkeys(keys, 0.0)) for name, keys in ERRORS.items()}
+    most = max(float(np.max(np.abs(total))), 1e-12)
+    return {name: part for name, part in parts.items() if float(np.max(np.abs(part))) > 1e-6 * most} | {"all": total}
+
+
+def bias_slopes(study: LoopStudy) -> tuple[BiasSlope, ...]:
+    """Return what each uncertain value of loops and damping does to the bias, largest effect first."""
+    keys = {*(key for keys in ERRORS.values() for key in keys), *SHARED}
+    bias = _bias_of(study.instrument, study.frequency, study.inverse_q, study.bryan_factor)
+    found = []
+    for one in study.instrument.uncertain:
+        if one.name in keys and one.sd > 0:
+            low, high = _ends(one.value, one.sd, one.name)
+            slope = (bias({one.name: high}) - bias({one.name: low})) / (high - low)
+            found.append(BiasSlope(one.name, one.value, one.sd, slope))
+    return tuple(sorted(found, key=lambda one: -one.effect))
+
+
+def _bias_of(
+    instrument: "Instrument", frequency: float, inverse_q: float, bryan_factor: float
+) -> Callable[[dict[str, float]], float]:
+    """Bias (deg/h) of the settled loops as a function of values of the card."""
+
+    def bias(values: dict[str, float]) -> float:
+        moved = instrument.with_values(values)
+        column = settled_columns(moved, np.array([frequency]), np.array([inverse_q]), bryan_factor)
+        return float(column["bias_deg_per_h"][0])
+
+    return bias
+
+
+def _sources(
+    instrument: "Instrument", frequency: float, inverse_q: float, bryan_factor: float
+) -> tuple[BiasSource, ...]:
+    """Bias of each source: what goes when its keys are 0; its spread: the card's uncertain values, moved by their sd."""
+    bias = _bias_of(instrument, frequency, inverse_q, bryan_factor)
+    total = bias({})
+    spread = {value.name: value for value in instrument.uncertain}
+
+    def effect(key: str) -> float:
+        low, high = _ends(spread[key].value, spread[key].sd, key)
+        return abs(bias({key: high}) - bias({key: low})) / 2
+
+    sources = []
+    for name, keys in ERRORS.items():
+        effects = [effect(key) for key in keys if key in spread]
+        sources.append(
+            BiasSource(name, total - bias(dict.fromkeys(keys, 0.0)), float(np.hypot.reduce([0.0, *effects])))
+        )
+    everything = [*(source.sd for source in sources), *(effect(key) for key in SHARED if key in spread)]
+    return (*sources, BiasSource("all", total, float(np.hypot.reduce([0.0, *everything]))))
+
+
+def _ends(value: float, sd: float, key: str) -> tuple[float, float]:
+    """One standard deviation below and above a value of the card, within what it can be."""
+    least = 0.0 if key.endswith(("anisotropy", "mHz")) else -np.inf
+    return max(value - sd, least), value + sd
+
+
+def _close(instrument: "Instrument", wave: StandingWave, electronics: Electronics, loops: Loops) -> ClosedLoop:
+    if require_loop(instrument).mode == "whole-angle":
+        return close_without_rate(wave, electronics, loops)
+    return close_loops(wave, electronics, loops, 0.0, float(np.radians(instrument.bias.pattern_angle_deg)))[0]
+
+
+def _noise(
+    instrument: "Instrument",
+    wave: StandingWave,
+    electronics: Electronics,
+    loops: Loops,
+    seconds: tuple[float, ...],
+) -> dict[str, Array]:
+    """Standard deviation (deg/h) of means of the rate over these times, of each source that there is and of all."""
+    there = [name for name in NOISES if getattr(electronics.noise, name) > 0]
+    found = {}
+    for label, names in (*((name, (name,)) for name in there), ("all", NOISES)):
+        only = LoopNoise(**{name: getattr(electronics.noise, name) for name in names})
+        if require_loop(instrument).mode == "whole-angle":
+            spread = [_free_spread(wave, only, loops, one) for one in seconds]
+        else:
+            held = Electronics(electronics.pickoff, electronics.drive, only)
+            spread = _held_spread(_close(instrument, wave, held, loops), seconds)
+        found[label] = np.array(spread) / wave.coupling * DEG_PER_H
+    return found
+
+
+def _free_spread(wave: StandingWave, noise: LoopNoise, loops: Loops, seconds: float) -> float:
+    """Spread of the mean turn ψ̇ (1/s) of a free wave: forces across it walk, readings at both ends scatter."""
+    walk = noise.thermal**2 + noise.command_variance(loops.sampling) / loops.sampling
+    reading = noise.measurement_variance(loops.sampling) * loops.smoothing / (2 - loops.smoothing)
+    return float(np.sqrt(walk / seconds + 2 * reading / seconds**2))
+
+
+def _held_spread(loop: ClosedLoop, lengths: tuple[float, ...]) -> list[float]:
+    """Spread of the mean rate command (1/s) over rows of these lengths (s), the loops settled before."""
+    at = loop.places
+    settled = loop.row(round(100 * loop.loops.sampling)).covariance.copy()
+    settled[at["sum"]] = settled[:, at["sum"]] = settled[at["wave_sum"]] = settled[:, at["wave_sum"]] = 0.0
+    spread = []
+    for seconds in lengths:
+        row = loop.row(max(round(seconds * loop.loops.sampling), 1))
+        total = row.map @ settled @ row.map.T + row.covariance
+        place = at["sum"].start + 2
+        spread.append(float(np.sqrt(max(total[place, place], 0.0)) / row.samples))
+    return spread
