@@ -8,6 +8,7 @@ from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 from studies.errors import InputError, naming
+from studies.films import film_numbers
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -203,10 +204,7 @@ def _film(
     from shell.damping.sources import film_names, known_film
 
     known = known_film(keys.material)
-    numbers = {
-        key: getattr(keys, key) if getattr(keys, key) is not None else known.get(key)
-        for key in (*FILM_NUMBERS, *FILM_HEAT)
-    }
+    numbers = film_numbers(keys, (*FILM_NUMBERS, *FILM_HEAT))
     missing = [key for key in FILM_NUMBERS if numbers[key] is None]
     if missing:
         listed = "" if known else f" (films of the table: {', '.join(film_names())})"

@@ -4,6 +4,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.constants import zero_Celsius
 
 from studies.errors import InputError
 
@@ -34,7 +35,7 @@ def check_card_frequency(instrument: "Instrument", frequency: Array, path: str) 
     spread = _spread(instrument, own)
     if away <= SPREADS * spread:
         return
-    T = instrument.reference_temperature - 273.15
+    T = instrument.reference_temperature - zero_Celsius
     raise InputError(
         f"{path}: frequency_Hz is near {read:.5g} Hz, but the card {instrument.name} rings at {own:.5g} Hz at {T:g} °C,"
         f" known to {100 * spread:.2g} %: is this a record of that gyro? If it is, say so in the card, with a dimension"

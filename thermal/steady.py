@@ -3,7 +3,6 @@
 from collections.abc import Mapping
 
 import numpy as np
-from scipy.constants import Stefan_Boltzmann
 
 from thermal.errors import ThermalError
 from thermal.network import Array, Network
@@ -42,54 +41,6 @@ def find_steady_state(network: Network, boundaries: Mapping[str, float], time: f
         f"no steady state was found after {NEWTON_STEPS} Newton steps; "
         "look for a source whose heat the network cannot carry away."
     )
-
-
-def steady_state_sensitivities(
-    network: Network, boundaries: Mapping[str, float], time: float = 0.0
-) -> dict[str, Array]:
-    """Change of every node's steady temperature (K) per relative change of each constant of the network.
-
-    From J dT = −∂(outflow − q)/∂ln p at the steady state, J the slope of the outflow; boundaries are per kelvin.
-
-    Returns
-    -------
-    dict
-        "conductance ONE-OTHER", "exchange ONE-OTHER", "power NODE", "boundary NAME" to an array (nodes,).
-    """
-    n = network.count
-    T = find_steady_state(network, boundaries, time)
-    slope = network.outflow_slope(T)
-    causes: dict[str, Array] = {}
-
-    def add(key: str, cause: Array) -> None:
-        causes[key] = causes.get(key, np.zeros(len(T))) + cause
-
-    def along(one: str, other: str, flow: float) -> Array:
-        cause = np.zeros(len(T))
-        cause[network.index(one)] += flow
-        cause[network.index(other)] -= flow
-        return cause
-
-    for conductor in network.conductors:
-        drop = T[network.index(conductor.other)] - T[network.index(conductor.one)]
-        flow = conductor.conductance * drop
-        add(f"conductance {conductor.name}", along(conductor.one, conductor.other, flow))
-    for radiator in network.radiators:
-        drop = T[network.index(radiator.other)] ** 4 - T[network.index(radiator.one)] ** 4
-        flow = Stefan_Boltzmann * radiator.exchange_area * drop
-        add(f"exchange {radiator.name}", along(radiator.one, radiator.other, flow))
-    for source in network.sources:
-        power = source.power if isinstance(source.power, int | float) else float(source.power.at(time))
-        cause = np.zeros(len(T))
-        cause[network.index(source.node)] = power
-        add(f"power {source.node}", cause)
-    for k, boundary in enumerate(network.boundaries):
-        add(f"boundary {boundary.name}", -slope[:, n + k])
-    inverse = np.linalg.inv(slope[:n, :n])
-    changes: dict[str, Array] = {}
-    for key, cause in causes.items():
-        changes[key] = inverse @ cause[:n]
-    return changes
 
 
 def boundary_vector(network: Network, boundaries: Mapping[str, float]) -> Array:

@@ -17,7 +17,7 @@ from functools import cached_property
 import numpy as np
 
 from shell.errors import ShellError
-from shell.imperfection.field import Complex, Field
+from shell.imperfection.field import Field
 from shell.imperfection.place import CrossSection, cut, fade
 from shell.kernel import energy_weights
 from shell.modes import Mode
@@ -46,10 +46,6 @@ class Density:
         around = 2 * harmonic
         z = complex(self.wave @ field.wave(around, self.position)) if around in field.orders else 0j
         return mean, z
-
-    def of_wave(self, profile: Complex) -> complex:
-        """Z of a wave 2n with this profile at the stations."""
-        return complex(self.wave @ profile)
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,7 +9,7 @@ import sys
 import warnings
 from collections.abc import Sequence
 
-from studies import interruption
+from studies.interruption import has_made, heed, let_be
 from studies.threads import ONE_THREAD
 
 TYPE_CHECKING = False  # `typing` takes as long to load as all the rest here, and until `run` nobody heeds Ctrl-C
@@ -87,7 +87,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         sys.stderr.close()
         return 0
     except Exception as error:
-        if interruption.has_made(error):  # as compiled modules do while they are loaded
+        if has_made(error):  # as compiled modules do while they are loaded
             return _complain("interrupted.", 130)
         return _complain(*_judge(error, words), error if debug else None)
     finally:
@@ -198,7 +198,7 @@ def describe_environment_error(error: BaseException) -> str:
 def run() -> None:
     """Entry point of the console script: a request to end counts as Ctrl-C, and a terminal shows what it can."""
     try:
-        interruption.heed()
+        heed()
         for stream in (sys.stdout, sys.stderr):
             if stream is not None and hasattr(stream, "reconfigure"):
                 stream.reconfigure(errors="backslashreplace")
@@ -213,5 +213,5 @@ def run() -> None:
     except OSError as error:
         status = _complain(describe_environment_error(error), 3)
     finally:
-        interruption.let_be()
+        let_be()
     sys.exit(status)

@@ -4,6 +4,8 @@ Where the card has imperfections or charged electrodes, the pairs n >= 1 have `s
 `slow_axis_deg` (azimuth of an antinode of the slower mode), `shift_ppm` of the mean, all to first order, and `every_order_split_Hz`; and
 `parts`, split_Hz, slow_axis_deg and shift_ppm by the imperfection, the measured split and the electrodes alone. With `--spin` the lowest modes of
 n >= 2 in the solid theory have `spin`: `rate_deg_per_s`, `lower_wave_Hz` and `upper_wave_Hz`, and `shift_ppm` of their mean with its parts.
+Where the card has films ([[loss.film]]), modes have `films`: `film`, `shift_ppm`, and the `missing` keys where that is null. Where its material is
+a crystal, the lowest pairs of n = 2, 3, 5, 6, 7, 9 … have `crystal`: `antinode_along_100_Hz`, `other_Hz`, `split_Hz`, `relative_split`.
 """
 
 from typing import TYPE_CHECKING, Annotated, Any, Literal
@@ -56,6 +58,8 @@ def modes(
     from scipy.constants import zero_Celsius
 
     from shell.modes import solve_modes
+    from studies.cli.crystal import crystal_pairs, print_crystal
+    from studies.cli.films import describe_films, print_films
     from studies.cli.output import print_table
     from studies.cli.spin import print_spin, spin_pairs
     from studies.errors import InputError, naming
@@ -72,7 +76,9 @@ def modes(
     with naming(instrument.path):
         resonator, elastic = instrument.at(T)
         found = [m for n in harmonic for m in solve_modes(resonator, elastic, n, count, theory, tolerance)]
-    detailed = theory != "rayleigh"
+        detailed = theory != "rayleigh"
+        films = describe_films(found, instrument) if detailed else {}
+        crystal = crystal_pairs(found, instrument.keys("material").cubic, tolerance)
     share, mean = _material_share(instrument, T), _mean_thickness(resonator)
     split = _find_splits(instrument, found, T) if detailed else {}
     spinning = {} if spin is None else spin_pairs(found, elastic, spin)
@@ -96,8 +102,9 @@ def modes(
             }
         if id(m) in split:
             entry["split"] = split[id(m)]
-        if id(m) in spinning:
-            entry["spin"] = spinning[id(m)]
+        for key, known in (("spin", spinning), ("films", films), ("crystal", crystal)):
+            if id(m) in known:
+                entry[key] = known[id(m)]
         entries.append(entry)
     yield {
         "schema": "hrg.modes/1",
@@ -131,6 +138,10 @@ def modes(
         _print_splits(found, split)
     if spinning:
         print_spin(found, spinning)
+    if films:
+        print_films(found, films)
+    if crystal:
+        print_crystal(found, crystal)
     if sensitivities and detailed:
         _print_details(found)
 

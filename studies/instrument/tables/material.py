@@ -6,6 +6,9 @@
     file = "mine.toml"          # a user's own material table, beside the card
     youngs_modulus_GPa, poisson_ratio, density_kg_m3   # given values at the reference temperature
 
+    [material.crystal]          # of a cubic crystal with [001] along the axis; density_kg_m3 stands above
+    C11_GPa, C12_GPa, C44_GPa   # `hrg modes` solves its pairs; everything else takes the isotropic mean (Voigt)
+
     [material.deviation.shear_modulus]                 # of the law, by property; for poisson_ratio and expansion: value,
     log_value, log_slope_per_K, log_curvature_per_K2   # slope_per_K, curvature_per_K2
 
@@ -22,6 +25,7 @@ from studies.instrument.keys import Keys, number
 from studies.instrument.registry import CardTable, Place
 
 if TYPE_CHECKING:
+    from shell.cubic import Cubic
     from shell.materials import Material
 
 STIFFEST = 2000.0  # GPa
@@ -72,6 +76,14 @@ class Deviation(Keys, frozen=True, kw_only=True):
         }
 
 
+class Crystal(Keys, frozen=True, kw_only=True):
+    """Elastic constants of a cubic crystal."""
+
+    C11_GPa: Annotated[float, number(above=0.0)]
+    C12_GPa: float
+    C44_GPa: Annotated[float, number(above=0.0)]
+
+
 class MaterialKeys(Keys, frozen=True, kw_only=True):
     """The keys of `[material]`."""
 
@@ -81,10 +93,37 @@ class MaterialKeys(Keys, frozen=True, kw_only=True):
     youngs_modulus_GPa: Annotated[float, number(above=0.0)] | None = None
     poisson_ratio: Annotated[float, number(above=-1.0, below=0.5)] | None = None
     density_kg_m3: Annotated[float, number(above=0.0)] | None = None
+    crystal: Crystal | None = None
     deviation: Deviation | None = None
     note: str = ""
 
+    @property
+    def cubic(self) -> "Cubic | None":
+        """The crystal, SI units."""
+        if self.crystal is None or self.density_kg_m3 is None:
+            return None
+        from shell.cubic import Cubic
+
+        C11, C12, C44 = (1e9 * C for C in msgspec.structs.astuple(self.crystal))
+        return Cubic(C11, C12, C44, self.density_kg_m3)
+
+    @property
+    def given(self) -> dict[str, float]:
+        """The values that the card gives, by property, SI units."""
+        if (cubic := self.cubic) is not None:
+            mean = cubic.isotropic
+            return {"youngs_modulus": mean.E, "poisson_ratio": mean.nu, "density": mean.rho}
+        values = {name: (getattr(self, key), si) for key, (name, si) in GIVEN.items()}
+        return {name: value * si for name, (value, si) in values.items() if value is not None}
+
     def __post_init__(self) -> None:
+        if self.crystal is not None:
+            if self.youngs_modulus_GPa is not None or self.poisson_ratio is not None:
+                raise ValueError(
+                    "a crystal has C11_GPa, C12_GPa and C44_GPa instead of youngs_modulus_GPa and poisson_ratio."
+                )
+            if self.density_kg_m3 is None:
+                raise ValueError("density_kg_m3 of the crystal is missing; add it.")
         E, rho = self.youngs_modulus_GPa, self.density_kg_m3
         if E is not None and E > STIFFEST:
             hint = f" It looks like pascal: write {E / 1e9:g}." if 1e-3 < E / 1e9 < STIFFEST else ""
@@ -98,9 +137,9 @@ def build_material(keys: MaterialKeys, place: Place) -> "Material":
     """Find the law, with the given values at the reference temperature."""
     from shell.materials import constant_material, find_material, read_materials
 
-    given = {name: getattr(keys, key) * si for key, (name, si) in GIVEN.items() if getattr(keys, key) is not None}
     own = None if keys.file is None else place.folder / keys.file
     with naming(place.where):
+        given = keys.given
         if own is None and given and keys.name not in read_materials():
             missing = [name for name, _ in GIVEN.values() if name not in given]
             if missing:
