@@ -7,16 +7,18 @@ from scipy.ndimage import median_filter
 Array = NDArray[np.float64]
 REACH = 3
 NEIGHBOURS = 2 * REACH + 1
-SPIKE = 8.0
+SPIKE, ALONE = 6.0, 4.0
 
 
 def find_spikes(values: Array, least: float = 0.0) -> NDArray[np.bool_]:
-    """Mark readings (m,) that stand out from their neighbours by more than 8 robust standard deviations.
+    """Mark readings (m,) that stand out from their neighbours by more than 6 robust standard deviations.
 
     What the neighbours say is the median of (y_{i−k} + y_{i+k})/2, k = 1, 2, 3, which follows any straight trend; at the
-    ends of the series that of 2 y_{i+k} − y_{i+2k}, looking inwards. The distance from it must exceed 8 times 1.4826 times
-    the median distance of the whole series, and 8 times the distance that is usual next to the sample, so that bends, gaps
-    and jumps are no spikes. Missing readings, NaN, are not marked, nor is anything in fewer than seven.
+    ends of the series that of 2 y_{i+k} − y_{i+2k}, looking inwards, whose distance counts half. The distance from it must exceed 6 times 1.4826 times
+    the median distance of the whole series, be the largest within two rows, and, once the reading is replaced by what its
+    neighbours say, exceed 4 times the distance that is usual next to it, so that bends, gaps and jumps are no spikes.
+    Spikes that are found are replaced, and the rest is searched again: one does not hide another beside it. Missing
+    readings, NaN, are not marked, nor is anything in fewer than seven.
 
     Parameters
     ----------
@@ -36,32 +38,48 @@ def find_spikes(values: Array, least: float = 0.0) -> NDArray[np.bool_]:
 
 
 def _stand_out(values: Array) -> NDArray[np.bool_]:
-    distance = np.abs(values - _expect(values))
-    # A straight ramp is left with the rounding of its own arithmetic, which is no spread.
-    distance[distance < 64 * np.finfo(float).eps * np.max(np.abs(values))] = 0.0
-    padded = np.pad(distance, REACH, mode="reflect")
-    nearby = _middle(*(np.maximum(padded[REACH - k : -REACH - k], _shifted(padded, k)) for k in (1, 2, 3)))
+    left = values.copy()
+    distance = _distance(left)
     positive = distance[distance > 0]
     # Rounded readings may have no spread at all: then the smallest distance takes its place.
     spread = max(1.4826 * float(np.median(distance)), float(positive.min()) if positive.size else 1.0)
-    return np.asarray(distance > SPIKE * np.maximum(spread, nearby))
+    while True:
+        distance = _distance(left)
+        around = np.pad(distance, REACH)
+        peak = distance >= np.fmax.reduce([_shifted(around, k) for k in (-2, -1, 1, 2)])
+        candidates = np.flatnonzero(peak & (distance > SPIKE * spread))
+        without = left.copy()
+        without[candidates] = np.nan
+        around = np.pad(_distance(without), REACH, mode="reflect")
+        nearby = _median([np.fmax(_shifted(around, -k), _shifted(around, k)) for k in (1, 2, 3)])[candidates]
+        found = candidates[distance[candidates] > ALONE * nearby]
+        if not found.size:
+            return np.isnan(left)
+        left[found] = np.nan
 
 
-def _expect(values: Array) -> Array:
-    """Return what the neighbours of every sample say that it should be."""
+def _distance(values: Array) -> Array:
+    """Return how far every sample is from what its neighbours say; NaN where it or they are missing."""
     padded = np.pad(values, REACH, mode="reflect", reflect_type="odd")
-    expected = _middle(*((padded[REACH - k : -REACH - k] + _shifted(padded, k)) / 2 for k in (1, 2, 3)))
-    if values.size > 3 * REACH:
-        for series, ends in ((values, expected), (values[::-1], expected[::-1])):  # views: written through
-            inward = (2 * series[k : REACH + k] - series[2 * k : REACH + 2 * k] for k in (1, 2, 3))
-            ends[:REACH] = _middle(*inward)
-    return expected
+    expected = _median([(_shifted(padded, -k) + _shifted(padded, k)) / 2 for k in (1, 2, 3)])
+    ends = values.size > 3 * REACH
+    if ends:
+        for series, end in ((values, expected), (values[::-1], expected[::-1])):  # views: written through
+            end[:REACH] = _median([2 * series[k : REACH + k] - series[2 * k : REACH + 2 * k] for k in (1, 2, 3)])
+    distance = np.abs(values - expected)
+    if ends:  # y_i − 2 y_{i+k} + y_{i+2k} has twice the bend and the noise of y_i − (y_{i−k} + y_{i+k})/2
+        distance[:REACH] /= 2
+        distance[-REACH:] /= 2
+    # A straight ramp is left with the rounding of its own arithmetic, which is no spread.
+    distance[distance < 64 * np.finfo(float).eps * np.nanmax(np.abs(values))] = 0.0
+    return distance
 
 
 def _shifted(padded: Array, k: int) -> Array:
     return padded[REACH + k : padded.size - REACH + k]
 
 
-def _middle(low: Array, middle: Array, high: Array) -> Array:
-    """Return the median of three arrays, entry by entry."""
-    return np.asarray(np.maximum(np.minimum(low, middle), np.minimum(np.maximum(low, middle), high)))
+def _median(of: list[Array]) -> Array:
+    """Return the median of three arrays, entry by entry, missing ones left out."""
+    low, middle, high = np.sort(of, axis=0)  # NaN last
+    return np.where(np.isnan(high), np.where(np.isnan(middle), low, (low + middle) / 2), middle)

@@ -31,6 +31,7 @@ from studies.diagnosis.scan import build_bank, scan
 from studies.diagnosis.search import drop, polish
 from studies.diagnosis.verdict import Interval
 from studies.effects import find_effect
+from studies.effects.effect import UNITS
 from studies.effects.states import FloatArray
 from studies.errors import InputError
 from studies.record import Record, read_record
@@ -64,7 +65,7 @@ class Share:
         The device that lacks it, or has it alone.
     probability : of this answer among the kinds and effects that were compared
     evidence : twice the log posterior over none, summed
-    sizes : the first coefficient of every device that has it, with its name
+    sizes : of every device that has it, with its name: its coefficient, or the rms of what a family of several makes
     """
 
     effect: str
@@ -239,7 +240,8 @@ class Standing:
     """An effect in its place in one device.
 
     `score`: log posterior over nothing being there; `size`, `sd`: rms of what it makes of the response in the records, and how
-    well that is known; `first`: its first coefficient.
+    well that is known; `first`: its coefficient, where it has one, else `size`, for the members of a family stand in for each
+    other.
     """
 
     score: float
@@ -277,7 +279,8 @@ def _scores(inquiry: Inquiry, names: Sequence[str]) -> dict[str, Standing]:
         value, C = model.solved.coefficients[places], model.solved.covariance[np.ix_(places, places)]
         size = float(np.sqrt(np.mean((model.linear.columns[:, places] @ value) ** 2)))
         times = float(np.sqrt(max(value @ np.linalg.solve(C + 1e-12 * np.diag(np.diag(C)), value), 1e-12)))
-        out[seen.term.name] = Standing(own.score - base.score, size, size / times, _interval(value[0], C[0, 0]))
+        first = _interval(value[0], C[0, 0]) if value.size == 1 else _interval(size, (size / times) ** 2)
+        out[seen.term.name] = Standing(own.score - base.score, size, size / times, first)
     return out
 
 
@@ -354,11 +357,13 @@ def compare(response: str, scores: Mapping[str, Mapping[str, Standing]]) -> Shar
 
 
 def _sizes(share: Share, scored: Mapping[str, Mapping[str, Standing]]) -> dict[str, Any]:
-    """Return the first coefficient of the effect in every device that has it."""
+    """Return the size of the effect in every device that has it, and its name."""
+    effect = find_effect(share.effect)
+    name = effect.coefficient_names(share.response)[0] if effect.spread.size == 1 else f"rms_{UNITS[share.response]}"
     having = [share.odd] if share.kind == "alone" else [device for device in scored if device != share.odd]
     found = {str(device): scored[str(device)].get(share.effect) for device in having}
     sizes = {device: one.first for device, one in found.items() if one is not None and one.score > 0.0}
-    return {"sizes": sizes, "coefficient": find_effect(share.effect).coefficient_names(share.response)[0]}
+    return {"sizes": sizes, "coefficient": name}
 
 
 def _interval(value: float, variance: float) -> Interval:

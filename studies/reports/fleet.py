@@ -63,7 +63,7 @@ def share_table(fleet: Fleet) -> Table:
         "probability",
         "evidence",
         "size of each device",
-        "of the coefficient",
+        "which is",
     )
     return Table("Causes over the fleet", columns, rows)
 

@@ -32,7 +32,25 @@ def test_spikes_are_found_however_steep_the_record(slope):
     assert np.flatnonzero(find_spikes(values)).tolist() == places
 
 
+@pytest.mark.parametrize("apart", [1, 2, 3, 4, 5, 6])
+@pytest.mark.parametrize("second", [0.2, -0.15])
+def test_a_spike_does_not_hide_the_one_beside_it(apart, second):
+    values = 0.1 * ROWS + 0.01 * np.random.default_rng(3).standard_normal(ROWS.size)
+    places = [200, 200 + apart]
+    values[places] += [0.2, second]
+    assert np.flatnonzero(find_spikes(values)).tolist() == places
+
+
+def test_a_staircase_has_none():
+    """A row taken in the middle of a transition, and the rows beside it, are readings."""
+    for noise in (0.0, 1e-3, 1e-2):
+        values = np.repeat(np.arange(20.0), 30)
+        values[30::90] -= 0.6
+        values += noise * np.random.default_rng(4).standard_normal(values.size)
+        assert not find_spikes(values).any()
+
+
 def test_gaussian_noise_has_next_to_none():
-    """Eight robust deviations are passed by 1e-15 of Gaussian rows."""
+    """Six robust deviations of the distance, about seven of the noise, are passed by 1e-11 of Gaussian rows."""
     found = sum(int(find_spikes(np.random.default_rng(k).standard_normal(600)).sum()) for k in range(100))
     assert found <= 1

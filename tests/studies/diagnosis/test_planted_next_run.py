@@ -69,9 +69,12 @@ def test_a_model_goes_on_where_it_was():
     """The mean of a repeated run is the fitted model of the recorded one, its initial state and noise aside."""
     campaign, (one,) = rivals_of(7, "second-lag", [("second-lag", (9000.0,))])
     ahead = continue_model(one, candidates(campaign)[0].states, None)
-    fitted = one.linear.columns @ one.solved.coefficients - one.problem.stack(one.tangent.shift)
-    late = ahead.mean.size // 2
-    assert np.allclose(ahead.mean[late:], fitted[late : ahead.mean.size], atol=0.02 * np.ptp(fitted))
+    fitted = np.full(one.problem.present[0].size, np.nan)
+    fitted[one.problem.present[0]] = one.linear.columns @ one.solved.coefficients - one.problem.stack(one.tangent.shift)
+    late = slice(ahead.mean.size // 2, ahead.mean.size)
+    away = (ahead.mean - fitted)[late]
+    assert np.isfinite(away).mean() > 0.99
+    assert np.nanmax(np.abs(away)) < 0.02 * np.nanmax(fitted) - 0.02 * np.nanmin(fitted)
 
 
 def test_profiles_keep_to_the_chamber():
