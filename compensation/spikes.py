@@ -82,4 +82,4 @@ def _shifted(padded: Array, k: int) -> Array:
 def _median(of: list[Array]) -> Array:
     """Return the median of three arrays, entry by entry, missing ones left out."""
     low, middle, high = np.sort(of, axis=0)  # NaN last
-    return np.where(np.isnan(high), np.where(np.isnan(middle), low, (low + middle) / 2), middle)
+    return np.asarray(np.where(np.isnan(high), np.where(np.isnan(middle), low, (low + middle) / 2), middle))
