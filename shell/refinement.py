@@ -6,7 +6,6 @@ from math import ceil, e, exp, hypot, log, pi
 import numpy as np
 
 from shell.assembly import build_system
-from shell.corner import find_kinks
 from shell.eigen import ElementMass, Factor, Iteration, whole_pattern
 from shell.elastic import Elastic, VaryingElastic
 from shell.errors import ShellError
@@ -91,8 +90,6 @@ def _first_level(resonator: Resonator, n: int, count: int, theory: Theory, toler
     level = replace(level, longest=_in_parts(_most(level, tolerance) / max(k, 1e-9) / (resonator.size * crowding(n))))
     if hypot(k, n / resonator.size) * max(value for _, value in resonator.thickness) > DEEP and tolerance < LOOSE:
         level = level.raised(theory, {"through"})
-    if theory == "shell" and tolerance < LOOSE and find_kinks(resonator):
-        level = level.raised(theory, {"solids"})  # the stiff ties beside a corner
     return level
 
 
