@@ -111,12 +111,17 @@ def simulate_rebalance(
 
 
 def settle_rebalance(
-    wave: StandingWave, electronics: Electronics, rate: ArrayLike = 0.0, angle: ArrayLike = 0.0
+    wave: StandingWave,
+    electronics: Electronics,
+    rate: ArrayLike = 0.0,
+    angle: ArrayLike = 0.0,
+    turn: ArrayLike = 0.0,
 ) -> LoopRun:
     """Return what settled loops say, without noise, for any number of rows at once: exact in the electronics' errors.
 
     Integral control shows the pick-offs their command, C_p (P, S) = (1, 0); the commands c are what that takes,
-    C_d c = (iν − A)(P, S), and ν, how far the oscillator is from the mean frequency, makes the amplitude's command real.
+    C_d c = (iν − A) C_p⁻¹ (1, 0) + n θ̇ C_p⁻¹ (0, 1), and ν, how far the oscillator is from the mean frequency, makes the
+    amplitude's command real.
 
     Parameters
     ----------
@@ -124,6 +129,8 @@ def settle_rebalance(
         Its values numbers, or arrays (N,).
     rate, angle : float or array (N,)
         Rate (rad/s) and azimuth of the wave (rad).
+    turn : float or array (N,)
+        θ̇ (rad/s) at which the rate's command turns the wave, as the pick-offs show it.
 
     Returns
     -------
@@ -133,15 +140,15 @@ def settle_rebalance(
     values = [np.asarray(getattr(wave, name), dtype=float) for name in PHYSICAL]
     shape = np.broadcast_shapes(*(np.shape(x) for x in (*values, rate, angle)), (1,))
     rows = spread_over_rows(wave, shape[0])
-    turning, azimuth = (np.broadcast_to(np.asarray(x, dtype=float), shape) for x in (rate, angle))
+    turning, azimuth, turned = (np.broadcast_to(np.asarray(x, dtype=float), shape) for x in (rate, angle, turn))
     A = _dynamics(rows, turning, azimuth)
     c, s = np.cos(rows.harmonic * azimuth), np.sin(rows.harmonic * azimuth)
     R = np.moveaxis(np.array([[c, -s], [s, c]]), -1, 0)
     back = np.swapaxes(R, 1, 2)
     pickoff = back @ electronics.pickoff.matrix(rows.harmonic) @ R
     drive = back @ electronics.drive.matrix(rows.harmonic) @ R
-    moved = np.linalg.solve(pickoff, np.broadcast_to([[1.0], [0.0]], (*shape, 2, 1)))
-    held = np.linalg.solve(drive, -A @ moved)[..., 0]
+    moved, across = np.moveaxis(np.linalg.inv(pickoff), -1, 0)[..., None]
+    held = np.linalg.solve(drive, wave.harmonic * turned[:, None, None] * across - A @ moved)[..., 0]
     shifted = np.linalg.solve(drive, 1j * moved)[..., 0]
     nu = -held[:, 0].imag / shifted[:, 0].imag
     command = held + nu[:, None] * shifted

@@ -74,15 +74,23 @@ def read_turning(
     angle: Real,
     *,
     rate: ArrayLike = 0.0,
-    precession: ArrayLike = 0.0,
+    precession: ArrayLike | None = None,
     time: Real | None = None,
 ) -> LoopRun:
-    """Return what settled loops say of a wave that turns through measured azimuths, array (N,), rad."""
-    held = settle_rebalance(wave, electronics, 0.0, angle)
-    shown, arriving = _channels(electronics, wave.harmonic)
-    e, k = np.exp(2j * wave.harmonic * angle), wave.bryan_factor
-    moved = _value(shown, e) * k * (np.asarray(rate) + held.rate) + _value(arriving, e) * np.asarray(precession)
-    return replace(held, time=held.time if time is None else time, rate=(moved - precession) / k, angle=angle)
+    """Return what settled loops say of a wave that turns through measured azimuths, array (N,), rad.
+
+    Unless `precession` is given, it is what turns the wave through these azimuths over the `time`.
+    """
+    k = wave.bryan_factor
+    if precession is None:
+        if time is None:
+            raise CompensationError("a wave that turns needs its commanded turn, or times.")
+        turn = np.gradient(angle, time)
+    else:  # the command is linear in the turn
+        still, moved = (settle_rebalance(wave, electronics, rate, angle, one).rate for one in (0.0, 1.0))
+        turn = (-np.asarray(precession) / k - still) / (moved - still)
+    found = settle_rebalance(wave, electronics, rate, angle, turn)
+    return replace(found, time=found.time if time is None else time, rate=turn / k + found.rate)
 
 
 def _pickoff(electronics: Electronics, n: int) -> Real:

@@ -219,8 +219,8 @@ class _Course:
         along, across = self.forces(psi, command, means)
         return np.array(
             [
-                -(decay + dc * c + ds * s) + along.real - means[0],
-                drift + wc * c + ws * s + along.imag,
+                -(decay + dc * c + ds * s) + (wc * s - ws * c) * means[2] + along.real - means[0],
+                drift + wc * c + ws * s + (dc * s - ds * c) * means[2] + along.imag,
                 0.0,
                 -(wc * s - ws * c) * means[3] + across.imag - means[1],
             ]

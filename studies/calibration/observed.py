@@ -20,6 +20,9 @@ SETTLED = "settled_frequency_Hz"
 """Frequencies of steady-state tables."""
 MOST_ROWS = 2000  # of a run that are predicted
 MOST_BLOCKS = 240  # of a run that are compared
+PERIOD = 90.0  # ° of azimuth, of what a turning wave of n = 2 meets
+ROWS_PER_PERIOD, BLOCKS_PER_PERIOD = 36, 6  # of that; the mean of a row's turn is then within 0.2 % of its middle
+TURNED_MOST = 10  # times as many rows, and three times as many blocks, for waves that turn often
 LEAST_ROWS = 10
 
 
@@ -108,7 +111,10 @@ def observe(records: Sequence[Record]) -> tuple[ObservedRun, ...]:
 
 
 def _observe(record: Record, start: float) -> ObservedRun:
-    time, columns = _fine_rows(record)
+    periods = _periods(record)
+    most_rows = int(np.clip(ROWS_PER_PERIOD * periods, MOST_ROWS, TURNED_MOST * MOST_ROWS))
+    most_blocks = int(np.clip(BLOCKS_PER_PERIOD * periods, MOST_BLOCKS, 3 * MOST_BLOCKS))
+    time, columns = _fine_rows(record, most_rows)
     if len(time) < LEAST_ROWS:
         raise InputError(f"{record.path}: {len(time)} rows say nothing; a run needs at least {LEAST_ROWS}.")
     inner = replace(drive_by_record(record, time=time), start=start)
@@ -116,7 +122,7 @@ def _observe(record: Record, start: float) -> ObservedRun:
     if inner.boundary == "housing" and COLUMN["chamber"] in record and np.isfinite(record[COLUMN["chamber"]]).sum() > 1:
         outer = replace(drive_by_record(record, "chamber", time=time), start=start)
     wanted = [name for name in RESPONSES if name in columns] + ([HOUSING] if outer is not None else [])
-    responses = {name: blocks for name in wanted if (blocks := _block(time, columns[name])) is not None}
+    responses = {name: blocks for name in wanted if (blocks := _block(time, columns[name], most_blocks)) is not None}
     if not any(name in responses for name in RESPONSES):
         raise InputError(
             f"{record.path}: none of {', '.join(RESPONSES)} has values; there is nothing to calibrate with."
@@ -124,34 +130,41 @@ def _observe(record: Record, start: float) -> ObservedRun:
     return ObservedRun(record, inner, outer, responses)
 
 
-def _fine_rows(record: Record) -> tuple[Array, dict[str, Array]]:
+def _periods(record: Record) -> float:
+    """How many periods of a standing wave's azimuth a run goes through."""
+    if "pattern_angle_deg" not in record:
+        return 0.0
+    return float(np.nansum(np.abs(np.diff(record["pattern_angle_deg"])))) / PERIOD
+
+
+def _fine_rows(record: Record, most: int) -> tuple[Array, dict[str, Array]]:
     """Rows to predict: those of the record, of very many rows the means of groups of equal duration."""
     time = record["time_s"]
     names = [name for name in (*RESPONSES, HOUSING) if name in record]
-    if len(time) <= MOST_ROWS:
+    if len(time) <= most:
         return time, {name: record[name] for name in names}
-    width = float(np.ptp(time)) / MOST_ROWS
-    group = np.minimum(((time - time[0]) / width).astype(np.intp), MOST_ROWS - 1)
+    width = float(np.ptp(time)) / most
+    group = np.minimum(((time - time[0]) / width).astype(np.intp), most - 1)
     present = np.unique(group)
-    means = np.bincount(group, time, MOST_ROWS) / np.maximum(np.bincount(group, minlength=MOST_ROWS), 1)
+    means = np.bincount(group, time, most) / np.maximum(np.bincount(group, minlength=most), 1)
     columns = {}
     for name in names:
         values = record[name]
         keep = np.isfinite(values) & ~find_spikes(values)
-        count = np.bincount(group[keep], minlength=MOST_ROWS)
+        count = np.bincount(group[keep], minlength=most)
         middle = float(np.median(values[keep])) if keep.any() else 0.0
-        total = np.bincount(group[keep], values[keep] - middle, MOST_ROWS)
+        total = np.bincount(group[keep], values[keep] - middle, most)
         columns[name] = np.where(count > 0, middle + total / np.maximum(count, 1), np.nan)[present]
     return means[present], columns
 
 
-def _block(time: Array, column: Array) -> Blocks | None:
+def _block(time: Array, column: Array, most: int) -> Blocks | None:
     keep = np.isfinite(column)
     if np.count_nonzero(keep) < LEAST_ROWS:
         return None
     spikes = find_spikes(column)
     rows = np.flatnonzero(keep & ~spikes)
-    width = max(float(np.ptp(time)) / MOST_BLOCKS, 1e-9)
+    width = max(float(np.ptp(time)) / most, 1e-9)
     group = ((time[rows] - time[0]) / width).astype(np.intp)
     edges = np.flatnonzero(np.diff(group, prepend=-1) > 0)
     counts = np.diff(np.append(edges, len(rows))).astype(float)

@@ -89,6 +89,7 @@ def loop(
     if out is not None:
         run = _run(
             instrument,
+            T,
             law.bryan_factor,
             frequency,
             inverse_q,
@@ -159,6 +160,7 @@ def _payload(study: "LoopStudy") -> dict[str, Any]:
 
 def _run(
     instrument: Any,
+    temperature: float,
     bryan_factor: float,
     frequency: float,
     inverse_q: float,
@@ -171,6 +173,7 @@ def _run(
     seed: int | None,
 ) -> "Record":
     import numpy as np
+    from scipy.constants import zero_Celsius
 
     from studies.record import Record, write_record
     from studies.simulation.chamber import load_profile
@@ -187,6 +190,7 @@ def _run(
         columns = {name: thermal[name] for name in names if name in thermal}
     else:
         time = np.asarray(row * np.arange(int(hours * 3600 / row * (1 + 1e-12)) + 1), dtype=float)
+        columns = {"chamber_temperature_degC": np.full(len(time), temperature - zero_Celsius)}
     generator = None if seed is None else np.random.default_rng(seed)
     run = run_loops(
         instrument, time, f, loss, bryan_factor, rate=np.radians(rate), both_ways=both_ways, generator=generator

@@ -134,7 +134,8 @@ def settled_columns(
     frequency, inverse_q : arrays (N,), Hz and 1
         Of the resonator.
     pattern_angle : array (N,), optional
-        Azimuth (rad). Unless given, that of `[bias]`, from which a whole-angle wave turns over the time.
+        Azimuth (rad), through which a whole-angle wave has turned. Unless given, that of `[bias]`, from which it turns
+        over the time.
     damping : array (N,), optional
         Of the parts of a loss budget; see `wave_of`.
     time : array (N,), optional, s
@@ -156,8 +157,10 @@ def settled_columns(
         run = settle_rebalance(wave, electronics, rate, angle)
     elif pattern_angle is None and time is not None:
         run = turn_settled(wave, electronics, time, rate=rate, precession=precession, angle=start)
-    else:
+    elif pattern_angle is None or time is None:
         run = read_turning(wave, electronics, angle, rate=rate, precession=precession)
+    else:  # whatever was commanded has turned it so
+        run = read_turning(wave, electronics, angle, rate=rate, time=time)
     return columns_of(loop, run)
 
 

@@ -96,8 +96,15 @@ def simulate_run(
         columns[COLUMN["chamber"]] = drive.profile.at(drive.time) - zero_Celsius
     else:
         true["housing_temperature_degC"] = drive.profile.at(drive.time) - zero_Celsius
-    columns |= _observe(true, levels, rate, np.random.default_rng(seed), sensed=drive.boundary == "chamber")
-    columns |= {name: true[name] for name in ("quadrature_V", "pattern_angle_deg") if name in true}
+    free = instrument.loop is not None and instrument.loop.mode == "whole-angle"
+    columns |= _observe(
+        true,
+        levels,
+        rate,
+        np.random.default_rng(seed),
+        sensed=drive.boundary == "chamber",
+        turns_by=prediction.law.bryan_factor if free else None,
+    )
     for name, (column, factor, power) in COMMANDS.items():
         if name in drive.commands:
             columns[column] = drive.commands[name] ** (1 / power) / factor
@@ -121,22 +128,39 @@ def simulate_run(
 
 
 def _observe(
-    true: dict[str, Array], levels: "NoiseKeys", rate: float, generator: np.random.Generator, sensed: bool
+    true: dict[str, Array],
+    levels: "NoiseKeys",
+    rate: float,
+    generator: np.random.Generator,
+    sensed: bool,
+    turns_by: float | None,
 ) -> dict[str, Array]:
-    """Return the columns as they are read: noise and rounding. A housing that was imposed has been read already."""
+    """Return the columns as they are read: noise and rounding. A housing that was imposed has been read already.
+
+    `turns_by` is the Bryan factor of a wave that turns freely: its azimuth is measured; else it is commanded.
+    """
     count = len(true["frequency_Hz"])
     housing = true["housing_temperature_degC"]
     scatter = white_noise(count, rate, levels.housing_white_K, generator)
     frequency = true["frequency_Hz"] + frequency_noise(levels).draw(count, rate, generator)
-    bias = true["bias_deg_per_h"] + bias_noise(levels).draw(count, rate, generator)
+    wander = bias_noise(levels).draw(count, rate, generator)
+    bias = true["bias_deg_per_h"] + wander
     loss = true["inverse_q"] * (1 + white_noise(count, rate, levels.inverse_q_white, generator))
-    return {
+    read = {
         "housing_temperature_degC": quantise(housing + scatter, levels.housing_resolution_degC) if sensed else housing,
         "resonator_temperature_degC": true["resonator_temperature_degC"],
         "frequency_Hz": quantise(frequency, levels.frequency_resolution_Hz),
         "bias_deg_per_h": quantise(bias, levels.bias_resolution_deg_per_h),
         "inverse_q": loss,
     }
+    if "quadrature_V" in true:
+        read["quadrature_V"] = true["quadrature_V"] + white_noise(count, rate, levels.quadrature_white_V, generator)
+    if "pattern_angle_deg" in true:
+        read["pattern_angle_deg"] = true["pattern_angle_deg"]
+    if turns_by is not None:  # what scatters as a rate has turned the wave
+        angle = true["pattern_angle_deg"] + turns_by / rate / 3600 * np.cumsum(np.append(0.0, wander[:-1]))
+        read["pattern_angle_deg"] = angle + white_noise(count, rate, levels.pattern_angle_white_deg, generator)
+    return read
 
 
 def _idle_effects(instrument: "Instrument", drive: Drive) -> tuple[str, ...]:

@@ -5,7 +5,7 @@ import pytest
 
 from compensation.controllers import Loops
 from compensation.electronics import Channels, Electronics
-from compensation.settled_turn import turn_settled
+from compensation.settled_turn import read_turning, turn_settled
 from compensation.wave import from_quality
 from compensation.whole_angle import simulate_whole_angle
 from studies.cli import main
@@ -26,11 +26,12 @@ frequency_split_mHz = 0.0
 K = 0.27562  # Bryan factor of the solid free dome
 
 
-def simulated(tmp_path, lines, schedule):
+def simulated(tmp_path, lines, schedule, noise=False):
     card, out, path = tmp_path / "card.toml", tmp_path / "run.csv", tmp_path / "schedule.csv"
     card.write_text(shipped_cards()["free-dome"].read_text() + lines)
     path.write_text(schedule)
-    assert main(["simulate", str(card), str(path), "--out", str(out), "--noiseless", "--rate", "0.1"]) == 0
+    words = ["simulate", str(card), str(path), "--out", str(out), "--rate", "0.1"]
+    assert main(words if noise else [*words, "--noiseless"]) == 0
     return load_card(card), read_record(out)
 
 
@@ -87,3 +88,40 @@ def test_settled_turning_is_the_loops_own_run_without_their_lag():
         made = np.ptp(loops.angle - ideal.angle)
         assert made > 1e-2
         assert np.abs(settled.angle - loops.angle).max() < 0.02 * made
+
+
+def test_settled_commands_of_a_turning_wave_are_those_of_the_loops():
+    """Amplitude's drive, quadrature, frequency and rate, each against its own swing around: the gains make the amplitude swell."""
+    time = np.arange(0.0, 1200.0, 1.0)
+    wave = from_quality(
+        4432.0, 1e6, damping_anisotropy=0.02, damping_axis=0.2, frequency_split=5e-3, frequency_axis=0.1
+    )
+    errors = Electronics(Channels(0.008, 0.002, 0.003, 0.001, 0.004), Channels(-0.005, 0.001, 0.002, 5e-4, 0.006))
+    precession = np.radians(0.5) * np.where(time < 600, 1.0, -1.0)
+    loops = simulate_whole_angle(wave, errors, Loops(), time, rate=7e-5, precession=precession, angle=0.1)
+    settled = read_turning(wave, errors, loops.angle, rate=7e-5, time=time)
+    inside = np.abs(time[:-1] - 600) > 5
+    for name in ("rate", "quadrature", "decay", "omega"):
+        values = getattr(settled, name)
+        made, found = getattr(loops, name)[:-1][inside], ((values[1:] + values[:-1]) / 2)[inside]
+        assert np.std(found - made) < 0.01 * np.std(made), name
+    given = read_turning(wave, errors, loops.angle[:500], rate=7e-5, precession=np.radians(0.5))
+    assert given.rate[5:495] == pytest.approx(settled.rate[5:495], abs=1e-3 * np.std(settled.rate))
+
+
+def test_the_measured_azimuth_scatters_as_the_rate_turns_it(tmp_path):
+    """θ = ∫ k (Ω + noise) dt and white noise of the reading; a held wave's azimuth is commanded, exact."""
+    lines = (
+        CARD
+        + "[noise]\nbias_white_deg_per_rt_h = 1.0\nbias_flicker_deg_per_h = 0.0\nbias_walk_deg_per_h_per_rt_h = 0.0\n"
+    )
+    lines += "pattern_angle_white_deg = 1e-3\n"
+    chamber = "time_s,chamber_temperature_degC\n0,20\n7200,20\n"
+    _, noisy = simulated(tmp_path, lines, chamber, noise=True)
+    _, plain = simulated(tmp_path, lines, chamber)
+    off = noisy["pattern_angle_deg"] - plain["pattern_angle_deg"]
+    wander = noisy["bias_deg_per_h"] - plain["bias_deg_per_h"]
+    step = np.median(np.diff(noisy["time_s"]))
+    turned = K * np.concatenate([[0.0], np.cumsum(wander[:-1])]) * step / 3600
+    assert np.std(turned) > 5e-3
+    assert np.std(off - turned) == pytest.approx(1e-3 / np.sqrt(step), rel=0.1)

@@ -8,6 +8,8 @@ bias_white_deg_per_rt_h = 0.02       # angle random walk
 bias_flicker_deg_per_h = 0.1         # flat part of the Allan deviation (0.664 of the bias instability)
 bias_walk_deg_per_h_per_rt_h = 0.01  # rate random walk: standard deviation of the change in 1 h
 inverse_q_white = 0.01               # relative, Allan deviation at 1 s
+pattern_angle_white_deg = 3e-5       # of a measured azimuth (whole angle), Allan deviation at 1 s; it walks besides as the bias does
+quadrature_white_V = 1e-4            # Allan deviation at 1 s, of a card with loops
 housing_white_K = 5e-3               # of the housing sensor, Allan deviation at 1 s
 housing_lag_s = 10.0                 # of the housing sensor; known to ± 50 % unless stated
 frequency_resolution_Hz = 0.0        # rounding of what is recorded; 0 keeps every digit
@@ -33,6 +35,8 @@ class NoiseKeys(Keys, frozen=True, kw_only=True):
     bias_flicker_deg_per_h: Level = 0.1
     bias_walk_deg_per_h_per_rt_h: Level = 0.01
     inverse_q_white: Level = 0.01
+    pattern_angle_white_deg: Level = 3e-5
+    quadrature_white_V: Level = 1e-4
     housing_white_K: Level = 5e-3
     housing_lag_s: Annotated[float, number(least=0.0, relative_sd=0.5)] = 10.0
     frequency_resolution_Hz: Level = 0.0
