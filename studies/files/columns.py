@@ -13,14 +13,16 @@ from collections import Counter
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import IO, TYPE_CHECKING, TypeAlias
 
 from studies.errors import InputError, nearest
-from studies.files.reading import read_bytes
+from studies.files.reading import opened, read_bytes
 
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
+
+    Table: TypeAlias = dict[str, NDArray[np.float64]]
 
 LARGEST = 1e20
 """No reading of an instrument, time or count is larger; what is larger would overflow in its powers."""
@@ -30,7 +32,9 @@ _SOMETHING = re.compile(rb"\S")
 HEAD = 1 << 20
 """Bytes in which comments and header are looked for first."""
 ROWS_AT_ONCE = 200_000
-"""Rows that are parsed at once, so that a large table costs its bytes and its numbers and little more."""
+"""Rows that are parsed at once, so that a large table costs its numbers and little more."""
+PORTION = 1 << 23
+"""Bytes that are looked through at once."""
 
 
 @dataclass(frozen=True)
@@ -69,29 +73,29 @@ def read_columns(
     InputError
         Anything that is not such a table: the message names file, line or column, and the mend.
     """
-    data = _check_text(path, read_bytes(path))
-    comments, header, header_line, body_start = _split_head(path, data)
+    comments, header, header_line, start = _read_head(path)
     names = _check_names(path, header, header_line, known, required, prefixes)
-    if not _SOMETHING.search(data, body_start):
-        raise InputError(f"{path}: the table has a header but no rows; add one line per measurement.")
-    values = _parse_fast(data, body_start, names)
-    if values is None:
-        values = _parse_by_line(path, data[body_start:].decode(), names, header_line + 1)
-    columns = Columns(str(path), values, comments, hashlib.sha256(data).hexdigest(), header_line + 1)
+    values, sha256 = _parse_fast(path, start, names) or _parse_with_care(path, start, names, header_line + 1)
+    columns = Columns(str(path), values, comments, sha256, header_line + 1)
     _check_size(columns)
     return columns
 
 
 def read_header(path: str | Path) -> list[str]:
     """Return the column names of a table without reading its numbers."""
+    _, header, _, _ = _read_head(path)
+    return [name.strip() for name in header]
+
+
+def _read_head(path: str | Path) -> tuple[tuple[str, ...], list[str], int, int]:
+    """See `_split_head`."""
     head = read_bytes(path, first=HEAD)
     if len(head) == HEAD:  # whole lines only
-        head = head[: head.rfind(b"\n") + 1]
-    try:
-        _, header, _, _ = _split_head(path, _check_text(path, head))
-    except InputError:
-        _, header, _, _ = _split_head(path, _check_text(path, read_bytes(path)))
-    return [name.strip() for name in header]
+        try:
+            return _split_head(path, _check_text(path, head[: head.rfind(b"\n") + 1]))
+        except InputError:
+            head = read_bytes(path)
+    return _split_head(path, _check_text(path, head))
 
 
 def _check_text(path: str | Path, data: bytes) -> bytes:
@@ -161,38 +165,68 @@ def _check_names(
     return names
 
 
-def _parse_fast(data: bytes, start: int, names: list[str]) -> "dict[str, NDArray[np.float64]] | None":
-    """Parse a clean table quickly; None when anything is unusual and the careful way must decide."""
+def _parse_fast(path: str | Path, start: int, names: list[str]) -> "tuple[Table, str] | None":
+    """Parse a clean table quickly, never all of its text in memory; None when the careful way must decide."""
     import numpy as np
     import pandas as pd
 
-    rows = data.count(b"\n", start) + (not data.endswith(b"\n"))
-    if data.count(b",", start) != rows * (len(names) - 1) or _UNUSUAL.search(data, start):
-        return None
-    body = io.BytesIO(data)
-    body.seek(start)
-    table, done = np.empty((len(names), rows)), 0
-    try:
-        with pd.read_csv(
-            body,
-            names=names,
-            header=None,
-            dtype="float64",
-            keep_default_na=False,
-            na_values=[""],
-            skip_blank_lines=False,
-            index_col=False,
-            chunksize=ROWS_AT_ONCE,
-        ) as parts:
-            for part in parts:
-                table[:, done : done + len(part)] = part.to_numpy().T
-                done += len(part)
-    except ValueError:
-        return None
-    return dict(zip(names, table, strict=True)) if done == rows else None
+    with opened(path) as file:
+        if (found := _scan(file, start, len(names))) is None:
+            return None
+        rows, body, sha256 = found
+        file.seek(body)
+        table, done = np.empty((len(names), rows)), 0
+        try:
+            with pd.read_csv(
+                file,
+                names=names,
+                header=None,
+                dtype="float64",
+                keep_default_na=False,
+                na_values=[""],
+                skip_blank_lines=False,
+                index_col=False,
+                chunksize=ROWS_AT_ONCE,
+            ) as parts:
+                for part in parts:
+                    table[:, done : done + len(part)] = part.to_numpy().T
+                    done += len(part)
+        except ValueError:
+            return None
+    return (dict(zip(names, table, strict=True)), sha256) if done == rows else None
 
 
-def _parse_by_line(path: str | Path, body: str, names: list[str], first_line: int) -> "dict[str, NDArray[np.float64]]":
+def _scan(file: IO[bytes], start: int, columns: int) -> tuple[int, int, str] | None:
+    """Return the rows of a table whose body starts there, the place of the body in the file, and the hash.
+
+    None where the rows have not all the same columns, or anything stands there but plain numbers.
+    """
+    if file.read(len(codecs.BOM_UTF8)) != codecs.BOM_UTF8:
+        file.seek(0)
+    body = file.tell() + start
+    sum_ = hashlib.sha256(file.read(start))
+    rows = commas = 0
+    is_empty, last = True, b""
+    while portion := file.read(PORTION):
+        if _UNUSUAL.search(portion):
+            return None
+        sum_.update(portion)
+        rows += portion.count(b"\n")
+        commas += portion.count(b",")
+        is_empty = is_empty and not _SOMETHING.search(portion)
+        last = portion
+    rows += not last.endswith(b"\n")
+    return None if is_empty or commas != rows * (columns - 1) else (rows, body, sum_.hexdigest())
+
+
+def _parse_with_care(path: str | Path, start: int, names: list[str], first_line: int) -> "tuple[Table, str]":
+    data = _check_text(path, read_bytes(path))
+    if not _SOMETHING.search(data, start):
+        raise InputError(f"{path}: the table has a header but no rows; add one line per measurement.")
+    return _parse_by_line(path, data[start:].decode(), names, first_line), hashlib.sha256(data).hexdigest()
+
+
+def _parse_by_line(path: str | Path, body: str, names: list[str], first_line: int) -> "Table":
     import numpy as np
 
     rows: list[list[float]] = []

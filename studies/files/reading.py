@@ -1,16 +1,26 @@
 """Files that a user names: read with one sentence where that fails, and found by bare name where they ship."""
 
 import stat
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
+from typing import IO
 
 from studies.errors import InputError, nearest
 
 MOST_BYTES = 2 * 1024**3
-"""A record at 200 Hz over a month is smaller; a table of numbers takes about twice its file in memory."""
+"""A record at 200 Hz over a month is smaller; a table of numbers takes about as much in memory."""
 
 
 def read_bytes(path: str | Path, most: int = MOST_BYTES, first: int = -1) -> bytes:
-    """Return the content, or its first bytes, of a regular file of at most so many bytes.
+    """Return the content, or its first bytes, of a file; raise as `opened`."""
+    with opened(path, most) as file:
+        return file.read(first)
+
+
+@contextmanager
+def opened(path: str | Path, most: int = MOST_BYTES) -> Iterator[IO[bytes]]:
+    """Open a regular file of at most so many bytes for reading.
 
     Raises
     ------
@@ -19,15 +29,13 @@ def read_bytes(path: str | Path, most: int = MOST_BYTES, first: int = -1) -> byt
     """
     try:
         with check_file(path, most).open("rb") as file:
-            return file.read(first)
-    except InputError:
-        raise
+            yield file
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror}).") from error
 
 
 def check_file(path: str | Path, most: int = MOST_BYTES) -> Path:
-    """Return the path of a regular file of at most so many bytes; raise as `read_bytes` for anything else."""
+    """Return the path of a regular file of at most so many bytes; raise as `opened` for anything else."""
     try:
         about = Path(path).stat()
         if stat.S_ISDIR(about.st_mode):
