@@ -5,23 +5,22 @@ and the shell feels A_II + A_Ii W. What an imperfection does inside a solid part
 """
 
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, replace
 from functools import cached_property
 from math import pi
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_matrix, csc_matrix, csr_matrix, eye, hstack, vstack
-from scipy.sparse.linalg import SuperLU, splu
+from scipy.sparse import coo_matrix, csc_matrix, csr_matrix, eye
+from scipy.sparse.linalg import splu
 
 from shell.constraints import Index
 from shell.imperfection.place import cut
+from shell.imperfection.substructure import Substructures
 from shell.quadrature import Array
 from shell.resonator import Resonator
 from shell.solution import Constants
-from shell.system import Inertia, ShellGroup, System
-
-PLACES = 16  # of masses whose displacements are kept
+from shell.system import ShellGroup, System
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,7 +32,8 @@ class Block:
     shell : the free unknowns of the shell, (size,), which are the unknowns here.
     shared : which of them the solid parts share, numbers among `shell`.
     inside, lifted : free unknowns inside the solid parts, and W, (inside, shared).
-    matrix : K - λ M, condensed. mass : of all elements, times what the harmonic has around.
+    elements : (unknowns, matrix) of K - λ M, the condensed solid parts as one element. around : ∫ cos² kθ dθ.
+    heavy : mass of the solid parts, (shared, shared).
     kept : M times the pair's vector in the pair's own block.
     """
 
@@ -42,11 +42,10 @@ class Block:
     shared: Index
     inside: Index
     lifted: Array
-    matrix: csr_matrix
-    mass: Inertia
+    elements: tuple[tuple[Index, Array], ...]
     around: float
+    heavy: Array
     kept: Array | None
-    places: dict[tuple[float, float], Array] = field(default_factory=dict, repr=False)
 
     @property
     def size(self) -> int:
@@ -54,61 +53,47 @@ class Block:
         return len(self.shell)
 
     @cached_property
-    def spreads(self) -> dict[int, tuple[csr_matrix, csr_matrix]]:
-        """From the unknowns to those of the elements of every chain of shell, in the plain basis, and the transpose."""
-        found = {}
-        for number, group in enumerate(self.system.groups):
-            if isinstance(group, ShellGroup):
-                spread = _plain(group, self.system.constraint)[:, self.shell]
-                found[number] = spread, spread.T.tocsr()
-        return found
+    def spreads(self) -> dict[int, csr_matrix]:
+        """From the unknowns to those of the elements of every chain of shell, in the plain basis."""
+        return {
+            number: _plain(group, self.system.constraint)[:, self.shell]
+            for number, group in enumerate(self.system.groups)
+            if isinstance(group, ShellGroup)
+        }
 
     def moves(self, resonator: Resonator, position: float, height: float) -> Array:
         """Displacements u, v, w of a place per unit of every unknown, (3, size)."""
-        if (position, height) not in self.places:
-            here = cut(resonator, self.system, position, np.array([height]))
-            table = here.table.displacement[0, 0, :, 0]
-            spread = self.spreads[here.group][0]
-            size = spread.shape[0] // len(self.system.groups[here.group].unknowns)
-            rows = spread[here.element * size : (here.element + 1) * size]
-            local = np.einsum("f,ca->cfa", here.along[0], table).reshape(3, size)
-            if len(self.places) >= PLACES:
-                self.places.clear()
-            self.places[position, height] = np.asarray((rows.T @ local.T).T)
-        return self.places[position, height]
+        here = cut(resonator, self.system, position, np.array([height]))
+        table = here.table.displacement[0, 0, :, 0]
+        spread = self.spreads[here.group]
+        size = spread.shape[0] // len(self.system.groups[here.group].unknowns)
+        rows = spread[here.element * size : (here.element + 1) * size]
+        local = np.einsum("f,ca->cfa", here.along[0], table).reshape(3, size)
+        return np.asarray((rows.T @ local.T).T)
 
     @cached_property
-    def factor(self) -> SuperLU:
-        """Of the matrix; in the pair's own block with a border that keeps the answers free of the pair."""
+    def inverse(self) -> Substructures:
+        """Of K - λ M; in the pair's own block with a border that keeps the answers free of the pair."""
         if self.kept is None:
-            return splu(self.matrix.tocsc())
-        scale = abs(self.matrix).max() / np.abs(self.kept).max()
-        border = csr_matrix(scale * self.kept[None])
-        side = vstack([border.T, csr_matrix((1, 1))])
-        return splu(csc_matrix(hstack([vstack([self.matrix, border]), side])))
+            return Substructures(self.elements, self.size)
+        largest = max(float(np.abs(A).max()) for _, A in self.elements)
+        border = largest / np.abs(self.kept).max() * self.kept
+        bordered = []
+        for unknowns, A in self.elements:
+            edge = border[unknowns][:, None]
+            border[unknowns] = 0.0  # of what elements share the first has it
+            bordered.append((np.append(unknowns, self.size), np.block([[A, edge], [edge.T, np.zeros((1, 1))]])))
+        return Substructures(bordered, self.size + 1)
 
     def answer(self, loads: Array) -> Array:
-        """-(K_k - λ M_k)⁻¹ of loads (columns, size); in the pair's own block without the pair, for which it is singular."""
+        """-(K_k - λ M_k)⁻¹ of loads (size, columns); in the pair's own block without the pair, for which it is singular."""
         if self.kept is None:
-            return np.asarray(-self.factor.solve(loads.T).T)
-        return np.asarray(-self.factor.solve(np.pad(loads.T, ((0, 1), (0, 0)))).T[:, :-1])
-
-    def weigh(self, x: Array) -> Array:
-        """M_k of unknowns (rows, size), what moves in the solid parts with them counted."""
-        free = np.zeros((self.system.constraint.shape[1], len(x)))
-        free[self.shell] = x.T
-        free[self.inside] = self.lifted @ x.T[self.shared]
-        moved = self.around * np.asarray(self.mass @ free)
-        found = moved[self.shell]
-        found[self.shared] += self.lifted.T @ moved[self.inside]
-        return np.asarray(found.T)
+            return -self.inverse.solve(loads)
+        return -self.inverse.solve(np.pad(loads, ((0, 1), (0, 0))))[:-1]
 
     def inner(self, number: int) -> Array:
         """What a unit of each shared unknown moves in a solid part: (shared, cells, size) in the plain basis."""
-        free = np.zeros((self.system.constraint.shape[1], len(self.shared)))
-        free[self.shell[self.shared], np.arange(len(self.shared))] = 1.0
-        free[self.inside] = self.lifted
-        raw = self.system.constraint @ free
+        raw = self.system.constraint @ _lift(self.system, self.shell[self.shared], self.inside, self.lifted)
         return np.array([self.system.groups[number].spread(column) for column in raw.T])
 
 
@@ -117,34 +102,44 @@ def condense(system: System, constants: tuple[Constants, ...], value: float, pai
     lam, G = ([one.lame[which] for one in constants] for which in (0, 1))
     matrices, mass = system.operators(lam, G, [one.rho for one in constants], False, -value)
     numbers = system.pattern.unknowns
-    of_shell = [isinstance(group, ShellGroup) for group in system.groups for _ in group.unknowns]
+    around = pi * (2 if system.n == 0 else 1)
+    are_shell = [isinstance(group, ShellGroup) for group in system.groups]
+    of_shell = [mine for mine, group in zip(are_shell, system.groups, strict=True) for _ in group.unknowns]
     shell = np.unique(np.concatenate([one for one, mine in zip(numbers, of_shell, strict=True) if mine]))
-    size = system.pattern.size
-
-    def assemble(of: bool) -> csr_matrix:
-        kept = [(n, m) for n, m, mine in zip(numbers, matrices, of_shell, strict=True) if mine is of]
-        return _assemble(kept, size)
-
-    matrix = assemble(True)[shell][:, shell]
+    elements = [
+        (np.searchsorted(shell, one), around * A)
+        for one, A, mine in zip(numbers, matrices, of_shell, strict=True)
+        if mine
+    ]
     shared = inside = np.zeros(0, dtype=np.intp)
-    lifted = np.zeros((0, 0))
+    lifted = heavy = np.zeros((0, 0))
     if not all(of_shell):
         solid = np.unique(np.concatenate([one for one, mine in zip(numbers, of_shell, strict=True) if not mine]))
         inside, edge = np.setdiff1d(solid, shell), np.intersect1d(solid, shell)
         shared = np.searchsorted(shell, edge)
-        core = assemble(False)
+        of_solid = [(n, A) for n, A, mine in zip(numbers, matrices, of_shell, strict=True) if not mine]
+        core = _assemble(of_solid, system.pattern.size)
         coupling = core[inside][:, edge].toarray()
-        lifted = -splu(core[inside][:, inside].tocsc()).solve(coupling)
+        lifted = -splu(csc_matrix(core[inside][:, inside])).solve(coupling)
         felt = core[edge][:, edge].toarray() + coupling.T @ lifted
-        rows, columns = np.meshgrid(shared, shared, indexing="ij")
-        matrix = matrix + csr_matrix(((felt + felt.T).ravel() / 2, (rows.ravel(), columns.ravel())), shape=matrix.shape)
+        elements.append((shared, around * (felt + felt.T) / 2))
+        moved = _lift(system, edge, inside, lifted)
+        blocks = tuple(0 * one if mine else one for one, mine in zip(mass.blocks, are_shell, strict=True))
+        heavy = around * moved.T @ (replace(mass, blocks=blocks) @ moved)
     kept = None
     if pair is not None:
-        moved = np.asarray(mass @ pair[:, None])[:, 0]
-        kept = moved[shell]
-        kept[shared] += lifted.T @ moved[inside]
-    around = pi * (2 if system.n == 0 else 1)
-    return Block(system, shell, shared, inside, lifted, around * matrix, mass, around, kept)
+        pull = np.asarray(mass @ pair[:, None])[:, 0]
+        kept = pull[shell]
+        kept[shared] += lifted.T @ pull[inside]
+    return Block(system, shell, shared, inside, lifted, tuple(elements), around, heavy, kept)
+
+
+def _lift(system: System, edge: Index, inside: Index, lifted: Array) -> Array:
+    """All free unknowns per unit of those that the solid parts share with the shell."""
+    free = np.zeros((system.constraint.shape[1], len(edge)))
+    free[edge, np.arange(len(edge))] = 1.0
+    free[inside] = lifted
+    return free
 
 
 def _assemble(elements: Iterable[tuple[NDArray[np.intp], Array]], size: int) -> csr_matrix:

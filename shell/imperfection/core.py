@@ -5,11 +5,14 @@ energies of two harmonics are those of their sections times ∫ (1 + p) cos kθ 
 """
 
 from collections.abc import Callable
+from typing import TypeAlias
 
 import numpy as np
 
 from shell.cells import CellTable
 from shell.imperfection.block import Block
+from shell.imperfection.together import Together
+from shell.imperfection.wall import Around
 from shell.kernel import energy_weights
 from shell.quadrature import Array
 from shell.solution import Constants
@@ -17,6 +20,8 @@ from shell.system import SolidGroup
 
 COSINE, SINE = [0, 1, 2, 4], [3, 5]  # strains, in the order of the kernel
 ALONG, AROUND = [0, 2], [1]  # displacements
+Energies: TypeAlias = Callable[[Block, Block], tuple[Array, Array]]
+"""Of two harmonics, what goes as the cosine and what goes as the sine, (shared, shared) each."""
 
 
 class Core:
@@ -24,38 +29,66 @@ class Core:
 
     Parameters
     ----------
-    number : of its group. constants : its material. blocks : the harmonics.
+    number : of its group. constants : its material.
     """
 
-    def __init__(self, number: int, constants: Constants, blocks: Callable[[int], Block]) -> None:
-        self.number, self.constants, self.blocks = number, constants, blocks
+    def __init__(self, number: int, constants: Constants) -> None:
+        self.number, self.constants = number, constants
         self._sections: dict[int, tuple[Array, Array]] = {}
-        self._energies: dict[tuple[int, int], tuple[Array, ...]] = {}
+        self._products: dict[tuple[int, int], tuple[Array, ...]] = {}
 
-    def energies(self, k: int, l: int) -> tuple[Array, ...]:
-        """Of strains that go as the cosine, as the sine, of displacements that go as the cosine, as the sine: (shared, shared)."""
-        if (k, l) not in self._energies:
-            (e, d), (f, g) = self._section(k), self._section(l)
-            volume = self._table(k).volume
+    def respond(self, X: Array, energies: Energies, weight: Array, around: Around, together: Together) -> Array:
+        """What a change of its material does to vectors (unknowns, vectors, 2).
+
+        Parameters
+        ----------
+        energies : `stiffness` or `mass`. weight : the relative change at the azimuths, times dθ.
+        """
+        found = np.zeros_like(X)
+        cosine, sine = ((one * weight) @ one.T for one in (around.cosine, around.sine))
+        least = 1e-14 * float(np.abs(weight).sum())
+        parts = list(enumerate(zip(together.blocks, together.rows, strict=True)))
+        for j, (other, columns) in parts:
+            moved = X[columns][other.shared]
+            for i, (block, rows) in parts if moved.any() else ():
+                here = np.s_[2 * i : 2 * i + 2, 2 * j : 2 * j + 2]
+                if max(np.abs(cosine[here]).max(), np.abs(sine[here]).max()) > least:
+                    one, two = (np.tensordot(part, moved, 1) for part in energies(block, other))
+                    found[rows][block.shared] += one @ cosine[here].T + two @ sine[here].T
+        return found
+
+    def stiffness(self, one: Block, other: Block) -> tuple[Array, Array]:
+        """Energies of strains."""
+        return self._energies(one, other)[:2]  # type: ignore[return-value]
+
+    def mass(self, one: Block, other: Block) -> tuple[Array, Array]:
+        """Energies of displacements per s⁻²."""
+        return self._energies(one, other)[2:]  # type: ignore[return-value]
+
+    def _energies(self, one: Block, other: Block) -> tuple[Array, ...]:
+        key = one.system.n, other.system.n
+        if key not in self._products:
+            (e, d), (f, g) = self._section(one), self._section(other)
+            volume = self._table(one).volume
             stress, momentum = self._stress(f) * volume, self.constants.rho[:, :, None] * volume * g
-            pairs = [(e, stress, one) for one in (COSINE, SINE)] + [(d, momentum, one) for one in (ALONG, AROUND)]
-            self._energies[k, l] = tuple(_flat(a[:, :, one]) @ _flat(b[:, :, one]).T for a, b, one in pairs)
-        return self._energies[k, l]
+            pairs = [(e, stress, some) for some in (COSINE, SINE)] + [(d, momentum, some) for some in (ALONG, AROUND)]
+            self._products[key] = tuple(_flat(a[:, :, some]) @ _flat(b[:, :, some]).T for a, b, some in pairs)
+        return self._products[key]
 
-    def _table(self, k: int) -> CellTable:
-        group = self.blocks(k).system.groups[self.number]
+    def _table(self, block: Block) -> CellTable:
+        group = block.system.groups[self.number]
         assert isinstance(group, SolidGroup)
         return group.table
 
-    def _section(self, k: int) -> tuple[Array, Array]:
+    def _section(self, block: Block) -> tuple[Array, Array]:
         """Strains and displacements per unit of every shared unknown."""
-        if k not in self._sections:
-            table, moved = self._table(k), self.blocks(k).inner(self.number)
-            self._sections[k] = (
+        if block.system.n not in self._sections:
+            table, moved = self._table(block), block.inner(self.number)
+            self._sections[block.system.n] = (
                 np.array([table.strains(one)[:, 0] for one in moved]),
                 np.array([table.displacements(one)[:, 0] for one in moved]),
             )
-        return self._sections[k]
+        return self._sections[block.system.n]
 
     def _stress(self, strain: Array) -> Array:
         """Stresses of strains (vectors, cells, 6, points)."""

@@ -11,7 +11,8 @@ wall are projected. The answers are folded onto the pair,
     T = [1; -A₁₁⁻¹ A₁₀],  A = K - λ M,   (Tᵀ A T) y = δ (Tᵀ M T) y,   ω² = λ + δ,
 
 which keeps a small split free of cancellation. One round of answers leaves an error of the fourth order in the imperfection;
-the next answers the forces that the first has left.
+the next answers the forces r = A T that the first has left. A last round of answers x is not taken into the basis: it moves the
+folded A by rᵀ x but for the imperfection's own share of that.
 """
 
 from functools import cached_property
@@ -22,12 +23,14 @@ import numpy as np
 from shell.assembly import lay_system
 from shell.elastic import Elastic, VaryingElastic
 from shell.errors import ShellError
+from shell.imperfection.basis import Basis, products
 from shell.imperfection.block import Block, condense
-from shell.imperfection.body import Body, Forms, Vector
+from shell.imperfection.body import Body
 from shell.imperfection.core import Core
 from shell.imperfection.field import Field
 from shell.imperfection.imperfect import FIELDS, Imperfection
 from shell.imperfection.split import Split
+from shell.imperfection.together import Together
 from shell.levels import Level, Theory
 from shell.modes import Mode
 from shell.quadrature import Array
@@ -39,6 +42,8 @@ from shell.system import ShellGroup, System
 SMALL = 1e-9  # of the largest wave of a field: smaller ones are left out
 MOST = 16  # rounds of answers
 REACH = 8  # harmonics beyond n that point masses excite
+EXACT = 1e-14  # of ω²: what is less is rounding
+KEPT = 8  # sets of harmonics that are kept side by side
 
 
 class CoupledHarmonics:
@@ -61,14 +66,14 @@ class CoupledHarmonics:
         self.theory: Theory = mode.theory
         self.level: Level = mode.solution.system.level
         self.resonator: Resonator = mode.resonator
-        self.together = (0, max(self.highest, self.n))
         self._systems: dict[int, System] = {}
         self._blocks: dict[int, Block] = {}
+        self._together: dict[tuple[int, ...], Together] = {}
 
     def system(self, k: int) -> System:
         """The elements of the perfect resonator at one harmonic, the same for all."""
         if k not in self._systems:
-            self._systems[k] = lay_system(self.resonator, k, self.theory, self.level, self.together)
+            self._systems[k] = lay_system(self.resonator, k, self.theory, self.level, (0, max(self.highest, self.n)))
         return self._systems[k]
 
     @cached_property
@@ -96,10 +101,18 @@ class CoupledHarmonics:
         """The solid parts."""
         groups = self.system(self.n).groups
         return tuple(
-            Core(number, self.constants[number], self.block)
+            Core(number, self.constants[number])
             for number, group in enumerate(groups)
             if not isinstance(group, ShellGroup)
         )
+
+    def together(self, harmonics: tuple[int, ...]) -> Together:
+        """Several of them side by side."""
+        if harmonics not in self._together:
+            if len(self._together) >= KEPT:
+                self._together.clear()
+            self._together[harmonics] = Together([self.block(k) for k in harmonics], self.resonator, self.constants)
+        return self._together[harmonics]
 
     def solve(self, imperfection: Imperfection, tolerance: float = 1e-6, rounds: int = MOST) -> Split:
         """The split with every order of the imperfection.
@@ -112,56 +125,51 @@ class CoupledHarmonics:
         """
         waves = _waves_that_count(imperfection)
         reach = waves | (set(range(self.highest + self.n + 1)) if imperfection.masses else set())
-        most = rounds if reach else 0
         answering = self._answering(reach)
+        together = self.together(answering)
+        highest, wave = answering[-1], max(waves, default=0)
+        azimuths = max(highest + self.n + 4 * wave, 2 * highest + wave) + 1
+        theta = 2 * pi * np.arange(azimuths) / azimuths
+        body = Body(together, self.cores, imperfection, tuple(waves), theta)
         value, vector = self.pair
-        body = Body(
-            self.block, self.constants, self.cores, self.resonator, imperfection, tuple(waves),
-            _azimuths(max(answering), max(waves, default=0)), self.n,
-        )  # fmt: skip
+        pair = np.zeros((together.size, 2, 2))
         own = vector[self.block(self.n).shell]
-        forms = Forms(body, value, answering)
-        forms.extend([{self.n: np.array([own, 0 * own])}, {self.n: np.array([0 * own, own])}], [{}, {}])
-        found = self._split(forms)
-        change = found.relative
-        for _ in range(most):
-            forms.extend(*self._answer(forms.forces(_fold(forms)[1])))
-            better = self._split(forms)
-            before, change, found = change, abs(better.wave - found.wave), better
-            # changes shrink from round to round: the last two foretell the next
-            if change * min(1.0, change / before if before else 1.0) < tolerance * found.relative:
-                break
-        return found
+        for one in (0, 1):
+            pair[together.rows[answering.index(self.n)], one, one] = own
+        basis = Basis(body, value)
+        basis.extend(pair, np.zeros_like(pair))
+        before = float(np.abs(basis.A).max())
+        for _ in range(rounds if reach else 0):
+            folded, T, _ = basis.fold()
+            forces = basis.forces(T)
+            answers = together.answer(forces)
+            closing = products(forces, answers)
+            move, split = float(np.abs(closing).max()), 2 * abs(_difference(folded + closing))
+            # what the imperfection does to the answers is of its own size, the root of how rounds shrink
+            missed = move * sqrt(min(1.0, move / before)) if before else move
+            if missed <= max(tolerance * split, EXACT * value if tolerance else 0.0):
+                return self._split(basis, closing)
+            before, size = move, np.linalg.norm(answers)
+            basis.extend(answers / size, -forces / size)
+        return self._split(basis)
 
-    def _answering(self, reach: set[int]) -> list[int]:
+    def _answering(self, reach: set[int]) -> tuple[int, ...]:
         """The harmonics that the waves couple with the pair and with those that they couple with it."""
         found = {self.n}
         for _ in range(2):
             found |= {k for at in found for m in reach for k in (abs(at - m), at + m) if k <= self.highest}
-        return sorted(found)
+        return tuple(sorted(found))
 
-    def _answer(self, forces: list[Vector]) -> tuple[list[Vector], list[Vector]]:
-        """Answers to the forces on the two of the pair, of unit size, and the loads that they answer."""
-        answers: list[Vector] = [{}, {}]
-        for k in forces[0]:
-            found = self.block(k).answer(np.concatenate([force[k] for force in forces]))
-            answers[0][k], answers[1][k] = found[:2], found[2:]
-        loads: list[Vector] = [{}, {}]
-        size = sqrt(sum(float(np.vdot(q, q)) for one in answers for q in one.values())) or 1.0
-        for answer, load, force in zip(answers, loads, forces, strict=True):
-            for k in answer:
-                answer[k], load[k] = answer[k] / size, -force[k] / size
-        return answers, loads
-
-    def _split(self, forms: Forms) -> Split:
-        value, at = forms.value, 0.0
+    def _split(self, basis: Basis, closing: Array | float = 0.0) -> Split:
+        """From the folded pair; closing : what is added to its A."""
+        value, at = basis.value, 0.0
         shift, wave = 0.0, 0j
         for _ in range(4):
-            reduced, _, norm = _fold(forms, at)
+            folded, _, norm = basis.fold(at)
             size, axes = np.linalg.eigh(norm)
             root = (axes / np.sqrt(size)) @ axes.T  # the symmetric root, which turns neither axis
-            B = root @ reduced @ root
-            mean, z = (B[0, 0] + B[1, 1]) / 2, complex((B[0, 0] - B[1, 1]) / 2, (B[0, 1] + B[1, 0]) / 2)
+            B = root @ (folded + closing) @ root
+            mean, z = (B[0, 0] + B[1, 1]) / 2, _difference(B)
             shift, wave, at = at + mean, z, at + mean
             if abs(mean) < 1e-13 * value:
                 break
@@ -173,17 +181,9 @@ class CoupledHarmonics:
         return Split(self.n, self.mode.frequency, base - 1, complex(relative * turn))
 
 
-def _azimuths(highest: int, wave: int) -> Array:
-    count = 2 * highest + 4 * wave + 4
-    return np.asarray(2 * pi * np.arange(count) / count)
-
-
-def _fold(forms: Forms, at: float = 0.0) -> tuple[Array, Array, Array]:
-    """A at λ + at on the folded pair, T, and Tᵀ M T."""
-    A = forms.A - at * forms.M
-    rest = np.linalg.pinv(A[2:, 2:], rcond=1e-13, hermitian=True) @ A[2:, :2]
-    T = np.vstack([np.eye(2), -rest])
-    return A[:2, :2] - A[:2, 2:] @ rest, T, T.T @ forms.M @ T
+def _difference(B: Array) -> complex:
+    """Half of what a symmetric 2 x 2 matrix makes of two equal values, with the direction."""
+    return complex((B[0, 0] - B[1, 1]) / 2, (B[0, 1] + B[1, 0]) / 2)
 
 
 def _waves_that_count(imperfection: Imperfection) -> set[int]:

@@ -6,10 +6,14 @@ the imperfect one, so that its energies differ by those of what is there more (o
     δK = ∫_layers σ : ε dV + ∫ δσ : ε dV,   δM = ∫_layers ρ u · u dV + ∫ δρ u · u dV,
 
 a layer from the perfect face to the true one. Nothing cancels, and δK never exceeds a share of K, whatever the waves around.
-The strains are those of the shell (shell.kernel), at any height:
+The heights t_j in a layer are the same all around, and the departure d tells how much of it belongs to each of them,
 
-    ε_s = (u_s + κ w)/A,  ε_θ = (v_θ + t_r u + n_r w)/ρ,  ε_ζ = w_ζ,
-    γ_sθ = v_s/A + (u_θ - t_r v)/ρ,  γ_sζ = u_ζ + (w_s - κ u)/A,  γ_θζ = v_ζ + (w_θ - n_r v)/ρ.
+    ∫_0^d f(t) dt = Σ_j w_j(d) f(t_j),   w_j(d) = ∫_0^d l_j(t) dt,   l_j Lagrange's polynomials on the t_j,
+
+so that the waves of a vector meet those of the imperfection in the weights alone. The strains are those of the shell (shell.kernel), at any height:
+
+    ε_s = (u_s + κ w)/A,  ε_θ = (k v + t_r u + n_r w)/ρ,  ε_ζ = w_ζ,
+    γ_sθ = v_s/A - (k u + t_r v)/ρ,  γ_sζ = u_ζ + (w_s - κ u)/A,  γ_θζ = v_ζ - (k w + n_r v)/ρ.
 """
 
 from collections.abc import Sequence
@@ -19,10 +23,10 @@ import numpy as np
 
 from shell.imperfection.field import Field, values_around
 from shell.kernel import Section, energy_weights
-from shell.quadrature import Array, gauss, legendre
+from shell.quadrature import Array, gauss, legendre, lobatto
 from shell.solution import Constants
 
-HEIGHTS = 2  # of a layer: a Gauss rule, exact to the third power of the height
+HEIGHTS = 4  # of a layer: exact to the third power of the height
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,22 +55,23 @@ def go_around(harmonics: Sequence[int], theta: Array) -> Around:
 
 @dataclass(frozen=True, eq=False)
 class Wall:
-    """Points of what is there more, (stations, heights, θ) or what broadcasts to it, of a run of elements.
+    """Points of what is there more, (stations, heights), of a run of elements.
 
     Attributes
     ----------
-    elements : which elements of the group these are.
-    along : (2, stations of an element, functions) values and ξ-derivatives. ds : ds/dξ, (elements, stations of an element).
-    through : of u, v, w: Legendre modes at the heights and their ζ-derivatives, (2, modes, stations, heights, θ).
-    drift : h'η/2 of the perfect wall: ∂_s at constant ζ is ∂_s - drift ∂_ζ.
+    elements : which elements of the chain these are.
+    along : (2, stations of an element, functions) values and ξ-derivatives. ds : ds/dξ, (stations, 1, 1).
+    through : of u, v, w: Legendre modes at the heights and their ζ-derivatives, (2, stations, heights, modes).
+    drift : h'η/2 of the perfect wall: ∂_s at constant ζ is ∂_s - drift ∂_ζ, (stations, heights, 1, 1) like those that follow.
     per_A, per_rho : 1/(1 + κ ζ) and 1/ρ. t_r, n_r, kappa : of the middle surface.
-    lam, G, rho : λ, G and ρ times volume. weights : of the strains in the energy.
+    lam, G, rho : λ, G and ρ. weights : of the strains in the energy.
+    stiff, heavy : volumes that count for the stiffness and for the mass, (stations, heights, 1, θ).
     """
 
     elements: slice
     along: Array
     ds: Array
-    through: tuple[Array, Array, Array]
+    through: tuple[Array, ...]
     drift: Array
     per_A: Array
     per_rho: Array
@@ -77,77 +82,80 @@ class Wall:
     G: Array
     rho: Array
     weights: Array
+    stiff: Array
+    heavy: Array
 
-    def move(self, unknowns: Array, around: Around) -> tuple[Array, Array]:
-        """Strains (6, ...) and displacements (3, ...) of element unknowns (rows, elements, size) that go around so."""
-        (U, U_s, U_t, U_z), (V, V_s, V_t, V_z), (W, W_s, W_t, W_z) = self._jets(unknowns, around)
-        A, rho = self.per_A, self.per_rho
-        strain = [
-            (U_s + self.kappa * W) * A,
-            (V_t + self.t_r * U + self.n_r * W) * rho,
-            W_z,
-            V_s * A + (U_t - self.t_r * V) * rho,
-            U_z + (W_s - self.kappa * U) * A,
-            V_z + (W_t - self.n_r * V) * rho,
-        ]
-        return np.array(strain), np.array([U, V, W])
+    def respond(self, plain: Array, around: Around) -> tuple[Array, Array]:
+        """δK and δM times vectors that go around so.
 
-    def stress(self, strain: Array) -> Array:
-        """Stresses times volume, (6, ...)."""
-        found = self.weights[:, None, None, None] * self.G * strain
-        found[:3] += self.lam * (strain[0] + strain[1] + strain[2])
-        return np.asarray(found)
-
-    def pull(self, stress: Array, force: Array, around: Around, elements: int) -> Array:
-        """∫ (σ : ε - f · u) of stresses and forces times volume, on the unknowns (rows, elements, functions x modes)."""
-        s, t, z, st, sz, tz = stress
-        A, rho = self.per_A, self.per_rho
-        s, st, sz, t_A, st_rho, tz_rho = s * A, st * A, sz * A, t * rho, st * rho, tz * rho
+        Parameters
+        ----------
+        plain : unknowns of these elements, (amplitudes, elements, functions, vectors, harmonics, 2); so are the answers.
+        """
+        A, rho, kappa, t_r, n_r = self.per_A, self.per_rho, self.kappa, self.t_r, self.n_r
+        k, cosine, sine = around.order[:, 0], around.cosine, around.sine
+        (u, u_s, u_z), (v, v_s, v_z), (w, w_s, w_z) = self._jets(plain)
+        s, t, z = (u_s + kappa * w) * A, (k * v + t_r * u + n_r * w) * rho, w_z
+        trace = self.lam * (s + t + z)
+        st, sz, tz = v_s * A - (k * u + t_r * v) * rho, u_z + (w_s - kappa * u) * A, v_z - (k * w + n_r * v) * rho
+        G = [weight * self.G for weight in self.weights]
+        s, t, z, sz = (
+            _weigh(e, self.stiff, cosine) for e in (G[0] * s + trace, G[1] * t + trace, G[2] * z + trace, G[4] * sz)
+        )
+        st, tz = (_weigh(e, self.stiff, sine) for e in (G[3] * st, G[5] * tz))
+        s, st, sz_A, t, st_rho, tz_rho = s * A, st * A, sz * A, t * rho, st * rho, tz * rho
         by_value = (
-            self.t_r * t_A - self.kappa * sz - force[0],
-            -self.t_r * st_rho - self.n_r * tz_rho - force[1],
-            self.kappa * s + self.n_r * t_A - force[2],
+            t_r * t - kappa * sz_A - k * st_rho,
+            k * t - t_r * st_rho - n_r * tz_rho,
+            kappa * s + n_r * t - k * tz_rho,
         )
-        by_s, by_theta, by_zeta = (s, st, sz), (st_rho, t_A, tz_rho), (sz, tz, z)
-        loads = []
-        for part, (value, slope) in enumerate(_turns(around)):
-            P, P_z = self.through[part]
-            height = by_zeta[part] - self.drift * by_s[part]
-            at = np.stack([(P * by_value[part] + P_z * height).sum(axis=2), (P * by_theta[part]).sum(axis=2)])
-            along_s = (P * by_s[part]).sum(axis=2) @ value.T
-            loads.append((at[0] @ value.T + at[1] @ slope.T, along_s))
-        by_value_, by_s_ = (np.moveaxis(np.concatenate(kind), 2, 0) for kind in zip(*loads, strict=True))
-        rows, modes, _ = by_value_.shape
-        shape = (rows, modes, *self.ds.shape)
-        found = np.zeros((rows, elements, self.along.shape[2], modes))
-        found[:, self.elements] = np.einsum("sf,rmes->refm", self.along[0], by_value_.reshape(shape), optimize=True)
-        found[:, self.elements] += np.einsum(
-            "sf,rmes->refm", self.along[1], by_s_.reshape(shape) / self.ds, optimize=True
-        )
-        return found.reshape(rows, elements, -1)
+        by_s, by_zeta = (s, st, sz_A), (sz, tz, z)
+        moved = [_weigh(self.rho * one, self.heavy, turn) for one, turn in ((u, cosine), (v, sine), (w, cosine))]
+        values, slopes, masses = [], [], []
+        for (P, P_z), value, slope, steep, mass in zip(self.through, by_value, by_s, by_zeta, moved, strict=True):
+            values.append(_on_modes(P, value) + _on_modes(P_z, steep - self.drift * slope))
+            slopes.append(_on_modes(P, slope))
+            masses.append(_on_modes(P, mass))
+        stiff = self._along(0, values, plain) + self._along(1, slopes, plain)
+        return stiff, self._along(0, masses, plain)
 
-    def _jets(self, unknowns: Array, around: Around) -> list[tuple[Array, Array, Array, Array]]:
-        """Of u, v, w: values and derivatives by s, θ and ζ."""
-        rows = len(unknowns)
-        amplitudes = unknowns[:, self.elements].reshape(rows, len(self.ds), self.along.shape[2], -1)
-        value, slope = self.along[0] @ amplitudes, (self.along[1] @ amplitudes) / self.ds[..., None]
-        value, slope = (np.moveaxis(one.reshape(rows, self.ds.size, -1), 0, 2) for one in (value, slope))
+    def _along(self, order: int, loads: Sequence[Array], plain: Array) -> Array:
+        """Loads of u, v, w at the stations (stations, modes, columns) on the elements' unknowns."""
+        whole = np.concatenate(loads, axis=1)
+        if order:
+            whole /= self.ds
+        stations = self.along.shape[1]
+        whole = whole.reshape(-1, stations, *whole.shape[1:]).transpose(2, 0, 1, 3)
+        return np.asarray(self.along[order].T @ whole).reshape(plain.shape)
+
+    def _jets(self, plain: Array) -> list[tuple[Array, Array, Array]]:
+        """Of u, v, w: values and derivatives by s and ζ, (stations, heights, vectors, 2 harmonics)."""
+        amplitudes = plain.reshape(*plain.shape[:3], -1)
+        value, slope = (
+            (one @ amplitudes).transpose(1, 2, 0, 3).reshape(len(self.ds), len(plain), -1) for one in self.along
+        )
+        slope = slope / self.ds
         found, first = [], 0
-        for (P, P_z), (going, turning) in zip(self.through, _turns(around), strict=True):
-            here = slice(first, first := first + len(P))
-            of_value, of_slope = (np.moveaxis(one[:, here], 1, 0) for one in (value, slope))
-            q, q_s, q_t = (
-                (one @ wave)[:, :, None] for one, wave in ((of_value, going), (of_slope, going), (of_value, turning))
+        for P, P_z in self.through:
+            here = np.s_[:, first : (first := first + P.shape[-1])]
+            q, q_s, q_z = (
+                (P_ @ one[here]).reshape(*P.shape[:2], plain.shape[3], -1)
+                for P_, one in ((P, value), (P, slope), (P_z, value))
             )
-            up = (P_z * q).sum(axis=0)
-            found.append(((P * q).sum(axis=0), (P * q_s).sum(axis=0) - self.drift * up, (P * q_t).sum(axis=0), up))
+            found.append((q, q_s - self.drift * q_z, q_z))
         return found
 
 
-def _turns(around: Around) -> list[tuple[Array, Array]]:
-    """Of u, v, w: how they go around and the derivative of that."""
-    cosine = around.cosine, -around.order * around.sine
-    return [cosine, (around.sine, around.order * around.cosine), cosine]
+def _weigh(field: Array, volumes: Array, turn: Array) -> Array:
+    """∫ of amplitudes (stations, heights, vectors, 2 harmonics) times volumes, on the same waves."""
+    at = (field.reshape(-1, len(turn)) @ turn).reshape(*field.shape[:3], -1)
+    at *= volumes
+    return np.asarray(at.reshape(-1, turn.shape[1]) @ turn.T).reshape(field.shape)
+
+
+def _on_modes(P: Array, loads: Array) -> Array:
+    """Loads at the heights on the modes, (stations, modes, columns)."""
+    return np.asarray(np.swapaxes(P, 1, 2) @ loads.reshape(*loads.shape[:2], -1))
 
 
 @dataclass(frozen=True, eq=False)
@@ -164,75 +172,94 @@ class Stretch:
 
     def layers(
         self, faces: tuple[Field | None, Field | None], waves: tuple[int, ...], stiff: Array, heavy: Array
-    ) -> Wall:
+    ) -> list[Wall]:
         """What the faces stand out of the perfect wall, m; stiff, heavy : 1 + changes of E and of ρ, (stations, 1, θ)."""
-        points, weights = gauss(HEIGHTS)
-        eta, height = [], []
+        nodes = lobatto(HEIGHTS - 1)
+        eta, volumes = [], []
         for sign, face in ((-1, faces[0]), (1, faces[1])):
-            if face is not None:
-                out = self._around(face, waves)
-                eta.append(sign * (1 + out * (1 + points[:, None]) / self._thickness))
-                height.append(out * weights[:, None] / 2)
-        return self._wall(np.concatenate(eta, axis=1), np.concatenate(height, axis=1), stiff, heavy)
+            out = self.values(face, waves)
+            reach = float(np.abs(out).max())
+            if reach > 0:
+                eta.append(sign * (1 + 2 * reach / self._thickness * nodes))
+                volumes.append(self._share * reach * _shares(nodes, out / reach))
+        if not eta:
+            return []
+        volume = np.concatenate(volumes, axis=1)
+        return [self._wall(np.concatenate(eta, axis=1), volume * stiff, volume * heavy)]
 
     def change(self, stiff: Array, heavy: Array) -> Wall:
         """A change of E and of ρ, relative, (stations, 1, θ)."""
         points, weights = gauss(max(self.orders) + 2)
-        return self._wall(points[None, :, None], self._thickness / 2 * weights[:, None], stiff, heavy)
+        volume = self._share * (self._thickness / 2 * weights)[:, :, None]
+        return self._wall(np.tile(points, (len(self._thickness), 1)), volume * stiff, volume * heavy)
 
     def strip(self, width: Array) -> Wall:
         """On the edge at the one station, m wide, (θ,)."""
         points, weights = gauss(max(self.orders) + 2)
-        one = np.ones((1, 1, 1))
-        return self._wall(points[None, :, None], self._thickness / 2 * weights[:, None], one, one, width)
+        volume = width * (self._thickness / 2 * weights)[:, :, None]
+        return self._wall(points[None], volume, volume)
 
-    def around(self, field: Field | None, waves: tuple[int, ...]) -> Array:
+    def values(self, field: Field | None, waves: tuple[int, ...]) -> Array:
         """Values of a field, (stations, 1, θ); zeros for none."""
-        if field is None:
-            return np.zeros((self.section.position.size, 1, self.theta.size))
-        return self._around(field, waves)
-
-    def _around(self, field: Field, waves: tuple[int, ...]) -> Array:
-        orders = [m for m in field.orders if m in waves]
-        return values_around(field, orders, self.section.position.ravel(), self.theta)[0][:, None]
+        x = self.section.position.ravel()
+        orders = [m for m in field.orders if m in waves] if field is not None else []
+        if field is None or not orders:
+            return np.zeros((x.size, 1, self.theta.size))
+        return values_around(field, orders, x, self.theta)[0][:, None]
 
     @property
     def _thickness(self) -> Array:
-        return _tall(self.section.thickness)
+        return self.section.thickness.reshape(-1, 1)
 
-    def _wall(self, eta: Array, height: Array, stiff: Array, heavy: Array, width: Array | None = None) -> Wall:
+    @property
+    def _share(self) -> Array:
+        """Of the meridian, (stations, 1, 1)."""
+        return (self.section.weight * self.section.ds).reshape(-1, 1, 1)
+
+    def _wall(self, eta: Array, stiff: Array, heavy: Array) -> Wall:
+        """At heights (stations, heights) with areas times lengths along, (stations, heights, θ), not yet those around."""
         place, h = self.section, self._thickness
-        zeta = eta * h / 2
-        t_r, n_r, kappa = _tall(place.tangent_r), _tall(-place.tangent_z), _tall(place.curvature)
-        A, rho = 1 + kappa * zeta, _tall(place.r) + n_r * zeta
-        share = _tall(place.weight * place.ds) if width is None else width
-        volume = share * height * A * rho * (2 * np.pi / self.theta.size)
-        lam, G = (_tall(one) for one in self.constants.lame)
+        t_r, n_r, kappa, r, slope = (
+            one.reshape(-1, 1)
+            for one in (place.tangent_r, -place.tangent_z, place.curvature, place.r, place.thickness_slope)
+        )
+        A, rho = 1 + kappa * eta * h / 2, r + n_r * eta * h / 2
+        around = (A * rho * (2 * np.pi / self.theta.size))[:, :, None]
+        lam, G = self.constants.lame
         return Wall(
             self.elements,
             self.along,
-            place.ds,
-            tuple(_modes(order, eta, 2 / h) for order in self.orders),  # type: ignore[arg-type]
-            _tall(place.thickness_slope) * eta / 2,
-            1 / A,
-            1 / rho,
-            t_r,
-            n_r,
-            kappa,
-            lam * stiff * volume,
-            G * stiff * volume,
-            _tall(self.constants.rho) * heavy * volume,
-            energy_weights(self.transverse),
+            place.ds.reshape(-1, 1, 1),
+            tuple(_modes(order, eta, 2 / h) for order in self.orders),
+            drift=_wide(slope * eta / 2),
+            per_A=_wide(1 / A),
+            per_rho=_wide(1 / rho),
+            t_r=_wide(t_r),
+            n_r=_wide(n_r),
+            kappa=_wide(kappa),
+            lam=_wide(lam.reshape(-1, 1)),
+            G=_wide(G.reshape(-1, 1)),
+            rho=_wide(self.constants.rho.reshape(-1, 1)),
+            weights=energy_weights(self.transverse),
+            stiff=(stiff * around)[:, :, None],
+            heavy=(heavy * around)[:, :, None],
         )
 
 
-def _tall(values: Array) -> Array:
-    """Values at stations, (stations, 1, 1)."""
-    return np.asarray(values.reshape(-1, 1, 1))
+def _wide(values: Array) -> Array:
+    """Values (stations, heights) for all vectors and harmonics."""
+    return values[:, :, None, None]
 
 
 def _modes(order: int, eta: Array, steepness: Array) -> Array:
-    """Legendre modes at heights and their ζ-derivatives, (2, modes, *heights)."""
+    """Legendre modes at heights (stations, heights) and their ζ-derivatives, (2, stations, heights, modes)."""
     basis = legendre(order, eta.ravel())
-    values, slopes = (np.moveaxis(one.reshape(*eta.shape, -1), -1, 0) for one in (basis.values, basis.slopes))
-    return np.stack(np.broadcast_arrays(values, slopes * steepness))
+    values, slopes = (one.reshape(*eta.shape, -1) for one in (basis.values, basis.slopes))
+    return np.stack([values, slopes * steepness[:, :, None]])
+
+
+def _shares(nodes: Array, x: Array) -> Array:
+    """∫_0^x of Lagrange's polynomials on nodes, for x (stations, 1, θ): (stations, nodes, θ)."""
+    count = len(nodes)
+    powers = x ** np.arange(1, count + 1)[:, None] / np.arange(1, count + 1)[:, None]
+    return np.asarray(np.linalg.inv(np.vander(nodes, increasing=True)).T @ powers)

@@ -1,0 +1,109 @@
+"""Harmonics of the perfect resonator side by side: all of their unknowns in one row.
+
+A vector is of two kinds at once, cos kθ and sin kθ of every harmonic k: columns come in such twos, (unknowns, vectors, 2).
+"""
+
+from collections.abc import Sequence
+from functools import cached_property
+from itertools import pairwise
+
+import numpy as np
+from scipy.sparse import block_diag, csr_matrix
+
+from shell.imperfection.block import Block
+from shell.kernel import station_mass
+from shell.quadrature import Array
+from shell.resonator import Resonator
+from shell.solution import Constants
+from shell.system import ShellGroup
+
+WORKSPACE = 1 << 19  # numbers that a solve uses and frees again
+PLACES = 16  # of masses whose displacements are kept
+
+
+class Together:
+    """Harmonics that take part, one after the other.
+
+    Parameters
+    ----------
+    blocks : of the harmonics, rising. resonator, constants : of them all.
+    """
+
+    def __init__(self, blocks: Sequence[Block], resonator: Resonator, constants: tuple[Constants, ...]) -> None:
+        self.blocks, self.resonator, self.constants = tuple(blocks), resonator, constants
+        self.harmonics = tuple(block.system.n for block in blocks)
+        ends = np.cumsum([0, *(block.size for block in blocks)])
+        self.size = int(ends[-1])
+        self.rows = tuple(slice(int(a), int(b)) for a, b in pairwise(ends))
+        self.groups = blocks[0].system.groups
+        np.empty(WORKSPACE)  # freed at once, so that the process keeps the memory of each solve for the next
+        self._places: dict[tuple[float, float], tuple[csr_matrix, csr_matrix]] = {}
+
+    @cached_property
+    def spreads(self) -> dict[int, tuple[csr_matrix, csr_matrix]]:
+        """From the unknowns to those of the elements of every chain of shell, in the plain basis, and the transpose."""
+        found = {}
+        for number in self.blocks[0].spreads:
+            whole = csr_matrix(block_diag([block.spreads[number] for block in self.blocks]))
+            found[number] = whole, csr_matrix(whole.T)
+        return found
+
+    def plain(self, number: int, X: Array) -> Array:
+        """Unknowns of a chain's elements, (amplitudes, elements, functions, vectors, harmonics, 2)."""
+        found = self.spreads[number][0] @ X.reshape(self.size, -1)
+        table, (elements, _) = self._chain(number).table, self._chain(number).unknowns.shape
+        found = found.reshape(len(self.harmonics), elements, table.along.shape[2], -1, X.shape[1], 2)
+        return np.ascontiguousarray(found.transpose(3, 1, 2, 4, 0, 5))
+
+    def gather(self, number: int, loads: Array) -> Array:
+        """Loads on the unknowns from those on a chain's elements, which are laid out as in `plain`."""
+        vectors = loads.shape[3]
+        rows = loads.transpose(4, 1, 2, 0, 3, 5).reshape(-1, 2 * vectors)
+        return np.asarray(self.spreads[number][1] @ rows).reshape(self.size, vectors, 2)
+
+    def moves(self, position: float, height: float) -> tuple[csr_matrix, csr_matrix]:
+        """Displacements u, v, w of a place in every harmonic per unit of every unknown, (3 harmonics, size), and the transpose."""
+        if (position, height) not in self._places:
+            if len(self._places) >= PLACES:
+                self._places.clear()
+            rows = [block.moves(self.resonator, position, height) for block in self.blocks]
+            whole = csr_matrix(block_diag([csr_matrix(one) for one in rows]))
+            self._places[position, height] = whole, csr_matrix(whole.T)
+        return self._places[position, height]
+
+    def answer(self, loads: Array) -> Array:
+        """-(K - λ M)⁻¹ of loads in every harmonic, without the pair."""
+        found = np.empty_like(loads)
+        for block, rows in zip(self.blocks, self.rows, strict=True):
+            own = loads[rows]
+            found[rows] = block.answer(own.reshape(len(own), -1)).reshape(own.shape)
+        return found
+
+    def weigh(self, X: Array) -> Array:
+        """M of the perfect resonator times vectors, what moves in the solid parts with them counted."""
+        around = np.repeat([block.around for block in self.blocks], 2)
+        found = np.zeros_like(X)
+        for number, mass in self._masses.items():
+            plain = self.plain(number, X)
+            along = self._chain(number).table.along[0]
+            at = along @ plain.reshape(*plain.shape[:3], -1)  # amplitudes, elements, stations, columns
+            heavy = np.moveaxis(mass @ np.moveaxis(at, 0, 2), 2, 0)
+            loads = (along.T @ heavy).reshape(plain.shape) * around.reshape(-1, 2)
+            found += self.gather(number, loads)
+        for block, rows in zip(self.blocks, self.rows, strict=True):
+            if len(block.shared):
+                found[rows][block.shared] += np.tensordot(block.heavy, X[rows][block.shared], 1)
+        return found
+
+    @cached_property
+    def _masses(self) -> dict[int, Array]:
+        """Of the amplitudes at every station of the chains, (elements, stations, amplitudes, amplitudes)."""
+        return {
+            number: station_mass(self._chain(number).table) * self.constants[number].rho[..., None, None]
+            for number in self.spreads
+        }
+
+    def _chain(self, number: int) -> ShellGroup:
+        group = self.groups[number]
+        assert isinstance(group, ShellGroup)
+        return group
