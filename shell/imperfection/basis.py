@@ -21,8 +21,8 @@ class Basis:
 
     def extend(self, X: Array, load: Array) -> None:
         """Add two vectors (unknowns, 2, 2) with what the perfect body's A makes of them (but for what holds back the pair)."""
-        stiff, heavy = self.body.respond(X)
-        self.rounds.append((X, load + stiff - self.value * heavy, heavy + self.body.together.weigh(X)))
+        change, mass = self.body.respond(X, self.value)
+        self.rounds.append((X, load + change, mass))
         self.A, self.M = (
             _border(old, [products(one[kind], X) for one in self.rounds]) for old, kind in ((self.A, 1), (self.M, 2))
         )

@@ -85,12 +85,6 @@ class Block:
             bordered.append((np.append(unknowns, self.size), np.block([[A, edge], [edge.T, np.zeros((1, 1))]])))
         return Substructures(bordered, self.size + 1)
 
-    def answer(self, loads: Array) -> Array:
-        """-(K_k - λ M_k)⁻¹ of loads (size, columns); in the pair's own block without the pair, for which it is singular."""
-        if self.kept is None:
-            return -self.inverse.solve(loads)
-        return -self.inverse.solve(np.pad(loads, ((0, 1), (0, 0))))[:-1]
-
     def inner(self, number: int) -> Array:
         """What a unit of each shared unknown moves in a solid part: (shared, cells, size) in the plain basis."""
         raw = self.system.constraint @ _lift(self.system, self.shell[self.shared], self.inside, self.lifted)

@@ -16,7 +16,7 @@ from shell.quadrature import Array, gauss
 from shell.solution import Constants
 from shell.system import ShellGroup
 
-RUN = 2  # elements that are treated at once: fields that stay in the fast memory
+RUN = 4  # elements that are treated at once: fields that stay in the fast memory
 
 
 class Body:
@@ -47,19 +47,21 @@ class Body:
             for place, azimuth, masses in _masses(together, flaw, theta)
         ]
 
-    def respond(self, X: Array) -> tuple[Array, Array]:
-        """δK and δM times vectors (unknowns, vectors, 2)."""
-        stiff, heavy = np.zeros_like(X), np.zeros_like(X)
-        vectors = X.shape[1]
+    def respond(self, X: Array, value: float) -> tuple[Array, Array]:
+        """δK - λ δM, of what is there more, and M, of all, times vectors (unknowns, vectors, 2); λ = value."""
+        together, vectors = self.together, X.shape[1]
+        change, mass = np.zeros_like(X), together.weigh_cores(X)
         for number, walls in self.walls.items():
-            plain = self.together.plain(number, X)
+            plain = together.plain(number, X)
             loads = np.zeros((*plain.shape[:3], 2 * vectors, *plain.shape[4:]))
+            loads[:, :, :, vectors:] = together.weigh(number, plain)
             for wall in walls:
-                found = wall.respond(plain[:, wall.elements], self.around)
-                loads[:, wall.elements] += np.concatenate(found, axis=3)
-            both = self.together.gather(number, loads)
-            stiff += both[:, :vectors]
-            heavy += both[:, vectors:]
+                stiff, heavy = wall.respond(plain[:, wall.elements], self.around)
+                loads[:, wall.elements] += np.concatenate([stiff - value * heavy, heavy], axis=3)
+            both = together.gather(number, loads)
+            change += both[:, :vectors]
+            mass += both[:, vectors:]
+        heavy = np.zeros_like(X)
         for place, masses, around in self.masses:
             turns = around.cosine, around.sine, around.cosine
             moves, pulled = self.together.moves(*place)
@@ -70,9 +72,9 @@ class Body:
                 pull[:, component] = ((at * masses) @ turn.T).reshape(vectors, -1, 2).transpose(1, 0, 2)
             heavy += (pulled @ pull.reshape(-1, 2 * vectors)).reshape(X.shape)
         for core, stiffer, heavier in self.cores:
-            stiff += core.respond(X, core.stiffness, stiffer, self.around, self.together)
+            change += core.respond(X, core.stiffness, stiffer, self.around, self.together)
             heavy += core.respond(X, core.mass, heavier, self.around, self.together)
-        return stiff, heavy
+        return change - value * heavy, mass + heavy
 
 
 def _walls(together: Together, flaw: Imperfection, waves: tuple[int, ...], theta: Array) -> dict[int, list[Wall]]:

@@ -8,6 +8,7 @@ The inverses are kept, so that an answer is a few small products.
 """
 
 from collections.abc import Sequence
+from copy import copy
 
 import numpy as np
 
@@ -44,15 +45,32 @@ class Substructures:
         inverse = np.linalg.inv(S)
         self.inverse = (inverse + inverse.T) / 2
 
+    @property
+    def layout(self) -> tuple[bytes, ...]:
+        """What is equal of those that can be stacked."""
+        return self.order.tobytes(), *(where.tobytes() for _, where, _, _ in self.parts)
+
     def solve(self, loads: Array) -> Array:
-        """A⁻¹ of loads (size, columns)."""
-        b = loads[self.order]
-        x, right = np.empty_like(b), b[self.own :]
+        """A⁻¹ of loads (..., size, columns)."""
+        b = loads[..., self.order, :]
+        x, right = np.empty_like(b), b[..., self.own :, :]
         for own, where, _, W in self.parts:
-            right[where] -= W.T @ b[own]
-        shared = x[self.own :] = self.inverse @ right
+            right[..., where, :] -= np.swapaxes(W, -1, -2) @ b[..., own, :]
+        shared = self.inverse @ right
+        x[..., self.own :, :] = shared
         for own, where, inverse, W in self.parts:
-            x[own] = inverse @ b[own] - W @ shared[where]
+            x[..., own, :] = inverse @ b[..., own, :] - W @ shared[..., where, :]
         found = np.empty_like(loads)
-        found[self.order] = x
+        found[..., self.order, :] = x
         return found
+
+
+def stack(ones: Sequence[Substructures]) -> Substructures:
+    """Several of the same layout, whose loads come in a row: (ones, size, columns)."""
+    found = copy(ones[0])
+    found.inverse = np.stack([one.inverse for one in ones])
+    found.parts = [
+        (own, where, np.stack([one.parts[k][2] for one in ones]), np.stack([one.parts[k][3] for one in ones]))
+        for k, (own, where, _, _) in enumerate(found.parts)
+    ]
+    return found

@@ -10,7 +10,9 @@ from itertools import pairwise
 import numpy as np
 from scipy.sparse import block_diag, csr_matrix
 
+from shell.constraints import Index
 from shell.imperfection.block import Block
+from shell.imperfection.substructure import Substructures, stack
 from shell.kernel import station_mass
 from shell.quadrature import Array
 from shell.resonator import Resonator
@@ -72,27 +74,38 @@ class Together:
         return self._places[position, height]
 
     def answer(self, loads: Array) -> Array:
-        """-(K - λ M)⁻¹ of loads in every harmonic, without the pair."""
-        found = np.empty_like(loads)
-        for block, rows in zip(self.blocks, self.rows, strict=True):
-            own = loads[rows]
-            found[rows] = block.answer(own.reshape(len(own), -1)).reshape(own.shape)
-        return found
+        """-(K - λ M)⁻¹ of loads in every harmonic; in the pair's own without the pair, for which it is singular."""
+        flat = np.concatenate([loads.reshape(self.size, -1), np.zeros((1, loads[0].size))])
+        found = np.empty_like(flat)
+        for rows, inverse in self._inverses:
+            found[rows] = -inverse.solve(flat[rows])
+        return found[:-1].reshape(loads.shape)
 
-    def weigh(self, X: Array) -> Array:
-        """M of the perfect resonator times vectors, what moves in the solid parts with them counted."""
+    @cached_property
+    def _inverses(self) -> list[tuple[Index, Substructures]]:
+        """Those of one layout stacked, with their unknowns; the number after all is that of the pair's border."""
+        alike: dict[tuple[bytes, ...], list[tuple[Index, Substructures]]] = {}
+        for block, rows in zip(self.blocks, self.rows, strict=True):
+            own = np.arange(rows.start, rows.stop)
+            if block.kept is not None:
+                own = np.append(own, self.size)
+            alike.setdefault(block.inverse.layout, []).append((own, block.inverse))
+        return [(np.stack([rows for rows, _ in own]), stack([one for _, one in own])) for own in alike.values()]
+
+    def weigh(self, number: int, plain: Array) -> Array:
+        """The mass of a perfect chain times unknowns of its elements as in `plain`."""
         around = np.repeat([block.around for block in self.blocks], 2)
+        along = self._chain(number).table.along[0]
+        at = along @ plain.reshape(*plain.shape[:3], -1)  # amplitudes, elements, stations, columns
+        heavy = np.moveaxis(self._masses[number] @ np.moveaxis(at, 0, 2), 2, 0)
+        return np.asarray((along.T @ heavy).reshape(plain.shape) * around.reshape(-1, 2))
+
+    def weigh_cores(self, X: Array) -> Array:
+        """The mass of the solid parts times vectors."""
         found = np.zeros_like(X)
-        for number, mass in self._masses.items():
-            plain = self.plain(number, X)
-            along = self._chain(number).table.along[0]
-            at = along @ plain.reshape(*plain.shape[:3], -1)  # amplitudes, elements, stations, columns
-            heavy = np.moveaxis(mass @ np.moveaxis(at, 0, 2), 2, 0)
-            loads = (along.T @ heavy).reshape(plain.shape) * around.reshape(-1, 2)
-            found += self.gather(number, loads)
         for block, rows in zip(self.blocks, self.rows, strict=True):
             if len(block.shared):
-                found[rows][block.shared] += np.tensordot(block.heavy, X[rows][block.shared], 1)
+                found[rows][block.shared] = np.tensordot(block.heavy, X[rows][block.shared], 1)
         return found
 
     @cached_property

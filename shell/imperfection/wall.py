@@ -226,11 +226,12 @@ class Stretch:
         A, rho = 1 + kappa * eta * h / 2, r + n_r * eta * h / 2
         around = (A * rho * (2 * np.pi / self.theta.size))[:, :, None]
         lam, G = self.constants.lame
+        modes = {order: _modes(order, eta, 2 / h) for order in set(self.orders)}
         return Wall(
             self.elements,
             self.along,
             place.ds.reshape(-1, 1, 1),
-            tuple(_modes(order, eta, 2 / h) for order in self.orders),
+            tuple(modes[order] for order in self.orders),
             drift=_wide(slope * eta / 2),
             per_A=_wide(1 / A),
             per_rho=_wide(1 / rho),
