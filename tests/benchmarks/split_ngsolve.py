@@ -1,9 +1,9 @@
-"""Two splits by three-dimensional finite elements (NGSolve, extra `peers`): python tests/benchmarks/split_ngsolve.py [ORDER].
+"""Two splits by three-dimensional finite elements (NGSolve, extra `peers`): python tests/benchmarks/split_ngsolve.py [ORDER:SIDE ...].
 
 A quarter of the free hemisphere of 15 mm x 0.9 mm, with its symmetry planes, so that n = 2 is symmetric on both (cos 2θ) or on
 neither (sin 2θ). Two imperfections: the wall 1 + 0.02 sin⁴φ cos 4θ times as thick about the same middle surface (the mesh is moved), and
 four lumps of mass, ρ (1 + 0.02 Σ exp(30 (cos γ_k - 1))), γ_k the angle from the rim at 0°, 90°, 180°, 270°. The split that the mesh
-has by itself is taken off.
+has by itself is taken off. A row for every order and mesh: the differences fall towards the last.
 """
 
 import sys
@@ -19,6 +19,7 @@ from shell.modes import solve_modes
 
 R, H, E, NU, RHO = 15e-3, 0.9e-3, 72.7e9, 0.17, 2203.0
 EPSILON = 0.02
+STEPS = ((3, 0.2), (3, 0.12), (4, 0.12), (5, 0.12))  # order, largest side of a cell at the rim over R
 
 
 def mesh_quarter(rim):
@@ -75,36 +76,44 @@ def solve(mesh, order, thicker=0.0, heavier=0.0):
     return np.array(found), len(free)
 
 
-def main(order=4, rim=0.12):
-    (mode,) = solve_modes(hemisphere(radius=R, thickness=H), Elastic(E, NU, RHO), 2, tolerance=1e-7)
-    pair, coupled = Pair(mode), CoupledHarmonics(mode, Elastic(E, NU, RHO), highest=14)
+def main(*steps):
+    elastic = Elastic(E, NU, RHO)
+    (mode,) = solve_modes(hemisphere(radius=R, thickness=H), elastic, 2, tolerance=1e-7)
+    pair, coupled = Pair(mode), CoupledHarmonics(mode, elastic, highest=14)
     wall = wave(4, EPSILON * H, profile=lambda s: np.sin(s * pi / 2) ** 4)
     lumps = Function(
         lambda s, theta: (
             EPSILON * sum(np.exp(30 * (np.sin(s * pi / 2) * np.cos(theta - k * pi / 2) - 1)) for k in range(4))
         )
     )
-    mesh = mesh_quarter(rim)
-    perfect, unknowns = solve(mesh, order)
-    own = (perfect[0] - perfect[1]) / perfect.mean()
+    cases = {
+        "thickness": (Imperfection(thickness=wall), {"thicker": EPSILON}),
+        "mass": (Imperfection(density=lumps), {"heavier": EPSILON}),
+    }
+    ours = {}
+    for name, (flaw, _) in cases.items():
+        whole, first = coupled.solve(flaw), find_split(pair, flaw)
+        ours[name] = whole.wave.real / (1 + whole.shift)
+        print(f"{name}: coupled harmonics {ours[name]:+.7f}, first order {first.wave.real:+.7f}")
     print(
-        f"order {order}, {mesh.ne} tetrahedra, {unknowns} unknowns; perfect {perfect.mean():.4f} Hz against {mode.frequency:.4f}"
+        f"perfect: {mode.frequency:.4f} Hz\n\nsplits of finite elements; in brackets their distance from the coupled harmonics"
     )
-    for name, flaw, change in (
-        ("thickness", Imperfection(thickness=wall), {"thicker": EPSILON}),
-        ("mass", Imperfection(density=lumps), {"heavier": EPSILON}),
-    ):
+    print("order  tetrahedra  unknowns  perfect (Hz)             thickness               mass                    s")
+    meshes = {}
+    for order, rim in steps or STEPS:
         start = time.perf_counter()
-        f, _ = solve(mesh, order, **change)
-        peer = (f[0] - f[1]) / f.mean() - own
-        ours = coupled.solve(flaw)
-        whole, first = ours.wave.real / (1 + ours.shift), find_split(pair, flaw).wave.real
-        print(
-            f"{name}: finite elements {peer:+.7f}, coupled harmonics {whole:+.7f} ({whole / peer - 1:+.1e}), first order {first:+.7f} "
-            f"({first / peer - 1:+.1e}); {time.perf_counter() - start:.0f} s",
-            flush=True,
-        )
+        mesh = meshes.setdefault(rim, mesh_quarter(rim))
+        perfect, unknowns = solve(mesh, order)
+        own = (perfect[0] - perfect[1]) / perfect.mean()
+        cells = [f"{perfect.mean():.4f} ({perfect.mean() / mode.frequency - 1:+.1e})"]
+        for name, (_, change) in cases.items():
+            f, _ = solve(mesh, order, **change)
+            peer = (f[0] - f[1]) / f.mean() - own
+            cells.append(f"{peer:+.7f} ({peer / ours[name] - 1:+.1e})")
+        seconds = time.perf_counter() - start
+        print(f"{order:5d}  {mesh.ne:10d}  {unknowns:8d}  " + "   ".join(cells) + f"  {seconds:4.0f}", flush=True)
 
 
 if __name__ == "__main__":
-    main(*(int(word) for word in sys.argv[1:2]), *(float(word) for word in sys.argv[2:3]))
+    words = [word.split(":") for word in sys.argv[1:]]
+    main(*((int(order), float(rim)) for order, rim in words))
