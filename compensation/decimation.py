@@ -33,6 +33,19 @@ class Blocks:
     spikes: int
 
 
+def average_groups(values: Array, group: NDArray[np.intp], count: int = 0) -> Array:
+    """Return the mean of the values of every group 0, 1, …, at least `count` of them; NaN of a group without values.
+
+    Sums of differences from one value keep the digits that sums of large values lose.
+    """
+    if not values.size:
+        return np.full(count, np.nan)
+    middle = float(values[0])
+    members = np.bincount(group, minlength=count)
+    total = np.bincount(group, values - middle, len(members))
+    return np.asarray(middle + np.divide(total, members, out=np.full(len(members), np.nan), where=members > 0))
+
+
 def average_blocks(time: ArrayLike, columns: Mapping[str, ArrayLike], width: float) -> Blocks:
     """Average every column over consecutive blocks of `width` seconds.
 

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.constants import zero_Celsius
 
+from compensation.decimation import average_groups
 from compensation.spikes import find_spikes
 from studies.errors import InputError
 from studies.record import Record, place_in_time
@@ -146,16 +147,12 @@ def _fine_rows(record: Record, most: int) -> tuple[Array, dict[str, Array]]:
     width = float(np.ptp(time)) / most
     group = np.minimum(((time - time[0]) / width).astype(np.intp), most - 1)
     present = np.unique(group)
-    means = np.bincount(group, time, most) / np.maximum(np.bincount(group, minlength=most), 1)
     columns = {}
     for name in names:
         values = record[name]
         keep = np.isfinite(values) & ~find_spikes(values)
-        count = np.bincount(group[keep], minlength=most)
-        middle = float(np.median(values[keep])) if keep.any() else 0.0
-        total = np.bincount(group[keep], values[keep] - middle, most)
-        columns[name] = np.where(count > 0, middle + total / np.maximum(count, 1), np.nan)[present]
-    return means[present], columns
+        columns[name] = average_groups(values[keep], group[keep], most)[present]
+    return average_groups(time, group)[present], columns
 
 
 def _block(time: Array, column: Array, most: int) -> Blocks | None:

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.constants import zero_Celsius
 
 from compensation.spikes import find_spikes
 from studies.diagnosis.checks import FEWEST_BINS, check_device, check_units
@@ -117,8 +118,8 @@ def load_campaign(records: Sequence[Record], reference_degC: float | None = None
     reading = max(_reading_noise(table["temperature"]) for table in tables)
     if not np.isfinite(temperature).any():
         raise InputError(f"{records[0].path}: {source} has no value at all.")
-    middle = 0.5 * (np.nanmin(temperature) + np.nanmax(temperature)) + 273.15
-    reference = middle if reference_degC is None else reference_degC + 273.15
+    middle = 0.5 * (np.nanmin(temperature) + np.nanmax(temperature)) + zero_Celsius
+    reference = middle if reference_degC is None else reference_degC + zero_Celsius
     runs: list[Run] = []
     for number, (record, table, offset) in enumerate(zip(records, tables, offsets, strict=True)):
         for begin, end in _stretches(table):
@@ -371,9 +372,9 @@ def _states(
     if known.sum() > 1.5 * grid.size:  # finer than the grid: average
         means = _bin(table["temperature"], time, slot, grid)
         solid = np.isfinite(means)
-        housing = _between(grid, grid[solid], means[solid]) + 273.15
+        housing = _between(grid, grid[solid], means[solid]) + zero_Celsius
     else:
-        housing = _between(grid, time[known], table["temperature"][known]) + 273.15
+        housing = _between(grid, time[known], table["temperature"][known]) + zero_Celsius
 
     def command(name: str) -> FloatArray | None:
         if name not in table or not (known := np.isfinite(table[name])).any():

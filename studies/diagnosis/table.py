@@ -15,6 +15,7 @@ from scipy.constants import zero_Celsius
 from scipy.special import logsumexp
 from scipy.stats import f as f_distribution
 
+from compensation.decimation import average_groups
 from studies.diagnosis.constants import CONSTANTS
 from studies.diagnosis.relative_law import Law
 from studies.diagnosis.table_noise import Scale, make_scale
@@ -235,9 +236,8 @@ def _averaged(T: FloatArray, f: FloatArray) -> tuple[FloatArray, FloatArray]:
     group = -(-T.size // MOST_ROWS)
     if group == 1:
         return T, f
-    places = np.arange(0, T.size, group)
-    counts = np.diff(np.append(places, T.size))
-    return np.add.reduceat(T, places) / counts, np.add.reduceat(f, places) / counts
+    place = np.arange(T.size) // group
+    return average_groups(T, place), average_groups(f, place)
 
 
 def _sentences(
@@ -292,7 +292,7 @@ def _sentences(
 def _merged(T: FloatArray, f: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Average readings at one temperature."""
     distinct, place = np.unique(T, return_inverse=True)
-    return distinct, np.bincount(place, f) / np.bincount(place)
+    return distinct, average_groups(f, place)
 
 
 def _turns(T: FloatArray) -> bool:

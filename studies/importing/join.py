@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from compensation.decimation import average_groups
 from studies.errors import InputError
 from studies.importing.clock import drop_repeated, read_times, seconds_between
 from studies.importing.mapping import TABLE_TARGETS, ColumnMap, FileMap, ImportMap
@@ -215,9 +216,7 @@ def _bin_means(t: "Array", v: "Array", grid: "Array") -> "Array":
     edges = np.concatenate([[grid[0] - (middles[0] - grid[0])], middles, [grid[-1] + (grid[-1] - middles[-1])]])
     which = np.searchsorted(edges, t, side="right") - 1
     inside = (which >= 0) & (which < len(grid))
-    total = np.bincount(which[inside], v[inside], len(grid))
-    count = np.bincount(which[inside], minlength=len(grid))
-    return np.asarray(np.divide(total, count, out=np.full(len(grid), np.nan), where=count > 0))
+    return average_groups(v[inside], which[inside], len(grid))
 
 
 def _lay_grid(base: ClockedFile, import_map: ImportMap) -> "Array":

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.constants import zero_Celsius
 
+from compensation.decimation import average_groups
 from compensation.frequency import FrequencyFit, OrderComparison, compare_orders, fit_frequency
 
 if TYPE_CHECKING:
@@ -137,7 +138,7 @@ def local_slopes(temperature_degC: Array, frequency: Array) -> tuple[Array, Arra
     Readings at one temperature count as one, their mean.
     """
     T, reading = np.unique(temperature_degC, return_inverse=True)
-    f = np.bincount(reading, frequency) / np.bincount(reading)
+    f = average_groups(frequency, reading)
     return (T[1:] + T[:-1]) / 2, 2e6 * np.diff(f) / np.diff(T) / (f[1:] + f[:-1])
 
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from compensation.decimation import average_groups
 from thermal.errors import ThermalError
 from thermal.network import Array
 
@@ -115,11 +116,8 @@ def even_rows(run: HousingRun, step: float) -> EvenRun:
 
 
 def _average(row: Rows, value: Array, count: int) -> tuple[Rows, Array]:
-    members = np.bincount(row, minlength=count)
-    mean = np.full(count, np.nan)
-    some = members > 0
-    mean[some] = np.bincount(row, value, count)[some] / members[some]
-    return np.flatnonzero(some), mean
+    mean = average_groups(value, row, count)
+    return np.flatnonzero(np.isfinite(mean)), mean
 
 
 def _describe_holes(places: Rows, time: Array, what: str, mend: str) -> Sequence[str]:
