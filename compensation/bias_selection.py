@@ -41,7 +41,7 @@ class NoHeldOut(CompensationError):
 
 
 @dataclass(frozen=True)
-class HeldOut:
+class HeldOutRows:
     """What models are worth on rows that they have not seen: standard deviations of 100 s averages, pooled.
 
     `before` without and `after` with compensation, both about the held-out piece's own mean; `coverage` the part of
@@ -116,7 +116,7 @@ def choose_memory(prepare: Callable[[Memory], Sequence[BiasRun]]) -> Memory:
     return best
 
 
-def score_held_out(runs: Sequence[BiasRun], method: Method = "guarded") -> HeldOut:
+def score_held_out(runs: Sequence[BiasRun], method: Method = "guarded") -> HeldOutRows:
     """Predict every run from a model selected and fitted without it; with one run, every fifth of it.
 
     The blocks of a single run are held out with a gap of one thermal constant, std(f) / rms(ḟ), on either side. The
@@ -210,7 +210,7 @@ def score_path(runs: Sequence[BiasRun], selection: Selection) -> tuple[float, ..
     return tuple(scores)
 
 
-def score_runs(fit: BiasFit, runs: Sequence[BiasRun], *, extrapolate: bool = False) -> HeldOut:
+def score_runs(fit: BiasFit, runs: Sequence[BiasRun], *, extrapolate: bool = False) -> HeldOutRows:
     """Apply a fitted model to runs that it has not seen; each run's own mean is taken out, nothing else.
 
     Rows outside the range that the fit has seen are left out, unless `extrapolate`.
@@ -228,7 +228,7 @@ def bias_stability(run: BiasRun, bias: Array | None = None) -> float:
     return float(np.std(_averages(run.bias if bias is None else bias, run), ddof=1))
 
 
-def _pool(folds: Sequence[_Fold], fits: Sequence[BiasFit], *, by_runs: bool, everywhere: bool = False) -> HeldOut:
+def _pool(folds: Sequence[_Fold], fits: Sequence[BiasFit], *, by_runs: bool, everywhere: bool = False) -> HeldOutRows:
     raw: list[Array] = []
     compensated: list[Array] = []
     for fold, fit in zip(folds, fits, strict=True):
@@ -246,7 +246,7 @@ def _pool(folds: Sequence[_Fold], fits: Sequence[BiasFit], *, by_runs: bool, eve
         )
     before, after = np.concatenate(raw), np.concatenate(compensated)
     possible = sum(_averages(fold.held_out.bias, fold.held_out).size for fold in folds)
-    return HeldOut(
+    return HeldOutRows(
         before=float(np.sqrt(np.mean(before**2))),
         after=float(np.sqrt(np.mean(after**2))),
         coverage=before.size / possible,

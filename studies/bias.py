@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from compensation.bias import FREQUENCY, TEMPERATURE, BiasFit, BiasRun, prepare_run
 from compensation.bias_selection import (
-    HeldOut,
+    HeldOutRows,
     Method,
     NoHeldOut,
     bias_stability,
@@ -51,7 +51,7 @@ class Judged:
     method: Method
     fit: BiasFit
     training: tuple[float, float]
-    held_out: HeldOut | None
+    held_out: HeldOutRows | None
     path_scores: tuple[float, ...]
 
     @property

@@ -53,7 +53,7 @@ class SplitOfScan:
 
 
 @dataclass(frozen=True)
-class Wave:
+class FaceWave:
     """A wave around of a face, the wall or the offset at a position: amplitude (m) and azimuth of a crest (rad)."""
 
     quantity: str
@@ -80,7 +80,7 @@ class Scan:
     faces: dict[str, Face]
     imperfection: Imperfection
     splits: tuple[SplitOfScan, ...]
-    waves: tuple[Wave, ...]
+    waves: tuple[FaceWave, ...]
     roundness: tuple[Roundness, ...]
 
     def map_of(self, quantity: str, rows: int = 60, columns: int = 180) -> tuple[Array, Array, Array]:
@@ -209,7 +209,7 @@ def polar_intervals(wave: complex, covariance: Array, fold: int) -> tuple[ScanIn
     return size, ScanInterval(at / fold, (at + a) / fold, (at + b) / fold)
 
 
-def _waves(faces: dict[str, Face]) -> tuple[Wave, ...]:
+def _waves(faces: dict[str, Face]) -> tuple[FaceWave, ...]:
     """Waves 0 ... 8 of each face, the wall and the offset, at the rim end of what was covered and at its middle."""
     found = []
     low, high = max(f.low for f in faces.values()), min(f.high for f in faces.values())
@@ -220,7 +220,7 @@ def _waves(faces: dict[str, Face]) -> tuple[Wave, ...]:
     return tuple(found)
 
 
-def _wave(faces: dict[str, Face], quantity: str, order: int, position: float) -> Wave:
+def _wave(faces: dict[str, Face], quantity: str, order: int, position: float) -> FaceWave:
     factors = {"wall": {"inner": 1.0, "outer": 1.0}, "offset": {"inner": -0.5, "outer": 0.5}}.get(
         quantity, {quantity: 1.0}
     )
@@ -230,9 +230,9 @@ def _wave(faces: dict[str, Face], quantity: str, order: int, position: float) ->
         c, covariance = c + factor * one, covariance + factor**2 * own
     if order == 0:
         sd = 1.645 * float(np.sqrt(covariance[0, 0]))
-        return Wave(quantity, 0, position, ScanInterval(c.real, c.real - sd, c.real + sd), 0.0)
+        return FaceWave(quantity, 0, position, ScanInterval(c.real, c.real - sd, c.real + sd), 0.0)
     size, _ = polar_intervals(c, covariance, order)
-    return Wave(quantity, order, position, size, float(np.angle(c) / order % (2 * pi / order)))
+    return FaceWave(quantity, order, position, size, float(np.angle(c) / order % (2 * pi / order)))
 
 
 def _roundness(faces: dict[str, Face]) -> tuple[Roundness, ...]:

@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from studies.calibration.estimates import SILENT, Estimate, estimate, find_groups
-from studies.calibration.fit import Fit, fit
+from studies.calibration.fit import CardFit, fit
 from studies.calibration.observed import HOUSING, SETTLED, ObservedRun, SettledTable, observe
 from studies.calibration.priors import Priors, gather_priors
-from studies.calibration.problem import Problem, State, wide_law
+from studies.calibration.problem import CardProblem, State, wide_law
 from studies.errors import InputError
 from studies.plausible import check_card_frequency
 from studies.record import Record
@@ -42,7 +42,7 @@ class Rung:
 
 
 @dataclass(frozen=True)
-class Baseline:
+class LinearResponse:
     """A response as a linear problem about the calibrated values, one array per run (rows are block averages).
 
     measured − predicted = columns · δ + noise, δ the move of the coordinates from the calibrated point, with prior mean
@@ -65,7 +65,7 @@ class Baseline:
 
 
 @dataclass(frozen=True)
-class HeldOut:
+class HeldOutRun:
     """How one run that the calibration has not seen is predicted: rms of block averages by response.
 
     Attributes
@@ -100,11 +100,11 @@ class Calibration(Shown):
 
     card: "Instrument"
     instrument: "Instrument"
-    fit: Fit
+    fit: CardFit
     estimates: tuple[Estimate, ...]
     groups: tuple[tuple[str, ...], ...]
     ladder: Mapping[str, Rung]
-    held_out: HeldOut | None
+    held_out: HeldOutRun | None
     warnings: tuple[str, ...]
 
     def __repr__(self) -> str:
@@ -132,7 +132,7 @@ class Calibration(Shown):
         ]
         return pd.DataFrame(rows).set_index("parameter")
 
-    def baseline(self, response: str) -> Baseline:
+    def baseline(self, response: str) -> LinearResponse:
         """Return a response as a linear problem, for what else may be in it."""
         problem, state = self.fit.problem, self.fit.state
         if response not in problem.responses or response == SETTLED:
@@ -141,7 +141,7 @@ class Calibration(Shown):
         starts = [
             f"{name} of run {problem.parts[k].run + 1} ({problem.parts[k].name})" for k, name, _ in problem.starts
         ]
-        return Baseline(
+        return LinearResponse(
             time=rows.times,
             residual=tuple(state.residual[response][s] for s in rows.slices),
             columns=tuple(state.slope[response][s] for s in rows.slices),
@@ -213,7 +213,7 @@ def calibrate(
 
 def _pose(
     instrument: "Instrument", runs: tuple[ObservedRun, ...], tables: tuple[SettledTable, ...], exact: Sequence[str]
-) -> Problem:
+) -> CardProblem:
     priors = gather_priors(instrument, exact)
     known = {value.name for value in instrument.uncertain}
     for name in exact:
@@ -223,10 +223,10 @@ def _pose(
             raise InputError(
                 f"{instrument.path}: '{name}' is no uncertain value of the card{nearest(name, sorted(known))}"
             )
-    return Problem(instrument, priors, runs, wide_law(instrument, runs, tables), tables)
+    return CardProblem(instrument, priors, runs, wide_law(instrument, runs, tables), tables)
 
 
-def _calibrated(instrument: "Instrument", found: Fit, estimates: Sequence[Estimate]) -> "Instrument":
+def _calibrated(instrument: "Instrument", found: CardFit, estimates: Sequence[Estimate]) -> "Instrument":
     """The card with posterior values, widths and correlations."""
     priors: Priors = found.problem.priors
     count = len(priors.values)
@@ -244,7 +244,7 @@ def _calibrated(instrument: "Instrument", found: Fit, estimates: Sequence[Estima
     return instrument.with_values(values).with_table("posterior", posterior)
 
 
-def _ladder(found: Fit) -> dict[str, Rung]:
+def _ladder(found: CardFit) -> dict[str, Rung]:
     problem = found.problem
     shipped = problem.evaluate(np.zeros(problem.count), slopes=False)
     return {
@@ -258,12 +258,12 @@ def _ladder(found: Fit) -> dict[str, Rung]:
     }
 
 
-def _spread(problem: Problem, state: State, name: str) -> float:
+def _spread(problem: CardProblem, state: State, name: str) -> float:
     parts = [state.residual[name][s] - state.residual[name][s].mean() for s in problem.rows[name].slices]
     return float(np.sqrt(np.mean(np.concatenate(parts) ** 2)))
 
 
-def noise_rms(found: Fit, name: str) -> float:
+def noise_rms(found: CardFit, name: str) -> float:
     """Rms of the noise about the mean of each run, as the fitted levels have it."""
     rows, total, count = found.problem.rows[name], 0.0, 0
     for run, t in enumerate(rows.times):
@@ -279,8 +279,8 @@ def predict_held_out(
     tables: tuple[SettledTable, ...],
     place: int,
     exact: Sequence[str],
-    whole: Fit,
-) -> HeldOut:
+    whole: CardFit,
+) -> HeldOutRun:
     """Calibrate without one run and predict it."""
     seen = tuple(run for k, run in enumerate(runs) if k != place % len(runs))
     run = runs[place % len(runs)]
@@ -305,10 +305,10 @@ def predict_held_out(
         before, after = (outer.evaluate(point, slopes=False) for point in points)
         by_chamber = {name: (_rms(before.residual[name]), _rms(after.residual[name])) for name in responses}
     noise = {name: noise_rms(whole, name) for name in responses}
-    return HeldOut(run.record.path, by_chamber, by_housing, noise)
+    return HeldOutRun(run.record.path, by_chamber, by_housing, noise)
 
 
-def _refit_start(problem: Problem, point: Array, whole: Fit) -> State:
+def _refit_start(problem: CardProblem, point: Array, whole: CardFit) -> State:
     """Residuals with the run's own initial state refitted."""
     count = len(problem.priors.values)
     state = problem.evaluate(point)
@@ -332,7 +332,7 @@ def _rms(values: Array) -> float:
     return float(np.sqrt(np.mean(values**2)))
 
 
-def _warn(found: Fit, estimates: Sequence[Estimate], ladder: Mapping[str, Rung]) -> tuple[str, ...]:
+def _warn(found: CardFit, estimates: Sequence[Estimate], ladder: Mapping[str, Rung]) -> tuple[str, ...]:
     warnings = []
     if not found.converged:
         warnings.append("the last step of the fit was not small; the values may still move.")
@@ -360,7 +360,7 @@ def _warn(found: Fit, estimates: Sequence[Estimate], ladder: Mapping[str, Rung])
     return tuple(warnings)
 
 
-def _usual_mean(found: Fit, name: str) -> float:
+def _usual_mean(found: CardFit, name: str) -> float:
     """Standard deviation of a run's mean by the noise without offsets."""
     rows = found.problem.rows[name]
     quiet = replace(found.noise[name], offset=0.0)

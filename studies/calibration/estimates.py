@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from studies.calibration.fit import Fit, objective
+from studies.calibration.fit import CardFit, objective
 from studies.calibration.priors import from_standard, to_standard
 from studies.calibration.wave import Polar
 from studies.errors import InputError
@@ -58,7 +58,7 @@ class Estimate:
         return "data" if self.width <= TOLD else "prior" if self.width >= SILENT else "both"
 
 
-def estimate(fit: Fit, profile: bool = True) -> tuple[Estimate, ...]:
+def estimate(fit: CardFit, profile: bool = True) -> tuple[Estimate, ...]:
     """Return the estimates of all values of the card."""
     priors = fit.problem.priors
     polar, best, mean, covariance = _over_the_wave(fit)
@@ -95,7 +95,7 @@ def estimate(fit: Fit, profile: bool = True) -> tuple[Estimate, ...]:
     return tuple(found)
 
 
-def _over_the_wave(fit: Fit) -> tuple[dict[int, Polar], Array, Array, Array]:
+def _over_the_wave(fit: CardFit) -> tuple[dict[int, Polar], Array, Array, Array]:
     """Most probable coordinates, their mean and covariance, with length and axis of the damping's anisotropy by their places.
 
     The components have the posterior that length and axis give them; the other values follow: they depend on the components
@@ -122,7 +122,7 @@ def _told_polar(value: "UncertainValue", one: Polar) -> Estimate:
     )
 
 
-def _profiled(fit: Fit, k: int, ends: tuple[float, float]) -> tuple[tuple[float, float], str]:
+def _profiled(fit: CardFit, k: int, ends: tuple[float, float]) -> tuple[tuple[float, float], str]:
     """Ends of an interval in z, each where the objective has risen by 2.71 along the way of least rise."""
     problem, priors = fit.problem, fit.problem.priors
     count = len(priors.values)
@@ -157,7 +157,7 @@ def _profiled(fit: Fit, k: int, ends: tuple[float, float]) -> tuple[tuple[float,
     return (found[0], found[1]), kind
 
 
-def find_groups(fit: Fit) -> tuple[tuple[str, ...], ...]:
+def find_groups(fit: CardFit) -> tuple[tuple[str, ...], ...]:
     """Return groups of values that the data ties together but cannot tell apart: |correlation| above 0.9."""
     priors = fit.problem.priors
     count = len(priors.values)

@@ -15,7 +15,7 @@ from compensation.correlated import KINDS, Noise, NoiseRows, estimate_noise
 from compensation.errors import CompensationError
 from shell.errors import ShellError
 from studies.calibration.observed import SETTLED
-from studies.calibration.problem import Problem, Progress, State
+from studies.calibration.problem import CardProblem, Progress, State
 from studies.errors import InputError
 from thermal.errors import ThermalError
 
@@ -31,7 +31,7 @@ LONGEST_STEP = 3.0  # prior standard deviations, of any coordinate in one step
 
 
 @dataclass(frozen=True)
-class Fit:
+class CardFit:
     """The most probable point.
 
     Attributes
@@ -46,7 +46,7 @@ class Fit:
     converged : whether the last one was small
     """
 
-    problem: Problem
+    problem: CardProblem
     state: State
     noise: Mapping[str, Noise]
     rows: Mapping[str, NoiseRows]
@@ -62,7 +62,7 @@ class Fit:
         return self.state.point
 
 
-def fit(problem: Problem, start: Array | None = None, progress: Progress = lambda _: None) -> Fit:
+def fit(problem: CardProblem, start: Array | None = None, progress: Progress = lambda _: None) -> CardFit:
     """Find the most probable point.
 
     Raises
@@ -97,16 +97,16 @@ def fit(problem: Problem, start: Array | None = None, progress: Progress = lambd
     J, _ = _whitened(problem, state, noise, rows)
     information = J.T @ J
     covariance = np.asarray(np.linalg.inv(information + np.eye(len(information))))
-    return Fit(problem, state, noise, rows, information, covariance, outliers, step, converged)
+    return CardFit(problem, state, noise, rows, information, covariance, outliers, step, converged)
 
 
-def objective(problem: Problem, state: State, noise: Mapping[str, Noise], rows: Mapping[str, NoiseRows]) -> float:
+def objective(problem: CardProblem, state: State, noise: Mapping[str, Noise], rows: Mapping[str, NoiseRows]) -> float:
     """−2 ln of likelihood and prior, up to a constant."""
     total = float(state.point @ state.point)
     return total + sum(float(np.sum(rows[n].whiten(state.residual[n], noise[n]) ** 2)) for n in problem.responses)
 
 
-def _noise(problem: Problem, rows: NoiseRows, state: State, name: str, near: Noise | None) -> Noise:
+def _noise(problem: CardProblem, rows: NoiseRows, state: State, name: str, near: Noise | None) -> Noise:
     J = state.slope[name]
     target = state.residual[name] + J @ state.point
     # Rotated coordinates of unit prior are of unit prior again; those that the rows do not see are left out.
@@ -135,7 +135,7 @@ def _spare_outliers(rows: NoiseRows, state: State, name: str, noise: Noise) -> t
 
 
 def _whitened(
-    problem: Problem, state: State, noise: Mapping[str, Noise], rows: Mapping[str, NoiseRows]
+    problem: CardProblem, state: State, noise: Mapping[str, Noise], rows: Mapping[str, NoiseRows]
 ) -> tuple[Array, Array]:
     white = [
         rows[name].whiten(np.column_stack([state.slope[name], state.residual[name]]), noise[name])
@@ -146,7 +146,7 @@ def _whitened(
 
 
 def _advance(
-    problem: Problem, state: State, move: Array, noise: Mapping[str, Noise], rows: Mapping[str, NoiseRows]
+    problem: CardProblem, state: State, move: Array, noise: Mapping[str, Noise], rows: Mapping[str, NoiseRows]
 ) -> State | None:
     """Go a step, or a quarter of it until the objective falls; None where it does not. The whole step is the usual one."""
     count = len(problem.priors.values)

@@ -28,7 +28,7 @@ LEAST_ROWS = 10
 
 
 @dataclass(frozen=True)
-class Blocks:
+class BlockMeans:
     """Means of one column over blocks of rows.
 
     Attributes
@@ -77,7 +77,7 @@ class ObservedRun:
     record: Record
     inner: Drive
     outer: Drive | None
-    responses: Mapping[str, Blocks]
+    responses: Mapping[str, BlockMeans]
 
 
 @dataclass(frozen=True)
@@ -155,7 +155,7 @@ def _fine_rows(record: Record, most: int) -> tuple[Array, dict[str, Array]]:
     return average_groups(time, group)[present], columns
 
 
-def _block(time: Array, column: Array, most: int) -> Blocks | None:
+def _block(time: Array, column: Array, most: int) -> BlockMeans | None:
     keep = np.isfinite(column)
     if np.count_nonzero(keep) < LEAST_ROWS:
         return None
@@ -170,4 +170,4 @@ def _block(time: Array, column: Array, most: int) -> Blocks | None:
         return np.asarray(np.add.reduceat(values, edges) / counts)
 
     middle = float(np.median(column[rows]))
-    return Blocks(rows, edges, counts, mean(time[rows]), middle + mean(column[rows] - middle), int(spikes.sum()))
+    return BlockMeans(rows, edges, counts, mean(time[rows]), middle + mean(column[rows] - middle), int(spikes.sum()))

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from studies.calibration.wave import ANISOTROPY, AXIS, Wave
+from studies.calibration.wave import ANISOTROPY, AXIS, WavePrior
 
 if TYPE_CHECKING:
     from studies.instrument.card import Instrument
@@ -28,7 +28,7 @@ class Priors:
 
     values: tuple["UncertainValue", ...]
     root: Array
-    wave: Wave | None = None
+    wave: WavePrior | None = None
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -109,7 +109,7 @@ def gather_priors(instrument: "Instrument", exact: Sequence[str] = ()) -> Priors
             R[i, j] = R[j, i] = correlation.get((one.name, other.name), correlation.get((other.name, one.name), 0.0))
     known = {value.name: value for value in values}
     wave = (
-        Wave(known[ANISOTROPY], known[AXIS])
+        WavePrior(known[ANISOTROPY], known[AXIS])
         if {ANISOTROPY, AXIS} <= set(known) and known[ANISOTROPY].logarithmic
         else None
     )

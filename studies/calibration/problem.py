@@ -58,7 +58,7 @@ class State:
 
 
 @dataclass(frozen=True)
-class Problem:
+class CardProblem:
     """An instrument, what is uncertain of it, and the runs."""
 
     instrument: "Instrument"

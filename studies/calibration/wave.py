@@ -36,7 +36,7 @@ class Polar:
 
 
 @dataclass(frozen=True)
-class Posterior:
+class WavePosterior:
     """Length and axis; (x, y) at the most probable of them, their mean and covariance."""
 
     length: Polar
@@ -47,7 +47,7 @@ class Posterior:
 
 
 @dataclass(frozen=True)
-class Wave:
+class WavePrior:
     """Priors of length and axis; coordinates (x, y) of unit variance of a = mean + spread_a x, b = spread_b y."""
 
     length: "UncertainValue"
@@ -81,7 +81,7 @@ class Wave:
         turn = np.array([[np.cos(phi), np.sin(phi)], np.array([-np.sin(phi), np.cos(phi)]) / (A * PER_DEGREE)])
         return np.asarray(turn * [spread_a, spread_b])
 
-    def posterior(self, information: Array, mean: Array) -> Posterior:
+    def posterior(self, information: Array, mean: Array) -> WavePosterior:
         """Length and axis, from the data's information on (x, y) and the mean that it has beside the unit prior.
 
         Parameters
@@ -112,7 +112,7 @@ class Wave:
         spread = self.length.sd / self.length.value
         middle = np.array([(weight * x).sum(), (weight * y).sum()])
         away = np.array([x - middle[0], y - middle[1]])
-        return Posterior(
+        return WavePosterior(
             _summed(A, weight, float(A[best]), _deviation(log, weight) / spread),
             _summed(
                 self.axis.value + angle,

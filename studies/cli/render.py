@@ -9,7 +9,7 @@ from studies.cli.output import Answer, answers
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from studies.reports.scenes import ShellTemperature, Shown
+    from studies.reports.scenes import ModeScene, ShellTemperature
 
 KINDS = (".png", ".webp", ".gif", ".html", ".glb", ".stl", ".ply")
 MOST = 4  # resonators in one picture
@@ -110,7 +110,7 @@ def _solve(
     temperatures: "Sequence[float]",
     theory: Literal["solid", "shell"],
     kind: str,
-) -> "list[Shown]":
+) -> "list[ModeScene]":
     """Solve every mode that is to be shown: cards × temperatures × harmonics."""
     from scipy.constants import zero_Celsius
 
@@ -133,7 +133,7 @@ def _solve(
 
 
 def _picture(
-    shown: "Sequence[Shown]",
+    shown: "Sequence[ModeScene]",
     kind: str,
     colour: Literal["displacement", "energy", "temperature"],
     field: "ShellTemperature | None",
@@ -151,7 +151,7 @@ def _picture(
         raise MissingEnvironment(f"{error} An .html page or a mesh needs none.") from None
 
 
-def _page(shown: "Sequence[Shown]") -> bytes:
+def _page(shown: "Sequence[ModeScene]") -> bytes:
     from scipy.constants import zero_Celsius
 
     from studies.reports.mode_picture import view_blocks
@@ -168,7 +168,7 @@ def _page(shown: "Sequence[Shown]") -> bytes:
 
 
 def _mesh(
-    one: "Shown",
+    one: "ModeScene",
     kind: str,
     colour: Literal["displacement", "energy", "temperature"],
     field: "ShellTemperature | None",

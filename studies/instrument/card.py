@@ -21,7 +21,7 @@ from studies.files.writing import write_text
 from studies.instrument.dotted import replaced
 from studies.instrument.keys import Keys, number
 from studies.instrument.mending import read_keys
-from studies.instrument.registry import Place, ReadTable, card_tables, read_table
+from studies.instrument.registry import CardPlace, ReadTable, card_tables, read_table
 from studies.instrument.uncertain import UncertainValue
 
 if TYPE_CHECKING:
@@ -255,7 +255,7 @@ def _reread(instrument: Instrument, content: Mapping[str, Any], changed: set[str
     tables = dict(instrument.tables)
     for name in card_tables():
         if name in changed:
-            place = Place(f"{instrument.path} [{name}]", folder, instrument.reference_temperature)
+            place = CardPlace(f"{instrument.path} [{name}]", folder, instrument.reference_temperature)
             tables[name] = read_table(name, content.get(name), place)
     unknown = changed - set(tables)
     if unknown:

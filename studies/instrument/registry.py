@@ -17,7 +17,7 @@ TABLES = "studies.instrument.tables"
 
 
 @dataclass(frozen=True)
-class Place:
+class CardPlace:
     """Where a table stands: "file [table]" for messages, the folder of the card, and its reference temperature (K)."""
 
     where: str
@@ -25,7 +25,7 @@ class Place:
     reference_temperature: float
 
 
-def _as_it_is(keys: Any, place: Place) -> Any:
+def _as_it_is(keys: Any, place: CardPlace) -> Any:
     return keys
 
 
@@ -54,7 +54,7 @@ class CardTable:
     table: str
     keys: Any = None
     part: str = ""
-    build: Callable[[Any, Place], Any] = _as_it_is
+    build: Callable[[Any, CardPlace], Any] = _as_it_is
     required: bool = False
     optional: bool = False
     keys_of: Callable[[Mapping[str, Any], str], Any] | None = None
@@ -90,7 +90,7 @@ def card_tables() -> Mapping[str, tuple[CardTable, ...]]:
     return found
 
 
-def read_table(name: str, raw: Any, place: Place) -> ReadTable:
+def read_table(name: str, raw: Any, place: CardPlace) -> ReadTable:
     """Read one table of a card; an absent one has its defaults.
 
     Raises
@@ -125,7 +125,7 @@ def read_table(name: str, raw: Any, place: Place) -> ReadTable:
     return ReadTable(read, parts, tuple(uncertain), stated)
 
 
-def _read_array(entry: CardTable, raw: Any, place: Place) -> ReadTable:
+def _read_array(entry: CardTable, raw: Any, place: CardPlace) -> ReadTable:
     assert entry.keys_of is not None
     if not isinstance(raw, list | None):
         raise InputError(f"{place.where}: {entry.table} must be an array of tables ([[{entry.table}]]).")
@@ -138,7 +138,7 @@ def _read_array(entry: CardTable, raw: Any, place: Place) -> ReadTable:
         bare, spreads = split_spreads(member, keys, where)
         read = read_keys(bare, keys, where)
         uncertain += gather_uncertain(f"{entry.table}.{number}", bare, read, keys, spreads, where)
-        parts.append(entry.build(read, Place(where, place.folder, place.reference_temperature)))
+        parts.append(entry.build(read, CardPlace(where, place.folder, place.reference_temperature)))
         stated |= _dotted(f"{entry.table}.{number}", spreads)
     return ReadTable({}, {entry.name: tuple(parts)}, tuple(uncertain), stated)
 

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from compensation.bias import BiasRun, prepare_run
-from compensation.bias_selection import HeldOut, Method, bias_stability, fit_bias, score_runs
+from compensation.bias_selection import HeldOutRows, Method, bias_stability, fit_bias, score_runs
 from studies.instrument.card import load_card
 from studies.simulation.chamber import load_profile
 from studies.simulation.virtual_gyro import simulate_run
@@ -40,8 +40,8 @@ class TwinFit:
     runs: int
     terms: tuple[str, ...]
     training: tuple[float, float]
-    cooling: HeldOut
-    warming: HeldOut
+    cooling: HeldOutRows
+    warming: HeldOutRows
 
     @property
     def training_gain(self) -> float:

@@ -10,7 +10,7 @@ from studies.reports.page import Block, Text
 
 if TYPE_CHECKING:
     from studies.instrument.card import Instrument
-    from studies.reports.scenes import Shown
+    from studies.reports.scenes import ModeScene
 
 
 def mode_blocks(instrument: "Instrument", harmonics: Sequence[int] = (2, 3)) -> list[Block]:
@@ -20,7 +20,7 @@ def mode_blocks(instrument: "Instrument", harmonics: Sequence[int] = (2, 3)) -> 
     return view_blocks([show_mode(instrument, n) for n in harmonics])
 
 
-def view_blocks(shown: "Sequence[Shown]") -> list[Block]:
+def view_blocks(shown: "Sequence[ModeScene]") -> list[Block]:
     """Return the interactive view of modes of one instrument at one temperature."""
     from shell.render import NoOpenGL, render_png
     from studies.reports.webgl import Drawn, view_modes

@@ -30,7 +30,7 @@ MICROMETRE = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
-class Shown:
+class ModeScene:
     """A mode of an instrument at one temperature with the surface of the resonator."""
 
     instrument: Instrument
@@ -107,7 +107,7 @@ def show_mode(
     temperature: float | None = None,
     theory: Literal["solid", "shell"] = "solid",
     exaggerated: bool = True,
-) -> Shown:
+) -> ModeScene:
     """Solve one mode of an instrument (temperature in K, its reference unless given) and build its surface.
 
     Of a card with an imperfection it is the slower mode on its axis, the shell's departures `exaggerated` or as they are.
@@ -121,13 +121,13 @@ def show_mode(
     mode = solve_modes(resonator, elastic, harmonic, index + 1, theory, tolerance=1e-4)[index]
     surface = build_surface(resonator, mode)
     if harmonic < 1 or not is_imperfect(instrument):
-        return Shown(instrument, T, resonator, mode, surface)
+        return ModeScene(instrument, T, resonator, mode, surface)
     return _show_split(instrument, T, resonator, mode, surface, exaggerated)
 
 
 def _show_split(
     instrument: Instrument, T: float, resonator: "Resonator", mode: "Mode", surface: "Surface", exaggerated: bool
-) -> Shown:
+) -> ModeScene:
     """The slower mode of the pair on its own axis, the shell with its departures exaggerated."""
     from shell.imperfection.surface import depart_surface, turn_surface
     from studies.splitting import SplitPair
@@ -137,7 +137,7 @@ def _show_split(
     fields = instrument.part("imperfection").fields
     if fields is not None:
         surface, factor = depart_surface(surface, resonator, fields, exaggerated)
-    return Shown(instrument, T, resonator, mode, surface, split, factor)
+    return ModeScene(instrument, T, resonator, mode, surface, split, factor)
 
 
 def read_field(path: str | Path) -> ShellTemperature:

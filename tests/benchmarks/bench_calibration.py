@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from studies.calibration.calibrate import calibrate
-from studies.calibration.fit import Fit
+from studies.calibration.fit import CardFit
 from studies.calibration.priors import gather_priors
 from studies.instrument.card import load_card
 from studies.simulation.chamber import load_profile
@@ -68,7 +68,7 @@ def measure(seed: int, rate: float) -> dict[str, list[float]]:
     return {"ratio": ratios, "inside": inside, "told": told, "drawn": drawn, "ahead": ahead, "cpu": [spent]}
 
 
-def residual_ratio(fit: Fit, name: str, true: list[Array]) -> float:
+def residual_ratio(fit: CardFit, name: str, true: list[Array]) -> float:
     """Residual over what a fit of the same columns leaves of the noise that is really there, means of the runs left out."""
     problem, slope = fit.problem, fit.state.slope
     noise = {}

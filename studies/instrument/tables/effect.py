@@ -17,7 +17,7 @@ import msgspec
 
 from studies.errors import InputError
 from studies.instrument.keys import Keys, number
-from studies.instrument.registry import CardTable, Place
+from studies.instrument.registry import CardPlace, CardTable
 
 if TYPE_CHECKING:
     from studies.effects import Effect
@@ -69,7 +69,7 @@ def _declare(effect: "Effect", response: str) -> Any:
     )
 
 
-def build_entry(keys: Any, place: Place) -> EffectEntry:
+def build_entry(keys: Any, place: CardPlace) -> EffectEntry:
     """Return an entry without the parameters that it leaves out."""
     given = {key: getattr(keys, key) for key in keys.__struct_fields__ if key not in ("name", "response")}
     return EffectEntry(keys.name, keys.response, {key: value for key, value in given.items() if value is not None})

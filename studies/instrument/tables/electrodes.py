@@ -23,7 +23,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import numpy as np
 
 from studies.instrument.keys import Keys, number
-from studies.instrument.registry import CardTable, Place
+from studies.instrument.registry import CardPlace, CardTable
 
 if TYPE_CHECKING:
     from shell.electrodes import Electrodes
@@ -90,7 +90,7 @@ class CardElectrodes:
         return Electrodes(pair, patches, gap, add(*waves), k.face)
 
 
-def build(keys: ElectrodeKeys, place: Place) -> CardElectrodes:
+def build(keys: ElectrodeKeys, place: CardPlace) -> CardElectrodes:
     """Return the electrodes."""
     return CardElectrodes(keys, place.reference_temperature)
 

@@ -30,7 +30,7 @@ from numpy.typing import NDArray
 
 from studies.errors import InputError
 from studies.instrument.keys import Keys, number
-from studies.instrument.registry import CardTable, Place
+from studies.instrument.registry import CardPlace, CardTable
 
 if TYPE_CHECKING:
     from shell.imperfection import Field, Imperfection
@@ -144,7 +144,7 @@ class Power:
         return np.asarray(position**self.exponent)
 
 
-def build(keys: ImperfectionKeys, place: Place) -> CardImperfection:
+def build(keys: ImperfectionKeys, place: CardPlace) -> CardImperfection:
     """Return the imperfection in SI units."""
     split = None
     if keys.split is not None:
@@ -174,7 +174,7 @@ def _wave(keys: WaveKeys) -> "Field":
     return wave(keys.order, size, np.deg2rad(keys.azimuth_deg), Power(keys.power) if keys.power else None)
 
 
-def _map(keys: MapKeys, place: Place) -> "Field":
+def _map(keys: MapKeys, place: CardPlace) -> "Field":
     from shell.scan.survey import survey_map
     from studies.files.clouds import FaceGrid, read_cloud
 

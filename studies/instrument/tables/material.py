@@ -22,7 +22,7 @@ import msgspec
 
 from studies.errors import InputError, naming
 from studies.instrument.keys import Keys, number
-from studies.instrument.registry import CardTable, Place
+from studies.instrument.registry import CardPlace, CardTable
 
 if TYPE_CHECKING:
     from shell.cubic import Cubic
@@ -133,7 +133,7 @@ class MaterialKeys(Keys, frozen=True, kw_only=True):
             raise ValueError(f"density_kg_m3 = {rho:g}: a solid has {LIGHTEST:g} to {HEAVIEST:g} kg/m³.{hint}")
 
 
-def build_material(keys: MaterialKeys, place: Place) -> "Material":
+def build_material(keys: MaterialKeys, place: CardPlace) -> "Material":
     """Find the law, with the given values at the reference temperature."""
     from shell.materials import constant_material, find_material, read_materials
 

@@ -9,7 +9,7 @@ from studies.instrument.keys import Keys
 from studies.instrument.registry import CardTable
 
 
-class Posterior(Keys, frozen=True, kw_only=True):
+class Correlations(Keys, frozen=True, kw_only=True):
     """Correlations of uncertain values."""
 
     names: tuple[str, ...] = ()
@@ -33,4 +33,4 @@ class Posterior(Keys, frozen=True, kw_only=True):
         }
 
 
-TABLE = CardTable("posterior", Posterior)
+TABLE = CardTable("posterior", Correlations)

@@ -8,7 +8,7 @@ import msgspec
 
 from studies.errors import InputError, naming
 from studies.instrument.keys import Keys, number
-from studies.instrument.registry import CardTable, Place
+from studies.instrument.registry import CardPlace, CardTable
 
 if TYPE_CHECKING:
     from shell.resonator import Resonator, Stem, Support
@@ -189,7 +189,7 @@ class Meridian(Shape, frozen=True, kw_only=True, tag="meridian"):
         return meridian(segments, thickness=self.thickness, support=support)
 
 
-def build_resonator(keys: Shape, place: Place) -> "Resonator":
+def build_resonator(keys: Shape, place: CardPlace) -> "Resonator":
     """Build the resonator; what the geometry does not allow is named with the card."""
     with naming(place.where):
         resonator = keys.build()
