@@ -220,7 +220,7 @@ def fit_frequency(
         raise CompensationError(f"the resolution of the readings must be positive, not {resolution:g} Hz.")
     if not abs(reference_temperature_degC) <= FARTHEST_REFERENCE:
         raise CompensationError(
-            f"a reference temperature of {reference_temperature_degC:g} °C is none; take one near those measured."
+            f"a reference temperature of {reference_temperature_degC:g} °C is impossible; take one near those measured."
         )
     if resolution is not None and f.size and not np.finfo(float).eps * np.max(f) <= resolution < np.max(f):
         raise CompensationError(f"readings of up to {np.max(f):g} Hz cannot have a resolution of {resolution:g} Hz.")

@@ -50,7 +50,7 @@ class SplitReading:
             raise ShellError("a split and its reading error are positive numbers of Hz.")
         if split < 2 * error:
             raise ShellError(
-                f"the split of n = {harmonic}, {1e3 * split:.3g} mHz, is not told from its reading error of {1e3 * error:.3g} mHz: "
+                f"the split of n = {harmonic}, {1e3 * split:.3g} mHz, cannot be distinguished from its reading error of {1e3 * error:.3g} mHz: "
                 "measure better, do not cut."
             )
         return cls(

@@ -117,7 +117,7 @@ def loss_model(
         elif instrument.resonator.stem is not None and parts.anchor_inverse_q is None:
             left_out.append("anchor: --anchor computes what the stem sends into its base.")
     if not causes:
-        raise InputError(f"{instrument.path} [loss]: nothing is known that loses energy. {' '.join(left_out)}")
+        raise InputError(f"{instrument.path} [loss]: it states no loss of energy. {' '.join(left_out)}")
     return LossModel(vibration, tuple(causes), tuple(left_out), tuple(ripples), mode.bryan_factor, mode.frequency)
 
 

@@ -110,7 +110,7 @@ class Calibration(Shown):
     def __repr__(self) -> str:
         told = sum(one.told_by == "data" for one in self.estimates)
         residuals = ", ".join(f"{name} {rung.calibrated:.3g}" for name, rung in self.ladder.items())
-        return f"Calibration({self.card.name}: {told} of {len(self.estimates)} values told by the data; residuals {residuals})"
+        return f"Calibration({self.card.name}: {told} of {len(self.estimates)} values determined by the data; residuals {residuals})"
 
     def to_frame(self) -> "DataFrame":
         """Return one row an uncertain value, best known first: card, value, interval, shift, width, told by."""
@@ -335,7 +335,7 @@ def _rms(values: Array) -> float:
 def _warn(found: CardFit, estimates: Sequence[Estimate], ladder: Mapping[str, Rung]) -> tuple[str, ...]:
     warnings = []
     if not found.converged:
-        warnings.append("the last step of the fit was not small; the values may still move.")
+        warnings.append("the fit has not fully converged; the values may still move.")
     rows = found.problem.rows
     for name, rung in ladder.items():
         usual = _usual_mean(found, name)
@@ -348,7 +348,7 @@ def _warn(found: CardFit, estimates: Sequence[Estimate], ladder: Mapping[str, Ru
     for name, count in found.outliers.items():
         if count:
             warnings.append(
-                f"{count} {'block' if count == 1 else 'blocks'} of {name} stood out of the noise and counted less."
+                f"{count} {'block' if count == 1 else 'blocks'} of {name} stood out of the noise and were given less weight."
             )
     stayed = [one.parameter for one in estimates if one.width >= SILENT]
     told = sum(rows[name].count for name in rows)

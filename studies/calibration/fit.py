@@ -84,7 +84,7 @@ def fit(problem: CardProblem, start: Array | None = None, progress: Progress = l
         A = J.T @ J
         move: Array = np.asarray(np.linalg.solve(A + np.eye(len(A)), J.T @ r - state.point))
         size = float(move @ (J.T @ r - state.point))
-        progress(f"step {step}: −2 ln L is to fall by {size:.2g}")
+        progress(f"step {step}: −2 ln L should fall by {size:.2g}")
         if size < CLOSE and step > 3:
             converged = True
             break

@@ -29,7 +29,10 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "loop": ("studies.cli.loop:loop", "The loops of a card: margins, bias and noise by source, start-up, runs."),
     "thermal": ("studies.cli.thermal:thermal", "Temperatures of the heat path for a chamber profile."),
     "fit frequency": ("studies.cli.fit_frequency:fit_frequency", "f(T) and its inverse from a steady-state table."),
-    "fit bias": ("studies.cli.fit_bias:fit_bias", "Bias over frequency and its rate, selected stepwise."),
+    "fit bias": (
+        "studies.cli.fit_bias:fit_bias",
+        "Bias over frequency or temperature and its rate, selected stepwise.",
+    ),
     "fit thermal": ("studies.cli.fit_thermal:fit_thermal", "Lags of the resonator behind its housing, from records."),
     "fit cross-damping": ("studies.cli.fit_cross_damping:fit_cross_damping", "Cross-damping bias over temperature."),
     "fit whole-angle": (
@@ -42,7 +45,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "derive": ("studies.cli.derive:derive", "The symbolic derivation, as equations, LaTeX or code."),
     "render": ("studies.cli.render:render", "A mode shape as picture, animation, page or mesh."),
     "mesh": ("studies.cli.mesh:mesh", "The solid as a quadratic mesh for a finite-element program."),
-    "scan": ("studies.cli.scan:scan", "Measured faces to wall maps, waves around and splits."),
+    "scan": ("studies.cli.scan:scan", "Measured faces to wall maps, harmonics and splits."),
     "trim": ("studies.cli.trim:trim", "Measured splits to a plan of cuts."),
     "electrodes": (
         "studies.cli.electrodes:electrodes",

@@ -31,7 +31,7 @@ def calibrate(
 
     Every number of the card that is uncertain may move, within its prior: {{ value = …, relative_sd = … }} in the card, or the
     documented uncertainty of its key (hrg cards CARD lists them). The noise of every response, the initial temperatures and
-    the offsets of the runs are estimated beside them. Frequency, bias and 1/Q are driven by the measured housing where there
+    the offsets of the runs are estimated at the same time. Frequency, bias and 1/Q are driven by the measured housing where there
     is one; with a chamber column the housing is explained too.
 
     Parameters

@@ -49,7 +49,7 @@ def compare(*card: str) -> Answer:
         ]
         print_table("Where the cards differ", ["Key", *names], differing)
     else:
-        print("The cards say the same.")
+        print("The cards are the same.")
 
 
 def _with_uncertainty(value: float, uncertainty: float) -> str:

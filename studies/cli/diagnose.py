@@ -17,7 +17,7 @@ def diagnose(
     device: list[str] | None = None,
     fleet: str | None = None,
 ) -> Answer:
-    """Name the physical effect that a campaign shows and the simulation lacks, or say that it cannot be told.
+    """Name the physical effect that a campaign shows and the simulation lacks, or say that the data cannot decide.
 
     Give the records of one gyro (several runs are better than one), or a steady-state table.
 
@@ -42,7 +42,7 @@ def diagnose(
         Of the draws.
     device : list[str]
         A device of a fleet and its records, such as A=a1.csv,a2.csv; once for each device of one design: what they share,
-        and which of them is not like the others.
+        and which of them is the odd one out.
     fleet : str
         The same as a file (TOML): a table [devices] with lines such as A = ["a1.csv", "a2.csv"], beside the records.
     """

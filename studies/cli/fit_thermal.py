@@ -5,7 +5,6 @@ With --json one object, schema `hrg.fit-thermal/1`: `data`, `confidence`, `estim
 `initial_departure_K` per run, `residual_rms_Hz`, `row_step_s` of the averaged rows, `warnings`.
 """
 
-import math
 from typing import TYPE_CHECKING, Any
 
 from studies.cli.output import Answer, answers
@@ -18,10 +17,10 @@ UNITS = {"offset": "Hz", "slope": "Hz/K", "curvature": "Hz/K²", "cubic": "Hz/K�
 
 @answers("hrg.fit-thermal/1")
 def fit_thermal(*data: str, card: str | None = None, lags: int | None = None, confidence: float = 0.9) -> Answer:
-    """Identify how the resonator lags behind its housing, with intervals, and say what the records cannot tell.
+    """Identify how the resonator lags behind its housing, with intervals, and say what the records do not determine.
 
     The records need time_s, frequency_Hz and housing_temperature_degC (or chamber_temperature_degC). The initial state of
-    every run is unknown and fitted; the noise may wander. The lags are in series, and radiation makes a share of their
+    every run is unknown and fitted; the noise may drift. The lags are in series, and radiation makes a share of their
     conductance at 20 °C. Intervals hold for a gyro that is such a chain; a residual above the noise says that it is not.
 
     Parameters
@@ -41,6 +40,7 @@ def fit_thermal(*data: str, card: str | None = None, lags: int | None = None, co
     from studies.errors import InputError
     from studies.instrument.card import load_card
     from studies.record import read_record
+    from studies.reports.digits import to_interval
 
     if not data:
         raise InputError("name at least one record (CSV) with a step, a ramp or a cycle of temperature.")
@@ -65,18 +65,11 @@ def fit_thermal(*data: str, card: str | None = None, lags: int | None = None, co
         if estimate.value is None:
             rows.append([name, "not determined", "", "", unit])
         else:
-            rows.append([name, *_to_its_digits(estimate.value, estimate.low, estimate.high), unit])
+            rows.append([name, *to_interval(estimate.value, estimate.low, estimate.high), unit])
     note = f"Intervals of {100 * confidence:g} %; rows of {found.row_step:g} s; residual {found.residual.std():.2g} Hz."
     print_table("Thermal constants", ["constant", "value", "low", "high", "unit"], rows, note)
     for direction in found.undetermined:
-        print(f"the records leave this combination open: {direction}")
-
-
-def _to_its_digits(value: float, low: float, high: float) -> list[str]:
-    """Write a value and its interval to the second digit of the interval's width."""
-    width = high - low
-    digits = max(1 - math.floor(math.log10(width)), 0) if math.isfinite(width) and width > 0 else 6
-    return [f"{x:.{digits}f}" for x in (value, low, high)]
+        print(f"the records do not determine this combination: {direction}")
 
 
 def _payload(found: "Identification", data: list[str]) -> "dict[str, Any]":

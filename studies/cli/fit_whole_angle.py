@@ -134,7 +134,7 @@ def fit_whole_angle(
         "Whole-angle run", ["key of the card", "value", "low", "high"], rows, f"Intervals of {100 * confidence:g} %."
     )
     for sentence in found.undetermined:
-        print(f"not told: {sentence}")
+        print(f"not determined: {sentence}")
 
 
 KEYS_OF_CARD = tuple(key for key, _ in KEYS.values() if key != "bias.offset_deg_per_h")

@@ -94,7 +94,7 @@ def mesh(
         f"{out}: {len(found.nodes):,} nodes, {len(found.hexahedra):,} hexahedra, {len(found.wedges):,} wedges, "
         f"{len(found.held):,} nodes held. The solid has {1e9 * exact.volume:.6g} mm³ and {1e3 * exact.mass:.5g} g."
         + (
-            " The [imperfection] of the card is not in it."
+            " The mesh leaves out the card's [imperfection]."
             if instrument.part("imperfection").fields is not None
             else ""
         )

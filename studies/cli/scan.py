@@ -36,12 +36,12 @@ def scan(
     report: str | None = None,
     save: str | None = None,
 ) -> Answer:
-    """Turn measured points of one or both faces into wall and offset maps, waves around, and frequency splits with intervals.
+    """Turn measured points of one or both faces into wall and offset maps, circumferential harmonics, and frequency splits with intervals.
 
     Points are x y z text (comments behind #), .ply or .stl; or a table over position and azimuth: first line
     "position,0,5,10,…" with azimuths in degrees, then a line per position (0 ... 1 of the meridian) with how far the face
     stands out of the material in µm. Each face is brought onto the card's resonator; gaps and outliers are allowed.
-    A shift of a sphere against another is no wave of the wall unless both share one frame (--frames common).
+    A shift of one sphere against the other is no harmonic of the wall unless both share one frame (--frames common).
 
     Parameters
     ----------
@@ -58,7 +58,7 @@ def scan(
     harmonic : tuple[int, ...]
         Harmonics n whose splits are wanted.
     highest : int
-        Highest wave around that is fitted, at least twice the highest n.
+        Highest circumferential harmonic that is fitted, at least twice the highest n.
     temperature : float
         Temperature in °C; the card's reference temperature unless given.
     theory : str
@@ -66,7 +66,7 @@ def scan(
     map_file : str
         CSV to write: position, azimuth and the departures of faces, wall and middle surface.
     report : str
-        Page to write: unwrapped maps, waves, roundness, splits.
+        Page to write: unwrapped maps, harmonics, roundness, splits.
     save : str
         Card to write: this one with the fitted faces as its imperfection, in tables beside it.
     """
@@ -121,8 +121,8 @@ def scan(
             ]
             for entry in payload["splits"]
         ],
-        "First order feels wave 2n alone; every order adds what two waves do together."
-        + (" One face: the other is taken as perfect." if len(files) == 1 else ""),
+        "First order: harmonic 2n alone; every order: with the products of two harmonics."
+        + (" One face: the other is assumed perfect." if len(files) == 1 else ""),
     )
     print_table(
         "Faces",
@@ -142,7 +142,7 @@ def scan(
     quantity = "wall" if len(files) == 2 else next(iter(files))
     rim = max(w.position for w in found.waves)
     print_table(
-        f"Waves of the {quantity} at position {rim:.3f} (µm)",
+        f"Circumferential harmonics of the {quantity} at position {rim:.3f} (µm)",
         ["wave", "amplitude", "90 %", "crest at (°)"],
         [
             [str(w.order), f"{1e6 * w.amplitude.value:.3f}", f"{1e6 * w.amplitude.low:.3f} … {1e6 * w.amplitude.high:.3f}",

@@ -77,7 +77,7 @@ def run(
         print(_estimate_words(estimate))
         return 0
     if out is None:
-        raise InputError("--out is missing: name the folder that shall keep the study.")
+        raise InputError("--out is missing: name the folder for the study.")
     for problem in find_invalid(read_study(spec, card)):
         say(f"note: {problem} Such designs fail; the others are computed.")
     try:

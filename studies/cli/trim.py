@@ -47,7 +47,7 @@ def trim(
 ) -> Answer:
     """Plan the cuts that null measured splits with the least mass, keep the balance, and do not overshoot.
 
-    Cut the first round, measure, and plan again with the new splits; the later rounds are what is expected. What material does
+    Cut the first round, measure, and plan again with the new splits; the later rounds are predictions. What material does
     depends on how it is taken: off the edge of the rim or a face it brings its strain energy, a tooth hardly any.
 
     Parameters
@@ -187,18 +187,20 @@ def trim(
 
 def measure_between(plan: "TrimPlan") -> list[str]:
     """What to measure between the rounds, and what to make of it."""
+    from studies.reports.digits import to_error
+
     found = []
     for k, one in enumerate(plan.rounds[:-1], 1):
         for state in one.after:
             spread = state.error * state.frequency
             found.append(
-                f"After round {k} measure the split of n = {state.harmonic} to ± {1e3 * min(plan.goal / 4, max(spread / 5, plan.goal / 10)):.2g} mHz and its axis: "
-                f"{1e3 * state.hertz:.3g} ± {1e3 * spread:.2g} mHz are expected. Outside twice that, give --gain, the measured over the "
-                "predicted change."
+                f"After round {k} measure the split of n = {state.harmonic} to ± {1e3 * min(plan.goal / 4, max(spread / 5, plan.goal / 10)):.2g} mHz, and its axis. "
+                f"Expected: {' ± '.join(to_error(1e3 * state.hertz, 1e3 * spread))} mHz. If it lies outside twice that, plan the next "
+                "round with `--gain`, the measured over the predicted change."
             )
     if plan.rounds:
         found.append(
-            "Let the shell come back to its temperature before each reading, and read the same mode on the same electrodes."
+            "Let the shell return to its temperature before each reading, and read the same mode on the same electrodes."
         )
     return found
 
@@ -244,7 +246,9 @@ def _from_scan(path: str, harmonic: tuple[int, ...]) -> list[tuple[int, float, f
         try:
             axis, size = entries[n]["slow_axis_deg"], entries[n]["split_Hz"]
             if axis is None:
-                raise InputError(f"{path}: the split of n = {n} is not told from 0: measure better, do not cut.")
+                raise InputError(
+                    f"{path}: the split of n = {n} cannot be distinguished from 0: measure better, do not cut."
+                )
             numbers = [size["value"], axis["value"], size["low"], size["high"]]
         except (KeyError, TypeError):
             raise refused from None

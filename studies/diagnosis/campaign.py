@@ -107,7 +107,7 @@ def load_campaign(records: Sequence[Record], reference_degC: float | None = None
     responses, skipped = _usable_responses(records, tables)
     offsets, timed = place_in_time(records)
     if not timed and len(records) > 1:
-        notes.append("the records do not all say when they start: taken one after the other, gaps unknown.")
+        notes.append("not every record says when it starts: they are taken one after the other, with unknown gaps.")
     spans = [float(table["time_s"][-1] - table["time_s"][0]) for table in tables]
     sampling = max(float(np.median(np.diff(table["time_s"]))) if table["time_s"].size > 1 else 1.0 for table in tables)
     # whole rows to a bin: the mean of rows is then compared with the mean of the model at the same moments

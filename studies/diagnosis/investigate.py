@@ -29,6 +29,8 @@ FAR = 2.0
 """Prior standard deviations beyond which a value of the card is wrong."""
 FORETOLD = 0.95
 """Part of the rows below which it is said that held-out residuals are not about all."""
+WORSE = 3.0
+"""Held-out over training residual from which on the other runs are said not to determine a run."""
 NARROW_RANGE = 1.0
 """Kelvin below which a temperature does not vary."""
 Progress = Callable[[str], None]
@@ -175,12 +177,20 @@ def _result(
     named = bool(mine) or any(cause.kind == "value" and cause.response == column for cause in causes)
     verdict, remarks = _judge(campaign, inquiry, mine, share, named)
     reached = extended or base
+    beyond = reached.held_out_rms
+    if verdict == "adequate" and beyond is not None and beyond > WORSE * reached.residual_rms:
+        response = inquiry.problem.response
+        remarks.append(
+            f"the values that the other runs give predict a run to {beyond * response.scale:.3g} "
+            f"{response.shown} only: they are not determined without it"
+        )
     if reached.foretold < FORETOLD and reached.held_out_rms is not None:
         remarks.append(
             f"held-out residuals are of {100 * reached.foretold:.0f} % of the rows: the others lie at temperatures that the "
             "rest of the record does not cover"
         )
-    white = float(np.sqrt(final.solved.variance * inquiry.problem.noise.rows))
+    noise = inquiry.problem.noise
+    white = float(np.sqrt(final.solved.variance * (noise.rows + noise.floor)))
     wander = final.wander
     return ResponseResult(
         verdict,
@@ -209,8 +219,8 @@ def _judge(
     patched = bool(mine) and max(cause.probability for cause in mine) < CONSTANTS["believed"]
     if left.wander and clean:
         return "not-identifiable", [
-            f"what is left wanders by {final.wander_ratio:.0f} times the white noise of a row: noise of that kind or a cause "
-            "that acts slowly, this record cannot tell"
+            f"the residual drifts by {final.wander_ratio:.0f} times the white noise of a row: this record cannot distinguish "
+            "slow noise from a cause that acts slowly"
         ]
     if left.significant and (share is None or not clean or patched):
         return "unexplained", []
@@ -228,9 +238,9 @@ def _judge(
     if not response.own_offset and apart > CONSTANTS["wander_usual"] * np.hypot(final.wander, white):
         text = (
             f"the runs lie {apart * response.scale:.3g} {response.shown} (rms) apart, {apart / max(final.wander, white):.0f} "
-            "times what is left within them: ageing, a clock, handling, or a wander between them"
+            "times the residual within them: ageing, a clock, handling, or drift between runs"
         )
-        starts = "" if campaign.timed else "; start times ('# start' in the records) would tell which"
+        starts = "" if campaign.timed else "; start times ('# start' in the records) would show which"
         return "not-identifiable", [text + starts]
     return "adequate", []
 

@@ -274,14 +274,13 @@ def without_rate_terms(campaign: Campaign, baseline: Simulated) -> Campaign:
 
 
 def as_shipped(campaign: Campaign, baseline: Simulated) -> dict[str, float]:
-    """Return what the card as shipped leaves of every response, rms on the grid; of a bias about the mean of each run."""
+    """Return what the card as shipped leaves of every response, rms on the records' rows; of a bias about each run's mean."""
     parts: dict[str, list[FloatArray]] = {column: [] for column in campaign.responses}
     for k, run in enumerate(campaign.runs):
         drive, time = baseline.drive(k)
         found = predict(baseline.card, drive, (), baseline.law)
         for column, own in parts.items():
-            predicted = average(np.interp(run.states.time, time, found.columns[column]), campaign.group)
-            rest = run.responses[column] - predicted
+            rest = run.row_responses[column] - np.interp(run.row_time, time, found.columns[column])
             own.append(rest - np.nanmean(rest) if RESPONSES[column].own_offset else rest)
     return {column: float(np.sqrt(np.nanmean(np.concatenate(own) ** 2))) for column, own in parts.items()}
 

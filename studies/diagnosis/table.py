@@ -155,7 +155,7 @@ def study_steady_table(
         state = "not-identifiable" if wanders else "adequate"
         if wanders:
             sentences.append(
-                f"The rows wander: {base_rms:.3g} Hz rms is left where neighbouring rows agree to {white:.2g} Hz. A drift"
+                f"The rows drift: the residual is {base_rms:.3g} Hz rms where neighbouring rows agree to {white:.2g} Hz. A drift"
                 " between the rows and a slow effect of temperature look alike in one table."
             )
         result = ResponseResult(state, base_rms, (base_rms, base_loo), None, "structure" if wanders else "none")

@@ -6,9 +6,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from studies.reports import style
+from studies.reports.digits import plain, to_interval
 from studies.reports.page import Block, Chapter, Facts, Picture, Table, Text, draw, render_page
 
 if TYPE_CHECKING:
+    from compensation.stability import AllanDeviation
     from studies.acceptance.judgement import Acceptance, JudgedQuantity
     from studies.record import Record
 
@@ -37,8 +39,7 @@ def quantities_table(found: "Acceptance") -> Table:
         [
             line.quantity.section,
             line.quantity.words,
-            f"{line.measured.value:.4g}",
-            _interval(line),
+            *_to_digits(line),
             line.quantity.unit.replace("deg", "°"),
             "" if line.limit is None else f"{'≤' if line.quantity.upper else '≥'} {line.limit:g}",
             line.verdict,
@@ -46,7 +47,7 @@ def quantities_table(found: "Acceptance") -> Table:
         for line in found.lines
         if line.measured is not None
     ]
-    note = "A limit is met, or not, where the whole interval is; of an upper limit the size of the value counts."
+    note = "A limit is met, or not met, if the whole interval is; an upper limit applies to the magnitude of the value."
     if found.band is not None:
         note += f" Warm-up: into ±{found.band:.3g} °/h about the final output."
     return Table(
@@ -57,15 +58,14 @@ def quantities_table(found: "Acceptance") -> Table:
     )
 
 
-def _interval(line: "JudgedQuantity") -> str:
+def _to_digits(line: "JudgedQuantity") -> list[str]:
+    """Return the value and its interval, where it has one."""
     assert line.measured is not None
-    low, high = line.measured.low, line.measured.high
+    value, low, high = line.measured.value, line.measured.low, line.measured.high
     if low is None or high is None:
-        return ""
-    # as many digits as tell the ends apart
-    spread = max(high - low, 1e-12 * abs(high))
-    digits = min(max(4, int(np.ceil(np.log10(max(abs(low), abs(high), spread) / spread))) + 2), 12)
-    return f"{low:.{digits}g} … {high:.{digits}g}"
+        return [plain(value, 4), ""]
+    value_words, low_words, high_words = to_interval(value, low, high)
+    return [value_words, f"{low_words} … {high_words}"]
 
 
 def _facts(found: "Acceptance") -> Facts:
@@ -73,6 +73,16 @@ def _facts(found: "Acceptance") -> Facts:
     counts = {kind: sum(line.verdict == kind for line in judged) for kind in ("pass", "fail", "undecided", "missing")}
     failed = ", ".join(line.quantity.words for line in judged if line.verdict == "fail")
     open_ = ", ".join(line.quantity.words for line in judged if line.verdict in ("undecided", "missing"))
+    if not judged:
+        none = "give them with `--limits FILE.toml`"
+        measured = sum(line.measured is not None for line in found.lines)
+        return Facts(
+            [
+                ("Verdict", found.verdict, "no limit was given"),
+                ("Limits", "none", none),
+                ("Measured", f"{measured} of {len(found.lines)}", "quantities; what the others need stands below"),
+            ]
+        )
     return Facts(
         [
             ("Verdict", found.verdict, WORDS[found.verdict]),
@@ -90,7 +100,7 @@ def _drift(found: "Acceptance") -> list[Block]:
     text = (
         f"Angle random walk {noise.N / 60:.3g} °/√h, bias instability {found.allan.bias_instability[0]:.3g} °/h (lowest"
         f" point over 0.664), rate random walk {noise.K * 60:.3g} °/h/√h. Misfit {noise.misfit:.2g}: about 1 where these"
-        " three kinds of noise explain the curve."
+        f" three kinds of noise explain the curve{_from(found.allan)}."
     )
     return [_allan_figure(found), Text(text)]
 
@@ -104,7 +114,7 @@ def _allan_figure(found: "Acceptance") -> Picture:
         axes.loglog(
             allan.tau, allan.deviation, "o-", color=style.BLUE, markersize=3, label="overlapping Allan deviation"
         )
-        tau = np.geomspace(allan.tau[0], allan.tau[-1], 100)
+        tau = np.geomspace(allan.tau[_first(allan)], allan.tau[-1], 100)
         axes.loglog(tau, noise.deviation(tau), "--", color=style.VERMILION, label="fit N, B, K")
         axes.set_xlabel("averaging time τ (s)")
         axes.set_ylabel("Allan deviation (°/h)")
@@ -112,6 +122,16 @@ def _allan_figure(found: "Acceptance") -> Picture:
     return draw(
         made, "Allan deviation of the longest drift record.", "Allan deviation over averaging time, both logarithmic."
     )
+
+
+def _first(allan: "AllanDeviation") -> int:
+    """Return the first averaging time at which noise of the angle does not rule: from there on N, B and K are fitted."""
+    return next((k for k, kind in enumerate(allan.noise) if kind != "phase"), 0)
+
+
+def _from(allan: "AllanDeviation") -> str:
+    first = _first(allan)
+    return f" from {plain(float(allan.tau[first]))} s on; below, noise of the angle rules" if first else ""
 
 
 def _missing(found: "Acceptance") -> Table:
@@ -122,7 +142,7 @@ def _missing(found: "Acceptance") -> Table:
     ]
     rows += [[section, test, "no", needs] for section, test, needs in found.elsewhere]
     rows.sort(key=lambda row: float(row[0].split("–")[0].split(".")[1]))
-    return Table("Not judged", ["Section", "Quantity or test", "Has a limit", "What would give it"], rows)
+    return Table("Not judged", ["Section", "Quantity or test", "Has a limit", "What it needs"], rows)
 
 
 def _records(found: "Acceptance", records: "Sequence[Record]") -> Table:

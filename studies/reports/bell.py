@@ -8,6 +8,7 @@ import numpy as np
 from scipy.constants import zero_Celsius
 
 from studies.reports import style
+from studies.reports.digits import to_error
 from studies.reports.page import Block, Chapter, Facts, Picture, Table, Text, draw, render_page
 
 if TYPE_CHECKING:
@@ -104,10 +105,9 @@ def steps_table(figures: "Sequence[StepFigures]", caption: str) -> Table:
     shown = [(name, cell) for name, cell in kinds if any(cell(f) for f in figures)]
     columns = [name for name, _ in shown]
     rows = [[cell(f) for _, cell in shown] for f in figures]
-    note = (
-        "σ: standard deviation over the temperature run. Bias instability: lowest Allan deviation over 0.664. A filter lowers the random"
-        " walk read at 1 s; at 100 s it cannot."
-    )
+    note = "σ: standard deviation over the temperature run."
+    if any("instability" in name for name, _ in shown):
+        note += " Bias instability: lowest Allan deviation over 0.664. A filter lowers the random walk read at 1 s; at 100 s it cannot."
     return Table(caption, columns, rows, note)
 
 
@@ -116,19 +116,19 @@ def coefficients_table(chain: "BellChain", output: str) -> Table:
     raw = "counts" if output == "output_counts" else "°/s"
     errors = np.sqrt(np.diag(chain.rough_covariance))
     rows = [
-        ["rough (33)", "null", f"{chain.null:.6g}", f"{errors[0]:.1e}", raw],
-        ["rough (33)", "scale", f"{chain.scale / DEG:.6g}", f"{errors[1] / DEG:.1e}", f"°/s per {raw}"],
+        ["rough (33)", "null", *to_error(chain.null, errors[0]), raw],
+        ["rough (33)", "scale", *to_error(chain.scale / DEG, errors[1] / DEG), f"°/s per {raw}"],
     ]
     curves: list[tuple[str, PolynomialCurve, float, float, tuple[str, ...]]] = [
-        ("bias (34)", chain.bias, 1.0, 0.0, ("°/s", "°/s/°C", "°/s/°C²")),
-        ("scale over rate (35)", chain.scale_over_rate, 1.0, 1.0, ("°/s", "ratio", "s/°")),
-        ("scale over temperature (36)", chain.scale_over_temperature, 0.0, 0.0, ("ratio", "per °C", "per °C²")),
+        ("bias (34)", chain.bias, 1.0, 0.0, ("°/s", "°/s per °C", "°/s per °C²")),
+        ("scale over rate (35)", chain.scale_over_rate, 1.0, 1.0, ("°/s", "1", "s/°")),
+        ("scale over temperature (36)", chain.scale_over_temperature, 0.0, 0.0, ("1", "1/°C", "1/°C²")),
     ]
     for name, curve, y, x, units in curves:
         size = DEG ** (x * np.arange(len(curve.coefficients)) - y)
         spread = size * np.sqrt(np.diag(curve.covariance))
         for i, (value, error) in enumerate(zip(size * curve.coefficients, spread, strict=True)):
-            rows.append([name, f"c{i}", f"{value:.6g}", f"{error:.1e}", units[i] if i < len(units) else ""])
+            rows.append([name, f"c{i}", *to_error(value, error), units[i] if i < len(units) else ""])
     note = (
         "Each step is fitted to what the steps before it deliver, and its errors hold given those. Temperature from 0 °C. The errors"
         " allow for white noise plus a random walk."

@@ -100,7 +100,7 @@ def theory_chapters(theory: BellTheory, reading: LoopReading) -> list[Chapter]:
                         "",
                         "Printed, as far as the copy shows it",
                         "Ours (U, V, W as (19) reads)",
-                        "What stands between them",
+                        "How they differ",
                     ],
                     [list(row) for row in COEFFICIENTS],
                     "U along the meridian, V around, W along the normal, the parity of (16) mended; ε, κ, γ the strains (5), (6) of the pattern."

@@ -7,11 +7,13 @@ import numpy as np
 
 from compensation.bias import SELECTED_BY_THE_PAPER, TERMS
 from compensation.stability import FLAT
-from studies.models.kinds.bias import OUTPUTS, unit_of_term
+from studies.models.kinds.bias import OUTPUTS
 from studies.reports import style
+from studies.reports.digits import plain, raised, to_error
 from studies.reports.page import Block, Chapter, Facts, Picture, Table, Text, draw, render_page
 
 if TYPE_CHECKING:
+    from compensation.bias import Variable
     from compensation.memory import Memory
     from studies.bias import BiasStudy, Judged, Stability
 
@@ -58,8 +60,8 @@ PATH_NOTE = (
     " the competing candidates. A term enters only after the lower-order terms that it contains. BIC compares steps of one path."
 )
 WHERE_READ = (
-    "N is read where the curve falls like τ^(−1/2) and is by definition its value at τ = 1 s on that line; K where it rises like"
-    f" τ^(+1/2), at τ = 3 s on that line; B is the flat part over {FLAT:.3f}. All three are fitted to the whole curve, so none"
+    "N is read where the curve falls like 1/√τ and is by definition its value at τ = 1 s on that line; K where it rises like"
+    f" √τ, at τ = 3 s on that line; B is the flat part over {FLAT:.3f}. All three are fitted to the whole curve, so none"
     " depends on a single point."
 )
 
@@ -151,23 +153,25 @@ def coefficients_table(judged: "Judged", output: str) -> Table:
         ("constant", *fit.terms), fit.coefficients, fit.standard_errors, fit.naive_errors, strict=True
     ):
         number = list(TERMS).index(name) + 1 if name in TERMS else 0
+        factor, words = _coefficient_unit(unit, name, fit.variable)
         printed = "" if name == "constant" else ("yes" if name in SELECTED_BY_THE_PAPER else "no")
         rows.append(
             [
                 f"k{number}" if number else ("B0" if name == "constant" else ""),
                 "constant" if name == "constant" else _symbol(name, fit.variable.symbol),
-                f"{value:.5g}",
-                f"{error:.2g}",
-                f"{naive:.2g}",
-                unit_of_term(unit, name, fit.variable).replace("*", "·"),
+                *to_error(factor * value, factor * error),
+                plain(factor * naive, 2),
+                words,
                 printed,
             ]
         )
-    columns = ["", "Term", "Value", "Standard error", "if rows were independent", "Unit", "in eq. (22)"]
+    columns = ["", "Term", "Value", "Standard error", "If rows were independent", "Unit", "In eq. (22)"]
     low, high = fit.state_range
     unit = fit.variable.unit
+    per, words = (60.0, "K/min") if unit == "°C" else (1.0, f"{unit}/s")
+    slow, fast = (plain(per * end) for end in fit.rate_range)
     note = (
-        f"Valid from {low:.4f} to {high:.4f} {unit} and from {fit.rate_range[0]:.2e} to {fit.rate_range[1]:.2e} {unit}/s."
+        f"Valid from {plain(low, 8)} to {plain(high, 8)} {unit} and from {slow} to {fast} {words}."
         f" The noise is autocorrelated with θ = {fit.theta:.3f} (1: white, 0: random walk)."
     )
     if judged.method == "guarded" and fit.theta < 0.99:
@@ -229,7 +233,7 @@ def noise_table(study: "BiasStudy") -> Table:
         ]
         return [label, *cells, f"{flat:.3g} ({low:.3g}…{high:.3g})", f"{noise.misfit:.1f}"]
 
-    columns = ["", f"N ({n_unit})", f"B ({unit})", f"K ({k_unit})", f"lowest point / 0.664 ({unit})", "Misfit"]
+    columns = ["", f"N ({n_unit})", f"B ({unit})", f"K ({k_unit})", f"Lowest point / 0.664 ({unit})", "Misfit"]
     note = (
         f"Longest run, samples of {study.allan_step:g} s. A misfit well above 1 says that more than white noise, flicker and random"
         " walk is there, such as drift with temperature; the uncertainties are widened by it."
@@ -310,4 +314,15 @@ def _probability(p: float) -> str:
 
 
 def _measured(value: float, uncertainty: float) -> str:
-    return f"{value:.3g} ± {uncertainty:.1g}" if value > 0 else f"not seen (< {2 * uncertainty:.1g})"
+    return " ± ".join(to_error(value, uncertainty)) if value > 0 else f"not seen (< {plain(2 * uncertainty, 1)})"
+
+
+def _coefficient_unit(output: str, term: str, variable: "Variable") -> tuple[float, str]:
+    """Return the unit of a coefficient for people, and what its value is multiplied by: a rate of temperature is in K/min."""
+    state, rate = TERMS.get(term, (1, 0)) if term != "constant" else (0, 0)
+    over = "K" if variable.unit == "°C" else variable.unit
+    timed = ("K/min", 60.0) if over == "K" else (f"{over}/s", 1.0)
+    powers = [over + raised(state) * (state > 1)] * (state > 0)
+    if rate:
+        powers.append(timed[0] if rate == 1 and not state else f"({timed[0]})" + raised(rate) * (rate > 1))
+    return timed[1] ** -rate, output + (f" per {' '.join(powers)}" if powers else "")

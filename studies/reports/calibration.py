@@ -6,9 +6,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.constants import zero_Celsius
 
-from studies.calibration.calibrate import UNITS, Calibration
+from studies.calibration.calibrate import Calibration
 from studies.calibration.observed import HOUSING, SETTLED
 from studies.reports import style
+from studies.reports.digits import plain, to_interval
 from studies.reports.page import Block, Chapter, Facts, Picture, Table, Text, draw, render_page
 
 if TYPE_CHECKING:
@@ -21,6 +22,14 @@ NAMES = {
     HOUSING: "Housing temperature",
     SETTLED: "Settled frequency",
 }
+SHOWN = {
+    "frequency_Hz": ("mHz", 1e3),
+    "bias_deg_per_h": ("°/h", 1.0),
+    "inverse_q": ("ppb", 1e9),
+    HOUSING: ("mK", 1e3),
+    SETTLED: ("mHz", 1e3),
+}
+"""Unit in which small numbers of a response are shown, and how many of it make one."""
 TOLD = {"data": "the data", "prior": "the prior", "both": "both"}
 
 
@@ -29,9 +38,9 @@ def calibration_page(found: Calibration, data: Sequence[str]) -> str:
     moved = sum(abs(one.shift_sd) > 2 for one in found.estimates)
     lead = (
         f"The card {found.card.name} against {len(data)} {'file' if len(data) == 1 else 'files'} ({', '.join(data)}): the most probable of its"
-        f" {len(found.estimates)} uncertain values, in noise that was estimated beside them."
-        f" {sum(one.told_by == 'data' for one in found.estimates)} are told by the data,"
-        f" {sum(one.told_by == 'prior' for one in found.estimates)} stayed at their prior; {moved} moved by more than two"
+        f" {len(found.estimates)} uncertain values, with the noise estimated at the same time."
+        f" {sum(one.told_by == 'data' for one in found.estimates)} are determined by the data,"
+        f" {sum(one.told_by == 'prior' for one in found.estimates)} stayed at their prior; {moved or 'none'} moved by more than two"
         " prior standard deviations."
     )
     blocks: list[Block] = [
@@ -42,8 +51,8 @@ def calibration_page(found: Calibration, data: Sequence[str]) -> str:
     held = held_out_table(found)
     chapters = [
         Chapter("From the card to the noise", [*blocks, _ladder_figure(found), *([held] if held is not None else [])]),
-        Chapter("Values", [values_table(found), *(Text(s) for s in separation_sentences(found)), _shift_figure(found)]),
-        Chapter("What is left over", [_residual_figure(found), noise_table(found)]),
+        Chapter("Values", [values_table(found), *_inseparable(found), _shift_figure(found)]),
+        Chapter("Residuals over time, and noise", [_residual_figure(found), noise_table(found)]),
     ]
     return render_page("Calibration", lead, chapters)
 
@@ -51,9 +60,9 @@ def calibration_page(found: Calibration, data: Sequence[str]) -> str:
 def _facts(found: Calibration) -> Facts:
     rows = []
     for name, rung in found.ladder.items():
-        unit = UNITS[name] if UNITS[name] != "1" else ""
-        remark = f"{rung.as_shipped:.3g} {unit} as shipped; noise {rung.noise:.3g} {unit}"
-        rows.append((f"{NAMES[name]}, residual", f"{rung.calibrated:.3g} {unit}", remark))
+        unit, scale = SHOWN[name]
+        remark = f"{plain(scale * rung.as_shipped)} {unit} as shipped; noise {plain(scale * rung.noise)} {unit}"
+        rows.append((f"{NAMES[name]}, residual", f"{plain(scale * rung.calibrated)} {unit}", remark))
     return Facts(rows)
 
 
@@ -64,7 +73,7 @@ def values_table(found: Calibration, touched: bool = False) -> Table:
     rows = [_value_row(one) for one in sorted(kept, key=lambda one: one.width)]
     note = (
         "* follows the curvature of the likelihood. Shift: move in prior standard deviations. Width: posterior over"
-        " prior standard deviation; up to 0.5 the data tells the value, from 0.95 it stayed at its prior."
+        " prior standard deviation; up to 0.5 the data determine the value, from 0.95 it stayed at its prior."
     )
     if silent:
         more = (
@@ -73,20 +82,22 @@ def values_table(found: Calibration, touched: bool = False) -> Table:
             else f"{len(silent)} more values are as the card has them"
         )
         note += f" {more}: nothing in these data depends on {'it' if len(silent) == 1 else 'them'}."
-    columns = ["Value", "Unit", "Card", "Calibrated", "90 % interval", "Shift", "Width", "Told by"]
+    columns = ["Value", "Unit", "Card", "Calibrated", "90 % interval", "Shift", "Width", "Determined by"]
     return Table("Values, best known first", columns, rows, note, sortable=True)
 
 
 def _value_row(one: "Estimate") -> list[str]:
     bound = f", at its {one.bound} bound" if one.bound else ""
     star = " *" if one.interval == "profile" else ""
+    value, low, high = to_interval(one.value, one.low, one.high)
+    shift = f"{one.shift_sd:+.2f}"
     return [
         one.parameter,
         one.unit,
-        f"{one.card:.5g}",
-        f"{one.value:.5g}",
-        f"{one.low:.5g} … {one.high:.5g}{star}",
-        f"{one.shift_sd:+.2f}",
+        plain(one.card, 5),
+        value,
+        f"{low} … {high}{star}",
+        "0.00" if shift in ("+0.00", "-0.00") else shift,
         f"{one.width:.3f}",
         TOLD[one.told_by] + bound,
     ]
@@ -97,11 +108,9 @@ def ladder_table(found: Calibration) -> Table:
     rows = [
         [
             NAMES[name],
-            UNITS[name],
-            f"{rung.as_shipped:.4g}",
-            f"{rung.calibrated:.4g}",
-            f"{rung.noise:.4g}",
-            f"{rung.offset:.2g}",
+            SHOWN[name][0],
+            *(plain(SHOWN[name][1] * v) for v in (rung.as_shipped, rung.calibrated, rung.noise)),
+            plain(SHOWN[name][1] * rung.offset, 2),
             str(found.fit.outliers[name]),
         ]
         for name, rung in found.ladder.items()
@@ -123,8 +132,8 @@ def held_out_table(found: Calibration) -> Table | None:
     for name, noise in held.noise.items():
         for words, by in (("chamber alone", held.chamber), ("measured housing", held.housing)):
             if name in by:
-                before, after = by[name]
-                rows.append([NAMES[name], UNITS[name], words, f"{before:.4g}", f"{after:.4g}", f"{noise:.4g}"])
+                unit, scale = SHOWN[name]
+                rows.append([NAMES[name], unit, words, *(plain(scale * v) for v in (*by[name], noise))])
     note = (
         f"{held.path or 'The run'} was predicted by a calibration that has not seen it. From the chamber alone nothing is refitted;"
         " from the housing its own offset and initial state are."
@@ -137,7 +146,11 @@ def held_out_table(found: Calibration) -> Table | None:
 def noise_table(found: Calibration) -> Table:
     """Return the levels of the noise."""
     rows = [
-        [NAMES[name], UNITS[name], *(f"{level:.3g}" for level in (n.white, n.flicker, n.walk, n.offset))]
+        [
+            NAMES[name],
+            SHOWN[name][0],
+            *(plain(SHOWN[name][1] * level) for level in (n.white, n.flicker, n.walk, n.offset)),
+        ]
         for name, n in found.fit.noise.items()
     ]
     note = "White: rms of a block average. Walk: standard deviation after 1 h. Offset: of a run's turn-on."
@@ -146,19 +159,27 @@ def noise_table(found: Calibration) -> Table:
 
 def separation_sentences(found: Calibration) -> list[str]:
     """Return what the data cannot tell apart."""
-    return [f"The data ties these together but cannot tell them apart: {', '.join(group)}." for group in found.groups]
+    return [f"The data determine only a combination of {', '.join(group)}." for group in found.groups]
+
+
+def _inseparable(found: Calibration) -> list[Block]:
+    rows = [[str(k + 1), ", ".join(group)] for k, group in enumerate(found.groups)]
+    return [Table("Only combinations of these are determined", ["Group", "Values"], rows)] if rows else []
 
 
 def _ladder_figure(found: Calibration) -> Picture:
     with style.figure(1, len(found.ladder), height=2.5, squeeze=False) as (made, axes):
         for axis, (name, rung) in zip(axes[0], found.ladder.items(), strict=True):
-            heights = [rung.as_shipped, rung.calibrated]
+            unit, scale = SHOWN[name]
+            heights = [scale * rung.as_shipped, scale * rung.calibrated]
             axis.bar(["shipped", "calibrated"], heights, color=[style.SKY, style.BLUE], width=0.6)
-            axis.axhline(rung.noise, color=style.BLACK, linestyle="--", linewidth=1.0)
-            axis.set_yscale("log")
-            axis.set_ylim(0.3 * min(*heights, rung.noise), 3 * max(*heights, rung.noise))
-            axis.set_title(f"{NAMES[name]} ({UNITS[name]})", fontsize=9)
+            axis.axhline(scale * rung.noise, color=style.BLACK, linestyle="--", linewidth=1.0)
+            for k, height in enumerate(heights):
+                axis.annotate(plain(height), (k, height), ha="center", va="bottom", fontsize=8)
+            axis.set_ylim(0.0, 1.25 * max(*heights, scale * rung.noise))
+            axis.set_title(f"{NAMES[name]} ({unit})", fontsize=8, loc="left")
             axis.tick_params(labelsize=8)
+            axis.grid(visible=False, axis="x")
         words = "Residuals as shipped and calibrated; dashed: the noise."
         return draw(made, words, words)
 
@@ -173,7 +194,7 @@ def _shift_figure(found: Calibration) -> Picture:
         axis.axvline(0.0, color=style.BLACK, linewidth=0.8)
         axis.set_yticks(place, [one.parameter for one in told], fontsize=8)
         axis.set_xlabel("prior standard deviations from the card")
-        words = "Shifts of the values of which the data says something, with 90 % intervals; shaded: 90 % of the prior."
+        words = "Shifts of the values that the data determine at least in part, with 90 % intervals; shaded: 90 % of the prior."
         return draw(made, words, words)
 
 
@@ -187,10 +208,11 @@ def _residual_figure(found: Calibration) -> Picture:
         for axis, name in zip(axes[:, 0], names, strict=True):
             rows, start = problem.rows[name], 0.0
             for run, (t, s) in enumerate(zip(rows.times, rows.slices, strict=True)):
-                axis.plot((start + t - t[0]) / 3600, state.residual[name][s], linewidth=0.7, color=colours[run % 5])
+                values = SHOWN[name][1] * state.residual[name][s]
+                axis.plot((start + t - t[0]) / 3600, values, linewidth=0.7, color=colours[run % 5])
                 start += t[-1] - t[0] + 600.0
             axis.axhline(0.0, color=style.BLACK, linewidth=0.6)
-            axis.set_ylabel(f"{NAMES[name]}\n({UNITS[name]})", fontsize=8)
+            axis.set_ylabel(f"{NAMES[name]}\n({SHOWN[name][0]})", fontsize=8)
         axes[-1, 0].set_xlabel("time of the runs one after the other (h)")
         words = "Measured minus predicted after the calibration, block averages, one colour a run."
         return draw(made, words, words)
@@ -200,9 +222,9 @@ def _settled_figure(found: Calibration) -> Picture:
     problem, residual = found.fit.problem, found.fit.state.residual[SETTLED]
     T = np.concatenate([table.temperature for table in problem.tables]) - zero_Celsius
     with style.figure(height=2.4) as (made, axis):
-        axis.plot(T, residual, "o", color=style.BLUE, markersize=4)
+        axis.plot(T, 1e3 * residual, "o", color=style.BLUE, markersize=4)
         axis.axhline(0.0, color=style.BLACK, linewidth=0.6)
         axis.set_xlabel("temperature (°C)")
-        axis.set_ylabel("residual (Hz)")
+        axis.set_ylabel("residual (mHz)")
         words = "Measured minus calculated settled frequency after the calibration."
         return draw(made, words, words)

@@ -5,8 +5,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.constants import zero_Celsius
 
+from compensation.decimation import average_blocks
+from compensation.improvement import AVERAGING
 from studies.models.kinds.cross_damping import OUTPUTS
 from studies.reports import style
+from studies.reports.digits import lowered, raised, to_error
 from studies.reports.page import Chapter, Facts, Picture, Table, Text, draw, render_page
 
 if TYPE_CHECKING:
@@ -17,7 +20,6 @@ if TYPE_CHECKING:
 
 SOURCES = ("Apostolyuk V., Chikovani V., Temperature error model in Coriolis vibratory gyroscopes: eqs. (1)–(10).",)
 UNITS = {"bias_deg_per_h": "°/h", "measured_rate_deg_per_s": "°/s"}
-MOST_POINTS = 4000
 
 
 def cross_damping_page(study: "CrossDampingStudy", data: "RestData", source: str) -> str:
@@ -119,16 +121,15 @@ def coefficients_table(study: "CrossDampingStudy") -> Table:
     model = study.model
     rows = [
         [
-            f"zeta_{i}",
-            f"{value:.5e}",
-            f"{error:.1e}",
-            ("ratio", "per °C")[i] if i < 2 else f"per °C^{i}",
-            f"{value / model.coefficients[0]:+.4e}",
+            f"ζ{lowered(i)}",
+            *to_error(value, error),
+            ("1", "1/°C")[i] if i < 2 else f"1/°C{raised(i)}",
+            f"{value / model.coefficients[0]:.4g}",
         ]
         for i, (value, error) in enumerate(zip(model.coefficients, np.sqrt(np.diag(model.covariance)), strict=True))
     ]
     at = model.calibration_temperature - zero_Celsius
-    columns = ["Coefficient", "Value", "Standard error", "Unit", "Over zeta_0"]
+    columns = ["Coefficient", "Value", "Standard error", "Unit", "Over ζ₀"]
     note = "The errors allow for white noise plus a random walk of the bias."
     return Table(f"Cross-damping about {at:g} °C", columns, rows, note)
 
@@ -179,15 +180,18 @@ def draw_runs(runs: "tuple[RestRun, ...]", model: "CrossDampingModel", unit: flo
     with style.figure(2, height=4.8, sharex=True, height_ratios=(1, 2)) as (made, (upper, lower)):
         begin = 0.0
         for i, run in enumerate(runs):
-            rows = np.unique(np.linspace(0, len(run.time) - 1, MOST_POINTS).astype(int))
-            hours = (run.time[rows] - run.time[0]) / 3600 + begin
+            after = model.compensate(run.time, run.rate, run.temperature, extrapolate=True)
+            width = max(AVERAGING, 2 * float(np.median(np.diff(run.time))))
+            blocks = average_blocks(run.time, {"T": run.temperature, "before": run.rate, "after": after}, width)
+            means = blocks.columns
+            hours = (blocks.time - run.time[0]) / 3600 + begin
             begin = hours[-1]
-            after = model.compensate(run.time, run.rate, run.temperature, extrapolate=True)[rows]
-            upper.plot(hours, run.temperature[rows] - zero_Celsius, color=style.VERMILION)
-            lower.plot(
-                hours, run.rate[rows] / unit, color=style.ORANGE, linewidth=0.8, label=None if i else "uncompensated"
-            )
-            lower.plot(hours, after / unit, color=style.BLUE, linewidth=0.8, label=None if i else "compensated")
+            upper.plot(hours, means["T"] - zero_Celsius, color=style.VERMILION)
+            for name, colour, label in (
+                ("before", style.ORANGE, "uncompensated"),
+                ("after", style.BLUE, "compensated"),
+            ):
+                lower.plot(hours, means[name] / unit, color=colour, linewidth=0.9, label=None if i else label)
         lower.axhline(0, color=style.BLACK, linewidth=0.8)
         upper.set_ylabel("temperature (°C)")
         lower.set_ylabel(f"zero-rate output ({name})")
@@ -195,6 +199,6 @@ def draw_runs(runs: "tuple[RestRun, ...]", model: "CrossDampingModel", unit: flo
         lower.legend()
     return draw(
         made,
-        "Temperature, and zero-rate output before and after compensation.",
+        "Temperature, and zero-rate output before and after compensation, 100 s averages.",
         "Temperature over time above, output with and without compensation below.",
     )

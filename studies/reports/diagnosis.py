@@ -11,6 +11,8 @@ from studies.diagnosis.investigate import Diagnosis
 from studies.diagnosis.planning.next_run import NextRun
 from studies.diagnosis.response import RESPONSES
 from studies.diagnosis.verdict import Cause, ResponseResult, Verdict
+from studies.instrument.units import split_unit, unit_of
+from studies.reports.digits import plain, to_interval
 from studies.reports.page import Block, Chapter, Facts, Picture, Table, Text, draw, render_page
 from studies.reports.style import BLACK, BLUE, ORANGE, VERMILION, figure
 
@@ -21,7 +23,7 @@ NAMES = {column: response.word for column, response in RESPONSES.items()}
 WORDS = {
     "adequate": "The simulation is adequate: nothing beyond noise is left.",
     "explained": "Explained: the named cause removes nine tenths of the structure or more.",
-    "not-identifiable": "Not identifiable: this data cannot decide between several causes.",
+    "not-identifiable": "Not identifiable: these data cannot decide between several causes.",
     "unexplained": "Unexplained: there is structure that no known effect explains.",
 }
 
@@ -29,7 +31,7 @@ WORDS = {
 def shown(column: str, value: float | None, digits: int = 3) -> str:
     """Return a size of a response for people, with its unit."""
     response = RESPONSES[column]
-    return "—" if value is None else f"{number(value * response.scale, digits)} {response.shown}"
+    return "—" if value is None else f"{plain(value * response.scale, digits)} {response.shown}"
 
 
 def headline(verdict: Verdict) -> str:
@@ -41,6 +43,11 @@ def headline(verdict: Verdict) -> str:
     return text
 
 
+def _reason(verdict: str) -> str:
+    """Return the verdict's sentence without its name."""
+    return WORDS[verdict].split(": ", 1)[-1].rstrip(".")
+
+
 def name_cause(cause: Cause) -> str:
     """Return a cause, or its set, with response and probability."""
     *others, last = [cause.effect, *cause.equivalent]
@@ -48,9 +55,14 @@ def name_cause(cause: Cause) -> str:
     return f"{names} in the {NAMES[cause.response]} (probability {cause.probability:.2f})"
 
 
-def number(value: float | None, digits: int = 3) -> str:
-    """Return a number for people; a dash where there is none."""
-    return "—" if value is None or not np.isfinite(value) else f"{value:.{digits}g}"
+def spell_parameter(name: str) -> tuple[str, float]:
+    """Return a parameter's name with its unit in brackets, and what its value is multiplied by: rates are in K/min."""
+    words, unit = (name, unit_of(name)) if "." in name else split_unit(name)
+    factor = 1.0
+    if unit.endswith(("/(K/s)", "/(K²/s)")):
+        unit, factor = unit.replace("/(K/s)", " per K/min").replace("/(K²/s)", " per K²/min"), 1.0 / 60.0
+    unit = unit.replace("1 per ", "per ")
+    return (words if "." in name else words.replace("_", " ")) + (f" ({unit})" if unit != "1" else ""), factor
 
 
 def cause_table(verdict: Verdict) -> Table:
@@ -70,14 +82,15 @@ def cause_table(verdict: Verdict) -> Table:
                 if first
                 else [""] * 5
             )
-            between = f" ({number(p.low, 4)} … {number(p.high, 4)})" if p.high > p.low else ""
-            rows.append([*lead, name, number(p.value, 4) + between])
+            words, factor = spell_parameter(name)
+            value, low, high = to_interval(*(factor * x for x in (p.value, p.low, p.high)))
+            rows.append([*lead, words, value, f"{low} … {high}" if p.high > p.low else "exact"])
             first = False
     return Table(
         "Causes",
-        ("cause", "or equally", "in", "peak to peak", "probability", "parameter", "value (90 % interval)"),
+        ("Cause", "Or equally", "In", "Peak to peak", "Probability", "Parameter", "Value", "90 % interval"),
         rows,
-        "Peak to peak: what the cause changes in this record. Lists of a family are in the saved card.",
+        "Peak to peak: what the cause changes in this record. Further coefficients of a cause are in the saved card.",
     )
 
 
@@ -91,10 +104,10 @@ def response_table(verdict: Verdict) -> Table:
         left = result.left_over + (f" in {result.left_over_input}" if result.left_over_input else "")
         rows.append(
             [
-                f"{NAMES[name]} / {RESPONSES[name].shown}",
+                f"{NAMES[name]} ({RESPONSES[name].shown})",
                 result.verdict,
-                *(number(None if value is None else value * scale) for value in cells),
-                number(result.gain),
+                *(plain(None if value is None else value * scale) for value in cells),
+                plain(result.gain),
                 "—" if result.explained_share is None else f"{100 * result.explained_share:.1f} %",
                 left if not result.remark else f"{left}; {result.remark}",
             ]
@@ -102,16 +115,16 @@ def response_table(verdict: Verdict) -> Table:
     return Table(
         "Responses: residual rms",
         (
-            "response",
-            "verdict",
-            "baseline",
-            "with causes",
-            "noise",
-            "white",
-            "wander",
-            "gain",
-            "explained",
-            "left over",
+            "Response",
+            "Verdict",
+            "Baseline",
+            "With causes",
+            "Noise",
+            "White",
+            "Wander",
+            "Gain",
+            "Explained",
+            "Left over",
         ),
         rows,
         "Baseline and with causes: on rows left out of the fit. Noise: what no model removed, its white part a row and its "
@@ -184,29 +197,29 @@ def next_run_picture(run: NextRun) -> Picture:
         axes,
     ):
         axes[0, 0].plot(run.time_h, run.temperature_degC, color=VERMILION)
-        axes[0, 0].set_ylabel("chamber / °C")
+        axes[0, 0].set_ylabel("chamber (°C)")
         for axis, (column, steps) in zip(axes[1:, 0], run.drives.items(), strict=True):
             begin = np.arange(len(steps.levels) + 1) * steps.hold_min / 60.0
             axis.stairs(steps.levels, begin, baseline=None, color=BLUE)
             axis.set_ylabel(column, rotation=0, ha="right", va="center", fontsize=8)
             axis.locator_params(axis="y", nbins=3)
             axis.margins(y=0.2)
-        axes[-1, 0].set_xlabel("time / h")
+        axes[-1, 0].set_xlabel("time (h)")
         return draw(canvas, f"Suggested next run: {run.profile}.", f"Chamber profile of the next run: {run.profile}.")
 
 
 def _facts(verdict: Verdict) -> list[tuple[str, str, str]]:
-    facts = [("verdict", verdict.verdict, WORDS[verdict.verdict])]
+    facts = [("Verdict", verdict.verdict.replace("-", " "), _reason(verdict.verdict))]
     for cause in verdict.causes[:3]:
         size = shown(cause.response, cause.peak)
         sure = f"{size} peak to peak in the {NAMES[cause.response]}; probability {cause.probability:.2f}"
-        facts.append(("cause", " or ".join(cause.names), sure))
+        facts.append(("Cause", " or ".join(cause.names), sure))
     main = _main_response(verdict)
     if main is not None:
         result = verdict.responses[main]
         if result.gain is not None:
-            facts.append(("gain", number(result.gain), f"of the {NAMES[main]}, on rows left out of the fit"))
-        facts.append(("noise", shown(main, result.noise), f"rms of the {NAMES[main]} that no model removes"))
+            facts.append(("Gain", plain(result.gain), f"of the {NAMES[main]}, on rows left out of the fit"))
+        facts.append(("Noise", shown(main, result.noise), f"rms of the {NAMES[main]} that no model removes"))
     return facts
 
 
@@ -221,7 +234,7 @@ def ladder(diagnosis: Diagnosis) -> Picture:
             colours = {"as shipped": BLACK, "calibrated": VERMILION, "with causes": BLUE, "noise": ORANGE}
             axis.bar(range(len(steps)), values, color=[colours[word] for word, _ in steps], width=0.7)
             for k, (_, value) in enumerate(steps):
-                label = f"{number(value * response.scale)} {response.shown}"
+                label = f"{plain(value * response.scale)} {response.shown}"
                 kelvin = as_temperature(diagnosis, column, value)
                 axis.annotate(
                     label if kelvin is None else f"{label}\n{kelvin}",
@@ -232,11 +245,11 @@ def ladder(diagnosis: Diagnosis) -> Picture:
                 )
             axis.set_xticks(range(len(steps)), [word.replace(" ", "\n") for word, _ in steps], fontsize=8)
             axis.set_ylim(0.0, 1.3 * max(values, default=1.0))
-            axis.set_title(f"{response.word} / {response.shown}", loc="left", fontsize=10)
+            axis.set_title(f"{response.word} ({response.shown})", loc="left", fontsize=10)
             axis.grid(visible=False, axis="x")
         return draw(
             canvas,
-            "What is left of each response, rms on rows that the fit has not seen; below it, as an error of temperature.",
+            "Residual of each response, rms; calibrated and with causes: on rows left out of the fit. Of the frequency also as an error of temperature.",
             "Bars of the residual rms of each response from the calibrated simulation to the noise.",
         )
 
@@ -256,16 +269,18 @@ def rungs(result: ResponseResult) -> list[tuple[str, float | None]]:
 
 
 def as_temperature(diagnosis: Diagnosis, column: str, value: float) -> str | None:
-    """Return the error of temperature that a residual of this response amounts to."""
+    """Return the error of temperature that a residual of the frequency amounts to; None for the others."""
+    if not RESPONSES[column].thermometer:
+        return None
     inquiry = diagnosis.inquiries[column]
     steep = np.concatenate([np.abs(view.steep) for view in inquiry.final.tangent.views])
     slope = float(np.median(steep)) if steep.size else 0.0
     return (
         None
         if not slope
-        else f"{number(1e3 * value / slope, 2)} mK"
-        if value < slope
-        else f"{number(value / slope, 2)} K"
+        else f"{plain(1e3 * value / slope, 2)} mK"
+        if value < 0.1 * slope
+        else f"{plain(value / slope, 2)} K"
     )
 
 
@@ -280,8 +295,9 @@ def before_and_after(diagnosis: Diagnosis, response: str) -> Picture:
     """Draw the residual over the campaign before and, if anything is named, after the extension; the noise as a band."""
     inquiry, unit = diagnosis.inquiries[response], RESPONSES[response]
     noise = (diagnosis.verdict.responses[response].noise or 0.0) * unit.scale
-    strips = [(inquiry.plain, "before: the calibrated simulation", VERMILION)]
+    strips = [(inquiry.plain, "the calibrated simulation", VERMILION)]
     if inquiry.final.terms:
+        strips = [(inquiry.plain, "before: the calibrated simulation", VERMILION)]
         strips.append((inquiry.final, "after: with the named causes", BLUE))
     with figure(len(strips), 1, height=2.0 * len(strips), sharex=True, sharey=True, squeeze=False) as (canvas, grid):
         axes = grid[:, 0]
@@ -294,14 +310,14 @@ def before_and_after(diagnosis: Diagnosis, response: str) -> Picture:
                 axis.axvline(begin / 3600.0, color="#b0b6bd", linewidth=0.8)
             axis.axhspan(-2 * noise, 2 * noise, color=ORANGE, alpha=0.25, label="noise, ± 2 rms")
             axis.set_title(title, loc="left", fontsize=10)
-            axis.set_ylabel(f"residual / {unit.shown}")
+            axis.set_ylabel(f"residual ({unit.shown})")
         axes[0].legend(loc="upper right")
-        axes[-1].set_xlabel("time, runs one after the other / h")
-        after = " and after" if inquiry.final.terms else ""
+        axes[-1].set_xlabel("time of the runs one after the other (h)")
+        when = " before and after the extension" if inquiry.final.terms else ""
         return draw(
             canvas,
-            f"Residual of the {NAMES[response]} before{after} the extension.",
-            f"The {NAMES[response]} residual over time before{after} the extension; the last strip has rms {number(noise)} {unit.shown}.",
+            f"Residual of the {NAMES[response]}{when}.",
+            f"The {NAMES[response]} residual over time{when}; the last strip has rms {plain(noise)} {unit.shown}.",
         )
 
 
@@ -317,15 +333,15 @@ def residual_views(diagnosis: Diagnosis, response: str) -> Picture:
     problem, views = fit.problem, fit.tangent.views
     rest = fit.residual * unit.scale
     inputs: dict[str, np.ndarray] = {
-        "resonator temperature / °C": problem.stack([v.seen.resonator - zero_Celsius for v in views]),
-        "rate / (K/min)": 60.0 * problem.stack([v.seen.rate for v in views]),
+        "resonator temperature (°C)": problem.stack([v.seen.resonator - zero_Celsius for v in views]),
+        "rate (K/min)": 60.0 * problem.stack([v.seen.rate for v in views]),
     }
     if "frequency_Hz" in campaign.responses:
-        inputs["frequency / Hz"] = problem.stack([run.responses["frequency_Hz"] for run in campaign.runs])
-    for label, drive in (("amplitude / V", "amplitude_squared"), ("electrode voltage / V", "voltage_squared")):
+        inputs["frequency (Hz)"] = problem.stack([run.responses["frequency_Hz"] for run in campaign.runs])
+    for label, drive in (("amplitude (V)", "amplitude_squared"), ("electrode voltage (V)", "voltage_squared")):
         if all(getattr(v.coarse, drive) is not None for v in views):
             inputs[label] = np.sqrt(problem.stack([getattr(v.coarse, drive) for v in views]))
-    heating = inputs["rate / (K/min)"] > 0
+    heating = inputs["rate (K/min)"] > 0
     runs = np.concatenate([np.full(int(mask.sum()), k) for k, mask in enumerate(problem.present)])
     columns = 2
     rows = (len(inputs) + 2) // columns
@@ -337,14 +353,15 @@ def residual_views(diagnosis: Diagnosis, response: str) -> Picture:
             )
             axis.plot(values[~heating], rest[~heating], ".", color=BLUE, markersize=2, label="cooling", rasterized=True)
             axis.set_xlabel(label)
-            axis.locator_params(axis="x", nbins=5)
+            axis.locator_params(axis="x", nbins=4)
+            axis.ticklabel_format(axis="x", useOffset=False)
         axis = flat[len(inputs)]
         axis.boxplot([rest[runs == k] for k in np.unique(runs)], showfliers=False)
         axis.set_xlabel("run")
         for axis in flat[len(inputs) + 1 :]:
             axis.set_visible(False)
         for axis in flat[::columns]:
-            axis.set_ylabel(f"residual / {unit.shown}")
+            axis.set_ylabel(f"residual ({unit.shown})")
         flat[0].legend(markerscale=4)
         return draw(
             canvas,
@@ -359,7 +376,7 @@ def _rivals(diagnosis: Diagnosis, response: str) -> list[Block]:
     for place in inquiry.selection.places:
         nothing = place.without.score
         rows = [[n, f"{2.0 * (r.score - nothing):.1f}"] for n, r in zip(place.names, place.rivals, strict=True)]
-        blocks.append(Table(f"Alternatives to {place.names[0]}", ("effect", "evidence"), rows))
+        blocks.append(Table(f"Alternatives to {place.names[0]}", ("Effect", "Evidence"), rows))
     left = inquiry.leftover
     if left.significant:
         blocks.append(
@@ -382,12 +399,12 @@ def table_page(found: "TableDiagnosis", path: str) -> str:
 def table_chapters(found: "TableDiagnosis") -> list[Chapter]:
     """Return the chapters of a steady-state table: the answer, and who else could have given it."""
     facts = [
-        ("verdict", found.verdict.verdict, WORDS[found.verdict.verdict]),
-        ("law imposed", f"{number(1e3 * found.law_rms)} mHz", "misfit rms with the law's curvature fixed"),
-        ("curvature", f"{number(found.curvature_ratio)} times", "the measured one over the law's"),
+        ("Verdict", found.verdict.verdict.replace("-", " "), _reason(found.verdict.verdict)),
+        ("Law imposed", f"{plain(1e3 * found.law_rms)} mHz", "misfit rms with the law's curvature fixed"),
+        ("Curvature", f"{plain(found.curvature_ratio)} times", "the measured one over the law's"),
     ]
-    rows = [[name, number(ssq), number(loo), number(score)] for name, ssq, loo, score in found.candidates]
-    columns = ("candidate", "sum of squares / Hz²", "leave-one-out / Hz", "evidence")
+    rows = [[name, plain(ssq), plain(loo), plain(score)] for name, ssq, loo, score in found.candidates]
+    columns = ("Candidate", "Sum of squares (Hz²)", "Leave-one-out (Hz)", "Evidence")
     candidates = Table("Candidates on top of the baseline", columns, rows)
     following = found.verdict.next_experiment
     note = [Text(f"Next experiment: {following}", "note")] if following else []
@@ -404,8 +421,8 @@ def table_residuals(found: "TableDiagnosis") -> Picture:
         axis.plot(found.temperature, found.law_residual, "o-", color=VERMILION, label="law imposed, f₀ and slope free")
         axis.plot(found.temperature, found.baseline_residual, "s-", color=ORANGE, label="baseline: curvature free")
         axis.plot(found.temperature, found.extended_residual, "^-", color=BLACK, label="with the strongest candidate")
-        axis.set_xlabel("temperature / °C")
-        axis.set_ylabel("measured − model / Hz")
+        axis.set_xlabel("temperature (°C)")
+        axis.set_ylabel("measured − model (Hz)")
         axis.legend()
         return draw(
             canvas, "What each model leaves of the measured table.", "Residuals of three models over temperature."

@@ -3,7 +3,8 @@
 from typing import TYPE_CHECKING
 
 from studies.diagnosis.fleet import Fleet, Share, Value
-from studies.reports.diagnosis import NAMES, cause_table, number, response_table
+from studies.reports.diagnosis import NAMES, cause_table, response_table
+from studies.reports.digits import plain
 from studies.reports.page import Block, Chapter, Picture, Table, Text, draw, render_page
 from studies.reports.style import BLUE, VERMILION, figure
 
@@ -50,20 +51,20 @@ def share_table(fleet: Fleet) -> Table:
             NAMES[one.response],
             KINDS[one.kind].format(one.odd),
             f"{one.probability:.2f}",
-            number(one.evidence),
-            ", ".join(f"{device} {number(size.value)}" for device, size in one.sizes.items()) or "—",
+            plain(one.evidence),
+            ", ".join(f"{device} {plain(size.value)}" for device, size in one.sizes.items()) or "—",
             one.coefficient or "—",
         ]
         for one in fleet.shares
     ]
     columns = (
-        "cause",
-        "response",
-        "who has it",
-        "probability",
-        "evidence",
-        "size of each device",
-        "which is",
+        "Cause",
+        "Response",
+        "Who has it",
+        "Probability",
+        "Evidence",
+        "Size of each device",
+        "Which is",
     )
     return Table("Causes over the fleet", columns, rows)
 
@@ -75,14 +76,14 @@ def value_table(fleet: Fleet) -> Table:
     rows = [
         [
             value.name,
-            *(number(value.of[d].value) + (" !" if d in value.odd else "") if d in value.of else "—" for d in devices),
-            number(value.common),
-            number(value.scatter),
+            *(plain(value.of[d].value) + (" !" if d in value.odd else "") if d in value.of else "—" for d in devices),
+            plain(value.common),
+            plain(value.scatter),
         ]
         for value in ordered
     ]
     note = "!: far from what the others foretell; it is left out of mean and scatter."
-    return Table("Values of every device", ("value", *devices, "mean", "scatter"), rows, note)
+    return Table("Values of every device", ("Value", *devices, "Mean", "Scatter"), rows, note)
 
 
 def device_table(fleet: Fleet) -> Table:
@@ -96,7 +97,7 @@ def device_table(fleet: Fleet) -> Table:
         ]
         for name, one in fleet.devices.items()
     ]
-    return Table("Every device alone", ("device", "verdict", "causes", "differs from the others"), rows)
+    return Table("Every device alone", ("Device", "Verdict", "Causes", "Differs from the others"), rows)
 
 
 def value_picture(fleet: Fleet, most: int = 6) -> Picture | None:

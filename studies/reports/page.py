@@ -1,7 +1,8 @@
 """A report page: blocks of text, tables and figures rendered into one self-contained HTML file.
 
-All text is escaped by the template; figures are embedded, so the page works without a network. What would make a page
-long is folded: tables of many rows, and the chapters that begin below `OPEN_HEIGHT`. On paper everything is unfolded.
+All text is escaped; figures are embedded, so the page works without a network. What would make a page long is folded:
+tables of many rows, and the chapters that begin below `OPEN_HEIGHT`. On paper everything is unfolded, but no table has more
+than `PAPER_ROWS` rows. On a phone a table that is too wide is stacked, every row a few lines of heading and value.
 """
 
 import base64
@@ -16,13 +17,16 @@ from io import BytesIO
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from markupsafe import Markup
     from matplotlib.figure import Figure
 
 PACKAGES = ("numpy", "scipy", "sympy", "pandas", "pyvista", "trimesh")
-OPEN_HEIGHT = 4600  # px at a width of 1280: chapters that would end below are folded
+OPEN_HEIGHT = 4600  # px: chapters that would end below, on a screen 1280 px wide or on a phone, are folded
 LONG_TABLE = 15  # rows; longer tables are folded, except in the first chapter, which is the answer
 LONG_ANSWER = 40  # rows of a table in the first chapter
+PAPER_ROWS = 60  # of a table; the others are on the screen only
 CONTENTS_FROM = 4  # chapters
+PHONE = 364.0  # px for a table on a phone
 
 
 @dataclass(frozen=True)
@@ -91,7 +95,8 @@ def render_page(title: str, lead: str, chapters: Sequence[Chapter], sources: Seq
 
     template = (files("studies.reports") / "templates" / "page.html").read_text(encoding="utf-8")
     environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
-    environment.filters.update(typeset=typeset, typeset_cell=_typeset_cell)
+    environment.filters.update(typeset=typeset, prose=_prose, cell=_cell)
+    environment.tests.update(stacked=_stacked)
     return environment.from_string(template).render(
         title=title,
         lead=lead,
@@ -99,33 +104,93 @@ def render_page(title: str, lead: str, chapters: Sequence[Chapter], sources: Seq
         contents=len(chapters) >= CONTENTS_FROM,
         long_table=LONG_TABLE,
         long_answer=LONG_ANSWER,
+        paper_rows=PAPER_ROWS,
         sources=sources,
         provenance=_provenance(),
     )
 
 
 def typeset(text: str) -> str:
-    """Return text with a minus sign before numbers that carry a unit, and a space before the per cent sign."""
-    text = re.sub(r"(?<![\w.)\]])-(?=\d[\d.]*(?:e[-+]?\d+)? ?(?:°|ppm|mHz|Hz|mK|K\b|µ|%|s\b|h\b))", "−", text)
-    return re.sub(r"(?<=\d)%", " %", text)
+    """Return text with a minus sign before numbers that carry a unit or begin a range, and a space before per cent."""
+    unit = r"°|ppm|mHz|Hz|mK|K\b|µ|%|s\b|h\b|to -?\d|…|±"
+    text = re.sub(rf"(?<![\w.)\]])-(?=\d[\d.]*(?:e[-+]?\d+)? ?(?:{unit}))", "−", text)
+    return re.sub(r"(?<=\d)%", " %", re.sub(r"(?<=\de)-(?=\d)", "−", text))
 
 
-def _typeset_cell(text: str) -> str:
-    """Return a cell with minus signs, also in exponents, where it begins as a number."""
+def _prose(text: str) -> "Markup":
+    """Return a paragraph, escaped: words between backticks as code, long names with places where a line may end."""
+    from markupsafe import Markup
+
+    parts = str(text).split("`")
+    if len(parts) % 2 == 0:  # an odd backtick is a character like others
+        parts = [str(text)]
+    pieces = [
+        f"<code>{_breakable(part)}</code>" if k % 2 else _breakable(typeset(part)) for k, part in enumerate(parts)
+    ]
+    return Markup("".join(pieces))
+
+
+def _cell(text: str) -> "Markup":
+    """Return a cell, escaped, with minus signs, also in exponents, where it begins as a number."""
+    from markupsafe import Markup
+
     text = str(text)
     if re.match(r"[-+±<> ]*[.\d]", text):
         text = re.sub(r"(?<![\w.)\]-])-(?=\.?\d)|(?<=\de)-(?=\d)", "−", text)
-    return re.sub(r"(?<=\d)%", " %", text)
+    return Markup(_breakable(re.sub(r"(?<=\d)%", " %", text)))
+
+
+def _breakable(text: str) -> str:
+    """Return escaped text in which paths and dotted names may be broken behind their signs."""
+    from markupsafe import escape
+
+    def give(name: re.Match[str]) -> str:
+        return re.sub(r"([./_])(?=[A-Za-z])", r"\1<wbr>", name[0])
+
+    return re.sub(r"[\w./-]{15,}", give, str(escape(text)))
+
+
+def _stacked(table: Table) -> bool:
+    """Return whether a table is too wide for a phone: the longest pieces that no line break divides, side by side."""
+
+    def least(text: str) -> int:
+        whole = re.match(r"[-+±<> ]*[.\d]", text) or len(text) <= 12
+        return len(text) if whole else max(map(len, re.split(r"[\s._/-]+", text)))
+
+    columns = [
+        max([least(str(row[k])) for row in table.rows] + [max(map(len, str(head).split()), default=0)])
+        for k, head in enumerate(table.columns)
+    ]
+    return sum(10.0 + 7.4 * width for width in columns) > PHONE
 
 
 def _folded(chapters: Sequence[Chapter]) -> list[bool]:
     """Return which chapters are folded: from the first on that would end below `OPEN_HEIGHT`, never the first two."""
-    reached = 260.0 + 26 * len(chapters)
+    reached, phone = 260.0 + 26 * len(chapters), 420.0 + 26 * len(chapters)
     folded: list[bool] = []
     for k, chapter in enumerate(chapters):
         reached += 80 + sum(_height(block, k == 0) for block in chapter.blocks)
-        folded.append((k > 1 and reached > OPEN_HEIGHT) or any(folded))
+        phone += 80 + sum(_height_on_a_phone(block, k == 0) for block in chapter.blocks)
+        folded.append((k > 1 and max(reached, phone) > OPEN_HEIGHT) or any(folded))
     return folded
+
+
+def _height_on_a_phone(block: "Block", answer: bool) -> float:
+    """Return about how many pixels a block is high at a width of 390 px."""
+    if isinstance(block, Text):
+        return 25 * (1 + len(block.text) / 40) + 12
+    if isinstance(block, Table):
+        if len(block.rows) > (LONG_ANSWER if answer else LONG_TABLE):
+            return 60
+        cells = len(block.columns) * (sum(map(len, block.columns)) / max(1, len(block.columns)) + 3)
+        if _stacked(block):
+            lines = sum(1 + (sum(len(str(cell)) for cell in row) + cells) / 46 for row in block.rows)
+        else:
+            lines = sum(1 + max((len(str(cell)) for cell in row), default=0) // 25 for row in block.rows) + 2.0
+        return 70 + 24 * lines + len(block.note) / 2
+    if isinstance(block, Picture):
+        return 0.51 * block.height + 45 + 0.6 * len(block.caption)
+    return 100.0 * len(block.facts) if isinstance(block, Facts) else 450
 
 
 def _height(block: "Block", answer: bool) -> float:

@@ -6,6 +6,7 @@ import numpy as np
 
 from studies.diagnosis.planning.plan import Outlook, Plan, effect_of
 from studies.diagnosis.planning.rehearsal import NOTHING
+from studies.diagnosis.response import RESPONSES
 from studies.reports.page import Chapter, Facts, Picture, Table, Text, draw, render_page
 from studies.reports.style import figure
 
@@ -23,11 +24,11 @@ def headline(outlook: Outlook) -> str:
     parts = []
     for plan in outlook.plans:
         sure = sum(1 for key in effects if (least := outlook.smallest(key)) is not None and least <= plan.snr)
-        parts.append(f"{sure} of {len(effects)} at SNR {plan.snr:g}")
-    text = f"Effects that this campaign names rightly nine times in ten: {', '.join(parts)}."
+        parts.append(f"{sure} of {len(effects)} with {_size_words(plan)} (SNR {plan.snr:g})")
+    text = f"Effects that this campaign would name rightly nine times in ten: {'; '.join(parts)}."
     never = [key for key in effects if outlook.smallest(key) is None]
     if never:
-        text += f" Not even at SNR {outlook.plans[0].snr:g}: {', '.join(never)}."
+        text += f" Not even at SNR {outlook.plans[0].snr:g}: {', '.join(map(shown_key, never))}."
     for reason in dict.fromkeys(outlook.close.invisible.values()):
         names = [name for name, why in outlook.close.invisible.items() if why == reason]
         text += f" Not testable, {reason}: {', '.join(names)}."
@@ -40,7 +41,7 @@ def plan_table(outlook: Outlook) -> Table:
     order = sorted(close.confusion, key=lambda key: [-_named(plan, key) for plan in reversed(outlook.plans)])
     rows = [
         [
-            key,
+            shown_key(key),
             *(f"{100 * _named(plan, key):.0f}" for plan in outlook.plans),
             _listed(close.sets[key], ()),
             _listed(close.confusion[key], (effect_of(key),)),
@@ -52,15 +53,22 @@ def plan_table(outlook: Outlook) -> Table:
     return Table(
         f"What this campaign could tell apart, {close.cases} cases each",
         (
-            "hidden effect",
-            *(f"named rightly at SNR {plan.snr:g} / %" for plan in outlook.plans),
-            f"as a set with (SNR {close.snr:g})",
-            f"said instead (SNR {close.snr:g})",
-            "survives the baseline / %",
+            "Hidden effect",
+            *(f"Named rightly at SNR {plan.snr:g} (%)" for plan in outlook.plans),
+            f"As a set with (SNR {close.snr:g})",
+            f"Said instead (SNR {close.snr:g})",
+            "Survives the baseline (%)",
         ),
         rows,
         "Named rightly: the answer, alone or as a set, holds the effect. " + SNR_WORDS,
     )
+
+
+def shown_key(key: str) -> str:
+    """Return the name of a hidden effect, with the response that it is hidden in for people: "jump (bias)"."""
+    for column, response in RESPONSES.items():
+        key = key.replace(f"({column})", f"({response.word})")
+    return key
 
 
 def _named(plan: Plan, key: str) -> float:
@@ -78,15 +86,15 @@ def plan_page(outlook: Outlook, profiles: Sequence[str]) -> str:
     facts = []
     for plan in outlook.plans:
         sure = sum(1 for key in effects if (least := outlook.smallest(key)) is not None and least <= plan.snr)
-        facts.append((f"named nine times in ten, SNR {plan.snr:g}", f"{sure} of {len(effects)}", _size_words(plan)))
-    facts.append(("chamber time", f"{outlook.close.hours:.3g} h", "of all planned runs"))
-    facts.append(("cannot show at all", str(len(outlook.close.invisible)), "a drive that is not stepped, or no change"))
-    runs = Table("Planned runs", ("run", "chamber"), [[str(k + 1), words] for k, words in enumerate(profiles)])
+        facts.append((f"Named nine times in ten, SNR {plan.snr:g}", f"{sure} of {len(effects)}", _size_words(plan)))
+    facts.append(("Chamber time", f"{outlook.close.hours:.3g} h", "of all planned runs"))
+    facts.append(("Not testable", str(len(outlook.close.invisible)), "a drive that is not stepped, or no change"))
+    runs = Table("Planned runs", ("Run", "Chamber"), [[str(k + 1), words] for k, words in enumerate(profiles)])
     return render_page(
         "What a planned campaign could tell apart",
         headline(outlook),
         [
-            Chapter("In short", [Facts(facts), _ladder(outlook), runs]),
+            Chapter("In short", [Facts(facts), runs, _ladder(outlook)]),
             Chapter("Every effect", [plan_table(outlook), *_sensor_table(outlook.close)]),
             Chapter("What would be said", [_matrix(outlook.close)]),
             Chapter(
@@ -109,12 +117,12 @@ def _sensor_table(plan: Plan) -> list[Table]:
         return []
     rows = [[sensor, str(len(pairs)), ", ".join(pairs)] for sensor, pairs in plan.sensors.items()]
     note = f"Sets at SNR {plan.snr:g}. A sensor costs no chamber hour; the first parts the most sets."
-    return [Table("Instead of a further run: sensors that part sets", ("sensor", "sets", "which"), rows, note)]
+    return [Table("Instead of a further run: sensors that part sets", ("Sensor", "Sets", "Which"), rows, note)]
 
 
 def _size_words(plan: Plan) -> str:
     sizes = ", ".join(f"{value:.2g} {key.split(' / ')[1]}" for key, value in plan.sizes.items())
-    return f"effects of {sizes} rms"
+    return f"{sizes} rms"
 
 
 def _ladder(outlook: Outlook) -> Picture:
@@ -126,7 +134,10 @@ def _ladder(outlook: Outlook) -> Picture:
     )
     labels = [f"SNR {plan.snr:g}\n{noise} noise" for plan, noise in columns]
     return _map(
-        shares, keys, labels, "How often each effect would be named rightly, %: white noise, and slow noise besides."
+        shares,
+        list(map(shown_key, keys)),
+        labels,
+        "How often each effect would be named rightly, %: white noise, and slow noise besides.",
     )
 
 
@@ -140,7 +151,7 @@ def _matrix(plan: Plan) -> Picture:
         f"Rows the hidden effect, columns the answer, % of {plan.cases} cases at SNR {plan.snr:g}; nothing: it would stay "
         "unseen."
     )
-    return _map(shares, keys, names, caption, 55.0)
+    return _map(shares, list(map(shown_key, keys)), names, caption, 55.0)
 
 
 def _map(shares: np.ndarray, rows: Sequence[str], columns: Sequence[str], caption: str, turn: float = 0.0) -> Picture:

@@ -4,11 +4,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from studies.reports.digits import to_interval
 from studies.reports.page import Chapter, Facts, Picture, Table, Text, draw, render_page
 from studies.reports.style import BLUE, ORANGE, figure
 
 if TYPE_CHECKING:
-    from studies.scan import Scan
+    from studies.scan import Scan, ScanInterval
 
 
 LEAD = "Measured faces, aligned with the card's resonator and fitted with circumferential harmonics, and the frequency splits that they cause."
@@ -24,15 +25,16 @@ def write_scan_page(path: str, scan: "Scan", card: str, files: dict[str, str]) -
 def _chapters(scan: "Scan", files: dict[str, str]) -> list[Chapter]:
     main = min(scan.splits, key=lambda one: abs(one.split.harmonic - 2))
     axis = "undetermined" if main.slow_axis is None else f"{np.rad2deg(main.slow_axis.value):.1f}°"
+    split, low, high = _millihertz(main.hertz)
     facts = Facts(
         [
-            (f"split of n = {main.split.harmonic}", f"{1e3 * main.hertz.value:.2f} mHz", f"{1e3 * main.hertz.low:.2f} … {1e3 * main.hertz.high:.2f} mHz"),
-            ("slow axis", axis, "an antinode of the slower mode: remove mass there"),
-            ("noise of a point", ", ".join(f"{1e9 * f.noise:.0f} nm" for f in scan.faces.values()), " and ".join(scan.faces)),
+            (f"Split of n = {main.split.harmonic}", f"{split} mHz", f"90 %: {low} … {high} mHz"),
+            ("Slow axis", axis, "an antinode of the slower mode: remove mass there"),
+            ("Noise of a point", ", ".join(f"{1e9 * f.noise:.0f} nm" for f in scan.faces.values()), " and ".join(scan.faces)),
         ]
     )  # fmt: skip
     one_face = Text(
-        "One face was measured; the other is taken as perfect, so the wall is this face's departure.", "warning"
+        "One face was measured; the other is assumed perfect, so the wall is this face's departure.", "warning"
     )
     return [
         Chapter("Result", [facts, *([one_face] if len(scan.faces) == 1 else []), _splits(scan)]),
@@ -47,20 +49,25 @@ def _splits(scan: "Scan") -> Table:
     rows = []
     for one in scan.splits:
         axis = one.slow_axis
+        split, low, high = _millihertz(one.hertz)
         rows.append([
-            str(one.split.harmonic), f"{one.split.frequency:.3f}", f"{1e3 * one.hertz.value:.3f}",
-            f"{1e3 * one.hertz.low:.3f} … {1e3 * one.hertz.high:.3f}",
+            str(one.split.harmonic), f"{one.split.frequency:.3f}", split, f"{low} … {high}",
             "undetermined" if axis is None else f"{np.rad2deg(axis.value):.2f}",
             "" if axis is None else f"{np.rad2deg(axis.low):.2f} … {np.rad2deg(axis.high):.2f}",
-            f"{1e3 * one.whole.hertz:.3f}", f"{np.rad2deg(one.whole.slow_axis):.2f}",
+            to_interval(1e3 * one.whole.hertz, 1e3 * one.hertz.low, 1e3 * one.hertz.high)[0],
+            f"{np.rad2deg(one.whole.slow_axis):.2f}",
         ])  # fmt: skip
-    columns = ["n", "f (Hz)", "split (mHz)", "90 %", "slow axis (°)", "90 %", "every order (mHz)", "axis (°)"]
+    columns = ["n", "f (Hz)", "Split (mHz)", "90 %", "Slow axis (°)", "90 %", "Every order (mHz)", "Axis (°)"]
     return Table(
         "Splits that the faces cause",
         columns,
         rows,
         "First order: harmonic 2n alone; every order: with the products of two harmonics.",
     )
+
+
+def _millihertz(split: "ScanInterval") -> list[str]:
+    return to_interval(1e3 * split.value, 1e3 * split.low, 1e3 * split.high)
 
 
 def _maps(scan: "Scan") -> Picture:
@@ -113,7 +120,7 @@ def _roundness(scan: "Scan") -> Table:
         [r.face, f"{r.position:.3f}", f"{1e6 * r.peak_to_valley:.3f}", f"{1e6 * r.rms:.3f}"] for r in scan.roundness
     ]
     note = "From harmonic 2 of the fit on; harmonic 1 is the eccentricity of the circle."
-    return Table("Roundness of circles", ["face", "position", "peak to valley (µm)", "rms (µm)"], rows, note)
+    return Table("Roundness of circles", ["Face", "Position", "Peak to valley (µm)", "Rms (µm)"], rows, note)
 
 
 def _faces(scan: "Scan", files: dict[str, str]) -> Table:
@@ -127,6 +134,6 @@ def _faces(scan: "Scan", files: dict[str, str]) -> Table:
         ])  # fmt: skip
     return Table(
         "What was read",
-        ["face", "file", "points", "left out", "noise (nm)", "positions", "offset (µm)", "tilt (°)"],
+        ["Face", "File", "Points", "Left out", "Noise (nm)", "Positions", "Offset (µm)", "Tilt (°)"],
         rows,
     )

@@ -103,7 +103,7 @@ def _yield(results: "Results") -> "Yield | None":
 
 
 def _short(results: "Results") -> list[Block]:
-    facts = [("Designs", str(len(results)), f"{len(results.failed)} failed, of {results.total} asked for")]
+    facts = [("Designs", str(len(results)), f"of {results.total}; {len(results.failed)} failed")]
     for column in main_columns(results)[:2]:
         n = _numbers(results, column)
         unit = "" if column.unit == "1" else f" {column.unit}"
@@ -115,7 +115,7 @@ def _short(results: "Results") -> list[Block]:
         facts.append(("Meet every requirement", percent(found.share), words))
     blocks: list[Block] = [Facts(facts)]
     if len(results) < results.total and not results.about["repeats"]:
-        blocks.append(Text("The study is not finished: run it again to resume, then make this page anew.", "warning"))
+        blocks.append(Text("The study is not finished: run it again to resume, then make this page again.", "warning"))
     return blocks
 
 

@@ -47,7 +47,7 @@ def _sobol(results: "Results", column: "Column") -> list[Block]:
         f"Sobol indices of {column.label}",
         heads,
         rows,
-        "A parameter whose total interval holds zero has no influence that shows.",
+        "A parameter whose total interval includes zero has no visible influence.",
         True,
     )
     return [table, figures.sobol_figure(found, column)]
@@ -61,7 +61,7 @@ def _slopes(results: "Results", column: "Column") -> list[Block]:
         unit = _slope_unit(column.unit, units[slope.parameter])
         rows.append([slope.parameter, f"{slope.slope:.6g}", f"{slope.uncertainty:.2g}", unit, f"{slope.swing:.6g}"])
     heads = ["Parameter", "Slope", "±", "Unit", f"Swing over the range ({column.unit})"]
-    note = "± holds the curvature beyond the outer levels and the solver's error; a slope smaller than that is not significant."
+    note = "± includes the curvature beyond the outer levels and the solver's error; a slope smaller than that is not significant."
     return [
         Table(f"Slopes of {column.label} at the nominal design", heads, rows, note, True),
         figures.tornado_figure(found, column),
@@ -115,10 +115,10 @@ def tolerance_chapters(results: "Results") -> list[Chapter]:
         words = "No sampled design fails: the tolerances may be wider than the ranges that were asked for."
     else:
         words = (
-            f"The largest box about the nominal design without a failing one reaches {100 * reach.part:.3g} % of every range"
+            f"The largest box about the nominal design without a failing one covers {100 * reach.part:.3g} % of every range"
             f" ({reach.inside} designs inside): "
             + ", ".join(_reach(p, reach.part) for p in study.parameters if not isinstance(p.nominal, str))
-            + ". It rests on the sampled designs alone; a worst-case search tests it."
+            + ". It is based on the sampled designs alone; a worst-case search tests it."
         )
     return [Chapter("Tolerances", [Table("Yield", heads, rows, note), Text(words, "note")])]
 
@@ -143,7 +143,7 @@ def search_chapters(results: "Results") -> list[Chapter]:
         found = findings.get(name_search(search))
         if found is None:
             blocks.append(
-                Text(f"The search for {name_search(search)} has not been made yet: run the study again.", "warning")
+                Text(f"The search for {name_search(search)} has not been run yet: run the study again.", "warning")
             )
         elif "failed" in found:
             blocks.append(Text(f"The search for {name_search(search)} failed: {found['failed']}", "warning"))
@@ -172,7 +172,7 @@ def _inversion(results: "Results", found: Mapping[str, Any]) -> list[Block]:
         limits = f" It lies on the limits of {', '.join(found['at_limit'])}." if found["at_limit"] else ""
         words, kind = f"No design in the ranges meets the targets; the nearest has {design}.{limits}", "warning"
     if found["condition"] and found["condition"] > 1e3:
-        words += f" The targets hardly tell the parameters apart (condition {found['condition']:.1e})."
+        words += f" The targets hardly distinguish the parameters (condition {found['condition']:.1e})."
     return [Table("Design by inversion", ["Column", "Wanted", "Found"], rows), Text(words, kind)]
 
 

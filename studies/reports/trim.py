@@ -31,7 +31,7 @@ def _chapters(plan: "TrimPlan", payload: dict[str, Any]) -> list[Chapter]:
     kinds = ", ".join(f"{kind} {value:+.2f}" for kind, value in payload["other_cuts"].items()).replace("-", "−")
     warning = Text(
         f"Planned as '{payload['cut']}'. The same mass at the rim moves the split, relative to this kind of cut, by: {kinds}. A negative "
-        "number moves it the other way. If round 1 shows another effect than predicted, plan the next with --gain.",
+        "number moves it the other way. If round 1 shows another effect than predicted, plan the next with `--gain`.",
         "note",
     )
     return [

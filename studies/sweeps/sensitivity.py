@@ -183,7 +183,7 @@ def _complete(results: "Results", column: str) -> Array:
     lacking = np.flatnonzero(~np.isfinite(y))
     if lacking.size:
         raise InputError(
-            f"{lacking.size} of {len(y)} cases have no {column}, and none is invented: {_list(results, lacking.tolist())}."
+            f"{lacking.size} of {len(y)} cases have no {column}, and none is made up: {_list(results, lacking.tolist())}."
             " Mend the ranges, or the function, and run a new study."
         )
     return y

@@ -38,7 +38,7 @@ def test_cells_are_escaped_sortable_and_have_minus_signs():
     text = page(1, 2)
     assert "&lt;b&gt;" in text
     assert "<td>−1.5e−03</td>" in text
-    assert '<table aria-labelledby="table-1-2" class="sortable">' in text
+    assert '<table aria-labelledby="table-1-2" class="sortable ">' in text
 
 
 def test_numbers_with_units_are_typeset_and_words_for_a_command_are_not():

@@ -94,7 +94,7 @@ def _detect(campaign: Campaign, models: Mapping[str, Fit], chamber: Chamber | No
     scored = to_detect(campaign, models, chamber)
     if not scored:
         return None, None
-    return _told(scored, "Nothing is named; what may be hidden would show best in")
+    return _told(scored, "No cause is named; a hidden one would show best in")
 
 
 def _told(scored: Sequence[Scored], begin: str) -> Advice:
@@ -103,7 +103,7 @@ def _told(scored: Sequence[Scored], begin: str) -> Advice:
     run = as_next_run(best, None if repeat is None else repeat.evidence)
     text = f"{begin} {_name(best)} ({best.programme.hours:.2g} h): expected evidence {best.evidence:.0f}"
     if best.pair[1] == NOTHING:
-        text += " for an effect that stands at 10 today"
+        text += " for an effect with evidence 10 today"
     if repeat is not None and repeat is not best:
         text += f", against {repeat.evidence:.0f} for a {repeat.programme.profile}"
     return f"{text}.", run

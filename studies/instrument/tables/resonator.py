@@ -195,7 +195,7 @@ def build_resonator(keys: Shape, place: CardPlace) -> "Resonator":
         resonator = keys.build()
     if not SMALLEST <= resonator.size <= LARGEST:
         hint = " Lengths are in mm, not in µm." if resonator.size > LARGEST else " Lengths are in mm, not in m."
-        raise InputError(f"{place.where}: a resonator of {resonator.size / MM:g} mm is none that can be built.{hint}")
+        raise InputError(f"{place.where}: a resonator of {resonator.size / MM:g} mm cannot be built.{hint}")
     return resonator
 
 
