@@ -121,8 +121,8 @@ def coefficients_table(chain: "BellChain", output: str) -> Table:
     ]
     curves: list[tuple[str, PolynomialCurve, float, float, tuple[str, ...]]] = [
         ("bias (34)", chain.bias, 1.0, 0.0, ("°/s", "°/s per °C", "°/s per °C²")),
-        ("scale over rate (35)", chain.scale_over_rate, 1.0, 1.0, ("°/s", "1", "s/°")),
-        ("scale over temperature (36)", chain.scale_over_temperature, 0.0, 0.0, ("1", "1/°C", "1/°C²")),
+        ("scale over rate (35)", chain.scale_over_rate, 1.0, 1.0, ("°/s", "ratio", "per °/s")),
+        ("scale over temperature (36)", chain.scale_over_temperature, 0.0, 0.0, ("ratio", "per °C", "per °C²")),
     ]
     for name, curve, y, x, units in curves:
         size = DEG ** (x * np.arange(len(curve.coefficients)) - y)

@@ -93,7 +93,7 @@ def _value_row(one: "Estimate") -> list[str]:
     shift = f"{one.shift_sd:+.2f}"
     return [
         one.parameter,
-        one.unit,
+        one.unit if one.unit != "1" else "—",
         plain(one.card, 5),
         value,
         f"{low} … {high}{star}",

@@ -123,7 +123,7 @@ def coefficients_table(study: "CrossDampingStudy") -> Table:
         [
             f"ζ{lowered(i)}",
             *to_error(value, error),
-            ("1", "1/°C")[i] if i < 2 else f"1/°C{raised(i)}",
+            ("ratio", "per °C")[i] if i < 2 else f"per °C{raised(i)}",
             f"{value / model.coefficients[0]:.4g}",
         ]
         for i, (value, error) in enumerate(zip(model.coefficients, np.sqrt(np.diag(model.covariance)), strict=True))
@@ -187,11 +187,11 @@ def draw_runs(runs: "tuple[RestRun, ...]", model: "CrossDampingModel", unit: flo
             hours = (blocks.time - run.time[0]) / 3600 + begin
             begin = hours[-1]
             upper.plot(hours, means["T"] - zero_Celsius, color=style.VERMILION)
-            for name, colour, label in (
+            for when, colour, label in (
                 ("before", style.ORANGE, "uncompensated"),
                 ("after", style.BLUE, "compensated"),
             ):
-                lower.plot(hours, means[name] / unit, color=colour, linewidth=0.9, label=None if i else label)
+                lower.plot(hours, means[when] / unit, color=colour, linewidth=0.9, label=None if i else label)
         lower.axhline(0, color=style.BLACK, linewidth=0.8)
         upper.set_ylabel("temperature (°C)")
         lower.set_ylabel(f"zero-rate output ({name})")

@@ -157,7 +157,7 @@ def diagnosis_page(diagnosis: Diagnosis) -> str:
                 *([cause_table(verdict)] if verdict.causes else []),
                 response_table(verdict),
                 *(Text(f"{cause.effect}: {_summary(cause)}") for cause in verdict.causes if cause.kind == "physics"),
-                *(Text(note, "note") for note in verdict.notes),
+                *(Text(f"{note[:1].upper()}{note[1:]}", "note") for note in verdict.notes),
             ],
         ),
     ]
@@ -218,7 +218,7 @@ def _facts(verdict: Verdict) -> list[tuple[str, str, str]]:
     if main is not None:
         result = verdict.responses[main]
         if result.gain is not None:
-            facts.append(("Gain", plain(result.gain), f"of the {NAMES[main]}, on rows left out of the fit"))
+            facts.append(("Gain", f"{plain(result.gain)} times", f"of the {NAMES[main]}, on rows left out of the fit"))
         facts.append(("Noise", shown(main, result.noise), f"rms of the {NAMES[main]} that no model removes"))
     return facts
 

@@ -24,7 +24,7 @@ PACKAGES = ("numpy", "scipy", "sympy", "pandas", "pyvista", "trimesh")
 OPEN_HEIGHT = 4600  # px: chapters that would end below, on a screen 1280 px wide or on a phone, are folded
 LONG_TABLE = 15  # rows; longer tables are folded, except in the first chapter, which is the answer
 LONG_ANSWER = 40  # rows of a table in the first chapter
-PAPER_ROWS = 60  # of a table; the others are on the screen only
+PAPER_ROWS = 40  # of a table; the others are on the screen only
 CONTENTS_FROM = 4  # chapters
 PHONE = 364.0  # px for a table on a phone
 

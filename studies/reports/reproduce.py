@@ -167,7 +167,7 @@ def _short(parts: "Reproduction") -> list[Text]:
             f" {parts.diagnosis.curvature_ratio:.2f} times that of the default law, a parabola through published statements"
             " about its maximum near 1100 °C. The slope of silica also vanishes near −200 °C, so that not even the sign of the"
             f" second derivative is settled in between: {physics.curvature_law:.2f} ± {physics.curvature_uncertainty:.2f}"
-            f" ppm/°C² is what the sources allow, and the measured {physics.curvature_measured:.2f} lies {away_curvature:.1f} standard"
+            f" ppm/°C² is what the sources allow, and the measured value of {physics.curvature_measured:.2f} ppm/°C² lies {away_curvature:.1f} standard"
             " deviations away. A slope that falls to 25 °C and rises again is beyond a constant curvature."
             " Seven points, each approached once, cannot say whether that is the glass, the thermometer, the mounting or"
             " the soak: a staircase up and down with a second thermometer would.",

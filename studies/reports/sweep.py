@@ -7,6 +7,7 @@ import numpy as np
 
 from studies.errors import UNUSABLE_INPUT, InputError
 from studies.reports import sweep_figures as figures
+from studies.reports.digits import plain
 from studies.reports.page import Block, Chapter, Facts, Table, Text, render_page
 from studies.reports.sweep_analysis import influence_chapters, search_chapters, tolerance_chapters
 from studies.reports.sweep_cells import main_columns, number, percent, short, spread, to_error
@@ -178,7 +179,7 @@ def _statistics(results: "Results") -> Table:
                 *(to_error(n[key], n["error"]) for key in ("least", "greatest")),
             ]
         )
-        rows[-1].append(f"{n['error']:.1e}" if n["error"] is not None and np.isfinite(n["error"]) else "")
+        rows[-1].append(plain(n["error"], 2) if n["error"] is not None and np.isfinite(n["error"]) else "")
     heads = ["Quantity", "Unit", "Nominal", "Mean", "Standard deviation", "Least", "Greatest", "Numerical error"]
     note = "The numerical error is the largest estimate of the solver for any design, against the exact solution of its theory."
     return Table("All designs with a value", heads, rows, note)
@@ -256,10 +257,13 @@ def _shapes(results: "Results") -> list[Chapter]:
 
 def _provenance(results: "Results") -> list[Block]:
     about, identity = results.about, results.about["identity"]
-    rows = [
-        [run["started_utc"], run["finished_utc"] or "", run["outcome"] or "killed", *_environment(run["provenance"])]
-        for run in results.store.runs()
-    ]
+    rows: list[list[str]] = []
+    environments: dict[str, list[str]] = {}
+    for count, run in enumerate(results.store.runs(), 1):
+        commit, versions, lock, machine = _environment(run["provenance"])
+        ended, outcome = run["finished_utc"] or "", run["outcome"] or "killed"
+        rows.append([str(count), run["started_utc"], ended, outcome, commit[:12], lock])
+        environments.setdefault(f"{versions}; {machine}", []).append(str(count))
     facts = [
         ["study made", about["created_utc"]],
         ["physics version", identity["physics_version"]],
@@ -269,8 +273,9 @@ def _provenance(results: "Results") -> list[Block]:
         ["card", results.study.instrument.path],
         *([f"user function {name}", source] for name, source in identity["functions"].items()),
     ]
-    heads = ["Started", "Ended", "Outcome", "Commit", "Versions", "Lock file", "Machine"]
+    heads = ["Run", "Started", "Ended", "Outcome", "Commit", "Lock file"]
     blocks: list[Block] = [Table("Identity", ["What", "Value"], facts), Table("Runs", heads, rows)]
+    blocks += [Text(f"Run {', '.join(runs)}: {versions}.") for versions, runs in environments.items()]
     return [*blocks, Text(about["spec_text"], "source")] if about["spec_text"] else blocks
 
 
