@@ -118,36 +118,24 @@ def typeset(text: str) -> str:
 
 
 def _prose(text: str) -> "Markup":
-    """Return a paragraph, escaped: words between backticks as code, long names with places where a line may end."""
-    from markupsafe import Markup
+    """Return a paragraph, escaped, with words between backticks as code."""
+    from markupsafe import Markup, escape
 
     parts = str(text).split("`")
     if len(parts) % 2 == 0:  # an odd backtick is a character like others
         parts = [str(text)]
-    pieces = [
-        f"<code>{_breakable(part)}</code>" if k % 2 else _breakable(typeset(part)) for k, part in enumerate(parts)
-    ]
+    pieces = [f"<code>{escape(part)}</code>" if k % 2 else escape(typeset(part)) for k, part in enumerate(parts)]
     return Markup("".join(pieces))
 
 
 def _cell(text: str) -> "Markup":
     """Return a cell, escaped, with minus signs, also in exponents, where it begins as a number."""
-    from markupsafe import Markup
+    from markupsafe import Markup, escape
 
     text = str(text)
     if re.match(r"[-+±<> ]*[.\d]", text):
         text = re.sub(r"(?<![\w.)\]-])-(?=\.?\d)|(?<=\de)-(?=\d)", "−", text)
-    return Markup(_breakable(re.sub(r"(?<=\d)%", " %", text)))
-
-
-def _breakable(text: str) -> str:
-    """Return escaped text in which paths and dotted names may be broken behind their signs."""
-    from markupsafe import escape
-
-    def give(name: re.Match[str]) -> str:
-        return re.sub(r"([./_])(?=[A-Za-z])", r"\1<wbr>", name[0])
-
-    return re.sub(r"[\w./-]{15,}", give, str(escape(text)))
+    return Markup(escape(re.sub(r"(?<=\d)%", " %", text)))
 
 
 def _stacked(table: Table) -> bool:
@@ -155,7 +143,7 @@ def _stacked(table: Table) -> bool:
 
     def least(text: str) -> int:
         whole = re.match(r"[-+±<> ]*[.\d]", text) or len(text) <= 12
-        return len(text) if whole else max(map(len, re.split(r"[\s._/-]+", text)))
+        return len(text) if whole else max(map(len, re.split(r"[\s-]+", text)))
 
     columns = [
         max([least(str(row[k])) for row in table.rows] + [max(map(len, str(head).split()), default=0)])
