@@ -7,6 +7,7 @@ import warnings
 from dataclasses import dataclass, field
 from functools import cached_property
 from math import pi, sqrt
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -20,6 +21,9 @@ from shell.refinement import refine
 from shell.resonator import Resonator
 from shell.sampling import ShapePatch, sample_shape
 from shell.solution import AlongMeridian, EnergyFractions, Solution, total
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 THEORIES = ("solid", "shell", "rayleigh")
 MOST_HARMONIC = 100  # waves shorter than any wall is thin; beyond, the meshes outgrow memory
@@ -87,6 +91,25 @@ class Mode:
         solution = self._solved()
         assert self.resonator is not None
         return sample_shape(self.resonator, solution, points)
+
+    def plot(self) -> "Figure":
+        """Draw the cross-section through an antinode, undeformed and at full swing to both sides (matplotlib).
+
+        Raises
+        ------
+        ShellError
+            Rayleigh's closed form has no shape.
+        """
+        from shell.section import draw_section
+
+        return draw_section(self)
+
+    def __repr__(self) -> str:
+        kind = f", {self.label}" if self.label else ""
+        return (
+            f"Mode(n = {self.harmonic}, {self.frequency:.3f} Hz{kind}, Bryan factor {self.bryan_factor:.4f},"
+            f" {self.theory}, relative error {self.relative_error_estimate:.1e})"
+        )
 
     def _solved(self) -> Solution:
         if self.solution is None:

@@ -18,6 +18,7 @@ from studies.record import Record
 from studies.shown import Shown
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
     from pandas import DataFrame
 
     from studies.instrument.card import Instrument

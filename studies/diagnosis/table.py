@@ -25,6 +25,7 @@ from studies.effects.states import FloatArray
 from studies.shown import Shown
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
     from pandas import DataFrame
 
 FEWEST_POINTS = 5
@@ -70,6 +71,14 @@ class TableDiagnosis(Shown):
 
         columns = ["form", "sum_of_squares_Hz2", "leave_one_out_Hz", "evidence"]
         return pd.DataFrame([*self.candidates], columns=columns).set_index("form")
+
+    def plot(self) -> "Figure":
+        """Draw what the law, the baseline and the strongest candidate leave of the table."""
+        from studies.reports.diagnosis import table_residuals
+
+        figure = table_residuals(self).figure
+        assert figure is not None
+        return figure
 
     def as_dict(self) -> dict[str, object]:
         """Return the object of `hrg diagnose --json`."""
@@ -131,7 +140,7 @@ def study_steady_table(
     if distinct < FEWEST_POINTS:
         remark = f"{distinct} temperatures; a baseline of three numbers needs five or more to be tested"
         result = ResponseResult("not-identifiable", None, (base_rms, None), None, "none", remark=remark)
-        verdict = Verdict("not-identifiable", (), {"frequency_Hz": result}, _NEXT)
+        verdict = Verdict("not-identifiable", (), {"frequency_Hz": result}, _MORE)
         return TableDiagnosis(verdict, T, law_left, left, left, law_rms, ratio, (), (remark + ".",))
     rounding = max(resolution / np.sqrt(12.0), 1e-9 * float(np.abs(f).max()))
     scale = make_scale(base, f, rounding)
@@ -159,7 +168,7 @@ def study_steady_table(
                 " between the rows and a slow effect of temperature look alike in one table."
             )
         result = ResponseResult(state, base_rms, (base_rms, base_loo), None, "structure" if wanders else "none")
-        verdict = Verdict(state, (), {"frequency_Hz": result}, _NEXT if wanders else None)
+        verdict = Verdict(state, (), {"frequency_Hz": result}, _next(T) if wanders else None)
         return TableDiagnosis(verdict, T, law_left, left, left, law_rms, ratio, forms, sentences)
     winner = ranked[0]
     members, probability = weigh([c.effect.name for c in ranked], [c.log_evidence + prior for c in ranked], nothing)
@@ -184,14 +193,22 @@ def study_steady_table(
     result = ResponseResult(state, max(reached, rounding), (base_rms, base_loo), (reached, winner.loo), "none")
     if len(names) > 1:
         sentences.append(f"The table cannot separate these: {', '.join(names)}.")
-    verdict = Verdict(state, (cause,), {"frequency_Hz": result}, _NEXT)
+    verdict = Verdict(state, (cause,), {"frequency_Hz": result}, _next(T))
     return TableDiagnosis(verdict, T, law_left, left, winner.residual, law_rms, ratio, forms, sentences)
 
 
-_NEXT = (
-    "Approach the same temperatures from above and from below, with two soak times and a second thermometer: direction tells "
-    "hysteresis and stress, soak time tells an unsettled resonator, the thermometer tells a scale error from a curvature of f."
-)
+_MORE = "Measure at five temperatures or more, from below and from above."
+_SOAK = "soak time shows an unsettled resonator, the thermometer separates a scale error from a curvature of f"
+
+
+def _next(T: FloatArray) -> str:
+    """Return what to measure next, which is not what the table has already."""
+    if _turns(T):
+        return f"Repeat the table with two soak times and a second thermometer: {_SOAK}."
+    return (
+        "Approach the same temperatures from above and from below, with two soak times and a second thermometer: direction "
+        f"shows hysteresis and stress, {_SOAK}."
+    )
 
 
 def _candidates(effect: Effect, x: FloatArray, base: FloatArray, f: FloatArray, scale: Scale) -> list[_Candidate]:
@@ -273,9 +290,13 @@ def _sentences(
         ratio_f = (cubic - quartic) / max(quartic / freedom, rounding**2)
         chance = float(f_distribution.sf(max(ratio_f, 0.0), 1, freedom))
         said = "a cubic is not sufficient" if chance < 0.05 else "a cubic is sufficient"
-        out.append(
-            f"Cubic against quartic: {cubic:.3g} and {quartic:.3g} Hz², F(1, {freedom}) = {ratio_f:.0f}, chance {chance:.2g}; {said}."
-        )
+        if cubic < T.size * rounding**2:
+            out.append("A cubic fits within the rounding of the readings; a cubic is sufficient.")
+        else:
+            out.append(
+                f"Cubic against quartic: {cubic:.3g} and {quartic:.3g} Hz², F(1, {freedom}) = {max(ratio_f, 0.0):.3g}, "
+                f"chance {chance:.2g}; {said}."
+            )
     both = _turns(T)
     out.append(
         f"{T.size} rows, "

@@ -13,6 +13,8 @@ from studies.reports.digits import plain, to_interval
 from studies.reports.page import Block, Chapter, Facts, Picture, Table, Text, draw, render_page
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from studies.calibration.estimates import Estimate
 
 NAMES = {
@@ -196,6 +198,13 @@ def _shift_figure(found: Calibration) -> Picture:
         axis.set_xlabel("prior standard deviations from the card")
         words = "Shifts of the values that the data determine at least in part, with 90 % intervals; shaded: 90 % of the prior."
         return draw(made, words, words)
+
+
+def draw_residuals(found: Calibration) -> "Figure":
+    """Return the residuals after the calibration as a figure."""
+    figure = _residual_figure(found).figure
+    assert figure is not None
+    return figure
 
 
 def _residual_figure(found: Calibration) -> Picture:

@@ -58,6 +58,7 @@ class Picture:
     caption: str
     alt: str
     height: float = 400.0  # px, roughly
+    figure: "Figure | None" = field(default=None, repr=False, compare=False)
     block: str = field(default="picture", init=False)
 
 
@@ -205,7 +206,7 @@ def draw(figure: "Figure", caption: str, alt: str) -> Picture:
     with mpl.rc_context({"svg.hashsalt": caption}):
         figure.savefig(buffer, format="svg", bbox_inches="tight", metadata={"Date": None})
     height = 96 * float(figure.get_figheight())
-    return Picture(_data_uri("image/svg+xml", buffer.getvalue()), caption, alt, height)
+    return Picture(_data_uri("image/svg+xml", buffer.getvalue()), caption, alt, height, figure)
 
 
 def _data_uri(kind: str, data: bytes) -> str:

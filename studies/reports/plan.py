@@ -24,8 +24,9 @@ def headline(outlook: Outlook) -> str:
     parts = []
     for plan in outlook.plans:
         sure = sum(1 for key in effects if (least := outlook.smallest(key)) is not None and least <= plan.snr)
-        parts.append(f"{sure} of {len(effects)} with {_size_words(plan)} (SNR {plan.snr:g})")
-    text = f"Effects that this campaign would name rightly nine times in ten: {'; '.join(parts)}."
+        size = f" ({_size_words(plan)})" if plan.sizes else ""
+        parts.append(f"{sure} of {len(effects)} at SNR {plan.snr:g}{size}")
+    text = f"Effects that this campaign would name rightly nine times in ten: {', '.join(parts)}."
     never = [key for key in effects if outlook.smallest(key) is None]
     if never:
         text += f" Not even at SNR {outlook.plans[0].snr:g}: {', '.join(map(shown_key, never))}."

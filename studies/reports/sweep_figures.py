@@ -4,11 +4,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from studies.errors import InputError, nearest
 from studies.instrument.units import split_unit
 from studies.reports import style
 from studies.reports.page import Picture, draw
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from studies.sweeps.quantity import Column
     from studies.sweeps.results import Results
     from studies.sweeps.sensitivity import LocalSlope, SobolIndices
@@ -28,6 +31,18 @@ def label(name: str, unit: str) -> str:
 def column_label(column: "Column") -> str:
     """Return what a column is, with its unit in brackets."""
     return column.label + ("" if column.unit == "1" else f" ({column.unit})")
+
+
+def draw_column(results: "Results", name: str | None = None) -> "Figure":
+    """Return a figure of one column against the parameters; the first column unless named."""
+    columns = {column.name: column for column in results.study.columns}
+    name = next(iter(columns)) if name is None else name
+    if name not in columns:
+        raise InputError(f"the study '{results.study.name}' has no column '{name}'{nearest(name, columns)}")
+    picture = response_figure(results, columns[name])
+    if picture is None or picture.figure is None:
+        raise InputError(f"no design of the study '{results.study.name}' has a value of '{name}'.")
+    return picture.figure
 
 
 def spread_figure(results: "Results", column: "Column", limits: "list[RequirementLimits]") -> Picture:

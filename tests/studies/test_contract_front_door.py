@@ -80,7 +80,13 @@ def test_results_show_themselves_shortly_and_as_tables(tmp_path):
         assert repr(one).startswith(begins)
         assert len(repr(one)) < 400
         assert len(one.to_frame()) > 0
-        assert one is study or "<table" in one._repr_html_()
+        assert "<table" in one._repr_html_()
+    for one in (calibration, shown[2][0], study):
+        assert one.plot().axes
+    (mode,) = shell.solve_modes(shell.hemisphere(radius=15e-3, thickness=0.9e-3), shell.Elastic(72.7e9, 0.17, 2203.0))
+    assert repr(mode).startswith("Mode(n = 2, ")
+    assert len(repr(mode)) < 120
+    assert len(mode.plot().axes) == 1
     assert comparison.to_frame().loc["frequency, n = 2", "hrg-30mm"] == pytest.approx(4432.09, abs=0.1)
 
 

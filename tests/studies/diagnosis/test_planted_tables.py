@@ -60,7 +60,7 @@ def test_neighbouring_rows_that_wander_together_name_nothing_and_are_not_adequat
         found = study(T, walk, seed, white=1e-4)
         assert found.verdict.verdict == "not-identifiable"
         assert not found.verdict.causes
-        assert any("The rows wander" in sentence for sentence in found.sentences)
+        assert any("The rows drift" in sentence for sentence in found.sentences)
 
 
 def test_a_dip_in_wandering_rows_is_still_found():
