@@ -102,7 +102,7 @@ class Mode:
         """
         from shell.section import draw_section
 
-        return draw_section(self)
+        return draw_section(self.shape(33), self.harmonic, f"n = {self.harmonic}, {self.frequency:.3f} Hz")
 
     def __repr__(self) -> str:
         kind = f", {self.label}" if self.label else ""

@@ -1,17 +1,35 @@
 """How a result shows itself in an interactive session: one short line, a table, and both in a notebook."""
 
-from typing import TYPE_CHECKING
+from importlib import import_module
+from typing import TYPE_CHECKING, ClassVar
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
     from pandas import DataFrame
 
 
 class Shown:
-    """Gives a class with a short `__repr__` and `to_frame` its look in a notebook."""
+    """Gives a class with a short `__repr__` and `to_frame` its look in a notebook, and its picture.
+
+    Attributes
+    ----------
+    drawn_by : str
+        "module:function" of the picture, by name: results do not import the pages, which import them.
+    """
+
+    drawn_by: ClassVar[str] = ""
 
     def to_frame(self) -> "DataFrame":
         """Return what the result holds as a table."""
         raise NotImplementedError
+
+    def plot(self) -> "Figure":
+        """Return the picture of the result (matplotlib)."""
+        module, _, name = self.drawn_by.partition(":")
+        if not module:
+            raise NotImplementedError
+        figure: Figure = getattr(import_module(module), name)(self).figure
+        return figure
 
     def _repr_html_(self) -> str:
         from html import escape

@@ -18,7 +18,6 @@ from studies.record import Record
 from studies.shown import Shown
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
     from pandas import DataFrame
 
     from studies.instrument.card import Instrument
@@ -98,6 +97,8 @@ class Calibration(Shown):
     held_out : HeldOut, where it was asked for
     warnings : in sentences
     """
+
+    drawn_by = "studies.reports.calibration:residual_figure"
 
     card: "Instrument"
     instrument: "Instrument"

@@ -36,7 +36,6 @@ NARROW_RANGE = 1.0
 Progress = Callable[[str], None]
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
     from pandas import DataFrame
 
     from studies.instrument.card import Instrument
@@ -45,6 +44,8 @@ if TYPE_CHECKING:
 @dataclass(frozen=True, repr=False)
 class Diagnosis(Shown):
     """A verdict with the fits behind it, for pages and extended models."""
+
+    drawn_by = "studies.reports.diagnosis:ladder"
 
     verdict: Verdict
     campaign: Campaign
@@ -56,14 +57,6 @@ class Diagnosis(Shown):
     def to_frame(self) -> "DataFrame":
         """Return one row a response."""
         return self.verdict.to_frame()
-
-    def plot(self) -> "Figure":
-        """Draw what is left of every response: calibrated, with the named causes, noise."""
-        from studies.reports.diagnosis import ladder
-
-        figure = ladder(self).figure
-        assert figure is not None
-        return figure
 
 
 def investigate(

@@ -25,7 +25,6 @@ from studies.effects.states import FloatArray
 from studies.shown import Shown
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
     from pandas import DataFrame
 
 FEWEST_POINTS = 5
@@ -52,6 +51,8 @@ class TableDiagnosis(Shown):
         What was found, in words.
     """
 
+    drawn_by = "studies.reports.diagnosis:table_residuals"
+
     verdict: Verdict
     temperature: FloatArray
     law_residual: FloatArray
@@ -71,14 +72,6 @@ class TableDiagnosis(Shown):
 
         columns = ["form", "sum_of_squares_Hz2", "leave_one_out_Hz", "evidence"]
         return pd.DataFrame([*self.candidates], columns=columns).set_index("form")
-
-    def plot(self) -> "Figure":
-        """Draw what the law, the baseline and the strongest candidate leave of the table."""
-        from studies.reports.diagnosis import table_residuals
-
-        figure = table_residuals(self).figure
-        assert figure is not None
-        return figure
 
     def as_dict(self) -> dict[str, object]:
         """Return the object of `hrg diagnose --json`."""

@@ -6,15 +6,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.constants import zero_Celsius
 
-from studies.calibration.calibrate import Calibration
 from studies.calibration.observed import HOUSING, SETTLED
 from studies.reports import style
 from studies.reports.digits import plain, to_interval
 from studies.reports.page import Block, Chapter, Facts, Picture, Table, Text, draw, render_page
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
+    from studies.calibration.calibrate import Calibration
     from studies.calibration.estimates import Estimate
 
 NAMES = {
@@ -35,7 +33,7 @@ SHOWN = {
 TOLD = {"data": "the data", "prior": "the prior", "both": "both"}
 
 
-def calibration_page(found: Calibration, data: Sequence[str]) -> str:
+def calibration_page(found: "Calibration", data: Sequence[str]) -> str:
     """Return the page."""
     moved = sum(abs(one.shift_sd) > 2 for one in found.estimates)
     lead = (
@@ -54,12 +52,12 @@ def calibration_page(found: Calibration, data: Sequence[str]) -> str:
     chapters = [
         Chapter("From the card to the noise", [*blocks, _ladder_figure(found), *([held] if held is not None else [])]),
         Chapter("Values", [values_table(found), *_inseparable(found), _shift_figure(found)]),
-        Chapter("Residuals over time, and noise", [_residual_figure(found), noise_table(found)]),
+        Chapter("Residuals over time, and noise", [residual_figure(found), noise_table(found)]),
     ]
     return render_page("Calibration", lead, chapters)
 
 
-def _facts(found: Calibration) -> Facts:
+def _facts(found: "Calibration") -> Facts:
     rows = []
     for name, rung in found.ladder.items():
         unit, scale = SHOWN[name]
@@ -68,7 +66,7 @@ def _facts(found: Calibration) -> Facts:
     return Facts(rows)
 
 
-def values_table(found: Calibration, touched: bool = False) -> Table:
+def values_table(found: "Calibration", touched: bool = False) -> Table:
     """Return what became of every uncertain value, or of those alone that the data touched."""
     silent = [one for one in found.estimates if touched and one.width > 0.9995 and abs(one.shift_sd) < 0.005]
     kept = [one for one in found.estimates if one not in silent]
@@ -105,7 +103,7 @@ def _value_row(one: "Estimate") -> list[str]:
     ]
 
 
-def ladder_table(found: Calibration) -> Table:
+def ladder_table(found: "Calibration") -> Table:
     """Return the residuals before and after, beside the noise."""
     rows = [
         [
@@ -125,7 +123,7 @@ def ladder_table(found: Calibration) -> Table:
     return Table("Residuals", columns, rows, note)
 
 
-def held_out_table(found: Calibration) -> Table | None:
+def held_out_table(found: "Calibration") -> Table | None:
     """Return how the held-out run was predicted."""
     held = found.held_out
     if held is None:
@@ -145,7 +143,7 @@ def held_out_table(found: Calibration) -> Table | None:
     )
 
 
-def noise_table(found: Calibration) -> Table:
+def noise_table(found: "Calibration") -> Table:
     """Return the levels of the noise."""
     rows = [
         [
@@ -159,17 +157,17 @@ def noise_table(found: Calibration) -> Table:
     return Table("Noise, estimated", ["Response", "Unit", "White", "Flicker", "Walk", "Offset"], rows, note)
 
 
-def separation_sentences(found: Calibration) -> list[str]:
+def separation_sentences(found: "Calibration") -> list[str]:
     """Return what the data cannot tell apart."""
     return [f"The data determine only a combination of {', '.join(group)}." for group in found.groups]
 
 
-def _inseparable(found: Calibration) -> list[Block]:
+def _inseparable(found: "Calibration") -> list[Block]:
     rows = [[str(k + 1), ", ".join(group)] for k, group in enumerate(found.groups)]
     return [Table("Only combinations of these are determined", ["Group", "Values"], rows)] if rows else []
 
 
-def _ladder_figure(found: Calibration) -> Picture:
+def _ladder_figure(found: "Calibration") -> Picture:
     with style.figure(1, len(found.ladder), height=2.5, squeeze=False) as (made, axes):
         for axis, (name, rung) in zip(axes[0], found.ladder.items(), strict=True):
             unit, scale = SHOWN[name]
@@ -186,7 +184,7 @@ def _ladder_figure(found: Calibration) -> Picture:
         return draw(made, words, words)
 
 
-def _shift_figure(found: Calibration) -> Picture:
+def _shift_figure(found: "Calibration") -> Picture:
     told = [one for one in found.estimates if one.told_by != "prior"][:30] or list(found.estimates)[:30]
     with style.figure(height=0.24 * len(told) + 0.9) as (made, axis):
         place = np.arange(len(told))[::-1]
@@ -200,14 +198,8 @@ def _shift_figure(found: Calibration) -> Picture:
         return draw(made, words, words)
 
 
-def draw_residuals(found: Calibration) -> "Figure":
-    """Return the residuals after the calibration as a figure."""
-    figure = _residual_figure(found).figure
-    assert figure is not None
-    return figure
-
-
-def _residual_figure(found: Calibration) -> Picture:
+def residual_figure(found: "Calibration") -> Picture:
+    """Draw measured minus predicted after the calibration, over time."""
     problem, state = found.fit.problem, found.fit.state
     names = [name for name in problem.responses if name != SETTLED]
     colours = (style.BLUE, style.VERMILION, style.GREEN, style.PURPLE, style.ORANGE)
@@ -227,7 +219,7 @@ def _residual_figure(found: Calibration) -> Picture:
         return draw(made, words, words)
 
 
-def _settled_figure(found: Calibration) -> Picture:
+def _settled_figure(found: "Calibration") -> Picture:
     problem, residual = found.fit.problem, found.fit.state.residual[SETTLED]
     T = np.concatenate([table.temperature for table in problem.tables]) - zero_Celsius
     with style.figure(height=2.4) as (made, axis):

@@ -7,7 +7,6 @@ import numpy as np
 from scipy.constants import zero_Celsius
 
 from studies.diagnosis.held_out import residuals
-from studies.diagnosis.investigate import Diagnosis
 from studies.diagnosis.planning.next_run import NextRun
 from studies.diagnosis.response import RESPONSES
 from studies.diagnosis.verdict import Cause, ResponseResult, Verdict
@@ -17,6 +16,7 @@ from studies.reports.page import Block, Chapter, Facts, Picture, Table, Text, dr
 from studies.reports.style import BLACK, BLUE, ORANGE, VERMILION, figure
 
 if TYPE_CHECKING:
+    from studies.diagnosis.investigate import Diagnosis
     from studies.diagnosis.table import TableDiagnosis
 
 NAMES = {column: response.word for column, response in RESPONSES.items()}
@@ -132,7 +132,7 @@ def response_table(verdict: Verdict) -> Table:
     )
 
 
-def diagnosis_page(diagnosis: Diagnosis) -> str:
+def diagnosis_page(diagnosis: "Diagnosis") -> str:
     """Return the page as HTML."""
     verdict = diagnosis.verdict
     first: list[Block] = [Facts(_facts(verdict))]
@@ -223,7 +223,7 @@ def _facts(verdict: Verdict) -> list[tuple[str, str, str]]:
     return facts
 
 
-def ladder(diagnosis: Diagnosis) -> Picture:
+def ladder(diagnosis: "Diagnosis") -> Picture:
     """Draw what is left of every response: as shipped, calibrated, with the named physics, noise; on held-out rows."""
     columns = [c for c in diagnosis.verdict.responses if c in diagnosis.inquiries]
     with figure(1, len(columns), height=3.0, squeeze=False) as (canvas, axes):
@@ -268,7 +268,7 @@ def rungs(result: ResponseResult) -> list[tuple[str, float | None]]:
     ]
 
 
-def as_temperature(diagnosis: Diagnosis, column: str, value: float) -> str | None:
+def as_temperature(diagnosis: "Diagnosis", column: str, value: float) -> str | None:
     """Return the error of temperature that a residual of the frequency amounts to; None for the others."""
     if not RESPONSES[column].thermometer:
         return None
@@ -291,7 +291,7 @@ def _main_response(verdict: Verdict) -> str | None:
     return next((name for name in ranked if verdict.responses[name].noise is not None), None)
 
 
-def before_and_after(diagnosis: Diagnosis, response: str) -> Picture:
+def before_and_after(diagnosis: "Diagnosis", response: str) -> Picture:
     """Draw the residual over the campaign before and, if anything is named, after the extension; the noise as a band."""
     inquiry, unit = diagnosis.inquiries[response], RESPONSES[response]
     noise = (diagnosis.verdict.responses[response].noise or 0.0) * unit.scale
@@ -326,7 +326,7 @@ def _thinned(time: np.ndarray, values: np.ndarray, most: int = 500) -> tuple[np.
     return time[::step], values[::step]
 
 
-def residual_views(diagnosis: Diagnosis, response: str) -> Picture:
+def residual_views(diagnosis: "Diagnosis", response: str) -> Picture:
     """Draw the baseline's residual against temperature (heating and cooling), rate, frequency and the drives."""
     campaign, inquiry, unit = diagnosis.campaign, diagnosis.inquiries[response], RESPONSES[response]
     fit = inquiry.plain
@@ -370,7 +370,7 @@ def residual_views(diagnosis: Diagnosis, response: str) -> Picture:
         )
 
 
-def _rivals(diagnosis: Diagnosis, response: str) -> list[Block]:
+def _rivals(diagnosis: "Diagnosis", response: str) -> list[Block]:
     inquiry = diagnosis.inquiries[response]
     blocks: list[Block] = []
     for place in inquiry.selection.places:

@@ -4,14 +4,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from studies.errors import InputError, nearest
+from studies.errors import InputError
 from studies.instrument.units import split_unit
 from studies.reports import style
 from studies.reports.page import Picture, draw
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
     from studies.sweeps.quantity import Column
     from studies.sweeps.results import Results
     from studies.sweeps.sensitivity import LocalSlope, SobolIndices
@@ -33,16 +31,19 @@ def column_label(column: "Column") -> str:
     return column.label + ("" if column.unit == "1" else f" ({column.unit})")
 
 
-def draw_column(results: "Results", name: str | None = None) -> "Figure":
-    """Return a figure of one column against the parameters; the first column unless named."""
-    columns = {column.name: column for column in results.study.columns}
-    name = next(iter(columns)) if name is None else name
-    if name not in columns:
-        raise InputError(f"the study '{results.study.name}' has no column '{name}'{nearest(name, columns)}")
-    picture = response_figure(results, columns[name])
-    if picture is None or picture.figure is None:
-        raise InputError(f"no design of the study '{results.study.name}' has a value of '{name}'.")
-    return picture.figure
+def first_figure(results: "Results") -> Picture:
+    """Draw the first column against the parameters.
+
+    Raises
+    ------
+    InputError
+        No design has a value.
+    """
+    column = results.study.columns[0]
+    picture = response_figure(results, column)
+    if picture is None:
+        raise InputError(f"no design of the study '{results.study.name}' has a value of '{column.name}'.")
+    return picture
 
 
 def spread_figure(results: "Results", column: "Column", limits: "list[RequirementLimits]") -> Picture:

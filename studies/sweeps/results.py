@@ -20,7 +20,6 @@ from studies.sweeps.store import Store, Stored, open_store
 
 if TYPE_CHECKING:
     import pandas as pd
-    from matplotlib.figure import Figure
 
 Array = NDArray[np.float64]
 
@@ -44,6 +43,8 @@ class _Loaded:
 @dataclass(frozen=True, repr=False)
 class Results(Shown):
     """What a store holds of a study; cases stand in the order of the spec's design."""
+
+    drawn_by = "studies.reports.sweep_figures:first_figure"
 
     study: Study
     store: Store = field(repr=False)
@@ -142,18 +143,6 @@ class Results(Shown):
     def to_frame(self) -> "pd.DataFrame":
         """Return `table()`, by the name that every result has."""
         return self.table()
-
-    def plot(self, column: str | None = None) -> "Figure":
-        """Draw how a column, the first unless named, is spread and follows the parameters.
-
-        Raises
-        ------
-        InputError
-            A column that the study does not have, or no design with a value.
-        """
-        from studies.reports.sweep_figures import draw_column
-
-        return draw_column(self, column)
 
     def __repr__(self) -> str:
         return f"Results({self.study.name}: {len(self)} of {self.total} cases, {len(self.failed)} failed)"
