@@ -99,6 +99,12 @@ def free_port() -> int:
         return int(probe.getsockname()[1])
 
 
+def answers(address: str) -> bool:
+    host, _, port = address.removeprefix("tcp://").rpartition(":")
+    with socket.socket() as probe:
+        return probe.connect_ex((host, int(port))) == 0
+
+
 @pytest.fixture
 def cluster():
     pytest.importorskip("distributed", reason="the extra 'cluster' (dask[distributed]) is not installed")
@@ -110,11 +116,18 @@ def cluster():
         subprocess.Popen([sys.executable, "-m", "dask", *words], env=environment(**quiet), stderr=subprocess.DEVNULL, stdout=subprocess.DEVNULL)
         for words in (scheduler_words, worker_words)
     ]  # fmt: skip
+    until = time.monotonic() + 120
+    while not answers(address) and time.monotonic() < until:
+        time.sleep(0.2)
     yield address, processes[0]
     for process in reversed(processes):
         process.terminate()
     for process in processes:
-        process.wait(30)
+        try:
+            process.wait(60)
+        except subprocess.TimeoutExpired:
+            process.kill()
+            process.wait()
 
 
 @pytest.mark.slow
