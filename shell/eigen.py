@@ -167,20 +167,6 @@ class ElementMass:
         return y
 
 
-def lowest_vectors(pattern: Pattern, stiffness: list[Array], mass: Mass, count: int, accuracy: float) -> Array:
-    """The `count` lowest eigenvectors of K, M-orthonormal, as columns.
-
-    Parameters
-    ----------
-    pattern : unknowns of the elements.
-    stiffness : their matrices, in the pattern's order.
-    mass : M.
-    count : how many.
-    accuracy : relative error of the Ritz values at which the iteration stops.
-    """
-    return Iteration(Factor(pattern, stiffness), mass).converge(count, accuracy).vectors
-
-
 @dataclass(frozen=True, eq=False)
 class Pairs:
     """Eigenvectors as columns, M-orthonormal, lowest first, and what the iteration leaves undone of each eigenvalue, relative."""

@@ -73,7 +73,7 @@ def ours():
 
 def stages():
     """Print what one cached solve of one level spends its time on."""
-    from shell.eigen import Factor, lowest_vectors
+    from shell.eigen import Factor, Iteration
     from shell.solution import Solution, find_constants
     from shell.surplus import estimate_errors
 
@@ -88,7 +88,9 @@ def stages():
         t_factor, factor = best_time(lambda p=pattern, K=K: Factor(p, K), 20)
         x = np.ones((pattern.size, 5))
         t_step, _ = best_time(lambda f=factor, M=M, x=x: f.solve(M @ x), 20)
-        t_vectors, vector = best_time(lambda p=pattern, K=K, M=M: lowest_vectors(p, K, M, 1, 1e-11), 20)
+        t_vectors, vector = best_time(
+            lambda p=pattern, K=K, M=M: Iteration(Factor(p, K), M).converge(1, 1e-11).vectors, 20
+        )
         solution = Solution(system, (constants,), vector[:, 0])
         t_quotient, _ = best_time(lambda s=solution: Solution(s.system, s.constants, s.vector).eigenvalue, 20)
         t_error, _ = best_time(lambda s=solution: estimate_errors(dome, GLASS, [s]), 20)

@@ -4,20 +4,60 @@ The records are synthetic: a housing with a lag of its own, a resonator behind i
 about 20 °C, white noise, a random walk or a wander of the frequency, noise of the housing sensor.
 """
 
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
 import numpy as np
 import pytest
 from scipy.constants import Stefan_Boltzmann
 from scipy.signal import lfilter
 
 from compensation.coloured import estimate_wander
-from studies.calibration.lags.followers import Constant, NetworkFollower, make_lags
+from studies.calibration.lags.followers import Constant, make_lags
 from studies.calibration.lags.housing_run import HousingRun, even_rows, row_step
 from studies.calibration.lags.identification import FrequencyPolynomial, identify, identify_lags, profile_interval
 from thermal.errors import ThermalError
 from thermal.lag import lag
-from thermal.network import Boundary, Conductor, Node, Radiator, assemble
+from thermal.network import Boundary, Conductor, Network, Node, Radiator, assemble
 from thermal.profile import Profile, parse_profile
 from thermal.radiative import integrate
+from thermal.steady import find_steady_state
+from thermal.sweeping import sweep
+from thermal.transient import propagate
+
+
+@dataclass(frozen=True)
+class NetworkFollower:
+    """The resonator as a node of a network whose one boundary is the housing.
+
+    Attributes
+    ----------
+    constants : the constants that `build` takes
+    build : callable from the constants by name to the network; its boundary must be called "housing"
+    node : the node whose temperature the frequency sees
+    node_count : number of nodes of the network
+    """
+
+    constants: tuple[Constant, ...]
+    build: Callable[[Mapping[str, float]], Network]
+    node: str
+    node_count: int
+
+    @property
+    def states(self) -> int:
+        """One for each node."""
+        return self.node_count
+
+    def follow(
+        self, constants: Mapping[str, float], departure: np.ndarray, time: np.ndarray, housing_temperature: np.ndarray
+    ) -> np.ndarray:
+        """Propagate a linear network, sweep one with radiation."""
+        network = self.build(constants)
+        held = {"housing": Profile(time, housing_temperature)}
+        first = find_steady_state(network, {"housing": float(housing_temperature[0])}, float(time[0]))
+        solver = propagate if network.is_linear else sweep
+        return solver(network, held, first[: network.count] + departure).node(self.node, time)
+
 
 ROOM = 293.15
 SLOPE, CURVATURE = 0.3716, -9.7e-4

@@ -1,6 +1,6 @@
 """How a resonator may follow its housing: by lags, or through a network with named constants."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -8,11 +8,7 @@ import numpy as np
 
 from thermal.errors import ThermalError
 from thermal.lag import lag
-from thermal.network import Array, Network
-from thermal.profile import Profile
-from thermal.steady import find_steady_state
-from thermal.sweeping import sweep
-from thermal.transient import propagate
+from thermal.network import Array
 
 SUBSTEPS = 4  # of a row, between which what radiation adds is linear
 MOST_FEEDS = 40
@@ -144,36 +140,3 @@ def _radiating_lag(time: Array, drive: Array, tau: float, share: float, cube: fl
         if np.abs(T - last).max() < FEED_TOLERANCE:
             return T
     return T
-
-
-@dataclass(frozen=True)
-class NetworkFollower:
-    """The resonator as a node of a network whose one boundary is the housing.
-
-    Attributes
-    ----------
-    constants : the constants that `build` takes
-    build : callable from the constants by name to the network; its boundary must be called "housing"
-    node : the node whose temperature the frequency sees
-    node_count : number of nodes of the network
-    """
-
-    constants: tuple[Constant, ...]
-    build: Callable[[Mapping[str, float]], Network]
-    node: str
-    node_count: int
-
-    @property
-    def states(self) -> int:
-        """One for each node."""
-        return self.node_count
-
-    def follow(
-        self, constants: Mapping[str, float], departure: Array, time: Array, housing_temperature: Array
-    ) -> Array:
-        """Propagate a linear network, sweep one with radiation."""
-        network = self.build(constants)
-        held = {"housing": Profile(time, housing_temperature)}
-        first = find_steady_state(network, {"housing": float(housing_temperature[0])}, float(time[0]))
-        solver = propagate if network.is_linear else sweep
-        return solver(network, held, first[: network.count] + departure).node(self.node, time)
