@@ -226,25 +226,30 @@ def _judge(
         ]
     if left.significant and (share is None or not clean or patched):
         return "unexplained", []
+    apart = _apart(campaign, inquiry)
     if final.terms:
-        return "not-identifiable" if any(cause.equivalent for cause in mine) else "explained", []
+        return "not-identifiable" if any(cause.equivalent for cause in mine) else "explained", apart
     if named:
         return "explained", []
     temperature = np.concatenate([run.states.housing for run in campaign.runs])
     if np.ptp(temperature) < NARROW_RANGE:
         return "not-identifiable", [f"the temperature varies by {np.ptp(temperature):.2g} K only"]
-    response = inquiry.problem.response
+    return ("not-identifiable", apart) if apart else ("adequate", [])
+
+
+def _apart(campaign: Campaign, inquiry: Inquiry) -> list[str]:
+    """Return the sentence on runs that lie farther apart than what is left within them; none where they do not."""
+    response, final = inquiry.problem.response, inquiry.final
     shifts = np.array(_run_shifts(final))
     apart = float(np.sqrt(np.mean(shifts**2)))
     white = float(np.sqrt(final.solved.variance))
-    if not response.own_offset and apart > CONSTANTS["wander_usual"] * np.hypot(final.wander, white):
-        text = (
-            f"the runs lie {apart * response.scale:.3g} {response.shown} (rms) apart, {apart / max(final.wander, white):.0f} "
-            "times the residual within them: ageing, a clock, handling, or drift between runs"
-        )
-        starts = "" if campaign.timed else "; start times ('# start' in the records) would show which"
-        return "not-identifiable", [text + starts]
-    return "adequate", []
+    if response.own_offset or apart <= CONSTANTS["wander_usual"] * np.hypot(final.wander, white):
+        return []
+    text = (
+        f"the runs lie {apart * response.scale:.3g} {response.shown} (rms) apart, {apart / max(final.wander, white):.0f} "
+        "times the residual within them: ageing, a clock, handling, or drift between runs"
+    )
+    return [text if campaign.timed else text + "; start times ('# start' in the records) would show which"]
 
 
 def _run_shifts(model: Fit) -> list[float]:
