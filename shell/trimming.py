@@ -26,8 +26,8 @@ MOST_ROUNDS = 6
 
 
 @dataclass(frozen=True)
-class SplitReading:
-    """A measured split of one harmonic.
+class SplitWave:
+    """A split of one harmonic as a vector.
 
     harmonic : n. frequency : f, Hz. wave : (f_fast - f_slow)/f exp(2 i n α_fast). error : standard error of either part of it.
     """
@@ -36,6 +36,21 @@ class SplitReading:
     frequency: float
     wave: complex
     error: float
+
+    @property
+    def hertz(self) -> float:
+        """The split, Hz."""
+        return abs(self.wave) * self.frequency
+
+    @property
+    def slow_axis(self) -> float:
+        """Azimuth of an antinode of the slower mode, rad, in 0 ... π/n."""
+        return float(np.angle(-self.wave) / (2 * self.harmonic) % (pi / self.harmonic))
+
+
+@dataclass(frozen=True)
+class SplitReading(SplitWave):
+    """A measured split."""
 
     @classmethod
     def of(cls, harmonic: int, frequency: float, split: float, slow_axis: float, error: float) -> "SplitReading":
@@ -56,16 +71,6 @@ class SplitReading:
         return cls(
             harmonic, frequency, complex(-split / frequency * np.exp(2j * harmonic * slow_axis)), error / frequency
         )
-
-    @property
-    def hertz(self) -> float:
-        """The split, Hz."""
-        return abs(self.wave) * self.frequency
-
-    @property
-    def slow_axis(self) -> float:
-        """Azimuth of an antinode of the slower mode, rad, in 0 ... π/n."""
-        return float(np.angle(-self.wave) / (2 * self.harmonic) % (pi / self.harmonic))
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,23 +99,8 @@ class Cut:
 
 
 @dataclass(frozen=True)
-class ExpectedSplit:
-    """A split as it is expected: most probable wave, and the standard error of either part of it, relative to f."""
-
-    harmonic: int
-    frequency: float
-    wave: complex
-    error: float
-
-    @property
-    def hertz(self) -> float:
-        """The split, Hz."""
-        return abs(self.wave) * self.frequency
-
-    @property
-    def slow_axis(self) -> float:
-        """Azimuth of an antinode of the slower mode, rad, in 0 ... π/n."""
-        return float(np.angle(-self.wave) / (2 * self.harmonic) % (pi / self.harmonic))
+class ExpectedSplit(SplitWave):
+    """A split as it is expected: most probable wave, and its error."""
 
     @property
     def most(self) -> float:

@@ -1,7 +1,7 @@
 """A card calibrated against records: the most probable instrument, what is known of it, and how well it predicts."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -118,21 +118,9 @@ class Calibration(Shown):
         """Return one row an uncertain value, best known first: card, value, interval, shift, width, told by."""
         import pandas as pd
 
-        rows = [
-            {
-                "parameter": one.parameter,
-                "unit": one.unit,
-                "card": one.card,
-                "value": one.value,
-                "low": one.low,
-                "high": one.high,
-                "shift_sd": one.shift_sd,
-                "width": one.width,
-                "told_by": one.told_by,
-            }
-            for one in sorted(self.estimates, key=lambda one: one.width)
-        ]
-        return pd.DataFrame(rows).set_index("parameter")
+        rows = [asdict(one) | {"told_by": one.told_by} for one in sorted(self.estimates, key=lambda one: one.width)]
+        columns = ["unit", "card", "value", "low", "high", "shift_sd", "width", "told_by"]
+        return pd.DataFrame(rows).set_index("parameter")[columns]
 
     def baseline(self, response: str) -> LinearResponse:
         """Return a response as a linear problem, for what else may be in it."""

@@ -90,6 +90,8 @@ def calibrate(
 
 
 def _payload(found: "Calibration", data: list[str], save: str | None) -> dict[str, Any]:
+    from dataclasses import asdict
+
     from studies.calibration.calibrate import UNITS
 
     held = found.held_out
@@ -101,22 +103,7 @@ def _payload(found: "Calibration", data: list[str], save: str | None) -> dict[st
         "schema": "hrg.calibration/1",
         "card": found.card.name,
         "records": data,
-        "values": [
-            {
-                "parameter": one.parameter,
-                "unit": one.unit,
-                "card": one.card,
-                "value": one.value,
-                "low": one.low,
-                "high": one.high,
-                "shift_sd": one.shift_sd,
-                "width": one.width,
-                "told_by": one.told_by,
-                "bound": one.bound,
-                "interval": one.interval,
-            }
-            for one in found.estimates
-        ],
+        "values": [{**asdict(one), "told_by": one.told_by} for one in found.estimates],
         "inseparable": [list(group) for group in found.groups],
         "responses": {
             name: {

@@ -7,10 +7,9 @@ where nothing varies around) with `inverse_q_split`, `damping_axis_deg`, `larges
 (null where the card states no 1/Q) with `inverse_q`, and the `explained` share of it with `explained_low`, `explained_high`.
 """
 
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
-from cyclopts import Parameter
-
+from studies.cli.arguments import FromDegC, ToDegC, lay_temperatures
 from studies.cli.output import Answer, answers
 
 if TYPE_CHECKING:
@@ -18,15 +17,13 @@ if TYPE_CHECKING:
     from studies.loss import LossModel
     from studies.loss_account import DampingAround, StatedLoss
 
-MOST_POINTS = 10_000
-
 
 @answers("hrg.loss/1")
 def loss(
     card: str,
     *,
-    from_degC: Annotated[float, Parameter(name="--from")] = -20.0,
-    to_degC: Annotated[float, Parameter(name="--to")] = 40.0,
+    from_degC: FromDegC = -20.0,
+    to_degC: ToDegC = 40.0,
     step: float = 10.0,
     harmonic: int = 2,
     theory: Literal["solid", "shell"] = "solid",
@@ -57,25 +54,14 @@ def loss(
     report : str
         Write a page (HTML).
     """
-    import numpy as np
-    from scipy.constants import zero_Celsius
-
     from studies.cli.output import say
-    from studies.errors import InputError
     from studies.instrument.card import load_card
     from studies.loss import loss_model
     from studies.loss_account import damping_around, stated_loss
 
-    if not step > 0 or not to_degC >= from_degC:
-        raise InputError(
-            f"--from {from_degC:g} --to {to_degC:g} --step {step:g}: the step must be positive and --to not below --from."
-        )
-    if not (to_degC - from_degC) / step < MOST_POINTS:
-        raise InputError(
-            f"--from {from_degC:g} --to {to_degC:g} --step {step:g}: more than {MOST_POINTS} temperatures; take a longer step."
-        )
+    temperatures = lay_temperatures(from_degC, to_degC, step)
     instrument = load_card(card)
-    T = instrument.material.check(np.arange(from_degC, to_degC + 1e-9 * step, step) + zero_Celsius)
+    T = instrument.material.check(temperatures)
     model = loss_model(instrument, harmonic, theory, anchor)
     budget = model.budget(T)
     around, stated = damping_around(model, budget), stated_loss(instrument, model)

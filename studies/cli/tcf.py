@@ -1,9 +1,8 @@
 """`hrg tcf`: frequency against temperature and its parts."""
 
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
-from cyclopts import Parameter
-
+from studies.cli.arguments import FromDegC, ToDegC, lay_temperatures
 from studies.cli.output import Answer, answers
 
 if TYPE_CHECKING:
@@ -12,7 +11,6 @@ if TYPE_CHECKING:
 
     from shell.law import FrequencyLaw
 
-MOST_POINTS = 10_000
 MOST_HARMONIC = 50  # a law of a higher one takes minutes
 LEAST = 0.005  # ppm/°C, that is shown
 
@@ -21,8 +19,8 @@ LEAST = 0.005  # ppm/°C, that is shown
 def tcf(
     card: str,
     *,
-    from_degC: Annotated[float, Parameter(name="--from")] = -20.0,
-    to_degC: Annotated[float, Parameter(name="--to")] = 40.0,
+    from_degC: FromDegC = -20.0,
+    to_degC: ToDegC = 40.0,
     step: float = 10.0,
     harmonic: int = 2,
     theory: Literal["solid", "shell", "rayleigh"] = "solid",
@@ -48,7 +46,6 @@ def tcf(
         A steady-state table (temperature_degC,frequency_Hz) whose local slopes stand beside; with the card hrg-30mm it is
         the HRG paper's Table 1 unless another is given.
     """
-    import numpy as np
     from scipy.constants import zero_Celsius
 
     from studies.cli.output import print_table
@@ -56,21 +53,13 @@ def tcf(
     from studies.instrument.card import load_card
     from studies.law import law_of
 
-    if not step > 0 or not to_degC >= from_degC:
-        raise InputError(
-            f"--from {from_degC:g} --to {to_degC:g} --step {step:g}: the step must be positive and --to not below --from."
-        )
-    if not (to_degC - from_degC) / step < MOST_POINTS:
-        raise InputError(
-            f"--from {from_degC:g} --to {to_degC:g} --step {step:g}: more than {MOST_POINTS} temperatures; take a longer step."
-        )
     if harmonic > MOST_HARMONIC and theory != "rayleigh":
         raise InputError(
             f"--harmonic {harmonic}: the law over temperature is solved up to n = {MOST_HARMONIC}; hrg modes goes higher."
         )
+    temperatures = lay_temperatures(from_degC, to_degC, step)
     instrument = load_card(card)
-    at = np.arange(from_degC, to_degC + 1e-9 * step, step)
-    T = instrument.material.check(at + zero_Celsius)
+    T = instrument.material.check(temperatures)
     law = law_of(instrument, float(T[0]), float(T[-1]), theory, harmonic)
     points, moves = _points(law, T), _moves(law, T)
     local = _measured_slopes(instrument.name, measured)
@@ -98,7 +87,7 @@ def tcf(
         shown = sorted({0, len(T) // 2, len(T) - 1})
         print_table(
             "Uncertainty of the law: change of the slope by one standard deviation (ppm/°C)",
-            ["Coefficient", "Standard deviation", *(f"at {at[k]:g} °C" for k in shown)],
+            ["Coefficient", "Standard deviation", *(f"at {T[k] - zero_Celsius:g} °C" for k in shown)],
             [
                 [m["coefficient"], f"{m['sd']:.2g}", *(f"{m['moves_slope_ppm_per_degC'][k]:+.2f}" for k in shown)]
                 for m in moves

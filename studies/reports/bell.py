@@ -26,7 +26,6 @@ NAMES = {
     "filtered": "FIR filter",
 }
 DEG = float(np.pi / 180)
-MOST_POINTS = 3000
 
 
 def scale_page(study: "ScaleStudy", source: str) -> str:
@@ -209,7 +208,7 @@ def draw_steps(chain: "BellChain", runs: "tuple[BellRun, BellRun, BellRun]") -> 
             result = apply_chain(
                 replace(chain, taps=np.empty(0)), run.time, run.output, run.temperature, extrapolate=True
             )
-            rows = np.unique(np.linspace(0, len(run.time) - 1, MOST_POINTS).astype(int))
+            rows = style.few_rows(len(run.time))
             for values, colour, name in (
                 (result.rough, style.ORANGE, "rough"),
                 (result.temperature_compensated, style.BLUE, "compensated"),

@@ -13,7 +13,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 Columns = Mapping[str, NDArray[np.float64]]
-MOST_POINTS = 4000
 FEW = 300  # rows that are drawn as points
 FIRST_ROWS = 5
 
@@ -35,7 +34,7 @@ def draw_columns(columns: Columns) -> "Figure":
     timed = names[0] == "time_s"
     x, label = (columns["time_s"] / 3600, "Time (h)") if timed else (columns[names[0]], names[0])
     shown = names[1:]
-    rows = np.unique(np.linspace(0, len(x) - 1, MOST_POINTS).astype(int))
+    rows = style.few_rows(len(x))
     mark = "-" if timed and len(x) >= FEW else "."
     with style.figure(len(shown), height=1.9 * len(shown) + 0.6, squeeze=False, sharex=True) as (figure, axes):
         for axis, name in zip(axes[:, 0], shown, strict=True):

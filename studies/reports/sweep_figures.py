@@ -15,7 +15,6 @@ if TYPE_CHECKING:
     from studies.sweeps.sensitivity import LocalSlope, SobolIndices
     from studies.sweeps.tolerance import RequirementLimits
 
-MOST_POINTS = 4000  # drawn in a scatter; more only make the page heavy
 COLOURS = (style.BLUE, style.VERMILION, style.GREEN, style.PURPLE, style.ORANGE, style.SKY)
 
 
@@ -81,7 +80,7 @@ def response_figure(results: "Results", column: "Column") -> Picture | None:
     columns = min(len(shown), 3)
     rows = -(-len(shown) // columns)
     y = results.column(column.name)
-    few = np.linspace(0, len(y) - 1, min(len(y), MOST_POINTS)).astype(int)
+    few = style.few_rows(len(y))
     with style.figure(rows, columns, height=2.6 * rows, sharey=True, squeeze=False) as (made, axes):
         for panel, parameter in zip(axes.flat, shown, strict=False):
             x = results.parameter(parameter.name).astype(float)

@@ -13,7 +13,6 @@ if TYPE_CHECKING:
     from studies.record import Record
 
 SOURCES = ("Wang X. et al., Sensors 2012, 12, 6434 (the HRG paper), eqs. (16)–(18), Table 2, figure 5.",)
-MOST_POINTS = 4000
 OTHERS = {
     "housing_temperature_degC": ("housing", style.ORANGE),
     "chamber_temperature_degC": ("chamber", style.GREEN),
@@ -39,7 +38,7 @@ def temperature_page(
 
 
 def _figure(record: "Record", found: NDArray[np.float64]) -> Picture:
-    rows = np.unique(np.linspace(0, len(record) - 1, MOST_POINTS).astype(int))
+    rows = style.few_rows(len(record))
     hours = record["time_s"][rows] / 3600
     with style.figure(height=3.6) as (made, axes):
         for column, (label, colour) in OTHERS.items():
