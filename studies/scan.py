@@ -240,7 +240,7 @@ def _roundness(faces: dict[str, Face]) -> tuple[Roundness, ...]:
     found = []
     for name, face in faces.items():
         for position in np.linspace(face.low, face.high, 11)[1:]:
-            c = face.polynomials(np.array([position]))[0] @ face.coefficients.T
+            c = face.waves.along(np.array([position]))[0] @ face.coefficients.T
             c = np.where(np.arange(len(c)) >= 2, c, 0)
             departure = (c * np.exp(-1j * np.multiply.outer(theta, np.arange(len(c))))).real.sum(axis=1)
             found.append(
