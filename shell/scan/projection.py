@@ -87,7 +87,14 @@ def check_unit(points: Array, resonator: Resonator, name: str) -> None:
     measured = float((high - low).max())
     if not 0.45 * nominal < measured < 2.2 * nominal:
         ratio = measured / nominal
-        guess = {3: "µm read as mm", -3: "m read as mm", 6: "nm read as mm", 1: "cm against mm", -1: "cm against mm"}
+        guess = {
+            3: "µm read as mm, or mm as m",
+            -3: "mm read as µm, or m as mm",
+            6: "µm read as m",
+            -6: "m read as µm",
+            1: "mm against cm",
+            -1: "cm against mm",
+        }
         power = round(np.log10(ratio)) if ratio > 0 else 0
         hint = f" ({guess[power]}?)" if power in guess else ""
         raise ShellError(

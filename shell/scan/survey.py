@@ -238,9 +238,10 @@ def _finish(
     inverse = np.linalg.inv(normal + 1e-13 * np.trace(normal) / len(normal) * np.eye(len(normal)))
     growth = _growth(inverse, waves.along(x), x >= (waves.low + waves.high) / 2, count, waves.highest)
     if not growth < HOLE:
+        times = f"{np.sqrt(growth):.0f}" if growth < 1e6 else "more than 1000"
         raise ShellError(
             f"{name}: the gaps between the points are larger than the waves up to {waves.highest} allow (the error of the worst grows "
-            f"{np.sqrt(growth):.0f} times): measure the missing places, or ask for fewer waves (--highest)."
+            f"{times} times): measure the missing places, or fit fewer waves (hrg scan --highest)."
         )
     change = inverse @ (design.T @ (count * left))
     rest = left - design @ change

@@ -99,6 +99,10 @@ def test_scan_refuses_what_it_cannot_use(faces, tmp_path, capsys):
     assert "gaps between the points are larger" in failing(capsys, "scan", "free-dome", "none", wrong, "--harmonic", 2)
     np.savetxt(wrong, points * [1.0, 1.15, 1.0])
     assert "cannot be brought onto the face" in failing(capsys, "scan", "free-dome", "none", wrong, "--harmonic", 2)
+    shifted = tmp_path / "shifted.asc"
+    np.savetxt(shifted, np.loadtxt(faces["inner"]) + np.array([3.0, 0.0, 2.0]))
+    assert "--frames own" in failing(capsys, "scan", "free-dome", shifted, faces["outer"], "--frames", "common")
+    assert "mm as m" in failing(capsys, "scan", "free-dome", "none", faces["outer"], "--unit", "m")
     wrong.write_text("x y z\n1 2 three\n")
     assert "not a table of x y z" in failing(capsys, "scan", "free-dome", "none", wrong)
     wrong.write_text("# nothing\n")
@@ -111,11 +115,13 @@ def test_scan_refuses_what_it_cannot_use(faces, tmp_path, capsys):
 def test_a_table_of_departures_must_close_the_circle(tmp_path, capsys):
     path = tmp_path / "grid.csv"
 
-    def write(angles, unit=1.0):
+    def write(angles, unit=1.0, gap=0):
         x = np.linspace(0.1, 1, 15)
         cells = unit * 0.5 * np.cos(4 * (np.deg2rad(angles) - 0.4)) * x[:, None] ** 2
         lines = ["position," + ",".join(f"{a:g}" for a in angles)]
-        lines += [f"{at:.4f}," + ",".join(f"{c:.5f}" for c in row) for at, row in zip(x, cells, strict=True)]
+        lines += [
+            f"{at:.4f}," + "," * gap + ",".join(f"{c:.5f}" for c in row[gap:]) for at, row in zip(x, cells, strict=True)
+        ]
         path.write_text("\n".join(lines))
 
     write(np.arange(0, 360, 7.5))
@@ -128,6 +134,8 @@ def test_a_table_of_departures_must_close_the_circle(tmp_path, capsys):
     assert "do not close the circle" in failing(capsys, "scan", "free-dome", "none", path)
     write(np.arange(0, 360, 7.5), 1e4)
     assert "cells are in µm" in failing(capsys, "scan", "free-dome", "none", path)
+    write(np.arange(0, 360, 7.5), gap=20)
+    assert "gaps between the points are larger" in failing(capsys, "scan", "free-dome", "none", path)
 
 
 def test_trim_refuses_what_it_should_not_cut(tmp_path, capsys):

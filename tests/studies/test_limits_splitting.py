@@ -174,6 +174,19 @@ def test_a_voltage_beyond_pull_in_names_its_table(tmp_path):
         _ = split_of(instrument).split
 
 
+def test_commands_refuse_a_voltage_beyond_pull_in_and_a_map_with_holes(tmp_path, capsys):
+    loaded(tmp_path, "[electrodes]\ngap_um = 10.0\nvoltage_V = 2000.0\n")
+    for command in ("electrodes", "modes"):
+        assert main([command, str(tmp_path / "card.toml")]) == 2
+        assert "Lower the voltage or widen the gap" in capsys.readouterr().err
+    angles = range(0, 360, 10)
+    rows = [f"{x:.2f}," + "," * 14 + ",".join("0.1" for _ in angles[14:]) for x in np.linspace(0, 1, 12)]
+    (tmp_path / "wall.csv").write_text("position," + ",".join(str(a) for a in angles) + "\n" + "\n".join(rows))
+    (tmp_path / "card.toml").write_text(CARD + '[[imperfection.map]]\nof = "wall"\nfile = "wall.csv"\n')
+    assert main(["modes", str(tmp_path / "card.toml")]) == 2
+    assert "gaps between the points are larger" in capsys.readouterr().err
+
+
 def test_a_simulated_run_is_softened_by_the_volts_and_the_gap(tmp_path):
     """δf/f = shift V²/V₀² (g₀/g)³ with the gap's own expansion, against a run of the perfect card."""
     gap = "[electrodes]\ngap_um = 100.0\nvoltage_V = 100.0\ngap_expansion_per_K = 1e-3\n"
