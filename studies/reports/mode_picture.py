@@ -33,7 +33,7 @@ def view_blocks(shown: "Sequence[ModeScene]") -> list[Block]:
     for one in shown:
         if one.split is not None:
             larger = (
-                f"; the departures of the shape are drawn {one.exaggeration:.3g} times as large"
+                f"; the departures of the shape are drawn {one.exaggeration:.0f} times as large"
                 if one.exaggeration
                 else ""
             )

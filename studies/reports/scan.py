@@ -72,7 +72,7 @@ def _millihertz(split: "ScanInterval") -> list[str]:
 
 def _maps(scan: "Scan") -> Picture:
     names = ["wall", "offset"] if len(scan.faces) == 2 else list(scan.faces)
-    with figure(len(names), 1, 3.0 * len(names), squeeze=False) as (made, axes):
+    with figure(len(names), 1, 2.5 * len(names), squeeze=False) as (made, axes):
         for ax, name in zip(axes[:, 0], names, strict=True):
             x, theta, values = scan.map_of(name)
             shown = 1e6 * (values - values.mean(axis=1, keepdims=True))

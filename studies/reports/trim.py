@@ -21,13 +21,14 @@ def write_trim_page(path: str, plan: "TrimPlan", payload: dict[str, Any]) -> Non
 
 
 def _chapters(plan: "TrimPlan", payload: dict[str, Any]) -> list[Chapter]:
-    before, last = payload["before"][0], payload["rounds"][-1]["after"][0]
+    before, last, first = payload["before"], payload["rounds"][-1]["after"], payload["rounds"][0]
+    axes = ", ".join(f"n = {s['harmonic']} at {s['slow_axis_deg']:.1f}°" for s in before)
     facts = Facts([
-        (f"Split of n = {before['harmonic']} now", f"{1e3 * before['split_Hz']:.3g} mHz", f"slow axis at {before['slow_axis_deg']:.1f}°"),
-        ("Round 1 takes", f"{payload['rounds'][0]['mass_ug']:.3g} µg", f"{len(payload['rounds'][0]['cuts'])} cuts, {100 * payload['rounds'][0]['share']:.0f} % of the split"),
-        ("Expected at the end", f"below {1e3 * last['most_Hz']:.2g} mHz", f"goal {1e3 * plan.goal:.2g} mHz, {len(plan.rounds)} rounds"),
+        ("Split now", ", ".join(f"{1e3 * s['split_Hz']:.3g} mHz" for s in before), f"slow axis of {axes}"),
+        ("Round 1 takes", f"{first['mass_ug']:.3g} µg", f"{len(first['cuts'])} cuts, {100 * first['share']:.0f} % of the split"),
+        ("Expected at the end", f"below {1e3 * max(s['most_Hz'] for s in last):.2g} mHz", f"goal {1e3 * plan.goal:.2g} mHz, {len(plan.rounds)} rounds"),
     ])  # fmt: skip
-    measure = [Text(sentence) for sentence in payload["measure"]]
+    measure = [Text(sentence.replace("--gain", "`--gain`")) for sentence in payload["measure"]]
     kinds = ", ".join(f"{kind} {value:+.2f}" for kind, value in payload["other_cuts"].items()).replace("-", "−")
     warning = Text(
         f"Planned as '{payload['cut']}'. The same mass at the rim moves the split, relative to this kind of cut, by: {kinds}. A negative "
@@ -36,24 +37,25 @@ def _chapters(plan: "TrimPlan", payload: dict[str, Any]) -> list[Chapter]:
     )
     return [
         Chapter("What to do", [facts, _cuts(payload, 1), *measure, warning]),
-        Chapter("Where", [_polar(plan)]),
+        Chapter("Where", [_polar(plan, payload)]),
         Chapter("What is expected", [_states(payload), *(_cuts(payload, k) for k in range(2, len(plan.rounds) + 1))]),
     ]
 
 
 def _cuts(payload: dict[str, Any], number: int) -> Table:
     one = payload["rounds"][number - 1]
-    rows = [
-        [str(k), f"{c['azimuth_deg']:.2f}", f"{c['height_mm']:.3f}", f"{c['mass_ug']:.3f}", "" if c["depth_um"] is None else f"{c['depth_um']:.3f}", "☐"]
-        for k, c in enumerate(sorted(one["cuts"], key=lambda c: c["azimuth_deg"]), 1)
-    ]  # fmt: skip
+    columns, rows = ["Cut", "Azimuth (°)", "Height z (mm)", "Mass (µg)"], []
+    deep = one["cuts"][0]["depth_um"] is not None
+    columns += ["Depth (µm)"] * deep + ["Done"] * (number == 1)
+    for k, c in enumerate(_in_order(one["cuts"]), 1):
+        row = [str(k), f"{c['azimuth_deg']:.2f}", f"{c['height_mm']:.3f}", f"{c['mass_ug']:.3f}"]
+        rows.append([*row, *([f"{c['depth_um']:.3f}"] if deep else []), *(["☐"] if number == 1 else [])])
     title = f"Round {number}: cut this" if number == 1 else f"Round {number}, predicted: plan again before cutting"
-    return Table(
-        title,
-        ["Cut", "Azimuth (°)", "Height z (mm)", "Mass (µg)", "Depth (µm)", "Done"],
-        rows,
-        f"{one['mass_ug']:.4g} µg together.",
-    )
+    return Table(title, columns, rows, f"{one['mass_ug']:.4g} µg together.")
+
+
+def _in_order(cuts: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    return sorted(cuts, key=lambda cut: (cut["azimuth_deg"], cut["position"]))
 
 
 def _states(payload: dict[str, Any]) -> Table:
@@ -69,9 +71,9 @@ def _states(payload: dict[str, Any]) -> Table:
     return Table("Splits", ["State", "n", "Split (mHz)", "Error (mHz)", "95 % below (mHz)", "Slow axis (°)"], rows)
 
 
-def _polar(plan: "TrimPlan") -> Picture:
+def _polar(plan: "TrimPlan", payload: dict[str, Any]) -> Picture:
     """Cuts as wedges on the rim; the split as a rose around it, before and as expected after round 1."""
-    first = plan.rounds[0]
+    first, cuts = plan.rounds[0], _in_order(payload["rounds"][0]["cuts"])
     theta = np.linspace(0, 2 * np.pi, 721)
     with figure(1, 2, 4.2, subplot_kw={"projection": "polar"}) as (made, axes):
         for ax, states, title in zip(
@@ -89,20 +91,14 @@ def _polar(plan: "TrimPlan") -> Picture:
                     at = state.slow_axis + k * np.pi / state.harmonic
                     ax.plot([at, at], [0, 0.9], color=colour, lw=0.8, ls="--")
             if states is plan.before:
-                most = max(cut.mass for cut in first.cuts)
-                for cut in first.cuts:
-                    ax.bar(
-                        cut.azimuth, 0.25 * cut.mass / most + 0.03, width=0.06, bottom=1.0, color="black", alpha=0.75
-                    )
-                    ax.annotate(
-                        f"{1e9 * cut.mass:.3g} µg", (cut.azimuth, 0.62), ha="center", va="center", fontsize=8,
-                        bbox={"facecolor": "white", "edgecolor": "none", "pad": 1.0},
-                    )  # fmt: skip
+                most = max(cut["mass_ug"] for cut in cuts)
+                for number, cut in enumerate(cuts, 1):
+                    azimuth, length = np.deg2rad(cut["azimuth_deg"]), 0.25 * cut["mass_ug"] / most + 0.03
+                    ax.bar(azimuth, length, width=0.06, bottom=1.0, color="black", alpha=0.75)
+                    ax.text(azimuth, 1.44, str(number), ha="center", va="center", fontsize=8)
             ax.set_ylim(0, 1.55)
             ax.set_yticks([])
             ax.set_title(title, fontsize=10)
             ax.legend(loc="lower center", bbox_to_anchor=(0.5, -0.28), fontsize=8)
-        caption = (
-            "The rim over azimuth. Waves stand out where the slower mode swings (dashed: its antinodes); black: cuts."
-        )
+        caption = "The rim over azimuth. Waves stand out where the slower mode swings (dashed: its antinodes); black: the cuts of the table."
         return draw(made, caption, "polar pictures of the split before and after the first round of cuts")
