@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from studies.calibration.estimates import SILENT, Estimate, estimate, find_groups
 from studies.calibration.fit import CardFit, fit
-from studies.calibration.observed import HOUSING, SETTLED, ObservedRun, SettledTable, observe
+from studies.calibration.observed import HOUSING, QUADRATURE, RESPONSES, SETTLED, ObservedRun, SettledTable, observe
 from studies.calibration.priors import Priors, gather_priors
 from studies.calibration.problem import CardProblem, State, wide_law
 from studies.errors import InputError
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 Progress = Callable[[str], None]
-UNITS = {"frequency_Hz": "Hz", "bias_deg_per_h": "°/h", "inverse_q": "1", HOUSING: "K", SETTLED: "Hz"}
+UNITS = {"frequency_Hz": "Hz", "bias_deg_per_h": "°/h", "inverse_q": "1", QUADRATURE: "V", HOUSING: "K", SETTLED: "Hz"}
 CONTRADICTION = 5.0  # runs whose offsets are so much larger than what else the noise makes of a run's mean
 
 
@@ -173,7 +173,10 @@ def calibrate(
     """
     if not records and not tables:
         raise InputError("nothing is calibrated without a record or a steady-state table.")
-    runs, tables = observe(records), tuple(tables)
+    loop = instrument.loop
+    named = RESPONSES if loop is None else (*RESPONSES, QUADRATURE)
+    turning = loop is not None and loop.mode == "whole-angle"
+    runs, tables = observe(records, named, turning=turning), tuple(tables)
     for record in records:
         if "frequency_Hz" in record:
             check_card_frequency(instrument, record["frequency_Hz"], record.path)

@@ -39,7 +39,6 @@ class CardFit:
     problem : Problem
     state : State, at the point
     noise, rows : by response: levels, and rows with the variances of outliers enlarged
-    information : array (p, p), JᵀJ of the whitened rows
     covariance : array (p, p), (JᵀJ + 1)⁻¹
     outliers : by response, how many blocks stand out
     steps : how many were taken
@@ -50,7 +49,6 @@ class CardFit:
     state: State
     noise: Mapping[str, Noise]
     rows: Mapping[str, NoiseRows]
-    information: Array
     covariance: Array
     outliers: Mapping[str, int]
     steps: int
@@ -81,8 +79,9 @@ def fit(problem: CardProblem, start: Array | None = None, progress: Progress = l
             for name in problem.responses:
                 rows[name], outliers[name] = _spare_outliers(problem.rows[name], state, name, noise[name])
         J, r = _whitened(problem, state, noise, rows)
-        A = J.T @ J
-        move: Array = np.asarray(np.linalg.solve(A + np.eye(len(A)), J.T @ r - state.point))
+        # (JᵀJ + 1) Δ = Jᵀ r − u, not by its matrix: of sharp data against a wide prior that has no digits left
+        both = np.vstack([J, np.eye(len(state.point))])
+        move: Array = np.linalg.lstsq(both, np.append(r, -state.point), rcond=None)[0]
         size = float(move @ (J.T @ r - state.point))
         progress(f"step {step}: −2 ln L should fall by {size:.2g}")
         if size < CLOSE and step > 3:
@@ -95,9 +94,9 @@ def fit(problem: CardProblem, start: Array | None = None, progress: Progress = l
             break
         state = reached
     J, _ = _whitened(problem, state, noise, rows)
-    information = J.T @ J
-    covariance = np.asarray(np.linalg.inv(information + np.eye(len(information))))
-    return CardFit(problem, state, noise, rows, information, covariance, outliers, step, converged)
+    _, S, ways = np.linalg.svd(np.vstack([J, np.eye(problem.count)]), full_matrices=False)
+    covariance = np.asarray((ways.T / S**2) @ ways)
+    return CardFit(problem, state, noise, rows, covariance, outliers, step, converged)
 
 
 def objective(problem: CardProblem, state: State, noise: Mapping[str, Noise], rows: Mapping[str, NoiseRows]) -> float:

@@ -16,13 +16,15 @@ from studies.simulation.drive import COLUMN, Drive, drive_by_record
 Array = NDArray[np.float64]
 Rows = NDArray[np.intp]
 RESPONSES = ("frequency_Hz", "bias_deg_per_h", "inverse_q")
+QUADRATURE = "quadrature_V"
+"""A response of cards with loops."""
 HOUSING = "housing_temperature_degC"
 SETTLED = "settled_frequency_Hz"
 """Frequencies of steady-state tables."""
 MOST_ROWS = 2000  # of a run that are predicted
 MOST_BLOCKS = 240  # of a run that are compared
 PERIOD = 90.0  # ° of azimuth, of what a turning wave of n = 2 meets
-ROWS_PER_PERIOD, BLOCKS_PER_PERIOD = 36, 6  # of that; the mean of a row's turn is then within 0.2 % of its middle
+ROWS_PER_PERIOD, BLOCKS_PER_PERIOD = 120, 6  # of that; the mean over a row is then within 1e-4 of its middle
 TURNED_MOST = 10  # times as many rows, and three times as many blocks, for waves that turn often
 LEAST_ROWS = 10
 
@@ -99,8 +101,15 @@ def read_settled(path: str) -> SettledTable:
     return SettledTable(path, values["temperature_degC"] + zero_Celsius, f, reading_resolution(f))
 
 
-def observe(records: Sequence[Record]) -> tuple[ObservedRun, ...]:
+def observe(
+    records: Sequence[Record], responses: Sequence[str] = RESPONSES, *, turning: bool = False
+) -> tuple[ObservedRun, ...]:
     """Make runs ready.
+
+    Parameters
+    ----------
+    responses : names of the columns that are predicted
+    turning : whether they are of a whole-angle wave, each row's the mean to the next
 
     Raises
     ------
@@ -108,26 +117,25 @@ def observe(records: Sequence[Record]) -> tuple[ObservedRun, ...]:
         A run without a drive or without a response, or too short.
     """
     starts, _ = place_in_time(records)
-    return tuple(_observe(record, start) for record, start in zip(records, starts, strict=True))
+    return tuple(_observe(record, start, responses, turning) for record, start in zip(records, starts, strict=True))
 
 
-def _observe(record: Record, start: float) -> ObservedRun:
+def _observe(record: Record, start: float, named: Sequence[str], turning: bool) -> ObservedRun:
     periods = _periods(record)
     most_rows = int(np.clip(ROWS_PER_PERIOD * periods, MOST_ROWS, TURNED_MOST * MOST_ROWS))
     most_blocks = int(np.clip(BLOCKS_PER_PERIOD * periods, MOST_BLOCKS, 3 * MOST_BLOCKS))
-    time, columns = _fine_rows(record, most_rows)
+    time, columns = _fine_rows(record, (*named, HOUSING), most_rows)
     if len(time) < LEAST_ROWS:
         raise InputError(f"{record.path}: {len(time)} rows say nothing; a run needs at least {LEAST_ROWS}.")
-    inner = replace(drive_by_record(record, time=time), start=start)
+    centre = time + 0.5 * float(np.median(np.diff(record["time_s"]))) if turning else time
+    inner = replace(drive_by_record(record, time=np.minimum(centre, record["time_s"][-1])), start=start)
     outer = None
     if inner.boundary == "housing" and COLUMN["chamber"] in record and np.isfinite(record[COLUMN["chamber"]]).sum() > 1:
         outer = replace(drive_by_record(record, "chamber", time=time), start=start)
-    wanted = [name for name in RESPONSES if name in columns] + ([HOUSING] if outer is not None else [])
+    wanted = [name for name in named if name in columns] + ([HOUSING] if outer is not None else [])
     responses = {name: blocks for name in wanted if (blocks := _block(time, columns[name], most_blocks)) is not None}
-    if not any(name in responses for name in RESPONSES):
-        raise InputError(
-            f"{record.path}: none of {', '.join(RESPONSES)} has values; there is nothing to calibrate with."
-        )
+    if not any(name in responses for name in named):
+        raise InputError(f"{record.path}: none of {', '.join(named)} has values; there is nothing to calibrate with.")
     return ObservedRun(record, inner, outer, responses)
 
 
@@ -138,10 +146,10 @@ def _periods(record: Record) -> float:
     return float(np.nansum(np.abs(np.diff(record["pattern_angle_deg"])))) / PERIOD
 
 
-def _fine_rows(record: Record, most: int) -> tuple[Array, dict[str, Array]]:
+def _fine_rows(record: Record, named: Sequence[str], most: int) -> tuple[Array, dict[str, Array]]:
     """Rows to predict: those of the record, of very many rows the means of groups of equal duration."""
     time = record["time_s"]
-    names = [name for name in (*RESPONSES, HOUSING) if name in record]
+    names = [name for name in named if name in record]
     if len(time) <= most:
         return time, {name: record[name] for name in names}
     width = float(np.ptp(time)) / most

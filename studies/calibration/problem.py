@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from compensation.correlated import NoiseRows
-from studies.calibration.observed import HOUSING, RESPONSES, SETTLED, ObservedRun, SettledTable
+from studies.calibration.observed import HOUSING, QUADRATURE, RESPONSES, SETTLED, ObservedRun, SettledTable
 from studies.calibration.priors import Priors
 from studies.law import law_of, moved_law
 from studies.simulation.drive import Drive
@@ -72,7 +72,7 @@ class CardProblem:
         """Drives of all runs in order."""
         found = []
         for number, run in enumerate(self.runs):
-            inner = tuple(name for name in RESPONSES if name in run.responses)
+            inner = tuple(name for name in (*RESPONSES, QUADRATURE) if name in run.responses)
             if inner:
                 found.append(Part(number, "inner", run.inner, inner))
             if run.outer is not None and HOUSING in run.responses:
@@ -104,7 +104,7 @@ class CardProblem:
     @cached_property
     def responses(self) -> tuple[str, ...]:
         """Responses that any run has, and the settled frequencies of tables."""
-        found = tuple(n for n in (*RESPONSES, HOUSING) if any(n in part.responses for part in self.parts))
+        found = tuple(n for n in (*RESPONSES, QUADRATURE, HOUSING) if any(n in part.responses for part in self.parts))
         return (*found, SETTLED) if self.tables else found
 
     def members(self, response: str) -> tuple[Part, ...]:

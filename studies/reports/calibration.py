@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.constants import zero_Celsius
 
-from studies.calibration.observed import HOUSING, SETTLED
+from studies.calibration.observed import HOUSING, QUADRATURE, SETTLED
 from studies.reports import style
 from studies.reports.digits import plain, to_interval
 from studies.reports.page import Block, Chapter, Facts, Picture, Table, Text, draw, render_page
@@ -19,6 +19,7 @@ NAMES = {
     "frequency_Hz": "Frequency",
     "bias_deg_per_h": "Zero-rate output",
     "inverse_q": "1/Q",
+    QUADRATURE: "Quadrature control",
     HOUSING: "Housing temperature",
     SETTLED: "Settled frequency",
 }

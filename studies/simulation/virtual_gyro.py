@@ -89,6 +89,10 @@ def simulate_run(
     levels = instrument.noise if noise else SILENT
     prediction = predict(instrument, drive, law=law or law_for(instrument, drive, theory=theory))
     true = dict(prediction.columns)
+    free = instrument.loop is not None and instrument.loop.mode == "whole-angle"
+    if free:  # its rate is what the azimuth does from row to row, and its other columns are means over the same time
+        for name in ("frequency_Hz", "bias_deg_per_h", "inverse_q", "quadrature_V"):
+            true[name] = np.append((true[name][1:] + true[name][:-1]) / 2, true[name][-1])
     if not noise:
         true["housing_temperature_degC"] = prediction.housing - zero_Celsius
     columns = {"time_s": drive.time.copy()}
@@ -96,7 +100,6 @@ def simulate_run(
         columns[COLUMN["chamber"]] = drive.profile.at(drive.time) - zero_Celsius
     else:
         true["housing_temperature_degC"] = drive.profile.at(drive.time) - zero_Celsius
-    free = instrument.loop is not None and instrument.loop.mode == "whole-angle"
     columns |= _observe(
         true,
         levels,

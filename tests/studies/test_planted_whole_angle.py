@@ -5,9 +5,10 @@ import json
 import numpy as np
 import pytest
 
+from studies.calibration.calibrate import calibrate
 from studies.cli import main
 from studies.instrument.card import load_card, shipped_cards
-from studies.record import Record, write_record
+from studies.record import Record, read_record, write_record
 
 LOOP = """
 [loss]
@@ -62,3 +63,28 @@ def test_what_is_missing_is_said(tmp_path, capsys):
     write_record(Record({"time_s": time, "pattern_angle_deg": 0.01 * time, "bias_deg_per_h": 0 * time}), path)
     assert main(["fit", "whole-angle", path, "--bryan-factor", "0.277"]) == 2
     assert "the fit needs 90°" in capsys.readouterr().err
+
+
+@pytest.mark.slow
+def test_calibrate_finds_splits_axes_gains_and_phase_in_a_whole_angle_run(tmp_path, capsys):
+    """A run through the loops, turned both ways; gains and phases of pick-offs and drives are told by their sums alone."""
+    text = shipped_cards()["free-dome"].read_text() + LOOP + "self_precession_deg_per_s = 0.5\n"
+    truth, card, run = tmp_path / "truth.toml", tmp_path / "card.toml", str(tmp_path / "run.csv")
+    truth.write_text(text + "pickoff_gain_ratio = 0.008\n")
+    card.write_text(text.replace("= 0.03", "= 0.02").replace("= 10.0", "= 5.0").replace("= 5.0\nf", "= 4.0\nf"))
+    assert "damping_axis_deg = 5.0" in card.read_text()
+    assert main(["loop", str(truth), "--out", run, "--hours", "0.4", "--row", "1", "--both-ways", "--seed", "3"]) == 0
+    instrument = load_card(card)
+    open_ = ("loss.", "bias.damping", "loop.", "bias.offset")
+    exact = [one.name for one in instrument.uncertain if not one.name.startswith(open_)]
+    found = calibrate(instrument, [read_record(run)], exact=exact, profile=False)
+    values = {one.parameter: one.value for one in found.estimates}
+    assert values["loss.inverse_q"] == pytest.approx(1e-6, rel=1e-3)
+    assert values["bias.damping_anisotropy"] == pytest.approx(0.03, rel=0.02)
+    assert values["bias.damping_axis_deg"] == pytest.approx(10.0, abs=0.02 * 14.3)
+    assert values["loop.frequency_split_mHz"] == pytest.approx(5.0, rel=0.02)
+    assert values["loop.frequency_axis_deg"] == pytest.approx(-6.0, abs=0.02 * 14.3)
+    for key, total in (("gain_ratio", 0.008), ("phase_deg", 0.6)):
+        pair = f"loop.pickoff_{key}", f"loop.drive_{key}"
+        assert values[pair[0]] + values[pair[1]] == pytest.approx(total, rel=0.02)
+        assert any(set(pair) <= set(group) for group in found.groups)
