@@ -42,11 +42,14 @@ def film_shifts(instrument: "Instrument", mode: "Mode") -> tuple[FilmShift, ...]
     ShellError
         A film is too thick for that.
     """
+    films = instrument.part("loss", "loss_parts").film
+    if not films:
+        return ()
     from shell.elastic import Elastic
     from shell.film import Film, film_shift
 
     found = []
-    for keys in instrument.part("loss", "loss_parts").film:
+    for keys in films:
         numbers = film_numbers(keys, ELASTIC)
         missing = tuple(name for name, value in numbers.items() if value is None)
         relative = None

@@ -9,13 +9,14 @@ if TYPE_CHECKING:
 
 def crystal_pairs(found: "list[Mode]", crystal: "Cubic | None", tolerance: float) -> "dict[int, dict[str, Any]]":
     """Both modes of every lowest pair n >= 2 but multiples of 4, by the identity of the mode in the isotropic mean."""
+    if crystal is None:
+        return {}
     from shell.cubic import solve_cubic
 
     entries: dict[int, dict[str, Any]] = {}
-    for m in found if crystal is not None else ():
+    for m in found:
         if m.theory != "solid" or m.harmonic < 2 or m.harmonic % 4 == 0 or m.index:
             continue
-        assert crystal is not None
         assert m.resonator is not None
         pair = solve_cubic(m.resonator, crystal, m.harmonic, tolerance)
         entries[id(m)] = {

@@ -23,7 +23,8 @@
     sha256 = "…"
     rows = 1800
 
-Numbers keep all their digits, so a model that was saved and read computes the same to the last bit.
+Numbers keep all their digits, so a model that was saved and read computes the same to the last bit. The text is laid out here,
+not by tomli-w, for the comments: how well each coefficient is known.
 """
 
 import math
