@@ -9,7 +9,7 @@ passes a one-pole low pass and a PI controller, the command is held for one samp
 on a plant ẋ = −x/τ + u (1/τ = 0 for the phase).
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
@@ -21,6 +21,7 @@ from compensation.errors import CompensationError
 Real = NDArray[np.float64]
 CORNER = 0.25
 """Corner of the integral part over the bandwidth: 14° of phase margin for it."""
+LEAST_BANDWIDTH = 1e-3
 
 
 @dataclass(frozen=True)
@@ -115,7 +116,7 @@ def require_stable(loops: Loops, decay: float, names: tuple[str, ...] = Loops.NA
     margins = find_margins(loops, decay, names)
     for margin in margins:
         if not margin.stable:
-            most = getattr(loops, margin.loop) * margin.gain / 2
+            most = _calm_bandwidth(loops, margin.loop, decay)
             raise CompensationError(
                 f"the {margin.loop} loop ({Loops.PAPER[margin.loop]}) is unstable: gain margin"
                 f" {20 * np.log10(margin.gain):.1f} dB at {margin.reversal:.3g} Hz, phase margin"
@@ -123,6 +124,17 @@ def require_stable(loops: Loops, decay: float, names: tuple[str, ...] = Loops.NA
                 " shorten the delay or sample faster."
             )
     return margins
+
+
+def _calm_bandwidth(loops: Loops, name: str, decay: float) -> float:
+    """The first lower bandwidth (Hz) with a gain margin of 6 dB and a phase margin of 45°."""
+    bandwidth: float = getattr(loops, name)
+    while bandwidth > LEAST_BANDWIDTH:
+        bandwidth /= 1.2
+        margin = _margin(replace(loops, **{name: bandwidth}), name, decay)
+        if margin.gain >= 2 and margin.phase >= np.pi / 4:
+            break
+    return bandwidth
 
 
 def _held(decay: float, time: float) -> float:

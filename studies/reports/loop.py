@@ -125,7 +125,7 @@ def _weakest(study: "LoopStudy") -> list[Text]:
     share = (first.effect / total) ** 2 if total > 0 else 0.0
     return [
         Text(
-            f"Attack first: {first.key}. What is not known of it (± {first.sd:.3g}) is worth {first.effect:.3g} °/h,"
+            f"Attack first: `{first.key}`. What is not known of it (± {first.sd:.3g}) is worth {first.effect:.3g} °/h,"
             f" {100 * share:.0f} % of the variance of the bias. A steady bias can be calibrated; what drifts by age or temperature"
             " drifts by these slopes."
         )

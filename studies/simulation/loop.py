@@ -6,12 +6,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from compensation.controllers import Loops
+from compensation.controllers import Loops, Margin, require_stable
 from compensation.electronics import Channels, Electronics, LoopNoise, thermal_noise
 from compensation.rebalance import LoopRun, settle_rebalance, simulate_rebalance
 from compensation.settled_turn import read_turning, turn_settled
 from compensation.wave import StandingWave
-from compensation.whole_angle import simulate_whole_angle
+from compensation.whole_angle import WITHOUT_RATE, simulate_whole_angle
 from studies.errors import InputError, naming
 from studies.instrument.imperfect import is_imperfect
 from studies.splitting import reference_split
@@ -110,6 +110,14 @@ def require_loop(instrument: "Instrument") -> "Loop":
             f"{instrument.path}: the card has no loops; add a table [loop] (it may be empty: all keys have defaults)."
         )
     return instrument.loop
+
+
+def require_stable_loops(instrument: "Instrument", frequency: float, inverse_q: float) -> tuple[Margin, ...]:
+    """Return the margins of a card's loops, or raise naming an unstable one, its margin and the mend."""
+    loop = require_loop(instrument)
+    names = Loops.NAMES if loop.mode == "force-rebalance" else WITHOUT_RATE
+    with naming(f"{instrument.path} [loop]"):
+        return require_stable(loops_of(loop), float(np.pi * frequency * inverse_q), names)
 
 
 def without_loop(instrument: "Instrument") -> "Instrument":

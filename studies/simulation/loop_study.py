@@ -8,14 +8,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from compensation.closed_loop import ClosedLoop
-from compensation.controllers import Loops, Margin, require_stable
+from compensation.controllers import Loops, Margin
 from compensation.electronics import Electronics, LoopNoise
 from compensation.rebalance import close_loops
 from compensation.start_up import StartUp, start_up
 from compensation.wave import StandingWave
-from compensation.whole_angle import WITHOUT_RATE, close_without_rate
+from compensation.whole_angle import close_without_rate
 from studies.errors import naming
-from studies.simulation.loop import DEG_PER_H, electronics_of, loops_of, require_loop, settled_columns, wave_of
+from studies.simulation.loop import (
+    DEG_PER_H,
+    electronics_of,
+    loops_of,
+    require_loop,
+    require_stable_loops,
+    settled_columns,
+    wave_of,
+)
 
 if TYPE_CHECKING:
     from studies.instrument.card import Instrument
@@ -110,9 +118,8 @@ def study_loops(instrument: "Instrument", frequency: float, inverse_q: float, br
     wave = wave_of(instrument, frequency, inverse_q, bryan_factor)
     electronics, loops = electronics_of(loop, wave, instrument.reference_temperature), loops_of(loop)
     decay = float(1 / np.asarray(wave.tau))
-    names = Loops.NAMES if loop.mode == "force-rebalance" else WITHOUT_RATE
+    margins = require_stable_loops(instrument, frequency, inverse_q)
     with naming(f"{instrument.path} [loop]"):
-        margins = require_stable(loops, decay, names)
         _close(instrument, wave, electronics, loops).require_stable()
         start = start_up(1 / decay, loops, headroom=loop.drive_headroom, offset=2 * np.pi * loop.start_offset_Hz)
         noise = {

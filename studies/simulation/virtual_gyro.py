@@ -11,6 +11,7 @@ from studies.instrument.tables.noise import SILENT
 from studies.record import Record
 from studies.simulation.chamber import check_profile
 from studies.simulation.drive import COLUMN, COMMANDS, RATE, Drive, drive_by_profile, rows_of
+from studies.simulation.loop import require_stable_loops
 from studies.simulation.noise import bias_noise, frequency_noise, quantise, white_noise
 from studies.simulation.prediction import Prediction, law_for, predict
 from thermal.profile import Profile
@@ -80,14 +81,18 @@ def simulate_run(
     Raises
     ------
     InputError, ThermalError, ShellError
-        An unusable table or effect; a boundary that leaves the range of the material.
+        An unusable table or effect, an unstable loop; a boundary that leaves the range of the material.
     """
     drive = driven if isinstance(driven, Drive) else drive_by_profile(driven, rows_of(driven, rate))
     if isinstance(driven, Drive):
         rate = 1 / float(np.median(np.diff(drive.time)))
     check_profile(drive.profile, instrument)
     levels = instrument.noise if noise else SILENT
-    prediction = predict(instrument, drive, law=law or law_for(instrument, drive, theory=theory))
+    law = law or law_for(instrument, drive, theory=theory)
+    if instrument.loop is not None:
+        frequency = float(law.frequency(instrument.reference_temperature))
+        require_stable_loops(instrument, frequency, instrument.loss.inverse_q)
+    prediction = predict(instrument, drive, law=law)
     true = dict(prediction.columns)
     free = instrument.loop is not None and instrument.loop.mode == "whole-angle"
     if free:  # its rate is what the azimuth does from row to row, and its other columns are means over the same time

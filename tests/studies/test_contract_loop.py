@@ -1,6 +1,7 @@
 """`hrg loop` speaks as promised: its schema, its refusals, and a record whose noise and bias are those that it states."""
 
 import json
+import re
 
 import numpy as np
 import pytest
@@ -58,11 +59,21 @@ def test_schema_and_record(card, tmp_path, capsys):
     assert turn == pytest.approx(np.degrees(0.5e-3 * decay / found["bryan_factor"]) * 3600, rel=1e-3)
 
 
-def test_unstable_loop_is_said_with_its_margin(card, capsys):
-    assert main(["loop", card("rate_bandwidth_Hz = 200.0\n")]) == 2
-    said = capsys.readouterr().err
-    assert "[loop]: the rate loop (GR) is unstable: gain margin -" in said
-    assert "lower its bandwidth" in said
+@pytest.mark.parametrize("lines", ["rate_bandwidth_Hz = 200.0\n", "rate_bandwidth_Hz = 120.0\ndelay_ms = 4.0\n"])
+def test_unstable_loop_is_said_with_its_margin_before_anything_is_simulated(card, tmp_path, capsys, lines):
+    out = tmp_path / "run.csv"
+    path = card(lines)
+    for words in (["loop", path, "--out", str(out)], ["simulate", path, "step 20 10 1h", "--out", str(out)]):
+        assert main(words) == 2
+        said = capsys.readouterr().err
+        assert "[loop]: the rate loop (GR) is unstable: gain margin -" in said
+        assert not out.exists()
+    calm = re.search(r"lower its bandwidth to about ([\d.]+) Hz", said)[1]
+    assert float(calm) > 5
+    assert main(["loop", card(re.sub(r"(?<=rate_bandwidth_Hz = )[\d.]+", calm, lines)), "--json"]) == 0
+    rate = next(m for m in json.loads(capsys.readouterr().out)["margins"] if m["loop"] == "rate")
+    assert rate["gain_margin_dB"] > 5.5
+    assert rate["phase_margin_deg"] > 44
 
 
 def test_card_without_loops_is_refused(capsys):
@@ -129,4 +140,4 @@ def test_the_page_shows_margins_drift_noise_start_and_run(card, tmp_path, capsys
     assert "A run through the loops" in text
     found = json.loads(capsys.readouterr().out)
     assert f"{found['noise'][-1]['deg_per_rt_h']:.3g} °/√h" in text
-    assert "Attack first: loop.pickoff_phase_deg" in text  # 0.5° on the quadrature of 5 mHz
+    assert "Attack first: <code>loop.pickoff_phase_deg</code>" in text  # 0.5° on the quadrature of 5 mHz
