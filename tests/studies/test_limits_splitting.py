@@ -237,6 +237,24 @@ def test_the_drawn_shell_departs_where_the_card_says_and_its_mode_lies_on_the_sl
     assert perfect.scene().axes.shape == (0, 2, 3)
 
 
+def test_the_mesh_departs_where_the_card_says(tmp_path):
+    def nodes(name):
+        assert main(["mesh", str(tmp_path / "card.toml"), "--out", str(tmp_path / name), "--around", "24"]) == 0
+        text = (tmp_path / name).read_text().split("*NODE")[1].split("\n", 1)[1].split("*")[0]
+        return np.array([[float(cell) for cell in line.split(",")[1:]] for line in text.strip().splitlines()])
+
+    loaded(tmp_path, WALL.replace('"wall"', '"outer"'), MASS)
+    true = nodes("imperfect.inp")
+    loaded(tmp_path)
+    perfect = nodes("perfect.inp")
+    radius = np.linalg.norm(perfect, axis=1)
+    off = np.linalg.norm(true, axis=1) - radius
+    theta = np.arctan2(perfect[:, 1], perfect[:, 0])
+    share = (radius - 14.55e-3) / 0.9e-3  # from the inner face, which stays, to the outer one
+    away = np.hypot(perfect[:, 0], perfect[:, 1]) > 1e-6
+    assert off[away] == pytest.approx((share * 0.3e-6 * np.cos(4 * (theta - np.deg2rad(31.0))))[away], abs=1e-11)
+
+
 def test_an_imperfect_card_travels_to_workers(tmp_path):
     instrument = loaded(tmp_path, WALL + "power = 2.0\n", ELECTRODES)
     assert split_of(pickle.loads(pickle.dumps(instrument))).split.wave == split_of(instrument).split.wave
