@@ -1,7 +1,7 @@
 """What makes a resonator differ from the body of revolution that was designed."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from math import pi
 
 import numpy as np
@@ -84,6 +84,11 @@ class Imperfection:
         if fade is None:
             return inner, outer
         return inner and Faded(inner, fade), outer and Faded(outer, fade)
+
+    def faded(self, fade: Callable[[Array], Array] | None) -> "Imperfection":
+        """The same with its shape given by the faces, which `fade` along the meridian."""
+        inner, outer = self.faces(fade)
+        return replace(self, thickness=None, offset=None, inner=inner, outer=outer)
 
     @property
     def orders(self) -> tuple[int, ...]:

@@ -50,9 +50,11 @@ def fade(resonator: Resonator, system: System) -> Callable[[Array], Array] | Non
     where nothing is held.
     """
     edges: list[tuple[float, int, float]] = []
+    spans: list[tuple[float, float]] = []
     for group in system.groups:
         if isinstance(group, ShellGroup):
             chain = group.place.chain
+            spans.append((chain.breaks[0] / resonator.length, chain.breaks[-1] / resonator.length))
             for s, inward, end in zip((chain.breaks[0], chain.breaks[-1]), (1, -1), chain.ends, strict=True):
                 if end in ("tied", "clamped"):
                     h = float(resonator.at([s], chain.segments[0 if inward > 0 else -1]).thickness[0])
@@ -61,7 +63,9 @@ def fade(resonator: Resonator, system: System) -> Callable[[Array], Array] | Non
         return None
 
     def factor(position: Array) -> Array:
-        found = np.ones(np.shape(position))
+        found = np.zeros(np.shape(position))
+        for one, two in spans:
+            found[(position > one - 1e-9) & (position < two + 1e-9)] = 1.0
         for place, inward, width in edges:
             off = (position - place) * inward / width
             beside = abs(position - place) < width

@@ -1,6 +1,5 @@
 """An imperfect resonator for pictures: its departures exaggerated, its mode turned onto an axis, the axes themselves."""
 
-from collections.abc import Callable
 from dataclasses import replace
 from math import pi
 
@@ -8,7 +7,6 @@ import numpy as np
 
 from shell.imperfection.field import Complex
 from shell.imperfection.imperfect import Imperfection
-from shell.imperfection.pair import Pair
 from shell.quadrature import Array
 from shell.resonator import Resonator
 from shell.scan.projection import Projector
@@ -27,18 +25,13 @@ def turn_surface(surface: Surface, angle: float) -> Surface:
 
 
 def find_departures(
-    resonator: Resonator,
-    imperfection: Imperfection,
-    x: Array,
-    r: Array,
-    z: Array,
-    fade: Callable[[Array], Array] | None = None,
+    resonator: Resonator, imperfection: Imperfection, x: Array, r: Array, z: Array
 ) -> dict[int, Complex]:
     """How far points of the section (position x, r, z) depart outwards and upwards: waves m to (2, points), m.
 
-    What is not a shape (density, modulus, masses) is not seen. fade : see `Imperfection.faces`.
+    What is not a shape (density, modulus, masses) is not seen.
     """
-    inner, outer = imperfection.faces(fade)
+    inner, outer = imperfection.faces()
     place = resonator.at(np.clip(x, 0.0, 1.0) * resonator.length)
     height = (r - place.r) * place.normal_r + (z - place.z) * place.normal_z
     through = np.clip(2 * height / place.thickness, -1.0, 1.0)
@@ -57,14 +50,14 @@ def find_departures(
     return found
 
 
-def depart_points(points: Array, resonator: Resonator, imperfection: Imperfection, pair: Pair) -> Array:
-    """Points (count, 3) of a perfect solid where they lie in the imperfect one; its solid parts stay as they are."""
+def depart_points(points: Array, resonator: Resonator, imperfection: Imperfection) -> Array:
+    """Points (count, 3) of a perfect solid where they lie in the imperfect one."""
     at = Projector(resonator).place(points)
     r = np.hypot(points[:, 0], points[:, 1])
     x = np.clip(at.position, 0.0, 1.0)
     on_shell = (abs(at.height) < at.thickness * (0.5 + SLACK)) & (abs(at.position - x) < SLACK)
     out, up = np.zeros((2, len(points)))
-    for m, wave in find_departures(resonator, imperfection, x, r, points[:, 2], pair.fade).items():
+    for m, wave in find_departures(resonator, imperfection, x, r, points[:, 2]).items():
         out, up = (np.array([out, up]) + (wave * np.exp(-1j * m * at.azimuth)).real) * on_shell
     return np.asarray(points + np.stack([out * np.cos(at.azimuth), out * np.sin(at.azimuth), up], axis=1))
 

@@ -82,9 +82,8 @@ def mesh(
         from studies.splitting import solved_pair
 
         with naming(f"{instrument.path} [imperfection]"):
-            found = replace(
-                found, nodes=depart_points(found.nodes, resonator, fields, solved_pair(resonator, elastic, 2))
-            )
+            shape = fields.faded(solved_pair(resonator, elastic, 2).fade)
+            found = replace(found, nodes=depart_points(found.nodes, resonator, shape))
     data = encode_volume(found, cast("VolumeKind", kind[1:]))
     with written_whole(out) as file:
         file.write(data)

@@ -1,6 +1,6 @@
 """What a picture of an instrument's mode shows: the solved mode, its surface, and the quantity that colours it."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
@@ -44,7 +44,10 @@ class ModeScene:
     @property
     def imperfection(self) -> "Imperfection | None":
         """What its shape departs by."""
-        return self.instrument.part("imperfection").fields if self.split is not None else None
+        from shell.imperfection import Pair
+
+        fields = self.instrument.part("imperfection").fields if self.split is not None else None
+        return None if fields is None else fields.faded(Pair(self.mode).fade)
 
     @property
     def title(self) -> str:
@@ -133,11 +136,11 @@ def _show_split(
     from studies.splitting import SplitPair
 
     split = SplitPair(instrument, mode, T).split
-    surface, factor = turn_surface(surface, split.slow_axis), 0.0
-    fields = instrument.part("imperfection").fields
-    if fields is not None:
-        surface, factor = depart_surface(surface, resonator, fields, exaggerated)
-    return ModeScene(instrument, T, resonator, mode, surface, split, factor)
+    scene = ModeScene(instrument, T, resonator, mode, turn_surface(surface, split.slow_axis), split)
+    if scene.imperfection is None:
+        return scene
+    surface, factor = depart_surface(scene.surface, resonator, scene.imperfection, exaggerated)
+    return replace(scene, surface=surface, exaggeration=factor)
 
 
 def read_field(path: str | Path) -> ShellTemperature:
