@@ -2,6 +2,8 @@
 
 import re
 
+from studies.reports.diagnosis import spell_parameter
+from studies.reports.digits import plain, to_error, to_interval
 from studies.reports.page import Chapter, Table, Text, render_page, typeset
 
 
@@ -47,3 +49,32 @@ def test_numbers_with_units_are_typeset_and_words_for_a_command_are_not():
         typeset("hrg simulate card 'step 20 -10 5h' on 2026-11-22")
         == "hrg simulate card 'step 20 -10 5h' on 2026-11-22"
     )
+
+
+def test_digits_follow_the_interval():
+    """GUM 7.2.6: two digits of an uncertainty, and the value to the same place."""
+    assert to_interval(1.2637e-8, -3.71e-4, 3.71e-4) == ["0.00000", "-0.00037", "0.00037"]
+    assert to_interval(4425.14349, 4425.14061, 4425.14648) == ["4425.1435", "4425.1406", "4425.1465"]
+    assert to_interval(1642.0, 488.8, 5515.0) == ["1600", "500", "5500"]
+    assert to_error(-1.87584e-5, 2.5e-7) == ("-1.876e-05", "2.5e-07")
+    assert to_error(-708.43, 11.0) == ("-708", "11")
+    assert to_error(0.0238945, 1.5e-5) == ("0.023894", "0.000015")  # the double lies below the half
+    assert [plain(x) for x in (720.0, 0.000123456, 12345.6, 1.2e-5, 0.0, None)] == [
+        "720", "0.000123", "12346", "1.20e-05", "0", "—",
+    ]  # fmt: skip
+
+
+def test_parameters_have_units_that_people_use():
+    assert spell_parameter("coefficient_deg_per_h_per_K_per_s") == ("coefficient (°/h per K/min)", 1.0 / 60.0)
+    assert spell_parameter("second_time_constant_s") == ("second time constant (s)", 1.0)
+    assert spell_parameter("initial_memory") == ("initial memory", 1.0)
+
+
+def test_wide_tables_are_stacked_on_a_phone_and_long_ones_end_on_paper():
+    wide = Table("T", [f"Quantity {k}" for k in range(9)], [["1234.5678"] * 9] * 50)
+    narrow = Table("T", ["Name", "Value"], [["f", "1"]])
+    text = render_page("A page", "lead", [Chapter("One", [wide, narrow, Text("run `step 20 -10 5h`")])])
+    assert text.count('class="stack paged"') == 1
+    assert text.count('data-head="Quantity 8"') == 50
+    assert 'class="remark onpaper">40 of 50 rows' in text
+    assert "<code>step 20 -10 5h</code>" in text
