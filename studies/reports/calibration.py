@@ -173,10 +173,10 @@ def _ladder_figure(found: "Calibration") -> Picture:
         for axis, (name, rung) in zip(axes[0], found.ladder.items(), strict=True):
             unit, scale = SHOWN[name]
             heights = [scale * rung.as_shipped, scale * rung.calibrated]
-            axis.bar(["shipped", "calibrated"], heights, color=[style.SKY, style.BLUE], width=0.6)
+            axis.bar(["shipped", "calibrated"], heights, color=[style.VERMILION, style.BLUE], width=0.6)
             axis.axhline(scale * rung.noise, color=style.BLACK, linestyle="--", linewidth=1.0)
             for k, height in enumerate(heights):
-                axis.annotate(plain(height), (k, height), ha="center", va="bottom", fontsize=8)
+                axis.annotate(plain(height), (k, 0.5 * height), ha="center", va="center", fontsize=8, color="white")
             axis.set_ylim(0.0, 1.25 * max(*heights, scale * rung.noise))
             axis.set_title(f"{NAMES[name]} ({unit})", fontsize=8, loc="left")
             axis.tick_params(labelsize=8)
