@@ -92,18 +92,19 @@ def _find_offsets(paths: Sequence[str], files: list[list[str]]) -> list[str]:
         ]
         if not found:
             continue
-        # of pairs that agree alike, the one that tells the offset most sharply
+        # two columns of one quantity before others, which may lag; of pairs that agree alike, the one with the sharpest offset
+        found = [item for item in found if _one_unit(item[1], item[2])] or found
         best = max(item[0].correlation for item in found)
         alike = [item for item in found if 1 - item[0].correlation < 3 * (1 - best) + 1e-3]
         offset, one, two = min(alike, key=lambda item: item[0].high - item[0].low)
-        said = f"{offset.value:.3g} s (90 %: {offset.low:.3g} to {offset.high:.3g} s)"
+        said = f"{offset.value:.2f} s (90 %: {offset.low:.2f} to {offset.high:.2f} s)"
         ours, theirs = _source_of(base, one), _source_of(other, two)
         place = next(k for k, line in enumerate(written) if line.startswith("# clock_offset_s"))
         written[place : place + 1] = [
             f"# {_comment(theirs)} here follows {_comment(ours)} of the first file best with",
             f"# {said}, correlation {offset.correlation:.4f};",
             "# a real lag between two places looks the same: take it only if both show one thing.",
-            f"# clock_offset_s = {offset.value:.4g}    # CHECK: added to this file's times",
+            f"# clock_offset_s = {offset.value:.2f}    # CHECK: added to this file's times",
         ]
         notes.append(f"{path}: its clock seems to need {said}, from {theirs} against {ours}; see the draft.")
     return notes

@@ -517,3 +517,19 @@ def test_what_the_reader_refuses_is_not_imported(tmp_path, header, value, part):
     )
     with pytest.raises(InputError, match=rf"line 6.*{part}"):
         import_records([str(tmp_path / "raw.csv")], load_map(tmp_path / "map.toml"))
+
+
+def test_columns_of_one_quantity_tell_the_offset_before_others(tmp_path):
+    """In a periodic run the frequency, late and of either sign, fits a false offset as well as the temperature fits the true one."""
+    x = 5.0 * np.arange(2400)
+
+    def wave(t):
+        return 15.0 * np.sin(t / 900.0)
+
+    first = "".join(f"{t:.0f},{25 - wave(t):.4f}\n" for t in x)
+    second = "".join(f"{t - 7:.0f},{4432 - 0.35 * wave(t - 300):.5f},{25 - wave(t):.4f}\n" for t in x)
+    (tmp_path / "a.csv").write_text("time_s,housing temperature\n" + first)
+    (tmp_path / "b.csv").write_text("time_s,frequency_Hz,chamber temp\n" + second)
+    draft = draft_map([str(tmp_path / "a.csv"), str(tmp_path / "b.csv")])
+    (line,) = [line for line in draft.text.splitlines() if line.startswith("# clock_offset_s") and "CHECK" in line]
+    assert float(line.split("=")[1].split("#")[0]) == pytest.approx(7.0, abs=0.5)
