@@ -157,12 +157,14 @@ def report(folder: str, *, out: str | None = None) -> Answer:
     """
     from pathlib import Path
 
+    from studies.cli.output import say
     from studies.files.writing import write_text
     from studies.reports.sweep import summarise, sweep_page
     from studies.sweeps.results import open_results
 
     results = open_results(folder)
     page = Path(out) if out else Path(folder) / "report.html"
+    say("drawing the page, with mode shapes where the study has modes ...")
     write_text(page, sweep_page(results))
     yield {**summarise(results), "report": str(page)}
     print(f"report: {page}")
@@ -226,7 +228,7 @@ def _print_reasons(results: "Results") -> None:
 
 def _estimate_words(estimate: "Effort") -> str:
     return (
-        f"{estimate.cases} cases in {estimate.batches} batches, {SOLVERS[estimate.solver]}"
+        f"{estimate.cases} cases in {estimate.batches} batch{'es' * (estimate.batches != 1)}, {SOLVERS[estimate.solver]}"
         + (f" ({estimate.why_full})" if estimate.why_full else "")
         + "; one takes"
         f" {estimate.seconds_each:.3g} s, all about {_duration(estimate.seconds)}; memory about {estimate.memory_MB:.0f} MB."
