@@ -35,12 +35,12 @@ def modes(tmp_path, capsys):
     return read
 
 
+@pytest.mark.slow
 def test_the_pair_of_a_silicon_dome(modes):
-    """By NGSolve (tests/benchmarks/cubic_ngsolve.py); pairs of odd n stay whole, n = 4 is not solved."""
-    two, three, four = modes(CARD, "--harmonic", "2", "3", "4")
+    """By NGSolve (tests/benchmarks/cubic_ngsolve.py); n = 4 is not solved."""
+    two, four = modes(CARD, "--harmonic", "2", "4")
     pair = two["crystal"]
     assert [pair["antinode_along_100_Hz"], pair["other_Hz"]] == pytest.approx([6407.882, 6876.657], rel=1e-5)
-    assert three["crystal"]["split_Hz"] == pytest.approx(0.0, abs=1e-3)
     assert "crystal" not in four
 
 
