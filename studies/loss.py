@@ -26,7 +26,8 @@ if TYPE_CHECKING:
     from studies.instrument.tables.loss_parts import FilmKeys, LossParts
 
 FILM_NUMBERS = ("youngs_modulus_GPa", "poisson_ratio", "loss")
-FILM_HEAT = ("expansion_per_K", "conductivity_W_per_m_K", "heat_capacity_J_per_kg_K", "density_kg_m3")
+FILM_HEAT = ("expansion_per_K", "conductivity_W_per_m_K")
+FILM_CAPACITY = ("heat_capacity_J_per_kg_K", "density_kg_m3")
 
 
 @dataclass(frozen=True)
@@ -204,7 +205,7 @@ def _film(
     from shell.damping.sources import film_names, known_film
 
     known = known_film(keys.material)
-    numbers = film_numbers(keys, (*FILM_NUMBERS, *FILM_HEAT))
+    numbers = film_numbers(keys, (*FILM_NUMBERS, *FILM_HEAT, *FILM_CAPACITY))
     missing = [key for key in FILM_NUMBERS if numbers[key] is None]
     if missing:
         listed = "" if known else f" (films of the table: {', '.join(film_names())})"
@@ -213,7 +214,7 @@ def _film(
         )
     with naming(where):
         relative = (spread.get(f"{name}.thickness_nm", 0.0), spread.get(f"{name}.loss", 0.0))
-        film = _build_film(keys, numbers)
+        film = _build_film(keys, numbers, known.get("heat_capacity_J_per_m3_K"))
         check_film(film, vibration.thinnest)
         causes = film_causes(keys.material, film, heat, relative, str(known.get("source", "given in the card")))
         if keys.anisotropy is None:
@@ -260,13 +261,15 @@ def _unbalance(resonator: "Resonator", elastic: "Elastic") -> "Unbalance":
     return unbalance_loss(_solve(resonator, elastic, 2, "solid"), elastic)
 
 
-def _build_film(keys: "FilmKeys", numbers: Mapping[str, Any]) -> "LossyFilm":
+def _build_film(keys: "FilmKeys", numbers: Mapping[str, Any], capacity: float | None) -> "LossyFilm":
+    """`capacity` per volume (J/(m³ K)) counts where the card or the table has none per mass."""
     from shell.damping.film import LossyFilm
     from shell.damping.heat import Heat
 
     heat = None
-    if all(numbers[key] is not None for key in FILM_HEAT):
+    if all(numbers[key] is not None for key in FILM_CAPACITY):
         capacity = numbers["density_kg_m3"] * numbers["heat_capacity_J_per_kg_K"]
+    if capacity is not None and all(numbers[key] is not None for key in FILM_HEAT):
         heat = Heat(numbers["expansion_per_K"], capacity, numbers["conductivity_W_per_m_K"])
     return LossyFilm(
         1e-9 * keys.thickness_nm,

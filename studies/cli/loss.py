@@ -153,13 +153,15 @@ def _print(name: str, model: "LossModel", budget: "Budget", theory: str) -> None
     from scipy.constants import zero_Celsius
 
     from studies.cli.output import print_table
+    from studies.loss_account import write_quality
+    from studies.reports.digits import plain
 
     low, high = budget.interval
     rows = [
         [
             f"{T - zero_Celsius:.1f}",
-            _plain(1 / total),
-            f"{_plain(1 / most)} … {_plain(1 / least)}",
+            write_quality(1 / total),
+            f"{write_quality(1 / most)} … {write_quality(1 / least)}",
             f"{1e9 * total:.3g}",
             f"{rise:+.2f}",
         ]
@@ -180,7 +182,7 @@ def _print(name: str, model: "LossModel", budget: "Budget", theory: str) -> None
                 part.name,
                 f"{share:.3g} %",
                 *(f"{1e9 * part.inverse_q[k]:.3g}" for k in shown),
-                f"{least:.2g} … {most:.2g}",
+                f"{plain(least, 2)} … {plain(most, 2)}",
                 f"{100 * part.slope[middle]:+.2f}",
                 part.source,
             ]
@@ -209,9 +211,13 @@ def _print_around(budget: "Budget", around: "DampingAround") -> None:
 def _print_advice(model: "LossModel", budget: "Budget") -> None:
     import numpy as np
 
+    from studies.loss_account import write_quality
+
     middle = int(np.argmin(abs(budget.temperatures - model.vibration.reference)))
     without, first = float(budget.without(budget.first.name)[middle]), budget.first
-    gain = "nothing known would be left" if not np.isfinite(without) else f"without it Q would be {_plain(without)}"
+    gain = (
+        "nothing known would be left" if not np.isfinite(without) else f"without it Q would be {write_quality(without)}"
+    )
     print(f"Attack first: {first.name}; {gain}. {_sentence(first.advice)}")
     known = budget.least_known.name
     print("It is also the least known." if known == first.name else f"Least known: {known}.")
@@ -220,17 +226,14 @@ def _print_advice(model: "LossModel", budget: "Budget") -> None:
 
 
 def _print_stated(stated: "StatedLoss") -> None:
+    from studies.loss_account import write_quality
+
     share, low, high = (100 * part for part in (stated.explained, stated.low, stated.high))
     print(
-        f"The card states Q = {_plain(1 / stated.inverse_q)}: the parts explain {share:.0f} % of its loss (90 %: {low:.0f} … {high:.0f} %)."
+        f"The card states Q = {write_quality(1 / stated.inverse_q)}: the parts explain {share:.0f} % of its loss (90 %: {low:.0f} … {high:.0f} %)."
     )
     if stated.verdict:
         print(stated.verdict)
-
-
-def _plain(value: float) -> str:
-    """Three digits, 7.28e6 for 7.28e+06."""
-    return f"{value:.3g}".replace("e+0", "e").replace("e+", "e")
 
 
 def _sentence(words: str) -> str:

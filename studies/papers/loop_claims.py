@@ -92,7 +92,7 @@ def _accuracy() -> Claim:
     return Claim(
         "force rebalance improves the accuracy",
         "BVG paper, section 3.2",
-        f"the bias is the same held ({held:.1f} deg/h) and free ({free:.1f} deg/h): no loop touches damping anisotropy, gains and"
+        f"the bias is the same held ({held:.1f} °/h) and free ({free:.1f} °/h): no loop touches damping anisotropy, gains and"
         " phases; scale and bandwidth improve",
         "not met",
     )
@@ -107,10 +107,10 @@ def _stability() -> Claim:
     phase = STABILITY_deg_per_h / slope
     within = np.degrees(STABILITY_deg_per_h / (slope * 1e-4) / 4)
     return Claim(
-        f"a bias stability of {STABILITY_deg_per_h:g} deg/h under force rebalance with a split of {1e3 * SPLIT_Hz:g} mHz, Q > 2e6",
+        f"a bias stability of {STABILITY_deg_per_h:g} °/h under force rebalance with a split of {1e3 * SPLIT_Hz:g} mHz, Q > 2e6",
         "Micromachines 2021, 266",
         f"only if the phase of the loop stays within {1e6 * phase:.1f} µrad, or the wave stands within {60 * within:.1f}′ of a"
-        f" principal axis with 0.1 mrad; a phase error is worth {slope / 1e3:.0f} deg/h per mrad at the worst azimuth",
+        f" principal axis with 0.1 mrad; a phase error is worth {slope / 1e3:.0f} °/h per mrad at the worst azimuth",
         "met on a condition",
     )
 
@@ -144,7 +144,7 @@ def _nonlinearity() -> Claim:
     return Claim(
         f"scale factor nonlinearity of {1e6 * NONLINEARITY:g} ppm in whole-angle mode",
         "title of a paper on a micro-shell",
-        f"at Q = 1e6 and 1 % of anisotropy only above {np.degrees(rate):.1f} deg/s, where √(Ω² − Ω_d²) departs from Ω by less;"
+        f"at Q = 1e6 and 1 % of anisotropy only above {np.degrees(rate):.1f} °/s, where √(Ω² − Ω_d²) departs from Ω by less;"
         " below it the drift must be compensated over the azimuth",
         "met on a condition",
     )

@@ -18,8 +18,8 @@ def claims_chapter(found: "LoopClaims") -> Chapter:
     """Return the chapter."""
     (drift, drift_closed), (mean, mean_closed) = found.drift, found.mean_rate
     text = (
-        f"One per cent of damping anisotropy at Q = 1e7 drifts by {drift:.3f} deg/h in the twin ({drift_closed:.3f} in closed form);"
-        f" under the earth's 15.041 deg/h a free wave indicates {mean:.3f} deg/h in the mean ({mean_closed:.3f}), and nothing below"
+        f"One per cent of damping anisotropy at Q = 1e7 drifts by {drift:.3f} °/h in the twin ({drift_closed:.3f} in closed form);"
+        f" under the earth's 15.041 °/h a free wave indicates {mean:.3f} °/h in the mean ({mean_closed:.3f}), and nothing below"
         " the drift, where it locks."
     )
     rows = [[claim.verdict, f"{claim.claim} ({claim.source})", claim.twin] for claim in found.claims]

@@ -5,8 +5,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.constants import zero_Celsius
 
-from studies.loss_account import DampingAround, StatedLoss, damping_around, stated_loss
+from studies.loss_account import DampingAround, StatedLoss, damping_around, stated_loss, write_quality
 from studies.reports import style
+from studies.reports.digits import plain
 from studies.reports.page import Block, Chapter, Facts, Picture, Table, Text, draw, render_page
 
 if TYPE_CHECKING:
@@ -49,7 +50,11 @@ def _facts(budget: "Budget", at: int, stated: StatedLoss | None) -> Facts:
     degrees = budget.temperatures[at] - zero_Celsius
     first = budget.first
     facts = [
-        (f"Q at {degrees:g} °C", _plain(1 / budget.inverse_q[at]), f"90 %: {_plain(1 / high)} … {_plain(1 / low)}"),
+        (
+            f"Q at {degrees:g} °C",
+            write_quality(1 / budget.inverse_q[at]),
+            f"90 %: {write_quality(1 / high)} … {write_quality(1 / low)}",
+        ),
         ("Attack first", first.name, f"{_share(first, budget, at)} of the loss; {_gain(budget, first, at)}"),
         ("Least known", budget.least_known.name, "moves the sum most within its uncertainty"),
     ]
@@ -57,7 +62,7 @@ def _facts(budget: "Budget", at: int, stated: StatedLoss | None) -> Facts:
         facts.append((
             "Explained of the stated Q",
             f"{100 * stated.explained:.0f} %",
-            f"stated {_plain(1 / stated.inverse_q)}; 90 %: {100 * stated.low:.0f} … {100 * stated.high:.0f} %",
+            f"stated {write_quality(1 / stated.inverse_q)}; 90 %: {100 * stated.low:.0f} … {100 * stated.high:.0f} %",
         ))  # fmt: skip
     return Facts(facts)
 
@@ -92,13 +97,13 @@ def _worth(budget: "Budget", at: int) -> Table:
     rows = []
     for part in budget.parts:
         rest = budget.inverse_q[at] - part.inverse_q[at] / 2
-        low, high = (_plain(1e9 * float(end[at]), 2) for end in part.interval)
+        low, high = (plain(1e9 * float(end[at]), 2) for end in part.interval)
         rows.append([
             part.name,
             _share(part, budget, at),
-            _plain(1e9 * part.inverse_q[at]),
+            plain(1e9 * part.inverse_q[at]),
             f"{low} … {high}",
-            _plain(1 / rest),
+            write_quality(1 / rest),
             _without(budget, part, at),
             _sentence(part.advice),
         ])  # fmt: skip
@@ -144,7 +149,12 @@ def _course(budget: "Budget", stated: StatedLoss | None, reference: float) -> li
 def _over_temperature(budget: "Budget") -> list[Block]:
     low, high = budget.interval
     rows = [
-        [f"{T:.4g}", _plain(1 / total), f"{_plain(1 / most)} … {_plain(1 / least)}", f"{100 * slope:+.2f}"]
+        [
+            f"{T:.4g}",
+            write_quality(1 / total),
+            f"{write_quality(1 / most)} … {write_quality(1 / least)}",
+            f"{100 * slope:+.2f}",
+        ]
         for T, total, least, most, slope in zip(
             budget.temperatures - zero_Celsius, budget.inverse_q, low, high, budget.slope, strict=True
         )
@@ -152,7 +162,7 @@ def _over_temperature(budget: "Budget") -> list[Block]:
     found: list[Block] = [Table("Q", ["T (°C)", "Q", "90 %", "Slope of 1/Q (%/°C)"], rows)]
     if len(rows) > 1:
         picked = np.unique(np.linspace(0, len(rows) - 1, min(len(rows), MOST_COLUMNS)).round().astype(int))
-        parts = [[part.name, *(_plain(1e9 * part.inverse_q[k]) for k in picked)] for part in budget.parts]
+        parts = [[part.name, *(plain(1e9 * part.inverse_q[k]) for k in picked)] for part in budget.parts]
         columns = ["Part", *(f"{rows[k][0]} °C" for k in picked)]
         found.append(Table("1/Q of the parts (1e−9)", columns, parts))
     return found
@@ -224,19 +234,12 @@ def _share(part: "LossPart", budget: "Budget", at: int) -> str:
 
 def _gain(budget: "Budget", part: "LossPart", at: int) -> str:
     Q = float(budget.without(part.name)[at])
-    return f"without it Q = {_plain(Q)}" if np.isfinite(Q) else "nothing known would be left"
+    return f"without it Q = {write_quality(Q)}" if np.isfinite(Q) else "nothing known would be left"
 
 
 def _without(budget: "Budget", part: "LossPart", at: int) -> str:
     Q = float(budget.without(part.name)[at])
-    return _plain(Q) if np.isfinite(Q) else "nothing left"
-
-
-def _plain(value: float, digits: int = 3) -> str:
-    """A few digits: 7.28e6 for 7.28e+06, 230 for 2.3e+02."""
-    if 1 <= abs(value) < 1e4:
-        return f"{float(f'{value:.{digits}g}'):g}"
-    return f"{value:.{digits}g}".replace("e+0", "e").replace("e+", "e").replace("e-0", "e-")
+    return write_quality(Q) if np.isfinite(Q) else "nothing left"
 
 
 def _sentence(words: str) -> str:

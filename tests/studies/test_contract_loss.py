@@ -207,3 +207,17 @@ def test_the_page_says_what_to_attack_first_and_what_each_part_is_worth(capsys, 
     assert f"without it Q = {found['attack_first']['q_without'][at]:.3g}".replace("e+0", "e") in text
     assert found["left_out"][0][1:] in text
     assert _run(capsys, str(path), "--report", str(page), "--from", "20", "--to", "20")[0] == 0
+
+
+@pytest.mark.parametrize(("film", "loss"), [("tantala", 2.3e-4), ("silica", 4e-5)])
+def test_a_dielectric_film_of_the_table_needs_its_thickness_alone(film, loss):
+    """gwinc states their loss and heat; a given loss angle replaces that of the table."""
+    keys = {"material": film, "thickness_nm": 100.0}
+    found = []
+    for more in ({}, {"loss": 2 * loss}):
+        card = build_instrument(DOME | {"loss": {"film": [keys | more]}})
+        found.append({part.name: part for part in loss_model(card).budget(293.15).parts})
+    own, twice = (parts[f"film {film}"] for parts in found)
+    assert "gwinc" in own.source
+    assert twice.inverse_q == pytest.approx(2 * own.inverse_q)
+    assert 0 < found[0][f"film {film}, heat"].inverse_q[0] < own.inverse_q[0]
