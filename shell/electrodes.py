@@ -291,9 +291,3 @@ def soften_at_gap(per_square_volt: float, voltage_squared: ArrayLike, gap: Array
     gap : g over that gap.
     """
     return np.asarray(per_square_volt * np.asarray(voltage_squared) / np.asarray(gap, dtype=float) ** 3)
-
-
-def uniform_softening(frequency: ArrayLike, rho: float, h: float, gap: float, voltage: float) -> Array:
-    """δf/f = -½ ε₀ V²/(g³ ρ h ω²) of a full ring with mode factor 1, the estimate on the back of an envelope."""
-    omega = 2 * pi * np.asarray(frequency, dtype=float)
-    return np.asarray(-VACUUM * voltage**2 / (2 * gap**3 * rho * h * omega**2))

@@ -62,18 +62,6 @@ class Imperfection:
         joined = {name: add(getattr(self, name), getattr(other, name)) for name in FIELDS}
         return Imperfection(**joined, masses=self.masses + other.masses, lines=self.lines + other.lines)
 
-    def times(self, factor: float) -> "Imperfection":
-        """All of it larger by a factor."""
-        masses = tuple(PointMass(factor * m.mass, m.azimuth, m.position, m.height) for m in self.masses)
-        lines = []
-        for line in self.lines:
-            larger = scaled(line.per_length, factor)
-            assert larger is not None
-            lines.append(LineMass(larger, line.position, line.height))
-        return Imperfection(
-            **{name: scaled(getattr(self, name), factor) for name in FIELDS}, masses=masses, lines=tuple(lines)
-        )
-
     def faces(self, fade: Callable[[Array], Array] | None = None) -> tuple[Field | None, Field | None]:
         """How far the inner and the outer face stand out of the material: thickness, faces and offset together.
 

@@ -23,7 +23,7 @@ import numpy as np
 
 from shell.imperfection.field import Field, values_around
 from shell.kernel import Section, energy_weights
-from shell.quadrature import Array, gauss, legendre, lobatto
+from shell.quadrature import Array, gauss, legendre
 from shell.solution import Constants
 
 HEIGHTS = 4  # of a layer: exact to the third power of the height
@@ -174,12 +174,12 @@ class Stretch:
         self, faces: tuple[Field | None, Field | None], waves: tuple[int, ...], stiff: Array, heavy: Array
     ) -> list[Wall]:
         """What the faces stand out of the perfect wall, m; stiff, heavy : 1 + changes of E and of ρ, (stations, 1, θ)."""
-        nodes = lobatto(HEIGHTS - 1)
         eta, volumes = [], []
         for sign, face in ((-1, faces[0]), (1, faces[1])):
             out = self.values(face, waves)
             reach = float(np.abs(out).max())
             if reach > 0:
+                nodes, _ = gauss(HEIGHTS)
                 eta.append(sign * (1 + 2 * reach / self._thickness * nodes))
                 volumes.append(self._share * reach * _shares(nodes, out / reach))
         if not eta:
