@@ -175,12 +175,14 @@ def _run(
     import numpy as np
     from scipy.constants import zero_Celsius
 
+    from studies.damping_law import damping_law
     from studies.record import Record, write_record
     from studies.simulation.chamber import load_profile
     from studies.simulation.loop import columns_of, run_loops, without_loop
     from studies.simulation.virtual_gyro import simulate_run
 
     columns: dict[str, Any] = {}
+    damping = None
     f, loss = np.array(frequency), np.array(inverse_q)
     if profile is not None:
         thermal = simulate_run(without_loop(instrument), load_profile(profile), 1 / row, noise=False).record
@@ -188,12 +190,23 @@ def _run(
         f, loss = thermal["frequency_Hz"], thermal["inverse_q"]
         names = ("chamber_temperature_degC", "housing_temperature_degC", "resonator_temperature_degC")
         columns = {name: thermal[name] for name in names if name in thermal}
+        warmed = thermal["resonator_temperature_degC"] + zero_Celsius
+        law = damping_law(instrument, float(warmed.min()), float(warmed.max()))
+        damping = law.wave(warmed) if law is not None and law.wave is not None else None
     else:
         time = np.asarray(row * np.arange(int(hours * 3600 / row * (1 + 1e-12)) + 1), dtype=float)
         columns = {"chamber_temperature_degC": np.full(len(time), temperature - zero_Celsius)}
     generator = None if seed is None else np.random.default_rng(seed)
     run = run_loops(
-        instrument, time, f, loss, bryan_factor, rate=np.radians(rate), both_ways=both_ways, generator=generator
+        instrument,
+        time,
+        f,
+        loss,
+        bryan_factor,
+        rate=np.radians(rate),
+        both_ways=both_ways,
+        damping=damping,
+        generator=generator,
     )
     found = columns_of(instrument.loop, run)
     columns = {"time_s": time, **columns, **found}

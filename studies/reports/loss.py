@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.constants import zero_Celsius
 
+from shell.damping.thermoelastic import trace_share
 from studies.loss_account import DampingAround, StatedLoss, damping_around, stated_loss, write_quality
 from studies.reports import style
 from studies.reports.digits import plain
@@ -36,7 +37,7 @@ def loss_page(instrument: "Instrument", model: "LossModel", budget: "Budget", th
         Chapter("In short", answer),
         Chapter("What each part is worth", [_worth(budget, at), _sources(budget)]),
         Chapter("Over temperature", [*_course(budget, stated, model.vibration.reference), *_over_temperature(budget)]),
-        Chapter("Where on the wall", [*_wall_words(), _along(model)]),
+        Chapter("Where on the wall", [*_wall_words(model), _along(model)]),
     ]
     if around is not None:
         chapters.append(Chapter("Around the axis", _around(budget, around)))
@@ -168,13 +169,18 @@ def _over_temperature(budget: "Budget") -> list[Block]:
     return found
 
 
-def _wall_words() -> list[Text]:
+def _wall_words(model: "LossModel") -> list[Text]:
+    share = trace_share(model.vibration.solution)
     return [
         Text(
             "What a treatment of the faces costs or gains depends on where it is done. Energy: what a damaged surface or a film"
             " takes part in. Squeeze, the change of area: what heats a film. Motion along the normal: what a gas brakes. Each is per area"
             " and over its mean; a film or a scratch does least harm where the curves are low."
-        )
+        ),
+        Text(
+            f"P = {share:.3g}: so much of its elastic energy the mode squeezes where a bent beam squeezes 1; the rest is twist and bending"
+            " without a change of volume, which does not heat."
+        ),
     ]
 
 

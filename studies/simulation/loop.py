@@ -193,6 +193,7 @@ def run_loops(
     rate: ArrayLike = 0.0,
     pattern_angle: ArrayLike | None = None,
     both_ways: bool = False,
+    damping: NDArray[np.complex128] | None = None,
     generator: np.random.Generator | None = None,
 ) -> LoopRun:
     """Run the card's loops over even rows (s), its resonator's frequency (Hz) and loss numbers or rows.
@@ -205,10 +206,12 @@ def run_loops(
         Azimuth (rad), at the start in whole-angle mode; that of `[bias]` unless given.
     both_ways : bool
         Whether the self-precession turns back after half of the rows.
+    damping : array (N,), optional
+        Of the parts of a loss budget; see `wave_of`.
     """
     loop = require_loop(instrument)
     angle = np.radians(instrument.bias.pattern_angle_deg) if pattern_angle is None else np.asarray(pattern_angle)
-    wave = wave_of(instrument, frequency, inverse_q, bryan_factor)
+    wave = wave_of(instrument, frequency, inverse_q, bryan_factor, damping=damping)
     electronics = electronics_of(loop, wave, instrument.reference_temperature)
     back = both_ways & (np.arange(len(time)) >= len(time) // 2)
     with naming(f"{instrument.path} [loop]"):

@@ -2,11 +2,14 @@
 
 import numpy as np
 import pytest
+import tomli_w
 
+from studies.cli import main
 from studies.damping_law import damping_law, settled_loss
 from studies.instrument.card import build_instrument
 from studies.instrument.tables.bias import Bias
 from studies.loss import loss_model
+from studies.record import read_record
 from studies.simulation.virtual_gyro import simulate_run
 from thermal.profile import Profile
 
@@ -66,3 +69,19 @@ def test_loops_without_errors_hold_the_drift_of_the_parts() -> None:
     inverse_q, there = settled_loss(build_instrument(PARTS), 293.15)
     assert inverse_q == pytest.approx(one["inverse_q"][0], rel=1e-6)
     assert there.bias.damping_axis_deg == pytest.approx(10.0, abs=0.5)
+
+
+def test_a_run_through_the_loops_takes_the_anisotropy_at_its_temperature(tmp_path, capsys) -> None:
+    """The peak at 60 °C damps all patterns alike: Δ(1/τ) is the film's alone, as hrg simulate has it, and no share of 1/Q."""
+    card, out = tmp_path / "card.toml", [str(tmp_path / f"{k}.csv") for k in range(2)]
+    loss = {"film": [GOLD], "activated": [{"height": 5e-8, "energy_eV": 0.5, "peak_degC": 60.0}]}
+    tables = {"loss": loss, "loop": {"frequency_split_mHz": 0.0}}
+    card.write_text(tomli_w.dumps(BARE | tables), encoding="utf-8")
+    profile = "soak 20 10min then ramp 20 60 120 then soak 60 100min"
+    assert main(["loop", str(card), "--profile", profile, "--row", "60", "--noiseless", "--out", out[0]]) == 0
+    assert main(["simulate", str(card), profile, "--rate", "0.0166666666666667", "--noiseless", "--out", out[1]]) == 0
+    capsys.readouterr()
+    loops, settled = (read_record(path) for path in out)
+    assert settled["inverse_q"][-1] > 1.3 * settled["inverse_q"][0]
+    size = np.abs(settled["bias_deg_per_h"]).mean()
+    assert loops["bias_deg_per_h"][5:-5] == pytest.approx(settled["bias_deg_per_h"][5:-5], abs=5e-3 * size)
