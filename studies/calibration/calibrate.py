@@ -73,12 +73,14 @@ class HeldOutRun:
     path : of its record
     chamber, housing : response -> (as shipped, calibrated); from the chamber alone nothing is refitted, from the housing the
         run's own offset and initial state
+    stated : response -> rms standard deviation that the calibrated values' own uncertainty leaves from the chamber
     noise : response -> rms
     """
 
     path: str
     chamber: Mapping[str, tuple[float, float]]
     housing: Mapping[str, tuple[float, float]]
+    stated: Mapping[str, float]
     noise: Mapping[str, float]
 
 
@@ -280,7 +282,8 @@ def predict_held_out(
     count = len(whole.problem.priors.values)
     problem = replace(whole.problem, runs=seen)
     start = np.concatenate([whole.point[:count], np.zeros(problem.count - count)])
-    values = fit(problem, start).point[:count]
+    without = fit(problem, start)
+    values = without.point[:count]
     inner = replace(whole.problem, runs=(replace(run, outer=None),), tables=())
     responses = [name for name in inner.responses if name not in (HOUSING, SETTLED)]
     by_housing = dict.fromkeys(responses, (0.0, 0.0))
@@ -291,14 +294,20 @@ def predict_held_out(
     for name in responses:
         by_housing[name] = (_spread(inner, both[0], name), _spread(inner, both[1], name))
     by_chamber: dict[str, tuple[float, float]] = {}
+    stated: dict[str, float] = {}
     if run.outer is not None:
         alone = replace(run, inner=run.outer, outer=None)
         outer = replace(whole.problem, runs=(alone,), tables=())
-        points = (np.concatenate([at, np.zeros(outer.count - count)]) for at in (np.zeros(count), values))
-        before, after = (outer.evaluate(point, slopes=False) for point in points)
+        as_shipped, calibrated = (
+            np.concatenate([at, np.zeros(outer.count - count)]) for at in (np.zeros(count), values)
+        )
+        before, after = outer.evaluate(as_shipped, slopes=False), outer.evaluate(calibrated)
+        C = without.covariance[:count, :count]
+        of_values = {name: after.slope[name][:, :count] for name in responses}
+        stated = {name: float(np.sqrt(np.mean(np.sum(J @ C * J, axis=1)))) for name, J in of_values.items()}
         by_chamber = {name: (_rms(before.residual[name]), _rms(after.residual[name])) for name in responses}
     noise = {name: noise_rms(whole, name) for name in responses}
-    return HeldOutRun(run.record.path, by_chamber, by_housing, noise)
+    return HeldOutRun(run.record.path, by_chamber, by_housing, stated, noise)
 
 
 def _refit_start(problem: CardProblem, point: Array, whole: CardFit) -> State:
@@ -318,7 +327,7 @@ def _refit_start(problem: CardProblem, point: Array, whole: CardFit) -> State:
     J, r = white[:, count:-1], white[:, -1]
     moved = np.array(point)
     moved[count:] += np.linalg.solve(J.T @ J + np.eye(J.shape[1]), J.T @ r)
-    return problem.evaluate(moved, slopes=False)
+    return problem.evaluate(np.clip(moved, *problem.ends), slopes=False)
 
 
 def _rms(values: Array) -> float:

@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from studies.calibration.fit import CardFit, objective
+from shell.errors import ShellError
+from studies.calibration.fit import CardFit, objective, whitened
 from studies.calibration.priors import from_standard, to_standard
 from studies.calibration.wave import Polar
 from studies.errors import InputError
@@ -20,6 +21,7 @@ NINETY = 1.6448536269514722
 NONLINEAR = ("thermal.", "noise.", "effect.", "resonator.")
 """Values whose intervals are looked at beyond the straight line."""
 BENT = 0.25  # relative departure of the objective at the ends of an interval from its parabola, beyond which it is profiled
+BENDS = 2  # corrections of the other values beside one that is held
 TOLD = 0.5  # posterior over prior width up to which the data has said what the value is
 SILENT = 0.95  # and from which it stayed at its prior
 INSEPARABLE = 0.9  # correlation, of two values that share what is known of them
@@ -65,6 +67,7 @@ def estimate(fit: CardFit, profile: bool = True) -> tuple[Estimate, ...]:
     z, bounds, at = priors.standard(best), priors.bound(best), priors.at(best)
     middle = priors.standard(mean)
     C = priors.root @ covariance @ priors.root.T
+    J, _ = whitened(fit.problem, fit.state, fit.noise, fit.rows)
     found = []
     for k, value in enumerate(priors.values):
         if k in polar:
@@ -73,7 +76,7 @@ def estimate(fit: CardFit, profile: bool = True) -> tuple[Estimate, ...]:
         sd = float(np.sqrt(C[k, k]))
         ends, kind = (float(middle[k]) - NINETY * sd, float(middle[k]) + NINETY * sd), "normal"
         if profile and value.name.startswith(NONLINEAR) and sd < SILENT:
-            ends, kind = _profiled(fit, k, ends)
+            ends, kind = _profiled(fit, k, J, ends)
         low, high = (float(np.clip(from_standard(value, end), value.low, value.high)) for end in ends)
         number = at[value.name]
         width = number * sd * value.sd / value.value if value.logarithmic else sd * value.sd
@@ -122,24 +125,37 @@ def _told_polar(value: "UncertainValue", one: Polar) -> Estimate:
     )
 
 
-def _profiled(fit: CardFit, k: int, ends: tuple[float, float]) -> tuple[tuple[float, float], str]:
-    """Ends of an interval in z, each where the objective has risen by 2.71 along the way of least rise."""
+def _profiled(fit: CardFit, k: int, J: Array, ends: tuple[float, float]) -> tuple[tuple[float, float], str]:
+    """Ends of an interval in z, each where the least objective with value k held has risen by 2.71."""
     problem, priors = fit.problem, fit.problem.priors
     count = len(priors.values)
     row = np.zeros(problem.count)
     row[:count] = priors.root[k]
-    way = fit.covariance @ row / np.sqrt(row @ fit.covariance @ row)  # one standard deviation of value k
+    toward = fit.covariance @ row
+    way = toward / np.sqrt(row @ toward)  # one standard deviation of value k
     least = objective(problem, fit.state, fit.noise, fit.rows)
     limits = priors.values[k]
     lowest, highest = (to_standard(limits, end) for end in (limits.low, limits.high))
     centre = float(priors.standard(fit.point[:count])[k])
 
     def rise(t: float) -> float:
-        try:
-            state = problem.evaluate(fit.point + t * way, slopes=False)
-        except (InputError, ThermalError):
-            return np.inf
-        return objective(problem, state, fit.noise, fit.rows) - least
+        """Rise on the straight way; where it is more than a parabola's, the others follow the bent valley."""
+        point, lower = fit.point + t * way, np.inf
+        for _ in range(1 + BENDS):
+            try:
+                state = problem.evaluate(point, slopes=False)
+            except (InputError, ShellError, ThermalError):
+                break
+            reached = objective(problem, state, fit.noise, fit.rows) - least
+            if not reached < lower:
+                break
+            lower = reached
+            if lower < (1 + BENT) * t**2:
+                break
+            r = np.concatenate([fit.rows[n].whiten(state.residual[n], fit.noise[n]) for n in problem.responses])
+            free = fit.covariance @ (J.T @ r - point)
+            point = point + free - toward * float(row @ free) / float(row @ toward)
+        return lower
 
     found, kind = [], "normal"
     for sign, end in zip((-1.0, 1.0), ends, strict=True):
@@ -148,11 +164,11 @@ def _profiled(fit: CardFit, k: int, ends: tuple[float, float]) -> tuple[tuple[fl
             found.append(end)
             continue
         for _ in range(3):
-            ratio = rise(sign * t) / NINETY**2
-            if abs(ratio - 1) < BENT:
+            ratio = rise(sign * t) / t**2
+            if abs(ratio * t**2 / NINETY**2 - 1) < BENT:
                 break
             kind = "profile"
-            t *= float(np.clip(1 / np.sqrt(max(ratio, 1e-3)), 0.4, 2.0))
+            t *= float(np.clip(NINETY / (t * np.sqrt(max(ratio, 1e-3))), 0.4, 2.0))
         found.append(centre + sign * t * (abs(end - centre) / NINETY))
     return (found[0], found[1]), kind
 

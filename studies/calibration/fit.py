@@ -20,12 +20,13 @@ from studies.errors import InputError
 from thermal.errors import ThermalError
 
 Array = NDArray[np.float64]
-MOST_STEPS = 20
+MOST_STEPS = 30
 CLOSE = 0.05  # fall of the objective that a step still promises: a move of 0.2 standard deviations in any direction
 NEAR = 1.0  # the same, where no step makes the fit better: what differences and rounding leave
 SETTLED_NOISE = 1.0  # the same, below which the noise is not estimated anew
 OUTLIER = 5.0
-HALVINGS = 5
+SHORTENINGS = 5
+LEAST_FALL = 0.1  # of the objective, over what the step promises
 UNSEEN = 0.1  # of the noise of one row: a column whose whole length is less tells nothing
 LONGEST_STEP = 3.0  # prior standard deviations, of any coordinate in one step
 
@@ -78,25 +79,38 @@ def fit(problem: CardProblem, start: Array | None = None, progress: Progress = l
         if step > 2:
             for name in problem.responses:
                 rows[name], outliers[name] = _spare_outliers(problem.rows[name], state, name, noise[name])
-        J, r = _whitened(problem, state, noise, rows)
+        J, r = whitened(problem, state, noise, rows)
         # (JᵀJ + 1) Δ = Jᵀ r − u, not by its matrix: of sharp data against a wide prior that has no digits left
-        both = np.vstack([J, np.eye(len(state.point))])
-        move: Array = np.linalg.lstsq(both, np.append(r, -state.point), rcond=None)[0]
-        size = float(move @ (J.T @ r - state.point))
+        both, target = np.vstack([J, np.eye(len(state.point))]), np.append(r, -state.point)
+        move = _step_within(both, target, *(end - state.point for end in problem.ends))
+        size = float(target @ target - np.sum((target - both @ move) ** 2))
         progress(f"step {step}: −2 ln L should fall by {size:.2g}")
         if size < CLOSE and step > 3:
             converged = True
             break
-        move *= min(1.0, LONGEST_STEP / max(float(np.abs(move).max(initial=0.0)), 1e-12))
-        reached = _advance(problem, state, move, noise, rows)
+        shortened = min(1.0, LONGEST_STEP / max(float(np.abs(move).max(initial=0.0)), 1e-12))
+        reached = _advance(problem, state, shortened * move, shortened * float(target @ both @ move), noise, rows)
         if reached is None:
             converged = size < NEAR
             break
         state = reached
-    J, _ = _whitened(problem, state, noise, rows)
+    J, _ = whitened(problem, state, noise, rows)
     _, S, ways = np.linalg.svd(np.vstack([J, np.eye(problem.count)]), full_matrices=False)
     covariance = np.asarray((ways.T / S**2) @ ways)
     return CardFit(problem, state, noise, rows, covariance, outliers, step, converged)
+
+
+def _step_within(both: Array, target: Array, low: Array, high: Array) -> Array:
+    """Least squares of both · x = target; where x leaves its bounds it is held at them and the others are solved anew."""
+    free = np.ones(both.shape[1], dtype=bool)
+    x = np.zeros(len(free))
+    while True:
+        x[free] = np.linalg.lstsq(both[:, free], target - both[:, ~free] @ x[~free], rcond=None)[0]
+        beyond = free & ((x < low) | (x > high))
+        if not beyond.any():
+            return x
+        x = np.clip(x, low, high)
+        free &= ~beyond
 
 
 def objective(problem: CardProblem, state: State, noise: Mapping[str, Noise], rows: Mapping[str, NoiseRows]) -> float:
@@ -133,9 +147,10 @@ def _spare_outliers(rows: NoiseRows, state: State, name: str, noise: Noise) -> t
     return NoiseRows(rows.times, stretched), beyond
 
 
-def _whitened(
+def whitened(
     problem: CardProblem, state: State, noise: Mapping[str, Noise], rows: Mapping[str, NoiseRows]
 ) -> tuple[Array, Array]:
+    """Slopes and residuals of all responses in rows whose noise is white of variance 1."""
     white = [
         rows[name].whiten(np.column_stack([state.slope[name], state.residual[name]]), noise[name])
         for name in problem.responses
@@ -145,20 +160,28 @@ def _whitened(
 
 
 def _advance(
-    problem: CardProblem, state: State, move: Array, noise: Mapping[str, Noise], rows: Mapping[str, NoiseRows]
+    problem: CardProblem,
+    state: State,
+    move: Array,
+    fall: float,
+    noise: Mapping[str, Noise],
+    rows: Mapping[str, NoiseRows],
 ) -> State | None:
-    """Go a step, or a quarter of it until the objective falls; None where it does not. The whole step is the usual one."""
+    """Go a step, or the part of it that a parabola through the objective promises most of; None where it does not fall."""
     count = len(problem.priors.values)
     before = objective(problem, state, noise, rows)
     part = 1.0
-    for _ in range(HALVINGS):
+    for _ in range(SHORTENINGS):
         trial = state.point + part * move
         trial = np.concatenate([problem.priors.inside(trial[:count]), trial[count:]])
         try:
             reached = problem.evaluate(trial, slopes=part == 1)
         except (InputError, ShellError, ThermalError, CompensationError):
-            reached = None
-        if reached is not None and objective(problem, reached, noise, rows) < before:
+            part /= 4
+            continue
+        after = objective(problem, reached, noise, rows)
+        if after < before - LEAST_FALL * part * fall:
             return reached if part == 1 else problem.evaluate(trial)
-        part /= 4
+        lowest = part * fall / (after - before + 2 * part * fall)  # of the parabola of slope −2 fall at the start
+        part *= float(np.clip(lowest, 0.1, 0.5))
     return None

@@ -83,15 +83,16 @@ class CardProblem:
     def starts(self) -> tuple[tuple[int, str, float], ...]:
         """What is free of each run, with its prior standard deviation: departures (K), and the chamber's clock (s).
 
-        Of a set point that jumped between two rows, the time of each jump is free: it was up to a row earlier.
+        Of a set point that jumped between two rows, the time of each jump is free: it was up to a row earlier. A jump at
+        the first row is not: what it did before the record began is in the departures.
         """
         found = [(k, f"initial.{lump}", START_SPREAD) for k, part in enumerate(self.parts) for lump in part.drive.lumps]
         for k, part in enumerate(self.parts):
             if part.drive.boundary == "chamber":
                 row = float(np.median(np.diff(part.drive.profile.time)))
-                jumps = part.drive.profile.jumps
+                jumps, begin = part.drive.profile.jumps, part.drive.profile.start
                 if 0 < len(jumps) <= MOST_JUMPS:
-                    found += [(k, f"{JUMP}{i}", row / np.sqrt(3)) for i in range(len(jumps))]
+                    found += [(k, f"{JUMP}{i}", row / np.sqrt(3)) for i, at in enumerate(jumps) if at > begin]
                 else:
                     found.append((k, SHIFT, 0.5 * row))
         return tuple(found)
@@ -100,6 +101,12 @@ class CardProblem:
     def count(self) -> int:
         """Number of coordinates."""
         return len(self.priors.values) + len(self.starts)
+
+    @cached_property
+    def ends(self) -> tuple[Array, Array]:
+        """Least and largest coordinates: a jump was after the row before it and not after its own, where the model has a kink."""
+        jumps = np.array([False] * len(self.priors.values) + [name.startswith(JUMP) for _, name, _ in self.starts])
+        return np.where(jumps, -np.sqrt(3.0), -np.inf), np.where(jumps, 0.0, np.inf)
 
     @cached_property
     def responses(self) -> tuple[str, ...]:

@@ -6,7 +6,8 @@ and `high` a 90 % interval, `shift_sd` the move in prior standard deviations, `w
 `told_by` "data", "prior" or "both", `bound` "low", "high" or null, `interval` "normal" or "profile"; `inseparable`: groups of
 parameters that the data ties together but cannot tell apart; `responses`: by name `unit`, `as_shipped`, `calibrated`, `noise`
 (rms of block averages about the mean of each run), `run_offset` (rms of these means) and `outliers`; `held_out`: null, or
-`record` and by response `chamber` and `housing` (`as_shipped`, `calibrated`, null where not measured) beside `noise`;
+`record` and by response `chamber` and `housing` (`as_shipped`, `calibrated`, null where not measured) beside `noise` and `stated`
+(what the uncertainty of the calibrated values leaves from the chamber, rms standard deviation, or null);
 `converged`; `warnings`; `calibrated_card`: path of the saved card or null.
 """
 
@@ -16,6 +17,8 @@ from studies.cli.output import Answer, answers
 
 if TYPE_CHECKING:
     from studies.calibration.calibrate import Calibration
+
+VALUE = ("parameter", "unit", "card", "value", "low", "high", "shift_sd", "width", "told_by", "bound", "interval")
 
 
 @answers("hrg.calibration/1")
@@ -90,8 +93,6 @@ def calibrate(
 
 
 def _payload(found: "Calibration", data: list[str], save: str | None) -> dict[str, Any]:
-    from dataclasses import asdict
-
     from studies.calibration.calibrate import UNITS
 
     held = found.held_out
@@ -103,7 +104,7 @@ def _payload(found: "Calibration", data: list[str], save: str | None) -> dict[st
         "schema": "hrg.calibration/1",
         "card": found.card.name,
         "records": data,
-        "values": [{**asdict(one), "told_by": one.told_by} for one in found.estimates],
+        "values": [{key: getattr(one, key) for key in VALUE} for one in found.estimates],
         "inseparable": [list(group) for group in found.groups],
         "responses": {
             name: {
@@ -124,6 +125,7 @@ def _payload(found: "Calibration", data: list[str], save: str | None) -> dict[st
                 name: {
                     "chamber": pair(held.chamber.get(name)),
                     "housing": pair(held.housing.get(name)),
+                    "stated": held.stated.get(name),
                     "noise": held.noise[name],
                 }
                 for name in held.noise

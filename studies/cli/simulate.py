@@ -2,7 +2,8 @@
 
 With --json one object, schema `hrg.simulate/1`: `card`, `out`, `rows`, `columns`, `rate_Hz`, `boundary` (what is imposed:
 "chamber" or "housing"), `seed` (null without noise), `frequency_Hz` (`first`, `last`), `solver_relative_error` (of the shell solver against its theory),
-`interpolation_relative_error` (of the frequency model against the solver), `warnings`.
+`interpolation_relative_error` (of the frequency model against the solver), `spread` (null, or with --spread by column the standard deviation,
+rms over the run, that the card's uncertainties leave), `warnings`.
 """
 
 from typing import Literal
@@ -22,6 +23,7 @@ def simulate(
     noiseless: bool = False,
     theory: Literal["solid", "shell"] = "solid",
     boundary: Literal["chamber", "housing"] | None = None,
+    spread: bool = False,
 ) -> Answer:
     """Run a virtual gyro through a chamber profile, or as a record was driven, and write the record.
 
@@ -54,6 +56,8 @@ def simulate(
         Of the shell: solid (three-dimensional) or shell (Naghdi).
     boundary : str
         Column of a record that is imposed: chamber or housing.
+    spread : bool
+        Say how well the card knows the run: what its uncertain values leave of every column, without noise.
     """
     import numpy as np
 
@@ -74,6 +78,12 @@ def simulate(
             say(f"written {written} of {rows} rows ({100 * written / rows:.0f} %)")
 
     write_record(run.record, out, progress)
+    known: dict[str, float] | None = None
+    if spread:
+        from studies.calibration.ahead import spread_of_prediction
+
+        found = spread_of_prediction(instrument, run.prediction.drive, run.law)
+        known = {name: float(np.sqrt(np.mean(values**2))) for name, values in found.items() if name in run.record}
     summary = {
         "schema": "hrg.simulate/1",
         "card": instrument.name,
@@ -86,6 +96,7 @@ def simulate(
         "frequency_Hz": {"first": run.record["frequency_Hz"][0], "last": run.record["frequency_Hz"][-1]},
         "solver_relative_error": run.law.solver_error,
         "interpolation_relative_error": run.law.interpolation_error,
+        "spread": known,
         "warnings": list(run.warnings),
     }
     yield summary
@@ -95,3 +106,7 @@ def simulate(
         f" covers {span:.2f} °C; the frequency law lies within {run.law.interpolation_error:.0e} of the solver, the"
         f" solver within {run.law.solver_error:.0e} of its theory."
     )
+    if known is not None:
+        print("The card's uncertainties leave (standard deviation, rms over the run):")
+        for name, value in known.items():
+            print(f"  {name}: {value:.3g}")

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from studies.diagnosis.campaign import Campaign, Run
+from studies.diagnosis.causes import parameters_of
 from studies.diagnosis.investigate import Diagnosis
 from studies.diagnosis.model import Fit, fit, used
 from studies.diagnosis.search import refine
@@ -21,6 +22,10 @@ from studies.record import Record
 
 if TYPE_CHECKING:
     from studies.instrument.card import Instrument
+
+NINETY = 1.645
+WIDER = 3.0
+"""Of what a diagnosis knows of an effect, the prior with which a calibration finds it anew beside all other values."""
 
 
 def extend(
@@ -107,14 +112,18 @@ def _without_member(effect: Effect, place: int) -> Effect:
 
 
 def entry_of(model: Fit, index: int, column: str) -> dict[str, Any]:
-    """Return the `[[effect]]` table of a fitted term, without the coefficients that are 0."""
+    """Return the `[[effect]]` table of a fitted term, without the coefficients that are 0; numbers are as uncertain as a prior."""
     term = model.terms[index]
     values = model.coefficients_of(index)
-    entry: dict[str, Any] = {"name": term.name, "response": column}
-    entry |= {p.name: float(value) for p, value in zip(term.effect.shape, term.shape, strict=True)}
+    numbers: dict[str, Any] = {p.name: float(value) for p, value in zip(term.effect.shape, term.shape, strict=True)}
     if term.effect.sees_heat:  # the fit knew the temperature with it; a simulation has to solve for it
-        entry[term.effect.shape[0].name] = float(np.clip(values[0], 0.0, 1.0))
-    return entry | {key: value for key, value in term.effect.numbers(values, column).items() if np.any(value)}
+        numbers[term.effect.shape[0].name] = float(np.clip(values[0], 0.0, 1.0))
+    numbers |= {key: value for key, value in term.effect.numbers(values, column).items() if np.any(value)}
+    for key, known in parameters_of(model, index).items():
+        sd = float(min(WIDER * (known.high - known.low) / (2 * NINETY), abs(known.value)))
+        if sd > 0 and isinstance(numbers.get(key), float):
+            numbers[key] = {"value": numbers[key], "sd": sd}
+    return {"name": term.name, "response": column, **numbers}
 
 
 def without_events(diagnosis: Diagnosis, records: Sequence[Record]) -> list[Record]:

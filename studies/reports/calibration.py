@@ -134,14 +134,15 @@ def held_out_table(found: "Calibration") -> Table | None:
         for words, by in (("chamber alone", held.chamber), ("measured housing", held.housing)):
             if name in by:
                 unit, scale = SHOWN[name]
-                rows.append([NAMES[name], unit, words, *(plain(scale * v) for v in (*by[name], noise))])
+                stated = plain(scale * held.stated[name]) if by is held.chamber else ""
+                before, after, usual = (plain(scale * v) for v in (*by[name], noise))
+                rows.append([NAMES[name], unit, words, before, after, stated, usual])
     note = (
         f"{held.path or 'The run'} was predicted by a calibration that has not seen it. From the chamber alone nothing is refitted;"
-        " from the housing its own offset and initial state are."
+        " from the housing its own offset and initial state are. Stated: what the uncertainty of the calibrated values leaves."
     )
-    return Table(
-        "Held-out run", ["Response", "Unit", "Predicted from", "As shipped", "Calibrated", "Noise"], rows, note
-    )
+    columns = ["Response", "Unit", "Predicted from", "As shipped", "Calibrated", "Stated", "Noise"]
+    return Table("Held-out run", columns, rows, note)
 
 
 def noise_table(found: "Calibration") -> Table:

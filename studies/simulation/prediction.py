@@ -34,7 +34,7 @@ MARGIN = 10.0  # K beyond the boundary in which the frequency stays known: effec
 STEP = 1e-3  # of a value, or of its standard deviation: the differences that give derivatives
 INITIAL = "initial."
 SHIFT, JUMP = "shift", "jump."
-SHIFT_STEP = 0.5  # s
+SHIFT_STEP = 0.02  # s
 OF_WALL = ("thermal.conductivity_W_per_m_K", "thermal.heat_capacity_J_per_kg_K")
 """Values of the heat path that the loss of a wall takes as well."""
 LAG = "noise.housing_lag_s"
@@ -149,7 +149,10 @@ def _slope_of_reading(read: Profile) -> Array:
 
 
 def _slope_of_timing(network: Network, drive: Drive, name: str, rows: Array, departure: Array) -> tuple[Array, Array]:
-    """Derivatives of `Temperatures` by the time of the boundary or of one of its jumps (K/s, K/s²): differences."""
+    """Derivatives of `Temperatures` by the time of the boundary or of one of its jumps (K/s, K/s²): differences.
+
+    A jump is moved to earlier times only: at a row there is a kink.
+    """
 
     def moved(step: float) -> Drive:
         if name == SHIFT:
@@ -157,11 +160,12 @@ def _slope_of_timing(network: Network, drive: Drive, name: str, rows: Array, dep
         k = int(name.removeprefix(JUMP))
         return replace(drive, jumps={**drive.jumps, k: drive.jumps.get(k, 0.0) + step})
 
+    steps = (-SHIFT_STEP, SHIFT_STEP if name == SHIFT else 0.0)
     below, above = (
-        respond(network, {drive.boundary: moved(step).imposed}, drive.time, rows, departure=departure)
-        for step in (-SHIFT_STEP, SHIFT_STEP)
+        respond(network, {drive.boundary: moved(step).imposed}, drive.time, rows, departure=departure) for step in steps
     )
-    return (above.temperature - below.temperature) / (2 * SHIFT_STEP), (above.rate - below.rate) / (2 * SHIFT_STEP)
+    distance = steps[1] - steps[0]
+    return (above.temperature - below.temperature) / distance, (above.rate - below.rate) / distance
 
 
 def _still(found: Temperatures, _: float) -> Temperatures:

@@ -31,8 +31,9 @@ def test_simulate_writes_a_record_and_one_json_object(tmp_path, capsys):
     assert answer["schema"] == "hrg.simulate/1"
     assert list(answer) == [
         "schema", "card", "out", "rows", "columns", "rate_Hz", "boundary", "seed", "frequency_Hz", "solver_relative_error",
-        "interpolation_relative_error", "warnings",
+        "interpolation_relative_error", "spread", "warnings",
     ]  # fmt: skip
+    assert answer["spread"] is None
     assert answer["rows"] == 361
     assert answer["interpolation_relative_error"] < 1e-7
     record = read_record(out)
@@ -78,3 +79,14 @@ def test_unusable_input_ends_with_status_2_and_one_sentence(arguments, words, ca
     assert words in answer.err
     assert "Traceback" not in answer.err
     assert list(tmp_path.iterdir()) == []
+
+
+def test_the_card_says_how_well_it_knows_a_run(tmp_path, capsys):
+    """Frequency and bias within what the shipped uncertainties leave; the wide mount makes it more than any noise."""
+    words = ["simulate", "hrg-30mm", "step 20 0 1h", "--out", str(tmp_path / "run.csv"), "--rate", "0.02"]
+    assert main([*words, "--spread", "--json"]) == 0
+    spread = json.loads(capsys.readouterr().out)["spread"]
+    assert set(spread) >= {"frequency_Hz", "bias_deg_per_h", "inverse_q", "housing_temperature_degC"}
+    assert spread["frequency_Hz"] > 0.1
+    assert main([*words[:3], "--out", str(tmp_path / "again.csv"), "--rate", "0.02", "--spread"]) == 0
+    assert "frequency_Hz" in capsys.readouterr().out

@@ -9,6 +9,7 @@ from datetime import UTC, datetime, timedelta
 
 import numpy as np
 
+from studies.calibration.ahead import spread_of_prediction
 from studies.diagnosis.campaign import load_campaign
 from studies.diagnosis.extension import extend
 from studies.diagnosis.investigate import investigate
@@ -103,8 +104,12 @@ class Hidden:
     def left(self, instrument):
         """Return the residual that an instrument leaves of the next run over its noise, by response; 1 is the noise."""
         said = simulate_run(instrument, self.next_drive, noise=False).record
-        left = {c: float(np.sqrt(np.mean((said[c] - self.truth[c]) ** 2))) for c in RESPONSES}
-        return {c: float(np.hypot(1.0, left[c] / self.noise[c])) for c in RESPONSES}
+        return {c: float(np.hypot(1.0, rms([said[c] - self.truth[c]]) / self.noise[c])) for c in RESPONSES}
+
+    def stated(self, instrument):
+        """Return what an instrument states that it will leave, its own uncertainty and the noise together over the noise."""
+        spread = spread_of_prediction(instrument, self.next_drive)
+        return {c: float(np.hypot(1.0, rms([spread[c]]) / self.noise[c])) for c in RESPONSES}
 
 
 @dataclass(frozen=True)
@@ -112,7 +117,7 @@ class Recovery:
     """What came of one hidden effect.
 
     `names` of all causes; `named` whether it is among them; of each response over its noise: `before` what the shipped card
-    leaves of the new run, `after` what the saved one leaves; 1 is the noise itself.
+    leaves of the new run, `after` what the saved one leaves, `stated` what its own uncertainties let expect; 1 is the noise itself.
     """
 
     effect: str
@@ -122,6 +127,7 @@ class Recovery:
     verdict: str
     before: dict
     after: dict
+    stated: dict
     saved: object
     diagnosis: object
 
@@ -199,6 +205,7 @@ def recover(name, response, times=TIMES, seed=0, moved=()):
         diagnosis.verdict.verdict,
         hidden.left(card),
         hidden.left(saved),
+        hidden.stated(saved),
         saved,
         diagnosis,
     )

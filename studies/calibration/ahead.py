@@ -1,0 +1,48 @@
+"""How well a card knows what it predicts: the spread of a run's columns over everything in the card that is uncertain."""
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from studies.calibration.priors import gather_priors
+from studies.simulation.prediction import predict
+
+if TYPE_CHECKING:
+    from shell.law import FrequencyLaw
+    from studies.instrument.card import Instrument
+    from studies.simulation.drive import Drive
+
+Array = NDArray[np.float64]
+
+
+def spread_of_prediction(
+    instrument: "Instrument", drive: "Drive", law: "FrequencyLaw | None" = None
+) -> dict[str, Array]:
+    """Return the standard deviation of every column of a predicted run at its rows: √diag(J C Jᵀ), without any noise.
+
+    C is the covariance of the card's uncertain values, correlations included: the prior of a card as shipped, the posterior
+    of a calibrated one. No calibration predicts a run more closely than this, beside the noise of that run.
+
+    Parameters
+    ----------
+    instrument : Instrument
+    drive : Drive
+    law : FrequencyLaw, optional
+        One that was built before for this instrument.
+
+    Raises
+    ------
+    InputError, ThermalError, ShellError
+        As `predict`.
+    """
+    priors = gather_priors(instrument)
+    found = predict(instrument, drive, priors.names, law)
+    scale = priors.slopes(np.zeros(len(priors.values)))
+    spread = {}
+    for column, values in found.columns.items():
+        J = np.zeros((len(values), len(priors.values)))
+        for k, name in enumerate(priors.names):
+            J[:, k] = found.derivatives[name][column]
+        spread[column] = np.asarray(np.linalg.norm(J @ scale, axis=1))
+    return spread

@@ -1,0 +1,98 @@
+"""What a calibration says of itself where it can be worked out by hand: spreads, bent valleys, jumps at a record's first row."""
+
+from dataclasses import dataclass
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from studies.calibration.ahead import spread_of_prediction
+from studies.calibration.estimates import NINETY, estimate
+from studies.calibration.fit import CardFit, whitened
+from studies.calibration.observed import observe
+from studies.calibration.priors import Priors
+from studies.calibration.problem import CardProblem, State
+from studies.instrument.card import load_card
+from studies.instrument.uncertain import UncertainValue
+from studies.simulation.chamber import load_profile
+from studies.simulation.drive import drive_by_profile, rows_of
+from studies.simulation.prediction import law_for, predict
+from studies.simulation.virtual_gyro import simulate_run
+
+TWO = {"thermal.mount_conductance_W_per_K": 1e-4, "bias.k1_deg_per_h_per_Hz": 0.02}
+
+
+def test_the_spread_of_a_prediction_is_that_of_two_correlated_values():
+    """σ² = d₁²s₁² + d₂²s₂² + 2ρ d₁d₂ s₁s₂ with d from moved cards; every other value is exact."""
+    card, rho = load_card("hrg-30mm"), 0.8
+    exact = {v.name: {"value": v.value, "sd": TWO.get(v.name, 0.0)} for v in card.uncertain}
+    names = list(TWO)
+    known = card.with_values(exact).with_table("posterior", {"names": names, "correlation": [[1.0, rho], [rho, 1.0]]})
+    profile = load_profile("step 20 5 1h")
+    drive = drive_by_profile(profile, rows_of(profile, 1 / 60))
+    law = law_for(card, drive)
+    spread = spread_of_prediction(known, drive, law)
+    value = {v.name: v.value for v in known.uncertain}
+    moves = []
+    for name, sd in TWO.items():
+        above, below = (
+            predict(card.with_values({name: value[name] + sign * 0.1 * sd}), drive, law=law) for sign in (1, -1)
+        )
+        moves.append({c: (above.columns[c] - below.columns[c]) / 0.2 for c in spread})
+    for column in ("frequency_Hz", "bias_deg_per_h"):
+        one, two = (move[column] for move in moves)
+        expected = np.sqrt(one**2 + two**2 + 2 * rho * one * two)
+        assert spread[column] == pytest.approx(expected, rel=1e-3, abs=1e-4 * expected.max())
+        assert expected.max() > 0
+
+
+@dataclass(frozen=True)
+class Banana:
+    """Two coordinates of unit prior; the data hold u₀ = 0 ± s and, a hundred times closer, u₁ = c u₀²."""
+
+    priors: Priors
+    responses: tuple[str, ...] = ("y",)
+    count: int = 2
+    sd: float = 0.5
+    bend: float = 0.2
+
+    def evaluate(self, u, slopes=True):
+        rest = np.array([-u[0] / self.sd, -(u[1] - self.bend * u[0] ** 2) / (0.01 * self.sd)])
+        slope = np.array([[1 / self.sd, 0.0], [-2 * self.bend * u[0] / (0.01 * self.sd), 1 / (0.01 * self.sd)]])
+        return State(u, {"y": rest}, {"y": slope})
+
+
+def test_an_interval_follows_a_bent_valley():
+    """Straight on, 1.6 standard deviations of u₀ miss the valley's floor by many times its width; along it nothing is bent."""
+    values = tuple(UncertainValue(f"thermal.{name}", 0.0, 1.0, -np.inf, np.inf) for name in "ab")
+    problem = Banana(Priors(values, np.eye(2)))
+    state = problem.evaluate(np.zeros(2))
+    rows = {"y": SimpleNamespace(whiten=lambda columns, noise: columns)}
+    J, _ = whitened(problem, state, {"y": None}, rows)
+    covariance = np.linalg.inv(J.T @ J + np.eye(2))
+    found = estimate(CardFit(problem, state, {"y": None}, rows, covariance, {}, 1, True))[0]
+    half = NINETY / np.sqrt(1 / problem.sd**2 + 1)
+    assert (found.low, found.high) == pytest.approx((-half, half), rel=0.12)
+    straight = problem.evaluate(np.array([half, 0.0])).residual["y"][1] ** 2
+    assert straight > 100
+
+
+def test_a_jump_is_free_up_to_a_row_earlier_but_not_at_the_first_row():
+    """At the first row nothing is known but what it did to the initial temperatures; a later one is after the row before it."""
+    card = load_card("hrg-30mm")
+    for words, expected in (
+        ("step 20 -10 1h", []),
+        ("soak 20 30min then soak 5 30min", ["jump.0"]),
+        ("ramp 20 0 1", ["shift"]),
+    ):
+        record = simulate_run(card, load_profile(words), 1 / 60).record
+        runs = observe([record])
+        problem = CardProblem(card, Priors((), np.eye(0)), runs, None)
+        times = [name for _, name, _ in problem.starts if not name.startswith("initial.")]
+        low, high = problem.ends
+        assert times == expected
+        bounded = np.isfinite(low)
+        assert bounded.sum() == sum(name.startswith("jump.") for name in times)
+        sd = next((sd for _, name, sd in problem.starts if name.startswith("jump.")), 0.0)
+        assert low[bounded] * sd == pytest.approx(-60.0)
+        assert np.array_equal(high[bounded], np.zeros(bounded.sum()))
