@@ -44,6 +44,7 @@ def compensate(
     from studies.cli.output import say
     from studies.errors import InputError
     from studies.files.writing import write_text
+    from studies.instrument.units import unit_of
     from studies.record import COMPENSATED, read_record, write_record
 
     loaded = models.read_model(model)
@@ -84,8 +85,11 @@ def compensate(
         "columns": columns,
     }
     for name, facts in columns.items():
-        from_what = "" if facts["stability_before"] is None else f"{facts['stability_before']:.4g} -> "
-        print(f"{out}: {name}; standard deviation of {AVERAGE:g} s averages {from_what}{facts['stability_after']:.4g}")
+        from_what = "" if facts["stability_before"] is None else f"{facts['stability_before']:.4g} → "
+        unit = "" if unit_of(name) == "1" else f" {unit_of(name)}"
+        print(
+            f"{out}: {name}; standard deviation of {AVERAGE:g} s averages {from_what}{facts['stability_after']:.4g}{unit}"
+        )
         if facts["rows_not_compensated"]:
             print(
                 f"{facts['rows_not_compensated']} rows stay empty: an input is missing there, or too few samples for its rate"
