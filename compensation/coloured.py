@@ -25,7 +25,7 @@ from compensation.regression import LinearFit, fit_linear
 Array = NDArray[np.float64]
 Runs = Sequence[slice]
 GAP = 1.5
-"""A step of more than this many usual ones is a gap: what the noise remembers is not carried over it."""
+"""A step of more than this many usual ones is a gap: the memory of the noise is not carried across it."""
 ROUNDING = 1e-12
 """Residuals below this part of the observations are rounding, which remembers nothing."""
 STARTS = ((7.0, 3.0), (3.0, 0.0))  # logits of ρ and of θ/ρ

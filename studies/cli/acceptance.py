@@ -27,7 +27,7 @@ def acceptance(
     Each record serves the test that it shows: at rest over temperature, at rest for an hour, several applied rates, a swept rate,
     a free decay of vibration_amplitude_V. A line '# test: warm-up' (or temperature, scale-factor, drift, run-down, transfer,
     angle-storage) above its header decides otherwise; warm-up and angle storage are taken only from records so marked. Every value has a 95 % interval; a limit is met, or
-    not, where the whole interval is.
+    not met, if the whole interval is.
 
     Parameters
     ----------

@@ -13,8 +13,8 @@ def cards(card: str = "") -> Answer:
     """List the instrument cards that ship with the package, or what one card weighs and its uncertain values.
 
     A number of a card may carry its uncertainty: { value = 0.0118, relative_sd = 0.3 }, { value = ..., sd = ... }, or
-    { value = ..., low = ..., high = ... } with hard bounds; sd = 0 makes it exact. Others are as uncertain as their key is
-    documented to be.
+    { value = ..., low = ..., high = ... } with hard bounds; sd = 0 makes it exact. Other numbers have the uncertainty
+    documented for their key.
 
     Parameters
     ----------

@@ -21,7 +21,7 @@ def electrodes(
     limit: float = 100.0,
     temperature: float | None = None,
 ) -> Answer:
-    """Tell what the card's table [electrodes] does to a pair: softening, split, coefficients, pull-in, trim voltages.
+    """Show what the card's table [electrodes] does to a pair: softening, split, coefficients, pull-in, trim voltages.
 
     Parameters
     ----------
@@ -30,7 +30,7 @@ def electrodes(
     harmonic : int
         Harmonic n of the pair.
     split : float
-        Split in Hz that is to be nulled; that of the whole card unless given, where it has one.
+        Split in Hz to be nulled; that of the whole card, if it has one, unless given.
     axis : float
         Azimuth in degrees of an antinode of its slower mode.
     limit : float

@@ -34,9 +34,9 @@ def fit_frequency(
     more : str
         Further records of the same device.
     time_constant : float
-        Slowest time constant of the gyro in s, for what is left of a change in a record; hrg fit thermal measures it.
+        Slowest time constant of the gyro in s, from which follows how settled a record is; hrg fit thermal measures it.
     left : float
-        What may be left of a change, in K, where a record counts as settled.
+        Departure from the settled temperature, in K, within which a record counts as settled.
     order : int
         Order of the polynomial; the paper takes 3.
     reference_temperature : float

@@ -38,8 +38,8 @@ def fit_whole_angle(
     """Fit damping and frequency split with their axes, gain ratio and phase error to a whole-angle run, with intervals.
 
     The record needs time_s, pattern_angle_deg (unwrapped) and bias_deg_per_h or measured_rate_deg_per_s (the indicated rate,
-    without what was commanded of the turn); inverse_q (the drive's effort), frequency_Hz and quadrature_V where they were
-    recorded, rate_deg_per_s where a rate was applied. Turn the wave both ways: one way leaves the gain ratio open. The
+    less the commanded turn); inverse_q (the drive's effort), frequency_Hz and quadrature_V where they were
+    recorded, rate_deg_per_s where a rate was applied. Turn the wave both ways: one way does not determine the gain ratio. The
     phase error is that of the whole path; the drives' own gain ratio is taken from the card.
 
     Parameters

@@ -48,7 +48,7 @@ def loop(
     hours : float
         Its length, when no profile is given.
     row : float
-        Its rows, in s.
+        Time between its rows in s.
     rate : float
         Applied rate in °/s.
     profile : str

@@ -25,7 +25,7 @@ def simulate(
     boundary: Literal["chamber", "housing"] | None = None,
     spread: bool = False,
 ) -> Answer:
-    """Run a virtual gyro through a chamber profile, or as a record was driven, and write the record.
+    """Run a virtual gyro through a chamber profile, or drive it as a record was driven, and write the record.
 
     A card with [loop] in mode whole-angle has a wave that turns: with the applied rate, its self-precession, and what damping
     and electronics make of it; a record or profile with pattern_angle_deg says where it stands instead.

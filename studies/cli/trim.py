@@ -47,8 +47,8 @@ def trim(
 ) -> Answer:
     """Plan the cuts that null measured splits with the least mass, keep the balance, and do not overshoot.
 
-    Cut the first round, measure, and plan again with the new splits; the later rounds are predictions. What material does
-    depends on how it is taken: off the edge of the rim or a face it brings its strain energy, a tooth hardly any.
+    Cut the first round, measure, and plan again with the new splits; the later rounds are predictions. What removing
+    material does depends on where it is removed: off the rim's edge or a face it takes strain energy along, a tooth hardly any.
 
     Parameters
     ----------

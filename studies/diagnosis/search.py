@@ -191,7 +191,7 @@ def drop(now: Hypothesis, index: int) -> Hypothesis:
 
 
 def _place(now: Hypothesis, index: int, bank: Bank) -> Place:
-    """Return who could stand in the place of one term, the others held."""
+    """Return the alternatives to one term, the others held."""
     base = drop(now, index)
     last = _moved_last(now, index)
     rivals = [last, *(h for h in contenders(base, bank, (now.fit.terms[index].name,)) if np.isfinite(h.score))]

@@ -32,7 +32,7 @@ class Interval:
 
 @dataclass(frozen=True)
 class Cause:
-    """One named cause, or the set that this data cannot separate; `kind` is "physics" or "value" (of the card)."""
+    """One named cause, or the set that these data cannot separate; `kind` is "physics" or "value" (of the card)."""
 
     effect: str
     response: str

@@ -1,4 +1,4 @@
-"""The next experiment: what would separate what this data leaves together, by a run or by a sensor."""
+"""The next experiment: what would separate what these data leave together, by a run or by a sensor."""
 
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
