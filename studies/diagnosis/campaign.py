@@ -103,7 +103,9 @@ def load_campaign(records: Sequence[Record], reference_degC: float | None = None
     check_device(records, tables)
     outliers = sum(_remove_outliers(table) for table in tables)
     if outliers:
-        notes.append(f"{outliers} outlying values were left out.")
+        notes.append(
+            "1 outlying value was left out." if outliers == 1 else f"{outliers} outlying values were left out."
+        )
     responses, skipped = _usable_responses(records, tables)
     offsets, timed = place_in_time(records)
     if not timed and len(records) > 1:
