@@ -16,6 +16,7 @@ from studies.errors import InputError
 from studies.plausible import check_card_frequency
 from studies.record import Record
 from studies.shown import Shown
+from studies.simulation.virtual_gyro import idle_effects
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -338,6 +339,8 @@ def _warn(found: CardFit, estimates: Sequence[Estimate], ladder: Mapping[str, Ru
     warnings = []
     if not found.converged:
         warnings.append("the fit has not fully converged; the values may still move.")
+    for run in found.problem.runs:
+        warnings += [f"{run.record.path}: {idle}" for idle in idle_effects(found.problem.instrument, run.inner)]
     rows = found.problem.rows
     for name, rung in ladder.items():
         usual = _usual_mean(found, name)

@@ -132,7 +132,7 @@ def simulate_run(
         source=f"simulated, rate {rate:g} Hz, " + (f"seed {seed}" if noise else "without noise"),
         resolution={name: step for name, step in resolution.items() if step > 0},
     )
-    return VirtualRun(record, prediction, _idle_effects(instrument, drive))
+    return VirtualRun(record, prediction, idle_effects(instrument, drive))
 
 
 def _observe(
@@ -171,14 +171,14 @@ def _observe(
     return read
 
 
-def _idle_effects(instrument: "Instrument", drive: Drive) -> tuple[str, ...]:
+def idle_effects(instrument: "Instrument", drive: Drive) -> tuple[str, ...]:
     """Name the effects whose drive (amplitude, voltage, quadrature) the run does not have; an azimuth it always has."""
     if not instrument.effects:
         return ()
     from studies.effects import find_effect
 
     return tuple(
-        f"the effect '{effect.name}' adds nothing: a virtual run does not move its drive"
+        f"the effect '{effect.name}' adds nothing: the run does not have its drive"
         f" ({', '.join(find_effect(effect.name).needs)})."
         for effect in instrument.effects
         if any(need not in (*drive.commands, "pattern_angle") for need in find_effect(effect.name).needs)
