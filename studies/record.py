@@ -45,7 +45,7 @@ LIMITS = {
     "_deg_per_s": (-1e6, 1e6),
     "_V": (-1e5, 1e5),
     "_deg": (-1e9, 1e9),
-    "inverse_q": (0.0, 1.0),
+    "inverse_q": (-1e-3, 1.0),  # noise about a small value
 }
 TABLE_COLUMNS = ("temperature_degC", "frequency_Hz")
 PROFILE_COLUMNS = ("time_s", "chamber_temperature_degC")

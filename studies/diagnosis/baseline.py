@@ -26,6 +26,8 @@ FOLLOWED_DELAY = 20.0
 """Standard deviation of the delay between the responses, s."""
 LAG_STEP = 0.3
 """Standard deviation of one correction of the logarithm of the lag."""
+STEADY = 0.4
+"""Largest bend of the law times the farthest temperature, K: the slope keeps its sign, as far as bends are small."""
 FARTHEST = 2.5
 """Standard deviations beyond which a delay is no delay of sensors: the baseline holds it there."""
 BENT = 3.0
@@ -192,6 +194,8 @@ class Lagged:
         """Take over slope, bend, lag and what warms the resonator."""
         slope = values["slope"] / 10.0
         bend = values["quadratic"] / 100.0 / slope if slope else 0.0
+        reach = max(float(np.abs(own.housing - own.reference).max()) for own in self.states)
+        most = max(0.02, STEADY / max(reach, 1e-3))
         tau = float(np.clip(self.tau * float(np.exp(np.clip(values["log lag"], -0.7, 0.7))), 5.0, 1e5))
         late = values["delay"] if self.delay is None else self.delay
         added = []
@@ -203,7 +207,7 @@ class Lagged:
             self,
             tau=tau,
             slope=slope,
-            bend=float(np.clip(bend, -0.02, 0.02)),
+            bend=float(np.clip(bend, -most, most)),
             warmer=tuple(added),
             starts=tuple(values[f"start@{k}"] for k in range(len(self.states))),
         )
@@ -241,6 +245,8 @@ class Followed:
         or not, the data decide.
     slope : float
         Change of the response for one kelvin, for the prior of the two.
+    curve : tuple of float
+        Coefficients of the second and higher powers, per (10 K)ᵖ: the whole of the law may come late.
     """
 
     response: Response
@@ -251,6 +257,7 @@ class Followed:
     slope: float = 0.0
     delay: float | None = None
     bends: tuple[float, ...] = ()
+    curve: tuple[float, ...] = ()
 
     @property
     def lagged(self) -> bool:
@@ -270,7 +277,8 @@ class Followed:
                 offsets[:, k] = 1.0
             v = coarse.spread
             static = [u / 10.0, (u**2 + v) / 1e2, (u**3 + 3.0 * u * v) / 1e3][:powers]
-            late = -average(own.rate, self.group) * self.slope
+            along = self.slope + sum(p * c * (u / 10.0) ** (p - 1) / 10.0 for p, c in enumerate(self.curve, 2))
+            late = -average(own.rate, self.group) * along
             shift.append(np.zeros_like(u))
             if self.delay is not None:
                 shift[-1] = -self.delay * late
@@ -290,8 +298,9 @@ class Followed:
         return Tangent(shift, columns, prior, names, views)
 
     def moved(self, values: dict[str, float], warmer: Sequence[FloatArray] | None) -> "Followed":
-        """Take over the slope."""
-        return replace(self, slope=values["slope"] / 10.0)
+        """Take over the law."""
+        powers = ("quadratic", "cubic")[: self.response.powers - 1]
+        return replace(self, slope=values["slope"] / 10.0, curve=tuple(values[p] for p in powers))
 
     def held(self, values: dict[str, float]) -> "Followed | None":
         """Hold the delay at its limit."""

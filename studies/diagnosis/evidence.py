@@ -93,8 +93,10 @@ class Grams:
     def __init__(self, model: Linear, kinds: Sequence[int] | None = None) -> None:
         """Rotate the model once a kind of wander; only `kinds` where they are named."""
         self.model = model
-        p = model.prior.size
-        table = np.concatenate([model.scaled, model.target[:, None]], axis=1)
+        p, free = model.prior.size, model.columns[:, : model.flat]
+        # squared, a level of 10⁷ would hide what is left of it: the flat columns take it first, at no change of the evidence
+        self.taken = np.linalg.lstsq(free, model.target, rcond=None)[0]
+        table = np.concatenate([model.scaled, (model.target - free @ self.taken)[:, None]], axis=1)
         self.kinds = tuple(range(len(KERNELS))) if kinds is None else tuple(kinds)
         self.grams = np.empty((len(self.kinds), SHARES.size, p + 1, p + 1))
         self.constant = np.empty((len(self.kinds), SHARES.size))
@@ -174,7 +176,9 @@ def solve(model: Linear, terms: int, scales: FloatArray | None = None, kinds: Se
     units = grams.scaling(sizes)[:-1] * np.where(np.isinf(model.prior), 1.0, model.prior / model.sigma)
     covariance = variance * (inverse.T @ inverse) * units[:, None] * units
     best = float(by_noise[k, s]) + marginal
-    return Solved(best, grams.kinds[k], s, sizes, mean * units, covariance, variance, by_noise)
+    coefficients = mean * units
+    coefficients[: model.flat] += grams.taken
+    return Solved(best, grams.kinds[k], s, sizes, coefficients, covariance, variance, by_noise)
 
 
 def _largest(table: FloatArray) -> tuple[int, int]:

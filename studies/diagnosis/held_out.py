@@ -8,6 +8,7 @@ import numpy as np
 from studies.diagnosis.baseline import Baseline, Followed, Lagged, Tangent
 from studies.diagnosis.campaign import Campaign
 from studies.diagnosis.model import Fit, fit, inexact_columns, pose, term_columns
+from studies.diagnosis.noise import SHARES
 from studies.effects.states import FloatArray
 
 BLOCKS = 5
@@ -19,6 +20,10 @@ WARMEST = 60.0
 NEIGHBOUR = 0.1
 """Part of the covered range within which rows that are held out must find the temperature of rows of the fit: a law is not
 asked about temperatures that it has never seen."""
+KNOWN = 1.5
+"""Standard deviation of what is foretold, in parts of the noise, up to which the rest of the record foretells a row."""
+FEWEST_FORETOLD = 0.5
+"""Part of the rows from which on they speak for the record."""
 KNOWN_START = 0.5
 """Part of the initial state's signature in a block from which on it is refitted there."""
 
@@ -27,7 +32,7 @@ KNOWN_START = 0.5
 class Score:
     """Residual rms on the rows of the fit and on rows that it has not seen (None where that cannot be had).
 
-    `foretold` is the part of the rows that the second is about: those at temperatures that rows of the fit know.
+    `foretold` is the part of the rows that the second is about: those that the rows of the fit can foretell.
     """
 
     residual_rms: float
@@ -87,6 +92,19 @@ class OnRows:
             start = float(found[places[0]])
             rows = self._started(k, start)
         return np.asarray(rest)
+
+    def uncertainty(self, k: int, free: Sequence[int], inside: "np.ndarray | None" = None) -> FloatArray:
+        """Return the standard deviation of what is foretold of run `k`, in parts of the noise, `free` refitted there."""
+        columns = self.columns(k)[0]
+        columns = columns if inside is None else columns[inside]
+        solved, noise = self.model.solved, self.model.problem.noise
+        own = np.linalg.qr(columns[:, list(free)])[0]
+        other = np.delete(columns, list(free), axis=1)
+        other = other - own @ (own.T @ other)
+        covariance = np.delete(np.delete(solved.covariance, list(free), axis=0), list(free), axis=1)
+        spread = np.einsum("ij,jk,ik->i", other, covariance, other)
+        row = noise.rows + noise.floor + SHARES[solved.share] * noise.bases[solved.kind].within
+        return np.asarray(np.sqrt(np.maximum(spread, 0.0) / (solved.variance * row)))
 
     def temperature(self, k: int) -> FloatArray:
         """Return the temperature of run `k` on its rows, K."""
@@ -166,22 +184,22 @@ def score(model: Fit, campaign: Campaign) -> Score:
     at temperatures that the rest does not come near are not asked for.
     """
     training = rms(residuals(model, campaign))
-    parts = _by_record(model, campaign) if len(campaign.records) > 1 else _by_block(model, campaign)
-    return Score(training, _rms_or_none(parts), _share(parts))
-
-
-def by_record(model: Fit, campaign: Campaign) -> float | None:
-    """Leave one record out at a time."""
-    return _rms_or_none(_by_record(model, campaign))
-
-
-def by_block(model: Fit, campaign: Campaign) -> float | None:
-    """Leave one block of every run out at a time, with a gap on both sides."""
-    return _rms_or_none(_by_block(model, campaign))
+    parts = by_record(model, campaign) if len(campaign.records) > 1 else by_block(model, campaign)
+    foretold = _share(parts)
+    return Score(training, _rms_or_none(parts) if foretold >= FEWEST_FORETOLD else None, foretold)
 
 
 Parts = list[tuple[FloatArray, "np.ndarray"]]
-"""What is left of rows that were held out, and which of them lie at known temperatures."""
+"""What is left of rows that were held out, and which of them the rows of the fit can foretell."""
+
+
+def compare(one: Parts | None, two: Parts | None) -> tuple[float | None, float | None]:
+    """Return the residuals of two models on the rows that both can foretell."""
+    if one is None or two is None:
+        return None, None
+    both = [a[1] & b[1] for a, b in zip(one, two, strict=True)]
+    first, second = ([(rest, near) for (rest, _), near in zip(parts, both, strict=True)] for parts in (one, two))
+    return _rms_or_none(first), _rms_or_none(second)
 
 
 def _rms_or_none(parts: Parts | None) -> float | None:
@@ -197,7 +215,8 @@ def _share(parts: Parts | None) -> float:
     return asked / max(sum(int(own.sum()) for own in finite), 1)
 
 
-def _by_record(model: Fit, campaign: Campaign) -> Parts | None:
+def by_record(model: Fit, campaign: Campaign) -> Parts | None:
+    """Leave one record out at a time."""
     out: Parts = []
     for record in campaign.records:
         keep = [np.full(run.time.shape, run.record != record) for run in campaign.runs]
@@ -205,15 +224,16 @@ def _by_record(model: Fit, campaign: Campaign) -> Parts | None:
         if rows is None:
             return None
         known = rows.known(keep)
-        out += [
-            (rows.residual(k, own_columns(rows.model, k)), _near(rows.temperature(k), known))
-            for k, run in enumerate(campaign.runs)
-            if run.record == record
-        ]
+        for k, run in enumerate(campaign.runs):
+            if run.record == record:
+                own = own_columns(rows.model, k)
+                near = _near(rows.temperature(k), known) & (rows.uncertainty(k, own) <= KNOWN)
+                out.append((rows.residual(k, own), near))
     return out
 
 
-def _by_block(model: Fit, campaign: Campaign) -> Parts | None:
+def by_block(model: Fit, campaign: Campaign) -> Parts | None:
+    """Leave one block of every run out at a time, with a gap on both sides."""
     gap = getattr(model.baseline, "tau", None) or model.tangent.views[0].fine.tau
     out: Parts = []
     longest = max(float(np.ptp(run.row_time)) for run in campaign.runs)
@@ -236,8 +256,9 @@ def _by_block(model: Fit, campaign: Campaign) -> Parts | None:
             low, high = ends[k]
             inside = (run.row_time >= low) & (run.row_time < high + (1e-9 if block < BLOCKS - 1 else 1.0))
             if inside.any():
-                rest = rows.residual(k, _start_within(rows, k, inside), inside)
-                out.append((rest, _near(rows.temperature(k)[inside], known)))
+                own = _start_within(rows, k, inside)
+                near = _near(rows.temperature(k)[inside], known) & (rows.uncertainty(k, own, inside) <= KNOWN)
+                out.append((rows.residual(k, own, inside), near))
     return out
 
 

@@ -12,13 +12,16 @@ from studies.diagnosis.campaign import Campaign
 from studies.diagnosis.clock import judged
 from studies.diagnosis.constants import CONSTANTS
 from studies.diagnosis.model import Fit, Problem, fit, pose, settle
+from studies.diagnosis.noise import tails_of
 from studies.diagnosis.response import RESPONSES
 from studies.diagnosis.scan import applicable, build_bank
-from studies.diagnosis.search import Selection, drop, search
+from studies.diagnosis.search import Hypothesis, Place, Selection, drop, needed, search
 from studies.diagnosis.witness import Leftover, look
 from studies.effects import Effect
 from studies.effects.states import FloatArray, States
 
+MOST_TRIED = 3
+"""Rivals that are asked when the winner of a place foretells nothing."""
 ALIKE = 0.005
 """Relative difference of two held-out residuals that says nothing."""
 
@@ -53,7 +56,8 @@ class Inquiry:
     leftover: Leftover
     votes: Mapping[str, float]
     unknown: float = -np.inf
-    """Log posterior of generic structure without any named effect, on the scale of the selection's scores."""
+    """Log posterior of generic structure without any named effect, on the scale of the selection's scores: less what such
+    structure would add to the named effects."""
 
     @property
     def plain(self) -> Fit:
@@ -102,20 +106,25 @@ def begin(
     first = settle(problem, baseline)
     tau = float(getattr(first.baseline, "tau", states[0].tau if thermometer is None else thermometer.states[0].tau))
     problem = replace(pose(campaign, column, tau), sigma=float(np.sqrt(first.solved.variance)))
-    row = row_noise(campaign, column)
+    row, tails = row_noise(campaign, column), tails_of(_jitter(campaign, column))
     if first.baseline.lagged:
         steep = float(np.median(np.abs(np.concatenate([view.steep for view in first.tangent.views]))))
         row = float(np.hypot(row, campaign.temperature_noise * steep))
     floor = max((row / problem.sigma) ** 2 - problem.noise.rows, 0.0)
-    problem = replace(problem, noise=replace(problem.noise, floor=floor))
+    problem = replace(problem, noise=replace(problem.noise, floor=floor, tails=tails))
     return fit(problem, first.moved(), (), 2)
 
 
 def row_noise(campaign: Campaign, column: str) -> float:
     """Return the white noise of one row of the record, from second differences."""
-    second = np.concatenate([np.diff(run.row_responses[column], 2) for run in campaign.runs])
-    second = second[np.isfinite(second)]
+    second = _jitter(campaign, column)
     return float(1.4826 * np.median(np.abs(second)) / np.sqrt(6.0)) if second.size else 0.0
+
+
+def _jitter(campaign: Campaign, column: str) -> FloatArray:
+    """Return the second differences of the rows of a response."""
+    second = np.concatenate([np.diff(run.row_responses[column], 2) for run in campaign.runs])
+    return np.asarray(second[np.isfinite(second)])
 
 
 def _slope(problem: Problem, reading: Sequence[FloatArray]) -> float:
@@ -140,23 +149,42 @@ def inquire(campaign: Campaign, plain: Fit, effects: Sequence[Effect] | None, sc
     if unknown > selection.final.score and not leftover.significant:
         # what is named patches up what a generic form says better alone
         leftover = replace(generic, share=0.0)
-    return Inquiry(plain.problem, selection, leftover, {}, unknown)
+    beside = max(leftover.smooth + CONSTANTS["log_prior_unknown"], 0.0)
+    return Inquiry(plain.problem, selection, leftover, {}, unknown - beside)
 
 
 def refuse(campaign: Campaign, selection: Selection) -> Selection:
-    """Drop causes, the weakest first, until the model needs each of them on rows that it has not seen."""
+    """Drop causes, the weakest first, until each pays for itself, here and on rows that the model has not seen."""
     while selection.final.fit.terms:
         fewer = [drop(selection.final, k) for k in range(len(selection.final.fit.terms))]
         for k in sorted(range(len(fewer)), key=lambda k: -fewer[k].score):
             event = selection.final.fit.terms[k].effect.event
             by_run = None if event or len(campaign.records) == 1 else held_out.by_record
-            if not _pays(fewer[k].fit, selection.final.fit, campaign, by_run):
-                kept = [place for n, place in enumerate(selection.places) if n != k]
-                selection = replace(selection, final=fewer[k], places=tuple(kept))
+            pays = fewer[k].score < selection.final.score - needed(selection.plain, fewer[k])
+            if not pays or not _pays(fewer[k].fit, selection.final.fit, campaign, by_run):
+                kept = tuple(place for n, place in enumerate(selection.places) if n != k)
+                other = _another(selection, k, fewer[k], campaign)
+                final = fewer[k] if other is None else other.rivals[0]
+                selection = replace(selection, final=final, places=kept if other is None else (*kept, other))
                 break
         else:
             break
     return selection
+
+
+def _another(selection: Selection, k: int, without: Hypothesis, campaign: Campaign) -> Place | None:
+    """Return a place whose first rival foretells what its refused winner could not; None where there is none."""
+    place = selection.places[k]
+    refused = selection.final.names[k]
+    rivals = [rival for name, rival in zip(place.names, place.rivals, strict=True) if name != refused]
+    for n, rival in enumerate(rivals[:MOST_TRIED]):
+        if rival.score < without.score + needed(selection.plain, without):
+            break
+        event = rival.fit.terms[place.index].effect.event
+        by_run = None if event or len(campaign.records) == 1 else held_out.by_record
+        if _pays(without.fit, rival.fit, campaign, by_run):
+            return replace(place, rivals=(rival, *rivals[n + 1 :]))
+    return None
 
 
 def _follows(model: Fit) -> bool:
@@ -169,7 +197,9 @@ def _follows(model: Fit) -> bool:
     return bool(np.isfinite(spread) and abs(model.solved.coefficients[place]) >= 3.0 * spread)
 
 
-def _pays(plain: Fit, model: Fit, campaign: Campaign, by_run: Callable[[Fit, Campaign], float | None] | None) -> bool:
+def _pays(
+    plain: Fit, model: Fit, campaign: Campaign, by_run: Callable[[Fit, Campaign], held_out.Parts | None] | None
+) -> bool:
     """Whether a model is better on rows that it has not seen.
 
     A run whose drive no other run moves cannot be foretold by them, nor can an event: then blocks in time decide.
@@ -177,7 +207,7 @@ def _pays(plain: Fit, model: Fit, campaign: Campaign, by_run: Callable[[Fit, Cam
     for measure in (by_run, held_out.by_block):
         if measure is None:
             continue
-        before, after = measure(plain, campaign), measure(model, campaign)
+        before, after = held_out.compare(measure(plain, campaign), measure(model, campaign))
         if before is None or after is None:
             continue
         if abs(after - before) > ALIKE * before:

@@ -14,7 +14,7 @@ from studies.diagnosis.causes import name_causes, vote
 from studies.diagnosis.checks import FEWEST_BINS
 from studies.diagnosis.constants import CONSTANTS
 from studies.diagnosis.held_out import Score
-from studies.diagnosis.inquiry import Inquiry, Thermometer, begin, inquire, read_thermometer
+from studies.diagnosis.inquiry import Inquiry, Thermometer, begin, inquire, read_thermometer, row_noise
 from studies.diagnosis.model import Fit
 from studies.diagnosis.planning.advice import suggest_next
 from studies.diagnosis.planning.chamber import Chamber
@@ -186,14 +186,13 @@ def _result(
             f"the values that the other runs give predict a run to {beyond * response.scale:.3g} "
             f"{response.shown} only: they are not determined without it"
         )
-    if reached.foretold < FORETOLD and reached.held_out_rms is not None:
+    if reached.foretold < FORETOLD:
+        share_known = f"{100 * reached.foretold:.0f} % of the rows"
         remarks.append(
-            f"held-out residuals are of {100 * reached.foretold:.0f} % of the rows: the others lie at temperatures that the "
-            "rest of the record does not cover"
+            f"no held-out residual: the rest of the record predicts only {share_known}"
+            if reached.held_out_rms is None
+            else f"held-out residuals cover {share_known}: the rest of the record cannot predict the others"
         )
-    noise = inquiry.problem.noise
-    white = float(np.sqrt(final.solved.variance * (noise.rows + noise.floor)))
-    wander = final.wander
     return ResponseResult(
         verdict,
         reached.residual_rms,
@@ -204,8 +203,8 @@ def _result(
         2.0 * max(left.evidence, 0.0),
         share,
         "; ".join(remarks),
-        white=white,
-        wander=wander,
+        white=row_noise(campaign, column) or float(np.sqrt(final.solved.variance * inquiry.problem.noise.rows)),
+        wander=final.wander,
         shipped=shipped,
         run_shifts=tuple(_run_shifts(final)),
     )
@@ -221,8 +220,8 @@ def _judge(
     patched = bool(mine) and max(cause.probability for cause in mine) < CONSTANTS["believed"]
     if left.wander and clean:
         return "not-identifiable", [
-            f"the residual drifts by {final.wander_ratio:.0f} times the white noise of a row: this record cannot distinguish "
-            "slow noise from a cause that acts slowly"
+            f"the residual drifts by {final.wander_ratio:.0f} times the noise of a row within minutes: this record cannot "
+            "distinguish slow noise from a cause that acts slowly"
         ]
     if left.significant and (share is None or not clean or patched):
         return "unexplained", []

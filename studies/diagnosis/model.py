@@ -245,7 +245,7 @@ class Fit:
 
     @property
     def wander_ratio(self) -> float:
-        """Rms of the wander within a run over the white noise of one row of the record."""
+        """Rms of the wander within a run over the noise of one row of the record within minutes."""
         return float(self.problem.noise.ratio(self.solved.kind)[self.solved.share])
 
     @property

@@ -1,14 +1,14 @@
 """All effects in all shapes at once: what each would add to the evidence of a fitted model, its leading columns alone."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from scipy.special import logsumexp
 
 from studies.diagnosis.evidence import SCALES
 from studies.diagnosis.model import Fit, Problem, Term, term_columns
-from studies.diagnosis.noise import KERNELS
+from studies.diagnosis.noise import KERNELS, Noise
 from studies.effects import Effect, library
 from studies.effects.states import FloatArray
 
@@ -32,18 +32,29 @@ class Group:
 
 @dataclass(frozen=True)
 class Bank:
-    """Every shape of every effect, in the rotated rows of each kind of wander.
+    """Every shape of every effect.
 
     Attributes
     ----------
     terms : tuple of Term
     groups : tuple of Group
-    rotated : tuple of (M, C) float32 arrays
+    table : (M, C) float32 array
+    noise : Noise
+    turned : dict
+        The table in the rotated rows of the kinds of wander that were asked for.
     """
 
     terms: tuple[Term, ...]
     groups: tuple[Group, ...]
-    rotated: tuple["np.ndarray", ...]
+    table: "np.ndarray" = field(repr=False)
+    noise: Noise = field(repr=False)
+    turned: dict[int, "np.ndarray"] = field(default_factory=dict, repr=False)
+
+    def rotated(self, kind: int) -> "np.ndarray":
+        """Return the table in the rotated rows of one kind of wander."""
+        if kind not in self.turned:
+            self.turned[kind] = self.noise.bases[kind].rotate(self.table)
+        return self.turned[kind]
 
 
 def applicable(problem: Problem, model: Fit, effects: Sequence[Effect] | None = None) -> list[Effect]:
@@ -96,7 +107,7 @@ def build_bank(model: Fit, effects: Sequence[Effect]) -> Bank:
         Group(np.array([f[0] for f in own]), np.array([f[1] for f in own]), np.array([f[2] for f in own]))
         for own in found.values()
     )
-    return Bank(tuple(terms), groups, tuple(basis.rotate(table) for basis in problem.noise.bases))
+    return Bank(tuple(terms), groups, table, problem.noise)
 
 
 @dataclass(frozen=True)
@@ -162,7 +173,7 @@ def _gains(model: Fit, bank: Bank, kind: int, share: int) -> FloatArray:
     least = max(float(rest @ rest), 1e-300)
     freedom = linear.target.size - linear.flat
     turn, narrow = root.astype(np.float32)[:, None], span.astype(np.float32)
-    table = bank.rotated[kind]
+    table = bank.rotated(kind)
     beside = np.empty((rows.shape[0], table.shape[1]), dtype=np.float32)
     for begin in range(0, table.shape[1], BLOCK):
         # what is left of a column may be a thousandth of it: projected before it is squared, in single precision

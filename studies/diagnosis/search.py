@@ -74,7 +74,12 @@ def search(plain: Fit, bank: Bank) -> Selection:
         if best is None or best.score - now.score < needed(start, now):
             break
         now = examine(best, bank, start)
-    places = tuple(_place(now, index, bank) for index in range(len(now.fit.terms)))
+    for _ in range(MOST_CAUSES):
+        places = tuple(_place(now, index, bank) for index in range(len(now.fit.terms)))
+        best = max((place.rivals[0] for place in places), key=lambda h: h.score, default=now)
+        if best.score < now.score + 1.0 or best.names[-1] in now.names:
+            break
+        now = best
     return Selection(start, now, places, bank)
 
 

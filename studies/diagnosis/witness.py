@@ -8,9 +8,11 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.linalg import solve_triangular
 
 from studies.diagnosis.constants import CONSTANTS
 from studies.diagnosis.model import Fit, Term, fit
+from studies.diagnosis.noise import SHARES, student_log
 from studies.diagnosis.scan import applicable, build_bank, scan
 from studies.effects import Coefficient, Effect, Parameter, Span
 from studies.effects.states import FloatArray, States, lag, play
@@ -170,14 +172,18 @@ def look(plain: Fit, model: Fit) -> Leftover:
     step = max((seen.gain for seen in scan(model, build_bank(model, [STEP]), 3)), default=0.0)
     if step > evidence:
         name, evidence = "time: a step", step
-    word, tails = sharp(best)
-    if tails > evidence:
-        name, evidence = word, tails
+    for word, found in (sharp(best), fitful(best)):
+        if found > evidence:
+            name, evidence = word, found
+    part = share(plain, model, best)
+    if evidence > smooth:  # brief things are in no smooth form: the share of what evidence there is
+        named = max(model.log_evidence - plain.log_evidence, 0.0)
+        part = min(part, named / max(named + evidence, 1e-9))
     if not model.believed and best.believed is False:
         own = CONSTANTS["margin"] - CONSTANTS["log_prior_unknown"] + 10.0 * np.log(max(model.wander_ratio, 1.0))
         if evidence < CONSTANTS["margin"] - CONSTANTS["log_prior_unknown"]:
-            return Leftover(WANDER, float(own), share(plain, model, best), best, float(smooth), True)
-    return Leftover(name, float(evidence), share(plain, model, best), best, float(smooth))
+            return Leftover(WANDER, float(own), part, best, float(smooth), True)
+    return Leftover(name, float(evidence), part, best, float(smooth))
 
 
 def share(plain: Fit, model: Fit, fullest: Fit) -> float:
@@ -197,20 +203,77 @@ def share(plain: Fit, model: Fit, fullest: Fit) -> float:
     return float(np.clip(1.0 - (after - floor) / total, 0.0, 1.0)) if before > after else 0.0
 
 
-def sharp(model: Fit) -> tuple[str, float]:
-    """Return the log evidence of brief events: tails of the whitened rows against a normal law.
+def fitful(model: Fit) -> tuple[str, float]:
+    """Return the log evidence of oscillations that come, go or wander: noise has the same spectrum all the time.
 
-    A mixture of two normal laws, a small part of the rows with a larger variance, against one normal law.
+    Short periodograms of the innovations over their mean in each run are of one exponential law in noise, with about one
+    mean at all frequencies; against it a mixture of two, a small part of the cells with more power.
     """
-    # back in time: in the independent rows a line of the spectrum would be brief
-    white = model.problem.noise.bases[model.solved.kind].unrotate(model.whitened)
-    rows = white / max(float(np.sqrt(np.mean(white**2))), 1e-300)
+    runs = innovations(model)
     best = 0.0
-    for part in (0.01, 0.03, 0.1):
-        for wide in (3.0, 5.0, 8.0):
-            narrow = np.sqrt(max((1.0 - part * wide**2 * 0.3) / (1.0 - part), 0.3))
-            mixed = (1 - part) / narrow * np.exp(-0.5 * (rows / narrow) ** 2) + part / wide * np.exp(
-                -0.5 * (rows / wide) ** 2
-            )
-            best = max(best, float(np.sum(np.log(mixed + 1e-300) + 0.5 * rows**2)))
-    return "time: brief events", best - 3.0
+    for length in CELLS:
+        cells = []
+        for rows in runs:
+            blocks = rows[: rows.size // length * length].reshape(-1, length)
+            power = np.abs(np.fft.rfft(blocks, axis=1)[:, 1:-1]) ** 2
+            cells.append(power / max(float(power.mean()), 1e-300) if power.size else power)
+        table = np.concatenate(cells)
+        if table.shape[0] < FEWEST_CELLS:
+            continue
+        power = table / np.clip(table.mean(axis=0), 1.0 / UNEVEN, UNEVEN)
+        for part in (0.01, 0.03, 0.1):
+            for strong in (3.0, 6.0, 12.0):
+                weak = max((1.0 - part * strong) / (1.0 - part), 0.3)
+                mixed = (1 - part) / weak * np.exp(-power / weak) + part / strong * np.exp(-power / strong)
+                best = max(best, float(np.sum(np.log(mixed + 1e-300) + power)))
+    return "time: an oscillation that comes and goes", best - 3.0
+
+
+CELLS = (8, 16, 32, 64, 128)
+"""Rows to a short periodogram."""
+FEWEST_CELLS = 6
+"""Of each length at least so many: of fewer the mean is no measure."""
+UNEVEN = 2.5
+"""Factor by which the spectrum of noise may differ from that of the kinds of wander."""
+
+
+def innovations(model: Fit) -> list[FloatArray]:
+    """Return what each row of a model's residual brings that the rows before do not foretell, in units of σ, run by run."""
+    solved, problem = model.solved, model.problem
+    basis, out = problem.noise.bases[solved.kind], []
+    begin = 0
+    for vectors in basis.vectors:
+        rows = slice(begin, begin := begin + vectors.shape[0])
+        covariance = (vectors * (1.0 + SHARES[solved.share] * basis.walk[rows])) @ vectors.T
+        root = np.linalg.cholesky(covariance)
+        out.append(np.asarray(solve_triangular(root, model.residual[rows], lower=True)) / np.sqrt(solved.variance))
+    return out
+
+
+def sharp(model: Fit) -> tuple[str, float]:
+    """Return the log evidence of brief events: a few innovations that are too large for noise.
+
+    A mixture of two normal laws about 0, by expectation and maximisation, against the likeliest of Student's laws, for the
+    tails of noise may be heavy; as many numbers more as the BIC counts.
+    """
+    rows = np.concatenate(innovations(model))
+    square = rows**2 / max(float(np.mean(rows**2)), 1e-300)
+    best = -np.inf
+    for part in (0.02, 0.1, 0.3):
+        narrow, wide = 0.5, 4.0
+        for _ in range(40):
+            laws = [(1.0 - part) * _normal(square, narrow), part * _normal(square, wide)]
+            total = laws[0] + laws[1] + 1e-300
+            belongs = laws[1] / total
+            part = float(np.clip(belongs.mean(), 0.5 / rows.size, 0.5))
+            narrow = max(float((1.0 - belongs) @ square / max(np.sum(1.0 - belongs), 1e-9)), 1e-3)
+            wide = max(float(belongs @ square / max(belongs.sum(), 1e-9)), narrow)
+        best = max(best, float(np.sum(np.log(total))))
+    # the tails of a mean over rows are lighter than theirs
+    heaviest = min(model.problem.noise.tails + 0.5 * (model.problem.noise.rows - 1.0), 1e3)
+    best -= max(student_log(square, freedom) for freedom in (heaviest, 2.0 * heaviest, 1e3))
+    return "time: brief events", best - float(np.log(rows.size))
+
+
+def _normal(square: FloatArray, variance: float) -> FloatArray:
+    return np.asarray(np.exp(-0.5 * square / variance) / np.sqrt(2.0 * np.pi * variance))

@@ -72,7 +72,7 @@ def _scene(model: Fit, bank: Bank, kind: int, share: int) -> Scene:
     own = basis.rotate(linear.scaled) * root[:, None]
     rows = np.concatenate([own, np.diag(np.where(np.isinf(linear.prior), 0.0, 1.0))])
     span = np.linalg.qr(rows)[0][: own.shape[0]]
-    table = bank.rotated[kind].astype(float) * root[:, None]
+    table = bank.rotated(kind).astype(float) * root[:, None]
     inner = span.T @ table
     eigen = []
     for group in bank.groups:

@@ -1,13 +1,16 @@
 """Amplitude-frequency effect: the spring of a large vibration is not linear."""
 
+import numpy as np
+
 from studies.effects.effect import Coefficient, Effect, Shape, Span
 from studies.effects.states import FloatArray, States
 
 
 def columns(states: States, shape: Shape, response: str) -> FloatArray:
-    """Backbone of a cubic (Duffing) spring: δf = κ A², at once."""
-    assert states.amplitude_squared is not None
-    return states.amplitude_squared[:, None]
+    """Backbone of a cubic (Duffing) spring: δf = κ A², at once; the next order, A⁴, of a spring that hardens or softens more."""
+    power = states.amplitude_squared
+    assert power is not None
+    return np.stack([power, power**2], axis=1)
 
 
 def grid(span: Span, response: str) -> list[tuple[float, ...]]:
@@ -20,7 +23,7 @@ EFFECT = Effect(
     summary="the frequency depends on the vibration amplitude: a nonlinear spring",
     source="Duffing oscillator, Nayfeh and Mook, Nonlinear Oscillations (1979), backbone curve",
     isolate="step the drive amplitude at constant temperature: an instant change, which the bias does not follow",
-    coefficients=(Coefficient("slope_{unit}_per_V2"),),
+    coefficients=(Coefficient("slope_{unit}_per_V2"), Coefficient("quartic_{unit}_per_V4", (0.1,))),
     columns=columns,
     grid=grid,
     sizes={"frequency_Hz": 1e-4},

@@ -1,14 +1,17 @@
 """Electrostatic softening: the electrodes' field acts as a negative spring."""
 
+import numpy as np
+
 from shell.electrodes import soften_at_gap
 from studies.effects.effect import Coefficient, Effect, Shape, Span
 from studies.effects.states import FloatArray, States
 
 
 def columns(states: States, shape: Shape, response: str) -> FloatArray:
-    """δf = −k V², at once, as of the electrodes of a card at a gap that stays."""
-    assert states.voltage_squared is not None
-    return soften_at_gap(-1.0, states.voltage_squared)[:, None]
+    """δf = −k V², at once, as of the electrodes of a card at a gap that stays; V⁴ as the field narrows the gap."""
+    power = states.voltage_squared
+    assert power is not None
+    return np.stack([soften_at_gap(-1.0, power), soften_at_gap(-1.0, power) * power], axis=1)
 
 
 def grid(span: Span, response: str) -> list[tuple[float, ...]]:
@@ -21,7 +24,7 @@ EFFECT = Effect(
     summary="the electrode voltage softens the resonator: the frequency falls with its square",
     source="negative spring ε₀ A V²/g³ of a biased gap",
     isolate="step the electrode voltage at constant temperature: an instant change, proportional to its square",
-    coefficients=(Coefficient("softening_{unit}_per_V2"),),
+    coefficients=(Coefficient("softening_{unit}_per_V2"), Coefficient("narrowing_{unit}_per_V4", (1e-5,))),
     columns=columns,
     grid=grid,
     sizes={"frequency_Hz": 2e-8},

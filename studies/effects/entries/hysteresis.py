@@ -1,22 +1,34 @@
 """Hysteresis: a response that depends on where the temperature came from, however slowly."""
 
 import numpy as np
+from scipy.constants import zero_Celsius
 
 from studies.effects.effect import Coefficient, Effect, Parameter, Shape, Span
 from studies.effects.states import FloatArray, States, play
 
 
 def columns(states: States, shape: Shape, response: str) -> FloatArray:
-    """Plays less the temperature itself, K: half widths of 1, 0.4, 0.7, 1.5 and 2.2 times the named one (Prandtl-Ishlinskii)."""
-    radius, start = shape
+    """Plays less the temperature itself, K: half widths of 1, 0.4, 0.7, 1.5 and 2.2 times the named one (Prandtl-Ishlinskii).
+
+    Beside them what curves of the first play do that the same curves of the temperature do not, in units of (play − T): a
+    relay of Preisach is a step of a play, and many of them a curve (generalised Prandtl-Ishlinskii).
+    """
+    radius, start, low, high = shape
     loops = play(states.resonator, [radius * ratio for ratio in RATIOS], start)
-    return np.asarray(loops - states.resonator[:, None])
+    turns = np.pi * np.arange(1, ENVELOPE + 1) / max(high - low, 1e-9)
+    bottom = low + zero_Celsius
+
+    def curves(temperature: FloatArray) -> FloatArray:
+        return np.asarray(np.cos(np.clip(temperature - bottom, 0.0, max(high - low, 0.0))[:, None] * turns) / turns)
+
+    return np.concatenate([loops - states.resonator[:, None], curves(loops[:, 0]) - curves(states.resonator)], axis=1)
 
 
 def grid(span: Span, response: str) -> list[tuple[float, ...]]:
     """Loop half widths from half a percent to a third of the covered range; three initial memories."""
     radii = span.temperature_range * np.geomspace(0.006, 0.35, 8)
-    return [(float(radius), start) for radius in radii for start in (0.0, -1.0, 1.0)]
+    ends = span.temperature_low - zero_Celsius, span.temperature_high - zero_Celsius
+    return [(float(radius), start, *ends) for radius in radii for start in (0.0, -1.0, 1.0)]
 
 
 def steady(x: FloatArray, shape: Shape) -> FloatArray:
@@ -24,21 +36,28 @@ def steady(x: FloatArray, shape: Shape) -> FloatArray:
     return np.asarray((play(x, shape[0]) - x)[:, None])
 
 
+ENVELOPE = 8
+"""Half waves over the covered range that the width of a loop may follow."""
 RATIOS = (1.0, 0.4, 0.7, 1.5, 2.2)
 
 
 EFFECT = Effect(
     name="hysteresis",
     summary="a rate-independent loop: heating and cooling branches differ and stay apart in a soak",
-    source="play operators, Visintin, Differential Models of Hysteresis (1994); Prandtl-Ishlinskii and Preisach loops are sums of plays",
+    source="play operators, Visintin, Differential Models of Hysteresis (1994); envelopes: Al Janaideh, Rakheja and Su, Mechatronics 19 (2009) 656",
     isolate="the same cycle at two rates, and soak points approached from both sides: hysteresis does not decay",
-    coefficients=(Coefficient("loop_{unit}_per_K", (1.0, 0.5, 0.6, 0.6, 0.5)),),
+    coefficients=(
+        Coefficient("loop_{unit}_per_K", (1.0, 0.5, 0.6, 0.6, 0.5)),
+        Coefficient("envelope_{unit}_per_K", tuple(0.35 / np.sqrt(k) for k in range(1, ENVELOPE + 1))),
+    ),
     columns=columns,
     grid=grid,
     sizes={"bias_deg_per_h": 2.0, "frequency_Hz": 3e-5, "inverse_q": 0.02},
     shape=(
         Parameter("half_width_K", 0.02, 40.0, "half width of the loop in temperature"),
         Parameter("initial_memory", -1.0, 1.0, "where in its band each run starts", False, True),
+        Parameter("from_degC", -273.0, 500.0, "lower end of the envelope", False, True),
+        Parameter("to_degC", -273.0, 500.0, "upper end of the envelope", False, True),
     ),
     steady=steady,
     steady_grid=lambda low, high: [(part * (high - low),) for part in (0.01, 0.05, 0.15, 0.4)],

@@ -7,9 +7,15 @@ from studies.effects.states import FloatArray, States, lag
 
 
 def columns(states: States, shape: Shape, response: str) -> FloatArray:
-    """Maxwell elements: stress ∝ T_r − lag(T_r; τ_s), a mismatch that relaxes with τ_s, a third and three times of it."""
+    """Maxwell elements: stress ∝ T_r − lag(T_r; τ_s), a mismatch that relaxes with τ_s, a third and three times of it.
+
+    Beside it what strains a joint between housing and resonator, s = T_h − T_r, the part of it that relaxes, and s³, per
+    (30 K)², of a joint that hardens or yields.
+    """
     strains = [lag(states.resonator, states.step, shape[0] * ratio) for ratio in (1.0, 1.0 / 3.0, 3.0)]
-    return states.resonator[:, None] - np.stack(strains, axis=1)
+    across = states.housing - states.resonator
+    joint = [across, lag(across, states.step, shape[0]), across * (across / 30.0) ** 2]
+    return np.concatenate([states.resonator[:, None] - np.stack(strains, 1), np.stack(joint, 1)], axis=1)
 
 
 def grid(span: Span, response: str) -> list[tuple[float, ...]]:
@@ -28,7 +34,10 @@ EFFECT = Effect(
     source="viscoelastic bond (Maxwell element) under thermal mismatch strain",
     isolate="soak for days after a large step and watch f against an independent thermometer on the resonator",
     sensor="a thermometer on the base or stem: a second lag would show there, a stress would not",
-    coefficients=(Coefficient("stress_{unit}_per_K", (1.0, 0.2, 0.2)),),
+    coefficients=(
+        Coefficient("stress_{unit}_per_K", (1.0, 0.2, 0.2)),
+        Coefficient("joint_{unit}_per_K", (1.0, 0.5, 0.3)),
+    ),
     columns=columns,
     grid=grid,
     sizes={"frequency_Hz": 5e-5, "bias_deg_per_h": 2.0},

@@ -24,5 +24,6 @@ EFFECT = Effect(
     columns=columns,
     grid=grid,
     sizes={"frequency_Hz": 0.02},
+    equivalents={"frequency_Hz": ("thermometer-lag",)},
     fine=True,
 )

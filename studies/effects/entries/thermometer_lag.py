@@ -1,12 +1,15 @@
 """Thermometer lag: the sensor on the housing is slower than the housing."""
 
+import numpy as np
+
 from studies.effects.effect import Coefficient, Effect, Shape, Span
 from studies.effects.states import FloatArray, States, lag
 
 
 def columns(states: States, shape: Shape, response: str) -> FloatArray:
-    """The true housing temperature is T_s + τ_s dT_s/dt; behind the resonator's lag τ that adds τ_s (T_s − lag(T_s; τ))/τ."""
-    return ((states.housing - lag(states.housing, states.step, states.tau)) / states.tau)[:, None]
+    """The true housing temperature is T_s + τ_s dT_s/dt; behind the resonator's lag τ that adds τ_s d lag(T_s; τ)/dt."""
+    late = lag(states.housing, states.step, states.tau)
+    return np.gradient(late, states.step)[:, None] if late.size > 1 else np.zeros((late.size, 1))
 
 
 def grid(span: Span, response: str) -> list[tuple[float, ...]]:
@@ -25,6 +28,7 @@ EFFECT = Effect(
     grid=grid,
     sizes={"frequency_Hz": 300.0},
     acts_on="temperature",
+    equivalents={"frequency_Hz": ("rate-frequency",)},
     positive=True,
     fine=True,
 )

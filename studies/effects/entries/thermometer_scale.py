@@ -2,19 +2,30 @@
 
 import numpy as np
 
-from studies.effects.effect import Coefficient, Effect, Shape, Span
+from studies.effects.effect import Coefficient, Effect, Parameter, Shape, Span
 from studies.effects.states import FloatArray, States, lag
 
 
 def columns(states: States, shape: Shape, response: str) -> FloatArray:
-    """The true housing temperature is T_s + Σ e_k x^k, k = 2, 3, 4, x = T_s − T₀ in units of 10 K; it then passes the lag."""
+    """The true housing temperature is T_s + Σ e_k x^k, k = 2, 3, 4, x = T_s − T₀ in units of 10 K; it then passes the lag.
+
+    A sensor that was exchanged or wired anew has it from one run on, with another slope, e₁, and zero, e₀: those of a
+    sensor that stays are part of the law.
+    """
+    (begin,) = shape
+    if states.run < begin:
+        return np.zeros((states.time.size, 5))
     x = (states.housing - states.reference) / 10.0
-    return np.stack([lag(x**power, states.step, states.tau) for power in (2, 3, 4)], axis=1)
+    powers = (2, 3, 4, 1, 0)
+    parts = [lag(x**power, states.step, states.tau) for power in powers]
+    if not begin:
+        parts[3] = parts[4] = np.zeros_like(x)
+    return np.stack(parts, axis=1)
 
 
 def grid(span: Span, response: str) -> list[tuple[float, ...]]:
-    """No shape parameter."""
-    return [()]
+    """One sensor for all runs, or another one from any run on."""
+    return [(float(run),) for run in range(span.runs)]
 
 
 def steady(x: FloatArray, shape: Shape) -> FloatArray:
@@ -32,10 +43,13 @@ EFFECT = Effect(
         Coefficient("quadratic_K_per_10K2"),
         Coefficient("cubic_K_per_10K3", (0.3,)),
         Coefficient("quartic_K_per_10K4", (0.05,)),
+        Coefficient("slope_K_per_10K"),
+        Coefficient("zero_K"),
     ),
     columns=columns,
     grid=grid,
     sizes={"frequency_Hz": 0.3},
+    shape=(Parameter("from_run", 0.0, 1e4, "run from which the sensor reads so, from 0", False, True),),
     acts_on="temperature",
     fine=True,
     steady=steady,
