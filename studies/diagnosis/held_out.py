@@ -38,6 +38,7 @@ class Score:
     residual_rms: float
     held_out_rms: float | None
     foretold: float = 1.0
+    parts: "Parts | None" = None
 
 
 def rms(parts: Sequence[FloatArray]) -> float:
@@ -176,8 +177,8 @@ def own_columns(model: Fit, k: int) -> list[int]:
     return [place for place, name in enumerate(model.tangent.names) if name.endswith(f"@{k}")]
 
 
-def score(model: Fit, campaign: Campaign) -> Score:
-    """Return training and held-out residual.
+def score(model: Fit, campaign: Campaign, like: "Parts | None" = None) -> Score:
+    """Return training and held-out residual, the latter of the rows that the model can foretell, or another one, `like`.
 
     One record is left out at a time, the rest is fitted anew; of the record that was left out only its own offset and
     initial state are refitted. With one record, blocks in time are left out, one thermal constant more on both sides. Rows
@@ -185,8 +186,9 @@ def score(model: Fit, campaign: Campaign) -> Score:
     """
     training = rms(residuals(model, campaign))
     parts = by_record(model, campaign) if len(campaign.records) > 1 else by_block(model, campaign)
+    parts = _of(parts, like)
     foretold = _share(parts)
-    return Score(training, _rms_or_none(parts) if foretold >= FEWEST_FORETOLD else None, foretold)
+    return Score(training, _rms_or_none(parts) if foretold >= FEWEST_FORETOLD else None, foretold, parts)
 
 
 Parts = list[tuple[FloatArray, "np.ndarray"]]
@@ -194,12 +196,17 @@ Parts = list[tuple[FloatArray, "np.ndarray"]]
 
 
 def compare(one: Parts | None, two: Parts | None) -> tuple[float | None, float | None]:
-    """Return the residuals of two models on the rows that both can foretell."""
+    """Return the residuals of two models on the rows that the second can foretell."""
     if one is None or two is None:
         return None, None
-    both = [a[1] & b[1] for a, b in zip(one, two, strict=True)]
-    first, second = ([(rest, near) for (rest, _), near in zip(parts, both, strict=True)] for parts in (one, two))
-    return _rms_or_none(first), _rms_or_none(second)
+    return _rms_or_none(_of(one, two)), _rms_or_none(two)
+
+
+def _of(parts: Parts | None, like: Parts | None) -> Parts | None:
+    """Return what is left with the rows that another model can foretell."""
+    if parts is None or like is None:
+        return parts
+    return [(rest, near) for (rest, _), (_, near) in zip(parts, like, strict=True)]
 
 
 def _rms_or_none(parts: Parts | None) -> float | None:

@@ -166,13 +166,13 @@ def _result(
 ) -> ResponseResult:
     plain, final, left = inquiry.plain, inquiry.final, inquiry.leftover
 
-    def measured(model: Fit) -> Score:
+    def measured(model: Fit, like: held_out.Parts | None = None) -> Score:
         if score_held_out:
-            return held_out.score(model, campaign)
+            return held_out.score(model, campaign, like)
         return Score(held_out.rms(held_out.residuals(model, campaign)), None)
 
-    base = measured(plain)
     extended = measured(final) if final.terms else None
+    base = measured(plain, None if extended is None else extended.parts)
     column = inquiry.problem.response.column
     mine = [cause for cause in causes if cause.response == column and cause.kind == "physics"]
     share = (left.share if left.significant else 1.0) if final.terms else None

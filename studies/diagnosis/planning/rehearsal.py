@@ -13,6 +13,7 @@ from scipy.special import logsumexp
 from studies.diagnosis.constants import CONSTANTS
 from studies.diagnosis.evidence import SCALES
 from studies.diagnosis.model import Fit, Term, term_columns, used
+from studies.diagnosis.noise import SHARES
 from studies.diagnosis.scan import Bank, build_bank
 from studies.diagnosis.verdict import weigh
 from studies.effects import Effect, Parameter
@@ -126,7 +127,7 @@ def hide(stage: Stage, effect: Effect, cases: int, rng: np.random.Generator) -> 
         drawn = rng.standard_normal((rows, mine.size)) / own_scene.root[:, None] * problem.sigma
         noise[:, mine] = basis.unrotate(drawn)
         white = problem.sigma**2 * problem.noise.rows
-        wander = white * problem.noise.ratio(own_scene.kind)[own_scene.share] ** 2
+        wander = problem.sigma**2 * SHARES[own_scene.share] * basis.within
         level[mine] = np.sqrt(white + wander)
     return Hidden(effect, np.stack(signals, axis=1) * level, noise, scene, survives)
 

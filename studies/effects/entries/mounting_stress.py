@@ -9,11 +9,11 @@ from studies.effects.states import FloatArray, States, lag
 def columns(states: States, shape: Shape, response: str) -> FloatArray:
     """Maxwell elements: stress ∝ T_r − lag(T_r; τ_s), a mismatch that relaxes with τ_s, a third and three times of it.
 
-    Beside it what strains a joint between housing and resonator, s = T_h − T_r, the part of it that relaxes, and s³, per
-    (30 K)², of a joint that hardens or yields.
+    Beside it, in the frequency, what strains a joint between housing and resonator, s = T_h − T_r, the part of it that
+    relaxes, and s³, per (30 K)², of a joint that hardens or yields. In the bias s is the rate bias, behind one lag exactly.
     """
     strains = [lag(states.resonator, states.step, shape[0] * ratio) for ratio in (1.0, 1.0 / 3.0, 3.0)]
-    across = states.housing - states.resonator
+    across = (states.housing - states.resonator) * (response == "frequency_Hz")
     joint = [across, lag(across, states.step, shape[0]), across * (across / 30.0) ** 2]
     return np.concatenate([states.resonator[:, None] - np.stack(strains, 1), np.stack(joint, 1)], axis=1)
 
