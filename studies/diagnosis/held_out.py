@@ -196,10 +196,11 @@ Parts = list[tuple[FloatArray, "np.ndarray"]]
 
 
 def compare(one: Parts | None, two: Parts | None) -> tuple[float | None, float | None]:
-    """Return the residuals of two models on the rows that the second can foretell."""
+    """Return the residuals of two models on the rows that both can foretell."""
     if one is None or two is None:
         return None, None
-    return _rms_or_none(_of(one, two)), _rms_or_none(two)
+    both: Parts = [(rest, a & b) for (rest, a), (_, b) in zip(one, two, strict=True)]
+    return _rms_or_none(both), _rms_or_none(_of(two, both))
 
 
 def _of(parts: Parts | None, like: Parts | None) -> Parts | None:
