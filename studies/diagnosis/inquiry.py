@@ -160,7 +160,7 @@ def refuse(campaign: Campaign, selection: Selection) -> Selection:
         for k in sorted(range(len(fewer)), key=lambda k: -fewer[k].score):
             event = selection.final.fit.terms[k].effect.event
             by_run = None if event or len(campaign.records) == 1 else held_out.by_record
-            pays = fewer[k].score < selection.final.score - needed(selection.plain, fewer[k])
+            pays = fewer[k].score < selection.final.score - CONSTANTS["margin"]
             if not pays or not _pays(fewer[k].fit, selection.final.fit, campaign, by_run):
                 kept = tuple(place for n, place in enumerate(selection.places) if n != k)
                 other = _another(selection, k, fewer[k], campaign)
