@@ -502,7 +502,7 @@ def test_names_and_units_on_two_lines_of_a_table(tmp_path):
     [
         ("bias_deg_per_h", "1e19", "cannot be a reading"),
         ("frequency_Hz", "-3", "cannot be a reading"),
-        ("inverse_q", "12", "0 to 1"),
+        ("inverse_q", "12", "-0.001 to 1 can"),
     ],
 )
 def test_what_the_reader_refuses_is_not_imported(tmp_path, header, value, part):
