@@ -59,6 +59,7 @@ def test_levels_are_recovered_from_drawn_noise():
     assert max(n.walk for n in quiet) < 0.03
 
 
+@pytest.mark.slow
 def test_tests_at_the_estimated_noise_keep_their_level():
     """A smooth column that is not there: χ² of its coefficient exceeds its 5 % quantile in about 5 % of runs of noise."""
     generator = np.random.default_rng(5)

@@ -66,6 +66,7 @@ def carrier_orbit(Q, seconds, y0, w, spread, detuning, axis_tau, axis_omega, cou
     return solve_ivp(lambda _, y: A @ y, (0, seconds), y0, "DOP853", [seconds], rtol=1e-11, atol=1e-16).y[:, -1]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("coupling", "detuning"), [(0.8, 0.0), (0.0, 3.0), (-0.5, 2.0)])
 def test_emitted_python_follows_the_carrier_at_a_quality_factor_of_1000(coupling, detuning):
     """The averaged orbit after most of a decay time against the carrier; the difference is of order 1/Q, Δω/ω, Ω/ω."""

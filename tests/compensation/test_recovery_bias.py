@@ -52,6 +52,7 @@ def test_planted_coefficients_are_covered_by_the_stated_intervals(white, walk):
         assert naive / fits < 0.75
 
 
+@pytest.mark.slow
 def test_noise_alone_brings_a_term_in_no_more_often_than_stated():
     found = {"guarded": 0, "paper": 0}
     gains = []

@@ -70,6 +70,7 @@ def drawn():
     return {2: (row[:, :500], row[:, 500:1000]), 3: (row[:, 1000:1500], row[:, 1500:])}
 
 
+@pytest.mark.slow
 @needs_opengl
 @pytest.mark.parametrize("n", [2, 3])
 def test_nodal_lines_in_the_picture_are_2n(drawn, n):
@@ -113,6 +114,7 @@ def test_the_rim_shows_the_thickness_and_the_stem(drawn):
         assert abs(distance - expected).min() < 2 * pixel
 
 
+@pytest.mark.slow
 @needs_opengl
 def test_animations_loop_and_move(monkeypatch):
     scene = scene_of(2)

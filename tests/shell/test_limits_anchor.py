@@ -52,6 +52,7 @@ def test_torque_on_a_stiff_half_space(standing: Resonator) -> None:
     assert found.frequency < mode.frequency
 
 
+@pytest.mark.slow
 def test_balanced_mode_hardly_reaches_the_base(standing: Resonator) -> None:
     """N = 2 dies out along the stem; a stem a fifth as long lets orders of magnitude more through."""
     short = hemisphere(radius=15e-3, thickness=0.86e-3, support="stem", stem=Stem(2.5e-3, 10e-3, 0.5e-3))

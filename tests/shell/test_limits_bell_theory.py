@@ -99,6 +99,7 @@ def test_pattern_19_without_its_cosine_only_shears_the_hemisphere():
     assert sp.simplify(shear + 3 * sp.sin(phi) ** 4 / r) == 0
 
 
+@pytest.mark.slow
 def test_coupling_c_1_comes_only_from_the_printed_parity_of_equation_16():
     assert symbolic.coupling_stiffness(two_patterns()) == 0
     printed = symbolic.coupling_stiffness(symbolic.printed_patterns())

@@ -79,6 +79,7 @@ def test_root_fills_its_outline(side: str, ends: float, h: float, fillet: float)
     assert 2 * pi * table.volume.sum() == pytest.approx(pappus(h, stem, collar), rel=1e-12)
 
 
+@pytest.mark.slow
 def test_random_roots_are_conforming_and_never_folded() -> None:
     rng = np.random.default_rng(31)
     for _ in range(150):

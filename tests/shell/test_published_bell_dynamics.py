@@ -1,5 +1,6 @@
 """BVG paper equations (7)–(15) and HRG paper equation (15): against textbook coordinates and motion in a fixed frame."""
 
+import pytest
 import sympy as sp
 
 from shell.derivation import bell_dynamics as bell
@@ -59,6 +60,7 @@ def test_printed_equilibrium_holds_around_and_errs_along_the_meridian():
     assert sp.simplify(left - (bell.stress(0, 2) - bell.stress(0, 1)) * sp.sin(phi) / bell.r_z) == 0
 
 
+@pytest.mark.slow
 def test_acceleration_is_the_second_derivative_in_a_fixed_frame():
     """A point of the body at distance a from the origin, moved by u, in a frame that turns about z by ∫Ω dt."""
     turn = sp.Function("psi")(t)

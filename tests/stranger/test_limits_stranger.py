@@ -89,6 +89,7 @@ def test_a_null_departs_from_the_baseline_by_less_than_can_be_seen(tmp_path):
     assert snr_again(truth) * np.sqrt(rows) < 3
 
 
+@pytest.mark.slow
 def test_the_same_seed_gives_the_same_files(tmp_path):
     for folder in ("a", "b"):
         make_campaign(8, "effect", "hysteresis", 3.0, runs=1, folder=tmp_path / folder)

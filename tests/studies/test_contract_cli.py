@@ -82,6 +82,7 @@ def test_debug_shows_the_traceback(capsys):
     assert "Traceback" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_json_is_one_object_and_nothing_else():
     done = hrg("fit", "frequency", "studies/papers/hrg_table1.csv", "--json")
     assert done.returncode == 0, done.stderr

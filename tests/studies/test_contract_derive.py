@@ -171,6 +171,7 @@ def test_latex_fragment_is_balanced_and_tagged(capsys):
     assert said.out.isascii()
 
 
+@pytest.mark.slow
 def test_latex_equations_are_typeset_by_an_independent_parser(capsys):
     from matplotlib.mathtext import MathTextParser
 
@@ -213,6 +214,7 @@ def test_unusable_arguments_end_with_one_sentence(words, capsys):
     assert said.err.startswith("hrg: ")
 
 
+@pytest.mark.slow
 def test_the_bell_is_derived_beside_its_numbers(capsys):
     status, said = speak(capsys, "--bell", "--json")
     assert status == 0

@@ -134,6 +134,7 @@ def test_a_request_to_end_that_falls_into_a_callback_is_not_lost():
     assert done.stderr == "hrg: interrupted.\n"
 
 
+@pytest.mark.slow
 def test_a_request_to_end_that_is_swallowed_comes_again_but_leaves_clearing_up_alone():
     """Compiled modules clear errors that they do not expect; what clears up after an interruption takes its time."""
     script = (

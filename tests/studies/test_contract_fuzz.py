@@ -269,6 +269,7 @@ TABLES = {
 }
 
 
+@pytest.mark.slow
 def test_mutated_toml_files_never_harm(tmp_path):
     flag = tmp_path / "evaluated"
     accepted, harmed = {}, {}
@@ -291,6 +292,7 @@ def test_mutated_toml_files_never_harm(tmp_path):
     assert all(accepted.values())  # some mutations are harmless
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", TABLES)
 def test_mutated_tables_never_harm(tmp_path, name):
     write, read = TABLES[name]
@@ -325,6 +327,7 @@ def test_mutated_raw_files_through_a_map_never_harm(tmp_path):
     assert 0 < accepted < CASES
 
 
+@pytest.mark.slow
 def test_a_drafted_map_of_a_mutated_file_is_valid_toml(tmp_path):
     """Names and cells of a hostile file cannot break out of the map that is drafted from it."""
     rng = np.random.default_rng(5)

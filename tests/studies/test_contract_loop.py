@@ -118,6 +118,7 @@ def test_keys_of_the_loops_carry_their_units(card):
     assert units["loop.frequency_split_mHz"] == "mHz"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("mode", "loops"), [("force-rebalance", ("GA", "GF", "GR", "GQ")), ("whole-angle", ("GA", "GF", "GQ"))]
 )

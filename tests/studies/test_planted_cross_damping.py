@@ -134,6 +134,7 @@ def test_a_gain_that_fast_rows_hide_shows_in_their_means():
     assert study.held_out.averages.ratio > 1.5
 
 
+@pytest.mark.slow
 def test_pure_noise_gains_nothing(tmp_path, capsys):
     """White noise, and a wandering bias, over a temperature cycle: no gain on data left out."""
     time, temperature = make_profile()

@@ -36,6 +36,7 @@ def test_noise_left_by_the_wiener_filter_is_what_its_spectrum_says(study):
     assert study.figure5.error_after < 0.5 * study.figure5.error_before
 
 
+@pytest.mark.slow
 def test_kalman_figures(study):
     """Noise is removed; the rate estimate is closer to the pulse than the output, but only at the finest step."""
     assert study.figure6.noise_before / study.figure6.noise_after > 10

@@ -13,6 +13,8 @@ from studies.papers import hrg
 from studies.reports.mode_picture import mode_blocks
 from studies.reports.page import Chapter, render_page
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):

@@ -68,6 +68,7 @@ def test_the_residual_is_the_noise_and_the_card_was_far_from_it(found):
         assert rung.as_shipped > 10 * rung.noise
 
 
+@pytest.mark.slow
 def test_the_intervals_hold_the_device(found, device, card):
     truth = {value.name: value.value for value in device.uncertain}
     priors = {value.name: value for value in card.uncertain}
@@ -92,6 +93,7 @@ def test_what_the_data_does_not_say_stays_at_its_prior(found):
     )
 
 
+@pytest.mark.slow
 def test_the_saved_card_predicts_the_runs_and_an_unseen_one_from_their_chambers(found, device, records, tmp_path):
     save_card(found.instrument, tmp_path / "calibrated.toml")
     saved = load_card(tmp_path / "calibrated.toml")

@@ -196,6 +196,7 @@ def test_radiation_and_conduction_are_told_apart_by_a_cold_and_a_hot_step():
     assert np.sqrt(np.mean(np.square(scores))) < 2.0
 
 
+@pytest.mark.slow
 def test_a_common_factor_of_capacity_and_links_is_named_as_undetermined():
     follower = NetworkFollower((CONDUCTANCE, EXCHANGE, Constant("capacity", 2.0, 0.1, 50.0)), radiating, "shell", 1)
     fit = identify([radiative_record(np.random.default_rng(1))], follower, FREE_LAW)

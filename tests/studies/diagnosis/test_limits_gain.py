@@ -1,12 +1,14 @@
 """Limit: a block that alone sees the start of a run cannot make the held-out figure explode."""
 
 import numpy as np
+import pytest
 
 from studies.diagnosis.campaign import load_campaign
 from studies.diagnosis.investigate import investigate
 from studies.record import Record
 
 
+@pytest.mark.slow
 def test_initial_state_that_one_block_alone_sees_is_refitted_there():
     """A resonator that follows its housing at once: e^(−t/τ) is over before the second block begins."""
     t = np.arange(0.0, 15000.0, 10.0)
@@ -20,6 +22,7 @@ def test_initial_state_that_one_block_alone_sees_is_refitted_there():
     assert found["held_out_rms"] < 1.1 * found["residual_rms"]
 
 
+@pytest.mark.slow
 def test_a_start_far_from_equilibrium_does_not_spoil_a_single_run():
     """30 K from equilibrium, which is 10⁴ times the noise; two hours later nothing of it is left."""
     t = np.arange(0.0, 36000.0, 10.0)

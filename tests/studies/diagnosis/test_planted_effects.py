@@ -100,6 +100,7 @@ def test_two_effects_are_both_found():
     assert {"hysteresis", "amplitude-frequency"} <= found, (verdict.causes, truth)
 
 
+@pytest.mark.slow
 def test_inseparable_pair_is_answered_as_a_set():
     """A drifting clock and an ageing frequency are the same data without a reference clock."""
     verdict, _ = diagnose("plain/2", "white", ("clock-drift",), seed=6000, only=("frequency_Hz",))
@@ -138,6 +139,7 @@ def test_reference_clock_tells_a_drifting_clock_from_ageing(hidden):
     assert verdict.responses["frequency_Hz"].verdict == "explained"
 
 
+@pytest.mark.slow
 def test_reference_clock_finds_a_drift_that_the_record_hides():
     """A drift of the size of the run-to-run noise: the record alone is adequate, with the reference it is named."""
     rng = np.random.default_rng(9000)

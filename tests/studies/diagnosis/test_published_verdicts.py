@@ -58,6 +58,7 @@ def test_the_step_of_an_axis_is_named_with_its_moment(chamber, axis, when):
         assert verdict.responses["bias_deg_per_h"].verdict == "explained"
 
 
+@pytest.mark.slow
 def test_noise_of_the_third_axis_is_split_into_white_and_wander(chamber):
     """Known: a cubic leaves 196 °/h, white noise is 73."""
     (found,) = diagnose(chamber / "run_y.csv").as_dict()["responses"].values()
@@ -82,6 +83,7 @@ def resistor(gap):
     return records
 
 
+@pytest.mark.slow
 def test_a_resistor_that_relaxes_from_run_to_run_ages():
     """Known: -8.8, -1.7 and -2.6 ppm from run to run, white noise 0.08 ppm of 10 kilohm."""
     verdict = diagnose(*resistor(7200.0))
@@ -102,6 +104,7 @@ def test_a_voltmeter_in_an_air_bath_gets_no_false_name():
     assert found["white"] / 1e4 < 0.33e-6
 
 
+@pytest.mark.slow
 def test_the_thermometer_of_a_crystal_is_slower_than_the_crystal(tmp_path):
     """Known: by 100 to 130 s, of a crystal at 25 MHz. To the frequency it is as if a gradient shifted it: one set."""
     column = '# no meaning found for the column "column 3"'
@@ -112,5 +115,6 @@ def test_the_thermometer_of_a_crystal_is_slower_than_the_crystal(tmp_path):
     assert cause.probability > 0.8
 
 
+@pytest.mark.slow
 def test_steps_of_liquid_on_a_crystal_are_not_adequate(tmp_path):
     assert diagnose(bring_in("qcm_steps.txt", tmp_path)).verdict != "adequate"

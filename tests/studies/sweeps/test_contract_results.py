@@ -161,6 +161,7 @@ def test_missing_dask_is_said(monkeypatch):
         run_study(SPEC, scheduler="tcp://127.0.0.1:1")
 
 
+@pytest.mark.slow
 def test_no_scheduler_is_said(tmp_path):
     pytest.importorskip("distributed", reason="the extra 'cluster' (dask[distributed]) is not installed")
     from studies.sweeps import cluster as module

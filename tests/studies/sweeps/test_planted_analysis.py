@@ -33,6 +33,7 @@ def ishigami(tmp_path_factory):
     return study(folder, "ishigami", sampling, *box("x1", "x2", "x3", "nothing"))
 
 
+@pytest.mark.slow
 def test_sobol_indices_of_ishigami(ishigami):
     """Ishigami & Homma 1990, a = 7, b = 0.1: the closed form of the variances."""
     found = sobol_indices(ishigami, "ishigami")
@@ -51,6 +52,7 @@ def test_sobol_indices_of_ishigami(ishigami):
     assert found.total_high - found.total_low == pytest.approx([0.17, 0.08, 0.06, 0], abs=0.05)
 
 
+@pytest.mark.slow
 def test_sobol_indices_equal_scipy(ishigami):
     from scipy.stats import sobol_indices as oracle
 
@@ -61,6 +63,7 @@ def test_sobol_indices_equal_scipy(ishigami):
     assert found.total == pytest.approx(expected.total_order, abs=1e-12)
 
 
+@pytest.mark.slow
 def test_no_influence_is_exactly_none(ishigami):
     found = sobol_indices(ishigami, "ishigami")
     assert (found.first[3], found.total[3], found.total_low[3], found.total_high[3]) == (0, 0, 0, 0)
@@ -102,6 +105,7 @@ def test_slopes_and_tornado_of_a_cubic_law(tmp_path, functions):
     assert abs(nothing.slope) <= nothing.uncertainty + 1e-15
 
 
+@pytest.mark.slow
 def test_yield_and_reach_of_a_disc(tmp_path, functions):
     limit = 0.5
     sampling = {"method": "sobol", "cases": 1024, "seed": 2}

@@ -147,6 +147,7 @@ def test_failures_keep_their_reason_and_do_not_stop_the_rest(tmp_path, functions
     assert "one is not welcome" in (tmp_path / "out" / "report.html").read_text()
 
 
+@pytest.mark.slow
 def test_a_design_that_kills_its_worker_is_found_and_the_rest_is_computed(tmp_path, functions, hrg):
     spec = tmp_path / "murder.toml"
     spec.write_text(
@@ -160,6 +161,7 @@ def test_a_design_that_kills_its_worker_is_found_and_the_rest_is_computed(tmp_pa
     assert [place for place, status, _ in rows_of(tmp_path / "out") if status == "lost"] == [3]
 
 
+@pytest.mark.slow
 def test_python_needs_to_be_allowed_and_must_exist(tmp_path, functions, hrg):
     spec = tmp_path / "square.toml"
     spec.write_text(spec_of("square", 'method = "grid"', 'name = "user.x"\nvalues = [1, 2]'))
@@ -173,6 +175,7 @@ def test_python_needs_to_be_allowed_and_must_exist(tmp_path, functions, hrg):
     assert "cube" in missing.stderr
 
 
+@pytest.mark.slow
 def test_changed_spec_card_or_function_is_refused_with_what_changed(tmp_path, functions):
     spec = tmp_path / "square.toml"
     text = spec_of("square", 'method = "grid"', 'name = "user.x"\nvalues = [1, 2]')
@@ -267,6 +270,7 @@ def test_full_disk_keeps_what_was_written_and_says_so(tmp_path, functions, hrg):
     assert len(rows_of(tmp_path / "out")) == 3000
 
 
+@pytest.mark.slow
 def test_folder_that_cannot_be_made_and_folder_without_study(tmp_path, functions, hrg):
     spec = tmp_path / "square.toml"
     spec.write_text(spec_of("square", 'method = "grid"', 'name = "user.x"\nvalues = [1]'))
@@ -352,6 +356,7 @@ def test_a_flipped_bit_is_found_and_its_case_computed_again(tmp_path, functions,
     assert "the store is damaged" in again.stderr
 
 
+@pytest.mark.slow
 def test_failed_cases_are_computed_again_when_asked(tmp_path, functions, hrg):
     spec = tmp_path / "spec.toml"
     spec.write_text(spec_of("square", 'method = "grid"', 'name = "user.x"\nvalues = [1, 2, 3]'))
@@ -367,6 +372,7 @@ def test_failed_cases_are_computed_again_when_asked(tmp_path, functions, hrg):
     assert json.loads(hrg(*run, "--retry-failed").stdout)["failed"] == 0
 
 
+@pytest.mark.slow
 def test_modules_of_the_working_directory_are_not_run_by_workers(tmp_path, monkeypatch):
     (tmp_path / "signal.py").write_text("open('was_run', 'w').write('x')\nraise SystemExit('mine')\n")
     monkeypatch.chdir(tmp_path)
