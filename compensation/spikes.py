@@ -14,11 +14,11 @@ def find_spikes(values: Array, least: float = 0.0) -> NDArray[np.bool_]:
     """Mark readings (m,) that stand out from their neighbours by more than 6 robust standard deviations.
 
     What the neighbours say is the median of (y_{i−k} + y_{i+k})/2, k = 1, 2, 3, which follows any straight trend; at the
-    ends of the series that of 2 y_{i+k} − y_{i+2k}, looking inwards, whose distance counts half. The distance from it must exceed 6 times 1.4826 times
-    the median distance of the whole series, be the largest within two rows, and, once the reading is replaced by what its
-    neighbours say, exceed 4 times the distance that is usual next to it, so that bends, gaps and jumps are no spikes.
-    Spikes that are found are replaced, and the rest is searched again: one does not hide another beside it. Missing
-    readings, NaN, are not marked, nor is anything in fewer than seven.
+    ends of the series that of 2 y_{i+k} − y_{i+2k}, looking inwards, whose distance counts half. The distance from it must
+    exceed 6 times 1.4826 times the median distance of the whole series, be the largest within two rows, and exceed 4 times
+    the distance that is usual next to it without this reading, so that bends, gaps and jumps are no spikes. Spikes that are
+    found are left out, and the rest is searched again: one does not hide another beside it. Missing readings, NaN, are not
+    marked, nor is anything in fewer than seven.
 
     Parameters
     ----------
@@ -44,7 +44,6 @@ def _stand_out(values: Array) -> NDArray[np.bool_]:
     # Rounded readings may have no spread at all: then the smallest distance takes its place.
     spread = max(1.4826 * float(np.median(distance)), float(positive.min()) if positive.size else 1.0)
     while True:
-        distance = _distance(left)
         around = np.pad(distance, REACH)
         peak = distance >= np.fmax.reduce([_shifted(around, k) for k in (-2, -1, 1, 2)])
         candidates = np.flatnonzero(peak & (distance > SPIKE * spread))
@@ -56,6 +55,7 @@ def _stand_out(values: Array) -> NDArray[np.bool_]:
         if not found.size:
             return np.isnan(left)
         left[found] = np.nan
+        distance = _distance(left)
 
 
 def _distance(values: Array) -> Array:

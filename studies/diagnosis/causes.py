@@ -11,7 +11,7 @@ from studies.diagnosis.inquiry import Inquiry, begin, inquire, read_thermometer
 from studies.diagnosis.model import Fit, exact_forms, fit
 from studies.diagnosis.response import RESPONSES
 from studies.diagnosis.search import Hypothesis, Place
-from studies.diagnosis.verdict import Cause, Interval, weigh
+from studies.diagnosis.verdict import NINETY, Cause, Interval, weigh
 from studies.diagnosis.witness import look
 from studies.effects import Effect, find_effect
 
@@ -122,11 +122,11 @@ def parameters_of(model: Fit, index: int) -> dict[str, Interval]:
     out: dict[str, Interval] = {}
     spreads = shape_spread(model, index)
     for parameter, value, sd in zip(term.effect.shape, term.shape, spreads, strict=True):
-        half = 1.645 * sd
-        if parameter.logarithmic and half > 0:
+        if parameter.logarithmic and sd > 0:
+            half = NINETY * sd
             out[parameter.name] = Interval(value, value * float(np.exp(-half)), value * float(np.exp(half)))
         else:
-            out[parameter.name] = Interval(value, value - half, value + half)
+            out[parameter.name] = Interval.about(value, sd)
     begin = 0
     columns = np.flatnonzero(term.effect.spread > 0)
     values = model.solved.coefficients[places]
@@ -136,8 +136,7 @@ def parameters_of(model: Fit, index: int) -> dict[str, Interval]:
     ):
         at = np.flatnonzero(columns == begin)
         if at.size:
-            value, half = float(values[at[0]]), 1.645 * float(deviations[at[0]])
-            out[name] = Interval(value, value - half, value + half)
+            out[name] = Interval.about(float(values[at[0]]), float(deviations[at[0]]))
         begin += len(coefficient.spread)
     return out
 

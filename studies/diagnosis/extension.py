@@ -23,7 +23,6 @@ from studies.record import Record
 if TYPE_CHECKING:
     from studies.instrument.card import Instrument
 
-NINETY = 1.645
 WIDER = 3.0
 """Of what a diagnosis knows of an effect, the prior with which a calibration finds it anew beside all other values."""
 
@@ -120,7 +119,7 @@ def entry_of(model: Fit, index: int, column: str) -> dict[str, Any]:
         numbers[term.effect.shape[0].name] = float(np.clip(values[0], 0.0, 1.0))
     numbers |= {key: value for key, value in term.effect.numbers(values, column).items() if np.any(value)}
     for key, known in parameters_of(model, index).items():
-        sd = float(min(WIDER * (known.high - known.low) / (2 * NINETY), abs(known.value)))
+        sd = float(min(WIDER * known.sd, abs(known.value)))
         if sd > 0 and isinstance(numbers.get(key), float):
             numbers[key] = {"value": numbers[key], "sd": sd}
     return {"name": term.name, "response": column, **numbers}

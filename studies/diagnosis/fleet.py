@@ -367,8 +367,7 @@ def _sizes(share: Share, scored: Mapping[str, Mapping[str, Standing]]) -> dict[s
 
 
 def _interval(value: float, variance: float) -> Interval:
-    half = 1.645 * float(np.sqrt(max(variance, 0.0)))
-    return Interval(float(value), float(value) - half, float(value) + half)
+    return Interval.about(float(value), float(np.sqrt(max(variance, 0.0))))
 
 
 def _values_of(found: Mapping[str, Diagnosis]) -> list[Value]:
@@ -402,7 +401,7 @@ def against_others(name: str, of: Mapping[str, Interval]) -> Value:
     """Hold every device against the mean and the scatter of the others: of at least three, else nobody is odd."""
     devices = list(of)
     value = np.array([of[d].value for d in devices])
-    sd = np.array([(of[d].high - of[d].low) / (2.0 * 1.645) for d in devices])
+    sd = np.array([of[d].sd for d in devices])
     odd: dict[str, float] = {}
     for k, device in enumerate(devices if len(devices) > 2 else []):
         rest: FloatArray = np.delete(value, k)

@@ -16,7 +16,7 @@ from scipy.constants import zero_Celsius
 from studies.diagnosis.baseline import START, Tangent, View
 from studies.diagnosis.campaign import Campaign
 from studies.diagnosis.response import RESPONSES, Response
-from studies.diagnosis.verdict import Shift
+from studies.diagnosis.verdict import NINETY, Shift
 from studies.effects.states import FloatArray, States, average
 from studies.instrument.tables.bias import TERMS
 from studies.law import law_of
@@ -294,6 +294,6 @@ def shifts_of(model: "Fit") -> list[Shift]:
     deviations = np.sqrt(np.maximum(np.diag(model.solved.covariance), 0.0))
     for k, value in enumerate(baseline.values):
         z, sd = float(model.solved.coefficients[k]), float(deviations[k])
-        ends = (at(value, z - 1.645 * sd), at(value, z + 1.645 * sd))
+        ends = (at(value, z - NINETY * sd), at(value, z + NINETY * sd))
         out.append(Shift(value.name, value.value, at(value, z), ends[0], ends[1], z))
     return out

@@ -19,7 +19,7 @@ from compensation.decimation import average_groups
 from studies.diagnosis.constants import CONSTANTS
 from studies.diagnosis.relative_law import Law
 from studies.diagnosis.table_noise import Scale, make_scale
-from studies.diagnosis.verdict import Cause, Interval, ResponseResult, Verdict, weigh
+from studies.diagnosis.verdict import NINETY, Cause, Interval, ResponseResult, Verdict, weigh
 from studies.effects import Effect, library
 from studies.effects.states import FloatArray
 from studies.shown import Shown
@@ -171,7 +171,7 @@ def study_steady_table(
     size = float(
         np.ptp(winner.columns @ np.linalg.lstsq(np.concatenate([base, winner.columns], 1), f, rcond=None)[0][3:])
     )
-    spread = 1.645 * float(np.sqrt(winner.ssq / max(T.size - 3 - winner.columns.shape[1], 1)))
+    spread = NINETY * float(np.sqrt(winner.ssq / max(T.size - 3 - winner.columns.shape[1], 1)))
     cause = Cause(
         winner.effect.name,
         "frequency_Hz",

@@ -17,6 +17,10 @@ if TYPE_CHECKING:
 VERDICTS = ("unexplained", "not-identifiable", "explained", "adequate")
 
 
+NINETY = 1.645
+"""Standard deviations on either side that hold 90 % of a normal distribution."""
+
+
 @dataclass(frozen=True)
 class Interval:
     """A value with its 90 % interval."""
@@ -24,6 +28,16 @@ class Interval:
     value: float
     low: float
     high: float
+
+    @classmethod
+    def about(cls, value: float, sd: float) -> "Interval":
+        """Return the interval of a value with a normal error."""
+        return cls(value, value - NINETY * sd, value + NINETY * sd)
+
+    @property
+    def sd(self) -> float:
+        """Its standard deviation, were its error normal."""
+        return (self.high - self.low) / (2.0 * NINETY)
 
     def as_dict(self) -> dict[str, float]:
         """Return the object of the contract."""

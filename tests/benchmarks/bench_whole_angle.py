@@ -8,11 +8,9 @@ import time
 
 import numpy as np
 
-from compensation.controllers import Loops
 from compensation.electronics import Channels, Electronics, LoopNoise
 from compensation.wave import from_quality
-from compensation.wave_fit import fit_whole_angle
-from compensation.whole_angle import simulate_whole_angle
+from tests.compensation.test_recovery_whole_angle import run_and_fit
 
 CARDS = {
     # Q, anisotropy, split (Hz), precession (deg/s), gain ratio, phase (rad), pick-off noise (1/√Hz)
@@ -51,19 +49,7 @@ def one_run(card: tuple[float, ...], seed: int) -> dict[str, tuple[float, bool]]
     )
     pickoff = Channels(gain, 0.0, rng.uniform(-3e-3, 3e-3))
     electronics = Electronics(pickoff, Channels(phase=phase), LoopNoise(noise, 10 * noise, 5e-5, thermal=3e-9))
-    t = np.arange(0.0, 5400.0, 2.0)
-    command = np.radians(precession) * np.where(t < 2700, 1.0, -1.0)
-    run = simulate_whole_angle(wave, electronics, Loops(), t, rate=7e-5, precession=command, generator=rng)
-    fit = fit_whole_angle(
-        t,
-        run.angle,
-        run.rate,
-        coupling=wave.coupling,
-        applied=7e-5,
-        decay=run.decay,
-        frequency=run.omega,
-        quadrature=run.quadrature,
-    )
+    fit = run_and_fit(wave, electronics, lambda t: np.radians(precession) * np.where(t < 2700, 1.0, -1.0), rng)
     drift = wave.damping_split / (2 * wave.coupling)
     truth = {
         "decay": 1 / wave.tau,

@@ -4,29 +4,13 @@ Sources and licences: `tests/reference/measured/SOURCES.md`.
 """
 
 import json
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 from studies.cli import main
 from studies.record import read_record
-
-DATA = Path("tests/reference/measured")
-
-
-def bring_in(raw, folder, *edits):
-    """Draft a map, correct it as a person would, import; return the path of the record."""
-    draft = folder / "map.toml"
-    assert main(["import", str(DATA / raw), "--draft", str(draft)]) == 0
-    text = draft.read_text(encoding="utf-8")
-    for old, new in edits:
-        assert old in text
-        text = text.replace(old, new)
-    draft.write_text(text, encoding="utf-8")
-    words = ["--map", str(draft), "--out", str(folder / "run.csv"), "--preview", str(folder / "preview.html")]
-    assert main(["import", str(DATA / raw), *words]) == 0
-    return folder / "run.csv"
+from tests.generator.measured import DATA, bring_in
 
 
 def fit(run, capsys, *words):
@@ -40,7 +24,7 @@ def test_a_gyro_of_three_axes_in_a_chamber(tmp_path, capsys):
 
     A cubic is known to leave 196 °/h of y, white noise 73; the steps of x at 1 021 s keep its gain small.
     """
-    bring_in("imu_chamber.txt", tmp_path, ('unit = "deg/s"', 'unit = "rad/s"'))
+    bring_in("imu_chamber.txt", tmp_path, ('unit = "deg/s"', 'unit = "rad/s"'), preview=True)
     y = read_record(tmp_path / "run_y.csv")
     assert np.median(np.diff(y["time_s"])) == pytest.approx(1.517, abs=0.01)  # 0.5057 s a row, every third
     assert y.instrument == "axis y"
@@ -56,7 +40,7 @@ def test_a_gyro_of_three_axes_in_a_chamber(tmp_path, capsys):
 def test_a_gyro_in_bursts_with_raw_temperatures(tmp_path, capsys):
     """Of 1 770 °/h in x a law in temperature leaves about 20 (burst means: 19); magnetometers in [T] are no temperatures."""
     scale = ("scale = 1.0 ", "scale = 0.00390625 "), ("offset = 0.0 ", "offset = -231.0 ")
-    bring_in("pan_bursts.csv", tmp_path, *scale)
+    bring_in("pan_bursts.csv", tmp_path, *scale, preview=True)
     run = tmp_path / "run_x.csv"
     found = fit(run, capsys, "--save", str(tmp_path / "m.toml"))
     guarded = found["methods"]["guarded"]
@@ -71,7 +55,7 @@ def test_a_crystal_against_satellites_without_a_header_line(tmp_path):
     """Nanoseconds since 1970, ppm about 25 MHz: the map is drafted from the values, the frequency is named by hand."""
     column = '# no meaning found for the column "column 3"'
     named = '[[file.column]]\nfrom = "column 3"\nto = "frequency_Hz"\nunit = "ppm"\nnominal_Hz = 25e6\n'
-    record = read_record(bring_in("dcxo_gps.txt", tmp_path, (column, named)))
+    record = read_record(bring_in("dcxo_gps.txt", tmp_path, (column, named), preview=True))
     assert record["frequency_Hz"][0] == pytest.approx(25e6 * (1 - 0.7551e-6), abs=1e-6)
     assert record["time_s"][-1] / 3600 == pytest.approx(61, abs=1)
     assert record.start.year == 2021
@@ -79,7 +63,7 @@ def test_a_crystal_against_satellites_without_a_header_line(tmp_path):
 
 
 def test_a_crystal_in_liquid_without_a_header_line(tmp_path):
-    record = read_record(bring_in("qcm_steps.txt", tmp_path))
+    record = read_record(bring_in("qcm_steps.txt", tmp_path, preview=True))
     assert np.ptp(record["time_s"]) / 3600 == pytest.approx(3.4, abs=0.1)
     assert record["frequency_Hz"][0] == pytest.approx(10016223.0)
     assert record["housing_temperature_degC"][0] == pytest.approx(24.1)

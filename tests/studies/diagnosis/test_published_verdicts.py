@@ -7,29 +7,13 @@ of its size; they may be left open, never called noise of another size or given 
 
 import datetime
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 
-from studies.cli import main
 from studies.diagnosis.campaign import load_campaign
 from studies.diagnosis.investigate import investigate
 from studies.record import read_record
-
-DATA = Path("tests/reference/measured")
-
-
-def bring_in(raw, folder, *edits):
-    """Draft a map, correct it as a person would, import; return the path of the record."""
-    draft, run = folder / "map.toml", folder / "run.csv"
-    assert main(["import", str(DATA / raw), "--draft", str(draft)]) == 0
-    text = draft.read_text(encoding="utf-8")
-    for old, new in edits:
-        assert old in text
-        text = text.replace(old, new)
-    draft.write_text(text, encoding="utf-8")
-    assert main(["import", str(DATA / raw), "--map", str(draft), "--out", str(run)]) == 0
-    return run
+from tests.generator.measured import DATA, bring_in
 
 
 def diagnose(*records):
