@@ -2,7 +2,7 @@
 
 import re
 
-SYMBOLS = {"deg": "°", "degC": "°C", "day": "d", "rt": "√"}
+SYMBOLS = {"um": "µm", "deg": "°", "degC": "°C", "day": "d", "rt": "√"}
 UNIT = re.compile(r"(10)?(per|rt|degC|deg|mrad|ppm|day|[GMkmun]?(?:Pa|Hz|W|J|V|eV|N|g|K|s)|[cmunp]?m|pF|h|1)([2-9])?")
 RATES = {
     # words of a key: one unit, so that what follows belongs to it as a whole
@@ -30,6 +30,8 @@ def split_unit(key: str) -> tuple[str, str]:
     first = len(words)
     while first > 1 and UNIT.fullmatch(words[first - 1]):
         first -= 1
+    while words[first : first + 1] == ["1"] and words[first + 1 : first + 2] not in ([], ["per"]):
+        first += 1  # a wave number, as in cosine_1_um
     unit = " ".join(words[first:])
     for spelled, symbol in RATES.items():
         unit = re.sub(rf"\b{spelled}\b", symbol, unit)

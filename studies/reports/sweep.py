@@ -10,7 +10,7 @@ from studies.reports import sweep_figures as figures
 from studies.reports.digits import plain
 from studies.reports.page import Block, Chapter, Facts, Table, Text, render_page
 from studies.reports.sweep_analysis import influence_chapters, search_chapters, tolerance_chapters
-from studies.reports.sweep_cells import main_columns, number, percent, short, spread, to_error
+from studies.reports.sweep_cells import main_columns, number, percent, spread, to_error, within
 from studies.sweeps.design import nominal_design
 from studies.sweeps.parameters import TEMPERATURE, set_parameters
 from studies.sweeps.sensitivity import linear_shares, local_slopes, sobol_indices
@@ -108,7 +108,7 @@ def _short(results: "Results") -> list[Block]:
     for column in main_columns(results)[:2]:
         n = _numbers(results, column)
         unit = "" if column.unit == "1" else f" {column.unit}"
-        least, greatest, nominal = (f"{short(n[key])}" for key in ("least", "greatest", "nominal"))
+        least, greatest, nominal = (within(n[key], n["deviation"]) for key in ("least", "greatest", "nominal"))
         facts.append((column.label, f"{least} … {greatest}{unit}", f"nominal {nominal}{unit}"))
     found = _yield(results)
     if found is not None:
@@ -174,15 +174,20 @@ def _statistics(results: "Results") -> Table:
             [
                 column.label,
                 column.unit,
-                *(to_error(n[key], n["error"]) for key in ("nominal", "mean")),
+                *(_digits(n, key) for key in ("nominal", "mean")),
                 spread(n["deviation"], n["mean"]),
-                *(to_error(n[key], n["error"]) for key in ("least", "greatest")),
+                *(_digits(n, key) for key in ("least", "greatest")),
             ]
         )
         rows[-1].append(plain(n["error"], 2) if n["error"] is not None and np.isfinite(n["error"]) else "")
     heads = ["Quantity", "Unit", "Nominal", "Mean", "Standard deviation", "Least", "Greatest", "Numerical error"]
     note = "The numerical error is the largest estimate of the solver for any design, against the exact solution of its theory."
     return Table("All designs with a value", heads, rows, note)
+
+
+def _digits(n: Mapping[str, Any], key: str) -> str:
+    known = n["error"] is not None and np.isfinite(n["error"])
+    return to_error(n[key], n["error"]) if known else within(n[key], n["deviation"])
 
 
 def _designs(results: "Results") -> Table:

@@ -120,7 +120,8 @@ def tolerance_chapters(results: "Results") -> list[Chapter]:
             + ", ".join(_reach(p, reach.part) for p in study.parameters if not isinstance(p.nominal, str))
             + ". It is based on the sampled designs alone; a worst-case search tests it."
         )
-    return [Chapter("Tolerances", [Table("Yield", heads, rows, note), Text(words, "note")])]
+    found = _findings(results, "tolerance")
+    return [Chapter("Tolerances", [*found, Table("Yield", heads, rows, note), Text(words, "note")])]
 
 
 def _yield_cells(results: "Results", requirements: Any) -> list[str]:
@@ -132,14 +133,19 @@ def _yield_cells(results: "Results", requirements: Any) -> list[str]:
 def _reach(parameter: "StudyParameter", part: float) -> str:
     nominal = float(parameter.nominal)
     low, high = (nominal + part * (end - nominal) for end in (parameter.low, parameter.high))
-    return f"{figures.label(parameter.name, parameter.unit)} {low:.8g} … {high:.8g}"
+    return f"{figures.label(parameter.name, parameter.unit)} {low:.4g} … {high:.4g}"
 
 
 def search_chapters(results: "Results") -> list[Chapter]:
     """Return what the worst-case searches and inversions found."""
+    blocks = _findings(results, "worst-case", "inversion")
+    return [Chapter("Searches", blocks)] if blocks else []
+
+
+def _findings(results: "Results", *kinds: str) -> list[Block]:
     findings = results.store.findings()
     blocks: list[Block] = []
-    for search in results.study.searches:
+    for search in (one for one in results.study.searches if one.kind in kinds):
         found = findings.get(name_search(search))
         if found is None:
             blocks.append(
@@ -149,7 +155,7 @@ def search_chapters(results: "Results") -> list[Chapter]:
             blocks.append(Text(f"The search for {name_search(search)} failed: {found['failed']}", "warning"))
         else:
             blocks += SEARCHES[search.kind](results, found)
-    return [Chapter("Searches", blocks)] if blocks else []
+    return blocks
 
 
 def _worst_case(results: "Results", found: Mapping[str, Any]) -> list[Block]:

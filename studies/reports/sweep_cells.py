@@ -15,10 +15,10 @@ def main_columns(results: "Results") -> "list[Column]":
 
 
 def number(value: Any) -> str:
-    """Return a cell: eight digits of a number, text as it is, nothing for nothing."""
+    """Return a cell: eight digits of a number, text as it is, nothing for nothing and for no end."""
     if isinstance(value, str):
         return value
-    return "" if value is None or np.isnan(value) else f"{value:.8g}"
+    return "" if value is None or not np.isfinite(value) else f"{value:.8g}"
 
 
 def to_error(value: float | None, error: float | None) -> str:
@@ -36,9 +36,11 @@ def spread(deviation: float | None, mean: float | None) -> str:
     return f"{deviation:.3g}" if mean is None or deviation > 1e-12 * abs(mean) else "0"
 
 
-def short(value: float | None) -> str:
-    """Return six digits of a number, nothing for nothing."""
-    return "" if value is None or np.isnan(value) else f"{value:.6g}"
+def within(value: float | None, deviation: float | None) -> str:
+    """Return a number to a hundredth of the standard deviation about it, six digits of it without one, nothing for nothing."""
+    if value is None or np.isnan(value):
+        return ""
+    return to_error(value, deviation / 3) if deviation and np.isfinite(deviation) else f"{value:.6g}"
 
 
 def percent(share: float | None) -> str:

@@ -317,6 +317,9 @@ def test_every_key_of_a_table_is_explained_in_its_file():
         ("effect.0.growth_per_day", "1/d"),
         ("material.deviation.expansion.slope_per_K", "1/K²"),
         ("loss.inverse_q", "1"),
+        ("imperfection.wall.cosine_1_um", "µm"),
+        ("effect.0.drift_1", "1"),
+        ("effect.0.loop_1_per_K", "1/K"),
     ],
 )
 def test_a_key_carries_its_unit(key, unit):
