@@ -22,7 +22,7 @@ from compensation.derivative import differentiate
 from compensation.errors import CompensationError
 from compensation.memory import NO_MEMORY, Memory, follow_lag, follow_play
 from compensation.regression import fit_linear
-from compensation.stepwise import Selection
+from compensation.stepwise import StepwiseSelection
 
 Array = NDArray[np.float64]
 # Powers of f and ḟ in the terms of HRG paper eq. (21), in its order k₁ … k₉.
@@ -95,7 +95,7 @@ class BiasFit:
     covariance: Array
     naive_errors: Array
     theta: float
-    selection: Selection | None
+    selection: StepwiseSelection | None
     held_out: tuple[float, ...]
     state_range: tuple[float, float]
     rate_range: tuple[float, float]
@@ -242,7 +242,7 @@ def fit_terms(
     design: BiasDesign,
     terms: tuple[str, ...],
     theta: float | None = None,
-    selection: Selection | None = None,
+    selection: StepwiseSelection | None = None,
     scores: tuple[float, ...] = (),
 ) -> BiasFit:
     """Fit the given terms by least squares, with errors for independent rows and for remembering ones.

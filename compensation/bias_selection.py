@@ -20,7 +20,7 @@ from compensation.bias import PARENTS, TERMS, BiasDesign, BiasFit, BiasRun, fit_
 from compensation.coloured import estimate_theta, whiten
 from compensation.errors import CompensationError
 from compensation.memory import NO_MEMORY, Memory
-from compensation.stepwise import Selection, select_stepwise
+from compensation.stepwise import StepwiseSelection, select_stepwise
 
 Array = NDArray[np.float64]
 Method = Literal["paper", "guarded"]
@@ -190,7 +190,7 @@ def thermal_constant(pieces: Sequence[BiasRun]) -> float:
     return float(np.std(state) / np.sqrt(np.mean(rate**2)))
 
 
-def score_path(runs: Sequence[BiasRun], selection: Selection) -> tuple[float, ...]:
+def score_path(runs: Sequence[BiasRun], selection: StepwiseSelection) -> tuple[float, ...]:
     """Return the held-out standard deviation of each model on a selection's path, over that of the constant alone.
 
     Whole runs are held out, or blocks of a single one, as in `score_held_out`, but the terms stay those of the path.

@@ -2,11 +2,11 @@
 
 The noise of rows i, j of one run has the covariance
 
-    Σ_ij = white² v_i δ_ij + flicker² F(|t_i − t_j|) + walk² (min(t_i, t_j) − t₀)/1 h + offset²,
+    Σ_ij = white² v_i δ_ij + flicker² F(t_i, t_j) + walk² W(t_i, t_j) + offset²,
 
-F the mean of exponentials of 1 min, 4 min, … 68 h, whose spectrum is 1/f between; runs are independent. Rows may be
-uneven and have gaps; v_i is a row's relative white variance, 1/count of a block average. Levels come from the marginal
-likelihood of r ~ N(0, Σ + X Λ⁻¹ Xᵀ), X the columns of what else is unknown and Λ the precision of its prior, 0 for none:
+F and W those of flicker noise and a random walk (`wander`); runs are independent. Rows may be uneven and have gaps;
+v_i is a row's relative white variance, 1/count of a block average. Levels come from the marginal likelihood of
+r ~ N(0, Σ + X Λ⁻¹ Xᵀ), X the columns of what else is unknown and Λ the precision of its prior, 0 for none:
 
     −2 ln L = ln|Σ| + ln|Λ + XᵀΣ⁻¹X| + rᵀΣ⁻¹r − bᵀ(Λ + XᵀΣ⁻¹X)⁻¹b,   b = XᵀΣ⁻¹r
 
@@ -25,10 +25,9 @@ from scipy.linalg import cho_factor, cho_solve, solve_triangular
 from scipy.optimize import minimize
 
 from compensation.errors import CompensationError
+from compensation.wander import HOUR, flicker, random_walk
 
 Array = NDArray[np.float64]
-HOUR = 3600.0
-FLICKER_TIMES = 60.0 * 4.0 ** np.arange(7)
 LEAST, MOST = -7.0, 5.0  # ln of a slow level over the white one, one row each
 KINDS = ("white", "flicker", "walk", "offset")
 USUAL, SPREAD = -1.0, 3.0  # their weak prior, which keeps a level that the rows say nothing about from running away
@@ -88,16 +87,14 @@ class NoiseRows:
             x = np.round(t - t[0], 3)
             key = x.tobytes() + np.round(v, 9).tobytes()
             if key not in found:
-                apart = np.abs(x[:, None] - x[None, :])
-                flicker = np.mean([np.exp(-apart / tau) for tau in FLICKER_TIMES], axis=0)
-                found[key] = (flicker, np.minimum(x[:, None], x[None, :]) / HOUR, [])
+                found[key] = (flicker(x), random_walk(x), [])
             found[key][2].append(run)
-        return tuple((flicker, walk, tuple(runs)) for flicker, walk, runs in found.values())
+        return tuple((F, W, tuple(runs)) for F, W, runs in found.values())
 
     def covariance(self, run: int, noise: Noise) -> Array:
         """Covariance of the rows of one run."""
-        flicker, walk = next((f, w) for f, w, runs in self._groups if run in runs)
-        total: Array = noise.flicker**2 * flicker + noise.walk**2 * walk + noise.offset**2
+        F, W = next((F, W) for F, W, runs in self._groups if run in runs)
+        total: Array = noise.flicker**2 * F + noise.walk**2 * W + noise.offset**2
         total[np.diag_indices_from(total)] += noise.white**2 * self.variances[run]
         return total
 

@@ -18,9 +18,9 @@ from compensation.errors import CompensationError
 
 Array = NDArray[np.float64]
 FLAT = math.sqrt(2 * math.log(2) / math.pi)  # 0.664, Allan deviation of flicker noise with B = 1
-Noise = Literal["phase", "white", "flicker", "random walk"]
+NoiseKind = Literal["phase", "white", "flicker", "random walk"]
 # Slope of log σ against log τ: quantisation, angle random walk, bias instability, rate random walk.
-SLOPES: dict[Noise, float] = {"phase": -1.0, "white": -0.5, "flicker": 0.0, "random walk": 0.5}
+SLOPES: dict[NoiseKind, float] = {"phase": -1.0, "white": -0.5, "flicker": 0.0, "random walk": 0.5}
 
 
 @dataclass(frozen=True)
@@ -33,7 +33,7 @@ class AllanDeviation:
     tau: Array
     deviation: Array
     degrees_of_freedom: Array
-    noise: tuple[Noise, ...]
+    noise: tuple[NoiseKind, ...]
     low: Array
     high: Array
     confidence: float
@@ -130,7 +130,7 @@ def allan_deviation(
     )
 
 
-def equivalent_freedom(noise: Noise, n: int, m: int) -> float:
+def equivalent_freedom(noise: NoiseKind, n: int, m: int) -> float:
     """Return the equivalent degrees of freedom of σ²(m τ₀) from n phase points, NIST SP 1065, table 5."""
     if noise == "phase":
         return (n + 1) * (n - 2 * m) / (2 * (n - m))
@@ -201,14 +201,14 @@ def _overlapping(x: Array, m: int, step: float) -> float:
     return math.sqrt(float(second @ second) / (2 * second.size)) / (m * step)
 
 
-def _identify(tau: Array, deviation: Array) -> tuple[Noise, ...]:
+def _identify(tau: Array, deviation: Array) -> tuple[NoiseKind, ...]:
     """Name the noise whose slope is nearest to the local slope of the curve over about an octave either side.
 
     Quantisation (phase noise) can only rule from the shortest τ on: later, a slope of −1 is chance, and its many degrees
     of freedom would give that chance a weight.
     """
     u, v = np.log2(tau), np.log2(np.maximum(deviation, 1e-300))
-    kinds: list[Noise] = []
+    kinds: list[NoiseKind] = []
     for centre in u:
         near = np.abs(u - centre) <= 1.0
         slope = float(np.polyfit(u[near], v[near], 1)[0]) if np.count_nonzero(near) > 1 else -0.5

@@ -38,7 +38,7 @@ class SelectionStep:
 
 
 @dataclass(frozen=True)
-class Selection:
+class StepwiseSelection:
     """The path of a stepwise selection, its final `terms`, and why candidates were `refused` from the start."""
 
     start: SelectionStep
@@ -57,7 +57,7 @@ def select_stepwise(
     remove: float = 0.10,
     *,
     shared: bool = False,
-) -> Selection:
+) -> StepwiseSelection:
     """Select among candidate columns by partial F-tests.
 
     Parameters
@@ -103,7 +103,7 @@ def select_stepwise(
             steps.append(step)
             chosen = list(step.terms)
     start = search.step(True, "", math.nan, math.nan, [])
-    return Selection(start, tuple(steps), tuple(sorted(chosen, key=list(names).index)), refused)
+    return StepwiseSelection(start, tuple(steps), tuple(sorted(chosen, key=list(names).index)), refused)
 
 
 class _Search:

@@ -6,7 +6,7 @@ from shell.imperfection.body import Body
 from shell.quadrature import Array
 
 
-class Basis:
+class PairBasis:
     """The pair, which the perfect body leaves without forces, and answers of the perfect body to loads.
 
     Parameters

@@ -23,7 +23,7 @@ import numpy as np
 from shell.assembly import lay_system
 from shell.elastic import Elastic, VaryingElastic
 from shell.errors import ShellError
-from shell.imperfection.basis import Basis, products
+from shell.imperfection.basis import PairBasis, products
 from shell.imperfection.block import Block, condense
 from shell.imperfection.body import Body
 from shell.imperfection.core import Core
@@ -136,7 +136,7 @@ class CoupledHarmonics:
         own = vector[self.block(self.n).shell]
         for one in (0, 1):
             pair[together.rows[answering.index(self.n)], one, one] = own
-        basis = Basis(body, value)
+        basis = PairBasis(body, value)
         basis.extend(pair, np.zeros_like(pair))
         before = float(np.abs(basis.A).max())
         for _ in range(rounds if reach else 0):
@@ -160,7 +160,7 @@ class CoupledHarmonics:
             found |= {k for at in found for m in reach for k in (abs(at - m), at + m) if k <= self.highest}
         return tuple(sorted(found))
 
-    def _split(self, basis: Basis, closing: Array | float = 0.0) -> Split:
+    def _split(self, basis: PairBasis, closing: Array | float = 0.0) -> Split:
         """From the folded pair; closing : what is added to its A."""
         value, at = basis.value, 0.0
         shift, wave = 0.0, 0j

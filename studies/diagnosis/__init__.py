@@ -2,7 +2,7 @@
 
 `campaign` puts records on one grid (`checks`); `response` says what is diagnosed; `baseline` is what counts as
 the simulation; `noise` and `evidence` weigh linear models by marginal likelihood; `model` joins baseline and effects;
-`scan` looks at every shape of every effect, `search` grows models, `clock` lets a reference clock judge; `witness` looks for
+`scan` looks at every shape of every effect, `search` grows models, `clock` lets a reference clock judge; `lack_of_fit` looks for
 what no effect explains, `held_out` measures the worth; `inquiry` is all that for one response, `causes` joins the responses,
 `verdict` finds the words, `investigate` is the whole of it.
 `table` does the same for steady-state tables, `extension` makes a card of the outcome, `planning` looks ahead.

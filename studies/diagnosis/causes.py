@@ -8,11 +8,11 @@ import numpy as np
 from studies.diagnosis.baseline import Followed
 from studies.diagnosis.campaign import Campaign
 from studies.diagnosis.inquiry import Inquiry, begin, inquire, read_thermometer
+from studies.diagnosis.lack_of_fit import look
 from studies.diagnosis.model import Fit, exact_forms, fit
 from studies.diagnosis.response import RESPONSES
 from studies.diagnosis.search import Hypothesis, Place
 from studies.diagnosis.verdict import NINETY, Cause, Interval, weigh
-from studies.diagnosis.witness import look
 from studies.effects import Effect, find_effect
 
 VOTERS = 4

@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from studies.diagnosis.noise import KERNELS, SHARES, Noise
+from studies.diagnosis.noise import KERNELS, SHARES, NoiseModels
 from studies.effects.states import FloatArray
 
 SCALES = 10.0 ** np.arange(-4.0, 0.51, 0.5)
@@ -34,7 +34,7 @@ class Linear:
         for its strong cases.
     owner : (p,) int array
         −1 for the baseline, else the number of the term that a column belongs to.
-    noise : Noise
+    noise : NoiseModels
     sigma : float
         White noise of a row of the grid, for the scale of the priors.
     """
@@ -43,7 +43,7 @@ class Linear:
     columns: FloatArray
     prior: FloatArray
     owner: "np.ndarray"
-    noise: Noise
+    noise: NoiseModels
     sigma: float
 
     @property

@@ -11,12 +11,12 @@ from studies.diagnosis.baseline import Baseline, Followed, Lagged, Reading, bend
 from studies.diagnosis.campaign import Campaign
 from studies.diagnosis.clock import judged
 from studies.diagnosis.constants import CONSTANTS
+from studies.diagnosis.lack_of_fit import Leftover, look
 from studies.diagnosis.model import Fit, Problem, fit, pose, settle
 from studies.diagnosis.noise import tails_of
 from studies.diagnosis.response import RESPONSES
 from studies.diagnosis.scan import applicable, build_bank
 from studies.diagnosis.search import Hypothesis, Place, Selection, drop, needed, search
-from studies.diagnosis.witness import Leftover, look
 from studies.effects import Effect
 from studies.effects.states import FloatArray, States
 
@@ -135,7 +135,7 @@ def _slope(problem: Problem, reading: Sequence[FloatArray]) -> float:
 
 
 def inquire(campaign: Campaign, plain: Fit, effects: Sequence[Effect] | None, score_held_out: bool) -> Inquiry:
-    """Select the effects of one response, refuse what does not pay, and ask the witnesses about the rest."""
+    """Select the effects of one response, refuse what does not pay, and test what is left for lack of fit."""
     bank = build_bank(plain, applicable(plain.problem, plain, effects))
     selection = search(plain, bank)
     selection = judged(campaign, selection, effects)

@@ -10,7 +10,7 @@ from studies.diagnosis.baseline import Baseline, Tangent, View
 from studies.diagnosis.campaign import Campaign
 from studies.diagnosis.constants import CONSTANTS
 from studies.diagnosis.evidence import Linear, Solved, solve
-from studies.diagnosis.noise import SHARES, Noise
+from studies.diagnosis.noise import SHARES, NoiseModels
 from studies.diagnosis.response import RESPONSES, Response
 from studies.effects import Effect, Span
 from studies.effects.states import FloatArray, average, lag
@@ -46,7 +46,7 @@ class Problem:
         Which steps of the grid have the response, run by run.
     values : (M,) array
         The present values, stacked.
-    noise : Noise
+    noise : NoiseModels
     sigma : float
         White noise of a step of the grid, from second differences: no slow effect reaches it.
     level : float
@@ -59,7 +59,7 @@ class Problem:
     response: Response
     present: tuple["np.ndarray", ...]
     values: FloatArray
-    noise: Noise
+    noise: NoiseModels
     sigma: float
     level: float
     group: int
@@ -100,7 +100,7 @@ def pose(campaign: Campaign, column: str, tau: float, keep: Sequence["np.ndarray
         response,
         tuple(present),
         values,
-        Noise.of(times, max(rows / max(steps, 1), 1.0)),
+        NoiseModels.of(times, max(rows / max(steps, 1), 1.0)),
         white_level(campaign, column),
         level,
         campaign.group,
@@ -256,7 +256,7 @@ class Fit:
     def slow_part(self) -> list[FloatArray]:
         """Return the slow part of what is left, run by run, as the noise model tells it from the white."""
         basis = self.problem.noise.bases[self.solved.kind]
-        slow = SHARES[self.solved.share] * basis.walk
+        slow = SHARES[self.solved.share] * basis.eigenvalues
         rows = basis.unrotate(basis.rotate(self.residual) * slow / (1.0 + slow))
         return self.problem.unstack(rows)
 

@@ -1,33 +1,42 @@
 """Noise of a response: white noise and a wander of unknown kind and share, in the bases where both are independent.
 
-The noise of one run has the covariance σ² (1 + q K): white noise and a wander K (a random walk that has already walked
-when the run starts, 1/f noise, a relaxation). K has the same eigenvectors for every share q, so one rotation a kind
-makes the rows independent. It is the batch form of the steady-state Kalman filter (1 − L)/(1 − θL), exact at the start of
-each run and across missing rows.
-
-What is noise is a matter of belief: a wander whose rms over a run is many times the white noise of one row is structure
-that nobody has explained, not noise. `Noise.prior` says how many.
+The noise of one run has the covariance σ² (1 + q K), K one of `KERNELS`, q one of `SHARES` (`compensation.wander`). What is
+noise is a matter of belief: a wander whose rms over a run is many times the white noise of one row is structure
+that nobody has explained, not noise. `NoiseModels.prior` says how many.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import partial
 
 import numpy as np
 from scipy.stats import t as student
 
+from compensation.wander import Covariance, Eigenbasis, flicker, gauss_markov, random_walk
 from studies.diagnosis.constants import CONSTANTS
 from studies.effects.states import FloatArray
 
-WALK_TIME = 8 * 3600.0
-WALKED_BEFORE = 0.5
 SHARES = np.array([0.0, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0, 400.0, 2000.0, 6000.0, 2e4])
-KERNELS = ("walk", "flicker", "relaxing", "slowly relaxing", "flicker and walk")
-"""Kinds of wander: random walk; 1/f; one relaxation of 10 min; one of 45 min; 1/f and walk, as every oscillator has both
-(IEEE Std 1139)."""
-RELAXATION = {"relaxing": 600.0, "slowly relaxing": 2700.0}
-BRIEF = 300.0
-"""What changes within so many seconds is noise of a row as much as white noise is: loops and filters have a memory."""
+
+
+def _walked(t: FloatArray) -> FloatArray:
+    """Covariance of a random walk of variance 1 after 8 h that has walked for 4 h when the run starts."""
+    return random_walk(t) / 8.0 + 0.5
+
+
+def _oscillator(t: FloatArray) -> FloatArray:
+    """Covariance of flicker noise and a random walk together: every oscillator has both (IEEE Std 1139)."""
+    return _walked(t) + flicker(t)
+
+
+KERNELS: Mapping[str, Covariance] = {
+    "random walk": _walked,
+    "flicker": flicker,
+    "Gauss–Markov, 10 min": partial(gauss_markov, tau=600.0),
+    "Gauss–Markov, 45 min": partial(gauss_markov, tau=2700.0),
+    "flicker and random walk": _oscillator,
+}
+"""Kinds of wander."""
 
 
 def student_log(square: FloatArray, freedom: float) -> float:
@@ -47,81 +56,13 @@ def tails_of(values: FloatArray) -> float:
 TAILS = (3.0, 4.0, 6.0, 9.0, 15.0, 30.0, 1e3)
 
 
-@lru_cache(maxsize=256)
-def _eigenbasis(times: bytes, kernel: str) -> tuple[FloatArray, FloatArray, float, float]:
-    t = np.frombuffer(times)
-    apart = np.abs(t[:, None] - t[None, :])
-    colour = np.zeros_like(apart)
-    if "walk" in kernel:
-        colour += (np.minimum(t[:, None], t[None, :]) - t[0]) / WALK_TIME + WALKED_BEFORE
-    if "flicker" in kernel:
-        colour += np.mean([np.exp(-apart / (60.0 * 4.0**k)) for k in range(7)], axis=0)
-    if kernel in RELAXATION:
-        colour += np.exp(-apart / RELAXATION[kernel])
-    values, vectors = np.linalg.eigh(colour)
-    # mean square of the wander about its mean over the run
-    within = float(np.trace(colour) / t.size - colour.mean())
-    own = np.diag(colour)
-    near = np.minimum(np.searchsorted(t, t + BRIEF), t.size - 1)
-    change = own + own[near] - 2.0 * colour[np.arange(t.size), near]
-    brief = 0.5 * float(np.median(change * np.minimum(BRIEF / np.maximum(t[near] - t, 1.0), 1.0)))
-    return np.clip(values, 0.0, None), vectors, within, brief
-
-
 @dataclass(frozen=True)
-class Basis:
-    """Rotation of the present rows of all runs into independent ones, for one kind of wander.
-
-    Attributes
-    ----------
-    vectors : sequence of (n_r, n_r) arrays
-        Eigenvectors of K, run by run.
-    walk : (M,) array
-        Eigenvalues of K, stacked: the variance of row i is σ² (1 + q walk_i).
-    within : float
-        Mean square of the wander within a run for σ² q = 1.
-    brief : float
-        Half the mean square of its change within five minutes.
-    """
-
-    vectors: tuple[FloatArray, ...]
-    walk: FloatArray
-    within: float
-    brief: float
-
-    @classmethod
-    def of(cls, times: Sequence[FloatArray], kernel: str) -> "Basis":
-        """Build the basis from the times of the present rows, one array a run, and the kind of wander."""
-        parts = [_eigenbasis(np.round(t - t[0], 3).tobytes(), kernel) for t in times]
-        rows = np.array([t.size for t in times])
-        within, brief = (float(np.average([part[k] for part in parts], weights=rows)) for k in (2, 3))
-        return cls(tuple(part[1] for part in parts), np.concatenate([part[0] for part in parts]), within, brief)
-
-    def rotate(self, stacked: FloatArray) -> FloatArray:
-        """Rotate columns of stacked rows, (M,) or (M, k)."""
-        return self._turned(stacked, [vectors.T for vectors in self.vectors])
-
-    def unrotate(self, rotated: FloatArray) -> FloatArray:
-        """Return stacked rows from rotated ones: the inverse of `rotate`."""
-        return self._turned(rotated, self.vectors)
-
-    def _turned(self, rows: FloatArray, turns: Sequence[FloatArray]) -> FloatArray:
-        out = np.empty_like(rows)
-        begin = 0
-        for turn in turns:
-            end = begin + turn.shape[0]
-            out[begin:end] = turn.astype(rows.dtype, copy=False) @ rows[begin:end]
-            begin = end
-        return out
-
-
-@dataclass(frozen=True)
-class Noise:
+class NoiseModels:
     """Every noise model that a response is tried with: each kind of wander with each share.
 
     Attributes
     ----------
-    bases : tuple of Basis
+    bases : tuple of Eigenbasis
         One a kind, in the order of `KERNELS`.
     rows : float
         Rows of the record to a row of the grid.
@@ -132,19 +73,19 @@ class Noise:
         Degrees of freedom of Student's law of the noise of a row.
     """
 
-    bases: tuple[Basis, ...]
+    bases: tuple[Eigenbasis, ...]
     rows: float
     floor: float = 0.0
     tails: float = np.inf
 
     @classmethod
-    def of(cls, times: Sequence[FloatArray], rows: float) -> "Noise":
+    def of(cls, times: Sequence[FloatArray], rows: float) -> "NoiseModels":
         """Build every basis from the times of the present rows, one array a run."""
-        return cls(tuple(Basis.of(times, kernel) for kernel in KERNELS), rows)
+        return cls(tuple(Eigenbasis.of(times, kernel) for kernel in KERNELS.values()), rows)
 
     def weights(self, kind: int) -> FloatArray:
         """Inverse variances over σ² for every share, (S, M)."""
-        return np.asarray(1.0 / (1.0 + SHARES[:, None] * self.bases[kind].walk))
+        return np.asarray(1.0 / (1.0 + SHARES[:, None] * self.bases[kind].eigenvalues))
 
     def ratio(self, kind: int) -> FloatArray:
         """Return rms of the wander within a run over the noise of one row of the record within minutes, for every share."""

@@ -8,7 +8,7 @@ from scipy.special import logsumexp
 
 from studies.diagnosis.evidence import SCALES
 from studies.diagnosis.model import Fit, Problem, Term, term_columns
-from studies.diagnosis.noise import KERNELS, Noise
+from studies.diagnosis.noise import KERNELS, NoiseModels
 from studies.effects import Effect, library
 from studies.effects.states import FloatArray
 
@@ -39,7 +39,7 @@ class Bank:
     terms : tuple of Term
     groups : tuple of Group
     table : (M, C) float32 array
-    noise : Noise
+    noise : NoiseModels
     turned : dict
         The table in the rotated rows of the kinds of wander that were asked for.
     """
@@ -47,7 +47,7 @@ class Bank:
     terms: tuple[Term, ...]
     groups: tuple[Group, ...]
     table: "np.ndarray" = field(repr=False)
-    noise: Noise = field(repr=False)
+    noise: NoiseModels = field(repr=False)
     turned: dict[int, "np.ndarray"] = field(default_factory=dict, repr=False)
 
     def rotated(self, kind: int) -> "np.ndarray":

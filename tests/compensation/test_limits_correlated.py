@@ -6,8 +6,9 @@ from numpy.typing import NDArray
 from scipy.linalg import block_diag
 from scipy.stats import chi2
 
-from compensation.correlated import HOUR, Noise, NoiseRows, estimate_noise
+from compensation.correlated import Noise, NoiseRows, estimate_noise
 from compensation.errors import CompensationError
+from compensation.wander import HOUR
 
 Array = NDArray[np.float64]
 GAPPED = np.cumsum(np.concatenate([np.full(60, 80.0), [4000.0], np.full(50, 130.0)]))

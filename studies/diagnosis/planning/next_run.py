@@ -21,7 +21,7 @@ from studies.diagnosis.baseline import Baseline, Followed, Reading
 from studies.diagnosis.campaign import Campaign
 from studies.diagnosis.constants import CONSTANTS
 from studies.diagnosis.model import Fit, Term, term_columns, used
-from studies.diagnosis.noise import KERNELS, SHARES, Basis
+from studies.diagnosis.noise import KERNELS, SHARES
 from studies.diagnosis.planning.chamber import Chamber
 from studies.diagnosis.planning.programme import Programme, Steps, candidates
 from studies.diagnosis.scan import applicable, scan
@@ -185,9 +185,8 @@ def covariance_of_noise(model: Fit, rows: int, step: float) -> FloatArray:
     """Return the covariance of the noise of one further run."""
     s = model.solved
     time = np.asarray(np.arange(rows) * step, dtype=float)
-    basis = Basis.of([time], KERNELS[s.kind])
-    vectors = basis.vectors[0]
-    return np.asarray(s.variance * (vectors * (1.0 + SHARES[s.share] * basis.walk)) @ vectors.T)
+    wander = [*KERNELS.values()][s.kind](time)
+    return np.asarray(s.variance * (np.eye(rows) + SHARES[s.share] * wander))
 
 
 def against(truth: Ahead, rival: Ahead, noise: FloatArray) -> float:

@@ -228,7 +228,7 @@ def predict(
             for plan in plans:
                 plan.survives[key] = hidden.survives
                 if hidden.noise.shape[1]:
-                    _fill(plan, key, rehearse(stage, hidden, plan.snr), hidden.scene)
+                    _fill(plan, key, rehearse(stage, hidden, plan.snr), hidden.assumed)
         white = float(np.sqrt(model.solved.variance * model.problem.noise.rows))
         for plan in plans:
             plan.sizes[f"{response.word} / {response.shown}"] = plan.snr * white * response.scale

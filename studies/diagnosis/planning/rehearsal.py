@@ -35,11 +35,11 @@ class Stage:
     model: Fit
     bank: Bank
     effects: tuple[Effect, ...]
-    noises: tuple["Scene", ...]
+    noises: tuple["AssumedNoise", ...]
 
 
 @dataclass(frozen=True)
-class Scene:
+class AssumedNoise:
     """One noise model: what the baseline takes away, and every shape beside it."""
 
     kind: int
@@ -52,22 +52,22 @@ class Scene:
 
 @dataclass(frozen=True)
 class Hidden:
-    """Cases of one hidden effect at SNR 1 on rows of the grid, with their noise: (M, B) both, one scene each."""
+    """Cases of one hidden effect at SNR 1 on rows of the grid, with their noise: (M, B) both, one assumed noise each."""
 
     effect: Effect
     left: FloatArray
     noise: FloatArray
-    scene: "np.ndarray"
+    assumed: "np.ndarray"
     survives: float
 
 
 def set_stage(model: Fit, effects: Sequence[Effect]) -> Stage:
     """Prepare the baseline of one response for the effects that can act on it."""
     bank = build_bank(model, effects)
-    return Stage(model, bank, tuple(effects), tuple(_scene(model, bank, *noise) for noise in NOISES.values()))
+    return Stage(model, bank, tuple(effects), tuple(_assume(model, bank, *noise) for noise in NOISES.values()))
 
 
-def _scene(model: Fit, bank: Bank, kind: int, share: int) -> Scene:
+def _assume(model: Fit, bank: Bank, kind: int, share: int) -> AssumedNoise:
     linear, problem = model.linear, model.problem
     basis, root = problem.noise.bases[kind], np.sqrt(problem.noise.weights(kind)[share])
     own = basis.rotate(linear.scaled) * root[:, None]
@@ -82,7 +82,7 @@ def _scene(model: Fit, bank: Bank, kind: int, share: int) -> Scene:
         gram = part @ part.transpose(0, 2, 1) - below @ below.transpose(0, 2, 1)
         values, vectors = np.linalg.eigh(gram * unit[:, :, None] * unit[:, None, :])
         eigen.append((np.maximum(values, 0.0), vectors))
-    return Scene(kind, share, root, span, table - span @ inner, tuple(eigen))
+    return AssumedNoise(kind, share, root, span, table - span @ inner, tuple(eigen))
 
 
 def hide(stage: Stage, effect: Effect, cases: int, rng: np.random.Generator) -> Hidden:
@@ -120,17 +120,17 @@ def hide(stage: Stage, effect: Effect, cases: int, rng: np.random.Generator) -> 
     survives = float(np.median(shares)) if shares else 0.0
     if not signals:
         return Hidden(effect, *(np.empty((rows, 0)),) * 2, np.empty(0, dtype=int), survives)
-    scene = np.arange(len(signals)) % len(stage.noises)
+    which = np.arange(len(signals)) % len(stage.noises)
     noise, level = np.empty((rows, len(signals))), np.empty(len(signals))
-    for n, own_scene in enumerate(stage.noises):
-        mine = np.flatnonzero(scene == n)
-        basis = problem.noise.bases[own_scene.kind]
-        drawn = rng.standard_normal((rows, mine.size)) / own_scene.root[:, None] * problem.sigma
+    for n, assumed in enumerate(stage.noises):
+        mine = np.flatnonzero(which == n)
+        basis = problem.noise.bases[assumed.kind]
+        drawn = rng.standard_normal((rows, mine.size)) / assumed.root[:, None] * problem.sigma
         noise[:, mine] = basis.unrotate(drawn)
         white = problem.sigma**2 * problem.noise.rows
-        wander = problem.sigma**2 * SHARES[own_scene.share] * basis.within
+        wander = problem.sigma**2 * SHARES[assumed.share] * basis.within
         level[mine] = np.sqrt(white + wander)
-    return Hidden(effect, np.stack(signals, axis=1) * level, noise, scene, survives)
+    return Hidden(effect, np.stack(signals, axis=1) * level, noise, which, survives)
 
 
 def _jitter(value: float, parameter: Parameter, rng: np.random.Generator) -> float:
@@ -148,11 +148,11 @@ def rehearse(stage: Stage, hidden: Hidden, snr: float) -> list[Answer]:
     names = np.array([term.name for term in stage.bank.terms])
     distinct = list(dict.fromkeys(names.tolist()))
     column = stage.model.problem.response.column
-    for n, scene in enumerate(stage.noises):
-        mine = np.flatnonzero(hidden.scene == n)
+    for n, assumed in enumerate(stage.noises):
+        mine = np.flatnonzero(hidden.assumed == n)
         if not mine.size:
             continue
-        gains = _gains(stage, scene, snr * hidden.left[:, mine] + hidden.noise[:, mine])
+        gains = _gains(stage, assumed, snr * hidden.left[:, mine] + hidden.noise[:, mine])
         total = np.stack([logsumexp(gains[names == name], axis=0) - np.log((names == name).sum()) for name in distinct])
         for b, case in enumerate(mine):
             scores = total[:, b] + CONSTANTS["log_prior_effect"]
@@ -165,16 +165,16 @@ def rehearse(stage: Stage, hidden: Hidden, snr: float) -> list[Answer]:
     return answers
 
 
-def _gains(stage: Stage, scene: Scene, data: FloatArray) -> FloatArray:
+def _gains(stage: Stage, assumed: AssumedNoise, data: FloatArray) -> FloatArray:
     """Log evidence of every shape in every case, (H, B)."""
     linear, problem = stage.model.linear, stage.model.problem
-    target = problem.noise.bases[scene.kind].rotate(data) * scene.root[:, None]
-    inside = scene.span.T @ target
+    target = problem.noise.bases[assumed.kind].rotate(data) * assumed.root[:, None]
+    inside = assumed.span.T @ target
     least = np.maximum((target**2).sum(axis=0) - (inside**2).sum(axis=0), 1e-300)
-    moments = scene.moments.T @ target
+    moments = assumed.moments.T @ target
     freedom = linear.target.size - linear.flat
     out = np.empty((len(stage.bank.terms), data.shape[1]))
-    for group, (values, vectors) in zip(stage.bank.groups, scene.eigen, strict=True):
+    for group, (values, vectors) in zip(stage.bank.groups, assumed.eigen, strict=True):
         moment = moments[group.columns] * (group.prior / problem.sigma)[:, :, None]
         along = np.einsum("hij,hib->hjb", vectors, moment)
         parts = []

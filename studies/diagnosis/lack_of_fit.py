@@ -1,4 +1,4 @@
-"""Witnesses for what no named effect explains: generic forms of each input, and what is sharp in time.
+"""Lack of fit: what no named effect explains, seen by generic forms of each input, and what is sharp in time.
 
 A generic form is a family like any effect, with many columns and no physics: smooth in temperature, in temperature and rate,
 in history, in a drive, in time. It is weighed by the same marginal likelihood; its name is where structure is left.
@@ -244,7 +244,7 @@ def innovations(model: Fit) -> list[FloatArray]:
     begin = 0
     for vectors in basis.vectors:
         rows = slice(begin, begin := begin + vectors.shape[0])
-        covariance = (vectors * (1.0 + SHARES[solved.share] * basis.walk[rows])) @ vectors.T
+        covariance = (vectors * (1.0 + SHARES[solved.share] * basis.eigenvalues[rows])) @ vectors.T
         root = np.linalg.cholesky(covariance)
         out.append(np.asarray(solve_triangular(root, model.residual[rows], lower=True)) / np.sqrt(solved.variance))
     return out
