@@ -13,44 +13,18 @@ coefficients of (10) would mean tens of rad/s, so they serve as the shape ζ₁�
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.constants import zero_Celsius
 
 from compensation.coloured import correlated_covariance
-from compensation.demodulated import expand_secondary, expand_slow_secondary, relate_rate_to_secondary
 from compensation.errors import CompensationError
 from compensation.regression import fit_linear, refuse_constant_columns
 from compensation.samples import check_time, read_columns
-from compensation.sensitive_element import SensitiveElement
 from compensation.transfer import TransferFunction
 
 Real = NDArray[np.float64]
-
-
-def relate_cross_damping_to_secondary(element: SensitiveElement) -> TransferFunction:
-    """W₂ᶻ(s) = 2 A₁ j ω k₂ / ((s + jω)² + 2 ζ₂ k₂ (s + jω) + k₂²), in m per unit ζ₁₂: second of eqs. (6).
-
-    Its companion, rate to secondary, is `demodulated.relate_rate_to_secondary`; both with the denominator of (4)
-    instead are the slow forms.
-    """
-    return TransferFunction((_drive_by_damping(element),), expand_secondary(element))
-
-
-def relate_cross_damping_to_slow_secondary(element: SensitiveElement) -> TransferFunction:
-    """The same with the second derivative of the amplitude neglected, m per unit ζ₁₂: the ζ₁₂ part of eq. (4)."""
-    return TransferFunction((_drive_by_damping(element),), expand_slow_secondary(element))
-
-
-def relate_cross_damping_to_rate(element: SensitiveElement) -> TransferFunction:
-    """Cross-damping to erroneous rate, rad/s per unit ζ₁₂: eq. (8).
-
-    W(s) = W₂ᶻ(s) / W₂(0) = 2 k₂ (k₂² − ω² + 2 j k₂ ω ζ₂) / (g₂ (k₂² − ω² + 2 k₂ ζ₂ s + 2 j ω (s + k₂ ζ₂))),
-    which takes W₂ᶻ in its slow form (4), not in the form (6).
-    """
-    return relate_cross_damping_to_slow_secondary(element) * (1 / relate_rate_to_secondary(element).steady_gain)
 
 
 def relate_cross_damping_to_rate_when_tuned(k: float, zeta: float, g2: float = 2.0) -> TransferFunction:
@@ -70,27 +44,6 @@ def relate_cross_damping_to_rate_when_tuned(k: float, zeta: float, g2: float = 2
             "eq. (9) needs a positive natural frequency that a resonator can have, damping between 0 and 1, and g2 not zero."
         )
     return TransferFunction((2 * k**2 * zeta / g2,), (1.0, k * zeta))
-
-
-def derive_tuned_transfer() -> tuple[Any, Any]:
-    """Return eq. (8) under ω = k √(1 − 2ζ²), k₁ = k₂ = k, ζ₁ = ζ₂ = ζ, and eq. (9), as SymPy expressions.
-
-    The first is simplified from (8) and not typed in, so that their equality proves the step from (8) to (9).
-    """
-    import sympy
-
-    k, zeta, g2 = sympy.symbols("k zeta g_2", positive=True)
-    s = sympy.Symbol("s")
-    omega = k * sympy.sqrt(1 - 2 * zeta**2)
-    j = sympy.I
-    stiffness = k**2 - omega**2
-    general = (
-        2
-        * k
-        * (stiffness + 2 * j * k * omega * zeta)
-        / (g2 * (stiffness + 2 * k * zeta * s + 2 * j * omega * (s + k * zeta)))
-    )
-    return sympy.factor(sympy.simplify(sympy.expand(general))), 2 * k**2 * zeta / (g2 * (s + k * zeta))
 
 
 def evaluate_cross_damping(coefficients: ArrayLike, shift: ArrayLike) -> Real:
@@ -264,7 +217,3 @@ def _check_range(temperature: Real, lowest: float, highest: float, extrapolate: 
             f"the temperature runs from {low - zero_Celsius:.2f} to {high - zero_Celsius:.2f} °C, but the model was fitted between "
             f"{lowest - zero_Celsius:.2f} and {highest - zero_Celsius:.2f} °C; allow extrapolation or fit a wider record."
         )
-
-
-def _drive_by_damping(element: SensitiveElement) -> complex:
-    return 2j * element.primary_amplitude * element.omega * element.k2

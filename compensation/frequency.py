@@ -10,7 +10,6 @@ from itertools import pairwise
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy import stats
 from scipy.optimize import elementwise
 
 from compensation.errors import CompensationError
@@ -78,12 +77,6 @@ class FrequencyFit:
         return None if self.resolution is None else self.sum_of_squares / (self.resolution**2 / 12)
 
     @property
-    def chi_squared_p_value(self) -> float | None:
-        """Probability that rounding alone leaves as large a sum of squares."""
-        chi = self.chi_squared
-        return None if chi is None else float(stats.chi2.sf(chi, self.degrees_of_freedom))
-
-    @property
     def largest_residual_of_span(self) -> float:
         """Largest |residual| over the span of the measured frequencies (1)."""
         measured = self.polynomial.regression.fitted + self.residuals
@@ -104,10 +97,6 @@ class FrequencyFit:
             * self.slope(temperature_degC, extrapolate=extrapolate)
             / self.frequency(temperature_degC, extrapolate=extrapolate)
         )
-
-    def frequency_uncertainty(self, temperature_degC: ArrayLike) -> Array:
-        """Return the standard uncertainty (Hz) of the curve itself at T."""
-        return np.sqrt(self.polynomial.variance(temperature_degC))
 
     def temperature(self, frequency: ArrayLike) -> Array:
         """Return the temperature (°C) whose frequency this is: the inverse of f(T), HRG paper Table 2.
@@ -138,15 +127,6 @@ class FrequencyFit:
             return self.polynomial.value(T) - f
 
         return np.asarray(elementwise.find_root(excess, (low, high), args=(frequency,)).x, dtype=np.float64)
-
-    def temperature_uncertainty(self, frequency: ArrayLike) -> Array:
-        """Return the standard uncertainty (°C) of `temperature(frequency)` for one new reading.
-
-        u²(T) = (variance of the curve + variance of a reading) / (df/dT)²; both rest on `degrees_of_freedom`.
-        """
-        T = self.temperature(frequency)
-        variance = self.frequency_uncertainty(T) ** 2 + self.reading_variance
-        return np.sqrt(variance) / np.abs(self.polynomial.slope(T))
 
     def _within(self, temperature_degC: ArrayLike, extrapolate: bool) -> Array:
         T = np.asarray(temperature_degC, dtype=np.float64)

@@ -56,12 +56,6 @@ class LinearModel:
         if np.linalg.eigvalsh(self.measurement_noise)[0] <= 0:
             raise CompensationError("measurement_noise must be positive: a perfect measurement needs no filter.")
 
-    @property
-    def observability(self) -> Real:
-        """(C; C F; C F²; …) with as many blocks as states: eq. (41)."""
-        powers = [np.linalg.matrix_power(self.transition, i) for i in range(len(self.transition))]
-        return np.vstack([self.measurement @ power for power in powers])
-
 
 def model_gyro(k: float, zeta: float, step: float, process_noise: ArrayLike, measurement_noise: float) -> LinearModel:
     """Return the model of a tuned gyro with the states (Ω measured, Ω₀ true), Ω₀ a random walk: eqs. (37)–(40).
@@ -129,12 +123,6 @@ class KalmanRun:
         """Normalised innovation squared νᵀ S⁻¹ ν (N,): chi-squared with m degrees of freedom if the model is right."""
         solved = np.linalg.solve(self.innovation_covariances, self.innovations[..., None])[..., 0]
         return np.asarray(np.einsum("ni,ni->n", self.innovations, solved), dtype=float)
-
-    def nees(self, truth: ArrayLike) -> Real:
-        """Normalised estimation error squared (N,) against the true states (N, n): chi-squared with n degrees."""
-        error = self.states - np.asarray(truth, dtype=float)
-        solved = np.linalg.solve(self.covariances, error[..., None])[..., 0]
-        return np.asarray(np.einsum("ni,ni->n", error, solved), dtype=float)
 
 
 def run_filter(model: LinearModel, measurements: ArrayLike, start: ArrayLike, covariance: ArrayLike) -> KalmanRun:

@@ -9,7 +9,6 @@ N_a n_w* d_b* / (d_a Δ*).
 """
 
 from dataclasses import dataclass
-from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -132,35 +131,6 @@ def judge_filter(
 def renormalise(candidate: TransferFunction, gyro: TransferFunction) -> TransferFunction:
     """Return the filter scaled to G(0) W(0) = 1, so that a constant rate is read without error: eqs. (35), (36)."""
     return candidate * (1 / (candidate.steady_gain * gyro.steady_gain))
-
-
-@dataclass(frozen=True)
-class WienerDerivation:
-    """SymPy results of the derivation: the factor Δ of the output's density, the optimum G, and G renormalised."""
-
-    factor: Any
-    optimum: Any
-    renormalised: Any
-
-
-def derive_wiener_filter(noise: Literal["white", "high-pass"]) -> WienerDerivation:
-    """Derive eq. (35) or (36) in symbols (γ, B, ζ, k, s), for W of eq. (25) and the rate (27).
-
-    Δ Δ* = p s⁴ − q s² + r gives Δ = √p s² + √(q + 2√(p r)) s + √r; the causal part is one residue at s = −B.
-    """
-    import sympy
-
-    gamma, B, zeta, k = sympy.symbols("gamma B zeta k", positive=True)
-    s = sympy.Symbol("s")
-    a = k * zeta
-    square = (B * a) ** 2 + gamma**2 * (a**2 - s**2) * (B**2 - s**2 if noise == "white" else -(s**2))
-    p, _, q, _, r = sympy.Poly(sympy.expand(square), s).all_coeffs()
-    root_r = sympy.sqrt(sympy.factor(r))
-    Delta = sympy.sqrt(p) * s**2 + sympy.sqrt(sympy.factor(2 * sympy.sqrt(p) * root_r - q)) * s + root_r
-    # Here t d_b is constant for both noises: with (29) the factor B + s of d_b cancels one of Δ.
-    residue = sympy.simplify(B**2 * a / Delta.subs(s, -s).subs(s, -B))
-    optimum = residue * (s + a) / Delta
-    return WienerDerivation(Delta, optimum, sympy.simplify(optimum / optimum.subs(s, 0)))
 
 
 def _numerator_over(spectrum: Spectrum, factor: Real) -> Real:

@@ -90,50 +90,6 @@ class TwoPatternModel:
         return self.coupling / (2 * self.mass)
 
 
-def bell_theory_frequency(resonator: Resonator, elastic: Elastic) -> float:
-    """Return the bell's frequency (Hz) from the Rayleigh functions (19), BVG paper eq. (22).
-
-    Parameters
-    ----------
-    resonator : Resonator
-        A bell or a hemisphere of `shell.meridian`; its support is left out of the count, as in the paper.
-    elastic : Elastic
-        E (Pa), ν and ρ (kg/m³).
-
-    Returns
-    -------
-    float
-        Frequency in Hz.
-
-    Raises
-    ------
-    ShellError
-        When the meridian does not start at a pole.
-    """
-    return two_pattern_model(resonator, elastic, rayleigh_functions).frequency
-
-
-def bell_theory_bryan_factor(resonator: Resonator) -> float:
-    """Return the bell's precession factor from the Rayleigh functions (19), BVG paper eq. (21).
-
-    Parameters
-    ----------
-    resonator : Resonator
-        A bell or a hemisphere of `shell.meridian`.
-
-    Returns
-    -------
-    float
-        k = b/(2 m₀), without unit; it does not depend on the material.
-
-    Raises
-    ------
-    ShellError
-        When the meridian does not start at a pole.
-    """
-    return two_pattern_model(resonator, Elastic(E=1.0, nu=0.0, rho=1.0), rayleigh_functions).bryan_factor
-
-
 def two_pattern_model(resonator: Resonator, elastic: Elastic, pattern: Pattern) -> TwoPatternModel:
     """Return m₀, b and c₀ of BVG paper eq. (20) for an assumed pattern with n = 2.
 

@@ -164,21 +164,6 @@ def energy_weights(cells: MeridianCells, place: ArrayLike, share: ArrayLike) -> 
     return weights
 
 
-def energy_weighted_temperature(weights: Array, field: Array) -> Array:
-    """Temperature (K) of an even shell of the same frequency: Σ w T / Σ w.
-
-    Parameters
-    ----------
-    weights : array (N,), as from `energy_weights`
-    field : array (..., N), K
-    """
-    total = float(weights.sum())
-    if total == 0:
-        raise ThermalError("the weights of a mean temperature add up to zero.")
-    mean: Array = field @ weights / total
-    return mean
-
-
 def scale(value: Capacity, factor: float) -> Capacity:
     """Multiply a number, or a callable of temperature, by a factor."""
     if callable(value):

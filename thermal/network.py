@@ -87,14 +87,6 @@ class Source:
 Part = Node | Boundary | Conductor | Radiator | Source
 
 
-def effective_emissivity(one: float, other: float) -> float:
-    """Emissivity of two large parallel grey faces, 1 / (1/ε₁ + 1/ε₂ − 1)."""
-    for value in (one, other):
-        if not 0 < value <= 1:
-            raise ThermalError(f"an emissivity must lie above 0 and not above 1, not {value:g}.")
-    return 1 / (1 / one + 1 / other - 1)
-
-
 @dataclass(frozen=True)
 class Network:
     """A checked network; made by `assemble`."""

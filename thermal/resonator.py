@@ -30,7 +30,7 @@ class HeatPath:
     stem_radius, stem_length : float
         m.
     emissivity : float
-        Effective emissivity between each face of the shell and what it faces (`network.effective_emissivity`);
+        Effective emissivity between each face of the shell and what it faces, 1/(1/ε₁ + 1/ε₂ − 1) of parallel faces;
         decided by the metal film.
     base_capacity, housing_capacity : float
         J/K.

@@ -5,7 +5,7 @@ from textwrap import fill
 
 import sympy as sp
 
-from compensation.derivation import averaging, demodulated, oscillator
+from compensation.derivation import averaging, demodulated, filters, oscillator
 
 WIDTH = 120
 # Unicode has no subscript for these; in code they are Delta_tau, psi_tau …
@@ -73,6 +73,21 @@ def steps() -> list[Step]:
             _name("ΔA_1' ΔA_2'", demodulated.neglected()),
         ),
         Step("25", "Measured over actual rate, 1/τ = kζ", _name("W", [demodulated.measured_rate()])),
+        Step(
+            "35",
+            "Optimal filter after it: white noise of γ² times the signal's power, renormalised",
+            _name("G", [filters.derive_wiener_filter("white").renormalised]),
+        ),
+        Step(
+            "36",
+            "The same for noise that rises with the frequency",
+            _name("G", [filters.derive_wiener_filter("high-pass").renormalised]),
+        ),
+        Step(
+            "",
+            "False rate over a cross-damping ζ_12 that varies, equal modes (paper on cross-damping, (9) from (8))",
+            _name("W_12", [filters.tuned_cross_damping()]),
+        ),
     ]
 
 

@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from shell.damping.budget import Budget
 from shell.damping.faces import FreeFaces
@@ -54,27 +54,6 @@ def damping_wave(budget: Budget, ripples: Sequence[Ripple], harmonic: int) -> Co
             raise ShellError(f"the budget has no part '{ripple.part}' that could vary around.")
         total += parts[ripple.part] * ripple.weight * ripple.amplitude * np.exp(2j * harmonic * ripple.angle)
     return total
-
-
-def map_wave(theta: ArrayLike, values: ArrayLike, order: int) -> tuple[float, float]:
-    """Relative amplitude a_k and angle θ_k (rad) of one wave of a map that was measured around, by least squares of all up to it.
-
-    Parameters
-    ----------
-    theta : rad, anywhere around.
-    values : thickness or loss there, in any unit.
-    order : k, for damping 2n.
-    """
-    angle, value = np.ravel(np.asarray(theta, dtype=float)), np.ravel(np.asarray(values, dtype=float))
-    if len(angle) < 2 * order + 1:
-        raise ShellError(f"the wave {order} around needs at least {2 * order + 1} places, not {len(angle)}.")
-    waves = np.arange(1, order + 1)
-    columns = [np.ones_like(angle), *np.cos(np.outer(waves, angle)), *np.sin(np.outer(waves, angle))]
-    fitted, _, rank, _ = np.linalg.lstsq(np.stack(columns, axis=1), value, rcond=None)
-    if rank < len(columns) or not fitted[0] > 0:
-        raise ShellError("the map's places do not tell its waves apart, or its mean is not positive.")
-    cosine, sine = fitted[order], fitted[2 * order]
-    return float(np.hypot(cosine, sine) / fitted[0]), float(np.arctan2(sine, cosine) / order)
 
 
 def film_weight(film: LossyFilm, faces: tuple[FreeFaces, ...]) -> float:

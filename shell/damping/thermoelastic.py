@@ -16,12 +16,11 @@ of a shell κ_φ + κ_θ = 0, and a bare dome warms only near its free edge.
 """
 
 import numpy as np
-from numpy.typing import ArrayLike
 from scipy.interpolate import BarycentricInterpolator
 from scipy.special import spherical_jn
 
 from shell.damping.conduction import conduct_in_cells
-from shell.damping.heat import Heat, mean_stress
+from shell.damping.heat import mean_stress
 from shell.quadrature import Array, legendre
 from shell.solution import Solution, total
 from shell.system import ShellGroup
@@ -36,30 +35,6 @@ def trace_share(solution: Solution) -> float:
         for group, c, e in zip(solution.system.groups, solution.constants, solution.strain, strict=True)
     ]
     return total(squares) / total(solution.elastic)
-
-
-def lifshitz_roukes(xi: ArrayLike) -> Array:
-    """F(ξ) of a bent wall, ξ = h √(ω C/(2 k)): ξ²/5 for thin walls, its maximum 0.494 at ξ = 2.225, 6/ξ² for thick ones."""
-    x = np.asarray(xi, dtype=float)
-    with np.errstate(over="ignore", invalid="ignore"):
-        decay = np.exp(-x)
-        ratio = (1 - decay**2 + 2 * decay * np.sin(x)) / (1 + decay**2 + 2 * decay * np.cos(x))
-        closed = 6 / x**2 - 6 / x**3 * ratio
-    series = x**2 / 5 - 31 * x**6 / 3780  # below ξ = 0.05 the closed form cancels
-    return np.asarray(np.where(x < 0.05, series, closed))
-
-
-def thermoelastic_loss(solution: Solution, heat: Heat, temperature: float) -> float:
-    """1/Q of a mode by the heat that flows through its wall at every place, and in all directions in roots and stems.
-
-    Parameters
-    ----------
-    solution : of a solved mode.
-    heat : expansion, capacity, conductivity.
-    temperature : K.
-    """
-    x = np.sqrt(solution.eigenvalue) * heat.capacity / heat.conductivity
-    return heat.expansion**2 * temperature / heat.capacity * heat_flow(solution, x) / total(solution.elastic)
 
 
 def heat_flow(solution: Solution, x: float) -> float:

@@ -144,26 +144,10 @@ def _equation_8(displacement: Displacement, twisting_slope: sp.Expr) -> Deformat
 
 
 @cache
-def derivation_defect() -> Deformation:
-    """Return derived minus corrected eq. (8) for arbitrary u, v, w: zero, six times."""
-    general = general_displacement()
-    pairs = zip(derive_deformation(general), corrected_deformation(general), strict=True)
-    return Deformation(*(sp.simplify(derived - corrected) for derived, corrected in pairs))
-
-
-@cache
 def printed_twist_defect() -> sp.Expr:
     """Return derived minus printed twist for arbitrary u, v, w: (∂w/∂θ − ∂w/∂φ) ctg φ / (r² sin φ), not zero."""
     general = general_displacement()
     return sp.factor(sp.simplify(derive_deformation(general).tau - printed_deformation(general).tau))
-
-
-def mirrored_twist(deformation: Deformation) -> sp.Expr:
-    """Return τ(θ) + τ(−θ), zero for any motion that is its own mirror image in the plane θ = 0.
-
-    There u and w are even in θ and v is odd; a twist is odd. The printed ∂w/∂φ · ctg φ is even.
-    """
-    return sp.simplify(deformation.tau + deformation.tau.subs(theta, -theta))
 
 
 @cache

@@ -392,11 +392,6 @@ def exact_forms(model: Fit) -> Fit:
     return fit(model.problem, model.baseline, terms, 1, model.solved.scales)
 
 
-def with_problem(model: Fit, problem: Problem, rounds: int = 1) -> Fit:
-    """Return the same model fitted to other rows."""
-    return fit(problem, model.baseline, model.terms, rounds, model.solved.scales)
-
-
 def settle(problem: Problem, baseline: Baseline, taus: FloatArray | None = None) -> Fit:
     """Fit a baseline alone, from the best of several lags where it has one."""
     from studies.diagnosis.baseline import Lagged

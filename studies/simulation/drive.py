@@ -1,7 +1,7 @@
 """What a run is driven with: its rows, the boundary that is imposed, its commands, and how it begins."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
@@ -97,10 +97,6 @@ class Drive:
         if t[-1] < self.time[-1]:
             t, T = np.append(t, self.time[-1]), np.append(T, T[-1])
         return Profile(t, T)
-
-    def with_initial(self, **initial: float) -> "Drive":
-        """Return the drive with another thermal state at the start."""
-        return replace(self, initial={**self.initial, **initial})
 
 
 def _move_jump(t: Array, T: Array, k: int, later: float) -> tuple[Array, Array]:

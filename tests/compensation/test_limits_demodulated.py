@@ -5,23 +5,26 @@ import pytest
 from scipy.interpolate import CubicSpline
 
 from compensation.demodulated import (
-    find_poles,
-    find_slow_pole,
     map_integral_error,
     measure_rate,
-    relate_drive_to_primary,
-    relate_primary_to_secondary,
     relate_rate_to_measured_rate,
     relate_rate_to_secondary,
-    relate_rate_to_slow_secondary,
     relate_rate_to_tuned_amplitude,
+)
+from compensation.errors import CompensationError
+from compensation.motion import demodulate, propagate_envelope
+from compensation.sensitive_element import SensitiveElement, tune
+from tests.compensation.printed_dynamics import (
+    find_poles,
+    find_slow_pole,
+    integrate_motion,
+    relate_drive_to_primary,
+    relate_primary_to_secondary,
+    relate_rate_to_slow_secondary,
     respond_to_oscillating_rate,
     split_primary,
     split_secondary,
 )
-from compensation.errors import CompensationError
-from compensation.motion import demodulate, integrate_motion, propagate_envelope
-from compensation.sensitive_element import SensitiveElement, tune
 
 MISTUNED = SensitiveElement(3141.0, 3200.0, 0.02, 0.03, 3100.0, q10=2.0, d3=0.6, g1=1.2, g2=1.7)
 TUNED = tune(2 * np.pi * 500, 0.025)

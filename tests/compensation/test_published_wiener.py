@@ -7,6 +7,7 @@ import pytest
 import sympy
 
 from compensation.demodulated import relate_rate_to_measured_rate
+from compensation.derivation.filters import derive_wiener_filter
 from compensation.errors import CompensationError
 from compensation.spectral import (
     Spectrum,
@@ -18,7 +19,7 @@ from compensation.spectral import (
     white_spectrum,
 )
 from compensation.transfer import TransferFunction
-from compensation.wiener import derive_wiener_filter, design_wiener_filter, judge_filter, renormalise
+from compensation.wiener import design_wiener_filter, judge_filter, renormalise
 
 K, ZETA, GAMMA, B = 2 * math.pi * 500, 0.025, 0.1, 2 * math.pi * 3
 

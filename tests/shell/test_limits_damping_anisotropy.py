@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from shell.curves import Line
-from shell.damping.anisotropy import Ripple, damping_wave, describe_wave, film_weight, map_wave, surface_weight
+from shell.damping.anisotropy import Ripple, damping_wave, describe_wave, film_weight, surface_weight
 from shell.damping.budget import Vibration, film_causes, loss_budget
 from shell.damping.film import LossyFilm, film_energy, thickness_power
 from shell.damping.heat import Heat
@@ -83,20 +83,9 @@ def test_heat_of_a_thin_film_goes_as_its_square() -> None:
     assert thickness_power(film, WALL, 2 * pi * 4400) == pytest.approx(2.0, abs=1e-2)
 
 
-def test_wave_of_a_measured_map() -> None:
-    generator = np.random.default_rng(1)
-    theta = np.sort(generator.uniform(0, 2 * pi, 60))
-    values = 100 * (1 + 0.05 * np.cos(theta - 2.0) + 0.02 * np.cos(4 * (theta - 0.3)) + 0.01 * np.sin(2 * theta))
-    amplitude, angle = map_wave(theta, values, 4)
-    assert amplitude == pytest.approx(0.02, rel=1e-9)
-    assert angle == pytest.approx(0.3, rel=1e-9)
-
-
 def test_bad_input_is_said() -> None:
     with pytest.raises(ShellError, match="at most 1"):
         Ripple("surface", 1.5, 0.0, 1.0)
-    with pytest.raises(ShellError, match="at least 9 places"):
-        map_wave([0, 1, 2], [1, 1, 1], 4)
     budget = loss_budget(_dome(0.9e-3), film_causes("gold", GOLD, None, (0, 0), ""), 293.15)
     with pytest.raises(ShellError, match="no part 'surface'"):
         damping_wave(budget, [Ripple("surface", 0.1, 0.0, 1.0)], 2)

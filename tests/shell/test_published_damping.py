@@ -6,7 +6,7 @@ import pytest
 
 from shell.damping.budget import Vibration, bulk_cause, loss_budget, surface_cause
 from shell.damping.gas import GASES, R, free_molecular_loss
-from shell.damping.thermoelastic import lifshitz_roukes, trace_share
+from shell.damping.thermoelastic import trace_share
 from shell.elastic import Elastic
 from shell.materials import find_material
 from shell.meridian import hemisphere
@@ -21,12 +21,6 @@ def test_trace_share_of_the_free_dome(n: int, share: float) -> None:
     (mode,) = solve_modes(hemisphere(radius=15e-3, thickness=0.9e-3), SILICA, n)
     assert mode.solution is not None
     assert trace_share(mode.solution) == pytest.approx(share, abs=1e-3 * share)
-
-
-def test_maximum_of_lifshitz_and_roukes() -> None:
-    """Phys. Rev. B 61 (2000) 5600: the largest damping is 0.494 of E α² T/C, at ξ = 2.225."""
-    assert float(lifshitz_roukes(2.225)) == pytest.approx(0.494, abs=5e-4)
-    assert lifshitz_roukes(2.225) > max(lifshitz_roukes([2.2, 2.25]))
 
 
 def test_bare_silica_resonator_lies_where_bare_resonators_are_measured() -> None:

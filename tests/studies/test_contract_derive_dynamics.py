@@ -22,7 +22,7 @@ def test_schema_is_kept(capsys):
     assert status == 0
     assert list(payload) == ["schema", "equations", "code"]
     assert payload["schema"] == "hrg.derive-dynamics/1"
-    assert [step["number"] for step in payload["equations"] if step["number"]] == ["7", "3", "25"]
+    assert [step["number"] for step in payload["equations"] if step["number"]] == ["7", "3", "25", "35", "36"]
     assert all(list(step) == ["number", "title", "latex", "plain"] for step in payload["equations"])
 
 

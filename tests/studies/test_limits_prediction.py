@@ -66,7 +66,7 @@ def test_every_derivative_against_central_differences(card, drive, law, measured
 
         def moved(step, name=name):
             if name not in known:
-                return predict(card, drive.with_initial(**{name.removeprefix("initial."): step}), law=law)
+                return predict(card, replace(drive, initial={name.removeprefix("initial."): step}), law=law)
             other = card.with_values({name: known[name].value + step})
             own = law.with_material(other.material) if name.startswith("material.") else law
             return predict(other, drive, law=own)
@@ -141,7 +141,7 @@ def test_the_bias_counts_in_the_frequency_of_the_calibrated_law(card, drive, law
 
 def test_departures_decay_from_their_start(drive, law):
     bare = load_card("hrg-30mm")
-    found = predict(bare, drive.with_initial(base=2.0, resonator=-1.0), law=law)
+    found = predict(bare, replace(drive, initial={"base": 2.0, "resonator": -1.0}), law=law)
     plain = predict(bare, drive, law=law)
     away = found.columns["resonator_temperature_degC"] - plain.columns["resonator_temperature_degC"]
     assert away[0] == pytest.approx(-1.0, abs=1e-9)
@@ -155,6 +155,6 @@ def test_a_run_without_a_drive_and_an_unknown_start_are_refused(card, drive):
     with pytest.raises(InputError, match="chamber_temperature_degC is missing; choose the other boundary"):
         drive_by_record(Record({"time_s": TIME, "housing_temperature_degC": TIME * 0.0}), "chamber")
     with pytest.raises(InputError, match="no initial 'shell'"):
-        drive.with_initial(shell=1.0)
+        replace(drive, initial={"shell": 1.0})
     with pytest.raises(InputError, match="the card has no number"):
         predict(card, drive, ["thermal.mass"])

@@ -5,7 +5,7 @@ import pytest
 
 from thermal.errors import ThermalError
 from thermal.lag import lag
-from thermal.network import Boundary, Conductor, Node, Radiator, Source, assemble, effective_emissivity, linearise
+from thermal.network import Boundary, Conductor, Node, Radiator, Source, assemble, linearise
 from thermal.profile import Profile, constant, parse_profile
 from thermal.radiative import integrate
 from thermal.steady import find_steady_state
@@ -102,8 +102,6 @@ def test_other_impossible_numbers_are_refused():
         find_steady_state(assemble([*ROOM, LINK]), {"chamber": -20.0})
     with pytest.raises(ThermalError, match="above 0 K, not at -10 K"):
         linearise(assemble([*ROOM, LINK]), -10.0)
-    with pytest.raises(ThermalError, match="emissivity must lie above 0"):
-        effective_emissivity(0.0, 0.5)
     with pytest.raises(ThermalError, match="must increase from row to row"):
         lag([0.0, 1.0, 1.0], [300.0, 300.0, 300.0], 10.0)
     with pytest.raises(ThermalError, match="time constant must be positive"):

@@ -16,7 +16,6 @@ from thermal.network import (
     Radiator,
     Source,
     assemble,
-    effective_emissivity,
     linearise,
 )
 from thermal.relaxation import find_relaxation, time_constant_sensitivities
@@ -111,11 +110,6 @@ def test_time_constant_sensitivities_match_finite_differences():
     for key, value in sensitivities.items():
         up, down = (find_relaxation(scaled(network, key, f), 293.15).time_constants for f in (1 + step, 1 - step))
         assert value == pytest.approx(np.log(up / down) / (2 * step), abs=1e-8), key
-
-
-def test_effective_emissivity_of_parallel_faces():
-    assert effective_emissivity(1.0, 0.03) == pytest.approx(0.03)
-    assert effective_emissivity(0.5, 0.5) == pytest.approx(1 / 3)
 
 
 positive = st.floats(1e-3, 1e3)

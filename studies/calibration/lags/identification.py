@@ -9,8 +9,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from scipy.optimize import brentq
-from scipy.stats import f as fisher
 from scipy.stats import t as student
 
 from compensation.coloured import Wander, estimate_wander
@@ -25,7 +23,6 @@ PASSES = 2  # fits, each with the noise of the one before; the first under white
 VAGUE = 0.5  # relative standard error above which a constant counts as not determined
 PART = 0.3  # smallest share with which a constant is named in an undetermined direction
 FRACTIONS = (0.004, 0.03, 0.2)  # of the longest run, at which a further lag is tried
-FARTHEST = 16.0  # standard errors to which a profile is followed
 EVIDENCE = 10.0  # how far the information criterion must fall before something is believed
 
 
@@ -252,32 +249,3 @@ def _undetermined(problem: LagProblem, solution: LagSolution) -> tuple[Direction
             parts = {name: float(a) for name, a in zip(problem.names, axis, strict=False) if abs(a) > PART}
             directions.append(Direction(parts, error))
     return tuple(directions)
-
-
-def profile_interval(result: Identification, name: str) -> tuple[float, float]:
-    """Interval of a constant from the profile of the fit: where refitting all others costs too much.
-
-    The whitened sum of squares may grow by the quantile of F(1, N − p) (Bates & Watts, Nonlinear Regression
-    Analysis, 1988, ch. 6). Unlike the intervals of `Identification.estimates` it needs no straight parabola, and an
-    end is 0 or infinite where the record never objects.
-    """
-    solution, problem = result.solution, result.problem
-    if name not in problem.names:
-        raise ThermalError(f"the fit has no constant '{name}'; it has {', '.join(problem.names)}.")
-    k = problem.names.index(name)
-    allowed = float(fisher.ppf(result.confidence, 1, problem.rows - problem.count))
-    best, error = solution.parameters[k], float(np.sqrt(solution.covariance[k, k]))
-    reference = solve(problem, solution.parameters, solution.noise, {k: best}).cost
-
-    def growth(distance: float) -> float:
-        fixed = solve(problem, solution.parameters, solution.noise, {k: best + distance * error})
-        return fixed.cost - reference - allowed
-
-    ends = []
-    for sign in (-1.0, 1.0):
-        reach = 2.0 * sign
-        while growth(reach) < 0 and abs(reach) < FARTHEST:
-            reach *= 2
-        ends.append(best + error * brentq(growth, 0.0, reach, xtol=1e-2) if growth(reach) > 0 else sign * np.inf)
-    low, high = np.exp(ends) if problem.is_logarithmic(k) else ends
-    return float(low), float(high)
