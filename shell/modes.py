@@ -82,9 +82,12 @@ class Mode:
     @cached_property
     def modal_mass(self) -> float:
         """Modal mass ∫ ρ |u|² dV, kg, of the mode scaled to a largest displacement of 1."""
-        patches = self.shape()
-        largest = max(float(np.max(np.maximum(np.hypot(p.u_r, p.u_z), abs(p.u_theta)))) for p in patches)
-        return self._solved().mass / largest**2
+        return self._solved().mass / self.largest_displacement**2
+
+    @cached_property
+    def largest_displacement(self) -> float:
+        """Largest displacement of the eigenvector as it is scaled."""
+        return max(float(np.max(np.maximum(np.hypot(p.u_r, p.u_z), abs(p.u_theta)))) for p in self.shape())
 
     def shape(self, points: int = 9) -> "tuple[ShapePatch, ...]":
         """Displacement on the cross-section, stem included, as curved grids of `points` by `points`."""

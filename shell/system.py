@@ -6,7 +6,7 @@ from functools import cached_property
 from typing import TypeAlias
 
 import numpy as np
-from scipy.sparse import csr_matrix
+from scipy.sparse import block_diag, csr_matrix
 
 from shell.blocks import Mesh, Support
 from shell.cells import CellTable, cell_mass, cell_stiffness
@@ -329,3 +329,13 @@ class Inertia:
         for block, rows in zip(self.blocks, np.split(local, self.starts), strict=True):
             rows[:] = (block @ rows.reshape(*block.shape[:2], -1)).reshape(rows.shape)
         return np.asarray(self.choice.T @ local)
+
+    def matrix(self) -> csr_matrix:
+        """M as a sparse matrix."""
+        per_group = np.diff([0, *self.starts, self.choice.shape[0]])
+        blocks = [
+            np.kron(one, np.eye(rows // one.shape[0] // len(block)))  # the same for each component of a solid
+            for block, rows in zip(self.blocks, per_group, strict=True)
+            for one in block
+        ]
+        return csr_matrix(self.choice.T @ block_diag(blocks, format="csr") @ self.choice)

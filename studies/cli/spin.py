@@ -14,7 +14,7 @@ def spin_pairs(found: "list[Mode]", elastic: "Elastic", rate: float) -> "dict[in
     """
     from math import isfinite, pi, radians
 
-    from shell.prestress import spin_shift
+    from shell.spin import spin_shift
     from studies.errors import InputError
 
     if not isfinite(rate):

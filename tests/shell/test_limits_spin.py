@@ -8,7 +8,7 @@ from shell.elastic import Elastic
 from shell.errors import ShellError
 from shell.meridian import cylinder, hemisphere
 from shell.modes import solve_modes
-from shell.prestress import spin_shift
+from shell.spin import spin_shift
 from shell.resonator import Stem
 
 SILICA = Elastic(72.7e9, 0.17, 2203.0)

@@ -1,0 +1,142 @@
+r"""A mode of a spinning resonator: the second-order change of its frequency, in the frame of the body.
+
+The initial state is static and axisymmetric, K_0 u_0 = f, with stresses σ. In the frame of the body the small motion obeys
+
+    M ü - 2 Ω G u̇ + (K + K_σ - Ω² M_⊥) u = 0,      uᵀ K_σ u = ∫ σ_ij u_k,i u_k,j dV,   uᵀ M_⊥ u = ∫ ρ (u_r² + u_θ²) dV,
+
+G of the waves that run around, uᵀ G v = ∫ ρ (u_r v_θ + u_θ v_r) dV. The two waves of a pair have ω = ω_0 ± Ω g + …, g = uᵀ G u/uᵀ M u,
+which is Bryan's effect; their mean moves in the second order,
+
+    2 ω_0 δω = [uᵀ K_σ u - Ω² uᵀ M_⊥ u]/uᵀ M u + Ω² g² - 4 Ω² ω_0² Σ_j (uᵀ G u_j)²/(ω_j² - ω_0²)
+
+(stiffening, centrifugal softening, Coriolis within the pair, Coriolis with all other modes of the harmonic, of unit mass).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from shell.eigen import Factor
+from shell.elastic import Elastic
+from shell.errors import ShellError
+from shell.finite import solved_as_solid
+from shell.modes import Mode
+from shell.prestress import mean_answer, neighbour
+from shell.quadrature import Array, gauss
+from shell.solution import Solution, total
+from shell.system import Group, ShellGroup, System
+
+STEPS = 60  # of the iterations for rigid motions and for the other modes
+DONE = 1e-8
+
+
+@dataclass(frozen=True)
+class SpinShift:
+    """Relative changes of the mean frequency of a pair per Ω² (s²/rad²): f(Ω) = f (1 + total Ω²)."""
+
+    stress: float
+    centrifugal: float
+    coriolis: float
+
+    @property
+    def total(self) -> float:
+        """All three together."""
+        return self.stress + self.centrifugal + self.coriolis
+
+
+def spin_shift(mode: Mode, elastic: Elastic) -> SpinShift:
+    """Second-order change of a mode's frequency by a constant spin about the axis, in the frame of the body.
+
+    Parameters
+    ----------
+    mode : the lowest of a harmonic n >= 2 in the solid theory.
+    elastic : the material it was solved with.
+
+    Raises
+    ------
+    ShellError
+        For other modes.
+    """
+    solution = solved_as_solid(mode)
+    if mode.harmonic < 2 or mode.index:
+        raise ShellError("the second-order effect of spin is computed for the lowest mode of a harmonic from 2 up.")
+    system, mass, eigenvalue = solution.system, total(solution.kinetic), solution.eigenvalue
+    rest = neighbour(mode, 0)
+    pull = [
+        -group.table.loads(
+            np.zeros((*_shape(group), 6, _points(group))), elastic.rho * _radially(group, _radii(group, system))
+        )
+        for group in rest.groups
+    ]
+    stiffening = 4 * float(mean_answer(mode)[0].vector @ rest.gather(pull)) / mass
+    around = [_radial_and_around(group, d) for group, d in zip(system.groups, solution.displacement, strict=True)]
+    softening = sum(
+        float(np.sum(elastic.rho * (r**2 + t**2) * group.table.volume))
+        for group, (r, t) in zip(system.groups, around, strict=True)
+    )
+    forces = []
+    for group, (r, t) in zip(system.groups, around, strict=True):
+        force = _radially(group, elastic.rho * t)
+        force[:, :, 1] = elastic.rho * r
+        forces.append(-group.table.loads(np.zeros((*_shape(group), 6, _points(group))), force))
+    load = system.gather(forces)
+    g = float(solution.vector @ load) / mass
+    others = _response(system, elastic, solution, load, mass)
+    return SpinShift(
+        stiffening / (2 * eigenvalue),
+        -softening / mass / (2 * eigenvalue),
+        g**2 / (2 * eigenvalue) - 2 * others / mass,
+    )
+
+
+def _response(system: System, elastic: Elastic, solution: Solution, load: Array, mass: float) -> float:
+    """Fᵀ (K - λ M)⁺ f without the mode itself: z = K⁻¹ (f + λ M z), which all higher modes let converge."""
+    lam, G, rho = (list(kind) for kind in zip(*((*c.lame, c.rho) for c in solution.constants), strict=True))
+    K, M = system.operators(lam, G, rho, True)
+    factor, own = Factor(system.pattern, K), solution.vector[:, None]
+    heavy = M @ own
+    f = load[:, None] - heavy * (float(own[:, 0] @ load) / mass)
+    z = np.zeros_like(f)
+    for _ in range(STEPS * 10):
+        before = z
+        z = factor.solve(np.asfortranarray(f + solution.eigenvalue * (M @ z)))
+        z = z - own * (float(heavy[:, 0] @ z[:, 0]) / mass)
+        if np.max(abs(z - before)) <= 1e-9 * np.max(abs(z)):
+            return float(f[:, 0] @ z[:, 0])
+    raise ShellError("the next mode lies so near that its share in the effect of spin does not converge.")
+
+
+def _shape(group: Group) -> tuple[int, int]:
+    return group.table.volume.shape[0], group.table.volume.shape[1]
+
+
+def _points(group: Group) -> int:
+    return int(group.table.volume.shape[2])
+
+
+def _radii(group: Group, system: System) -> Array:
+    """Distance of the points from the axis, (elements, stations, points)."""
+    if not isinstance(group, ShellGroup):
+        return group.table.radius[:, None]
+    section = group.place.section
+    eta = gauss(max(system.level.through) + 2)[0]
+    return np.asarray(section.r[..., None] - section.tangent_z[..., None] * section.thickness[..., None] * eta / 2)
+
+
+def _radially(group: Group, amount: Array) -> Array:
+    """A vector field along r, in the axes of a group: (elements, stations, 3, points)."""
+    field = np.zeros((*amount.shape[:2], 3, amount.shape[2]))
+    if isinstance(group, ShellGroup):
+        section = group.place.section
+        field[:, :, 0], field[:, :, 2] = section.tangent_r[..., None] * amount, -section.tangent_z[..., None] * amount
+    else:
+        field[:, :, 0] = amount
+    return field
+
+
+def _radial_and_around(group: Group, d: Array) -> tuple[Array, Array]:
+    """Displacements along r and θ at the points."""
+    if isinstance(group, ShellGroup):
+        section = group.place.section
+        return section.tangent_r[..., None] * d[:, :, 0] - section.tangent_z[..., None] * d[:, :, 2], d[:, :, 1]
+    return d[:, :, 0], d[:, :, 1]
