@@ -2,9 +2,9 @@ r"""A mode of a spinning resonator: the second-order change of its frequency, in
 
 The initial state is static and axisymmetric, K_0 u_0 = f, with stresses σ. In the frame of the body the small motion obeys
 
-    M ü - 2 Ω G u̇ + (K + K_σ - Ω² M_⊥) u = 0,      uᵀ K_σ u = ∫ σ_ij u_k,i u_k,j dV,   uᵀ M_⊥ u = ∫ ρ (u_r² + u_θ²) dV,
+    M ü - 2 Ω G u̇ + (K + K_σ - Ω² M_⊥) u = 0,      uᵀ M_⊥ u = ∫ ρ (u_r² + u_θ²) dV,
 
-G of the waves that run around, uᵀ G v = ∫ ρ (u_r v_θ + u_θ v_r) dV. The two waves of a pair have ω = ω_0 ± Ω g + …, g = uᵀ G u/uᵀ M u,
+K_σ by the stresses and the shape that they give (shell.prestress), G of the waves that run around, uᵀ G v = ∫ ρ (u_r v_θ + u_θ v_r) dV. The two waves of a pair have ω = ω_0 ± Ω g + …, g = uᵀ G u/uᵀ M u,
 which is Bryan's effect; their mean moves in the second order,
 
     2 ω_0 δω = [uᵀ K_σ u - Ω² uᵀ M_⊥ u]/uᵀ M u + Ω² g² - 4 Ω² ω_0² Σ_j (uᵀ G u_j)²/(ω_j² - ω_0²)

@@ -3,7 +3,8 @@
 Where the card has imperfections or charged electrodes, the pairs n >= 1 have `split` in the JSON besides: `split_Hz`, `slow_Hz`, `fast_Hz`,
 `slow_axis_deg` (azimuth of an antinode of the slower mode), `shift_ppm` of the mean, all to first order, and `every_order_split_Hz`; and
 `parts`, split_Hz, slow_axis_deg and shift_ppm by the imperfection, the measured split and the electrodes alone. With `--spin` the lowest modes of
-n >= 2 in the solid theory have `spin`: `rate_deg_per_s`, `lower_wave_Hz` and `upper_wave_Hz`, and `shift_ppm` of their mean with its parts.
+n >= 2 in the solid theory have `spin`: `rate_deg_per_s`, `lower_wave_Hz` and `upper_wave_Hz`, and `shift_ppm` of their mean with its parts; with
+`--amplitude` all modes of n >= 2 there have `amplitude`: `amplitude_um`, `shift_ppb` with its parts, `shift_Hz_per_um2`.
 Where the card has films ([[loss.film]]), modes have `films`: `film`, `shift_ppm`, and the `missing` keys where that is null. Where its material is
 a crystal, the lowest pairs of n = 2, 3, 5, 6, 7, 9 … have `crystal`: `antinode_along_100_Hz`, `other_Hz`, `split_Hz`, `relative_split`.
 """
@@ -31,6 +32,7 @@ def modes(
     tolerance: float = 1e-5,
     sensitivities: bool = False,
     spin: float | None = None,
+    amplitude: float | None = None,
 ) -> Answer:
     """Compute the lowest modes of a resonator: frequency, Bryan factor, energies, sensitivities.
 
@@ -52,12 +54,15 @@ def modes(
         Show how each frequency follows E, nu, rho, thickness and radius, and where its energy is.
     spin : float
         Rate of spin about the axis in °/s: the two waves that run around, and what the second order of the rate does to both.
+    amplitude : float
+        Largest displacement in µm: what the nonlinear geometry of a large vibration does to the frequency.
     """
     from dataclasses import asdict
 
     from scipy.constants import zero_Celsius
 
     from shell.modes import solve_modes
+    from studies.cli.amplitude import describe_amplitude, print_amplitude
     from studies.cli.crystal import crystal_pairs, print_crystal
     from studies.cli.films import describe_films, print_films
     from studies.cli.output import print_table
@@ -82,6 +87,7 @@ def modes(
     share, mean = _material_share(instrument, T), _mean_thickness(resonator)
     split = _find_splits(instrument, found, T) if detailed else {}
     spinning = {} if spin is None else spin_pairs(found, elastic, spin)
+    large = {} if amplitude is None else describe_amplitude(found, amplitude)
     entries = []
     for m in found:
         entry = {
@@ -102,7 +108,7 @@ def modes(
             }
         if id(m) in split:
             entry["split"] = split[id(m)]
-        for key, known in (("spin", spinning), ("films", films), ("crystal", crystal)):
+        for key, known in (("spin", spinning), ("amplitude", large), ("films", films), ("crystal", crystal)):
             if id(m) in known:
                 entry[key] = known[id(m)]
         entries.append(entry)
@@ -138,6 +144,8 @@ def modes(
         _print_splits(found, split)
     if spinning:
         print_spin(found, spinning)
+    if large:
+        print_amplitude(found, large)
     if films:
         print_films(found, films)
     if crystal:

@@ -61,6 +61,8 @@ def test_an_error_of_a_real_process_is_status_2_without_traceback():
         (["tcf", "hrg-30mm", "--step", "0"], "step"),
         (["modes", "hrg-30mm", "--count", "0"], "count"),
         (["modes", "free-dome", "--spin", "nan"], "--spin"),
+        (["modes", "free-dome", "--amplitude", "-1"], "--amplitude"),
+        (["modes", "free-dome", "--amplitude", "1", "--harmonic", "1"], "--amplitude"),
         (["modes", "free-dome", "--spin", "100", "--theory", "shell"], "--spin"),
         (["materials", "fused-silca"], "fused-silica"),
         (["fit", "frequency", "none.csv"], "no such file"),
@@ -99,6 +101,16 @@ def test_spin_parts_the_waves_of_a_pair_by_bryan(capsys):
     assert spin["upper_wave_Hz"] - spin["lower_wave_Hz"] == pytest.approx(2 * 2 * pair["bryan_factor"], rel=1e-9)
     mean = (spin["upper_wave_Hz"] + spin["lower_wave_Hz"]) / 2
     assert mean - pair["frequency_Hz"] == pytest.approx(1e-6 * spin["shift_ppm"] * pair["frequency_Hz"], rel=1e-3)
+
+
+def test_the_shift_by_amplitude_has_two_parts_and_goes_with_its_square(capsys):
+    found = []
+    for amplitude in ("1", "2"):
+        assert main(["modes", "free-dome", "--amplitude", amplitude, "--json"]) == 0
+        found.append(json.loads(capsys.readouterr().out)["modes"][0]["amplitude"])
+    one, two = found
+    assert two["shift_ppb"] == pytest.approx(4 * one["shift_ppb"], rel=1e-9)
+    assert one["shift_ppb"] == pytest.approx(one["static_ppb"] + one["inertial_ppb"], rel=1e-9)
 
 
 def test_a_foreign_package_of_our_name_is_status_3(tmp_path):
