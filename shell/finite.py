@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from shell.cells import R, Z, ZERO, CellTable
+from shell.cells import ZERO, CellTable, R, Z
 from shell.errors import ShellError
 from shell.kernel import shell_gradients
 from shell.modes import Mode
@@ -33,7 +33,9 @@ def solved_as_solid(mode: Mode) -> Solution:
         For other theories.
     """
     if mode.theory != "solid" or mode.solution is None or mode.resonator is None:
-        raise ShellError("initial stress and large amplitudes are computed in the solid theory: solve the mode with it.")
+        raise ShellError(
+            "initial stress and large amplitudes are computed in the solid theory: solve the mode with it."
+        )
     return mode.solution
 
 

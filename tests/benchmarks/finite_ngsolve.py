@@ -136,7 +136,9 @@ def lowest(waves: Waves, n: int, near: float, H0=None, growth=1.0):
     shifted = waves.matrix(space, stiff - (2 * pi * near) ** 2 * heavy)
     inverse = shifted.mat.Inverse(space.FreeDofs(), inverse="umfpack")
     free = np.array([bool(x) for x in space.FreeDofs()])
-    k, m = (csr_matrix((x, (i, j)), shape=(space.ndof,) * 2)[free][:, free] for i, j, x in (f.mat.COO() for f in (K, M)))
+    k, m = (
+        csr_matrix((x, (i, j)), shape=(space.ndof,) * 2)[free][:, free] for i, j, x in (f.mat.COO() for f in (K, M))
+    )
     load, answer = shifted.mat.CreateColVector(), shifted.mat.CreateColVector()
 
     def solve(x):
@@ -163,7 +165,9 @@ def grown(E, growth):
     return [[E[i][j] - ((growth**2 - 1) / 2 if i == j else 0.0) for j in range(3)] for i in range(3)]
 
 
-def slope_by_difference(mesh, elastic: Elastic, n: int, near: float, order: int, uneven: bool, strain: float = 1e-6) -> float:
+def slope_by_difference(
+    mesh, elastic: Elastic, n: int, near: float, order: int, uneven: bool, strain: float = 1e-6
+) -> float:
     """D ln f of equilibria at ± strain: by that of the base, or by the growth strain cos² of the polar angle of the body."""
     waves = Waves(mesh, elastic, order)
     ng, found = waves.ng, []
@@ -270,7 +274,9 @@ def main() -> None:
             base = slope_by_difference(mesh, SILICA, 2, near, order, False) if clamped else 0.0
             field = slope_by_difference(mesh, SILICA, 2, near, order, True) if clamped and "cup" not in name else 0.0
             spent = time.process_time() - start
-            print(f"   NGSolve order {order}: f {f:.5f} Hz, per m² {theirs:.6e}, base {base:.7f}, field {field:.7f}, {spent:.0f} s")
+            print(
+                f"   NGSolve order {order}: f {f:.5f} Hz, per m² {theirs:.6e}, base {base:.7f}, field {field:.7f}, {spent:.0f} s"
+            )
 
 
 if __name__ == "__main__":

@@ -8,8 +8,8 @@ from shell.elastic import Elastic
 from shell.errors import ShellError
 from shell.meridian import cylinder, hemisphere
 from shell.modes import solve_modes
-from shell.spin import spin_shift
 from shell.resonator import Stem
+from shell.spin import spin_shift
 
 SILICA = Elastic(72.7e9, 0.17, 2203.0)
 
