@@ -148,7 +148,7 @@ def lowest(waves: Waves, n: int, near: float, H0=None, growth=1.0):
         return answer.FV().NumPy()[free].copy()
 
     operator = LinearOperator(k.shape, matvec=solve, dtype=float)
-    values, vectors = eigsh(k, 1, m, sigma=(2 * pi * near) ** 2, OPinv=operator, which="LM")
+    _, vectors = eigsh(k, 1, m, sigma=(2 * pi * near) ** 2, OPinv=operator, which="LM")
     mode = ng.GridFunction(space)
     mode.vec.FV().NumPy()[:] = 0.0
     mode.vec.FV().NumPy()[free] = vectors[:, 0]
