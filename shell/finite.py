@@ -65,7 +65,7 @@ def gradient_loads(system: System, group: Group, P: Array) -> Array:
     w = (P * table.volume[:, :, None, None])[:, 0]  # (cells, i, k, points)
     n, (along_r, around, along_z) = system.n, (w[:, k] for k in range(3))
     over_r = np.stack([around[:, 1] - n * around[:, 0], n * around[:, 1] - around[:, 0], -n * around[:, 2]], axis=1)
-    found = 0.0
+    found = np.zeros((len(w), table.gradients.shape[3], 3))
     for place, dual in ((R, along_r), (Z, along_z), (ZERO, over_r)):
         found = found + np.swapaxes(table.gradients[:, place], 1, 2) @ np.swapaxes(dual, 1, 2)
     return np.asarray(found)
