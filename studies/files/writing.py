@@ -1,5 +1,6 @@
 """Output files appear whole or not at all: written beside their place, then renamed into it."""
 
+import errno
 import os
 import shutil
 import tempfile
@@ -62,10 +63,12 @@ def written_whole(path: str | Path) -> Iterator[IO[bytes]]:
 
 def _follow(path: Path) -> Path:
     """Return where a link leads to; any other path as it is."""
-    try:
-        return path.resolve() if path.is_symlink() else path
-    except RuntimeError as error:  # a loop of links
-        raise OSError(str(error)) from error
+    if not path.is_symlink():
+        return path
+    target = Path(os.path.realpath(path))
+    if target.is_symlink():
+        raise OSError(errno.ELOOP, "its link leads back to itself")
+    return target
 
 
 def check_folder(path: str | Path) -> Path:

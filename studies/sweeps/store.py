@@ -10,13 +10,14 @@ import os
 import sqlite3
 import struct
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from hashlib import blake2b
 from pathlib import Path
 from types import TracebackType
 from typing import IO, TYPE_CHECKING, Any, Self
+from weakref import finalize
 
 from studies.errors import InputError, MissingEnvironment
 from studies.sweeps.canonical import find_changes, spell
@@ -59,13 +60,13 @@ class Stored:
 
 
 class Store:
-    """An open store; a context manager that closes it and frees its lock."""
+    """An open store; a context manager that closes it and frees its lock. One that is forgotten is closed too."""
 
     def __init__(self, connection: sqlite3.Connection, path: Path, lock: IO[str] | None = None) -> None:
         self.connection = connection
         self.path = path
-        self.lock = lock
         self.run = 0
+        self.end = finalize(self, _end, connection, lock)
 
     def __enter__(self) -> Self:
         return self
@@ -77,9 +78,7 @@ class Store:
 
     def close(self) -> None:
         """Close the file and free the lock."""
-        self.connection.close()
-        if self.lock is not None:
-            self.lock.close()
+        self.end()
 
     def begin_run(self, provenance: Mapping[str, Any]) -> None:
         """Note that a run starts, and on what."""
@@ -255,6 +254,13 @@ class Store:
             ) from error
         except sqlite3.DatabaseError as error:
             raise _damaged(self.path, error) from error
+
+
+def _end(connection: sqlite3.Connection, lock: IO[str] | None) -> None:
+    with suppress(sqlite3.ProgrammingError):  # forgotten by another thread than the one that opened it
+        connection.close()
+    if lock is not None:
+        lock.close()
 
 
 _STUDY = ("created_utc", "identity", "spec", "spec_text", "instrument", "folder", "cases", "repeats")
