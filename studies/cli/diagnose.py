@@ -142,7 +142,8 @@ def _fleet(devices: list[str], manifest: str | None, card: str | None, report: s
     """Diagnose devices of one design together."""
     from studies.cli.output import print_table, say
     from studies.cli.telling import Told
-    from studies.diagnosis.fleet import diagnose_fleet, read_fleet
+    from studies.diagnosis.fleet.investigation import diagnose_fleet
+    from studies.diagnosis.fleet.records import read_fleet
     from studies.files.writing import write_text
     from studies.instrument.card import load_card
     from studies.reports import fleet as page

@@ -2,7 +2,7 @@
 
 from typing import TYPE_CHECKING
 
-from studies.diagnosis.fleet import Fleet, Share, Value
+from studies.diagnosis.fleet.outcome import Fleet, Share, Value
 from studies.reports.diagnosis import NAMES, cause_table, response_table
 from studies.reports.digits import plain
 from studies.reports.page import Block, Chapter, Picture, Table, Text, draw, render_page

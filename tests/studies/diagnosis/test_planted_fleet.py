@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from studies.cli import main
-from studies.diagnosis.fleet import Standing, against_others, compare, read_fleet
+from studies.diagnosis.fleet.comparison import Standing, against_others, compare
+from studies.diagnosis.fleet.records import read_fleet
 from studies.diagnosis.verdict import Interval
 from studies.errors import InputError
 from studies.record import Record, write_record

@@ -1,6 +1,8 @@
 """Contract of results: the same with any workers, on a cluster, in any order; tables with units; a self-contained page."""
 
+import gc
 import socket
+import sqlite3
 import subprocess
 import sys
 import time
@@ -172,3 +174,14 @@ def test_no_scheduler_is_said(tmp_path):
             run_study(SPEC, scheduler=f"tcp://127.0.0.1:{free_port()}")
     finally:
         module.PATIENCE = patience
+
+
+def test_a_store_that_is_forgotten_is_closed():
+    from studies.sweeps.store import memory_store
+
+    store = memory_store()
+    connection = store.connection
+    del store
+    gc.collect()
+    with pytest.raises(sqlite3.ProgrammingError, match="closed"):
+        connection.execute("SELECT 1")

@@ -1,0 +1,1 @@
+"""Several devices of one design: `records` reads them, `investigation` diagnoses them together, `comparison` weighs what they share."""
