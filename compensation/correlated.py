@@ -31,6 +31,7 @@ Array = NDArray[np.float64]
 LEAST, MOST = -7.0, 5.0  # ln of a slow level over the white one, one row each
 KINDS = ("white", "flicker", "walk", "offset")
 USUAL, SPREAD = -1.0, 3.0  # their weak prior, which keeps a level that the rows say nothing about from running away
+STATED_SPREAD = 1.5  # the same about ln of a level that is stated: a factor of 3
 
 
 @dataclass(frozen=True)
@@ -139,6 +140,7 @@ def estimate_noise(
     precision: Array | None = None,
     kinds: Sequence[str] = KINDS,
     near: Noise | None = None,
+    stated: Noise | None = None,
 ) -> Noise:
     """Estimate the levels of the noise by its marginal likelihood.
 
@@ -154,6 +156,8 @@ def estimate_noise(
         What the noise may consist of; one run has no offset, since none is known from another.
     near : Noise, optional
         Levels from which the search begins: those of residuals that were much the same.
+    stated : Noise, optional
+        What is said of the slow levels beforehand, to a factor of 3; of a level of 0 nothing is.
 
     Returns
     -------
@@ -180,8 +184,16 @@ def estimate_noise(
         slow["walk"] = slow.get("walk", 0.0) / float(np.sqrt(hours))
         return Noise(white, **slow)
 
+    said = {kind: getattr(stated, kind) for kind in free if stated is not None and getattr(stated, kind) > 0}
+
+    def surprise(kind: str, x: Array, ratio: float) -> float:
+        if kind not in said:
+            return (ratio - USUAL) / SPREAD
+        return float(np.log(getattr(levels(x), kind) / said[kind])) / STATED_SPREAD
+
     def objective(x: Array) -> float:
-        return rows.deviance(rest, X, lam, levels(x), -free_part) + float((((x[1:] - USUAL) / SPREAD) ** 2).sum())
+        prior = sum(surprise(kind, x, float(ratio)) ** 2 for kind, ratio in zip(free, x[1:], strict=True))
+        return rows.deviance(rest, X, lam, levels(x), -free_part) + prior
 
     first = np.array([-0.3, *[USUAL] * len(free)])
     if near is not None and near.white > 0:

@@ -7,17 +7,23 @@ than 5 standard deviations are given the variance that they show: one outlier mo
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from compensation.correlated import KINDS, Noise, NoiseRows, estimate_noise
+from compensation.correlated import HOUR, KINDS, Noise, NoiseRows, estimate_noise
 from compensation.errors import CompensationError
+from compensation.wander import FLICKER_TIMES
 from shell.errors import ShellError
 from studies.calibration.observed import SETTLED
 from studies.calibration.problem import CardProblem, Progress, State
 from studies.errors import InputError
+from studies.simulation.noise import bias_noise, frequency_noise
 from thermal.errors import ThermalError
+
+if TYPE_CHECKING:
+    from studies.instrument.tables.noise import NoiseKeys
 
 Array = NDArray[np.float64]
 MOST_STEPS = 30
@@ -126,11 +132,25 @@ def _noise(problem: CardProblem, rows: NoiseRows, state: State, name: str, near:
     U, S, _ = np.linalg.svd(J, full_matrices=False)
     seen = S > UNSEEN * float(np.median(np.abs(np.diff(state.residual[name]))))
     kinds = ("white",) if name == SETTLED else KINDS
-    noise = estimate_noise(rows, target, U[:, seen] * S[seen], np.ones(int(seen.sum())), kinds, near)
+    stated = stated_noise(problem.instrument.noise, name)
+    noise = estimate_noise(rows, target, U[:, seen] * S[seen], np.ones(int(seen.sum())), kinds, near, stated)
     if name == SETTLED:  # a reading is not better than its last digit
         rounding = max(table.resolution for table in problem.tables) / np.sqrt(12.0)
         return replace(noise, white=max(noise.white, rounding))
     return noise
+
+
+def stated_noise(noise: "NoiseKeys", response: str) -> Noise | None:
+    """Slow levels of a response as a card's `[noise]` states them; None where it says nothing of them.
+
+    1/f noise of Allan deviation a, S = h/f, a² = 2 ln 2 · h, has the variance h ln 4 = a² per factor of 4 in time: one of
+    the exponentials of which `flicker` is the mean.
+    """
+    slow = {"frequency_Hz": frequency_noise, "bias_deg_per_h": bias_noise}
+    if response not in slow:
+        return None
+    levels = slow[response](noise)
+    return Noise(0.0, flicker=levels.flicker * np.sqrt(len(FLICKER_TIMES)), walk=levels.walk * np.sqrt(HOUR))
 
 
 def _spare_outliers(rows: NoiseRows, state: State, name: str, noise: Noise) -> tuple[NoiseRows, int]:

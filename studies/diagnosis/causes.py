@@ -17,6 +17,9 @@ from studies.effects import Effect, find_effect
 
 VOTERS = 4
 """Rivals of one place that the other responses are asked about."""
+FAR_DOWN = 8.0
+"""Fall of the log evidence beyond which a step along a shape parameter is too far to show its curvature."""
+SHORTENINGS = 5
 
 
 def vote(
@@ -150,16 +153,24 @@ def shape_spread(model: Fit, index: int) -> list[float]:
             out.append(0.0)
             continue
         step = 0.03 if parameter.logarithmic else max(0.01 * abs(term.shape[k]), 0.05)
-        sides = []
-        for sign in (-1.0, 1.0):
-            value = term.shape[k] * float(np.exp(sign * step)) if parameter.logarithmic else term.shape[k] + sign * step
-            shape = (*term.shape[:k], value, *term.shape[k + 1 :])
-            terms = (*model.terms[:index], replace(term, shape=shape), *model.terms[index + 1 :])
-            own = fit(model.problem, model.baseline, terms, 1, model.solved.scales, [model.solved.kind])
-            sides.append(own.log_evidence)
+        for _ in range(SHORTENINGS):
+            sides = [_moved(model, index, k, sign * step).log_evidence for sign in (-1.0, 1.0)]
+            fall = model.log_evidence - min(sides)
+            if fall < FAR_DOWN:
+                break
+            step *= max(float(np.sqrt(1.0 / fall)), 0.02)
         bend = (2.0 * model.log_evidence - sides[0] - sides[1]) / step**2
         out.append(float(1.0 / np.sqrt(bend)) if bend > 0 else step * 10.0)
     return out
+
+
+def _moved(model: Fit, index: int, k: int, step: float) -> Fit:
+    """Return the model with one shape parameter of a term (its logarithm where it has one) a step further."""
+    term = model.terms[index]
+    value = term.shape[k] * float(np.exp(step)) if term.effect.shape[k].logarithmic else term.shape[k] + step
+    shape = (*term.shape[:k], value, *term.shape[k + 1 :])
+    terms = (*model.terms[:index], replace(term, shape=shape), *model.terms[index + 1 :])
+    return fit(model.problem, model.baseline, terms, 1, model.solved.scales, [model.solved.kind])
 
 
 def peak_of(model: Fit, index: int) -> float:

@@ -117,12 +117,20 @@ def entry_of(model: Fit, index: int, column: str) -> dict[str, Any]:
     numbers: dict[str, Any] = {p.name: float(value) for p, value in zip(term.effect.shape, term.shape, strict=True)}
     if term.effect.sees_heat:  # the fit knew the temperature with it; a simulation has to solve for it
         numbers[term.effect.shape[0].name] = float(np.clip(values[0], 0.0, 1.0))
-    numbers |= {key: value for key, value in term.effect.numbers(values, column).items() if np.any(value)}
+    numbers |= {key: _shortest(value) for key, value in term.effect.numbers(values, column).items() if np.any(value)}
     for key, known in parameters_of(model, index).items():
         sd = float(min(WIDER * known.sd, abs(known.value)))
         if sd > 0 and isinstance(numbers.get(key), float):
             numbers[key] = {"value": numbers[key], "sd": sd}
     return {"name": term.name, "response": column, **numbers}
+
+
+def _shortest(value: float | list[float]) -> float | list[float]:
+    """Return a list without the zeros at its end, and a number for one alone: that can be uncertain."""
+    if isinstance(value, float):
+        return value
+    members = value[: int(np.flatnonzero(value)[-1]) + 1]
+    return members if len(members) > 1 else members[0]
 
 
 def without_events(diagnosis: Diagnosis, records: Sequence[Record]) -> list[Record]:

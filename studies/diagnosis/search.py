@@ -10,8 +10,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from studies.diagnosis.constants import CONSTANTS
-from studies.diagnosis.model import Fit, fit
-from studies.diagnosis.scan import Bank, Seen, scan
+from studies.diagnosis.model import Fit, Term, fit
+from studies.diagnosis.scan import Bank, Seen, build_bank, scan
 from studies.effects import Effect, Parameter
 
 MOST_CAUSES = 4
@@ -101,8 +101,19 @@ def contenders(base: Hypothesis, bank: Bank, but: Sequence[str] = ()) -> list[Hy
 def polish(base: Hypothesis, seen: Seen) -> Hypothesis:
     """Add an effect and move its shape to where the evidence is largest."""
     price = CONSTANTS["log_prior_effect"] + seen.choice
-    model = fit(base.fit.problem, base.fit.moved(), (*base.fit.terms, seen.term), 2, _sizes(base.fit))
+    term = nearer(base.fit, seen.term)
+    model = fit(base.fit.problem, base.fit.moved(), (*base.fit.terms, term), 2, _sizes(base.fit))
     return Hypothesis(refine(model, len(model.terms) - 1), (*base.price, price))
+
+
+def nearer(model: Fit, term: Term) -> Term:
+    """Return the likeliest of the shapes that a shape of the coarse grid stands for."""
+    effect = term.effect
+    if effect.near is None:
+        return term
+    shapes = effect.near(model.problem.span, model.problem.response.column, term.shape)
+    seen = scan(model, build_bank(model, [replace(effect, grid=lambda *_: shapes)]))
+    return replace(term, shape=seen[0].term.shape) if seen else term
 
 
 def _sizes(model: Fit) -> np.ndarray:
@@ -149,17 +160,22 @@ def _along(model: Fit, index: int, place: int, parameter: Parameter) -> Fit:
             best[0] = own
         return -own.log_evidence
 
-    low, high = _bracket(at, term.effect, parameter, model)
+    low, high = _bracket(term, place, model)
     tolerance = 0.02 * (high - low)
     minimize_scalar(tried, bounds=(low, high), method="bounded", options={"xatol": tolerance, "maxiter": 12})
     return best[0]
 
 
-def _bracket(at: float, effect: Effect, parameter: Parameter, model: Fit) -> tuple[float, float]:
-    """As far to both sides as the next points of the grid."""
-    span = model.problem.span
-    column = effect.shape.index(parameter)
-    grid = np.unique([shape[column] for shape in effect.grid(span, model.problem.response.column)])
+def _bracket(term: Term, place: int, model: Fit) -> tuple[float, float]:
+    """As far to both sides as the next points of the grid, or of the finer one about it."""
+    span, effect, at = model.problem.span, term.effect, term.shape[place]
+    parameter, response = effect.shape[place], model.problem.response.column
+    shapes = list(effect.grid(span, response))
+    if effect.near is not None:
+        steady = [k for k, own in enumerate(effect.shape) if own.steady]
+        near = effect.near(span, response, term.shape)
+        shapes = [one for one in near if all(one[k] == term.shape[k] for k in steady)]
+    grid = np.unique([shape[place] for shape in shapes])
     low = grid[grid < at * (1 - 1e-9) if at > 0 else grid < at - 1e-9]
     high = grid[grid > at * (1 + 1e-9) if at > 0 else grid > at + 1e-9]
     below = float(low[-1]) if low.size else (at / 1.6 if parameter.logarithmic else at - 1.0)

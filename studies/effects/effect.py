@@ -89,6 +89,8 @@ class Effect:
         temperature (frequency, bias and 1/Q then follow by themselves), else a change of the response in its own unit.
     grid : callable (span, response) -> list of shapes
         Shapes to look at, fine enough for a scan; all equally likely beforehand.
+    near : callable (span, response, shape) -> list of shapes, optional
+        Where the grid is coarser than what records tell apart: the shapes that one of it stands for.
     sizes : mapping from response to number
         How large the first coefficient is in strong cases that sources show; smaller sizes are likely as well, down to a
         ten thousandth, every decade as much. Frequency and 1/Q count in parts of their level. Its keys are the responses
@@ -141,6 +143,7 @@ class Effect:
     once: bool = False
     fine: bool = False
     sees_heat: bool = False
+    near: Callable[[Span, str, Shape], Sequence[tuple[float, ...]]] | None = None
     steady: Callable[[FloatArray, Shape], FloatArray] | None = None
     steady_grid: Callable[[float, float], Sequence[tuple[float, ...]]] | None = None
     steady_words: str = ""

@@ -26,9 +26,22 @@ def grid(span: Span, response: str) -> list[tuple[float, ...]]:
     return forms
 
 
+def near(span: Span, response: str, shape: Shape) -> list[tuple[float, ...]]:
+    """Periods that one run hardly tells from this one, spaced finer than the lines that runs days apart tell: a tenth of a turn."""
+    middle, reach = 1.0 / shape[0], LOBE / span.longest_run
+    forms: list[tuple[float, ...]] = []
+    for restarts, length in ((1.0, span.longest_run), (0.0, span.campaign_length))[: 2 if span.runs > 1 else 1]:
+        apart = max(0.1 / length, 2.0 * reach / MOST)
+        steps = int(reach / apart)
+        forms += [(float(1.0 / f), restarts) for f in middle + apart * np.arange(-steps, steps + 1) if f > 0.0]
+    return forms
+
+
 CYCLES = 3.0
 """Periods in the longest run that make a line: with fewer, a wandering response looks the same."""
 MOST = 1500
+LOBE = 0.6
+"""Turns over a run by which two periods may differ and still look alike in it."""
 
 
 EFFECT = Effect(
@@ -40,6 +53,7 @@ EFFECT = Effect(
     coefficients=(Coefficient("sine_{unit}", (1.0, 0.3, 0.1)), Coefficient("cosine_{unit}", (1.0, 0.3, 0.1))),
     columns=columns,
     grid=grid,
+    near=near,
     sizes={"bias_deg_per_h": 10.0, "frequency_Hz": 5e-5, "inverse_q": 0.3},
     shape=(
         Parameter("period_s", 1.0, 1e7, "period", of_run=1.0 / CYCLES),
