@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from compensation.correlated import HOUR, KINDS, Noise, NoiseRows, estimate_noise
+from compensation.correlated import KINDS, Noise, NoiseRows, estimate_noise
 from compensation.errors import CompensationError
-from compensation.wander import FLICKER_TIMES
+from compensation.wander import FLICKER_TIMES, HOUR
 from shell.errors import ShellError
 from studies.calibration.observed import SETTLED
 from studies.calibration.problem import CardProblem, Progress, State

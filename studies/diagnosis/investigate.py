@@ -233,22 +233,39 @@ def _judge(
     temperature = np.concatenate([run.states.housing for run in campaign.runs])
     if np.ptp(temperature) < NARROW_RANGE:
         return "not-identifiable", [f"the temperature varies by {np.ptp(temperature):.2g} K only"]
-    return ("not-identifiable", apart) if apart else ("adequate", [])
+    return ("not-identifiable", apart) if apart else ("adequate", _turned_on(inquiry))
 
 
 def _apart(campaign: Campaign, inquiry: Inquiry) -> list[str]:
     """Return the sentence on runs that lie farther apart than what is left within them; none where they do not."""
     response, final = inquiry.problem.response, inquiry.final
-    shifts = np.array(_run_shifts(final))
-    apart = float(np.sqrt(np.mean(shifts**2)))
-    white = float(np.sqrt(final.solved.variance))
-    if response.own_offset or apart <= CONSTANTS["wander_usual"] * np.hypot(final.wander, white):
+    apart, usual = _spread_of_runs(final)
+    if response.own_offset or apart <= usual:
         return []
+    white = float(np.sqrt(final.solved.variance))
     text = (
         f"the runs lie {apart * response.scale:.3g} {response.shown} (rms) apart, {apart / max(final.wander, white):.0f} "
         "times the residual within them: ageing, a clock, handling, or drift between runs"
     )
     return [text if campaign.timed else text + "; start times ('# start' in the records) would show which"]
+
+
+def _turned_on(inquiry: Inquiry) -> list[str]:
+    """Return the sentence on a response whose runs have offsets of their own, far beyond what is left within them."""
+    response, final = inquiry.problem.response, inquiry.final
+    apart, usual = _spread_of_runs(final)
+    if not response.own_offset or apart <= usual:
+        return []
+    return [
+        f"the runs lie {apart * response.scale:.3g} {response.shown} (rms) apart, which is taken for an offset of each turn-on: "
+        "ageing or a jump between runs would look the same, and no saved model predicts it"
+    ]
+
+
+def _spread_of_runs(final: Fit) -> tuple[float, float]:
+    """Return how far the runs lie apart (rms), and how far they may before it is said."""
+    apart = float(np.sqrt(np.mean(np.square(_run_shifts(final)))))
+    return apart, CONSTANTS["wander_usual"] * float(np.hypot(final.wander, np.sqrt(final.solved.variance)))
 
 
 def _run_shifts(model: Fit) -> list[float]:

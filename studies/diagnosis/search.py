@@ -12,7 +12,7 @@ import numpy as np
 from studies.diagnosis.constants import CONSTANTS
 from studies.diagnosis.model import Fit, Term, fit
 from studies.diagnosis.scan import Bank, Seen, build_bank, scan
-from studies.effects import Effect, Parameter
+from studies.effects import Parameter
 
 MOST_CAUSES = 4
 CONTENDERS = 7
@@ -147,7 +147,6 @@ def _along(model: Fit, index: int, place: int, parameter: Parameter) -> Fit:
     from scipy.optimize import minimize_scalar
 
     term = model.terms[index]
-    at = term.shape[place]
     baseline, kinds = model.baseline, [model.solved.kind]
     best = [model]
 

@@ -60,6 +60,25 @@ def test_levels_are_recovered_from_drawn_noise():
     assert max(n.walk for n in quiet) < 0.03
 
 
+def test_what_is_stated_of_the_noise_helps_where_rows_say_little_and_yields_where_they_say_much():
+    """Two short runs with a trend of each that is free: they hardly tell a walk from flicker."""
+    generator = np.random.default_rng(8)
+    few, many = NoiseRows.of([EVEN] * 2), NoiseRows.of([EVEN] * 4)
+    trends = np.kron(np.eye(2), np.column_stack([np.ones(200), EVEN / 2e4, np.log1p(EVEN / 5e3)]))
+    true = Noise(0.2, 0.5, 0.6)
+    drawn = [draw(few, true, generator) for _ in range(4)]
+
+    def missed(stated: Noise | None) -> float:
+        found = [estimate_noise(few, r, trends, stated=stated).walk for r in drawn]
+        return float(np.sqrt(np.mean(np.log(np.array(found) / true.walk) ** 2)))
+
+    assert missed(true) < 0.5
+    assert missed(true) < 0.5 * missed(None)
+    loud = [draw(many, Noise(0.2, walk=2.0), generator) for _ in range(2)]
+    found = [estimate_noise(many, r, stated=Noise(0.0, flicker=0.02, walk=0.1)).walk for r in loud]
+    assert np.median(found) == pytest.approx(2.0, rel=0.35)
+
+
 @pytest.mark.slow
 def test_tests_at_the_estimated_noise_keep_their_level():
     """A smooth column that is not there: χ² of its coefficient exceeds its 5 % quantile in about 5 % of runs of noise."""

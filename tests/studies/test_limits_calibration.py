@@ -6,16 +6,19 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from compensation.correlated import NoiseRows
 from studies.calibration.ahead import spread_of_prediction
 from studies.calibration.estimates import NINETY, estimate
-from studies.calibration.fit import CardFit, whitened
+from studies.calibration.fit import CardFit, stated_noise, whitened
 from studies.calibration.observed import observe
 from studies.calibration.priors import Priors
 from studies.calibration.problem import CardProblem, State
 from studies.instrument.card import load_card
+from studies.instrument.tables.noise import NoiseKeys
 from studies.instrument.uncertain import UncertainValue
 from studies.simulation.chamber import load_profile
 from studies.simulation.drive import drive_by_profile, rows_of
+from studies.simulation.noise import frequency_noise
 from studies.simulation.prediction import law_for, predict
 from studies.simulation.virtual_gyro import simulate_run
 
@@ -96,3 +99,16 @@ def test_a_jump_is_free_up_to_a_row_earlier_but_not_at_the_first_row():
         sd = next((sd for _, name, sd in problem.starts if name.startswith("jump.")), 0.0)
         assert low[bounded] * sd == pytest.approx(-60.0)
         assert np.array_equal(high[bounded], np.zeros(bounded.sum()))
+
+
+def test_the_noise_that_a_card_states_has_the_covariance_that_a_calibration_expects():
+    """Mean squares of what drawn frequency noise changes by within 10 min to 3 h, against the stated levels' covariance."""
+    noise = NoiseKeys(frequency_white_Hz=0.0, frequency_flicker_Hz=3e-4, frequency_walk_Hz=2e-6)
+    stated = stated_noise(noise, "frequency_Hz")
+    lags = np.array([10, 30, 90, 180])
+    drawn = [frequency_noise(noise).draw(1000, 1 / 60, np.random.default_rng(seed)) for seed in range(60)]
+    measured = [np.mean([np.mean((x[lag:] - x[:-lag]) ** 2) for x in drawn]) for lag in lags]
+    C = NoiseRows.of([60.0 * np.arange(1000)]).covariance(0, stated)
+    expected = [np.mean(np.diag(C)[lag:] + np.diag(C)[:-lag] - 2 * np.diag(C, lag)) for lag in lags]
+    assert measured == pytest.approx(expected, rel=0.15)
+    assert stated_noise(noise, "inverse_q") is None

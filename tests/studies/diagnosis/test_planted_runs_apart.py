@@ -49,3 +49,16 @@ def test_runs_that_lie_apart_are_not_adequate_and_start_times_would_show_why():
 def test_the_same_runs_without_offsets_are_adequate():
     verdict = judge(runs([0.0, 0.0, 0.0]))
     assert verdict.verdict == "adequate", verdict.causes
+
+
+@pytest.mark.slow
+def test_a_bias_that_differs_from_run_to_run_is_adequate_as_turn_on_and_what_else_it_may_be_is_said():
+    rng, records = np.random.default_rng(5), []
+    for k, offset in enumerate((0.0, 4.0)):
+        bias = 0.2 * (HOUSING - 20.0) + offset + 0.05 * rng.standard_normal(TIME.size)
+        columns = {"time_s": TIME, "housing_temperature_degC": HOUSING, "bias_deg_per_h": bias}
+        records.append(Record(columns, path=f"run{k}.csv", sha256=str(k)))
+    result = judge(load_campaign(records)).responses["bias_deg_per_h"]
+    assert result.verdict == "adequate"
+    assert "lie 2 deg/h (rms) apart" in result.remark
+    assert "turn-on" in result.remark
