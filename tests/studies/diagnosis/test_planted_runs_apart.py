@@ -60,5 +60,5 @@ def test_a_bias_that_differs_from_run_to_run_is_adequate_as_turn_on_and_what_els
         records.append(Record(columns, path=f"run{k}.csv", sha256=str(k)))
     result = judge(load_campaign(records)).responses["bias_deg_per_h"]
     assert result.verdict == "adequate"
-    assert "lie 2 deg/h (rms) apart" in result.remark
+    assert "lie 2 °/h (rms) apart" in result.remark
     assert "turn-on" in result.remark
