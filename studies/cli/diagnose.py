@@ -1,7 +1,13 @@
 """`hrg diagnose`: what the simulation gets wrong, why, and what the repair is worth."""
 
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
 from studies.cli.arguments import Seed
 from studies.cli.output import Answer, answers
+
+if TYPE_CHECKING:
+    from studies.diagnosis.planning.chamber import Chamber
 
 
 @answers("hrg.diagnosis/1, with --plan hrg.plan/1, with --device hrg.fleet/1")
@@ -46,70 +52,81 @@ def diagnose(
     fleet : str
         The same as a file (TOML): a table [devices] with lines such as A = ["a1.csv", "a2.csv"], beside the records.
     """
-    from scipy.constants import zero_Celsius
-
-    from studies.cli.output import print_table, say
-    from studies.cli.telling import Told
     from studies.diagnosis.planning.chamber import parse_chamber
     from studies.errors import InputError
     from studies.files.columns import read_header
-    from studies.files.writing import write_text
 
     limits = None if chamber is None else parse_chamber(chamber)
     if plan:
-        from studies.diagnosis.planning.plan import plan_campaign
-        from studies.reports.plan import headline, plan_page, plan_table
-
-        profiles = [*plan, *runs]
-        cases = max(4, min(draws, 2000) // 4)
-        told = Told("plan")
-        outlook = plan_campaign(profiles, seed=seed, cases=cases, card=card, chamber=limits, progress=told)
-        told.done()
-        if report is not None:
-            write_text(report, plan_page(outlook, profiles))
-            say(f"report: {report}")
-        yield outlook.as_dict()
-        print(headline(outlook))
-        block = plan_table(outlook)
-        print_table(block.caption, block.columns, block.rows, block.note)
-        return 0
+        return (yield from _plan([*plan, *runs], card, limits, draws, seed, report))
     if device or fleet is not None:
         if runs or save is not None:
             raise InputError("a fleet has its records behind --device and saves no card; leave the rest out.")
-        yield from _fleet(device or [], fleet, card, report)
-        return
+        return (yield from _fleet(device or [], fleet, card, report))
     if not runs:
         raise InputError("give the records of one gyro: hrg diagnose RUN.csv [RUN.csv ...].")
     if save is not None and card is None:
         raise InputError("--save writes an extended card, so it needs --card CARD to extend.")
-
-    import numpy as np
-
-    from studies.reports import diagnosis as page
-
     tables = [path for path in runs if "time_s" not in (names := read_header(path)) and "temperature_degC" in names]
-    if tables:
-        from studies.diagnosis.table import diagnose_table
+    if not tables:
+        return (yield from _campaign(runs, card, limits, save, report))
+    if len(runs) > 1:
+        raise InputError(f"{tables[0]}: a steady-state table is diagnosed alone; leave the other files out.")
+    if save is not None:
+        raise InputError(
+            f"{tables[0]}: a steady-state table does not decide on a model, so --save has nothing to write."
+        )
+    return (yield from _table(tables[0], card, report))
 
-        if len(runs) > 1:
-            raise InputError(f"{tables[0]}: a steady-state table is diagnosed alone; leave the other files out.")
-        if save is not None:
-            raise InputError(
-                f"{tables[0]}: a steady-state table does not decide on a model, so --save has nothing to write."
-            )
-        found = diagnose_table(tables[0], card)
-        if report is not None:
-            write_text(report, page.table_page(found, tables[0]))
-            say(f"report: {report}")
-        yield found.as_dict()
-        print(page.table_text(found))
-        return 0
 
+def _plan(
+    profiles: list[str], card: str | None, limits: "Chamber | None", draws: int, seed: int, report: str | None
+) -> Answer:
+    """Say what a planned campaign could tell apart."""
+    from studies.cli.output import print_table
+    from studies.cli.telling import Told
+    from studies.diagnosis.planning.plan import plan_campaign
+    from studies.reports.plan import headline, plan_page, plan_table
+
+    told = Told("plan")
+    cases = max(4, min(draws, 2000) // 4)
+    outlook = plan_campaign(profiles, seed=seed, cases=cases, card=card, chamber=limits, progress=told)
+    told.done()
+    _write(report, lambda: plan_page(outlook, profiles))
+    yield outlook.as_dict()
+    print(headline(outlook))
+    block = plan_table(outlook)
+    print_table(block.caption, block.columns, block.rows, block.note)
+    return 0
+
+
+def _table(path: str, card: str | None, report: str | None) -> Answer:
+    """Diagnose one steady-state table."""
+    from studies.diagnosis.table import diagnose_table
+    from studies.reports.diagnosis import table_page, table_text
+
+    found = diagnose_table(path, card)
+    _write(report, lambda: table_page(found, path))
+    yield found.as_dict()
+    print(table_text(found))
+    return 0
+
+
+def _campaign(
+    runs: tuple[str, ...], card: str | None, limits: "Chamber | None", save: str | None, report: str | None
+) -> Answer:
+    """Diagnose the records of one gyro."""
+    import numpy as np
+    from scipy.constants import zero_Celsius
+
+    from studies.cli.output import print_table, say
+    from studies.cli.telling import Told
     from studies.diagnosis.campaign import load_campaign
     from studies.diagnosis.extension import extend
     from studies.diagnosis.investigate import investigate
     from studies.instrument.card import load_card, save_card
     from studies.record import read_record
+    from studies.reports import diagnosis as page
 
     instrument = None if card is None else load_card(card)
     reference = None if instrument is None else instrument.reference_temperature - zero_Celsius
@@ -124,9 +141,7 @@ def diagnose(
     if save is not None and extended is not None:
         save_card(extended, save)
         say(f"extended model: {save}")
-    if report is not None:
-        write_text(report, page.diagnosis_page(diagnosis))
-        say(f"report: {report}")
+    _write(report, lambda: page.diagnosis_page(diagnosis))
     yield {**diagnosis.verdict.as_dict(), "extended_model": save}
     print(page.headline(diagnosis.verdict))
     for block in (page.cause_table(diagnosis.verdict), page.response_table(diagnosis.verdict)):
@@ -136,15 +151,15 @@ def diagnose(
         print(f"Note: {note}")
     if diagnosis.verdict.next_experiment:
         print(f"Next: {diagnosis.verdict.next_experiment}")
+    return 0
 
 
 def _fleet(devices: list[str], manifest: str | None, card: str | None, report: str | None) -> Answer:
     """Diagnose devices of one design together."""
-    from studies.cli.output import print_table, say
+    from studies.cli.output import print_table
     from studies.cli.telling import Told
     from studies.diagnosis.fleet.investigation import diagnose_fleet
     from studies.diagnosis.fleet.records import read_fleet
-    from studies.files.writing import write_text
     from studies.instrument.card import load_card
     from studies.reports import fleet as page
 
@@ -152,11 +167,19 @@ def _fleet(devices: list[str], manifest: str | None, card: str | None, report: s
     design = None if card is None else load_card(card)
     whole = diagnose_fleet(read_fleet(devices, manifest), design, progress=told)
     told.done()
-    if report is not None:
-        write_text(report, page.fleet_page(whole))
-        say(f"report: {report}")
+    _write(report, lambda: page.fleet_page(whole))
     yield whole.as_dict()
     print(page.headline(whole))
     for block in (page.share_table(whole), page.device_table(whole), page.value_table(whole)):
         if block.rows:
             print_table(block.caption, block.columns, block.rows, block.note)
+    return 0
+
+
+def _write(report: str | None, page: Callable[[], str]) -> None:
+    if report is not None:
+        from studies.cli.output import say
+        from studies.files.writing import write_text
+
+        write_text(report, page())
+        say(f"report: {report}")

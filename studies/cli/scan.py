@@ -72,7 +72,7 @@ def scan(
     """
     from scipy.constants import zero_Celsius
 
-    from studies.cli.output import print_table, say
+    from studies.cli.output import say
     from studies.errors import InputError, naming
     from studies.instrument.card import load_card
     from studies.scan import scan_faces
@@ -104,52 +104,60 @@ def scan(
         say(f"wrote {save}")
     payload = _payload(found, instrument.name, T - zero_Celsius, files)
     yield payload
+    _print(found, payload)
+
+
+def _print(found: "Scan", payload: dict[str, Any]) -> None:
+    from math import degrees
+
+    from studies.cli.output import print_table
+
+    faces = payload["faces"]
+    splits = [
+        [
+            str(entry["harmonic"]),
+            f"{entry['split_Hz']['value']:.5f}",
+            f"{entry['split_Hz']['low']:.5f} … {entry['split_Hz']['high']:.5f}",
+            f"{axis['value']:.2f}" if (axis := entry["slow_axis_deg"]) else "not told",
+            f"{axis['low']:.2f} … {axis['high']:.2f}" if axis else "",
+            f"{entry['every_order']['split_Hz']:.5f}",
+            f"{entry['every_order']['slow_axis_deg']:.2f}",
+        ]
+        for entry in payload["splits"]
+    ]
     print_table(
-        f"{instrument.name}: splits by the measured {' and '.join(found.faces)} face{'s' if len(files) > 1 else ''}",
+        f"{payload['card']}: splits by the measured {' and '.join(faces)} face{'s' if len(faces) > 1 else ''}",
         ["n", "split (Hz)", "90 %", "slow axis (°)", "90 %", "with every order (Hz)", "axis (°)"],
-        [
-            [
-                str(entry["harmonic"]),
-                f"{entry['split_Hz']['value']:.5f}",
-                f"{entry['split_Hz']['low']:.5f} … {entry['split_Hz']['high']:.5f}",
-                f"{entry['slow_axis_deg']['value']:.2f}" if entry["slow_axis_deg"] else "not told",
-                f"{entry['slow_axis_deg']['low']:.2f} … {entry['slow_axis_deg']['high']:.2f}"
-                if entry["slow_axis_deg"]
-                else "",
-                f"{entry['every_order']['split_Hz']:.5f}",
-                f"{entry['every_order']['slow_axis_deg']:.2f}",
-            ]
-            for entry in payload["splits"]
-        ],
+        splits,
         "First order: harmonic 2n alone; every order: with the products of two harmonics."
-        + (" One face: the other is assumed perfect." if len(files) == 1 else ""),
+        + (" One face: the other is assumed perfect." if len(faces) == 1 else ""),
     )
-    print_table(
-        "Faces",
-        ["face", "points", "left out", "noise (nm)", "tilt (°)", "offset (µm)"],
+    places = [
         [
-            [
-                name,
-                str(face["points"]),
-                str(face["outliers"]),
-                f"{1e3 * face['noise_um']:.1f}",
-                "" if face["tilt_deg"] is None else f"{face['tilt_deg']:.3f}",
-                "" if face["offset_um"] is None else ", ".join(f"{x:.1f}" for x in face["offset_um"]),
-            ]
-            for name, face in payload["faces"].items()
-        ],
-    )
-    quantity = "wall" if len(files) == 2 else next(iter(files))
+            name,
+            str(face["points"]),
+            str(face["outliers"]),
+            f"{1e3 * face['noise_um']:.1f}",
+            "" if face["tilt_deg"] is None else f"{face['tilt_deg']:.3f}",
+            "" if face["offset_um"] is None else ", ".join(f"{x:.1f}" for x in face["offset_um"]),
+        ]
+        for name, face in faces.items()
+    ]
+    print_table("Faces", ["face", "points", "left out", "noise (nm)", "tilt (°)", "offset (µm)"], places)
+    quantity = "wall" if len(faces) == 2 else next(iter(faces))
     rim = max(w.position for w in found.waves)
-    print_table(
-        f"Circumferential harmonics of the {quantity} at position {rim:.3f} (µm)",
-        ["wave", "amplitude", "90 %", "crest at (°)"],
+    waves = [
         [
-            [str(w.order), f"{1e6 * w.amplitude.value:.3f}", f"{1e6 * w.amplitude.low:.3f} … {1e6 * w.amplitude.high:.3f}",
-             f"{w.azimuth * 57.29577951308232:.1f}" if w.order else ""]
-            for w in found.waves if w.quantity == quantity and w.position == rim
-        ],
-    )  # fmt: skip
+            str(w.order),
+            f"{1e6 * w.amplitude.value:.3f}",
+            f"{1e6 * w.amplitude.low:.3f} … {1e6 * w.amplitude.high:.3f}",
+            f"{degrees(w.azimuth):.1f}" if w.order else "",
+        ]
+        for w in found.waves
+        if w.quantity == quantity and w.position == rim
+    ]
+    title = f"Circumferential harmonics of the {quantity} at position {rim:.3f} (µm)"
+    print_table(title, ["wave", "amplitude", "90 %", "crest at (°)"], waves)
 
 
 def _payload(found: "Scan", name: str, temperature: float, files: dict[str, str]) -> dict[str, Any]:

@@ -14,7 +14,10 @@ from cyclopts import Parameter
 from studies.cli.output import Answer, answers
 
 if TYPE_CHECKING:
-    from shell.trimming import ExpectedSplit, TrimPlan
+    from collections.abc import Callable
+
+    from shell.resonator import Resonator
+    from shell.trimming import ExpectedSplit, Round, TrimPlan
 
 MANY = Parameter(consume_multiple=True)
 
@@ -100,7 +103,7 @@ def trim(
     import numpy as np
     from scipy.constants import zero_Celsius
 
-    from studies.cli.output import print_table, say
+    from studies.cli.output import say
     from studies.errors import naming
     from studies.instrument.card import load_card
     from studies.trim import Groove, Teeth, other_cuts, plan_for_card
@@ -118,9 +121,7 @@ def trim(
     )  # fmt: skip
     others = other_cuts(resonator, elastic, measured[0][0], cut)
 
-    def place(x: float) -> float:
-        return 1e3 * float(resonator.at([x * resonator.length]).z[0])
-
+    depth = None if teeth else lambda mass: 1e6 * groove.depth(mass, elastic.rho)
     payload: dict[str, Any] = {
         "schema": "hrg.trim/1",
         "card": instrument.name,
@@ -128,25 +129,7 @@ def trim(
         "goal_Hz": goal,
         "cut": cut,
         "before": [_state(s) for s in plan.before],
-        "rounds": [
-            {
-                "share": one.share,
-                "mass_ug": 1e9 * one.mass,
-                "cuts": [
-                    {
-                        "azimuth_deg": float(np.rad2deg(c.azimuth)),
-                        "position": c.position,
-                        "height_mm": place(c.position),
-                        "mass_ug": 1e9 * c.mass,
-                        "depth_um": None if teeth else 1e6 * groove.depth(c.mass, elastic.rho),
-                    }
-                    for c in one.cuts
-                ],
-                "after": [_state(s) for s in one.after],
-                "unbalance": {str(k): [1e9 * abs(u), float(np.rad2deg(np.angle(u)))] for k, u in one.unbalance.items()},
-            }
-            for one in plan.rounds
-        ],
+        "rounds": [_round(one, resonator, depth) for one in plan.rounds],
         "mass_ug": 1e9 * plan.mass,
         "other_cuts": others,
         "measure": measure_between(plan),
@@ -162,27 +145,63 @@ def trim(
         write_trim_page(report, plan, payload)
         say(f"wrote {report}")
     yield payload
-    print_table(
-        f"{instrument.name}: cuts",
-        ["round", "azimuth (°)", "height (mm)", "mass (µg)", "depth (µm)"],
-        [
-            [str(k), f"{c['azimuth_deg']:.2f}", f"{c['height_mm']:.3f}", f"{c['mass_ug']:.3f}", "" if c["depth_um"] is None else f"{c['depth_um']:.3f}"]
-            for k, one in enumerate(payload["rounds"], 1)
-            for c in one["cuts"]
-        ],
-        f"{payload['mass_ug']:.3g} µg in all. Cut round 1 only, then measure and plan again.",
-    )  # fmt: skip
-    print_table(
-        "Splits as expected",
-        ["after round", "n", "split (mHz)", "error (mHz)", "95 % below (mHz)", "slow axis (°)"],
-        [
-            [label, str(s["harmonic"]), *(f"{1e3 * s[key]:.3f}" for key in ("split_Hz", "error_Hz", "most_Hz")), f"{s['slow_axis_deg']:.2f}"]
-            for label, states in [("measured", payload["before"]), *((str(k), one["after"]) for k, one in enumerate(payload["rounds"], 1))]
-            for s in states
-        ],
-    )  # fmt: skip
+    _print(payload)
     for sentence in payload["measure"]:
         say(sentence)
+
+
+def _round(one: "Round", resonator: "Resonator", depth: "Callable[[float], float] | None") -> dict[str, Any]:
+    """One round of cuts; `depth` in µm of a cut by its mass, where it is a groove."""
+    import numpy as np
+
+    return {
+        "share": one.share,
+        "mass_ug": 1e9 * one.mass,
+        "cuts": [
+            {
+                "azimuth_deg": float(np.rad2deg(c.azimuth)),
+                "position": c.position,
+                "height_mm": 1e3 * float(resonator.at([c.position * resonator.length]).z[0]),
+                "mass_ug": 1e9 * c.mass,
+                "depth_um": None if depth is None else depth(c.mass),
+            }
+            for c in one.cuts
+        ],
+        "after": [_state(s) for s in one.after],
+        "unbalance": {str(k): [1e9 * abs(u), float(np.rad2deg(np.angle(u)))] for k, u in one.unbalance.items()},
+    }
+
+
+def _print(payload: dict[str, Any]) -> None:
+    from studies.cli.output import print_table
+
+    rounds = [*enumerate(payload["rounds"], 1)]
+    cuts = [
+        [
+            str(k),
+            f"{c['azimuth_deg']:.2f}",
+            f"{c['height_mm']:.3f}",
+            f"{c['mass_ug']:.3f}",
+            "" if c["depth_um"] is None else f"{c['depth_um']:.3f}",
+        ]
+        for k, one in rounds
+        for c in one["cuts"]
+    ]
+    note = f"{payload['mass_ug']:.3g} µg in all. Cut round 1 only, then measure and plan again."
+    columns = ["round", "azimuth (°)", "height (mm)", "mass (µg)", "depth (µm)"]
+    print_table(f"{payload['card']}: cuts", columns, cuts, note)
+    splits = [
+        [
+            label,
+            str(s["harmonic"]),
+            *(f"{1e3 * s[key]:.3f}" for key in ("split_Hz", "error_Hz", "most_Hz")),
+            f"{s['slow_axis_deg']:.2f}",
+        ]
+        for label, states in [("measured", payload["before"]), *((str(k), one["after"]) for k, one in rounds)]
+        for s in states
+    ]
+    columns = ["after round", "n", "split (mHz)", "error (mHz)", "95 % below (mHz)", "slow axis (°)"]
+    print_table("Splits as expected", columns, splits)
 
 
 def measure_between(plan: "TrimPlan") -> list[str]:
