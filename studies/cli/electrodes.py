@@ -6,9 +6,12 @@ by which all voltages could grow (null without voltages); `reach_Hz`, the split 
 a split was given: {voltages_V, left_Hz, shift_ppm}.
 """
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from studies.cli.output import Answer, answers
+
+if TYPE_CHECKING:
+    from studies.instrument.tables.electrodes import ElectrodeKeys
 
 
 @answers("hrg.electrodes/1")
@@ -45,7 +48,7 @@ def electrodes(
 
     from shell.electrodes import reach, trim_voltages
     from shell.modes import solve_modes
-    from studies.cli.output import print_table, say
+    from studies.cli.output import say
     from studies.errors import InputError, naming
     from studies.instrument.card import load_card
     from studies.splitting import SplitPair
@@ -99,25 +102,37 @@ def electrodes(
         },
     }
     yield payload
-    rows = [
-        ["softening by the card's voltages (ppm)", f"{payload['softening_ppm']:+.4f}"],
-        ["split by them (mHz)", f"{1e3 * own.hertz:.4f}"],
-        ["per volt on all electrodes (ppm/V)", f"{payload['per_volt_ppm']:+.4f}"],
-        ["per kelvin by the gap (ppm/K)", f"{payload['per_kelvin_ppm']:+.5f}"],
-        ["voltages can grow before pull-in by", "without end" if math.isinf(factor) else f"{factor:.3g} times"],
-        [f"split that {limit:g} V null, any axis (mHz)", f"{1e3 * payload['reach_Hz']:.3f}"],
-    ]
-    title = f"{instrument.name}, n = {harmonic}, {mode.frequency:.3f} Hz at {T - zero_Celsius:g} °C"
-    print_table(title, ["electrodes", "value"], rows)
-    if trim is not None:
-        step = 360 / keys.count
-        print_table(
-            f"Trim voltages that null {1e3 * abs(wave) * mode.frequency:.4g} mHz, besides the card's own",
-            ["electrode", "azimuth (°)", "V"],
-            [[str(k), f"{keys.azimuth_deg + step * k:.2f}", f"{v:.3f}"] for k, v in enumerate(trim.voltages) if v > 0],
-            f"They soften the pair by {1e6 * abs(trim.shift):.3g} ppm. Voltages add in squares: trim_V of the card.",
-        )
-    elif abs(wave) > 0:
+    _print(payload, None if trim is None else abs(wave) * mode.frequency, keys)
+    if trim is None and abs(wave) > 0:
         say(
             f"The card's split of {1e3 * abs(wave) * mode.frequency:.4g} mHz is beyond what {limit:g} V null: hrg trim."
         )
+
+
+def _print(payload: dict[str, Any], nulled: float | None, keys: "ElectrodeKeys") -> None:
+    """Print tables of it; `nulled` is the split in Hz that the trim voltages null."""
+    from math import isinf
+
+    from studies.cli.output import print_table
+
+    factor, limit = payload["pull_in_factor"], payload["limit_V"]
+    rows = [
+        ["softening by the card's voltages (ppm)", f"{payload['softening_ppm']:+.4f}"],
+        ["split by them (mHz)", f"{1e3 * payload['split_Hz']:.4f}"],
+        ["per volt on all electrodes (ppm/V)", f"{payload['per_volt_ppm']:+.4f}"],
+        ["per kelvin by the gap (ppm/K)", f"{payload['per_kelvin_ppm']:+.5f}"],
+        ["voltages can grow before pull-in by", "without end" if isinf(factor) else f"{factor:.3g} times"],
+        [f"split that {limit:g} V null, any axis (mHz)", f"{1e3 * payload['reach_Hz']:.3f}"],
+    ]
+    where = f"{payload['frequency_Hz']:.3f} Hz at {payload['temperature_degC']:g} °C"
+    print_table(f"{payload['card']}, n = {payload['harmonic']}, {where}", ["electrodes", "value"], rows)
+    trim = payload["trim"]
+    if trim is None or nulled is None:
+        return
+    step = 360 / keys.count
+    print_table(
+        f"Trim voltages that null {1e3 * nulled:.4g} mHz, besides the card's own",
+        ["electrode", "azimuth (°)", "V"],
+        [[str(k), f"{keys.azimuth_deg + step * k:.2f}", f"{v:.3f}"] for k, v in enumerate(trim["voltages_V"]) if v > 0],
+        f"They soften the pair by {abs(trim['shift_ppm']):.3g} ppm. Voltages add in squares: trim_V of the card.",
+    )

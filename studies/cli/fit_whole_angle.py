@@ -4,24 +4,27 @@ With --json one object, schema `hrg.fit-whole-angle/1`: `data`, `confidence`, `e
 `sd`, `low`, `high`), `undetermined` (sentences), `saved` (path or null).
 """
 
+from math import degrees, pi
 from typing import TYPE_CHECKING
 
 from studies.cli.output import Answer, answers
 
 if TYPE_CHECKING:
     from compensation.wave_fit import WaveFit
+    from studies.instrument.card import Instrument
+    from studies.instrument.tables.loop import Loop
 
 KEYS = {
     # estimate: key of the card, factor to its unit
     "decay": ("loss.inverse_q", 0.0),
     "damping_split": ("bias.damping_anisotropy", 0.0),
-    "damping_axis": ("bias.damping_axis_deg", 57.29577951308232),
-    "frequency_split": ("loop.frequency_split_mHz", 1e3 / 6.283185307179586),
-    "frequency_axis": ("loop.frequency_axis_deg", 57.29577951308232),
+    "damping_axis": ("bias.damping_axis_deg", degrees(1)),
+    "frequency_split": ("loop.frequency_split_mHz", 1e3 / (2 * pi)),
+    "frequency_axis": ("loop.frequency_axis_deg", degrees(1)),
     "gain_ratio": ("loop.pickoff_gain_ratio", 1.0),
     "skew": ("loop.pickoff_skew_mrad", 1e3),
-    "phase_error": ("loop.pickoff_phase_deg", 57.29577951308232),
-    "rate": ("bias.offset_deg_per_h", 206264.80624709636),
+    "phase_error": ("loop.pickoff_phase_deg", degrees(1)),
+    "rate": ("bias.offset_deg_per_h", degrees(3600)),
 }
 
 
@@ -57,14 +60,10 @@ def fit_whole_angle(
     save : str
         Write the card with the values found and their uncertainties.
     """
-    import numpy as np
-
-    from compensation.wave_fit import fit_whole_angle as fit
     from studies.cli.output import print_table, say
-    from studies.errors import InputError, naming
+    from studies.errors import InputError
     from studies.instrument.card import load_card, save_card
     from studies.law import law_of
-    from studies.record import read_record
 
     if not 0 < confidence < 1:
         raise InputError(f"--confidence {confidence:g}: a confidence lies between 0 and 1, such as 0.95.")
@@ -79,47 +78,10 @@ def fit_whole_angle(
         bryan_factor = law_of(instrument, T - 5, T + 5).bryan_factor
     if quadrature_volts_per_hertz is None and loop is not None:
         quadrature_volts_per_hertz = loop.quadrature_V_per_Hz
-    record = read_record(run)
-    rate = record["measured_rate_deg_per_s"] if "measured_rate_deg_per_s" in record else record["bias_deg_per_h"] / 3600
-    frequency = record.columns.get("frequency_Hz")
-    quadrature = None
-    if "quadrature_V" in record:
-        if quadrature_volts_per_hertz is None:
-            say(
-                "note: quadrature_V is left out, its scale is unknown; give --quadrature-volts-per-hertz or a card with [loop]."
-            )
-        else:
-            quadrature = np.pi * record["quadrature_V"] / quadrature_volts_per_hertz
-    decay = None
-    if "inverse_q" in record:
-        if frequency is None:
-            raise InputError(f"{run}: inverse_q is a rate of decay only with frequency_Hz; add that column.")
-        decay = np.pi * frequency * record["inverse_q"]
-    with naming(run):
-        found = fit(
-            record["time_s"],
-            np.radians(record["pattern_angle_deg"]),
-            np.radians(rate),
-            coupling=2 * bryan_factor,
-            applied=np.radians(record["rate_deg_per_s"]) if "rate_deg_per_s" in record else 0.0,
-            decay=decay,
-            frequency=None if frequency is None else 2 * np.pi * frequency,
-            quadrature=quadrature,
-            drive_gain_ratio=loop.drive_gain_ratio if loop else 0.0,
-            drive_skew=1e-3 * loop.drive_skew_mrad if loop else 0.0,
-            confidence=confidence,
-        )
-    estimates = _in_card_units(found, None if frequency is None else float(np.mean(frequency)))
+    found, frequency = _fit_record(run, bryan_factor, quadrature_volts_per_hertz, loop, confidence)
+    estimates = _in_card_units(found, frequency)
     if save is not None and instrument is not None:
-        axes = {"bias.damping_anisotropy": 0.0}
-        values = {
-            key: {"value": e["value"], "sd": e["sd"]}
-            for key, e in estimates.items()
-            if key in KEYS_OF_CARD and not (key in axes and e["value"] < 0)
-        }
-        if "loop" not in instrument.content:
-            instrument = instrument.with_table("loop", {"mode": "whole-angle"})
-        save_card(instrument.with_values(values), save)
+        save_card(_with_estimates(instrument, estimates), save)
         say(f"card: {save}")
     yield {
         "schema": "hrg.fit-whole-angle/1",
@@ -135,6 +97,60 @@ def fit_whole_angle(
     )
     for sentence in found.undetermined:
         print(f"not determined: {sentence}")
+
+
+def _fit_record(
+    path: str, bryan_factor: float, volts_per_hertz: float | None, loop: "Loop | None", confidence: float
+) -> "tuple[WaveFit, float | None]":
+    """Fit what is in a record; also its mean frequency in Hz, where it has one."""
+    import numpy as np
+
+    from compensation.wave_fit import fit_whole_angle as fit
+    from studies.cli.output import say
+    from studies.errors import InputError, naming
+    from studies.record import read_record
+
+    record = read_record(path)
+    rate = record["measured_rate_deg_per_s"] if "measured_rate_deg_per_s" in record else record["bias_deg_per_h"] / 3600
+    frequency = record.columns.get("frequency_Hz")
+    quadrature = decay = None
+    if "quadrature_V" in record and volts_per_hertz is not None:
+        quadrature = np.pi * record["quadrature_V"] / volts_per_hertz
+    elif "quadrature_V" in record:
+        say(
+            "note: quadrature_V is left out, its scale is unknown; give --quadrature-volts-per-hertz or a card with [loop]."
+        )
+    if "inverse_q" in record:
+        if frequency is None:
+            raise InputError(f"{path}: inverse_q is a rate of decay only with frequency_Hz; add that column.")
+        decay = np.pi * frequency * record["inverse_q"]
+    with naming(path):
+        found = fit(
+            record["time_s"],
+            np.radians(record["pattern_angle_deg"]),
+            np.radians(rate),
+            coupling=2 * bryan_factor,
+            applied=np.radians(record["rate_deg_per_s"]) if "rate_deg_per_s" in record else 0.0,
+            decay=decay,
+            frequency=None if frequency is None else 2 * np.pi * frequency,
+            quadrature=quadrature,
+            drive_gain_ratio=loop.drive_gain_ratio if loop else 0.0,
+            drive_skew=1e-3 * loop.drive_skew_mrad if loop else 0.0,
+            confidence=confidence,
+        )
+    return found, None if frequency is None else float(np.mean(frequency))
+
+
+def _with_estimates(instrument: "Instrument", estimates: dict[str, dict[str, float]]) -> "Instrument":
+    """The card with the values found and their uncertainties; an anisotropy below 0 is none."""
+    values = {
+        key: {"value": e["value"], "sd": e["sd"]}
+        for key, e in estimates.items()
+        if key in KEYS_OF_CARD and not (key == "bias.damping_anisotropy" and e["value"] < 0)
+    }
+    if "loop" not in instrument.content:
+        instrument = instrument.with_table("loop", {"mode": "whole-angle"})
+    return instrument.with_values(values)
 
 
 KEYS_OF_CARD = tuple(key for key, _ in KEYS.values() if key != "bias.offset_deg_per_h")
