@@ -4,12 +4,14 @@ A free resonator of one material expands evenly, so by dimensions, for every the
 
     f(T) = √(E(T)/ρ(T)) Φ(ν(T)) / g(T),      g = exp ∫ α dT the growth of lengths since the reference temperature,
 
-and only Φ, a smooth function of one number, needs the solver. The slope has five parts (HRG paper eq. 15),
+and only Φ, a smooth function of one number, needs the solver. A base that expands otherwise (shell.mount) adds s ε(T) to ln f,
+s by the mode in its stress (shell.prestress). The slope has five parts (HRG paper eq. 15), and s ε' by the base,
 
     d ln f/dT = ½ E'/E + (∂ ln f/∂ν) ν' − ½ ρ'/ρ + (∂ ln f/∂ ln h) h'/h + (∂ ln f/∂ ln r) r'/r,
 
 with ∂ ln f/∂ ln h + ∂ ln f/∂ ln r = −1 and h'/h = r'/r = α. For a temperature that varies along the meridian, to first
-order in its unevenness, δ ln f = Σ sensitivity (T(s) − T_mean) over the stations of the mode.
+order in its unevenness, δ ln f = Σ sensitivity (T(s) − T_mean) over the stations of the mode, the stress of uneven expansion
+included.
 """
 
 from collections.abc import Mapping
@@ -26,6 +28,8 @@ from shell.errors import ShellError
 from shell.levels import Theory
 from shell.materials import Material
 from shell.modes import Mode, solve_modes
+from shell.mount import Mount
+from shell.prestress import Prestress
 from shell.property import coefficient_names, powers
 from shell.resonator import Resonator
 from shell.shape_factor import ShapeFactor, interpolate_shape, shape_of
@@ -50,15 +54,18 @@ class SlopeParts:
     rho: Array
     h: Array
     r: Array
+    base: Array
 
     @property
     def total(self) -> Array:
         """The slope d ln f/dT, 1/K."""
-        return np.asarray(self.E + self.nu + self.rho + self.h + self.r)
+        return np.asarray(self.E + self.nu + self.rho + self.h + self.r + self.base)
 
 
-def slope_parts(material: Material, temperature: ArrayLike, by_nu: Array, by_thickness: Array) -> SlopeParts:
-    """The five parts of d ln f/dT (HRG paper eq. 15) at temperatures (K).
+def slope_parts(
+    material: Material, temperature: ArrayLike, by_nu: Array, by_thickness: Array, base: ArrayLike = 0.0
+) -> SlopeParts:
+    """The parts of d ln f/dT (HRG paper eq. 15, and the base's) at temperatures (K).
 
     Parameters
     ----------
@@ -66,6 +73,8 @@ def slope_parts(material: Material, temperature: ArrayLike, by_nu: Array, by_thi
     temperature : array_like, K
     by_nu, by_thickness : arrays
         ∂ ln f/∂ν and ∂ ln f/∂ ln h there.
+    base : array_like, 1/K
+        By the stress of a base that expands otherwise.
     """
     alpha = material.value("expansion", temperature)
     return SlopeParts(
@@ -74,6 +83,7 @@ def slope_parts(material: Material, temperature: ArrayLike, by_nu: Array, by_thi
         rho=-0.5 * material.log_slope("density", temperature),
         h=np.asarray(by_thickness * alpha),
         r=np.asarray((-1 - by_thickness) * alpha),
+        base=np.broadcast_to(np.asarray(base, dtype=float), alpha.shape),
     )
 
 
@@ -93,6 +103,10 @@ class FrequencyLaw:
     shape : ShapeFactor
     mode : Mode
         The mode at the reference temperature: Bryan factor, energies, shape.
+    prestress : Prestress
+        What expansion does to it through stress.
+    mount : Mount, optional
+        A base that expands otherwise than the resonator.
     """
 
     material: Material
@@ -103,6 +117,8 @@ class FrequencyLaw:
     harmonic: int
     shape: ShapeFactor
     mode: Mode
+    prestress: Prestress
+    mount: Mount | None = None
 
     def frequency(self, temperature: ArrayLike, *, extrapolate: bool = False) -> Array:
         """Frequency (Hz) at even temperatures of the resonator (K).
@@ -131,10 +147,11 @@ class FrequencyLaw:
         return np.asarray(self._spline(T if extrapolate else self._check(T), 1))
 
     def parts(self, temperature: ArrayLike) -> SlopeParts:
-        """The five parts of d ln f/dT (HRG paper eq. 15)."""
+        """The five parts of d ln f/dT (HRG paper eq. 15), and that of the base."""
         T = self._check(temperature)
         nu = self._nu(T)
-        return slope_parts(self.material, T, self.shape.by_nu(nu), self.shape.by_thickness(nu))
+        base = 0.0 if self.mount is None else self.prestress.by_base * self.mount.strain_slope(self.material, T)
+        return slope_parts(self.material, T, self.shape.by_nu(nu), self.shape.by_thickness(nu), base)
 
     def derivatives(self, temperature: ArrayLike) -> dict[str, Array]:
         """Derivative of ln f(T) by every coefficient of the material's deviation that acts on it.
@@ -190,15 +207,29 @@ class FrequencyLaw:
     def sensitivity(self, temperature: float | None = None) -> Array:
         """What each station of the meridian contributes to d ln f/dT (1/K); they add up to the slope.
 
-        The expansion is spread like the elastic energy. `temperature` (K) is that of the material's slopes, the
+        The stress that uneven expansion makes is in it; the base is as warm as the station next to it. `temperature` (K) is that of the material's slopes, the
         reference temperature when absent.
         """
         T = self.reference_temperature if temperature is None else temperature
-        alpha = self.material.value("expansion", T)
+        kinetic, nu, growth, base = self.uneven_slopes(T)
         return np.asarray(
-            self.along.elastic * (0.5 * self.material.log_slope("youngs_modulus", T) - alpha)
-            - 0.5 * self.along.kinetic * self.material.log_slope("density", T)
-            + self.along.nu * self.material.slope("poisson_ratio", T)
+            0.5 * self.along.elastic * self.material.log_slope("youngs_modulus", T)
+            + kinetic * self.along.kinetic
+            + nu * self.along.nu
+            + growth * self.prestress.shares
+            + base * self.prestress.held
+        )
+
+    def uneven_slopes(self, temperature: float) -> Array:
+        """What multiplies temperatures weighed with the shares of kinetic energy, ν, expansion and base, 1/K.
+
+        −½ (ρ'/ρ + 3 α), since the mass stays where it is, ν', α, and s α_base.
+        """
+        alpha = float(self.material.value("expansion", temperature))
+        density = float(self.material.log_slope("density", temperature))
+        base = self.prestress.by_base * (self.mount.expansion if self.mount else alpha)
+        return np.array(
+            [-0.5 * (density + 3 * alpha), float(self.material.slope("poisson_ratio", temperature)), alpha, base]
         )
 
     def with_material(self, material: Material) -> "FrequencyLaw":
@@ -234,7 +265,8 @@ class FrequencyLaw:
         """Ln f at temperatures, the material evaluated at each."""
         E, nu, rho = (self.material.value(name, T) for name in ("youngs_modulus", "poisson_ratio", "density"))
         growth = self.material.growth(T, self.reference_temperature)
-        return np.asarray(0.5 * np.log(E / rho) + self.shape.logarithm(nu) - np.log(growth))
+        base = 0.0 if self.mount is None else self.prestress.by_base * self.mount.strain(self.material, T)
+        return np.asarray(0.5 * np.log(E / rho) + self.shape.logarithm(nu) - np.log(growth) + base)
 
     @cached_property
     def _knots(self) -> Array:
@@ -256,6 +288,9 @@ class FrequencyLaw:
                 at_density = self.material.properties["density"].numbers["at_degC"] + zero_Celsius
                 since = (_integrals(x - about) for x in (T, np.array(at_density), np.array(self.reference_temperature)))
                 moved = [t / 2 - 1.5 * d + r for t, d, r in zip(*since, strict=True)]
+                if self.mount is not None:
+                    by_base = self.mount.by_expansion(self.material, T)
+                    moved = [one + self.prestress.by_base * e for one, e in zip(moved, by_base, strict=True)]
             else:
                 moved = [weights[name] * power for power in powers(T - about)]
             found |= {f"{name}.{c}": value for c, value in zip(coefficient_names(name), moved, strict=True)}
@@ -291,6 +326,7 @@ def build_law(
     highest: float,
     theory: Theory = "solid",
     harmonic: int = 2,
+    mount: Mount | None = None,
 ) -> FrequencyLaw:
     """Solve the mode at a few Poisson's ratios and build its frequency law.
 
@@ -305,12 +341,15 @@ def build_law(
         the law does not follow changes of Poisson's ratio.
     theory : "solid", "shell" or "rayleigh".
     harmonic : n.
+    mount : what the support holds on to, if it expands otherwise; for the solid theory and n >= 1.
 
     Raises
     ------
     ShellError
-        The range lies outside that of the material, or the material lacks a property.
+        The range lies outside that of the material, the material lacks a property, or a mount has nothing to act on.
     """
+    if mount is not None:
+        check_mount(resonator, theory, harmonic)
     lowest, highest = max(lowest, material.lowest), min(highest, material.highest)
     material.check([lowest, highest])
 
@@ -332,7 +371,17 @@ def build_law(
             shape = shape_of(mode, resonator, elastic)
         else:
             shape = interpolate_shape(mode, resonator, elastic, max(low, -0.99), min(high, 0.499), solve)
-    return FrequencyLaw(material, reference_temperature, lowest, highest, theory, harmonic, shape, mode)
+    return FrequencyLaw(
+        material, reference_temperature, lowest, highest, theory, harmonic, shape, mode, Prestress(mode), mount
+    )
+
+
+def check_mount(resonator: Resonator, theory: Theory, harmonic: int) -> None:
+    """Refuse what a base that expands otherwise is not computed for."""
+    if resonator.support == "free":
+        raise ShellError("nothing of a free resonator is held by a base: give it a support, or leave the mount out.")
+    if theory != "solid" or harmonic < 1:
+        raise ShellError("the stress by a base is computed in the solid theory, for harmonics from 1 up.")
 
 
 def _ratio_spread(material: Material, T: Array) -> float:

@@ -14,6 +14,9 @@ temperature the numbers add up to δ ln f = ½ β: lengths grow, the mass stays.
 is a resonator that grows by ε less than its base.
 """
 
+from dataclasses import dataclass
+from functools import cached_property
+
 import numpy as np
 
 from shell.assembly import assemble, lay_resonator
@@ -27,6 +30,46 @@ from shell.system import ShellGroup, System
 
 STEPS = 60  # of the iteration for rigid motions
 DONE = 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class Prestress:
+    """What expansion does to one mode through stress and shape; computed once, when it is asked for.
+
+    In shell theory, and for the harmonic 0, shares are those of the energies alone, and no base is known.
+    """
+
+    mode: Mode
+
+    @cached_property
+    def shares(self) -> Array:
+        """`expansion_shares` at the stations of `mode.along`; with the base they add up to ½."""
+        if self.is_solved:
+            return expansion_shares(self.mode)
+        along = self.mode.along
+        return np.asarray(1.5 * along.kinetic - along.elastic)
+
+    @property
+    def is_solved(self) -> bool:
+        """Whether stress and shape are in it."""
+        return self.mode.theory == "solid" and self.mode.harmonic > 0
+
+    @cached_property
+    def by_base(self) -> float:
+        """δ ln f over the growth of the base beyond the resonator's own; 0 where nothing is held."""
+        resonator = self.mode.resonator
+        if resonator is None or resonator.support == "free" or not self.is_solved:
+            return 0.0
+        return 0.5 - float(self.shares.sum())
+
+    @property
+    def held(self) -> Array:
+        """1 at the station next to the base, 0 at all others."""
+        position, resonator = self.mode.along.position, self.mode.resonator
+        at_rim = resonator is not None and resonator.support == "clamped-rim"
+        found = np.zeros(len(position))
+        found[-1 if at_rim else 0] = 1.0
+        return found
 
 
 def expansion_shares(mode: Mode) -> Array:
@@ -67,13 +110,6 @@ def expansion_shares(mode: Mode) -> Array:
             position.append(group.table.position[0])
             shares.append(np.array([found.sum()]))
     return np.concatenate(shares)[np.argsort(np.concatenate(position), kind="stable")]
-
-
-def base_slope(mode: Mode) -> float:
-    """δ ln f over the growth ε of the base beyond the resonator's own, with its sign; 0 for free resonators."""
-    if solved_as_solid(mode).system.rigid_motions or mode.resonator is None or mode.resonator.support == "free":
-        return 0.0
-    return 0.5 - float(expansion_shares(mode).sum())
 
 
 def mean_answer(mode: Mode) -> tuple[Solution, list[Array]]:

@@ -5,6 +5,7 @@ Where the card has imperfections or charged electrodes, the pairs n >= 1 have `s
 `parts`, split_Hz, slow_axis_deg and shift_ppm by the imperfection, the measured split and the electrodes alone. With `--spin` the lowest modes of
 n >= 2 in the solid theory have `spin`: `rate_deg_per_s`, `lower_wave_Hz` and `upper_wave_Hz`, and `shift_ppm` of their mean with its parts; with
 `--amplitude` all modes of n >= 2 there have `amplitude`: `amplitude_um`, `shift_ppb` with its parts, `shift_Hz_per_um2`.
+Where the card has a [mount] the pairs of n >= 1 have `mount`: `strain_ppm` of the base, `shift_ppm`, `slope_ppm_per_degC`, `per_strain`.
 Where the card has films ([[loss.film]]), modes have `films`: `film`, `shift_ppm`, and the `missing` keys where that is null. Where its material is
 a crystal, the lowest pairs of n = 2, 3, 5, 6, 7, 9 … have `crystal`: `antinode_along_100_Hz`, `other_Hz`, `split_Hz`, `relative_split`.
 """
@@ -65,6 +66,7 @@ def modes(
     from studies.cli.amplitude import describe_amplitude, print_amplitude
     from studies.cli.crystal import crystal_pairs, print_crystal
     from studies.cli.films import describe_films, print_films
+    from studies.cli.mount import describe_mount, print_mount
     from studies.cli.output import print_table
     from studies.cli.spin import print_spin, spin_pairs
     from studies.errors import InputError, naming
@@ -83,6 +85,7 @@ def modes(
         found = [m for n in harmonic for m in solve_modes(resonator, elastic, n, count, theory, tolerance)]
         detailed = theory != "rayleigh"
         films = describe_films(found, instrument) if detailed else {}
+        mount = describe_mount(found, instrument, T)
         crystal = crystal_pairs(found, instrument.keys("material").cubic, tolerance)
     share, mean = _material_share(instrument, T), _mean_thickness(resonator)
     split = _find_splits(instrument, found, T) if detailed else {}
@@ -108,7 +111,13 @@ def modes(
             }
         if id(m) in split:
             entry["split"] = split[id(m)]
-        for key, known in (("spin", spinning), ("amplitude", large), ("films", films), ("crystal", crystal)):
+        for key, known in (
+            ("spin", spinning),
+            ("amplitude", large),
+            ("mount", mount),
+            ("films", films),
+            ("crystal", crystal),
+        ):
             if id(m) in known:
                 entry[key] = known[id(m)]
         entries.append(entry)
@@ -146,6 +155,8 @@ def modes(
         print_spin(found, spinning)
     if large:
         print_amplitude(found, large)
+    if mount:
+        print_mount(found, mount)
     if films:
         print_films(found, films)
     if crystal:

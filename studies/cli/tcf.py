@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from shell.law import FrequencyLaw
 
 MOST_HARMONIC = 50  # a law of a higher one takes minutes
+PARTS = ("E", "nu", "rho", "h", "r", "base")
 LEAST = 0.005  # ppm/°C, that is shown
 
 
@@ -26,7 +27,7 @@ def tcf(
     theory: Literal["solid", "shell", "rayleigh"] = "solid",
     measured: str | None = None,
 ) -> Answer:
-    """Show the frequency over temperature, its slope in ppm/°C, and the slope's parts from E, μ, ρ, h and r.
+    """Show the frequency over temperature, its slope in ppm/°C, and the slope's parts from E, μ, ρ, h, r and a [mount].
 
     Parameters
     ----------
@@ -74,14 +75,17 @@ def tcf(
         "prior": moves,
         "measured": [{"temperature_degC": T, "slope_ppm_per_degC": s} for T, s in local],
     }
+    shown_parts = PARTS if law.mount else PARTS[:-1]
     rows = [
         [f"{p['temperature_degC']:.1f}", f"{p['frequency_Hz']:.3f}"]
-        + [f"{p['parts_ppm_per_degC'][k]:+.2f}" for k in ("E", "nu", "rho", "h", "r")]
+        + [f"{p['parts_ppm_per_degC'][k]:+.2f}" for k in shown_parts]
         + [f"{p['slope_ppm_per_degC']:.2f} ± {p['uncertainty_ppm_per_degC']:.1f}"]
         for p in points
     ]
-    columns = ["T (°C)", "f (Hz)", "E", "μ", "ρ", "h", "r", "slope"]
+    columns = ["T (°C)", "f (Hz)", "E", "μ", "ρ", "h", "r", *(["base"] if law.mount else []), "slope"]
     note = f"Slopes in ppm/°C; ± is one standard deviation by the prior of law '{instrument.material.law}'."
+    if law.mount:
+        note += " Base: the stress of the card's [mount], which expands otherwise."
     print_table(f"{instrument.name}, n = {harmonic}, {theory}", columns, rows, note)
     if moves:
         shown = sorted({0, len(T) // 2, len(T) - 1})
@@ -110,7 +114,7 @@ def _points(law: "FrequencyLaw", T: "NDArray[np.float64]") -> "list[dict[str, An
             "frequency_Hz": float(f[k]),
             "slope_ppm_per_degC": float(slope[k]),
             "uncertainty_ppm_per_degC": float(spread[k]),
-            "parts_ppm_per_degC": {name: 1e6 * float(getattr(parts, name)[k]) for name in ("E", "nu", "rho", "h", "r")},
+            "parts_ppm_per_degC": {name: 1e6 * float(getattr(parts, name)[k]) for name in PARTS},
         }
         for k in range(len(T))
     ]

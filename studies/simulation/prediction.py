@@ -256,7 +256,7 @@ class Variations:
         sides = []
         for distance in ends:
             moved, law = here.instrument.with_values({name: value + distance}), here.law
-            if table == "material":
+            if table in ("material", "mount"):
                 law = moved_law(law, moved)
             elif table == "resonator":
                 law = law_of(moved, law.lowest, law.highest, law.theory)

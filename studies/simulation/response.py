@@ -1,9 +1,9 @@
 """What a gyro reads at given temperatures: frequency, zero-rate output, loss, and its housing sensor.
 
-    f = f(T_r) (1 + …):  ln f = ln f(T_r) − ½ (ρ'/ρ) (T_k − T_r) + ν' Σ n (T − T_r) + effects,
+    f = f(T_r) (1 + …):  ln f = ln f(T_r) − ½ (ρ'/ρ + 3 α) (T_k − T_r) + ν' Σ n (T − T_r) + α Σ g (T − T_r) + s α_b (T_b − T_r) + effects,
 
-T_r the mean temperature of the shell weighed with the mode's elastic energy, T_k with its kinetic energy, n its density
-of ∂ ln f/∂ν: to first order in the unevenness of the shell, and nothing is divided by the whole slope, which vanishes in
+T_r the mean temperature of the shell weighed with the mode's elastic energy, T_k with its kinetic energy, T_b that of the cell
+next to the base, n the mode's density of ∂ ln f/∂ν, g and s its shares of expansion and of the base (shell.prestress): to first order in the unevenness of the shell, and nothing is divided by the whole slope, which vanishes in
 an Elinvar alloy. The bias follows the *thermal* frequency: a spring or a clock moves only the reading.
 """
 
@@ -32,9 +32,9 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Temperatures:
-    """Temperatures at the rows and their rates, arrays (N, 4), K and K/s.
+    """Temperatures at the rows and their rates, arrays (N, 6), K and K/s.
 
-    Columns: the housing (its rate is not used), the resonator's mean T_r, T_k − T_r, and Σ n (T − T_r).
+    Columns: the housing (its rate is not used), the resonator's mean T_r, T_k − T_r, Σ n (T − T_r), Σ g (T − T_r), T_b − T_r.
     """
 
     value: Array
@@ -46,16 +46,17 @@ class Temperatures:
 
 
 def observed_rows(instrument: "Instrument", law: "FrequencyLaw", nodes: tuple[str, ...]) -> Array:
-    """Sums over the nodes that make `Temperatures`, (4, nodes); the housing's is empty where it is no node."""
+    """Sums over the nodes that make `Temperatures`, (6, nodes); the housing's is empty where it is no node."""
     elastic = cell_weights(instrument, law)
-    kinetic, ratio = (to_cells(instrument, law, share) for share in (law.along.kinetic, law.along.nu))
-    rows = np.zeros((4, len(nodes)))
+    shares = (law.along.kinetic, law.along.nu, law.prestress.shares, law.prestress.held)
+    rows = np.zeros((6, len(nodes)))
     cells = [nodes.index(name) for name in cell_names(len(elastic))]
     if "housing" in nodes:
         rows[0, nodes.index("housing")] = 1.0
     rows[1, cells] = elastic
-    rows[2, cells] = kinetic - kinetic.sum() * elastic
-    rows[3, cells] = ratio - ratio.sum() * elastic
+    for row, share in zip(rows[2:], shares, strict=True):
+        found = to_cells(instrument, law, share)
+        row[cells] = found - found.sum() * elastic
     return rows
 
 
@@ -96,23 +97,24 @@ def read_out(
         A loss that becomes negative.
     """
     reference = instrument.reference_temperature
-    housing, resonator, kinetic, ratio = found.value.T
+    housing, resonator, *uneven = found.value.T
     changes = _apply_effects(instrument, drive, housing, resonator, tau)
     warmed, rate = resonator, found.rate[:, 1]
     if "resonator_temperature" in changes:
         warmed = resonator + changes["resonator_temperature"]
         rate = rate + np.gradient(changes["resonator_temperature"], drive.time)
-    by_density = -0.5 * float(law.material.log_slope("density", reference))
-    by_ratio = float(law.material.slope("poisson_ratio", reference))
-    thermal = np.exp(law.logarithm(warmed) + by_density * kinetic + by_ratio * ratio)
+    slopes = law.uneven_slopes(reference)
+    thermal = np.exp(law.logarithm(warmed) + slopes @ np.array(uneven))
     softened = thermal * (1 + mean_shift(instrument, warmed, drive.commands.get("voltage_squared")))
     frequency = softened + changes.get("frequency_Hz", 0.0)
     own = instrument.loss.at(warmed - reference) if damping is None else damping.inverse_q(warmed)
     inverse_q = own + changes.get("inverse_q", 0.0)
     wave = None if damping is None or damping.wave is None else damping.wave(warmed)
     change = thermal - float(law.frequency(reference))
-    uneven = by_density * found.rate[:, 2] + by_ratio * found.rate[:, 3]
-    slope, angle = thermal * (law.slope(warmed) * rate + uneven), drive.commands.get("pattern_angle")
+    slope, angle = (
+        thermal * (law.slope(warmed) * rate + found.rate[:, 2:] @ slopes),
+        drive.commands.get("pattern_angle"),
+    )
     read = {"frequency_Hz": frequency, "inverse_q": inverse_q}
     if instrument.loop is None:
         read["bias_deg_per_h"] = instrument.bias.at(

@@ -86,6 +86,8 @@ class _Bodies:
 
 def why_not(study: "Study") -> str:
     """Return why a study cannot be computed through families, or nothing when it can."""
+    if study.instrument.part("mount") is not None:
+        return "families do not cover a [mount] that stresses the resonator"
     if study.derived:
         return "derived parameters are computed design by design"
     for parameter in study.parameters:

@@ -1,0 +1,43 @@
+"""`[mount]`: what the support holds on to, where it expands otherwise than the resonator.
+
+[mount]
+expansion_per_K = 5.1e-6             # of the base that a stem ends in, or that a rim or face is joined to; known to ± 10 % unless stated
+joined_at_degC = 20.0                # where the joint is free of stress; the reference temperature unless given
+"""
+
+from typing import TYPE_CHECKING, Annotated
+
+from scipy.constants import zero_Celsius
+
+from studies.instrument.keys import Keys, number
+from studies.instrument.registry import CardPlace, CardTable
+
+if TYPE_CHECKING:
+    from shell.mount import Mount
+
+FASTEST = 1e-3  # 1/K
+
+
+class MountKeys(Keys, frozen=True, kw_only=True):
+    """Expansion of the base, and the temperature of the joint."""
+
+    expansion_per_K: Annotated[float, number(least=-FASTEST, most=FASTEST, relative_sd=0.1)] | None = None
+    joined_at_degC: Annotated[float, number(least=-273.15, most=1500.0)] | None = None
+    note: str = ""
+
+    def __post_init__(self) -> None:
+        if self.expansion_per_K is None and (self.joined_at_degC is not None or self.note):
+            raise ValueError("expansion_per_K of the base is missing; add it.")
+
+
+def build(keys: MountKeys, place: CardPlace) -> "Mount | None":
+    """The mount in SI units; None where the base expands with the resonator."""
+    from shell.mount import Mount
+
+    if keys.expansion_per_K is None:
+        return None
+    at = place.reference_temperature if keys.joined_at_degC is None else keys.joined_at_degC + zero_Celsius
+    return Mount(keys.expansion_per_K, at)
+
+
+TABLE = CardTable("mount", MountKeys, build=build, optional=True)
