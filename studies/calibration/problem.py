@@ -194,7 +194,7 @@ class CardProblem:
     def _settled_slopes(self, table: SettledTable, varied: Variations, scale: Array) -> Array:
         columns = np.zeros((len(table.frequency), len(self.priors.values)))
         for k, name in enumerate(self.priors.names):
-            if name.startswith(("material.", "resonator.")):
+            if name.startswith(("material.", "mount.", "resonator.")):
                 below, above = varied.sides(name)
                 high, low = (side.law.frequency(table.temperature, extrapolate=True) for side in (above, below))
                 columns[:, k] = (high - low) / (above.distance - below.distance)

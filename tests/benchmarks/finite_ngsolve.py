@@ -9,7 +9,7 @@ amplitude on the waves 0, n and 2n are integrals over azimuths of the first Piol
 
 import sys
 import time
-from math import cos, pi, sin
+from math import cos, hypot, pi, sin
 
 import numpy as np
 
@@ -42,6 +42,20 @@ def cup(R: float, h: float, H: float, bottom: float, clamp: float) -> list[Piece
     return [(one, two, None) for one, two in zip(spots, [*spots[1:], spots[0]], strict=True)]
 
 
+def refined(mesh, corners: list[tuple[Spot, float]], levels: int):
+    """The mesh with the elements at sharp corners halved again and again."""
+    import ngsolve as ng
+
+    mesh = ng.Mesh(mesh)
+    for _ in range(levels):
+        for element in mesh.Elements(ng.VOL):
+            there = [mesh[v].point for v in element.vertices]
+            touches = any(hypot(p[0] - r, p[1] - z) < 1e-9 for p in there for (r, z), _ in corners)
+            mesh.SetRefinementFlag(ng.ElementId(element), touches)
+        mesh.Refine()
+    return mesh
+
+
 class Waves:
     """Gradients, strains and stresses of waves around the axis on a mesh of the section."""
 
@@ -49,7 +63,7 @@ class Waves:
         import ngsolve as ng
 
         self.ng, self.elastic, self.order = ng, elastic, order
-        self.mesh = ng.Mesh(mesh)
+        self.mesh = mesh
         self.mesh.Curve(order)
 
     def space(self, n: int):
@@ -250,13 +264,13 @@ CASES: dict[str, tuple[Resonator, list[Piece], list[int], list[tuple[Spot, float
         hemisphere(15e-3, 0.9e-3, support="clamped-rim"),
         dome(15e-3, 0.9e-3),
         [1],
-        [((14.55e-3, 0.0), 2e-5), ((15.45e-3, 0.0), 2e-5)],
+        [((14.55e-3, 0.0), 1e-4), ((15.45e-3, 0.0), 1e-4)],
     ),
     "cup 12.5 x 0.6, bottom 1, clamp 3": (
         cylinder(12.5e-3, 0.6e-3, 18e-3, bottom_thickness=1e-3, clamp_radius=3e-3),
         cup(12.5e-3, 0.6e-3, 18e-3, 1e-3, 3e-3),
         [0],
-        [((3e-3, 0.0), 2e-5), ((12.2e-3, 1e-3), 2e-5)],
+        [((3e-3, 0.0), 1e-4), ((12.2e-3, 1e-3), 1e-4)],
     ),
 }
 
@@ -270,9 +284,9 @@ def main() -> None:
         angle = mode.along.position * pi / 2
         field = float(prestress.shares @ np.cos(angle) ** 2)
         print(f"{name}: f {mode.frequency:.5f} Hz, per m² {ours:.6e}, base {prestress.by_base:.7f}, field {field:.7f}")
-        for order, size in ((4, 0.8e-3), (6, 0.5e-3)):
+        for order, size in ((4, 0.8e-3), (5, 0.8e-3)):
             start = time.process_time()
-            mesh = section(outline, clamped, size, corners)
+            mesh = refined(section(outline, clamped, size, corners), corners, 8)
             near = mode.frequency * 0.99
             theirs, f = amplitude_by_azimuths(mesh, SILICA, 2, near, order)
             base = slope_by_difference(mesh, SILICA, 2, near, order, False) if clamped else 0.0

@@ -67,7 +67,7 @@ def test_a_clamped_disc_that_its_frame_stretches(n):
     ("shape", "by_base"),
     [
         (hemisphere(15e-3, 0.9e-3, support="clamped-rim"), -1.0171617),
-        (cylinder(12.5e-3, 0.6e-3, 18e-3, bottom_thickness=1e-3, clamp_radius=3e-3), 0.2),
+        (cylinder(12.5e-3, 0.6e-3, 18e-3, bottom_thickness=1e-3, clamp_radius=3e-3), 0.28376),
     ],
 )
 def test_the_stress_of_a_base_as_another_code_has_it(shape, by_base):
@@ -79,7 +79,7 @@ def test_the_stress_of_a_base_as_another_code_has_it(shape, by_base):
 def test_uneven_expansion_of_a_free_dome_as_another_code_has_it():
     """The same of a dome that grows by cos² of the polar angle."""
     (mode,) = solve_modes(hemisphere(15e-3, 0.9e-3), SILICA, tolerance=1e-6)
-    assert expansion_shares(mode) @ np.cos(mode.along.position * pi / 2) ** 2 == pytest.approx(-0.2035637, abs=2e-5)
+    assert expansion_shares(mode) @ np.cos(mode.along.position * pi / 2) ** 2 == pytest.approx(-0.2035640, abs=2e-6)
 
 
 def test_a_law_with_a_base():
@@ -94,7 +94,9 @@ def test_a_law_with_a_base():
     assert law.sensitivity().sum() == pytest.approx(float(law.slope(T0)), rel=1e-6)
     assert bare.sensitivity().sum() == pytest.approx(float(bare.slope(T0)), rel=1e-6)
     moved = law.with_material(alloy.with_coefficients({"expansion.value": 1e-7}))
-    assert law.derivatives(T)["expansion.value"] == pytest.approx((moved.logarithm(T) - law.logarithm(T)) / 1e-7, rel=1e-5)
+    assert law.derivatives(T)["expansion.value"] == pytest.approx(
+        (moved.logarithm(T) - law.logarithm(T)) / 1e-7, rel=1e-5
+    )
     expansion = float(alloy.value("expansion", T0))
     same = build_law(cup, alloy, T0, 273.15, 313.15, mount=Mount(expansion, 340.0))
     assert same.logarithm(T) == pytest.approx(bare.logarithm(T), abs=1e-12)
