@@ -88,13 +88,11 @@ MOVED = (
 
 @dataclass(frozen=True)
 class Hidden:
-    """A card, records of a device that has one effect more, and the device's next run, noiseless, with what drives it.
+    """A card, records of a device that has effects more, and the device's next run, noiseless, with what drives it.
 
     `noise`: rms of the noise in the records, by response.
     """
 
-    effect: str
-    response: str
     card: object
     records: list
     next_drive: object
@@ -114,14 +112,12 @@ class Hidden:
 
 @dataclass(frozen=True)
 class Recovery:
-    """What came of one hidden effect.
+    """What came of hidden effects.
 
-    `names` of all causes; `named` whether it is among them; of each response over its noise: `before` what the shipped card
-    leaves of the new run, `after` what the saved one leaves, `stated` what its own uncertainties let expect; 1 is the noise itself.
+    `names` of all causes; `named` whether every effect is among them; of each response over its noise: `before` what the shipped
+    card leaves of the new run, `after` what the saved one leaves, `stated` what its own uncertainties let expect; 1 is the noise.
     """
 
-    effect: str
-    response: str
     names: tuple[str, ...]
     named: bool
     verdict: str
@@ -145,16 +141,18 @@ def run_drive(words, start, commanded, turn):
     return replace(drive_by_profile(profile, time), commands=commands, start=start)
 
 
-def hide(name, response, times=TIMES, seed=0, moved=()):
-    """Hide an effect in records of a device.
+def hide(*cases, times=TIMES, seed=0, moved=()):
+    """Hide effects in records of a device.
 
-    `moved`: names of values of the device that differ from the card that the diagnosis is given, by a standard deviation.
+    `cases`: (effect, response), each of its own response. `moved`: names of values of the device that differ from the card that
+    the diagnosis is given, by a standard deviation.
     """
-    effect = find_effect(name)
+    effects = [find_effect(name) for name, _ in cases]
     card = load_card(CARD).with_values(BIAS)
     device = card.with_values({v.name: v.value + v.sd for v in card.uncertain if v.name in moved})
-    commanded = (
-        ["pattern_angle"] if name == "cross-damping" and HIDDEN[name, response]["axis_deg"] >= 0 else effect.needs
+    turning = any(name == "cross-damping" and HIDDEN[name, r]["axis_deg"] >= 0 for name, r in cases)
+    commanded = sorted(
+        {*(["pattern_angle"] if turning else []), *(need for effect in effects for need in effect.needs)}
     )
     starts = [k * GAP for k in range(len(PROFILES) + 1)]
     drives = [run_drive(w, s, commanded, k) for k, (w, s) in enumerate(zip((*PROFILES, UNSEEN), starts, strict=True))]
@@ -166,42 +164,48 @@ def hide(name, response, times=TIMES, seed=0, moved=()):
     bare = [simulate(device, k, noise=False) for k in range(3)]
     quiet = [simulate(device, k) for k in range(3)]
     noise = {column: rms([q[column] - b[column] for q, b in zip(quiet, bare, strict=True)]) for column in RESPONSES}
-    shape = HIDDEN[name, response]
-    keys = effect.coefficient_names(response)
 
-    def hiding(size):
-        sized = {key: value * size if key in keys else value for key, value in shape.items()}
-        return device.with_table("effect", [{"name": name, "response": response, **sized}])
+    def sized(effect, response):
+        """Return the effect's table at the size that adds so many times the noise."""
+        shape, keys = HIDDEN[effect.name, response], effect.coefficient_names(response)
+        column = "frequency_Hz" if effect.thermal and response != "inverse_q" else response
+        size = 1e-4 if effect.thermal else 1e-2 * noise[column]
 
-    runs = [0] if effect.once else [0, 1]
-    column = "frequency_Hz" if effect.thermal and response != "inverse_q" else response
-    size = 1e-4 if effect.thermal else 1e-2 * noise[column]
-    for _ in range(3):
-        added = rms([simulate(hiding(size), k, noise=False)[column] - bare[k][column] for k in runs])
-        size *= times * noise[column] / added
-    hidden = hiding(size)
-    records = []
-    for k in range(2):
-        record = simulate(hidden if k in runs else device, k)
-        records.append(
-            replace(record, start=datetime(2026, 1, 1, tzinfo=UTC) + timedelta(seconds=starts[k]), path=f"run{k}")
+        def table(size):
+            own = {key: value * size if key in keys else value for key, value in shape.items()}
+            return {"name": effect.name, "response": response, **own}
+
+        for _ in range(3):
+            one = device.with_table("effect", [table(size)])
+            runs = [0] if effect.once else [0, 1]
+            added = rms([simulate(one, k, noise=False)[column] - bare[k][column] for k in runs])
+            size *= times * noise[column] / added
+        return table(size)
+
+    tables = [sized(effect, response) for effect, (_, response) in zip(effects, cases, strict=True)]
+    lasting = [table for table, effect in zip(tables, effects, strict=True) if not effect.once]
+    devices = [device.with_table("effect", own) if own else device for own in (tables, lasting, lasting)]
+    records = [
+        replace(
+            simulate(devices[k], k),
+            start=datetime(2026, 1, 1, tzinfo=UTC) + timedelta(seconds=starts[k]),
+            path=f"run{k}",
         )
-    truth = simulate(device if effect.once else hidden, 2, noise=False)
-    return Hidden(name, response, card, records, drives[2], truth, noise)
+        for k in range(2)
+    ]
+    return Hidden(card, records, drives[2], simulate(devices[2], 2, noise=False), noise)
 
 
-def recover(name, response, times=TIMES, seed=0, moved=()):
-    """Hide, diagnose, save, and predict a new run from its chamber alone."""
-    hidden = hide(name, response, times, seed, moved)
+def recover(*cases, times=TIMES, seed=0, moved=()):
+    """Hide effects, each in a response of its own, diagnose, save, and predict a new run from its chamber alone."""
+    hidden = hide(*cases, times=times, seed=seed, moved=moved)
     card = hidden.card
     diagnosis = investigate(load_campaign(hidden.records, card.reference_temperature - 273.15), card=card, advise=False)
     saved = extend(card, diagnosis, hidden.records)
     names = tuple(dict.fromkeys(n for cause in diagnosis.verdict.causes for n in cause.names))
     return Recovery(
-        name,
-        response,
         names,
-        name in names,
+        all(name in names for name, _ in cases),
         diagnosis.verdict.verdict,
         hidden.left(card),
         hidden.left(saved),
