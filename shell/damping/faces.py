@@ -76,9 +76,9 @@ def shell_faces(solution: Solution) -> tuple[FreeFaces, FreeFaces]:
                     name,  # type: ignore[arg-type]
                     section.position.ravel(),
                     area[..., k].ravel(),
-                    _rows(strain[..., k]),
+                    _points(strain[..., k]),
                     energy.ravel(),
-                    _rows(moved[..., k]),
+                    _points(moved[..., k]),
                     c.E.ravel(),
                     c.nu.ravel(),
                 )
@@ -155,13 +155,8 @@ def _surface(kind: Kind, table: StrainTable | CellTable, c: Constants, q: Array,
     return FreeFaces(kind, position, area.ravel(), _points(strain), energy, _points(moved), E, nu)
 
 
-def _rows(field: Array) -> Array:
-    """(elements, stations, k) to (k, points)."""
-    return np.moveaxis(field, 2, 0).reshape(field.shape[2], -1)
-
-
 def _points(field: Array) -> Array:
-    """(elements, stations, k, points) to (k, all points)."""
+    """(elements, stations, k) or (elements, stations, k, points) to (k, all points)."""
     return np.moveaxis(field, 2, 0).reshape(field.shape[2], -1)
 
 

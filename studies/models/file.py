@@ -102,6 +102,14 @@ class Model:
                 return part
         raise InputError(f"{self.path or 'model'}: a model of kind '{self.kind}' needs a [[part]] named '{name}'.")
 
+    @property
+    def temperature_column(self) -> str:
+        """The column that the setting of this name calls the temperature."""
+        column = self.settings.get("temperature_column")
+        if not isinstance(column, str):
+            raise InputError(f"{self.path or 'model'} [settings]: the key 'temperature_column' must name a column.")
+        return column
+
     def number(self, key: str, *, above: float | None = None, least: float | None = None) -> float:
         """Return a setting that must be a finite number within its bounds.
 

@@ -52,7 +52,7 @@ def load_cross_damping(model: Model) -> "CrossDampingModel":
     """Return the fit that a model file holds."""
     from compensation.cross_damping import CrossDampingModel
 
-    part, column = _part(model), _temperature_column(model)
+    part, column = _part(model), model.temperature_column
     if column not in model.validity:
         raise InputError(f"{model.path or 'model'} [validity]: the range of '{column}' is missing; add it.")
     low, high = model.range_of(column)
@@ -71,7 +71,7 @@ def load_cross_damping(model: Model) -> "CrossDampingModel":
 
 def compensate(model: Model, record: Record, *, extrapolate: bool) -> dict[str, NDArray[np.float64]]:
     """Subtract the predicted cross-damping error; rows without temperature or output stay empty."""
-    output, column = model.compensates, _temperature_column(model)
+    output, column = model.compensates, model.temperature_column
     if output not in OUTPUTS:
         raise InputError(f"{model.path or 'model'}: a cross-damping model compensates {' or '.join(OUTPUTS)}.")
     for name in (output, column):
@@ -99,7 +99,7 @@ def emit_c(model: Model) -> str:
     pole = 2 * math.pi * model.number("frequency_Hz", above=0) * model.number("relative_damping", above=0)
     gain = 2 * (2 * math.pi * model.number("frequency_Hz", above=0)) / model.number("g2", above=0) / unit
     return f"""{head(model)}
-/* Call with every temperature reading, {_temperature_column(model)}; the temperature counts as linear between readings. */
+/* Call with every temperature reading, {model.temperature_column}; the temperature counts as linear between readings. */
 typedef struct {{
     double target, value;
 }} hrg_cross_damping_state;
@@ -133,7 +133,7 @@ STEP = """    static hrg_cross_damping_state state;
 
 def _test_rows(model: Model) -> list[tuple[float, ...]]:
     """A few uneven steps through the calibrated range, with what Python makes of them."""
-    low, high = model.range_of(_temperature_column(model))
+    low, high = model.range_of(model.temperature_column)
     steps = np.array([0.0, *np.resize([1.0, 2.0, 4.0, 2.0, 0.5], 23)])
     temperature = np.round((low + high) / 2 + 0.45 * (high - low) * np.sin(0.5 * np.arange(24)), 9)
     fit = load_cross_damping(model)
@@ -149,10 +149,3 @@ def _part(model: Model) -> ModelPart:
             f"{model.path or 'model'} [[part]] cross-damping: the coefficients must be {', '.join(expected)}, in this order."
         )
     return part
-
-
-def _temperature_column(model: Model) -> str:
-    column = model.settings.get("temperature_column")
-    if not isinstance(column, str):
-        raise InputError(f"{model.path or 'model'} [settings]: the key 'temperature_column' must name a column.")
-    return column

@@ -67,7 +67,7 @@ def load_scale(model: Model) -> "BellChain":
     """Return the chain that a model file holds."""
     from compensation.bell import BellChain
 
-    rough, column = model.part("rough"), _temperature_column(model)
+    rough, column = model.part("rough"), model.temperature_column
     for name in (column, RATE):
         if name not in model.validity:
             raise InputError(f"{model.path or 'model'} [validity]: the range of '{name}' is missing; add it.")
@@ -93,7 +93,7 @@ def compensate(model: Model, record: Record, *, extrapolate: bool) -> dict[str, 
     """Return the compensated rate; without a filter, rows that lack an input stay empty."""
     from compensation.bell import apply_chain
 
-    output, column = model.compensates, _temperature_column(model)
+    output, column = model.compensates, model.temperature_column
     if output not in RAW:
         raise InputError(f"{model.path or 'model'}: a scale model compensates {' or '.join(RAW)}.")
     for name in (output, column):
@@ -199,10 +199,3 @@ def _coefficient(model: Model, part: ModelPart, name: str) -> float:
     if name not in part.names:
         raise InputError(f"{model.path or 'model'} [[part]] {part.name}: the coefficient '{name}' is missing.")
     return part[name]
-
-
-def _temperature_column(model: Model) -> str:
-    column = model.settings.get("temperature_column")
-    if not isinstance(column, str):
-        raise InputError(f"{model.path or 'model'} [settings]: the key 'temperature_column' must name a column.")
-    return column
