@@ -10,7 +10,7 @@ wander, and one Cholesky factor of the bordered matrix [A, b; bᵀ, c] gives det
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -153,6 +153,9 @@ def solve(model: Linear, terms: int, scales: FloatArray | None = None, kinds: Se
     kinds : sequence of int, optional
         Kinds of wander to look at; all unless given.
     """
+    live = np.isinf(model.prior) | model.columns.any(axis=0)
+    if not live.all():
+        return _beside_nothing(model, live, terms, scales, kinds)
     grams = Grams(model, kinds)
     sizes = np.full(terms, 0.1) if scales is None else np.array(scales, dtype=float)
     marginal = 0.0
@@ -179,6 +182,20 @@ def solve(model: Linear, terms: int, scales: FloatArray | None = None, kinds: Se
     coefficients = mean * units
     coefficients[: model.flat] += grams.taken
     return Solved(best, grams.kinds[k], s, sizes, coefficients, covariance, variance, by_noise)
+
+
+def _beside_nothing(
+    model: Linear, live: "np.ndarray", terms: int, scales: FloatArray | None, kinds: Sequence[int] | None
+) -> Solved:
+    """Solve without the columns that no row shows: their coefficients are what they were before, 0 ± prior."""
+    seen = replace(model, columns=model.columns[:, live], prior=model.prior[live], owner=model.owner[live])
+    found = solve(seen, terms, scales, kinds)
+    own = np.where(model.owner >= 0, np.append(found.scales, 1.0)[model.owner], 1.0)
+    covariance = np.diag(found.variance * (own * np.where(live, 0.0, model.prior) / model.sigma) ** 2)
+    covariance[np.ix_(live, live)] = found.covariance
+    coefficients = np.zeros(model.owner.size)
+    coefficients[live] = found.coefficients
+    return replace(found, coefficients=coefficients, covariance=covariance)
 
 
 def _largest(table: FloatArray) -> tuple[int, int]:

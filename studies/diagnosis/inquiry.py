@@ -158,8 +158,7 @@ def refuse(campaign: Campaign, selection: Selection) -> Selection:
     while selection.final.fit.terms:
         fewer = [drop(selection.final, k) for k in range(len(selection.final.fit.terms))]
         for k in sorted(range(len(fewer)), key=lambda k: -fewer[k].score):
-            event = selection.final.fit.terms[k].effect.event
-            by_run = None if event or len(campaign.records) == 1 else held_out.by_record
+            by_run = None if selection.final.fit.alone(k) or len(campaign.records) == 1 else held_out.by_record
             pays = fewer[k].score < selection.final.score - CONSTANTS["margin"]
             if not pays or not _pays(fewer[k].fit, selection.final.fit, campaign, by_run):
                 kept = tuple(place for n, place in enumerate(selection.places) if n != k)
@@ -177,14 +176,23 @@ def _another(selection: Selection, k: int, without: Hypothesis, campaign: Campai
     place = selection.places[k]
     refused = selection.final.names[k]
     rivals = [rival for name, rival in zip(place.names, place.rivals, strict=True) if name != refused]
+    if len(place.without.names) > len(without.names):  # other causes were refused since the rivals were fitted
+        rivals = [_beside(without, rival, place.index) for rival in rivals[:MOST_TRIED]]
+        place = replace(place, index=len(without.names), without=without)
     for n, rival in enumerate(rivals[:MOST_TRIED]):
         if rival.score < without.score + needed(selection.plain, without):
             break
-        event = rival.fit.terms[place.index].effect.event
-        by_run = None if event or len(campaign.records) == 1 else held_out.by_record
+        by_run = None if rival.fit.alone(place.index) or len(campaign.records) == 1 else held_out.by_record
         if _pays(without.fit, rival.fit, campaign, by_run):
             return replace(place, rivals=(rival, *rivals[n + 1 :]))
     return None
+
+
+def _beside(base: Hypothesis, rival: Hypothesis, index: int) -> Hypothesis:
+    """Return a model with one term of a rival more."""
+    terms = (*base.fit.terms, replace(rival.fit.terms[index], about=()))
+    scales = np.append(base.fit.solved.scales, rival.fit.solved.scales[index])
+    return Hypothesis(fit(base.fit.problem, base.fit.moved(), terms, 2, scales), (*base.price, rival.price[index]))
 
 
 def _follows(model: Fit) -> bool:

@@ -74,13 +74,16 @@ class Problem:
         own = effect.sizes[self.response.column]
         return own * self.level if self.response.relative and not effect.thermal else own
 
+    def split(self, rows: FloatArray) -> list[FloatArray]:
+        """Return stacked rows run by run, the present ones only."""
+        return np.split(rows, np.cumsum([int(mask.sum()) for mask in self.present])[:-1])
+
     def unstack(self, rows: FloatArray) -> list[FloatArray]:
         """Return stacked rows run by run; missing ones are NaN."""
-        out, begin = [], 0
-        for mask in self.present:
+        out = []
+        for mask, part in zip(self.present, self.split(rows), strict=True):
             own = np.full(mask.shape, np.nan)
-            own[mask] = rows[begin : begin + int(mask.sum())]
-            begin += int(mask.sum())
+            own[mask] = part
             out.append(own)
         return out
 
@@ -136,6 +139,7 @@ def span_of(campaign: Campaign, tau: float) -> Span:
         len(campaign.runs),
         tuple(run.time for run in campaign.runs),
         turns,
+        campaign.timed,
     )
 
 
@@ -201,6 +205,12 @@ class Fit:
         out = np.zeros(self.terms[index].effect.spread.size)
         out[used(self.terms[index].effect)] = self.solved.coefficients[self.columns_of(index)]
         return out
+
+    def alone(self, index: int) -> bool:
+        """Whether other runs know nothing of a term: an event, or columns of one run each."""
+        columns = self.linear.columns[:, self.columns_of(index)]
+        runs = np.stack([part.any(axis=0) for part in self.problem.split(columns)])
+        return self.terms[index].effect.event or bool((runs.sum(axis=0) <= 1).all())
 
     def known(self, index: int) -> Term:
         """Return a term with what was found of it, about which it may be inexact."""

@@ -15,7 +15,7 @@ from studies.effects.states import FloatArray
 FEW = 40
 """An effect with no more shapes than this is scanned with its whole family."""
 LEADING, WIDTH = 0.4, 4
-"""Of others the columns whose prior is at least this part of the widest, and at most so many."""
+"""Of others the columns whose prior is at least this part of the widest, and at most so many beside the widest."""
 BLOCK = 4000
 VARIES = 1e-3
 """Relative change from which on a drive varies."""
@@ -89,7 +89,7 @@ def build_bank(model: Fit, effects: Sequence[Effect]) -> Bank:
         spread, shapes = effect.spread, effect.grid(problem.span, column)
         least = 0.0 if len(shapes) <= FEW else LEADING * float(spread.max())
         leading = [k for k in np.argsort(-spread, kind="stable") if spread[k] >= least and spread[k] > 0]
-        most = len(leading) if len(shapes) <= FEW else WIDTH
+        most = len(leading) if len(shapes) <= FEW else max(WIDTH, int(np.sum(spread == spread.max())))
         size = problem.size(effect)
         for shape in shapes:
             term = Term(effect, tuple(shape))

@@ -66,6 +66,8 @@ class Span:
     bins: tuple[FloatArray, ...] = ()
     turns: bool = False
     """Whether the wave stands at several azimuths."""
+    timed: bool = True
+    """Whether the starts of the runs are known, so that time goes on from run to run."""
 
     @property
     def temperature_range(self) -> float:

@@ -111,8 +111,8 @@ def lag(drive: FloatArray, step: float, tau: float) -> FloatArray:
 
     Parameters
     ----------
-    drive : (N,) array
-        Input on an even grid.
+    drive : (N,) or (N, m) array
+        Input on an even grid, or several side by side.
     step, tau : float
         Time step and time constant, s.
     """
@@ -121,7 +121,7 @@ def lag(drive: FloatArray, step: float, tau: float) -> FloatArray:
     ramp = -np.expm1(-ratio) / ratio if ratio > 1e-12 else 1.0
     ahead, behind = 1.0 - ramp, ramp - decay
     start = drive[:1] * (1.0 - ahead)
-    out, _ = lfilter([ahead, behind], [1.0, -decay], drive, zi=start)
+    out, _ = lfilter([ahead, behind], [1.0, -decay], drive, axis=0, zi=start)
     return np.asarray(out)
 
 

@@ -3,11 +3,10 @@
 import numpy as np
 from scipy.constants import zero_Celsius
 
-from compensation.cross_damping import simulate_bias
 from compensation.wave import see_across
 from studies.effects.curves import ORDERS, smoothness, waves
 from studies.effects.effect import Coefficient, Effect, Parameter, Shape, Span
-from studies.effects.states import FloatArray, States
+from studies.effects.states import FloatArray, States, lag
 
 
 def columns(states: States, shape: Shape, response: str) -> FloatArray:
@@ -23,8 +22,7 @@ def columns(states: States, shape: Shape, response: str) -> FloatArray:
         curve = curve * see_across(states.pattern_angle, np.radians(axis))[:, None]
     if not pole:
         return curve
-    k, zeta = 1e3 / pole, 1e-3  # eq. (9) is a lag 1/(kζ) with the gain 2k/g₂
-    return np.stack([simulate_bias(states.time, column, k, zeta, 2.0 * k) for column in curve.T], axis=1)
+    return lag(curve, states.step, pole)  # eq. (9) is a lag 1/(kζ)
 
 
 def grid(span: Span, response: str) -> list[tuple[float, ...]]:

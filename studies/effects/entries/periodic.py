@@ -7,11 +7,19 @@ from studies.effects.states import FloatArray, States
 
 
 def columns(states: States, shape: Shape, response: str) -> FloatArray:
-    """Σ A_h sin(2πht/P) + B_h cos(2πht/P), h = 1 … 3, means over a step; t of the campaign or, after a restart, of the run."""
+    """Σ A_h sin(2πht/P) + B_h cos(2πht/P), h = 1 … 3, means over a step; t of the campaign or, after a restart, of the run.
+
+    Nobody knows the phase between runs whose starts are not known: each then has sines and cosines of its own.
+    """
     period, restarts = shape
     turn = np.exp(2j * np.pi * (states.time if restarts else states.campaign_time) / period)
     waves = np.stack([turn, turn**2, turn**3], axis=1) * np.sinc(np.arange(1, 4) * states.step / period)
-    return np.concatenate([waves.imag, waves.real], axis=1)
+    pairs = np.concatenate([waves.imag, waves.real], axis=1)
+    out = np.zeros((states.time.size, 6 * (1 + MOST_RUNS)))
+    place = 1 + states.run if restarts == OWN else 0
+    if place <= MOST_RUNS:
+        out[:, 6 * place : 6 * (place + 1)] = pairs
+    return out
 
 
 def grid(span: Span, response: str) -> list[tuple[float, ...]]:
@@ -20,6 +28,9 @@ def grid(span: Span, response: str) -> list[tuple[float, ...]]:
     forms: list[tuple[float, ...]] = [
         (float(1.0 / f), 1.0) for f in np.arange(slowest, fastest, 0.35 / span.longest_run)
     ]
+    if span.runs > 1 and not span.timed:
+        own = [(period, OWN) for period, _ in forms] if span.runs <= MOST_RUNS else []
+        return forms + own
     if span.runs > 1:
         apart = max(0.4 / span.campaign_length, (fastest - slowest) / MOST)
         forms += [(float(1.0 / f), 0.0) for f in np.arange(slowest, fastest, apart)]
@@ -42,6 +53,8 @@ CYCLES = 3.0
 MOST = 1500
 LOBE = 0.6
 """Turns over a run by which two periods may differ and still look alike in it."""
+OWN, MOST_RUNS = 2.0, 12
+HARMONICS = (1.0, 0.3, 0.1)
 
 
 EFFECT = Effect(
@@ -50,14 +63,20 @@ EFFECT = Effect(
     source="harmonic regression",
     isolate="change the period of the chamber's control, or let the table turn at a known rate",
     sensor="the chamber's air temperature, or the table's angle",
-    coefficients=(Coefficient("sine_{unit}", (1.0, 0.3, 0.1)), Coefficient("cosine_{unit}", (1.0, 0.3, 0.1))),
+    coefficients=(
+        Coefficient("sine_{unit}", HARMONICS),
+        Coefficient("cosine_{unit}", HARMONICS),
+        Coefficient("own_{unit}", 2 * MOST_RUNS * HARMONICS),
+    ),
     columns=columns,
     grid=grid,
     near=near,
     sizes={"bias_deg_per_h": 10.0, "frequency_Hz": 5e-5, "inverse_q": 0.3},
     shape=(
         Parameter("period_s", 1.0, 1e7, "period", of_run=1.0 / CYCLES),
-        Parameter("restarts_each_run", 0.0, 1.0, "1 when each run starts with the same phase", False, True),
+        Parameter(
+            "restarts_each_run", 0.0, OWN, "1 when each run starts with the same phase, 2 with its own", False, True
+        ),
     ),
     by_clock=True,
 )
