@@ -188,10 +188,13 @@ def _gains(model: Fit, bank: Bank, kind: int, share: int) -> FloatArray:
             place = slice(begin, begin + BLOCK)
             chosen = group.columns[place]
             unit = group.prior[place] / linear.sigma
-            columns = beside.T[chosen]
+            columns, own = beside.T[chosen], moment[chosen]
+            if chosen.shape[1] > WIDTH:  # many columns are nearly of one plane: single precision would find more than is there
+                columns = columns.astype(float)
+                own = columns @ rest
             gram = (columns @ columns.transpose(0, 2, 1)).astype(float) * unit[:, :, None] * unit[:, None, :]
             values, vectors = np.linalg.eigh(gram)
-            along = np.einsum("hij,hi->hj", vectors, moment[chosen] * unit)
+            along = np.einsum("hij,hi->hj", vectors, own * unit)
             values = np.maximum(values, 0.0)[None]
             size = (SCALES**2)[:, None, None]
             determinant = 0.5 * np.log1p(size * values).sum(axis=-1)

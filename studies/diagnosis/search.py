@@ -179,7 +179,7 @@ def _bracket(term: Term, place: int, model: Fit) -> tuple[float, float]:
     high = grid[grid > at * (1 + 1e-9) if at > 0 else grid > at + 1e-9]
     below = float(low[-1]) if low.size else (at / 1.6 if parameter.logarithmic else at - 1.0)
     above = float(high[0]) if high.size else (at * 1.6 if parameter.logarithmic else at + 1.0)
-    most = min(parameter.high, parameter.of_run * span.longest_run)
+    most = min(parameter.high, parameter.of_run * span.longest_run, parameter.of_range * span.temperature_range)
     below, above = max(below, parameter.low), min(above, most)
     if above <= below:
         below, above = min(at, most) * (1 - 1e-6), min(at, most) * (1 + 1e-6) + 1e-9

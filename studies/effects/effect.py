@@ -23,7 +23,7 @@ class Parameter:
     """A shape parameter: it enters the signature nonlinearly, between `low` and `high`.
 
     `steady` ones are chosen from the grid only and are `low` where a card leaves them out; `of_run` bounds it from above by
-    that part of the longest run, besides `high`.
+    that part of the longest run, `of_range` by that part of the covered temperatures, besides `high`.
     """
 
     name: str
@@ -33,6 +33,7 @@ class Parameter:
     logarithmic: bool = True
     steady: bool = False
     of_run: float = np.inf
+    of_range: float = np.inf
 
     @property
     def unit(self) -> str:

@@ -25,8 +25,8 @@ def columns(states: States, shape: Shape, response: str) -> FloatArray:
 
 
 def grid(span: Span, response: str) -> list[tuple[float, ...]]:
-    """Loop half widths from half a percent to a third of the covered range; three initial memories."""
-    radii = span.temperature_range * np.geomspace(0.006, 0.35, 8)
+    """Loop half widths from half a percent of the covered range; three initial memories."""
+    radii = span.temperature_range * np.geomspace(0.006, WIDEST, 8)
     ends = span.temperature_low - zero_Celsius, span.temperature_high - zero_Celsius
     return [(float(radius), start, *ends) for radius in radii for start in (0.0, -1.0, 1.0)]
 
@@ -36,6 +36,9 @@ def steady(x: FloatArray, shape: Shape) -> FloatArray:
     return np.asarray((play(x, shape[0]) - x)[:, None])
 
 
+WIDEST = 0.25
+"""Largest half width, in parts of the covered range: the play of a wider loop hardly moves, and less the temperature it is a
+static curve."""
 ENVELOPE = 8
 """Half waves over the covered range that the width of a loop may follow."""
 RATIOS = (1.0, 0.4, 0.7, 1.5, 2.2)
@@ -54,7 +57,7 @@ EFFECT = Effect(
     grid=grid,
     sizes={"bias_deg_per_h": 2.0, "frequency_Hz": 3e-5, "inverse_q": 0.02},
     shape=(
-        Parameter("half_width_K", 0.02, 40.0, "half width of the loop in temperature"),
+        Parameter("half_width_K", 0.02, 40.0, "half width of the loop in temperature", of_range=WIDEST),
         Parameter("initial_memory", -1.0, 1.0, "where in its band each run starts", False, True),
         Parameter("from_degC", -273.0, 500.0, "lower end of the envelope", False, True),
         Parameter("to_degC", -273.0, 500.0, "upper end of the envelope", False, True),
