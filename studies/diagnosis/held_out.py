@@ -7,7 +7,7 @@ import numpy as np
 
 from studies.diagnosis.baseline import Baseline, Followed, Lagged, Tangent
 from studies.diagnosis.campaign import Campaign
-from studies.diagnosis.model import Fit, fit, inexact_columns, pose, term_columns
+from studies.diagnosis.model import Fit, fit, inexact_columns, pose, term_columns, used
 from studies.diagnosis.noise import SHARES
 from studies.effects.states import FloatArray
 
@@ -76,6 +76,7 @@ class OnRows:
         run = self.campaign.runs[k]
         inside = np.ones(run.row_time.size, dtype=bool) if inside is None else inside
         rows, start, names = self, 0.0, self.model.tangent.names
+        begin = names.index(f"start@{k}") if f"start@{k}" in names else -1
         for _ in range(4):
             columns, shift = rows.columns(k)
             coefficients = self.model.solved.coefficients.copy()
@@ -85,9 +86,9 @@ class OnRows:
             if not free or known.sum() <= len(free):
                 return np.asarray(rest)
             own = columns[inside][:, list(free)]
-            found = _within(own[known], rest[known], np.array([names[place] == f"start@{k}" for place in free]))
+            found = _within(own[known], rest[known], np.array([place == begin for place in free]))
             rest = rest - own @ found
-            places = [n for n, place in enumerate(free) if names[place] == f"start@{k}"]
+            places = [n for n, place in enumerate(free) if place == begin]
             if not places or abs(found[places[0]] - start) < SETTLED:
                 break
             start = float(found[places[0]])
@@ -99,7 +100,7 @@ class OnRows:
         columns = self.columns(k)[0]
         columns = columns if inside is None else columns[inside]
         solved, noise = self.model.solved, self.model.problem.noise
-        own = np.linalg.qr(columns[:, list(free)])[0]
+        own = np.linalg.qr(columns[:, [place for place in free if columns[:, place].any()]])[0]
         other = np.delete(columns, list(free), axis=1)
         other = other - own @ (own.T @ other)
         covariance = np.delete(np.delete(solved.covariance, list(free), axis=0), list(free), axis=1)
@@ -173,8 +174,12 @@ def residuals(model: Fit, campaign: Campaign) -> list[FloatArray]:
 
 
 def own_columns(model: Fit, k: int) -> list[int]:
-    """Return which columns belong to run `k` alone: its offset and its initial state."""
-    return [place for place, name in enumerate(model.tangent.names) if name.endswith(f"@{k}")]
+    """Return which columns belong to run `k` alone: its offset and its initial states."""
+    own = [place for place, name in enumerate(model.tangent.names) if name.endswith(f"@{k}")]
+    for index, term in enumerate(model.terms):
+        fitted, places = used(term.effect), model.columns_of(index)
+        own += [int(places[fitted == column][0]) for column in term.effect.initial_of(k)]
+    return own
 
 
 def score(model: Fit, campaign: Campaign, like: "Parts | None" = None) -> Score:
