@@ -41,7 +41,8 @@ def near(span: Span, response: str, shape: Shape) -> list[tuple[float, ...]]:
     """Periods that one run hardly tells from this one, spaced finer than the lines that runs days apart tell: a tenth of a turn."""
     middle, reach = 1.0 / shape[0], LOBE / span.longest_run
     forms: list[tuple[float, ...]] = []
-    for restarts, length in ((1.0, span.longest_run), (0.0, span.campaign_length))[: 2 if span.runs > 1 else 1]:
+    further = (0.0, span.campaign_length) if span.timed else (OWN, span.longest_run)
+    for restarts, length in ((1.0, span.longest_run), further)[: 2 if span.runs > 1 else 1]:
         apart = max(0.1 / length, 2.0 * reach / MOST)
         steps = int(reach / apart)
         forms += [(float(1.0 / f), restarts) for f in middle + apart * np.arange(-steps, steps + 1) if f > 0.0]
