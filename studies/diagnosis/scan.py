@@ -189,7 +189,9 @@ def _gains(model: Fit, bank: Bank, kind: int, share: int) -> FloatArray:
             chosen = group.columns[place]
             unit = group.prior[place] / linear.sigma
             columns, own = beside.T[chosen], moment[chosen]
-            if chosen.shape[1] > WIDTH:  # many columns are nearly of one plane: single precision would find more than is there
+            if (
+                chosen.shape[1] > WIDTH
+            ):  # many columns are nearly of one plane: single precision would find more than is there
                 columns = columns.astype(float)
                 own = columns @ rest
             gram = (columns @ columns.transpose(0, 2, 1)).astype(float) * unit[:, :, None] * unit[:, None, :]
