@@ -6,12 +6,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import block_diag
 
 from studies.calibration.estimates import SILENT, Estimate, estimate, find_groups
-from studies.calibration.fit import CardFit, fit
+from studies.calibration.fit import CardFit, fit, whitened
 from studies.calibration.observed import HOUSING, QUADRATURE, RESPONSES, SETTLED, ObservedRun, SettledTable, observe
 from studies.calibration.priors import Priors, gather_priors
-from studies.calibration.problem import CardProblem, State, wide_law
+from studies.calibration.problem import JUMP, SHIFT, CardProblem, State, wide_law
 from studies.errors import InputError
 from studies.plausible import check_card_frequency
 from studies.record import Record
@@ -27,6 +28,8 @@ Array = NDArray[np.float64]
 Progress = Callable[[str], None]
 UNITS = {"frequency_Hz": "Hz", "bias_deg_per_h": "°/h", "inverse_q": "1", QUADRATURE: "V", HOUSING: "K", SETTLED: "Hz"}
 CONTRADICTION = 5.0  # runs whose offsets are so much larger than what else the noise makes of a run's mean
+START_STEPS = 3
+UNSETTLED, UNSETTLED_SD = 0.5, 4.0  # K and standard deviations by which a gyro had not settled at the start
 
 
 @dataclass(frozen=True)
@@ -74,7 +77,8 @@ class HeldOutRun:
     path : of its record
     chamber, housing : response -> (as shipped, calibrated); from the chamber alone nothing is refitted, from the housing the
         run's own offset and initial state
-    stated : response -> rms standard deviation that the calibrated values' own uncertainty leaves from the chamber
+    stated : response -> rms standard deviation from the chamber that the calibrated values' own uncertainty leaves, and how
+        the campaign's runs began and their chambers' clocks ran
     noise : response -> rms
     """
 
@@ -288,10 +292,7 @@ def predict_held_out(
     inner = replace(whole.problem, runs=(replace(run, outer=None),), tables=())
     responses = [name for name in inner.responses if name not in (HOUSING, SETTLED)]
     by_housing = dict.fromkeys(responses, (0.0, 0.0))
-    both = []
-    for at in (np.zeros(count), values):
-        point = np.concatenate([at, np.zeros(inner.count - count)])
-        both.append(_refit_start(inner, point, whole))
+    both = [_refit_start(inner, at, whole) for at in (np.zeros(count), values)]
     for name in responses:
         by_housing[name] = (_spread(inner, both[0], name), _spread(inner, both[1], name))
     by_chamber: dict[str, tuple[float, float]] = {}
@@ -303,32 +304,56 @@ def predict_held_out(
             np.concatenate([at, np.zeros(outer.count - count)]) for at in (np.zeros(count), values)
         )
         before, after = outer.evaluate(as_shipped, slopes=False), outer.evaluate(calibrated)
-        C = without.covariance[:count, :count]
-        of_values = {name: after.slope[name][:, :count] for name in responses}
-        stated = {name: float(np.sqrt(np.mean(np.sum(J @ C * J, axis=1)))) for name, J in of_values.items()}
+        C = block_diag(without.covariance[:count, :count], _usual_starts(whole, outer))
+        stated = {name: float(np.sqrt(np.mean(np.sum(J @ C * J, axis=1)))) for name, J in after.slope.items()}
         by_chamber = {name: (_rms(before.residual[name]), _rms(after.residual[name])) for name in responses}
     noise = {name: noise_rms(whole, name) for name in responses}
     return HeldOutRun(run.record.path, by_chamber, by_housing, stated, noise)
 
 
+def _usual_starts(whole: CardFit, problem: CardProblem) -> Array:
+    """Covariance of the free starts of a run of which only the chamber is known: mean squares over the campaign's runs.
+
+    Where the campaign has none of a kind, such as a jump of the chamber, the prior's. What departs behind the housing is
+    taken from where the measured housing drives, for frequency sees it there.
+    """
+    count, seen = len(whole.problem.priors.values), whole.problem
+    units = np.array([sd for _, _, sd in seen.starts])
+    point, C = units * whole.point[count:], np.outer(units, units) * whole.covariance[count:, count:]
+    square = np.outer(point, point) + C
+    names = [name for _, name, _ in problem.starts]
+    begin = [name for name in names if name.startswith("initial.")]
+    found = np.diag([sd**2 for _, _, sd in problem.starts])
+    usual = []
+    for run in range(len(seen.runs)):
+        at: dict[str, int] = {}
+        for place, (k, name, _) in enumerate(seen.starts):
+            if seen.parts[k].run == run:
+                at.setdefault(name, place)
+        if set(begin) <= set(at):
+            usual.append(square[np.ix_(*2 * [[at[name] for name in begin]])])
+    if usual:
+        own = [names.index(name) for name in begin]
+        found[np.ix_(own, own)] = np.mean(usual, axis=0)
+    for kind in (JUMP, SHIFT):
+        others = [square[i, i] for i, (_, name, _) in enumerate(seen.starts) if name.startswith(kind)]
+        for place, name in enumerate(names):
+            if name.startswith(kind) and others:
+                found[place, place] = np.mean(others)
+    scale = np.array([sd for _, _, sd in problem.starts])
+    return np.asarray(found / np.outer(scale, scale))
+
+
 def _refit_start(problem: CardProblem, point: Array, whole: CardFit) -> State:
-    """Residuals with the run's own initial state refitted."""
-    count = len(problem.priors.values)
-    state = problem.evaluate(point)
-    names = problem.responses
-    white = np.concatenate(
-        [
-            problem.rows[n].whiten(
-                np.column_stack([state.slope[n], state.residual[n]]),
-                replace(whole.noise[n], offset=1e3 * whole.noise[n].white),
-            )
-            for n in names
-        ]
-    )
-    J, r = white[:, count:-1], white[:, -1]
-    moved = np.array(point)
-    moved[count:] += np.linalg.solve(J.T @ J + np.eye(J.shape[1]), J.T @ r)
-    return problem.evaluate(np.clip(moved, *problem.ends), slopes=False)
+    """Residuals with the values of a point and the run's own initial state refitted."""
+    instrument = problem.instrument_at(point)
+    known = replace(problem, instrument=instrument, priors=Priors((), np.eye(0)), law=problem.law_at(instrument))
+    noise = {name: replace(whole.noise[name], offset=1e3 * whole.noise[name].white) for name in known.responses}
+    start = np.zeros(known.count)
+    for _ in range(START_STEPS):
+        J, r = whitened(known, known.evaluate(start), noise, known.rows)
+        start = np.clip(start + np.linalg.solve(J.T @ J + np.eye(len(start)), J.T @ r - start), *known.ends)
+    return known.evaluate(start, slopes=False)
 
 
 def _rms(values: Array) -> float:
@@ -341,6 +366,7 @@ def _warn(found: CardFit, estimates: Sequence[Estimate], ladder: Mapping[str, Ru
         warnings.append("the fit has not fully converged; the values may still move.")
     for run in found.problem.runs:
         warnings += [f"{run.record.path}: {idle}" for idle in idle_effects(found.problem.instrument, run.inner)]
+    warnings += _unsettled(found)
     rows = found.problem.rows
     for name, rung in ladder.items():
         usual = _usual_mean(found, name)
@@ -363,6 +389,29 @@ def _warn(found: CardFit, estimates: Sequence[Estimate], ladder: Mapping[str, Ru
             f" {', '.join(stayed)}."
         )
     return tuple(warnings)
+
+
+def _unsettled(found: CardFit) -> list[str]:
+    """Name the runs that began in the midst of a change, with the part that was furthest from being settled."""
+    problem, count = found.problem, len(found.problem.priors.values)
+    spread = np.sqrt(np.diag(found.covariance)[count:])
+    furthest: dict[int, tuple[float, str]] = {}
+    for (k, name, sd), u, own in zip(problem.starts, found.point[count:], spread, strict=True):
+        lump, away, run = name.removeprefix("initial."), float(sd * u), problem.parts[k].run
+        known = abs(u) > UNSETTLED_SD * own and abs(away) > UNSETTLED
+        if lump in ("base", "resonator") and known and abs(away) > abs(furthest.get(run, (0.0, ""))[0]):
+            furthest[run] = away, lump
+    return [
+        f"{problem.runs[run].record.path}: the gyro had not settled when this run began: its {lump} was {abs(away):.2g} K"
+        f" {'warmer' if away > 0 else 'colder'} than its {_settled_by(problem, run)}; a prediction from the chamber alone"
+        " does not know of that."
+        for run, (away, lump) in sorted(furthest.items())
+    ]
+
+
+def _settled_by(problem: CardProblem, run: int) -> str:
+    one = problem.runs[run]
+    return "chamber" if one.outer is None and one.inner.boundary == "chamber" else "housing"
 
 
 def _usual_mean(found: CardFit, name: str) -> float:

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from shell.errors import ShellError
 from studies.calibration.fit import CardFit, objective, whitened
 from studies.calibration.priors import from_standard, to_standard
+from studies.calibration.valley import find_bend
 from studies.calibration.wave import Polar
 from studies.errors import InputError
 from thermal.errors import ThermalError
@@ -68,6 +69,7 @@ def estimate(fit: CardFit, profile: bool = True) -> tuple[Estimate, ...]:
     middle = priors.standard(mean)
     C = priors.root @ covariance @ priors.root.T
     J, _ = whitened(fit.problem, fit.state, fit.noise, fit.rows)
+    bend = find_bend(fit, J) if profile else None
     found = []
     for k, value in enumerate(priors.values):
         if k in polar:
@@ -77,6 +79,10 @@ def estimate(fit: CardFit, profile: bool = True) -> tuple[Estimate, ...]:
         ends, kind = (float(middle[k]) - NINETY * sd, float(middle[k]) + NINETY * sd), "normal"
         if profile and value.name.startswith(NONLINEAR) and sd < SILENT:
             ends, kind = _profiled(fit, k, J, ends)
+        wide = sd
+        if bend is not None and kind == "normal" and max(abs(bend.low[k]), abs(bend.high[k])) > BENT * sd:
+            ends, kind = (ends[0] + float(bend.low[k]), ends[1] + float(bend.high[k])), "profile"
+            wide = float(bend.sd[k])
         low, high = (float(np.clip(from_standard(value, end), value.low, value.high)) for end in ends)
         number = at[value.name]
         width = number * sd * value.sd / value.value if value.logarithmic else sd * value.sd
@@ -90,7 +96,7 @@ def estimate(fit: CardFit, profile: bool = True) -> tuple[Estimate, ...]:
                 max(high, number),
                 width,
                 float(z[k]),
-                sd,
+                wide,
                 bounds[k],
                 kind,
             )

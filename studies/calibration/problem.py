@@ -1,6 +1,6 @@
 """The least-squares problem of a calibration: predictions of all runs, their derivatives, and what else is free.
 
-Coordinates: the card's uncertain values (`studies.calibration.priors`), then for each run how far its housing, base and
+Coordinates: the card's uncertain values (`studies.calibration.priors`), then for each run how far its housing, base, stem and
 resonator departed from being settled at the start, all of unit prior variance. Frequency, bias and 1/Q are driven by the
 measured housing where there is one; the chamber then explains the housing.
 """
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from studies.instrument.card import Instrument
 
 Array = NDArray[np.float64]
-START_SPREAD = 3.0  # K, of the departures at the start
+START_SPREAD = 10.0  # K, of the departures at the start: a run may begin in the midst of a change
 SHIFT, JUMP = "shift", "jump."
 MOST_JUMPS = 24  # of a run whose times are free, each for itself
 Progress = Callable[[str], None]
@@ -86,7 +86,9 @@ class CardProblem:
         Of a set point that jumped between two rows, the time of each jump is free: it was up to a row earlier. A jump at
         the first row is not: what it did before the record began is in the departures.
         """
-        found = [(k, f"initial.{lump}", START_SPREAD) for k, part in enumerate(self.parts) for lump in part.drive.lumps]
+        found = [
+            (k, f"initial.{lump}", START_SPREAD) for k, part in enumerate(self.parts) for lump in part.drive.departing
+        ]
         for k, part in enumerate(self.parts):
             if part.drive.boundary == "chamber":
                 row = float(np.median(np.diff(part.drive.profile.time)))

@@ -28,8 +28,10 @@ COMMANDS = {
 RATE = "rate_deg_per_s"
 COMMAND_COLUMNS = (*(column for column, _, _ in COMMANDS.values()), RATE)
 """Columns beside the chamber's that a profile may have."""
-LUMPS = ("housing", "base", "resonator")
+LUMPS = ("housing", "base", "stem", "resonator")
 """Parts of the heat path whose temperature at the start may depart from the settled one."""
+SENSOR = "sensor"
+"""Of a housing that is predicted: its reading at the start may depart from the housing, behind which it lags."""
 MOST_BOUNDARY_ROWS = 20_000
 MOST_ROWS = 40_000_000
 LEAST_JUMP = 0.5  # K from one row to the next, and
@@ -49,7 +51,8 @@ class Drive:
     profile : Profile, K
         Temperature of the boundary over all the rows.
     initial : mapping
-        How far (K) the "housing", the "base" and the "resonator" depart at the start from having settled at the first value.
+        How far (K) the "housing", the "base", the "stem" and the "resonator" depart at the start from having settled at the
+        first value, and the reading of the housing's "sensor" from the housing.
     commands : mapping
         Amplitude and voltage squared (V²), quadrature (V), pattern angle (rad) at the rows; what is absent does not move.
     shift : float, s
@@ -74,15 +77,20 @@ class Drive:
 
     def __post_init__(self) -> None:
         for name in self.initial:
-            if name not in self.lumps:
+            if name not in self.departing:
                 raise InputError(
-                    f"a drive by the {self.boundary} has no initial '{name}'; it has {', '.join(self.lumps)}."
+                    f"a drive by the {self.boundary} has no initial '{name}'; it has {', '.join(self.departing)}."
                 )
 
     @property
     def lumps(self) -> tuple[str, ...]:
         """Parts whose initial temperature is free."""
         return LUMPS if self.boundary == "chamber" else LUMPS[1:]
+
+    @property
+    def departing(self) -> tuple[str, ...]:
+        """All that is free at the start: the lumps, and the sensor of a housing that is predicted."""
+        return (*self.lumps, SENSOR) if self.boundary == "chamber" else self.lumps
 
     @property
     def imposed(self) -> Profile:

@@ -1,5 +1,6 @@
 """Networks of an instrument's heat path, from the boundary "chamber", "housing" or "base" to the cells of the shell."""
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -52,9 +53,17 @@ def slowest_lag(network: Network, temperature: float) -> float:
     return float(find_relaxation(chain, temperature).time_constants[0])
 
 
-def lump_shape(network: Network, lump: str) -> NDArray[np.float64]:
-    """1 for the nodes of a lump ("housing", "base", or "resonator": stem and shell), 0 for the others."""
+def departures(network: Network, lumps: Sequence[str], temperature: float) -> dict[str, NDArray[np.float64]]:
+    """Temperatures of the nodes (K) for 1 K of each lump: "housing", "base", "stem", or "resonator" (stem and shell).
+
+    Only what persists of it, Σ v vᵀC e over as many of the slowest modes v as there are lumps: what happened before a run
+    is left in its slow modes, and a lump that departed evenly would begin with fast ones.
+    """
     names = [node.name for node in network.nodes]
-    if lump == "resonator":
-        return np.array([float(name not in ("housing", "base")) for name in names])
-    return np.array([float(name == lump) for name in names])
+    relaxation = find_relaxation(network, temperature)
+    slow = relaxation.shapes[:, : len(lumps)]
+    shapes = {}
+    for lump in lumps:
+        even = [float(name not in ("housing", "base") if lump == "resonator" else name == lump) for name in names]
+        shapes[lump] = np.asarray(slow @ (slow.T @ (relaxation.capacity * even)))
+    return shapes

@@ -17,9 +17,9 @@ from studies.damping_law import DampingLaw, damping_law
 from studies.errors import InputError
 from studies.instrument.dotted import look_up
 from studies.law import law_of, moved_law
-from studies.simulation.drive import Drive
-from studies.simulation.heat_path import build_network, lump_shape, slowest_lag
-from studies.simulation.response import Temperatures, check_loss, observed_rows, read_out
+from studies.simulation.drive import COLUMN, SENSOR, Drive
+from studies.simulation.heat_path import build_network, departures, slowest_lag
+from studies.simulation.response import Temperatures, check_loss, observed_rows, read_out, sensor_decay
 from thermal.network import Network
 from thermal.profile import Profile
 from thermal.sensitivity import NetworkChange, difference, no_change, respond
@@ -79,7 +79,7 @@ def predict(
     instrument : Instrument
     drive : Drive
     derivatives : names, or `Variations` of this instrument that several runs share
-        Keys of the card ("thermal.mount_conductance_W_per_K"), "initial.base" (K) and the other lumps of the drive,
+        Keys of the card ("thermal.mount_conductance_W_per_K"), "initial.base" (K) and whatever else of the drive may depart,
         "shift" (s), and "jump.0" (s) and the other jumps of its profile.
     law : FrequencyLaw, optional
         One that was built before for this instrument and a range that is wide enough.
@@ -95,8 +95,9 @@ def predict(
     network = varied.network(drive.boundary)
     rows = observed_rows(instrument, law, tuple(node.name for node in network.nodes))
     boundary: dict[str, Profile] = {drive.boundary: _behind_sensor(instrument, drive)}
+    shapes = varied.departures(drive)
     departure = sum(
-        (value * lump_shape(network, name) for name, value in drive.initial.items()), np.zeros(network.count)
+        (value * shapes[name] for name, value in drive.initial.items() if name != SENSOR), np.zeros(network.count)
     )
     changes = {name: change for name in varied.names if (change := varied.change(name, drive)) is not None}
     thermal = respond(network, boundary, drive.time, rows, list(changes.values()), departure)
@@ -107,6 +108,10 @@ def predict(
     check_loss(instrument, columns["inverse_q"])
     slopes = {}
     for name in varied.names:
+        if name == INITIAL + SENSOR:
+            slopes[name] = dict.fromkeys(columns, np.zeros(len(drive.time)))
+            slopes[name][COLUMN["housing"]] = sensor_decay(instrument, drive)
+            continue
         along = partial(_still, found)
         if name == SHIFT or name.startswith(JUMP):
             along = partial(found.moved, *_slope_of_timing(network, drive, name, rows, departure))
@@ -182,6 +187,14 @@ class Side:
     damping: DampingLaw | None
     networks: dict[str, Network] = field(default_factory=dict)
     lags: dict[str, float] = field(default_factory=dict)
+    left: dict[str, dict[str, Array]] = field(default_factory=dict)
+
+    def departures(self, drive: Drive) -> dict[str, Array]:
+        """Temperatures of the nodes (K) for 1 K of each lump at the start, worked out once."""
+        if drive.boundary not in self.left:
+            T0 = self.instrument.reference_temperature
+            self.left[drive.boundary] = departures(self.network(drive.boundary), drive.lumps, T0)
+        return self.left[drive.boundary]
 
     def network(self, boundary: str) -> Network:
         """Return its network, built once."""
@@ -217,6 +230,10 @@ class Variations:
         """Return the network of the instrument itself."""
         return self._here.network(boundary)
 
+    def departures(self, drive: Drive) -> dict[str, Array]:
+        """Temperatures of its nodes (K) for 1 K of each lump at the start."""
+        return self._here.departures(drive)
+
     @property
     def damping(self) -> DampingLaw | None:
         """Its loss over temperature, where the parts of a budget make it."""
@@ -236,7 +253,8 @@ class Variations:
         """What a value does to the temperatures; None for nothing."""
         network = self.network(drive.boundary)
         if name.startswith(INITIAL):
-            return no_change(network, initial=lump_shape(network, name.removeprefix(INITIAL)))
+            lump = name.removeprefix(INITIAL)
+            return None if lump == SENSOR else no_change(network, initial=self.departures(drive)[lump])
         if name == LAG and drive.boundary == "housing":
             return no_change(network, {"housing": Profile(drive.profile.time, _slope_of_reading(drive.profile))})
         if name.partition(".")[0] not in ("thermal", "material", "resonator"):

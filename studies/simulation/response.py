@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from scipy.constants import zero_Celsius
 
 from studies.errors import InputError, naming
-from studies.simulation.drive import Drive
+from studies.simulation.drive import SENSOR, Drive
 from studies.simulation.loop import DEG_PER_H, settled_columns
 from studies.splitting import mean_shift
 from thermal.lag import lag
@@ -151,7 +151,16 @@ def _read_housing(instrument: "Instrument", drive: Drive, housing: Array) -> Arr
         return drive.profile.at(drive.time) - zero_Celsius
     if time_constant == 0 or len(housing) < 2:
         return housing - zero_Celsius
-    return lag(drive.time, housing, time_constant) - zero_Celsius
+    departed = drive.initial.get(SENSOR, 0.0) * sensor_decay(instrument, drive)
+    return np.asarray(lag(drive.time, housing, time_constant) + departed - zero_Celsius)
+
+
+def sensor_decay(instrument: "Instrument", drive: Drive) -> Array:
+    """What is left at the rows of 1 K by which the housing's reading departed from the housing at the start."""
+    time_constant = instrument.noise.housing_lag_s
+    if drive.boundary == "housing" or time_constant == 0:
+        return np.zeros(len(drive.time))
+    return np.asarray(np.exp(-(drive.time - drive.time[0]) / time_constant))
 
 
 def _apply_effects(

@@ -80,6 +80,30 @@ def test_an_interval_follows_a_bent_valley():
     assert straight > 100
 
 
+@dataclass(frozen=True)
+class Bow(Banana):
+    """The data say nothing of u₀, and closely u₁ = c u₀²: on the straight line at 0 the one does not move the other."""
+
+    def evaluate(self, u, slopes=True):
+        rest = np.array([-(u[1] - self.bend * u[0] ** 2) / 0.001])
+        return State(u, {"y": rest}, {"y": np.array([[-2 * self.bend * u[0], 1.0]]) / 0.001})
+
+
+def test_a_value_that_follows_the_square_of_an_unknown_one_is_no_surer_than_that():
+    """u₀² of a unit normal is chi-squared with one degree of freedom, of which 95 % are below 3.84."""
+    values = tuple(UncertainValue(f"material.{name}", 0.0, 1.0, -np.inf, np.inf) for name in "ab")
+    problem = Bow(Priors(values, np.eye(2)))
+    state = problem.evaluate(np.zeros(2))
+    rows = {"y": SimpleNamespace(whiten=lambda columns, noise: columns)}
+    J, _ = whitened(problem, state, {"y": None}, rows)
+    covariance = np.linalg.inv(J.T @ J + np.eye(2))
+    unknown, follower = estimate(CardFit(problem, state, {"y": None}, rows, covariance, {}, 1, True))
+    assert (unknown.low, unknown.high) == pytest.approx((-NINETY, NINETY), rel=1e-3)
+    assert follower.high == pytest.approx(3.84 * problem.bend, rel=0.03)
+    assert follower.low == pytest.approx(0.0, abs=0.01)
+    assert follower.sd < 0.01  # of a point where the other is known, as a saved card keeps it
+
+
 def test_a_jump_is_free_up_to_a_row_earlier_but_not_at_the_first_row():
     """At the first row nothing is known but what it did to the initial temperatures; a later one is after the row before it."""
     card = load_card("hrg-30mm")

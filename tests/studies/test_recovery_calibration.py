@@ -115,6 +115,33 @@ def test_a_run_that_was_held_out_is_predicted(found):
         assert held.chamber[name][1] < 0.1 * held.chamber[name][0]
 
 
+def started_late(device, words, seed, seconds):
+    record = measure(device, words, seed)
+    late = record["time_s"] >= seconds
+    columns = {name: values[late] for name, values in record.columns.items()}
+    return dataclasses.replace(record, columns=columns, path=f"{seed}.csv")
+
+
+@pytest.mark.slow
+def test_a_run_that_began_in_the_midst_of_a_change_is_explained_and_what_its_chamber_cannot_say_is_stated(device):
+    """Its past is in the slow modes of the heat path: measured from the housing it is at the noise, from the chamber not."""
+    fixed = [value.name for value in device.uncertain if not value.name.startswith("loss.inverse_q")]
+    late = started_late(device, "step 20 -10 2h", 3, 2400.0)
+    for runs, most in (([measure(device, "step 20 -10 2h", 3)], 0.02), ([late], np.inf)):
+        both = [measure(device, PROFILES[1], 2), *runs]
+        found = calibrate(device, both, hold_out=1, exact=fixed, profile=False)
+        held, rung = found.held_out, found.ladder["frequency_Hz"]
+        assert found.fit.converged
+        assert rung.calibrated < 1.2 * rung.noise < 2e-3
+        assert held.housing["frequency_Hz"][1] < 2 * rung.noise
+        expected = np.hypot(held.stated["frequency_Hz"], rung.noise)
+        assert held.chamber["frequency_Hz"][1] < 3 * expected
+        assert held.stated["frequency_Hz"] < most
+        assert any("3.csv: the gyro had not settled when this run began" in one for one in found.warnings) == (
+            runs[0] is late
+        )
+
+
 def test_the_baseline_is_the_linear_problem_about_the_calibrated_values(found):
     base = found.baseline("frequency_Hz")
     problem = found.fit.problem

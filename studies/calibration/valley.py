@@ -1,0 +1,104 @@
+"""How values that the data tells move with those that it does not, to second order: a valley that is bent at its lowest point.
+
+Where the frequency is even in Poisson's ratio, as near the least of a cylinder's, the straight line says nothing of it, and
+Young's modulus would seem as sure as the frequency; yet f² ∝ E (1 + c ν²), and E follows c ν². With s_j independent unit
+normals along what is left unknown (a pivoted Cholesky factor of the posterior), and Q_j how much the others move,
+
+    z = z₀ + L (W s + rest + Σ_j Q_j s_j²),
+
+of which an interval is summed.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shell.errors import ShellError
+from studies.calibration.fit import CardFit
+from studies.errors import InputError
+from thermal.errors import ThermalError
+
+Array = NDArray[np.float64]
+STRAIGHT = ("bias.", "loss.")
+"""Values in which every response is a straight line."""
+UNKNOWN = 0.1  # variance that is left of a value, over its prior's, from which on the others may follow it in a curve
+REACH = 1.5  # standard deviations to both sides at which the curve is measured
+DRAWS = 20_000
+FIVE, NINETY_FIVE = 5.0, 95.0
+
+
+@dataclass(frozen=True)
+class Bend:
+    """What the curve adds to each value, in prior standard deviations: to both ends of its 90 % interval, and to its spread.
+
+    Attributes
+    ----------
+    low, high : arrays (n,)
+    sd : array (n,), of the posterior, the curve included
+    """
+
+    low: Array
+    high: Array
+    sd: Array
+
+
+def find_bend(fit: CardFit, J: Array) -> Bend:
+    """Follow what is left unknown to both sides.
+
+    Parameters
+    ----------
+    J : array (M, p)
+        Slopes in rows whose noise is white.
+    """
+    ways, curves, rest = _follow(fit, J)
+    generator = np.random.default_rng(0)
+    count = len(fit.problem.priors.values)
+    L = fit.problem.priors.root
+    root = np.linalg.cholesky(rest + 1e-12 * np.eye(len(rest)))[:count]
+    s = generator.standard_normal((len(ways), DRAWS))
+    straight = L @ (root @ generator.standard_normal((root.shape[1], DRAWS)) + ways[:, :count].T @ s)
+    bent = straight + L @ (curves[:, :count].T @ s**2)
+    before, after = (np.percentile(z, (FIVE, NINETY_FIVE), axis=1) for z in (straight, bent))
+    C = L @ fit.covariance[:count, :count] @ L.T
+    more = np.maximum(bent.var(axis=1) / straight.var(axis=1), 1.0)
+    return Bend(after[0] - before[0], after[1] - before[1], np.sqrt(np.diag(C) * more))
+
+
+def _follow(fit: CardFit, J: Array) -> tuple[Array, Array, Array]:
+    """Ways of one standard deviation, (m, p), how the others curve along each, (m, p), and the covariance that is left."""
+    problem, priors = fit.problem, fit.problem.priors
+    count = len(priors.values)
+    rows = np.zeros((count, problem.count))
+    rows[:, :count] = priors.root
+    bendable = np.array([not value.name.startswith(STRAIGHT) for value in priors.values], dtype=bool)
+    left = np.array(fit.covariance)
+    ways, curves = [], []
+    while True:
+        variance = np.einsum("ki,ij,kj->k", rows, left, rows) * bendable
+        k = int(np.argmax(variance)) if count else 0
+        if not count or variance[k] < UNKNOWN:
+            break
+        way = left @ rows[k] / np.sqrt(variance[k])
+        left -= np.outer(way, way)
+        bendable[k] = False
+        ways.append(way)
+        curves.append(_curve(fit, J, rows[k], way))
+    shape = (len(ways), problem.count)
+    return np.array(ways).reshape(shape), np.array(curves).reshape(shape), left
+
+
+def _curve(fit: CardFit, J: Array, row: Array, way: Array) -> Array:
+    """Half the second derivative of the most probable point along a way, the value that it follows held; none where it ends."""
+    toward = fit.covariance @ row
+    total = np.zeros(len(way))
+    for t in (-REACH, REACH):
+        there = fit.point + t * way
+        try:
+            state = fit.problem.evaluate(there, slopes=False)
+        except (InputError, ShellError, ThermalError):
+            return np.zeros(len(way))
+        r = np.concatenate([fit.rows[n].whiten(state.residual[n], fit.noise[n]) for n in fit.problem.responses])
+        moved = fit.covariance @ (J.T @ r - there) + t * way  # of a straight problem: nothing
+        total += moved - toward * float(row @ moved) / float(row @ toward)
+    return total / (2 * REACH**2)
