@@ -78,7 +78,7 @@ class HeldOutRun:
     chamber, housing : response -> (as shipped, calibrated); from the chamber alone nothing is refitted, from the housing the
         run's own offset and initial state
     stated : response -> rms standard deviation from the chamber that the calibrated values' own uncertainty leaves, and how
-        the campaign's runs began and their chambers' clocks ran
+        the campaign's runs began, turned on and their chambers' clocks ran
     noise : response -> rms
     """
 
@@ -305,7 +305,8 @@ def predict_held_out(
         )
         before, after = outer.evaluate(as_shipped, slopes=False), outer.evaluate(calibrated)
         C = block_diag(without.covariance[:count, :count], _usual_starts(whole, outer))
-        stated = {name: float(np.sqrt(np.mean(np.sum(J @ C * J, axis=1)))) for name, J in after.slope.items()}
+        spread = {name: np.mean(np.sum(J @ C * J, axis=1)) for name, J in after.slope.items()}
+        stated = {name: float(np.sqrt(spread[name] + whole.noise[name].offset ** 2)) for name in responses}
         by_chamber = {name: (_rms(before.residual[name]), _rms(after.residual[name])) for name in responses}
     noise = {name: noise_rms(whole, name) for name in responses}
     return HeldOutRun(run.record.path, by_chamber, by_housing, stated, noise)

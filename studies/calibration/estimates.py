@@ -71,9 +71,10 @@ def estimate(fit: CardFit, profile: bool = True) -> tuple[Estimate, ...]:
     J, _ = whitened(fit.problem, fit.state, fit.noise, fit.rows)
     bend = find_bend(fit, J) if profile else None
     found = []
+    seen = any(J[:, priors.pair].any(axis=0))
     for k, value in enumerate(priors.values):
         if k in polar:
-            found.append(_told_polar(value, polar[k]))
+            found.append(_told_polar(value, polar[k], seen))
             continue
         sd = float(np.sqrt(C[k, k]))
         ends, kind = (float(middle[k]) - NINETY * sd, float(middle[k]) + NINETY * sd), "normal"
@@ -123,7 +124,10 @@ def _over_the_wave(fit: CardFit) -> tuple[dict[int, Polar], Array, Array, Array]
     return polar, best, mean, C + gain @ (found.covariance - C[np.ix_(pair, pair)]) @ gain.T
 
 
-def _told_polar(value: "UncertainValue", one: Polar) -> Estimate:
+def _told_polar(value: "UncertainValue", one: Polar, seen: bool) -> Estimate:
+    if not seen:
+        low, high = (float(np.clip(from_standard(value, z), value.low, value.high)) for z in (-NINETY, NINETY))
+        return Estimate(value.name, value.unit, value.value, value.value, low, high, value.sd, 0.0, 1.0, None, "normal")
     sd = one.width * value.sd * (one.value / value.value if value.logarithmic else 1.0)
     shift = to_standard(value, one.value)
     return Estimate(

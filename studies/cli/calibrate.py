@@ -7,7 +7,7 @@ and `high` a 90 % interval, `shift_sd` the move in prior standard deviations, `w
 parameters that the data ties together but cannot tell apart; `responses`: by name `unit`, `as_shipped`, `calibrated`, `noise`
 (rms of block averages about the mean of each run), `run_offset` (rms of these means) and `outliers`; `held_out`: null, or
 `record` and by response `chamber` and `housing` (`as_shipped`, `calibrated`, null where not measured) beside `noise` and `stated`
-(what the uncertainty of the calibrated values leaves from the chamber, rms standard deviation, or null);
+(rms standard deviation that the calibrated values, the run's start and its turn-on leave from the chamber, or null);
 `converged`; `warnings`; `calibrated_card`: path of the saved card or null.
 """
 
@@ -32,7 +32,7 @@ def calibrate(
 ) -> Answer:
     """Find the most probable values of a card, given its uncertainties and records of the device.
 
-    Every number of the card that is uncertain may move, within its prior: {{ value = …, relative_sd = … }} in the card, or the
+    Every number of the card that is uncertain may move, within its prior: { value = …, relative_sd = … } in the card, or the
     documented uncertainty of its key (hrg cards CARD lists them). The noise of every response, the initial temperatures and
     the offsets of the runs are estimated at the same time. Frequency, bias and 1/Q are driven by the measured housing where there
     is one; with a chamber column the housing is explained too.
@@ -67,7 +67,8 @@ def calibrate(
     settled = [path for path in data if "time_s" not in (names := read_header(path)) and "temperature_degC" in names]
     paths = [path for path in data if path not in settled]
     if not 0 <= hold_out <= len(paths):
-        raise InputError(f"--hold-out {hold_out}: there are {len(paths)} records, numbered from 1.")
+        there = "is 1 record" if len(paths) == 1 else f"are {len(paths)} records"
+        raise InputError(f"--hold-out {hold_out}: there {there}, numbered from 1.")
     records = [read_record(path) for path in paths]
     tables = [read_settled(path) for path in settled]
     left = (hold_out or len(records)) - 1 if len(records) > 1 else None

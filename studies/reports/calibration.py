@@ -27,6 +27,7 @@ SHOWN = {
     "frequency_Hz": ("mHz", 1e3),
     "bias_deg_per_h": ("°/h", 1.0),
     "inverse_q": ("ppb", 1e9),
+    QUADRATURE: ("mV", 1e3),
     HOUSING: ("mK", 1e3),
     SETTLED: ("mHz", 1e3),
 }
@@ -116,10 +117,12 @@ def ladder_table(found: "Calibration") -> Table:
         ]
         for name, rung in found.ladder.items()
     ]
-    note = (
-        "Rms of block averages about the mean of each run; offset: rms of these means after the calibration. Frequency, zero-rate"
-        " output and 1/Q follow the measured housing where there is one, the housing its chamber."
-    )
+    note = "Rms about the mean of each table; offset: rms of these means after the calibration."
+    if set(found.ladder) != {SETTLED}:
+        note = (
+            "Rms of block averages about the mean of each run; offset: rms of these means after the calibration. Frequency, zero-rate"
+            " output and 1/Q follow the measured housing where there is one, the housing its chamber."
+        )
     columns = ["Response", "Unit", "As shipped", "Calibrated", "Noise", "Offset", "Outliers"]
     return Table("Residuals", columns, rows, note)
 
@@ -139,7 +142,8 @@ def held_out_table(found: "Calibration") -> Table | None:
                 rows.append([NAMES[name], unit, words, before, after, stated, usual])
     note = (
         f"{held.path or 'The run'} was predicted by a calibration that has not seen it. From the chamber alone nothing is refitted;"
-        " from the housing its own offset and initial state are. Stated: what the uncertainty of the calibrated values leaves."
+        " from the housing its own offset and initial state are. Stated: what remains uncertain from the chamber, of the calibrated values,"
+        " and of how a run begins and turns on, as these runs did."
     )
     columns = ["Response", "Unit", "Predicted from", "As shipped", "Calibrated", "Stated", "Noise"]
     return Table("Held-out run", columns, rows, note)

@@ -5,9 +5,11 @@ import json
 import numpy as np
 import pytest
 
+from studies.calibration.calibrate import UNITS
 from studies.cli import main
 from studies.instrument.card import load_card
 from studies.record import write_record
+from studies.reports.calibration import NAMES, SHOWN
 from studies.simulation.chamber import load_profile
 from studies.simulation.virtual_gyro import simulate_run
 
@@ -61,6 +63,12 @@ def test_tables_are_for_people(capsys):
     assert "Settled frequency" in out
 
 
+def test_every_response_has_a_name_and_a_unit_for_people():
+    assert set(NAMES) == set(SHOWN) == set(UNITS)
+    known = {"Hz": "mHz", "K": "mK", "V": "mV", "1": "ppb", "°/h": "°/h"}
+    assert {name: known[unit] for name, unit in UNITS.items()} == {name: unit for name, (unit, _) in SHOWN.items()}
+
+
 def test_what_cannot_be_calibrated_is_refused(run, tmp_path, capsys):
     bare = tmp_path / "bare.csv"
     t = np.arange(0.0, 3600.0, 60.0)
@@ -68,7 +76,7 @@ def test_what_cannot_be_calibrated_is_refused(run, tmp_path, capsys):
     for words, message in (
         (["calibrate", "hrg-30mm"], "name at least one record"),
         (["calibrate", "hrg-30mm", str(bare)], "add the column housing_temperature_degC or chamber_temperature_degC"),
-        (["calibrate", "hrg-30mm", str(run), "--hold-out", "3"], "there are 1 records, numbered from 1"),
+        (["calibrate", "hrg-30mm", str(run), "--hold-out", "3"], "there is 1 record, numbered from 1"),
         (["calibrate", "hrg-30mm", str(run), "--exact", "thermal.film"], "is no uncertain value of the card"),
     ):
         assert main(words) == 2
