@@ -71,7 +71,7 @@ def estimate(fit: CardFit, profile: bool = True) -> tuple[Estimate, ...]:
     J, _ = whitened(fit.problem, fit.state, fit.noise, fit.rows)
     bend = find_bend(fit, J) if profile else None
     found = []
-    seen = any(J[:, priors.pair].any(axis=0))
+    seen = bool(J[:, priors.pair].any())
     for k, value in enumerate(priors.values):
         if k in polar:
             found.append(_told_polar(value, polar[k], seen))
