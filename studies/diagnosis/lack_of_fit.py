@@ -19,8 +19,6 @@ from studies.effects.states import FloatArray, States, lag, play
 
 TEMPERATURE_ORDERS, TIME_ORDERS = 24, 24
 STRONG = {"frequency_Hz": 1e-4, "bias_deg_per_h": 10.0, "inverse_q": 0.3}
-SHARP_ROWS = 3
-"""Neighbouring rows that are averaged before their tails are counted."""
 
 
 WANDER = "time: it wanders far beyond its white noise"
