@@ -2,6 +2,7 @@
 
 import ast
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,8 +10,10 @@ import pytest
 
 import studies.diagnosis
 from studies.cli import main
+from studies.diagnosis.baseline import View
+from studies.diagnosis.model import Term, term_columns
 from studies.effects import Span, States, apply_effect, apply_effects, find_effect, library
-from studies.effects.states import lag
+from studies.effects.states import average, lag
 from studies.errors import InputError
 from studies.instrument.card import load_card, save_card
 
@@ -224,3 +227,19 @@ def test_of_a_positive_effect_only_the_first_coefficient_cannot_be_negative(tmp_
     assert load_card(tmp_path / "card.toml").content["effect"][0]["outgassing_1_per_root_day"] == -1e-9
     with pytest.raises(InputError, match="at least 0"):
         card.with_table("effect", [leak | {"growth_1_per_day": -2e-8}])
+
+
+@pytest.mark.parametrize("name", [*sorted(e.name for e in library().values() if e.needs), "cross-damping"])
+def test_a_drive_that_steps_within_a_mean_is_averaged_as_the_record_is(name):
+    """The mean of sin 4θ is not sin 4 of the mean: an azimuth that stepped within a mean once hid a turn of the axes."""
+    fine, group = make_states(), 7
+    coarse = fine.averaged(group)
+    view = View(fine, coarse, fine, coarse, np.ones(coarse.time.size))
+    effect = find_effect(name)
+    span = replace(SPAN, turns=True)
+    for response in effect.responses:
+        for shape in effect.grid(span, response)[-2:]:
+            expected = average(effect.columns(fine, shape, response), group)
+            found = term_columns(Term(effect, tuple(shape)), view, group, response)
+            size = np.abs(expected).max(axis=0)
+            assert np.all(np.abs(found - expected).max(axis=0) <= 0.01 * size), (response, shape)
