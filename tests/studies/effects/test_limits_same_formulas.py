@@ -30,7 +30,7 @@ def law(card):
 
 def read(card, law, commands, damping=None):
     """Return what a card reads at given temperatures of its resonator."""
-    value = np.stack([HOUSING, HOUSING, np.zeros_like(TIME), np.zeros_like(TIME)], axis=1)
+    value = np.stack([HOUSING, HOUSING, *np.zeros((4, len(TIME)))], axis=1)
     drive = Drive(TIME, "chamber", Profile(TIME, HOUSING), commands=commands)
     return read_out(card, law, drive, Temperatures(value, np.zeros_like(value)), 1000.0, damping)
 
@@ -59,7 +59,7 @@ def test_turned_axis_is_that_of_the_cards_damping(card, law):
     angle = np.radians(np.where(TIME > 3600.0, 10.0, 35.0))
     plain = card.with_values({"bias.damping_anisotropy": 0.0, "loss.slope_per_K": 0.0})
     uneven = plain.with_values({"bias.damping_anisotropy": 0.02, "bias.damping_axis_deg": 12.0})
-    value = np.tile([293.15, 293.15, 0.0, 0.0], (TIME.size, 1))
+    value = np.tile([293.15, 293.15, 0.0, 0.0, 0.0, 0.0], (TIME.size, 1))
     drive = Drive(TIME, "chamber", Profile(TIME, np.full_like(TIME, 293.15)), commands={"pattern_angle": angle})
     found = Temperatures(value, np.zeros_like(value))
     with_it, without = (read_out(one, law, drive, found, 1000.0) for one in (uneven, plain))
