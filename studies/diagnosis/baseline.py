@@ -16,7 +16,7 @@ from typing import Protocol
 import numpy as np
 
 from studies.diagnosis.response import Response
-from studies.effects.states import FloatArray, States, average
+from studies.effects.states import FloatArray, States, average, remembered
 
 DELAY = 10.0
 """Standard deviation of the delay between housing sensor and resonator that every model tolerates, s."""
@@ -47,6 +47,15 @@ class View:
     seen_fine: States
     seen: States
     steep: FloatArray
+
+
+def remembering(views: Sequence[View]) -> list[View]:
+    """Return the views of all runs, each with what a loop may remember of the runs before."""
+    pasts = remembered([view.seen_fine for view in views])
+    return [
+        replace(view, seen_fine=replace(view.seen_fine, before=past), seen=replace(view.seen, before=past))
+        for view, past in zip(views, pasts, strict=True)
+    ]
 
 
 @dataclass(frozen=True)
@@ -141,7 +150,7 @@ class Lagged:
             seen_fine = fine if self.warmer is None else replace(fine, resonator=fine.resonator + self.warmer[k])
             coarse, seen = fine.averaged(self.group), seen_fine.averaged(self.group)
             out.append(View(fine, coarse, seen_fine, seen, self.steepness(seen)))
-        return out
+        return remembering(out)
 
     def steepness(self, seen: States) -> FloatArray:
         """Change of the response for one kelvin of the resonator."""
@@ -277,13 +286,16 @@ class Followed:
                 offsets[:, k] = 1.0
             v = coarse.spread
             static = [u / 10.0, (u**2 + v) / 1e2, (u**3 + 3.0 * u * v) / 1e3][:powers]
-            along = self.slope + sum(p * c * (u / 10.0) ** (p - 1) / 10.0 for p, c in enumerate(self.curve, 2))
+            along = np.full(u.size, self.slope) + sum(
+                p * c * (u / 10.0) ** (p - 1) / 10.0 for p, c in enumerate(self.curve, 2)
+            )
             late = -average(own.rate, self.group) * along
             shift.append(np.zeros_like(u))
             if self.delay is not None:
                 shift[-1] = -self.delay * late
                 late = np.zeros_like(late)
-            columns.append(np.concatenate([offsets, np.stack(static, 1), self.missed[k], late[:, None]], axis=1))
+            besides = self.missed[k] * (along / self.slope if self.slope else np.ones(u.size))[:, None]
+            columns.append(np.concatenate([offsets, np.stack(static, 1), besides, late[:, None]], axis=1))
             steep = np.full(u.size, self.slope)
             views.append(View(own, coarse, own, coarse, steep))
         names = (

@@ -24,6 +24,8 @@ UNKNOWN_HEAT = 50.0
 """Area between temperature and line, K s, that a gap may hide: 50 mK of the resonator at a time constant of 1000 s."""
 HOLE = 2.0
 """Steps of the grid between neighbours, in parts of the usual, that make a hole."""
+SEVERAL = 5
+"""Rows from which on a step has a slope of its own."""
 ASIDE = 0.02
 """Part of a step by which the rows of a step beside a hole may lie off its centre."""
 
@@ -321,7 +323,7 @@ def _grid_run(
     return Run(
         record,
         label,
-        _states(run, fine, offset, reference, table, slot),
+        _states(run, fine, offset, reference, table),
         coarse,
         {name: binned(rows[name]) if name in rows else np.full(coarse.size, np.nan) for name in responses},
         time,
@@ -333,14 +335,27 @@ def _grid_run(
 def _bin(column: FloatArray, time: FloatArray, slot: np.ndarray, grid: FloatArray) -> FloatArray:
     """Mean over each step of the grid, moved along the slope from the rows' mean time to the centre.
 
-    A step beside a hole, where the slope is not known well enough, stands only if its rows are centred.
+    A row stands for the time up to halfway to the next ones, so that missing and uneven rows do not bend it. The slope is
+    that of the step's own rows where they are several, else that between its neighbours. A step beside a hole stands only if
+    its rows are centred.
     """
     present = np.isfinite(column)
-    weight = np.bincount(slot[present], minlength=grid.size)
-    full = weight >= max(1.0, 0.34 * float(np.median(weight[weight > 0]))) if weight.any() else weight > 0
+    t, y, place = time[present], column[present], slot[present]
+    count = np.bincount(place, minlength=grid.size)
+    full = count >= max(1.0, 0.34 * float(np.median(count[count > 0]))) if count.any() else count > 0
+    half, between = 0.5 * (grid[1] - grid[0]), 0.5 * (t[1:] + t[:-1])
+    begin = np.maximum(grid[place] - half, np.append(-np.inf, between))
+    own = np.maximum(np.minimum(grid[place] + half, np.append(between, np.inf)) - begin, 1e-9 * half)
+
+    def total(values: FloatArray) -> FloatArray:
+        return np.asarray(np.bincount(place, own * values, grid.size), dtype=float)
+
     with np.errstate(invalid="ignore", divide="ignore"):
-        mean = np.bincount(slot[present], column[present], grid.size) / weight
-        lead = np.bincount(slot[present], time[present], grid.size) / weight - grid
+        weight = total(np.ones_like(t))
+        mean = total(y) / weight
+        lead = total(t) / weight - grid
+        off = t - (grid + lead)[place]
+        along = total(off * y) / total(off**2)
     mean[~full] = np.nan
     known = np.flatnonzero(full)
     if known.size < 2:
@@ -352,6 +367,7 @@ def _bin(column: FloatArray, time: FloatArray, slot: np.ndarray, grid: FloatArra
     stands = np.isfinite(around).all(axis=0) | (np.abs(lead[known]) <= ASIDE * (grid[1] - grid[0]))
     there = np.isfinite(around)
     slope = np.where(there, around, 0.0).sum(axis=0) / np.maximum(there.sum(axis=0), 1)
+    slope = np.where(count[known] >= SEVERAL, along[known], slope)
     mean[known] = np.where(stands, mean[known] - slope * lead[known], np.nan)
     return np.asarray(mean)
 
@@ -365,16 +381,22 @@ def _between(grid: FloatArray, time: FloatArray, values: FloatArray) -> FloatArr
     return np.asarray(out)
 
 
-def _states(
-    run: int, grid: FloatArray, offset: float, reference: float, table: dict[str, FloatArray], slot: np.ndarray
-) -> States:
+def _means_between(grid: FloatArray, time: FloatArray, values: FloatArray) -> FloatArray:
+    """Means over the steps of a grid of the line through the rows."""
+    half = 0.5 * (grid[1] - grid[0])
+    edges = np.append(grid - half, grid[-1] + half)
+    every = np.union1d(time, edges)
+    line = _between(every, time, values)
+    area = np.append(0.0, np.cumsum(0.5 * (line[1:] + line[:-1]) * np.diff(every)))
+    return np.asarray(np.diff(area[np.searchsorted(every, edges)]) / (2.0 * half))
+
+
+def _states(run: int, grid: FloatArray, offset: float, reference: float, table: dict[str, FloatArray]) -> States:
     """Drives on the fine grid: the temperature between its rows, commands held until they change."""
     time = table["time_s"]
     known = np.isfinite(table["temperature"])
-    if known.sum() > 1.5 * grid.size:  # finer than the grid: average
-        means = _bin(table["temperature"], time, slot, grid)
-        solid = np.isfinite(means)
-        housing = _between(grid, grid[solid], means[solid]) + zero_Celsius
+    if known.sum() > 1.5 * grid.size:  # finer than the grid: the mean over a step, so that no heat is lost at a bend
+        housing = _means_between(grid, time[known], table["temperature"][known]) + zero_Celsius
     else:
         housing = _between(grid, time[known], table["temperature"][known]) + zero_Celsius
 

@@ -7,6 +7,7 @@ import numpy as np
 
 from studies.diagnosis.baseline import Followed
 from studies.diagnosis.campaign import Campaign
+from studies.diagnosis.constants import CONSTANTS
 from studies.diagnosis.inquiry import Inquiry, begin, inquire, read_thermometer
 from studies.diagnosis.lack_of_fit import look
 from studies.diagnosis.model import Fit, exact_forms, fit
@@ -96,6 +97,9 @@ def _cause(campaign: Campaign, inquiry: Inquiry, place: Place) -> Cause:
     own = max(r.score for r in place.rivals)
     nothing = place.without.score + (max(scores) - own if inquiry.votes else 0.0) if base else place.without.score
     members, probability = weigh(place.names, scores, nothing, inquiry.unknown - inquiry.selection.final.score)
+    left = inquiry.leftover
+    if left.significant and 0.0 < left.share < CONSTANTS["share_explained"]:
+        probability *= left.share  # whatever made the rest may have made this too
     winner = place.rivals[int(np.argmax(scores))]
     effect = winner.fit.terms[place.index].effect
     exact = effect.equivalents.get(column, ())

@@ -98,14 +98,15 @@ class Grams:
         self.taken = np.linalg.lstsq(free, model.target, rcond=None)[0]
         table = np.concatenate([model.scaled, (model.target - free @ self.taken)[:, None]], axis=1)
         self.kinds = tuple(range(len(KERNELS))) if kinds is None else tuple(kinds)
-        self.grams = np.empty((len(self.kinds), SHARES.size, p + 1, p + 1))
+        live = np.flatnonzero(table.any(axis=0))
+        self.grams = np.zeros((len(self.kinds), SHARES.size, p + 1, p + 1))
         self.constant = np.empty((len(self.kinds), SHARES.size))
         for k, kind in enumerate(self.kinds):
             basis = model.noise.bases[kind]
-            rotated = basis.rotate(table)
+            rotated = basis.rotate(table[:, live])
             weights = model.noise.weights(kind)
             for s, w in enumerate(weights):
-                self.grams[k, s] = (rotated * w[:, None]).T @ rotated
+                self.grams[k, s, live[:, None], live] = (rotated * w[:, None]).T @ rotated
             self.constant[k] = 0.5 * np.log(weights).sum(axis=1) + model.noise.prior(kind)
 
     def scaling(self, scales: FloatArray) -> FloatArray:

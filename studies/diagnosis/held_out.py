@@ -68,8 +68,20 @@ class OnRows:
         rows = np.stack([np.interp(run.row_time, time, column) for column in table.T], axis=1)
         return rows[:, :-1], rows[:, -1]
 
-    def residual(self, k: int, free: Sequence[int] = (), inside: "np.ndarray | None" = None) -> FloatArray:
-        """Return what is left of run `k`; the columns `free` are refitted on the rows `inside`.
+    @property
+    def level(self) -> bool:
+        """Whether the noise gives every run a level of its own, beside that which the model gives it."""
+        own = any(name.startswith("offset@") for name in self.model.tangent.names)
+        return not own and bool(SHARES[self.model.solved.share] > 0.0)
+
+    def free(self, columns: FloatArray, places: Sequence[int], level: bool) -> FloatArray:
+        """Return the columns that are refitted: some of the model's, and a level."""
+        return np.concatenate([columns[:, list(places)], np.ones((columns.shape[0], int(level)))], axis=1)
+
+    def residual(
+        self, k: int, free: Sequence[int] = (), inside: "np.ndarray | None" = None, level: bool = False
+    ) -> FloatArray:
+        """Return what is left of run `k`; the columns `free`, and a level, are refitted on the rows `inside`.
 
         An initial state far from equilibrium bends the law: it is refitted about where it was found.
         """
@@ -83,10 +95,11 @@ class OnRows:
             coefficients[list(free)] = 0.0
             rest = (run.row_responses[self.model.problem.response.column] + shift - columns @ coefficients)[inside]
             known = np.isfinite(rest)
-            if not free or known.sum() <= len(free):
+            own = self.free(columns[inside], free, level)
+            if not own.size or known.sum() <= own.shape[1]:
                 return np.asarray(rest)
-            own = columns[inside][:, list(free)]
-            found = _within(own[known], rest[known], np.array([place == begin for place in free]))
+            starts = np.array([*(place == begin for place in free), *[False] * level])
+            found = _within(own[known], rest[known], starts)
             rest = rest - own @ found
             places = [n for n, place in enumerate(free) if place == begin]
             if not places or abs(found[places[0]] - start) < SETTLED:
@@ -95,12 +108,15 @@ class OnRows:
             rows = self._started(k, start)
         return np.asarray(rest)
 
-    def uncertainty(self, k: int, free: Sequence[int], inside: "np.ndarray | None" = None) -> FloatArray:
+    def uncertainty(
+        self, k: int, free: Sequence[int], inside: "np.ndarray | None" = None, level: bool = False
+    ) -> FloatArray:
         """Return the standard deviation of what is foretold of run `k`, in parts of the noise, `free` refitted there."""
         columns = self.columns(k)[0]
         columns = columns if inside is None else columns[inside]
         solved, noise = self.model.solved, self.model.problem.noise
-        own = np.linalg.qr(columns[:, [place for place in free if columns[:, place].any()]])[0]
+        own = self.free(columns, free, level)
+        own = np.linalg.qr(own[:, own.any(axis=0)])[0]
         other = np.delete(columns, list(free), axis=1)
         other = other - own @ (own.T @ other)
         covariance = np.delete(np.delete(solved.covariance, list(free), axis=0), list(free), axis=1)
@@ -186,11 +202,11 @@ def score(model: Fit, campaign: Campaign, like: "Parts | None" = None) -> Score:
     """Return training and held-out residual, the latter of the rows that the model can foretell, or another one, `like`.
 
     One record is left out at a time, the rest is fitted anew; of the record that was left out only its own offset and
-    initial state are refitted. With one record, blocks in time are left out, one thermal constant more on both sides. Rows
+    initial state are refitted, and a level where the noise has one. With one record, blocks in time are left out, one thermal constant more on both sides. Rows
     at temperatures that the rest does not come near are not asked for.
     """
     training = rms(residuals(model, campaign))
-    parts = by_record(model, campaign) if len(campaign.records) > 1 else by_block(model, campaign)
+    parts = by_record(model, campaign, True) if len(campaign.records) > 1 else by_block(model, campaign)
     parts = _of(parts, like)
     foretold = _share(parts)
     return Score(training, _rms_or_none(parts) if foretold >= FEWEST_FORETOLD else None, foretold, parts)
@@ -201,10 +217,12 @@ Parts = list[tuple[FloatArray, "np.ndarray"]]
 
 
 def compare(one: Parts | None, two: Parts | None) -> tuple[float | None, float | None]:
-    """Return the residuals of two models on the rows that both can foretell."""
+    """Return the residuals of two models on the rows that both can foretell; where there are none, on most rows if the second can."""
     if one is None or two is None:
         return None, None
     both: Parts = [(rest, a & b) for (rest, a), (_, b) in zip(one, two, strict=True)]
+    if _rms_or_none(both) is None and _share(two) >= FEWEST_FORETOLD:
+        both = [(rest, b) for (rest, _), (_, b) in zip(one, two, strict=True)]
     return _rms_or_none(both), _rms_or_none(_of(two, both))
 
 
@@ -228,20 +246,20 @@ def _share(parts: Parts | None) -> float:
     return asked / max(sum(int(own.sum()) for own in finite), 1)
 
 
-def by_record(model: Fit, campaign: Campaign) -> Parts | None:
-    """Leave one record out at a time."""
+def by_record(model: Fit, campaign: Campaign, level: bool = False) -> Parts | None:
+    """Leave one record out at a time; its level is refitted where the noise has one and that is asked for."""
     out: Parts = []
     for record in campaign.records:
         keep = [np.full(run.time.shape, run.record != record) for run in campaign.runs]
         rows = _trained(model, campaign, keep)
         if rows is None:
             return None
-        known = rows.known(keep)
+        known, own_level = rows.known(keep), level and rows.level
         for k, run in enumerate(campaign.runs):
             if run.record == record:
                 own = own_columns(rows.model, k)
-                near = _near(rows.temperature(k), known) & (rows.uncertainty(k, own) <= KNOWN)
-                out.append((rows.residual(k, own), near))
+                near = _near(rows.temperature(k), known) & (rows.uncertainty(k, own, level=own_level) <= KNOWN)
+                out.append((rows.residual(k, own, level=own_level), near))
     return out
 
 

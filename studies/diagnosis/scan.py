@@ -94,7 +94,8 @@ def build_bank(model: Fit, effects: Sequence[Effect]) -> Bank:
         for shape in shapes:
             term = Term(effect, tuple(shape))
             own = problem.stack([term_columns(term, view, problem.group, column) for view in model.tangent.views])
-            kept = [k for k in leading if np.any(own[:, k])][:most]
+            there = np.any(own, axis=0).tolist()
+            kept = [k for k in leading if there[k]][:most]
             if not kept:
                 continue
             places = list(range(count, count + len(kept)))

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from scipy.constants import zero_Celsius
 
-from studies.diagnosis.baseline import START, Tangent, View
+from studies.diagnosis.baseline import START, Tangent, View, remembering
 from studies.diagnosis.campaign import Campaign
 from studies.diagnosis.response import RESPONSES, Response
 from studies.diagnosis.verdict import NINETY, Shift
@@ -168,7 +168,7 @@ class Simulated:
             *(f"{name}@{k}" for name in own for k in range(runs)),
         )
         prior = np.array([1.0] * len(self.values) + [START] * (2 * runs))
-        return Tangent(shift, columns, prior, names, views)
+        return Tangent(shift, columns, prior, names, remembering(views))
 
     def tangent(self) -> Tangent:
         """Linearise where it is."""

@@ -222,7 +222,7 @@ def weigh(
     lead = max(float(values.max()) - nothing, 0.0)
     temper = CONSTANTS["temper"] + CONSTANTS["misfit"] * lead
     weight = np.exp((values - values.max()) / temper)
-    chance = np.exp(-max(lead - CONSTANTS["margin"] / 2.0, 0.0) / CONSTANTS["temper"])
+    chance = np.exp(-max(lead - CONSTANTS["margin"] / 2.0, 0.0) / CONSTANTS["chance"])
     # a generic form must be the better one by as much as the named form may be inexact before it counts for more
     strange = np.exp(np.clip(unknown / (temper if unknown > 0 else CONSTANTS["temper"]), -50.0, 50.0))
     members: list[str] = []

@@ -37,6 +37,8 @@ class States:
         Variance of the resonator temperature within each sample of an averaged grid, K²: the mean of x² is x̄² + spread.
     fading : (N,) array or 0
         What is left of an initial offset of the resonator, e^(−t/τ), once there is a lag.
+    before : (K,) array or None
+        Temperatures at which the resonator turned in the runs before, K: all that a loop may remember of them.
     """
 
     run: int
@@ -52,6 +54,7 @@ class States:
     pattern_angle: FloatArray | None = None
     spread: FloatArray | float = 0.0
     fading: FloatArray | float = 0.0
+    before: FloatArray | None = None
 
     @property
     def step(self) -> float:
@@ -96,6 +99,16 @@ class States:
         """Return the same run with the resonator following the housing through the lag `tau`, s."""
         fading = np.exp(-(self.time - self.time[0]) / tau)
         return replace(self, tau=tau, resonator=lag(self.housing, self.step, tau), fading=fading)
+
+
+def remembered(runs: Sequence[States]) -> list[FloatArray]:
+    """Return, for every run, the temperatures at which the resonator turned in the runs before it, K."""
+    past, out = np.empty(0), [np.empty(0)] * len(runs)
+    for k in sorted(range(len(runs)), key=lambda k: float(runs[k].campaign_time[0])):
+        out[k], t = past, runs[k].resonator
+        turns = np.flatnonzero((t[1:-1] - t[:-2]) * (t[2:] - t[1:-1]) < 0.0) + 1
+        past = np.concatenate([past, t[:1], t[turns], t[-1:]])
+    return out
 
 
 def average(values: FloatArray, group: int) -> FloatArray:

@@ -26,12 +26,14 @@ def columns(states: States, shape: Shape, response: str) -> FloatArray:
 
 
 def grid(span: Span, response: str) -> list[tuple[float, ...]]:
-    """At once and behind a slow loop; axes a tenth of a period apart, and -1 where the wave stands still."""
+    """At once, behind a loop and behind a slow one; axes a tenth of a period apart, and -1 where the wave stands still."""
     ends = span.temperature_low - zero_Celsius, span.temperature_high - zero_Celsius
     axes = (-1.0, *np.arange(0.0, 45.0, 5.0).tolist()) if span.turns else (-1.0,)
-    return [(*ends, pole, axis) for pole in (0.0, 60.0) for axis in axes]
+    return [(*ends, pole, axis) for pole in POLES for axis in axes]
 
 
+POLES = (0.0, 20.0, 60.0)
+"""Time constants of the loop, s."""
 FIXED = np.array([0.0] * 4 + [1.0] * (4 + ORDERS - 1))
 """At one azimuth the baseline has the terms up to the third order."""
 

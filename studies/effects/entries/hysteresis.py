@@ -14,7 +14,10 @@ def columns(states: States, shape: Shape, response: str) -> FloatArray:
     relay of Preisach is a step of a play, and many of them a curve (generalised Prandtl-Ishlinskii).
     """
     radius, start, low, high = shape
-    loops = play(states.resonator, [radius * ratio for ratio in RATIOS], start)
+    radii, past = [radius * ratio for ratio in RATIOS], np.empty(0)
+    if start == KEPT:
+        start, past = 0.0, past if states.before is None else states.before
+    loops = play(np.concatenate([past, states.resonator]), radii, start)[past.size :]
     turns = np.pi * np.arange(1, ENVELOPE + 1) / max(high - low, 1e-9)
     bottom = low + zero_Celsius
 
@@ -25,10 +28,13 @@ def columns(states: States, shape: Shape, response: str) -> FloatArray:
 
 
 def grid(span: Span, response: str) -> list[tuple[float, ...]]:
-    """Loop half widths from half a percent of the covered range; three initial memories."""
+    """Loop half widths from half a percent of the covered range; three initial memories, for the bias that of all runs too."""
     radii = span.temperature_range * np.geomspace(0.006, WIDEST, 8)
+    # elsewhere what is kept looks like a run's own level, as slow noise does
+    kept = span.runs > 1 and response == "bias_deg_per_h"
+    starts = (0.0, -1.0, 1.0, KEPT) if kept else (0.0, -1.0, 1.0)
     ends = span.temperature_low - zero_Celsius, span.temperature_high - zero_Celsius
-    return [(float(radius), start, *ends) for radius in radii for start in (0.0, -1.0, 1.0)]
+    return [(float(radius), start, *ends) for radius in radii for start in starts]
 
 
 def steady(x: FloatArray, shape: Shape) -> FloatArray:
@@ -39,6 +45,8 @@ def steady(x: FloatArray, shape: Shape) -> FloatArray:
 WIDEST = 0.25
 """Largest half width, in parts of the covered range: the play of a wider loop hardly moves, and less the temperature it is a
 static curve."""
+KEPT = 2.0
+"""Initial memory that stands for what the runs before have left."""
 ENVELOPE = 8
 """Half waves over the covered range that the width of a loop may follow."""
 RATIOS = (1.0, 0.4, 0.7, 1.5, 2.2)
@@ -58,7 +66,9 @@ EFFECT = Effect(
     sizes={"bias_deg_per_h": 2.0, "frequency_Hz": 3e-5, "inverse_q": 0.02},
     shape=(
         Parameter("half_width_K", 0.02, 40.0, "half width of the loop in temperature", of_range=WIDEST),
-        Parameter("initial_memory", -1.0, 1.0, "where in its band each run starts", False, True),
+        Parameter(
+            "initial_memory", -1.0, KEPT, "where each run starts in its band; 2: where the last ended", False, True
+        ),
         Parameter("from_degC", -273.0, 500.0, "lower end of the envelope", False, True),
         Parameter("to_degC", -273.0, 500.0, "upper end of the envelope", False, True),
     ),

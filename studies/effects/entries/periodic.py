@@ -9,7 +9,7 @@ from studies.effects.states import FloatArray, States
 def columns(states: States, shape: Shape, response: str) -> FloatArray:
     """Σ A_h sin(2πht/P) + B_h cos(2πht/P), h = 1 … 3, means over a step; t of the campaign or, after a restart, of the run.
 
-    Nobody knows the phase between runs whose starts are not known: each then has sines and cosines of its own.
+    A line that nothing ties to the start of a run, or to runs whose starts are not known, has its own sines and cosines in each.
     """
     period, restarts = shape
     turn = np.exp(2j * np.pi * (states.time if restarts else states.campaign_time) / period)
@@ -28,21 +28,19 @@ def grid(span: Span, response: str) -> list[tuple[float, ...]]:
     forms: list[tuple[float, ...]] = [
         (float(1.0 / f), 1.0) for f in np.arange(slowest, fastest, 0.35 / span.longest_run)
     ]
-    if span.runs > 1 and not span.timed:
-        own = [(period, OWN) for period, _ in forms] if span.runs <= MOST_RUNS else []
-        return forms + own
-    if span.runs > 1:
+    own = [(period, OWN) for period, _ in forms] if 1 < span.runs <= MOST_RUNS else []
+    if span.runs > 1 and span.timed:
         apart = max(0.4 / span.campaign_length, (fastest - slowest) / MOST)
         forms += [(float(1.0 / f), 0.0) for f in np.arange(slowest, fastest, apart)]
-    return forms
+    return forms + own
 
 
 def near(span: Span, response: str, shape: Shape) -> list[tuple[float, ...]]:
     """Periods that one run hardly tells from this one, spaced finer than the lines that runs days apart tell: a tenth of a turn."""
     middle, reach = 1.0 / shape[0], LOBE / span.longest_run
     forms: list[tuple[float, ...]] = []
-    further = (0.0, span.campaign_length) if span.timed else (OWN, span.longest_run)
-    for restarts, length in ((1.0, span.longest_run), further)[: 2 if span.runs > 1 else 1]:
+    lines = [(1.0, span.longest_run), (OWN, span.longest_run), (0.0, span.campaign_length)]
+    for restarts, length in lines[: 1 if span.runs == 1 else 3 if span.timed else 2]:
         apart = max(0.1 / length, 2.0 * reach / MOST)
         steps = int(reach / apart)
         forms += [(float(1.0 / f), restarts) for f in middle + apart * np.arange(-steps, steps + 1) if f > 0.0]

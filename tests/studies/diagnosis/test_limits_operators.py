@@ -1,13 +1,17 @@
 """Operators with memory and the coloured likelihood against closed forms."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from compensation.wander import Eigenbasis
+from studies.diagnosis.campaign import load_campaign
 from studies.diagnosis.evidence import Grams, Linear, solve
 from studies.diagnosis.noise import KERNELS, SHARES, NoiseModels
-from studies.effects import States, apply_effect
-from studies.effects.states import average, lag, play
+from studies.effects import States, apply_effect, find_effect
+from studies.effects.states import average, lag, play, remembered
+from studies.record import Record
 
 
 @pytest.mark.parametrize("tau", [40.0, 900.0, 2e4])
@@ -107,3 +111,44 @@ def test_radiation_of_a_saved_card_solves_the_exchange_of_heat():
     exact = np.interp(time, fine, T)
     assert np.abs(exact - states.resonator).max() > 0.4
     assert np.abs(states.resonator + change - exact).max() < 0.01
+
+
+def run_of(number, time, temperature, start=0.0):
+    return States(number, time, time + start, temperature, temperature, 1.0, 293.15)
+
+
+def test_a_loop_goes_on_in_the_next_run_where_it_ended_in_the_last():
+    time = np.arange(0.0, 6000.0, 10.0)
+    whole = 293.15 + 20.0 * np.sin(time / 700.0) * time / 6000.0
+    runs = [run_of(0, time[:250], whole[:250]), run_of(1, time[:350], whole[250:], 2500.0)]
+    parts = [replace(run, before=past) for run, past in zip(runs, remembered(runs), strict=True)]
+    effect = find_effect("hysteresis")
+    shape = (3.0, 2.0, -5.0, 45.0)
+    once = effect.columns(run_of(0, time, whole), shape, "bias_deg_per_h")
+    twice = np.concatenate([effect.columns(part, shape, "bias_deg_per_h") for part in parts])
+    assert np.allclose(once, twice, atol=1e-9)
+    assert not np.allclose(once, np.concatenate([effect.columns(run, shape, "bias_deg_per_h") for run in runs]))
+
+
+def test_uneven_and_missing_rows_do_not_bend_means_and_a_bend_loses_no_heat():
+    rng = np.random.default_rng(8)
+    time = np.arange(0.0, 108000.0, 5.0)
+    time[1:] += rng.uniform(-1.0, 1.0, time.size - 1)
+    time = time[(rng.random(time.size) > 0.05) | (time < 20.0)]
+    housing = 20.0 + 0.08 * np.clip(time - 9004.0, 0.0, 300.0)
+    slow = 4400.0 + 40.0 * (time / 36000.0) ** 2 + np.cos(time / 900.0)
+    record = Record({"time_s": time, "housing_temperature_degC": housing, "frequency_Hz": slow})
+    campaign = load_campaign([record])
+    run = campaign.runs[0]
+    fine = np.linspace(-0.5, 0.5, 401)[None] * campaign.step + run.time[:, None]
+    exact = np.mean(4400.0 + 40.0 * (fine / 36000.0) ** 2 + np.cos(fine / 900.0), axis=1)
+    bound = np.diff(time).max() ** 2 / 8.0 * (1.0 / 900.0**2 + 80.0 / 36000.0**2)  # of a line between rows
+    assert np.nanmax(np.abs(run.responses["frequency_Hz"] - exact)) < bound
+    heat = np.cumsum(run.states.housing - 293.15) * run.states.step
+    told = [
+        0.5 * 0.08 * min(max(t - 9004.0, 0.0), 300.0) ** 2 + 24.0 * max(t - 9304.0, 0.0)
+        for t in run.states.time + run.states.step / 2
+    ]
+    assert (
+        np.max(np.abs(heat - told)) < 2.0 * 0.08 * np.diff(time).max() ** 2 / 8.0
+    )  # of a line between rows at two bends
