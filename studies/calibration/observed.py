@@ -1,7 +1,7 @@
 """What records say, made ready for a fit: rows that are predicted, blocks that are compared, spikes left out."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,6 +27,8 @@ PERIOD = 90.0  # ° of azimuth, of what a turning wave of n = 2 meets
 ROWS_PER_PERIOD, BLOCKS_PER_PERIOD = 120, 6  # of that; the mean over a row is then within 1e-4 of its middle
 TURNED_MOST = 10  # times as many rows, and three times as many blocks, for waves that turn often
 LEAST_ROWS = 10
+MOST_KINKS = 24  # of a run
+LEAST_KINK = 1e-3  # K
 
 
 @dataclass(frozen=True)
@@ -74,12 +76,16 @@ class ObservedRun:
         Where both are measured: the chamber, which drives the housing.
     responses : mapping
         Blocks of every response that was measured, the housing among them where it has an outer drive.
+    kinks : mapping
+        Rows of the measured housing's profile before which its chamber jumped, and how far (K) the housing may have been from the
+        straight line midway between them.
     """
 
     record: Record
     inner: Drive
     outer: Drive | None
     responses: Mapping[str, BlockMeans]
+    kinks: Mapping[int, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -136,7 +142,16 @@ def _observe(record: Record, start: float, named: Sequence[str], turning: bool) 
     responses = {name: blocks for name in wanted if (blocks := _block(time, columns[name], most_blocks)) is not None}
     if not any(name in responses for name in named):
         raise InputError(f"{record.path}: none of {', '.join(named)} has values; there is nothing to calibrate with.")
-    return ObservedRun(record, inner, outer, responses)
+    return ObservedRun(record, inner, outer, responses, {} if outer is None else _find_kinks(inner, outer))
+
+
+def _find_kinks(inner: Drive, outer: Drive) -> dict[int, float]:
+    """Rows of the housing's profile before which the chamber jumped, and a quarter of how its slope changes there."""
+    t, T = inner.profile.time, inner.profile.value
+    bend = np.abs(np.diff(T, 2, prepend=T[0], append=T[-1]))
+    after = [k for at in outer.profile.jumps if 1 < (k := int(np.searchsorted(t, at))) < len(t) - 1]
+    sizes = {k: float(bend[k - 2 : k + 2].max()) / 4 for k in after[:MOST_KINKS]}
+    return {k: size for k, size in sizes.items() if size > LEAST_KINK}
 
 
 def _periods(record: Record) -> float:

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 START_SPREAD = 10.0  # K, of the departures at the start: a run may begin in the midst of a change
-SHIFT, JUMP = "shift", "jump."
+SHIFT, JUMP, KINK = "shift", "jump.", "kink."
 MOST_JUMPS = 24  # of a run whose times are free, each for itself
 Progress = Callable[[str], None]
 
@@ -84,13 +84,16 @@ class CardProblem:
         """What is free of each run, with its prior standard deviation: departures (K), and the chamber's clock (s).
 
         Of a set point that jumped between two rows, the time of each jump is free: it was up to a row earlier. A jump at
-        the first row is not: what it did before the record began is in the departures.
+        the first row is not: what it did before the record began is in the departures. What the measured housing did
+        between these two rows is free too: it has a kink there, and a straight line between its rows is not it.
         """
         found = [
             (k, f"initial.{lump}", START_SPREAD) for k, part in enumerate(self.parts) for lump in part.drive.departing
         ]
         for k, part in enumerate(self.parts):
-            if part.drive.boundary == "chamber":
+            if part.drive.boundary == "housing":
+                found += [(k, f"{KINK}{row}", size) for row, size in self.runs[part.run].kinks.items()]
+            else:
                 row = float(np.median(np.diff(part.drive.profile.time)))
                 jumps, begin = part.drive.profile.jumps, part.drive.profile.start
                 if 0 < len(jumps) <= MOST_JUMPS:
@@ -151,8 +154,9 @@ class CardProblem:
         free = {name: sd * float(point[offset + i]) for i, (part, name, sd) in enumerate(self.starts) if part == k}
         shift = free.pop(SHIFT, 0.0)
         jumps = {int(name.removeprefix(JUMP)): free.pop(name) for name in [*free] if name.startswith(JUMP)}
+        kinks = {int(name.removeprefix(KINK)): free.pop(name) for name in [*free] if name.startswith(KINK)}
         initial = {name.removeprefix("initial."): value for name, value in free.items()}
-        return replace(self.parts[k].drive, initial=initial, shift=shift, jumps=jumps)
+        return replace(self.parts[k].drive, initial=initial, shift=shift, jumps=jumps, kinks=kinks)
 
     def evaluate(self, point: Array, slopes: bool = True) -> State:
         """Predict all runs and compare."""

@@ -63,6 +63,9 @@ class Drive:
         That is applied, at the rows.
     jumps : mapping
         How much later (s) single jumps of the profile are, in their order from 0: between which two rows they were is all that is known.
+    kinks : mapping
+        How far (K) the profile departs from the straight line midway between the row before and row k, by k: what a measured housing
+        did between two rows when its chamber jumped.
     """
 
     time: Array
@@ -74,6 +77,7 @@ class Drive:
     start: float = 0.0
     rate: Array | None = None
     jumps: Mapping[int, float] = field(default_factory=dict)
+    kinks: Mapping[int, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         for name in self.initial:
@@ -91,6 +95,21 @@ class Drive:
     def departing(self) -> tuple[str, ...]:
         """All that is free at the start: the lumps, and the sensor of a housing that is predicted."""
         return (*self.lumps, SENSOR) if self.boundary == "chamber" else self.lumps
+
+    def kinked(self, profile: Profile) -> Profile:
+        """Profile of the same rows with its kinks."""
+        if not self.kinks:
+            return profile
+        after = np.array(sorted(self.kinks))
+        t, T = profile.time, profile.value
+        middle = (T[after - 1] + T[after]) / 2 + [self.kinks[int(k)] for k in after]
+        return Profile(np.insert(t, after, (t[after - 1] + t[after]) / 2), np.insert(T, after, middle))
+
+    def kink_shape(self, k: int) -> Profile:
+        """Change of the profile for 1 K of the kink before row k."""
+        t = self.profile.time
+        times = np.unique([t[0], t[k - 1], (t[k - 1] + t[k]) / 2, t[k], t[-1]])
+        return Profile(times, (times == (t[k - 1] + t[k]) / 2).astype(float))
 
     @property
     def imposed(self) -> Profile:

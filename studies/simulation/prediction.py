@@ -33,7 +33,7 @@ Array = NDArray[np.float64]
 MARGIN = 10.0  # K beyond the boundary in which the frequency stays known: effects and self-heating
 STEP = 1e-3  # of a value, or of its standard deviation: the differences that give derivatives
 INITIAL = "initial."
-SHIFT, JUMP = "shift", "jump."
+SHIFT, JUMP, KINK = "shift", "jump.", "kink."
 SHIFT_STEP = 0.02  # s
 OF_WALL = ("thermal.conductivity_W_per_m_K", "thermal.heat_capacity_J_per_kg_K")
 """Values of the heat path that the loss of a wall takes as well."""
@@ -80,7 +80,7 @@ def predict(
     drive : Drive
     derivatives : names, or `Variations` of this instrument that several runs share
         Keys of the card ("thermal.mount_conductance_W_per_K"), "initial.base" (K) and whatever else of the drive may depart,
-        "shift" (s), and "jump.0" (s) and the other jumps of its profile.
+        "shift" (s), "jump.0" (s) and the other jumps of its profile, "kink.7" (K) before its row 7.
     law : FrequencyLaw, optional
         One that was built before for this instrument and a range that is wide enough.
 
@@ -141,9 +141,12 @@ def law_for(
 def _behind_sensor(instrument: "Instrument", drive: Drive) -> Profile:
     """Temperature that is imposed: of the housing what its sensor will have read, y + τ dy/dt."""
     time_constant = instrument.noise.housing_lag_s
-    if drive.boundary == "chamber" or time_constant == 0:
+    if drive.boundary == "chamber":
         return drive.imposed
-    return Profile(drive.profile.time, drive.profile.value + time_constant * _slope_of_reading(drive.profile))
+    if time_constant == 0:
+        return drive.kinked(drive.imposed)
+    behind = Profile(drive.profile.time, drive.profile.value + time_constant * _slope_of_reading(drive.profile))
+    return drive.kinked(behind)
 
 
 def _slope_of_reading(read: Profile) -> Array:
@@ -255,6 +258,8 @@ class Variations:
         if name.startswith(INITIAL):
             lump = name.removeprefix(INITIAL)
             return None if lump == SENSOR else no_change(network, initial=self.departures(drive)[lump])
+        if name.startswith(KINK):
+            return no_change(network, {drive.boundary: drive.kink_shape(int(name.removeprefix(KINK)))})
         if name == LAG and drive.boundary == "housing":
             return no_change(network, {"housing": Profile(drive.profile.time, _slope_of_reading(drive.profile))})
         if name.partition(".")[0] not in ("thermal", "material", "resonator"):
@@ -266,7 +271,7 @@ class Variations:
 
     def _build(self, name: str) -> tuple[Side, Side]:
         here = self._here
-        if name == SHIFT or name.startswith((INITIAL, JUMP)):
+        if name == SHIFT or name.startswith((INITIAL, JUMP, KINK)):
             low, high = (replace(here, distance=d) for d in (-0.05, 0.05))
             return low, high
         value, ends = self._value_and_ends(name)

@@ -1,6 +1,6 @@
 """What a calibration says of itself where it can be worked out by hand: spreads, bent valleys, jumps at a record's first row."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -104,6 +104,27 @@ def test_a_value_that_follows_the_square_of_an_unknown_one_is_no_surer_than_that
     assert follower.sd < 0.01  # of a point where the other is known, as a saved card keeps it
 
 
+def test_a_measured_housing_has_a_kink_between_the_rows_where_its_chamber_jumped():
+    """What the kink before that row does is the change of the profile midway; nowhere else is one looked for."""
+    card = load_card("hrg-30mm").with_values({"noise.housing_lag_s": 0.0})
+    profile = load_profile("soak 20 1815s then soak 5 30min")
+    record = simulate_run(card, profile, 1 / 30, noise=False).record
+    (run,) = observe([record])
+    assert list(run.kinks) == [61]  # 1815 s is midway between rows 60 and 61
+    law = law_for(card, run.inner)
+    true = record["frequency_Hz"]
+    plain = predict(card, run.inner, ["kink.61"], law)
+    slope, error = plain.derivatives["kink.61"]["frequency_Hz"], true - plain.columns["frequency_Hz"]
+    size = float(slope @ error / (slope @ slope))
+    bent = predict(card, replace(run.inner, kinks={61: size}), law=law)
+    assert bent.columns["frequency_Hz"] - plain.columns["frequency_Hz"] == pytest.approx(
+        size * slope, abs=1e-2 * np.abs(size * slope).max()
+    )
+    assert abs(size) < 2 * run.kinks[61]
+    left = true - bent.columns["frequency_Hz"]
+    assert np.sqrt(np.mean(left**2)) < 0.2 * np.sqrt(np.mean(error**2))
+
+
 def test_a_jump_is_free_up_to_a_row_earlier_but_not_at_the_first_row():
     """At the first row nothing is known but what it did to the initial temperatures; a later one is after the row before it."""
     card = load_card("hrg-30mm")
@@ -115,7 +136,7 @@ def test_a_jump_is_free_up_to_a_row_earlier_but_not_at_the_first_row():
         record = simulate_run(card, load_profile(words), 1 / 60).record
         runs = observe([record])
         problem = CardProblem(card, Priors((), np.eye(0)), runs, None)
-        times = [name for _, name, _ in problem.starts if not name.startswith("initial.")]
+        times = [name for _, name, _ in problem.starts if not name.startswith(("initial.", "kink."))]
         low, high = problem.ends
         assert times == expected
         bounded = np.isfinite(low)
