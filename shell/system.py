@@ -6,7 +6,7 @@ from functools import cached_property
 from typing import TypeAlias
 
 import numpy as np
-from scipy.sparse import block_diag, csr_matrix
+from scipy.sparse import block_diag, coo_array, csr_matrix
 
 from shell.blocks import Mesh, Support
 from shell.cells import CellTable, cell_mass, cell_stiffness
@@ -338,4 +338,5 @@ class Inertia:
             for block, rows in zip(self.blocks, per_group, strict=True)
             for one in block
         ]
-        return csr_matrix(self.choice.T @ block_diag(blocks, format="csr") @ self.choice)
+        first, *others = blocks
+        return csr_matrix(self.choice.T @ block_diag([coo_array(first), *others], format="csr") @ self.choice)
