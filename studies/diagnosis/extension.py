@@ -114,8 +114,6 @@ def entry_of(model: Fit, index: int, column: str) -> dict[str, Any]:
     """Return the `[[effect]]` table of a fitted term, without the coefficients that are 0; numbers are as uncertain as a prior."""
     term = model.terms[index]
     values = model.coefficients_of(index)
-    for run in range(len(model.problem.present)):
-        values[term.effect.initial_of(run)] = 0.0  # how the runs of a campaign began says nothing of the next
     numbers: dict[str, Any] = {p.name: float(value) for p, value in zip(term.effect.shape, term.shape, strict=True)}
     if term.effect.sees_heat:  # the fit knew the temperature with it; a simulation has to solve for it
         numbers[term.effect.shape[0].name] = float(np.clip(values[0], 0.0, 1.0))

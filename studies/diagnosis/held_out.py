@@ -7,7 +7,7 @@ import numpy as np
 
 from studies.diagnosis.baseline import Baseline, Followed, Lagged, Tangent
 from studies.diagnosis.campaign import Campaign
-from studies.diagnosis.model import Fit, fit, inexact_columns, pose, term_columns, used
+from studies.diagnosis.model import Fit, fit, inexact_columns, pose, term_columns
 from studies.diagnosis.noise import SHARES
 from studies.effects.states import FloatArray
 
@@ -190,12 +190,8 @@ def residuals(model: Fit, campaign: Campaign) -> list[FloatArray]:
 
 
 def own_columns(model: Fit, k: int) -> list[int]:
-    """Return which columns belong to run `k` alone: its offset and its initial states."""
-    own = [place for place, name in enumerate(model.tangent.names) if name.endswith(f"@{k}")]
-    for index, term in enumerate(model.terms):
-        fitted, places = used(term.effect), model.columns_of(index)
-        own += [int(places[fitted == column][0]) for column in term.effect.initial_of(k)]
-    return own
+    """Return which columns belong to run `k` alone: its offset and its initial state."""
+    return [place for place, name in enumerate(model.tangent.names) if name.endswith(f"@{k}")]
 
 
 def score(model: Fit, campaign: Campaign, like: "Parts | None" = None) -> Score:

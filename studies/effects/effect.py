@@ -46,13 +46,11 @@ class Coefficient:
     """A linear coefficient: a number, or a list where the effect is a family.
 
     `name` ends with its unit, `{unit}` standing for that of the response. `spread` are the prior standard deviations of
-    the members of the list, in parts of the effect's size; the first is the definite curve. An `initial` one has a member for
-    each run, its state at the start, of which other runs know nothing.
+    the members of the list, in parts of the effect's size; the first is the definite curve.
     """
 
     name: str
     spread: tuple[float, ...] = (1.0,)
-    initial: bool = False
 
 
 @dataclass(frozen=True)
@@ -167,15 +165,6 @@ class Effect:
     def spread(self) -> FloatArray:
         """Prior standard deviations of all columns over the effect's size."""
         return np.array([value for coefficient in self.coefficients for value in coefficient.spread])
-
-    def initial_of(self, run: int) -> list[int]:
-        """Return which columns are the state of one run at its start."""
-        out, begin = [], 0
-        for coefficient in self.coefficients:
-            if coefficient.initial and run < len(coefficient.spread):
-                out.append(begin + run)
-            begin += len(coefficient.spread)
-        return out
 
     def coefficient_names(self, response: str) -> tuple[str, ...]:
         """Return the names of the coefficients with the unit of `response` filled in."""

@@ -120,10 +120,7 @@ def test_saved_card_loads_equal_even_from_another_folder(tmp_path):
     assert again.material == first.material
     assert again.resonator == first.resonator
     (effect,) = again.effects
-    assert (effect.name, effect.parameters) == (
-        "second-lag",
-        {"weight": 0.1, "second_time_constant_s": 2000.0, "own_starts": 0.0},
-    )
+    assert (effect.name, effect.parameters) == ("second-lag", {"weight": 0.1, "second_time_constant_s": 2000.0})
     assert tomllib.loads(moved.read_text())["schema"] == "hrg.card/1"
 
 

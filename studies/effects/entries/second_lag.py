@@ -7,27 +7,16 @@ from studies.effects.states import FloatArray, States, lag
 
 
 def columns(states: States, shape: Shape, response: str) -> FloatArray:
-    """T_r = (1 − w) lag(T_h; τ) + w lag(T_h; τ₂): the change for w = 1, and for paths at a third and at three times of τ₂.
-
-    Beside them, where the slow path does not start in equilibrium, what is left of 1 K in each run: e^(−t/τ₂).
-    """
+    """T_r = (1 − w) lag(T_h; τ) + w lag(T_h; τ₂): the change for w = 1, and for paths at a third and at three times of τ₂."""
     first = lag(states.housing, states.step, states.tau)
     paths = [lag(states.housing, states.step, shape[0] * ratio) - first for ratio in (1.0, 1.0 / 3.0, 3.0)]
-    starts = np.zeros((states.time.size, MOST_RUNS))
-    if shape[1] and states.run < MOST_RUNS:
-        starts[:, states.run] = np.exp(-states.time / shape[0])
-    return np.concatenate([np.stack(paths, axis=1), starts], axis=1)
+    return np.stack(paths, axis=1)
 
 
 def grid(span: Span, response: str) -> list[tuple[float, ...]]:
-    """Time constants away from the first one; settled starts and others."""
+    """Time constants away from the first one."""
     ratios = (0.03, 0.1, 0.2, 0.4, 2.5, 4.0, 6.5, 10.0, 20.0)
-    settled = (0.0, 1.0) if span.runs <= MOST_RUNS else (0.0,)
-    return [(span.tau * ratio, own) for ratio in ratios if span.tau * ratio > span.step / 2 for own in settled]
-
-
-MOST_RUNS = 12
-"""Runs that may each start as they like."""
+    return [(span.tau * ratio,) for ratio in ratios if span.tau * ratio > span.step / 2]
 
 
 EFFECT = Effect(
@@ -36,14 +25,11 @@ EFFECT = Effect(
     source="two-node thermal network; Bacher and Madsen, Energy and Buildings 43 (2011) 1511",
     isolate="equal steps up and down at two mean temperatures, with a soak longer than five of the slow constant",
     sensor="a thermometer on the base or stem, beside the one on the housing",
-    coefficients=(Coefficient("weight", (1.0, 0.2, 0.2)), Coefficient("start_K", (10.0,) * MOST_RUNS, initial=True)),
+    coefficients=(Coefficient("weight", (1.0, 0.2, 0.2)),),
     columns=columns,
     grid=grid,
     sizes={"frequency_Hz": 0.5},
-    shape=(
-        Parameter("second_time_constant_s", 20.0, 3e5, "the other time constant"),
-        Parameter("own_starts", 0.0, 1.0, "1 when the second path starts each run out of equilibrium", False, True),
-    ),
+    shape=(Parameter("second_time_constant_s", 20.0, 3e5, "the other time constant"),),
     acts_on="temperature",
     fine=True,
 )
