@@ -213,12 +213,14 @@ Parts = list[tuple[FloatArray, "np.ndarray"]]
 
 
 def compare(one: Parts | None, two: Parts | None) -> tuple[float | None, float | None]:
-    """Return the residuals of two models on the rows that both can foretell; where there are none, on most rows if the second can."""
+    """Return the residuals of two models on the rows that both can foretell, or else that the second can; None where they are few."""
     if one is None or two is None:
         return None, None
     both: Parts = [(rest, a & b) for (rest, a), (_, b) in zip(one, two, strict=True)]
-    if _rms_or_none(both) is None and _share(two) >= FEWEST_FORETOLD:
+    if _share(both) < FEWEST_FORETOLD:
         both = [(rest, b) for (rest, _), (_, b) in zip(one, two, strict=True)]
+    if _share(both) < FEWEST_FORETOLD:
+        return None, None
     return _rms_or_none(both), _rms_or_none(_of(two, both))
 
 
