@@ -10,6 +10,7 @@ from scipy.constants import zero_Celsius
 
 from studies.errors import InputError
 from studies.record import Record
+from studies.simulation.heat_path import SENSOR
 from thermal.profile import Profile
 
 Array = NDArray[np.float64]
@@ -30,8 +31,6 @@ COMMAND_COLUMNS = (*(column for column, _, _ in COMMANDS.values()), RATE)
 """Columns beside the chamber's that a profile may have."""
 LUMPS = ("housing", "base", "stem", "resonator")
 """Parts of the heat path whose temperature at the start may depart from the settled one."""
-SENSOR = "sensor"
-"""Of a housing that is predicted: its reading at the start may depart from the housing, behind which it lags."""
 MOST_BOUNDARY_ROWS = 20_000
 MOST_ROWS = 40_000_000
 LEAST_JUMP = 0.5  # K from one row to the next, and

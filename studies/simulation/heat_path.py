@@ -7,12 +7,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from studies.errors import naming
-from thermal.network import Boundary, Network, Part, assemble, linearise
+from thermal.network import Boundary, Conductor, Network, Node, Part, assemble, linearise
 from thermal.relaxation import find_relaxation
 from thermal.resonator import describe_resonator, describe_shell_and_stem
 
 if TYPE_CHECKING:
     from studies.instrument.card import Instrument
+
+SENSOR = "sensor"
+"""Node of the sensor on a housing that is predicted; its reading at the start may depart from the housing."""
+SENSOR_SHARE = 1e-8  # of the housing's heat capacity: hardly any heat
+LEAST_LAG = 1e-3  # s
 
 
 def build_network(instrument: "Instrument", radiation: bool | None = None, boundary: str = "chamber") -> Network:
@@ -40,6 +45,15 @@ def behind_housing(network: Network) -> Network:
     parts += [link for link in network.conductors if "chamber" not in (link.one, link.other)]
     parts += network.radiators
     return assemble(parts)
+
+
+def with_sensor(network: Network, time_constant: float) -> Network:
+    """Return a whole heat path with the sensor on its housing, a node that takes no heat: τ dT_s/dt = T_housing − T_s."""
+    housing = next(node for node in network.nodes if node.name == "housing")
+    capacity = SENSOR_SHARE * housing.capacity_at(0.0)
+    joint = Conductor("housing", SENSOR, capacity / max(time_constant, LEAST_LAG))
+    parts: list[Part] = [*network.nodes, Node(SENSOR, capacity), *network.boundaries, *network.sources]
+    return assemble([*parts, *network.conductors, joint, *network.radiators])
 
 
 def build_shell_and_stem(instrument: "Instrument") -> Network:

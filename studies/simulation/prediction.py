@@ -12,14 +12,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.constants import zero_Celsius
 
 from studies.damping_law import DampingLaw, damping_law
 from studies.errors import InputError
 from studies.instrument.dotted import look_up
 from studies.law import law_of, moved_law
-from studies.simulation.drive import COLUMN, SENSOR, Drive
-from studies.simulation.heat_path import build_network, departures, slowest_lag
-from studies.simulation.response import Temperatures, check_loss, observed_rows, read_out, sensor_decay
+from studies.simulation.drive import COLUMN, Drive
+from studies.simulation.heat_path import SENSOR, build_network, departures, slowest_lag, with_sensor
+from studies.simulation.response import Temperatures, check_loss, observed_rows, read_out
 from thermal.network import Network
 from thermal.profile import Profile
 from thermal.sensitivity import NetworkChange, difference, no_change, respond
@@ -38,6 +39,7 @@ SHIFT_STEP = 0.02  # s
 OF_WALL = ("thermal.conductivity_W_per_m_K", "thermal.heat_capacity_J_per_kg_K")
 """Values of the heat path that the loss of a wall takes as well."""
 LAG = "noise.housing_lag_s"
+GAP = 3.0  # usual distances of rows, across which nothing is known of a curve
 
 
 @dataclass(frozen=True)
@@ -92,42 +94,42 @@ def predict(
     if law is None:
         law = law_for(instrument, drive)
     varied = derivatives if isinstance(derivatives, Variations) else Variations(instrument, law, tuple(derivatives))
-    network = varied.network(drive.boundary)
+    network = varied.driven(drive.boundary)
     rows = observed_rows(instrument, law, tuple(node.name for node in network.nodes))
-    boundary: dict[str, Profile] = {drive.boundary: _behind_sensor(instrument, drive)}
+    imposed = _behind_sensor(instrument, drive)
+    lines = imposed if drive.boundary == "chamber" else drive.kinked(of_equal_area(imposed))
+    boundary: dict[str, Profile] = {drive.boundary: lines}
     shapes = varied.departures(drive)
-    departure = sum(
-        (value * shapes[name] for name, value in drive.initial.items() if name != SENSOR), np.zeros(network.count)
-    )
+    departure = sum((value * shapes[name] for name, value in drive.initial.items()), np.zeros(network.count))
     changes = {name: change for name in varied.names if (change := varied.change(name, drive)) is not None}
     thermal = respond(network, boundary, drive.time, rows, list(changes.values()), departure)
-    found = Temperatures(thermal.temperature, thermal.rate)
+    found, reading = Temperatures(thermal.temperature[:, :6], thermal.rate[:, :6]), thermal.temperature[:, 6]
     if drive.boundary == "housing":
-        found.value[:, 0] = boundary["housing"].at(drive.time)
-    columns = read_out(instrument, law, drive, found, varied.lag(drive.boundary), varied.damping)
+        found.value[:, 0], reading = imposed.at(drive.time), drive.profile.at(drive.time)
+    columns = {COLUMN["housing"]: reading - zero_Celsius}
+    columns |= read_out(instrument, law, drive, found, varied.lag(drive.boundary), varied.damping)
     check_loss(instrument, columns["inverse_q"])
     slopes = {}
     for name in varied.names:
-        if name == INITIAL + SENSOR:
-            slopes[name] = dict.fromkeys(columns, np.zeros(len(drive.time)))
-            slopes[name][COLUMN["housing"]] = sensor_decay(instrument, drive)
-            continue
-        along = partial(_still, found)
+        along, read = partial(_still, found), np.zeros(len(drive.time))
         if name == SHIFT or name.startswith(JUMP):
-            along = partial(found.moved, *_slope_of_timing(network, drive, name, rows, departure))
+            slope, rate = _slope_of_timing(network, drive, name, rows, departure)
+            along, read = partial(found.moved, slope[:, :6], rate[:, :6]), slope[:, 6]
         elif name in changes:
             k = list(changes).index(name)
-            slope = thermal.slope[k]
+            slope, rate = thermal.slope[k], thermal.rate_slope[k]
             if drive.boundary == "housing" and changes[name].boundaries:
                 slope[:, 0] = changes[name].boundaries["housing"].at(drive.time)
-            along = partial(found.moved, slope, thermal.rate_slope[k])
+            along, read = partial(found.moved, slope[:, :6], rate[:, :6]), slope[:, 6]
+        elif name == LAG:
+            read = _slope_of_lag(varied.sides(name), boundary, drive.time, departure)
         below, above = (
             read_out(side.instrument, side.law, drive, along(side.distance), side.lag(drive.boundary), side.damping)
             for side in varied.sides(name)
         )
         step = np.ptp([side.distance for side in varied.sides(name)])
-        slopes[name] = {column: (above[column] - below[column]) / step for column in columns}
-    return Prediction(drive, columns, slopes, found.value[:, 0], law, network)
+        slopes[name] = {COLUMN["housing"]: read} | {column: (above[column] - below[column]) / step for column in above}
+    return Prediction(drive, columns, slopes, found.value[:, 0], law, varied.network(drive.boundary))
 
 
 def law_for(
@@ -140,13 +142,23 @@ def law_for(
 
 def _behind_sensor(instrument: "Instrument", drive: Drive) -> Profile:
     """Temperature that is imposed: of the housing what its sensor will have read, y + τ dy/dt."""
-    time_constant = instrument.noise.housing_lag_s
-    if drive.boundary == "chamber":
-        return drive.imposed
-    if time_constant == 0:
-        return drive.kinked(drive.imposed)
-    behind = Profile(drive.profile.time, drive.profile.value + time_constant * _slope_of_reading(drive.profile))
-    return drive.kinked(behind)
+    time_constant, read = instrument.noise.housing_lag_s, drive.imposed
+    if drive.boundary == "chamber" or time_constant == 0:
+        return read
+    return Profile(read.time, read.value + time_constant * _slope_of_reading(read))
+
+
+def of_equal_area(curve: Profile) -> Profile:
+    """Straight lines between the rows of a smooth curve T(t), with the area under it.
+
+    Straight lines through its rows leave out h³ T''/12 between two of them; rows moved by h² T''/12 do not. What follows
+    with a time constant of many rows takes in the area. Beside a gap the rows stay.
+    """
+    h = np.diff(curve.time)
+    before, after = h[:-1], h[1:]
+    bend = np.diff(np.diff(curve.value) / h) * (before**3 + after**3) / (6 * (before + after) ** 2)
+    bend[np.maximum(before, after) > GAP * np.median(h)] = 0.0
+    return Profile(curve.time, curve.value - np.concatenate([[0.0], bend, [0.0]]))
 
 
 def _slope_of_reading(read: Profile) -> Array:
@@ -176,6 +188,17 @@ def _slope_of_timing(network: Network, drive: Drive, name: str, rows: Array, dep
     return (above.temperature - below.temperature) / distance, (above.rate - below.rate) / distance
 
 
+def _slope_of_lag(sides: "Sequence[Side]", boundary: Mapping[str, Profile], time: Array, departure: Array) -> Array:
+    """Derivative of the reading of a predicted housing by its sensor's time constant (K/s): it may be shorter than a sweep's steps."""
+    reading = np.zeros((1, len(departure)))
+    reading[0, -1] = 1.0
+    below, above = (
+        respond(side.driven("chamber"), boundary, time, reading, departure=departure).temperature[:, 0]
+        for side in sides
+    )
+    return np.asarray((above - below) / (sides[1].distance - sides[0].distance))
+
+
 def _still(found: Temperatures, _: float) -> Temperatures:
     return found
 
@@ -190,13 +213,19 @@ class Side:
     damping: DampingLaw | None
     networks: dict[str, Network] = field(default_factory=dict)
     lags: dict[str, float] = field(default_factory=dict)
+    sensed: dict[str, Network] = field(default_factory=dict)
     left: dict[str, dict[str, Array]] = field(default_factory=dict)
 
     def departures(self, drive: Drive) -> dict[str, Array]:
         """Temperatures of the nodes (K) for 1 K of each lump at the start, worked out once."""
         if drive.boundary not in self.left:
             T0 = self.instrument.reference_temperature
-            self.left[drive.boundary] = departures(self.network(drive.boundary), drive.lumps, T0)
+            plain = self.network(drive.boundary)
+            left = departures(plain, drive.lumps, T0)
+            if drive.boundary == "chamber":  # the sensor begins at its housing's temperature, unless it departs itself
+                left = {lump: np.append(shape, shape[plain.index("housing")]) for lump, shape in left.items()}
+                left[SENSOR] = np.append(np.zeros(plain.count), 1.0)
+            self.left[drive.boundary] = left
         return self.left[drive.boundary]
 
     def network(self, boundary: str) -> Network:
@@ -204,6 +233,14 @@ class Side:
         if boundary not in self.networks:
             self.networks[boundary] = build_network(self.instrument, boundary=boundary)
         return self.networks[boundary]
+
+    def driven(self, boundary: str) -> Network:
+        """Return its network with the sensor of a housing that is predicted, built once."""
+        if boundary == "housing":
+            return self.network(boundary)
+        if boundary not in self.sensed:
+            self.sensed[boundary] = with_sensor(self.network(boundary), self.instrument.noise.housing_lag_s)
+        return self.sensed[boundary]
 
     def lag(self, boundary: str) -> float:
         """Slowest time constant (s) of the resonator behind its housing, in which effects count."""
@@ -233,6 +270,10 @@ class Variations:
         """Return the network of the instrument itself."""
         return self._here.network(boundary)
 
+    def driven(self, boundary: str) -> Network:
+        """Return its network with the sensor of a housing that is predicted."""
+        return self._here.driven(boundary)
+
     def departures(self, drive: Drive) -> dict[str, Array]:
         """Temperatures of its nodes (K) for 1 K of each lump at the start."""
         return self._here.departures(drive)
@@ -254,19 +295,19 @@ class Variations:
 
     def change(self, name: str, drive: Drive) -> NetworkChange | None:
         """What a value does to the temperatures; None for nothing."""
-        network = self.network(drive.boundary)
+        network = self.driven(drive.boundary)
         if name.startswith(INITIAL):
-            lump = name.removeprefix(INITIAL)
-            return None if lump == SENSOR else no_change(network, initial=self.departures(drive)[lump])
+            return no_change(network, initial=self.departures(drive)[name.removeprefix(INITIAL)])
         if name.startswith(KINK):
             return no_change(network, {drive.boundary: drive.kink_shape(int(name.removeprefix(KINK)))})
         if name == LAG and drive.boundary == "housing":
-            return no_change(network, {"housing": Profile(drive.profile.time, _slope_of_reading(drive.profile))})
+            read = drive.imposed
+            return no_change(network, {"housing": of_equal_area(Profile(read.time, _slope_of_reading(read)))})
         if name.partition(".")[0] not in ("thermal", "material", "resonator"):
             return None
         below, above = self.sides(name)
         step, T0 = above.distance - below.distance, self._here.instrument.reference_temperature
-        change = difference(above.network(drive.boundary), below.network(drive.boundary), step, temperature=T0)
+        change = difference(above.driven(drive.boundary), below.driven(drive.boundary), step, temperature=T0)
         return change if change.moves else None
 
     def _build(self, name: str) -> tuple[Side, Side]:

@@ -1,4 +1,4 @@
-"""What a gyro reads at given temperatures: frequency, zero-rate output, loss, and its housing sensor.
+"""What a gyro reads at given temperatures: frequency, zero-rate output and loss.
 
     f = f(T_r) (1 + …):  ln f = ln f(T_r) − ½ (ρ'/ρ + 3 α) (T_k − T_r) + ν' Σ n (T − T_r) + α Σ g (T − T_r) + s α_b (T_b − T_r) + effects,
 
@@ -16,10 +16,10 @@ from numpy.typing import NDArray
 from scipy.constants import zero_Celsius
 
 from studies.errors import InputError, naming
-from studies.simulation.drive import SENSOR, Drive
+from studies.simulation.drive import Drive
+from studies.simulation.heat_path import SENSOR
 from studies.simulation.loop import DEG_PER_H, settled_columns
 from studies.splitting import mean_shift
-from thermal.lag import lag
 from thermal.meridian import cell_names, energy_weights
 
 if TYPE_CHECKING:
@@ -46,15 +46,16 @@ class Temperatures:
 
 
 def observed_rows(instrument: "Instrument", law: "FrequencyLaw", nodes: tuple[str, ...]) -> Array:
-    """Sums over the nodes that make `Temperatures`, (6, nodes); the housing's is empty where it is no node."""
+    """Sums over the nodes that make `Temperatures` and what the housing's sensor reads, (7, nodes); empty where they are no nodes."""
     elastic = cell_weights(instrument, law)
     shares = (law.along.kinetic, law.along.nu, law.prestress.shares, law.prestress.held)
-    rows = np.zeros((6, len(nodes)))
+    rows = np.zeros((7, len(nodes)))
     cells = [nodes.index(name) for name in cell_names(len(elastic))]
     if "housing" in nodes:
         rows[0, nodes.index("housing")] = 1.0
+        rows[6, nodes.index(SENSOR if instrument.noise.housing_lag_s > 0 else "housing")] = 1.0
     rows[1, cells] = elastic
-    for row, share in zip(rows[2:], shares, strict=True):
+    for row, share in zip(rows[2:6], shares, strict=True):
         found = to_cells(instrument, law, share)
         row[cells] = found - found.sum() * elastic
     return rows
@@ -131,7 +132,6 @@ def read_out(
         )
         read["bias_deg_per_h"] = read["bias_deg_per_h"] - applied * DEG_PER_H + (0.0 if free else felt)
     return {
-        "housing_temperature_degC": _read_housing(instrument, drive, housing),
         "resonator_temperature_degC": warmed - zero_Celsius,
         **read,
     }
@@ -143,24 +143,6 @@ def check_loss(instrument: "Instrument", inverse_q: Array) -> None:
         raise InputError(
             f"{instrument.path} [loss]: 1/Q becomes negative in this profile; correct its slope or curvature."
         )
-
-
-def _read_housing(instrument: "Instrument", drive: Drive, housing: Array) -> Array:
-    time_constant = instrument.noise.housing_lag_s
-    if drive.boundary == "housing":
-        return drive.profile.at(drive.time) - zero_Celsius
-    if time_constant == 0 or len(housing) < 2:
-        return housing - zero_Celsius
-    departed = drive.initial.get(SENSOR, 0.0) * sensor_decay(instrument, drive)
-    return np.asarray(lag(drive.time, housing, time_constant) + departed - zero_Celsius)
-
-
-def sensor_decay(instrument: "Instrument", drive: Drive) -> Array:
-    """What is left at the rows of 1 K by which the housing's reading departed from the housing at the start."""
-    time_constant = instrument.noise.housing_lag_s
-    if drive.boundary == "housing" or time_constant == 0:
-        return np.zeros(len(drive.time))
-    return np.asarray(np.exp(-(drive.time - drive.time[0]) / time_constant))
 
 
 def _apply_effects(

@@ -17,10 +17,13 @@ from studies.instrument.card import load_card
 from studies.instrument.tables.noise import NoiseKeys
 from studies.instrument.uncertain import UncertainValue
 from studies.simulation.chamber import load_profile
-from studies.simulation.drive import drive_by_profile, rows_of
+from studies.simulation.drive import Drive, drive_by_profile, rows_of
+from studies.simulation.heat_path import slowest_lag
 from studies.simulation.noise import frequency_noise
 from studies.simulation.prediction import law_for, predict
 from studies.simulation.virtual_gyro import simulate_run
+from thermal.lag import lag
+from thermal.profile import Profile
 
 TWO = {"thermal.mount_conductance_W_per_K": 1e-4, "bias.k1_deg_per_h_per_Hz": 0.02}
 
@@ -123,6 +126,34 @@ def test_a_measured_housing_has_a_kink_between_the_rows_where_its_chamber_jumped
     assert abs(size) < 2 * run.kinks[61]
     left = true - bent.columns["frequency_Hz"]
     assert np.sqrt(np.mean(left**2)) < 0.2 * np.sqrt(np.mean(error**2))
+
+
+def test_a_sensor_follows_its_housing_between_rows_too():
+    """Of a jump midway between rows 30 s apart: one lag through the housing every half second, not through its rows."""
+    card, tau = load_card("hrg-30mm").with_values({"noise.housing_lag_s": 20.0}), 20.0
+    profile = load_profile("soak 20 1815s then soak 5 30min")
+    fine = drive_by_profile(profile, rows_of(profile, 2.0))
+    law = law_for(card, fine)
+    expected = lag(fine.time, predict(card, fine, law=law).housing, tau)[::60] - 273.15
+    read = predict(card, drive_by_profile(profile, fine.time[::60]), law=law).columns["housing_temperature_degC"]
+    assert np.ptp(read) > 10
+    assert read == pytest.approx(expected, rel=0, abs=1e-5)
+
+
+@pytest.mark.parametrize("tau", [0.0, 20.0])
+def test_a_measured_housing_drives_the_frequency_as_its_chamber_did(tau):
+    """Straight lines between rows h apart miss h²/12 of a curve's bend: where a ramp of slope s begins, h² s/12 of its area."""
+    card = load_card("hrg-30mm").with_values({"noise.housing_lag_s": tau})
+    profile, h = load_profile("ramp -10 35 0.5 then soak 35 90min"), 30.0
+    drive = drive_by_profile(profile, rows_of(profile, 1 / h))
+    law = law_for(card, drive)
+    found = predict(card, drive, law=law)
+    measured = Profile(drive.time, found.columns["housing_temperature_degC"] + 273.15)
+    again = predict(card, Drive(drive.time, "housing", measured), law=law)
+    missed_by_lines = h**2 / 12 * (0.5 / 60)  # K s
+    per_area = np.abs(law.slope(293.15) * law.frequency(293.15)) / slowest_lag(found.network, 293.15)  # Hz/(K s)
+    error = np.abs(again.columns["frequency_Hz"] - found.columns["frequency_Hz"])
+    assert error.max() < 0.05 * missed_by_lines * per_area
 
 
 def test_a_jump_is_free_up_to_a_row_earlier_but_not_at_the_first_row():
