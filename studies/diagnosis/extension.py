@@ -14,6 +14,7 @@ from studies.diagnosis.campaign import Campaign, Run
 from studies.diagnosis.causes import parameters_of
 from studies.diagnosis.investigate import Diagnosis
 from studies.diagnosis.model import Fit, fit, used
+from studies.diagnosis.scan import build_bank, scan
 from studies.diagnosis.search import refine
 from studies.effects import Effect, find_effect
 from studies.effects.states import FloatArray
@@ -94,8 +95,30 @@ def prune(model: Fit) -> Fit:
             if tried.log_evidence >= fewer.log_evidence:
                 fewer = tried
         if fewer is not model:
-            model = refine(fewer, index)
+            fewer = refine(fewer, index)
+        plainest = _definite(model, index)
+        model = max((plainest, fewer), key=lambda f: f.log_evidence)
     return model
+
+
+def _definite(model: Fit, index: int) -> Fit:
+    """Return the model with a term cut down to its definite curve, the first column, at the likeliest of all its shapes.
+
+    A family at another shape may hold the same curve as a further member: two members of a number each, or one that is known.
+    """
+    term, problem = model.terms[index], model.problem
+    effect = term.effect
+    if used(effect).size == 1:
+        return model
+    for place in used(effect)[1:]:
+        effect = _without_member(effect, int(place))
+    others = [one for k, one in enumerate(model.terms) if k != index]
+    base = fit(problem, model.baseline, others, 1, np.delete(model.solved.scales, index))
+    seen = scan(base, build_bank(base, [effect]))
+    if not seen:
+        return model
+    terms = (*model.terms[:index], replace(term, effect=effect, shape=seen[0].term.shape), *model.terms[index + 1 :])
+    return refine(fit(problem, model.baseline, terms, 1, model.solved.scales), index)
 
 
 def _without_member(effect: Effect, place: int) -> Effect:
