@@ -8,7 +8,7 @@ records (targets: within 3 %; of the noise of all columns, and of that column al
 94 %), and how often the next run, predicted from its chamber alone, is within twice its noise (90 %); the noise of that run is what is
 really in it ("drawn"), and the rms of eight such draws ("usual"), since wander differs from run to run. "stated": what is left of the
 next run over the root of what calibration and noise state of it. "ideal": how often the next run's frequency would be within
-twice its noise, were the noise's levels known and the rest Gaussian: no unbiased estimate of these records is closer.
+twice its noise, were the levels of all noise known: to first order nothing that is estimated from these records is closer on average.
 """
 
 import argparse
