@@ -125,7 +125,7 @@ def residual_ratios(fit: CardFit, name: str, true: list[dict[str, Array]]) -> tu
 def slopes_ahead(found: Calibration, drive: Drive) -> dict[str, Array]:
     """Derivatives of a run's columns by the coordinates of the card's values."""
     priors = found.fit.problem.priors
-    derivatives = predict(found.instrument, drive, priors.names).derivatives
+    derivatives = predict(found.fit.problem.instrument_at(found.fit.point), drive, priors.names).derivatives
     scale = priors.slopes(found.fit.point[: len(priors.values)])
     return {name: np.column_stack([derivatives[one][name] for one in priors.names]) @ scale for name in RESPONSES}
 
