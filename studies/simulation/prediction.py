@@ -96,8 +96,7 @@ def predict(
     varied = derivatives if isinstance(derivatives, Variations) else Variations(instrument, law, tuple(derivatives))
     network = varied.driven(drive.boundary)
     rows = observed_rows(instrument, law, tuple(node.name for node in network.nodes))
-    imposed = _behind_sensor(instrument, drive)
-    lines = imposed if drive.boundary == "chamber" else drive.kinked(of_equal_area(imposed))
+    imposed, lines = _impose(instrument, drive)
     boundary: dict[str, Profile] = {drive.boundary: lines}
     shapes = varied.departures(drive)
     departure = sum((value * shapes[name] for name, value in drive.initial.items()), np.zeros(network.count))
@@ -140,12 +139,16 @@ def law_for(
     return law_of(instrument, float(reached.min()) - margin, float(reached.max()) + margin, theory)
 
 
-def _behind_sensor(instrument: "Instrument", drive: Drive) -> Profile:
-    """Temperature that is imposed: of the housing what its sensor will have read, y + τ dy/dt."""
-    time_constant, read = instrument.noise.housing_lag_s, drive.imposed
-    if drive.boundary == "chamber" or time_constant == 0:
-        return read
-    return Profile(read.time, read.value + time_constant * _slope_of_reading(read))
+def _impose(instrument: "Instrument", drive: Drive) -> tuple[Profile, Profile]:
+    """Temperature that is imposed, of the housing what its sensor will have read, y + τ dy/dt: at its rows, and as lines between them.
+
+    The area of τ dy/dt, the sum of central differences, is right as it is. What jumps is behind no sensor.
+    """
+    read = drive.imposed
+    if drive.boundary == "chamber" or read.jumps.size:
+        return read, read
+    lag = instrument.noise.housing_lag_s * _slope_of_reading(read)
+    return Profile(read.time, read.value + lag), drive.kinked(Profile(read.time, of_equal_area(read).value + lag))
 
 
 def of_equal_area(curve: Profile) -> Profile:
@@ -301,8 +304,7 @@ class Variations:
         if name.startswith(KINK):
             return no_change(network, {drive.boundary: drive.kink_shape(int(name.removeprefix(KINK)))})
         if name == LAG and drive.boundary == "housing":
-            read = drive.imposed
-            return no_change(network, {"housing": of_equal_area(Profile(read.time, _slope_of_reading(read)))})
+            return no_change(network, {"housing": Profile(drive.imposed.time, _slope_of_reading(drive.imposed))})
         if name.partition(".")[0] not in ("thermal", "material", "resonator"):
             return None
         below, above = self.sides(name)
