@@ -99,21 +99,26 @@ def contenders(base: Hypothesis, bank: Bank, but: Sequence[str] = ()) -> list[Hy
 
 
 def polish(base: Hypothesis, seen: Seen) -> Hypothesis:
-    """Add an effect and move its shape to where the evidence is largest."""
+    """Add an effect and move its shape to where the evidence is largest; forms of one effect are compared where each is best."""
     price = CONSTANTS["log_prior_effect"] + seen.choice
-    term = nearer(base.fit, seen.term)
-    model = fit(base.fit.problem, base.fit.moved(), (*base.fit.terms, term), 2, _sizes(base.fit))
-    return Hypothesis(refine(model, len(model.terms) - 1), (*base.price, price))
+    forms = []
+    for term in nearer(base.fit, seen.term):
+        model = fit(base.fit.problem, base.fit.moved(), (*base.fit.terms, term), 2, _sizes(base.fit))
+        forms.append(refine(model, len(model.terms) - 1))
+    return Hypothesis(max(forms, key=lambda f: f.log_evidence), (*base.price, price))
 
 
-def nearer(model: Fit, term: Term) -> Term:
-    """Return the likeliest of the shapes that a shape of the coarse grid stands for."""
+def nearer(model: Fit, term: Term) -> list[Term]:
+    """Return the likeliest of the shapes that a shape of the coarse grid stands for, one of every form."""
     effect = term.effect
     if effect.near is None:
-        return term
+        return [term]
     shapes = effect.near(model.problem.span, model.problem.response.column, term.shape)
-    seen = scan(model, build_bank(model, [replace(effect, grid=lambda *_: shapes)]))
-    return replace(term, shape=seen[0].term.shape) if seen else term
+    forms: dict[tuple[float, ...], list[tuple[float, ...]]] = {}
+    for shape in shapes:
+        forms.setdefault(tuple(shape[k] for k, own in enumerate(effect.shape) if own.steady), []).append(shape)
+    seen = [scan(model, build_bank(model, [replace(effect, grid=lambda *_, own=own: own)])) for own in forms.values()]
+    return [replace(term, shape=found[0].term.shape) for found in seen if found] or [term]
 
 
 def _sizes(model: Fit) -> np.ndarray:
