@@ -304,9 +304,9 @@ def _near(temperature: FloatArray, known: FloatArray) -> "np.ndarray":
 
 
 def _trained(model: Fit, campaign: Campaign, keep: Sequence["np.ndarray"]) -> OnRows | None:
-    problem = pose(campaign, model.problem.response.column, model.problem.span.tau, keep)
-    if problem.values.size < FEWEST:
+    if sum(int((own & kept).sum()) for own, kept in zip(model.problem.present, keep, strict=True)) < FEWEST:
         return None
+    problem = pose(campaign, model.problem.response.column, model.problem.span.tau, keep)
     problem = replace(problem, sigma=model.problem.sigma, level=model.problem.level)
     # the delay that every model tolerates is nothing that rows could teach: it stays where it is
     baseline = model.baseline

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from studies.diagnosis.campaign import load_campaign
+from studies.diagnosis.held_out import _trained
 from studies.diagnosis.investigate import investigate
 from studies.record import Record
 
@@ -38,3 +39,13 @@ def test_a_start_far_from_equilibrium_does_not_spoil_a_single_run():
     ]
     assert found["held_out_rms"] < 1.1 * found["residual_rms"]
     assert found["residual_rms"] < 1.1e-3
+
+
+def test_a_block_that_leaves_no_row_for_the_fit_is_not_held_out():
+    """Gaps on both sides of a block may take in all rows that have a value."""
+    t = np.arange(0.0, 7200.0, 10.0)
+    housing = 20 + 10 * np.sin(t / 900)
+    frequency = 4432 + 0.35 * (housing - 20) + 1e-3 * np.random.default_rng(10).standard_normal(t.size)
+    campaign = load_campaign([Record({"time_s": t, "housing_temperature_degC": housing, "frequency_Hz": frequency})])
+    found = investigate(campaign, advise=False, score_held_out=False).inquiries["frequency_Hz"].plain
+    assert _trained(found, campaign, [np.zeros(run.time.shape, dtype=bool) for run in campaign.runs]) is None
