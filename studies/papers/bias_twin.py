@@ -26,7 +26,6 @@ COOLING, WARMING = "step 25 -20 5h", "step -20 25 5h"
 ROWS_PER_SECOND = 0.1
 PAPER_BEFORE, PAPER_AFTER = 3.0143, 0.5848
 METHODS: tuple[Method, ...] = ("paper", "guarded")
-SEEDS = 24
 
 
 @dataclass(frozen=True)

@@ -68,15 +68,19 @@ class Banana:
         return State(u, {"y": rest}, {"y": slope})
 
 
+def fitted(problem):
+    """Return the fit of a problem at its most probable point, 0."""
+    state = problem.evaluate(np.zeros(2))
+    rows = {"y": SimpleNamespace(whiten=lambda columns, noise: columns)}
+    J, _ = whitened(problem, state, {"y": None}, rows)
+    return CardFit(problem, state, {"y": None}, rows, np.linalg.inv(J.T @ J + np.eye(2)), {}, 1, True)
+
+
 def test_an_interval_follows_a_bent_valley():
     """Straight on, 1.6 standard deviations of u₀ miss the valley's floor by many times its width; along it nothing is bent."""
     values = tuple(UncertainValue(f"thermal.{name}", 0.0, 1.0, -np.inf, np.inf) for name in "ab")
     problem = Banana(Priors(values, np.eye(2)))
-    state = problem.evaluate(np.zeros(2))
-    rows = {"y": SimpleNamespace(whiten=lambda columns, noise: columns)}
-    J, _ = whitened(problem, state, {"y": None}, rows)
-    covariance = np.linalg.inv(J.T @ J + np.eye(2))
-    found = estimate(CardFit(problem, state, {"y": None}, rows, covariance, {}, 1, True))[0]
+    found = estimate(fitted(problem))[0]
     half = NINETY / np.sqrt(1 / problem.sd**2 + 1)
     assert (found.low, found.high) == pytest.approx((-half, half), rel=0.12)
     straight = problem.evaluate(np.array([half, 0.0])).residual["y"][1] ** 2
@@ -96,11 +100,7 @@ def test_a_value_that_follows_the_square_of_an_unknown_one_is_no_surer_than_that
     """u₀² of a unit normal is chi-squared with one degree of freedom, of which 95 % are below 3.84."""
     values = tuple(UncertainValue(f"material.{name}", 0.0, 1.0, -np.inf, np.inf) for name in "ab")
     problem = Bow(Priors(values, np.eye(2)))
-    state = problem.evaluate(np.zeros(2))
-    rows = {"y": SimpleNamespace(whiten=lambda columns, noise: columns)}
-    J, _ = whitened(problem, state, {"y": None}, rows)
-    covariance = np.linalg.inv(J.T @ J + np.eye(2))
-    unknown, follower = estimate(CardFit(problem, state, {"y": None}, rows, covariance, {}, 1, True))
+    unknown, follower = estimate(fitted(problem))
     assert (unknown.low, unknown.high) == pytest.approx((-NINETY, NINETY), rel=1e-3)
     assert follower.high == pytest.approx(3.84 * problem.bend, rel=0.03)
     assert follower.low == pytest.approx(0.0, abs=0.01)
