@@ -5,6 +5,7 @@ thermometer, so the inverse matters as much as the fit: it is refused where the 
 where nothing was measured. Temperatures here are in °C, as the names say; frequencies in Hz.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -18,6 +19,7 @@ from compensation.regression import FTest, compare_nested
 
 Array = NDArray[np.float64]
 FARTHEST_REFERENCE = 1e4  # °C
+GRID = 2001  # temperatures at which a curve is looked at
 
 
 @dataclass(frozen=True)
@@ -112,21 +114,7 @@ class FrequencyFit:
         frequency = np.asarray(frequency, dtype=np.float64)
         if not np.all(np.isfinite(frequency)):
             raise CompensationError("a frequency is missing or infinite; remove those rows.")
-        low, high = self._bracket()
-        ends = self.polynomial.value(np.array([low, high]))
-        outside = (frequency < ends.min()) | (frequency > ends.max())
-        if np.any(outside):
-            raise CompensationError(
-                f"{frequency[outside][0]:.6g} Hz lies outside {ends.min():.6g} to {ends.max():.6g} Hz, the range that "
-                f"was fitted ({low:.1f} to {high:.1f} °C); measure there before using the curve there."
-            )
-        if frequency.size == 0:
-            return frequency
-
-        def excess(T: Array, f: Array) -> Array:
-            return self.polynomial.value(T) - f
-
-        return np.asarray(elementwise.find_root(excess, (low, high), args=(frequency,)).x, dtype=np.float64)
+        return invert(self.polynomial.value, self._bracket(), frequency)
 
     def _within(self, temperature_degC: ArrayLike, extrapolate: bool) -> Array:
         T = np.asarray(temperature_degC, dtype=np.float64)
@@ -140,19 +128,12 @@ class FrequencyFit:
         return T
 
     def _bracket(self) -> tuple[float, float]:
-        """Return the measured range, widened by the fit's own errors, on which f(T) must be monotonic."""
+        """Return the measured range, widened by the fit's own errors."""
         low, high = self.temperature_range_degC
         margin = max(3 * np.sqrt(self.reading_variance), float(np.max(np.abs(self.residuals))))
         slopes = np.abs(self.polynomial.slope(np.array([low, high])))
         reach = np.minimum(margin / np.maximum(slopes, 1e-300), 0.05 * (high - low))
-        low, high = low - float(reach[0]), high + float(reach[1])
-        turns = self.polynomial.turning_points(low, high)
-        if turns.size:
-            raise CompensationError(
-                f"the curve of order {self.order} turns round at {turns[0]:.1f} °C, so two temperatures have the same "
-                "frequency there and it cannot be inverted; fit a narrower range of temperature or another order."
-            )
-        return low, high
+        return low - float(reach[0]), high + float(reach[1])
 
 
 @dataclass(frozen=True)
@@ -167,6 +148,51 @@ class OrderComparison:
     against_next: tuple[FTest, ...]
     level: float
     recommended: int
+
+
+def find_turn(curve: Callable[[Array], Array], span: tuple[float, float]) -> float | None:
+    """Return the temperature (°C) within a span at which a curve f(T) turns round; None where it only rises or only falls."""
+    T = np.linspace(*span, GRID)
+    rise = np.sign(np.diff(curve(T)))
+    turned = np.flatnonzero((rise != rise[GRID // 2]) | (rise == 0))
+    return float(T[turned[np.argmin(np.abs(turned - GRID // 2))]]) if turned.size else None
+
+
+def invert(curve: Callable[[Array], Array], span: tuple[float, float], frequency: Array) -> Array:
+    """Return the temperatures (°C) within a span whose frequencies (Hz) these are; NaN where there is no frequency.
+
+    Parameters
+    ----------
+    curve : callable
+        f(T).
+    span : (low, high), °C
+        The root is bracketed by it.
+    frequency : array
+
+    Raises
+    ------
+    CompensationError
+        A curve that turns round within the span, or frequencies outside it.
+    """
+    turn = find_turn(curve, span)
+    if turn is not None:
+        raise CompensationError(
+            f"the curve turns round at {turn:.1f} °C, so two temperatures have the same frequency there and it cannot"
+            " be inverted; fit a narrower range of temperature or another order."
+        )
+    low, high = np.sort(curve(np.array(span)))
+    known = np.isfinite(frequency)
+    outside = known & ((frequency < low) | (frequency > high))
+    if np.any(outside):
+        raise CompensationError(
+            f"the frequency runs from {np.nanmin(frequency):.8g} to {np.nanmax(frequency):.8g} Hz and lies outside {low:.8g}"
+            f" to {high:.8g} Hz ({span[0]:.1f} to {span[1]:.1f} °C), over which the curve was fitted, in"
+            f" {np.mean(outside):.1%} of the readings; calibrate over that range."
+        )
+    found = np.full(frequency.shape, np.nan)
+    if np.any(known):
+        found[known] = elementwise.find_root(lambda T, f: curve(T) - f, span, args=(frequency[known],)).x
+    return found
 
 
 def fit_frequency(

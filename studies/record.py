@@ -23,7 +23,7 @@ COLUMNS = {
     "time_s": "time since the start of the run",
     "housing_temperature_degC": "temperature sensor on the housing",
     "chamber_temperature_degC": "chamber set point or air",
-    "resonator_temperature_degC": "temperature of the resonator (simulations only)",
+    "resonator_temperature_degC": "temperature of the resonator (simulated, or from its frequency)",
     "frequency_Hz": "n = 2 frequency by the gyro's clock",
     "reference_frequency_Hz": "n = 2 frequency by an external clock",
     "bias_deg_per_h": "zero-rate output",
@@ -38,6 +38,7 @@ COLUMNS = {
     "pattern_angle_deg": "azimuth of the standing wave",
 }
 COMPENSATED = "compensated_"
+RESONATOR = "resonator_temperature_degC"
 LIMITS = {
     # what a column can be, by the end of its name: lowest, highest
     "_Hz": (0.0, 1e12),

@@ -6,9 +6,11 @@ is small: τ the slowest time constant, about 3 000 s for the gyro of the paper'
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import minimize_scalar
 
 from compensation.decimation import average_blocks
 from compensation.errors import CompensationError
@@ -20,6 +22,9 @@ BLOCK = 60.0  # s
 REACH = 5  # blocks to either side, over which slopes are taken
 LEAST = 600.0  # s, of a soak
 USUAL_SLOPE = 8e-5  # 1/K, relative, where a record is too even to show its own
+HELD = 0.5  # K, within which a temperature is held
+STANDS_OUT = 5.0  # scatters of a block, by which an exponential is seen
+HOUR = 3600.0
 TEMPERATURES = ("housing_temperature_degC", "chamber_temperature_degC")
 
 
@@ -65,46 +70,137 @@ def find_soaks(records: Sequence[Record], time_constant: float = 3000.0, toleran
     return tuple(soak for record in records for soak in _soaks_of(record, time_constant, tolerance))
 
 
-def settled_table(soaks: Sequence[Soak], where: str) -> tuple[Array, Array, float]:
+def settled_table(soaks: Sequence[Soak], where: str, advice: str = "") -> tuple[Array, Array, float]:
     """Return temperatures (°C) and frequencies (Hz) of soaks, and the step (Hz) of readings that are as uncertain as theirs.
 
     Raises
     ------
     InputError
-        Fewer than two temperatures that are half a kelvin apart.
+        Fewer than two temperatures that are half a kelvin apart; `advice` says what to do.
     """
     T, f = np.array([s.temperature_degC for s in soaks]), np.array([s.frequency_Hz for s in soaks])
     if np.count_nonzero(np.diff(np.sort(T)) > 0.5) < 1:
         raise InputError(
-            f"{where}: {len(soaks)} settled {'part' if len(soaks) == 1 else 'parts'}, where a fit over temperature needs several temperatures; soak longer, or"
+            f"{where}: {len(soaks)} settled {'part' if len(soaks) == 1 else 'parts'}, where a fit over temperature needs several temperatures; {advice}soak longer, or"
             " allow more to be left (--left), or give a shorter --time-constant."
         )
     return T, f, float(np.sqrt(12.0) * max(s.error_Hz for s in soaks))
 
 
-def _soaks_of(record: Record, time_constant: float, tolerance: float) -> list[Soak]:
+def advise_hold(records: Sequence[Record], time_constant: float, tolerance: float) -> str:
+    """Say how long to hold a temperature, from the longest hold that had not settled and how its frequency moves.
+
+    What is left to settle decays with the record's own time constant τ, so that it takes τ ln(left/tolerance) more.
+    """
+    judged = [one for record in records if (one := _judge(record, time_constant)) is not None]
+    holds = [(one, rows) for one in judged for rows in _holds(one.drive)]
+    # Slopes near the end of a hold know of what comes after it.
+    whole = [(one, rows[:-REACH]) for one, rows in holds if np.ptp(one.time[rows]) >= LEAST and len(rows) > 3 * REACH]
+    if not whole:
+        longest = max((float(np.ptp(one.time[rows])) for one, rows in holds), default=0.0)
+        return f"no temperature is held for longer than {longest / 60:.0f} min; " if holds else ""
+    moving = [(one, rows) for one, rows in whole if one.left[rows[-2 * REACH :]].min() > tolerance]
+    if not moving:
+        return ""
+    longest = max(float(np.ptp(one.time[rows])) for one, rows in moving)
+    found = [_settling(one, rows, tolerance) for one, rows in moving if np.ptp(one.time[rows]) > 0.9 * longest]
+    speed, own, needed = max(found, key=lambda one: one[2])  # the temperature that settles most slowly
+    moves = (
+        f"the frequency still moves {speed * HOUR:.2g} Hz/h at the end of the longest hold that has not settled,"
+        f" {longest / HOUR:.1f} h"
+    )
+    if not np.isfinite(own):
+        return f"{moves}; "
+    return (
+        f"{moves}; with the time constant of {own / 60:.0f} min that it shows, hold each temperature"
+        f" {np.ceil(10 * needed / HOUR) / 10:.1f} h; or "
+    )
+
+
+def _settling(one: "_Judged", rows: NDArray[np.intp], tolerance: float) -> tuple[float, float, float]:
+    """Speed at the end of a hold (Hz/s), its time constant (s) and how long it should be held (s); infinite where none shows."""
+    t, f = one.time[rows], one.frequency[rows]
+    speed, own = abs(float(_slopes(t, f)[-1])), _time_constant(t[len(t) // 2 :], f[len(t) // 2 :])
+    # The mean is that of the middle of its rows, REACH before their end; as much at the end of a hold sees what comes after.
+    left = float(one.left[rows[-2 * REACH :]].mean())
+    return speed, own, float(np.ptp(t)) + own * float(np.log(left / tolerance)) + LEAST + REACH * one.width
+
+
+@dataclass(frozen=True)
+class _Judged:
+    """Blocks of a record: time (s), what holds the temperature (°C), temperature, frequency (Hz), what is left to settle (K)."""
+
+    time: Array
+    drive: Array
+    temperature: Array
+    frequency: Array
+    left: Array
+    slope: float
+    width: float
+
+
+def _judge(record: Record, time_constant: float) -> _Judged | None:
     column = next((name for name in TEMPERATURES if name in record), TEMPERATURES[0])
+    drive = TEMPERATURES[1] if TEMPERATURES[1] in record else column
     try:
         blocks = average_blocks(
-            record["time_s"], {"T": record[column], "f": record["frequency_Hz"]}, max(BLOCK, float(np.median(np.diff(record["time_s"]))))
-        )  # fmt: skip
+            record["time_s"],
+            {"T": record[column], "f": record["frequency_Hz"], "drive": record[drive]},
+            max(BLOCK, float(np.median(np.diff(record["time_s"])))),
+        )
     except CompensationError as error:
         raise InputError(f"{record.path}: {error}") from None
     t, T, f = blocks.time, blocks.columns["T"], blocks.columns["f"]
     if len(t) < 2 * REACH + 1:
-        return []
+        return None
     span = float(np.ptp(T))
     slope = abs(float(np.polyfit(T - T.mean(), f, 1)[0])) if span > 1.0 else 0.0
     slope = slope or USUAL_SLOPE * float(f.mean())
     left = time_constant * np.maximum(np.abs(_slopes(t, T)), np.abs(_slopes(t, f)) / slope)
+    return _Judged(t, blocks.columns["drive"], T, f, left, slope, blocks.width)
+
+
+def _soaks_of(record: Record, time_constant: float, tolerance: float) -> list[Soak]:
+    one = _judge(record, time_constant)
+    if one is None:
+        return []
+    t, T, f, left = one.time, one.temperature, one.frequency, one.left
     found = []
-    for rows in _stretches((left < tolerance) & (np.gradient(t) < 3 * blocks.width)):
+    for rows in _stretches((left < tolerance) & (np.gradient(t) < 3 * one.width)):
         if t[rows[-1]] - t[rows[0]] >= LEAST:
             scatter = float(np.std(np.diff(f[rows]))) / np.sqrt(2.0 * len(rows))
-            uncertainty = float(np.hypot(scatter, slope * left[rows].mean()))
+            uncertainty = float(np.hypot(scatter, one.slope * left[rows].mean()))
             ends, means = (float(t[rows[0]]), float(t[rows[-1]])), (float(T[rows].mean()), float(f[rows].mean()))
             found.append(Soak(record.path, *ends, *means, uncertainty, float(left[rows].max())))
     return found
+
+
+def _holds(drive: Array) -> list[NDArray[np.intp]]:
+    """Rows of the stretches in which a temperature stays within `HELD`."""
+    ends, low, high = [0], np.inf, -np.inf
+    for k, T in enumerate(drive):
+        low, high = min(low, T), max(high, T)
+        if high - low > HELD:
+            ends.append(k)
+            low = high = T
+    return [np.arange(first, last) for first, last in pairwise([*ends, len(drive)])]
+
+
+def _time_constant(t: Array, f: Array) -> float:
+    """Time constant (s) of f = a + b exp(−t/τ); infinite where the fit shows none: b does not stand out, or τ is beyond the rows."""
+
+    def miss(log_tau: float) -> tuple[float, float]:
+        X = np.column_stack([np.ones(len(t)), np.exp(-(t - t[0]) / np.exp(log_tau))])
+        found, *_ = np.linalg.lstsq(X, f, rcond=None)
+        return float(np.sum((f - X @ found) ** 2)), float(found[1])
+
+    length = float(np.ptp(t))
+    low, high = np.log(length / 30), np.log(3 * length)
+    best = minimize_scalar(lambda x: miss(x)[0], bounds=(low, high), method="bounded").x
+    scatter = np.sqrt(miss(best)[0] / max(len(t) - 3, 1))
+    if min(best - low, high - best) < 0.01 or abs(miss(best)[1]) < STANDS_OUT * scatter:
+        return np.inf
+    return float(np.exp(best))
 
 
 def _slopes(t: Array, values: Array) -> Array:

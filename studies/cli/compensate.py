@@ -23,7 +23,9 @@ def compensate(
 ) -> Answer:
     """Write a record again with compensated_… columns, from a model that one of the hrg fit commands saved.
 
-    The model refuses values that its fit has not seen.
+    The model refuses values that its fit has not seen. A frequency model takes the housing's temperature, without it the
+    resonator's or the chamber's; of a record without any thermometer the frequency is its own, and the resonator's
+    temperature is added instead, as hrg temperature does.
 
     Parameters
     ----------
@@ -45,7 +47,7 @@ def compensate(
     from studies.errors import InputError
     from studies.files.writing import write_text
     from studies.instrument.units import unit_of
-    from studies.record import COMPENSATED, read_record, write_record
+    from studies.record import COMPENSATED, RESONATOR, read_record, write_record
 
     loaded = models.read_model(model)
     if (run is None) != (out is None):
@@ -57,7 +59,8 @@ def compensate(
     if emit is not None:
         write_text(emit, models.emit_c(loaded))
         say(f"C source: {emit}")
-    columns = {}
+    columns: dict[str, dict[str, float | None]] = {}
+    added: list[str] = []
     if run is not None and out is not None:
         say(f"reading {run}")
         record = read_record(run)
@@ -65,6 +68,7 @@ def compensate(
         write_record(
             result, out, lambda rows: say(f"written {rows:,} of {len(result):,} rows") if rows % 500_000 == 0 else None
         )
+        added = [name for name in result.columns if name not in record]
         for name in result.columns:
             if name.startswith(COMPENSATED) and name not in record:
                 original, after = name.removeprefix(COMPENSATED), result[name]
@@ -82,8 +86,14 @@ def compensate(
         "kind": loaded.kind,
         "run": run,
         "out": out,
+        "added": added,
         "columns": columns,
     }
+    if RESONATOR in added:
+        print(
+            f"{out}: {RESONATOR}, by the frequency: {run} has no other thermometer, and a frequency that is compensated by"
+            " itself is the same in every row. hrg fit bias --over temperature compensates the other outputs over it."
+        )
     for name, facts in columns.items():
         from_what = "" if facts["stability_before"] is None else f"{facts['stability_before']:.4g} → "
         unit = "" if unit_of(name) == "1" else f" {unit_of(name)}"

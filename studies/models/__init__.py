@@ -4,7 +4,8 @@ A kind of model is one module in `studies.models.kinds`, found by its name (`cro
 `cross_damping.py`), with two functions:
 
     def compensate(model: Model, record: Record, *, extrapolate: bool) -> dict[str, NDArray[np.float64]]:
-        "Return the `compensated_…` columns; a row that lacks an input stays NaN, never silently wrong."
+        "Return the `compensated_…` columns; a row that lacks an input stays NaN, never silently wrong.
+        A frequency model of a record without any thermometer returns `resonator_temperature_degC`."
 
     def emit_c(model: Model) -> str:
         "Return a C99 translation unit without dependencies beyond math.h."
@@ -24,7 +25,7 @@ from compensation.errors import CompensationError
 from studies.errors import InputError, nearest
 from studies.models import kinds
 from studies.models.file import Model, ModelPart, ModelSource, format_model, make_part, read_model, write_model
-from studies.record import COMPENSATED, Record
+from studies.record import COMPENSATED, RESONATOR, Record
 
 __all__ = [
     "Model", "ModelPart", "ModelSource", "compensate", "emit_c", "format_model", "make_part", "model_kinds", "read_model",
@@ -62,7 +63,7 @@ def compensate(model: Model, record: Record, *, extrapolate: bool = False) -> Re
     for name, values in columns.items():
         if isinf(values).any():
             raise InputError(f"{model.path or 'model'}: its coefficients make '{name}' infinite; correct them.")
-        if not name.startswith(COMPENSATED):
+        if not name.startswith(COMPENSATED) and name != RESONATOR:
             raise ValueError(f"{model.kind} writes '{name}', which is no {COMPENSATED}… column")
         if name in record:
             raise InputError(f"{record.path}: has a column '{name}' already; remove it or start from the raw record.")

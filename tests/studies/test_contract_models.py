@@ -1,6 +1,7 @@
 """Model files: what is saved is read back, what is broken is named, what is emitted compiles and agrees."""
 
 import ctypes
+import json
 import shutil
 import subprocess
 import tomllib
@@ -10,10 +11,11 @@ import numpy as np
 import pytest
 
 from compensation.frequency import fit_frequency
+from studies.cli import main
 from studies.errors import InputError
 from studies.models import ModelSource, compensate, emit_c, format_model, model_kinds, read_model, write_model
-from studies.models.kinds.frequency import find_temperature, save_frequency
-from studies.record import Record
+from studies.models.kinds.frequency import evaluate, find_temperature, save_frequency
+from studies.record import Record, read_record, write_record
 
 T = np.linspace(-20, 40, 7)
 F = 4424.9 + 0.3716 * T - 9.7e-4 * T**2 + 1.5e-5 * T**3 + 0.01 * np.cos(5 * T)
@@ -84,6 +86,24 @@ def test_compensation_takes_the_curve_out_and_refuses_to_extrapolate(model):
     assert np.isfinite(compensate(model, hot, extrapolate=True)["compensated_frequency_Hz"][0])
     with pytest.raises(InputError, match="already"):
         compensate(model, compensate(model, record))
+
+
+def test_a_frequency_model_needs_no_housing_sensor(model, tmp_path, capsys):
+    true = np.array([-10.0, 5.0, 25.0])
+    columns = {"time_s": np.arange(3.0), "frequency_Hz": evaluate(model, true) + 0.5}
+    f0 = model.part("frequency")["f0"]
+    for name in ("resonator_temperature_degC", "chamber_temperature_degC"):
+        out = compensate(model, Record(columns | {name: true}))
+        assert out["compensated_frequency_Hz"] == pytest.approx(f0 + 0.5, abs=1e-9)
+    # Without any thermometer the frequency is its own: its temperature is all that the model can say.
+    write_model(model, tmp_path / "m.toml")
+    write_record(Record(columns | {"frequency_Hz": evaluate(model, true)}), tmp_path / "run.csv")
+    words = ["compensate", str(tmp_path / "m.toml"), str(tmp_path / "run.csv"), "--out", str(tmp_path / "out.csv")]
+    assert main([*words, "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["added"] == ["resonator_temperature_degC"]
+    out = read_record(tmp_path / "out.csv")
+    assert out["resonator_temperature_degC"] == pytest.approx(true, abs=1e-6)
+    assert "compensated_frequency_Hz" not in out
 
 
 @pytest.mark.parametrize(

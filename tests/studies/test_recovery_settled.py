@@ -1,6 +1,7 @@
 """Soaks found in a record against the law of the device that made it."""
 
 import json
+import re
 
 import numpy as np
 import pytest
@@ -11,7 +12,9 @@ from studies.instrument.card import load_card
 from studies.record import Record, write_record
 from studies.settled import find_soaks
 from studies.simulation.chamber import load_profile
+from studies.simulation.heat_path import build_network
 from studies.simulation.virtual_gyro import simulate_run
+from thermal.relaxation import find_relaxation
 
 
 @pytest.fixture(scope="module")
@@ -37,6 +40,23 @@ def test_what_has_not_settled_is_no_soak(run):
         find_soaks([short], tolerance=0.0)
     with pytest.raises(InputError, match="frequency_Hz' is missing"):
         find_soaks([Record({"time_s": np.arange(100.0), "housing_temperature_degC": np.ones(100)})])
+
+
+def test_what_is_advised_settles(tmp_path, capsys):
+    card, path = load_card("hrg-30mm"), str(tmp_path / "run.csv")
+    record = simulate_run(card, load_profile("staircase -20 40 20 3h"), 1 / 30, 3).record
+    write_record(record, path)
+    assert main(["fit", "frequency", path, "--order", "2"]) == 2
+    says = r"time constant of (\d+) min that it shows, hold each temperature ([\d.]+) h"
+    advised = re.search(says, capsys.readouterr().err)
+    slowest = find_relaxation(build_network(card), 273.15).time_constants[0] / 60  # the coldest that moves
+    assert advised is not None
+    assert float(advised[1]) == pytest.approx(slowest, rel=0.15)
+    hours = float(advised[2])
+    longer = simulate_run(card, load_profile(f"staircase -20 40 20 {60 * hours:.0f}min"), 1 / 30, 4).record
+    assert [round(soak.temperature_degC) for soak in find_soaks([longer])] == [-20, 0, 20, 40]
+    shorter = simulate_run(card, load_profile(f"staircase -20 40 20 {60 * (hours - 0.7):.0f}min"), 1 / 30, 4).record
+    assert len(find_soaks([shorter])) < 4
 
 
 def test_the_command_takes_a_record(run, tmp_path, capsys):

@@ -4,16 +4,18 @@ The file has one part "frequency" (f0, a1, a2 …) and the setting `reference_te
 fit, widened by 5 % of its length on either side because readings scatter, as far as the curve does not turn round there.
 """
 
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from studies.errors import InputError
+from studies.errors import InputError, naming
 from studies.models.c_source import head, polynomial, self_test
 from studies.models.file import Model, ModelSource, make_part
 from studies.plausible import check_model_frequency
-from studies.record import COMPENSATED, Record
+from studies.record import COMPENSATED, RESONATOR, Record
+from studies.rest import TEMPERATURES
 
 if TYPE_CHECKING:
     from compensation.frequency import FrequencyFit
@@ -21,7 +23,6 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 VARIABLE = "temperature_degC"
 WIDENED = 0.05
-GRID = 2001
 
 
 def save_frequency(fit: "FrequencyFit", sources: tuple[ModelSource, ...], made_by: str) -> Model:
@@ -42,23 +43,22 @@ def save_frequency(fit: "FrequencyFit", sources: tuple[ModelSource, ...], made_b
 def compensate(model: Model, record: Record, *, extrapolate: bool) -> dict[str, Array]:
     """Take the fitted temperature dependence out of the frequency: f − (f(T) − f₀), T the housing's.
 
-    The curve is a settled one: while the housing's temperature moves, the resonator lags behind it and the
-    difference stays in the result.
+    Without a housing sensor T is the resonator's, where it is known, or the chamber's. Without any thermometer the frequency
+    is its own: nothing of it would be left but f₀, so that what is returned is the resonator's temperature, over which
+    the other outputs can be compensated. The curve is a settled one: while a housing's or chamber's temperature moves, the
+    resonator lags behind it and the difference stays in the result.
     """
     if model.compensates != "frequency_Hz":
         raise InputError(f"{model.path or 'model'}: a frequency model compensates frequency_Hz.")
-    if "housing_temperature_degC" not in record:
-        raise InputError(
-            "the column 'housing_temperature_degC' is missing; without it the frequency is its own thermometer:"
-            " 'hrg temperature MODEL RUN.csv --out FILE' turns it into the resonator's temperature, over which"
-            " 'hrg fit bias --over temperature' compensates the other outputs."
-        )
+    column = next((name for name in TEMPERATURES if name in record and np.isfinite(record[name]).any()), None)
+    if column is None:
+        return {RESONATOR: find_temperature(model, record["frequency_Hz"], record.path or "record")}
     if "frequency_Hz" in record and not extrapolate:
         ends = np.sort(evaluate(model, np.linspace(*model.range_of(VARIABLE), 201)))
         check_model_frequency(
             record["frequency_Hz"], ends[0], ends[-1], record.path or "record", model.path or "the model"
         )
-    T = record["housing_temperature_degC"]
+    T = record[column]
     model.check_range(VARIABLE, T, extrapolate)
     f0 = model.part("frequency").values[0]
     return {f"{COMPENSATED}frequency_Hz": record["frequency_Hz"] - (evaluate(model, T) - f0)}
@@ -78,32 +78,12 @@ def find_temperature(model: Model, frequency: Array, path: str = "record") -> Ar
     InputError
         The curve turns round within the model's range, or a frequency lies outside it.
     """
-    from scipy.optimize import elementwise
+    from compensation.frequency import invert
 
-    low, high = model.range_of(VARIABLE)
-    if not _is_monotonic(model):
-        raise InputError(
-            f"{model.path or 'model'}: the curve turns round between {low:g} and {high:g} °C, so two temperatures have"
-            " the same frequency there and it cannot be inverted; fit a narrower range of temperature or another order."
-        )
-    ends = np.sort(evaluate(model, np.array([low, high])))
-    check_model_frequency(frequency, float(ends[0]), float(ends[1]), path, model.path or "the model")
-    known = np.isfinite(frequency)
-    outside = known & ((frequency < ends[0]) | (frequency > ends[1]))
-    if np.any(outside):
-        raise InputError(
-            f"frequency_Hz runs from {np.nanmin(frequency):.8g} to {np.nanmax(frequency):.8g}, outside {ends[0]:.8g} to"
-            f" {ends[1]:.8g} ({low:g} to {high:g} °C) that the model was fitted to ({np.mean(outside):.1%} of the rows);"
-            " calibrate over that range."
-        )
-    found = np.full(frequency.shape, np.nan)
-    if np.any(known):
-
-        def excess(T: Array, f: Array) -> Array:
-            return evaluate(model, T) - f
-
-        found[known] = elementwise.find_root(excess, (low, high), args=(frequency[known],)).x
-    return found
+    low, high = np.sort(evaluate(model, np.array(model.range_of(VARIABLE))))
+    check_model_frequency(frequency, float(low), float(high), path, model.path or "the model")
+    with naming(model.path or "model"):
+        return invert(partial(evaluate, model), model.range_of(VARIABLE), frequency)
 
 
 def temperature_error(model: Model, temperature_degC: float) -> float:
@@ -162,9 +142,9 @@ def _test_rows(model: Model) -> list[tuple[float, ...]]:
 
 
 def _is_monotonic(model: Model) -> bool:
-    low, high = model.range_of(VARIABLE)
-    rise = np.diff(evaluate(model, np.linspace(low, high, GRID)))
-    return bool(np.all(rise > 0) or np.all(rise < 0))
+    from compensation.frequency import find_turn
+
+    return find_turn(partial(evaluate, model), model.range_of(VARIABLE)) is None
 
 
 def _widen(fit: "FrequencyFit") -> tuple[float, float]:
