@@ -189,9 +189,13 @@ def invert(curve: Callable[[Array], Array], span: tuple[float, float], frequency
             f" to {high:.8g} Hz ({span[0]:.1f} to {span[1]:.1f} °C), over which the curve was fitted, in"
             f" {np.mean(outside):.1%} of the readings; calibrate over that range."
         )
+
+    def excess(T: Array, f: Array) -> Array:
+        return curve(T) - f
+
     found = np.full(frequency.shape, np.nan)
     if np.any(known):
-        found[known] = elementwise.find_root(lambda T, f: curve(T) - f, span, args=(frequency[known],)).x
+        found[known] = elementwise.find_root(excess, span, args=(frequency[known],)).x
     return found
 
 
