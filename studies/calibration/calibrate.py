@@ -227,7 +227,7 @@ def _pose(
 
 
 def _calibrated(instrument: "Instrument", found: CardFit, estimates: Sequence[Estimate]) -> "Instrument":
-    """The card with posterior values, widths and correlations."""
+    """The card with posterior values, widths, correlations and intervals."""
     priors: Priors = found.problem.priors
     count = len(priors.values)
     moves = priors.slopes(found.point[:count])
@@ -240,7 +240,11 @@ def _calibrated(instrument: "Instrument", found: CardFit, estimates: Sequence[Es
         ends = {"low": prior.low if prior.low != 0.0 else -np.inf, "high": prior.high}
         hard = {name: end for name, end in ends.items() if np.isfinite(end)}
         values[one.parameter] = {"value": one.value, "sd": one.sd, **hard}
-    posterior = {"names": [one.parameter for one in estimates], "correlation": R.round(6).tolist()}
+    posterior = {
+        "names": [one.parameter for one in estimates],
+        "correlation": R.round(6).tolist(),
+        "interval": [[one.low, one.high] for one in estimates],
+    }
     return instrument.with_values(values).with_table("posterior", posterior)
 
 

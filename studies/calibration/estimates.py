@@ -6,13 +6,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from shell.errors import ShellError
-from studies.calibration.fit import CardFit, objective, whitened
+from studies.calibration.fit import CardFit, whitened
 from studies.calibration.priors import from_standard, to_standard
-from studies.calibration.valley import find_bend
+from studies.calibration.valley import find_bend, follow
 from studies.calibration.wave import Polar
-from studies.errors import InputError
-from thermal.errors import ThermalError
 
 if TYPE_CHECKING:
     from studies.instrument.uncertain import UncertainValue
@@ -22,7 +19,6 @@ NINETY = 1.6448536269514722
 NONLINEAR = ("thermal.", "noise.", "effect.", "resonator.")
 """Values whose intervals are looked at beyond the straight line."""
 BENT = 0.25  # relative departure of the objective at the ends of an interval from its parabola, beyond which it is profiled
-BENDS = 2  # corrections of the other values beside one that is held
 TOLD = 0.5  # posterior over prior width up to which the data has said what the value is
 SILENT = 0.95  # and from which it stayed at its prior
 INSEPARABLE = 0.9  # correlation, of two values that share what is known of them
@@ -143,29 +139,19 @@ def _profiled(fit: CardFit, k: int, J: Array, ends: tuple[float, float]) -> tupl
     row[:count] = priors.root[k]
     toward = fit.covariance @ row
     way = toward / np.sqrt(row @ toward)  # one standard deviation of value k
-    least = objective(problem, fit.state, fit.noise, fit.rows)
+    bend = np.zeros(problem.count)  # of the valley: the others at t are t² of it off the straight way
     limits = priors.values[k]
     lowest, highest = (to_standard(limits, end) for end in (limits.low, limits.high))
     centre = float(priors.standard(fit.point[:count])[k])
 
     def rise(t: float) -> float:
-        """Rise on the straight way; where it is more than a parabola's, the others follow the bent valley."""
-        point, lower = fit.point + t * way, np.inf
-        for _ in range(1 + BENDS):
-            try:
-                state = problem.evaluate(point, slopes=False)
-            except (InputError, ShellError, ThermalError):
-                break
-            reached = objective(problem, state, fit.noise, fit.rows) - least
-            if not reached < lower:
-                break
-            lower = reached
-            if lower < (1 + BENT) * t**2:
-                break
-            r = np.concatenate([fit.rows[n].whiten(state.residual[n], fit.noise[n]) for n in problem.responses])
-            free = fit.covariance @ (J.T @ r - point)
-            point = point + free - toward * float(row @ free) / float(row @ toward)
-        return lower
+        """Rise along the valley; a parabola's where it cannot be followed."""
+        nonlocal bend
+        point, risen = follow(fit, J, row, fit.point + t * way + t**2 * bend, (1 + BENT) * t**2)
+        if not np.isfinite(risen):
+            return t**2
+        bend = (point - fit.point - t * way) / t**2
+        return risen
 
     found, kind = [], "normal"
     for sign, end in zip((-1.0, 1.0), ends, strict=True):

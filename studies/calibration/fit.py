@@ -88,7 +88,7 @@ def fit(problem: CardProblem, start: Array | None = None, progress: Progress = l
         J, r = whitened(problem, state, noise, rows)
         # (JᵀJ + 1) Δ = Jᵀ r − u, not by its matrix: of sharp data against a wide prior that has no digits left
         both, target = np.vstack([J, np.eye(len(state.point))]), np.append(r, -state.point)
-        move = _step_within(both, target, *(end - state.point for end in problem.ends))
+        move = step_within(both, target, *(end - state.point for end in problem.ends))
         size = float(target @ target - np.sum((target - both @ move) ** 2))
         progress(f"step {step}: −2 ln L should fall by {size:.2g}")
         if size < CLOSE and step > 3:
@@ -106,7 +106,7 @@ def fit(problem: CardProblem, start: Array | None = None, progress: Progress = l
     return CardFit(problem, state, noise, rows, covariance, outliers, step, converged)
 
 
-def _step_within(both: Array, target: Array, low: Array, high: Array) -> Array:
+def step_within(both: Array, target: Array, low: Array, high: Array) -> Array:
     """Least squares of both · x = target; where x leaves its bounds it is held at them and the others are solved anew."""
     free = np.ones(both.shape[1], dtype=bool)
     x = np.zeros(len(free))

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shell.errors import ShellError
-from studies.calibration.fit import CardFit
+from studies.calibration.fit import LONGEST_STEP, CardFit, objective, step_within, whitened
 from studies.errors import InputError
 from thermal.errors import ThermalError
 
@@ -24,6 +24,9 @@ STRAIGHT = ("bias.", "loss.")
 """Values in which every response is a straight line."""
 UNKNOWN = 0.1  # variance that is left of a value, over its prior's, from which on the others may follow it in a curve
 REACH = 1.5  # standard deviations to both sides at which the curve is measured
+TURNS, FRESH = 8, 5  # steps to the bottom of a valley, and from which on slopes are taken anew
+NEAR = 0.1  # relative, of the objective: where the bottom of a valley is reached
+HELD = 1e6  # weight of a value that is held
 DRAWS = 20_000
 FIVE, NINETY_FIVE = 5.0, 95.0
 
@@ -90,15 +93,56 @@ def _follow(fit: CardFit, J: Array) -> tuple[Array, Array, Array]:
 
 def _curve(fit: CardFit, J: Array, row: Array, way: Array) -> Array:
     """Half the second derivative of the most probable point along a way, the value that it follows held; none where it ends."""
-    toward = fit.covariance @ row
     total = np.zeros(len(way))
     for t in (-REACH, REACH):
-        there = fit.point + t * way
-        try:
-            state = fit.problem.evaluate(there, slopes=False)
-        except (InputError, ShellError, ThermalError):
+        straight = fit.point + t * way
+        found, risen = follow(fit, J, row, straight, (1 + NEAR) * t**2)
+        if not np.isfinite(risen):
             return np.zeros(len(way))
-        r = np.concatenate([fit.rows[n].whiten(state.residual[n], fit.noise[n]) for n in fit.problem.responses])
-        moved = fit.covariance @ (J.T @ r - there) + t * way  # of a straight problem: nothing
-        total += moved - toward * float(row @ moved) / float(row @ toward)
+        total += found - straight
     return total / (2 * REACH**2)
+
+
+def follow(fit: CardFit, J: Array, row: Array, point: Array, enough: float) -> tuple[Array, float]:
+    """Go down to the bottom of a valley beside a point, one value held.
+
+    Gauss–Newton steps with the slopes of the fit, where they do not suffice with those of each point.
+
+    Parameters
+    ----------
+    J : array (M, p)
+        Slopes at the fit in rows whose noise is white.
+    row : array (p,)
+        What is held: row · point.
+    point : array (p,)
+    enough : float
+        Rise of the objective above the fit's at which the bottom is near.
+
+    Returns
+    -------
+    point, rise
+        The lowest point; the rise is infinite where the bottom is not found.
+    """
+    problem = fit.problem
+    least = objective(problem, fit.state, fit.noise, fit.rows)
+    point = np.clip(point, *problem.ends)
+    found, lower = point, np.inf
+    for turn in range(1 + TURNS):
+        try:
+            state = problem.evaluate(point, slopes=turn >= FRESH)
+        except (InputError, ShellError, ThermalError):
+            break
+        risen = objective(problem, state, fit.noise, fit.rows) - least
+        if risen < lower:
+            found, lower = point, risen
+        if lower < enough:
+            return found, lower
+        if turn >= FRESH:
+            J, _ = whitened(problem, state, fit.noise, fit.rows)
+        r = np.concatenate([fit.rows[n].whiten(state.residual[n], fit.noise[n]) for n in problem.responses])
+        both, target = np.vstack([J, np.eye(len(point)), HELD * row]), np.concatenate([r, -point, [0.0]])
+        move = step_within(both, target, *(end - point for end in problem.ends))
+        if turn >= FRESH and target @ target - np.sum((target - both @ move) ** 2) < NEAR * enough:
+            return found, lower
+        point = point + move / max(1.0, float(np.abs(move).max()) / LONGEST_STEP)
+    return found, np.inf

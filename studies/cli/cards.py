@@ -51,11 +51,16 @@ def _show_values(card: str) -> Answer:
 
     instrument = load_card(card)
     values, stated = instrument.uncertain, instrument.stated
+    intervals = instrument.part("posterior").intervals
     mass = weigh(instrument.resonator, instrument.material.elastic(instrument.reference_temperature).rho)
     yield {
         "schema": "hrg.card-values/1",
         "card": instrument.name,
-        "values": [{**asdict(one), "stated": one.name in stated} for one in values],
+        "values": [
+            {**asdict(one), "stated": one.name in stated}
+            | ({"interval": intervals[one.name]} if one.name in intervals else {})
+            for one in values
+        ],
         "correlations": [[*pair, correlation] for pair, correlation in instrument.correlation.items()],
         "mass_properties": asdict(mass),
     }
@@ -68,9 +73,12 @@ def _show_values(card: str) -> Answer:
     for one in values:
         table, key = one.name.split(".", 1)
         origin = "card" if one.name in stated else "default"
-        tables.setdefault(table, []).append([key, f"{one.value:.4g}", f"{one.sd:.2g}", origin])
+        row = [key, f"{one.value:.4g}", f"{one.sd:.2g}", origin]
+        if intervals:
+            row.append("{:.4g} to {:.4g}".format(*intervals[one.name]) if one.name in intervals else "")
+        tables.setdefault(table, []).append(row)
     for table, rows in tables.items():
-        print_table(f"[{table}]", ["Key", "Value", "±", "From"], rows)
+        print_table(f"[{table}]", ["Key", "Value", "±", "From", *(["90 %"] if intervals else [])], rows)
     return 0
 
 

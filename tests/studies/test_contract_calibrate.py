@@ -63,6 +63,25 @@ def test_tables_are_for_people(capsys):
     assert "Settled frequency" in out
 
 
+@pytest.mark.slow
+def test_a_saved_card_keeps_what_was_found_of_intervals(tmp_path, capsys):
+    """They need not be symmetric about the value, as value ± sd is."""
+    card = tmp_path / "calibrated.toml"
+    assert main(["calibrate", "hrg-30mm", "studies/papers/hrg_table1.csv", "--save", str(card), "--json"]) == 0
+    told = {one["parameter"]: one for one in json.loads(capsys.readouterr().out)["values"]}
+    assert main(["cards", str(card), "--json"]) == 0
+    kept = {one["name"]: one for one in json.loads(capsys.readouterr().out)["values"]}
+    assert {name: kept[name]["interval"] for name in told} == {name: [v["low"], v["high"]] for name, v in told.items()}
+    q = kept["loss.inverse_q"]
+    assert q["interval"][1] - q["value"] > 1.2 * (q["value"] - q["interval"][0])  # its logarithm is normal
+    assert main(["cards", str(card)]) == 0
+    assert "90 %" in capsys.readouterr().out
+    broken = card.read_text(encoding="utf-8").replace("interval = [", "interval = [[1.0, 0.0],", 1)
+    card.write_text(broken, encoding="utf-8")
+    assert main(["modes", str(card)]) == 2
+    assert "interval must be" in capsys.readouterr().err
+
+
 def test_every_response_has_a_name_and_a_unit_for_people():
     assert set(NAMES) == set(SHOWN) == set(UNITS)
     known = {"Hz": "mHz", "K": "mK", "V": "mV", "1": "ppb", "°/h": "°/h"}

@@ -61,6 +61,7 @@ class Banana:
     count: int = 2
     sd: float = 0.5
     bend: float = 0.2
+    ends: tuple[np.ndarray, np.ndarray] = (np.full(2, -np.inf), np.full(2, np.inf))
 
     def evaluate(self, u, slopes=True):
         rest = np.array([-u[0] / self.sd, -(u[1] - self.bend * u[0] ** 2) / (0.01 * self.sd)])

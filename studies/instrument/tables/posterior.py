@@ -3,6 +3,10 @@
 [posterior]
 names = ["thermal.mount_conductance_W_per_K", "thermal.base_heat_capacity_J_per_K"]   # keys of the card with an uncertainty
 correlation = [[1.0, 0.9], [0.9, 1.0]]                                                # of their normal coordinates
+interval = [[0.0101, 0.0123], [0.24, 0.31]]                                           # 90 %, in the unit of each key
+
+A value's own sd and the correlations hold together near the most probable card: they are what a prediction's spread follows from.
+Where the likelihood is bent the interval is not symmetric about the value, and may be many times as wide as that sd.
 """
 
 from studies.instrument.keys import Keys
@@ -14,6 +18,7 @@ class Correlations(Keys, frozen=True, kw_only=True):
 
     names: tuple[str, ...] = ()
     correlation: tuple[tuple[float, ...], ...] = ()
+    interval: tuple[tuple[float, float], ...] = ()
     note: str = ""
 
     def __post_init__(self) -> None:
@@ -22,6 +27,13 @@ class Correlations(Keys, frozen=True, kw_only=True):
             raise ValueError(f"correlation must be a square table of {count} by {count} numbers, one for each name.")
         if any(not -1.0 <= rho <= 1.0 for row in self.correlation for rho in row):
             raise ValueError("correlation must hold numbers from -1 to 1.")
+        if len(self.interval) not in (0, count) or any(not low <= high for low, high in self.interval):
+            raise ValueError(f"interval must be {count} pairs of numbers [low, high], one for each name.")
+
+    @property
+    def intervals(self) -> dict[str, tuple[float, float]]:
+        """90 % intervals by name; none where the card does not say them."""
+        return dict(zip(self.names, self.interval, strict=False))
 
     @property
     def pairs(self) -> dict[tuple[str, str], float]:
