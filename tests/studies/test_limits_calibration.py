@@ -71,10 +71,10 @@ class Banana:
 
 def fitted(problem):
     """Return the fit of a problem at its most probable point, 0."""
-    state = problem.evaluate(np.zeros(2))
+    state = problem.evaluate(np.zeros(problem.count))
     rows = {"y": SimpleNamespace(whiten=lambda columns, noise: columns)}
     J, _ = whitened(problem, state, {"y": None}, rows)
-    return CardFit(problem, state, {"y": None}, rows, np.linalg.inv(J.T @ J + np.eye(2)), {}, 1, True)
+    return CardFit(problem, state, {"y": None}, rows, np.linalg.inv(J.T @ J + np.eye(problem.count)), {}, 1, True)
 
 
 def test_an_interval_follows_a_bent_valley():
@@ -86,6 +86,42 @@ def test_an_interval_follows_a_bent_valley():
     assert (found.low, found.high) == pytest.approx((-half, half), rel=0.12)
     straight = problem.evaluate(np.array([half, 0.0])).residual["y"][1] ** 2
     assert straight > 100
+
+
+@dataclass(frozen=True)
+class Steep(Banana):
+    """The same, but the data see sinh 15 (u₁ − c u₀²): two steps with the slopes at 0 do not reach the valley's floor."""
+
+    def evaluate(self, u, slopes=True):
+        off, by = 15 * (u[1] - self.bend * u[0] ** 2), 15 * 0.01 * self.sd
+        slope = np.array([[1 / self.sd, 0.0], 15 * np.cosh(off) / by * np.array([-2 * self.bend * u[0], 1.0])])
+        return State(u, {"y": np.array([-u[0] / self.sd, -np.sinh(off) / by])}, {"y": slope})
+
+
+def test_an_interval_is_not_narrowed_by_a_floor_that_is_hard_to_reach():
+    values = tuple(UncertainValue(f"thermal.{name}", 0.0, 1.0, -np.inf, np.inf) for name in "ab")
+    found = estimate(fitted(Steep(Priors(values, np.eye(2)))))[0]
+    half = NINETY / np.sqrt(1 / Banana.sd**2 + 1)
+    assert (found.low, found.high) == pytest.approx((-half, half), rel=0.12)
+
+
+@dataclass(frozen=True)
+class Stopped(Banana):
+    """Of u₀ the data say nothing; u₁ is u₂, which they would have at 1, but which may not exceed 0."""
+
+    count: int = 3
+    ends: tuple[np.ndarray, np.ndarray] = (np.full(3, -np.inf), np.array([np.inf, np.inf, 0.0]))
+
+    def evaluate(self, u, slopes=True):
+        rest = np.array([(u[2] - u[1]) / 0.1, (1.0 - u[2]) / 0.1])
+        return State(u, {"y": rest}, {"y": np.array([[0.0, 1.0, -1.0], [0.0, 0.0, 1.0]]) / 0.1})
+
+
+def test_what_a_bound_holds_back_bends_no_interval():
+    values = tuple(UncertainValue(f"material.{name}", 0.0, 1.0, -np.inf, np.inf) for name in "ab")
+    for one in estimate(fitted(Stopped(Priors(values, np.eye(2))))):
+        assert one.interval == "normal"
+        assert one.low == pytest.approx(-one.high, rel=1e-6)
 
 
 @dataclass(frozen=True)
