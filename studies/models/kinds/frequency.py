@@ -82,7 +82,7 @@ def find_temperature(model: Model, frequency: Array, path: str = "record") -> Ar
 
     low, high = np.sort(evaluate(model, np.array(model.range_of(VARIABLE))))
     check_model_frequency(frequency, float(low), float(high), path, model.path or "the model")
-    with naming(model.path or "model"):
+    with naming(f"{path} with {model.path or 'model'}"):
         return invert(partial(evaluate, model), model.range_of(VARIABLE), frequency)
 
 
