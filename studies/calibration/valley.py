@@ -26,6 +26,7 @@ UNKNOWN = 0.1  # variance that is left of a value, over its prior's, from which 
 REACH = 1.5  # standard deviations to both sides at which the curve is measured
 TURNS, FRESH = 8, 5  # steps to the bottom of a valley, and from which on slopes are taken anew
 NEAR = 0.1  # relative, of the objective: where the bottom of a valley is reached
+FAR = 30.0  # of what is enough: where steps with the slopes of the fit have not come closer, others hardly do
 HELD = 1e6  # weight of a value that is held
 DRAWS = 20_000
 FIVE, NINETY_FIVE = 5.0, 95.0
@@ -137,6 +138,8 @@ def follow(fit: CardFit, J: Array, row: Array, point: Array, enough: float) -> t
             found, lower = point, risen
         if lower < enough:
             return found, lower
+        if turn >= FRESH and lower > FAR * enough:
+            break
         if turn >= FRESH:
             J, _ = whitened(problem, state, fit.noise, fit.rows)
         r = np.concatenate([fit.rows[n].whiten(state.residual[n], fit.noise[n]) for n in problem.responses])
