@@ -25,7 +25,7 @@ def _evaluate(case: Case, options: Options) -> tuple[Number, ...]:
 
 QUANTITY = Quantity(
     "frequency",
-    "Frequency of a mode.",
+    "Frequency of a mode; without the stress of a [mount], which is in `tcf`.",
     {"harmonic": HARMONIC, "index": INDEX, "theory": THEORY, "temperature_degC": TEMPERATURE},
     _columns,
     _evaluate,
