@@ -97,9 +97,8 @@ def compensate(
     for name, facts in columns.items():
         from_what = "" if facts["stability_before"] is None else f"{facts['stability_before']:.4g} → "
         unit = "" if unit_of(name) == "1" else f" {unit_of(name)}"
-        print(
-            f"{out}: {name}; standard deviation of {AVERAGE:g} s averages {from_what}{facts['stability_after']:.4g}{unit}"
-        )
+        figure = "too few rows for it" if facts["stability_after"] is None else f"{facts['stability_after']:.4g}{unit}"
+        print(f"{out}: {name}; standard deviation of {AVERAGE:g} s averages: {from_what}{figure}")
         if facts["rows_not_compensated"]:
             print(
                 f"{facts['rows_not_compensated']} rows stay empty: an input is missing there, or too few samples for its rate"
@@ -107,8 +106,12 @@ def compensate(
             )
 
 
-def _stability(time: "NDArray[np.float64]", values: "NDArray[np.float64]") -> float:
-    """Return the standard deviation of block averages; missing values are left out."""
+def _stability(time: "NDArray[np.float64]", values: "NDArray[np.float64]") -> float | None:
+    """Return the standard deviation of block averages, missing values left out; None of too few rows."""
     from compensation.decimation import average_blocks
+    from compensation.errors import CompensationError
 
-    return float(average_blocks(time, {"output": values}, AVERAGE).columns["output"].std())
+    try:
+        return float(average_blocks(time, {"output": values}, AVERAGE).columns["output"].std())
+    except CompensationError:
+        return None

@@ -106,6 +106,19 @@ def test_a_frequency_model_needs_no_housing_sensor(model, tmp_path, capsys):
     assert "compensated_frequency_Hz" not in out
 
 
+def test_a_record_too_short_for_its_stability_is_compensated_all_the_same(model, tmp_path, capsys):
+    housing = np.array([-10.0, 5.0, 25.0])
+    columns = {"time_s": np.arange(3.0), "housing_temperature_degC": housing, "frequency_Hz": evaluate(model, housing)}
+    write_model(model, tmp_path / "m.toml")
+    write_record(Record(columns), tmp_path / "run.csv")
+    words = ["compensate", str(tmp_path / "m.toml"), str(tmp_path / "run.csv"), "--out", str(tmp_path / "out.csv")]
+    assert main(words) == 0
+    assert "too few rows" in capsys.readouterr().out
+    assert main([*words, "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["columns"]["compensated_frequency_Hz"]["stability_after"] is None
+    assert read_record(tmp_path / "out.csv")["compensated_frequency_Hz"] == pytest.approx(model.part("frequency")["f0"])
+
+
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
