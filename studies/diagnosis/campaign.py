@@ -1,7 +1,7 @@
 """A campaign: several records of one gyro, checked, freed of outliers and put on one even time grid."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,6 +10,7 @@ from scipy.constants import zero_Celsius
 from compensation.spikes import find_spikes
 from studies.diagnosis.checks import FEWEST_BINS, check_device, check_units
 from studies.diagnosis.response import RESPONSES
+from studies.diagnosis.steps import Steps
 from studies.effects.states import FloatArray, States, average
 from studies.errors import InputError
 from studies.record import Record, place_in_time
@@ -22,12 +23,6 @@ FINEST = 20
 LONGEST_GAP = 900.0
 UNKNOWN_HEAT = 50.0
 """Area between temperature and line, K s, that a gap may hide: 50 mK of the resonator at a time constant of 1000 s."""
-HOLE = 2.0
-"""Steps of the grid between neighbours, in parts of the usual, that make a hole."""
-SEVERAL = 5
-"""Rows from which on a step has a slope of its own."""
-ASIDE = 0.02
-"""Part of a step by which the rows of a step beside a hole may lie off its centre."""
 
 
 @dataclass(frozen=True)
@@ -48,6 +43,8 @@ class Run:
         The record's own rows, outliers as NaN.
     clock_error : (N,) array or None
         Frequency by the gyro's clock minus that by a reference clock, where both were recorded, Hz.
+    steps : Steps
+        Which rows make which step of the coarse grid.
     """
 
     record: int
@@ -57,7 +54,17 @@ class Run:
     responses: dict[str, FloatArray]
     row_time: FloatArray
     row_responses: dict[str, FloatArray]
+    steps: Steps
     clock_error: FloatArray | None = None
+
+    def without_rows(self, column: str, outlying: "np.ndarray") -> "Run":
+        """Return the run without some of the rows of a response."""
+        rows = np.where(outlying, np.nan, self.row_responses[column])
+        return replace(
+            self,
+            responses=self.responses | {column: self.steps.means(rows)},
+            row_responses=self.row_responses | {column: rows},
+        )
 
 
 @dataclass(frozen=True)
@@ -86,6 +93,29 @@ class Campaign:
         """Numbers of the records, each once."""
         return tuple(dict.fromkeys(run.record for run in self.runs))
 
+    @property
+    def said(self) -> tuple[str, ...]:
+        """The notes, and how many values were left out."""
+        if not self.outliers:
+            return self.notes
+        one = self.outliers == 1
+        return (
+            "1 outlying value was left out." if one else f"{self.outliers} outlying values were left out.",
+            *self.notes,
+        )
+
+    def without_spikes(self, column: str, rests: Sequence[FloatArray]) -> "Campaign":
+        """Leave out the rows of a response that stand out from what a model leaves, run by run.
+
+        Before there was a model, a bend of the temperature or an uneven clock of the logger may have hidden them.
+        """
+        spikes = [find_spikes(rest) for rest in rests]
+        count = sum(int(own.sum()) for own in spikes)
+        if not count:
+            return self
+        runs = [run.without_rows(column, own) if own.any() else run for run, own in zip(self.runs, spikes, strict=True)]
+        return replace(self, runs=tuple(runs), outliers=self.outliers + count)
+
 
 def load_campaign(records: Sequence[Record], reference_degC: float | None = None) -> Campaign:
     """Check several records of one gyro and put them on one even grid.
@@ -104,10 +134,6 @@ def load_campaign(records: Sequence[Record], reference_degC: float | None = None
     check_units(records, tables)
     check_device(records, tables)
     outliers = sum(_remove_outliers(table) for table in tables)
-    if outliers:
-        notes.append(
-            "1 outlying value was left out." if outliers == 1 else f"{outliers} outlying values were left out."
-        )
     responses, skipped = _usable_responses(records, tables)
     offsets, timed = place_in_time(records)
     if not timed and len(records) > 1:
@@ -168,8 +194,6 @@ def _reading_noise(temperature: FloatArray) -> float:
 
 
 def _without(run: Run, drive: str) -> Run:
-    from dataclasses import replace
-
     return replace(run, states=replace(run.states, **{drive: None}))  # type: ignore[arg-type]
 
 
@@ -308,68 +332,22 @@ def _grid_run(
     coarse = average(fine, group)
     if coarse.size < 5 or time.size < 6:
         return None
-    whole = slot < coarse.size * group
-    rows = {key: column[whole] for key, column in table.items()}
-
-    def binned(column: FloatArray) -> FloatArray:
-        means = _bin(column, rows["time_s"], slot[whole] // group, coarse)
-        if fine.size == coarse.size * group:
-            means[-1] = np.nan  # this bin holds the moment beyond the last row
-        return means
-
+    commands = [table[name] for name in COMMANDS if name in table]
+    steps = Steps.of(time, slot // group, coarse, fine.size == coarse.size * group, commands)
     clock_error = None
-    if "reference_frequency_Hz" in rows and "frequency_Hz" in rows:
-        clock_error = binned(rows["frequency_Hz"] - rows["reference_frequency_Hz"])
+    if "reference_frequency_Hz" in table and "frequency_Hz" in table:
+        clock_error = steps.means(table["frequency_Hz"] - table["reference_frequency_Hz"])
     return Run(
         record,
         label,
         _states(run, fine, offset, reference, table),
         coarse,
-        {name: binned(rows[name]) if name in rows else np.full(coarse.size, np.nan) for name in responses},
+        {name: steps.means(table[name]) if name in table else np.full(coarse.size, np.nan) for name in responses},
         time,
         {name: table.get(name, np.full(time.shape, np.nan)) for name in responses},
+        steps,
         clock_error,
     )
-
-
-def _bin(column: FloatArray, time: FloatArray, slot: np.ndarray, grid: FloatArray) -> FloatArray:
-    """Mean over each step of the grid, moved along the slope from the rows' mean time to the centre.
-
-    A row stands for the time up to halfway to the next ones, so that missing and uneven rows do not bend it. The slope is
-    that of the step's own rows where they are several, else that between its neighbours. A step beside a hole stands only if
-    its rows are centred.
-    """
-    present = np.isfinite(column)
-    t, y, place = time[present], column[present], slot[present]
-    count = np.bincount(place, minlength=grid.size)
-    full = count >= max(1.0, 0.34 * float(np.median(count[count > 0]))) if count.any() else count > 0
-    half, between = 0.5 * (grid[1] - grid[0]), 0.5 * (t[1:] + t[:-1])
-    begin = np.maximum(grid[place] - half, np.append(-np.inf, between))
-    own = np.maximum(np.minimum(grid[place] + half, np.append(between, np.inf)) - begin, 1e-9 * half)
-
-    def total(values: FloatArray) -> FloatArray:
-        return np.asarray(np.bincount(place, own * values, grid.size), dtype=float)
-
-    with np.errstate(invalid="ignore", divide="ignore"):
-        weight = total(np.ones_like(t))
-        mean = total(y) / weight
-        lead = total(t) / weight - grid
-        off = t - (grid + lead)[place]
-        along = total(off * y) / total(off**2)
-    mean[~full] = np.nan
-    known = np.flatnonzero(full)
-    if known.size < 2:
-        return np.asarray(mean)
-    gap = np.diff(known)
-    slopes = np.diff(mean[known]) / np.diff((grid + lead)[known])
-    slopes[gap > HOLE * np.median(gap)] = np.nan
-    around = np.stack([np.append(np.nan, slopes), np.append(slopes, np.nan)])
-    stands = np.isfinite(around).all(axis=0) | (np.abs(lead[known]) <= ASIDE * (grid[1] - grid[0]))
-    there = np.isfinite(around)
-    slope = np.where(there, around, 0.0).sum(axis=0) / np.maximum(there.sum(axis=0), 1)
-    slope = np.where(count[known] >= SEVERAL, along[known], slope)
-    mean[known] = np.where(stands, mean[known] - slope * lead[known], np.nan)
-    return np.asarray(mean)
 
 
 def _between(grid: FloatArray, time: FloatArray, values: FloatArray) -> FloatArray:

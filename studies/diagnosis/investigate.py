@@ -106,6 +106,9 @@ def investigate(
             )
             campaign = campaign if clock is None else without_rate_terms(campaign, clock)
         plain = begin(campaign, column, thermometer, make)
+        cleaned = campaign.without_spikes(column, held_out.residuals(plain, campaign))
+        if cleaned is not campaign:
+            campaign, plain = cleaned, begin(cleaned, column, thermometer, make)
         inquiries[column] = inquire(campaign, plain, effects, score_held_out)
         if RESPONSES[column].thermometer:
             thermometer = read_thermometer(campaign, inquiries[column].final)
@@ -124,7 +127,7 @@ def investigate(
     for column, reason in campaign.skipped.items():
         results[column] = _too_little(reason)
     verdict = overall([result.verdict for result in results.values()])
-    found = Verdict(verdict, causes, results, None, campaign.notes, calibration=shifts)
+    found = Verdict(verdict, causes, results, None, campaign.said, calibration=shifts)
     if advise:
         tell("next run")
         text, run = suggest_next(campaign, found, inquiries, chamber)

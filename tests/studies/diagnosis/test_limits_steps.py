@@ -1,0 +1,64 @@
+"""Limits: a step of the grid stands for its mean only, and rows that a bend or an uneven clock hid are left out."""
+
+import numpy as np
+
+from studies.diagnosis.campaign import load_campaign
+from studies.diagnosis.held_out import residuals
+from studies.diagnosis.inquiry import begin
+from studies.diagnosis.steps import Steps
+from studies.record import Record
+
+TIME = np.arange(0.0, 4800.0, 10.0)
+GRID = np.arange(115.0, 4800.0, 240.0)
+PLACE = (TIME // 240.0).astype(int)
+
+
+def curve(time):
+    """A parabola: its mean over a step is known, and its slope is not that of its parts."""
+    return 1e-4 * (time - 2000.0) ** 2
+
+
+def mean(grid):
+    """Its mean over the rows of whole steps."""
+    return curve(grid) + 1e-4 * (240.0**2 - 10.0**2) / 12.0
+
+
+def test_a_step_without_its_rows_is_no_mean():
+    """Of a bend only the first half of a step is known: its own slope leads astray, so that the step is missing."""
+    steps = Steps.of(TIME, PLACE, GRID, False, ())
+    whole = steps.means(curve(TIME))
+    assert np.allclose(whole, mean(GRID), rtol=0.0, atol=0.05)
+    values = np.where((TIME >= 2000.0) & (TIME < 2160.0), np.nan, curve(TIME))
+    found = steps.means(values)
+    assert np.isnan(found[8])
+    assert np.array_equal(np.delete(found, 8), np.delete(whole, 8))
+
+
+def test_a_step_that_lacks_rows_while_a_command_changes_is_no_mean():
+    """The loop loses its hold in the seconds in which the voltage steps: what is left is no mean over before and after."""
+    volts = np.where(TIME < 1000.0, 40.0, 60.0)
+    values = np.where(np.abs(TIME - 1000.0) <= 10.0, np.nan, 0.1 * volts)
+    steps = Steps.of(TIME, PLACE, GRID, False, (volts,))
+    assert steps.switched.tolist() == [4]
+    assert np.flatnonzero(np.isnan(steps.means(values))).tolist() == [4]
+    assert not np.isnan(steps.means(0.1 * volts)).any()  # with all its rows it is one
+
+
+def test_outlying_rows_hide_neither_behind_a_bend_nor_behind_an_uneven_clock():
+    """Rows a minute apart of a fast cycle, in uneven moments: only beside a model do 20 σ stand out."""
+    rng = np.random.default_rng(11)
+    time = np.arange(0.0, 30000.0, 60.0)
+    time[1:] += rng.uniform(-12.0, 12.0, time.size - 1)
+    housing = 20.0 + 30.0 * np.sin(2 * np.pi * time / 7000.0)
+    sigma = 5e-3
+    frequency = 4432.0 + 0.36 * (housing - 20.0) + sigma * rng.standard_normal(time.size)
+    places = [100, 233, 371]
+    frequency[places] += 20.0 * sigma * np.array([1.0, -1.0, 1.0])
+    columns = {"time_s": time, "housing_temperature_degC": housing, "frequency_Hz": frequency}
+    campaign = load_campaign([Record(columns)])
+    assert np.isfinite(campaign.runs[0].row_responses["frequency_Hz"][places]).any()
+    cleaned = campaign.without_spikes("frequency_Hz", residuals(begin(campaign, "frequency_Hz", None), campaign))
+    left_out = np.flatnonzero(np.isnan(cleaned.runs[0].row_responses["frequency_Hz"]))
+    assert left_out.tolist() == places
+    assert cleaned.outliers == len(places)
+    assert cleaned.said[0].startswith("3 outlying")
