@@ -17,6 +17,8 @@ FEW = 40
 LEADING, WIDTH = 0.4, 4
 """Of others the columns whose prior is at least this part of the widest, and at most so many beside the widest."""
 BLOCK = 4000
+HILLS, NEARLY = 0.2, 5.0
+"""Part of the best evidence, and log evidence beside it, by which another hill of shapes may seem lower before it is climbed."""
 VARIES = 1e-3
 """Relative change from which on a drive varies."""
 
@@ -113,11 +115,15 @@ def build_bank(model: Fit, effects: Sequence[Effect]) -> Bank:
 
 @dataclass(frozen=True)
 class Seen:
-    """What a scan sees of one effect: its log evidence over all shapes, the best shape, and what the choice costs."""
+    """What a scan sees of one effect: its log evidence over all shapes, the best shape, and what the choice costs.
+
+    `other` is the best shape that lies apart from it in every parameter, where its evidence is near: the top of another hill.
+    """
 
     term: Term
     gain: float
     best: float
+    other: Term | None = None
 
     @property
     def choice(self) -> float:
@@ -139,9 +145,23 @@ def scan(model: Fit, bank: Bank, models: int = 5) -> list[Seen]:
     for name in dict.fromkeys(names.tolist()):
         own = np.flatnonzero(names == name)
         best = own[int(np.argmax(gain[own]))]
+        if not np.isfinite(gain[best]):
+            continue  # of the wrong sign in every shape
         total = float(logsumexp(gain[own]) - np.log(own.size))
-        out.append(Seen(bank.terms[best], total, float(gain[best])))
+        out.append(Seen(bank.terms[best], total, float(gain[best]), _other_hill(bank, gain, own, int(best))))
     return sorted(out, key=lambda seen: -seen.gain)
+
+
+def _other_hill(bank: Bank, gain: FloatArray, own: "np.ndarray", best: int) -> Term | None:
+    """Return the best of the shapes that differ from the best one in every one of several free parameters; None if far below."""
+    free = [k for k, parameter in enumerate(bank.terms[best].effect.shape) if not parameter.steady]
+    if len(free) < 2:
+        return None
+    shapes = np.array([bank.terms[k].shape for k in own])[:, free]
+    apart = own[np.all(shapes != np.array(bank.terms[best].shape)[free], axis=1)]
+    if not apart.size or gain[apart].max() < (1.0 - HILLS) * gain[best] - NEARLY:
+        return None
+    return bank.terms[int(apart[np.argmax(gain[apart])])]
 
 
 def _noise_models(by_noise: FloatArray, count: int) -> list[tuple[int, int]]:
@@ -203,5 +223,7 @@ def _gains(model: Fit, bank: Bank, kind: int, share: int) -> FloatArray:
             determinant = 0.5 * np.log1p(size * values).sum(axis=-1)
             explained = (size * along[None] ** 2 / (1.0 + size * values)).sum(axis=-1)
             gains = -determinant - 0.5 * freedom * np.log(np.maximum(1.0 - explained / least, 1e-12))
-            out[group.terms[place]] = logsumexp(gains, axis=0) - np.log(SCALES.size)
+            first = (vectors[:, 0] * along / (1.0 + values[0])).sum(axis=-1)
+            wrong = np.array([bank.terms[k].effect.positive for k in group.terms[place]]) & (first < 0.0)
+            out[group.terms[place]] = np.where(wrong, -np.inf, logsumexp(gains, axis=0) - np.log(SCALES.size))
     return out

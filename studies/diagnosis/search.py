@@ -102,7 +102,8 @@ def polish(base: Hypothesis, seen: Seen) -> Hypothesis:
     """Add an effect and move its shape to where the evidence is largest; forms of one effect are compared where each is best."""
     price = CONSTANTS["log_prior_effect"] + seen.choice
     forms = []
-    for term in nearer(base.fit, seen.term):
+    tops = [seen.term] if seen.other is None else [seen.term, seen.other]
+    for term in (near for top in tops for near in nearer(base.fit, top)):
         model = fit(base.fit.problem, base.fit.moved(), (*base.fit.terms, term), 2, _sizes(base.fit))
         forms.append(refine(model, len(model.terms) - 1))
     return Hypothesis(max(forms, key=lambda f: f.log_evidence), (*base.price, price))
