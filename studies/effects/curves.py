@@ -4,7 +4,8 @@ import numpy as np
 
 from studies.effects.states import FloatArray
 
-ORDERS = 9
+ORDERS = 12
+"""A knee of a tenth of the range is followed, fringes of a sixth of it are not."""
 
 
 def waves(x: FloatArray, low: float, high: float, orders: int = ORDERS) -> FloatArray:

@@ -12,7 +12,7 @@ def columns(states: States, shape: Shape, response: str) -> FloatArray:
     """Static terms x³ … x⁶ of the frequency, x = T_r − T₀ in units of 10 K, and smooth waves over the covered range."""
     x = states.excess / 10.0
     powers = np.stack([x**order for order in range(3, 7)], axis=1)
-    return np.concatenate([powers, waves(states.resonator - zero_Celsius, shape[0], shape[1])], axis=1)
+    return np.concatenate([powers, waves(states.resonator - zero_Celsius, shape[0], shape[1], FINE)], axis=1)
 
 
 def grid(span: Span, response: str) -> list[tuple[float, ...]]:
@@ -25,6 +25,10 @@ def steady(x: FloatArray, shape: Shape) -> FloatArray:
     return np.stack([(x / 10.0) ** power for power in range(3, int(shape[0]) + 1)], axis=1)
 
 
+FINE = 20
+"""Half waves over the range: a frequency is measured so finely that a knee of a twentieth of it shows."""
+
+
 EFFECT = Effect(
     name="curvature",
     summary="the frequency has a static dependence on temperature beyond the second order",
@@ -35,7 +39,7 @@ EFFECT = Effect(
         Coefficient("quartic_{unit}_per_10K4", (0.3,)),
         Coefficient("quintic_{unit}_per_10K5", (0.1,)),
         Coefficient("sextic_{unit}_per_10K6", (0.03,)),
-        Coefficient("waves_{unit}", smoothness(5.0)),
+        Coefficient("waves_{unit}", smoothness(5.0, FINE)),
     ),
     columns=columns,
     grid=grid,

@@ -132,6 +132,19 @@ def test_leak_is_the_gas_of_the_cards_budget(card):
     assert gas == pytest.approx(change, rel=2e-3)
 
 
+def test_a_leak_fills_up():
+    """p = τ (1 − e^(−t/τ)) at a constant temperature: after ln 2 of τ half of what the first rate would bring in τ; τ → ∞: t."""
+    tau = 4.0e6
+    still = np.full_like(TIME, 293.15)
+    aged = States(0, TIME, np.full_like(TIME, tau * np.log(2.0)), still, still, 1000.0, 293.15)
+    sized = {"temperature_exponent": 0.5, "growth_1_per_day": 1e-9}
+    _, half = apply_effect("leak", {**sized, "filling_s": tau}, aged)
+    _, never = apply_effect("leak", sized, aged)
+    _, late = apply_effect("leak", {**sized, "filling_s": 1e12}, aged)
+    assert half == pytest.approx(0.5 * 1e-9 * tau / 86400.0, rel=1e-12)
+    assert late == pytest.approx(never, rel=1e-5)
+
+
 def test_cross_damping_goes_through_the_papers_filter():
     """ζ₁₂(T) of eq. (10) through eq. (9), whose time constant is 1/(kζ) and whose gain is 2k/g₂."""
     k, zeta, quartic, quintic = 50.0, 4e-4, 3e-7, -1e-8
