@@ -14,15 +14,17 @@ if TYPE_CHECKING:
     from studies.simulation.drive import Drive
 
 Array = NDArray[np.float64]
+BIAS = "bias_deg_per_h"
 
 
 def spread_of_prediction(
     instrument: "Instrument", drive: "Drive", law: "FrequencyLaw | None" = None
 ) -> dict[str, Array]:
-    """Return the standard deviation of every column of a predicted run at its rows: √diag(J C Jᵀ), without any noise.
+    """Return the standard deviation of every column of a predicted run at its rows: √diag(J C Jᵀ), without noise within it.
 
     C is the covariance of the card's uncertain values, correlations included: the prior of a card as shipped, the posterior
-    of a calibrated one. No calibration predicts a run more closely than this, beside the noise of that run.
+    of a calibrated one. What the card says of the bias from turn-on to turn-on is part of it. No calibration predicts a run
+    more closely than this, beside the noise of that run.
 
     Parameters
     ----------
@@ -45,4 +47,5 @@ def spread_of_prediction(
         for k, name in enumerate(priors.names):
             J[:, k] = found.derivatives[name][column]
         spread[column] = np.asarray(np.linalg.norm(J @ scale, axis=1))
+    spread[BIAS] = np.hypot(spread[BIAS], instrument.noise.bias_turn_on_deg_per_h)
     return spread

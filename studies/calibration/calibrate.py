@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import block_diag
 
+from studies.calibration.ahead import BIAS
 from studies.calibration.estimates import SILENT, Estimate, estimate, find_groups
 from studies.calibration.fit import CardFit, fit, whitened
 from studies.calibration.observed import HOUSING, QUADRATURE, RESPONSES, SETTLED, ObservedRun, SettledTable, observe
@@ -245,7 +246,16 @@ def _calibrated(instrument: "Instrument", found: CardFit, estimates: Sequence[Es
         "correlation": R.round(6).tolist(),
         "interval": [[one.low, one.high] for one in estimates],
     }
-    return instrument.with_values(values).with_table("posterior", posterior)
+    return instrument.with_values(values | _turn_on(found)).with_table("posterior", posterior)
+
+
+def _turn_on(found: CardFit) -> dict[str, float]:
+    """What the runs show of the bias from turn-on to turn-on, where that is more than the noise within them makes of a mean."""
+    if BIAS not in found.noise or len(found.problem.rows[BIAS].times) < 2:
+        return {}
+    offset = found.noise[BIAS].offset
+    stated = found.problem.instrument.noise.bias_turn_on_deg_per_h > 0
+    return {"noise.bias_turn_on_deg_per_h": offset} if stated or offset > _usual_mean(found, BIAS) else {}
 
 
 def _ladder(found: CardFit) -> dict[str, Rung]:

@@ -141,7 +141,7 @@ def _noise(problem: CardProblem, rows: NoiseRows, state: State, name: str, near:
 
 
 def stated_noise(noise: "NoiseKeys", response: str) -> Noise | None:
-    """Slow levels of a response as a card's `[noise]` states them; None where it says nothing of them.
+    """Slow levels and offset of a response as a card's `[noise]` states them; None where it says nothing of them.
 
     1/f noise of Allan deviation a, S = h/f, a² = 2 ln 2 · h, has the variance h ln 4 = a² per factor of 4 in time: one of
     the exponentials of which `flicker` is the mean.
@@ -150,7 +150,8 @@ def stated_noise(noise: "NoiseKeys", response: str) -> Noise | None:
     if response not in slow:
         return None
     levels = slow[response](noise)
-    return Noise(0.0, flicker=levels.flicker * np.sqrt(len(FLICKER_TIMES)), walk=levels.walk * np.sqrt(HOUR))
+    flicker, walk = levels.flicker * np.sqrt(len(FLICKER_TIMES)), levels.walk * np.sqrt(HOUR)
+    return Noise(0.0, flicker=flicker, walk=walk, offset=levels.offset)
 
 
 def _spare_outliers(rows: NoiseRows, state: State, name: str, noise: Noise) -> tuple[NoiseRows, int]:

@@ -123,7 +123,8 @@ class Lagged:
     """A polynomial over a resonator that follows the housing through one lag.
 
     `tau`, `slope`, `bend` and `warmer` are where it is linearised: lag, s; slope, unit/K, and curvature over slope, 1/K, of
-    the law; what initial state, delay and effects add to the lagged temperature, K on the fine grid.
+    the law; what initial state, delay and effects add to the lagged temperature, K on the fine grid. `turn_on` is how far
+    the offsets of runs lie apart, in the response's unit, 0 where nothing is known of it.
     """
 
     response: Response
@@ -136,6 +137,7 @@ class Lagged:
     delay: float | None = None
     bends: tuple[float, ...] = ()
     starts: tuple[float, ...] = ()
+    turn_on: float = 0.0
 
     @property
     def lagged(self) -> bool:
@@ -165,10 +167,7 @@ class Lagged:
             seen = view.seen
             x = seen.excess
             static = [x / 10.0, (x**2 + seen.spread) / 1e2, (x**3 + 3.0 * x * seen.spread) / 1e3][:powers]
-            offsets = np.ones((x.size, 1))
-            if self.response.own_offset:
-                offsets = np.zeros((x.size, runs))
-                offsets[:, k] = 1.0
+            level, own = levels(self.response, self.turn_on, k, runs, x.size)
             start = np.zeros((x.size, runs))
             start[:, k] = view.coarse.fading * view.steep
             delay = -(view.coarse.housing - view.coarse.resonator) / self.tau * view.steep
@@ -180,18 +179,20 @@ class Lagged:
                 shift[-1] = shift[-1] - self.delay * delay
                 delay = np.zeros_like(delay)
             columns.append(
-                np.concatenate([offsets, np.stack(static, 1), start, delay[:, None], slower[:, None]], axis=1)
+                np.concatenate([level, np.stack(static, 1), own, start, delay[:, None], slower[:, None]], axis=1)
             )
+        flat, tied = level_names(self.response, self.turn_on, runs)
         names = (
-            *([f"offset@{k}" for k in range(runs)] if self.response.own_offset else ["level"]),
+            *flat,
             *("slope", "quadratic", "cubic")[:powers],
+            *tied,
             *(f"start@{k}" for k in range(runs)),
             "delay",
             "log lag",
         )
         bends = self.bends or (np.inf,) * (powers - 1)
-        flat = len(names) - runs - 2 - (powers - 1)
-        prior = np.array([np.inf] * flat + [*bends] + [START] * runs + [DELAY, LAG_STEP])
+        deviations = [*bends, *[self.turn_on] * len(tied), *[START] * runs, DELAY, LAG_STEP]
+        prior = np.array([np.inf] * (len(flat) + 1) + deviations)
         return Tangent(shift, columns, prior, names, views)
 
     def _free(self, k: int, tau: float) -> FloatArray:
@@ -256,6 +257,8 @@ class Followed:
         Change of the response for one kelvin, for the prior of the two.
     curve : tuple of float
         Coefficients of the second and higher powers, per (10 K)ᵖ: the whole of the law may come late.
+    turn_on : float
+        As of `Lagged`.
     """
 
     response: Response
@@ -267,6 +270,7 @@ class Followed:
     delay: float | None = None
     bends: tuple[float, ...] = ()
     curve: tuple[float, ...] = ()
+    turn_on: float = 0.0
 
     @property
     def lagged(self) -> bool:
@@ -280,10 +284,7 @@ class Followed:
         for k, own in enumerate(self.states):
             coarse = own.averaged(self.group)
             u = self.reading[k]
-            offsets = np.ones((u.size, 1))
-            if self.response.own_offset:
-                offsets = np.zeros((u.size, runs))
-                offsets[:, k] = 1.0
+            level, tied = levels(self.response, self.turn_on, k, runs, u.size)
             v = coarse.spread
             static = [u / 10.0, (u**2 + v) / 1e2, (u**3 + 3.0 * u * v) / 1e3][:powers]
             along = np.full(u.size, self.slope) + sum(
@@ -295,18 +296,21 @@ class Followed:
                 shift[-1] = -self.delay * late
                 late = np.zeros_like(late)
             besides = self.missed[k] * (along / self.slope if self.slope else np.ones(u.size))[:, None]
-            columns.append(np.concatenate([offsets, np.stack(static, 1), besides, late[:, None]], axis=1))
+            columns.append(np.concatenate([level, np.stack(static, 1), besides, tied, late[:, None]], axis=1))
             steep = np.full(u.size, self.slope)
             views.append(View(own, coarse, own, coarse, steep))
+        flat, named = level_names(self.response, self.turn_on, runs)
         names = (
-            *([f"offset@{k}" for k in range(runs)] if self.response.own_offset else ["level"]),
+            *flat,
             *("slope", "quadratic", "cubic")[:powers],
             *(f"missed {m}" for m in range(missed)),
+            *named,
             "delay",
         )
         size = max(abs(self.slope), 1e-300)
         bends = self.bends or (np.inf,) * (powers - 1)
-        prior = np.array([np.inf] * (len(names) - missed - powers) + [*bends, *[1.5 * size] * missed, FOLLOWED_DELAY])
+        deviations = [*bends, *[1.5 * size] * missed, *[self.turn_on] * len(named), FOLLOWED_DELAY]
+        prior = np.array([np.inf] * (len(flat) + 1) + deviations)
         return Tangent(shift, columns, prior, names, views)
 
     def moved(self, values: dict[str, float], warmer: Sequence[FloatArray] | None) -> "Followed":
@@ -331,6 +335,20 @@ class Followed:
         return replace(
             self, states=(states,), reading=(nothing,), missed=(np.zeros((nothing.size, self.missed[0].shape[1])),)
         )
+
+
+def level_names(response: Response, turn_on: float, runs: int) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Return the names of the levels without a prior, and of a run's own offsets with one."""
+    own = tuple(f"offset@{k}" for k in range(runs)) if response.own_offset else ()
+    return (("level",), own) if turn_on or not own else (own, ())
+
+
+def levels(response: Response, turn_on: float, run: int, runs: int, size: int) -> tuple[FloatArray, FloatArray]:
+    """Return the columns of one run that `level_names` names."""
+    flat, tied = level_names(response, turn_on, runs)
+    common, own = np.ones((size, 1)), np.zeros((size, runs))
+    own[:, run] = 1.0
+    return (own if "level" not in flat else common), own[:, : len(tied)]
 
 
 def bends_of(values: FloatArray, reading: FloatArray, powers: int) -> tuple[float, ...]:

@@ -69,7 +69,11 @@ class Run:
 
 @dataclass(frozen=True)
 class Campaign:
-    """All runs of one gyro on one grid; `temperature_noise` is that of one reading of the driving temperature, K."""
+    """All runs of one gyro on one grid.
+
+    `temperature_noise` is that of one reading of the driving temperature, K; `turn_on` the standard deviation of a run's own
+    offset of the bias as a card states it, °/h, 0 where nothing is said of it.
+    """
 
     runs: tuple[Run, ...]
     step: float
@@ -82,6 +86,7 @@ class Campaign:
     skipped: dict[str, str] = field(default_factory=dict)
     outliers: int = 0
     temperature_noise: float = 0.0
+    turn_on: float = 0.0
 
     @property
     def clock_known(self) -> bool:

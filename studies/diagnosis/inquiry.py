@@ -80,6 +80,7 @@ def begin(
     response = RESPONSES[column]
     problem = pose(campaign, column, 1000.0)
     states = tuple(run.states for run in campaign.runs)
+    turn_on = campaign.turn_on if response.own_offset else 0.0
     baseline: Baseline
     if make is not None:
         baseline = make(problem.sigma)
@@ -91,6 +92,7 @@ def begin(
             1000.0,
             _slope(problem, housing := [s.averaged(campaign.group).excess for s in states]),
             bends=bends_of(problem.values, problem.stack(housing), response.powers),
+            turn_on=turn_on,
         )
     else:
         reading = thermometer.change if response.bent else thermometer.excess
@@ -102,6 +104,7 @@ def begin(
             thermometer.missed,
             _slope(problem, reading),
             bends=bends_of(problem.values, problem.stack(list(reading)), response.powers),
+            turn_on=turn_on,
         )
     first = settle(problem, baseline)
     tau = float(getattr(first.baseline, "tau", states[0].tau if thermometer is None else thermometer.states[0].tau))
@@ -210,17 +213,20 @@ def _pays(
 ) -> bool:
     """Whether a model is better on rows that it has not seen.
 
-    A run whose drive no other run moves cannot be foretold by them, nor can an event: then blocks in time decide.
+    A run whose drive no other run moves cannot be foretold by them, nor can an event: then blocks in time decide. What neither
+    foretells is for the evidence: nothing speaks against it.
     """
+    asked = False
     for measure in (by_run, held_out.by_block):
         if measure is None:
             continue
         before, after = held_out.compare(measure(plain, campaign), measure(model, campaign))
         if before is None or after is None:
             continue
+        asked = True
         if abs(after - before) > ALIKE * before:
             return after < before
-    return by_run is None
+    return by_run is None or not asked
 
 
 def read_thermometer(campaign: Campaign, model: Fit) -> Thermometer | None:

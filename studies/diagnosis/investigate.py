@@ -91,6 +91,7 @@ def investigate(
         for seen in campaign.runs:
             if "frequency_Hz" in seen.responses:
                 check_card_frequency(card, seen.responses["frequency_Hz"], seen.label)
+        campaign = measured = replace(campaign, turn_on=card.noise.bias_turn_on_deg_per_h)
     inquiries: dict[str, Inquiry] = {}
     thermometer: Thermometer | None = None
     for column in (c for c in RESPONSES if c in campaign.responses):
@@ -261,7 +262,8 @@ def _turned_on(inquiry: Inquiry) -> list[str]:
         return []
     return [
         f"the runs lie {apart * response.scale:.3g} {response.shown} (rms) apart, which is taken for an offset of each turn-on: "
-        "ageing or a jump between runs would look the same, and no saved model predicts it"
+        "ageing or a jump between runs would look the same; a saved model states it as turn-on, "
+        "and a card that states bias_turn_on_deg_per_h tells them apart"
     ]
 
 

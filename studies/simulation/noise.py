@@ -15,17 +15,23 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class NoiseLevels:
-    """White, flicker and random-walk levels in the unit of a signal: Allan deviations at 1 s, flat, and change in 1 s."""
+    """White, flicker and random-walk levels in the unit of a signal: Allan deviations at 1 s, flat, and change in 1 s.
+
+    `offset` is the standard deviation of what a run has from its first row to its last.
+    """
 
     white: float = 0.0
     flicker: float = 0.0
     walk: float = 0.0
+    offset: float = 0.0
 
     def draw(self, count: int, rate: float, generator: np.random.Generator) -> Array:
         """Draw `count` samples at `rate` (Hz)."""
         noise = white_noise(count, rate, self.white, generator)
         noise += flicker_noise(count, self.flicker, generator)
         noise += random_walk(count, rate, self.walk, generator)
+        if self.offset:
+            noise += self.offset * generator.standard_normal()
         return noise
 
 
@@ -40,6 +46,7 @@ def bias_noise(noise: "NoiseKeys") -> NoiseLevels:
         60.0 * noise.bias_white_deg_per_rt_h,
         noise.bias_flicker_deg_per_h,
         noise.bias_walk_deg_per_h_per_rt_h / 60.0,
+        noise.bias_turn_on_deg_per_h,
     )
 
 

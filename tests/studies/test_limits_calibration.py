@@ -8,6 +8,7 @@ import pytest
 
 from compensation.correlated import NoiseRows
 from studies.calibration.ahead import spread_of_prediction
+from studies.calibration.calibrate import calibrate
 from studies.calibration.estimates import NINETY, estimate
 from studies.calibration.fit import CardFit, stated_noise, whitened
 from studies.calibration.observed import observe
@@ -19,12 +20,13 @@ from studies.instrument.uncertain import UncertainValue
 from studies.simulation.chamber import load_profile
 from studies.simulation.drive import Drive, drive_by_profile, rows_of
 from studies.simulation.heat_path import slowest_lag
-from studies.simulation.noise import frequency_noise
+from studies.simulation.noise import bias_noise, frequency_noise
 from studies.simulation.prediction import law_for, predict
 from studies.simulation.virtual_gyro import simulate_run
 from thermal.lag import lag
 from thermal.profile import Profile
 
+LEVEL = {"bias_white_deg_per_rt_h": 0.0, "bias_flicker_deg_per_h": 0.0, "bias_walk_deg_per_h_per_rt_h": 0.0}
 TWO = {"thermal.mount_conductance_W_per_K": 1e-4, "bias.k1_deg_per_h_per_Hz": 0.02}
 
 
@@ -50,6 +52,38 @@ def test_the_spread_of_a_prediction_is_that_of_two_correlated_values():
         expected = np.sqrt(one**2 + two**2 + 2 * rho * one * two)
         assert spread[column] == pytest.approx(expected, rel=1e-3, abs=1e-4 * expected.max())
         assert expected.max() > 0
+
+
+def test_an_offset_of_each_turn_on_is_part_of_the_spread_of_the_bias():
+    """A card whose values are all exact and whose bias differs by 0.3 °/h from turn-on to turn-on is wrong by so much."""
+    card = load_card("hrg-30mm")
+    known = card.with_values({v.name: {"value": v.value, "sd": 0.0} for v in card.uncertain})
+    known = known.with_values({"noise.bias_turn_on_deg_per_h": 0.3})
+    profile = load_profile("step 20 5 1h")
+    spread = spread_of_prediction(known, drive_by_profile(profile, rows_of(profile, 1 / 60)))
+    assert spread["bias_deg_per_h"] == pytest.approx(0.3)
+    assert np.all(spread["frequency_Hz"] == 0.0)
+
+
+def test_the_offset_of_a_turn_on_is_drawn_once_a_run():
+    levels = bias_noise(NoiseKeys(**LEVEL, bias_turn_on_deg_per_h=0.3))
+    draws = np.array([levels.draw(3, 1.0, np.random.default_rng(seed)) for seed in range(2000)])
+    assert np.ptp(draws, axis=1).max() == 0.0
+    assert draws[:, 0].std() == pytest.approx(0.3, rel=0.05)
+
+
+@pytest.mark.slow
+def test_a_calibrated_card_states_the_turn_on_that_its_runs_show():
+    """Offsets of +0.8, −1.1 and +0.3 °/h, far beyond the noise of a run's mean: their standard deviation is 0.985 °/h."""
+    card, offsets = load_card("hrg-30mm"), (0.8, -1.1, 0.3)
+    profile = load_profile("step 20 0 3h")
+    records = []
+    for seed, offset in enumerate((*offsets, 0.0)):
+        record = simulate_run(card, profile, rate=1 / 60, seed=seed).record
+        records.append(record.with_columns({"bias_deg_per_h": record["bias_deg_per_h"] + offset}))
+    stated = calibrate(card, records[:3], profile=False).instrument.noise.bias_turn_on_deg_per_h
+    assert np.std(offsets, ddof=1) / 1.5 < stated < 1.5 * np.std(offsets, ddof=1)
+    assert calibrate(card, records[3:], profile=False).instrument.noise.bias_turn_on_deg_per_h == 0.0
 
 
 @dataclass(frozen=True)

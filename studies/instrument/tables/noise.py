@@ -7,6 +7,7 @@ frequency_walk_Hz = 1e-5             # random walk: standard deviation of the ch
 bias_white_deg_per_rt_h = 0.02       # angle random walk
 bias_flicker_deg_per_h = 0.1         # flat part of the Allan deviation (0.664 of the bias instability)
 bias_walk_deg_per_h_per_rt_h = 0.01  # rate random walk: standard deviation of the change in 1 h
+bias_turn_on_deg_per_h = 0.0         # standard deviation of the offset that each run has of its own; 0: nothing is said of it
 inverse_q_white = 0.01               # relative, Allan deviation at 1 s
 pattern_angle_white_deg = 3e-5       # of a measured azimuth (whole angle), Allan deviation at 1 s; it walks besides as the bias does
 quadrature_white_V = 1e-4            # Allan deviation at 1 s, of a card with loops
@@ -34,6 +35,7 @@ class NoiseKeys(Keys, frozen=True, kw_only=True):
     bias_white_deg_per_rt_h: Level = 0.02
     bias_flicker_deg_per_h: Level = 0.1
     bias_walk_deg_per_h_per_rt_h: Level = 0.01
+    bias_turn_on_deg_per_h: Level = 0.0
     inverse_q_white: Level = 0.01
     pattern_angle_white_deg: Level = 3e-5
     quadrature_white_V: Level = 1e-4
