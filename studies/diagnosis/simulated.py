@@ -19,7 +19,7 @@ from studies.diagnosis.response import RESPONSES, Response
 from studies.diagnosis.verdict import NINETY, Shift
 from studies.effects.states import FloatArray, States, average
 from studies.instrument.tables.bias import TERMS
-from studies.law import law_of
+from studies.law import law_of, moved_law
 from studies.simulation.drive import Boundary, Drive
 from studies.simulation.prediction import Prediction, Variations, predict
 from thermal.profile import Profile
@@ -36,12 +36,30 @@ POINTS = 3
 """Predictions to a step of the grid; between them lies a straight line."""
 BOLDEST = 1.5
 """Largest change of a z from one linearisation to the next."""
-NEAR = 0.1
-"""Change of z, and K of an initial state, below which the old linearisation is kept."""
+WARMER = 0.01
+"""Relative change of what an initial state does with its size, 1/K: radiation and the law's bend."""
+STRAIGHT = 0.3
+"""Part of the noise up to which a straight line may miss a prediction before it is drawn anew."""
 RATE_TERMS = tuple(key for key, (_, by_rate) in TERMS.items() if by_rate)
 """Terms of the bias in the rate of the frequency."""
 SILENT = 1e-4
 """Part of the noise below which one standard deviation of a value changes nothing."""
+
+
+@dataclass(frozen=True)
+class Point:
+    """Prediction of a run at values, by name in the unit of the card, and whether its derivatives were `solved` there."""
+
+    values: dict[str, float]
+    found: Prediction
+    time: FloatArray
+    solved: bool
+
+    def missed(self, values: dict[str, float], found: Prediction, column: str) -> float:
+        """Return what a straight line from here misses of a prediction elsewhere, rms."""
+        slopes = self.found.derivatives
+        line = sum((value - self.values[name]) * slopes[name][column] for name, value in values.items())
+        return float(np.sqrt(np.mean((found.columns[column] - self.found.columns[column] - line) ** 2)))
 
 
 @dataclass(frozen=True)
@@ -71,6 +89,7 @@ class Simulated:
     card: "Instrument"
     boundary: Boundary
     stride: int
+    noise: float
     values: "tuple[UncertainValue, ...]"
     z: tuple[float, ...]
     initial: tuple[dict[str, float], ...]
@@ -90,9 +109,14 @@ class Simulated:
 
     @cached_property
     def law(self) -> "FrequencyLaw":
-        """Its frequency law over the whole range of the material."""
-        material = self.instrument.material
-        return law_of(self.instrument, material.lowest, material.highest)
+        """Its frequency law over the whole range of the material; solved anew only where dimensions move."""
+        if "law" not in self.memory:
+            self.memory["law"] = law_of(self.card, self.card.material.lowest, self.card.material.highest)
+        shipped: FrequencyLaw = self.memory["law"]
+        moved = {v.name for v, z in zip(self.values, self.z, strict=True) if z != 0.0}
+        if any(name.startswith("resonator.") for name in moved):
+            return law_of(self.instrument, shipped.lowest, shipped.highest)
+        return moved_law(shipped, self.instrument) if moved else shipped
 
     @cached_property
     def varied(self) -> Variations:
@@ -121,13 +145,27 @@ class Simulated:
         return Drive(time, self.boundary, profile, self.initial[k], commands, 0.0, float(s.campaign_time[0])), time
 
     def predicted(self, k: int) -> tuple[Prediction, FloatArray]:
-        """Prediction of run `k` with its derivatives, and its times; computed once for every point."""
-        key = (k, id(self.states[k]), self.z, tuple(sorted(self.initial[k].items())))
-        if key not in self.memory:
+        """Prediction of run `k` with its derivatives, and its times; computed once for every point.
+
+        The derivatives are those of a point before, where a straight line from there foretells the prediction here.
+        """
+        points: dict[object, Point] = self.memory.setdefault(("run", id(self.states[k]), self.values), {})
+        initial = tuple(self.initial[k].get(lump, 0.0) for lump in LUMPS)
+        key = (self.z, initial)
+        if key not in points:
             drive, time = self.drive(k)
-            self.memory[key] = predict(self.instrument, drive, self.varied, self.law), time
-        found: tuple[Prediction, FloatArray] = self.memory[key]
-        return found
+            found = predict(self.instrument, drive, (), self.law)
+            here = {v.name: at(v, z) for v, z in zip(self.values, self.z, strict=True)}
+            here |= {f"initial.{lump}": value for lump, value in zip(LUMPS, initial, strict=True)}
+            known = [point for point in points.values() if point.solved]
+            misses = [point.missed(here, found, self.response.column) for point in known]
+            solved = min(misses, default=np.inf) > STRAIGHT * self.noise
+            if solved:
+                found = predict(self.instrument, drive, self.varied, self.law)
+            else:
+                found = replace(found, derivatives=known[int(np.argmin(misses))].found.derivatives)
+            points[key] = Point(here, found, time, solved)
+        return points[key].found, points[key].time
 
     @cached_property
     def known(self) -> Tangent:
@@ -192,15 +230,22 @@ class Simulated:
             z.append(to_z(value, float(np.clip(at(value, new), value.low, value.high))))
         initial = tuple({lump: values[f"initial.{lump}@{k}"] for lump in LUMPS} for k in range(len(self.states)))
         warm = None if warmer is None else tuple(warmer)
-        far = max((abs(new - old) for new, old in zip(z, self.z, strict=True)), default=0.0)
-        warmest = max(
-            abs(new[lump] - old.get(lump, 0.0))
-            for new, old in zip(initial, self.initial, strict=True)
-            for lump in LUMPS
-        )
-        if far < NEAR and warmest < NEAR:  # a straight line is as good there
+        if self.bend(z, initial) < STRAIGHT * self.noise:  # a straight line is as good there
             return replace(self, warmer=warm)
         return replace(self, z=tuple(z), initial=initial, warmer=warm)
+
+    def bend(self, z: Sequence[float], initial: Sequence[dict[str, float]]) -> float:
+        """Return about how far a straight line from here misses a point: a value that counts by its logarithm, p = p₀ e^(s z), has ½ s J Δz²."""
+        columns = np.concatenate(self.known.columns)
+        reach = np.std(columns, axis=0)
+        rises = [v.sd / v.value if v.logarithmic else 0.0 for v in self.values]
+        missed = [0.5 * s * (new - old) ** 2 for s, new, old in zip(rises, z, self.z, strict=True)]
+        missed += [
+            0.5 * WARMER * (new[lump] - old.get(lump, 0.0)) ** 2
+            for lump in LUMPS
+            for new, old in zip(initial, self.initial, strict=True)
+        ]
+        return float(np.linalg.norm(reach * missed))
 
     def held(self, values: dict[str, float]) -> "Simulated | None":
         """Nothing is held: the card's own lag of its sensor has a prior."""
@@ -242,6 +287,7 @@ def simulate_baseline(campaign: Campaign, card: "Instrument", noise: float) -> S
         card,
         boundary,
         max(1, campaign.group // POINTS),
+        noise,
         tuple(card.uncertain),
         (0.0,) * len(card.uncertain),
         tuple({} for _ in campaign.runs),
