@@ -112,6 +112,8 @@ def entry(name, response, shape, values):
     effect = library()[name]
     table = {"name": name, "response": response}
     table |= {p.name: float(v) for p, v in zip(effect.shape, shape, strict=True)}
+    if effect.sees_heat:  # the temperature is solved for with the heat that takes this way
+        table[effect.shape[0].name] = float(values[0])
     return table | effect.numbers(values, response)
 
 
@@ -140,10 +142,13 @@ def make_case(seed, plain):
         )
         values = values * effect.sizes[response] * level * 0.03
         for _ in range(2):
+            values = np.minimum(values, 1.0) if effect.sees_heat else values  # all of the heat at most
             true = card.with_table("effect", [entry(name, response, shape, values)])
             there = run(true, folder, profiles, seed, True)
             size = left(clean, [a[response] - c[response] for a, c in zip(there, clean, strict=True)], response) / noise
             values = values * snr / max(size, 1e-9)
+        if effect.sees_heat and values[0] > 1.0:
+            raise InputError(f"{name}: even if all heat took this way it would not reach SNR {snr:g} in {chosen}")
         true = card.with_table("effect", [entry(name, response, shape, values)])
         return chosen, card, run(true, folder, profiles, seed), name, response, snr
 
