@@ -172,6 +172,8 @@ def inexact_columns(term: Term, view: View, problem: Problem, group: int) -> Flo
     return np.concatenate([curve[:, None] * factors, late[:, None] / LATE], axis=1)
 
 
+IN_ONE_RUN = 0.99
+"""Part of the power of what an effect does from which on it does it in one run: what is left of a resonance far from it."""
 LATE = 0.1
 """Delay of what a form may miss, in parts of the thermal lag."""
 
@@ -207,10 +209,16 @@ class Fit:
         return out
 
     def alone(self, index: int) -> bool:
-        """Whether other runs know nothing of a term: an event, or columns of one run each."""
-        columns = self.linear.columns[:, self.columns_of(index)]
-        runs = np.stack([part.any(axis=0) for part in self.problem.split(columns)])
-        return self.terms[index].effect.event or bool((runs.sum(axis=0) <= 1).all())
+        """Whether other runs know next to nothing of a term: an event, columns of one run each, or all that it does lies in one run."""
+        places = self.columns_of(index)
+        parts = self.problem.split(self.linear.columns[:, places])
+        runs = np.stack([part.any(axis=0) for part in parts])
+        power = np.array([np.sum((part @ self.solved.coefficients[places]) ** 2) for part in parts])
+        return (
+            self.terms[index].effect.event
+            or bool((runs.sum(axis=0) <= 1).all())
+            or bool(power.max() >= IN_ONE_RUN * power.sum())
+        )
 
     def known(self, index: int) -> Term:
         """Return a term with what was found of it, about which it may be inexact."""
