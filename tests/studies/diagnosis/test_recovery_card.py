@@ -1,5 +1,7 @@
 """A card's own simulation as the baseline: nothing, a wrong value, and a hidden effect are told apart; what is saved predicts."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -10,6 +12,7 @@ from studies.diagnosis.simulated import simulate_baseline, without_rate_terms
 from studies.effects import find_effect
 from studies.instrument.card import load_card, save_card
 from studies.record import read_record
+from studies.simulation.prediction import predict
 from tests.benchmarks.diagnosis.unseen import PACKS, RESPONSES, TURN_ON, B, F, lacking, recover
 
 AHEAD = {("ageing", F): 1.5}
@@ -34,6 +37,23 @@ def simulated(card, folder, capsys, profiles=PROFILES):
 @pytest.fixture(scope="module")
 def shipped():
     return load_card("hrg-30mm")
+
+
+def test_derivatives_serve_as_far_as_a_straight_line_foretells(shipped, tmp_path, capsys):
+    records = simulated(shipped, tmp_path, capsys, ("step 20 -10 1h",))
+    here = simulate_baseline(load_campaign(records, 20.0), shipped, 1e-3)
+    names = [value.name for value in here.values]
+    place, still = names.index("thermal.film_emissivity"), dict.fromkeys(names, 0.0)
+    still |= {"initial.base@0": 0.0, "initial.resonator@0": 0.0}
+    for z, anew in ((0.02, False), (1.0, True)):
+        moved = here.moved(still | {names[place]: z}, None)
+        there = replace(here, z=tuple(z if n == place else 0.0 for n in range(len(names))))
+        found, _ = there.predicted(0)
+        kept = found.derivatives is here.predicted(0)[0].derivatives
+        exact = predict(there.instrument, there.drive(0)[0], (), there.law).columns["frequency_Hz"]
+        np.testing.assert_allclose(found.columns["frequency_Hz"], exact, atol=1e-9)
+        assert kept is not anew
+        assert (moved.z[place] == 0.0) is not anew
 
 
 @pytest.mark.slow
