@@ -20,7 +20,7 @@ from studies.diagnosis.planning.advice import suggest_next
 from studies.diagnosis.planning.chamber import Chamber
 from studies.diagnosis.response import RESPONSES
 from studies.diagnosis.simulated import Simulated, as_shipped, shifts_of, simulate_baseline, without_rate_terms
-from studies.diagnosis.verdict import Cause, Interval, ResponseResult, Shift, Verdict, overall
+from studies.diagnosis.verdict import Cause, Interval, ResponseResult, Shift, Verdict, doubted, overall
 from studies.effects import Effect
 from studies.plausible import check_card_frequency
 from studies.shown import Shown
@@ -128,6 +128,7 @@ def investigate(
     for column, reason in campaign.skipped.items():
         results[column] = _too_little(reason)
     verdict = overall([result.verdict for result in results.values()])
+    causes = doubted(causes, {column: result.verdict for column, result in results.items()})
     found = Verdict(verdict, causes, results, None, campaign.said, calibration=shifts)
     if advise:
         tell("next run")
@@ -154,7 +155,7 @@ def wrong_values(shifts: Sequence[Shift]) -> list[Cause]:
         Cause(
             shift.parameter,
             "frequency_Hz",
-            float(erf(abs(shift.shift_sd) / np.sqrt(2.0))) * (1.0 - CONSTANTS["doubt"]),
+            float(erf(abs(shift.shift_sd) / np.sqrt(2.0))),
             (),
             {shift.parameter: Interval(shift.value, min(shift.low, shift.high), max(shift.low, shift.high))},
             shift.shift_sd**2,

@@ -19,7 +19,7 @@ from compensation.decimation import average_groups
 from studies.diagnosis.constants import CONSTANTS
 from studies.diagnosis.relative_law import Law
 from studies.diagnosis.table_noise import Scale, make_scale
-from studies.diagnosis.verdict import NINETY, Cause, Interval, ResponseResult, Verdict, weigh
+from studies.diagnosis.verdict import NINETY, Cause, Interval, ResponseResult, Verdict, doubted, weigh
 from studies.effects import Effect, library
 from studies.effects.states import FloatArray
 from studies.shown import Shown
@@ -186,7 +186,7 @@ def study_steady_table(
     result = ResponseResult(state, max(reached, rounding), (base_rms, base_loo), (reached, winner.loo), "none")
     if len(names) > 1:
         sentences.append(f"The table cannot separate these: {', '.join(names)}.")
-    verdict = Verdict(state, (cause,), {"frequency_Hz": result}, _next(T))
+    verdict = Verdict(state, doubted((cause,), {"frequency_Hz": state}), {"frequency_Hz": result}, _next(T))
     return TableDiagnosis(verdict, T, law_left, left, winner.residual, law_rms, ratio, forms, sentences)
 
 

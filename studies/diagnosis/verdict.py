@@ -1,7 +1,7 @@
 """From evidence to words: sets that the data cannot separate, probabilities, and the verdict of each response."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -200,6 +200,29 @@ def overall(verdicts: Sequence[str]) -> str:
     return next((v for v in VERDICTS if v in verdicts), "not-identifiable")
 
 
+def doubted(causes: Sequence[Cause], verdicts: Mapping[str, str]) -> tuple[Cause, ...]:
+    """Return the causes with probabilities lowered by how often such names were wrong for reasons outside the likelihood.
+
+    A further name may only patch what the form of the first leaves, and a name in a response whose structure nobody
+    explains may stand for part of that.
+
+    Parameters
+    ----------
+    causes : sequence of Cause
+        The strongest first.
+    verdicts : mapping
+        The verdict of each response.
+    """
+    first = next((cause for cause in causes if cause.kind == "physics"), None)
+
+    def share(cause: Cause) -> float:
+        if verdicts.get(cause.response) == "unexplained":
+            return CONSTANTS["doubt_beside_structure"]
+        return CONSTANTS["doubt" if cause is first or cause.kind == "value" else "doubt_further"]
+
+    return tuple(replace(cause, probability=cause.probability * (1.0 - share(cause))) for cause in causes)
+
+
 def weigh(
     names: Sequence[str], scores: Sequence[float], nothing: float, unknown: float = -np.inf
 ) -> tuple[tuple[str, ...], float]:
@@ -230,5 +253,5 @@ def weigh(
         if weight[k] >= CONSTANTS["member"] and names[k] not in members:
             members.append(names[k])
     inside = sum(w for w, name in zip(weight, names, strict=True) if name in members)
-    probability = float(inside / (weight.sum() * (1.0 + strange) + chance)) * (1.0 - CONSTANTS["doubt"])
+    probability = float(inside / (weight.sum() * (1.0 + strange) + chance))
     return tuple(members), probability

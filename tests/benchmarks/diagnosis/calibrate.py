@@ -1,6 +1,6 @@
 """Fit the engine's constants on cases of the tests' generator, and write them with their provenance.
 
-`temper` is the most likely one for the hidden names among the rivals of their places, `doubt` the share of sure answers that are
+`temper` is the most likely one for the hidden names among the rivals of their places, the doubts the shares of sure names that are
 wrong all the same. The others are beliefs, with their reasons beside them.
 """
 
@@ -16,6 +16,8 @@ from tests.benchmarks.diagnosis.cases import current_commit
 
 FILE = Path(studies.diagnosis.__file__).parent / "calibration.toml"
 SURE = 0.95
+LIKE_LIFE = ("effect", "pair", "null", "alien")
+"""Kinds of cases that a doubt is counted in: those with all that the library knows."""
 
 
 def fit_constants(cases):
@@ -38,13 +40,21 @@ def fit_constants(cases):
         return total
 
     temper = np.exp(minimize_scalar(minus_log, bounds=(0.0, 2.0), method="bounded").x)
-    sure = [c for case in cases if case["kind"] in ("effect", "pair", "null") for c in _claims(case) if c[0] > SURE]
-    wrong = sum(not right for _, right in sure)
-    return {"temper": float(temper), "doubt": (wrong + 0.5) / (len(sure) + 1.0)}
+    return {"temper": float(temper), **_doubts(cases)}
 
 
-def _claims(case):
-    return [(c[3], any(t in [c[0], *c[1]] for t in case["truth"])) for c in case["causes"]]
+def _doubts(cases):
+    """Return how often sure names were wrong: first ones, further ones, and those in responses with unexplained structure."""
+    sides = {"doubt": [], "doubt_further": [], "doubt_beside_structure": []}
+    for case in cases:
+        if case["kind"] not in LIKE_LIFE:
+            continue
+        for k, (name, others, response, probability, _) in enumerate(case["causes"]):
+            unexplained = case["responses"][response][0] == "unexplained"
+            side = "doubt_beside_structure" if unexplained else "doubt_further" if k else "doubt"
+            if probability > SURE * (1.0 - CONSTANTS[side]):
+                sides[side].append(not any(true in [name, *others] for true in case["truth"]))
+    return {side: (sum(wrong) + 0.5) / (len(wrong) + 1.0) for side, wrong in sides.items()}
 
 
 def write_constants(cases):
