@@ -3,6 +3,9 @@
 import numpy as np
 import pytest
 
+from studies.diagnosis.constants import CONSTANTS
+from studies.diagnosis.verdict import Cause, doubted
+from tests.benchmarks.diagnosis.calibrate import doubts
 from tests.benchmarks.diagnosis.plan_check import agreement, compare, simulated_shares
 from tests.benchmarks.diagnosis.scoring import band, confusion, exact_set, first_right, reliability, said
 
@@ -94,3 +97,40 @@ def test_right_predictions_leave_no_error_beyond_chance_and_wrong_ones_do():
     assert found["beyond"] <= 0.3 * found["entries"]
     shifted = {"rich 1": plan(**{name: {name: 0.9, "nothing": 0.1} for name in NAMES})}
     assert agreement(compare(cases, shifted))["rms"] == pytest.approx(0.3, abs=0.05)
+
+
+def test_doubts_are_counted_by_rank_and_beside_structure():
+    """Ten first names, one wrong; four further ones, one wrong; three beside structure, two wrong, one of these an alien's."""
+    told = {"frequency_Hz": ["explained"], "bias_deg_per_h": ["unexplained"]}
+
+    def answer(kind, truth, *names):
+        causes = [[name, [], response, 0.99, 50.0] for name, response in names]
+        return {"kind": kind, "truth": truth, "causes": causes, "responses": told}
+
+    f, b = "frequency_Hz", "bias_deg_per_h"
+    cases = [answer("effect", ["jump"], ("jump", f)) for _ in range(5)]
+    cases += [answer("effect", ["jump"], ("ageing", f))]
+    cases += [answer("pair", ["jump", "leak"], ("jump", f), ("leak", f)) for _ in range(3)]
+    cases += [answer("effect", ["jump"], ("jump", f), ("leak", f))]
+    cases += [
+        answer("effect", ["leak"], ("leak", b)),
+        answer("effect", ["leak"], ("jump", b)),
+        answer("alien", [], ("jump", b)),
+    ]
+    cases += [answer("alien", [], ("jump", f)), answer("without", ["jump"], ("leak", f))]  # counted nowhere
+    found = doubts(cases)
+    assert found["doubt"] == pytest.approx(1.5 / 11)
+    assert found["doubt_further"] == pytest.approx(1.5 / 5)
+    assert found["doubt_beside_structure"] == pytest.approx(2.5 / 4)
+
+
+def test_the_first_name_is_doubted_less_than_a_further_one_and_a_value_as_a_first():
+    def cause(name, response="frequency_Hz", kind="physics"):
+        return Cause(name, response, 1.0, (), {}, 10.0, kind)
+
+    causes = [cause("E", kind="value"), cause("jump"), cause("leak"), cause("ageing", "bias_deg_per_h")]
+    left = [
+        1.0 - c.probability for c in doubted(causes, {"frequency_Hz": "explained", "bias_deg_per_h": "unexplained"})
+    ]
+    expected = ("doubt", "doubt", "doubt_further", "doubt_beside_structure")
+    assert left == pytest.approx([CONSTANTS[name] for name in expected])
