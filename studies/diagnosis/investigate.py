@@ -128,8 +128,7 @@ def investigate(
     for column, reason in campaign.skipped.items():
         results[column] = _too_little(reason)
     verdict = overall([result.verdict for result in results.values()])
-    causes = doubted(causes, {column: result.verdict for column, result in results.items()})
-    found = Verdict(verdict, causes, results, None, campaign.said, calibration=shifts)
+    found = Verdict(verdict, doubted(causes), results, None, campaign.said, calibration=shifts)
     if advise:
         tell("next run")
         text, run = suggest_next(campaign, found, inquiries, chamber)

@@ -186,7 +186,7 @@ def study_steady_table(
     result = ResponseResult(state, max(reached, rounding), (base_rms, base_loo), (reached, winner.loo), "none")
     if len(names) > 1:
         sentences.append(f"The table cannot separate these: {', '.join(names)}.")
-    verdict = Verdict(state, doubted((cause,), {"frequency_Hz": state}), {"frequency_Hz": result}, _next(T))
+    verdict = Verdict(state, doubted((cause,)), {"frequency_Hz": result}, _next(T))
     return TableDiagnosis(verdict, T, law_left, left, winner.residual, law_rms, ratio, forms, sentences)
 
 

@@ -200,27 +200,17 @@ def overall(verdicts: Sequence[str]) -> str:
     return next((v for v in VERDICTS if v in verdicts), "not-identifiable")
 
 
-def doubted(causes: Sequence[Cause], verdicts: Mapping[str, str]) -> tuple[Cause, ...]:
-    """Return the causes with probabilities lowered by how often such names were wrong for reasons outside the likelihood.
+def doubted(causes: Sequence[Cause]) -> tuple[Cause, ...]:
+    """Return the causes, the strongest first, with probabilities lowered by how often such names were wrong all the same.
 
-    A further name may only patch what the form of the first leaves, and a name in a response whose structure nobody
-    explains may stand for part of that.
-
-    Parameters
-    ----------
-    causes : sequence of Cause
-        The strongest first.
-    verdicts : mapping
-        The verdict of each response.
+    A further name may only patch what the form of the first leaves.
     """
     first = next((cause for cause in causes if cause.kind == "physics"), None)
-
-    def share(cause: Cause) -> float:
-        if verdicts.get(cause.response) == "unexplained":
-            return CONSTANTS["doubt_beside_structure"]
-        return CONSTANTS["doubt" if cause is first or cause.kind == "value" else "doubt_further"]
-
-    return tuple(replace(cause, probability=cause.probability * (1.0 - share(cause))) for cause in causes)
+    share = {True: CONSTANTS["doubt"], False: CONSTANTS["doubt_further"]}
+    return tuple(
+        replace(cause, probability=cause.probability * (1.0 - share[cause is first or cause.kind == "value"]))
+        for cause in causes
+    )
 
 
 def weigh(

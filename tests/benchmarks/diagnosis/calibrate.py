@@ -17,8 +17,6 @@ from tests.benchmarks.diagnosis.cases import current_commit
 FILE = Path(studies.diagnosis.__file__).parent / "calibration.toml"
 SURE = 0.95
 KNOWN = ("effect", "pair", "null")
-"""Kinds of cases whose causes the library has. Aliens count beside structure only: where nothing is left, a bump that is
-named activity-dip, or a drift that is named ageing, has the form of its name."""
 
 
 def fit_constants(cases):
@@ -45,15 +43,12 @@ def fit_constants(cases):
 
 
 def doubts(cases):
-    """Return how often sure names were wrong: first ones, further ones, and those in responses with unexplained structure."""
-    sides = {"doubt": [], "doubt_further": [], "doubt_beside_structure": []}
+    """Return how often sure names were wrong, first ones and further ones, in cases whose causes the library has."""
+    sides = {"doubt": [], "doubt_further": []}
     for case in cases:
-        for k, (name, others, response, probability, _) in enumerate(case["causes"]):
-            unexplained = case["responses"][response][0] == "unexplained"
-            if case["kind"] not in ((*KNOWN, "alien") if unexplained else KNOWN):
-                continue
-            side = "doubt_beside_structure" if unexplained else "doubt_further" if k else "doubt"
-            if probability > SURE * (1.0 - CONSTANTS[side]):
+        for k, (name, others, _, probability, _) in enumerate(case["causes"]):
+            side = "doubt_further" if k else "doubt"
+            if case["kind"] in KNOWN and probability > SURE * (1.0 - CONSTANTS[side]):
                 sides[side].append(not any(true in [name, *others] for true in case["truth"]))
     return {side: (sum(wrong) + 0.5) / (len(wrong) + 1.0) for side, wrong in sides.items()}
 
