@@ -149,7 +149,8 @@ class Simulated:
 
         The derivatives are those of a point before, where a straight line from there foretells the prediction here.
         """
-        points: dict[object, Point] = self.memory.setdefault(("run", id(self.states[k]), self.values), {})
+        run = self.states[k]  # kept beside its points: no other run gets its id
+        points: dict[object, Point] = self.memory.setdefault(("run", id(run), self.values), (run, {}))[1]
         initial = tuple(self.initial[k].get(lump, 0.0) for lump in LUMPS)
         key = (self.z, initial)
         if key not in points:
