@@ -129,8 +129,9 @@ def follow(fit: CardFit, J: Array, row: Array, point: Array, enough: float) -> t
     point = np.clip(point, *problem.ends)
     found, lower = point, np.inf
     for turn in range(1 + TURNS):
+        fresh = turn >= FRESH
         try:
-            state = problem.evaluate(point, slopes=turn >= FRESH)
+            state = problem.evaluate(point, slopes=fresh)
         except (InputError, ShellError, ThermalError):
             break
         risen = objective(problem, state, fit.noise, fit.rows) - least
@@ -138,14 +139,15 @@ def follow(fit: CardFit, J: Array, row: Array, point: Array, enough: float) -> t
             found, lower = point, risen
         if lower < enough:
             return found, lower
-        if turn >= FRESH and lower > FAR * enough:
+        if fresh and lower > FAR * enough:
             break
-        if turn >= FRESH:
-            J, _ = whitened(problem, state, fit.noise, fit.rows)
-        r = np.concatenate([fit.rows[n].whiten(state.residual[n], fit.noise[n]) for n in problem.responses])
+        if fresh:
+            J, r = whitened(problem, state, fit.noise, fit.rows)
+        else:
+            r = np.concatenate([fit.rows[n].whiten(state.residual[n], fit.noise[n]) for n in problem.responses])
         both, target = np.vstack([J, np.eye(len(point)), HELD * row]), np.concatenate([r, -point, [0.0]])
         move = step_within(both, target, *(end - point for end in problem.ends))
-        if turn >= FRESH and target @ target - np.sum((target - both @ move) ** 2) < NEAR * enough:
+        if fresh and target @ target - np.sum((target - both @ move) ** 2) < NEAR * enough:
             return found, lower
         point = point + move / max(1.0, float(np.abs(move).max()) / LONGEST_STEP)
     return found, np.inf
