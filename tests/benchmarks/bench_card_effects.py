@@ -1,4 +1,4 @@
-"""Hide effects in cards, run `hrg simulate`, and ask the diagnosis with the plain card: what is right, by SNR.
+"""Hide effects in cards, run the virtual gyro, and ask the diagnosis with the plain card: what is right, by SNR.
 
     python tests/benchmarks/bench_card_effects.py cases.jsonl --minutes 5 [--seed N] [--plain]    append cases and sum up
 
@@ -8,27 +8,28 @@ coefficients off any grid, scaled to its SNR in 120 s means after a least-square
 """
 
 import argparse
-import contextlib
-import io
 import json
 import sys
 import tempfile
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
-from studies.cli import main as hrg
 from studies.diagnosis.campaign import load_campaign
 from studies.diagnosis.investigate import investigate
 from studies.diagnosis.model import span_of
 from studies.effects import library
 from studies.errors import InputError
-from studies.instrument.card import load_card, save_card
-from studies.record import read_record
+from studies.instrument.card import load_card
+from studies.simulation.chamber import load_drive
+from studies.simulation.drive import drive_by_profile, rows_of
+from studies.simulation.virtual_gyro import simulate_run
 from tests.benchmarks.diagnosis.scoring import short_rate
+from thermal.profile import Profile
 
 CARDS = ("hrg-30mm", "cvg-25mm", "bvg-bell", "hrg-30mm-loops")
 SNRS = (3.0, 6.0, 12.0, 1.0)
@@ -58,19 +59,34 @@ def draw_profile(rng, path, commanded):
     np.savetxt(path, np.stack(list(columns.values()), 1), "%.4f", ",", header=",".join(columns), comments="")
 
 
-def run(card, folder, profiles, seed, noiseless=False):
-    """Return the records of `hrg simulate`."""
-    save_card(card, folder / "card.toml")
+def run(card, drives, seed, noise=True):
+    """Return the virtual gyro's records of a campaign; its card may hold one effect, which acts in the campaign's time."""
     records = []
-    for k, profile in enumerate(profiles):
-        out = str(folder / f"run{k}.csv")
-        words = ["simulate", str(folder / "card.toml"), str(profile), "--out", out, "--rate", str(RATE)]
-        words += ["--noiseless"] if noiseless else ["--seed", str(seed + k)]
-        with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()):
-            if hrg(words):
-                raise InputError("not simulated")
-        records.append(read_record(out))
+    for k, drive in enumerate(drives):
+        found = simulate_run(within(card, k), drive, seed=seed + k, noise=noise)
+        records.append(replace(found.record, path=f"run{k}.csv"))
     return records
+
+
+def one_after_the_other(profiles):
+    """Return the drives of a campaign whose records do not say when they start."""
+    drives, start = [], 0.0
+    for path in profiles:
+        drive = load_drive(str(path), rate=RATE)
+        if isinstance(drive, Profile):
+            drive = drive_by_profile(drive, rows_of(drive, RATE))
+        drives.append(replace(drive, start=start))
+        start += drive.time[-1] - drive.time[0]
+    return drives
+
+
+def within(card, k):
+    """Return the card as it is in run `k`: a virtual gyro knows one run, and a jump is in one of them."""
+    table = card.content.get("effect", [{}])[0]
+    if "run" not in table or table["run"] == k:
+        return card.with_table("effect", [table | {"run": 0.0}]) if "run" in table else card
+    stayed = k > table["run"] and table["stays_in_later_runs"]
+    return card.with_table("effect", [table | {"run": 0.0, "time_s": 0.0}] if stayed else [])
 
 
 def means(values):
@@ -131,10 +147,11 @@ def make_case(seed, plain):
         profiles = [folder / f"profile{k}.csv" for k in range(int(rng.integers(1, 5)))]
         for path in profiles:
             draw_profile(rng, path, [DRIVES[n] for n in effect.needs] if hidden else [])
+        drives = one_after_the_other(profiles)
         if not hidden:
-            return chosen, card, run(card, folder, profiles, seed), "", "", 0.0
-        clean = run(card, folder, profiles, seed, True)
-        noisy = run(card, folder, profiles, seed)
+            return chosen, card, run(card, drives, seed), "", "", 0.0
+        clean = run(card, drives, seed, False)
+        noisy = run(card, drives, seed)
         noise = left(clean, [n[response] - c[response] for n, c in zip(noisy, clean, strict=True)], response)
         shape, values = draw_effect(rng, name, response, span_of(load_campaign(noisy), 1000.0))
         level = (
@@ -144,13 +161,13 @@ def make_case(seed, plain):
         for _ in range(2):
             values = np.minimum(values, 1.0) if effect.sees_heat else values  # all of the heat at most
             true = card.with_table("effect", [entry(name, response, shape, values)])
-            there = run(true, folder, profiles, seed, True)
+            there = run(true, drives, seed, False)
             size = left(clean, [a[response] - c[response] for a, c in zip(there, clean, strict=True)], response) / noise
             values = values * snr / max(size, 1e-9)
         if effect.sees_heat and values[0] > 1.0:
             raise InputError(f"{name}: even if all heat took this way it would not reach SNR {snr:g} in {chosen}")
         true = card.with_table("effect", [entry(name, response, shape, values)])
-        return chosen, card, run(true, folder, profiles, seed), name, response, snr
+        return chosen, card, run(true, drives, seed), name, response, snr
 
 
 def answer(seed, plain):
