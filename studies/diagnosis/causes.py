@@ -90,12 +90,17 @@ def scores_of(inquiry: Inquiry, place: Place) -> list[float]:
     return [_voted(inquiry.votes, place, n, r) for n, r in zip(place.names, place.rivals, strict=True)]
 
 
+def nothing_of(inquiry: Inquiry, place: Place) -> float:
+    """Return the log posterior of the model without the place's effect, with what the other responses say where they were asked."""
+    if not min(inquiry.votes.values(), default=0.0):
+        return place.without.score
+    return place.without.score + max(scores_of(inquiry, place)) - max(r.score for r in place.rivals)
+
+
 def _cause(campaign: Campaign, inquiry: Inquiry, place: Place) -> Cause:
     column = inquiry.problem.response.column
     scores = scores_of(inquiry, place)
-    base = min(inquiry.votes.values(), default=0.0)
-    own = max(r.score for r in place.rivals)
-    nothing = place.without.score + (max(scores) - own if inquiry.votes else 0.0) if base else place.without.score
+    nothing = nothing_of(inquiry, place)
     members, probability = weigh(place.names, scores, nothing, inquiry.unknown - inquiry.selection.final.score)
     left = inquiry.leftover
     if left.significant and 0.0 < left.share < CONSTANTS["believed"]:
@@ -153,7 +158,7 @@ def shape_spread(model: Fit, index: int) -> list[float]:
     term = model.terms[index]
     out = []
     for k, parameter in enumerate(term.effect.shape):
-        if parameter.steady:
+        if not parameter.moves(term.shape[k]):
             out.append(0.0)
             continue
         step = 0.03 if parameter.logarithmic else max(0.01 * abs(term.shape[k]), 0.05)

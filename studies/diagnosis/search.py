@@ -129,7 +129,7 @@ def _sizes(model: Fit) -> np.ndarray:
 def refine(model: Fit, index: int) -> Fit:
     """Move the free shape parameters of one term to where the evidence is largest; wrong signs are refused."""
     term = model.terms[index]
-    free = [(k, p) for k, p in enumerate(term.effect.shape) if not p.steady]
+    free = [(k, p) for k, p in enumerate(term.effect.shape) if p.moves(term.shape[k])]
     best = model
     for k, parameter in free if free else ():
         best = _along(best, index, k, parameter)
@@ -180,7 +180,7 @@ def _bracket(term: Term, place: int, model: Fit) -> tuple[float, float]:
         steady = [k for k, own in enumerate(effect.shape) if own.steady]
         near = effect.near(span, response, term.shape)
         shapes = [one for one in near if all(one[k] == term.shape[k] for k in steady)]
-    grid = np.unique([shape[place] for shape in shapes])
+    grid = np.unique([shape[place] for shape in shapes if parameter.moves(shape[place])])
     low = grid[grid < at * (1 - 1e-9) if at > 0 else grid < at - 1e-9]
     high = grid[grid > at * (1 + 1e-9) if at > 0 else grid > at + 1e-9]
     below = float(low[-1]) if low.size else (at / 1.6 if parameter.logarithmic else at - 1.0)

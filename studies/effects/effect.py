@@ -22,8 +22,9 @@ Numbers = float | Sequence[float]
 class Parameter:
     """A shape parameter: it enters the signature nonlinearly, between `low` and `high`.
 
-    `steady` ones are chosen from the grid only and are `low` where a card leaves them out; `of_run` bounds it from above by
-    that part of the longest run, `of_range` by that part of the covered temperatures, besides `high`.
+    `steady` ones are chosen from the grid only and are `low` where a card leaves them out; of these, `refined` ones are moved
+    afterwards unless they are `low`, which stands for none. `of_run` bounds it from above by that part of the longest run,
+    `of_range` by that part of the covered temperatures, besides `high`.
     """
 
     name: str
@@ -34,6 +35,11 @@ class Parameter:
     steady: bool = False
     of_run: float = np.inf
     of_range: float = np.inf
+    refined: bool = False
+
+    def moves(self, value: float) -> bool:
+        """Whether a fit moves it away from a value of the grid."""
+        return not self.steady or (self.refined and value > self.low)
 
     @property
     def unit(self) -> str:

@@ -98,7 +98,7 @@ def hide(stage: Stage, effect: Effect, cases: int, rng: np.random.Generator) -> 
     for _ in range(cases):
         shape = list(grid[int(rng.integers(len(grid)))])
         for k, parameter in enumerate(effect.shape):
-            if not parameter.steady and not effect.once:
+            if parameter.moves(shape[k]) and not effect.once:
                 ends = [own[k] for own in grid]  # a line faster than the grid of time shows is none that a run can have
                 shape[k] = float(np.clip(_jitter(shape[k], parameter, rng), min(ends), max(ends)))
         term = Term(effect, tuple(shape))

@@ -14,7 +14,7 @@ def columns(states: States, shape: Shape, response: str) -> FloatArray:
     low, high, pole, axis = shape
     x = states.excess / 10.0
     curve = np.concatenate([x[:, None] ** np.arange(8), waves(states.resonator - zero_Celsius, low, high)], axis=1)
-    if axis < 0:
+    if axis == STILL:
         curve = curve * FIXED
     elif states.pattern_angle is None:
         return np.zeros_like(curve)
@@ -26,14 +26,16 @@ def columns(states: States, shape: Shape, response: str) -> FloatArray:
 
 
 def grid(span: Span, response: str) -> list[tuple[float, ...]]:
-    """At once, behind a loop and behind a slow one; axes a tenth of a period apart, and -1 where the wave stands still."""
+    """At once, behind a loop and behind a slow one; axes a tenth of a half period apart, and none where the wave stands still."""
     ends = span.temperature_low - zero_Celsius, span.temperature_high - zero_Celsius
-    axes = (-1.0, *np.arange(0.0, 45.0, 5.0).tolist()) if span.turns else (-1.0,)
+    axes = (STILL, *np.arange(0.0, 50.0, 5.0).tolist()) if span.turns else (STILL,)
     return [(*ends, pole, axis) for pole in POLES for axis in axes]
 
 
 POLES = (0.0, 20.0, 60.0)
 """Time constants of the loop, s."""
+STILL = -90.0
+"""Axis of a wave that stands still: none."""
 FIXED = np.array([0.0] * 4 + [1.0] * (4 + ORDERS - 1))
 """At one azimuth the baseline has the terms up to the third order."""
 
@@ -61,8 +63,16 @@ EFFECT = Effect(
     shape=(
         Parameter("from_degC", -273.0, 500.0, "lower end of the smooth curve", False, True),
         Parameter("to_degC", -273.0, 500.0, "upper end of the smooth curve", False, True),
-        Parameter("pole_s", 0.0, 3600.0, "time constant of the loop behind the curve", False, True),
-        Parameter("axis_deg", -1.0, 45.0, "azimuth of the damping axis; -1: the wave stands still", False, True),
+        Parameter("pole_s", 0.0, 3600.0, "time constant of the loop behind the curve", True, True, refined=True),
+        Parameter(
+            "axis_deg",
+            STILL,
+            90.0,
+            "azimuth of the damping axis; -90: the wave stands still",
+            False,
+            True,
+            refined=True,
+        ),
     ),
     fine=True,
 )

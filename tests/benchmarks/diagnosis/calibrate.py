@@ -1,14 +1,14 @@
 """Fit the engine's constants on cases of the tests' generator, and write them with their provenance.
 
-`temper` is the most likely one for the hidden names among the rivals of their places, the doubts the shares of sure names that are
-wrong all the same. The others are beliefs, with their reasons beside them.
+`temper` and `misfit` are the most likely ones for the hidden names among the rivals of their places, the doubts the shares of sure
+names that are wrong all the same. The others are beliefs, with their reasons beside them.
 """
 
 import re
 from pathlib import Path
 
 import numpy as np
-from scipy.optimize import minimize_scalar
+from scipy.optimize import minimize
 
 import studies.diagnosis
 from studies.diagnosis.constants import CONSTANTS
@@ -29,17 +29,19 @@ def fit_constants(cases):
     ]
     known = [(place, name) for place, name in places if name is not None]
 
-    def minus_log(log_temper):
+    def minus_log(logs):
+        temper, misfit = np.exp(logs)
         total = 0.0
         for place, name in known:
             scores = np.array(place["scores"])
             lead = max(scores.max() - place["nothing"], 0.0)
-            weight = np.exp((scores - scores.max()) / (np.exp(log_temper) + CONSTANTS["misfit"] * lead))
+            weight = np.exp((scores - scores.max()) / (temper + misfit * lead))
             total -= np.log(weight[place["names"].index(name)] / weight.sum())
         return total
 
-    temper = np.exp(minimize_scalar(minus_log, bounds=(0.0, 2.0), method="bounded").x)
-    return {"temper": float(temper), **doubts(cases)}
+    bounds = [(0.0, 2.0), tuple(np.log([0.002, 0.1]))]
+    temper, misfit = np.exp(minimize(minus_log, (0.5, np.log(0.03)), method="Nelder-Mead", bounds=bounds).x)
+    return {"temper": float(temper), "misfit": float(misfit), **doubts(cases)}
 
 
 def doubts(cases):

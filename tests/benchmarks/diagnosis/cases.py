@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from studies.diagnosis.campaign import load_campaign
-from studies.diagnosis.causes import scores_of
+from studies.diagnosis.causes import nothing_of, scores_of
 from studies.diagnosis.investigate import investigate
 from studies.effects import library
 from tests.generator.designs import DESIGNS
@@ -119,7 +119,7 @@ def contended(inquiry):
             "response": inquiry.problem.response.column,
             "names": list(place.names),
             "scores": scores_of(inquiry, place),
-            "nothing": place.without.score,
+            "nothing": nothing_of(inquiry, place),
             "unknown": inquiry.unknown - inquiry.selection.final.score,
         }
         for place in inquiry.selection.places

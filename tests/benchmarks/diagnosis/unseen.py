@@ -57,7 +57,7 @@ HIDDEN = {
     ("cross-damping", "bias_deg_per_h"): {
         "from_degC": -15.0,
         "to_degC": 40.0,
-        "axis_deg": -1.0,
+        "axis_deg": -90.0,
         "quartic_deg_per_h_per_10K4": 1.0,
         "quintic_deg_per_h_per_10K5": 0.3,
     },
@@ -175,7 +175,7 @@ def hide(*cases, times=TIMES, seed=0, moved=(), stated=None):
     effects = [find_effect(name) for name, _ in cases]
     card = load_card(CARD).with_values(BIAS | (stated or {}))
     device = card.with_values({v.name: v.value + v.sd for v in card.uncertain if v.name in moved})
-    turning = any(name == "cross-damping" and HIDDEN[name, r]["axis_deg"] >= 0 for name, r in cases)
+    turning = any(name == "cross-damping" and HIDDEN[name, r]["axis_deg"] > -90.0 for name, r in cases)
     commanded = sorted(
         {*(["pattern_angle"] if turning else []), *(need for effect in effects for need in effect.needs)}
     )

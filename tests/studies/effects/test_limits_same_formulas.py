@@ -152,7 +152,7 @@ def test_cross_damping_goes_through_the_papers_filter():
     rate = simulate_bias(TIME, evaluate_cross_damping(coefficients, HOUSING - 293.15), k, zeta)
     gain = np.real(relate_cross_damping_to_rate_when_tuned(k, zeta).steady_gain)
     sized = {"quartic_deg_per_h_per_10K4": quartic * gain, "quintic_deg_per_h_per_10K5": quintic * gain}
-    shape = {"from_degC": 0.0, "to_degC": 40.0, "pole_s": 1.0 / (k * zeta), "axis_deg": -1.0}
+    shape = {"from_degC": 0.0, "to_degC": 40.0, "pole_s": 1.0 / (k * zeta), "axis_deg": -90.0}
     _, change = apply_effect("cross-damping", {**shape, **sized}, states())
     assert change == pytest.approx(rate, rel=1e-9, abs=1e-12 * np.abs(rate).max())
 
