@@ -1,7 +1,8 @@
 """Settled parts of a record: soaks, each of which becomes one row of a steady-state table, as the HRG paper makes its Table 1.
 
 A moment is settled when what is left of the change, |dT/dt| τ of the sensor and |df/dt| τ over the slope of the frequency,
-is small: τ the slowest time constant, about 3 000 s for the gyro of the paper's Figure 3.
+is small: τ the slowest time constant, about 3 000 s for the gyro of the paper's Figure 3, or what the records show where that
+is longer. Slopes are taken over as many blocks as the noise asks for.
 """
 
 from collections.abc import Sequence
@@ -19,7 +20,9 @@ from studies.record import Record
 
 Array = NDArray[np.float64]
 BLOCK = 60.0  # s
-REACH = 5  # blocks to either side, over which slopes are taken
+REACH = 5  # blocks to either side, over which slopes are taken in a quiet record
+FARTHEST = 60  # the same in a noisy one
+UNSEEN = 1 / 3  # of the tolerance: what noise may make of what is left (one standard deviation)
 LEAST = 600.0  # s, of a soak
 USUAL_SLOPE = 8e-5  # 1/K, relative, where a record is too even to show its own
 HELD = 0.5  # K, within which a temperature is held
@@ -39,6 +42,7 @@ class Soak:
     temperature_degC, frequency_Hz : float, means
     error_Hz : float, of the mean frequency: its scatter, and what is left to settle
     left_K : float, largest estimate of what is left to settle
+    time_constant : float, s, by which that is judged
     """
 
     path: str
@@ -48,6 +52,7 @@ class Soak:
     frequency_Hz: float
     error_Hz: float
     left_K: float
+    time_constant: float
 
 
 def find_soaks(records: Sequence[Record], time_constant: float = 3000.0, tolerance: float = 0.05) -> tuple[Soak, ...]:
@@ -56,7 +61,7 @@ def find_soaks(records: Sequence[Record], time_constant: float = 3000.0, toleran
     Parameters
     ----------
     time_constant : float, s
-        Slowest of the gyro.
+        Slowest of the gyro; what the records show takes its place where that is longer.
     tolerance : float, K
         What may be left of a change.
 
@@ -67,7 +72,7 @@ def find_soaks(records: Sequence[Record], time_constant: float = 3000.0, toleran
     """
     if not (time_constant > 0 and tolerance > 0):
         raise InputError("a time constant and a tolerance must be positive.")
-    return tuple(soak for record in records for soak in _soaks_of(record, time_constant, tolerance))
+    return tuple(soak for one in _judge(records, time_constant, tolerance) for soak in _soaks_of(one, tolerance))
 
 
 def settled_table(soaks: Sequence[Soak], where: str, advice: str = "") -> tuple[Array, Array, float]:
@@ -92,14 +97,13 @@ def advise_hold(records: Sequence[Record], time_constant: float, tolerance: floa
 
     What is left to settle decays with the record's own time constant τ, so that it takes τ ln(left/tolerance) more.
     """
-    judged = [one for record in records if (one := _judge(record, time_constant)) is not None]
-    holds = [(one, rows) for one in judged for rows in _holds(one.drive)]
+    holds = [(one, rows) for one in _judge(records, time_constant, tolerance) for rows in _holds(one.seen.drive)]
     # Slopes near the end of a hold know of what comes after it.
-    whole = [(one, rows[:-REACH]) for one, rows in holds if np.ptp(one.time[rows]) >= LEAST and len(rows) > 3 * REACH]
+    whole = [(one, rows[: -one.reach]) for one, rows in holds if _is_whole(one.time, rows, one.reach)]
     if not whole:
         longest = max((float(np.ptp(one.time[rows])) for one, rows in holds), default=0.0)
         return f"no temperature is held for longer than {longest / 60:.0f} min; " if holds else ""
-    moving = [(one, rows) for one, rows in whole if one.left[rows[-2 * REACH :]].min() > tolerance]
+    moving = [(one, rows) for one, rows in whole if one.left[rows[-2 * one.reach :]].min() > tolerance]
     if not moving:
         return ""
     longest = max(float(np.ptp(one.time[rows])) for one, rows in moving)
@@ -119,60 +123,114 @@ def advise_hold(records: Sequence[Record], time_constant: float, tolerance: floa
 
 def _settling(one: "_Judged", rows: NDArray[np.intp], tolerance: float) -> tuple[float, float, float]:
     """Speed at the end of a hold (Hz/s), its time constant (s) and how long it should be held (s); infinite where none shows."""
-    t, f = one.time[rows], one.frequency[rows]
-    speed, own = abs(float(_slopes(t, f)[-1])), _time_constant(t[len(t) // 2 :], f[len(t) // 2 :])
-    # The mean is that of the middle of its rows, REACH before their end; as much at the end of a hold sees what comes after.
-    left = float(one.left[rows[-2 * REACH :]].mean())
-    return speed, own, float(np.ptp(t)) + own * float(np.log(left / tolerance)) + LEAST + REACH * one.width
+    t, f = one.time[rows], one.seen.frequency[rows]
+    speed = abs(float(_slopes(t, f, one.reach)[-1]))
+    own = _time_constant(t[len(t) // 2 :], f[len(t) // 2 :])
+    # The mean is that of the middle of its rows, the reach before their end; as much at the end of a hold sees what comes after.
+    left = float(one.left[rows[-2 * one.reach :]].mean())
+    return speed, own, float(np.ptp(t)) + own * float(np.log(left / tolerance)) + LEAST + one.reach * one.seen.width
 
 
 @dataclass(frozen=True)
-class _Judged:
-    """Blocks of a record: time (s), what holds the temperature (°C), temperature, frequency (Hz), what is left to settle (K)."""
+class _Seen:
+    """Blocks of a record: time (s), what holds the temperature (°C), temperature, frequency (Hz) and its slope (Hz/K)."""
 
+    path: str
     time: Array
     drive: Array
     temperature: Array
     frequency: Array
-    left: Array
     slope: float
     width: float
 
 
-def _judge(record: Record, time_constant: float) -> _Judged | None:
+@dataclass(frozen=True)
+class _Judged:
+    """What is left to settle (K) in every block, by a time constant (s), from slopes over `reach` blocks to either side."""
+
+    seen: _Seen
+    left: Array
+    time_constant: float
+    reach: int
+
+    @property
+    def time(self) -> Array:
+        return self.seen.time
+
+
+def _judge(records: Sequence[Record], time_constant: float, tolerance: float) -> list[_Judged]:
+    seen = [one for record in records if (one := _see(record)) is not None]
+    tau = max(time_constant, _shown(seen, tolerance))
+    return [_judge_one(one, tau, tolerance) for one in seen]
+
+
+def _see(record: Record) -> _Seen | None:
     column = next((name for name in TEMPERATURES if name in record), TEMPERATURES[0])
     drive = TEMPERATURES[1] if TEMPERATURES[1] in record else column
     try:
         blocks = average_blocks(
             record["time_s"],
-            {"T": record[column], "f": record["frequency_Hz"], "drive": record[drive]},
+            {column: record[column], "frequency_Hz": record["frequency_Hz"], drive: record[drive]},
             max(BLOCK, float(np.median(np.diff(record["time_s"])))),
         )
     except CompensationError as error:
         raise InputError(f"{record.path}: {error}") from None
-    t, T, f = blocks.time, blocks.columns["T"], blocks.columns["f"]
+    t, T, f = blocks.time, blocks.columns[column], blocks.columns["frequency_Hz"]
     if len(t) < 2 * REACH + 1:
         return None
-    span = float(np.ptp(T))
-    slope = abs(float(np.polyfit(T - T.mean(), f, 1)[0])) if span > 1.0 else 0.0
-    slope = slope or USUAL_SLOPE * float(f.mean())
-    left = time_constant * np.maximum(np.abs(_slopes(t, T)), np.abs(_slopes(t, f)) / slope)
-    return _Judged(t, blocks.columns["drive"], T, f, left, slope, blocks.width)
+    slope = abs(float(np.polyfit(T - T.mean(), f, 1)[0])) if np.ptp(T) > 1.0 else 0.0
+    return _Seen(
+        record.path or "record", t, blocks.columns[drive], T, f, slope or USUAL_SLOPE * float(f.mean()), blocks.width
+    )
 
 
-def _soaks_of(record: Record, time_constant: float, tolerance: float) -> list[Soak]:
-    one = _judge(record, time_constant)
-    if one is None:
-        return []
-    t, T, f, left = one.time, one.temperature, one.frequency, one.left
+def _shown(seen: Sequence[_Seen], tolerance: float) -> float:
+    """Return the longest time constant (s) of those that the longest holds show, 0 where none does.
+
+    It counts where what settles in the second half of a hold is more than the tolerance and the half is longer than it:
+    what is seen of a shorter part may be a bend of another kind.
+    """
     found = []
-    for rows in _stretches((left < tolerance) & (np.gradient(t) < 3 * one.width)):
+    for one in seen:
+        for rows in (rows[:-REACH] for rows in _holds(one.drive) if _is_whole(one.time, rows, REACH)):
+            half = rows[len(rows) // 2 :]
+            tau = _time_constant(one.time[half], one.frequency[half], tolerance * one.slope)
+            if tau < np.ptp(one.time[half]):
+                found.append((float(np.ptp(one.time[rows])), tau))
+    longest = max((length for length, _ in found), default=0.0)
+    return max((tau for length, tau in found if length > 0.9 * longest), default=0.0)
+
+
+def _judge_one(one: _Seen, time_constant: float, tolerance: float) -> _Judged:
+    t, T, f = one.time, one.temperature, one.frequency
+    noise = time_constant * max(_noise(T), _noise(f) / one.slope) / one.width
+    # A line through blocks −r … r has a slope that scatters by σ/√Σk².
+    r = np.arange(REACH, FARTHEST + 1)
+    quiet = np.flatnonzero(noise <= UNSEEN * tolerance * np.sqrt(r * (r + 1) * (2 * r + 1) / 3))
+    reach = int(r[quiet[0]]) if quiet.size else FARTHEST
+    left = time_constant * np.maximum(np.abs(_slopes(t, T, reach)), np.abs(_slopes(t, f, reach)) / one.slope)
+    return _Judged(one, left, time_constant, reach)
+
+
+def _soaks_of(one: _Judged, tolerance: float) -> list[Soak]:
+    t, T, f, left = one.time, one.seen.temperature, one.seen.frequency, one.left
+    found = []
+    for rows in _stretches((left < tolerance) & (np.gradient(t) < 3 * one.seen.width), T, one.reach):
         if t[rows[-1]] - t[rows[0]] >= LEAST:
             scatter = float(np.std(np.diff(f[rows]))) / np.sqrt(2.0 * len(rows))
-            uncertainty = float(np.hypot(scatter, one.slope * left[rows].mean()))
+            uncertainty = float(np.hypot(scatter, one.seen.slope * left[rows].mean()))
             ends, means = (float(t[rows[0]]), float(t[rows[-1]])), (float(T[rows].mean()), float(f[rows].mean()))
-            found.append(Soak(record.path, *ends, *means, uncertainty, float(left[rows].max())))
+            found.append(Soak(one.seen.path, *ends, *means, uncertainty, float(left[rows].max()), one.time_constant))
     return found
+
+
+def _is_whole(time: Array, rows: NDArray[np.intp], reach: int) -> bool:
+    return len(rows) > 3 * reach and float(np.ptp(time[rows])) >= LEAST
+
+
+def _noise(values: Array) -> float:
+    """Scatter of a block, from second differences."""
+    return float(1.4826 * np.median(np.abs(np.diff(values, 2))) / np.sqrt(6.0))
 
 
 def _holds(drive: Array) -> list[NDArray[np.intp]]:
@@ -186,8 +244,11 @@ def _holds(drive: Array) -> list[NDArray[np.intp]]:
     return [np.arange(first, last) for first, last in pairwise([*ends, len(drive)])]
 
 
-def _time_constant(t: Array, f: Array) -> float:
-    """Time constant (s) of f = a + b exp(−t/τ); infinite where the fit shows none: b does not stand out, or τ is beyond the rows."""
+def _time_constant(t: Array, f: Array, least: float = 0.0) -> float:
+    """Time constant (s) of f = a + b exp(−t/τ); infinite where the fit shows none: b does not stand out, or τ is beyond the rows.
+
+    To stand out, b must be larger than `least` (Hz) too.
+    """
 
     def miss(log_tau: float) -> tuple[float, float]:
         X = np.column_stack([np.ones(len(t)), np.exp(-(t - t[0]) / np.exp(log_tau))])
@@ -198,22 +259,24 @@ def _time_constant(t: Array, f: Array) -> float:
     low, high = np.log(length / 30), np.log(3 * length)
     best = minimize_scalar(lambda x: miss(x)[0], bounds=(low, high), method="bounded").x
     scatter = np.sqrt(miss(best)[0] / max(len(t) - 3, 1))
-    if min(best - low, high - best) < 0.01 or abs(miss(best)[1]) < STANDS_OUT * scatter:
+    if min(best - low, high - best) < 0.01 or abs(miss(best)[1]) < max(STANDS_OUT * scatter, least):
         return np.inf
     return float(np.exp(best))
 
 
-def _slopes(t: Array, values: Array) -> Array:
+def _slopes(t: Array, values: Array, reach: int) -> Array:
     """Slopes of straight lines through each block and its neighbours."""
     slopes = np.empty_like(values)
     for k in range(len(t)):
-        near = slice(max(k - REACH, 0), k + REACH + 1)
+        near = slice(max(k - reach, 0), k + reach + 1)
         x = t[near] - t[near].mean()
         slopes[k] = float(x @ values[near]) / float(x @ x)
     return slopes
 
 
-def _stretches(settled: NDArray[np.bool_]) -> list[NDArray[np.intp]]:
-    """Settled rows, apart where more than some of them together are not: noise interrupts no soak."""
+def _stretches(settled: NDArray[np.bool_], T: Array, reach: int) -> list[NDArray[np.intp]]:
+    """Settled rows, apart where more than some of them together are not, or the temperature is another: noise interrupts no soak."""
     rows = np.flatnonzero(settled)
-    return [part for part in np.split(rows, np.flatnonzero(np.diff(rows) > 2 * REACH) + 1) if len(part)]
+    gap = np.diff(rows)
+    apart = (gap > 2 * reach) | ((gap > 2 * REACH) & (np.abs(np.diff(T[rows])) > HELD))
+    return [part for part in np.split(rows, np.flatnonzero(apart) + 1) if len(part)]

@@ -1,7 +1,7 @@
 """`hrg fit frequency`: f(T) and its inverse from a steady-state table, or from the settled parts of records.
 
 With --json one object, schema `hrg.fit-frequency/1`; from records it has besides `soaks`: `[{record, start_s, end_s,
-temperature_degC, frequency_Hz, error_Hz, left_K}]`, `left_K` what may be left of the change.
+temperature_degC, frequency_Hz, error_Hz, left_K}]`, `left_K` what may be left of the change, and `time_constant_s` by which.
 """
 
 from typing import TYPE_CHECKING
@@ -34,7 +34,8 @@ def fit_frequency(
     more : str
         Further records of the same device.
     time_constant : float
-        Slowest time constant of the gyro in s, from which follows how settled a record is; hrg fit thermal measures it.
+        Slowest time constant of the gyro in s, from which follows how settled a record is; hrg fit thermal measures it. A longer
+        one that the records show takes its place.
     left : float
         Departure from the settled temperature, in K, within which a record counts as settled.
     order : int
@@ -65,6 +66,11 @@ def fit_frequency(
         soaks = find_soaks(records, time_constant, left)
         T, f, step = settled_table(soaks, table, advise_hold(records, time_constant, left) if len(soaks) < 2 else "")
         sha256 = records[0].sha256
+        shown = soaks[0].time_constant
+        if shown > time_constant:
+            say(
+                f"the records show a time constant of {shown / 60:.0f} min; it takes the place of {time_constant / 60:.0f} min."
+            )
         for soak in soaks:
             say(
                 f"settled: {soak.path}, {soak.start:.0f} to {soak.end:.0f} s: {soak.temperature_degC:.3f} °C,"
@@ -103,7 +109,7 @@ def fit_frequency(
         "calculated_degC": study.calculated_degC,
         "error_degC": study.error_degC,
         "recommended_order": study.orders.recommended,
-        **({"soaks": [_describe(soak) for soak in soaks]} if soaks else {}),
+        **({"soaks": [_describe(soak) for soak in soaks], "time_constant_s": soaks[0].time_constant} if soaks else {}),
     }
     for block in (page.coefficients_table(study), page.inverse_table(study), page.order_table(study)):
         print_table(block.caption, block.columns, block.rows, block.note)
