@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 Progress = Callable[[str], None]
 UNITS = {"frequency_Hz": "Hz", "bias_deg_per_h": "°/h", "inverse_q": "1", QUADRATURE: "V", HOUSING: "K", SETTLED: "Hz"}
+TURNED_ON = 2.0  # runs whose offsets are so much larger than the card states
 CONTRADICTION = 5.0  # runs whose offsets are so much larger than what else the noise makes of a run's mean
 START_STEPS = 3
 UNSETTLED, UNSETTLED_SD = 0.5, 4.0  # K and standard deviations by which a gyro had not settled at the start
@@ -384,12 +385,15 @@ def _warn(found: CardFit, estimates: Sequence[Estimate], ladder: Mapping[str, Ru
     warnings += _unsettled(found)
     rows = found.problem.rows
     for name, rung in ladder.items():
+        stated = found.problem.instrument.noise.bias_turn_on_deg_per_h if name == BIAS else 0.0
         usual = _usual_mean(found, name)
-        if len(rows[name].times) > 1 and rung.offset > CONTRADICTION * usual:
+        if len(rows[name].times) > 1 and rung.offset > max(CONTRADICTION * usual, TURNED_ON * stated):
             warnings.append(
                 f"the runs contradict each other in {name}: after the calibration their means lie {rung.offset:.3g}"
-                f" {UNITS[name]} (rms) from the model, where the noise within a run explains {usual:.2g}; are they of one"
-                " device and one turn-on?"
+                f" {UNITS[name]} (rms) from the model, where the noise within a run explains {usual:.2g}"
+                + (f" and the card states {stated:.3g} from turn-on to turn-on" if stated else "")
+                + "; are they of one device"
+                + ("?" if stated else " and one turn-on?")
             )
     for name, count in found.outliers.items():
         if count:

@@ -51,7 +51,9 @@ def _show_values(card: str) -> Answer:
 
     instrument = load_card(card)
     values, stated = instrument.uncertain, instrument.stated
-    intervals = instrument.part("posterior").intervals
+    # A value that was changed since the calibration is not described by its interval any more.
+    saved, held = instrument.part("posterior").intervals, {one.name: one.value for one in values}
+    intervals = {name: (low, high) for name, (low, high) in saved.items() if low <= held.get(name, low) <= high}
     mass = weigh(instrument.resonator, instrument.material.elastic(instrument.reference_temperature).rho)
     yield {
         "schema": "hrg.card-values/1",

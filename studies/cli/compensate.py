@@ -36,7 +36,7 @@ def compensate(
     out : str
         Where the record with the added columns goes.
     extrapolate : bool
-        Apply the model outside the range of its fit too.
+        Apply the model outside the range of its fit too; of a record without a thermometer, leave the rows empty there.
     emit : str
         Write the model as C99 source for firmware.
     """
@@ -94,6 +94,10 @@ def compensate(
             f"{out}: {RESONATOR}, by the frequency: {run} has no other thermometer, and a frequency that is compensated by"
             " itself is the same in every row. hrg fit bias --over temperature compensates the other outputs over it."
         )
+        if empty := int(np.count_nonzero(np.isnan(result[RESONATOR]))):
+            print(
+                f"{empty} {'row stays' if empty == 1 else 'rows stay'} empty: no frequency, or one outside the range of the model."
+            )
     for name, facts in columns.items():
         from_what = "" if facts["stability_before"] is None else f"{facts['stability_before']:.4g} → "
         unit = "" if unit_of(name) == "1" else f" {unit_of(name)}"

@@ -4,6 +4,7 @@ import functools
 import inspect
 import json as json_module
 import math
+import os
 import sys
 import textwrap
 from collections.abc import Callable, Generator, Mapping, Sequence
@@ -15,6 +16,8 @@ Payload = Mapping[str, Any]
 Answer = Generator[Payload | tuple[Payload, int], None, Any]
 """What a command is: see `answers`."""
 
+OUTPUTS = ("out", "save", "report", "emit", "draft", "preview")
+"""Arguments of commands that name a file to be written."""
 SHORT_WORD = 10  # characters; longer words, such as file names, may be folded inside
 
 
@@ -27,8 +30,11 @@ def answers(schema: str) -> Callable[[Callable[..., Answer]], Callable[..., int]
     """
 
     def give(command: Callable[..., Answer]) -> Callable[..., int]:
+        own = inspect.signature(command)
+
         @functools.wraps(command)
         def run(*arguments: Any, json: bool = False, **options: Any) -> int:
+            _spare_inputs(own.bind(*arguments, **options).arguments)
             steps = command(*arguments, **options)
             try:
                 answer = next(steps)
@@ -43,7 +49,6 @@ def answers(schema: str) -> Callable[[Callable[..., Answer]], Callable[..., int]
             return status
 
         flag = Annotated[bool, Parameter(help=f"Print one JSON object (schema {schema}) instead of text.")]
-        own = inspect.signature(command)
         last = inspect.Parameter("json", inspect.Parameter.KEYWORD_ONLY, default=False, annotation=flag)
         signature = own.replace(parameters=[*own.parameters.values(), last], return_annotation=int)
         run.__signature__ = signature  # type: ignore[attr-defined]
@@ -51,6 +56,31 @@ def answers(schema: str) -> Callable[[Callable[..., Answer]], Callable[..., int]
         return run
 
     return give
+
+
+def _spare_inputs(arguments: Mapping[str, Any]) -> None:
+    """Refuse to write over a file that the same command reads.
+
+    Raises
+    ------
+    InputError
+        One of `OUTPUTS` is a file that another argument names too.
+    """
+    written = {name: arguments[name] for name in OUTPUTS if isinstance(arguments.get(name), str)}
+    read = [
+        word
+        for name, value in arguments.items()
+        if name not in OUTPUTS
+        for word in (value if isinstance(value, tuple | list) else [value])
+        if isinstance(word, str)
+    ]
+    for name, path in written.items():
+        if any(os.path.isfile(path) and os.path.isfile(word) and os.path.samefile(path, word) for word in read):
+            from studies.errors import InputError
+
+            raise InputError(
+                f"--{name} {path}: this file is read by the same command and would be lost; name another one."
+            )
 
 
 def print_json(payload: Mapping[str, Any]) -> None:

@@ -27,8 +27,13 @@ class Correlations(Keys, frozen=True, kw_only=True):
             raise ValueError(f"correlation must be a square table of {count} by {count} numbers, one for each name.")
         if any(not -1.0 <= rho <= 1.0 for row in self.correlation for rho in row):
             raise ValueError("correlation must hold numbers from -1 to 1.")
-        if len(self.interval) not in (0, count) or any(not low <= high for low, high in self.interval):
+        if len(self.interval) not in (0, count):
             raise ValueError(f"interval must be {count} pairs of numbers [low, high], one for each name.")
+        for name, (low, high) in self.intervals.items():
+            if not low <= high:
+                raise ValueError(
+                    f"interval of {name} must go from a lower to a higher number, not from {low:g} to {high:g}."
+                )
 
     @property
     def intervals(self) -> dict[str, tuple[float, float]]:

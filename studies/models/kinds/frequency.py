@@ -45,14 +45,14 @@ def compensate(model: Model, record: Record, *, extrapolate: bool) -> dict[str, 
 
     Without a housing sensor T is the resonator's, where it is known, or the chamber's. Without any thermometer the frequency
     is its own: nothing of it would be left but f₀, so that what is returned is the resonator's temperature, over which
-    the other outputs can be compensated. The curve is a settled one: while a housing's or chamber's temperature moves, the
+    the other outputs can be compensated, and to extrapolate is to leave the rows empty that lie outside. The curve is a settled one: while a housing's or chamber's temperature moves, the
     resonator lags behind it and the difference stays in the result.
     """
     if model.compensates != "frequency_Hz":
         raise InputError(f"{model.path or 'model'}: a frequency model compensates frequency_Hz.")
     column = next((name for name in TEMPERATURES if name in record and np.isfinite(record[name]).any()), None)
     if column is None:
-        return {RESONATOR: find_temperature(model, record["frequency_Hz"], record.path or "record")}
+        return {RESONATOR: find_temperature(model, record["frequency_Hz"], record.path or "record", spare=extrapolate)}
     if "frequency_Hz" in record and not extrapolate:
         ends = np.sort(evaluate(model, np.linspace(*model.range_of(VARIABLE), 201)))
         check_model_frequency(
@@ -70,18 +70,27 @@ def evaluate(model: Model, temperature_degC: Array) -> Array:
     return np.asarray(np.polynomial.polynomial.polyval(shift, model.part("frequency").values))
 
 
-def find_temperature(model: Model, frequency: Array, path: str = "record") -> Array:
+def find_temperature(model: Model, frequency: Array, path: str = "record", *, spare: bool = False) -> Array:
     """Return the temperature (°C) whose frequency this is, HRG paper Table 2; NaN where no frequency is given.
+
+    Parameters
+    ----------
+    spare : bool
+        Leave frequencies outside the model's range without a temperature.
 
     Raises
     ------
     InputError
-        The curve turns round within the model's range, or a frequency lies outside it.
+        The curve turns round within the model's range, or a frequency lies outside it, or there is none.
     """
     from compensation.frequency import invert
 
+    if not np.isfinite(frequency).any():
+        raise InputError(f"{path}: the column 'frequency_Hz' has no value.")
     low, high = np.sort(evaluate(model, np.array(model.range_of(VARIABLE))))
     check_model_frequency(frequency, float(low), float(high), path, model.path or "the model")
+    if spare:
+        frequency = np.where((frequency >= low) & (frequency <= high), frequency, np.nan)
     with naming(f"{path} with {model.path or 'model'}"):
         return invert(partial(evaluate, model), model.range_of(VARIABLE), frequency)
 

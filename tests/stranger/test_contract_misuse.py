@@ -1,0 +1,73 @@
+"""What a user who misunderstands is told, and what stays whole: files of this test's own making."""
+
+import csv
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from studies.cli import main
+
+
+def _frequency(T):
+    return 4424.7 + 0.352 * T - 6.1e-4 * T**2 + 8.0e-6 * T**3
+
+
+def _write(path, **columns):
+    with open(path, "w", newline="") as file:
+        rows = csv.writer(file)
+        rows.writerow(columns)
+        rows.writerows(
+            [["" if np.isnan(x) else f"{x:.6f}" for x in row] for row in zip(*columns.values(), strict=True)]
+        )
+    return str(path)
+
+
+@pytest.fixture
+def model(tmp_path):
+    T = np.array([-40.0, -25.0, -10.0, 5.0, 20.0, 35.0, 50.0, 65.0])
+    table = _write(tmp_path / "table.csv", temperature_degC=T, frequency_Hz=_frequency(T))
+    assert main(["fit", "frequency", table, "--save", str(tmp_path / "model.toml")]) == 0
+    return str(tmp_path / "model.toml")
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["temperature", "MODEL", "RUN", "--out", "MODEL"],
+        ["temperature", "MODEL", "RUN", "--out", "RUN"],
+        ["compensate", "MODEL", "RUN", "--out", "RUN"],
+        ["compensate", "MODEL", "--emit", "MODEL"],
+        ["fit", "frequency", "RUN", "--save", "RUN"],
+    ],
+)
+def test_no_command_writes_over_what_it_reads(words, model, tmp_path, capsys):
+    time = np.arange(0.0, 3600.0, 30.0)
+    run = _write(tmp_path / "run.csv", time_s=time, frequency_Hz=_frequency(20.0 + time / 600))
+    names = {"MODEL": model, "RUN": run}
+    before = [Path(path).read_text() for path in (model, run)]
+    assert main([names.get(word, word) for word in words]) == 2
+    assert "this file is read by the same command" in capsys.readouterr().err
+    assert [Path(path).read_text() for path in (model, run)] == before
+
+
+def test_a_glitch_costs_its_own_row_alone(model, tmp_path, capsys):
+    T = 20.0 + np.arange(120.0) / 20
+    f = _frequency(T)
+    f[30], f[50] = 5000.0, np.nan
+    run, out = _write(tmp_path / "run.csv", time_s=30.0 * np.arange(120), frequency_Hz=f), tmp_path / "out.csv"
+    assert main(["compensate", model, run, "--out", str(out)]) == 2
+    assert not out.exists()
+    assert main(["compensate", model, run, "--out", str(out), "--extrapolate"]) == 0
+    assert "2 rows stay empty" in capsys.readouterr().out
+    found = np.genfromtxt(out, delimiter=",", names=True)["resonator_temperature_degC"]
+    assert np.flatnonzero(np.isnan(found)).tolist() == [30, 50]
+    assert np.nanmax(np.abs(found - T)) < 1e-4
+
+
+def test_a_record_without_any_frequency_is_refused(model, tmp_path, capsys):
+    run = _write(tmp_path / "run.csv", time_s=np.arange(9.0), frequency_Hz=np.full(9, np.nan))
+    for command in ("compensate", "temperature"):
+        assert main([command, model, run, "--out", str(tmp_path / "out.csv")]) == 2
+        assert "'frequency_Hz' has no value" in capsys.readouterr().err
+    assert not (tmp_path / "out.csv").exists()
