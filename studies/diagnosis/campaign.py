@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.constants import zero_Celsius
 
-from compensation.spikes import find_spikes
+from compensation.spikes import find_spike_groups, find_spikes
 from studies.diagnosis.checks import FEWEST_BINS, check_device, check_units
 from studies.diagnosis.response import RESPONSES
 from studies.diagnosis.steps import Steps
@@ -110,11 +110,11 @@ class Campaign:
         )
 
     def without_spikes(self, column: str, rests: Sequence[FloatArray]) -> "Campaign":
-        """Leave out the rows of a response that stand out from what a model leaves, run by run.
+        """Leave out the rows of a response that stand out from what a model leaves, run by run, alone or two or three together.
 
         Before there was a model, a bend of the temperature or an uneven clock of the logger may have hidden them.
         """
-        spikes = [find_spikes(rest) for rest in rests]
+        spikes = [find_spikes(rest) | find_spike_groups(rest) for rest in rests]
         count = sum(int(own.sum()) for own in spikes)
         if not count:
             return self

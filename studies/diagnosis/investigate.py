@@ -14,7 +14,7 @@ from studies.diagnosis.causes import name_causes, vote
 from studies.diagnosis.checks import FEWEST_BINS
 from studies.diagnosis.constants import CONSTANTS
 from studies.diagnosis.held_out import Score
-from studies.diagnosis.inquiry import Inquiry, Thermometer, begin, inquire, read_thermometer, row_noise
+from studies.diagnosis.inquiry import Inquiry, Thermometer, again, begin, inquire, read_thermometer, row_noise
 from studies.diagnosis.model import Fit
 from studies.diagnosis.planning.advice import suggest_next
 from studies.diagnosis.planning.chamber import Chamber
@@ -109,7 +109,7 @@ def investigate(
         plain = begin(campaign, column, thermometer, make)
         cleaned = campaign.without_spikes(column, held_out.residuals(plain, campaign))
         if cleaned is not campaign:
-            campaign, plain = cleaned, begin(cleaned, column, thermometer, make)
+            campaign, plain = cleaned, begin(cleaned, column, thermometer, make and again(plain))
         inquiries[column] = inquire(campaign, plain, effects, score_held_out)
         if RESPONSES[column].thermometer:
             thermometer = read_thermometer(campaign, inquiries[column].final)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from compensation.spikes import find_spikes
+from compensation.spikes import find_spike_groups, find_spikes
 
 ROWS = np.arange(600.0)
 SHAPES = {
@@ -54,3 +54,32 @@ def test_gaussian_noise_has_next_to_none():
     """Six robust deviations of the distance, about seven of the noise, are passed by 1e-11 of Gaussian rows."""
     found = sum(int(find_spikes(np.random.default_rng(k).standard_normal(600)).sum()) for k in range(100))
     assert found <= 1
+
+
+@pytest.mark.parametrize("places", [[200], [200, 201], [200, 202], [200, 201, 202], [200, 201, 203], [3, 4], [595, 596]])
+def test_a_few_rows_that_stand_out_together_are_found(places):
+    rests = np.random.default_rng(6).standard_normal(ROWS.size)
+    rests[places] += 30.0
+    assert np.flatnonzero(find_spike_groups(rests)).tolist() == places
+
+
+@pytest.mark.parametrize(
+    "event",
+    [
+        np.where(ROWS < 300.0, 0.0, 30.0),
+        np.where(np.abs(ROWS - 300.0) < 2.5, 30.0, 0.0),  # five rows
+        30.0 * np.exp(-0.5 * ((ROWS - 300.0) / 2.0) ** 2),
+        30.0 / (1.0 + ((ROWS - 300.0) / 2.0) ** 2),
+        np.where(ROWS < 300.0, 0.0, 30.0 * np.exp(-(ROWS - 300.0) / 3.0)),
+        30.0 * (np.sin(ROWS / 5.0) > 0.5),
+    ],
+    ids=["jump", "five rows", "bump", "dip", "decay", "telegraph"],
+)
+def test_an_event_of_many_rows_is_no_group_of_spikes(event):
+    for seed in range(20):
+        assert not find_spike_groups(event + np.random.default_rng(seed).standard_normal(ROWS.size)).any()
+
+
+def test_noise_has_next_to_no_groups():
+    """Six deviations of Gaussian rows are passed by 2e-9 of them."""
+    assert not any(find_spike_groups(np.random.default_rng(k).standard_normal(600)).any() for k in range(100))

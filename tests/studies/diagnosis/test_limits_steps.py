@@ -4,7 +4,7 @@ import numpy as np
 
 from studies.diagnosis.campaign import load_campaign
 from studies.diagnosis.held_out import residuals
-from studies.diagnosis.inquiry import begin
+from studies.diagnosis.inquiry import again, begin
 from studies.diagnosis.steps import Steps
 from studies.record import Record
 
@@ -62,3 +62,22 @@ def test_outlying_rows_hide_neither_behind_a_bend_nor_behind_an_uneven_clock():
     assert left_out.tolist() == places
     assert cleaned.outliers == len(places)
     assert cleaned.said[0].startswith("3 outlying")
+
+
+def test_outlying_rows_beside_each_other_are_left_out_and_the_baseline_goes_on_from_where_it_was():
+    """Three rows within four stand out together and are counted; five rows are an event, not outliers."""
+    rng = np.random.default_rng(12)
+    time = np.arange(0.0, 30000.0, 30.0)
+    housing = 20.0 + 30.0 * np.sin(2 * np.pi * time / 20000.0)
+    sigma = 5e-3
+    frequency = 4432.0 + 0.36 * (housing - 20.0) + sigma * rng.standard_normal(time.size)
+    group, event = [400, 401, 403], [700, 701, 702, 703, 704]
+    frequency[[*group, *event]] += 15.0 * sigma
+    campaign = load_campaign([Record({"time_s": time, "housing_temperature_degC": housing, "frequency_Hz": frequency})])
+    plain = begin(campaign, "frequency_Hz", None)
+    cleaned = campaign.without_spikes("frequency_Hz", residuals(plain, campaign))
+    assert np.flatnonzero(np.isnan(cleaned.runs[0].row_responses["frequency_Hz"])).tolist() == group
+    assert cleaned.said[0].startswith("3 outlying")
+    fresh = begin(cleaned, "frequency_Hz", None)
+    onward = begin(cleaned, "frequency_Hz", None, again(plain))
+    assert abs(onward.log_evidence - fresh.log_evidence) < 0.3
