@@ -6,6 +6,8 @@
                                                              what `--plan` predicts for the same designs
     python tests/benchmarks/bench_diagnosis.py cases.jsonl --calibrate
                                                              rewrite studies/diagnosis/calibration.toml from the cases
+    python tests/benchmarks/bench_diagnosis.py cases.jsonl --ceilings
+                                                             add to the file what an ideal detector would see
     python tests/benchmarks/bench_diagnosis.py cases.jsonl --report FILE.md
 
 Cases are appended to the file, so that several runs add up; the seed is drawn and printed unless given.
@@ -19,7 +21,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
-from tests.benchmarks.diagnosis.cases import KINDS, collect, read_cases
+from tests.benchmarks.diagnosis.cases import KINDS, add_ceilings, collect, read_cases
 from tests.benchmarks.diagnosis.summary import summarise
 
 
@@ -33,6 +35,7 @@ def main():
     parser.add_argument("--plan-check", action="store_true", help="predict the confusion of the cases of the file")
     parser.add_argument("--draws", type=int, default=100, help="cases of each effect that --plan-check predicts")
     parser.add_argument("--calibrate", action="store_true", help="fit the engine's constants on the cases of the file")
+    parser.add_argument("--ceilings", action="store_true", help="what an ideal detector would see of the cases of the file")
     parser.add_argument("--report", type=Path)
     arguments = parser.parse_args()
     path = arguments.cases
@@ -44,6 +47,8 @@ def main():
         from tests.benchmarks.diagnosis.plan_check import check_plan
 
         print(check_plan(path, arguments.draws))
+    elif arguments.ceilings:
+        add_ceilings(path)
     elif arguments.report:
         arguments.report.write_text(summarise(read_cases(path)))
     else:

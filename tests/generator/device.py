@@ -26,7 +26,9 @@ class Truth:
     channel: str = ""
     parameters: dict = field(default_factory=dict)
     noise: dict = field(default_factory=dict)
-    structural: dict = field(default_factory=dict)
+    levels: dict = field(default_factory=dict)
+    alone: list = field(default_factory=list)
+    """For every effect its channel and the records with it alone, without and with the noise of the responses."""
     twin: object = None
 
 
@@ -193,6 +195,29 @@ def build(design, family, rng, effects=(), alien="", snr=0.0):
         own = {c: noise[c][k] for c in CHANNELS}
         path = f"run{k + 1}.csv"
         records.append(_record(world, k, sample[k], responses, sensed, own, offsets[k], begin[k], rng, path))
+    silent = {c: [np.zeros(s.size) for s in sample] for c in CHANNELS}
+    for piece, size in zip(pieces, sizes, strict=True):
+        own, read = _responses([piece], [size], world, plan, device, starts)
+        both = [
+            [
+                _record(
+                    world,
+                    k,
+                    sample[k],
+                    own,
+                    read,
+                    {c: part[c][k] for c in CHANNELS},
+                    offsets[k],
+                    begin[k],
+                    np.random.default_rng(k),
+                    "",
+                )
+                for k in range(runs)
+            ]
+            for part in (silent, noise)
+        ]
+        truth.alone.append((piece.channel, *both))
+    truth.levels = {c: (device.sigma[c], levels[c]) for c in CHANNELS}
     truth.twin = Twin(world, (tuple(effects), alien), sizes, world.rng.drawn, family, levels, list(begin))
     for c in CHANNELS:
         truth.noise[c] = float(np.sqrt(np.mean(np.concatenate(noise[c]) ** 2)))

@@ -3,6 +3,8 @@
 import numpy as np
 
 FAMILIES = ("white", "walk", "flicker", "correlated", "outliers")
+TAUS = tuple(30.0 * 4.0 ** np.arange(7))
+"""Correlation times of the flicker noise, s."""
 
 
 def draw_level(family, rng):
@@ -23,7 +25,7 @@ def draw(family, time, level, rng):
         return white + level * np.cumsum(rng.standard_normal(n) * np.sqrt(dt / 3600.0 / hours))
     if family == "flicker":
         out = white
-        for tau in 30.0 * 4.0 ** np.arange(7):
+        for tau in TAUS:
             out = out + level * _ou(dt, tau, rng)
         return out
     if family == "correlated":

@@ -20,6 +20,9 @@ from pathlib import Path
 import numpy as np
 
 BANDS = ((0.0, 0.65), (0.65, 2.0), (2.0, 4.5), (4.5, 9.0), (9.0, 99.0))
+REACH_SD = 4.24
+"""Standard deviations from which on an ideal detector, which knows noise and form, could name a cause: a log likelihood ratio
+of d²/2 = 9, for a prior of one name of some thirty in fifty and a margin."""
 ASK = "import sys; from studies.cli import main; sys.exit(main(sys.argv[1:]))"
 
 
@@ -37,6 +40,7 @@ class Mark:
     stray: int  # named causes that are not there
     stated: tuple[tuple[float, bool], ...]
     held_out: tuple[float, ...]
+    reach: float  # of the least visible hidden cause, in standard deviations of noise along it
 
 
 def ask(folder: Path, card: bool, again: bool) -> dict:
@@ -81,6 +85,7 @@ def mark(folder: Path, answer: dict) -> Mark:
         folder.name, kind, "+".join(h["effect"] for h in hidden) or "-", min((h["snr"] for h in hidden), default=0.0),
         len(truth["files"]), verdict, right, bool(hits and hits[0]), every, len(hits) - sum(hits),
         tuple((c["probability"], hit) for c, hit in zip(causes, hits, strict=True)), tuple(held),
+        min((h["detectability"] for h in hidden), default=0.0),
     )  # fmt: skip
 
 
@@ -110,7 +115,7 @@ def table(marks: list[Mark]) -> str:
         share = (
             f"{100 * sum(values) / len(values):5.1f} %  [{100 * low:5.1f}, {100 * high:5.1f}]" if values else "    –"
         )
-        lines.append(f"{label:44} {sum(values):4d} / {len(values):4d}  {share}")
+        lines.append(f"{label:52} {sum(values):4d} / {len(values):4d}  {share}")
 
     known = [m for m in marks if m.kind == "effect"]
     pairs = [m for m in marks if m.kind == "pair"]
@@ -120,6 +125,9 @@ def table(marks: list[Mark]) -> str:
         row(f"one effect, SNR {low:g}–{high:g}: right class", [m.right for m in band])
         row("    strongest name right", [m.first for m in band])
         row("    called unexplained", [m.verdict == "unexplained" for m in band])
+        seen = [m for m in band if m.reach > REACH_SD]
+        if len(seen) < len(band):
+            row(f"    of {len(seen)} that an ideal detector could name: right", [m.right for m in seen])
     row("one effect, SNR ≥ 2: right class", [m.right for m in known if m.snr >= 2])
     row("    strongest name right", [m.first for m in known if m.snr >= 2])
     row("    in some named set", [m.every for m in known if m.snr >= 2])

@@ -12,6 +12,7 @@ from studies.diagnosis.campaign import load_campaign
 from studies.diagnosis.causes import nothing_of, scores_of
 from studies.diagnosis.investigate import investigate
 from studies.effects import library
+from tests.benchmarks.diagnosis.ceiling import ceilings
 from tests.generator.designs import DESIGNS
 from tests.generator.device import build
 from tests.generator.hidden import ALIENS, EFFECTS, possible
@@ -136,6 +137,17 @@ def collect(path, minutes, kinds, seed, held_out=True):
             case = run_case(kinds[count % len(kinds)], count // len(kinds), seed + count, held_out, commit)
             file.write(json.dumps(case, default=float) + "\n")
             file.flush()
+
+
+def add_ceilings(path):
+    """Write into the file what an ideal detector would see of the faint effects and of pairs."""
+    cases = read_cases(path)
+    for case in cases:
+        wanted = case["kind"] == "pair" or (case["kind"] in ("effect", "faint") and case["snr"] < min(SNRS[:2]))
+        if wanted and "ceiling" not in case:
+            _, truth = build_case(case["kind"], case["count"], case["seed"])
+            case["ceiling"] = [[own.known, own.wandering] for own in ceilings(truth)]
+    path.write_text("".join(json.dumps(case, default=float) + "\n" for case in cases))
 
 
 def read_cases(path):

@@ -4,6 +4,7 @@ from collections import Counter
 
 import numpy as np
 
+from tests.benchmarks.diagnosis.ceiling import PRICE
 from tests.benchmarks.diagnosis.scoring import (
     NOTHING,
     SNR_ROWS,
@@ -48,6 +49,7 @@ def summarise(cases):
         row = [share_of([c for c in mine if c["snr"] == snr], first_right) for snr in levels]
         wrong = Counter(_word(c) for c in mine if c["snr"] >= 1 and not first_right(c))
         lines.append(f"| {name} | {' | '.join(f'{hits}/{total}' for hits, total in row)} | {_counts(wrong)} |")
+    lines += ["", *_within_reach(singles, "one effect", first_right)]
     lines += ["", "## Held-out residual over the noise (right name)", ""]
     groups = sorted({held_out_group(c) for c in singles})
     for group, snr in [(None, snr) for snr in levels] + [(group, None) for group in groups]:
@@ -79,6 +81,7 @@ def summarise(cases):
     pairs = of_kind(cases, "pair")
     lines += ["", "## Two effects at SNR 3", ""]
     lines.append(f"- exact set: {rate(*share_of(pairs, exact_set))}; both found: {rate(*share_of(pairs, all_found))}")
+    lines += _within_reach(pairs, "both of a pair", all_found)
     lines += ["", "## Reliability of the stated probability", ""]
     stated = claims(cases)
     rows, error = reliability(stated)
@@ -94,6 +97,23 @@ def summarise(cases):
         f" Commits: {_counts(Counter(c['commit'] or 'not recorded' for c in cases))}.",
     ]
     return "\n".join(lines) + "\n"
+
+
+def _within_reach(cases, word, found):
+    """Lines on what an ideal detector could name, and how much of it was found."""
+    lines = []
+    for k, knows in enumerate(("knows the noise", "does not know whether the noise wanders")):
+        for snr in sorted({c["snr"] for c in cases if "ceiling" in c}, reverse=True):
+            mine = [c for c in cases if c["snr"] == snr and "ceiling" in c]
+            seen = [c for c in mine if min(own[k] for own in c["ceiling"]) > PRICE]
+            lines.append(
+                f"- {word} at SNR {snr:g}, an ideal detector that {knows}: could name {len(seen)} of {len(mine)}; "
+                f"of these found {rate(*share_of(seen, found))}"
+            )
+            missed = [f"{c['truth'][0]} {min(own[k] for own in c['ceiling']):.0f}" for c in seen if not found(c)]
+            if missed:
+                lines.append(f"  - missed, with its log likelihood ratio: {', '.join(sorted(missed))}")
+    return lines
 
 
 def _hidden(case):

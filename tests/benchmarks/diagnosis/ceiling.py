@@ -1,0 +1,103 @@
+"""What an ideal detector would see: it knows the form of the hidden effect and the noise, but not the baseline's values.
+
+With the noise-free response y of the effect alone, the baseline's columns F (priors D, linearised where it fits), the true
+covariance C of the noise and another, C′, the log likelihood of the truth over that of "no effect, noise C′" is on average
+
+    L = ½ [min_φ (y − F φ)ᵀ C′⁻¹ (y − F φ) + φᵀ D⁻² φ + tr(C′⁻¹ C) − n + log |C′|/|C|].
+
+C′ = C gives the ratio where the noise is known; the least of all C′ = C + a wander of the diagnosis' kinds that where nobody knows
+whether the noise wanders. What stays below the price of a name (its prior and the margin) cannot be named by anybody.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import cholesky, solve_triangular
+
+from studies.diagnosis.campaign import load_campaign
+from studies.diagnosis.constants import CONSTANTS
+from studies.diagnosis.inquiry import begin, read_thermometer
+from studies.diagnosis.noise import KERNELS, SHARES
+from tests.generator.noises import TAUS
+
+PRICE = CONSTANTS["margin"] - CONSTANTS["log_prior_effect"]
+
+
+@dataclass(frozen=True)
+class Ceiling:
+    """Log likelihood ratio of an effect with the noise known, and with a wander possible."""
+
+    known: float
+    wandering: float
+
+
+def ceilings(truth):
+    """Return the ceiling of every hidden effect, the others absent."""
+    return [ceiling_of(truth, *alone) for alone in truth.alone]
+
+
+def ceiling_of(truth, channel, clean, noisy):
+    """Return the ceiling of one effect, from the records with it alone."""
+    campaign = load_campaign(noisy)
+    plain = begin(campaign, "frequency_Hz", None)
+    if channel != "frequency_Hz":
+        plain = begin(campaign, channel, read_thermometer(campaign, plain))
+    problem, tangent = plain.problem, plain.tangent
+    sigma, level = truth.levels[channel]
+    rows, noise, times = [], [], []
+    for run, mask in zip(campaign.runs, problem.present, strict=True):
+        silent = clean[run.record]
+        known = np.isfinite(run.row_responses[channel])
+        own = np.interp(run.row_time, silent["time_s"] - silent["time_s"][0], silent[channel])
+        rows.append(run.steps.means(np.where(known, own, np.nan)))
+        noise.append(sigma**2 * covariance(truth.family, level, run, mask, problem.noise.rows))
+        times.append(run.time[mask])
+    target = problem.split(problem.stack(rows) + problem.stack(tangent.shift))
+    columns = problem.split(problem.stack(tangent.columns))
+    white = sigma**2 / problem.noise.rows
+
+    def ratio(kernel, share):
+        wander = [share * white * kernel(t) for t in times] if share else [0.0] * len(times)
+        return 0.5 * _divergence(target, columns, tangent.prior, noise, wander)
+
+    known = ratio(None, 0.0)
+    ratios = [ratio(kernel, share) for kernel in KERNELS.values() for share in SHARES[1:-3]]
+    return Ceiling(known, min(known, *ratios))
+
+
+def _divergence(target, columns, prior, noise, wander):
+    """Return twice the mean log likelihood ratio."""
+    total, ys, xs = 0.0, [], []
+    for y, x, own, more in zip(target, columns, noise, wander, strict=True):
+        root = cholesky(own + more, lower=True)
+        white = solve_triangular(root, np.column_stack([y, x]), lower=True)
+        ys.append(white[:, 0])
+        xs.append(white[:, 1:])
+        if np.ndim(more):
+            inner = cholesky(own, lower=True)
+            total += float(np.sum(solve_triangular(root, inner, lower=True) ** 2)) - y.size
+            total += 2.0 * float(np.sum(np.log(np.diag(root)) - np.log(np.diag(inner))))
+    held = np.diag(np.where(np.isinf(prior), 0.0, 1.0 / prior))
+    whole, y = np.concatenate([*xs, held]), np.concatenate([*ys, np.zeros(prior.size)])
+    size = np.maximum(np.linalg.norm(whole, axis=0), 1e-300)
+    found = np.linalg.lstsq(whole / size, y, rcond=1e-12)[0]
+    return total + float(np.sum((y - whole / size @ found) ** 2))
+
+
+def covariance(family, level, run, mask, rows):
+    """Covariance of the means of a run's rows over the steps of its grid, over the white variance of a row."""
+    time = run.time[mask]
+    step = float(run.time[1] - run.time[0])
+    out = np.eye(time.size) / rows
+    if family == "walk":
+        out += level**2 * np.minimum.outer(time, time) / float(np.ptp(run.row_time))
+    for tau in {"flicker": TAUS, "correlated": (1500.0,)}.get(family, ()):
+        out += level**2 * averaged(np.abs(time[:, None] - time), tau, step)
+    return out
+
+
+def averaged(apart, tau, step):
+    """Covariance e^(−|t|/τ) of means over steps that lie `apart`."""
+    ratio = step / tau
+    within = 2.0 / ratio * (1.0 - (1.0 - np.exp(-ratio)) / ratio)
+    return np.where(apart < 0.5 * step, within, np.exp(-apart / tau) * (np.sinh(0.5 * ratio) / (0.5 * ratio)) ** 2)
