@@ -148,6 +148,30 @@ STEP = replace(
 )
 
 
+def _bump(states: States, shape: Sequence[float], response: str) -> FloatArray:
+    """A bump at one temperature, what shifts it and what widens it: Hermite's functions of order 0, 1 and 2."""
+    centre, width = shape
+    z = (states.resonator - centre) / width
+    return np.asarray(np.stack([np.ones_like(z), z, z * z - 1.0], axis=1) * np.exp(-0.5 * z * z)[:, None])
+
+
+def _bumps(span: Span, response: str) -> list[tuple[float, ...]]:
+    """Centres a width apart; wider ones are curves, which the other forms have."""
+    low, high = span.temperature_low, span.temperature_high
+    widths = [(high - low) * part for part in BUMPS]
+    return [(float(centre), width) for width in widths for centre in np.arange(low, high, max(width, 1e-3))]
+
+
+BUMPS = tuple(2.0 ** (-0.5 * k) for k in range(8, 14))
+"""Widths of bumps in parts of the covered range: a sixteenth to a ninetieth."""
+BUMP = replace(
+    _generic("temperature: a bump", _bump, [1.0, 0.5, 0.5]),
+    shape=(Parameter("centre", 0.0, 1e4, "centre", False, True), Parameter("width", 0.0, 1e4, "width", True, True)),
+    grid=_bumps,
+    fine=True,
+)
+
+
 def look(plain: Fit, model: Fit) -> Leftover:
     """Return the strongest generic form beside a model, and the part of the structure that the model explains.
 
@@ -166,7 +190,12 @@ def look(plain: Fit, model: Fit) -> Leftover:
         tried = fit(problem, baseline, (*model.terms, Term(form, (), named=False)), 1, np.append(scales, 1e-2))
         if tried.log_evidence > best.log_evidence:
             best, name = tried, form.name
-    evidence = smooth = best.log_evidence - model.log_evidence
+    smooth = best.log_evidence - model.log_evidence
+    for seen in scan(model, build_bank(model, [BUMP]), 3):
+        tried = fit(problem, baseline, (*model.terms, replace(seen.term, named=False)), 1, np.append(scales, 1e-2))
+        if tried.log_evidence - model.log_evidence + seen.choice > smooth:
+            best, name, smooth = tried, BUMP.name, tried.log_evidence - model.log_evidence + seen.choice
+    evidence = smooth
     step = max((seen.gain for seen in scan(model, build_bank(model, [STEP]), 3)), default=0.0)
     if step > evidence:
         name, evidence = "time: a step", step
