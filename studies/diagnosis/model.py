@@ -74,6 +74,11 @@ class Problem:
         own = effect.sizes[self.response.column]
         return own * self.level if self.response.relative and not effect.thermal else own
 
+    @property
+    def run(self) -> "np.ndarray":
+        """Number of the run of every stacked row."""
+        return np.repeat(np.arange(len(self.present)), [int(mask.sum()) for mask in self.present])
+
     def split(self, rows: FloatArray) -> list[FloatArray]:
         """Return stacked rows run by run, the present ones only."""
         return np.split(rows, np.cumsum([int(mask.sum()) for mask in self.present])[:-1])
@@ -173,7 +178,7 @@ def inexact_columns(term: Term, view: View, problem: Problem, group: int) -> Flo
 
 
 IN_ONE_RUN = 0.99
-"""Part of the power of what an effect does from which on it does it in one run: what is left of a resonance far from it."""
+"""Part of the power of what an effect does beyond the baseline from which on it does it in one run."""
 LATE = 0.1
 """Delay of what a form may miss, in parts of the thermal lag."""
 
@@ -209,16 +214,19 @@ class Fit:
         return out
 
     def alone(self, index: int) -> bool:
-        """Whether other runs know next to nothing of a term: an event, columns of one run each, or all that it does lies in one run."""
-        places = self.columns_of(index)
-        parts = self.problem.split(self.linear.columns[:, places])
-        runs = np.stack([part.any(axis=0) for part in parts])
-        power = np.array([np.sum((part @ self.solved.coefficients[places]) ** 2) for part in parts])
-        return (
-            self.terms[index].effect.event
-            or bool((runs.sum(axis=0) <= 1).all())
-            or bool(power.max() >= IN_ONE_RUN * power.sum())
-        )
+        """Whether the runs but one know next to nothing of a term: an event, or what it does there the baseline does as well."""
+        if self.terms[index].effect.event:
+            return True
+        places, run = self.columns_of(index), self.problem.run
+        curve = self.linear.columns[:, places] @ self.solved.coefficients[places]
+        free = self.linear.columns[:, : self.tangent.prior.size]
+
+        def beyond(rows: "np.ndarray") -> float:
+            columns = free[rows] / np.maximum(np.linalg.norm(free, axis=0), 1e-300)
+            return float(np.sum((curve[rows] - columns @ np.linalg.lstsq(columns, curve[rows])[0]) ** 2))
+
+        least = (1.0 - IN_ONE_RUN) * beyond(np.ones(run.size, dtype=bool))
+        return any(beyond(run != k) <= least for k in np.unique(run))
 
     def known(self, index: int) -> Term:
         """Return a term with what was found of it, about which it may be inexact."""
