@@ -35,7 +35,9 @@ def main():
     parser.add_argument("--plan-check", action="store_true", help="predict the confusion of the cases of the file")
     parser.add_argument("--draws", type=int, default=100, help="cases of each effect that --plan-check predicts")
     parser.add_argument("--calibrate", action="store_true", help="fit the engine's constants on the cases of the file")
-    parser.add_argument("--ceilings", action="store_true", help="what an ideal detector would see of the cases of the file")
+    parser.add_argument(
+        "--ceilings", action="store_true", help="what an ideal detector would see of the cases of the file"
+    )
     parser.add_argument("--report", type=Path)
     arguments = parser.parse_args()
     path = arguments.cases

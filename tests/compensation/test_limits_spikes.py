@@ -56,7 +56,9 @@ def test_gaussian_noise_has_next_to_none():
     assert found <= 1
 
 
-@pytest.mark.parametrize("places", [[200], [200, 201], [200, 202], [200, 201, 202], [200, 201, 203], [3, 4], [595, 596]])
+@pytest.mark.parametrize(
+    "places", [[200], [200, 201], [200, 202], [200, 201, 202], [200, 201, 203], [3, 4], [595, 596]]
+)
 def test_a_few_rows_that_stand_out_together_are_found(places):
     rests = np.random.default_rng(6).standard_normal(ROWS.size)
     rests[places] += 30.0
