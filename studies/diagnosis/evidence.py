@@ -148,7 +148,7 @@ def solve(model: Linear, terms: int, scales: FloatArray | None = None, kinds: Se
     ----------
     model : Linear
     terms : int
-        Number of effects in it.
+        Number of effects in it whose size is looked for; with 0 the sizes are `scales`.
     scales : (terms,) array, optional
         Sizes to start from.
     kinds : sequence of int, optional

@@ -308,12 +308,13 @@ def _trained(model: Fit, campaign: Campaign, keep: Sequence["np.ndarray"]) -> On
         return None
     problem = pose(campaign, model.problem.response.column, model.problem.span.tau, keep)
     problem = replace(problem, sigma=model.problem.sigma, level=model.problem.level)
-    # the delay that every model tolerates is nothing that rows could teach: it stays where it is
+    # The delay that every model tolerates is nothing that rows could teach: it stays where it is. So do the sizes of the effects:
+    # rows that do not show an effect leave it open, and found anew, its size would vanish with its uncertainty.
     baseline = model.baseline
     if isinstance(baseline, (Lagged, Followed)) and baseline.delay is None:
         baseline = replace(baseline, delay=model.values()["delay"])
     terms = [term if term.about else replace(term, named=False) for term in model.terms]  # exact where it was
-    return OnRows(fit(problem, baseline, terms, 4, model.solved.scales, release=False), campaign)
+    return OnRows(fit(problem, baseline, terms, 4, model.solved.scales, release=False, sized=True), campaign)
 
 
 def _start_within(rows: OnRows, k: int, inside: "np.ndarray") -> list[int]:

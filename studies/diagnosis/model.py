@@ -361,6 +361,7 @@ def fit(
     scales: FloatArray | None = None,
     kinds: Sequence[int] | None = None,
     release: bool = True,
+    sized: bool = False,
 ) -> Fit:
     """Fit a model; every further round moves the baseline to where the last one ended, as long as that pays.
 
@@ -377,20 +378,22 @@ def fit(
         Kinds of wander to look at.
     release : bool
         Let go what the baseline holds.
+    sized : bool
+        The sizes of the terms are known: `scales`.
     """
     best: Fit | None = None
     if rounds > 1 and release:
         baseline = baseline.released()
     for _ in range(rounds):
-        now = _once(problem, baseline, terms, scales, kinds)
+        now = _once(problem, baseline, terms, scales, kinds, sized)
         if rounds > 1 and (held := baseline.held(now.values())) is not None:
             baseline, best = held, None
-            now = _once(problem, baseline, terms, now.solved.scales, kinds)
+            now = _once(problem, baseline, terms, now.solved.scales, kinds, sized)
         if not now.consistent:
             if best is not None:
                 break
             terms = [replace(term, about=()) for term in terms]
-            now = _once(problem, baseline, terms, now.solved.scales, kinds)
+            now = _once(problem, baseline, terms, now.solved.scales, kinds, sized)
         settled = best is not None and abs(now.log_evidence - best.log_evidence) < 0.3
         if best is None or now.log_evidence > best.log_evidence:
             best = now
@@ -403,11 +406,18 @@ def fit(
 
 
 def _once(
-    problem: Problem, baseline: Baseline, terms: Sequence[Term], scales: FloatArray | None, kinds: Sequence[int] | None
+    problem: Problem,
+    baseline: Baseline,
+    terms: Sequence[Term],
+    scales: FloatArray | None,
+    kinds: Sequence[int] | None,
+    sized: bool,
 ) -> Fit:
     tangent = baseline.tangent()
     linear = linearise(problem, tangent, terms)
-    return Fit(problem, baseline, tuple(terms), tangent, linear, solve(linear, len(terms), scales, kinds))
+    return Fit(
+        problem, baseline, tuple(terms), tangent, linear, solve(linear, 0 if sized else len(terms), scales, kinds)
+    )
 
 
 def exact_forms(model: Fit) -> Fit:

@@ -148,9 +148,10 @@ def make_campaign(seed: int, kind: str, effect: str | None = None, snr: float | 
             if cause.target == "clock" and not reference:
                 right["ageing"] = "without a reference clock, a drift of the clock is one of the resonator"
         hidden.append(Hidden(cause.effect.name, r, got, seen, right))
-    floor = _floor(times, noise_full, device.network.main_s)
+    floor = _floor(times, noise_full, device.network.main_s, ("frequency", "bias", "inverse_q"))
+    own = _floor(times, noise_full, device.network.main_s, ("frequency",))
     truth = Truth(
-        seed, kind, tuple(hidden), _verdicts(kind, hidden), floor, family, (protocol,) * count,
+        seed, kind, tuple(hidden), _verdicts(kind, hidden), floor, own, family, (protocol,) * count,
         ("second-lag", "curvature", "radiation") if rich else (), departure * np.sqrt(sum(map(len, times))),
         tuple(f"run_{i + 1}.csv" for i in range(count)), dt, starts,
         [{"time_s": t} | {k: np.interp(t, run.time, v[i]) for k, v in clean.items()} for i, (t, run) in enumerate(zip(times, done, strict=True))],
@@ -287,12 +288,15 @@ def _cells(times: list[np.ndarray], pick: list[np.ndarray], values: list[np.ndar
     )
 
 
-def _floor(times: list[np.ndarray], noise: list[dict[str, np.ndarray]], tau: float) -> dict[str, float]:
+def _floor(
+    times: list[np.ndarray], noise: list[dict[str, np.ndarray]], tau: float, start: tuple[str, ...]
+) -> dict[str, float]:
+    """Take every run's offset out of its noise, and in the responses of `start` an initial state that fades."""
     out = {}
     for r in noise[0]:
         left = []
         for t, n in zip(times, noise, strict=True):
-            basis = orthonormal(np.column_stack([np.ones_like(t), np.exp(-t / tau)]))
+            basis = orthonormal(np.column_stack([np.ones_like(t), np.exp(-t / tau)])[:, : 2 if r in start else 1])
             left.append(n[r] - basis @ (basis.T @ n[r]))
         out[COLUMN[r]] = rms(np.concatenate(left))
     return out

@@ -6,7 +6,8 @@ right        verdict among the true ones; each hidden cause within {effect} ∪ 
 first        the strongest named cause is a hidden one, whatever the verdict
 false alarm  a null that is not `adequate`, or for which a cause is named
 calibration  probability of a named cause against how often its set holds a hidden cause; aliens hold none
-held-out     held-out rms of the model that is kept over the rms of the true noise
+held-out     held-out rms of the model that is kept over the rms of the true noise, once with offset and initial state of each run taken out of it,
+             once with what the contract refits in that response: bias and 1/Q have no initial state
 """
 
 import argparse
@@ -39,7 +40,7 @@ class Mark:
     every: bool  # every hidden cause is in some named set
     stray: int  # named causes that are not there
     stated: tuple[tuple[float, bool], ...]
-    held_out: tuple[float, ...]
+    held_out: tuple[tuple[float, float], ...]
     reach: float  # of the least visible hidden cause, in standard deviations of noise along it
 
 
@@ -80,7 +81,7 @@ def mark(folder: Path, answer: dict) -> Mark:
     for name, response in answer.get("responses", {}).items():
         model = response.get("extended") or response["baseline"]
         if model.get("held_out_rms") and name in truth["floor"] and kind != "alien":
-            held.append(model["held_out_rms"] / truth["floor"][name])
+            held.append(tuple(model["held_out_rms"] / truth[floor][name] for floor in ("floor", "own_floor")))
     return Mark(
         folder.name, kind, "+".join(h["effect"] for h in hidden) or "-", min((h["snr"] for h in hidden), default=0.0),
         len(truth["files"]), verdict, right, bool(hits and hits[0]), every, len(hits) - sum(hits),
@@ -140,8 +141,9 @@ def table(marks: list[Mark]) -> str:
     row("aliens with a name at 0.5 or more", [any(p >= 0.5 for p, _ in m.stated) for m in aliens])
     row("pairs: both named", [m.every for m in pairs])
     row("pairs: right class", [m.right for m in pairs])
-    held = [h for m in marks for h in m.held_out]
+    held, own = ([h[k] for m in marks for h in m.held_out] for k in (0, 1))
     row("held-out within 10 % of the floor", [h <= 1.1 for h in held])
+    row("    of the floor of what each response refits", [h <= 1.1 for h in own])
     row("commands that failed", [m.verdict == "failed" for m in marks])
     stated = [s for m in marks for s in m.stated]
     lines.append(

@@ -27,6 +27,9 @@ class Truth:
     hidden: tuple[Hidden, ...]
     verdicts: tuple[str, ...]
     floor: dict[str, float]  # rms of the true noise, each run's offset and initial state taken out
+    own_floor: dict[
+        str, float
+    ]  # the same, the initial state of the frequency alone: bias and 1/Q have none in the contract
     noise_family: dict[str, str]
     protocols: tuple[str, ...]
     tolerated: tuple[str, ...]  # small real departures of the device; naming them beside the cause is no error
