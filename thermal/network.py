@@ -162,10 +162,14 @@ class Network:
         return q
 
     def _laplacian(self, links: Sequence[tuple[str, str, float]]) -> Array:
-        L = np.zeros((len(self.names), len(self.names)))
+        place = {name: k for k, name in enumerate(self.names)}
+        L = np.zeros((len(place), len(place)))
         for one, other, value in links:
-            i, j = self.index(one), self.index(other)
-            L[[i, j, i, j], [i, j, j, i]] += [value, value, -value, -value]
+            i, j = place[one], place[other]
+            L[i, i] += value
+            L[j, j] += value
+            L[i, j] -= value
+            L[j, i] -= value
         return L
 
 

@@ -31,6 +31,7 @@ UNITS = {"frequency_Hz": "Hz", "bias_deg_per_h": "°/h", "inverse_q": "1", QUADR
 TURNED_ON = 2.0  # runs whose offsets are so much larger than the card states
 CONTRADICTION = 5.0  # runs whose offsets are so much larger than what else the noise makes of a run's mean
 START_STEPS = 3
+DIGITS = 12  # of a correlation: the frequency knows two values together a thousand times better than each, and 1 − ρ² is the square
 UNSETTLED, UNSETTLED_SD = 0.5, 4.0  # K and standard deviations by which a gyro had not settled at the start
 
 
@@ -244,7 +245,7 @@ def _calibrated(instrument: "Instrument", found: CardFit, estimates: Sequence[Es
         values[one.parameter] = {"value": one.value, "sd": one.sd, **hard}
     posterior = {
         "names": [one.parameter for one in estimates],
-        "correlation": R.round(6).tolist(),
+        "correlation": R.round(DIGITS).tolist(),
         "interval": [[one.low, one.high] for one in estimates],
     }
     return instrument.with_values(values | _turn_on(found)).with_table("posterior", posterior)

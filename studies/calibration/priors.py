@@ -20,6 +20,8 @@ if TYPE_CHECKING:
     from studies.instrument.uncertain import UncertainValue
 
 Array = NDArray[np.float64]
+LEAST = 1e-12
+"""Of the variances of a correlation's principal axes: what is left by the digits that a card keeps."""
 
 
 @dataclass(frozen=True)
@@ -118,7 +120,7 @@ def gather_priors(instrument: "Instrument", exact: Sequence[str] = ()) -> Priors
         R[pair], R[:, pair] = 0.0, 0.0
         R[pair, pair] = 1.0
     low, vectors = np.linalg.eigh(R)
-    R = (vectors * np.maximum(low, 1e-10)) @ vectors.T
+    R = (vectors * np.maximum(low, LEAST)) @ vectors.T
     return Priors(values, np.linalg.cholesky(R), wave)
 
 

@@ -15,6 +15,7 @@ from studies.diagnosis.response import RESPONSES
 from studies.diagnosis.search import Hypothesis, Place
 from studies.diagnosis.verdict import NINETY, Cause, Interval, weigh
 from studies.effects import Effect, find_effect
+from studies.effects.states import FloatArray
 
 VOTERS = 4
 """Rivals of one place that the other responses are asked about."""
@@ -128,11 +129,14 @@ def _judge_of(name: str) -> str:
 
 
 def parameters_of(model: Fit, index: int) -> dict[str, Interval]:
-    """Return shape and coefficients of a term with 90 % intervals; of lists the definite member."""
+    """Return shape and coefficients of a term with 90 % intervals; of lists the definite member.
+
+    What is not known of the shape is part of what is not known of the coefficients: Σ = Σ_c + Σ_s (∂c/∂s)² σ_s².
+    """
     term = model.terms[index]
     places = model.columns_of(index)
     out: dict[str, Interval] = {}
-    spreads = shape_spread(model, index)
+    spreads, moves = shape_spread(model, index)
     for parameter, value, sd in zip(term.effect.shape, term.shape, spreads, strict=True):
         if parameter.logarithmic and sd > 0:
             half = NINETY * sd
@@ -142,7 +146,7 @@ def parameters_of(model: Fit, index: int) -> dict[str, Interval]:
     begin = 0
     columns = np.flatnonzero(term.effect.spread > 0)
     values = model.solved.coefficients[places]
-    deviations = np.sqrt(np.maximum(np.diag(model.solved.covariance)[places], 0.0))
+    deviations = np.sqrt(np.maximum(np.diag(model.solved.covariance)[places], 0.0) + np.sum(np.square(moves), axis=0))
     for name, coefficient in zip(
         term.effect.coefficient_names(model.problem.response.column), term.effect.coefficients, strict=True
     ):
@@ -153,24 +157,29 @@ def parameters_of(model: Fit, index: int) -> dict[str, Interval]:
     return out
 
 
-def shape_spread(model: Fit, index: int) -> list[float]:
-    """Return the standard deviation of every shape parameter (of its logarithm where it has one), from the curvature."""
+def shape_spread(model: Fit, index: int) -> tuple[list[float], FloatArray]:
+    """Return the standard deviation of every shape parameter (of its logarithm where it has one), from the curvature.
+
+    Beside them, shape by shape, how far the fitted coefficients go with a standard deviation of it: (shapes, coefficients).
+    """
     term = model.terms[index]
-    out = []
+    out, moves = [], np.zeros((len(term.shape), model.columns_of(index).size))
     for k, parameter in enumerate(term.effect.shape):
         if not parameter.moves(term.shape[k]):
             out.append(0.0)
             continue
         step = 0.03 if parameter.logarithmic else max(0.01 * abs(term.shape[k]), 0.05)
         for _ in range(SHORTENINGS):
-            sides = [_moved(model, index, k, sign * step).log_evidence for sign in (-1.0, 1.0)]
-            fall = model.log_evidence - min(sides)
+            below, above = (_moved(model, index, k, sign * step) for sign in (-1.0, 1.0))
+            fall = model.log_evidence - min(below.log_evidence, above.log_evidence)
             if fall < FAR_DOWN:
                 break
             step *= max(float(np.sqrt(1.0 / fall)), 0.02)
-        bend = (2.0 * model.log_evidence - sides[0] - sides[1]) / step**2
+        bend = (2.0 * model.log_evidence - below.log_evidence - above.log_evidence) / step**2
         out.append(float(1.0 / np.sqrt(bend)) if bend > 0 else step * 10.0)
-    return out
+        low, high = (side.solved.coefficients[side.columns_of(index)] for side in (below, above))
+        moves[k] = (high - low) / (2.0 * step) * out[k]
+    return out, moves
 
 
 def _moved(model: Fit, index: int, k: int, step: float) -> Fit:

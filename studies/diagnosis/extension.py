@@ -16,7 +16,8 @@ from studies.diagnosis.investigate import Diagnosis
 from studies.diagnosis.model import Fit, fit, used
 from studies.diagnosis.scan import build_bank, scan
 from studies.diagnosis.search import refine
-from studies.effects import Effect, find_effect
+from studies.diagnosis.verdict import Interval
+from studies.effects import Effect, Parameter, find_effect
 from studies.effects.states import FloatArray
 from studies.errors import InputError
 from studies.record import Record
@@ -141,11 +142,20 @@ def entry_of(model: Fit, index: int, column: str) -> dict[str, Any]:
     if term.effect.sees_heat:  # the fit knew the temperature with it; a simulation has to solve for it
         numbers[term.effect.shape[0].name] = float(np.clip(values[0], 0.0, 1.0))
     numbers |= {key: _shortest(value) for key, value in term.effect.numbers(values, column).items() if np.any(value)}
+    shapes = {parameter.name: parameter for parameter in term.effect.shape}
     for key, known in parameters_of(model, index).items():
-        sd = float(min(WIDER * known.sd, abs(known.value)))
+        sd = _spread_of_shape(shapes[key], known) if key in shapes else WIDER * known.sd
         if sd > 0 and isinstance(numbers.get(key), float):
-            numbers[key] = {"value": numbers[key], "sd": sd}
+            numbers[key] = {"value": numbers[key], "sd": float(sd)}
     return {"name": term.name, "response": column, **numbers}
+
+
+def _spread_of_shape(parameter: Parameter, known: Interval) -> float:
+    """Return the prior's standard deviation of a shape parameter: at most that of a value which is even between its bounds."""
+    interval, bounds, scale = np.array([known.low, known.high]), np.array([parameter.low, parameter.high]), 1.0
+    if parameter.logarithmic and parameter.low > 0:
+        interval, bounds, scale = np.log(interval), np.log(bounds), known.value
+    return scale * min(WIDER * Interval(known.value, *interval).sd, float(np.ptp(bounds)) / float(np.sqrt(12.0)))
 
 
 def _shortest(value: float | list[float]) -> float | list[float]:

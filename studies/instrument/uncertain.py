@@ -154,7 +154,7 @@ def gather_uncertain(
 
 def _make(name: str, spread: Spread, low: float, high: float) -> UncertainValue:
     ends = (low if spread.low is None else spread.low, high if spread.high is None else spread.high)
-    logarithmic = low == 0.0 and spread.value > 0.0
+    logarithmic = low >= 0.0 and spread.value > 0.0
     return UncertainValue(name, spread.value, spread.width, *ends, logarithmic, unit_of(name))
 
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
+from studies.calibration.ahead import spread_of_prediction
 from studies.calibration.calibrate import calibrate
 from studies.calibration.observed import HOUSING, SETTLED, read_settled
 from studies.calibration.priors import gather_priors, to_standard
@@ -13,6 +14,8 @@ from studies.errors import InputError
 from studies.instrument.card import load_card, save_card
 from studies.record import Record
 from studies.simulation.chamber import load_profile
+from studies.simulation.drive import drive_by_profile, rows_of
+from studies.simulation.prediction import predict
 from studies.simulation.virtual_gyro import simulate_run
 
 PROFILES = ("staircase 20 -10 15 75min", "ramp -10 35 0.5 then soak 35 90min")
@@ -47,6 +50,22 @@ def records(device):
 @pytest.fixture(scope="module")
 def found(card, records):
     return calibrate(card, records, hold_out=1)
+
+
+@pytest.mark.slow
+def test_a_saved_card_states_of_a_run_what_the_fit_knows(found, tmp_path):
+    """1 − ρ² of two values that only their sum tells was once lost in the digits of a card: it stated up to twice the spread."""
+    save_card(found.instrument, tmp_path / "card.toml")
+    saved = load_card(str(tmp_path / "card.toml"))
+    profile = load_profile(UNSEEN)
+    drive = drive_by_profile(profile, rows_of(profile, 1 / 300))
+    priors = found.fit.problem.priors
+    count = len(priors.names)
+    predicted = predict(found.instrument, drive, priors.names)
+    J = np.column_stack([predicted.derivatives[name]["frequency_Hz"] for name in priors.names])
+    J = J @ priors.slopes(found.fit.point[:count])
+    known = np.sqrt(np.einsum("ij,jk,ik->i", J, found.fit.covariance[:count, :count], J))
+    np.testing.assert_allclose(spread_of_prediction(saved, drive)["frequency_Hz"], known, rtol=0.02)
 
 
 @pytest.mark.slow

@@ -22,12 +22,16 @@ from studies.simulation.virtual_gyro import simulate_run
 CARD = "hrg-30mm"
 PROFILES = ("cycle 20 -15 40 0.5 30min 1", "step 20 -10 3h then ramp -10 30 1 then soak 30 2h")
 UNSEEN = "cycle 20 35 -10 1 20min 2"
-RATE = 1 / 30
+RATE = 1 / 60
+RATES = {("rate-frequency", "frequency_Hz"): 1 / 30}
+"""Rows a second; what follows the rate of the temperature shows in the minutes after a step."""
 GAP = 86400.0
-RESPONSES = ("frequency_Hz", "bias_deg_per_h", "inverse_q")
+RESPONSES = F, B, Q = ("frequency_Hz", "bias_deg_per_h", "inverse_q")
 TIMES = 20.0
 LARGER = {("curvature", "frequency_Hz"): 60.0, ("cross-damping", "bias_deg_per_h"): 40.0}
 """The same of what shows at the ends of the range, where the unseen profile hardly is."""
+DEVIATIONS = 1.96
+"""An error is within so many of its standard deviations in 95 of 100 draws of the noise; of several independent ones, in more."""
 BIAS = {"bias.k1_deg_per_h_per_Hz": 0.5, "bias.damping_anisotropy": 0.0}
 """The bias follows the temperature; the wave's own anisotropy is 0, so that its azimuth may move without a second cause."""
 COMMANDED = {
@@ -81,7 +85,6 @@ HIDDEN = {
 }
 TURN_ON = {"noise.bias_turn_on_deg_per_h": 0.02}
 """What a card must state for a drift of the bias from run to run to be told from offsets of turn-on, °/h: a tenth of the noise."""
-F, B, Q = RESPONSES
 PACKS = (
     (("jump", F), ("hysteresis", B), ("ageing", Q)),
     (("ageing", F), ("jump", B), ("hysteresis", Q)),
@@ -115,7 +118,7 @@ MOVED = (
 class Hidden:
     """A card, records of a device that has effects more, and the device's next run, noiseless, with what drives it.
 
-    `noise`: rms of the noise in the records, by response.
+    `noise`: rms of the noise in the records, by response: the frequency, and those in which effects are hidden.
     """
 
     card: object
@@ -127,12 +130,12 @@ class Hidden:
     def left(self, instrument):
         """Return the residual that an instrument leaves of the next run over its noise, by response; 1 is the noise."""
         said = simulate_run(instrument, self.next_drive, noise=False).record
-        return {c: float(np.hypot(1.0, rms([said[c] - self.truth[c]]) / self.noise[c])) for c in RESPONSES}
+        return {c: float(np.hypot(1.0, rms([said[c] - self.truth[c]]) / noise)) for c, noise in self.noise.items()}
 
     def stated(self, instrument):
         """Return what an instrument states that it will leave, its own uncertainty and the noise together over the noise."""
         spread = spread_of_prediction(instrument, self.next_drive)
-        return {c: float(np.hypot(1.0, rms([spread[c]]) / self.noise[c])) for c in RESPONSES}
+        return {c: float(np.hypot(1.0, rms([spread[c]]) / noise)) for c, noise in self.noise.items()}
 
 
 @dataclass(frozen=True)
@@ -152,11 +155,16 @@ class Recovery:
     saved: object
     diagnosis: object
 
+    @property
+    def errors(self):
+        """Error of the saved card over the standard deviation that it states of it, by response."""
+        return {c: float(np.sqrt((self.after[c] ** 2 - 1) / (self.stated[c] ** 2 - 1))) for c in self.after}
 
-def run_drive(words, start, commanded, turn):
+
+def run_drive(words, start, commanded, turn, rate=RATE):
     """Return the drive of one run, its commands stepping through their levels."""
     profile = load_profile(words)
-    time = rows_of(profile, RATE)
+    time = rows_of(profile, rate)
     commands = {}
     for name in commanded:
         levels = COMMANDED[name]
@@ -180,7 +188,10 @@ def hide(*cases, times=TIMES, seed=0, moved=(), stated=None):
         {*(["pattern_angle"] if turning else []), *(need for effect in effects for need in effect.needs)}
     )
     starts = [k * GAP for k in range(len(PROFILES) + 1)]
-    drives = [run_drive(w, s, commanded, k) for k, (w, s) in enumerate(zip((*PROFILES, UNSEEN), starts, strict=True))]
+    rate = max(RATES.get(case, RATE) for case in cases)
+    drives = [
+        run_drive(w, s, commanded, k, rate) for k, (w, s) in enumerate(zip((*PROFILES, UNSEEN), starts, strict=True))
+    ]
     law = simulate_run(device, drives[0], noise=False).law
 
     def simulate(instrument, k, noise=True, law=law):
@@ -188,7 +199,8 @@ def hide(*cases, times=TIMES, seed=0, moved=(), stated=None):
 
     bare = [simulate(device, k, noise=False) for k in range(3)]
     quiet = [simulate(device, k) for k in range(3)]
-    noise = {column: rms([q[column] - b[column] for q, b in zip(quiet, bare, strict=True)]) for column in RESPONSES}
+    measured = [column for column in RESPONSES if column == F or any(column == own for _, own in cases)]
+    noise = {column: rms([q[column] - b[column] for q, b in zip(quiet, bare, strict=True)]) for column in measured}
 
     def sized(effect, response):
         """Return the effect's table at the size that adds so many times the noise."""
@@ -210,14 +222,11 @@ def hide(*cases, times=TIMES, seed=0, moved=(), stated=None):
     tables = [sized(effect, response) for effect, (_, response) in zip(effects, cases, strict=True)]
     lasting = [table for table, effect in zip(tables, effects, strict=True) if not effect.once]
     devices = [device.with_table("effect", own) if own else device for own in (tables, lasting, lasting)]
-    records = [
-        replace(
-            simulate(devices[k], k),
-            start=datetime(2026, 1, 1, tzinfo=UTC) + timedelta(seconds=starts[k]),
-            path=f"run{k}",
-        )
-        for k in range(2)
-    ]
+    records = []
+    for k in range(2):
+        record, start = simulate(devices[k], k), datetime(2026, 1, 1, tzinfo=UTC) + timedelta(seconds=starts[k])
+        columns = {name: own for name, own in record.columns.items() if name in measured or name not in RESPONSES}
+        records.append(replace(record, columns=columns, start=start, path=f"run{k}"))
     return Hidden(card, records, drives[2], simulate(devices[2], 2, noise=False), noise)
 
 
