@@ -110,7 +110,10 @@ def investigate(
         cleaned = campaign.without_spikes(column, held_out.residuals(plain, campaign))
         if cleaned is not campaign:
             campaign, plain = cleaned, begin(cleaned, column, thermometer, make and again(plain))
-        inquiries[column] = inquire(campaign, plain, effects, score_held_out)
+        found_here = inquire(campaign, plain, effects, score_held_out)
+        if found_here.final.terms and RESPONSES[column].own_offset and campaign.turn_on:
+            campaign, found_here = _doubt_turn_on(campaign, column, thermometer, found_here, effects, score_held_out)
+        inquiries[column] = found_here
         if RESPONSES[column].thermometer:
             thermometer = read_thermometer(campaign, inquiries[column].final)
     inquiries = vote(campaign, inquiries, effects, score_held_out)
@@ -134,6 +137,38 @@ def investigate(
         text, run = suggest_next(campaign, found, inquiries, chamber)
         found = replace(found, next_experiment=text, next_run=run)
     return Diagnosis(found, campaign, inquiries)
+
+
+def _doubt_turn_on(
+    campaign: Campaign,
+    column: str,
+    thermometer: Thermometer | None,
+    inquiry: Inquiry,
+    effects: Sequence[Effect] | None,
+    score_held_out: bool,
+) -> tuple[Campaign, Inquiry]:
+    """Ask whether one turn-on beyond what the card states is all that was named of a response.
+
+    What changes a bias from run to run, ageing or a jump, does not come back. A run whose level leaves both neighbours far beyond
+    the stated deviation has had another turn-on, if with levels of their own the runs need no cause.
+    """
+    free = replace(campaign, turn_on=0.0)
+    plain = begin(free, column, thermometer)
+    order = np.argsort([run.time[0] for run in campaign.runs])
+    steps = np.diff(np.array(_run_shifts(plain))[order])
+    furthest = np.maximum(np.minimum(steps[:-1], -steps[1:]), np.minimum(-steps[:-1], steps[1:]))
+    stretches = len(campaign.records) < len(campaign.runs)
+    if stretches or furthest.max(initial=0.0) < CONSTANTS["turned_back"] * campaign.turn_on:
+        return campaign, inquiry
+    without = inquire(free, plain, effects, score_held_out)
+    if without.final.terms:
+        return campaign, inquiry
+    path = campaign.runs[order[int(np.argmax(furthest)) + 1]].label
+    note = (
+        f"{path}: its bias lies {furthest.max():.2g} °/h from the runs before and after it, where the card states"
+        f" {campaign.turn_on:.2g} °/h from turn-on to turn-on: every run has been given an offset of its own."
+    )
+    return replace(free, notes=(*free.notes, note)), without
 
 
 def _too_little(reason: str) -> ResponseResult:
