@@ -67,6 +67,7 @@ def parameters(effect: "Effect") -> list[dict[str, str]]:
         many = len(coefficient.spread)
         kind = "coefficient" if many == 1 else f"coefficient, or a list of {many}"
         bounds = "0 and above" if effect.positive and name == names[0] else "any"
+        bounds = bounds.replace("and above", f"to {coefficient.most:g}") if coefficient.most < float("inf") else bounds
         rows.append({"name": name, "kind": kind, "bounds": bounds, "meaning": "size; the unit is that of the name"})
     return rows
 

@@ -28,6 +28,8 @@ LAG_STEP = 0.3
 """Standard deviation of one correction of the logarithm of the lag."""
 STEADY = 0.4
 """Largest bend of the law times the farthest temperature, K: the slope keeps its sign, as far as bends are small."""
+CARRIED = float(np.e)
+"""Standard deviation of what 1/Q carries into the bias over what the card says: its anisotropy is known to a factor of e."""
 FARTHEST = 2.5
 """Standard deviations beyond which a delay is no delay of sensors: the baseline holds it there."""
 BENT = 3.0
@@ -99,6 +101,9 @@ class Baseline(Protocol):
 
     def released(self) -> "Baseline":
         """Return the baseline with nothing held."""
+
+    def stated(self) -> "Baseline | None":
+        """Return the baseline at the values of its card, where it is far from there; else None."""
 
     def alone(self, states: States) -> "Baseline":
         """Return the same law for one further run that starts in equilibrium."""
@@ -233,6 +238,9 @@ class Lagged:
         """Let the delay go."""
         return replace(self, delay=None)
 
+    def stated(self) -> None:
+        """No card states its values."""
+
     def alone(self, states: States) -> "Lagged":
         """Return the same law for one further run that starts in equilibrium."""
         return replace(self, states=(states,), warmer=(np.zeros(states.time.size),), starts=())
@@ -259,6 +267,8 @@ class Followed:
         Coefficients of the second and higher powers, per (10 K)ᵖ: the whole of the law may come late.
     turn_on : float
         As of `Lagged`.
+    carried : tuple of (n, m) arrays
+        As of `Campaign`; none where it is empty.
     """
 
     response: Response
@@ -271,6 +281,7 @@ class Followed:
     bends: tuple[float, ...] = ()
     curve: tuple[float, ...] = ()
     turn_on: float = 0.0
+    carried: tuple[FloatArray, ...] = ()
 
     @property
     def lagged(self) -> bool:
@@ -280,6 +291,7 @@ class Followed:
     def tangent(self) -> Tangent:
         """Columns of the polynomial, the missed parts, and a delay against the thermometer."""
         runs, powers, missed = len(self.states), self.response.powers, self.missed[0].shape[1]
+        carried = self.carried[0].shape[1] if self.carried else 0
         shift, columns, views = [], [], []
         for k, own in enumerate(self.states):
             coarse = own.averaged(self.group)
@@ -296,6 +308,7 @@ class Followed:
                 shift[-1] = -self.delay * late
                 late = np.zeros_like(late)
             besides = self.missed[k] * (along / self.slope if self.slope else np.ones(u.size))[:, None]
+            besides = np.concatenate([besides, self.carried[k]], axis=1) if carried else besides
             columns.append(np.concatenate([level, np.stack(static, 1), besides, tied, late[:, None]], axis=1))
             steep = np.full(u.size, self.slope)
             views.append(View(own, coarse, own, coarse, steep))
@@ -304,12 +317,14 @@ class Followed:
             *flat,
             *("slope", "quadratic", "cubic")[:powers],
             *(f"missed {m}" for m in range(missed)),
+            *(f"missed loss {m}" for m in range(carried)),
             *named,
             "delay",
         )
         size = max(abs(self.slope), 1e-300)
         bends = self.bends or (np.inf,) * (powers - 1)
-        deviations = [*bends, *[1.5 * size] * missed, *[self.turn_on] * len(named), FOLLOWED_DELAY]
+        deviations = [*bends, *[1.5 * size] * missed, *[CARRIED] * carried]
+        deviations += [*[self.turn_on] * len(named), FOLLOWED_DELAY]
         prior = np.array([np.inf] * (len(flat) + 1) + deviations)
         return Tangent(shift, columns, prior, names, views)
 
@@ -329,12 +344,16 @@ class Followed:
         """Let the delay go."""
         return replace(self, delay=None)
 
+    def stated(self) -> None:
+        """No card states its values."""
+
     def alone(self, states: States) -> "Followed":
         """Return the same law for one further run whose states already hold the thermometer's temperature."""
         nothing = np.zeros(states.time.size // self.group)
-        return replace(
-            self, states=(states,), reading=(nothing,), missed=(np.zeros((nothing.size, self.missed[0].shape[1])),)
+        missed, carried = (
+            tuple(np.zeros((nothing.size, part.shape[1])) for part in own[:1]) for own in (self.missed, self.carried)
         )
+        return replace(self, states=(states,), reading=(nothing,), missed=missed, carried=carried)
 
 
 def level_names(response: Response, turn_on: float, runs: int) -> tuple[tuple[str, ...], tuple[str, ...]]:

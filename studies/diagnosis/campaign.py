@@ -72,7 +72,8 @@ class Campaign:
     """All runs of one gyro on one grid.
 
     `temperature_noise` is that of one reading of the driving temperature, K; `turn_on` the standard deviation of a run's own
-    offset of the bias as a card states it, °/h, 0 where nothing is said of it.
+    offset of the bias as a card states it, °/h, 0 where nothing is said of it; `carried` what effects on 1/Q do to the bias by what
+    a card says, °/h, one (n, m) array a run on the coarse grid, empty where there are none.
     """
 
     runs: tuple[Run, ...]
@@ -87,6 +88,7 @@ class Campaign:
     outliers: int = 0
     temperature_noise: float = 0.0
     turn_on: float = 0.0
+    carried: tuple[FloatArray, ...] = ()
 
     @property
     def clock_known(self) -> bool:

@@ -137,7 +137,8 @@ def _without_member(effect: Effect, place: int) -> Effect:
 def entry_of(model: Fit, index: int, column: str) -> dict[str, Any]:
     """Return the `[[effect]]` table of a fitted term, without the coefficients that are 0; numbers are as uncertain as a prior."""
     term = model.terms[index]
-    values = model.coefficients_of(index)
+    most = np.concatenate([np.full(len(own.spread), own.most) for own in term.effect.coefficients])
+    values = np.minimum(model.coefficients_of(index), most)
     numbers: dict[str, Any] = {p.name: float(value) for p, value in zip(term.effect.shape, term.shape, strict=True)}
     if term.effect.sees_heat:  # the fit knew the temperature with it; a simulation has to solve for it
         numbers[term.effect.shape[0].name] = float(np.clip(values[0], 0.0, 1.0))

@@ -168,6 +168,7 @@ def fine(baseline: Baseline, campaign: Campaign) -> Baseline:
             group=1,
             reading=tuple(_finer(campaign, baseline.reading)),
             missed=tuple(_finer(campaign, baseline.missed)),
+            carried=tuple(_finer(campaign, baseline.carried)) if baseline.carried else (),
         )
     return replace(baseline, group=1)  # type: ignore[type-var]
 
@@ -213,15 +214,22 @@ Parts = list[tuple[FloatArray, "np.ndarray"]]
 
 
 def compare(one: Parts | None, two: Parts | None) -> tuple[float | None, float | None]:
-    """Return the residuals of two models on the rows that both can foretell, or else that the second can; None where they are few."""
+    """Return the residuals of two models on the rows that both can foretell, or else that the second can; None where they are few.
+
+    Rows that the first cannot foretell speak for the second where it is nearer to them. They do not speak against it: that the
+    first came near them was chance, for it said that it did not know them.
+    """
     if one is None or two is None:
         return None, None
     both: Parts = [(rest, a & b) for (rest, a), (_, b) in zip(one, two, strict=True)]
-    if _share(both) < FEWEST_FORETOLD:
+    if not (fair := _share(both) >= FEWEST_FORETOLD):
         both = [(rest, b) for (rest, _), (_, b) in zip(one, two, strict=True)]
     if _share(both) < FEWEST_FORETOLD:
         return None, None
-    return _rms_or_none(both), _rms_or_none(_of(two, both))
+    before, after = _rms_or_none(both), _rms_or_none(_of(two, both))
+    if not fair and before is not None and after is not None and after > before:
+        return None, None
+    return before, after
 
 
 def _of(parts: Parts | None, like: Parts | None) -> Parts | None:

@@ -105,6 +105,7 @@ def begin(
             _slope(problem, reading),
             bends=bends_of(problem.values, problem.stack(list(reading)), response.powers),
             turn_on=turn_on,
+            carried=campaign.carried if response.own_offset else (),
         )
     first = settle(problem, baseline)
     tau = float(getattr(first.baseline, "tau", states[0].tau if thermometer is None else thermometer.states[0].tau))

@@ -19,14 +19,22 @@ from studies.diagnosis.model import Fit
 from studies.diagnosis.planning.advice import suggest_next
 from studies.diagnosis.planning.chamber import Chamber
 from studies.diagnosis.response import RESPONSES
-from studies.diagnosis.simulated import Simulated, as_shipped, shifts_of, simulate_baseline, without_rate_terms
+from studies.diagnosis.simulated import (
+    FAR,
+    Simulated,
+    as_shipped,
+    shifts_of,
+    simulate_baseline,
+    with_loss_carried,
+    without_rate_terms,
+)
 from studies.diagnosis.verdict import Cause, Interval, ResponseResult, Shift, Verdict, doubted, overall
 from studies.effects import Effect
 from studies.plausible import check_card_frequency
 from studies.shown import Shown
 
-FAR = 2.0
-"""Prior standard deviations beyond which a value of the card is wrong."""
+ASKED = ("frequency_Hz", "inverse_q", "bias_deg_per_h")
+"""The bias last: it follows the temperature, and 1/Q through the anisotropy of damping."""
 FORETOLD = 0.95
 """Part of the rows below which it is said that held-out residuals are not about all."""
 WORSE = 3.0
@@ -94,7 +102,7 @@ def investigate(
         campaign = measured = replace(campaign, turn_on=card.noise.bias_turn_on_deg_per_h)
     inquiries: dict[str, Inquiry] = {}
     thermometer: Thermometer | None = None
-    for column in (c for c in RESPONSES if c in campaign.responses):
+    for column in (c for c in ASKED if c in campaign.responses):
         rows = sum(int(np.isfinite(run.responses[column]).sum()) for run in campaign.runs)
         if rows < FEWEST_BINS + 2 * len(campaign.runs):
             continue
@@ -106,6 +114,8 @@ def investigate(
                 (i.final.baseline for i in inquiries.values() if isinstance(i.final.baseline, Simulated)), None
             )
             campaign = campaign if clock is None else without_rate_terms(campaign, clock)
+            if clock is not None and "inverse_q" in inquiries:
+                campaign = with_loss_carried(campaign, clock, inquiries["inverse_q"].final)
         plain = begin(campaign, column, thermometer, make)
         cleaned = campaign.without_spikes(column, held_out.residuals(plain, campaign))
         if cleaned is not campaign:
@@ -116,6 +126,7 @@ def investigate(
         inquiries[column] = found_here
         if RESPONSES[column].thermometer:
             thermometer = read_thermometer(campaign, inquiries[column].final)
+    inquiries = {column: inquiries[column] for column in RESPONSES if column in inquiries}
     inquiries = vote(campaign, inquiries, effects, score_held_out)
     tell("held-out residuals")
     shifts = tuple(shift for inquiry in inquiries.values() for shift in shifts_of(inquiry.final))

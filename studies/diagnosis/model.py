@@ -384,7 +384,7 @@ def fit(
     best: Fit | None = None
     if rounds > 1 and release:
         baseline = baseline.released()
-    for _ in range(rounds):
+    for left in reversed(range(rounds)):
         now = _once(problem, baseline, terms, scales, kinds, sized)
         if rounds > 1 and (held := baseline.held(now.values())) is not None:
             baseline, best = held, None
@@ -397,7 +397,7 @@ def fit(
         settled = best is not None and abs(now.log_evidence - best.log_evidence) < 0.3
         if best is None or now.log_evidence > best.log_evidence:
             best = now
-        if settled:
+        if settled or not left:
             break
         baseline, scales = now.moved(), now.solved.scales
         terms = [now.known(index) for index in range(len(terms))]

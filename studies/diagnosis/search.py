@@ -9,6 +9,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from studies.diagnosis.baseline import Baseline
 from studies.diagnosis.constants import CONSTANTS
 from studies.diagnosis.model import Fit, Term, fit
 from studies.diagnosis.scan import Bank, Seen, build_bank, scan
@@ -70,12 +71,13 @@ def search(plain: Fit, bank: Bank) -> Selection:
     start = Hypothesis(plain)
     now = start
     while len(now.fit.terms) < MOST_CAUSES:
-        best = max(contenders(now, bank), key=lambda h: h.score, default=None)
+        tried = contenders(now, bank) + (from_the_card(now, bank) if now is start else [])
+        best = max(tried, key=lambda h: h.score, default=None)
         if best is None or best.score - now.score < needed(start, now):
             break
         now = examine(best, bank, start)
     for _ in range(MOST_CAUSES):
-        places = tuple(_place(now, index, bank) for index in range(len(now.fit.terms)))
+        places = tuple(_place(now, index, bank, start) for index in range(len(now.fit.terms)))
         best = max((place.rivals[0] for place in places), key=lambda h: h.score, default=now)
         if best.score < now.score + 1.0 or best.names[-1] in now.names:
             break
@@ -88,23 +90,36 @@ def needed(start: Hypothesis, now: Hypothesis) -> float:
     return CONSTANTS["margin"] + CONSTANTS["further"] * max(now.score - start.score, 0.0)
 
 
-def contenders(base: Hypothesis, bank: Bank, but: Sequence[str] = ()) -> list[Hypothesis]:
+def from_the_card(plain: Hypothesis, bank: Bank) -> list[Hypothesis]:
+    """Return the models with one effect about the card's values, where without it they have gone far: to do what the effect does."""
+    stated = plain.fit.moved().stated()
+    if stated is None:
+        return []
+    base = fit(plain.fit.problem, stated)
+    effects = list({term.name: term.effect for term in bank.terms}.values())
+    return contenders(Hypothesis(base), build_bank(base, effects), about=stated)
+
+
+def contenders(
+    base: Hypothesis, bank: Bank, but: Sequence[str] = (), about: Baseline | None = None
+) -> list[Hypothesis]:
     """Return the models with one effect more whose scans are near the best, each with its shape polished."""
     taken = {term.name for term in base.fit.terms}
     seen = [s for s in scan(base.fit, bank) if s.term.name not in but and (s.term.name not in taken)]
     if not seen or seen[0].gain < -2.0:
         return []
     reach = NEAR + 0.5 * max(seen[0].gain, 0.0)
-    return [polish(base, s) for s in seen[:CONTENDERS] if s.gain > seen[0].gain - reach]
+    return [polish(base, s, about) for s in seen[:CONTENDERS] if s.gain > seen[0].gain - reach]
 
 
-def polish(base: Hypothesis, seen: Seen) -> Hypothesis:
+def polish(base: Hypothesis, seen: Seen, about: Baseline | None = None) -> Hypothesis:
     """Add an effect and move its shape to where the evidence is largest; forms of one effect are compared where each is best."""
     price = CONSTANTS["log_prior_effect"] + seen.choice
+    about = base.fit.moved() if about is None else about
     forms = []
     tops = [seen.term] if seen.other is None else [seen.term, seen.other]
     for term in (near for top in tops for near in nearer(base.fit, top)):
-        model = fit(base.fit.problem, base.fit.moved(), (*base.fit.terms, term), 2, _sizes(base.fit))
+        model = fit(base.fit.problem, about, (*base.fit.terms, term), 2, _sizes(base.fit))
         forms.append(refine(model, len(model.terms) - 1))
     return Hypothesis(max(forms, key=lambda f: f.log_evidence), (*base.price, price))
 
@@ -216,9 +231,10 @@ def drop(now: Hypothesis, index: int) -> Hypothesis:
     return Hypothesis(own, price)
 
 
-def _place(now: Hypothesis, index: int, bank: Bank) -> Place:
+def _place(now: Hypothesis, index: int, bank: Bank, start: Hypothesis) -> Place:
     """Return the alternatives to one term, the others held."""
     base = drop(now, index)
+    base = base if base.names else max(base, start, key=lambda h: h.score)
     last = _moved_last(now, index)
     rivals = [last, *(h for h in contenders(base, bank, (now.fit.terms[index].name,)) if np.isfinite(h.score))]
     rivals.sort(key=lambda h: -h.score)

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from scipy.constants import zero_Celsius
 
+from shell.errors import ShellError
 from studies.diagnosis.baseline import START, Tangent, View, remembering
 from studies.diagnosis.campaign import Campaign
 from studies.diagnosis.response import RESPONSES, Response
@@ -42,8 +43,14 @@ STRAIGHT = 0.3
 """Part of the noise up to which a straight line may miss a prediction before it is drawn anew."""
 RATE_TERMS = tuple(key for key, (_, by_rate) in TERMS.items() if by_rate)
 """Terms of the bias in the rate of the frequency."""
-SILENT = 1e-4
-"""Part of the noise below which one standard deviation of a value changes nothing."""
+FAR = 2.0
+"""Prior standard deviations beyond which a value of the card is wrong."""
+STEPS = (1.0, 0.5, 0.25)
+"""Parts of a step that are tried."""
+NUDGE = 0.01
+"""Part of 1/Q by which it is changed to see what the bias does then."""
+SILENT = 0.01
+"""Part of the noise, or of the least known level, below which one standard deviation of a value changes nothing."""
 
 
 @dataclass(frozen=True)
@@ -56,10 +63,15 @@ class Point:
     solved: bool
 
     def missed(self, values: dict[str, float], found: Prediction, column: str) -> float:
-        """Return what a straight line from here misses of a prediction elsewhere, rms."""
+        """Return what a fit with the slopes of here would miss elsewhere, rms.
+
+        A straight line from here misses m of a change c: its slopes are wrong by m/c, and the next step corrects about m.
+        """
         slopes = self.found.derivatives
         line = sum((value - self.values[name]) * slopes[name][column] for name, value in values.items())
-        return float(np.sqrt(np.mean((found.columns[column] - self.found.columns[column] - line) ** 2)))
+        change = found.columns[column] - self.found.columns[column]
+        missed = float(np.sqrt(np.mean((change - line) ** 2)))
+        return missed * min(1.0, missed / max(float(np.sqrt(np.mean(change**2))), 1e-300))
 
 
 @dataclass(frozen=True)
@@ -224,16 +236,33 @@ class Simulated:
         return np.asarray((law.frequency(reference + excess) - zero) / (zero * float(law.slope(reference))))
 
     def moved(self, values: dict[str, float], warmer: Sequence[FloatArray] | None) -> "Simulated":
-        """Take over the values, a bold step at most, and the initial states."""
-        z = []
-        for value, old in zip(self.values, self.z, strict=True):
-            new = old + float(np.clip(values[value.name] - old, -BOLDEST, BOLDEST))
-            z.append(to_z(value, float(np.clip(at(value, new), value.low, value.high))))
-        initial = tuple({lump: values[f"initial.{lump}@{k}"] for lump in LUMPS} for k in range(len(self.states)))
+        """Take over the values, a bold step at most, and the initial states; a part of the way where the law ends before."""
         warm = None if warmer is None else tuple(warmer)
-        if self.bend(z, initial) < STRAIGHT * self.noise:  # a straight line is as good there
-            return replace(self, warmer=warm)
-        return replace(self, z=tuple(z), initial=initial, warmer=warm)
+        for part in STEPS:
+            z = []
+            for value, old in zip(self.values, self.z, strict=True):
+                new = old + part * float(np.clip(values[value.name] - old, -BOLDEST, BOLDEST))
+                z.append(to_z(value, float(np.clip(at(value, new), value.low, value.high))))
+            initial = tuple(
+                {lump: (1.0 - part) * own.get(lump, 0.0) + part * values[f"initial.{lump}@{k}"] for lump in LUMPS}
+                for k, own in enumerate(self.initial)
+            )
+            if self.bend(z, initial) < STRAIGHT * self.noise:  # a straight line is as good there
+                break
+            there = replace(self, z=tuple(z), initial=initial, warmer=warm)
+            if there.reached:
+                return there
+        return replace(self, warmer=warm)
+
+    @property
+    def reached(self) -> bool:
+        """Whether the law is known at all temperatures that are predicted."""
+        try:
+            for k in range(len(self.states)):
+                self.predicted(k)
+        except ShellError:
+            return False
+        return True
 
     def bend(self, z: Sequence[float], initial: Sequence[dict[str, float]]) -> float:
         """Return about how far a straight line from here misses a point: a value that counts by its logarithm, p = p₀ e^(s z), has ½ s J Δz²."""
@@ -255,6 +284,12 @@ class Simulated:
     def released(self) -> "Simulated":
         """Nothing is held."""
         return self
+
+    def stated(self) -> "Simulated | None":
+        """Return the card as shipped where a value has gone far from it; else None."""
+        if max(map(abs, self.z), default=0.0) <= FAR:
+            return None
+        return replace(self, z=(0.0,) * len(self.z), initial=tuple({} for _ in self.initial), warmer=None)
 
     def alone(self, states: States) -> "Simulated":
         """Return the same simulation of one further run that starts in equilibrium."""
@@ -294,7 +329,8 @@ def simulate_baseline(campaign: Campaign, card: "Instrument", noise: float) -> S
         tuple({} for _ in campaign.runs),
     )
     columns = np.concatenate(own.known.columns)[:, : len(own.values)]
-    telling = np.ptp(columns, axis=0) + np.abs(columns).max(axis=0) > SILENT * noise
+    varies, level = np.ptp(columns, axis=0), np.abs(columns.mean(axis=0))
+    telling = (varies > SILENT * noise) | (level > SILENT * max(noise, float(level.max())))
     values = tuple(v for v, tells in zip(own.values, telling, strict=True) if tells)
     return replace(own, values=values, z=(0.0,) * len(values))
 
@@ -318,6 +354,26 @@ def without_rate_terms(campaign: Campaign, baseline: Simulated) -> Campaign:
         own = run.row_responses["bias_deg_per_h"] - np.interp(run.row_time, time, by_rate)
         runs.append(replace(run, responses=responses, row_responses=run.row_responses | {"bias_deg_per_h": own}))
     return replace(campaign, runs=tuple(runs))
+
+
+def with_loss_carried(campaign: Campaign, baseline: Simulated, loss: "Fit") -> Campaign:
+    """Tell the bias what the effects on 1/Q do to it: B ∝ Δ(1/τ), which is the card's anisotropy of π f/Q."""
+    made = loss.beside_temperature()
+    if not made:
+        return campaign
+    card = baseline.instrument
+    lossier = card.with_values({"loss.inverse_q": (1.0 + NUDGE) * card.loss.inverse_q})
+    carried = []
+    for k, run in enumerate(campaign.runs):
+        drive, time = baseline.drive(k)
+        one, two = (predict(own, drive, (), baseline.law).columns for own in (card, lossier))
+        change = two["inverse_q"] - one["inverse_q"]  # none where the card adds up parts: their anisotropy is their own
+        gain = np.divide(
+            two["bias_deg_per_h"] - one["bias_deg_per_h"], change, np.zeros_like(change), where=change != 0.0
+        )
+        here = average(np.interp(run.states.time, time, gain), campaign.group)
+        carried.append(np.stack([here * own[k] for own in made], axis=1))
+    return replace(campaign, carried=tuple(carried))
 
 
 def as_shipped(campaign: Campaign, baseline: Simulated) -> dict[str, float]:

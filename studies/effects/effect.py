@@ -52,11 +52,12 @@ class Coefficient:
     """A linear coefficient: a number, or a list where the effect is a family.
 
     `name` ends with its unit, `{unit}` standing for that of the response. `spread` are the prior standard deviations of
-    the members of the list, in parts of the effect's size; the first is the definite curve.
+    the members of the list, in parts of the effect's size; the first is the definite curve. None is above `most`.
     """
 
     name: str
     spread: tuple[float, ...] = (1.0,)
+    most: float = np.inf
 
 
 @dataclass(frozen=True)
@@ -244,6 +245,8 @@ def check_effect(name: str, parameters: Mapping[str, Numbers], response: str) ->
         given, most = np.atleast_1d(np.asarray(parameters.get(key, 0.0), dtype=float)), len(coefficient.spread)
         if given.ndim != 1 or given.size > most:
             raise InputError(f"effect '{name}': {key} takes a number or a list of at most {most}")
+        if given.max(initial=0.0) > coefficient.most:
+            raise InputError(f"effect '{name}': {key} must be at most {coefficient.most:g}, not {given.max():g}")
         weights += [*given.tolist(), *[0.0] * (most - given.size)]
     return shape, np.array(weights)
 

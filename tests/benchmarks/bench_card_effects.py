@@ -20,6 +20,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 from studies.diagnosis.campaign import load_campaign
+from studies.diagnosis.evidence import SCALES
 from studies.diagnosis.investigate import investigate
 from studies.diagnosis.model import span_of
 from studies.effects import library
@@ -34,6 +35,8 @@ from thermal.profile import Profile
 CARDS = ("hrg-30mm", "cvg-25mm", "bvg-bell", "hrg-30mm-loops")
 SNRS = (3.0, 6.0, 12.0, 1.0)
 RATE = 0.05
+STRONGEST = float(SCALES[-1])
+"""Largest size of an effect in parts of its strong cases: one that a free law and lag absorb would need far more."""
 MEAN = 6
 """Rows to 120 s."""
 DRIVES = {"amplitude_squared": "drive_amplitude_V", "voltage_squared": "electrode_bias_V"}
@@ -164,6 +167,8 @@ def make_case(seed, plain):
             there = run(true, drives, seed, False)
             size = left(clean, [a[response] - c[response] for a, c in zip(there, clean, strict=True)], response) / noise
             values = values * snr / max(size, 1e-9)
+        if abs(values[0]) > STRONGEST * effect.sizes[response] * level * effect.spread[0]:
+            raise InputError(f"{name}: no gyro shows what SNR {snr:g} would take in {chosen}")
         if effect.sees_heat and values[0] > 1.0:
             raise InputError(f"{name}: even if all heat took this way it would not reach SNR {snr:g} in {chosen}")
         true = card.with_table("effect", [entry(name, response, shape, values)])

@@ -42,7 +42,7 @@ EFFECT = Effect(
     summary="part of the heat is radiated, so the thermal time constant is shorter when hot",
     source="Stefan-Boltzmann exchange linearised about 20 °C: conductance 4 ε σ A T³",
     isolate="the same step at a cold and at a hot mean temperature",
-    coefficients=(Coefficient("radiated_share"),),
+    coefficients=(Coefficient("radiated_share", most=1.0),),
     columns=columns,
     grid=grid,
     sizes={"frequency_Hz": 1.0},

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import msgspec
+import numpy as np
 
 from studies.errors import InputError
 from studies.instrument.keys import Keys, number
@@ -56,7 +57,8 @@ def _declare(effect: "Effect", response: str) -> Any:
     coefficients = effect.coefficient_names(response)
     for key, coefficient in zip(coefficients, effect.coefficients, strict=True):
         positive = effect.positive and key == coefficients[0]
-        weight: Any = Annotated[float, number(least=0.0)] if positive else float
+        most = coefficient.most if np.isfinite(coefficient.most) else None
+        weight: Any = Annotated[float, number(least=0.0 if positive else None, most=most)]
         many = Annotated[list[float], msgspec.Meta(min_length=1, max_length=len(coefficient.spread))]
         fields.append((key, weight | many | None if len(coefficient.spread) > 1 else weight | None, None))
 

@@ -12,7 +12,10 @@ from studies.diagnosis.simulated import simulate_baseline, without_rate_terms
 from studies.effects import find_effect
 from studies.instrument.card import load_card, save_card
 from studies.record import read_record
+from studies.simulation.chamber import load_profile
+from studies.simulation.drive import drive_by_profile, rows_of
 from studies.simulation.prediction import predict
+from studies.simulation.virtual_gyro import simulate_run
 from tests.benchmarks.diagnosis.unseen import DEVIATIONS, PACKS, TURN_ON, B, lacking, recover
 
 PROFILES = ("cycle 20 -15 40 0.5 30min 1", "step 20 -10 3h then ramp -10 30 1 then soak 30 2h")
@@ -81,6 +84,37 @@ def test_what_the_card_says_of_the_bias_by_rate_is_not_found_as_an_effect(shippe
     own = cleaned.row_responses["bias_deg_per_h"] - without.row_responses["bias_deg_per_h"]
     assert np.nanmax(np.abs(own)) < 0.1 * size
     assert left.runs[0].responses["frequency_Hz"] is with_rate.responses["frequency_Hz"]
+
+
+@pytest.mark.slow
+def test_what_a_loss_peak_does_to_the_bias_is_no_second_cause():
+    """Anisotropy of damping makes bias of 1/Q (Lynch 1995): a peak of the one was once named cross-damping in the other too."""
+    card = load_card("cvg-25mm")
+    peak = {"name": "loss-peak", "response": "inverse_q", "temperature_degC": 8.0, "width_K": 6.0, "peak_1": 1e-6}
+    device = card.with_table("effect", [peak])
+    drives = [drive_by_profile(profile, rows_of(profile, 0.05)) for profile in map(load_profile, PROFILES)]
+    runs = [simulate_run(device, drive, seed=k).record for k, drive in enumerate(drives)]
+    few = [find_effect(name) for name in ("loss-peak", "cross-damping", "activity-dip", "mounting-stress")]
+    found = investigate(load_campaign(runs, 20.0), few, card=card, advise=False)
+    assert [cause.effect for cause in found.verdict.causes] == ["loss-peak"], found.verdict.causes
+    carried = np.ptp(np.concatenate(found.inquiries["bias_deg_per_h"].final.baseline.carried))
+    stated = card.content["bias"]["damping_anisotropy"]["value"]
+    frequency, bryan = np.median(runs[0]["frequency_Hz"]), simulate_run(card, drives[0], noise=False).law.bryan_factor
+    largest = np.degrees(stated * np.pi * frequency * peak["peak_1"] / (4.0 * bryan)) * 3600.0
+    assert carried == pytest.approx(largest, rel=0.2)
+
+
+@pytest.mark.slow
+def test_an_effect_is_not_taken_for_values_far_from_the_card():
+    """A gradient's dT/dt was once fitted as eleven standard deviations of the housing's lag, with other causes to mend it."""
+    card = load_card("bvg-bell")
+    slope = {"name": "rate-frequency", "response": "frequency_Hz", "coefficient_Hz_per_K_per_s": 60.0}
+    drive = drive_by_profile(profile := load_profile("cycle 20 5 40 1 30min 1"), rows_of(profile, 0.05))
+    run = simulate_run(card.with_table("effect", [slope]), drive, seed=5).record
+    few = [find_effect(name) for name in ("rate-frequency", "mounting-stress", "second-lag", "thermometer-scale")]
+    verdict = investigate(load_campaign([run], 20.0), few, card=card, advise=False).verdict
+    assert "rate-frequency" in verdict.causes[0].names, verdict.causes
+    assert {cause.kind for cause in verdict.causes} == {"physics"}
 
 
 @pytest.mark.slow

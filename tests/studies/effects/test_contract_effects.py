@@ -229,6 +229,16 @@ def test_of_a_positive_effect_only_the_first_coefficient_cannot_be_negative(tmp_
         card.with_table("effect", [leak | {"growth_1_per_day": -2e-8}])
 
 
+def test_no_more_heat_is_radiated_than_there_is():
+    whole = {"name": "radiation", "radiated_share": 1.0}
+    card = load_card("hrg-30mm").with_table("effect", [whole])
+    assert card.effects[0].parameters["radiated_share"] == 1.0
+    with pytest.raises(InputError, match=r"radiated_share must be .*at most 1"):
+        card.with_table("effect", [whole | {"radiated_share": 1.4}])
+    with pytest.raises(InputError, match=r"radiated_share must be at most 1, not 1\.4"):
+        apply_effect("radiation", {"radiated_share": 1.4}, make_states())
+
+
 @pytest.mark.parametrize("name", [*sorted(e.name for e in library().values() if e.needs), "cross-damping"])
 def test_a_drive_that_steps_within_a_mean_is_averaged_as_the_record_is(name):
     """The mean of sin 4θ is not sin 4 of the mean: an azimuth that stepped within a mean once hid a turn of the axes."""
