@@ -155,10 +155,10 @@ def inquire(campaign: Campaign, plain: Fit, effects: Sequence[Effect] | None, sc
         return Inquiry(plain.problem, selection, leftover, {})
     generic = look(selection.plain.fit, selection.plain.fit)
     unknown = selection.plain.score + generic.smooth + CONSTANTS["log_prior_unknown"]
+    beside = max(leftover.smooth + CONSTANTS["log_prior_unknown"], 0.0)
     if unknown > selection.final.score and not leftover.significant:
         # what is named patches up what a generic form says better alone
         leftover = replace(generic, share=0.0)
-    beside = max(leftover.smooth + CONSTANTS["log_prior_unknown"], 0.0)
     return Inquiry(plain.problem, selection, leftover, {}, unknown - beside)
 
 

@@ -14,6 +14,6 @@ def waves(x: FloatArray, low: float, high: float, orders: int = ORDERS) -> Float
     return np.asarray(np.cos(np.pi * u[:, None] * np.arange(2, orders + 1)))
 
 
-def smoothness(size: float, orders: int = ORDERS, fall: float = 2.0) -> tuple[float, ...]:
-    """Return prior standard deviations of the waves, falling as k to the minus `fall`: 2 has a slope and knees, 3 finite bends."""
-    return tuple(float(size * (2.0 / k) ** fall) for k in range(2, orders + 1))
+def smoothness(size: float, orders: int = ORDERS) -> tuple[float, ...]:
+    """Return prior standard deviations of the waves, falling as k⁻²: the curve has a slope, and finite bends."""
+    return tuple(float(size * (2.0 / k) ** 2) for k in range(2, orders + 1))

@@ -36,8 +36,6 @@ POLES = (0.0, 20.0, 60.0)
 """Time constants of the loop, s."""
 STILL = -90.0
 """Axis of a wave that stands still: none."""
-SMOOTH = 3.0
-"""Losses are activated or thermoelastic: a damping has steep steps over temperature, but no knees."""
 FIXED = np.array([0.0] * 4 + [1.0] * (4 + ORDERS - 1))
 """At one azimuth the baseline has the terms up to the third order."""
 
@@ -57,7 +55,7 @@ EFFECT = Effect(
         Coefficient("quintic_{unit}_per_10K5", (0.2,)),
         Coefficient("sextic_{unit}_per_10K6", (0.05,)),
         Coefficient("septic_{unit}_per_10K7", (0.02,)),
-        Coefficient("waves_{unit}", smoothness(5.0, fall=SMOOTH)),
+        Coefficient("waves_{unit}", smoothness(5.0)),
     ),
     columns=columns,
     grid=grid,
