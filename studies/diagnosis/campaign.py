@@ -19,7 +19,7 @@ from studies.rest import LEAST_SPIKE
 TEMPERATURES = ("housing_temperature_degC", "chamber_temperature_degC", "resonator_temperature_degC")
 COMMANDS = ("drive_amplitude_V", "electrode_bias_V", "quadrature_V", "pattern_angle_deg")
 MOST_BINS = 800
-FINEST = 20
+FINEST = 40
 LONGEST_GAP = 900.0
 UNKNOWN_HEAT = 50.0
 """Area between temperature and line, K s, that a gap may hide: 50 mK of the resonator at a time constant of 1000 s."""
@@ -149,8 +149,9 @@ def load_campaign(records: Sequence[Record], reference_degC: float | None = None
     sampling = max(float(np.median(np.diff(table["time_s"]))) if table["time_s"].size > 1 else 1.0 for table in tables)
     # whole rows to a bin: the mean of rows is then compared with the mean of the model at the same moments
     rows = max(1, round(sum(spans) / MOST_BINS / sampling))
-    group = -(-rows // -(-rows // FINEST))
-    step = sampling * group * -(-rows // FINEST)
+    whole = -(-rows // FINEST)
+    group = -(-rows // whole)
+    step = sampling * group * whole
     temperature = np.concatenate([table["temperature"] for table in tables])
     reading = max(_reading_noise(table["temperature"]) for table in tables)
     if not np.isfinite(temperature).any():
@@ -166,6 +167,7 @@ def load_campaign(records: Sequence[Record], reference_degC: float | None = None
                 record.path or f"run {number + 1}",
                 {key: values[begin:end] for key, values in table.items()},
                 step / group,
+                0.5 * (whole - 1) * sampling,
                 group,
                 offset,
                 reference,
@@ -328,14 +330,16 @@ def _grid_run(
     label: str,
     table: dict[str, FloatArray],
     step: float,
+    centre: float,
     group: int,
     offset: float,
     reference: float,
     responses: Sequence[str],
 ) -> Run | None:
     time = table["time_s"]
-    slot = np.floor((time - time[0]) / step + 0.5).astype(int)
-    fine = time[0] + step * np.arange(slot[-1] + 2)  # beyond the last row
+    begin = time[0] + centre  # the rows of a step lie about its centre, not before it
+    slot = np.floor((time - begin) / step + 0.5).astype(int)
+    fine = begin + step * np.arange(slot[-1] + 2)  # beyond the last row
     coarse = average(fine, group)
     if coarse.size < 5 or time.size < 6:
         return None
@@ -376,12 +380,17 @@ def _means_between(grid: FloatArray, time: FloatArray, values: FloatArray) -> Fl
     return np.asarray(np.diff(area[np.searchsorted(every, edges)]) / (2.0 * half))
 
 
+def _unbent(means: FloatArray) -> FloatArray:
+    """Return what gives the same heat and the same moments of it: a mean, and the line to the next, flatten a bend by 1/8 of it."""
+    return np.asarray(np.concatenate([means[:1], means[1:-1] - np.diff(means, 2) / 8.0, means[-1:]]))
+
+
 def _states(run: int, grid: FloatArray, offset: float, reference: float, table: dict[str, FloatArray]) -> States:
     """Drives on the fine grid: the temperature between its rows, commands held until they change."""
     time = table["time_s"]
     known = np.isfinite(table["temperature"])
     if known.sum() > 1.5 * grid.size:  # finer than the grid: the mean over a step, so that no heat is lost at a bend
-        housing = _means_between(grid, time[known], table["temperature"][known]) + zero_Celsius
+        housing = _unbent(_means_between(grid, time[known], table["temperature"][known])) + zero_Celsius
     else:
         housing = _between(grid, time[known], table["temperature"][known]) + zero_Celsius
 
