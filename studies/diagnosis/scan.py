@@ -153,12 +153,20 @@ def scan(model: Fit, bank: Bank, models: int = 5) -> list[Seen]:
 
 
 def _other_hill(bank: Bank, gain: FloatArray, own: "np.ndarray", best: int) -> Term | None:
-    """Return the best of the shapes that differ from the best one in every one of several free parameters; None if far below."""
-    free = [k for k, parameter in enumerate(bank.terms[best].effect.shape) if not parameter.steady]
-    if len(free) < 2:
-        return None
+    """Return the best of the shapes that differ from the best one in every one of several free parameters; None if far below.
+
+    One lag of an effect on the temperature moves with the baseline's own: then a shape beyond the next ones.
+    """
+    effect = bank.terms[best].effect
+    free = [k for k, parameter in enumerate(effect.shape) if not parameter.steady]
     shapes = np.array([bank.terms[k].shape for k in own])[:, free]
-    apart = own[np.all(shapes != np.array(bank.terms[best].shape)[free], axis=1)]
+    if len(free) == 1 and effect.thermal:
+        place = np.argsort(np.argsort(shapes[:, 0]))
+        apart = own[np.abs(place - place[own == best]) > 1]
+    elif len(free) > 1:
+        apart = own[np.all(shapes != np.array(bank.terms[best].shape)[free], axis=1)]
+    else:
+        return None
     if not apart.size or gain[apart].max() < (1.0 - HILLS) * gain[best] - NEARLY:
         return None
     return bank.terms[int(apart[np.argmax(gain[apart])])]

@@ -19,6 +19,8 @@ MOST_CAUSES = 4
 CONTENDERS = 7
 NEAR = 25.0
 """A contender's scan may be this far behind the best one's, beside what the misfit of forms allows."""
+SHARPER = 0.04
+"""Part of the distance to the next shapes of the grid within which the first look leaves a shape: a hop is found closer."""
 
 
 @dataclass(frozen=True)
@@ -75,7 +77,7 @@ def search(plain: Fit, bank: Bank) -> Selection:
         best = max(tried, key=lambda h: h.score, default=None)
         if best is None or best.score - now.score < needed(start, now):
             break
-        now = examine(best, bank, start)
+        now = examine(sharpen(best), bank, start)
     for _ in range(MOST_CAUSES):
         places = tuple(_place(now, index, bank, start) for index in range(len(now.fit.terms)))
         best = max((place.rivals[0] for place in places), key=lambda h: h.score, default=now)
@@ -141,15 +143,20 @@ def _sizes(model: Fit) -> np.ndarray:
     return np.append(model.solved.scales, 0.1)
 
 
-def refine(model: Fit, index: int) -> Fit:
+def sharpen(grown: Hypothesis) -> Hypothesis:
+    """Look once more at the shape of the last term, near where it is."""
+    return replace(grown, fit=refine(grown.fit, len(grown.fit.terms) - 1, SHARPER))
+
+
+def refine(model: Fit, index: int, reach: float = 1.0) -> Fit:
     """Move the free shape parameters of one term to where the evidence is largest; wrong signs are refused."""
     term = model.terms[index]
     free = [(k, p) for k, p in enumerate(term.effect.shape) if p.moves(term.shape[k])]
     best = model
     for k, parameter in free if free else ():
-        best = _along(best, index, k, parameter)
+        best = _along(best, index, k, parameter, reach)
     if len(free) > 1:
-        best = _along(best, index, *free[0])
+        best = _along(best, index, *free[0], reach)
     best = fit(best.problem, best.moved(), best.terms, 2, best.solved.scales)
     best = max(best, model, key=lambda f: f.log_evidence)
     return _signed(best, index)
@@ -163,8 +170,8 @@ def _signed(model: Fit, index: int) -> Fit:
     return model
 
 
-def _along(model: Fit, index: int, place: int, parameter: Parameter) -> Fit:
-    """Golden section along one shape parameter, about where it is."""
+def _along(model: Fit, index: int, place: int, parameter: Parameter, reach: float) -> Fit:
+    """Golden section along one shape parameter, about where it is, over a part of the way to the next shapes of the grid."""
     from scipy.optimize import minimize_scalar
 
     term = model.terms[index]
@@ -181,6 +188,8 @@ def _along(model: Fit, index: int, place: int, parameter: Parameter) -> Fit:
         return -own.log_evidence
 
     low, high = _bracket(term, place, model)
+    at = float(np.log(term.shape[place])) if parameter.logarithmic else term.shape[place]
+    low, high = at + reach * min(low - at, 0.0), at + reach * max(high - at, 0.0)
     tolerance = 0.02 * (high - low)
     minimize_scalar(tried, bounds=(low, high), method="bounded", options={"xatol": tolerance, "maxiter": 12})
     return best[0]

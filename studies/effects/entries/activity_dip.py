@@ -11,7 +11,7 @@ def columns(states: States, shape: Shape, response: str) -> FloatArray:
     """With z = (T − T_d)/w, f shifts by z/(1 + z²), 1/Q by 1/(1 + z²); a stronger coupling mixes and widens the two.
 
     A loop that follows the branch which is more the working mode, δ ± √(δ² + κ²), hops where they cross: f then shifts by
-    sgn(z) (√(z² + 1) − |z|), 1/Q by 1 − |z|/√(z² + 1), the other mode's share.
+    sgn(z) (√(z² + 1) − |z|), 1/Q by 1 − |z|/√(z² + 1), the other mode's share; a hop is sharp however wide the crossing.
     """
     centre, width = shape
     out = []
@@ -19,9 +19,10 @@ def columns(states: States, shape: Shape, response: str) -> FloatArray:
         z = (states.resonator - zero_Celsius - centre) / (width * ratio)
         pair = [z / (1.0 + z * z), 1.0 / (1.0 + z * z)]
         out += pair if response == "frequency_Hz" else pair[::-1]
-    z = (states.resonator - zero_Celsius - centre) / width
-    root = np.sqrt(z * z + 1.0)
-    out.append(np.sign(z) * (root - np.abs(z)) if response == "frequency_Hz" else 1.0 - np.abs(z) / root)
+    for ratio in (1.0, 3.0):
+        z = (states.resonator - zero_Celsius - centre) / (width * ratio)
+        root = np.sqrt(z * z + 1.0)
+        out.append(np.sign(z) * (root - np.abs(z)) if response == "frequency_Hz" else 1.0 - np.abs(z) / root)
     return np.stack(out, axis=1)
 
 
@@ -48,7 +49,7 @@ EFFECT = Effect(
     source="avoided crossing of two damped modes; Ballato and Tilton, IEEE UFFC 25 (1978) on activity dips",
     isolate="cross the temperature twice in both directions, then with another amplitude or bias voltage: the dip moves",
     sensor="1/Q beside the frequency: a dip shows in both at the same temperature",
-    coefficients=(Coefficient("pull_{unit}", (1.0, 0.4, 0.4, 0.2, 0.35)),),
+    coefficients=(Coefficient("pull_{unit}", (1.0, 0.4, 0.4, 0.2, 0.35, 0.35)),),
     columns=columns,
     grid=grid,
     sizes={"frequency_Hz": 1e-4, "inverse_q": 1.0},

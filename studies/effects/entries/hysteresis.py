@@ -28,11 +28,9 @@ def columns(states: States, shape: Shape, response: str) -> FloatArray:
 
 
 def grid(span: Span, response: str) -> list[tuple[float, ...]]:
-    """Loop half widths from half a percent of the covered range; three initial memories, for the bias that of all runs too."""
+    """Loop half widths from half a percent of the covered range; three initial memories, and that which the runs before have left."""
     radii = span.temperature_range * np.geomspace(0.006, WIDEST, 8)
-    # elsewhere what is kept looks like a run's own level, as slow noise does
-    kept = span.runs > 1 and response == "bias_deg_per_h"
-    starts = (0.0, -1.0, 1.0, KEPT) if kept else (0.0, -1.0, 1.0)
+    starts = (0.0, -1.0, 1.0, KEPT) if span.runs > 1 else (0.0, -1.0, 1.0)
     ends = span.temperature_low - zero_Celsius, span.temperature_high - zero_Celsius
     return [(float(radius), start, *ends) for radius in radii for start in starts]
 

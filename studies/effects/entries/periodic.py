@@ -23,8 +23,8 @@ def columns(states: States, shape: Shape, response: str) -> FloatArray:
 
 
 def grid(span: Span, response: str) -> list[tuple[float, ...]]:
-    """Periods from 2.5 steps of the grid to a third of a run, spaced finer than a phase slip of 1/4 turn."""
-    slowest, fastest = CYCLES / span.longest_run, 1.0 / (2.5 * span.step)
+    """Periods from hardly more than two steps of the grid to a third of a run, spaced finer than a phase slip of 1/4 turn."""
+    slowest, fastest = CYCLES / span.longest_run, 1.0 / (FASTEST * span.step)
     forms: list[tuple[float, ...]] = [
         (float(1.0 / f), 1.0) for f in np.arange(slowest, fastest, 0.35 / span.longest_run)
     ]
@@ -50,6 +50,8 @@ def near(span: Span, response: str, shape: Shape) -> list[tuple[float, ...]]:
 CYCLES = 3.0
 """Periods in the longest run that make a line: with fewer, a wandering response looks the same."""
 MOST = 1500
+FASTEST = 2.05
+"""Steps of the grid to a period: one of two steps or fewer is folded back to a slower one."""
 LOBE = 0.6
 """Turns over a run by which two periods may differ and still look alike in it."""
 OWN, MOST_RUNS = 2.0, 12

@@ -15,7 +15,7 @@ def columns(states: States, shape: Shape, response: str) -> FloatArray:
 
 def grid(span: Span, response: str) -> list[tuple[float, ...]]:
     """Time constants away from the first one."""
-    ratios = (0.03, 0.1, 0.2, 0.4, 2.5, 4.0, 6.5, 10.0, 20.0)
+    ratios = (0.03, 0.1, 0.2, 0.4, 0.6, 1.6, 2.5, 4.0, 6.5, 10.0, 20.0)
     return [(span.tau * ratio,) for ratio in ratios if span.tau * ratio > span.step / 2]
 
 
