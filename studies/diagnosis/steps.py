@@ -57,7 +57,7 @@ class Steps:
     def means(self, column: FloatArray) -> FloatArray:
         """Mean over each step, moved along the slope from the rows' mean time to the centre; NaN where it stands for none.
 
-        A row stands for the time up to halfway to the next ones, so that missing and uneven rows do not bend it. The slope
+        A row stands for the time up to halfway to the next ones of its step, so that missing and uneven rows do not bend it. The slope
         is that of the step's own rows where they are several, else that between its neighbours. A step beside a hole stands
         only if its rows are centred, and so does one of several that lacks rows; one that lacks rows while a command changed
         is no mean over the step at all.
@@ -66,9 +66,10 @@ class Steps:
         t, y, place = self.time[present], column[present], self.place[present]
         count = np.bincount(place, minlength=grid.size)
         full = count >= max(1.0, 0.34 * float(np.median(count[count > 0]))) if count.any() else count > 0
-        half, between = 0.5 * (grid[1] - grid[0]), 0.5 * (t[1:] + t[:-1])
-        begin = np.maximum(grid[place] - half, np.append(-np.inf, between))
-        own = np.maximum(np.minimum(grid[place] + half, np.append(between, np.inf)) - begin, 1e-9 * half)
+        half, between, same = 0.5 * (grid[1] - grid[0]), 0.5 * (t[1:] + t[:-1]), place[1:] == place[:-1]
+        begin = np.where(np.append(False, same), np.append(0.0, between), grid[place] - half)
+        end = np.where(np.append(same, False), np.append(between, 0.0), grid[place] + half)
+        own = np.maximum(end - begin, 1e-9 * half)
 
         def total(values: FloatArray) -> FloatArray:
             return np.asarray(np.bincount(place, own * values, grid.size), dtype=float)
