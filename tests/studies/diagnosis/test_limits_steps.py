@@ -6,6 +6,7 @@ from studies.diagnosis.campaign import load_campaign
 from studies.diagnosis.held_out import residuals
 from studies.diagnosis.inquiry import again, begin
 from studies.diagnosis.steps import Steps
+from studies.effects.states import average
 from studies.record import Record
 
 TIME = np.arange(0.0, 4800.0, 10.0)
@@ -81,3 +82,29 @@ def test_outlying_rows_beside_each_other_are_left_out_and_the_baseline_goes_on_f
     fresh = begin(cleaned, "frequency_Hz", None)
     onward = begin(cleaned, "frequency_Hz", None, again(plain))
     assert abs(onward.log_evidence - fresh.log_evidence) < 0.3
+
+
+def test_a_step_of_many_rows_is_the_mean_of_the_lag_at_a_bend():
+    """A ramp that has passed two lags, against its solution: a grid coarser than the rows must not bend it (by 0.9 mK once)."""
+    first, second, rate = 300.0, 1700.0, 40.0 / 180.0
+
+    def ramped(time):
+        """Response of 1/((1 + 300 s·p)(1 + 1700 s·p)) to a ramp, and of the first lag alone, K."""
+        t = np.clip(time, 0.0, None)
+        slow, fast = np.exp(-t / second), np.exp(-t / first)
+        both = t - first - second + (second**2 * slow - first**2 * fast) / (second - first)
+        return rate * both, rate * (t - first * (1.0 - fast))
+
+    records = []
+    for begun in (6001.0, 7003.0, 9007.0, 11009.0, 13013.0, 15017.0, 17003.0, 8001.0):
+        time = np.arange(0.0, 25000.0, 5.0)
+        there, before = (a - b for a, b in zip(ramped(time - begun), ramped(time - begun - 180.0), strict=True))
+        records.append(
+            Record({"time_s": time, "housing_temperature_degC": 10.0 + before, "frequency_Hz": 4400.0 + there})
+        )
+    campaign = load_campaign(records)
+    assert campaign.step / 5.0 >= 40.0
+    for run in campaign.runs:
+        model = average(run.states.with_lag(second).resonator, campaign.group)
+        error = run.responses["frequency_Hz"] - 4400.0 - (model - 283.15)
+        assert np.nanmax(np.abs(error)) < 1e-4
