@@ -256,8 +256,8 @@ class Followed:
 
     Attributes
     ----------
-    reading : tuple of arrays
-        Its reading, K on the coarse grid.
+    reading, whole : tuple of arrays
+        Its reading, K on the coarse grid and on the fine one: between steps, and after the last, it bends.
     missed : tuple of (n, m) arrays
         What the thermometer's own model cannot explain, and what effects on the thermometer itself add to it, K: temperature
         or not, the data decide.
@@ -275,6 +275,7 @@ class Followed:
     states: tuple[States, ...]
     group: int
     reading: tuple[FloatArray, ...]
+    whole: tuple[FloatArray, ...]
     missed: tuple[FloatArray, ...]
     slope: float = 0.0
     delay: float | None = None
@@ -353,7 +354,8 @@ class Followed:
         missed, carried = (
             tuple(np.zeros((nothing.size, part.shape[1])) for part in own[:1]) for own in (self.missed, self.carried)
         )
-        return replace(self, states=(states,), reading=(nothing,), missed=missed, carried=carried)
+        whole = (np.zeros(states.time.size),)
+        return replace(self, states=(states,), reading=(nothing,), whole=whole, missed=missed, carried=carried)
 
 
 def level_names(response: Response, turn_on: float, runs: int) -> tuple[tuple[str, ...], tuple[str, ...]]:

@@ -70,8 +70,8 @@ def _suits(campaign: Campaign, rival: Fit, other: Inquiry) -> float:
     baseline = other.final.baseline
     if thermometer is None or not isinstance(baseline, Followed):
         return other.final.log_evidence
-    reading = thermometer.change if other.problem.response.bent else thermometer.excess
-    moved = replace(baseline, states=thermometer.states, reading=reading, missed=thermometer.missed)
+    reading, whole = thermometer.reads(other.problem.response)
+    moved = replace(baseline, states=thermometer.states, reading=reading, whole=whole, missed=thermometer.missed)
     return fit(other.problem, moved, other.final.terms, 2, other.final.solved.scales).log_evidence
 
 

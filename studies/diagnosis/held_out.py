@@ -166,7 +166,7 @@ def fine(baseline: Baseline, campaign: Campaign) -> Baseline:
         return replace(
             baseline,
             group=1,
-            reading=tuple(_finer(campaign, baseline.reading)),
+            reading=baseline.whole,
             missed=tuple(_finer(campaign, baseline.missed)),
             carried=tuple(_finer(campaign, baseline.carried)) if baseline.carried else (),
         )

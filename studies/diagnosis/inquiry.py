@@ -14,7 +14,7 @@ from studies.diagnosis.constants import CONSTANTS
 from studies.diagnosis.lack_of_fit import Leftover, look
 from studies.diagnosis.model import Fit, Problem, fit, pose, settle
 from studies.diagnosis.noise import tails_of
-from studies.diagnosis.response import RESPONSES
+from studies.diagnosis.response import RESPONSES, Response
 from studies.diagnosis.scan import applicable, build_bank
 from studies.diagnosis.search import Hypothesis, Place, Selection, drop, needed, search
 from studies.effects import Effect
@@ -32,8 +32,9 @@ class Thermometer:
 
     Attributes
     ----------
-    change, excess : tuples of (N,) arrays
-        Change of frequency over its slope, K, and temperature minus reference, K, run by run on the coarse grid.
+    change, excess : tuples of pairs of arrays
+        Change of frequency over its slope, K, and temperature minus reference, K, run by run on the coarse grid, (N,), and on
+        the fine one.
     missed : tuple of (N, m) arrays
         What may be temperature or not, as if it were, K: the slow part of what the model leaves, then every named effect
         on the frequency itself.
@@ -41,10 +42,15 @@ class Thermometer:
         Runs on the fine grid with that temperature.
     """
 
-    change: tuple[FloatArray, ...]
-    excess: tuple[FloatArray, ...]
+    change: tuple[tuple[FloatArray, FloatArray], ...]
+    excess: tuple[tuple[FloatArray, FloatArray], ...]
     missed: tuple[FloatArray, ...]
     states: tuple[States, ...]
+
+    def reads(self, response: Response) -> tuple[tuple[FloatArray, ...], tuple[FloatArray, ...]]:
+        """Return what a response follows, K, run by run on the coarse grid and on the fine one."""
+        coarse, whole = zip(*(self.change if response.bent else self.excess), strict=True)
+        return coarse, whole
 
 
 @dataclass(frozen=True)
@@ -95,12 +101,13 @@ def begin(
             turn_on=turn_on,
         )
     else:
-        reading = thermometer.change if response.bent else thermometer.excess
+        reading, whole = thermometer.reads(response)
         baseline = Followed(
             response,
             thermometer.states,
             campaign.group,
             reading,
+            whole,
             thermometer.missed,
             _slope(problem, reading),
             bends=bends_of(problem.values, problem.stack(list(reading)), response.powers),
@@ -243,11 +250,11 @@ def read_thermometer(campaign: Campaign, model: Fit) -> Thermometer | None:
     slow, beside = model.slow_part(), model.beside_temperature()
     changes, excesses, missed, states = [], [], [], []
     for k, (run, view, rest) in enumerate(zip(campaign.runs, baseline.views(), slow, strict=True)):
-        x = view.seen.excess
+        x, whole = view.seen.excess, view.seen_fine.excess
         known = np.isfinite(rest)
         filled = np.interp(run.time, run.time[known], rest[known]) if known.any() else np.zeros_like(x)
-        excesses.append(x)
-        changes.append(baseline.change(x))
+        excesses.append((x, whole))
+        changes.append((baseline.change(x), baseline.change(whole)))
         parts = np.stack([filled, *(own[k] for own in beside)], axis=1)
         missed.append(parts / np.where(np.abs(view.steep) > 0, view.steep, np.inf)[:, None])
         states.append(view.seen_fine)

@@ -176,9 +176,12 @@ def _alone(model: Fit, states: States, clock: Fit | None) -> Baseline:
     if not isinstance(own, Followed) or clock is None:
         return own.alone(states)
     view = follow(clock, states, None).continued.tangent.views[0]
-    x = average(view.seen_fine.excess, own.group)
-    reading = cast("Reading", clock.baseline).change(x) if own.response.bent else x
-    return replace(own.alone(view.seen_fine), reading=(reading,))
+    whole = view.seen_fine.excess
+    reading, whole = (
+        cast("Reading", clock.baseline).change(x) if own.response.bent else x
+        for x in (average(whole, own.group), whole)
+    )
+    return replace(own.alone(view.seen_fine), reading=(reading,), whole=(whole,))
 
 
 def covariance_of_noise(model: Fit, rows: int, step: float) -> FloatArray:
