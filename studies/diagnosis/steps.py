@@ -13,6 +13,8 @@ SEVERAL = 5
 """Rows from which on a step has a slope of its own."""
 ASIDE = 0.02
 """Part of a step by which the rows of a step that lacks some, or lies beside a hole, may lie off its centre."""
+UNEVEN = 1e-4
+"""Part of the square of half a step by which the rows of a step spread otherwise than usual, from which on a bend counts."""
 SWITCHED = 0.01
 """Change of a command from row to row, in parts of its range, that is a step of it."""
 
@@ -57,8 +59,9 @@ class Steps:
     def means(self, column: FloatArray) -> FloatArray:
         """Mean over each step, moved along the slope from the rows' mean time to the centre; NaN where it stands for none.
 
-        A row stands for the time up to halfway to the next ones of its step, so that missing and uneven rows do not bend it. The slope
-        is that of the step's own rows where they are several, else that between its neighbours. A step beside a hole stands
+        A row stands for the time up to halfway to the next ones, so that missing and uneven rows do not bend it. The slope
+        is that of the step's own rows where they are several, else that between its neighbours; rows that spread otherwise than
+        usual see another part of a bend, which the neighbours tell. A step beside a hole stands
         only if its rows are centred, and so does one of several that lacks rows; one that lacks rows while a command changed
         is no mean over the step at all.
         """
@@ -66,10 +69,9 @@ class Steps:
         t, y, place = self.time[present], column[present], self.place[present]
         count = np.bincount(place, minlength=grid.size)
         full = count >= max(1.0, 0.34 * float(np.median(count[count > 0]))) if count.any() else count > 0
-        half, between, same = 0.5 * (grid[1] - grid[0]), 0.5 * (t[1:] + t[:-1]), place[1:] == place[:-1]
-        begin = np.where(np.append(False, same), np.append(0.0, between), grid[place] - half)
-        end = np.where(np.append(same, False), np.append(between, 0.0), grid[place] + half)
-        own = np.maximum(end - begin, 1e-9 * half)
+        half, between = 0.5 * (grid[1] - grid[0]), 0.5 * (t[1:] + t[:-1])
+        begin = np.maximum(grid[place] - half, np.append(-np.inf, between))
+        own = np.maximum(np.minimum(grid[place] + half, np.append(between, np.inf)) - begin, 1e-9 * half)
 
         def total(values: FloatArray) -> FloatArray:
             return np.asarray(np.bincount(place, own * values, grid.size), dtype=float)
@@ -80,6 +82,7 @@ class Steps:
             lead = total(t) / weight - grid
             off = t - (grid + lead)[place]
             along = total(off * y) / total(off**2)
+            spread = total((t - grid[place]) ** 2) / weight
         usual = float(np.median(count[full])) if full.any() else 0.0
         lacks = count < usual
         full[self.switched] &= ~lacks[self.switched]
@@ -96,6 +99,14 @@ class Steps:
             slope = np.where(there, around, 0.0).sum(axis=0) / np.maximum(there.sum(axis=0), 1)
             slope = np.where(count[known] >= SEVERAL, along[known], slope)
             mean[known] = np.where(stands, mean[known] - slope * lead[known], np.nan)
+            wide = spread - np.median(spread[known])
+            uneven = full & (count >= SEVERAL) & (np.abs(wide) > UNEVEN * half**2)
+            mean = np.where(uneven, mean - 0.5 * _bend(mean) / (2.0 * half) ** 2 * wide, mean)
         if self.open_end:
             mean[-1] = np.nan
         return np.asarray(mean)
+
+
+def _bend(mean: FloatArray) -> FloatArray:
+    """Return second differences of the means, 0 where one of the three is missing."""
+    return np.nan_to_num(np.concatenate([[0.0], np.diff(mean, 2), [0.0]])) if mean.size > 2 else np.zeros_like(mean)
