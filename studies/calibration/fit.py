@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import solve_triangular
 
 from compensation.correlated import KINDS, Noise, NoiseRows, estimate_noise
 from compensation.errors import CompensationError
@@ -31,7 +32,9 @@ CLOSE = 0.05  # fall of the objective that a step still promises: a move of 0.2 
 NEAR = 1.0  # the same, where no step makes the fit better: what differences and rounding leave
 SETTLED_NOISE = 1.0  # the same, below which the noise is not estimated anew
 OUTLIER = 5.0
-SHORTENINGS = 5
+TRIALS = 6
+KEPT = 0.75  # of its promise, beyond which a step may be longer
+LEAST_DAMPING, MOST_DAMPING, HALVINGS = -12.0, 24.0, 14  # ln of what is added to the prior's precision
 LEAST_FALL = 0.1  # of the objective, over what the step promises
 UNSEEN = 0.1  # of the noise of one row: a column whose whole length is less tells nothing
 LONGEST_STEP = 3.0  # prior standard deviations, of any coordinate in one step
@@ -78,28 +81,25 @@ def fit(problem: CardProblem, start: Array | None = None, progress: Progress = l
     state = problem.evaluate(np.zeros(problem.count) if start is None else start)
     rows = dict(problem.rows)
     noise: dict[str, Noise] = {}
-    converged, step, size, outliers = False, 0, np.inf, dict.fromkeys(problem.responses, 0)
+    converged, straight, radius, step, size = False, False, LONGEST_STEP, 0, np.inf
+    outliers = dict.fromkeys(problem.responses, 0)
     for step in range(1, MOST_STEPS + 1):
-        if step <= 2 or size > SETTLED_NOISE:
-            noise = {name: _noise(problem, rows[name], state, name, noise.get(name)) for name in problem.responses}
-        if step > 2:
+        if size > SETTLED_NOISE:
+            noise = _estimate(problem, rows, state, noise) if straight else _left(problem, rows, state)
+        if straight:
             for name in problem.responses:
                 rows[name], outliers[name] = _spare_outliers(problem.rows[name], state, name, noise[name])
-        J, r = whitened(problem, state, noise, rows)
-        # (JᵀJ + 1) Δ = Jᵀ r − u, not by its matrix: of sharp data against a wide prior that has no digits left
-        both, target = np.vstack([J, np.eye(len(state.point))]), np.append(r, -state.point)
-        move = step_within(both, target, *(end - state.point for end in problem.ends))
-        size = float(target @ target - np.sum((target - both @ move) ** 2))
+        linear = _Linear.of(problem, state, noise, rows)
+        size = linear.fall(linear.step(np.inf))
         progress(f"step {step}: −2 ln L should fall by {size:.2g}")
-        if size < CLOSE and step > 3:
+        if size < CLOSE and straight and step > 3:
             converged = True
             break
-        shortened = min(1.0, LONGEST_STEP / max(float(np.abs(move).max(initial=0.0)), 1e-12))
-        reached = _advance(problem, state, shortened * move, shortened * float(target @ both @ move), noise, rows)
+        reached, radius, whole = _advance(problem, state, linear, radius, noise, rows)
         if reached is None:
-            converged = size < NEAR
+            converged = size < NEAR and straight
             break
-        state = reached
+        state, straight = reached, straight or whole
     J, _ = whitened(problem, state, noise, rows)
     _, S, ways = np.linalg.svd(np.vstack([J, np.eye(problem.count)]), full_matrices=False)
     covariance = np.asarray((ways.T / S**2) @ ways)
@@ -125,15 +125,48 @@ def objective(problem: CardProblem, state: State, noise: Mapping[str, Noise], ro
     return total + sum(float(np.sum(rows[n].whiten(state.residual[n], noise[n]) ** 2)) for n in problem.responses)
 
 
-def _noise(problem: CardProblem, rows: NoiseRows, state: State, name: str, near: Noise | None) -> Noise:
-    J = state.slope[name]
-    target = state.residual[name] + J @ state.point
-    # Rotated coordinates of unit prior are of unit prior again; those that the rows do not see are left out.
-    U, S, _ = np.linalg.svd(J, full_matrices=False)
-    seen = S > UNSEEN * float(np.median(np.abs(np.diff(state.residual[name]))))
+def _left(problem: CardProblem, rows: Mapping[str, NoiseRows], state: State) -> dict[str, Noise]:
+    """Noise that the residuals would be as they are: far from the values, a straight line promises what no step keeps."""
+    return {n: _levels(problem, rows[n], n, state.residual[n]) for n in problem.responses}
+
+
+def _estimate(
+    problem: CardProblem, rows: Mapping[str, NoiseRows], state: State, noise: Mapping[str, Noise]
+) -> dict[str, Noise]:
+    """Noise of highest marginal likelihood, each response's given the others'.
+
+    What the others say of the values is their prior for this one: it may not bend for itself what they hold. What the model
+    cannot follow is then left to the slow noise (the discrepancy of Kennedy & O'Hagan 2001, J. R. Stat. Soc. B 63, 425).
+    """
+    found = dict(noise)
+    for name in problem.responses:
+        others = [np.column_stack([np.eye(problem.count), -state.point])]
+        for other in problem.responses:
+            if other != name:
+                both = np.column_stack([state.slope[other], state.residual[other]])
+                others.append(rows[other].whiten(both, found[other]))
+        triangle = np.linalg.qr(np.vstack(others), mode="r")[: problem.count]
+        R, move = triangle[:, :-1], solve_triangular(triangle[:, :-1], triangle[:, -1])
+        residual, J = state.residual[name], state.slope[name]
+        # Rotated coordinates of unit prior are of unit prior again; those that the rows do not see are left out.
+        U, S, _ = np.linalg.svd(solve_triangular(R, J.T, trans="T").T, full_matrices=False)
+        seen = S > UNSEEN * float(np.median(np.abs(np.diff(residual))))
+        found[name] = _levels(problem, rows[name], name, residual - J @ move, U[:, seen] * S[seen], found[name])
+    return found
+
+
+def _levels(
+    problem: CardProblem,
+    rows: NoiseRows,
+    name: str,
+    target: Array,
+    columns: Array | None = None,
+    near: Noise | None = None,
+) -> Noise:
     kinds = ("white",) if name == SETTLED else KINDS
-    stated = stated_noise(problem.instrument.noise, name)
-    noise = estimate_noise(rows, target, U[:, seen] * S[seen], np.ones(int(seen.sum())), kinds, near, stated)
+    precision = None if columns is None else np.ones(columns.shape[1])
+    stated = None if columns is None else stated_noise(problem.instrument.noise, name)
+    noise = estimate_noise(rows, target, columns, precision, kinds, near, stated)
     if name == SETTLED:  # a reading is not better than its last digit
         rounding = max(table.resolution for table in problem.tables) / np.sqrt(12.0)
         return replace(noise, white=max(noise.white, rounding))
@@ -180,29 +213,97 @@ def whitened(
     return both[:, :-1], both[:, -1]
 
 
+@dataclass(frozen=True)
+class _Linear:
+    """Whitened slopes J and residuals r at a point u; (JᵀJ + 1) Δ = Jᵀ r − u within ends, by the triangle of [J; 1].
+
+    Not by JᵀJ: of sharp data against a wide prior that has no digits left.
+    """
+
+    slopes: Array
+    residual: Array
+    triangle: Array
+    target: Array
+    low: Array
+    high: Array
+
+    @classmethod
+    def of(
+        cls, problem: CardProblem, state: State, noise: Mapping[str, Noise], rows: Mapping[str, NoiseRows]
+    ) -> "_Linear":
+        J, r = whitened(problem, state, noise, rows)
+        both = np.column_stack([np.vstack([J, np.eye(problem.count)]), np.append(r, -state.point)])
+        triangle = np.linalg.qr(both, mode="r")
+        low, high = (end - state.point for end in problem.ends)
+        return cls(J, r, triangle[:, :-1], triangle[:, -1], low, high)
+
+    def fall(self, move: Array) -> float:
+        """What a move promises of the objective."""
+        return float(self.target @ self.target - np.sum((self.target - self.triangle @ move) ** 2))
+
+    def step(self, radius: float) -> Array:
+        """The move of the largest fall of those that are no longer than the radius in any coordinate (Levenberg, Marquardt)."""
+        move = self._damped(0.0)
+        if np.abs(move).max(initial=0.0) <= radius:
+            return move
+        low, high = LEAST_DAMPING, MOST_DAMPING
+        for _ in range(HALVINGS):
+            middle = (low + high) / 2
+            low, high = (low, middle) if np.abs(self._damped(np.exp(middle))).max() <= radius else (middle, high)
+        return self._damped(np.exp(high))
+
+    def bend(self, move: Array, reached: Array) -> Array:
+        """What a move is short of a valley that bends, from the whitened residuals that it reached."""
+        missed = reached - (self.residual - self.slopes @ move)
+        count = len(move)
+        R = self.triangle[:count]
+        way = solve_triangular(R, solve_triangular(R, self.slopes.T @ missed, trans="T"))
+        return np.clip(way, self.low - move, self.high - move)
+
+    def _damped(self, damping: float) -> Array:
+        more = np.sqrt(damping) * np.eye(self.triangle.shape[1])
+        target = np.append(self.target, np.zeros(len(more)))
+        return step_within(np.vstack([self.triangle, more]), target, self.low, self.high)
+
+
 def _advance(
     problem: CardProblem,
     state: State,
-    move: Array,
-    fall: float,
+    linear: _Linear,
+    radius: float,
     noise: Mapping[str, Noise],
     rows: Mapping[str, NoiseRows],
-) -> State | None:
-    """Go a step, or the part of it that a parabola through the objective promises most of; None where it does not fall."""
-    count = len(problem.priors.values)
+) -> tuple[State | None, float, bool]:
+    """Go the longest step that keeps what it promises; None where nothing falls.
+
+    With it the radius that the next one should keep, and whether it was a whole step that kept half of its promise.
+    """
     before = objective(problem, state, noise, rows)
-    part = 1.0
-    for _ in range(SHORTENINGS):
-        trial = state.point + part * move
-        trial = np.concatenate([problem.priors.inside(trial[:count]), trial[count:]])
-        try:
-            reached = problem.evaluate(trial, slopes=part == 1)
-        except (InputError, ShellError, ThermalError, CompensationError):
-            part /= 4
-            continue
-        after = objective(problem, reached, noise, rows)
-        if after < before - LEAST_FALL * part * fall:
-            return reached if part == 1 else problem.evaluate(trial)
-        lowest = part * fall / (after - before + 2 * part * fall)  # of the parabola of slope −2 fall at the start
-        part *= float(np.clip(lowest, 0.1, 0.5))
-    return None
+    for _ in range(TRIALS):
+        move = linear.step(radius)
+        length, promised = float(np.abs(move).max()), linear.fall(move)
+        reached = _reach(problem, state.point + move)
+        kept = -np.inf if reached is None else (before - objective(problem, reached, noise, rows)) / promised
+        if reached is not None and kept < KEPT:
+            there = np.concatenate([rows[n].whiten(reached.residual[n], noise[n]) for n in problem.responses])
+            bent = linear.bend(move, there)
+            if np.abs(bent).max() < length:
+                other = _reach(problem, state.point + move + bent)
+                gained = -np.inf if other is None else (before - objective(problem, other, noise, rows)) / promised
+                if gained > kept:
+                    reached, kept = other, gained
+        if reached is not None and kept > LEAST_FALL:
+            whole = length < 0.999 * radius and kept > 0.5
+            wider = min(LONGEST_STEP, max(radius, 2 * length)) if kept > KEPT else radius
+            return problem.evaluate(reached.point), wider if kept > 0.5 else length / 2, whole
+        radius = length / 4
+    return None, radius, False
+
+
+def _reach(problem: CardProblem, point: Array) -> State | None:
+    """The model at a point, its values within their bounds; None where it is impossible there."""
+    count = len(problem.priors.values)
+    try:
+        return problem.evaluate(np.concatenate([problem.priors.inside(point[:count]), point[count:]]), slopes=False)
+    except (InputError, ShellError, ThermalError, CompensationError):
+        return None
