@@ -8,9 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import block_diag
 
+from compensation.correlated import Noise
 from studies.calibration.ahead import BIAS
 from studies.calibration.estimates import SILENT, Estimate, estimate, find_groups
-from studies.calibration.fit import CardFit, fit, whitened
+from studies.calibration.fit import CardFit, fit, stated_noise, whitened
 from studies.calibration.observed import HOUSING, QUADRATURE, RESPONSES, SETTLED, ObservedRun, SettledTable, observe
 from studies.calibration.priors import Priors, gather_priors
 from studies.calibration.problem import JUMP, SHIFT, CardProblem, State, wide_law
@@ -30,6 +31,7 @@ Progress = Callable[[str], None]
 UNITS = {"frequency_Hz": "Hz", "bias_deg_per_h": "°/h", "inverse_q": "1", QUADRATURE: "V", HOUSING: "K", SETTLED: "Hz"}
 TURNED_ON = 2.0  # runs whose offsets are so much larger than the card states
 CONTRADICTION = 5.0  # runs whose offsets are so much larger than what else the noise makes of a run's mean
+MISFIT = 2.0  # residuals that are so much larger than their rows' white noise and what the card states of slow noise
 START_STEPS = 3
 DIGITS = 12  # of a correlation: the frequency knows two values together a thousand times better than each, and 1 − ρ² is the square
 UNSETTLED, UNSETTLED_SD = 0.5, 4.0  # K and standard deviations by which a gyro had not settled at the start
@@ -279,11 +281,12 @@ def _spread(problem: CardProblem, state: State, name: str) -> float:
     return float(np.sqrt(np.mean(np.concatenate(parts) ** 2)))
 
 
-def noise_rms(found: CardFit, name: str) -> float:
-    """Rms of the noise about the mean of each run, as the fitted levels have it."""
+def noise_rms(found: CardFit, name: str, noise: Noise | None = None) -> float:
+    """Rms of the noise about the mean of each run, as the fitted levels have it, or others."""
     rows, total, count = found.problem.rows[name], 0.0, 0
+    levels = found.noise[name] if noise is None else noise
     for run, t in enumerate(rows.times):
-        S = rows.covariance(run, found.noise[name])
+        S = rows.covariance(run, levels)
         total += float(np.trace(S) - S.mean() * len(t))
         count += len(t)
     return float(np.sqrt(total / count))
@@ -380,10 +383,12 @@ def _rms(values: Array) -> float:
 def _warn(found: CardFit, estimates: Sequence[Estimate], ladder: Mapping[str, Rung]) -> tuple[str, ...]:
     warnings = []
     if not found.converged:
-        warnings.append("the fit has not fully converged; the values may still move.")
+        warnings.append(
+            f"the fit has not converged in {found.steps} steps: its values may still move and are no result."
+        )
     for run in found.problem.runs:
         warnings += [f"{run.record.path}: {idle}" for idle in idle_effects(found.problem.instrument, run.inner)]
-    warnings += _unsettled(found)
+    warnings += [*_unsettled(found), *_misfit(found, ladder)]
     rows = found.problem.rows
     for name, rung in ladder.items():
         stated = found.problem.instrument.noise.bias_turn_on_deg_per_h if name == BIAS else 0.0
@@ -409,6 +414,20 @@ def _warn(found: CardFit, estimates: Sequence[Estimate], ladder: Mapping[str, Ru
             f" {', '.join(stayed)}."
         )
     return tuple(warnings)
+
+
+def _misfit(found: CardFit, ladder: Mapping[str, Rung]) -> list[str]:
+    """Name the responses that the model does not follow: what it leaves stands out of what their rows scatter and the card states."""
+    said = []
+    for name, rung in ladder.items():
+        slow = stated_noise(found.problem.instrument.noise, name) or Noise(0.0)
+        usual = noise_rms(found, name, replace(slow, white=found.noise[name].white, offset=0.0))
+        if rung.calibrated > MISFIT * usual:
+            said.append(
+                f"the model does not follow {name}: it leaves {rung.calibrated:.2g} {UNITS[name]} (rms), where the noise of the rows"
+                f" is {usual:.2g}; the values carry this misfit. hrg diagnose with --card looks for what the card lacks."
+            )
+    return said
 
 
 def _unsettled(found: CardFit) -> list[str]:

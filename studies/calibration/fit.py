@@ -1,12 +1,13 @@
 """Most probable values: Gauss–Newton steps in coloured noise that is estimated beside them.
 
-At every step each response's noise has the levels of highest marginal likelihood, the free coordinates integrated out
-(`compensation.correlated`); with rows whitened by it, (JᵀJ + 1) Δ = Jᵀ r − u. Blocks whose innovation stands out by more
-than 5 standard deviations are given the variance that they show: one outlier moves nothing.
+At first the noise of each response is all of its residual; once a whole step has kept what it promised, its levels are those of
+highest marginal likelihood, the free coordinates integrated out (`compensation.correlated`). With rows whitened by it,
+(JᵀJ + 1) Δ = Jᵀ r − u, damped until the step keeps its promise, then bent as the valley bends. Blocks whose innovation stands
+out by more than 5 standard deviations are given the variance that they show: one outlier moves nothing.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import astuple, dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -32,6 +33,7 @@ CLOSE = 0.05  # fall of the objective that a step still promises: a move of 0.2 
 NEAR = 1.0  # the same, where no step makes the fit better: what differences and rounding leave
 SETTLED_NOISE = 1.0  # the same, below which the noise is not estimated anew
 OUTLIER = 5.0
+PATIENCE = 8  # steps, after which the noise only rises: what the model still promises to explain it has not explained
 TRIALS = 6
 KEPT = 0.75  # of its promise, beyond which a step may be longer
 LEAST_DAMPING, MOST_DAMPING, HALVINGS = -12.0, 24.0, 14  # ln of what is added to the prior's precision
@@ -85,7 +87,8 @@ def fit(problem: CardProblem, start: Array | None = None, progress: Progress = l
     outliers = dict.fromkeys(problem.responses, 0)
     for step in range(1, MOST_STEPS + 1):
         if size > SETTLED_NOISE:
-            noise = _estimate(problem, rows, state, noise) if straight else _left(problem, rows, state)
+            found = _estimate(problem, rows, state, noise) if straight else _left(problem, rows, state)
+            noise = found if step <= PATIENCE else {name: _larger(noise[name], found[name]) for name in found}
         if straight:
             for name in problem.responses:
                 rows[name], outliers[name] = _spare_outliers(problem.rows[name], state, name, noise[name])
@@ -145,7 +148,7 @@ def _estimate(
             if other != name:
                 both = np.column_stack([state.slope[other], state.residual[other]])
                 others.append(rows[other].whiten(both, found[other]))
-        triangle = np.linalg.qr(np.vstack(others), mode="r")[: problem.count]
+        triangle = np.linalg.qr(np.vstack(others)).R[: problem.count]
         R, move = triangle[:, :-1], solve_triangular(triangle[:, :-1], triangle[:, -1])
         residual, J = state.residual[name], state.slope[name]
         # Rotated coordinates of unit prior are of unit prior again; those that the rows do not see are left out.
@@ -171,6 +174,10 @@ def _levels(
         rounding = max(table.resolution for table in problem.tables) / np.sqrt(12.0)
         return replace(noise, white=max(noise.white, rounding))
     return noise
+
+
+def _larger(one: Noise, other: Noise) -> Noise:
+    return Noise(*(max(pair) for pair in zip(astuple(one), astuple(other), strict=True)))
 
 
 def stated_noise(noise: "NoiseKeys", response: str) -> Noise | None:
@@ -233,7 +240,7 @@ class _Linear:
     ) -> "_Linear":
         J, r = whitened(problem, state, noise, rows)
         both = np.column_stack([np.vstack([J, np.eye(problem.count)]), np.append(r, -state.point)])
-        triangle = np.linalg.qr(both, mode="r")
+        triangle = np.linalg.qr(both).R
         low, high = (end - state.point for end in problem.ends)
         return cls(J, r, triangle[:, :-1], triangle[:, -1], low, high)
 

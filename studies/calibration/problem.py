@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from compensation.correlated import NoiseRows
 from studies.calibration.observed import HOUSING, QUADRATURE, RESPONSES, SETTLED, ObservedRun, SettledTable
 from studies.calibration.priors import Priors
+from studies.calibration.start import start_spread
 from studies.law import law_of, moved_law
 from studies.simulation.drive import Drive
 from studies.simulation.prediction import Prediction, Variations, predict
@@ -25,7 +26,6 @@ if TYPE_CHECKING:
     from studies.instrument.card import Instrument
 
 Array = NDArray[np.float64]
-START_SPREAD = 10.0  # K, of the departures at the start: a run may begin in the midst of a change
 SHIFT, JUMP, KINK = "shift", "jump.", "kink."
 MOST_JUMPS = 24  # of a run whose times are free, each for itself
 Progress = Callable[[str], None]
@@ -87,8 +87,9 @@ class CardProblem:
         the first row is not: what it did before the record began is in the departures. What the measured housing did
         between these two rows is free too: it has a kink there, and a straight line between its rows is not it.
         """
+        away = [start_spread(run, self.instrument, self.law) for run in self.runs]
         found = [
-            (k, f"initial.{lump}", START_SPREAD) for k, part in enumerate(self.parts) for lump in part.drive.departing
+            (k, f"initial.{lump}", away[part.run]) for k, part in enumerate(self.parts) for lump in part.drive.departing
         ]
         for k, part in enumerate(self.parts):
             if part.drive.boundary == "housing":

@@ -8,7 +8,7 @@ parameters that the data ties together but cannot tell apart; `responses`: by na
 (rms of block averages about the mean of each run), `run_offset` (rms of these means) and `outliers`; `held_out`: null, or
 `record` and by response `chamber` and `housing` (`as_shipped`, `calibrated`, null where not measured) beside `noise` and `stated`
 (rms standard deviation that the calibrated values, the run's start and its turn-on leave from the chamber, or null);
-`converged`; `warnings`; `calibrated_card`: path of the saved card or null.
+`converged`; `warnings`; `calibrated_card`: path of the saved card or null, as where a fit that has not converged was not saved.
 """
 
 from typing import TYPE_CHECKING, Any
@@ -44,7 +44,8 @@ def calibrate(
     data : str
         Records (CSV), the runs of one device, and steady-state tables (temperature_degC,frequency_Hz).
     save : str
-        Write the calibrated card: most probable values with their posterior widths.
+        Write the calibrated card: most probable values with their posterior widths. A fit that has not converged is not saved
+        (exit status 2).
     report : str
         Write a page (HTML).
     hold_out : int
@@ -75,6 +76,12 @@ def calibrate(
     found = run(instrument, records, tables, left, exact, progress=say)
     for warning in found.warnings:
         say(f"warning: {warning}")
+    refused = save is not None and not found.fit.converged
+    if refused:
+        say(
+            f"{save} is not written: what has not converged is no card. Give more of it as known (--exact), or runs that differ less."
+        )
+        save = None
     if save is not None:
         save_card(found.instrument, save)
         say(f"card: {save}")
@@ -83,7 +90,7 @@ def calibrate(
 
         write_text(report, calibration_page(found, list(data)))
         say(f"report: {report}")
-    yield _payload(found, list(data), save)
+    yield _payload(found, list(data), save), 2 if refused else 0
     from studies.reports.calibration import held_out_table, ladder_table, separation_sentences, values_table
 
     for block in (values_table(found, touched=True), ladder_table(found), held_out_table(found)):

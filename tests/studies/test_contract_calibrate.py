@@ -56,6 +56,19 @@ def test_the_object_the_card_and_the_page(run, tmp_path, capsys):
     assert "run&lt;1&gt;" in text
 
 
+def test_what_has_not_converged_is_no_card(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr("studies.calibration.fit.MOST_STEPS", 1)
+    card = tmp_path / "calibrated.toml"
+    words = ["calibrate", "hrg-30mm", "studies/papers/hrg_table1.csv", "--json"]
+    assert main([*words, "--save", str(card)]) == 2
+    said = capsys.readouterr()
+    answer = json.loads(said.out)
+    assert (answer["converged"], answer["calibrated_card"]) == (False, None)
+    assert "calibrated.toml is not written" in said.err
+    assert not card.exists()
+    assert main(words) == 0
+
+
 def test_tables_are_for_people(capsys):
     assert main(["calibrate", "hrg-30mm", "studies/papers/hrg_table1.csv"]) == 0
     out = capsys.readouterr().out

@@ -14,12 +14,15 @@ from studies.calibration.fit import CardFit, stated_noise, whitened
 from studies.calibration.observed import observe
 from studies.calibration.priors import Priors
 from studies.calibration.problem import CardProblem, State
+from studies.calibration.start import MOST_SPREAD, start_spread
 from studies.instrument.card import load_card
 from studies.instrument.tables.noise import NoiseKeys
 from studies.instrument.uncertain import UncertainValue
+from studies.law import law_of
+from studies.record import Record
 from studies.simulation.chamber import load_profile
 from studies.simulation.drive import Drive, drive_by_profile, rows_of
-from studies.simulation.heat_path import slowest_lag
+from studies.simulation.heat_path import build_network, slowest_lag
 from studies.simulation.noise import bias_noise, frequency_noise
 from studies.simulation.prediction import law_for, predict
 from studies.simulation.virtual_gyro import simulate_run
@@ -237,7 +240,7 @@ def test_a_jump_is_free_up_to_a_row_earlier_but_not_at_the_first_row():
     ):
         record = simulate_run(card, load_profile(words), 1 / 60).record
         runs = observe([record])
-        problem = CardProblem(card, Priors((), np.eye(0)), runs, None)
+        problem = CardProblem(card, Priors((), np.eye(0)), runs, law_of(card, 240.0, 330.0))
         times = [name for _, name, _ in problem.starts if not name.startswith(("initial.", "kink."))]
         low, high = problem.ends
         assert times == expected
@@ -246,6 +249,25 @@ def test_a_jump_is_free_up_to_a_row_earlier_but_not_at_the_first_row():
         sd = next((sd for _, name, sd in problem.starts if name.startswith("jump.")), 0.0)
         assert low[bounded] * sd == pytest.approx(-60.0)
         assert np.array_equal(high[bounded], np.zeros(bounded.sum()))
+
+
+def test_a_gyro_whose_frequency_and_housing_stand_still_was_at_rest():
+    """Half a kelvin that fades within the card's slowest time constant is seen in the frequency; without one nothing is known."""
+    card, random, t = load_card("hrg-30mm"), np.random.default_rng(2), np.arange(0.0, 7200.0, 30.0)
+    law = law_of(card, 270.0, 320.0)
+    tau = slowest_lag(build_network(card, boundary="housing"), 293.15)
+
+    def spread(away, **columns):
+        housing = 20.0 + 5e-3 * random.standard_normal(t.size)
+        f = law.frequency(293.15 + away * np.exp(-t / tau)) + 1e-3 * random.standard_normal(t.size)
+        (run,) = observe([Record({"time_s": t, "housing_temperature_degC": housing, "frequency_Hz": f} | columns)])
+        return start_spread(run, card, law)
+
+    assert spread(0.0) < 0.2
+    assert 0.5 < spread(0.5) < 2.0
+    assert spread(0.0, housing_temperature_degC=20.0 + 0.01 * t) == MOST_SPREAD
+    (blind,) = observe([Record({"time_s": t, "housing_temperature_degC": 20.0 + 0 * t, "bias_deg_per_h": 1.0 + 0 * t})])
+    assert start_spread(blind, card, law) == MOST_SPREAD
 
 
 def test_the_noise_that_a_card_states_has_the_covariance_that_a_calibration_expects():
