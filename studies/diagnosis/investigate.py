@@ -165,7 +165,7 @@ def _doubt_turn_on(
     """
     free = replace(campaign, turn_on=0.0)
     plain = begin(free, column, thermometer)
-    order = np.argsort([run.time[0] for run in campaign.runs])
+    order = np.argsort([run.states.campaign_time[0] for run in campaign.runs])
     steps = np.diff(np.array(_run_shifts(plain))[order])
     furthest = np.maximum(np.minimum(steps[:-1], -steps[1:]), np.minimum(-steps[:-1], steps[1:]))
     stretches = len(campaign.records) < len(campaign.runs)
