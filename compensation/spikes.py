@@ -11,7 +11,7 @@ SPIKE, ALONE = 6.0, 4.0
 FEW, LEVEL = 3, 25
 
 
-def find_spikes(values: Array, least: float = 0.0) -> NDArray[np.bool_]:
+def find_spikes(values: Array, least: float = 0.0, step: float = 0.0) -> NDArray[np.bool_]:
     """Mark readings (m,) that stand out from their neighbours by more than 6 robust standard deviations.
 
     What the neighbours say is the median of (y_{i−k} + y_{i+k})/2, k = 1, 2, 3, which follows any straight trend; at the
@@ -26,31 +26,39 @@ def find_spikes(values: Array, least: float = 0.0) -> NDArray[np.bool_]:
     least : float
         Part of the series' span, spikes left out of it, by which a spike must stand out too: a smooth column has no noise
         to measure a spike by.
+    step : float
+        What the readings were rounded to, where the values do not show it any more: half of it is the least spread.
     """
     marked, rows = np.zeros(len(values), dtype=bool), np.flatnonzero(np.isfinite(values))
     if len(rows) < NEIGHBOURS:
         return marked
     known = values[rows]
-    marked[rows] = _stand_out(known)
+    marked[rows] = _stand_out(known, 0.5 * step)
     if least:
         smooth = median_filter(known, NEIGHBOURS, mode="mirror")
         marked[rows] &= np.abs(known - smooth) > least * np.ptp(smooth)
     return marked
 
 
-def find_spike_groups(rests: Array) -> NDArray[np.bool_]:
+def find_step(readings: Array) -> float:
+    """Return the smallest difference of readings (m,): what they were rounded to, if they were; 0 where all are alike."""
+    apart = np.diff(np.unique(readings[np.isfinite(readings)]))
+    return float(apart.min()) if apart.size else 0.0
+
+
+def find_spike_groups(rests: Array, step: float = 0.0) -> NDArray[np.bool_]:
     """Mark one to three readings within four rows that stand out together from what a model leaves, (m,).
 
     The level is the median of the twenty-five rows about each, which three readings do not move. Those farther from it than 6
     robust standard deviations are together where no two rows lie between them, and are marked where the mean distance of
     the three rows before, and of the three after, is below a quarter of the smallest among them: a dip, a decay or a jump
-    has a shoulder, what lasts longer is for the model, and what an end cuts off may last longer.
+    has a shoulder, what lasts longer is for the model, and what an end cuts off may last longer. `step` as of `find_spikes`.
     """
     marked, rows = np.zeros(len(rests), dtype=bool), np.flatnonzero(np.isfinite(rests))
     if len(rows) < LEVEL:
         return marked
     distance = np.abs(rests[rows] - median_filter(rests[rows], LEVEL, mode="mirror"))
-    far = np.flatnonzero(distance > SPIKE * 1.4826 * np.median(distance))
+    far = np.flatnonzero(distance > SPIKE * max(1.4826 * float(np.median(distance)), 0.5 * step))
     groups = np.split(far, np.flatnonzero(np.diff(far) > 2) + 1) if far.size else []
     for own in groups:
         first, last = int(own[0]), int(own[-1])
@@ -61,12 +69,12 @@ def find_spike_groups(rests: Array) -> NDArray[np.bool_]:
     return marked
 
 
-def _stand_out(values: Array) -> NDArray[np.bool_]:
+def _stand_out(values: Array, least: float) -> NDArray[np.bool_]:
     left = values.copy()
     distance = _distance(left)
     positive = distance[distance > 0]
     # Rounded readings may have no spread at all: then the smallest distance takes its place.
-    spread = max(1.4826 * float(np.median(distance)), float(positive.min()) if positive.size else 1.0)
+    spread = max(1.4826 * float(np.median(distance)), float(positive.min()) if positive.size else 1.0, least)
     while True:
         around = np.pad(distance, REACH)
         peak = distance >= np.fmax.reduce([_shifted(around, k) for k in (-2, -1, 1, 2)])

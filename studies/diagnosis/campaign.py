@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.constants import zero_Celsius
 
-from compensation.spikes import find_spike_groups, find_spikes
+from compensation.spikes import find_spike_groups, find_spikes, find_step
 from studies.diagnosis.checks import FEWEST_BINS, check_device, check_units
 from studies.diagnosis.response import RESPONSES
 from studies.diagnosis.steps import Steps
@@ -116,7 +116,11 @@ class Campaign:
 
         Before there was a model, a bend of the temperature or an uneven clock of the logger may have hidden them.
         """
-        spikes = [find_spikes(rest) | find_spike_groups(rest) for rest in rests]
+        steps = [find_step(run.row_responses[column]) for run in self.runs]
+        spikes = [
+            find_spikes(rest, step=step) | find_spike_groups(rest, step)
+            for rest, step in zip(rests, steps, strict=True)
+        ]
         count = sum(int(own.sum()) for own in spikes)
         if not count:
             return self

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from compensation.spikes import find_spike_groups, find_spikes
+from compensation.spikes import find_spike_groups, find_spikes, find_step
 
 ROWS = np.arange(600.0)
 SHAPES = {
@@ -85,3 +85,17 @@ def test_an_event_of_many_rows_is_no_group_of_spikes(event):
 def test_noise_has_next_to_no_groups():
     """Six deviations of Gaussian rows are passed by 2e-9 of them."""
     assert not any(find_spike_groups(np.random.default_rng(k).standard_normal(600)).any() for k in range(100))
+
+
+def test_one_digit_more_or_less_is_no_spike_where_a_smooth_model_was_taken_away():
+    """Readings that change by their last digit now and then: beside a smooth model that digit is many of the usual distances."""
+    readings = np.round(np.cumsum(0.1 * np.random.default_rng(4).standard_normal(4000)) + 20.0)
+    rests = readings - 20.0 + 1e-3 * np.random.default_rng(5).standard_normal(readings.size)
+    step = find_step(readings)
+    assert step == 1.0
+    assert find_spikes(rests).any()
+    assert find_spike_groups(rests).any()
+    assert not find_spikes(rests, step=step).any()
+    assert not find_spike_groups(rests, step).any()
+    rests[2000] += 10.0
+    assert np.flatnonzero(find_spikes(rests, step=step)).tolist() == [2000]
