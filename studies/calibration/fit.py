@@ -1,7 +1,8 @@
 """Most probable values: Gauss–Newton steps in coloured noise that is estimated beside them.
 
 At first the noise of each response is all of its residual; once a whole step has kept what it promised, its levels are those of
-highest marginal likelihood, the free coordinates integrated out (`compensation.correlated`). With rows whitened by it,
+highest marginal likelihood, the free coordinates integrated out (`compensation.correlated`); where steps then leave no less, the
+model cannot follow all responses at once, and the noise of each is judged given the others. With rows whitened by it,
 (JᵀJ + 1) Δ = Jᵀ r − u, damped until the step keeps its promise, then bent as the valley bends. Blocks whose innovation stands
 out by more than 5 standard deviations are given the variance that they show: one outlier moves nothing.
 """
@@ -33,8 +34,12 @@ CLOSE = 0.05  # fall of the objective that a step still promises: a move of 0.2 
 NEAR = 1.0  # the same, where no step makes the fit better: what differences and rounding leave
 SETTLED_NOISE = 1.0  # the same, below which the noise is not estimated anew
 OUTLIER = 5.0
-PATIENCE = 8  # steps, after which the noise only rises: what the model still promises to explain it has not explained
+PATIENCE = (
+    5  # steps that leave no less, after which the noise only rises: what the model still promises it does not keep
+)
+LESS = 0.2  # of the logarithm of what is left, all responses together: a step that leaves less
 TRIALS = 6
+CORRECTIONS = 5  # of a step, towards the floor of a valley that bends
 KEPT = 0.75  # of its promise, beyond which a step may be longer
 LEAST_DAMPING, MOST_DAMPING, HALVINGS = -12.0, 24.0, 14  # ln of what is added to the prior's precision
 LEAST_FALL = 0.1  # of the objective, over what the step promises
@@ -84,16 +89,22 @@ def fit(problem: CardProblem, start: Array | None = None, progress: Progress = l
     rows = dict(problem.rows)
     noise: dict[str, Noise] = {}
     converged, straight, radius, step, size = False, False, LONGEST_STEP, 0, np.inf
+    least, waited = np.inf, 0
     outliers = dict.fromkeys(problem.responses, 0)
     for step in range(1, MOST_STEPS + 1):
+        left = sum(float(np.log(np.linalg.norm(state.residual[name]))) for name in problem.responses)
+        waited = 0 if left < least - LESS else waited + 1
+        least = min(least, left)
         if size > SETTLED_NOISE:
-            found = _estimate(problem, rows, state, noise) if straight else _left(problem, rows, state)
-            noise = found if step <= PATIENCE else {name: _larger(noise[name], found[name]) for name in found}
+            found = (
+                _estimate(problem, rows, state, noise, waited > PATIENCE) if straight else _left(problem, rows, state)
+            )
+            noise = found if waited <= PATIENCE else {name: _larger(noise[name], found[name]) for name in found}
         if straight:
             for name in problem.responses:
                 rows[name], outliers[name] = _spare_outliers(problem.rows[name], state, name, noise[name])
         linear = _Linear.of(problem, state, noise, rows)
-        size = linear.fall(linear.step(np.inf))
+        size = linear.fall(linear.step(np.inf)[0])
         progress(f"step {step}: −2 ln L should fall by {size:.2g}")
         if size < CLOSE and straight and step > 3:
             converged = True
@@ -134,18 +145,18 @@ def _left(problem: CardProblem, rows: Mapping[str, NoiseRows], state: State) -> 
 
 
 def _estimate(
-    problem: CardProblem, rows: Mapping[str, NoiseRows], state: State, noise: Mapping[str, Noise]
+    problem: CardProblem, rows: Mapping[str, NoiseRows], state: State, noise: Mapping[str, Noise], given: bool
 ) -> dict[str, Noise]:
-    """Noise of highest marginal likelihood, each response's given the others'.
+    """Noise of highest marginal likelihood, each response's by itself or `given` the others'.
 
-    What the others say of the values is their prior for this one: it may not bend for itself what they hold. What the model
-    cannot follow is then left to the slow noise (the discrepancy of Kennedy & O'Hagan 2001, J. R. Stat. Soc. B 63, 425).
+    What the others say of the values is then their prior for this one: it may not bend for itself what they hold. What the model
+    cannot follow is left to the slow noise (the discrepancy of Kennedy & O'Hagan 2001, J. R. Stat. Soc. B 63, 425).
     """
     found = dict(noise)
     for name in problem.responses:
         others = [np.column_stack([np.eye(problem.count), -state.point])]
         for other in problem.responses:
-            if other != name:
+            if given and other != name:
                 both = np.column_stack([state.slope[other], state.residual[other]])
                 others.append(rows[other].whiten(both, found[other]))
         triangle = np.linalg.qr(np.vstack(others)).R[: problem.count]
@@ -248,22 +259,25 @@ class _Linear:
         """What a move promises of the objective."""
         return float(self.target @ self.target - np.sum((self.target - self.triangle @ move) ** 2))
 
-    def step(self, radius: float) -> Array:
-        """The move of the largest fall of those that are no longer than the radius in any coordinate (Levenberg, Marquardt)."""
+    def step(self, radius: float) -> tuple[Array, float]:
+        """The move of the largest fall of those that are no longer than the radius in any coordinate, and its damping (Levenberg, Marquardt)."""
         move = self._damped(0.0)
         if np.abs(move).max(initial=0.0) <= radius:
-            return move
+            return move, 0.0
         low, high = LEAST_DAMPING, MOST_DAMPING
         for _ in range(HALVINGS):
             middle = (low + high) / 2
             low, high = (low, middle) if np.abs(self._damped(np.exp(middle))).max() <= radius else (middle, high)
-        return self._damped(np.exp(high))
+        return self._damped(np.exp(high)), float(np.exp(high))
 
-    def bend(self, move: Array, reached: Array) -> Array:
-        """What a move is short of a valley that bends, from the whitened residuals that it reached."""
-        missed = reached - (self.residual - self.slopes @ move)
+    def bend(self, move: Array, damping: float, bent: Array, reached: Array) -> Array:
+        """What a move is short of a valley that bends, from the whitened residuals that it reached when it was `bent` already.
+
+        Damped as the move was: along the valley, where nothing holds it, what is missed would say anything.
+        """
+        missed = reached - (self.residual - self.slopes @ (move + bent))
         count = len(move)
-        R = self.triangle[:count]
+        R = np.linalg.qr(np.vstack([self.triangle, np.sqrt(damping) * np.eye(count)])).R
         way = solve_triangular(R, solve_triangular(R, self.slopes.T @ missed, trans="T"))
         return np.clip(way, self.low - move, self.high - move)
 
@@ -287,18 +301,21 @@ def _advance(
     """
     before = objective(problem, state, noise, rows)
     for _ in range(TRIALS):
-        move = linear.step(radius)
+        move, damping = linear.step(radius)
         length, promised = float(np.abs(move).max()), linear.fall(move)
         reached = _reach(problem, state.point + move)
         kept = -np.inf if reached is None else (before - objective(problem, reached, noise, rows)) / promised
-        if reached is not None and kept < KEPT:
+        bent = np.zeros_like(move)
+        for _ in range(CORRECTIONS):
+            if reached is None or kept >= KEPT:
+                break
             there = np.concatenate([rows[n].whiten(reached.residual[n], noise[n]) for n in problem.responses])
-            bent = linear.bend(move, there)
-            if np.abs(bent).max() < length:
-                other = _reach(problem, state.point + move + bent)
-                gained = -np.inf if other is None else (before - objective(problem, other, noise, rows)) / promised
-                if gained > kept:
-                    reached, kept = other, gained
+            bent = linear.bend(move, damping, bent, there)
+            other = _reach(problem, state.point + move + bent) if np.abs(bent).max() < length else None
+            gained = -np.inf if other is None else (before - objective(problem, other, noise, rows)) / promised
+            if gained <= kept:
+                break
+            reached, kept = other, gained
         if reached is not None and kept > LEAST_FALL:
             whole = length < 0.999 * radius and kept > 0.5
             wider = min(LONGEST_STEP, max(radius, 2 * length)) if kept > KEPT else radius

@@ -23,6 +23,7 @@ from studies.instrument.tables.bias import TERMS
 from studies.law import law_of, moved_law
 from studies.simulation.drive import Boundary, Drive
 from studies.simulation.prediction import Prediction, Variations, predict
+from thermal.errors import ThermalError
 from thermal.profile import Profile
 
 if TYPE_CHECKING:
@@ -256,11 +257,11 @@ class Simulated:
 
     @property
     def reached(self) -> bool:
-        """Whether the law is known at all temperatures that are predicted."""
+        """Whether the network can be swept and the law is known at all temperatures that are predicted."""
         try:
             for k in range(len(self.states)):
                 self.predicted(k)
-        except ShellError:
+        except (ShellError, ThermalError):
             return False
         return True
 
