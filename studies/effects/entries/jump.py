@@ -1,4 +1,4 @@
-"""Jump: the response steps once and stays."""
+"""Jump: the response steps once and stays, but for what relaxes within the hour."""
 
 import numpy as np
 
@@ -7,12 +7,19 @@ from studies.effects.states import FloatArray, States
 
 
 def columns(states: States, shape: Shape, response: str) -> FloatArray:
-    """H(t − t*) of one run; where the jump stays, all later runs have it too."""
+    """H(t − t*) of one run, and H(t − t*) e^(−(t − t*)/τ) for what relaxes after it; where the jump stays, later runs have the first."""
     run, time, stays = shape
+    out = np.zeros((states.time.size, 1 + len(RELAXING)))
     if states.run != int(run):
-        return np.full((states.time.size, 1), float(bool(stays) and states.run > run))
-    # a mean over the step of the grid: the share of it that lies behind the jump
-    return np.asarray(np.clip((states.time - time) / states.step + 0.5, 0.0, 1.0)[:, None])
+        out[:, 0] = float(bool(stays) and states.run > run)
+        return out
+    # means over the step of the grid: only the share of it that lies behind the jump
+    end = np.maximum(states.time + states.step / 2 - time, 0.0)
+    begin = np.maximum(end - states.step, 0.0)
+    out[:, 0] = (end - begin) / states.step
+    for k, tau in enumerate(RELAXING, 1):
+        out[:, k] = tau / states.step * (np.exp(-begin / tau) - np.exp(-end / tau))
+    return out
 
 
 def grid(span: Span, response: str) -> list[tuple[float, ...]]:
@@ -27,12 +34,16 @@ def grid(span: Span, response: str) -> list[tuple[float, ...]]:
     ]
 
 
+RELAXING = (300.0, 1000.0, 3000.0)
+"""Time constants of what relaxes after the jump, s."""
+
+
 EFFECT = Effect(
     name="jump",
     summary="the response stepped once, at one moment",
     source="step at an unknown time; stress release, charge, a mode of the electronics",
     isolate="repeat the run: a jump does not come back at the same temperature",
-    coefficients=(Coefficient("step_{unit}"),),
+    coefficients=(Coefficient("step_{unit}"), Coefficient("relaxing_{unit}", (0.3,) * len(RELAXING))),
     columns=columns,
     grid=grid,
     sizes={"frequency_Hz": 1e-4, "bias_deg_per_h": 30.0, "inverse_q": 0.5},
