@@ -24,6 +24,8 @@ KNOWN = 1.5
 """Standard deviation of what is foretold, in parts of the noise, up to which the rest of the record foretells a row."""
 FEWEST_FORETOLD = 0.5
 """Part of the rows from which on they speak for the record."""
+ALIKE = 0.005
+"""Relative difference of two held-out residuals that says nothing."""
 KNOWN_START = 0.5
 """Part of the initial state's signature in a block from which on it is refitted there."""
 
@@ -213,23 +215,46 @@ Parts = list[tuple[FloatArray, "np.ndarray"]]
 """What is left of rows that were held out, and which of them the rows of the fit can foretell."""
 
 
-def compare(one: Parts | None, two: Parts | None) -> tuple[float | None, float | None]:
-    """Return the residuals of two models on the rows that both can foretell, or else that the second can; None where they are few.
+@dataclass(frozen=True)
+class Compared:
+    """Held-out residuals of a model and of another one, on the same rows; `sure` where the parts agree which is smaller."""
+
+    before: float
+    after: float
+    sure: bool
+
+    @property
+    def pays(self) -> bool:
+        """Whether the second is smaller."""
+        return self.after < self.before
+
+
+def compare(one: Parts | None, two: Parts | None) -> Compared | None:
+    """Compare two models on the rows that both can foretell, or else that the second can; None where they are few.
 
     Rows that the first cannot foretell speak for the second where it is nearer to them. They do not speak against it: that the
-    first came near them was chance, for it said that it did not know them.
+    first came near them was chance, for it said that it did not know them. A difference is sure where its sum over the parts is
+    larger than its scatter from part to part, and not a matter of digits.
     """
     if one is None or two is None:
-        return None, None
+        return None
     both: Parts = [(rest, a & b) for (rest, a), (_, b) in zip(one, two, strict=True)]
     if not (fair := _share(both) >= FEWEST_FORETOLD):
         both = [(rest, b) for (rest, _), (_, b) in zip(one, two, strict=True)]
     if _share(both) < FEWEST_FORETOLD:
-        return None, None
-    before, after = _rms_or_none(both), _rms_or_none(_of(two, both))
-    if not fair and before is not None and after is not None and after > before:
-        return None, None
-    return before, after
+        return None
+    other = _of(two, both) or []
+    before, after = _rms_or_none(both), _rms_or_none(other)
+    if before is None or after is None or (not fair and after > before):
+        return None
+    gains = np.array([_squares(own) - _squares(its) for own, its in zip(both, other, strict=True)])
+    sure = abs(after - before) > ALIKE * before and abs(gains.sum()) > float(np.sqrt(np.sum(gains**2)))
+    return Compared(before, after, bool(sure))
+
+
+def _squares(part: tuple[FloatArray, "np.ndarray"]) -> float:
+    rest, near = part
+    return float(np.nansum(np.where(near, rest, 0.0) ** 2))
 
 
 def _of(parts: Parts | None, like: Parts | None) -> Parts | None:

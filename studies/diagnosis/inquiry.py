@@ -22,8 +22,6 @@ from studies.effects.states import FloatArray, States
 
 MOST_TRIED = 3
 """Rivals that are asked when the winner of a place foretells nothing."""
-ALIKE = 0.005
-"""Relative difference of two held-out residuals that says nothing."""
 
 
 @dataclass(frozen=True)
@@ -36,8 +34,8 @@ class Thermometer:
         Change of frequency over its slope, K, and temperature minus reference, K, run by run on the coarse grid, (N,), and on
         the fine one.
     missed : tuple of (N, m) arrays
-        What may be temperature or not, as if it were, K: the slow part of what the model leaves, then every named effect
-        on the frequency itself.
+        What may be temperature or not, as if it were, K: the slow part of what the model leaves, what is not known of the
+        law's bend beside the named effects, then every named effect on the frequency itself.
     states : tuple of States
         Runs on the fine grid with that temperature.
     """
@@ -227,19 +225,27 @@ def _pays(
     """Whether a model is better on rows that it has not seen.
 
     A run whose drive no other run moves cannot be foretold by them, nor can an event: then blocks in time decide. What neither
-    foretells is for the evidence: nothing speaks against it.
+    foretells is for the evidence: nothing speaks against it. Where the runs disagree it must not be worse as it is scored.
     """
-    asked = False
+    found: list[held_out.Compared] = []
     for measure in (by_run, held_out.by_block):
-        if measure is None:
-            continue
-        before, after = held_out.compare(measure(plain, campaign), measure(model, campaign))
-        if before is None or after is None:
-            continue
-        asked = True
-        if abs(after - before) > ALIKE * before:
-            return after < before
-    return by_run is None or not asked
+        own = None if measure is None else held_out.compare(measure(plain, campaign), measure(model, campaign))
+        if own is not None and own.sure:
+            return own.pays
+        found += [] if own is None else [own]
+    if by_run is None or not found:
+        return True
+    as_scored = held_out.compare(*(held_out.by_record(own, campaign, level=True) for own in (plain, model)))
+    return as_scored is None or as_scored.after <= as_scored.before * (1.0 + held_out.ALIKE)
+
+
+def _bend(model: Fit) -> float:
+    """Standard deviation of the law's second power, Hz/K²: a named static curve may have taken some of it, or left some there."""
+    names = model.tangent.names
+    if "quadratic" not in names or not model.terms:
+        return 0.0
+    place = names.index("quadratic")
+    return float(np.sqrt(max(model.solved.covariance[place, place], 0.0))) / 1e2
 
 
 def read_thermometer(campaign: Campaign, model: Fit) -> Thermometer | None:
@@ -247,7 +253,7 @@ def read_thermometer(campaign: Campaign, model: Fit) -> Thermometer | None:
     if not model.baseline.lagged or not _follows(model):
         return None
     baseline = cast("Reading", model.moved())
-    slow, beside = model.slow_part(), model.beside_temperature()
+    slow, beside, bend = model.slow_part(), model.beside_temperature(), _bend(model)
     changes, excesses, missed, states = [], [], [], []
     for k, (run, view, rest) in enumerate(zip(campaign.runs, baseline.views(), slow, strict=True)):
         x, whole = view.seen.excess, view.seen_fine.excess
@@ -255,7 +261,7 @@ def read_thermometer(campaign: Campaign, model: Fit) -> Thermometer | None:
         filled = np.interp(run.time, run.time[known], rest[known]) if known.any() else np.zeros_like(x)
         excesses.append((x, whole))
         changes.append((baseline.change(x), baseline.change(whole)))
-        parts = np.stack([filled, *(own[k] for own in beside)], axis=1)
+        parts = np.stack([filled, bend * x**2, *(own[k] for own in beside)], axis=1)
         missed.append(parts / np.where(np.abs(view.steep) > 0, view.steep, np.inf)[:, None])
         states.append(view.seen_fine)
     return Thermometer(tuple(changes), tuple(excesses), tuple(missed), tuple(states))

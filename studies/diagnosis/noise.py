@@ -16,7 +16,7 @@ from compensation.wander import Covariance, Eigenbasis, flicker, gauss_markov, r
 from studies.diagnosis.constants import CONSTANTS
 from studies.effects.states import FloatArray
 
-SHARES = np.array([0.0, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0, 400.0, 2000.0, 6000.0, 2e4])
+SHARES = np.array([0.0, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0, 400.0, 2000.0, 6000.0, 2e4, 6e4, 2e5])
 
 
 def _walked(t: FloatArray) -> FloatArray:
