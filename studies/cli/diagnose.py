@@ -34,7 +34,8 @@ def diagnose(
     card : str
         The instrument's card: its own simulation, calibrated within its uncertainties, is what the records are held against.
     save : str
-        Write the extended model as a card (TOML); needs --card.
+        Write the extended model as a card (TOML); needs --card. It is not written, with exit status 2, where its calibration does not
+        converge.
     report : str
         Write a page (HTML).
     plan : list[str]
@@ -138,15 +139,21 @@ def _campaign(
     diagnosis = investigate(campaign, progress=told, chamber=limits, card=instrument)
     extended = None if save is None or instrument is None else extend(instrument, diagnosis, records, told)
     told.done()
+    refused = extended is not None and not extended.fit.converged
+    if refused:
+        say(f"{save} is not written: the calibration of the extended card has not converged, and that is no card.")
+        save = None
     if save is not None and extended is not None:
-        save_card(extended, save)
+        save_card(extended.instrument, save)
         say(f"extended model: {save}")
     _write(report, lambda: page.diagnosis_page(diagnosis))
-    yield {**diagnosis.verdict.as_dict(), "extended_model": save}
+    yield {**diagnosis.verdict.as_dict(), "extended_model": save}, 2 if refused else 0
     print(page.headline(diagnosis.verdict))
     for block in (page.cause_table(diagnosis.verdict), page.response_table(diagnosis.verdict)):
         if block.rows:
             print_table(block.caption, block.columns, block.rows, block.note)
+    for remark in page.remarks(diagnosis.verdict):
+        print(remark)
     for note in diagnosis.verdict.notes:
         print(f"Note: {note}")
     if diagnosis.verdict.next_experiment:

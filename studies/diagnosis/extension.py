@@ -23,6 +23,7 @@ from studies.errors import InputError
 from studies.record import Record
 
 if TYPE_CHECKING:
+    from studies.calibration.calibrate import Calibration
     from studies.instrument.card import Instrument
 
 WIDER = 3.0
@@ -34,8 +35,8 @@ def extend(
     diagnosis: Diagnosis,
     records: Sequence[Record],
     progress: Callable[[str], None] = lambda words: None,
-) -> "Instrument":
-    """Return a new instrument that predicts what was diagnosed.
+) -> "Calibration":
+    """Calibrate the card with the named effects: its instrument predicts what was diagnosed.
 
     Parameters
     ----------
@@ -62,7 +63,7 @@ def extend(
         model = prune(inquiry.final)
         entries += [entry_of(model, k, column) for k, term in enumerate(model.terms) if not term.effect.once]
     extended = instrument.with_table("effect", entries)
-    return calibrate(extended, without_events(diagnosis, records), profile=False, progress=progress).instrument
+    return calibrate(extended, without_events(diagnosis, records), profile=False, progress=progress)
 
 
 def _is_in_the_baseline(entry: dict[str, Any]) -> bool:

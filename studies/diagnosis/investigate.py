@@ -245,7 +245,7 @@ def _result(
         )
     return ResponseResult(
         verdict,
-        reached.residual_rms,
+        min(value for value in (reached.residual_rms, reached.held_out_rms) if value is not None),
         (base.residual_rms, base.held_out_rms),
         None if extended is None else (extended.residual_rms, extended.held_out_rms),
         "structure" if left.significant else "none",

@@ -109,7 +109,7 @@ def response_table(verdict: Verdict) -> Table:
                 *(plain(None if value is None else value * scale) for value in cells),
                 plain(result.gain),
                 "—" if result.explained_share is None else f"{100 * result.explained_share:.1f} %",
-                left if not result.remark else f"{left}; {result.remark}",
+                left,
             ]
         )
     return Table(
@@ -130,6 +130,12 @@ def response_table(verdict: Verdict) -> Table:
         "Baseline and with causes: on rows left out of the fit. Noise: what no model removed, its white part a row and its "
         "wander within a run. Explained: part of the structure that the causes remove.",
     )
+
+
+def remarks(verdict: Verdict) -> list[str]:
+    """Return what must be said of a response beside its numbers, a sentence each."""
+    found = [(NAMES[name], result.remark) for name, result in verdict.responses.items() if result.remark]
+    return [f"{name[:1].upper()}{name[1:]}: {remark}." for name, remark in found]
 
 
 def diagnosis_page(diagnosis: "Diagnosis") -> str:
@@ -156,6 +162,7 @@ def diagnosis_page(diagnosis: "Diagnosis") -> str:
             [
                 *([cause_table(verdict)] if verdict.causes else []),
                 response_table(verdict),
+                *(Text(remark, "note") for remark in remarks(verdict)),
                 *(Text(f"{cause.effect}: {_summary(cause)}") for cause in verdict.causes if cause.kind == "physics"),
                 *(Text(f"{note[:1].upper()}{note[1:]}", "note") for note in verdict.notes),
             ],

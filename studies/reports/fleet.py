@@ -3,7 +3,7 @@
 from typing import TYPE_CHECKING
 
 from studies.diagnosis.fleet.outcome import Fleet, Share, Value
-from studies.reports.diagnosis import NAMES, cause_table, response_table
+from studies.reports.diagnosis import NAMES, cause_table, remarks, response_table
 from studies.reports.digits import plain
 from studies.reports.page import Block, Chapter, Picture, Table, Text, draw, render_page
 from studies.reports.style import BLUE, VERMILION, figure
@@ -142,7 +142,8 @@ def fleet_page(fleet: Fleet) -> str:
         chapters.append(Chapter("Values", [picture, value_table(fleet)]))
     for name, one in fleet.devices.items():
         own: list[Block] = [cause_table(one.verdict)] if one.verdict.causes else []
-        own += [response_table(one.verdict), *(Text(note, "note") for note in one.verdict.notes)]
+        said = [*remarks(one.verdict), *one.verdict.notes]
+        own += [response_table(one.verdict), *(Text(words, "note") for words in said)]
         chapters.append(Chapter(f"Device {name}", own))
     chapters.append(Chapter("How it was found", [Text(METHOD)]))
     return render_page("Diagnosis of a fleet", headline(fleet), chapters)

@@ -235,7 +235,7 @@ def recover(*cases, times=TIMES, seed=0, moved=(), stated=None):
     hidden = hide(*cases, times=times, seed=seed, moved=moved, stated=stated)
     card = hidden.card
     diagnosis = investigate(load_campaign(hidden.records, card.reference_temperature - 273.15), card=card, advise=False)
-    saved = extend(card, diagnosis, hidden.records)
+    saved = extend(card, diagnosis, hidden.records).instrument
     names = tuple(dict.fromkeys(n for cause in diagnosis.verdict.causes for n in cause.names))
     return Recovery(
         names,

@@ -1,5 +1,6 @@
 """A card's own simulation as the baseline: nothing, a wrong value, and a hidden effect are told apart; what is saved predicts."""
 
+import json
 from dataclasses import replace
 
 import numpy as np
@@ -146,3 +147,24 @@ def test_hidden_effects_are_named_saved_and_predict_an_unseen_chamber_profile(ca
 
 def test_every_effect_is_hidden_in_every_response():
     assert not lacking()
+
+
+@pytest.mark.slow
+def test_what_has_not_converged_is_no_card(shipped, tmp_path, capsys, monkeypatch):
+    """Two steps do not reach what the records say: the answer is given, the card is not written."""
+    simulated(shipped.with_table("bias", {"k1_deg_per_h_per_Hz": 0.2}), tmp_path, capsys, ("step 20 -10 1h",))
+    words = [
+        "diagnose",
+        str(tmp_path / "run0.csv"),
+        "--card",
+        "hrg-30mm",
+        "--save",
+        str(tmp_path / "out.toml"),
+        "--json",
+    ]
+    monkeypatch.setattr("studies.calibration.fit.MOST_STEPS", 2)
+    assert main(words) == 2
+    out, err = capsys.readouterr()
+    assert json.loads(out)["extended_model"] is None
+    assert "not converged" in err
+    assert not (tmp_path / "out.toml").exists()
