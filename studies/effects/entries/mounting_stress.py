@@ -10,13 +10,15 @@ def columns(states: States, shape: Shape, response: str) -> FloatArray:
     """Maxwell elements: stress ∝ T_r − lag(T_r; τ_s), a mismatch that relaxes with τ_s, a third and three times of it.
 
     Beside it, in the frequency, what strains a joint between housing and resonator, s = T_h − T_r, the part of it that
-    relaxes, s³, per (30 K)², of a joint that hardens, and s/√(1 + (s/k)²) − s of one that yields, k = 10 and 30 K. In the bias
-    s is the rate bias, behind one lag exactly.
+    relaxes, s³, per (30 K)², of a joint that hardens, and u/√(1 + (u/k)²) − u of one that yields, k = 10 and 30 K, u = s and what
+    is left of s when half of it has relaxed. In the bias s is the rate bias, behind one lag exactly.
     """
     strains = [lag(states.resonator, states.step, shape[0] * ratio) for ratio in (1.0, 1.0 / 3.0, 3.0)]
     across = (states.housing - states.resonator) * (response == "frequency_Hz")
-    joint = [across, lag(across, states.step, shape[0]), across * (across / 30.0) ** 2]
-    joint += [across / np.sqrt(1.0 + (across / most) ** 2) - across for most in (10.0, 30.0)]
+    relaxing = lag(across, states.step, shape[0])
+    joint = [across, relaxing, across * (across / 30.0) ** 2]
+    for held in (across, across - 0.5 * relaxing):
+        joint += [held / np.sqrt(1.0 + (held / most) ** 2) - held for most in (10.0, 30.0)]
     return np.concatenate([states.resonator[:, None] - np.stack(strains, 1), np.stack(joint, 1)], axis=1)
 
 
@@ -38,7 +40,7 @@ EFFECT = Effect(
     sensor="a thermometer on the base or stem: a second lag would show there, a stress would not",
     coefficients=(
         Coefficient("stress_{unit}_per_K", (1.0, 0.2, 0.2)),
-        Coefficient("joint_{unit}_per_K", (1.0, 0.5, 0.3, 0.5, 0.5)),
+        Coefficient("joint_{unit}_per_K", (1.0, 0.5, 0.3, 0.5, 0.5, 0.5, 0.5)),
     ),
     columns=columns,
     grid=grid,
