@@ -27,6 +27,8 @@ HOUR = 3600.0
 FLICKER_TIMES = 60.0 * 4.0 ** np.arange(7)
 BRIEF = 300.0
 """What changes within so many seconds is noise of a row as much as white noise is: loops and filters have a memory."""
+AT_ONCE = np.zeros(1)
+"""A row that is no mean."""
 
 
 def random_walk(t: Array) -> Array:
@@ -66,12 +68,18 @@ class Eigenbasis:
     brief: float
 
     @classmethod
-    def of(cls, times: Sequence[Array], covariance: Covariance) -> "Eigenbasis":
-        """Build the basis from the times of the present rows, one array a run, and the wander's covariance."""
+    def of(cls, times: Sequence[Array], covariance: Covariance, moments: Array = AT_ONCE) -> "Eigenbasis":
+        """Build the basis from the times of the present rows, one array a run, and the wander's covariance.
+
+        A row that is a mean over `moments` about its time has less variance than the wander at that time, and next to the
+        same covariance with the other rows: a random walk Δ/6 less, over Δ s.
+        """
         parts = [_KEPT.solve(t, covariance) for t in times]
         rows = np.array([t.size for t in times])
         within, brief = (float(np.average([part[k] for part in parts], weights=rows)) for k in (2, 3))
-        eigenvalues = np.concatenate([part.eigenvalues for part in parts])
+        within_row = covariance(np.append(moments, 0.0))
+        less = within_row[-1, -1] - within_row[:-1, :-1].mean()
+        eigenvalues = np.clip(np.concatenate([part.eigenvalues for part in parts]) - less, 0.0, None)
         return cls(tuple(part.vectors for part in parts), eigenvalues, within, brief)
 
     def rotate(self, stacked: Array) -> Array:

@@ -108,7 +108,7 @@ def pose(campaign: Campaign, column: str, tau: float, keep: Sequence["np.ndarray
         response,
         tuple(present),
         values,
-        NoiseModels.of(times, max(rows / max(steps, 1), 1.0)),
+        NoiseModels.of(times, max(rows / max(steps, 1), 1.0), campaign.step),
         white_level(campaign, column),
         level,
         campaign.group,

@@ -56,6 +56,10 @@ def tails_of(values: FloatArray) -> float:
 TAILS = (3.0, 4.0, 6.0, 9.0, 15.0, 30.0, 1e3)
 
 
+MOST_MOMENTS = 31
+"""Rows of a mean beyond which it is as one over all moments."""
+
+
 @dataclass(frozen=True)
 class NoiseModels:
     """Every noise model that a response is tried with: each kind of wander with each share.
@@ -79,9 +83,11 @@ class NoiseModels:
     tails: float = np.inf
 
     @classmethod
-    def of(cls, times: Sequence[FloatArray], rows: float) -> "NoiseModels":
-        """Build every basis from the times of the present rows, one array a run."""
-        return cls(tuple(Eigenbasis.of(times, kernel) for kernel in KERNELS.values()), rows)
+    def of(cls, times: Sequence[FloatArray], rows: float, step: float = 0.0) -> "NoiseModels":
+        """Build every basis from the times of the present rows, one array a run, each the mean of `rows` over a step."""
+        count = int(np.clip(round(rows), 1, MOST_MOMENTS))
+        moments = step * ((np.arange(count) + 0.5) / count - 0.5)
+        return cls(tuple(Eigenbasis.of(times, kernel, moments) for kernel in KERNELS.values()), rows)
 
     def weights(self, kind: int) -> FloatArray:
         """Inverse variances over σ² for every share, (S, M)."""
