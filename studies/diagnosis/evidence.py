@@ -1,7 +1,7 @@
 """Marginal likelihood of a linear model in coloured noise, for every noise model and every size of its effects.
 
 y = F φ + G γ + noise, φ with a flat prior (the static law), γ ~ N(0, D²) (initial states, delays, the members of an effect's
-family). With σ² integrated out under its scale prior 1/σ² and D counted in the white noise of a row of the grid,
+family). With σ² integrated out under its scale prior 1/σ² and D counted in the white noise that each noise model leaves in a row,
 
     log p(y | q) = −½ log|A| − ½ Σ log(1 + q walk) − ½ (M − p_F) log r,   A = [F GD]ᵀ W [F GD] + diag(0, 1)
 
@@ -75,6 +75,8 @@ class Solved:
         σ², of the white noise of a row of the grid.
     by_noise : (K, S) array
         Log evidence under every noise model, at these sizes.
+    units : (K, S) array
+        The usual white noise over that which each noise model leaves.
     """
 
     log_evidence: float
@@ -85,12 +87,13 @@ class Solved:
     covariance: FloatArray
     variance: float
     by_noise: FloatArray = field(repr=False)
+    units: FloatArray = field(repr=False)
 
 
 class Grams:
     """The bordered matrices [F GD y]ᵀ W [F GD y] of a linear model under every noise model."""
 
-    def __init__(self, model: Linear, kinds: Sequence[int] | None = None) -> None:
+    def __init__(self, model: Linear, scales: FloatArray, kinds: Sequence[int] | None = None) -> None:
         """Rotate the model once a kind of wander; only `kinds` where they are named."""
         self.model = model
         p, free = model.prior.size, model.columns[:, : model.flat]
@@ -108,18 +111,23 @@ class Grams:
             for s, w in enumerate(weights):
                 self.grams[k, s, live[:, None], live] = (rotated * w[:, None]).T @ rotated
             self.constant[k] = 0.5 * np.log(weights).sum(axis=1) + model.noise.prior(kind)
+        # sizes are known in units of the response: less white noise beside more wander makes no coefficient smaller
+        self.units = np.ones(self.constant.shape)
+        for _ in range(2 if scales.size or model.flat < p else 0):
+            rest = self.factor(self.grams, scales, self.units)[..., p, p]
+            self.units = model.sigma * np.sqrt(max(model.target.size - model.flat, 1)) / np.maximum(rest, 1e-150)
 
-    def scaling(self, scales: FloatArray) -> FloatArray:
-        """Return the factor of every column, and 1 for the target."""
-        owner = self.model.owner
+    def scaling(self, scales: FloatArray, units: FloatArray) -> FloatArray:
+        """Return the factor of every column, and 1 for the target, (..., p + 1)."""
+        owner, prior = self.model.owner, self.model.prior
         own = np.ones(owner.size + 1)
         own[:-1][owner >= 0] = scales[owner[owner >= 0]]
-        return own
+        return np.where(np.append(np.isinf(prior), True), own, own * np.asarray(units)[..., None])
 
     def log_evidence(self, scales: FloatArray, at: tuple[int, int] | None = None) -> FloatArray:
         """Return the log evidence at given sizes, under every noise model (K, S) or under one of them ()."""
-        grams = self.grams if at is None else self.grams[at]
-        factor = self.factor(grams, scales)
+        grams, units = (self.grams, self.units) if at is None else (self.grams[at], self.units[at])
+        factor = self.factor(grams, scales, units)
         flat, p = self.model.flat, self.model.prior.size
         diagonal = np.diagonal(factor, axis1=-2, axis2=-1)
         rest = np.maximum(diagonal[..., p], 1e-150)
@@ -127,10 +135,10 @@ class Grams:
         constant = self.constant if at is None else self.constant[at]
         return np.asarray(constant - np.log(diagonal[..., :p]).sum(axis=-1) - freedom * np.log(rest))
 
-    def factor(self, grams: FloatArray, scales: FloatArray) -> FloatArray:
+    def factor(self, grams: FloatArray, scales: FloatArray, units: FloatArray) -> FloatArray:
         """Cholesky factor of the bordered matrix with the prior."""
-        own = self.scaling(scales)
-        bordered = grams * own[:, None] * own
+        own = self.scaling(scales, units)
+        bordered = grams * own[..., :, None] * own[..., None, :]
         flat, p = self.model.flat, self.model.prior.size
         places = np.arange(flat, p)
         bordered[..., places, places] += 1.0
@@ -157,8 +165,8 @@ def solve(model: Linear, terms: int, scales: FloatArray | None = None, kinds: Se
     live = np.isinf(model.prior) | model.columns.any(axis=0)
     if not live.all():
         return _beside_nothing(model, live, terms, scales, kinds)
-    grams = Grams(model, kinds)
     sizes = np.full(terms, 0.1) if scales is None else np.array(scales, dtype=float)
+    grams = Grams(model, sizes, kinds)
     marginal = 0.0
     by_noise = grams.log_evidence(sizes)
     for _ in range(2 if terms else 0):
@@ -170,19 +178,19 @@ def solve(model: Linear, terms: int, scales: FloatArray | None = None, kinds: Se
             marginal += float(np.log(np.mean(np.exp(tried - tried.max()))))
         by_noise = grams.log_evidence(sizes)
     k, s = _largest(by_noise)
-    factor = grams.factor(grams.grams[k, s], sizes)
+    factor = grams.factor(grams.grams[k, s], sizes, grams.units[k, s])
     p = model.prior.size
     lower, border = factor[:p, :p], factor[p, :p]
     mean = np.linalg.solve(lower.T, border)
     inverse = np.linalg.inv(lower)
     freedom = model.target.size - model.flat
     variance = float(factor[p, p] ** 2 / max(freedom, 1))
-    units = grams.scaling(sizes)[:-1] * np.where(np.isinf(model.prior), 1.0, model.prior / model.sigma)
+    units = grams.scaling(sizes, grams.units[k, s])[:-1] * np.where(np.isinf(model.prior), 1.0, model.prior / model.sigma)
     covariance = variance * (inverse.T @ inverse) * units[:, None] * units
     best = float(by_noise[k, s]) + marginal
     coefficients = mean * units
     coefficients[: model.flat] += grams.taken
-    return Solved(best, grams.kinds[k], s, sizes, coefficients, covariance, variance, by_noise)
+    return Solved(best, grams.kinds[k], s, sizes, coefficients, covariance, variance, by_noise, grams.units)
 
 
 def _beside_nothing(

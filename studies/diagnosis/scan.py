@@ -186,12 +186,13 @@ def _noise_models(by_noise: FloatArray, count: int) -> list[tuple[int, int]]:
 
 def _gains(model: Fit, bank: Bank, kind: int, share: int) -> FloatArray:
     """Log evidence that every shape adds under one noise model, averaged over its size."""
-    problem, linear = model.problem, model.linear
+    problem, linear, sigma = model.problem, model.linear, model.linear.sigma / model.solved.units[kind, share]
     basis = problem.noise.bases[kind]
     root = np.sqrt(problem.noise.weights(kind)[share])
     scales = np.ones(linear.owner.size)
     known = linear.owner >= 0
     scales[known] = model.solved.scales[linear.owner[known]]
+    scales[np.isfinite(linear.prior)] *= linear.sigma / sigma
     # columns in units of their prior, with one row more for each prior: least squares is then the posterior
     own = basis.rotate(linear.scaled) * root[:, None] * scales
     rows = np.concatenate([own, np.diag(np.where(np.isinf(linear.prior), 0.0, 1.0))])
@@ -216,7 +217,7 @@ def _gains(model: Fit, bank: Bank, kind: int, share: int) -> FloatArray:
         for begin in range(0, group.terms.size, BLOCK):
             place = slice(begin, begin + BLOCK)
             chosen = group.columns[place]
-            unit = group.prior[place] / linear.sigma
+            unit = group.prior[place] / sigma
             columns, own = beside.T[chosen], moment[chosen]
             if (
                 chosen.shape[1] > WIDTH
