@@ -104,8 +104,8 @@ def _cause(campaign: Campaign, inquiry: Inquiry, place: Place) -> Cause:
     nothing = nothing_of(inquiry, place)
     members, probability = weigh(place.names, scores, nothing, inquiry.unknown - inquiry.selection.final.score)
     left = inquiry.leftover
-    if left.significant and 0.0 < left.share < CONSTANTS["share_explained"]:
-        probability *= left.share  # whatever made the rest may have made this too
+    if left.significant and 0.0 < left.share < CONSTANTS["believed"]:
+        probability *= left.share  # whatever made the larger rest may have made this too
     winner = place.rivals[int(np.argmax(scores))]
     effect = winner.fit.terms[place.index].effect
     exact = effect.equivalents.get(column, ())

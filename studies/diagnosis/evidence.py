@@ -185,7 +185,9 @@ def solve(model: Linear, terms: int, scales: FloatArray | None = None, kinds: Se
     inverse = np.linalg.inv(lower)
     freedom = model.target.size - model.flat
     variance = float(factor[p, p] ** 2 / max(freedom, 1))
-    units = grams.scaling(sizes, grams.units[k, s])[:-1] * np.where(np.isinf(model.prior), 1.0, model.prior / model.sigma)
+    units = grams.scaling(sizes, grams.units[k, s])[:-1] * np.where(
+        np.isinf(model.prior), 1.0, model.prior / model.sigma
+    )
     covariance = variance * (inverse.T @ inverse) * units[:, None] * units
     best = float(by_noise[k, s]) + marginal
     coefficients = mean * units

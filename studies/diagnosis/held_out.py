@@ -15,6 +15,8 @@ BLOCKS = 5
 FEWEST = 40
 SETTLED = 0.02
 """Kelvin by which a refitted initial state may still move."""
+CARRIED_OFF = 3.0
+"""Standard deviations of its level by which noise may carry a run."""
 WARMEST = 60.0
 """Kelvin by which a run may start away from equilibrium."""
 NEIGHBOUR = 0.1
@@ -70,20 +72,14 @@ class OnRows:
         rows = np.stack([np.interp(run.row_time, time, column) for column in table.T], axis=1)
         return rows[:, :-1], rows[:, -1]
 
-    @property
-    def level(self) -> bool:
-        """Whether the noise gives every run a level of its own, beside that which the model gives it."""
-        own = any(name.startswith("offset@") for name in self.model.tangent.names)
-        return not own and bool(SHARES[self.model.solved.share] > 0.0)
-
-    def free(self, columns: FloatArray, places: Sequence[int], level: bool) -> FloatArray:
+    def free(self, columns: FloatArray, places: Sequence[int], level: float) -> FloatArray:
         """Return the columns that are refitted: some of the model's, and a level."""
-        return np.concatenate([columns[:, list(places)], np.ones((columns.shape[0], int(level)))], axis=1)
+        return np.concatenate([columns[:, list(places)], np.ones((columns.shape[0], int(level > 0.0)))], axis=1)
 
     def residual(
-        self, k: int, free: Sequence[int] = (), inside: "np.ndarray | None" = None, level: bool = False
+        self, k: int, free: Sequence[int] = (), inside: "np.ndarray | None" = None, level: float = 0.0
     ) -> FloatArray:
-        """Return what is left of run `k`; the columns `free`, and a level, are refitted on the rows `inside`.
+        """Return what is left of run `k`; the columns `free`, and a level up to `level`, are refitted on the rows `inside`.
 
         An initial state far from equilibrium bends the law: it is refitted about where it was found.
         """
@@ -100,8 +96,8 @@ class OnRows:
             own = self.free(columns[inside], free, level)
             if not own.size or known.sum() <= own.shape[1]:
                 return np.asarray(rest)
-            starts = np.array([*(place == begin for place in free), *[False] * level])
-            found = _within(own[known], rest[known], starts)
+            most = [WARMEST if place == begin else np.inf for place in free] + [level] * (level > 0.0)
+            found = _within(own[known], rest[known], np.array(most))
             rest = rest - own @ found
             places = [n for n, place in enumerate(free) if place == begin]
             if not places or abs(found[places[0]] - start) < SETTLED:
@@ -111,7 +107,7 @@ class OnRows:
         return np.asarray(rest)
 
     def uncertainty(
-        self, k: int, free: Sequence[int], inside: "np.ndarray | None" = None, level: bool = False
+        self, k: int, free: Sequence[int], inside: "np.ndarray | None" = None, level: float = 0.0
     ) -> FloatArray:
         """Return the standard deviation of what is foretold of run `k`, in parts of the noise, `free` refitted there."""
         columns = self.columns(k)[0]
@@ -151,14 +147,13 @@ class OnRows:
         return OnRows(replace(self.model, baseline=moved), self.campaign)
 
 
-def _within(columns: FloatArray, rest: FloatArray, starts: "np.ndarray") -> FloatArray:
-    """Least squares, with initial states no further from equilibrium than any gyro is put into a chamber."""
+def _within(columns: FloatArray, rest: FloatArray, most: FloatArray) -> FloatArray:
+    """Least squares, no coefficient beyond its limit: no gyro starts so far from equilibrium, no noise has such a level."""
     found = np.linalg.lstsq(columns, rest, rcond=None)[0]
-    limited = np.where(starts, np.clip(found, -WARMEST, WARMEST), found)
+    limited = np.clip(found, -most, most)
     if np.any(limited != found):
-        limited[~starts] = np.linalg.lstsq(
-            columns[:, ~starts], rest - columns[:, starts] @ limited[starts], rcond=None
-        )[0]
+        held = np.isfinite(most)
+        limited[~held] = np.linalg.lstsq(columns[:, ~held], rest - columns[:, held] @ limited[held], rcond=None)[0]
     return np.asarray(limited)
 
 
@@ -197,15 +192,31 @@ def own_columns(model: Fit, k: int) -> list[int]:
     return [place for place, name in enumerate(model.tangent.names) if name.endswith(f"@{k}")]
 
 
-def score(model: Fit, campaign: Campaign, like: "Parts | None" = None) -> Score:
+def level_of(model: Fit) -> float:
+    """Return how far the noise of a model may carry a whole run, beside the level which the model gives it; 0 if nowhere."""
+    if any(name.startswith("offset@") for name in model.tangent.names):
+        return 0.0
+    solved, problem = model.solved, model.problem
+    basis = problem.noise.bases[solved.kind]
+    means = [
+        basis.rotate(np.where(problem.run == k, 1.0 / max(np.sum(problem.run == k), 1), 0.0))
+        for k in set(problem.run.tolist())
+    ]
+    variance = np.mean([mean**2 @ basis.eigenvalues for mean in means])
+    return CARRIED_OFF * float(np.sqrt(solved.variance * SHARES[solved.share] * variance))
+
+
+def score(model: Fit, campaign: Campaign, like: "Parts | None" = None, judge: Fit | None = None) -> Score:
     """Return training and held-out residual, the latter of the rows that the model can foretell, or another one, `like`.
 
     One record is left out at a time, the rest is fitted anew; of the record that was left out only its own offset and
-    initial state are refitted, and a level where the noise has one. With one record, blocks in time are left out, one
+    initial state are refitted, and a level where the noise has one, that of `judge` where another model knows it better. With one record, blocks in time are left out, one
     thermal constant more on both sides. Rows at temperatures that the rest does not come near are not asked for.
     """
     training = rms(residuals(model, campaign))
-    parts = by_record(model, campaign, True) if len(campaign.records) > 1 else by_block(model, campaign)
+    parts = (
+        by_record(model, campaign, level_of(judge or model)) if len(campaign.records) > 1 else by_block(model, campaign)
+    )
     parts = _of(parts, like)
     foretold = _share(parts)
     return Score(training, _rms_or_none(parts) if foretold >= FEWEST_FORETOLD else None, foretold, parts)
@@ -277,20 +288,20 @@ def _share(parts: Parts | None) -> float:
     return asked / max(sum(int(own.sum()) for own in finite), 1)
 
 
-def by_record(model: Fit, campaign: Campaign, level: bool = False) -> Parts | None:
-    """Leave one record out at a time; its level is refitted where the noise has one and that is asked for."""
+def by_record(model: Fit, campaign: Campaign, level: float = 0.0) -> Parts | None:
+    """Leave one record out at a time; a level of its own, up to `level`, is refitted."""
     out: Parts = []
     for record in campaign.records:
         keep = [np.full(run.time.shape, run.record != record) for run in campaign.runs]
         rows = _trained(model, campaign, keep)
         if rows is None:
             return None
-        known, own_level = rows.known(keep), level and rows.level
+        known = rows.known(keep)
         for k, run in enumerate(campaign.runs):
             if run.record == record:
                 own = own_columns(rows.model, k)
-                near = _near(rows.temperature(k), known) & (rows.uncertainty(k, own, level=own_level) <= KNOWN)
-                out.append((rows.residual(k, own, level=own_level), near))
+                near = _near(rows.temperature(k), known) & (rows.uncertainty(k, own, level=level) <= KNOWN)
+                out.append((rows.residual(k, own, level=level), near))
     return out
 
 

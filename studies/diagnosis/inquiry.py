@@ -161,8 +161,9 @@ def inquire(campaign: Campaign, plain: Fit, effects: Sequence[Effect] | None, sc
     generic = look(selection.plain.fit, selection.plain.fit)
     unknown = selection.plain.score + generic.smooth + CONSTANTS["log_prior_unknown"]
     beside = max(leftover.smooth + CONSTANTS["log_prior_unknown"], 0.0)
-    if unknown > selection.final.score and not leftover.significant:
-        # what is named patches up what a generic form says better alone
+    inexact = CONSTANTS["misfit"] * max(selection.final.score - selection.plain.score, 0.0)
+    if unknown > selection.final.score + inexact and not leftover.significant:
+        # what is named patches up what a generic form says better alone, by more than its own may be inexact
         leftover = replace(generic, share=0.0)
     return Inquiry(plain.problem, selection, leftover, {}, unknown - beside)
 
@@ -227,16 +228,16 @@ def _pays(
     A run whose drive no other run moves cannot be foretold by them, nor can an event: then blocks in time decide. What neither
     foretells is for the evidence: nothing speaks against it. Where the runs disagree it must not be worse as it is scored.
     """
-    found: list[held_out.Compared] = []
+    last: held_out.Compared | None = None
     for measure in (by_run, held_out.by_block):
-        own = None if measure is None else held_out.compare(measure(plain, campaign), measure(model, campaign))
-        if own is not None and own.sure:
-            return own.pays
-        found += [] if own is None else [own]
-    if by_run is None or not found:
-        return True
-    as_scored = held_out.compare(*(held_out.by_record(own, campaign, level=True) for own in (plain, model)))
-    return as_scored is None or as_scored.after <= as_scored.before * (1.0 + held_out.ALIKE)
+        found = None if measure is None else held_out.compare(measure(plain, campaign), measure(model, campaign))
+        if found is not None and found.sure:
+            return found.pays
+        last = found or last
+    if by_run is not None and last is not None:
+        level = held_out.level_of(model)
+        last = held_out.compare(*(held_out.by_record(own, campaign, level) for own in (plain, model)))
+    return last is None or last.after <= last.before * (1.0 + held_out.ALIKE)
 
 
 def _bend(model: Fit) -> float:

@@ -218,7 +218,7 @@ def _result(
 
     def measured(model: Fit, like: held_out.Parts | None = None) -> Score:
         if score_held_out:
-            return held_out.score(model, campaign, like)
+            return held_out.score(model, campaign, like, final)
         return Score(held_out.rms(held_out.residuals(model, campaign)), None)
 
     extended = measured(final) if final.terms else None

@@ -71,8 +71,8 @@ def _generic(
     )
 
 
-def generic_forms(span: Span, runs: int) -> list[Effect]:
-    """Return the generic forms of a campaign."""
+def generic_forms(span: Span, runs: Sequence[States]) -> list[Effect]:
+    """Return the generic forms of a campaign: of a drive, what it does where it leaves its mean, and no curve of the temperature."""
     low, high = span.temperature_low, span.temperature_high
 
     def place(states: States) -> FloatArray:
@@ -98,20 +98,25 @@ def generic_forms(span: Span, runs: int) -> list[Effect]:
     def time(states: States, shape: Sequence[float], response: str) -> FloatArray:
         t = (states.time - states.time[0]) / max(float(np.ptp(states.time)), 1e-9)
         waves = np.cos(np.pi * t[:, None] * np.arange(TIME_ORDERS))
-        out = np.zeros((t.size, runs * TIME_ORDERS))
+        out = np.zeros((t.size, len(runs) * TIME_ORDERS))
         out[:, states.run * TIME_ORDERS : (states.run + 1) * TIME_ORDERS] = waves
         return out
 
     def drive(field: str) -> Callable[[States, Sequence[float], str], FloatArray]:
         def columns(states: States, shape: Sequence[float], response: str) -> FloatArray:
-            values = np.asarray(getattr(states, field), dtype=float)
-            unit = values / max(float(np.abs(values).max()), 1e-12)
+            own, means = powers(states), np.mean(np.concatenate([powers(run) for run in runs]), axis=0)
             curve = _powers(2.0 * place(states) - 1.0, 4)
-            slow = lag(unit, states.step, states.tau)
-            powers = (
-                [unit, unit**2, unit**3, slow] if field != "pattern_angle" else [np.sin(4 * values), np.cos(4 * values)]
-            )
-            return np.concatenate([curve * power[:, None] for power in powers], axis=1)
+            return np.concatenate([curve * power[:, None] for power in (own - means).T], axis=1)
+
+        def powers(states: States) -> FloatArray:
+            values = np.asarray(getattr(states, field), dtype=float)
+            if field == "pattern_angle":
+                return np.stack([np.sin(4 * values), np.cos(4 * values)], axis=1)
+            unit = values / largest
+            return np.stack([unit, unit**2, unit**3, lag(unit, states.step, states.tau)], axis=1)
+
+        every = [getattr(run, field) for run in runs]
+        largest = max((float(np.abs(own).max()) for own in every if own is not None), default=0.0) or 1e-12
 
         return columns
 
@@ -120,7 +125,7 @@ def generic_forms(span: Span, runs: int) -> list[Effect]:
         _generic("temperature", temperature, 2.0 / orders),
         _generic("rate and temperature", rate, [1.0] * 12),
         _generic("history of the temperature", history, [1.0] * 8),
-        _generic("time", time, np.tile(1.0 / (1.0 + np.arange(TIME_ORDERS)), runs)),
+        _generic("time", time, np.tile(1.0 / (1.0 + np.arange(TIME_ORDERS)), len(runs))),
     ]
     for field, word in (
         ("voltage_squared", "voltage"),
@@ -183,7 +188,7 @@ def look(plain: Fit, model: Fit) -> Leftover:
         With the named effects.
     """
     problem = model.problem
-    forms = applicable(problem, model, generic_forms(problem.span, len(problem.present)))
+    forms = applicable(problem, model, generic_forms(problem.span, [view.coarse for view in model.tangent.views]))
     best, name = model, ""
     baseline, scales = model.baseline, model.solved.scales
     for form in forms:

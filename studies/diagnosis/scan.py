@@ -80,6 +80,14 @@ def _varies(model: Fit, drive: str) -> bool:
     return bool(np.ptp(values) > VARIES * max(float(np.abs(values).max()), 1e-12))
 
 
+def leading(effect: Effect, shapes: int) -> tuple[list[int], int]:
+    """Return the columns with which an effect of so many shapes is scanned, the widest first, and how many of them at most."""
+    spread = effect.spread
+    least = 0.0 if shapes <= FEW else LEADING * float(spread.max())
+    first = [int(k) for k in np.argsort(-spread, kind="stable") if spread[k] >= least and spread[k] > 0]
+    return first, len(first) if shapes <= FEW else max(WIDTH, int(np.sum(spread == spread.max())))
+
+
 def build_bank(model: Fit, effects: Sequence[Effect]) -> Bank:
     """Compute the leading columns of every shape, with the states that a fitted model sees."""
     problem, column = model.problem, model.problem.response.column
@@ -89,15 +97,13 @@ def build_bank(model: Fit, effects: Sequence[Effect]) -> Bank:
     count = 0
     for effect in effects:
         spread, shapes = effect.spread, effect.grid(problem.span, column)
-        least = 0.0 if len(shapes) <= FEW else LEADING * float(spread.max())
-        leading = [k for k in np.argsort(-spread, kind="stable") if spread[k] >= least and spread[k] > 0]
-        most = len(leading) if len(shapes) <= FEW else max(WIDTH, int(np.sum(spread == spread.max())))
+        first, most = leading(effect, len(shapes))
         size = problem.size(effect)
         for shape in shapes:
             term = Term(effect, tuple(shape))
             own = problem.stack([term_columns(term, view, problem.group, column) for view in model.tangent.views])
             there = np.any(own, axis=0).tolist()
-            kept = [k for k in leading if there[k]][:most]
+            kept = [k for k in first if there[k]][:most]
             if not kept:
                 continue
             places = list(range(count, count + len(kept)))

@@ -12,9 +12,9 @@ from scipy.special import logsumexp
 
 from studies.diagnosis.constants import CONSTANTS
 from studies.diagnosis.evidence import SCALES
-from studies.diagnosis.model import Fit, Term, term_columns, used
+from studies.diagnosis.model import Fit, Term, term_columns
 from studies.diagnosis.noise import SHARES
-from studies.diagnosis.scan import Bank, build_bank
+from studies.diagnosis.scan import Bank, build_bank, leading
 from studies.diagnosis.verdict import weigh
 from studies.effects import Effect, Parameter
 from studies.effects.states import FloatArray
@@ -93,7 +93,7 @@ def hide(stage: Stage, effect: Effect, cases: int, rng: np.random.Generator) -> 
     columns = linear.columns[:, taken]
     absorbs = np.linalg.qr(columns / np.maximum(np.linalg.norm(columns, axis=0), 1e-300))[0]
     grid = list(effect.grid(problem.span, problem.response.column))
-    places = used(effect)
+    places = np.sort(leading(effect, len(grid))[0])  # what a scan does not see it cannot rehearse
     signals, shares = [], []
     for _ in range(cases):
         shape = list(grid[int(rng.integers(len(grid)))])

@@ -42,7 +42,10 @@ def test_play_is_rate_independent_and_remembers_its_return_points():
 
 @pytest.mark.parametrize("kind", range(len(KERNELS)))
 def test_evidence_is_that_of_the_full_covariance(kind):
-    """Against the dense formula: flat columns projected out, priors as part of the covariance, σ² integrated."""
+    """Against the dense formula: flat columns projected out, priors as part of the covariance, σ² integrated.
+
+    A prior counts in the white noise that this noise model leaves, whatever is usual.
+    """
     rng = np.random.default_rng(4)
     t = np.sort(rng.choice(np.arange(0.0, 28800.0, 144.0), 90, replace=False))
     flat = np.stack([np.ones(90), t / 1e4], axis=1)
@@ -52,15 +55,18 @@ def test_evidence_is_that_of_the_full_covariance(kind):
     prior = np.array([np.inf, np.inf, 2.0, 0.5])
     model = Linear(y, np.concatenate([flat, ours], axis=1), prior, np.array([-1, -1, 0, 0]), noise, 0.7)
     share, scale = 5, 0.1
-    found = Grams(model).log_evidence(np.array([scale]), (kind, share)) - noise.prior(kind)[share]
+    grams = Grams(model, np.array([scale]))
+    found = grams.log_evidence(np.array([scale]), (kind, share)) - noise.prior(kind)[share]
+    white = 0.7 / grams.units[kind, share]
     basis = noise.bases[kind]
     covariance = basis.vectors[0] @ np.diag(1.0 + SHARES[share] * basis.eigenvalues) @ basis.vectors[0].T
-    covariance += (ours * (scale * prior[2:] / 0.7) ** 2) @ ours.T
+    covariance += (ours * (scale * prior[2:] / white) ** 2) @ ours.T
     inverse = np.linalg.inv(covariance)
     middle = flat.T @ inverse @ flat
     rest = y @ inverse @ y - y @ inverse @ flat @ np.linalg.solve(middle, flat.T @ inverse @ y)
     exact = -0.5 * (np.linalg.slogdet(covariance)[1] + np.linalg.slogdet(middle)[1] + 88 * np.log(rest))
     assert found == pytest.approx(exact, abs=1e-6)
+    assert white == pytest.approx(np.sqrt(rest / 88), rel=0.01)
 
 
 def test_a_solution_holds_the_coefficients_of_generalised_least_squares():
