@@ -183,8 +183,8 @@ METHOD = (
     "bias as a cubic in the change of frequency with an offset per run, 1/Q as a quadratic in temperature. Every effect of the "
     "library is a family of curves with a prior on its size. Models with none, one or several of them are compared by their "
     "marginal likelihood in white noise with a wander; equal ones are named as a set, and the other responses vote. Generic smooth "
-    "functions of time, temperature, rate, history and drives look for what no effect explains. A cause is named only where "
-    "the model with it is better on rows that the fit has not seen."
+    "functions of time, temperature, rate, history and drives look for what no effect explains. A cause is refused where "
+    "the model with it is worse on rows that the fit has not seen."
 )
 
 
