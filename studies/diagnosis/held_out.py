@@ -210,8 +210,9 @@ def score(model: Fit, campaign: Campaign, like: "Parts | None" = None, judge: Fi
     """Return training and held-out residual, the latter of the rows that the model can foretell, or another one, `like`.
 
     One record is left out at a time, the rest is fitted anew; of the record that was left out only its own offset and
-    initial state are refitted, and a level where the noise has one, that of `judge` where another model knows it better. With one record, blocks in time are left out, one
-    thermal constant more on both sides. Rows at temperatures that the rest does not come near are not asked for.
+    initial state are refitted, and a level where the noise has one, that of `judge` where another model knows it better.
+    With one record, blocks in time are left out, one thermal constant more on both sides. Rows at temperatures that the
+    rest does not come near are not asked for.
     """
     training = rms(residuals(model, campaign))
     parts = (
