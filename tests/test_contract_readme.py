@@ -38,7 +38,7 @@ def test_the_first_block_holds_the_two_commands():
     assert len(lines) == 2
     assert lines[0].startswith("python -m pip install .")
     assert "hrg reproduce" in lines[0]
-    assert lines[1].endswith("python -m pytest -n auto")
+    assert lines[1].endswith("python -m pytest -n auto --dist worksteal")
 
 
 @pytest.mark.slow

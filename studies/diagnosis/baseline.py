@@ -11,7 +11,7 @@ and resonator is part of it.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Protocol
+from typing import ClassVar, Protocol
 
 import numpy as np
 
@@ -84,7 +84,9 @@ class Tangent:
 
 
 class Baseline(Protocol):
-    """A law with uncertain values."""
+    """A law with uncertain values; `from_card` where these are a card's."""
+
+    from_card: ClassVar[bool]
 
     @property
     def lagged(self) -> bool:
@@ -132,6 +134,7 @@ class Lagged:
     the offsets of runs lie apart, in the response's unit, 0 where nothing is known of it.
     """
 
+    from_card: ClassVar[bool] = False
     response: Response
     states: tuple[States, ...]
     group: int
@@ -271,6 +274,7 @@ class Followed:
         As of `Campaign`; none where it is empty.
     """
 
+    from_card: ClassVar[bool] = False
     response: Response
     states: tuple[States, ...]
     group: int

@@ -103,21 +103,21 @@ def _cause(campaign: Campaign, inquiry: Inquiry, place: Place) -> Cause:
     scores = scores_of(inquiry, place)
     nothing = nothing_of(inquiry, place)
     members, probability = weigh(place.names, scores, nothing, inquiry.unknown - inquiry.selection.final.score)
-    left, names = inquiry.leftover, len(inquiry.selection.places)
-    if left.significant and 0.0 < left.share < CONSTANTS["share_explained" if names > 1 else "believed"]:
-        probability *= left.share**names  # whatever made the rest may have made this too, and each of several
+    left = inquiry.leftover
+    if left.significant and 0.0 < left.share < CONSTANTS["believed"]:
+        probability *= left.share  # whatever made the larger rest may have made this too
     winner = place.rivals[int(np.argmax(scores))]
     effect = winner.fit.terms[place.index].effect
     exact = effect.equivalents.get(column, ())
     settled = bool(effect.judge or any(_judge_of(n) for n in exact)) and campaign.clock_known
-    alike = list(dict.fromkeys([effect.name, *members, *(() if settled else exact)]))
+    names = list(dict.fromkeys([effect.name, *members, *(() if settled else exact)]))
     if settled:
-        alike = [n for n in alike if n == effect.name or n not in exact]
+        names = [n for n in names if n == effect.name or n not in exact]
     return Cause(
         effect.name,
         column,
         probability,
-        tuple(sorted(alike[1:])),
+        tuple(sorted(names[1:])),
         parameters_of(exact_forms(winner.fit), place.index),
         2.0 * max(max(scores) - nothing, 0.0),
         peak=peak_of(winner.fit, place.index),

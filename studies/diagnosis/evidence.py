@@ -37,6 +37,9 @@ class Linear:
     noise : NoiseModels
     sigma : float
         White noise of a row of the grid, for the scale of the priors.
+    absolute : bool
+        Whether priors keep their units under every noise model, or count in what white noise it leaves: beside much wander, wide
+        priors of a card's values take what an effect does.
     """
 
     target: FloatArray
@@ -45,6 +48,7 @@ class Linear:
     owner: "np.ndarray"
     noise: NoiseModels
     sigma: float
+    absolute: bool = True
 
     @property
     def flat(self) -> int:
@@ -113,7 +117,7 @@ class Grams:
             self.constant[k] = 0.5 * np.log(weights).sum(axis=1) + model.noise.prior(kind)
         # sizes are known in units of the response: less white noise beside more wander makes no coefficient smaller
         self.units = np.ones(self.constant.shape)
-        for _ in range(2 if scales.size or model.flat < p else 0):
+        for _ in range(2 if model.absolute and (scales.size or model.flat < p) else 0):
             rest = self.factor(self.grams, scales, self.units)[..., p, p]
             self.units = model.sigma * np.sqrt(max(model.target.size - model.flat, 1)) / np.maximum(rest, 1e-150)
 

@@ -414,7 +414,7 @@ def _once(
     sized: bool,
 ) -> Fit:
     tangent = baseline.tangent()
-    linear = linearise(problem, tangent, terms)
+    linear = replace(linearise(problem, tangent, terms), absolute=not baseline.from_card)
     return Fit(
         problem, baseline, tuple(terms), tangent, linear, solve(linear, 0 if sized else len(terms), scales, kinds)
     )

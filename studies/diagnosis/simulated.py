@@ -8,7 +8,7 @@ negative), so that every z has the prior 0 ± 1.
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 from scipy.constants import zero_Celsius
@@ -96,6 +96,7 @@ class Simulated:
         Departure of base and resonator at the start of every run, K.
     """
 
+    from_card: ClassVar[bool] = True
     response: Response
     states: tuple[States, ...]
     group: int
