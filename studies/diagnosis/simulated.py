@@ -46,6 +46,8 @@ RATE_TERMS = tuple(key for key, (_, by_rate) in TERMS.items() if by_rate)
 """Terms of the bias in the rate of the frequency."""
 FAR = 2.0
 """Prior standard deviations beyond which a value of the card is wrong."""
+AWAY = 1.0
+"""Beyond which it is asked whether an effect about the card's own values does the same: several values move less than one."""
 STEPS = (1.0, 0.5, 0.25)
 """Parts of a step that are tried."""
 NUDGE = 0.01
@@ -288,8 +290,8 @@ class Simulated:
         return self
 
     def stated(self) -> "Simulated | None":
-        """Return the card as shipped where a value has gone far from it; else None."""
-        if max(map(abs, self.z), default=0.0) <= FAR:
+        """Return the card as shipped where a value has gone away from it; else None."""
+        if max(map(abs, self.z), default=0.0) <= AWAY:
             return None
         return replace(self, z=(0.0,) * len(self.z), initial=tuple({} for _ in self.initial), warmer=None)
 
