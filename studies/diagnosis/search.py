@@ -117,12 +117,16 @@ def contenders(
 def polish(base: Hypothesis, seen: Seen, about: Baseline | None = None) -> Hypothesis:
     """Add an effect and move its shape to where the evidence is largest; forms of one effect are compared where each is best."""
     price = CONSTANTS["log_prior_effect"] + seen.choice
+    # where a card's values have gone to do what an effect does, it is strong or it is not
+    sizes = (0.1,) if about is None else (0.1, 1.0)
     about = base.fit.moved() if about is None else about
     forms = []
     tops = [seen.term] if seen.other is None else [seen.term, seen.other]
     for term in (near for top in tops for near in nearer(base.fit, top)):
-        model = fit(base.fit.problem, about, (*base.fit.terms, term), 2, _sizes(base.fit))
-        forms.append(refine(model, len(model.terms) - 1))
+        for size in sizes:
+            scales = np.append(base.fit.solved.scales, size)
+            model = fit(base.fit.problem, about, (*base.fit.terms, term), 2, scales)
+            forms.append(refine(model, len(model.terms) - 1))
     return Hypothesis(max(forms, key=lambda f: f.log_evidence), (*base.price, price))
 
 
@@ -137,10 +141,6 @@ def nearer(model: Fit, term: Term) -> list[Term]:
         forms.setdefault(tuple(shape[k] for k, own in enumerate(effect.shape) if own.steady), []).append(shape)
     seen = [scan(model, build_bank(model, [replace(effect, grid=lambda *_, own=own: own)])) for own in forms.values()]
     return [replace(term, shape=found[0].term.shape) for found in seen if found] or [term]
-
-
-def _sizes(model: Fit) -> np.ndarray:
-    return np.append(model.solved.scales, 0.1)
 
 
 def sharpen(grown: Hypothesis) -> Hypothesis:
