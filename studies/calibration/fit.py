@@ -34,9 +34,7 @@ CLOSE = 0.05  # fall of the objective that a step still promises: a move of 0.2 
 NEAR = 1.0  # the same, where no step makes the fit better: what differences and rounding leave
 SETTLED_NOISE = 1.0  # the same, below which the noise is not estimated anew
 OUTLIER = 5.0
-PATIENCE = (
-    5  # steps that leave no less, after which the noise only rises: what the model still promises it does not keep
-)
+PATIENCE = 5  # steps that leave no less, after which the noise only rises: promises are not kept
 LESS = 0.2  # of the logarithm of what is left, all responses together: a step that leaves less
 TRIALS = 6
 CORRECTIONS = 5  # of a step, towards the floor of a valley that bends

@@ -103,10 +103,8 @@ def generic_forms(span: Span, runs: Sequence[States]) -> list[Effect]:
         return out
 
     def drive(field: str) -> Callable[[States, Sequence[float], str], FloatArray]:
-        def columns(states: States, shape: Sequence[float], response: str) -> FloatArray:
-            own, means = powers(states), np.mean(np.concatenate([powers(run) for run in runs]), axis=0)
-            curve = _powers(2.0 * place(states) - 1.0, 4)
-            return np.concatenate([curve * power[:, None] for power in (own - means).T], axis=1)
+        every = [own for run in runs if (own := getattr(run, field)) is not None]
+        largest = max((float(np.abs(own).max()) for own in every), default=0.0) or 1e-12
 
         def powers(states: States) -> FloatArray:
             values = np.asarray(getattr(states, field), dtype=float)
@@ -115,8 +113,12 @@ def generic_forms(span: Span, runs: Sequence[States]) -> list[Effect]:
             unit = values / largest
             return np.stack([unit, unit**2, unit**3, lag(unit, states.step, states.tau)], axis=1)
 
-        every = [getattr(run, field) for run in runs]
-        largest = max((float(np.abs(own).max()) for own in every if own is not None), default=0.0) or 1e-12
+        # a drive that a run lacks has no form
+        means = np.mean(np.concatenate([powers(run) for run in runs]), axis=0) if len(every) == len(runs) else 0.0
+
+        def columns(states: States, shape: Sequence[float], response: str) -> FloatArray:
+            curve = _powers(2.0 * place(states) - 1.0, 4)
+            return np.concatenate([curve * power[:, None] for power in (powers(states) - means).T], axis=1)
 
         return columns
 
