@@ -65,14 +65,19 @@ def _voted(votes: Mapping[str, float], place: Place, name: str, rival: Hypothesi
 
 
 def _suits(campaign: Campaign, rival: Fit, other: Inquiry) -> float:
-    """Log evidence of another response, its own causes included, when the thermometer is read by a rival."""
+    """Log evidence of another response, its own causes included, when the thermometer is read by a rival.
+
+    No form of its own causes is exact: the more they explain, the less a difference counts.
+    """
     thermometer = read_thermometer(campaign, rival)
     baseline = other.final.baseline
+    lead = max(other.selection.final.score - other.selection.plain.score, 0.0)
+    temper = CONSTANTS["temper"] + CONSTANTS["misfit"] * lead
     if thermometer is None or not isinstance(baseline, Followed):
-        return other.final.log_evidence
+        return other.final.log_evidence / temper
     reading, whole = thermometer.reads(other.problem.response)
     moved = replace(baseline, states=thermometer.states, reading=reading, whole=whole, missed=thermometer.missed)
-    return fit(other.problem, moved, other.final.terms, 2, other.final.solved.scales).log_evidence
+    return fit(other.problem, moved, other.final.terms, 2, other.final.solved.scales).log_evidence / temper
 
 
 def name_causes(campaign: Campaign, inquiries: Mapping[str, Inquiry]) -> tuple[Cause, ...]:

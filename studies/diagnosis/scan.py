@@ -137,12 +137,12 @@ class Seen:
         return min(self.gain - self.best, 0.0)
 
 
-def scan(model: Fit, bank: Bank, models: int = 5) -> list[Seen]:
-    """Return what every effect would add to a model, the strongest first."""
+def scan(model: Fit, bank: Bank, models: int = 5, like: Fit | None = None) -> list[Seen]:
+    """Return what every effect would add to a model, the strongest first; in the noise of another model if one is given."""
     if not bank.terms:
         return []
     by_noise = model.solved.by_noise
-    picked = _noise_models(by_noise, models)
+    picked = _noise_models(by_noise, models) if like is None else [(like.solved.kind, like.solved.share)]
     top = float(by_noise.max())
     gains = [_gains(model, bank, kind, share) + (float(by_noise[kind, share]) - top) for kind, share in picked]
     gain = np.max(np.stack(gains), axis=0)

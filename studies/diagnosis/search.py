@@ -19,6 +19,8 @@ MOST_CAUSES = 4
 CONTENDERS = 7
 NEAR = 25.0
 """A contender's scan may be this far behind the best one's, beside what the misfit of forms allows."""
+LEAST_OF_TWO = 20.0
+"""Lead over nothing below which one cause is not asked whether it is two."""
 SHARPER = 0.04
 """Part of the distance to the next shapes of the grid within which the first look leaves a shape: a hop is found closer."""
 
@@ -82,9 +84,29 @@ def search(plain: Fit, bank: Bank) -> Selection:
         places = tuple(_place(now, index, bank, start) for index in range(len(now.fit.terms)))
         best = max((place.rivals[0] for place in places), key=lambda h: h.score, default=now)
         if best.score < now.score + 1.0 or best.names[-1] in now.names:
+            best = two_for_one(now, places, bank, start)
+        if best is now:
             break
         now = best
     return Selection(start, now, places, bank)
+
+
+def two_for_one(now: Hypothesis, places: Sequence[Place], bank: Bank, start: Hypothesis) -> Hypothesis:
+    """Return the model with a rival and one effect more in the place of one cause, where the two are better beyond doubt.
+
+    A wide family may imitate two effects at once: a model that grows by one never sees them side by side.
+    """
+    lead = now.score - start.score
+    enough = now.score + CONSTANTS["margin"] + CONSTANTS["misfit"] * lead
+    if len(now.names) == MOST_CAUSES or lead < LEAST_OF_TWO:
+        return now
+    best = now
+    for rival in (rival for place in places for rival in place.rivals if rival.names[-1] not in now.names):
+        partner = next((s for s in scan(rival.fit, bank, like=now.fit) if s.term.name not in rival.names), None)
+        if partner and rival.score + CONSTANTS["log_prior_effect"] + partner.gain > enough - NEAR:
+            pair = polish(rival, partner)
+            best = pair if pair.score > max(enough, best.score) else best
+    return best
 
 
 def needed(start: Hypothesis, now: Hypothesis) -> float:
