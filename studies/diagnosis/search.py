@@ -80,33 +80,33 @@ def search(plain: Fit, bank: Bank) -> Selection:
         if best is None or best.score - now.score < needed(start, now):
             break
         now = examine(sharpen(best), bank, start)
+    places = places_of(now, bank, start)
     for _ in range(MOST_CAUSES):
-        places = tuple(_place(now, index, bank, start) for index in range(len(now.fit.terms)))
         best = max((place.rivals[0] for place in places), key=lambda h: h.score, default=now)
         if best.score < now.score + 1.0 or best.names[-1] in now.names:
             best = two_for_one(now, places, bank, start)
         if best is now:
             break
         now = best
+        places = places_of(now, bank, start)
     return Selection(start, now, places, bank)
 
 
 def two_for_one(now: Hypothesis, places: Sequence[Place], bank: Bank, start: Hypothesis) -> Hypothesis:
-    """Return the model with a rival and one effect more in the place of one cause, where the two are better beyond doubt.
+    """Return the model with a rival and one effect more in the place of one cause, where the two pay for it.
 
     A wide family may imitate two effects at once: a model that grows by one never sees them side by side.
     """
-    lead = now.score - start.score
-    enough = now.score + CONSTANTS["margin"] + CONSTANTS["misfit"] * lead
-    if len(now.names) == MOST_CAUSES or lead < LEAST_OF_TWO:
+    enough, best = now.score + needed(start, now), now
+    if len(now.names) == MOST_CAUSES or now.score - start.score < LEAST_OF_TWO:
         return now
-    best = now
     for rival in (rival for place in places for rival in place.rivals if rival.names[-1] not in now.names):
-        partner = next((s for s in scan(rival.fit, bank, like=now.fit) if s.term.name not in rival.names), None)
+        others = {*now.names, rival.names[-1]}
+        partner = next((s for s in scan(rival.fit, bank, like=now.fit) if s.term.name not in others), None)
         if partner and rival.score + CONSTANTS["log_prior_effect"] + partner.gain > enough - NEAR:
             pair = polish(rival, partner)
             best = pair if pair.score > max(enough, best.score) else best
-    return best
+    return best if best is now else examine(best, bank, start)
 
 
 def needed(start: Hypothesis, now: Hypothesis) -> float:
@@ -260,6 +260,11 @@ def drop(now: Hypothesis, index: int) -> Hypothesis:
     if not terms:
         return Hypothesis(own, price)
     return Hypothesis(own, price)
+
+
+def places_of(now: Hypothesis, bank: Bank, start: Hypothesis) -> tuple[Place, ...]:
+    """Return the place of every cause of a model."""
+    return tuple(_place(now, index, bank, start) for index in range(len(now.fit.terms)))
 
 
 def _place(now: Hypothesis, index: int, bank: Bank, start: Hypothesis) -> Place:
