@@ -62,21 +62,26 @@ class Place:
 
 @dataclass(frozen=True)
 class Selection:
-    """The outcome of a search: the baseline alone, the final model, and the places of its causes."""
+    """The outcome of a search: the baseline alone, the final model, and the places of its causes.
+
+    `nearest` is the log posterior of the best single effect over the baseline's, whether it paid or not.
+    """
 
     plain: Hypothesis
     final: Hypothesis
     places: tuple[Place, ...] = ()
+    nearest: float = -np.inf
     bank: Bank | None = field(default=None, repr=False)
 
 
 def search(plain: Fit, bank: Bank) -> Selection:
     """Grow a model from a fitted baseline."""
     start = Hypothesis(plain)
-    now = start
+    now, nearest = start, -np.inf
     while len(now.fit.terms) < MOST_CAUSES:
         tried = contenders(now, bank) + (from_the_card(now, bank) if now is start else [])
         best = max(tried, key=lambda h: h.score, default=None)
+        nearest = best.score - start.score if best and now is start else nearest
         if best is None or best.score - now.score < needed(start, now):
             break
         now = examine(sharpen(best), bank, start)
@@ -89,7 +94,7 @@ def search(plain: Fit, bank: Bank) -> Selection:
             break
         now = best
         places = places_of(now, bank, start)
-    return Selection(start, now, places, bank)
+    return Selection(start, now, places, nearest, bank)
 
 
 def two_for_one(now: Hypothesis, places: Sequence[Place], bank: Bank, start: Hypothesis) -> Hypothesis:

@@ -101,6 +101,7 @@ def run_case(kind, count, seed, held_out=True, commit=""):
         "seconds": time.perf_counter() - begin,
         "verdict": found.verdict,
         "places": [place for inquiry in diagnosis.inquiries.values() for place in contended(inquiry)],
+        "nearest": {k: inquiry.selection.nearest for k, inquiry in diagnosis.inquiries.items()},
         "causes": [[c.effect, list(c.equivalent), c.response, c.probability, c.evidence] for c in found.causes],
         "intervals": [{n: [p.value, p.low, p.high] for n, p in c.parameters.items()} for c in found.causes],
         "responses": {

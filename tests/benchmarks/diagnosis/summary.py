@@ -31,6 +31,10 @@ def summarise(cases):
     lines += ["## False alarms (any verdict but adequate)", ""]
     for family in FAMILIES:
         lines.append(f"- {family}: {rate(*share_of(of_kind(cases, 'null', family=family), alarmed))}")
+    nets = sorted((net for c in of_kind(cases, "null") for net in c.get("nearest", {}).values()), reverse=True)
+    if nets:
+        words = ", ".join(f"{net:.1f}" for net in nets[:3])
+        lines.append(f"- strongest effects in {len(nets)} responses, log posterior over nothing: {words}")
     lines += ["", "## Right class (truth in the strongest set) and exact answers", ""]
     singles = of_kind(cases, "effect") + of_kind(cases, "faint")
     levels = sorted({c["snr"] for c in singles} | set(SNR_ROWS), reverse=True)

@@ -60,7 +60,7 @@ def test_a_switch_is_no_relaxation():
 def test_a_chirp_is_no_noise():
     """Over the run it has a smooth spectrum; at each moment it has one frequency."""
     u = np.arange(ROWS) / ROWS
-    beside = 4e-3 * np.sin(2 * np.pi * STEP * ROWS * (u / 3000.0 + (1 / 300.0 - 1 / 3000.0) * u**2 / 2))
+    beside = 3e-3 * np.sin(2 * np.pi * STEP * ROWS * (u / 3000.0 + (1 / 300.0 - 1 / 3000.0) * u**2 / 2))
     assert look_at(beside)[1] > SIGNIFICANT
 
 
