@@ -7,6 +7,7 @@ import numpy as np
 
 from studies.diagnosis.baseline import Baseline, Followed, Lagged, Tangent
 from studies.diagnosis.campaign import Campaign
+from studies.diagnosis.constants import CONSTANTS
 from studies.diagnosis.model import Fit, fit, inexact_columns, pose, term_columns
 from studies.diagnosis.noise import SHARES
 from studies.effects.states import FloatArray
@@ -96,7 +97,8 @@ class OnRows:
             own = self.free(columns[inside], free, level)
             if not own.size or known.sum() <= own.shape[1]:
                 return np.asarray(rest)
-            most = [WARMEST if place == begin else np.inf for place in free] + [level] * (level > 0.0)
+            limits = {begin: WARMEST} | dict.fromkeys(self.model.starts_of(k), CARRIED_OFF * CONSTANTS["inexact"])
+            most = [limits.get(place, np.inf) for place in free] + [level] * (level > 0.0)
             found = _within(own[known], rest[known], np.array(most))
             rest = rest - own @ found
             places = [n for n, place in enumerate(free) if place == begin]
@@ -188,8 +190,8 @@ def residuals(model: Fit, campaign: Campaign) -> list[FloatArray]:
 
 
 def own_columns(model: Fit, k: int) -> list[int]:
-    """Return which columns belong to run `k` alone: its offset and its initial state."""
-    return [place for place, name in enumerate(model.tangent.names) if name.endswith(f"@{k}")]
+    """Return which columns belong to run `k` alone: its offset and its initial state, of effects with memory too."""
+    return [place for place, name in enumerate(model.tangent.names) if name.endswith(f"@{k}")] + model.starts_of(k)
 
 
 def level_of(model: Fit) -> float:

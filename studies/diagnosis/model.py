@@ -13,7 +13,7 @@ from studies.diagnosis.evidence import Linear, Solved, solve
 from studies.diagnosis.noise import SHARES, NoiseModels
 from studies.diagnosis.response import RESPONSES, Response
 from studies.effects import Effect, Span
-from studies.effects.states import FloatArray, average, lag
+from studies.effects.states import FloatArray, States, average, lag
 
 
 @dataclass(frozen=True)
@@ -21,13 +21,14 @@ class Term:
     """An effect with its shape fixed.
 
     `about` are the coefficients about which it is known to be inexact, none before it has been fitted; a form that is not
-    `named` has none.
+    `named` has none. Of an `exact` one nothing but what it had at the start of a run is unknown.
     """
 
     effect: Effect
     shape: tuple[float, ...]
     about: tuple[float, ...] = ()
     named: bool = True
+    exact: bool = False
 
     @property
     def name(self) -> str:
@@ -168,15 +169,31 @@ def inexact_columns(term: Term, view: View, problem: Problem, group: int) -> Flo
     O'Hagan, J. R. Statist. Soc. B 63 (2001) 425, one for every hypothesis, so that it needs no second name.
     """
     span = problem.span
-    curve = term_columns(term, view, group, problem.response.column)[:, used(term.effect)] @ np.array(term.about)
     seen = view.seen if group > 1 else view.seen_fine
+    starts = _starts(term, view, span, seen)
+    if term.exact:
+        return starts
+    curve = term_columns(term, view, group, problem.response.column)[:, used(term.effect)] @ np.array(term.about)
     x = np.clip(2.0 * (seen.resonator - span.temperature_low) / max(span.temperature_range, 1e-9) - 1.0, -1.2, 1.2)
     u = 2.0 * (seen.time - seen.time[0]) / max(span.longest_run, 1e-9) - 1.0
     late = lag(curve, seen.step, max(LATE * span.tau, seen.step)) - curve
     factors = np.stack([x, 1.5 * x**2 - 0.5, 2.5 * x**3 - 1.5 * x, u], axis=1)
-    return np.concatenate([curve[:, None] * factors, late[:, None] / LATE], axis=1)
+    return np.concatenate([curve[:, None] * factors, late[:, None] / LATE, starts], axis=1)
 
 
+def _starts(term: Term, view: View, span: Span, seen: States) -> FloatArray:
+    """Return the columns of what an effect with memory had at the start of each run: as much as the covered range would give it."""
+    if not term.effect.memory:
+        return np.zeros((seen.time.size, 0))
+    tau = term.shape[[p.name for p in term.effect.shape].index(term.effect.memory)]
+    steep = view.steep if term.effect.thermal else 1.0
+    out = np.zeros((seen.time.size, span.runs))
+    out[:, seen.run] = term.about[0] * steep * span.temperature_range * np.exp(-(seen.time - seen.time[0]) / tau)
+    return out
+
+
+FORMS = 5
+"""Columns of what a form may miss, before those of its starts."""
 IN_ONE_RUN = 0.99
 """Part of the power of what an effect does beyond the baseline from which on it does it in one run."""
 LATE = 0.1
@@ -206,6 +223,16 @@ class Fit:
     def columns_of(self, index: int) -> "np.ndarray":
         """Return the places of a term's columns."""
         return np.flatnonzero(self.linear.owner == index)
+
+    def starts_of(self, run: int) -> list[int]:
+        """Return the places of the columns of what effects with memory had at the start of a run."""
+        place, out = self.tangent.prior.size + sum(used(term.effect).size for term in self.terms), []
+        for term in (term for term in self.terms if term.about):
+            place += 0 if term.exact else FORMS
+            if term.effect.memory:
+                out.append(place + run)
+                place += self.problem.span.runs
+        return out
 
     def coefficients_of(self, index: int) -> FloatArray:
         """Return one value for each column of a term, zero for those that have no prior."""
@@ -424,7 +451,7 @@ def exact_forms(model: Fit) -> Fit:
     """Return a model with its forms taken at their word: for numbers that belong to the forms themselves."""
     if not any(term.about for term in model.terms):
         return model
-    terms = [replace(term, about=(), named=False) for term in model.terms]
+    terms = [replace(term, named=False, exact=True) for term in model.terms]
     return fit(model.problem, model.baseline, terms, 1, model.solved.scales)
 
 

@@ -123,6 +123,9 @@ class Effect:
         Whether time alone drives it, so that no programme of temperatures and drives shows it better than another.
     once : bool
         Whether it happens once in a gyro's life rather than in every run, so that a saved card does not repeat it.
+    memory : str
+        The shape parameter that is the time constant with which fades what it had at the start of a run: of what came before
+        a record nobody knows. "" where it has none.
     fine : bool
         Whether its columns need the fine grid (lags of fast drives, narrow curves) before they are averaged.
     sees_heat : bool
@@ -151,6 +154,7 @@ class Effect:
     event: bool = False
     by_clock: bool = False
     once: bool = False
+    memory: str = ""
     fine: bool = False
     sees_heat: bool = False
     near: Callable[[Span, str, Shape], Sequence[tuple[float, ...]]] | None = None
