@@ -255,6 +255,7 @@ def read_thermometer(campaign: Campaign, model: Fit) -> Thermometer | None:
         return None
     baseline = cast("Reading", model.moved())
     slow, beside, bend = model.slow_part(), model.beside_temperature(), _bend(model)
+    inexact = model.inexact_temperature()
     changes, excesses, missed, states = [], [], [], []
     for k, (run, view, rest) in enumerate(zip(campaign.runs, baseline.views(), slow, strict=True)):
         x, whole = view.seen.excess, view.seen_fine.excess
@@ -263,6 +264,7 @@ def read_thermometer(campaign: Campaign, model: Fit) -> Thermometer | None:
         excesses.append((x, whole))
         changes.append((baseline.change(x), baseline.change(whole)))
         parts = np.stack([filled, bend * x**2, *(own[k] for own in beside)], axis=1)
+        parts = np.concatenate([parts, inexact[k]], axis=1)
         missed.append(parts / np.where(np.abs(view.steep) > 0, view.steep, np.inf)[:, None])
         states.append(view.seen_fine)
     return Thermometer(tuple(changes), tuple(excesses), tuple(missed), tuple(states))

@@ -328,6 +328,21 @@ class Fit:
                 )
         return out
 
+    def inexact_temperature(self) -> list[FloatArray]:
+        """Return what the forms of effects on the temperature may miss, one deviation in units of the response, run by run."""
+        problem = self.problem
+        thermal = [term for term in self.terms if term.effect.thermal and term.about]
+        return [
+            np.concatenate(
+                [
+                    np.zeros((view.seen.time.size, 0)),
+                    *(CONSTANTS["inexact"] * inexact_columns(term, view, problem, problem.group) for term in thermal),
+                ],
+                axis=1,
+            )
+            for view in self.tangent.views
+        ]
+
     def warmer(self) -> list[FloatArray] | None:
         """Return what the effects on the temperature add to it, K on the fine grid, run by run."""
         thermal = [k for k, term in enumerate(self.terms) if term.effect.thermal]
