@@ -101,6 +101,16 @@ def test_two_effects_are_both_found():
 
 
 @pytest.mark.slow
+def test_two_effects_are_not_named_as_a_wider_one():
+    """A bond with its joint imitates both at once, and neither alone comes near it."""
+    hidden = ("rate-frequency", "radiation")
+    verdict, truth = diagnose("rich/2", "white", hidden, seed=5100, only=("frequency_Hz",))
+    found = [names_of(cause) for cause in verdict.causes]
+    assert len(found) == 2, (verdict.causes, truth)
+    assert all(any(name in names for names in found) for name in hidden), (verdict.causes, truth)
+
+
+@pytest.mark.slow
 def test_inseparable_pair_is_answered_as_a_set():
     """A drifting clock and an ageing frequency are the same data without a reference clock."""
     verdict, _ = diagnose("plain/2", "white", ("clock-drift",), seed=6000, only=("frequency_Hz",))
