@@ -31,6 +31,13 @@ AT_ONCE = np.zeros(1)
 """A row that is no mean."""
 
 
+def white_noise(*series: Array) -> float:
+    """Return the white noise of series that change slowly, from the median size of their second differences; 0 of none."""
+    second = np.concatenate([np.diff(values, 2) for values in series])
+    second = second[np.isfinite(second)]
+    return float(1.4826 * np.median(np.abs(second)) / np.sqrt(6.0)) if second.size else 0.0
+
+
 def random_walk(t: Array) -> Array:
     """Covariance of a random walk that begins with the run and has variance 1 after an hour."""
     return np.asarray((np.minimum(t[:, None], t[None, :]) - t[0]) / HOUR)

@@ -15,6 +15,7 @@ from scipy.optimize import minimize_scalar
 
 from compensation.decimation import average_blocks
 from compensation.errors import CompensationError
+from compensation.wander import white_noise
 from studies.errors import InputError
 from studies.record import Record
 
@@ -203,7 +204,7 @@ def _shown(seen: Sequence[_Seen], tolerance: float) -> float:
 
 def _judge_one(one: _Seen, time_constant: float, tolerance: float) -> _Judged:
     t, T, f = one.time, one.temperature, one.frequency
-    noise = time_constant * max(_noise(T), _noise(f) / one.slope) / one.width
+    noise = time_constant * max(white_noise(T), white_noise(f) / one.slope) / one.width
     # A line through blocks −r … r has a slope that scatters by σ/√Σk².
     r = np.arange(REACH, FARTHEST + 1)
     quiet = np.flatnonzero(noise <= UNSEEN * tolerance * np.sqrt(r * (r + 1) * (2 * r + 1) / 3))
@@ -226,11 +227,6 @@ def _soaks_of(one: _Judged, tolerance: float) -> list[Soak]:
 
 def _is_whole(time: Array, rows: NDArray[np.intp], reach: int) -> bool:
     return len(rows) > 3 * reach and float(np.ptp(time[rows])) >= LEAST
-
-
-def _noise(values: Array) -> float:
-    """Scatter of a block, from second differences."""
-    return float(1.4826 * np.median(np.abs(np.diff(values, 2))) / np.sqrt(6.0))
 
 
 def _holds(drive: Array) -> list[NDArray[np.intp]]:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from compensation.wander import white_noise
 from studies.calibration.observed import ObservedRun
 from studies.simulation.heat_path import build_network, slowest_lag
 
@@ -22,9 +23,6 @@ LEAST_SPREAD = 0.05  # K, of a chamber that holds
 WINDOW = 0.2  # of the slowest time constant, over which a rate is taken
 LEAST_ROWS = 5
 CARE = 2.0  # times what the card's time constant makes of a rate: it may be that much slower
-SECOND_DIFFERENCE = 1.4826 / np.sqrt(
-    6.0
-)  # standard deviation of white noise over the median size of its second differences
 
 
 def start_spread(run: ObservedRun, instrument: "Instrument", law: "FrequencyLaw") -> float:
@@ -45,5 +43,5 @@ def _rate(time: Array, value: Array, window: float) -> float:
     """Rate (per s) that the first rows leave likely, rms: of a straight line through them, and of its noise."""
     count = min(max(int(np.searchsorted(time - time[0], window)), LEAST_ROWS), len(time))
     t = time[:count] - time[:count].mean()
-    spread = SECOND_DIFFERENCE * float(np.median(np.abs(np.diff(value, 2))))
+    spread = white_noise(value)
     return float(np.hypot(t @ value[:count] / (t @ t), spread / np.sqrt(t @ t)))

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from scipy.constants import zero_Celsius
 
 from compensation.spikes import find_spike_groups, find_spikes, find_step
+from compensation.wander import white_noise
 from studies.diagnosis.checks import FEWEST_BINS, check_device, check_units
 from studies.diagnosis.response import RESPONSES
 from studies.diagnosis.steps import Steps
@@ -200,8 +201,7 @@ def _reading_noise(temperature: FloatArray) -> float:
     known = temperature[np.isfinite(temperature)]
     steps = np.abs(np.diff(known))
     rounding = float(steps[steps > 1e-9].min()) / np.sqrt(12.0) if (steps > 1e-9).any() else 0.0
-    second = np.diff(known, 2)
-    white = 1.4826 * float(np.median(np.abs(second))) / np.sqrt(6.0) if second.size else 0.0
+    white = white_noise(known)
     distinct = np.unique(known).size
     return float(max(white, rounding)) if distinct < 0.5 * known.size else white
 

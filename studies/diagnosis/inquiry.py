@@ -6,6 +6,7 @@ from typing import cast
 
 import numpy as np
 
+from compensation.wander import white_noise
 from studies.diagnosis import held_out
 from studies.diagnosis.baseline import Baseline, Followed, Lagged, Reading, bends_of
 from studies.diagnosis.campaign import Campaign
@@ -131,8 +132,7 @@ def again(plain: Fit) -> Callable[[float], Baseline]:
 
 def row_noise(campaign: Campaign, column: str) -> float:
     """Return the white noise of one row of the record, from second differences."""
-    second = _jitter(campaign, column)
-    return float(1.4826 * np.median(np.abs(second)) / np.sqrt(6.0)) if second.size else 0.0
+    return white_noise(*(run.row_responses[column] for run in campaign.runs))
 
 
 def _jitter(campaign: Campaign, column: str) -> FloatArray:

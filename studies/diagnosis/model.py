@@ -6,6 +6,7 @@ from functools import cached_property
 
 import numpy as np
 
+from compensation.wander import white_noise
 from studies.diagnosis.baseline import Baseline, Tangent, View
 from studies.diagnosis.campaign import Campaign
 from studies.diagnosis.constants import CONSTANTS
@@ -119,12 +120,10 @@ def pose(campaign: Campaign, column: str, tau: float, keep: Sequence["np.ndarray
 
 def white_level(campaign: Campaign, column: str) -> float:
     """Return the white noise of a step of the grid, from second differences."""
-    second = np.concatenate([np.diff(run.responses[column], 2) for run in campaign.runs])
-    second = second[np.isfinite(second)]
-    level = 1.4826 * float(np.median(np.abs(second))) / np.sqrt(6.0) if second.size else 0.0
-    if level > 0.0:
-        return float(level)
-    values = np.concatenate([run.responses[column] for run in campaign.runs])
+    parts = [run.responses[column] for run in campaign.runs]
+    if (level := white_noise(*parts)) > 0.0:
+        return level
+    values = np.concatenate(parts)
     return max(1e-9 * float(np.nanmax(np.abs(values))), 1e-300)
 
 
