@@ -8,18 +8,18 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import block_diag
 
-from compensation.correlated import Noise
 from studies.calibration.ahead import BIAS
-from studies.calibration.estimates import SILENT, Estimate, estimate, find_groups
-from studies.calibration.fit import CardFit, fit, stated_noise, whitened
+from studies.calibration.estimates import Estimate, estimate, find_groups
+from studies.calibration.fit import CardFit, fit, whitened
+from studies.calibration.ladder import Rung, build_ladder, noise_rms, spread_of, usual_mean
 from studies.calibration.observed import HOUSING, QUADRATURE, RESPONSES, SETTLED, ObservedRun, SettledTable, observe
 from studies.calibration.priors import Priors, gather_priors
 from studies.calibration.problem import JUMP, SHIFT, CardProblem, State, wide_law
+from studies.calibration.remarks import warn
 from studies.errors import InputError
 from studies.plausible import check_card_frequency
 from studies.record import Record
 from studies.shown import Shown
-from studies.simulation.virtual_gyro import idle_effects
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -28,26 +28,8 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 Progress = Callable[[str], None]
-UNITS = {"frequency_Hz": "Hz", "bias_deg_per_h": "°/h", "inverse_q": "1", QUADRATURE: "V", HOUSING: "K", SETTLED: "Hz"}
-TURNED_ON = 2.0  # runs whose offsets are so much larger than the card states
-CONTRADICTION = 5.0  # runs whose offsets are so much larger than what else the noise makes of a run's mean
-MISFIT = 2.0  # residuals that are so much larger than their rows' white noise and what the card states of slow noise
 START_STEPS = 3
 DIGITS = 12  # of a correlation: the frequency knows two values together a thousand times better than each, and 1 − ρ² is the square
-UNSETTLED, UNSETTLED_SD = 0.5, 4.0  # K and standard deviations by which a gyro had not settled at the start
-
-
-@dataclass(frozen=True)
-class Rung:
-    """Residuals of one response (its unit, rms of block averages): with the card as shipped, calibrated, and the noise.
-
-    The mean of a run's residual is left out of all three; `offset` is the rms of these means after the calibration.
-    """
-
-    as_shipped: float
-    calibrated: float
-    noise: float
-    offset: float
 
 
 @dataclass(frozen=True)
@@ -203,7 +185,7 @@ def calibrate(
     if profile:
         progress("intervals")
     estimates = estimate(found, profile)
-    ladder = _ladder(found)
+    ladder = build_ladder(found)
     return Calibration(
         instrument,
         _calibrated(instrument, found, estimates),
@@ -212,7 +194,7 @@ def calibrate(
         find_groups(found),
         ladder,
         held_out,
-        _warn(found, estimates, ladder),
+        warn(found, estimates, ladder),
     )
 
 
@@ -259,37 +241,7 @@ def _turn_on(found: CardFit) -> dict[str, float]:
         return {}
     offset = found.noise[BIAS].offset
     stated = found.problem.instrument.noise.bias_turn_on_deg_per_h > 0
-    return {"noise.bias_turn_on_deg_per_h": offset} if stated or offset > _usual_mean(found, BIAS) else {}
-
-
-def _ladder(found: CardFit) -> dict[str, Rung]:
-    problem = found.problem
-    shipped = problem.evaluate(np.zeros(problem.count), slopes=False)
-    return {
-        name: Rung(
-            _spread(problem, shipped, name),
-            _spread(problem, found.state, name),
-            noise_rms(found, name),
-            float(np.sqrt(np.mean([found.state.residual[name][s].mean() ** 2 for s in problem.rows[name].slices]))),
-        )
-        for name in problem.responses
-    }
-
-
-def _spread(problem: CardProblem, state: State, name: str) -> float:
-    parts = [state.residual[name][s] - state.residual[name][s].mean() for s in problem.rows[name].slices]
-    return float(np.sqrt(np.mean(np.concatenate(parts) ** 2)))
-
-
-def noise_rms(found: CardFit, name: str, noise: Noise | None = None) -> float:
-    """Rms of the noise about the mean of each run, as the fitted levels have it, or others."""
-    rows, total, count = found.problem.rows[name], 0.0, 0
-    levels = found.noise[name] if noise is None else noise
-    for run, t in enumerate(rows.times):
-        S = rows.covariance(run, levels)
-        total += float(np.trace(S) - S.mean() * len(t))
-        count += len(t)
-    return float(np.sqrt(total / count))
+    return {"noise.bias_turn_on_deg_per_h": offset} if stated or offset > usual_mean(found, BIAS) else {}
 
 
 def predict_held_out(
@@ -313,7 +265,7 @@ def predict_held_out(
     by_housing = dict.fromkeys(responses, (0.0, 0.0))
     both = [_refit_start(inner, at, whole) for at in (np.zeros(count), values)]
     for name in responses:
-        by_housing[name] = (_spread(inner, both[0], name), _spread(inner, both[1], name))
+        by_housing[name] = (spread_of(inner, both[0], name), spread_of(inner, both[1], name))
     by_chamber: dict[str, tuple[float, float]] = {}
     stated: dict[str, float] = {}
     if run.outer is not None:
@@ -378,83 +330,3 @@ def _refit_start(problem: CardProblem, point: Array, whole: CardFit) -> State:
 
 def _rms(values: Array) -> float:
     return float(np.sqrt(np.mean(values**2)))
-
-
-def _warn(found: CardFit, estimates: Sequence[Estimate], ladder: Mapping[str, Rung]) -> tuple[str, ...]:
-    warnings = []
-    if not found.converged:
-        warnings.append(
-            f"the fit has not converged in {found.steps} steps: its values may still move and are no result."
-        )
-    for run in found.problem.runs:
-        warnings += [f"{run.record.path}: {idle}" for idle in idle_effects(found.problem.instrument, run.inner)]
-    warnings += [*_unsettled(found), *_misfit(found, ladder)]
-    rows = found.problem.rows
-    for name, rung in ladder.items():
-        stated = found.problem.instrument.noise.bias_turn_on_deg_per_h if name == BIAS else 0.0
-        usual = _usual_mean(found, name)
-        if len(rows[name].times) > 1 and rung.offset > max(CONTRADICTION * usual, TURNED_ON * stated):
-            warnings.append(
-                f"the runs contradict each other in {name}: after the calibration their means lie {rung.offset:.3g}"
-                f" {UNITS[name]} (rms) from the model, where the noise within a run explains {usual:.2g}"
-                + (f" and the card states {stated:.3g} from turn-on to turn-on" if stated else "")
-                + "; are they of one device"
-                + ("?" if stated else " and one turn-on?")
-            )
-    for name, count in found.outliers.items():
-        if count:
-            warnings.append(
-                f"{count} {'block' if count == 1 else 'blocks'} of {name} stood out of the noise and were given less weight."
-            )
-    stayed = [one.parameter for one in estimates if one.width >= SILENT]
-    told = sum(rows[name].count for name in rows)
-    if len(estimates) > told:
-        warnings.append(
-            f"{len(estimates)} uncertain values, but {told} data: {len(stayed)} of the values stayed at their prior:"
-            f" {', '.join(stayed)}."
-        )
-    return tuple(warnings)
-
-
-def _misfit(found: CardFit, ladder: Mapping[str, Rung]) -> list[str]:
-    """Name the responses that the model does not follow: what it leaves stands out of what their rows scatter and the card states."""
-    said = []
-    for name, rung in ladder.items():
-        slow = stated_noise(found.problem.instrument.noise, name) or Noise(0.0)
-        usual = noise_rms(found, name, replace(slow, white=found.noise[name].white, offset=0.0))
-        if rung.calibrated > MISFIT * usual:
-            said.append(
-                f"the model does not follow {name}: it leaves {rung.calibrated:.2g} {UNITS[name]} (rms), where the noise of the rows"
-                f" is {usual:.2g}; the values carry this misfit. hrg diagnose with --card looks for what the card lacks."
-            )
-    return said
-
-
-def _unsettled(found: CardFit) -> list[str]:
-    """Name the runs that began in the midst of a change, with the part that was furthest from being settled."""
-    problem, count = found.problem, len(found.problem.priors.values)
-    spread = np.sqrt(np.diag(found.covariance)[count:])
-    furthest: dict[int, tuple[float, str]] = {}
-    for (k, name, sd), u, own in zip(problem.starts, found.point[count:], spread, strict=True):
-        lump, away, run = name.removeprefix("initial."), float(sd * u), problem.parts[k].run
-        known = abs(u) > UNSETTLED_SD * own and abs(away) > UNSETTLED
-        if lump in ("base", "resonator") and known and abs(away) > abs(furthest.get(run, (0.0, ""))[0]):
-            furthest[run] = away, lump
-    return [
-        f"{problem.runs[run].record.path}: the gyro had not settled when this run began: its {lump} was {abs(away):.2g} K"
-        f" {'warmer' if away > 0 else 'colder'} than its {_settled_by(problem, run)}; a prediction from the chamber alone"
-        " does not know of that."
-        for run, (away, lump) in sorted(furthest.items())
-    ]
-
-
-def _settled_by(problem: CardProblem, run: int) -> str:
-    one = problem.runs[run]
-    return "chamber" if one.outer is None and one.inner.boundary == "chamber" else "housing"
-
-
-def _usual_mean(found: CardFit, name: str) -> float:
-    """Standard deviation of a run's mean by the noise without offsets."""
-    rows = found.problem.rows[name]
-    quiet = replace(found.noise[name], offset=0.0)
-    return float(np.sqrt(np.mean([rows.covariance(run, quiet).mean() for run in range(len(rows.times))])))

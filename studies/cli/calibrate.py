@@ -101,7 +101,7 @@ def calibrate(
 
 
 def _payload(found: "Calibration", data: list[str], save: str | None) -> dict[str, Any]:
-    from studies.calibration.calibrate import UNITS
+    from studies.calibration.observed import UNITS
 
     held = found.held_out
 

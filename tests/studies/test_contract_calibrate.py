@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from studies.calibration.calibrate import UNITS
+from studies.calibration.observed import UNITS
 from studies.cli import main
 from studies.instrument.card import load_card
 from studies.record import write_record

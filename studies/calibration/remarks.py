@@ -1,0 +1,94 @@
+"""What must be said with a calibration: that it has not converged, that runs contradict each other or the model does not follow."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from compensation.correlated import Noise
+from studies.calibration.ahead import BIAS
+from studies.calibration.estimates import SILENT, Estimate
+from studies.calibration.fit import CardFit, stated_noise
+from studies.calibration.ladder import Rung, noise_rms, usual_mean
+from studies.calibration.observed import UNITS
+from studies.calibration.problem import CardProblem
+from studies.simulation.virtual_gyro import idle_effects
+
+TURNED_ON = 2.0  # runs whose offsets are so much larger than the card states
+CONTRADICTION = 5.0  # runs whose offsets are so much larger than what else the noise makes of a run's mean
+MISFIT = 2.0  # residuals that are so much larger than their rows' white noise and what the card states of slow noise
+UNSETTLED, UNSETTLED_SD = 0.5, 4.0  # K and standard deviations by which a gyro had not settled at the start
+
+
+def warn(found: CardFit, estimates: Sequence[Estimate], ladder: Mapping[str, Rung]) -> tuple[str, ...]:
+    """Return the warnings of a calibration."""
+    warnings = []
+    if not found.converged:
+        warnings.append(
+            f"the fit has not converged in {found.steps} steps: its values may still move and are no result."
+        )
+    for run in found.problem.runs:
+        warnings += [f"{run.record.path}: {idle}" for idle in idle_effects(found.problem.instrument, run.inner)]
+    warnings += [*_unsettled(found), *_misfit(found, ladder)]
+    rows = found.problem.rows
+    for name, rung in ladder.items():
+        stated = found.problem.instrument.noise.bias_turn_on_deg_per_h if name == BIAS else 0.0
+        usual = usual_mean(found, name)
+        if len(rows[name].times) > 1 and rung.offset > max(CONTRADICTION * usual, TURNED_ON * stated):
+            warnings.append(
+                f"the runs contradict each other in {name}: after the calibration their means lie {rung.offset:.3g}"
+                f" {UNITS[name]} (rms) from the model, where the noise within a run explains {usual:.2g}"
+                + (f" and the card states {stated:.3g} from turn-on to turn-on" if stated else "")
+                + "; are they of one device"
+                + ("?" if stated else " and one turn-on?")
+            )
+    for name, count in found.outliers.items():
+        if count:
+            warnings.append(
+                f"{count} {'block' if count == 1 else 'blocks'} of {name} stood out of the noise and were given less weight."
+            )
+    stayed = [one.parameter for one in estimates if one.width >= SILENT]
+    told = sum(rows[name].count for name in rows)
+    if len(estimates) > told:
+        warnings.append(
+            f"{len(estimates)} uncertain values, but {told} data: {len(stayed)} of the values stayed at their prior:"
+            f" {', '.join(stayed)}."
+        )
+    return tuple(warnings)
+
+
+def _misfit(found: CardFit, ladder: Mapping[str, Rung]) -> list[str]:
+    """Name the responses that the model does not follow: what it leaves stands out of what their rows scatter and the card states."""
+    said = []
+    for name, rung in ladder.items():
+        slow = stated_noise(found.problem.instrument.noise, name) or Noise(0.0)
+        usual = noise_rms(found, name, replace(slow, white=found.noise[name].white, offset=0.0))
+        if rung.calibrated > MISFIT * usual:
+            said.append(
+                f"the model does not follow {name}: it leaves {rung.calibrated:.2g} {UNITS[name]} (rms), where the noise of the rows"
+                f" is {usual:.2g}; the values carry this misfit. hrg diagnose with --card looks for what the card lacks."
+            )
+    return said
+
+
+def _unsettled(found: CardFit) -> list[str]:
+    """Name the runs that began in the midst of a change, with the part that was furthest from being settled."""
+    problem, count = found.problem, len(found.problem.priors.values)
+    spread = np.sqrt(np.diag(found.covariance)[count:])
+    furthest: dict[int, tuple[float, str]] = {}
+    for (k, name, sd), u, own in zip(problem.starts, found.point[count:], spread, strict=True):
+        lump, away, run = name.removeprefix("initial."), float(sd * u), problem.parts[k].run
+        known = abs(u) > UNSETTLED_SD * own and abs(away) > UNSETTLED
+        if lump in ("base", "resonator") and known and abs(away) > abs(furthest.get(run, (0.0, ""))[0]):
+            furthest[run] = away, lump
+    return [
+        f"{problem.runs[run].record.path}: the gyro had not settled when this run began: its {lump} was {abs(away):.2g} K"
+        f" {'warmer' if away > 0 else 'colder'} than its {_settled_by(problem, run)}; a prediction from the chamber alone"
+        " does not know of that."
+        for run, (away, lump) in sorted(furthest.items())
+    ]
+
+
+def _settled_by(problem: CardProblem, run: int) -> str:
+    one = problem.runs[run]
+    return "chamber" if one.outer is None and one.inner.boundary == "chamber" else "housing"
