@@ -180,11 +180,17 @@ def inexact_columns(term: Term, view: View, problem: Problem, group: int) -> Flo
     return np.concatenate([curve[:, None] * factors, late[:, None] / LATE, starts], axis=1)
 
 
+def remembers(term: Term, span: Span) -> float:
+    """Return the time constant, s, with which an effect forgets what came before a run; 0 where it does so sooner than the resonator."""
+    effect = term.effect
+    times = [value for value, own in zip(term.shape, effect.shape, strict=True) if own.name == effect.memory]
+    return times[0] if times and times[0] > span.tau else 0.0
+
+
 def _starts(term: Term, view: View, span: Span, seen: States) -> FloatArray:
     """Return the columns of what an effect with memory had at the start of each run: as much as the covered range would give it."""
-    if not term.effect.memory:
+    if not (tau := remembers(term, span)):
         return np.zeros((seen.time.size, 0))
-    tau = term.shape[[p.name for p in term.effect.shape].index(term.effect.memory)]
     steep = view.steep if term.effect.thermal else 1.0
     out = np.zeros((seen.time.size, span.runs))
     out[:, seen.run] = term.about[0] * steep * span.temperature_range * np.exp(-(seen.time - seen.time[0]) / tau)
@@ -228,7 +234,7 @@ class Fit:
         place, out = self.tangent.prior.size + sum(used(term.effect).size for term in self.terms), []
         for term in (term for term in self.terms if term.about):
             place += 0 if term.exact else FORMS
-            if term.effect.memory:
+            if remembers(term, self.problem.span):
                 out.append(place + run)
                 place += self.problem.span.runs
         return out
