@@ -46,7 +46,6 @@ EFFECT = Effect(
     grid=grid,
     sizes={"frequency_Hz": 5e-5, "bias_deg_per_h": 2.0},
     shape=(Parameter("relaxation_time_s", 600.0, 1e6, "time in which the stress relaxes"),),
-    memory="relaxation_time_s",
     fine=True,
     steady=steady,
     steady_grid=lambda low, high: [
