@@ -13,7 +13,7 @@ from studies.diagnosis.lack_of_fit import look
 from studies.diagnosis.model import Fit, exact_forms, fit
 from studies.diagnosis.response import RESPONSES
 from studies.diagnosis.search import Hypothesis, Place
-from studies.diagnosis.verdict import NINETY, Cause, Interval, weigh
+from studies.diagnosis.verdict import NINETY, Cause, Interval, temper_of, weigh
 from studies.effects import Effect, find_effect
 from studies.effects.states import FloatArray
 
@@ -71,8 +71,7 @@ def _suits(campaign: Campaign, rival: Fit, other: Inquiry) -> float:
     """
     thermometer = read_thermometer(campaign, rival)
     baseline = other.final.baseline
-    lead = max(other.selection.final.score - other.selection.plain.score, 0.0)
-    temper = CONSTANTS["temper"] + CONSTANTS["misfit"] * lead
+    temper = temper_of(other.selection.final.score - other.selection.plain.score)
     if thermometer is None or not isinstance(baseline, Followed):
         return other.final.log_evidence / temper
     reading, whole = thermometer.reads(other.problem.response)

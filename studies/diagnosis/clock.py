@@ -7,8 +7,9 @@ import numpy as np
 
 from studies.diagnosis.campaign import Campaign
 from studies.diagnosis.evidence import solve
-from studies.diagnosis.model import Fit, Term, fit
+from studies.diagnosis.model import Fit, fit
 from studies.diagnosis.search import Hypothesis, Place, Selection
+from studies.diagnosis.terms import Term
 from studies.effects import Effect, library
 from studies.effects.states import average
 

@@ -20,6 +20,9 @@ from studies.effects.states import FloatArray
 SCALES = 10.0 ** np.arange(-4.0, 0.51, 0.5)
 """Sizes of an effect, in parts of its strong cases: every half decade as likely as the next."""
 
+START = -2
+"""Owner of a column of what effects with memory had at the start of the first run."""
+
 
 @dataclass(frozen=True)
 class Linear:
@@ -33,7 +36,8 @@ class Linear:
         Standard deviations of the coefficients; inf where the prior is flat (these come first). Those of an effect are
         for its strong cases.
     owner : (p,) int array
-        −1 for the baseline, else the number of the term that a column belongs to.
+        −1 for the baseline, `START` − k for what effects with memory had at the start of run k, else the number of the term that a
+        column belongs to.
     noise : NoiseModels
     sigma : float
         White noise of a row of the grid, for the scale of the priors.
@@ -205,7 +209,7 @@ def _beside_nothing(
     """Solve without the columns that no row shows: their coefficients are what they were before, 0 ± prior."""
     seen = replace(model, columns=model.columns[:, live], prior=model.prior[live], owner=model.owner[live])
     found = solve(seen, terms, scales, kinds)
-    own = np.where(model.owner >= 0, np.append(found.scales, 1.0)[model.owner], 1.0)
+    own = np.append(found.scales, 1.0)[np.maximum(model.owner, -1)]
     covariance = np.diag(found.variance * (own * np.where(live, 0.0, model.prior) / model.sigma) ** 2)
     covariance[np.ix_(live, live)] = found.covariance
     coefficients = np.zeros(model.owner.size)

@@ -13,9 +13,10 @@ import numpy as np
 from studies.diagnosis.campaign import Campaign, Run
 from studies.diagnosis.causes import parameters_of
 from studies.diagnosis.investigate import Diagnosis
-from studies.diagnosis.model import Fit, fit, used
+from studies.diagnosis.model import Fit, fit
 from studies.diagnosis.scan import build_bank, scan
 from studies.diagnosis.search import refine
+from studies.diagnosis.terms import used
 from studies.diagnosis.verdict import Interval
 from studies.effects import Effect, Parameter, find_effect
 from studies.effects.states import FloatArray

@@ -8,8 +8,10 @@ import numpy as np
 from studies.diagnosis.baseline import Baseline, Followed, Lagged, Tangent
 from studies.diagnosis.campaign import Campaign
 from studies.diagnosis.constants import CONSTANTS
-from studies.diagnosis.model import Fit, fit, inexact_columns, pose, term_columns
+from studies.diagnosis.model import Fit, fit
 from studies.diagnosis.noise import SHARES
+from studies.diagnosis.problem import pose
+from studies.diagnosis.terms import inexact_columns, term_columns
 from studies.effects.states import FloatArray
 
 BLOCKS = 5
@@ -88,6 +90,8 @@ class OnRows:
         inside = np.ones(run.row_time.size, dtype=bool) if inside is None else inside
         rows, start, names = self, 0.0, self.model.tangent.names
         begin = names.index(f"start@{k}") if f"start@{k}" in names else -1
+        limits = {begin: WARMEST} | dict.fromkeys(self.model.starts_of(k), CARRIED_OFF * CONSTANTS["inexact"])
+        most = np.array([limits.get(place, np.inf) for place in free] + [level] * (level > 0.0))
         for _ in range(4):
             columns, shift = rows.columns(k)
             coefficients = self.model.solved.coefficients.copy()
@@ -97,9 +101,7 @@ class OnRows:
             own = self.free(columns[inside], free, level)
             if not own.size or known.sum() <= own.shape[1]:
                 return np.asarray(rest)
-            limits = {begin: WARMEST} | dict.fromkeys(self.model.starts_of(k), CARRIED_OFF * CONSTANTS["inexact"])
-            most = [limits.get(place, np.inf) for place in free] + [level] * (level > 0.0)
-            found = _within(own[known], rest[known], np.array(most))
+            found = _within(own[known], rest[known], most)
             rest = rest - own @ found
             places = [n for n, place in enumerate(free) if place == begin]
             if not places or abs(found[places[0]] - start) < SETTLED:

@@ -13,8 +13,9 @@ from studies.diagnosis.campaign import Campaign
 from studies.diagnosis.clock import judged
 from studies.diagnosis.constants import CONSTANTS
 from studies.diagnosis.lack_of_fit import Leftover, look
-from studies.diagnosis.model import Fit, Problem, fit, pose, settle
+from studies.diagnosis.model import Fit, fit, settle
 from studies.diagnosis.noise import tails_of
+from studies.diagnosis.problem import Problem, pose
 from studies.diagnosis.response import RESPONSES, Response
 from studies.diagnosis.scan import applicable, build_bank
 from studies.diagnosis.search import Hypothesis, Place, Selection, drop, needed, search
@@ -263,8 +264,7 @@ def read_thermometer(campaign: Campaign, model: Fit) -> Thermometer | None:
         filled = np.interp(run.time, run.time[known], rest[known]) if known.any() else np.zeros_like(x)
         excesses.append((x, whole))
         changes.append((baseline.change(x), baseline.change(whole)))
-        parts = np.stack([filled, bend * x**2, *(own[k] for own in beside)], axis=1)
-        parts = np.concatenate([parts, inexact[k]], axis=1)
+        parts = np.column_stack([filled, bend * x**2, *(own[k] for own in beside), inexact[k]])
         missed.append(parts / np.where(np.abs(view.steep) > 0, view.steep, np.inf)[:, None])
         states.append(view.seen_fine)
     return Thermometer(tuple(changes), tuple(excesses), tuple(missed), tuple(states))

@@ -11,9 +11,10 @@ import numpy as np
 from scipy.linalg import solve_triangular
 
 from studies.diagnosis.constants import CONSTANTS
-from studies.diagnosis.model import Fit, Term, fit
+from studies.diagnosis.model import Fit, fit
 from studies.diagnosis.noise import SHARES, student_log
 from studies.diagnosis.scan import applicable, build_bank, scan
+from studies.diagnosis.terms import Term
 from studies.effects import Coefficient, Effect, Parameter, Span
 from studies.effects.states import FloatArray, States, lag, play
 

@@ -1,4 +1,4 @@
-"""One response of a campaign, and its model: a baseline with named effects, fitted by evidence."""
+"""The model of one response: a baseline with named effects, fitted by evidence."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -6,203 +6,16 @@ from functools import cached_property
 
 import numpy as np
 
-from compensation.wander import white_noise
-from studies.diagnosis.baseline import Baseline, Tangent, View
-from studies.diagnosis.campaign import Campaign
+from studies.diagnosis.baseline import Baseline, Tangent
 from studies.diagnosis.constants import CONSTANTS
-from studies.diagnosis.evidence import Linear, Solved, solve
-from studies.diagnosis.noise import SHARES, NoiseModels
-from studies.diagnosis.response import RESPONSES, Response
-from studies.effects import Effect, Span
-from studies.effects.states import FloatArray, States, average, lag
+from studies.diagnosis.evidence import START, Linear, Solved, solve
+from studies.diagnosis.noise import SHARES
+from studies.diagnosis.problem import Problem
+from studies.diagnosis.terms import Term, inexact_columns, remembers, term_columns, used
+from studies.effects.states import FloatArray
 
-
-@dataclass(frozen=True)
-class Term:
-    """An effect with its shape fixed.
-
-    `about` are the coefficients about which it is known to be inexact, none before it has been fitted; a form that is not
-    `named` has none. Of an `exact` one nothing but what it had at the start of a run is unknown.
-    """
-
-    effect: Effect
-    shape: tuple[float, ...]
-    about: tuple[float, ...] = ()
-    named: bool = True
-    exact: bool = False
-
-    @property
-    def name(self) -> str:
-        """Name of the effect."""
-        return self.effect.name
-
-
-@dataclass(frozen=True)
-class Problem:
-    """The rows of one response on the coarse grid.
-
-    Attributes
-    ----------
-    response : Response
-    present : tuple of bool arrays
-        Which steps of the grid have the response, run by run.
-    values : (M,) array
-        The present values, stacked.
-    noise : NoiseModels
-    sigma : float
-        White noise of a step of the grid, from second differences: no slow effect reaches it.
-    level : float
-        Level of the response, in parts of which sizes count; 1 where they count in its unit.
-    group : int
-        Fine samples to a step.
-    span : Span
-    """
-
-    response: Response
-    present: tuple["np.ndarray", ...]
-    values: FloatArray
-    noise: NoiseModels
-    sigma: float
-    level: float
-    group: int
-    span: Span
-
-    def stack(self, parts: Sequence[FloatArray]) -> FloatArray:
-        """Stack the present rows of arrays given run by run."""
-        return np.concatenate([part[mask] for part, mask in zip(parts, self.present, strict=True)])
-
-    def size(self, effect: Effect) -> float:
-        """Strong cases of an effect in this response, in the unit of its first coefficient."""
-        own = effect.sizes[self.response.column]
-        return own * self.level if self.response.relative and not effect.thermal else own
-
-    @property
-    def run(self) -> "np.ndarray":
-        """Number of the run of every stacked row."""
-        return np.repeat(np.arange(len(self.present)), [int(mask.sum()) for mask in self.present])
-
-    def split(self, rows: FloatArray) -> list[FloatArray]:
-        """Return stacked rows run by run, the present ones only."""
-        return np.split(rows, np.cumsum([int(mask.sum()) for mask in self.present])[:-1])
-
-    def unstack(self, rows: FloatArray) -> list[FloatArray]:
-        """Return stacked rows run by run; missing ones are NaN."""
-        out = []
-        for mask, part in zip(self.present, self.split(rows), strict=True):
-            own = np.full(mask.shape, np.nan)
-            own[mask] = part
-            out.append(own)
-        return out
-
-
-def pose(campaign: Campaign, column: str, tau: float, keep: Sequence["np.ndarray"] | None = None) -> Problem:
-    """Set up the rows of one response; `keep` restricts them."""
-    response = RESPONSES[column]
-    present = [np.isfinite(run.responses[column]) for run in campaign.runs]
-    if keep is not None:
-        present = [mask & own for mask, own in zip(present, keep, strict=True)]
-    values = np.concatenate([run.responses[column][m] for run, m in zip(campaign.runs, present, strict=True)])
-    times = [run.time[m] for run, m in zip(campaign.runs, present, strict=True) if m.any()]
-    rows = sum(int(np.isfinite(run.row_responses[column]).sum()) for run in campaign.runs)
-    steps = sum(int(np.isfinite(run.responses[column]).sum()) for run in campaign.runs)
-    level = abs(float(np.median(values))) if response.relative else 1.0
-    return Problem(
-        response,
-        tuple(present),
-        values,
-        NoiseModels.of(times, max(rows / max(steps, 1), 1.0), campaign.step),
-        white_level(campaign, column),
-        level,
-        campaign.group,
-        span_of(campaign, tau),
-    )
-
-
-def white_level(campaign: Campaign, column: str) -> float:
-    """Return the white noise of a step of the grid, from second differences."""
-    parts = [run.responses[column] for run in campaign.runs]
-    if (level := white_noise(*parts)) > 0.0:
-        return level
-    values = np.concatenate(parts)
-    return max(1e-9 * float(np.nanmax(np.abs(values))), 1e-300)
-
-
-def span_of(campaign: Campaign, tau: float) -> Span:
-    """Return what a campaign covers."""
-    housing = np.concatenate([run.states.housing for run in campaign.runs])
-    starts = [run.states.campaign_time for run in campaign.runs]
-    angles = [run.states.pattern_angle for run in campaign.runs]
-    known = [angle for angle in angles if angle is not None]
-    turns = bool(known) and len(known) == len(angles) and float(np.ptp(np.concatenate(known))) > 1e-3
-    return Span(
-        float(np.percentile(housing, 0.5)),
-        float(np.percentile(housing, 99.5)),
-        max(float(np.ptp(run.states.time)) for run in campaign.runs),
-        max(float(t[-1]) for t in starts) - min(float(t[0]) for t in starts),
-        campaign.step,
-        tau,
-        len(campaign.runs),
-        tuple(run.time for run in campaign.runs),
-        turns,
-        campaign.timed,
-    )
-
-
-def term_columns(term: Term, view: View, group: int, column: str) -> FloatArray:
-    """Return the columns of an effect for one run on the coarse grid, in units of the response."""
-    effect = term.effect
-    if effect.thermal:
-        states = view.seen_fine if effect.sees_heat else view.fine
-        return average(effect.columns(states, term.shape, column), group) * view.steep[:, None]
-    if effect.fine:
-        return average(effect.columns(view.seen_fine, term.shape, column), group)
-    return effect.columns(view.seen, term.shape, column)
-
-
-def inexact_columns(term: Term, view: View, problem: Problem, group: int) -> FloatArray:
-    """Return what a form may miss of an effect for one run: no form is exact.
-
-    The world's loop is not a play, its leak not linear, its peak not the textbook's: e(t), what the effect was found to do,
-    may change slowly with temperature and time, e · P₁(x), e · P₂(x), e · P₃(x), e · u, and come late, lag(e) − e, each by a
-    small part of it. x is the temperature over the covered range, u the time over the run. The discrepancy of Kennedy and
-    O'Hagan, J. R. Statist. Soc. B 63 (2001) 425, one for every hypothesis, so that it needs no second name.
-    """
-    span = problem.span
-    seen = view.seen if group > 1 else view.seen_fine
-    starts = _starts(term, view, span, seen)
-    if term.exact:
-        return starts
-    curve = term_columns(term, view, group, problem.response.column)[:, used(term.effect)] @ np.array(term.about)
-    x = np.clip(2.0 * (seen.resonator - span.temperature_low) / max(span.temperature_range, 1e-9) - 1.0, -1.2, 1.2)
-    u = 2.0 * (seen.time - seen.time[0]) / max(span.longest_run, 1e-9) - 1.0
-    late = lag(curve, seen.step, max(LATE * span.tau, seen.step)) - curve
-    factors = np.stack([x, 1.5 * x**2 - 0.5, 2.5 * x**3 - 1.5 * x, u], axis=1)
-    return np.concatenate([curve[:, None] * factors, late[:, None] / LATE, starts], axis=1)
-
-
-def remembers(term: Term, span: Span) -> float:
-    """Return the time constant, s, with which an effect forgets what came before a run; 0 where it does so sooner than the resonator."""
-    effect = term.effect
-    times = [value for value, own in zip(term.shape, effect.shape, strict=True) if own.name == effect.memory]
-    return times[0] if times and times[0] > span.tau else 0.0
-
-
-def _starts(term: Term, view: View, span: Span, seen: States) -> FloatArray:
-    """Return the columns of what an effect with memory had at the start of each run: as much as the covered range would give it."""
-    if not (tau := remembers(term, span)):
-        return np.zeros((seen.time.size, 0))
-    steep = view.steep if term.effect.thermal else 1.0
-    out = np.zeros((seen.time.size, span.runs))
-    out[:, seen.run] = term.about[0] * steep * span.temperature_range * np.exp(-(seen.time - seen.time[0]) / tau)
-    return out
-
-
-FORMS = 5
-"""Columns of what a form may miss, before those of its starts."""
 IN_ONE_RUN = 0.99
 """Part of the power of what an effect does beyond the baseline from which on it does it in one run."""
-LATE = 0.1
-"""Delay of what a form may miss, in parts of the thermal lag."""
 
 
 @dataclass(frozen=True)
@@ -231,13 +44,7 @@ class Fit:
 
     def starts_of(self, run: int) -> list[int]:
         """Return the places of the columns of what effects with memory had at the start of a run."""
-        place, out = self.tangent.prior.size + sum(used(term.effect).size for term in self.terms), []
-        for term in (term for term in self.terms if term.about):
-            place += 0 if term.exact else FORMS
-            if remembers(term, self.problem.span):
-                out.append(place + run)
-                place += self.problem.span.runs
-        return out
+        return np.flatnonzero(self.linear.owner == START - run).tolist()
 
     def coefficients_of(self, index: int) -> FloatArray:
         """Return one value for each column of a term, zero for those that have no prior."""
@@ -368,11 +175,6 @@ class Fit:
         return self.baseline.moved(self.values(), self.warmer())
 
 
-def used(effect: Effect) -> "np.ndarray":
-    """Return which columns of an effect a diagnosis fits: those that have a prior."""
-    return np.flatnonzero(effect.spread > 0)
-
-
 def linearise(problem: Problem, tangent: Tangent, terms: Sequence[Term]) -> Linear:
     """Return baseline and effects side by side as a linear model of the stacked rows."""
     columns = [problem.stack(tangent.columns)]
@@ -390,6 +192,8 @@ def linearise(problem: Problem, tangent: Tangent, terms: Sequence[Term]) -> Line
             columns.append(problem.stack(own))
             prior.append(np.full(own[0].shape[1], CONSTANTS["inexact"]))
             owner.append(np.full(own[0].shape[1], -1))
+            if remembers(term, problem.span):  # the last ones, one a run
+                owner[-1][-problem.span.runs :] = START - np.arange(problem.span.runs)
     return Linear(
         problem.values + problem.stack(tangent.shift),
         np.concatenate(columns, axis=1),

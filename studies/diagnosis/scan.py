@@ -7,8 +7,10 @@ import numpy as np
 from scipy.special import logsumexp
 
 from studies.diagnosis.evidence import SCALES
-from studies.diagnosis.model import Fit, Problem, Term, term_columns
+from studies.diagnosis.model import Fit
 from studies.diagnosis.noise import KERNELS, NoiseModels
+from studies.diagnosis.problem import Problem
+from studies.diagnosis.terms import Term, term_columns
 from studies.effects import Effect, library
 from studies.effects.states import FloatArray
 

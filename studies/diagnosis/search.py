@@ -11,8 +11,9 @@ import numpy as np
 
 from studies.diagnosis.baseline import Baseline
 from studies.diagnosis.constants import CONSTANTS
-from studies.diagnosis.model import Fit, Term, fit
+from studies.diagnosis.model import Fit, fit
 from studies.diagnosis.scan import Bank, Seen, build_bank, scan
+from studies.diagnosis.terms import Term
 from studies.effects import Parameter
 
 MOST_CAUSES = 4

@@ -213,6 +213,11 @@ def doubted(causes: Sequence[Cause]) -> tuple[Cause, ...]:
     )
 
 
+def temper_of(lead: float) -> float:
+    """Return what differences of log evidence are divided by where so much is explained: no form is exact."""
+    return CONSTANTS["temper"] + CONSTANTS["misfit"] * max(lead, 0.0)
+
+
 def weigh(
     names: Sequence[str], scores: Sequence[float], nothing: float, unknown: float = -np.inf
 ) -> tuple[tuple[str, ...], float]:
@@ -233,7 +238,7 @@ def weigh(
     values = np.array(scores, dtype=float)
     order = np.argsort(-values)
     lead = max(float(values.max()) - nothing, 0.0)
-    temper = CONSTANTS["temper"] + CONSTANTS["misfit"] * lead
+    temper = temper_of(lead)
     weight = np.exp((values - values.max()) / temper)
     chance = np.exp(-max(lead - CONSTANTS["margin"] / 2.0, 0.0) / CONSTANTS["chance"])
     # a generic form must be the better one by as much as the named form may be inexact before it counts for more

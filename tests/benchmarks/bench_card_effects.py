@@ -22,7 +22,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 from studies.diagnosis.campaign import load_campaign
 from studies.diagnosis.evidence import SCALES
 from studies.diagnosis.investigate import investigate
-from studies.diagnosis.model import span_of
+from studies.diagnosis.problem import span_of
 from studies.effects import library
 from studies.errors import InputError
 from studies.instrument.card import load_card

@@ -20,7 +20,7 @@ import numpy as np
 
 from studies.diagnosis.constants import CONSTANTS
 from studies.diagnosis.fleet.outcome import Share, Value
-from studies.diagnosis.verdict import Interval
+from studies.diagnosis.verdict import Interval, temper_of
 from studies.effects import find_effect
 from studies.effects.states import FloatArray
 
@@ -102,7 +102,7 @@ def compare(response: str, scores: Mapping[str, Mapping[str, Standing]]) -> Shar
     kinds = list(answers)
     values = np.array([answers[kind] for kind in kinds])
     lead = float(values.max())
-    temper = CONSTANTS["temper"] + CONSTANTS["misfit"] * max(lead, 0.0) / len(scores)
+    temper = temper_of(lead / len(scores))
     weight = np.exp((values - lead) / temper)
     kind, apart, effect = kinds[int(np.argmax(values))]
     if kind == "none":

@@ -20,12 +20,13 @@ from scipy.constants import zero_Celsius
 from studies.diagnosis.baseline import Baseline, Followed, Reading
 from studies.diagnosis.campaign import Campaign
 from studies.diagnosis.constants import CONSTANTS
-from studies.diagnosis.model import Fit, Term, term_columns, used
+from studies.diagnosis.model import Fit
 from studies.diagnosis.noise import KERNELS, SHARES
 from studies.diagnosis.planning.chamber import Chamber
 from studies.diagnosis.planning.programme import Programme, Steps, candidates
 from studies.diagnosis.scan import applicable, scan
 from studies.diagnosis.search import Place
+from studies.diagnosis.terms import Term, term_columns, used
 from studies.effects import library
 from studies.effects.states import FloatArray, States, average
 

@@ -12,9 +12,10 @@ from scipy.special import logsumexp
 
 from studies.diagnosis.constants import CONSTANTS
 from studies.diagnosis.evidence import SCALES
-from studies.diagnosis.model import Fit, Term, term_columns
+from studies.diagnosis.model import Fit
 from studies.diagnosis.noise import SHARES
 from studies.diagnosis.scan import Bank, build_bank, leading
+from studies.diagnosis.terms import Term, term_columns
 from studies.diagnosis.verdict import weigh
 from studies.effects import Effect, Parameter
 from studies.effects.states import FloatArray

@@ -11,7 +11,7 @@ import pytest
 import studies.diagnosis
 from studies.cli import main
 from studies.diagnosis.baseline import View
-from studies.diagnosis.model import Term, term_columns
+from studies.diagnosis.terms import Term, term_columns
 from studies.effects import Span, States, apply_effect, apply_effects, find_effect, library
 from studies.effects.states import average, lag
 from studies.errors import InputError
