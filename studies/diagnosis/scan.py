@@ -125,13 +125,20 @@ def build_bank(model: Fit, effects: Sequence[Effect]) -> Bank:
 class Seen:
     """What a scan sees of one effect: its log evidence over all shapes, the best shape, and what the choice costs.
 
-    `other` is the best shape that lies apart from it in every parameter, where its evidence is near: the top of another hill.
+    `shapes` is how many were tried; `other` is the best of them that lies apart in every parameter, where its evidence is
+    near: the top of another hill.
     """
 
     term: Term
     gain: float
     best: float
+    shapes: int
     other: Term | None = None
+
+    @property
+    def may_pay(self) -> bool:
+        """Whether a better shape may pay: something is seen, or the effect is narrow and may lie between its many shapes."""
+        return self.gain > 0.0 or self.shapes > FEW
 
     @property
     def choice(self) -> float:
@@ -156,7 +163,7 @@ def scan(model: Fit, bank: Bank, models: int = 5, like: Fit | None = None) -> li
         if not np.isfinite(gain[best]):
             continue  # of the wrong sign in every shape
         total = float(logsumexp(gain[own]) - np.log(own.size))
-        out.append(Seen(bank.terms[best], total, float(gain[best]), _other_hill(bank, gain, own, int(best))))
+        out.append(Seen(bank.terms[best], total, float(gain[best]), own.size, _other_hill(bank, gain, own, int(best))))
     return sorted(out, key=lambda seen: -seen.gain)
 
 

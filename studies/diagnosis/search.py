@@ -135,7 +135,7 @@ def contenders(
 ) -> list[Hypothesis]:
     """Return the models with one effect more whose scans are near the best, each with its shape polished."""
     taken = {term.name for term in base.fit.terms}
-    seen = [s for s in scan(base.fit, bank) if s.term.name not in but and (s.term.name not in taken)]
+    seen = [s for s in scan(base.fit, bank) if s.term.name not in {*but, *taken} and s.may_pay]
     if not seen or seen[0].gain < -2.0:
         return []
     reach = NEAR + 0.5 * max(seen[0].gain, 0.0)

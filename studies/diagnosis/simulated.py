@@ -8,7 +8,7 @@ negative), so that every z has the prior 0 ± 1.
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar, cast
 
 import numpy as np
 from scipy.constants import zero_Celsius
@@ -134,11 +134,14 @@ class Simulated:
             return law_of(self.instrument, shipped.lowest, shipped.highest)
         return moved_law(shipped, self.instrument) if moved else shipped
 
-    @cached_property
+    @property
     def varied(self) -> Variations:
-        """The instrument and its neighbours."""
-        names = (*(v.name for v in self.values), *(f"initial.{lump}" for lump in LUMPS))
-        return Variations(self.instrument, self.law, names)
+        """The instrument and its neighbours; built once for every point, whatever the run."""
+        key = ("varied", self.values, self.z)
+        if key not in self.memory:
+            names = (*(v.name for v in self.values), *(f"initial.{lump}" for lump in LUMPS))
+            self.memory[key] = Variations(self.instrument, self.law, names)
+        return cast("Variations", self.memory[key])
 
     @cached_property
     def tau(self) -> float:
@@ -171,15 +174,15 @@ class Simulated:
         key = (self.z, initial)
         if key not in points:
             drive, time = self.drive(k)
-            found = predict(self.instrument, drive, (), self.law)
             here = {v.name: at(v, z) for v, z in zip(self.values, self.z, strict=True)}
             here |= {f"initial.{lump}": value for lump, value in zip(LUMPS, initial, strict=True)}
             known = [point for point in points.values() if point.solved]
+            found = predict(self.instrument, drive, () if known else self.varied, self.law)
             misses = [point.missed(here, found, self.response.column) for point in known]
-            solved = min(misses, default=np.inf) > STRAIGHT * self.noise
-            if solved:
+            solved = not known or min(misses) > STRAIGHT * self.noise
+            if known and solved:
                 found = predict(self.instrument, drive, self.varied, self.law)
-            else:
+            elif known:
                 found = replace(found, derivatives=known[int(np.argmin(misses))].found.derivatives)
             points[key] = Point(here, found, time, solved)
         return points[key].found, points[key].time

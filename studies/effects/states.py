@@ -114,7 +114,9 @@ def remembered(runs: Sequence[States]) -> list[FloatArray]:
 def average(values: FloatArray, group: int) -> FloatArray:
     """Return means of `group` samples at a time along the first axis; an incomplete last group is left out."""
     count = values.shape[0] // group
-    return np.asarray(values[: count * group].reshape(count, group, *values.shape[1:]).mean(axis=1))
+    return np.asarray(np.full(group, 1.0 / group) @ values[: count * group].reshape(count, group, -1)).reshape(
+        count, *values.shape[1:]
+    )
 
 
 def lag(drive: FloatArray, step: float, tau: float) -> FloatArray:
