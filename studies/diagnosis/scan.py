@@ -136,9 +136,9 @@ class Seen:
     other: Term | None = None
 
     @property
-    def may_pay(self) -> bool:
-        """Whether a better shape may pay: something is seen, or the effect is narrow and may lie between its many shapes."""
-        return self.gain > 0.0 or self.shapes > FEW
+    def narrow(self) -> bool:
+        """Whether it may lie between its many shapes and be seen as much less than it is."""
+        return self.shapes > FEW
 
     @property
     def choice(self) -> float:

@@ -20,6 +20,8 @@ MOST_CAUSES = 4
 CONTENDERS = 7
 NEAR = 25.0
 """A contender's scan may be this far behind the best one's, beside what the misfit of forms allows."""
+NARROW = 0.2
+"""Part of the best one's scan that is enough for an effect which may lie between its shapes."""
 LEAST_OF_TWO = 20.0
 """Lead over nothing below which one cause is not asked whether it is two."""
 SHARPER = 0.04
@@ -135,11 +137,12 @@ def contenders(
 ) -> list[Hypothesis]:
     """Return the models with one effect more whose scans are near the best, each with its shape polished."""
     taken = {term.name for term in base.fit.terms}
-    seen = [s for s in scan(base.fit, bank) if s.term.name not in {*but, *taken} and s.may_pay]
+    seen = [s for s in scan(base.fit, bank) if s.term.name not in {*but, *taken}]
     if not seen or seen[0].gain < -2.0:
         return []
-    reach = NEAR + 0.5 * max(seen[0].gain, 0.0)
-    return [polish(base, s, about) for s in seen[:CONTENDERS] if s.gain > seen[0].gain - reach]
+    most = max(seen[0].gain, 0.0)
+    near = [s for s in seen if s.gain > (most * NARROW - NEAR if s.narrow else max(0.5 * most - NEAR, 0.0))]
+    return [polish(base, s, about) for s in near[:CONTENDERS]]
 
 
 def polish(base: Hypothesis, seen: Seen, about: Baseline | None = None) -> Hypothesis:

@@ -30,10 +30,23 @@ def grid(span: Span, response: str) -> list[tuple[float, ...]]:
     """Centres over the covered range, a width apart."""
     low, high = span.temperature_low - zero_Celsius, span.temperature_high - zero_Celsius
     widths = [width for width in (0.25, 0.5, 1.0, 2.0) if width < 0.2 * (high - low)]
+    return [(float(centre), width) for width in widths for centre in np.arange(low, high, apart(span, width))]
+
+
+def apart(span: Span, width: float) -> float:
+    """Distance of the first centres, K."""
+    return max(0.8 * width, span.temperature_range / 80)
+
+
+def near(span: Span, response: str, shape: Shape) -> list[tuple[float, ...]]:
+    """Centres up to the next ones, a sixth of a width apart: a hop is sharp."""
+    centre, width = shape
+    reach = apart(span, width)
+    step = max(width / 6, reach / 15)
     return [
-        (float(centre), width)
-        for width in widths
-        for centre in np.arange(low, high, max(width * 0.8, (high - low) / 80))
+        (float(centre + k * step), float(width * ratio))
+        for ratio in (0.7, 1.0, 1.4)
+        for k in range(-int(reach / step), int(reach / step) + 1)
     ]
 
 
@@ -52,6 +65,7 @@ EFFECT = Effect(
     coefficients=(Coefficient("pull_{unit}", (1.0, 0.4, 0.4, 0.2, 0.35, 0.35)),),
     columns=columns,
     grid=grid,
+    near=near,
     sizes={"frequency_Hz": 1e-4, "inverse_q": 1.0},
     shape=(
         Parameter("temperature_degC", -150.0, 250.0, "where the modes cross", False),
