@@ -205,7 +205,8 @@ class Simulated:
             fine = replace(s, resonator=resonator, tau=self.tau, reference=reference)
             seen_fine = fine if self.warmer is None else replace(fine, resonator=resonator + self.warmer[k])
             coarse, seen = fine.averaged(self.group), seen_fine.averaged(self.group)
-            steep = np.asarray(found.law.frequency(seen.resonator) * found.law.slope(seen.resonator))
+            inside = np.clip(seen.resonator, found.law.lowest, found.law.highest)  # whatever an effect is tried to add
+            steep = np.asarray(found.law.frequency(inside) * found.law.slope(inside))
             views.append(View(fine, coarse, seen_fine, seen, steep))
             column = self.response.column
 
@@ -239,8 +240,8 @@ class Simulated:
     def change(self, excess: FloatArray) -> FloatArray:
         """Change of the response from the reference over its slope there, K."""
         law, reference = self.law, self.card.reference_temperature
-        zero = float(law.frequency(reference))
-        return np.asarray((law.frequency(reference + excess) - zero) / (zero * float(law.slope(reference))))
+        zero, there = float(law.frequency(reference)), np.clip(reference + excess, law.lowest, law.highest)
+        return np.asarray((law.frequency(there) - zero) / (zero * float(law.slope(reference))))
 
     def moved(self, values: dict[str, float], warmer: Sequence[FloatArray] | None) -> "Simulated":
         """Take over the values, a bold step at most, and the initial states; a part of the way where the law ends before."""
