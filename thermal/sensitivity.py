@@ -20,7 +20,7 @@ from thermal.steady import find_steady_state
 from thermal.sweeping import MOST_SWEEPS, Sweep, SweepError, capacity_ratio, hermite, hold, outflow, run_sweeps
 from thermal.transient import BLOCK
 
-RELATIVE_TOLERANCE = 1e-5  # of the derivatives, at the last sweep
+RELATIVE_TOLERANCE = 1e-7  # of the derivatives, at the last sweep
 CAPACITY_STEP = 0.5  # K, half the central difference of a capacity over temperature
 
 

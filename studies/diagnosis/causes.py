@@ -125,7 +125,13 @@ def _cause(campaign: Campaign, inquiry: Inquiry, place: Place) -> Cause:
         parameters_of(exact_forms(winner.fit), place.index),
         2.0 * max(max(scores) - nothing, 0.0),
         peak=peak_of(winner.fit, place.index),
+        shapes={n: _shape_of(rival.fit, place.index) for n, rival in zip(place.names, place.rivals, strict=True)},
     )
+
+
+def _shape_of(model: Fit, index: int) -> dict[str, Interval]:
+    term = model.terms[index]
+    return {own.name: Interval.about(value, 0.0) for own, value in zip(term.effect.shape, term.shape, strict=True)}
 
 
 def _judge_of(name: str) -> str:
@@ -206,11 +212,16 @@ def _same(one: Cause, two: Cause) -> bool:
     """The same effect in two responses is one cause when its place agrees; two members of one set are one answer."""
     if one.response == two.response:
         return one.effect in two.equivalent and two.effect in one.equivalent
-    if one.effect not in two.names and two.effect not in one.names:
-        return False
+    shared = [name for name in (one.effect, two.effect) if name in one.names and name in two.names]
+    return any(
+        _agree(*(c.parameters if name == c.effect else c.shapes.get(name, {}) for c in (one, two))) for name in shared
+    )
+
+
+def _agree(one: Mapping[str, Interval], two: Mapping[str, Interval]) -> bool:
     for name in ("time_s", "temperature_degC", "period_s", "run"):
-        if name in one.parameters and name in two.parameters:
-            a, b = one.parameters[name], two.parameters[name]
+        if name in one and name in two:
+            a, b = one[name], two[name]
             slack = 300.0 if name == "time_s" else 0.05 * abs(b.value) + 0.5
             if not (a.low - slack <= b.value <= a.high + slack or b.low - slack <= a.value <= b.high + slack):
                 return False

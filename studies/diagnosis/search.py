@@ -135,7 +135,7 @@ def from_the_card(plain: Hypothesis, bank: Bank) -> list[Hypothesis]:
 def contenders(
     base: Hypothesis, bank: Bank, but: Sequence[str] = (), about: Baseline | None = None
 ) -> list[Hypothesis]:
-    """Return the models with one effect more whose scans are near the best, each with its shape polished."""
+    """Return the models with one effect more whose scans are near enough to the best, each with its shape polished."""
     taken = {term.name for term in base.fit.terms}
     seen = [s for s in scan(base.fit, bank) if s.term.name not in {*but, *taken}]
     if not seen or seen[0].gain < -2.0:

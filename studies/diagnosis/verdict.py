@@ -57,6 +57,8 @@ class Cause:
     kind: str = "physics"
     peak: float = 0.0
     """Largest less smallest change of the response that the effect makes in this campaign, in its unit."""
+    shapes: Mapping[str, Mapping[str, Interval]] = field(default_factory=dict)
+    """Where and when each of its equals would be: shape parameters by name."""
 
     @property
     def names(self) -> tuple[str, ...]:
