@@ -134,7 +134,14 @@ def predict(
 def law_for(
     instrument: "Instrument", drive: Drive, margin: float = MARGIN, theory: "Theory" = "solid"
 ) -> "FrequencyLaw":
-    """Build the frequency law over the temperatures of a drive and of the reference, and some kelvin more."""
+    """Build the frequency law over the temperatures of a drive and of the reference, and some kelvin more.
+
+    Over all that the material allows where the card has effects on the temperature: how far they go is not known before.
+    """
+    from studies.effects import find_effect
+
+    if any(find_effect(one.name).thermal for one in instrument.effects):
+        return law_of(instrument, instrument.material.lowest, instrument.material.highest, theory)
     reached = np.append(drive.profile.value, instrument.reference_temperature)
     return law_of(instrument, float(reached.min()) - margin, float(reached.max()) + margin, theory)
 

@@ -19,6 +19,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
+from shell.errors import ShellError
 from studies.diagnosis.campaign import load_campaign
 from studies.diagnosis.evidence import SCALES
 from studies.diagnosis.investigate import investigate
@@ -245,7 +246,7 @@ def main():
         while time.process_time() < end:
             try:
                 file.write(json.dumps(answer(seed, given.plain), default=float) + "\n")
-            except InputError as error:
+            except (InputError, ShellError) as error:
                 print(f"seed {seed}: {error}")
             file.flush()
             seed += 1

@@ -1,5 +1,7 @@
 """The virtual gyro against its parts: shell solver, heat path, bias formula, record contract."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -12,6 +14,7 @@ from studies.instrument.tables.loss import Loss
 from studies.law import law_of
 from studies.record import read_record, write_record
 from studies.simulation.chamber import load_profile
+from studies.simulation.drive import drive_by_profile, rows_of
 from studies.simulation.heat_path import build_network, build_shell_and_stem, slowest_lag
 from studies.simulation.response import cell_weights, to_cells
 from studies.simulation.virtual_gyro import simulate_run
@@ -282,3 +285,16 @@ def test_unusable_runs_are_refused(card, law, tmp_path):
         load_profile(str(tmp_path / "absent.csv"))
     with pytest.raises(ThermalError, match="'jump' is no profile"):
         load_profile("jump 20 30")
+
+
+def test_an_effect_may_warm_the_resonator_beyond_the_drive():
+    """A drive that is doubled heats by 15 K: the frequency is the law's there, far from what the housing goes through."""
+    card = load_card("hrg-30mm")
+    warm = card.with_table("effect", [{"name": "self-heating", "response": "frequency_Hz", "heating_K_per_V2": 15.0}])
+    profile = load_profile("soak 20 10h")
+    drive = drive_by_profile(profile, rows_of(profile, 1 / 60))
+    drive = replace(drive, commands={"amplitude_squared": np.where(drive.time < 3600.0, 1.0, 2.0)})
+    found = simulate_run(warm, drive, noise=False)
+    law = law_of(card, 270.0, 330.0)
+    start, end = found.record["frequency_Hz"][[0, -1]]
+    assert end / start == pytest.approx(float(law.frequency(293.15 + 30.0) / law.frequency(293.15 + 15.0)), rel=1e-7)
