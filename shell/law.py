@@ -136,6 +136,10 @@ class FrequencyLaw:
         """
         return np.asarray(np.exp(self.logarithm(temperature, extrapolate=extrapolate)))
 
+    def inside(self, temperature: ArrayLike) -> Array:
+        """Return temperatures (K) with those beyond the law's range at its ends."""
+        return np.asarray(np.clip(temperature, self.lowest, self.highest))
+
     def logarithm(self, temperature: ArrayLike, *, extrapolate: bool = False) -> Array:
         """Return ln f, f in Hz; arguments as in `frequency`."""
         T = np.asarray(temperature, dtype=float)
@@ -256,7 +260,7 @@ class FrequencyLaw:
                 f"the resonator reaches {T.min() - zero_Celsius:.2f} to {T.max() - zero_Celsius:.2f} °C, but its frequency"
                 f" is known from {self.lowest - zero_Celsius:.2f} to {self.highest - zero_Celsius:.2f} °C only."
             )
-        return np.asarray(np.clip(T, self.lowest, self.highest))
+        return self.inside(T)
 
     def _nu(self, T: Array) -> Array:
         return self.material.value("poisson_ratio", T)

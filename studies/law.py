@@ -1,6 +1,7 @@
 """The frequency law of an instrument: what a simulation, a diagnosis, a study and a page take f(T) from."""
 
 from dataclasses import replace
+from math import inf
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -10,9 +11,13 @@ if TYPE_CHECKING:
 
 
 def law_of(
-    instrument: "Instrument", lowest: float, highest: float, theory: "Theory" = "solid", harmonic: int = 2
+    instrument: "Instrument",
+    lowest: float = -inf,
+    highest: float = inf,
+    theory: "Theory" = "solid",
+    harmonic: int = 2,
 ) -> "FrequencyLaw":
-    """Build the frequency law of an instrument between two temperatures (K), within its material's range."""
+    """Build the frequency law of an instrument between two temperatures (K), within its material's range: over all of it unless given."""
     from shell.law import build_law, check_mount
     from studies.errors import naming
 

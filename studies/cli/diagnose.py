@@ -104,7 +104,7 @@ def _plan(
 def _table(path: str, card: str | None, report: str | None) -> Answer:
     """Diagnose one steady-state table."""
     from studies.diagnosis.table import diagnose_table
-    from studies.reports.diagnosis import table_page, table_text
+    from studies.reports.diagnosis_table import table_page, table_text
 
     found = diagnose_table(path, card)
     _write(report, lambda: table_page(found, path))

@@ -115,6 +115,8 @@ def _cause(campaign: Campaign, inquiry: Inquiry, place: Place) -> Cause:
     exact = effect.equivalents.get(column, ())
     settled = bool(effect.judge or any(_judge_of(n) for n in exact)) and campaign.clock_known
     names = list(dict.fromkeys([effect.name, *members, *(() if settled else exact)]))
+    found = parameters_of(exact_forms(winner.fit), place.index)
+    shapes = {n: _shape_of(rival.fit, place.index) for n, rival in zip(place.names, place.rivals, strict=True)}
     if settled:
         names = [n for n in names if n == effect.name or n not in exact]
     return Cause(
@@ -122,10 +124,10 @@ def _cause(campaign: Campaign, inquiry: Inquiry, place: Place) -> Cause:
         column,
         probability,
         tuple(sorted(names[1:])),
-        parameters_of(exact_forms(winner.fit), place.index),
+        found,
         2.0 * max(max(scores) - nothing, 0.0),
         peak=peak_of(winner.fit, place.index),
-        shapes={n: _shape_of(rival.fit, place.index) for n, rival in zip(place.names, place.rivals, strict=True)},
+        shapes=shapes | {effect.name: found},
     )
 
 
@@ -213,9 +215,7 @@ def _same(one: Cause, two: Cause) -> bool:
     if one.response == two.response:
         return one.effect in two.equivalent and two.effect in one.equivalent
     shared = [name for name in (one.effect, two.effect) if name in one.names and name in two.names]
-    return any(
-        _agree(*(c.parameters if name == c.effect else c.shapes.get(name, {}) for c in (one, two))) for name in shared
-    )
+    return any(_agree(one.shapes.get(name, {}), two.shapes.get(name, {})) for name in shared)
 
 
 def _agree(one: Mapping[str, Interval], two: Mapping[str, Interval]) -> bool:

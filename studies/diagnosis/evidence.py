@@ -59,6 +59,10 @@ class Linear:
         """Number of columns with a flat prior."""
         return int(np.isinf(self.prior).sum())
 
+    def sizes(self, scales: FloatArray) -> FloatArray:
+        """Return the size of every column: that of its term, 1 for the baseline and for starts, (p,)."""
+        return np.asarray(np.append(scales, 1.0)[np.maximum(self.owner, -1)])
+
     @property
     def scaled(self) -> FloatArray:
         """Columns in units of their prior over the noise."""
@@ -127,10 +131,8 @@ class Grams:
 
     def scaling(self, scales: FloatArray, units: FloatArray) -> FloatArray:
         """Return the factor of every column, and 1 for the target, (..., p + 1)."""
-        owner, prior = self.model.owner, self.model.prior
-        own = np.ones(owner.size + 1)
-        own[:-1][owner >= 0] = scales[owner[owner >= 0]]
-        return np.where(np.append(np.isinf(prior), True), own, own * np.asarray(units)[..., None])
+        own = np.append(self.model.sizes(scales), 1.0)
+        return np.where(np.append(np.isinf(self.model.prior), True), own, own * np.asarray(units)[..., None])
 
     def log_evidence(self, scales: FloatArray, at: tuple[int, int] | None = None) -> FloatArray:
         """Return the log evidence at given sizes, under every noise model (K, S) or under one of them ()."""
@@ -209,8 +211,8 @@ def _beside_nothing(
     """Solve without the columns that no row shows: their coefficients are what they were before, 0 ± prior."""
     seen = replace(model, columns=model.columns[:, live], prior=model.prior[live], owner=model.owner[live])
     found = solve(seen, terms, scales, kinds)
-    own = np.append(found.scales, 1.0)[np.maximum(model.owner, -1)]
-    covariance = np.diag(found.variance * (own * np.where(live, 0.0, model.prior) / model.sigma) ** 2)
+    unseen = model.sizes(found.scales) * np.where(live, 0.0, model.prior) / model.sigma
+    covariance = np.diag(found.variance * unseen**2)
     covariance[np.ix_(live, live)] = found.covariance
     coefficients = np.zeros(model.owner.size)
     coefficients[live] = found.coefficients

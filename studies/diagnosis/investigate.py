@@ -19,15 +19,8 @@ from studies.diagnosis.model import Fit
 from studies.diagnosis.planning.advice import suggest_next
 from studies.diagnosis.planning.chamber import Chamber
 from studies.diagnosis.response import RESPONSES
-from studies.diagnosis.simulated import (
-    FAR,
-    Simulated,
-    as_shipped,
-    shifts_of,
-    simulate_baseline,
-    with_loss_carried,
-    without_rate_terms,
-)
+from studies.diagnosis.simulated import FAR, Simulated, shifts_of, simulate_baseline
+from studies.diagnosis.stated import as_shipped, with_loss_carried, without_rate_terms
 from studies.diagnosis.verdict import Cause, Interval, ResponseResult, Shift, Verdict, doubted, overall
 from studies.effects import Effect
 from studies.plausible import check_card_frequency
@@ -53,7 +46,7 @@ if TYPE_CHECKING:
 class Diagnosis(Shown):
     """A verdict with the fits behind it, for pages and extended models."""
 
-    drawn_by = "studies.reports.diagnosis:ladder"
+    drawn_by = "studies.reports.diagnosis_pictures:ladder"
 
     verdict: Verdict
     campaign: Campaign

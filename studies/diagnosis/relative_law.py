@@ -23,7 +23,7 @@ def relative_law(instrument: "Instrument", measured: FloatArray) -> Law:
     """
     material = instrument.material
     material.check(measured)
-    law = law_of(instrument, material.lowest, material.highest)
+    law = law_of(instrument)
 
     def frequency(temperature: FloatArray) -> FloatArray:
         return law.frequency(temperature, extrapolate=True)

@@ -204,9 +204,7 @@ def _gains(model: Fit, bank: Bank, kind: int, share: int) -> FloatArray:
     problem, linear, sigma = model.problem, model.linear, model.linear.sigma / model.solved.units[kind, share]
     basis = problem.noise.bases[kind]
     root = np.sqrt(problem.noise.weights(kind)[share])
-    scales = np.ones(linear.owner.size)
-    known = linear.owner >= 0
-    scales[known] = model.solved.scales[linear.owner[known]]
+    scales = linear.sizes(model.solved.scales)
     scales[np.isfinite(linear.prior)] *= linear.sigma / sigma
     # columns in units of their prior, with one row more for each prior: least squares is then the posterior
     own = basis.rotate(linear.scaled) * root[:, None] * scales

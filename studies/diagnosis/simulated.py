@@ -19,7 +19,6 @@ from studies.diagnosis.campaign import Campaign
 from studies.diagnosis.response import RESPONSES, Response
 from studies.diagnosis.verdict import NINETY, Shift
 from studies.effects.states import FloatArray, States, average
-from studies.instrument.tables.bias import TERMS
 from studies.law import law_of, moved_law
 from studies.simulation.drive import Boundary, Drive
 from studies.simulation.prediction import Prediction, Variations, predict
@@ -42,16 +41,12 @@ WARMER = 0.01
 """Relative change of what an initial state does with its size, 1/K: radiation and the law's bend."""
 STRAIGHT = 0.3
 """Part of the noise up to which a straight line may miss a prediction before it is drawn anew."""
-RATE_TERMS = tuple(key for key, (_, by_rate) in TERMS.items() if by_rate)
-"""Terms of the bias in the rate of the frequency."""
 FAR = 2.0
 """Prior standard deviations beyond which a value of the card is wrong."""
 AWAY = 1.0
 """Beyond which it is asked whether an effect about the card's own values does the same: several values move less than one."""
 STEPS = (1.0, 0.5, 0.25)
 """Parts of a step that are tried."""
-NUDGE = 0.01
-"""Part of 1/Q by which it is changed to see what the bias does then."""
 SILENT = 0.01
 """Part of the noise, or of the least known level, below which one standard deviation of a value changes nothing."""
 
@@ -127,7 +122,7 @@ class Simulated:
     def law(self) -> "FrequencyLaw":
         """Its frequency law over the whole range of the material; solved anew only where dimensions move."""
         if "law" not in self.memory:
-            self.memory["law"] = law_of(self.card, self.card.material.lowest, self.card.material.highest)
+            self.memory["law"] = law_of(self.card)
         shipped: FrequencyLaw = self.memory["law"]
         moved = {v.name for v, z in zip(self.values, self.z, strict=True) if z != 0.0}
         if any(name.startswith("resonator.") for name in moved):
@@ -205,7 +200,7 @@ class Simulated:
             fine = replace(s, resonator=resonator, tau=self.tau, reference=reference)
             seen_fine = fine if self.warmer is None else replace(fine, resonator=resonator + self.warmer[k])
             coarse, seen = fine.averaged(self.group), seen_fine.averaged(self.group)
-            inside = np.clip(seen.resonator, found.law.lowest, found.law.highest)  # whatever an effect is tried to add
+            inside = found.law.inside(seen.resonator)  # whatever an effect is tried to add
             steep = np.asarray(found.law.frequency(inside) * found.law.slope(inside))
             views.append(View(fine, coarse, seen_fine, seen, steep))
             column = self.response.column
@@ -240,8 +235,8 @@ class Simulated:
     def change(self, excess: FloatArray) -> FloatArray:
         """Change of the response from the reference over its slope there, K."""
         law, reference = self.law, self.card.reference_temperature
-        zero, there = float(law.frequency(reference)), np.clip(reference + excess, law.lowest, law.highest)
-        return np.asarray((law.frequency(there) - zero) / (zero * float(law.slope(reference))))
+        zero = float(law.frequency(reference))
+        return np.asarray((law.frequency(law.inside(reference + excess)) - zero) / (zero * float(law.slope(reference))))
 
     def moved(self, values: dict[str, float], warmer: Sequence[FloatArray] | None) -> "Simulated":
         """Take over the values, a bold step at most, and the initial states; a part of the way where the law ends before."""
@@ -341,59 +336,6 @@ def simulate_baseline(campaign: Campaign, card: "Instrument", noise: float) -> S
     telling = (varies > SILENT * noise) | (level > SILENT * max(noise, float(level.max())))
     values = tuple(v for v, tells in zip(own.values, telling, strict=True) if tells)
     return replace(own, values=values, z=(0.0,) * len(values))
-
-
-def without_rate_terms(campaign: Campaign, baseline: Simulated) -> Campaign:
-    """Take what the card says of the bias by rate (k4 to k9) out of the records: the static terms are free, these are stated."""
-    stated = dict(baseline.card.content.get("bias", {}))
-    static = {key: value for key, value in stated.items() if key not in RATE_TERMS}
-    if len(static) == len(stated) or "bias_deg_per_h" not in campaign.responses:
-        return campaign
-    still = baseline.instrument.with_table("bias", static)
-    runs = []
-    for k, run in enumerate(campaign.runs):
-        drive, time = baseline.drive(k)
-        whole, rest = (
-            predict(card, drive, (), baseline.law).columns["bias_deg_per_h"] for card in (baseline.instrument, still)
-        )
-        by_rate = whole - rest
-        fine = average(np.interp(run.states.time, time, by_rate), campaign.group)
-        responses = run.responses | {"bias_deg_per_h": run.responses["bias_deg_per_h"] - fine}
-        own = run.row_responses["bias_deg_per_h"] - np.interp(run.row_time, time, by_rate)
-        runs.append(replace(run, responses=responses, row_responses=run.row_responses | {"bias_deg_per_h": own}))
-    return replace(campaign, runs=tuple(runs))
-
-
-def with_loss_carried(campaign: Campaign, baseline: Simulated, loss: "Fit") -> Campaign:
-    """Tell the bias what the effects on 1/Q do to it: B ∝ Δ(1/τ), which is the card's anisotropy of π f/Q."""
-    made = loss.beside_temperature()
-    if not made:
-        return campaign
-    card = baseline.instrument
-    lossier = card.with_values({"loss.inverse_q": (1.0 + NUDGE) * card.loss.inverse_q})
-    carried = []
-    for k, run in enumerate(campaign.runs):
-        drive, time = baseline.drive(k)
-        one, two = (predict(own, drive, (), baseline.law).columns for own in (card, lossier))
-        change = two["inverse_q"] - one["inverse_q"]  # none where the card adds up parts: their anisotropy is their own
-        gain = np.divide(
-            two["bias_deg_per_h"] - one["bias_deg_per_h"], change, np.zeros_like(change), where=change != 0.0
-        )
-        here = average(np.interp(run.states.time, time, gain), campaign.group)
-        carried.append(np.stack([here * own[k] for own in made], axis=1))
-    return replace(campaign, carried=tuple(carried))
-
-
-def as_shipped(campaign: Campaign, baseline: Simulated) -> dict[str, float]:
-    """Return what the card as shipped leaves of every response, rms on the records' rows; of a bias about each run's mean."""
-    parts: dict[str, list[FloatArray]] = {column: [] for column in campaign.responses}
-    for k, run in enumerate(campaign.runs):
-        drive, time = baseline.drive(k)
-        found = predict(baseline.card, drive, (), baseline.law)
-        for column, own in parts.items():
-            rest = run.row_responses[column] - np.interp(run.row_time, time, found.columns[column])
-            own.append(rest - np.nanmean(rest) if RESPONSES[column].own_offset else rest)
-    return {column: float(np.sqrt(np.nanmean(np.concatenate(own) ** 2))) for column, own in parts.items()}
 
 
 def shifts_of(model: "Fit") -> list[Shift]:

@@ -51,7 +51,7 @@ class TableDiagnosis(Shown):
         What was found, in words.
     """
 
-    drawn_by = "studies.reports.diagnosis:table_residuals"
+    drawn_by = "studies.reports.diagnosis_table:table_residuals"
 
     verdict: Verdict
     temperature: FloatArray

@@ -12,7 +12,8 @@ from studies.papers import hrg
 from studies.papers.settling import NETWORKS, ROOM_degC
 from studies.reports import gyro_papers, style
 from studies.reports.bias_twin import twin_chapters
-from studies.reports.diagnosis import headline, table_chapters
+from studies.reports.diagnosis import headline
+from studies.reports.diagnosis_table import table_chapters
 from studies.reports.frequency import coefficients_table, error_figure, fit_figure, order_chapter
 from studies.reports.page import Block, Chapter, Facts, Picture, Table, Text, draw, render_page
 from studies.reports.settling import settling_chapter

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from studies.instrument.card import Instrument
 
 Array = NDArray[np.float64]
-MARGIN = 10.0  # K beyond the boundary in which the frequency stays known: effects and self-heating
+MARGIN = 10.0  # K beyond the boundary in which the frequency stays known: the drive's own heat
 STEP = 1e-3  # of a value, or of its standard deviation: the differences that give derivatives
 INITIAL = "initial."
 SHIFT, JUMP, KINK = "shift", "jump.", "kink."
@@ -141,7 +141,7 @@ def law_for(
     from studies.effects import find_effect
 
     if any(find_effect(one.name).thermal for one in instrument.effects):
-        return law_of(instrument, instrument.material.lowest, instrument.material.highest, theory)
+        return law_of(instrument, theory=theory)
     reached = np.append(drive.profile.value, instrument.reference_temperature)
     return law_of(instrument, float(reached.min()) - margin, float(reached.max()) + margin, theory)
 

@@ -43,11 +43,9 @@ def near(span: Span, response: str, shape: Shape) -> list[tuple[float, ...]]:
     centre, width = shape
     reach = apart(span, width)
     step = max(width / 6, reach / 15)
-    return [
-        (float(centre + k * step), float(width * ratio))
-        for ratio in (0.7, 1.0, 1.4)
-        for k in range(-int(reach / step), int(reach / step) + 1)
-    ]
+    steps = int(reach / step)
+    centres = centre + step * np.arange(-steps, steps + 1)
+    return [(float(at), float(width * ratio)) for ratio in (0.7, 1.0, 1.4) for at in centres]
 
 
 def steady(x: FloatArray, shape: Shape) -> FloatArray:

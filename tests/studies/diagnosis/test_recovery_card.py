@@ -9,7 +9,8 @@ import pytest
 from studies.cli import main
 from studies.diagnosis.campaign import load_campaign
 from studies.diagnosis.investigate import investigate
-from studies.diagnosis.simulated import simulate_baseline, without_rate_terms
+from studies.diagnosis.simulated import simulate_baseline
+from studies.diagnosis.stated import without_rate_terms
 from studies.effects import find_effect
 from studies.instrument.card import load_card, save_card
 from studies.record import read_record

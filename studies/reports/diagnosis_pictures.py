@@ -1,0 +1,177 @@
+"""Pictures of a diagnosis: the ladder of the residual, the residual in time and against its inputs, the next run."""
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.constants import zero_Celsius
+
+from studies.diagnosis.held_out import residuals
+from studies.diagnosis.planning.next_run import NextRun
+from studies.diagnosis.response import RESPONSES
+from studies.diagnosis.verdict import ResponseResult
+from studies.reports.digits import plain
+from studies.reports.page import Picture, draw
+from studies.reports.style import BLACK, BLUE, ORANGE, VERMILION, figure
+
+if TYPE_CHECKING:
+    from studies.diagnosis.investigate import Diagnosis
+
+
+def ladder(diagnosis: "Diagnosis") -> Picture:
+    """Draw what is left of every response: as shipped, calibrated, with the named physics, noise; on held-out rows."""
+    columns = [c for c in diagnosis.verdict.responses if c in diagnosis.inquiries]
+    with figure(1, len(columns), height=3.0, squeeze=False) as (canvas, axes):
+        for axis, column in zip(axes[0], columns, strict=True):
+            response, result = RESPONSES[column], diagnosis.verdict.responses[column]
+            steps = [(word, value) for word, value in rungs(result) if value]
+            values = [value * response.scale for _, value in steps]
+            colours = {"as shipped": BLACK, "calibrated": VERMILION, "with causes": BLUE, "noise": ORANGE}
+            axis.bar(range(len(steps)), values, color=[colours[word] for word, _ in steps], width=0.7)
+            for k, (_, value) in enumerate(steps):
+                label = f"{plain(value * response.scale)} {response.shown}"
+                kelvin = as_temperature(diagnosis, column, value)
+                axis.annotate(
+                    label if kelvin is None else f"{label}\n{kelvin}",
+                    (k, values[k]),
+                    ha="center",
+                    va="bottom",
+                    fontsize=8,
+                )
+            axis.set_xticks(range(len(steps)), [word.replace(" ", "\n") for word, _ in steps], fontsize=8)
+            axis.set_ylim(0.0, 1.3 * max(values, default=1.0))
+            axis.set_title(f"{response.word} ({response.shown})", loc="left", fontsize=10)
+            axis.grid(visible=False, axis="x")
+        return draw(
+            canvas,
+            "Residual of each response, rms; calibrated and with causes: on rows left out of the fit. Of the frequency also as an error of temperature.",
+            "Bars of the residual rms of each response from the calibrated simulation to the noise.",
+        )
+
+
+def rungs(result: ResponseResult) -> list[tuple[str, float | None]]:
+    """Return the steps of the ladder, held out where that could be had."""
+
+    def best(pair: tuple[float | None, float | None] | None) -> float | None:
+        return None if pair is None else (pair[1] if pair[1] is not None else pair[0])
+
+    return [
+        ("as shipped", result.shipped),
+        ("calibrated", best(result.baseline)),
+        ("with causes", best(result.extended)),
+        ("noise", result.noise),
+    ]
+
+
+def as_temperature(diagnosis: "Diagnosis", column: str, value: float) -> str | None:
+    """Return the error of temperature that a residual of the frequency amounts to; None for the others."""
+    if not RESPONSES[column].thermometer:
+        return None
+    inquiry = diagnosis.inquiries[column]
+    steep = np.concatenate([np.abs(view.steep) for view in inquiry.final.tangent.views])
+    slope = float(np.median(steep)) if steep.size else 0.0
+    return (
+        None
+        if not slope
+        else f"{plain(1e3 * value / slope, 2)} mK"
+        if value < 0.1 * slope
+        else f"{plain(value / slope, 2)} K"
+    )
+
+
+def before_and_after(diagnosis: "Diagnosis", response: str) -> Picture:
+    """Draw the residual over the campaign before and, if anything is named, after the extension; the noise as a band."""
+    inquiry, unit = diagnosis.inquiries[response], RESPONSES[response]
+    noise = (diagnosis.verdict.responses[response].noise or 0.0) * unit.scale
+    strips = [(inquiry.plain, "the calibrated simulation", VERMILION)]
+    if inquiry.final.terms:
+        strips = [(inquiry.plain, "before: the calibrated simulation", VERMILION)]
+        strips.append((inquiry.final, "after: with the named causes", BLUE))
+    with figure(len(strips), 1, height=2.0 * len(strips), sharex=True, sharey=True, squeeze=False) as (canvas, grid):
+        axes = grid[:, 0]
+        for axis, (model, title, colour) in zip(axes, strips, strict=True):
+            begin = 0.0
+            for run, rest in zip(diagnosis.campaign.runs, residuals(model, diagnosis.campaign), strict=True):
+                time, values = _thinned(run.row_time, rest * unit.scale)
+                axis.plot((begin + time - time[0]) / 3600.0, values, color=colour, linewidth=0.6)
+                begin += float(run.row_time[-1] - run.row_time[0])
+                axis.axvline(begin / 3600.0, color="#b0b6bd", linewidth=0.8)
+            axis.axhspan(-2 * noise, 2 * noise, color=ORANGE, alpha=0.25, label="noise, ± 2 rms")
+            axis.set_title(title, loc="left", fontsize=10)
+            axis.set_ylabel(f"residual ({unit.shown})")
+        axes[0].legend(loc="upper right")
+        axes[-1].set_xlabel("time of the runs one after the other (h)")
+        when = " before and after the extension" if inquiry.final.terms else ""
+        return draw(
+            canvas,
+            f"Residual of the {unit.word}{when}.",
+            f"The {unit.word} residual over time{when}; the last strip has rms {plain(noise)} {unit.shown}.",
+        )
+
+
+def _thinned(time: np.ndarray, values: np.ndarray, most: int = 500) -> tuple[np.ndarray, np.ndarray]:
+    step = max(1, time.size // most)
+    return time[::step], values[::step]
+
+
+def residual_views(diagnosis: "Diagnosis", response: str) -> Picture:
+    """Draw the baseline's residual against temperature (heating and cooling), rate, frequency and the drives."""
+    campaign, inquiry, unit = diagnosis.campaign, diagnosis.inquiries[response], RESPONSES[response]
+    fit = inquiry.plain
+    problem, views = fit.problem, fit.tangent.views
+    rest = fit.residual * unit.scale
+    inputs: dict[str, np.ndarray] = {
+        "resonator temperature (°C)": problem.stack([v.seen.resonator - zero_Celsius for v in views]),
+        "rate (K/min)": 60.0 * problem.stack([v.seen.rate for v in views]),
+    }
+    if "frequency_Hz" in campaign.responses:
+        inputs["frequency (Hz)"] = problem.stack([run.responses["frequency_Hz"] for run in campaign.runs])
+    for label, drive in (("amplitude (V)", "amplitude_squared"), ("electrode voltage (V)", "voltage_squared")):
+        if all(getattr(v.coarse, drive) is not None for v in views):
+            inputs[label] = np.sqrt(problem.stack([getattr(v.coarse, drive) for v in views]))
+    heating = inputs["rate (K/min)"] > 0
+    runs = np.concatenate([np.full(int(mask.sum()), k) for k, mask in enumerate(problem.present)])
+    columns = 2
+    rows = (len(inputs) + 2) // columns
+    with figure(rows, columns, height=2.5 * rows, sharey=True) as (canvas, axes):
+        flat = list(np.ravel(axes))
+        for axis, (label, values) in zip(flat, inputs.items(), strict=False):
+            axis.plot(
+                values[heating], rest[heating], ".", color=VERMILION, markersize=2, label="heating", rasterized=True
+            )
+            axis.plot(values[~heating], rest[~heating], ".", color=BLUE, markersize=2, label="cooling", rasterized=True)
+            axis.set_xlabel(label)
+            axis.locator_params(axis="x", nbins=4)
+            axis.ticklabel_format(axis="x", useOffset=False)
+        axis = flat[len(inputs)]
+        axis.boxplot([rest[runs == k] for k in np.unique(runs)], showfliers=False)
+        axis.set_xlabel("run")
+        for axis in flat[len(inputs) + 1 :]:
+            axis.set_visible(False)
+        for axis in flat[::columns]:
+            axis.set_ylabel(f"residual ({unit.shown})")
+        flat[0].legend(markerscale=4)
+        return draw(
+            canvas,
+            f"Baseline residual of the {unit.word} (means over {campaign.step:.0f} s) against its inputs.",
+            f"Scatter of the {unit.word} residual against temperature, rate, frequency and drives.",
+        )
+
+
+def next_run_picture(run: NextRun) -> Picture:
+    """Draw the suggested run: the chamber's temperature, and the drives that step."""
+    rows = 1 + len(run.drives)
+    heights = [2.0] + [0.7] * len(run.drives)
+    with figure(rows, 1, height=1.1 + sum(heights), sharex=True, squeeze=False, height_ratios=heights) as (
+        canvas,
+        axes,
+    ):
+        axes[0, 0].plot(run.time_h, run.temperature_degC, color=VERMILION)
+        axes[0, 0].set_ylabel("chamber (°C)")
+        for axis, (column, steps) in zip(axes[1:, 0], run.drives.items(), strict=True):
+            begin = np.arange(len(steps.levels) + 1) * steps.hold_min / 60.0
+            axis.stairs(steps.levels, begin, baseline=None, color=BLUE)
+            axis.set_ylabel(column, rotation=0, ha="right", va="center", fontsize=8)
+            axis.locator_params(axis="y", nbins=3)
+            axis.margins(y=0.2)
+        axes[-1, 0].set_xlabel("time (h)")
+        return draw(canvas, f"Suggested next run: {run.profile}.", f"Chamber profile of the next run: {run.profile}.")
