@@ -6,6 +6,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from scipy.constants import zero_Celsius
 
+from compensation.lines import Line, find_line
 from compensation.spikes import find_spike_groups, find_spikes, find_step
 from compensation.wander import white_noise
 from studies.diagnosis.checks import FEWEST_BINS, check_device, check_units
@@ -21,6 +22,10 @@ TEMPERATURES = ("housing_temperature_degC", "chamber_temperature_degC", "resonat
 COMMANDS = ("drive_amplitude_V", "electrode_bias_V", "quadrature_V", "pattern_angle_deg")
 MOST_BINS = 800
 FINEST = 40
+RESOLVED, FINER = 2.5, 3
+"""Steps of the grid to a period of a fast line, for which it may have so many times the usual bins."""
+LEAST_LINE = 0.01
+"""Part of the variance of what a response does from row to row from which on a line counts: without it the noise is less by 0.5 %."""
 
 
 @dataclass(frozen=True)
@@ -69,7 +74,7 @@ class Run:
 class Campaign:
     """All runs of one gyro on one grid.
 
-    `temperature_noise` is that of one reading of the driving temperature, K; `turn_on` the standard deviation of a run's own
+    `step` is that of the coarse grid, `sampling` that of the rows, s; `temperature_noise` is that of one reading of the driving temperature, K; `turn_on` the standard deviation of a run's own
     offset of the bias as a card states it, °/h, 0 where nothing is said of it; `carried` what effects on 1/Q do to the bias by what
     a card says, °/h, one (n, m) array a run on the coarse grid, empty where there are none.
     """
@@ -77,6 +82,7 @@ class Campaign:
     runs: tuple[Run, ...]
     step: float
     group: int
+    sampling: float
     responses: tuple[str, ...]
     reference: float
     temperature_source: str
@@ -151,6 +157,11 @@ def load_campaign(records: Sequence[Record], reference_degC: float | None = None
     sampling = max(float(np.median(np.diff(table["time_s"]))) if table["time_s"].size > 1 else 1.0 for table in tables)
     # whole rows to a bin: the mean of rows is then compared with the mean of the model at the same moments
     rows = max(1, round(sum(spans) / MOST_BINS / sampling))
+    for name in responses:
+        readings = [(table["time_s"], table[name]) for table in tables if name in table]
+        line = fast_line(readings, sampling, rows * sampling)
+        if line is not None and FINER * line.period > RESOLVED * rows * sampling:
+            rows = min(rows, int(line.period / RESOLVED / sampling))
     whole = -(-rows // FINEST)
     group = -(-rows // whole)
     step = sampling * group * whole
@@ -189,8 +200,25 @@ def load_campaign(records: Sequence[Record], reference_degC: float | None = None
             notes.append(f"{drive} is not in every record and is left out.")
             runs = [_without(run, drive) for run in runs]
     return Campaign(
-        tuple(runs), step, group, responses, float(reference), source, timed, tuple(notes), skipped, outliers, reading
+        tuple(runs),
+        step,
+        group,
+        sampling,
+        responses,
+        float(reference),
+        source,
+        timed,
+        tuple(notes),
+        skipped,
+        outliers,
+        reading,
     )
+
+
+def fast_line(series: Sequence[tuple[FloatArray, FloatArray]], sampling: float, step: float) -> Line | None:
+    """Return the largest line that is too fast for steps of a grid, of readings or of what a model leaves of them."""
+    line = find_line(series, sampling, RESOLVED * step)
+    return line if line is not None and line.share > LEAST_LINE else None
 
 
 def _reading_noise(temperature: FloatArray) -> float:

@@ -12,7 +12,7 @@ from studies.diagnosis.baseline import Baseline, Followed, Lagged, Reading, bend
 from studies.diagnosis.campaign import Campaign
 from studies.diagnosis.clock import judged
 from studies.diagnosis.constants import CONSTANTS
-from studies.diagnosis.lack_of_fit import Leftover, look
+from studies.diagnosis.lack_of_fit import Leftover, beside_fast_line, look
 from studies.diagnosis.model import Fit, fit, settle
 from studies.diagnosis.noise import tails_of
 from studies.diagnosis.problem import Problem, pose
@@ -156,7 +156,7 @@ def inquire(campaign: Campaign, plain: Fit, effects: Sequence[Effect] | None, sc
     selection = judged(campaign, selection, effects)
     if score_held_out:
         selection = refuse(campaign, selection)
-    leftover = look(plain, selection.final.fit)
+    leftover = beside_fast_line(campaign, plain, selection.final.fit, look(plain, selection.final.fit))
     if not selection.final.fit.terms:
         return Inquiry(plain.problem, selection, leftover, {})
     generic = look(selection.plain.fit, selection.plain.fit)

@@ -10,7 +10,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.linalg import solve_triangular
 
+from studies.diagnosis.campaign import Campaign, fast_line
 from studies.diagnosis.constants import CONSTANTS
+from studies.diagnosis.held_out import residuals, rms
 from studies.diagnosis.model import Fit, fit
 from studies.diagnosis.noise import SHARES, student_log
 from studies.diagnosis.scan import applicable, build_bank, scan
@@ -219,6 +221,19 @@ def look(plain: Fit, model: Fit) -> Leftover:
         if evidence < CONSTANTS["margin"] - CONSTANTS["log_prior_unknown"]:
             return Leftover(WANDER, float(own), part, best, float(smooth), True)
     return Leftover(name, float(evidence), part, best, float(smooth))
+
+
+def beside_fast_line(campaign: Campaign, plain: Fit, model: Fit, left: Leftover) -> Leftover:
+    """Return what is left, or a line faster than the steps of the grid where it is more: of it their means show little or nothing."""
+    before, after = (residuals(own, campaign) for own in (plain, model))
+    series = [(run.row_time, own) for run, own in zip(campaign.runs, after, strict=True)]
+    line = fast_line(series, campaign.sampling, campaign.step)
+    if line is None or line.evidence < left.evidence:
+        return left
+    made = line.share * rms(after) ** 2
+    removed = max(rms(before) ** 2 - rms(after) ** 2, 0.0)
+    word = f"time: a line of {line.period:.3g} s, too fast for steps of {campaign.step:.3g} s"
+    return replace(left, input=word, evidence=line.evidence, share=min(left.share, removed / (removed + made)))
 
 
 def share(plain: Fit, model: Fit, fullest: Fit) -> float:

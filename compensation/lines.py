@@ -1,0 +1,95 @@
+"""Lines: one period that stands out of the spectrum of several series."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.fft import next_fast_len, rfft
+from scipy.ndimage import median_filter, uniform_filter1d
+from scipy.special import gammaln
+from scipy.stats import gamma
+
+from compensation.spikes import find_step
+from compensation.wander import white_noise
+
+Array = NDArray[np.float64]
+AROUND = 101
+"""Frequencies about each whose median power is the level of the noise there; a series with fewer rows has no spectrum."""
+CYCLES = 8.0
+"""Periods in the longest series that make a line."""
+TALLEST = 4.0
+"""Distance from the mean, in robust standard deviations, beyond which a reading belongs to no line."""
+FAR = 100.0
+FASTEST = 2.5
+"""Rows to a period: what is faster may be folded, and the law of a power is another one at two rows."""
+
+
+@dataclass(frozen=True)
+class Line:
+    """A line.
+
+    Attributes
+    ----------
+    period : float
+        In s.
+    evidence : float
+        Minus the log of the probability that noise has one as strong among all that were looked at.
+    share : float
+        Its part of the variance within twice the slowest period, in the series where it is the largest.
+    """
+
+    period: float
+    evidence: float
+    share: float
+
+
+def find_line(
+    series: Sequence[tuple[Array, Array]], sampling: float, slowest: float, least: float = 12.0
+) -> Line | None:
+    """Return the largest line with a period from `FASTEST` rows to `slowest`, s, of series of times (m,), s, and readings (m,).
+
+    In noise of any smooth spectrum the sum over n series of their periodograms over their levels has a gamma law of order n. A
+    slope that is rounded to steps q makes lines too, of amplitude q/π where the noise does not blur them: none of up to twice that
+    counts. None where no line has the evidence that is the `least`.
+    """
+    rows = [(time[known], values[known]) for time, values in series if (known := np.isfinite(values)).sum() > AROUND]
+    longest = round(max((time[-1] - time[0] for time, _ in rows), default=0.0) / sampling) + 1
+    count = next_fast_len(2 * longest, real=True)
+    frequency = np.arange(count // 2 + 1) / (count * sampling)
+    slow = max(1.0 / slowest, CYCLES / (longest * sampling))
+    looked_at = (frequency > slow) & (frequency < 1.0 / (FASTEST * sampling))
+    ratio, share = np.zeros(frequency.size), np.zeros(frequency.size)
+    for time, values in rows:
+        fast = _fast(time, values, sampling, slowest)
+        window = np.hanning(fast.size)
+        amplitude = np.abs(rfft(fast * window, count)) * 2.0 / window.sum()
+        level = median_filter(amplitude**2, AROUND, mode="nearest") / np.log(2.0)
+        real = looked_at & (level > 0.0) & (amplitude > 2.0 * _of_rounding(values))
+        ratio[real] += amplitude[real] ** 2 / level[real]
+        share[real] = np.maximum(share[real], 0.5 * amplitude[real] ** 2 / np.var(fast))
+    evidence = _improbable(ratio, len(rows)) - np.log(max(int(looked_at.sum()), 1))
+    at = int(np.argmax(np.where(evidence > least, share, 0.0)))
+    return Line(1.0 / float(frequency[at]), float(evidence[at]), float(share[at])) if evidence[at] > least else None
+
+
+def _improbable(ratio: Array, order: int) -> Array:
+    """Return minus the log of the probability that a gamma law exceeds a number; far out by its leading term."""
+    with np.errstate(divide="ignore"):
+        far = ratio - (order - 1) * np.log(ratio) + gammaln(order)
+    return np.asarray(np.where(ratio > FAR * order, far, -gamma.logsf(ratio, order)))
+
+
+def _fast(time: Array, values: Array, sampling: float, slowest: float) -> Array:
+    """Return what readings do within twice the slowest period, on an even grid; a bend or a hop is clipped."""
+    table = np.interp(np.arange(time[0], time[-1] + 0.5 * sampling, sampling), time, values)
+    width = max(3, round(slowest / sampling))
+    fast = table - uniform_filter1d(uniform_filter1d(table, width, mode="nearest"), width, mode="nearest")
+    most = TALLEST * 1.4826 * float(np.median(np.abs(fast)))
+    return np.asarray(np.clip(fast, -most, most))
+
+
+def _of_rounding(values: Array) -> float:
+    """Return the amplitude of the first line that rounding makes of a slope; noise of a step or more blurs it."""
+    step = find_step(values)
+    return step / np.pi if white_noise(values) < step else 0.0
