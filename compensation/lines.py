@@ -35,13 +35,13 @@ class Line:
         In s.
     evidence : float
         Minus the log of the probability that noise has one as strong among all that were looked at.
-    share : float
-        Its part of the variance within twice the slowest period, in the series where it is the largest.
+    rms : float
+        Its size in the series where it is the largest.
     """
 
     period: float
     evidence: float
-    share: float
+    rms: float
 
 
 def find_line(
@@ -59,7 +59,7 @@ def find_line(
     frequency = np.arange(count // 2 + 1) / (count * sampling)
     slow = max(1.0 / slowest, CYCLES / (longest * sampling))
     looked_at = (frequency > slow) & (frequency < 1.0 / (FASTEST * sampling))
-    ratio, share = np.zeros(frequency.size), np.zeros(frequency.size)
+    ratio, size = np.zeros(frequency.size), np.zeros(frequency.size)
     for time, values in rows:
         fast = _fast(time, values, sampling, slowest)
         window = np.hanning(fast.size)
@@ -67,16 +67,15 @@ def find_line(
         level = median_filter(amplitude**2, AROUND, mode="nearest") / np.log(2.0)
         real = looked_at & (level > 0.0) & (amplitude > 2.0 * _of_rounding(values))
         ratio[real] += amplitude[real] ** 2 / level[real]
-        share[real] = np.maximum(share[real], 0.5 * amplitude[real] ** 2 / np.var(fast))
+        size[real] = np.maximum(size[real], amplitude[real] / np.sqrt(2.0))
     evidence = _improbable(ratio, len(rows)) - np.log(max(int(looked_at.sum()), 1))
-    at = int(np.argmax(np.where(evidence > least, share, 0.0)))
-    return Line(1.0 / float(frequency[at]), float(evidence[at]), float(share[at])) if evidence[at] > least else None
+    at = int(np.argmax(np.where(evidence > least, size, 0.0)))
+    return Line(1.0 / float(frequency[at]), float(evidence[at]), float(size[at])) if evidence[at] > least else None
 
 
 def _improbable(ratio: Array, order: int) -> Array:
     """Return minus the log of the probability that a gamma law exceeds a number; far out by its leading term."""
-    with np.errstate(divide="ignore"):
-        far = ratio - (order - 1) * np.log(ratio) + gammaln(order)
+    far = ratio - (order - 1) * np.log(np.maximum(ratio, 1.0)) + gammaln(order)
     return np.asarray(np.where(ratio > FAR * order, far, -gamma.logsf(ratio, order)))
 
 

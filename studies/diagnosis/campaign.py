@@ -24,8 +24,8 @@ MOST_BINS = 800
 FINEST = 40
 RESOLVED, FINER = 2.5, 3
 """Steps of the grid to a period of a fast line, for which it may have so many times the usual bins."""
-LEAST_LINE = 0.01
-"""Part of the variance of what a response does from row to row from which on a line counts: without it the noise is less by 0.5 %."""
+LEAST_LINE = 0.1
+"""Size of a line over the noise from which on it counts: without it the noise is less by 0.5 %."""
 
 
 @dataclass(frozen=True)
@@ -159,7 +159,7 @@ def load_campaign(records: Sequence[Record], reference_degC: float | None = None
     rows = max(1, round(sum(spans) / MOST_BINS / sampling))
     for name in responses:
         readings = [(table["time_s"], table[name]) for table in tables if name in table]
-        line = fast_line(readings, sampling, rows * sampling)
+        line = fast_line(readings, sampling, rows * sampling, white_noise(*(values for _, values in readings)))
         if line is not None and FINER * line.period > RESOLVED * rows * sampling:
             rows = min(rows, int(line.period / RESOLVED / sampling))
     whole = -(-rows // FINEST)
@@ -215,10 +215,12 @@ def load_campaign(records: Sequence[Record], reference_degC: float | None = None
     )
 
 
-def fast_line(series: Sequence[tuple[FloatArray, FloatArray]], sampling: float, step: float) -> Line | None:
+def fast_line(
+    series: Sequence[tuple[FloatArray, FloatArray]], sampling: float, step: float, noise: float
+) -> Line | None:
     """Return the largest line that is too fast for steps of a grid, of readings or of what a model leaves of them."""
     line = find_line(series, sampling, RESOLVED * step)
-    return line if line is not None and line.share > LEAST_LINE else None
+    return line if line is not None and line.rms > LEAST_LINE * noise else None
 
 
 def _reading_noise(temperature: FloatArray) -> float:

@@ -225,15 +225,14 @@ def look(plain: Fit, model: Fit) -> Leftover:
 
 def beside_fast_line(campaign: Campaign, plain: Fit, model: Fit, left: Leftover) -> Leftover:
     """Return what is left, or a line faster than the steps of the grid where it is more: of it their means show little or nothing."""
-    before, after = (residuals(own, campaign) for own in (plain, model))
-    series = [(run.row_time, own) for run, own in zip(campaign.runs, after, strict=True)]
-    line = fast_line(series, campaign.sampling, campaign.step)
+    rest = residuals(model, campaign)
+    series = [(run.row_time, own) for run, own in zip(campaign.runs, rest, strict=True)]
+    line = fast_line(series, campaign.sampling, campaign.step, rms(rest))
     if line is None or line.evidence < left.evidence:
         return left
-    made = line.share * rms(after) ** 2
-    removed = max(rms(before) ** 2 - rms(after) ** 2, 0.0)
+    removed = max(rms(residuals(plain, campaign)) ** 2 - rms(rest) ** 2, 0.0)
     word = f"time: a line of {line.period:.3g} s, too fast for steps of {campaign.step:.3g} s"
-    return replace(left, input=word, evidence=line.evidence, share=min(left.share, removed / (removed + made)))
+    return replace(left, input=word, evidence=line.evidence, share=min(left.share, removed / (removed + line.rms**2)))
 
 
 def share(plain: Fit, model: Fit, fullest: Fit) -> float:

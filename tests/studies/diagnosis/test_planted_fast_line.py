@@ -1,0 +1,57 @@
+"""A line faster than the steps of the grid: resolved where a finer grid does, else said to be there; never taken for noise."""
+
+import numpy as np
+import pytest
+
+from studies.diagnosis.campaign import load_campaign
+from studies.diagnosis.investigate import investigate
+from studies.record import Record
+
+ROWS, SAMPLING, LAG, NOISE = 2880, 5.0, 900.0, 4e-4  # rows a run, s, s, Hz
+
+
+def a_campaign(period, size=3.0):
+    """Two runs of 4 h, of a frequency that follows a chamber with one lag; a line beside it, 3 times the noise of a row."""
+    rng = np.random.default_rng(11)
+    records = []
+    time = SAMPLING * np.arange(ROWS)
+    for run, (low, high) in enumerate([(0.0, 40.0), (45.0, -5.0)]):
+        chamber = np.interp(time, [0.0, 1800.0, 5400.0, 9000.0, 12600.0], [20.0, 20.0, low, high, 20.0])
+        gyro = np.empty(ROWS)
+        gyro[0] = warm = chamber[0]
+        for k in range(1, ROWS):
+            warm += (0.5 * (chamber[k] + chamber[k - 1]) - warm) * (1.0 - np.exp(-SAMPLING / LAG))
+            gyro[k] = warm
+        frequency = 5000.0 * (1.0 + 8e-5 * (gyro - 20.0) + 3e-8 * (gyro - 20.0) ** 2)
+        frequency += NOISE * (rng.standard_normal(ROWS) + size * np.sin(2.0 * np.pi * time / period + 2.0 * run))
+        columns = {"time_s": time, "housing_temperature_degC": chamber, "frequency_Hz": frequency}
+        records.append(Record(columns, path=f"run{run}.csv", sha256=str(run)))
+    return load_campaign(records)
+
+
+def test_without_a_line_the_grid_is_the_usual_one():
+    campaign = a_campaign(60.0, size=0.0)
+    assert campaign.step == 35.0
+    assert investigate(campaign, advise=False).verdict.verdict == "adequate"
+
+
+@pytest.mark.slow
+def test_a_line_of_less_than_two_steps_is_named_on_a_finer_grid():
+    campaign = a_campaign(60.0)
+    assert campaign.step <= 60.0 / 2.5
+    verdict = investigate(campaign, advise=False).verdict
+    (cause,) = verdict.causes
+    assert (verdict.verdict, cause.effect) == ("explained", "periodic")
+    assert cause.parameters["period_s"].value == pytest.approx(60.0, abs=0.02)
+    assert verdict.responses["frequency_Hz"].noise == pytest.approx(NOISE, rel=0.05)
+
+
+def test_a_line_that_no_grid_resolves_is_said_to_be_there():
+    """Means over a step show nothing of it: fitted, the record is as good as noise, and its noise is 2.3 times too large."""
+    campaign = a_campaign(17.0)
+    assert campaign.step == 35.0
+    verdict = investigate(campaign, advise=False).verdict
+    result = verdict.responses["frequency_Hz"]
+    assert verdict.verdict == "unexplained"
+    assert result.left_over == "structure"
+    assert "a line of 17 s" in result.left_over_input
