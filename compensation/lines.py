@@ -7,8 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import next_fast_len, rfft
 from scipy.ndimage import median_filter, uniform_filter1d
-from scipy.special import gammaln
-from scipy.stats import gamma
+from scipy.special import gammaincc, gammaln
 
 from compensation.spikes import find_step
 from compensation.wander import white_noise
@@ -20,7 +19,8 @@ CYCLES = 8.0
 """Periods in the longest series that make a line."""
 TALLEST = 4.0
 """Distance from the mean, in robust standard deviations, beyond which a reading belongs to no line."""
-FAR = 100.0
+FAR = 200.0
+"""Beyond this and three times its order a gamma law counts by its leading term: it leaves the range of numbers."""
 FASTEST = 2.5
 """Rows to a period: what is faster may be folded, and the law of a power is another one at two rows."""
 
@@ -76,7 +76,8 @@ def find_line(
 def _improbable(ratio: Array, order: int) -> Array:
     """Return minus the log of the probability that a gamma law exceeds a number; far out by its leading term."""
     far = ratio - (order - 1) * np.log(np.maximum(ratio, 1.0)) + gammaln(order)
-    return np.asarray(np.where(ratio > FAR * order, far, -gamma.logsf(ratio, order)))
+    near = np.minimum(ratio, FAR + 3.0 * order)
+    return np.asarray(np.where(ratio > near, far, -np.log(gammaincc(order, near))))
 
 
 def _fast(time: Array, values: Array, sampling: float, slowest: float) -> Array:
