@@ -22,8 +22,10 @@ TEMPERATURES = ("housing_temperature_degC", "chamber_temperature_degC", "resonat
 COMMANDS = ("drive_amplitude_V", "electrode_bias_V", "quadrature_V", "pattern_angle_deg")
 MOST_BINS = 800
 FINEST = 40
-RESOLVED, FINER = 2.5, 3
-"""Steps of the grid to a period of a fast line, for which it may have so many times the usual bins."""
+RESOLVED = 2.5
+"""Steps of the grid to a period of a fast line that it resolves."""
+MOST_RESOLVED, LONGEST_RUN = 3 * MOST_BINS, 1200
+"""Bins for which a grid may be finer for such a line: of all runs, and of one, whose noise costs their third power."""
 LEAST_LINE = 0.1
 """Size of a line over the noise from which on it counts: without it the noise is less by 0.5 %."""
 
@@ -160,8 +162,8 @@ def load_campaign(records: Sequence[Record], reference_degC: float | None = None
     for name in responses:
         readings = [(table["time_s"], table[name]) for table in tables if name in table]
         line = fast_line(readings, sampling, rows * sampling, white_noise(*(values for _, values in readings)))
-        if line is not None and FINER * line.period > RESOLVED * rows * sampling:
-            rows = min(rows, int(line.period / RESOLVED / sampling))
+        if line is not None and line.period / RESOLVED > max(sum(spans) / MOST_RESOLVED, max(spans) / LONGEST_RUN):
+            rows = min(rows, max(1, int(line.period / RESOLVED / sampling)))
     whole = -(-rows // FINEST)
     group = -(-rows // whole)
     step = sampling * group * whole
@@ -179,8 +181,8 @@ def load_campaign(records: Sequence[Record], reference_degC: float | None = None
                 len(runs),
                 record.path or f"run {number + 1}",
                 {key: values[begin:end] for key, values in table.items()},
-                step / group,
-                0.5 * (whole - 1) * sampling,
+                sampling,
+                whole,
                 group,
                 offset,
                 reference,
@@ -213,6 +215,11 @@ def load_campaign(records: Sequence[Record], reference_degC: float | None = None
         outliers,
         reading,
     )
+
+
+def longest_resolved(period: float) -> float:
+    """Return the length of a record, s, whose grid resolves a line."""
+    return LONGEST_RUN * period / RESOLVED
 
 
 def fast_line(
@@ -326,15 +333,16 @@ def _grid_run(
     run: int,
     label: str,
     table: dict[str, FloatArray],
-    step: float,
-    centre: float,
+    sampling: float,
+    whole: int,
     group: int,
     offset: float,
     reference: float,
     responses: Sequence[str],
 ) -> Run | None:
     time = table["time_s"]
-    begin = time[0] + centre  # the rows of a step lie about its centre, not before it
+    step = whole * sampling
+    begin = time[0] + 0.5 * (step - sampling)  # the rows of a step lie about its centre, not before it
     slot = np.floor((time - begin) / step + 0.5).astype(int)
     fine = begin + step * np.arange(slot[-1] + 2)  # beyond the last row
     coarse = average(fine, group)
@@ -348,7 +356,7 @@ def _grid_run(
     return Run(
         record,
         label,
-        drives(run, fine, offset, reference, table),
+        drives(run, fine, whole, offset, reference, table),
         coarse,
         {name: steps.means(table[name]) if name in table else np.full(coarse.size, np.nan) for name in responses},
         time,

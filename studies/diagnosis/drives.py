@@ -70,8 +70,10 @@ def _unbent(means: FloatArray) -> FloatArray:
     return np.asarray(np.concatenate([means[:1], means[1:-1] - np.diff(means, 2) / 8.0, means[-1:]]))
 
 
-def drives(run: int, grid: FloatArray, offset: float, reference: float, table: dict[str, FloatArray]) -> States:
-    """Drives on the fine grid: the temperature between its rows, commands held until they change."""
+def drives(
+    run: int, grid: FloatArray, rows: int, offset: float, reference: float, table: dict[str, FloatArray]
+) -> States:
+    """Drives on the fine grid of so many `rows` a step: the temperature between its rows, commands held until they change."""
     time = table["time_s"]
     known = np.isfinite(table["temperature"])
     if known.sum() > 1.5 * grid.size:  # finer than the grid: the mean over a step, so that no heat is lost at a bend
@@ -98,4 +100,5 @@ def drives(run: int, grid: FloatArray, offset: float, reference: float, table: d
         voltage_squared=None if voltage is None else voltage**2,
         quadrature=command("quadrature_V"),
         pattern_angle=None if angle is None else np.radians(angle),
+        rows=rows,
     )

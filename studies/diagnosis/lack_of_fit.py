@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.linalg import solve_triangular
 
+from compensation.lines import Line
 from studies.diagnosis.campaign import Campaign, fast_line
 from studies.diagnosis.constants import CONSTANTS
 from studies.diagnosis.held_out import residuals, rms
@@ -39,6 +40,8 @@ class Leftover:
     """Log evidence of the strongest smooth form."""
     wander: bool = False
     """Whether it is nothing but a wander larger than noise is believed to be."""
+    line: Line | None = None
+    """The line that it is, where that is too fast for the grid."""
 
     @property
     def significant(self) -> bool:
@@ -232,7 +235,8 @@ def beside_fast_line(campaign: Campaign, plain: Fit, model: Fit, left: Leftover)
         return left
     removed = max(rms(residuals(plain, campaign)) ** 2 - rms(rest) ** 2, 0.0)
     word = f"time: a line of {line.period:.3g} s, too fast for steps of {campaign.step:.3g} s"
-    return replace(left, input=word, evidence=line.evidence, share=min(left.share, removed / (removed + line.rms**2)))
+    part = min(left.share, removed / (removed + line.rms**2))
+    return replace(left, input=word, evidence=line.evidence, share=part, line=line)
 
 
 def share(plain: Fit, model: Fit, fullest: Fit) -> float:

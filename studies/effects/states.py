@@ -39,6 +39,8 @@ class States:
         What is left of an initial offset of the resonator, e^(−t/τ), once there is a lag.
     before : (K,) array or None
         Temperatures at which the resonator turned in the runs before, K: all that a loop may remember of them.
+    rows : int
+        Readings at even moments of which a sample is the mean.
     """
 
     run: int
@@ -55,6 +57,7 @@ class States:
     spread: FloatArray | float = 0.0
     fading: FloatArray | float = 0.0
     before: FloatArray | None = None
+    rows: int = 1
 
     @property
     def step(self) -> float:
@@ -93,6 +96,7 @@ class States:
             pattern_angle=mean(self.pattern_angle),
             fading=average(self.fading, group) if isinstance(self.fading, np.ndarray) else self.fading,
             spread=average(self.excess**2, group) - average(self.excess, group) ** 2,
+            rows=group * self.rows,
         )
 
     def with_lag(self, tau: float) -> "States":

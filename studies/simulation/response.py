@@ -9,7 +9,7 @@ an Elinvar alloy. The bias follows the *thermal* frequency: a spring or a clock 
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -164,6 +164,7 @@ def _apply_effects(
         return values if even is time else np.interp(even, time, values)
 
     standing = {"pattern_angle": np.full(len(time), np.radians(instrument.bias.pattern_angle_deg))}
+    driven: dict[str, Any] = {name: onto(values) for name, values in (standing | dict(drive.commands)).items()}
     states = States(
         run=0,
         time=even,
@@ -172,7 +173,7 @@ def _apply_effects(
         resonator=onto(resonator),
         tau=tau,
         reference=instrument.reference_temperature,
-        **{name: onto(values) for name, values in (standing | dict(drive.commands)).items()},
+        **driven,
     )
     with naming(f"{instrument.path} [[effect]]"):
         changes = apply_effects([(one.name, one.response, one.parameters) for one in instrument.effects], states)

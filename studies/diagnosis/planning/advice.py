@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
-from studies.diagnosis.campaign import Campaign
+from studies.diagnosis.campaign import Campaign, longest_resolved
 from studies.diagnosis.model import Fit
 from studies.diagnosis.planning.chamber import Chamber
 from studies.diagnosis.planning.next_run import (
@@ -36,7 +36,7 @@ def suggest_next(
     if not inquiries:
         return "Record a run that covers the temperature range in both directions.", None
     if verdict.verdict == "unexplained":
-        return _look_again(campaign, verdict, chamber)
+        return _look_again(campaign, verdict, inquiries, chamber)
     clock = next((i.final for i in inquiries.values() if i.problem.response.thermometer), None)
     for cause in verdict.causes:
         if cause.equivalent:
@@ -119,12 +119,18 @@ def _name(scored: Scored) -> str:
     return f"{profile} with {drives}" if drives else profile
 
 
-def _look_again(campaign: Campaign, verdict: Verdict, chamber: Chamber | None) -> Advice:
+def _look_again(
+    campaign: Campaign, verdict: Verdict, inquiries: "Mapping[str, Inquiry]", chamber: Chamber | None
+) -> Advice:
     results = verdict.responses
     name = max(
         (name for name, result in results.items() if result.verdict == "unexplained"),
         key=lambda name: results[name].left_over_evidence,
     )
+    if (line := inquiries[name].leftover.line) is not None:
+        hours = longest_resolved(line.period) / 3600.0
+        text = f"{name} holds a line of {line.period:.3g} s, which means over {campaign.step:.3g} s do not show: "
+        return f"{text}diagnose a stretch of at most {hours:.2g} h by itself, on a grid that resolves it.", None
     seen = results[name].left_over_input
     programme = programme_for(campaign, seen, chamber)
     repeat = candidates(campaign, (), chamber)[0]

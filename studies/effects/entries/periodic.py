@@ -1,19 +1,21 @@
 """Periodic disturbance: a line at one period, with harmonics."""
 
 import numpy as np
+from scipy.special import diric
 
 from studies.effects.effect import Coefficient, Effect, Parameter, Shape, Span
 from studies.effects.states import FloatArray, States
 
 
 def columns(states: States, shape: Shape, response: str) -> FloatArray:
-    """Σ A_h sin(2πht/P) + B_h cos(2πht/P), h = 1 … 3, means over a step; t of the campaign or, after a restart, of the run.
+    """Σ A_h sin(2πht/P) + B_h cos(2πht/P), h = 1 … 3, means over the readings of a step; t of the campaign or, after a restart, of the run.
 
     A line that nothing ties to the start of a run, or to runs whose starts are not known, has its own sines and cosines in each.
     """
     period, restarts = shape
     turn = np.exp(2j * np.pi * (states.time if restarts else states.campaign_time) / period)
-    waves = np.stack([turn, turn**2, turn**3], axis=1) * np.sinc(np.arange(1, 4) * states.step / period)
+    apart = 2.0 * np.pi * states.step / (states.rows * period)  # phase from one reading to the next
+    waves = np.stack([turn, turn**2, turn**3], axis=1) * diric(np.arange(1, 4) * apart, states.rows)
     pairs = np.concatenate([waves.imag, waves.real], axis=1)
     out = np.zeros((states.time.size, 6 * (1 + MOST_RUNS)))
     place = 1 + states.run if restarts == OWN else 0

@@ -10,8 +10,8 @@ from studies.record import Record
 ROWS, SAMPLING, LAG, NOISE = 2880, 5.0, 900.0, 4e-4  # rows a run, s, s, Hz
 
 
-def a_campaign(period, size=3.0):
-    """Two runs of 4 h, of a frequency that follows a chamber with one lag; a line beside it, 3 times the noise of a row."""
+def a_campaign(period, size=3.0, runs=2, rows=ROWS):
+    """Runs of 4 h, of a frequency that follows a chamber with one lag; a line beside it, 3 times the noise of a row."""
     rng = np.random.default_rng(11)
     records = []
     time = SAMPLING * np.arange(ROWS)
@@ -25,8 +25,14 @@ def a_campaign(period, size=3.0):
         frequency = 5000.0 * (1.0 + 8e-5 * (gyro - 20.0) + 3e-8 * (gyro - 20.0) ** 2)
         frequency += NOISE * (rng.standard_normal(ROWS) + size * np.sin(2.0 * np.pi * time / period + 2.0 * run))
         columns = {"time_s": time, "housing_temperature_degC": chamber, "frequency_Hz": frequency}
+        columns = {name: column[:rows] for name, column in columns.items()}
         records.append(Record(columns, path=f"run{run}.csv", sha256=str(run)))
-    return load_campaign(records)
+    return load_campaign(records[:runs])
+
+
+def amplitude(cause):
+    """Of the first harmonic, whose phase in each run is its own."""
+    return np.hypot(cause.parameters["sine_Hz"].value, cause.parameters["cosine_Hz"].value)
 
 
 def test_without_a_line_the_grid_is_the_usual_one():
@@ -50,8 +56,19 @@ def test_a_line_that_no_grid_resolves_is_said_to_be_there():
     """Means over a step show nothing of it: fitted, the record is as good as noise, and its noise is 2.3 times too large."""
     campaign = a_campaign(17.0)
     assert campaign.step == 35.0
-    verdict = investigate(campaign, advise=False).verdict
+    verdict = investigate(campaign).verdict
     result = verdict.responses["frequency_Hz"]
     assert verdict.verdict == "unexplained"
     assert result.left_over == "structure"
     assert "a line of 17 s" in result.left_over_input
+    assert "a stretch of at most 2.3 h" in verdict.next_experiment
+
+
+@pytest.mark.slow
+def test_a_shorter_stretch_resolves_it():
+    """A row is then a step, a reading at a moment: the amplitude is that of the line, not that of its means."""
+    verdict = investigate(a_campaign(17.0, runs=1, rows=900), advise=False).verdict
+    (cause,) = verdict.causes
+    assert (verdict.verdict, cause.effect) == ("explained", "periodic")
+    assert cause.parameters["period_s"].value == pytest.approx(17.0, abs=1e-3)
+    assert amplitude(cause) == pytest.approx(3.0 * NOISE, rel=0.03)
