@@ -194,9 +194,10 @@ def refine(model: Fit, index: int, reach: float = 1.0) -> Fit:
 
 
 def _signed(model: Fit, index: int) -> Fit:
-    """A coefficient that cannot be negative and is has no evidence."""
-    effect = model.terms[index].effect
-    if effect.positive and model.coefficients_of(index)[0] < 0.0:
+    """An effect that cannot be negative and is has no evidence: by what it does along its first column, which the others resemble."""
+    places = model.columns_of(index)
+    own = model.linear.columns[:, places] - model.linear.columns[:, places].mean(axis=0)
+    if model.terms[index].effect.positive and own[:, 0] @ own @ model.solved.coefficients[places] < 0.0:
         return replace(model, solved=replace(model.solved, log_evidence=-np.inf))
     return model
 

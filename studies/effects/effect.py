@@ -116,7 +116,7 @@ class Effect:
     judge : str
         A column of the record that settles whether it is this effect or its equivalent, where it is there.
     positive : bool
-        Whether its first coefficient cannot be negative.
+        Whether it cannot go against its first column.
     event : bool
         Whether other runs know nothing of it, so that no held-out run can confirm it.
     by_clock : bool
