@@ -20,6 +20,8 @@ from studies.effects.states import FloatArray, States, average, remembered
 
 DELAY = 10.0
 """Standard deviation of the delay between housing sensor and resonator that every model tolerates, s."""
+LAGS = np.geomspace(60.0, 2e4, 7)
+"""Lags, s, from which one is looked for."""
 START = 10.0
 """Standard deviation of the resonator's unknown initial temperature about the housing's, K."""
 FOLLOWED_DELAY = 20.0
@@ -107,6 +109,9 @@ class Baseline(Protocol):
     def stated(self) -> "Baseline | None":
         """Return the baseline at the values of its card, where it is far from there; else None."""
 
+    def elsewhere(self, near: float = 0.0) -> Sequence["Baseline"]:
+        """Return the baseline at other points, everywhere or so many e-folds away: an effect may imitate its own values."""
+
     def alone(self, states: States) -> "Baseline":
         """Return the same law for one further run that starts in equilibrium."""
 
@@ -175,7 +180,7 @@ class Lagged:
             seen = view.seen
             x = seen.excess
             static = [x / 10.0, (x**2 + seen.spread) / 1e2, (x**3 + 3.0 * x * seen.spread) / 1e3][:powers]
-            level, own = levels(self.response, self.turn_on, k, runs, x.size)
+            level, own = levels(self.response, self.turn_on, k, self.states, x.size)
             start = np.zeros((x.size, runs))
             start[:, k] = view.coarse.fading * view.steep
             delay = -(view.coarse.housing - view.coarse.resonator) / self.tau * view.steep
@@ -189,7 +194,7 @@ class Lagged:
             columns.append(
                 np.concatenate([level, np.stack(static, 1), own, start, delay[:, None], slower[:, None]], axis=1)
             )
-        flat, tied = level_names(self.response, self.turn_on, runs)
+        flat, tied = level_names(self.response, self.turn_on, self.states)
         names = (
             *flat,
             *("slope", "quadratic", "cubic")[:powers],
@@ -244,6 +249,11 @@ class Lagged:
     def stated(self) -> None:
         """No card states its values."""
 
+    def elsewhere(self, near: float = 0.0) -> list["Lagged"]:
+        """Return it with other lags: without an effect of the rate, none at all may seem the best."""
+        lags = self.tau * np.exp([-near, near]) if near else LAGS
+        return [replace(self, tau=float(tau), warmer=None, starts=()) for tau in lags]
+
     def alone(self, states: States) -> "Lagged":
         """Return the same law for one further run that starts in equilibrium."""
         return replace(self, states=(states,), warmer=(np.zeros(states.time.size),), starts=())
@@ -295,13 +305,13 @@ class Followed:
 
     def tangent(self) -> Tangent:
         """Columns of the polynomial, the missed parts, and a delay against the thermometer."""
-        runs, powers, missed = len(self.states), self.response.powers, self.missed[0].shape[1]
+        powers, missed = self.response.powers, self.missed[0].shape[1]
         carried = self.carried[0].shape[1] if self.carried else 0
         shift, columns, views = [], [], []
         for k, own in enumerate(self.states):
             coarse = own.averaged(self.group)
             u = self.reading[k]
-            level, tied = levels(self.response, self.turn_on, k, runs, u.size)
+            level, tied = levels(self.response, self.turn_on, k, self.states, u.size)
             v = coarse.spread
             static = [u / 10.0, (u**2 + v) / 1e2, (u**3 + 3.0 * u * v) / 1e3][:powers]
             along = np.full(u.size, self.slope) + sum(
@@ -317,7 +327,7 @@ class Followed:
             columns.append(np.concatenate([level, np.stack(static, 1), besides, tied, late[:, None]], axis=1))
             steep = np.full(u.size, self.slope)
             views.append(View(own, coarse, own, coarse, steep))
-        flat, named = level_names(self.response, self.turn_on, runs)
+        flat, named = level_names(self.response, self.turn_on, self.states)
         names = (
             *flat,
             *("slope", "quadratic", "cubic")[:powers],
@@ -352,6 +362,10 @@ class Followed:
     def stated(self) -> None:
         """No card states its values."""
 
+    def elsewhere(self, near: float = 0.0) -> tuple[()]:
+        """Its temperature is given."""
+        return ()
+
     def alone(self, states: States) -> "Followed":
         """Return the same law for one further run whose states already hold the thermometer's temperature."""
         nothing = np.zeros(states.time.size // self.group)
@@ -362,18 +376,28 @@ class Followed:
         return replace(self, states=(states,), reading=(nothing,), whole=whole, missed=missed, carried=carried)
 
 
-def level_names(response: Response, turn_on: float, runs: int) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Return the names of the levels without a prior, and of a run's own offsets with one."""
-    own = tuple(f"offset@{k}" for k in range(runs)) if response.own_offset else ()
+def first_stretches(states: Sequence[States]) -> list[int]:
+    """Return, for every run, the number of the first run of its record: a gap in a log is no turn-on."""
+    records = [own.record if own.record >= 0 else -1 - k for k, own in enumerate(states)]
+    return [records.index(record) for record in records]
+
+
+def level_names(
+    response: Response, turn_on: float, states: Sequence[States]
+) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Return the names of the levels without a prior, and of a record's own offsets with one."""
+    own = tuple(f"offset@{k}" for k in dict.fromkeys(first_stretches(states))) if response.own_offset else ()
     return (("level",), own) if turn_on or not own else (own, ())
 
 
-def levels(response: Response, turn_on: float, run: int, runs: int, size: int) -> tuple[FloatArray, FloatArray]:
+def levels(
+    response: Response, turn_on: float, run: int, states: Sequence[States], size: int
+) -> tuple[FloatArray, FloatArray]:
     """Return the columns of one run that `level_names` names."""
-    flat, tied = level_names(response, turn_on, runs)
-    common, own = np.ones((size, 1)), np.zeros((size, runs))
-    own[:, run] = 1.0
-    return (own if "level" not in flat else common), own[:, : len(tied)]
+    flat, tied = level_names(response, turn_on, states)
+    firsts = first_stretches(states)
+    own = np.tile(np.array(list(dict.fromkeys(firsts))) == firsts[run], (size, 1)).astype(float)
+    return (own if "level" not in flat else np.ones((size, 1))), own[:, : len(tied)]
 
 
 def bends_of(values: FloatArray, reading: FloatArray, powers: int) -> tuple[float, ...]:

@@ -356,7 +356,7 @@ def _grid_run(
     return Run(
         record,
         label,
-        drives(run, fine, whole, offset, reference, table),
+        drives(run, record, fine, whole, offset, reference, table),
         coarse,
         {name: steps.means(table[name]) if name in table else np.full(coarse.size, np.nan) for name in responses},
         time,

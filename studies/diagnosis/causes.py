@@ -48,7 +48,9 @@ def vote(
     if len(inquiry.selection.places) == 1 and ranked[0][0] != place.names[0] and _key(place, ranked[0][0]) in votes:
         winner = ranked[0][1]
         selection = replace(inquiry.selection, final=winner)
-        out[column] = replace(inquiry, selection=selection, leftover=look(inquiry.plain, winner.fit), votes=votes)
+        out[column] = replace(
+            inquiry, selection=selection, leftover=look(inquiry.plain, winner.fit), votes=votes, scores=None
+        )
         thermometer = read_thermometer(campaign, winner.fit)
         for c in others:
             out[c] = inquire(campaign, begin(campaign, c, thermometer), effects, score_held_out)

@@ -71,7 +71,7 @@ def _unbent(means: FloatArray) -> FloatArray:
 
 
 def drives(
-    run: int, grid: FloatArray, rows: int, offset: float, reference: float, table: dict[str, FloatArray]
+    run: int, record: int, grid: FloatArray, rows: int, offset: float, reference: float, table: dict[str, FloatArray]
 ) -> States:
     """Drives on the fine grid of so many `rows` a step: the temperature between its rows, commands held until they change."""
     time = table["time_s"]
@@ -101,4 +101,5 @@ def drives(
         quadrature=command("quadrature_V"),
         pattern_angle=None if angle is None else np.radians(angle),
         rows=rows,
+        record=record,
     )

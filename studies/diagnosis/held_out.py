@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from studies.diagnosis.baseline import Baseline, Followed, Lagged, Tangent
+from studies.diagnosis.baseline import Baseline, Followed, Lagged, Tangent, first_stretches
 from studies.diagnosis.campaign import Campaign
 from studies.diagnosis.constants import CONSTANTS
 from studies.diagnosis.model import Fit, fit
@@ -192,8 +192,11 @@ def residuals(model: Fit, campaign: Campaign) -> list[FloatArray]:
 
 
 def own_columns(model: Fit, k: int) -> list[int]:
-    """Return which columns belong to run `k` alone: its offset and its initial state, of effects with memory too."""
-    return [place for place, name in enumerate(model.tangent.names) if name.endswith(f"@{k}")] + model.starts_of(k)
+    """Return which columns belong to run `k` alone: its record's offset and its initial state, of effects with memory too."""
+    first = first_stretches([view.fine for view in model.tangent.views])[k]
+    own = {place for place, name in enumerate(model.tangent.names) if name.endswith(f"@{k}")}
+    own |= {place for place, name in enumerate(model.tangent.names) if name == f"offset@{first}"}
+    return sorted(own) + model.starts_of(k)
 
 
 def level_of(model: Fit) -> float:
@@ -225,6 +228,19 @@ def score(model: Fit, campaign: Campaign, like: "Parts | None" = None, judge: Fi
     parts = _of(parts, like)
     foretold = _share(parts)
     return Score(training, _rms_or_none(parts) if foretold >= FEWEST_FORETOLD else None, foretold, parts)
+
+
+def score_both(plain: Fit, final: Fit, campaign: Campaign) -> tuple[Score, Score]:
+    """Return the scores of a baseline and of the model with causes beside it, on rows that the latter can foretell."""
+    extended = score(final, campaign, judge=final)
+    return score(plain, campaign, extended.parts, final), extended
+
+
+def is_worse(before: Score, after: Score) -> bool:
+    """Whether a model leaves more than the baseline, on rows that were held out or, where there are none, on its own."""
+    pairs = (before.held_out_rms, after.held_out_rms), (before.residual_rms, after.residual_rms)
+    one, two = pairs[0] if None not in pairs[0] else pairs[1]
+    return bool(one is not None and two is not None and two > one * (1.0 + ALIKE))
 
 
 Parts = list[tuple[FloatArray, "np.ndarray"]]

@@ -12,6 +12,7 @@ from studies.diagnosis.baseline import Baseline, Followed, Lagged, Reading, bend
 from studies.diagnosis.campaign import Campaign
 from studies.diagnosis.clock import judged
 from studies.diagnosis.constants import CONSTANTS
+from studies.diagnosis.held_out import Score, is_worse, score_both
 from studies.diagnosis.lack_of_fit import Leftover, beside_fast_line, look
 from studies.diagnosis.model import Fit, fit, settle
 from studies.diagnosis.noise import tails_of
@@ -37,7 +38,8 @@ class Thermometer:
         the fine one.
     missed : tuple of (N, m) arrays
         What may be temperature or not, as if it were, K: the slow part of what the model leaves, what is not known of the
-        law's bend beside the named effects, then every named effect on the frequency itself.
+        law's bend beside the named effects, then every named effect on the frequency itself and what the forms of thermal ones may
+        miss; last the bend itself, for a law that follows the temperature may do so as a power of it or of the frequency.
     states : tuple of States
         Runs on the fine grid with that temperature.
     """
@@ -61,6 +63,8 @@ class Inquiry:
     selection: Selection
     leftover: Leftover
     votes: Mapping[str, float]
+    scores: tuple[Score, Score] | None = None
+    """What the baseline and the model with causes leave, where it has any and that was measured."""
     unknown: float = -np.inf
     """Log posterior of generic structure without any named effect, on the scale of the selection's scores: less what such
     structure would add to the named effects."""
@@ -154,8 +158,9 @@ def inquire(campaign: Campaign, plain: Fit, effects: Sequence[Effect] | None, sc
     bank = build_bank(plain, applicable(plain.problem, plain, effects))
     selection = search(plain, bank)
     selection = judged(campaign, selection, effects)
+    scores = None
     if score_held_out:
-        selection = refuse(campaign, selection)
+        selection, scores = refuse(campaign, selection)
     leftover = beside_fast_line(campaign, plain, selection.final.fit, look(plain, selection.final.fit))
     if not selection.final.fit.terms:
         return Inquiry(plain.problem, selection, leftover, {})
@@ -166,25 +171,36 @@ def inquire(campaign: Campaign, plain: Fit, effects: Sequence[Effect] | None, sc
     if unknown > selection.final.score + inexact and not leftover.significant:
         # what is named patches up what a generic form says better alone, by more than its own may be inexact
         leftover = replace(generic, share=0.0)
-    return Inquiry(plain.problem, selection, leftover, {}, unknown - beside)
+    return Inquiry(plain.problem, selection, leftover, {}, scores, unknown - beside)
 
 
-def refuse(campaign: Campaign, selection: Selection) -> Selection:
-    """Drop causes, the weakest first, until each pays for itself, here and on rows that the model has not seen."""
+def refuse(campaign: Campaign, selection: Selection) -> tuple[Selection, tuple[Score, Score] | None]:
+    """Drop causes, the weakest first, until each pays for itself, here and on rows that the model has not seen.
+
+    Besides, what all of them leave must not be more than what the baseline does; returned with both scores.
+    """
     while selection.final.fit.terms:
         fewer = [drop(selection.final, k) for k in range(len(selection.final.fit.terms))]
-        for k in sorted(range(len(fewer)), key=lambda k: -fewer[k].score):
-            by_run = None if selection.final.fit.alone(k) or len(campaign.records) == 1 else held_out.by_record
-            pays = fewer[k].score < selection.final.score - CONSTANTS["margin"]
-            if not pays or not _pays(fewer[k].fit, selection.final.fit, campaign, by_run):
-                kept = tuple(place for n, place in enumerate(selection.places) if n != k)
-                other = _another(selection, k, fewer[k], campaign)
-                final = fewer[k] if other is None else other.rivals[0]
-                selection = replace(selection, final=final, places=kept if other is None else (*kept, other))
-                break
-        else:
-            break
-    return selection
+        weakest = sorted(range(len(fewer)), key=lambda k: -fewer[k].score)
+        unpaid = next((k for k in weakest if not _is_paid(campaign, selection, k, fewer[k])), None)
+        if unpaid is None:
+            scores = score_both(selection.plain.fit, selection.final.fit, campaign)
+            if not is_worse(*scores):
+                return selection, scores
+            kept = tuple(place for n, place in enumerate(selection.places) if n != weakest[0])
+            selection = replace(selection, final=fewer[weakest[0]], places=kept)
+            continue
+        kept = tuple(place for n, place in enumerate(selection.places) if n != unpaid)
+        other = _another(selection, unpaid, fewer[unpaid], campaign)
+        final = fewer[unpaid] if other is None else other.rivals[0]
+        selection = replace(selection, final=final, places=kept if other is None else (*kept, other))
+    return selection, None
+
+
+def _is_paid(campaign: Campaign, selection: Selection, k: int, without: Hypothesis) -> bool:
+    by_run = None if selection.final.fit.alone(k) or len(campaign.records) == 1 else held_out.by_record
+    pays = without.score < selection.final.score - CONSTANTS["margin"]
+    return pays and _pays(without.fit, selection.final.fit, campaign, by_run)
 
 
 def _another(selection: Selection, k: int, without: Hypothesis, campaign: Campaign) -> Place | None:
@@ -265,6 +281,7 @@ def read_thermometer(campaign: Campaign, model: Fit) -> Thermometer | None:
         excesses.append((x, whole))
         changes.append((baseline.change(x), baseline.change(whole)))
         parts = np.column_stack([filled, bend * x**2, *(own[k] for own in beside), inexact[k]])
-        missed.append(parts / np.where(np.abs(view.steep) > 0, view.steep, np.inf)[:, None])
+        parts = parts / np.where(np.abs(view.steep) > 0, view.steep, np.inf)[:, None]
+        missed.append(np.column_stack([parts, x - baseline.change(x)]))
         states.append(view.seen_fine)
     return Thermometer(tuple(changes), tuple(excesses), tuple(missed), tuple(states))

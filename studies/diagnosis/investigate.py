@@ -9,11 +9,12 @@ import numpy as np
 from scipy.special import erf
 
 from studies.diagnosis import held_out
+from studies.diagnosis.baseline import first_stretches
 from studies.diagnosis.campaign import Campaign
 from studies.diagnosis.causes import name_causes, vote
 from studies.diagnosis.checks import FEWEST_BINS
 from studies.diagnosis.constants import CONSTANTS
-from studies.diagnosis.held_out import Score
+from studies.diagnosis.held_out import Score, score_both
 from studies.diagnosis.inquiry import Inquiry, Thermometer, again, begin, inquire, read_thermometer, row_noise
 from studies.diagnosis.model import Fit
 from studies.diagnosis.planning.advice import suggest_next
@@ -156,13 +157,14 @@ def _doubt_turn_on(
     What changes a bias from run to run, ageing or a jump, does not come back. A run whose level leaves both neighbours far beyond
     the stated deviation has had another turn-on, if with levels of their own the runs need no cause.
     """
+    if len(campaign.records) < len(campaign.runs):
+        return campaign, inquiry
     free = replace(campaign, turn_on=0.0)
     plain = begin(free, column, thermometer)
     order = np.argsort([run.states.campaign_time[0] for run in campaign.runs])
     steps = np.diff(np.array(_run_shifts(plain))[order])
     furthest = np.maximum(np.minimum(steps[:-1], -steps[1:]), np.minimum(-steps[:-1], steps[1:]))
-    stretches = len(campaign.records) < len(campaign.runs)
-    if stretches or furthest.max(initial=0.0) < CONSTANTS["turned_back"] * campaign.turn_on:
+    if furthest.max(initial=0.0) < CONSTANTS["turned_back"] * campaign.turn_on:
         return campaign, inquiry
     without = inquire(free, plain, effects, score_held_out)
     if without.final.terms:
@@ -209,13 +211,16 @@ def _result(
 ) -> ResponseResult:
     plain, final, left = inquiry.plain, inquiry.final, inquiry.leftover
 
-    def measured(model: Fit, like: held_out.Parts | None = None) -> Score:
-        if score_held_out:
-            return held_out.score(model, campaign, like, final)
-        return Score(held_out.rms(held_out.residuals(model, campaign)), None)
-
-    extended = measured(final) if final.terms else None
-    base = measured(plain, None if extended is None else extended.parts)
+    extended = None
+    if inquiry.scores is not None:
+        base, extended = inquiry.scores
+    elif not score_held_out:
+        base = Score(held_out.rms(held_out.residuals(plain, campaign)), None)
+        extended = Score(held_out.rms(held_out.residuals(final, campaign)), None) if final.terms else None
+    elif final.terms:
+        base, extended = score_both(plain, final, campaign)
+    else:
+        base = held_out.score(plain, campaign)
     column = inquiry.problem.response.column
     mine = [cause for cause in causes if cause.response == column and cause.kind == "physics"]
     share = (left.share if left.significant else 1.0) if final.terms else None
@@ -313,11 +318,11 @@ def _spread_of_runs(final: Fit) -> tuple[float, float]:
 
 
 def _run_shifts(model: Fit) -> list[float]:
-    """Return the offset of every run about their mean, or the mean residual where runs have none."""
+    """Return the offset of every record about their mean, or the mean residual where they have none."""
     values = model.values()
     own = [value for name, value in values.items() if name.startswith("offset@")]
     if own:
         return [float(v - np.mean(own)) for v in own]
-    return [
-        float(np.nanmean(part)) if np.isfinite(part).any() else 0.0 for part in model.problem.unstack(model.residual)
-    ]
+    firsts = np.array(first_stretches([view.fine for view in model.tangent.views]))
+    rows, first = model.residual, firsts[model.problem.run]
+    return [float(rows[first == k].mean()) if np.any(first == k) else 0.0 for k in dict.fromkeys(firsts.tolist())]

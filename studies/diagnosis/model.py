@@ -14,6 +14,8 @@ from studies.diagnosis.problem import Problem
 from studies.diagnosis.terms import Term, inexact_columns, remembers, term_columns, used
 from studies.effects.states import FloatArray
 
+NEARER = (0.5, 0.25, 0.12, 0.06)
+"""Distances, e-folds, at which a better point of a baseline is looked for about one that was found far away."""
 IN_ONE_RUN = 0.99
 """Part of the power of what an effect does beyond the baseline from which on it does it in one run."""
 
@@ -279,13 +281,26 @@ def exact_forms(model: Fit) -> Fit:
     return fit(model.problem, model.baseline, terms, 1, model.solved.scales)
 
 
-def settle(problem: Problem, baseline: Baseline, taus: FloatArray | None = None) -> Fit:
-    """Fit a baseline alone, from the best of several lags where it has one."""
-    from studies.diagnosis.baseline import Lagged
+def from_elsewhere(model: Fit, rounds: int = 2) -> Fit:
+    """Return the fit of the same model from another point of its baseline, where one is better than where it is."""
 
-    if not isinstance(baseline, Lagged):
+    def best(now: Fit, starts: Sequence[Baseline]) -> Fit:
+        tried = [fit(now.problem, start, now.terms, 1, now.solved.scales, [now.solved.kind]) for start in starts]
+        return max([now, *tried], key=lambda f: f.log_evidence)
+
+    found = best(model, model.baseline.elsewhere())
+    if found is model:
+        return model
+    for near in NEARER:
+        found = best(found, found.baseline.elsewhere(near))
+    again = fit(model.problem, found.baseline, found.terms, rounds, found.solved.scales)
+    return max(model, again, key=lambda f: f.log_evidence)
+
+
+def settle(problem: Problem, baseline: Baseline) -> Fit:
+    """Fit a baseline alone, from the best two of several points where it has them."""
+    tried = [fit(problem, start, (), 1) for start in baseline.elsewhere()]
+    if not tried:
         return fit(problem, baseline, (), 12 if baseline.lagged else 3)
-    starts = np.geomspace(60.0, 2e4, 7) if taus is None else taus
-    tried = [fit(problem, replace(baseline, tau=float(tau)), (), 1) for tau in starts]
     best = sorted(tried, key=lambda f: -f.log_evidence)[:2]
-    return max((fit(problem, f.moved(), (), 6) for f in best), key=lambda f: f.log_evidence)
+    return from_elsewhere(max((fit(problem, f.moved(), (), 6) for f in best), key=lambda f: f.log_evidence), 6)

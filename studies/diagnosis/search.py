@@ -11,7 +11,7 @@ import numpy as np
 
 from studies.diagnosis.baseline import Baseline
 from studies.diagnosis.constants import CONSTANTS
-from studies.diagnosis.model import Fit, fit
+from studies.diagnosis.model import Fit, fit, from_elsewhere
 from studies.diagnosis.scan import Bank, Seen, build_bank, scan
 from studies.diagnosis.terms import Term
 from studies.effects import Parameter
@@ -141,7 +141,9 @@ def contenders(
     if not seen or seen[0].gain < -2.0:
         return []
     most = max(seen[0].gain, 0.0)
-    near = [s for s in seen if s.gain > (most * NARROW - NEAR if s.narrow else max(0.5 * most - NEAR, 0.0))]
+    # a bias or 1/Q that has no thermometer beside it finds its lag by itself, and without an effect of the rate far off
+    astray = base.fit.baseline.lagged and not base.fit.problem.response.thermometer
+    near = [s for s in seen if s.gain > (most * NARROW - NEAR if s.narrow or astray else max(0.5 * most - NEAR, 0.0))]
     return [polish(base, s, about) for s in near[:CONTENDERS]]
 
 
@@ -157,7 +159,7 @@ def polish(base: Hypothesis, seen: Seen, about: Baseline | None = None) -> Hypot
         for size in sizes:
             scales = np.append(base.fit.solved.scales, size)
             model = fit(base.fit.problem, about, (*base.fit.terms, term), 2, scales)
-            forms.append(refine(model, len(model.terms) - 1))
+            forms.append(refine(from_elsewhere(model), len(model.terms) - 1))
     return Hypothesis(max(forms, key=lambda f: f.log_evidence), (*base.price, price))
 
 

@@ -294,6 +294,10 @@ class Simulated:
             return None
         return replace(self, z=(0.0,) * len(self.z), initial=tuple({} for _ in self.initial), warmer=None)
 
+    def elsewhere(self, near: float = 0.0) -> tuple[()]:
+        """Its card says where it is."""
+        return ()
+
     def alone(self, states: States) -> "Simulated":
         """Return the same simulation of one further run that starts in equilibrium."""
         return replace(self, states=(states,), initial=({},), warmer=(np.zeros(states.time.size),))

@@ -41,6 +41,8 @@ class States:
         Temperatures at which the resonator turned in the runs before, K: all that a loop may remember of them.
     rows : int
         Readings at even moments of which a sample is the mean.
+    record : int
+        Number of the record of which the run is an unbroken stretch; −1 where it is one by itself.
     """
 
     run: int
@@ -58,6 +60,7 @@ class States:
     fading: FloatArray | float = 0.0
     before: FloatArray | None = None
     rows: int = 1
+    record: int = -1
 
     @property
     def step(self) -> float:
