@@ -1,5 +1,6 @@
 """A campaign: several records of one gyro, checked, freed of outliers and put on one even time grid."""
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
@@ -193,8 +194,12 @@ def load_campaign(records: Sequence[Record], reference_degC: float | None = None
     if not runs:
         skipped |= dict.fromkeys(responses, "too few rows in every run")
         responses = ()
-    if len(runs) > len(records):
-        notes.append("long gaps split a record: each stretch has its own unknown thermal state.")
+    parts = Counter(run.label for run in runs)
+    notes += [
+        f"{label}: long gaps split it into {count} stretches, each of which starts at an unknown temperature."
+        for label, count in parts.items()
+        if count > 1
+    ]
     for drive in ("amplitude_squared", "voltage_squared", "quadrature", "pattern_angle"):
         if any(getattr(run.states, drive) is None for run in runs) and any(
             getattr(run.states, drive) is not None for run in runs

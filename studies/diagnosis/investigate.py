@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.special import erf
 
+from compensation.wander import white_noise
 from studies.diagnosis import held_out
 from studies.diagnosis.baseline import first_stretches
 from studies.diagnosis.campaign import Campaign
@@ -15,7 +16,7 @@ from studies.diagnosis.causes import name_causes, vote
 from studies.diagnosis.checks import FEWEST_BINS
 from studies.diagnosis.constants import CONSTANTS
 from studies.diagnosis.held_out import Score, score_both
-from studies.diagnosis.inquiry import Inquiry, Thermometer, again, begin, inquire, read_thermometer, row_noise
+from studies.diagnosis.inquiry import Inquiry, Thermometer, again, begin, inquire, read_thermometer
 from studies.diagnosis.model import Fit
 from studies.diagnosis.planning.advice import suggest_next
 from studies.diagnosis.planning.chamber import Chamber
@@ -31,6 +32,8 @@ ASKED = ("frequency_Hz", "inverse_q", "bias_deg_per_h")
 """The bias last: it follows the temperature, and 1/Q through the anisotropy of damping."""
 FORETOLD = 0.95
 """Part of the rows below which it is said that held-out residuals are not about all."""
+SURE_DELAY, LEAST_DELAY = 3.0, 0.5
+"""Standard deviations, and part of what is expected of it beforehand, from which on a delay is said."""
 WORSE = 3.0
 """Held-out over training residual from which on the other runs are said not to determine a run."""
 NARROW_RANGE = 1.0
@@ -136,7 +139,8 @@ def investigate(
     for column, reason in campaign.skipped.items():
         results[column] = _too_little(reason)
     verdict = overall([result.verdict for result in results.values()])
-    found = Verdict(verdict, doubted(causes), results, None, campaign.said, calibration=shifts)
+    named = tuple(cause for cause in doubted(causes) if cause.probability >= CONSTANTS["member"])
+    found = Verdict(verdict, named, results, None, campaign.said, calibration=shifts)
     if advise:
         tell("next run")
         text, run = suggest_next(campaign, found, inquiries, chamber)
@@ -226,6 +230,7 @@ def _result(
     share = (left.share if left.significant else 1.0) if final.terms else None
     named = bool(mine) or any(cause.kind == "value" and cause.response == column for cause in causes)
     verdict, remarks = _judge(campaign, inquiry, mine, share, named)
+    remarks += _delayed(inquiry)
     reached = extended or base
     beyond = reached.held_out_rms
     if verdict == "adequate" and beyond is not None and beyond > WORSE * reached.residual_rms:
@@ -251,7 +256,8 @@ def _result(
         2.0 * max(left.evidence, 0.0),
         share,
         "; ".join(remarks),
-        white=row_noise(campaign, column) or float(np.sqrt(final.solved.variance * inquiry.problem.noise.rows)),
+        white=white_noise(*held_out.residuals(final, campaign))
+        or float(np.sqrt(final.solved.variance * inquiry.problem.noise.rows)),
         wander=final.wander,
         shipped=shipped,
         run_shifts=tuple(_run_shifts(final)),
@@ -296,6 +302,21 @@ def _apart(campaign: Campaign, inquiry: Inquiry) -> list[str]:
         "times the residual within them: ageing, a clock, handling, or drift between runs"
     )
     return [text if campaign.timed else text + "; start times ('# start' in the records) would show which"]
+
+
+def _delayed(inquiry: Inquiry) -> list[str]:
+    """Return the sentence on a delay that the baseline has taken: it tolerates what sensors and clocks may have."""
+    final = inquiry.final
+    if "delay" not in final.tangent.names:
+        return []
+    place = final.tangent.names.index("delay")
+    delay, prior = float(final.solved.coefficients[place]), float(final.tangent.prior[place])
+    delay = float(getattr(final.baseline, "delay", None) or delay)
+    sure = abs(delay) > SURE_DELAY * float(np.sqrt(final.solved.covariance[place, place]))
+    if not sure or abs(delay) < LEAST_DELAY * prior:
+        return []
+    said = "follows its temperature {:.2g} s {} than one lag says, as sensors and clocks may: a lag of the thermometer or an effect of the rate of that size looks the same"
+    return [said.format(abs(delay), "later" if delay > 0.0 else "sooner")]
 
 
 def _turned_on(inquiry: Inquiry) -> list[str]:

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 NAMES = {column: response.word for column, response in RESPONSES.items()}
 WORDS = {
     "adequate": "The simulation is adequate: nothing beyond noise is left.",
-    "explained": "Explained: the named cause removes nine tenths of the structure or more.",
+    "explained": "Explained: {} nine tenths of the structure or more.",
     "not-identifiable": "Not identifiable: these data cannot decide between several causes.",
     "unexplained": "Unexplained: there is structure that no known effect explains.",
 }
@@ -29,16 +29,21 @@ def shown(column: str, value: float | None, digits: int = 3) -> str:
 
 def headline(verdict: Verdict) -> str:
     """Return the verdict in one or two sentences."""
-    text = WORDS[verdict.verdict]
+    text = _sentence(verdict)
     if verdict.causes:
         causes = "; ".join(name_cause(cause) for cause in verdict.causes)
         text += f" {causes[0].upper()}{causes[1:]}."
     return text
 
 
-def reason(verdict: str) -> str:
+def _sentence(verdict: Verdict) -> str:
+    causes = "the named causes remove" if len(verdict.causes) > 1 else "the named cause removes"
+    return WORDS[verdict.verdict].format(causes)
+
+
+def reason(verdict: Verdict) -> str:
     """Return the verdict's sentence without its name."""
-    return WORDS[verdict].split(": ", 1)[-1].rstrip(".")
+    return _sentence(verdict).split(": ", 1)[-1].rstrip(".")
 
 
 def name_cause(cause: Cause) -> str:
@@ -189,7 +194,7 @@ def _summary(cause: Cause) -> str:
 
 
 def _facts(verdict: Verdict) -> list[tuple[str, str, str]]:
-    facts = [("Verdict", verdict.verdict.replace("-", " "), reason(verdict.verdict))]
+    facts = [("Verdict", verdict.verdict.replace("-", " "), reason(verdict))]
     for cause in verdict.causes[:3]:
         size = shown(cause.response, cause.peak)
         sure = f"{size} peak to peak in the {NAMES[cause.response]}; probability {cause.probability:.2f}"

@@ -26,7 +26,7 @@ def table_page(found: "TableDiagnosis", path: str) -> str:
 def table_chapters(found: "TableDiagnosis") -> list[Chapter]:
     """Return the chapters of a steady-state table: the answer, and who else could have given it."""
     facts = [
-        ("Verdict", found.verdict.verdict.replace("-", " "), reason(found.verdict.verdict)),
+        ("Verdict", found.verdict.verdict.replace("-", " "), reason(found.verdict)),
         ("Law imposed", f"{plain(1e3 * found.law_rms)} mHz", "misfit rms with the law's curvature fixed"),
         ("Curvature", f"{plain(found.curvature_ratio)} times", "the measured one over the law's"),
     ]

@@ -105,7 +105,7 @@ def _told(scored: Sequence[Scored], begin: str) -> Advice:
     if best.pair[1] == NOTHING:
         text += " for an effect with evidence 10 today"
     if repeat is not None and repeat is not best:
-        text += f", against {repeat.evidence:.0f} for a {repeat.programme.profile}"
+        text += f", against {repeat.evidence:.0f} for a {repeat.programme.profile} ({repeat.programme.hours:.2g} h)"
     return f"{text}.", run
 
 
