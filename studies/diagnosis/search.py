@@ -141,9 +141,8 @@ def contenders(
     if not seen or seen[0].gain < -2.0:
         return []
     most = max(seen[0].gain, 0.0)
-    # a bias or 1/Q that has no thermometer beside it finds its lag by itself, and without an effect of the rate far off
-    astray = base.fit.baseline.lagged and not base.fit.problem.response.thermometer
-    near = [s for s in seen if s.gain > (most * NARROW - NEAR if s.narrow or astray else max(0.5 * most - NEAR, 0.0))]
+    unsure = _astray(base.fit)
+    near = [s for s in seen if s.gain > (most * NARROW - NEAR if s.narrow or unsure else max(0.5 * most - NEAR, 0.0))]
     return [polish(base, s, about) for s in near[:CONTENDERS]]
 
 
@@ -159,8 +158,13 @@ def polish(base: Hypothesis, seen: Seen, about: Baseline | None = None) -> Hypot
         for size in sizes:
             scales = np.append(base.fit.solved.scales, size)
             model = fit(base.fit.problem, about, (*base.fit.terms, term), 2, scales)
-            forms.append(refine(from_elsewhere(model), len(model.terms) - 1))
+            forms.append(refine(from_elsewhere(model) if _astray(model) else model, len(model.terms) - 1))
     return Hypothesis(max(forms, key=lambda f: f.log_evidence), (*base.price, price))
+
+
+def _astray(model: Fit) -> bool:
+    """Whether its lag may be far off: a bias or 1/Q without a thermometer finds one by itself, and a wrong one beside a rate."""
+    return model.baseline.lagged and not model.problem.response.thermometer
 
 
 def nearer(model: Fit, term: Term) -> list[Term]:
