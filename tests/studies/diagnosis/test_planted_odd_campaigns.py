@@ -1,0 +1,154 @@
+"""Campaigns of an unusual kind: gaps in a log, a bias alone, a voltage that swings, uneven stamps, a thermometer that lags."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+import pytest
+
+from studies.diagnosis.campaign import load_campaign
+from studies.diagnosis.held_out import Score, is_worse
+from studies.diagnosis.investigate import investigate
+from studies.record import Record
+
+LAG = 1200.0  # s
+
+
+@dataclass
+class Bench:
+    """A chamber between corners (h, °C), the gyro behind one lag, rows every so many seconds."""
+
+    corners: list
+    sampling: float = 60.0
+    seed: int = 1
+    jitter: float = 0.0
+    rng: np.random.Generator = field(init=False)
+
+    def __post_init__(self):
+        self.rng = np.random.default_rng(self.seed)
+        hours, self.levels = np.array(self.corners, dtype=float).T
+        self.fine = np.arange(0.0, 3600.0 * hours[-1] + 5.0, 5.0)
+        chamber = np.interp(self.fine, 3600.0 * hours, self.levels)
+        keep = np.exp(-5.0 / LAG)
+        gyro = chamber.copy()
+        for k in range(1, gyro.size):
+            gyro[k] = keep * gyro[k - 1] + (1.0 - keep) * 0.5 * (chamber[k] + chamber[k - 1])
+        self._chamber, self._gyro = chamber, gyro
+        even = np.arange(0.0, self.fine[-1], self.sampling)
+        self.time = np.sort(even + self.jitter * self.rng.uniform(-0.5, 0.5, even.size) * self.sampling)
+
+    @property
+    def chamber(self):
+        return np.interp(self.time, self.fine, self._chamber)
+
+    def gyro(self, late=0.0):
+        return np.interp(self.time - late, self.fine, self._gyro)
+
+    @property
+    def rate(self):
+        return (self.chamber - self.gyro()) / LAG
+
+    def frequency(self, noise, late=0.0):
+        x = self.gyro(late) - 20.0
+        return 5000.0 * (1.0 + 8e-5 * x + 4e-8 * x**2) + noise * self.rng.standard_normal(x.size)
+
+    def record(self, number=0, keep=slice(None), **columns):
+        table = {"time_s": self.time, "housing_temperature_degC": self.chamber} | columns
+        table = {name: values[keep] for name, values in table.items()}
+        return Record(table, path=f"run{number}.csv", sha256=f"{number}{self.seed}")
+
+
+CYCLE = [(0, 20), (0.5, 20), (2, 55), (3, 55), (5, -15), (6, -15), (7.5, 30), (8, 30)]
+BACK = [(0, 30), (0.5, 30), (2.5, -20), (4, -20), (6, 50), (7, 50), (8, 20)]
+
+
+def told(records):
+    return investigate(load_campaign(records), advise=False).verdict
+
+
+def test_a_gap_in_a_log_is_no_turn_on():
+    """Half an hour is missing of each of two records: their stretches share an offset, and nothing is named."""
+    records = []
+    for number, corners in enumerate([CYCLE, BACK]):
+        bench = Bench(corners, seed=number + 3)
+        x = (bench.gyro() - 20.0) / 10.0
+        bias = 1.0 + 3.0 * number + 0.8 * x - 0.3 * x**2 + 0.05 * bench.rng.standard_normal(x.size)
+        hole = (bench.time < 3.6 * 3600.0) | (bench.time > 4.1 * 3600.0)
+        records.append(bench.record(number, hole, bias_deg_per_h=bias))
+    campaign = load_campaign(records)
+    assert len(campaign.runs) == 4
+    assert sum("split it into 2 stretches" in note for note in campaign.notes) == 2
+    verdict = investigate(campaign, advise=False).verdict
+    result = verdict.responses["bias_deg_per_h"]
+    assert (verdict.verdict, verdict.causes) == ("adequate", ())
+    assert result.run_shifts == pytest.approx((-1.5, 1.5), abs=0.2)  # one a record
+    assert result.noise == pytest.approx(0.05, rel=0.1)
+
+
+@pytest.mark.slow
+def test_a_voltage_that_swings_about_its_mean_softens():
+    """V² and V⁴ are nearly one curve there: which of their two coefficients is negative says nothing."""
+    records = []
+    for number, corners in enumerate([CYCLE, BACK]):
+        bench = Bench(corners, seed=number + 5)
+        voltage = 100.0 + 10.0 * np.sin(2.0 * np.pi * bench.time / 5200.0 + number)
+        frequency = bench.frequency(8e-4) - 4e-7 * voltage**2
+        records.append(bench.record(number, frequency_Hz=frequency, electrode_bias_V=voltage))
+    verdict = told(records)
+    assert verdict.verdict == "explained"
+    assert [cause.effect for cause in verdict.causes] == ["electrostatic-softening"]
+
+
+@pytest.mark.slow
+def test_a_bias_alone_with_a_term_in_the_rate_finds_its_lag():
+    """Without the effect no lag at all seems the best: the temperature comes forward as the rate does."""
+    records = []
+    for number, corners in enumerate([CYCLE, BACK]):
+        bench = Bench(corners, seed=number + 7)
+        x = (bench.gyro() - 20.0) / 10.0
+        bias = number + 0.5 * x - 0.1 * x**2 + 400.0 * bench.rate + 0.05 * bench.rng.standard_normal(x.size)
+        records.append(bench.record(number, bias_deg_per_h=bias))
+    verdict = told(records)
+    (cause,) = verdict.causes
+    assert "rate-bias" in cause.names
+    assert verdict.responses["bias_deg_per_h"].noise == pytest.approx(0.05, rel=0.05)
+
+
+def test_a_bias_that_is_a_cubic_of_the_temperature_has_no_cause():
+    """The frequency is bent, so that a cubic of it is another curve: the difference is a tenth of the noise here."""
+    records = []
+    for number, corners in enumerate([CYCLE, BACK]):
+        bench = Bench(corners, sampling=20.0, seed=number + 9)
+        x = (bench.gyro() - 20.0) / 10.0
+        bias = number + 1.2 * x - 0.5 * x**2 + 0.3 * x**3 + 0.02 * bench.rng.standard_normal(x.size)
+        records.append(bench.record(number, frequency_Hz=bench.frequency(2e-3), bias_deg_per_h=bias))
+    verdict = told(records)
+    assert (verdict.verdict, verdict.causes) == ("adequate", ())
+
+
+def test_a_delay_is_said():
+    """A thermometer that reads 12 s late: one record cannot tell that from clocks, and the answer says so."""
+    records = []
+    for number, corners in enumerate([CYCLE, BACK]):
+        bench = Bench(corners, seed=number + 11)
+        records.append(bench.record(number, frequency_Hz=bench.frequency(1e-3, late=-12.0)))
+    result = told(records).responses["frequency_Hz"]
+    assert "12 s sooner" in result.remark
+
+
+def test_uneven_stamps_on_a_ramp_are_no_noise():
+    bench = Bench(CYCLE, seed=13, jitter=0.8)
+    result = told([bench.record(frequency_Hz=bench.frequency(1e-3))]).responses["frequency_Hz"]
+    assert result.white == pytest.approx(1e-3, rel=0.15)
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "worse"),
+    [
+        (Score(1.0, 1.0), Score(0.5, 1.1), True),
+        (Score(1.0, 1.0), Score(1.5, 0.9), False),
+        (Score(1.0, None), Score(1.1, None), True),
+        (Score(1.0, 2.0), Score(1.001, None), False),
+    ],
+)
+def test_more_is_left_where_it_was_held_out_or_else_where_it_was_fitted(before, after, worse):
+    assert is_worse(before, after) is worse
