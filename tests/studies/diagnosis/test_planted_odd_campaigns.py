@@ -7,7 +7,10 @@ import pytest
 
 from studies.diagnosis.campaign import load_campaign
 from studies.diagnosis.held_out import Score, is_worse
+from studies.diagnosis.inquiry import begin
 from studies.diagnosis.investigate import investigate
+from studies.diagnosis.scan import build_bank, scan
+from studies.effects import find_effect
 from studies.record import Record
 
 LAG = 1200.0  # s
@@ -84,18 +87,19 @@ def test_a_gap_in_a_log_is_no_turn_on():
     assert result.noise == pytest.approx(0.05, rel=0.1)
 
 
-@pytest.mark.slow
-def test_a_voltage_that_swings_about_its_mean_softens():
-    """V² and V⁴ are nearly one curve there: which of their two coefficients is negative says nothing."""
-    records = []
-    for number, corners in enumerate([CYCLE, BACK]):
-        bench = Bench(corners, seed=number + 5)
-        voltage = 100.0 + 10.0 * np.sin(2.0 * np.pi * bench.time / 5200.0 + number)
-        frequency = bench.frequency(8e-4) - 4e-7 * voltage**2
-        records.append(bench.record(number, frequency_Hz=frequency, electrode_bias_V=voltage))
-    verdict = told(records)
-    assert verdict.verdict == "explained"
-    assert [cause.effect for cause in verdict.causes] == ["electrostatic-softening"]
+@pytest.mark.parametrize(("softening", "seen"), [(2.5e-7, True), (-2.5e-7, False)])
+def test_a_voltage_that_swings_about_its_mean_softens_and_never_stiffens(softening, seen):
+    """V² and V⁴ are nearly one curve there: which of their two coefficients is negative says nothing, their sum does."""
+    for seed in range(10, 90, 20):
+        records = []
+        for number, corners in enumerate([CYCLE, BACK]):
+            bench = Bench(corners, seed=seed + number)
+            voltage = 100.0 + 10.0 * np.sin(2.0 * np.pi * bench.time / 5200.0 + number)
+            frequency = bench.frequency(8e-4) - softening * voltage**2
+            records.append(bench.record(number, frequency_Hz=frequency, electrode_bias_V=voltage))
+        plain = begin(load_campaign(records), "frequency_Hz", None)
+        found = scan(plain, build_bank(plain, [find_effect("electrostatic-softening")]))
+        assert [one.gain > 20.0 for one in found] == [True] * seen
 
 
 @pytest.mark.slow
