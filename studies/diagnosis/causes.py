@@ -9,7 +9,7 @@ from studies.diagnosis.baseline import Followed
 from studies.diagnosis.campaign import Campaign
 from studies.diagnosis.constants import CONSTANTS
 from studies.diagnosis.inquiry import Inquiry, begin, inquire, read_thermometer
-from studies.diagnosis.lack_of_fit import look
+from studies.diagnosis.lack_of_fit import left_over
 from studies.diagnosis.model import Fit, exact_forms, fit
 from studies.diagnosis.response import RESPONSES
 from studies.diagnosis.search import Hypothesis, Place
@@ -49,7 +49,11 @@ def vote(
         winner = ranked[0][1]
         selection = replace(inquiry.selection, final=winner)
         out[column] = replace(
-            inquiry, selection=selection, leftover=look(inquiry.plain, winner.fit), votes=votes, scores=None
+            inquiry,
+            selection=selection,
+            leftover=left_over(campaign, inquiry.plain, winner.fit),
+            votes=votes,
+            scores=None,
         )
         thermometer = read_thermometer(campaign, winner.fit)
         for c in others:

@@ -13,7 +13,7 @@ from studies.diagnosis.campaign import Campaign
 from studies.diagnosis.clock import judged
 from studies.diagnosis.constants import CONSTANTS
 from studies.diagnosis.held_out import Score, is_worse, score_both
-from studies.diagnosis.lack_of_fit import Leftover, beside_fast_line, look
+from studies.diagnosis.lack_of_fit import Leftover, left_over, look
 from studies.diagnosis.model import Fit, fit, settle
 from studies.diagnosis.noise import tails_of
 from studies.diagnosis.problem import Problem, pose
@@ -161,7 +161,7 @@ def inquire(campaign: Campaign, plain: Fit, effects: Sequence[Effect] | None, sc
     scores = None
     if score_held_out:
         selection, scores = refuse(campaign, selection)
-    leftover = beside_fast_line(campaign, plain, selection.final.fit, look(plain, selection.final.fit))
+    leftover = left_over(campaign, plain, selection.final.fit)
     if not selection.final.fit.terms:
         return Inquiry(plain.problem, selection, leftover, {})
     generic = look(selection.plain.fit, selection.plain.fit)

@@ -315,8 +315,10 @@ def _delayed(inquiry: Inquiry) -> list[str]:
     sure = abs(delay) > SURE_DELAY * float(np.sqrt(final.solved.covariance[place, place]))
     if not sure or abs(delay) < LEAST_DELAY * prior:
         return []
-    said = "follows its temperature {:.2g} s {} than one lag says, as sensors and clocks may: a lag of the thermometer or an effect of the rate of that size looks the same"
-    return [said.format(abs(delay), "later" if delay > 0.0 else "sooner")]
+    return [
+        f"follows its temperature {abs(delay):.2g} s {'later' if delay > 0.0 else 'sooner'} than one lag says, as sensors and "
+        "clocks may: a lag of the thermometer or an effect of the rate of that size looks the same"
+    ]
 
 
 def _turned_on(inquiry: Inquiry) -> list[str]:

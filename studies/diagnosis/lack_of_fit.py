@@ -226,8 +226,9 @@ def look(plain: Fit, model: Fit) -> Leftover:
     return Leftover(name, float(evidence), part, best, float(smooth))
 
 
-def beside_fast_line(campaign: Campaign, plain: Fit, model: Fit, left: Leftover) -> Leftover:
+def left_over(campaign: Campaign, plain: Fit, model: Fit) -> Leftover:
     """Return what is left, or a line faster than the steps of the grid where it is more: of it their means show little or nothing."""
+    left = look(plain, model)
     rest = residuals(model, campaign)
     series = [(run.row_time, own) for run, own in zip(campaign.runs, rest, strict=True)]
     line = fast_line(series, campaign.sampling, campaign.step, rms(rest))
