@@ -246,9 +246,16 @@ def _result(
             if reached.held_out_rms is None
             else f"held-out residuals cover {share_known}: the rest of the record cannot predict the others"
         )
+    noise = min(value for value in (reached.residual_rms, reached.held_out_rms) if value is not None)
+    white = white_noise(*held_out.residuals(final, campaign))
+    white = white or float(np.sqrt(final.solved.variance * inquiry.problem.noise.rows))
+    if verdict != "unexplained" and noise > CONSTANTS["wander_usual"] * white:
+        remarks.append(
+            f"what is left is {noise / white:.2g} times its white noise: it wanders within a run, which is taken for noise"
+        )
     return ResponseResult(
         verdict,
-        min(value for value in (reached.residual_rms, reached.held_out_rms) if value is not None),
+        noise,
         (base.residual_rms, base.held_out_rms),
         None if extended is None else (extended.residual_rms, extended.held_out_rms),
         "structure" if left.significant else "none",
@@ -256,8 +263,7 @@ def _result(
         2.0 * max(left.evidence, 0.0),
         share,
         "; ".join(remarks),
-        white=white_noise(*held_out.residuals(final, campaign))
-        or float(np.sqrt(final.solved.variance * inquiry.problem.noise.rows)),
+        white=white,
         wander=final.wander,
         shipped=shipped,
         run_shifts=tuple(_run_shifts(final)),
