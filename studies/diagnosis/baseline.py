@@ -22,6 +22,8 @@ DELAY = 10.0
 """Standard deviation of the delay between housing sensor and resonator that every model tolerates, s."""
 LAGS = np.geomspace(60.0, 2e4, 7)
 """Lags, s, from which one is looked for."""
+OF_RUN = 0.5
+"""Part of the longest run beyond which a lag is not looked for: what it would do there anything slow does."""
 START = 10.0
 """Standard deviation of the resonator's unknown initial temperature about the housing's, K."""
 FOLLOWED_DELAY = 20.0
@@ -251,8 +253,9 @@ class Lagged:
 
     def elsewhere(self, near: float = 0.0) -> list["Lagged"]:
         """Return it with other lags: without an effect of the rate, none at all may seem the best."""
+        most = OF_RUN * max(float(np.ptp(own.time)) for own in self.states)
         lags = self.tau * np.exp([-near, near]) if near else LAGS
-        return [replace(self, tau=float(tau), warmer=None, starts=()) for tau in lags]
+        return [replace(self, tau=float(tau), warmer=None, starts=()) for tau in lags if tau <= max(most, LAGS[0])]
 
     def alone(self, states: States) -> "Lagged":
         """Return the same law for one further run that starts in equilibrium."""

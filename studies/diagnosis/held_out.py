@@ -31,6 +31,8 @@ FEWEST_FORETOLD = 0.5
 """Part of the rows from which on they speak for the record."""
 ALIKE = 0.005
 """Relative difference of two held-out residuals that says nothing."""
+LOST = 0.05
+"""Relative rise of what is left by which causes are refused together: an offset that is refitted to a run may make some of it."""
 KNOWN_START = 0.5
 """Part of the initial state's signature in a block from which on it is refitted there."""
 
@@ -240,7 +242,7 @@ def is_worse(before: Score, after: Score) -> bool:
     """Whether a model leaves more than the baseline, on rows that were held out or, where there are none, on its own."""
     pairs = (before.held_out_rms, after.held_out_rms), (before.residual_rms, after.residual_rms)
     one, two = pairs[0] if None not in pairs[0] else pairs[1]
-    return bool(one is not None and two is not None and two > one * (1.0 + ALIKE))
+    return bool(one is not None and two is not None and two > one * (1.0 + LOST))
 
 
 Parts = list[tuple[FloatArray, "np.ndarray"]]
