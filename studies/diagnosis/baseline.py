@@ -22,8 +22,9 @@ DELAY = 10.0
 """Standard deviation of the delay between housing sensor and resonator that every model tolerates, s."""
 LAGS = np.geomspace(60.0, 2e4, 7)
 """Lags, s, from which one is looked for."""
+SHORTEST_LAG, LONGEST_LAG = 5.0, 1e5
 OF_RUN = 0.5
-"""Part of the longest run beyond which a lag is not looked for: what it would do there anything slow does."""
+"""Part of the longest run up to which a response that is no thermometer may have a lag by itself."""
 START = 10.0
 """Standard deviation of the resonator's unknown initial temperature about the housing's, K."""
 FOLLOWED_DELAY = 20.0
@@ -221,7 +222,8 @@ class Lagged:
         bend = values["quadratic"] / 100.0 / slope if slope else 0.0
         reach = max(float(np.abs(own.housing - own.reference).max()) for own in self.states)
         most = max(0.02, STEADY / max(reach, 1e-3))
-        tau = float(np.clip(self.tau * float(np.exp(np.clip(values["log lag"], -0.7, 0.7))), 5.0, 1e5))
+        tau = self.tau * float(np.exp(np.clip(values["log lag"], -0.7, 0.7)))
+        tau = float(np.clip(tau, SHORTEST_LAG, self.longest_lag))
         late = values["delay"] if self.delay is None else self.delay
         added = []
         for k, own in enumerate(self.states):
@@ -253,9 +255,15 @@ class Lagged:
 
     def elsewhere(self, near: float = 0.0) -> list["Lagged"]:
         """Return it with other lags: without an effect of the rate, none at all may seem the best."""
-        most = OF_RUN * max(float(np.ptp(own.time)) for own in self.states)
         lags = self.tau * np.exp([-near, near]) if near else LAGS
-        return [replace(self, tau=float(tau), warmer=None, starts=()) for tau in lags if tau <= max(most, LAGS[0])]
+        return [replace(self, tau=float(tau), warmer=None, starts=()) for tau in lags if tau <= self.longest_lag]
+
+    @property
+    def longest_lag(self) -> float:
+        """Lag, s, beyond which a bias or 1/Q by itself is not looked for: an initial state would be an offset of the run."""
+        if self.response.thermometer:
+            return LONGEST_LAG
+        return max(OF_RUN * max(float(np.ptp(own.time)) for own in self.states), float(LAGS[0]))
 
     def alone(self, states: States) -> "Lagged":
         """Return the same law for one further run that starts in equilibrium."""
