@@ -322,7 +322,7 @@ def _delayed(inquiry: Inquiry) -> list[str]:
     if not sure or abs(delay) < LEAST_DELAY * prior:
         return []
     return [
-        f"follows its temperature {abs(delay):.2g} s {'later' if delay > 0.0 else 'sooner'} than one lag says, as sensors and "
+        f"it follows its temperature {abs(delay):.2g} s {'later' if delay > 0.0 else 'sooner'} than one lag says, as sensors and "
         "clocks may: a lag of the thermometer or an effect of the rate of that size looks the same"
     ]
 
