@@ -187,12 +187,10 @@ def refuse(campaign: Campaign, selection: Selection) -> tuple[Selection, tuple[S
             scores = score_both(selection.plain.fit, selection.final.fit, campaign)
             if not is_worse(*scores):
                 return selection, scores
-            kept = tuple(place for n, place in enumerate(selection.places) if n != weakest[0])
-            selection = replace(selection, final=fewer[weakest[0]], places=kept)
-            continue
-        kept = tuple(place for n, place in enumerate(selection.places) if n != unpaid)
-        other = _another(selection, unpaid, fewer[unpaid], campaign)
-        final = fewer[unpaid] if other is None else other.rivals[0]
+        k = weakest[0] if unpaid is None else unpaid
+        other = None if unpaid is None else _another(selection, k, fewer[k], campaign)
+        kept = tuple(place for n, place in enumerate(selection.places) if n != k)
+        final = fewer[k] if other is None else other.rivals[0]
         selection = replace(selection, final=final, places=kept if other is None else (*kept, other))
     return selection, None
 
@@ -232,9 +230,8 @@ def _follows(model: Fit) -> bool:
     names = model.tangent.names
     if "slope" not in names:
         return True
-    place = names.index("slope")
-    spread = float(np.sqrt(model.solved.covariance[place, place]))
-    return bool(np.isfinite(spread) and abs(model.solved.coefficients[place]) >= 3.0 * spread)
+    spread = model.deviation_of("slope")
+    return bool(np.isfinite(spread) and abs(model.values()["slope"]) >= 3.0 * spread)
 
 
 def _pays(
@@ -262,8 +259,7 @@ def _bend(model: Fit) -> float:
     names = model.tangent.names
     if "quadratic" not in names or not model.terms:
         return 0.0
-    place = names.index("quadratic")
-    return float(np.sqrt(max(model.solved.covariance[place, place], 0.0))) / 1e2
+    return model.deviation_of("quadratic") / 1e2
 
 
 def read_thermometer(campaign: Campaign, model: Fit) -> Thermometer | None:

@@ -315,11 +315,9 @@ def _delayed(inquiry: Inquiry) -> list[str]:
     final = inquiry.final
     if "delay" not in final.tangent.names:
         return []
-    place = final.tangent.names.index("delay")
-    delay, prior = float(final.solved.coefficients[place]), float(final.tangent.prior[place])
-    delay = float(getattr(final.baseline, "delay", None) or delay)
-    sure = abs(delay) > SURE_DELAY * float(np.sqrt(final.solved.covariance[place, place]))
-    if not sure or abs(delay) < LEAST_DELAY * prior:
+    delay = float(getattr(final.baseline, "delay", None) or final.values()["delay"])
+    prior = float(final.tangent.prior[final.tangent.names.index("delay")])
+    if abs(delay) < max(SURE_DELAY * final.deviation_of("delay"), LEAST_DELAY * prior):
         return []
     return [
         f"it follows its temperature {abs(delay):.2g} s {'later' if delay > 0.0 else 'sooner'} than one lag says, as sensors and "

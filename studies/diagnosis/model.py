@@ -40,6 +40,11 @@ class Fit:
         """Values of the baseline by name."""
         return dict(zip(self.tangent.names, self.solved.coefficients.tolist(), strict=False))
 
+    def deviation_of(self, name: str) -> float:
+        """Return the standard deviation of a value of the baseline."""
+        place = self.tangent.names.index(name)
+        return float(np.sqrt(max(self.solved.covariance[place, place], 0.0)))
+
     def columns_of(self, index: int) -> "np.ndarray":
         """Return the places of a term's columns."""
         return np.flatnonzero(self.linear.owner == index)

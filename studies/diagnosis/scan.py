@@ -245,9 +245,8 @@ def _gains(model: Fit, bank: Bank, kind: int, share: int) -> FloatArray:
             determinant = 0.5 * np.log1p(size * values).sum(axis=-1)
             explained = (size * along[None] ** 2 / (1.0 + size * values)).sum(axis=-1)
             gains = -determinant - 0.5 * freedom * np.log(np.maximum(1.0 - explained / least, 1e-12))
-            first = (vectors[:, 0] * values[0] * along / (1.0 + values[0])).sum(
-                axis=-1
-            )  # what it does along its first column
+            # what it does along its first column
+            first = (vectors[:, 0] * values[0] * along / (1.0 + values[0])).sum(axis=-1)
             wrong = np.array([bank.terms[k].effect.positive for k in group.terms[place]]) & (first < 0.0)
             out[group.terms[place]] = np.where(wrong, -np.inf, logsumexp(gains, axis=0) - np.log(SCALES.size))
     return out
