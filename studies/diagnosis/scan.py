@@ -18,7 +18,7 @@ FEW = 40
 """An effect with no more shapes than this is scanned with its whole family."""
 LEADING, WIDTH = 0.4, 4
 """Of others the columns whose prior is at least this part of the widest, and at most so many beside the widest."""
-BLOCK = 4000
+BLOCK = 500
 HILLS, NEARLY = 0.2, 5.0
 """Part of the best evidence, and log evidence beside it, by which another hill of shapes may seem lower before it is climbed."""
 VARIES = 1e-3
@@ -113,7 +113,7 @@ def build_bank(model: Fit, effects: Sequence[Effect]) -> Bank:
             terms.append(term)
             parts.append(own[:, kept].astype(np.float32))
             count += len(kept)
-    table: FloatArray = np.concatenate(parts, axis=1) if parts else np.zeros((problem.values.size, 1))
+    table: FloatArray = np.concatenate([part.T for part in parts]).T if parts else np.zeros((problem.values.size, 1))
     groups = tuple(
         Group(np.array([f[0] for f in own]), np.array([f[1] for f in own]), np.array([f[2] for f in own]))
         for own in found.values()
@@ -217,13 +217,13 @@ def _gains(model: Fit, bank: Bank, kind: int, share: int) -> FloatArray:
     freedom = linear.target.size - linear.flat
     turn, narrow = root.astype(np.float32)[:, None], span.astype(np.float32)
     table = bank.rotated(kind)
-    beside = np.empty((rows.shape[0], table.shape[1]), dtype=np.float32)
+    beside = np.empty((rows.shape[0], table.shape[1]), dtype=np.float32, order="F")
     for begin in range(0, table.shape[1], BLOCK):
         # what is left of a column may be a thousandth of it: projected before it is squared, in single precision
         part = table[:, begin : begin + BLOCK] * turn
-        inside = narrow[:top].T @ part
-        beside[:top, begin : begin + BLOCK] = part - narrow[:top] @ inside
-        beside[top:, begin : begin + BLOCK] = -narrow[top:] @ inside
+        inside = part.T @ narrow[:top]
+        beside[:top, begin : begin + BLOCK] = part - (inside @ narrow[:top].T).T
+        beside[top:, begin : begin + BLOCK] = -(inside @ narrow[top:].T).T
     moment = beside.T @ rest.astype(np.float32)
     out = np.empty(len(bank.terms))
     for group in bank.groups:
