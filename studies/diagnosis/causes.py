@@ -147,7 +147,7 @@ def _judge_of(name: str) -> str:
 
 
 def parameters_of(model: Fit, index: int) -> dict[str, Interval]:
-    """Return shape and coefficients of a term with 90 % intervals; of lists the definite member.
+    """Return shape and coefficients of a term with 90 % intervals; of lists the definite member. What no row shows is left out.
 
     What is not known of the shape is part of what is not known of the coefficients: Σ = Σ_c + Σ_s (∂c/∂s)² σ_s².
     """
@@ -168,10 +168,11 @@ def parameters_of(model: Fit, index: int) -> dict[str, Interval]:
     for name, coefficient in zip(
         term.effect.coefficient_names(model.problem.response.column), term.effect.coefficients, strict=True
     ):
-        at = np.flatnonzero(columns == begin)
-        if at.size:
+        at, end = np.flatnonzero(columns == begin), begin + len(coefficient.spread)
+        members = places[(columns >= begin) & (columns < end)]
+        if at.size and model.linear.columns[:, members].any():
             out[name] = Interval.about(float(values[at[0]]), float(deviations[at[0]]))
-        begin += len(coefficient.spread)
+        begin = end
     return out
 
 

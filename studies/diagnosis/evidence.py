@@ -211,8 +211,9 @@ def _beside_nothing(
     """Solve without the columns that no row shows: their coefficients are what they were before, 0 ± prior."""
     seen = replace(model, columns=model.columns[:, live], prior=model.prior[live], owner=model.owner[live])
     found = solve(seen, terms, scales, kinds)
-    unseen = model.sizes(found.scales) * np.where(live, 0.0, model.prior) / model.sigma
-    covariance = np.diag(found.variance * unseen**2)
+    unit = 1.0 if model.absolute else np.sqrt(found.variance) / model.sigma
+    unseen = model.sizes(found.scales) * np.where(live, 0.0, model.prior) * unit
+    covariance = np.diag(unseen**2)
     covariance[np.ix_(live, live)] = found.covariance
     coefficients = np.zeros(model.owner.size)
     coefficients[live] = found.coefficients

@@ -115,15 +115,19 @@ class OnRows:
     def uncertainty(
         self, k: int, free: Sequence[int], inside: "np.ndarray | None" = None, level: float = 0.0
     ) -> FloatArray:
-        """Return the standard deviation of what is foretold of run `k`, in parts of the noise, `free` refitted there."""
+        """Return the standard deviation of what is foretold of run `k`, in parts of the noise, `free` refitted there.
+
+        A level is refitted as well where what is unknown of the run's level is within its limit.
+        """
         columns = self.columns(k)[0]
         columns = columns if inside is None else columns[inside]
         solved, noise = self.model.solved, self.model.problem.noise
-        own = self.free(columns, free, level)
-        own = np.linalg.qr(own[:, own.any(axis=0)])[0]
-        other = np.delete(columns, list(free), axis=1)
-        other = other - own @ (own.T @ other)
         covariance = np.delete(np.delete(solved.covariance, list(free), axis=0), list(free), axis=1)
+        other = np.delete(columns, list(free), axis=1)
+        mean = other.mean(axis=0)
+        own = self.free(columns, free, level if mean @ covariance @ mean <= level**2 else 0.0)
+        own = np.linalg.qr(own[:, own.any(axis=0)])[0]
+        other = other - own @ (own.T @ other)
         spread = np.einsum("ij,jk,ik->i", other, covariance, other)
         row = noise.rows + noise.floor + SHARES[solved.share] * noise.bases[solved.kind].within
         return np.asarray(np.sqrt(np.maximum(spread, 0.0) / (solved.variance * row)))

@@ -1,12 +1,17 @@
-"""`python -m tests.stranger OUT --count N --seed S`: a mixed set of campaigns, the kinds in turn."""
+"""`python -m tests.stranger OUT --count N --seed S`: a mixed set of campaigns, the kinds in turn.
+
+Beside each campaign `ideal.json`: what an ideal predictor leaves of held-out rows, over the floor.
+"""
 
 import argparse
+import json
 from itertools import cycle, islice
 from pathlib import Path
 
 from tests.stranger.aliens import ALIENS
 from tests.stranger.campaign import make_campaign
 from tests.stranger.effects import EFFECTS
+from tests.stranger.ideal import ideal_ratios
 from tests.stranger.noise import FAMILIES
 
 SNRS = (0.3, 1.0, 3.0, 6.0, 12.0)
@@ -37,7 +42,9 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=0)
     given = parser.parse_args()
     for i, (kind, name, snr) in enumerate(islice(plan(given.count), given.count)):
-        truth = make_campaign(given.seed + i, kind, name, snr, folder=given.out / f"s{given.seed + i:04d}")
+        folder = given.out / f"s{given.seed + i:04d}"
+        truth = make_campaign(given.seed + i, kind, name, snr, folder=folder)
+        (folder / "ideal.json").write_text(json.dumps(ideal_ratios(truth)))
         print(f"s{given.seed + i:04d} {kind:6} {'+'.join(h.effect for h in truth.hidden) or name}", flush=True)
 
 

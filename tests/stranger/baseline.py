@@ -6,6 +6,7 @@ Rows are a thinned set of the record's own rows.
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy.optimize import least_squares
@@ -39,10 +40,18 @@ class Rows:
 
 @dataclass
 class Fitted:
-    """A fitted baseline of one response: what it leaves, and an orthonormal basis of all that it can absorb."""
+    """A fitted baseline of one response: what it leaves, and its derivatives with respect to all that is free.
+
+    Columns: frequency c₂, c₁, c₀, log of the lag, start of each run; bias k₃, k₂, k₁, offset of each run; 1/Q three powers.
+    """
 
     residual: np.ndarray
-    absorbs: np.ndarray
+    columns: np.ndarray
+
+    @cached_property
+    def absorbs(self) -> np.ndarray:
+        """Return an orthonormal basis of all that it can absorb."""
+        return orthonormal(self.columns)
 
     def project(self, values: np.ndarray) -> np.ndarray:
         return values - self.absorbs @ (self.absorbs.T @ values)
@@ -90,12 +99,12 @@ def fit_frequency(
     moved = [
         (powers(best.x + s * e) - powers(best.x - s * e)) @ c for s, e in zip(step, np.eye(count + 1), strict=True)
     ]
-    return Fitted(frequency - a @ c, orthonormal(np.column_stack([a, *moved]))), theta(best.x)
+    return Fitted(frequency - a @ c, np.column_stack([a, *moved])), theta(best.x)
 
 
 def fit_linear(columns: np.ndarray, values: np.ndarray) -> Fitted:
     basis = orthonormal(columns)
-    return Fitted(values - basis @ (basis.T @ values), basis)
+    return Fitted(values - basis @ (basis.T @ values), columns)
 
 
 def fit_all(rows: Rows, reading: list[np.ndarray], clean: dict[str, np.ndarray], tau: float) -> dict[str, Fitted]:

@@ -153,7 +153,7 @@ def make_campaign(seed: int, kind: str, effect: str | None = None, snr: float | 
     truth = Truth(
         seed, kind, tuple(hidden), _verdicts(kind, hidden), floor, own, family, (protocol,) * count,
         ("second-lag", "curvature", "radiation") if rich else (), departure * np.sqrt(sum(map(len, times))),
-        tuple(f"run_{i + 1}.csv" for i in range(count)), dt, starts,
+        tuple(f"run_{i + 1}.csv" for i in range(count)), dt, starts, device.network.main_s, memory,
         [{"time_s": t} | {k: np.interp(t, run.time, v[i]) for k, v in clean.items()} for i, (t, run) in enumerate(zip(times, done, strict=True))],
         noise_full,
         [{k: np.interp(t, run.time, v[i]) for k, v in bare.items()} for i, (t, run) in enumerate(zip(times, done, strict=True))],

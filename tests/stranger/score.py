@@ -8,6 +8,7 @@ false alarm  a null that is not `adequate`, or for which a cause is named
 calibration  probability of a named cause against how often its set holds a hidden cause; aliens hold none
 held-out     held-out rms of the model that is kept over the rms of the true noise, once with offset and initial state of each run taken out of it,
              once with what the contract refits in that response: bias and 1/Q have no initial state
+ideal        the latter of a predictor that knows the form of what is hidden and the noise's covariance (`ideal.py`)
 """
 
 import argparse
@@ -40,7 +41,7 @@ class Mark:
     every: bool  # every hidden cause is in some named set
     stray: int  # named causes that are not there
     stated: tuple[tuple[float, bool], ...]
-    held_out: tuple[tuple[float, float], ...]
+    held_out: tuple[tuple[float, float, float], ...]
     reach: float  # of the least visible hidden cause, in standard deviations of noise along it
 
 
@@ -64,6 +65,7 @@ def ask(folder: Path, card: bool, again: bool) -> dict:
 
 def mark(folder: Path, answer: dict) -> Mark:
     truth = json.loads((folder / "truth.json").read_text())
+    ideal = json.loads(kept.read_text()) if (kept := folder / "ideal.json").exists() else {}
     kind, hidden = truth["kind"], truth["hidden"]
     causes = [c for c in answer.get("causes", []) if c.get("kind", "physics") != "value"]
     sets = [{c["effect"], *c.get("equivalent", [])} for c in causes]
@@ -81,7 +83,8 @@ def mark(folder: Path, answer: dict) -> Mark:
     for name, response in answer.get("responses", {}).items():
         model = response.get("extended") or response["baseline"]
         if model.get("held_out_rms") and name in truth["floor"] and kind != "alien":
-            held.append(tuple(model["held_out_rms"] / truth[floor][name] for floor in ("floor", "own_floor")))
+            rms = model["held_out_rms"]
+            held.append((rms / truth["floor"][name], rms / truth["own_floor"][name], ideal.get(name, np.nan)))
     return Mark(
         folder.name, kind, "+".join(h["effect"] for h in hidden) or "-", min((h["snr"] for h in hidden), default=0.0),
         len(truth["files"]), verdict, right, bool(hits and hits[0]), every, len(hits) - sum(hits),
@@ -141,9 +144,14 @@ def table(marks: list[Mark]) -> str:
     row("aliens with a name at 0.5 or more", [any(p >= 0.5 for p, _ in m.stated) for m in aliens])
     row("pairs: both named", [m.every for m in pairs])
     row("pairs: right class", [m.right for m in pairs])
-    held, own = ([h[k] for m in marks for h in m.held_out] for k in (0, 1))
+    held, own, ideal = ([h[k] for m in marks for h in m.held_out] for k in (0, 1, 2))
     row("held-out within 10 % of the floor", [h <= 1.1 for h in held])
     row("    of the floor of what each response refits", [h <= 1.1 for h in own])
+    row("    an ideal predictor, of the same", [h <= 1.1 for h in ideal if np.isfinite(h)])
+    row(
+        "    of those where an ideal predictor is",
+        [h <= 1.1 for h, best in zip(own, ideal, strict=True) if best <= 1.1],
+    )
     row("commands that failed", [m.verdict == "failed" for m in marks])
     stated = [s for m in marks for s in m.stated]
     lines.append(

@@ -37,6 +37,8 @@ class Truth:
     files: tuple[str, ...]
     sampling_s: float
     starts_known: bool
+    main_s: float  # the lag of the baseline
+    memory_s: float  # of noise `ar1`
     clean: list[dict[str, np.ndarray]] = field(default_factory=list, repr=False, compare=False)
     noise: list[dict[str, np.ndarray]] = field(default_factory=list, repr=False, compare=False)
     bare: list[dict[str, np.ndarray]] = field(default_factory=list, repr=False, compare=False)
