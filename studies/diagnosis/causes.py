@@ -218,11 +218,21 @@ def peak_of(model: Fit, index: int) -> float:
 
 
 def _same(one: Cause, two: Cause) -> bool:
-    """The same effect in two responses is one cause when its place agrees; two members of one set are one answer."""
+    """The same effect in two responses is one cause when its place agrees; two members of one set are one answer.
+
+    An equal that does not act on both tells of a choice that the other response does not have: then each is named.
+    """
     if one.response == two.response:
         return one.effect in two.equivalent and two.effect in one.equivalent
+    if not all(_acts(name, own.response) for name in (*one.names, *two.names) for own in (one, two)):
+        return False
     shared = [name for name in (one.effect, two.effect) if name in one.names and name in two.names]
     return any(_agree(one.shapes.get(name, {}), two.shapes.get(name, {})) for name in shared)
+
+
+def _acts(name: str, response: str) -> bool:
+    effect = find_effect(name)
+    return effect.thermal or response in effect.responses
 
 
 def _agree(one: Mapping[str, Interval], two: Mapping[str, Interval]) -> bool:

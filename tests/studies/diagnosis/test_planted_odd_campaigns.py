@@ -1,6 +1,7 @@
 """Campaigns of an unusual kind: gaps in a log, a bias alone, a voltage that swings, uneven stamps, a thermometer that lags."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from datetime import UTC, datetime, timedelta
 
 import numpy as np
 import pytest
@@ -156,3 +157,20 @@ def test_uneven_stamps_on_a_ramp_are_no_noise():
 )
 def test_more_is_left_where_it_was_held_out_or_else_where_it_was_fitted(before, after, worse):
     assert is_worse(before, after) is worse
+
+
+@pytest.mark.slow
+def test_a_drift_of_the_frequency_is_no_reason_for_one_of_the_loss():
+    """A clock that drifts looks like a resonator that ages; the loss of a gyro that leaks is not its doing."""
+    records = []
+    for k in range(3):
+        bench = Bench([(0, 20), (1, 20), (2, -10 + 15 * k), (4, -10 + 15 * k), (6, 35), (8, 35)], seed=60 + k)
+        day = 2.0 * k + bench.time / 86400.0
+        loss = 1.4e-7 * (1.0 + 0.02 * day) + 1e-10 * bench.rng.standard_normal(day.size)
+        record = bench.record(k, frequency_Hz=bench.frequency(0.002) + 0.01 * day, inverse_q=loss)
+        records.append(replace(record, start=datetime(2026, 3, 1, tzinfo=UTC) + timedelta(days=2 * k)))
+    causes = investigate(load_campaign(records), advise=False).verdict.causes
+    found = {cause.response: {cause.effect, *cause.equivalent} for cause in causes}
+    assert found.keys() == {"frequency_Hz", "inverse_q"}
+    assert "clock-drift" in found["frequency_Hz"]
+    assert "leak" in found["inverse_q"]
