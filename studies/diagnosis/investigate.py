@@ -240,11 +240,12 @@ def _result(
             f"{response.shown} only: they are not determined without it"
         )
     if reached.foretold < FORETOLD:
+        rest = "the other runs" if len(campaign.records) > 1 else "the rest of the record"
         share_known = f"{100 * reached.foretold:.0f} % of the rows"
         remarks.append(
-            f"no held-out residual: the rest of the record predicts only {share_known}"
+            f"no held-out residual: {'no row' if reached.foretold < 0.005 else 'only ' + share_known} can be predicted from {rest}"
             if reached.held_out_rms is None
-            else f"held-out residuals cover {share_known}: the rest of the record cannot predict the others"
+            else f"held-out residuals cover {share_known}: the others cannot be predicted from {rest}"
         )
     noise = min(value for value in (reached.residual_rms, reached.held_out_rms) if value is not None)
     white = white_noise(*held_out.residuals(final, campaign))

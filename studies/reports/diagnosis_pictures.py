@@ -43,7 +43,7 @@ def ladder(diagnosis: "Diagnosis") -> Picture:
             axis.grid(visible=False, axis="x")
         return draw(
             canvas,
-            "Residual of each response, rms; calibrated and with causes: on rows left out of the fit, where the others foretell them. Of the frequency also as an error of temperature.",
+            "Residual of each response, rms; calibrated and with causes: on rows left out of the fit, where the others foretell them, else on the rows of the fit. Of the frequency also as an error of temperature.",
             "Bars of the residual rms of each response from the calibrated simulation to the noise.",
         )
 
