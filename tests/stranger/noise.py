@@ -67,6 +67,6 @@ def _convolved(own: np.ndarray, columns: np.ndarray, place: np.ndarray) -> np.nd
     """Multiply columns at `place` of a uniform grid by the Toeplitz matrix of an autocovariance."""
     n = len(own)
     full = np.zeros((n, columns.shape[1]))
-    full[place] = columns
+    np.add.at(full, place, columns)  # stamps that jitter may share a place
     kernel = np.fft.rfft(np.r_[own, 0.0, own[:0:-1]])[:, None]
     return np.fft.irfft(kernel * np.fft.rfft(full, 2 * n, axis=0), 2 * n, axis=0)[place]

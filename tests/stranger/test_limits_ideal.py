@@ -25,6 +25,10 @@ def test_covariance_follows_uneven_rows():
     assert np.allclose(walk, [[2.5, 5.0, 5.0], [5.0, 20.0, 20.0], [5.0, 20.0, 52.5]])  # means of min(t, t')
     relaxing = covariance_of("ar1", time, np.arange(5), 30.0)
     assert np.allclose(relaxing, np.exp(-np.abs(time[:, None] - time) / 30.0))
+    jittered = np.array([0.0, 6.0, 14.0, 21.0, 31.0])  # of steps of 7.5 s the places 0, 1, 2, 3, 4
+    shared = np.array([0.0, 10.0, 14.0, 20.0, 30.0])  # of steps of 8 s the places 0, 1, 2, 2, 4
+    assert np.allclose(np.diag(covariance_of("ar1", jittered, np.arange(5), 30.0)), 1.0)
+    assert covariance_of("ar1", shared, np.arange(5), 30.0)[2, 3] == pytest.approx(1.0)
 
 
 @pytest.mark.slow
