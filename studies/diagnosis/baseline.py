@@ -33,6 +33,8 @@ LAG_STEP = 0.3
 """Standard deviation of one correction of the logarithm of the lag."""
 STEADY = 0.4
 """Largest bend of the law times the farthest temperature, K: the slope keeps its sign, as far as bends are small."""
+STRAIGHTENED = 1.0
+"""Deviation of the part of its bend by which a response follows the temperature (1) and not the frequency (0)."""
 CARRIED = float(np.e)
 """Standard deviation of what 1/Q carries into the bias over what the card says: its anisotropy is known to a factor of e."""
 FARTHEST = 2.5
@@ -349,7 +351,7 @@ class Followed:
         )
         size = max(abs(self.slope), 1e-300)
         bends = self.bends or (np.inf,) * (powers - 1)
-        deviations = [*bends, *[1.5 * size] * missed, *[CARRIED] * carried]
+        deviations = [*bends, *[1.5 * size] * (missed - 1), STRAIGHTENED * size, *[CARRIED] * carried]
         deviations += [*[self.turn_on] * len(named), FOLLOWED_DELAY]
         prior = np.array([np.inf] * (len(flat) + 1) + deviations)
         return Tangent(shift, columns, prior, names, views)

@@ -141,10 +141,10 @@ def collect(path, minutes, kinds, seed, held_out=True):
 
 
 def add_ceilings(path):
-    """Write into the file what an ideal detector would see of the faint effects and of pairs."""
+    """Write into the file what an ideal detector would see of single effects below SNR 3 and of pairs."""
     cases = read_cases(path)
     for case in cases:
-        wanted = case["kind"] == "pair" or (case["kind"] in ("effect", "faint") and case["snr"] < min(SNRS[:2]))
+        wanted = case["kind"] == "pair" or (case["kind"] in ("effect", "faint") and case["snr"] < max(SNRS))
         if wanted and "ceiling" not in case:
             _, truth = build_case(case["kind"], case["count"], case["seed"])
             case["ceiling"] = [[own.known, own.wandering] for own in ceilings(truth)]
