@@ -33,8 +33,10 @@ LAG_STEP = 0.3
 """Standard deviation of one correction of the logarithm of the lag."""
 STEADY = 0.4
 """Largest bend of the law times the farthest temperature, K: the slope keeps its sign, as far as bends are small."""
-STRAIGHTENED = 1.0
-"""Deviation of the part of its bend by which a response follows the temperature (1) and not the frequency (0)."""
+PART = 1.0
+"""Standard deviation of the part by which a response follows the temperature (1) and not the frequency (0), or the other way."""
+PARTS = (-0.5, 1.5)
+"""Between which it lies: what would need more is something else."""
 CARRIED = float(np.e)
 """Standard deviation of what 1/Q carries into the bias over what the card says: its anisotropy is known to a factor of e."""
 FARTHEST = 2.5
@@ -284,6 +286,8 @@ class Followed:
     ----------
     reading, whole : tuple of arrays
         Its reading, K on the coarse grid and on the fine one: between steps, and after the last, it bends.
+    instead : tuple of arrays
+        What it may follow instead, K: the temperature itself and not the change of the frequency, which bends, or the other way.
     missed : tuple of (n, m) arrays
         What the thermometer's own model cannot explain, and what effects on the thermometer itself add to it, K: temperature
         or not, the data decide.
@@ -291,6 +295,8 @@ class Followed:
         Change of the response for one kelvin, for the prior of the two.
     curve : tuple of float
         Coefficients of the second and higher powers, per (10 K)ᵖ: the whole of the law may come late.
+    part : float
+        By which it follows `instead`, 0 to 1 but for errors, where it is linearised or, with `part_held`, left.
     turn_on : float
         As of `Lagged`.
     carried : tuple of (n, m) arrays
@@ -303,11 +309,14 @@ class Followed:
     group: int
     reading: tuple[FloatArray, ...]
     whole: tuple[FloatArray, ...]
+    instead: tuple[FloatArray, ...]
     missed: tuple[FloatArray, ...]
     slope: float = 0.0
     delay: float | None = None
     bends: tuple[float, ...] = ()
     curve: tuple[float, ...] = ()
+    part: float = 0.0
+    part_held: bool = False
     turn_on: float = 0.0
     carried: tuple[FloatArray, ...] = ()
 
@@ -323,7 +332,8 @@ class Followed:
         shift, columns, views = [], [], []
         for k, own in enumerate(self.states):
             coarse = own.averaged(self.group)
-            u = self.reading[k]
+            beyond = self.instead[k] - self.reading[k]
+            u = self.reading[k] + self.part * beyond
             level, tied = levels(self.response, self.turn_on, k, self.states, u.size)
             v = coarse.spread
             static = [u / 10.0, (u**2 + v) / 1e2, (u**3 + 3.0 * u * v) / 1e3][:powers]
@@ -331,13 +341,15 @@ class Followed:
                 p * c * (u / 10.0) ** (p - 1) / 10.0 for p, c in enumerate(self.curve, 2)
             )
             late = -average(own.rate, self.group) * along
-            shift.append(np.zeros_like(u))
+            bend = np.zeros_like(u) if self.part_held else beyond * along
+            shift.append(self.part * bend)
             if self.delay is not None:
-                shift[-1] = -self.delay * late
+                shift[-1] = shift[-1] - self.delay * late
                 late = np.zeros_like(late)
             besides = self.missed[k] * (along / self.slope if self.slope else np.ones(u.size))[:, None]
             besides = np.concatenate([besides, self.carried[k]], axis=1) if carried else besides
-            columns.append(np.concatenate([level, np.stack(static, 1), besides, tied, late[:, None]], axis=1))
+            ends = np.stack([bend, late], axis=1)
+            columns.append(np.concatenate([level, np.stack(static, 1), besides, tied, ends], axis=1))
             steep = np.full(u.size, self.slope)
             views.append(View(own, coarse, own, coarse, steep))
         flat, named = level_names(self.response, self.turn_on, self.states)
@@ -347,30 +359,35 @@ class Followed:
             *(f"missed {m}" for m in range(missed)),
             *(f"missed loss {m}" for m in range(carried)),
             *named,
+            "part",
             "delay",
         )
         size = max(abs(self.slope), 1e-300)
         bends = self.bends or (np.inf,) * (powers - 1)
-        deviations = [*bends, *[1.5 * size] * (missed - 1), STRAIGHTENED * size, *[CARRIED] * carried]
-        deviations += [*[self.turn_on] * len(named), FOLLOWED_DELAY]
+        deviations = [*bends, *[1.5 * size] * missed, *[CARRIED] * carried]
+        deviations += [*[self.turn_on] * len(named), PART, FOLLOWED_DELAY]
         prior = np.array([np.inf] * (len(flat) + 1) + deviations)
         return Tangent(shift, columns, prior, names, views)
 
     def moved(self, values: dict[str, float], warmer: Sequence[FloatArray] | None) -> "Followed":
         """Take over the law."""
         powers = ("quadratic", "cubic")[: self.response.powers - 1]
-        return replace(self, slope=values["slope"] / 10.0, curve=tuple(values[p] for p in powers))
+        part = self.part if self.part_held else values["part"]
+        return replace(self, slope=values["slope"] / 10.0, curve=tuple(values[p] for p in powers), part=part)
 
     def held(self, values: dict[str, float]) -> "Followed | None":
-        """Hold the delay at its limit."""
-        most = FARTHEST * FOLLOWED_DELAY
-        if self.delay is not None or abs(values["delay"]) <= most:
-            return None
-        return replace(self, delay=most * float(np.sign(values["delay"])))
+        """Hold the delay and the part at their limits."""
+        most, part = FARTHEST * FOLLOWED_DELAY, float(np.clip(values["part"], *PARTS))
+        out = self
+        if self.delay is None and abs(values["delay"]) > most:
+            out = replace(out, delay=most * float(np.sign(values["delay"])))
+        if not self.part_held and part != values["part"]:
+            out = replace(out, part=part, part_held=True)
+        return None if out is self else out
 
     def released(self) -> "Followed":
-        """Let the delay go."""
-        return replace(self, delay=None)
+        """Let delay and part go."""
+        return replace(self, delay=None, part_held=False)
 
     def stated(self) -> None:
         """No card states its values."""
@@ -386,7 +403,8 @@ class Followed:
             tuple(np.zeros((nothing.size, part.shape[1])) for part in own[:1]) for own in (self.missed, self.carried)
         )
         whole = (np.zeros(states.time.size),)
-        return replace(self, states=(states,), reading=(nothing,), whole=whole, missed=missed, carried=carried)
+        alone = replace(self, states=(states,), reading=(nothing,), whole=whole, missed=missed, carried=carried)
+        return replace(alone, instead=(nothing,))
 
 
 def first_stretches(states: Sequence[States]) -> list[int]:

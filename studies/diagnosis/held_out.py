@@ -174,6 +174,7 @@ def fine(baseline: Baseline, campaign: Campaign) -> Baseline:
             baseline,
             group=1,
             reading=baseline.whole,
+            instead=tuple(_finer(campaign, baseline.instead)),
             missed=tuple(_finer(campaign, baseline.missed)),
             carried=tuple(_finer(campaign, baseline.carried)) if baseline.carried else (),
         )

@@ -39,7 +39,7 @@ class Thermometer:
     missed : tuple of (N, m) arrays
         What may be temperature or not, as if it were, K: the slow part of what the model leaves, what is not known of the
         law's bend beside the named effects, then every named effect on the frequency itself and what the forms of thermal ones may
-        miss; last the bend itself, for a law that follows the temperature may do so as a power of it or of the frequency.
+        miss.
     states : tuple of States
         Runs on the fine grid with that temperature.
     """
@@ -53,6 +53,10 @@ class Thermometer:
         """Return what a response follows, K, run by run on the coarse grid and on the fine one."""
         coarse, whole = zip(*(self.change if response.bent else self.excess), strict=True)
         return coarse, whole
+
+    def instead(self, response: Response) -> tuple[FloatArray, ...]:
+        """Return what it may follow instead on the coarse grid: a law may be one of the temperature or of the frequency."""
+        return tuple(coarse for coarse, _ in (self.excess if response.bent else self.change))
 
 
 @dataclass(frozen=True)
@@ -112,6 +116,7 @@ def begin(
             campaign.group,
             reading,
             whole,
+            thermometer.instead(response),
             thermometer.missed,
             _slope(problem, reading),
             bends=bends_of(problem.values, problem.stack(list(reading)), response.powers),
@@ -278,6 +283,6 @@ def read_thermometer(campaign: Campaign, model: Fit) -> Thermometer | None:
         changes.append((baseline.change(x), baseline.change(whole)))
         parts = np.column_stack([filled, bend * x**2, *(own[k] for own in beside), inexact[k]])
         parts = parts / np.where(np.abs(view.steep) > 0, view.steep, np.inf)[:, None]
-        missed.append(np.column_stack([parts, x - baseline.change(x)]))
+        missed.append(parts)
         states.append(view.seen_fine)
     return Thermometer(tuple(changes), tuple(excesses), tuple(missed), tuple(states))

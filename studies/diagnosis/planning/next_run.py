@@ -178,11 +178,12 @@ def _alone(model: Fit, states: States, clock: Fit | None) -> Baseline:
         return own.alone(states)
     view = follow(clock, states, None).continued.tangent.views[0]
     whole = view.seen_fine.excess
-    reading, whole = (
-        cast("Reading", clock.baseline).change(x) if own.response.bent else x
-        for x in (average(whole, own.group), whole)
-    )
-    return replace(own.alone(view.seen_fine), reading=(reading,), whole=(whole,))
+    change = cast("Reading", clock.baseline).change
+    reading = average(whole, own.group)
+    instead = change(reading)
+    if own.response.bent:
+        reading, instead, whole = instead, reading, change(whole)
+    return replace(own.alone(view.seen_fine), reading=(reading,), whole=(whole,), instead=(instead,))
 
 
 def covariance_of_noise(model: Fit, rows: int, step: float) -> FloatArray:

@@ -43,6 +43,16 @@ def names_of(cause):
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("seed", [0, 1, 2])
+def test_a_static_curve_of_the_bias_is_no_bend_between_temperature_and_frequency(seed):
+    """A bias follows the temperature or the frequency: minus ten parts of their difference took what cross-damping does."""
+    verdict, truth = diagnose(
+        "steps/4", "white", ("cross-damping",), snr=1.0, seed=seed, only=("frequency_Hz", "bias_deg_per_h")
+    )
+    assert [cause.effect for cause in verdict.causes] == ["cross-damping"], (verdict.causes, truth)
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("key", sorted(EFFECTS))
 def test_hidden_effect_is_named(key):
     name, family = key.split("@")[0], FAMILIES[seed_of(key) % len(FAMILIES)]

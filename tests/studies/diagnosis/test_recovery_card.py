@@ -120,6 +120,25 @@ def test_an_effect_is_not_taken_for_values_far_from_the_card():
 
 
 @pytest.mark.slow
+def test_a_strong_effect_leaves_the_values_alone():
+    """Beside an amplitude-frequency effect of a hundred times the noise, priors of the first fit's scale let three values go far."""
+    card, runs = load_card("bvg-bell"), []
+    effect = {"name": "amplitude-frequency", "response": "frequency_Hz", "slope_Hz_per_V2": 0.03}
+    few = [find_effect(name) for name in ("amplitude-frequency", "mounting-stress", "second-lag", "thermometer-scale")]
+    for k, words in enumerate(("cycle 20 5 40 1 30min 1", "step 20 35 2h then ramp 35 0 1 then soak 0 90min")):
+        drive, rng = (
+            drive_by_profile(profile := load_profile(words), rows_of(profile, 0.05)),
+            np.random.default_rng(k + 3),
+        )
+        held = rng.uniform(0.5, 2.0, 40)[np.searchsorted(np.cumsum(rng.uniform(1200.0, 4000.0, 40)), drive.time)]
+        drive = replace(drive, commands={"amplitude_squared": held})
+        runs.append(simulate_run(card.with_table("effect", [effect]), drive, seed=k).record)
+    verdict = investigate(load_campaign(runs, 20.0), few, card=card, advise=False).verdict
+    assert [(cause.kind, cause.effect) for cause in verdict.causes] == [("physics", "amplitude-frequency")]
+    assert max(abs(shift.shift_sd) for shift in verdict.calibration) < 2.0
+
+
+@pytest.mark.slow
 def test_a_wrong_value_is_named_as_one(shipped, tmp_path, capsys):
     """The glass stiffens with temperature by four standard deviations of its law more than the card says."""
     name = "material.deviation.shear_modulus.log_slope_per_K"
