@@ -1,6 +1,7 @@
 """Hide effects in cards, run the virtual gyro, and ask the diagnosis with the plain card: what is right, by SNR.
 
     python tests/benchmarks/bench_card_effects.py cases.jsonl --minutes 5 [--seed N] [--plain]    append cases and sum up
+    python tests/benchmarks/bench_card_effects.py cases.jsonl --ceilings    what an ideal detector sees of those at SNR 1 and 3
 
 Every case: a shipped card, one to four runs of chamber programmes in words, one effect of the library with a shape and
 coefficients off any grid, scaled to its SNR in 120 s means after a least-squares baseline; one case in four hides nothing.
@@ -12,24 +13,31 @@ import json
 import sys
 import tempfile
 import time
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from functools import cached_property, partial
 from pathlib import Path
 
 import numpy as np
+from scipy.fft import irfft, next_fast_len
+from scipy.linalg import toeplitz
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 from shell.errors import ShellError
 from studies.diagnosis.campaign import load_campaign
 from studies.diagnosis.evidence import SCALES
+from studies.diagnosis.inquiry import begin, read_thermometer
 from studies.diagnosis.investigate import investigate
 from studies.diagnosis.problem import span_of
+from studies.diagnosis.simulated import simulate_baseline
 from studies.effects import library
 from studies.errors import InputError
-from studies.instrument.card import load_card
+from studies.instrument.card import Instrument, load_card
 from studies.simulation.chamber import load_drive
 from studies.simulation.drive import drive_by_profile, rows_of
+from studies.simulation.noise import NoiseLevels, bias_noise, frequency_noise
 from studies.simulation.virtual_gyro import simulate_run
+from tests.benchmarks.diagnosis.ceiling import PRICE, above
 from tests.benchmarks.diagnosis.scoring import short_rate
 from thermal.profile import Profile
 
@@ -42,6 +50,8 @@ MEAN = 6
 """Rows to 120 s."""
 DRIVES = {"amplitude_squared": "drive_amplitude_V", "voltage_squared": "electrode_bias_V"}
 DRIVES |= {"quadrature": "quadrature_V", "pattern_angle": "pattern_angle_deg"}
+SEEN = 3.0
+"""Largest SNR at which it is asked whether an ideal detector would see the effect."""
 RANGES = {"drive_amplitude_V": (0.7, 1.4), "electrode_bias_V": (60.0, 110.0)}
 RANGES |= {"quadrature_V": (-2.0, 2.0), "pattern_angle_deg": (0.0, 80.0)}
 
@@ -137,11 +147,33 @@ def entry(name, response, shape, values):
     return table | effect.numbers(values, response)
 
 
+@dataclass(frozen=True)
+class Case:
+    """A card, what its device hides, and the records of both; `name` is empty where nothing is hidden."""
+
+    card: Instrument
+    device: Instrument
+    drives: list
+    seed: int
+    name: str = ""
+    response: str = ""
+    snr: float = 0.0
+
+    @cached_property
+    def records(self):
+        """What the device did."""
+        return run(self.device, self.drives, self.seed)
+
+    def does(self):
+        """What is hidden, run by run: the device without noise less the card's."""
+        both = [run(card, self.drives, self.seed, False) for card in (self.device, self.card)]
+        return [there[self.response] - plain[self.response] for there, plain in zip(*both, strict=True)]
+
+
 def make_case(seed, plain):
-    """Return (card, records, truth) of a case."""
+    """Return a case."""
     rng = np.random.default_rng(seed)
-    chosen = CARDS[int(rng.integers(len(CARDS)))]
-    card = load_card(chosen)
+    card = load_card(CARDS[int(rng.integers(len(CARDS)))])
     acting = [(name, r) for name, effect in library().items() for r in effect.sizes if name != "clock-offset"]
     name, response = acting[int(rng.integers(len(acting)))]
     effect, snr = library()[name], SNRS[int(rng.integers(len(SNRS)))]
@@ -152,49 +184,88 @@ def make_case(seed, plain):
         for path in profiles:
             draw_profile(rng, path, [DRIVES[n] for n in effect.needs] if hidden else [])
         drives = one_after_the_other(profiles)
-        if not hidden:
-            return chosen, card, run(card, drives, seed), "", "", 0.0
-        clean = run(card, drives, seed, False)
-        noisy = run(card, drives, seed)
-        noise = left(clean, [n[response] - c[response] for n, c in zip(noisy, clean, strict=True)], response)
-        shape, values = draw_effect(rng, name, response, span_of(load_campaign(noisy), 1000.0))
-        level = (
-            abs(float(np.median(clean[0][response]))) if response != "bias_deg_per_h" and not effect.thermal else 1.0
+    if not hidden:
+        return Case(card, card, drives, seed)
+    clean = run(card, drives, seed, False)
+    noisy = run(card, drives, seed)
+    noise = left(clean, [n[response] - c[response] for n, c in zip(noisy, clean, strict=True)], response)
+    shape, values = draw_effect(rng, name, response, span_of(load_campaign(noisy), 1000.0))
+    level = abs(float(np.median(clean[0][response]))) if response != "bias_deg_per_h" and not effect.thermal else 1.0
+    values = values * effect.sizes[response] * level * 0.03
+    for _ in range(2):
+        values = np.minimum(values, 1.0) if effect.sees_heat else values  # all of the heat at most
+        case = Case(
+            card, card.with_table("effect", [entry(name, response, shape, values)]), drives, seed, name, response
         )
-        values = values * effect.sizes[response] * level * 0.03
-        for _ in range(2):
-            values = np.minimum(values, 1.0) if effect.sees_heat else values  # all of the heat at most
-            true = card.with_table("effect", [entry(name, response, shape, values)])
-            there = run(true, drives, seed, False)
-            size = left(clean, [a[response] - c[response] for a, c in zip(there, clean, strict=True)], response) / noise
-            values = values * snr / max(size, 1e-9)
-        if abs(values[0]) > STRONGEST * effect.sizes[response] * level * effect.spread[0]:
-            raise InputError(f"{name}: no gyro shows what SNR {snr:g} would take in {chosen}")
-        if effect.sees_heat and values[0] > 1.0:
-            raise InputError(f"{name}: even if all heat took this way it would not reach SNR {snr:g} in {chosen}")
-        true = card.with_table("effect", [entry(name, response, shape, values)])
-        return chosen, card, run(true, drives, seed), name, response, snr
+        values = values * snr / max(left(clean, case.does(), response) / noise, 1e-9)
+    if abs(values[0]) > STRONGEST * effect.sizes[response] * level * effect.spread[0]:
+        raise InputError(f"{name}: no gyro shows what SNR {snr:g} would take in {card.name}")
+    if effect.sees_heat and values[0] > 1.0:
+        raise InputError(f"{name}: even if all heat took this way it would not reach SNR {snr:g} in {card.name}")
+    return replace(case, device=card.with_table("effect", [entry(name, response, shape, values)]), snr=snr)
 
 
 def answer(seed, plain):
     """Make and diagnose one case, with the card and, where nothing is hidden, without."""
-    chosen, card, records, name, response, snr = make_case(seed, plain)
-    campaign = load_campaign(records)
-    begin = time.process_time()
-    found = investigate(campaign, card=card, advise=False).verdict
-    case = {"seed": seed, "card": chosen, "runs": len(records), "hidden": name, "response": response, "snr": snr}
-    case |= {
-        "seconds": time.process_time() - begin,
+    made = make_case(seed, plain)
+    campaign = load_campaign(made.records)
+    started = time.process_time()
+    found = investigate(campaign, card=made.card, advise=False).verdict
+    named = [c for c in found.causes if c.kind == "physics"]
+    case = {
+        "seed": seed,
+        "card": made.card.name,
+        "runs": len(made.drives),
+        "hidden": made.name,
+        "response": made.response,
+        "snr": made.snr,
+        "seconds": time.process_time() - started,
         "verdict": found.verdict,
         "names": [c.effect for c in found.causes],
+        "sets": [[*c.names] for c in named],
+        "stated": [c.probability for c in named],
+        "values": [c.effect for c in found.causes if c.kind == "value"],
+        "left": {k: r.left_over_input for k, r in found.responses.items()},
     }
-    case["sets"] = [[*c.names] for c in found.causes if c.kind == "physics"]
-    case["stated"] = [c.probability for c in found.causes if c.kind == "physics"]
-    case["values"] = [c.effect for c in found.causes if c.kind == "value"]
-    case["left"] = {k: r.left_over_input for k, r in found.responses.items()}
-    if not name:
+    if not made.name:
         case["alone"] = investigate(campaign, advise=False, score_held_out=True).verdict.verdict
     return case
+
+
+def ceiling(seed):
+    """Return what an ideal detector would see of a case: it knows form and noise, but the card's values no better than the card."""
+    made = make_case(seed, False)
+    campaign = load_campaign(run(made.card, made.drives, seed))
+    plain = begin(campaign, "frequency_Hz", None, partial(simulate_baseline, campaign, made.card))
+    if made.response != "frequency_Hz":
+        plain = begin(campaign, made.response, read_thermometer(campaign, plain))
+    levels = noise_of(made.card, made.response, made.drives)
+    silent, rows, noise = run(made.device, made.drives, seed, False), [], []
+    for own, mask in zip(campaign.runs, plain.problem.present, strict=True):
+        rows.append(own.steps.means(silent[own.record][made.response]))
+        noise.append(covariance(levels, own, mask, plain.problem.noise.rows))
+    found = above(campaign, plain, rows, noise, levels.white**2 * RATE / plain.problem.noise.rows)
+    return [found.known, found.wandering]
+
+
+def noise_of(card, response, drives):
+    """Return the noise of a response of the virtual gyro: as the card states it, and for 1/Q white, as it is found."""
+    if response != "inverse_q":
+        return (bias_noise if response == "bias_deg_per_h" else frequency_noise)(card.noise)
+    quiet, noisy = (run(card, drives[:1], 0, noise)[0][response] for noise in (False, True))
+    return NoiseLevels(white=float(np.std(noisy - quiet)) / np.sqrt(RATE))
+
+
+def covariance(levels, own, mask, rows):
+    """Covariance of the means of a run's rows over the steps of its grid, of white noise, flicker and a walk."""
+    count, time = own.row_time.size, own.time[mask] - own.row_time[0]
+    length = next_fast_len(2 * count, real=True)
+    power = np.zeros(length // 2 + 1)
+    power[1:] = levels.flicker**2 / (2.0 * np.log(2.0)) / (2.0 * np.arange(1, power.size))  # S(f) = h/f, line by line
+    flicker = toeplitz(irfft(power, length)[:count] * length)
+    means = np.stack([own.steps.means(column) for column in np.eye(count)], axis=1)[mask]
+    walk = levels.walk**2 * np.minimum.outer(time, time)
+    return np.eye(time.size) * levels.white**2 * RATE / rows + walk + means @ flicker @ means.T
 
 
 def summarise(cases):
@@ -229,6 +300,12 @@ def summarise(cases):
         )
         row("    unexplained", own, lambda c: c["verdict"] == "unexplained")
     hidden = [c for c in cases if c["hidden"]]
+    for snr in sorted({c["snr"] for c in hidden if "ceiling" in c}):
+        own = [c for c in hidden if c["snr"] == snr and "ceiling" in c]
+        for k, word in enumerate(("knows the noise", "does not know whether it wanders")):
+            seen = [c for c in own if c["ceiling"][k] > PRICE]
+            row(f"SNR {snr:g}: seen by an ideal that {word}", own, lambda c, k=k: c["ceiling"][k] > PRICE)
+            row("    of these in a set", seen, hit)
     row("a value of the card named beside", hidden, lambda c: c["values"])
     row("something named that is not there", hidden, lambda c: any(not equals(c["hidden"]) & set(s) for s in c["sets"]))
     return "\n".join(lines)
@@ -240,7 +317,15 @@ def main():
     parser.add_argument("--minutes", type=float, default=5.0)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--plain", action="store_true", help="hide nothing")
+    parser.add_argument("--ceilings", action="store_true", help="what an ideal detector sees of the cases of the file")
     given = parser.parse_args()
+    if given.ceilings:
+        cases = [json.loads(line) for line in given.cases.read_text().splitlines()]
+        for case in cases:
+            if case["hidden"] and case["snr"] <= SEEN and "ceiling" not in case:
+                case["ceiling"] = ceiling(case["seed"])
+        given.cases.write_text("".join(json.dumps(case, default=float) + "\n" for case in cases))
+        given.minutes = 0.0
     end, seed = time.process_time() + 60 * given.minutes, given.seed
     with given.cases.open("a") as file:
         while time.process_time() < end:

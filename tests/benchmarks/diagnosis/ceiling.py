@@ -42,19 +42,26 @@ def ceiling_of(truth, channel, clean, noisy):
     plain = begin(campaign, "frequency_Hz", None)
     if channel != "frequency_Hz":
         plain = begin(campaign, channel, read_thermometer(campaign, plain))
-    problem, tangent = plain.problem, plain.tangent
     sigma, level = truth.levels[channel]
-    rows, noise, times = [], [], []
-    for run, mask in zip(campaign.runs, problem.present, strict=True):
+    rows, noise = [], []
+    for run, mask in zip(campaign.runs, plain.problem.present, strict=True):
         silent = clean[run.record]
         known = np.isfinite(run.row_responses[channel])
         own = np.interp(run.row_time, silent["time_s"] - silent["time_s"][0], silent[channel])
         rows.append(run.steps.means(np.where(known, own, np.nan)))
-        noise.append(sigma**2 * covariance(truth.family, level, run, mask, problem.noise.rows))
-        times.append(run.time[mask])
+        noise.append(sigma**2 * covariance(truth.family, level, run, mask, plain.problem.noise.rows))
+    return above(campaign, plain, rows, noise, sigma**2 / plain.problem.noise.rows)
+
+
+def above(campaign, plain, rows, noise, white):
+    """Return the ceiling of a response without its noise, in steps of the grid, above a baseline in noise of given covariance.
+
+    Wanders are counted in the white noise of a step, `white`.
+    """
+    problem, tangent = plain.problem, plain.tangent
+    times = [run.time[mask] for run, mask in zip(campaign.runs, problem.present, strict=True)]
     target = problem.split(problem.stack(rows) + problem.stack(tangent.shift))
     columns = problem.split(problem.stack(tangent.columns))
-    white = sigma**2 / problem.noise.rows
 
     def ratio(kernel, share):
         wander = [share * white * kernel(t) for t in times] if share else [0.0] * len(times)
