@@ -15,6 +15,8 @@ from compensation.wander import white_noise
 Array = NDArray[np.float64]
 AROUND = 101
 """Frequencies about each whose median power is the level of the noise there; a series with fewer rows has no spectrum."""
+LEVEL = 24.0
+"""Degrees of freedom of that median: every other frequency is independent, and a median knows (ln 2)² of what a mean would."""
 CYCLES = 8.0
 """Periods in the longest series that make a line."""
 TALLEST = 4.0
@@ -49,7 +51,8 @@ def find_line(
 ) -> Line | None:
     """Return the largest line with a period from `FASTEST` rows to `slowest`, s, of series of times (m,), s, and readings (m,).
 
-    In noise of any smooth spectrum the sum over n series of their periodograms over their levels has a gamma law of order n. A
+    In noise of any smooth spectrum the sum over n series of their periodograms over their levels has a gamma law of order n, once
+    what a level of ν degrees of freedom leaves uncertain is taken off: P(ratio > x) = (1 + x/ν)^−ν. A
     slope that is rounded to steps q makes lines too, of amplitude q/π where the noise does not blur them: none of up to twice that
     counts. None where no line has the evidence that is the `least`.
     """
@@ -66,9 +69,9 @@ def find_line(
         amplitude = np.abs(rfft(fast * window, count)) * 2.0 / window.sum()
         level = median_filter(amplitude**2, AROUND, mode="nearest") / np.log(2.0)
         real = looked_at & (level > 0.0) & (amplitude > 2.0 * _of_rounding(values))
-        ratio[real] += amplitude[real] ** 2 / level[real]
+        ratio[real] += LEVEL * np.log1p(amplitude[real] ** 2 / level[real] / LEVEL)
         size[real] = np.maximum(size[real], amplitude[real] / np.sqrt(2.0))
-    evidence = _improbable(ratio, len(rows)) - np.log(max(int(looked_at.sum()), 1))
+    evidence = _improbable(ratio, len(rows)) - np.log(max(int(looked_at.sum()) / 2.0, 1.0))
     at = int(np.argmax(np.where(evidence > least, size, 0.0)))
     return Line(1.0 / float(frequency[at]), float(evidence[at]), float(size[at])) if evidence[at] > least else None
 
