@@ -51,10 +51,10 @@ def find_line(
 ) -> Line | None:
     """Return the largest line with a period from `FASTEST` rows to `slowest`, s, of series of times (m,), s, and readings (m,).
 
-    In noise of any smooth spectrum the sum over n series of their periodograms over their levels has a gamma law of order n, once
-    what a level of ν degrees of freedom leaves uncertain is taken off: P(ratio > x) = (1 + x/ν)^−ν. A
-    slope that is rounded to steps q makes lines too, of amplitude q/π where the noise does not blur them: none of up to twice that
-    counts. None where no line has the evidence that is the `least`.
+    In noise of any smooth spectrum a periodogram over its level exceeds x with the probability (1 + x/ν)^−ν, the level having ν
+    degrees of freedom; the sum over n series of ν log(1 + x/ν) has a gamma law of order n. A slope that is rounded to steps q makes
+    lines too, of amplitude q/π where the noise does not blur them: none of up to twice that counts. None where no line has the
+    evidence that is the `least`.
     """
     rows = [(time[known], values[known]) for time, values in series if (known := np.isfinite(values)).sum() > AROUND]
     longest = round(max((time[-1] - time[0] for time, _ in rows), default=0.0) / sampling) + 1

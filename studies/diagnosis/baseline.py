@@ -402,9 +402,15 @@ class Followed:
         missed, carried = (
             tuple(np.zeros((nothing.size, part.shape[1])) for part in own[:1]) for own in (self.missed, self.carried)
         )
-        whole = (np.zeros(states.time.size),)
-        alone = replace(self, states=(states,), reading=(nothing,), whole=whole, missed=missed, carried=carried)
-        return replace(alone, instead=(nothing,))
+        return replace(
+            self,
+            states=(states,),
+            reading=(nothing,),
+            whole=(np.zeros(states.time.size),),
+            instead=(nothing,),
+            missed=missed,
+            carried=carried,
+        )
 
 
 def first_stretches(states: Sequence[States]) -> list[int]:

@@ -81,9 +81,14 @@ def _suits(campaign: Campaign, rival: Fit, other: Inquiry) -> float:
     if thermometer is None or not isinstance(baseline, Followed):
         return other.final.log_evidence / temper
     reading, whole = thermometer.reads(other.problem.response)
-    instead = thermometer.instead(other.problem.response)
-    moved = replace(baseline, states=thermometer.states, reading=reading, whole=whole, missed=thermometer.missed)
-    moved = replace(moved, instead=instead)
+    moved = replace(
+        baseline,
+        states=thermometer.states,
+        reading=reading,
+        whole=whole,
+        instead=thermometer.instead(other.problem.response),
+        missed=thermometer.missed,
+    )
     return fit(other.problem, moved, other.final.terms, 2, other.final.solved.scales).log_evidence / temper
 
 

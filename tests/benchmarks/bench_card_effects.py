@@ -14,7 +14,7 @@ import sys
 import tempfile
 import time
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -149,7 +149,7 @@ def entry(name, response, shape, values):
 
 @dataclass(frozen=True)
 class Case:
-    """A card, what its device hides, and the records of both; `name` is empty where nothing is hidden."""
+    """A card, the device that hides an effect from it, and how both are driven; `name` is empty where nothing is hidden."""
 
     card: Instrument
     device: Instrument
@@ -158,16 +158,6 @@ class Case:
     name: str = ""
     response: str = ""
     snr: float = 0.0
-
-    @cached_property
-    def records(self):
-        """What the device did."""
-        return run(self.device, self.drives, self.seed)
-
-    def does(self):
-        """What is hidden, run by run: the device without noise less the card's."""
-        both = [run(card, self.drives, self.seed, False) for card in (self.device, self.card)]
-        return [there[self.response] - plain[self.response] for there, plain in zip(*both, strict=True)]
 
 
 def make_case(seed, plain):
@@ -192,23 +182,26 @@ def make_case(seed, plain):
     shape, values = draw_effect(rng, name, response, span_of(load_campaign(noisy), 1000.0))
     level = abs(float(np.median(clean[0][response]))) if response != "bias_deg_per_h" and not effect.thermal else 1.0
     values = values * effect.sizes[response] * level * 0.03
+
+    def hiding(values):
+        return card.with_table("effect", [entry(name, response, shape, values)])
+
     for _ in range(2):
         values = np.minimum(values, 1.0) if effect.sees_heat else values  # all of the heat at most
-        case = Case(
-            card, card.with_table("effect", [entry(name, response, shape, values)]), drives, seed, name, response
-        )
-        values = values * snr / max(left(clean, case.does(), response) / noise, 1e-9)
+        there = run(hiding(values), drives, seed, False)
+        size = left(clean, [a[response] - c[response] for a, c in zip(there, clean, strict=True)], response) / noise
+        values = values * snr / max(size, 1e-9)
     if abs(values[0]) > STRONGEST * effect.sizes[response] * level * effect.spread[0]:
         raise InputError(f"{name}: no gyro shows what SNR {snr:g} would take in {card.name}")
     if effect.sees_heat and values[0] > 1.0:
         raise InputError(f"{name}: even if all heat took this way it would not reach SNR {snr:g} in {card.name}")
-    return replace(case, device=card.with_table("effect", [entry(name, response, shape, values)]), snr=snr)
+    return Case(card, hiding(values), drives, seed, name, response, snr)
 
 
 def answer(seed, plain):
     """Make and diagnose one case, with the card and, where nothing is hidden, without."""
     made = make_case(seed, plain)
-    campaign = load_campaign(made.records)
+    campaign = load_campaign(run(made.device, made.drives, seed))
     started = time.process_time()
     found = investigate(campaign, card=made.card, advise=False).verdict
     named = [c for c in found.causes if c.kind == "physics"]
