@@ -67,7 +67,7 @@ def browse(page, *flags):
         "--window-size=900,900", "--virtual-time-budget=10000", *flags, "--dump-dom", f"file://{page}",
     ]  # fmt: skip
     cut = shutil.which("unshare") and subprocess.run(["unshare", "-n", "true"], capture_output=True).returncode == 0
-    done = subprocess.run(["unshare", "-n", *command] if cut else command, capture_output=True, text=True, timeout=150)
+    done = subprocess.run(["unshare", "-n", *command] if cut else command, capture_output=True, text=True, timeout=600)
     title = re.search(r"<title>(.*?)</title>", done.stdout, re.DOTALL)
     assert title, done.stderr[-2000:]
     return json.loads(html.unescape(title.group(1)))

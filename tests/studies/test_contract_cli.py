@@ -27,7 +27,7 @@ def test_help_starts_without_the_heavy_packages(words):
         f"status = main({words!r})\n"
         f"print('HEAVY', [m for m in {HEAVY!r} if m in sys.modules], status)"
     )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=ROOT, timeout=60)
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=ROOT, timeout=600)
     assert "HEAVY [] 0" in done.stdout, done.stdout[-500:] + done.stderr[-500:]
 
 
@@ -117,7 +117,7 @@ def test_a_foreign_package_of_our_name_is_status_3(tmp_path):
     (tmp_path / "thermal.py").write_text("")
     code = "import sys; sys.path.insert(0, sys.argv.pop(1)); from studies.cli import main; sys.exit(main(['cards']))"
     done = subprocess.run(
-        [sys.executable, "-c", code, str(tmp_path)], capture_output=True, text=True, cwd=ROOT, timeout=60
+        [sys.executable, "-c", code, str(tmp_path)], capture_output=True, text=True, cwd=ROOT, timeout=600
     )
     assert done.returncode == 3
     assert "thermal" in done.stderr

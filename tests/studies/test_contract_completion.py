@@ -15,7 +15,7 @@ BASH = shutil.which("bash")
 def install(home, shell):
     environment = {**os.environ, "PYTHONPATH": str(ROOT), "HOME": str(home), "SHELL": shell}
     command = [sys.executable, "-c", "from studies.cli import run; run()", "--install-completion"]
-    return subprocess.run(command, capture_output=True, text=True, env=environment, cwd=home, timeout=120)
+    return subprocess.run(command, capture_output=True, text=True, env=environment, cwd=home, timeout=600)
 
 
 @pytest.mark.skipif(BASH is None, reason="no bash on this machine")
@@ -27,7 +27,7 @@ def test_bash_completes_commands_and_options(tmp_path):
     def complete(*words):
         line = " ".join(f"'{word}'" for word in words)
         code = f"source {script}; COMP_WORDS=({line}); COMP_CWORD={len(words) - 1}; _hrg; printf '%s\\n' \"${{COMPREPLY[@]}}\""
-        return subprocess.run([BASH, "-c", code], capture_output=True, text=True, timeout=30).stdout.split()
+        return subprocess.run([BASH, "-c", code], capture_output=True, text=True, timeout=600).stdout.split()
 
     assert {"render", "reproduce"} <= set(complete("hrg", "re"))
     assert "--swing-mm" in complete("hrg", "render", "--sw")

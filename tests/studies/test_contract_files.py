@@ -29,7 +29,7 @@ def test_a_pipe_is_written_into_and_stays_a_pipe(tmp_path):
     reader = threading.Thread(target=lambda: got.append(pipe.read_text()))
     reader.start()
     write_text(pipe, "hello")
-    reader.join(timeout=10)
+    reader.join(timeout=600)
     assert got == ["hello"]
     assert pipe.is_fifo()
     assert os.listdir(tmp_path) == ["pipe"]
@@ -88,7 +88,7 @@ def test_closed_full_and_plain_terminals(tmp_path, shell, status, said):
     command = shell.replace("hrg ", f'{sys.executable} -c "{code}" ').replace("{folder}", str(tmp_path))
     environment = {**os.environ, "PYTHONPATH": os.getcwd()}
     done = subprocess.run(
-        ["sh", "-c", command], capture_output=True, text=True, env=environment, timeout=120, check=False
+        ["sh", "-c", command], capture_output=True, text=True, env=environment, timeout=600, check=False
     )
     assert done.returncode == status, done.stderr
     assert said in done.stderr
@@ -111,7 +111,7 @@ def test_a_request_to_end_counts_as_ctrl_c(tmp_path):
         assert process.poll() is None, process.stderr.read()
     threading.Event().wait(1.0)
     process.terminate()
-    _, said = process.communicate(timeout=60)
+    _, said = process.communicate(timeout=600)
     assert process.returncode == 130, said
     assert "Traceback" not in said
 
@@ -129,7 +129,7 @@ def test_a_request_to_end_that_falls_into_a_callback_is_not_lost():
         "studies.cli.main = work\n"
         "studies.cli.run()\n"
     )
-    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, timeout=60, check=False)
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, timeout=600, check=False)
     assert done.returncode == 130
     assert done.stderr == "hrg: interrupted.\n"
 
@@ -154,7 +154,7 @@ def test_a_request_to_end_that_is_swallowed_comes_again_but_leaves_clearing_up_a
         "studies.cli.main = work\n"
         "studies.cli.run()\n"
     )
-    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, timeout=60, check=False)
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, timeout=600, check=False)
     assert (done.returncode, done.stdout, done.stderr) == (130, "cleared up\n", "hrg: interrupted.\n")
 
 

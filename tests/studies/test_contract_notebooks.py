@@ -17,7 +17,7 @@ def run_notebook(name, folder):
     assert all(not cell.get("outputs") for cell in notebook.cells)  # kept without outputs
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # of the messaging libraries
-        NotebookClient(notebook, timeout=120, resources={"metadata": {"path": str(folder)}}).execute()
+        NotebookClient(notebook, timeout=600, resources={"metadata": {"path": str(folder)}}).execute()
         asyncio.set_event_loop(None)  # other tests find none left over
     assert list(folder.iterdir()) == []
     return "".join(

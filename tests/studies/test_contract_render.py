@@ -129,7 +129,7 @@ def test_the_drawing_process_ends_with_the_one_that_wants_it(tmp_path):
     folder = tmp_path / "job"
     folder.mkdir()
     child = [sys.executable, "-m", "shell.render", str(folder)]
-    done = subprocess.run(child, stdin=subprocess.DEVNULL, capture_output=True, timeout=60, check=False)
+    done = subprocess.run(child, stdin=subprocess.DEVNULL, capture_output=True, timeout=600, check=False)
     assert done.returncode == 1
     assert not folder.exists()
 

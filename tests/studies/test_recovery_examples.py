@@ -18,7 +18,7 @@ def run_example(name, folder):
     """Return what an example prints; it leaves no files."""
     environment = {**os.environ, "PYTHONPATH": str(ROOT), "OPENBLAS_NUM_THREADS": "1"}
     command = [sys.executable, "-m", f"studies.examples.{name}"]
-    done = subprocess.run(command, capture_output=True, text=True, cwd=folder, env=environment, timeout=200)
+    done = subprocess.run(command, capture_output=True, text=True, cwd=folder, env=environment, timeout=600)
     assert done.returncode == 0, done.stderr
     assert list(folder.iterdir()) == []
     return done.stdout

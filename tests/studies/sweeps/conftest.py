@@ -21,7 +21,7 @@ def hrg():
     def call(*words: object, **more: str) -> subprocess.CompletedProcess[str]:
         command = words_of(*map(str, words))
         return subprocess.run(
-            command, capture_output=True, text=True, env=environment(**more), timeout=120, check=False
+            command, capture_output=True, text=True, env=environment(**more), timeout=600, check=False
         )
 
     return call
