@@ -69,6 +69,7 @@ def _figures(instrument: "Instrument") -> Iterator[Figure]:
     import numpy as np
 
     from shell.modes import solve_modes
+    from shell.separation import nearest_mode
     from studies.errors import naming
     from studies.law import law_of
     from studies.simulation.heat_path import behind_housing, build_network, slowest_lag
@@ -76,14 +77,12 @@ def _figures(instrument: "Instrument") -> Iterator[Figure]:
     T0, nothing = instrument.reference_temperature, float("nan")
     with naming(instrument.path):
         lowest = {n: solve_modes(*instrument.at(T0), n)[0] for n in HARMONICS}
+        nearest = nearest_mode(lambda n, count: solve_modes(*instrument.at(T0), n, count), lowest[DRIVE])
         law = law_of(instrument, T0 - 1.0, T0 + 1.0)
     drive, share = lowest[DRIVE], float(law.uncertainty(np.array([T0]))[0])
     for n, mode in lowest.items():
         yield Figure(f"frequency, n = {n}", "Hz", mode.frequency, share * mode.frequency)
-    others = [mode.frequency for n, mode in lowest.items() if n != DRIVE]
-    yield Figure(
-        "nearest other mode", "Hz", min(others, key=lambda f: abs(f - drive.frequency)) - drive.frequency, nothing
-    )
+    yield Figure("nearest other mode", "Hz", nearest.frequency - drive.frequency, nothing)
     yield Figure("Bryan factor", "1", drive.bryan_factor, nothing)
     yield Figure("modal mass", "g", 1e3 * drive.modal_mass, nothing)
     mean = float(np.mean([h for _, h in instrument.resonator.thickness]))

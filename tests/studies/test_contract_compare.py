@@ -49,3 +49,26 @@ def test_one_card_cannot_be_compared(capsys):
     assert main(["compare", "free-dome"]) == 2
     assert "two cards or more" in capsys.readouterr().err
     assert main(["compare", "free-dome", "no-such"]) == 2
+
+
+def test_nearest_mode_is_any_mode_and_not_the_lowest_of_its_harmonic(capsys):
+    """The card's second n = 1 mode is nearer to the drive mode than the first, as the list of modes shows."""
+    modes = ask(capsys, "modes", "hrg-30mm", "--harmonic", "0", "1", "2", "3", "4", "--count", "3")["modes"]
+    drive = next(one["frequency_Hz"] for one in modes if (one["harmonic"], one["index"]) == (2, 0))
+    others = [one["frequency_Hz"] - drive for one in modes if (one["harmonic"], one["index"]) != (2, 0)]
+    figures = {one["name"]: one for one in ask(capsys, "compare", "hrg-30mm", "free-dome")["figures"]}
+    assert figures["nearest other mode"]["values"][0] == pytest.approx(min(others, key=abs), abs=0.2)
+
+
+def test_nearest_mode_lies_behind_many_lower_ones():
+    """Planted: five modes of n = 1 below the drive mode, the fifth nearest."""
+    from types import SimpleNamespace
+
+    from shell.separation import nearest_mode
+
+    spectrum = {0: (9000.0,), 1: (100.0, 200.0, 300.0, 400.0, 4990.0, 6000.0), 2: (5000.0, 7000.0)}
+    modes = {
+        n: [SimpleNamespace(harmonic=n, index=k, frequency=f) for k, f in enumerate(one)] for n, one in spectrum.items()
+    }
+    found = nearest_mode(lambda n, count: modes[n][:count], modes[2][0], range(3), least=1)
+    assert (found.harmonic, found.index) == (1, 4)

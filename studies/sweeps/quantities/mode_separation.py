@@ -1,5 +1,6 @@
 """How far the nearest other mode is from a mode, in Hz: parasitic modes close by couple under vibration."""
 
+from shell.separation import nearest_mode
 from studies.sweeps.case import Case, Options
 from studies.sweeps.quantity import (
     HARMONIC,
@@ -23,10 +24,10 @@ def _columns(options: Options) -> tuple[Column, ...]:
 
 def _evaluate(case: Case, options: Options) -> tuple[Number, ...]:
     n, theory, at = options["harmonic"], options["theory"], case.temperature(options)
-    each = {m: case.modes(m, options["each"] + (m == n), theory, at) for m in range(options["highest"] + 1)}
     own = case.modes(n, 1, theory, at)[0]
-    others = [mode for modes in each.values() for mode in modes if (mode.harmonic, mode.index) != (n, 0)]
-    nearest = min(others, key=lambda mode: abs(mode.frequency - own.frequency))
+    nearest = nearest_mode(
+        lambda m, count: case.modes(m, count, theory, at), own, range(options["highest"] + 1), options["each"]
+    )
     error = sum(mode.frequency * mode.relative_error_estimate for mode in (own, nearest))
     return (Number(nearest.frequency - own.frequency, error), Number(float(nearest.harmonic), 0.0))
 
@@ -39,7 +40,7 @@ QUANTITY = Quantity(
         "theory": THEORY,
         "temperature_degC": TEMPERATURE,
         "highest": whole(4, "highest harmonic that is searched", most=20),
-        "each": whole(2, "modes searched of each harmonic", least=1, most=10),
+        "each": whole(2, "modes of each harmonic that are solved at least", least=1, most=10),
     },
     _columns,
     _evaluate,
