@@ -56,6 +56,7 @@ class Material:
         Range of the law.
     reference : float, K
         Temperature about which the deviations of the law and their prior count.
+    constant : properties given at one temperature only: nobody says how they change with it.
     """
 
     name: str
@@ -66,6 +67,7 @@ class Material:
     source: str = ""
     note: str = ""
     reference: float = ROOM
+    constant: tuple[str, ...] = ()
 
     def value(self, name: str, temperature: ArrayLike) -> NDArray[np.float64]:
         """Return a property at temperatures in kelvin; E, G and nu are derived from the two that are stated.
@@ -165,7 +167,8 @@ class Material:
         span = [self.lowest - zero_Celsius, self.highest - zero_Celsius]
         for name, found in moved.items():
             _check_sign(f"material '{self.name}', coefficients of {name}", name, found, span)
-        return replace(self, properties={**self.properties, **moved})
+        constant = tuple(name for name in self.constant if name not in moved)
+        return replace(self, properties={**self.properties, **moved}, constant=constant)
 
     def coefficient(self, key: str) -> float:
         """Return one coefficient of the deviation, for example `expansion.value`."""
@@ -222,14 +225,15 @@ class Material:
 
 
 def constant_material(name: str, youngs_modulus: float, poisson_ratio: float, density: float) -> Material:
-    """Return a material whose given values (Pa, 1, kg/m³) hold at every temperature and that does not expand."""
+    """Return a material of given values (Pa, 1, kg/m³): constant, without expansion, until its coefficients say more."""
     given = {"youngs_modulus": youngs_modulus, "poisson_ratio": poisson_ratio, "density": density}
     numbers = {key: {"value": value, "at_degC": 20.0} for key, value in given.items()}
     properties = {
         key: Property("constant", n, source="given value", relative=key not in SIGNED) for key, n in numbers.items()
     }
     properties["expansion"] = Property("constant", {"value": 0.0}, source="given values do not expand", relative=False)
-    return Material(name, "given values", 0.0, 5000.0, properties, source="given in the card")
+    open_ones = ("youngs_modulus", "expansion")  # what the slope of a frequency needs
+    return Material(name, "given values", 0.0, 5000.0, properties, "given in the card", constant=open_ones)
 
 
 @lru_cache(maxsize=8)

@@ -70,7 +70,7 @@ def _figures(instrument: "Instrument") -> Iterator[Figure]:
 
     from shell.modes import solve_modes
     from shell.separation import nearest_mode
-    from studies.errors import naming
+    from studies.errors import InputError, naming
     from studies.law import law_of
     from studies.simulation.heat_path import behind_housing, build_network, slowest_lag
 
@@ -89,9 +89,13 @@ def _figures(instrument: "Instrument") -> Iterator[Figure]:
     yield Figure(
         "frequency per thickness", "Hz/µm", drive.frequency * drive.sensitivities.thickness / mean * 1e-6, nothing
     )
-    at = np.array([T0])
-    yield Figure("slope", "ppm/°C", 1e6 * float(law.slope(at)[0]), 1e6 * float(law.slope_uncertainty(at)[0]))
-    lag = slowest_lag(behind_housing(build_network(instrument)), T0)
+    at, known = np.array([T0]), not instrument.material.constant
+    slope = (float(law.slope(at)[0]), float(law.slope_uncertainty(at)[0])) if known else (nothing, nothing)
+    yield Figure("slope", "ppm/°C", 1e6 * slope[0], 1e6 * slope[1])
+    try:
+        lag = slowest_lag(behind_housing(build_network(instrument)), T0)
+    except InputError:  # no source states the material's heat capacity or conductivity
+        lag = nothing
     yield Figure("lag behind the housing", "s", lag, nothing)
 
 

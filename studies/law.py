@@ -9,6 +9,8 @@ if TYPE_CHECKING:
     from shell.levels import Theory
     from studies.instrument.card import Instrument
 
+SLOPE_KEYS = {"youngs_modulus": "log_slope_per_K", "expansion": "value"}
+
 
 def law_of(
     instrument: "Instrument",
@@ -34,6 +36,29 @@ def law_of(
     open_one = replace(material, properties={**material.properties, "poisson_ratio": ratio})
     law = build_law(instrument.resonator, open_one, T0, lowest, highest, theory, harmonic, mount)
     return law.with_material(material)
+
+
+def unknown_slope(instrument: "Instrument") -> str:
+    """Say why the slope of the frequency is not known, and which keys would tell it; empty where it is known."""
+    missing = instrument.material.constant
+    named = {"youngs_modulus": "Young's modulus", "expansion": "expansion"}
+    keys = {name: f"[material.deviation.{name}] {key} (1/K)" for name, key in SLOPE_KEYS.items()}
+    if not missing:
+        return ""
+    return (
+        f"the card does not say how the {' and the '.join(named[name] for name in missing)} of"
+        f" '{instrument.material.name}' change{'s' if len(missing) == 1 else ''} with temperature, so the slope of the"
+        f" frequency is not known. Give {' and '.join(keys[name] for name in missing)}, or a material of the table"
+        " (hrg materials) or of your own ('file')."
+    )
+
+
+def check_slope_known(instrument: "Instrument") -> None:
+    """Refuse a material that is given at one temperature only: the slope of its frequency is not 0 but unknown."""
+    from studies.errors import InputError
+
+    if why := unknown_slope(instrument):
+        raise InputError(f"{instrument.path} [material]: {why}")
 
 
 def moved_law(law: "FrequencyLaw", instrument: "Instrument") -> "FrequencyLaw":

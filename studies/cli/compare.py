@@ -53,7 +53,9 @@ def compare(*card: str) -> Answer:
 
 
 def _with_uncertainty(value: float, uncertainty: float) -> str:
-    """Write a value to the second digit of its uncertainty."""
+    """Write a value to the second digit of its uncertainty; "not known" for NaN."""
+    if math.isnan(value):
+        return "not known"
     if not uncertainty > 0:
         return f"{value:.4g}" if abs(value) < 1e4 else f"{value:.0f}"
     digits = max(1 - math.floor(math.log10(uncertainty)), 0)

@@ -103,7 +103,7 @@ def modes(
         }
         if detailed:
             entry |= {
-                "material_uncertainty_Hz": share * m.frequency,
+                "material_uncertainty_Hz": share * m.frequency if share else None,
                 "frequency_per_thickness_Hz_per_um": _per_micrometre(m, mean),
                 "modal_mass_kg": m.modal_mass,
                 "sensitivities": asdict(m.sensitivities),
@@ -136,15 +136,20 @@ def modes(
             f"{m.frequency:.4f}",
             f"{m.bryan_factor:.5f}",
             f"{m.relative_error_estimate:.0e}",
-            f"{share * m.frequency:.2g}",
+            f"{share * m.frequency:.2g}" if share else "—",
             f"{_per_micrometre(m, mean):+.3g}" if detailed else "",
         ]
         for m in found
     ]
     columns = ["n", "index", "kind", "f (Hz)", "Bryan", "rel. error", "± Hz", "Hz/µm"]
+    spread = (
+        "what the material's published values leave (one standard deviation)"
+        if share
+        else "not known: the card gives its material without uncertainty"
+    )
     note = (
-        "The relative error is the solver's, against the exact solution of the same theory; ± Hz is what the material's"
-        " published values leave (one standard deviation); Hz/µm of wall thickness."
+        f"The relative error is the solver's, against the exact solution of the same theory; ± Hz is {spread};"
+        " Hz/µm of wall thickness."
     )
     if theory == "rayleigh":
         note = "Rayleigh's closed form ignores the free edge: on a hemisphere it lies several per cent too high."

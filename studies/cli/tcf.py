@@ -52,7 +52,7 @@ def tcf(
     from studies.cli.output import print_table
     from studies.errors import InputError
     from studies.instrument.card import load_card
-    from studies.law import law_of
+    from studies.law import check_slope_known, law_of
 
     if harmonic > MOST_HARMONIC and theory != "rayleigh":
         raise InputError(
@@ -60,6 +60,7 @@ def tcf(
         )
     temperatures = lay_temperatures(from_degC, to_degC, step)
     instrument = load_card(card)
+    check_slope_known(instrument)
     T = instrument.material.check(temperatures)
     law = law_of(instrument, float(T[0]), float(T[-1]), theory, harmonic)
     points, moves = _points(law, T), _moves(law, T)

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from scipy.constants import zero_Celsius
 
 from studies.instrument.tables.noise import SILENT
+from studies.law import unknown_slope
 from studies.record import Record
 from studies.simulation.chamber import check_profile
 from studies.simulation.drive import COLUMN, COMMANDS, RATE, Drive, drive_by_profile, rows_of
@@ -132,7 +133,10 @@ def simulate_run(
         source=f"simulated, rate {rate:g} Hz, " + (f"seed {seed}" if noise else "without noise"),
         resolution={name: step for name, step in resolution.items() if step > 0},
     )
-    return VirtualRun(record, prediction, idle_effects(instrument, drive))
+    warnings = idle_effects(instrument, drive)
+    if why := unknown_slope(instrument):
+        warnings += (f"the frequency follows no temperature: {why}",)
+    return VirtualRun(record, prediction, warnings)
 
 
 def _observe(

@@ -1,6 +1,6 @@
 """The temperature coefficient of frequency, d ln f/dT, and its parts from E, ν, ρ, h and r (HRG paper eq. 15)."""
 
-from studies.law import law_of
+from studies.law import check_slope_known, law_of
 from studies.sweeps.case import Case, Options
 from studies.sweeps.quantity import HARMONIC, TEMPERATURE, THEORY, Column, Number, Quantity, mode_stem
 
@@ -15,6 +15,7 @@ def _columns(options: Options) -> tuple[Column, ...]:
 
 
 def _evaluate(case: Case, options: Options) -> tuple[Number, ...]:
+    check_slope_known(case.instrument)
     T = case.temperature(options)
     law = law_of(case.instrument, T, T, options["theory"], options["harmonic"])
     found, level = law.parts(T), STEEPEST * law.solver_error

@@ -1,0 +1,64 @@
+"""A material given at one temperature: its slope is not known, and no command prints it as 0."""
+
+import json
+
+import pytest
+
+from studies.cli import main
+
+CARD = """schema = "hrg.card/1"
+name = "hand"
+[resonator]
+shape = "hemisphere"
+radius_mm = 15.0
+thickness_mm = 0.9
+[material]
+name = "my-steel"
+youngs_modulus_GPa = 190.0
+poisson_ratio = 0.3
+density_kg_m3 = 8000.0
+"""
+E_SLOPE, EXPANSION = -2.4e-4, 12e-6  # 1/K
+KNOWN = f"[material.deviation]\nyoungs_modulus.log_slope_per_K = {E_SLOPE}\nexpansion.value = {EXPANSION}\n"
+
+
+@pytest.fixture
+def card(tmp_path):
+    path = tmp_path / "hand.toml"
+    path.write_text(CARD)
+    return path
+
+
+def test_slope_is_refused_with_the_keys_that_would_tell_it(card, capsys):
+    assert main(["tcf", str(card)]) == 2
+    said = capsys.readouterr().err
+    assert "not known" in said
+    assert str(card) in said
+    assert "[material.deviation.youngs_modulus] log_slope_per_K" in said
+    assert "[material.deviation.expansion] value" in said
+
+
+def test_one_missing_half_is_named_alone(card, capsys):
+    card.write_text(CARD + f"[material.deviation]\nyoungs_modulus.log_slope_per_K = {E_SLOPE}\n")
+    assert main(["tcf", str(card)]) == 2
+    said = capsys.readouterr().err
+    assert "expansion" in said
+    assert "log_slope_per_K" not in said
+
+
+def test_given_slopes_are_those_of_the_free_shell(card, capsys):
+    """Free expansion without a change of ν: d ln f/dT = ½ (E′/E + α), since f ∝ √(E/ρ)/R and ρ ∝ R⁻³."""
+    card.write_text(CARD + KNOWN)
+    assert main(["tcf", str(card), "--from", "20", "--to", "20", "--json"]) == 0
+    (point,) = json.loads(capsys.readouterr().out)["points"]
+    assert point["slope_ppm_per_degC"] == pytest.approx(1e6 * (E_SLOPE + EXPANSION) / 2, rel=1e-6)
+
+
+def test_comparison_and_modes_leave_open_what_is_not_known(card, capsys):
+    assert main(["compare", str(card), "free-dome", "--json"]) == 0
+    slope = next(one for one in json.loads(capsys.readouterr().out)["figures"] if one["name"] == "slope")
+    assert slope["values"][0] is None
+    assert slope["uncertainties"][0] is None
+    assert slope["values"][1] > 0
+    assert main(["modes", str(card), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["modes"][0]["material_uncertainty_Hz"] is None
