@@ -141,7 +141,7 @@ def study_steady_table(
     found = [c for effect in library().values() if effect.steady for c in _candidates(effect, x, base, f, scale)]
     best = {
         name: max((c for c in found if c.effect.name == name), key=lambda c: c.log_evidence)
-        for name in {c.effect.name for c in found}
+        for name in dict.fromkeys(c.effect.name for c in found)
     }
     prior = CONSTANTS["log_prior_effect"]
     ranked = sorted(best.values(), key=lambda c: -c.log_evidence)
