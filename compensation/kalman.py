@@ -193,6 +193,23 @@ def settle(model: LinearModel) -> tuple[Real, Real, Real]:
     return K, P, after
 
 
+def noise_of_estimate(model: LinearModel) -> Real:
+    """Return the covariance of what the settled filter leaves of the measurement noise, the truth being still.
+
+    With the settled gain K the error of the estimate obeys e⁺ = (1 − K C) F e + K v, so N = A N Aᵀ + K R Kᵀ, A = (1 − K C) F.
+
+    Raises
+    ------
+    CompensationError
+        When the filter has no settled gain.
+    """
+    from scipy.linalg import solve_discrete_lyapunov
+
+    K = settle(model)[0]
+    A = (np.eye(len(K)) - K @ model.measurement) @ model.transition
+    return np.asarray(solve_discrete_lyapunov(A, K @ model.measurement_noise @ K.T), dtype=float)
+
+
 def expect_mean_nis(rows: int, degrees: int, probability: float = 0.95) -> tuple[float, float]:
     """Return the band in which the mean of `rows` NIS or NEES values lies with `probability`, from chi-squared.
 

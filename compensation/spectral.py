@@ -160,6 +160,36 @@ class CrossSpectrum:
         return np.asarray(p[0] * left, dtype=float), np.asarray(right, dtype=float)
 
 
+def require_possible(one: Spectrum, other: Spectrum, cross: CrossSpectrum | None) -> None:
+    """Raise when two signals cannot have this cross-spectral density: their coherence |S_φΩ|²/(S_φ S_Ω) is above 1.
+
+    The coherence is a rational function of x = ω²; it is largest at 0, at infinity, or where its derivative vanishes.
+    """
+    if cross is None:
+        return
+    cross.split_poles()
+    mixed, below = (np.trim_zeros(np.asarray(p, dtype=float), "f") for p in (cross.numerator, cross.denominator))
+    if not len(mixed):
+        return
+    # |p(jω)|² = p(s) p(−s); s² = −x
+    tops = multiply(mixed, reflect(mixed), np.array(one.denominator), np.array(other.denominator))
+    bottoms = multiply(below, reflect(below), np.array(one.numerator), np.array(other.numerator))
+    top, bottom = (np.trim_zeros(p[::2] * (-1.0) ** np.arange(len(p[::2]))[::-1], "f") for p in (tops, bottoms))
+    slope = np.polysub(np.polymul(np.polyder(top), bottom), np.polymul(top, np.polyder(bottom)))
+    roots = np.roots(np.trim_zeros(slope, "f"))
+    still = roots.real[(np.abs(roots.imag) <= 1e-6 * np.abs(roots)) & (roots.real > 0)]
+    scale = float(np.max(np.abs(np.r_[np.roots(top), np.roots(bottom)]), initial=1.0))
+    x = np.r_[still, scale * np.geomspace(1e-9, 1e9, 37)]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        coherence = np.nan_to_num(np.abs(np.polyval(top, x) / np.polyval(bottom, x)), nan=0.0, posinf=np.inf)
+    worst = int(np.argmax(coherence))
+    if coherence[worst] > 1 + 1e-6:
+        raise CompensationError(
+            f"rate and noise have a coherence |S_φΩ|²/(S_φ S_Ω) of {coherence[worst]:.3g} at {np.sqrt(x[worst]):.3g} rad/s; no two"
+            " signals have more than 1. Lower the cross-spectral density, or raise the noise's own."
+        )
+
+
 def _sign(polynomial: tuple[float, ...], frequency: Real) -> Real:
     """Sign of an even polynomial at jω; 0 where rounding decides it."""
     terms = np.array(polynomial)[:, None] * (1j * frequency) ** np.arange(len(polynomial) - 1, -1, -1)[:, None]

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from compensation.errors import CompensationError
-from compensation.spectral import CrossSpectrum, Spectrum, factorise, multiply, reflect, separate
+from compensation.spectral import CrossSpectrum, Spectrum, factorise, multiply, reflect, require_possible, separate
 from compensation.transfer import TransferFunction
 
 Real = NDArray[np.float64]
@@ -73,8 +73,9 @@ def design_wiener_filter(
     Raises
     ------
     CompensationError
-        When W or H is not stable or not real, or the densities have no stable factors.
+        When W or H is not stable or not real, the densities have no stable factors, or their coherence is above 1.
     """
+    require_possible(rate, noise, cross)
     if not gyro.is_real or not gyro.is_stable:
         raise CompensationError("the Wiener filter needs a stable gyro with real coefficients, such as eq. (25).")
     if not wanted.is_real or not wanted.is_stable:
@@ -118,7 +119,14 @@ def judge_filter(
     wanted: TransferFunction = UNITY,
     cross: CrossSpectrum | None = None,
 ) -> WienerFilter:
-    """Return any filter behind the gyro with its error variances: eqs. (30), (31), without weight."""
+    """Return any filter behind the gyro with its error variances: eqs. (30), (31), without weight.
+
+    Raises
+    ------
+    CompensationError
+        The coherence of rate and noise is above 1.
+    """
+    require_possible(rate, noise, cross)
     n, d = np.real(candidate.numerator), np.real(candidate.denominator)
     n_w, d_w = np.real(gyro.numerator), np.real(gyro.denominator)
     n_h, d_h = np.real(wanted.numerator), np.real(wanted.denominator)

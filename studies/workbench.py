@@ -22,7 +22,7 @@ Card = Instrument | str | Path
 Run = Record | str | Path
 
 
-def simulate(card: Card, profile: str, *, rate: float = 1.0, seed: int = 0, noise: bool = True) -> Record:
+def simulate(card: Card, profile: str, *, row: float = 1.0, seed: int = 0, noise: bool = True) -> Record:
     """Return the record of a virtual run: `hrg simulate`.
 
     Parameters
@@ -30,8 +30,8 @@ def simulate(card: Card, profile: str, *, rate: float = 1.0, seed: int = 0, nois
     card : Instrument, path, or name of a card that ships
     profile : str
         A chamber profile in words ("step 20 -10 5h"), a profile file, or a record whose housing column drives the run.
-    rate : float
-        Rows per second.
+    row : float
+        Time between rows (s).
     seed : int
         Of the noise.
     noise : bool
@@ -45,7 +45,7 @@ def simulate(card: Card, profile: str, *, rate: float = 1.0, seed: int = 0, nois
     from studies.simulation.chamber import load_drive
     from studies.simulation.virtual_gyro import simulate_run
 
-    return simulate_run(open_card(card), load_drive(profile, None, rate), rate, seed, noise).record
+    return simulate_run(open_card(card), load_drive(profile, None, 1 / row), 1 / row, seed, noise).record
 
 
 def compare(*cards: Card) -> "Comparison":

@@ -29,7 +29,9 @@ TYPESET = {oscillator.delta_tau: r"\Delta(1/\tau)", oscillator.delta_omega: r"\D
 }
 WORDS = {
     letter: f"${name}$"
-    for letter, name in zip("ωψφτζ−", (r"\omega", r"\psi", r"\phi", r"\tau", r"\zeta", "-"), strict=True)
+    for letter, name in zip(
+        "ωψφτζγ²−", (r"\omega", r"\psi", r"\phi", r"\tau", r"\zeta", r"\gamma", "^2", "-"), strict=True
+    )
 } | {
     "{": r"\{",
     "}": r"\}",

@@ -54,7 +54,7 @@ def loop(
     profile : str
         Chamber profile, as for hrg simulate: frequency and loss follow the temperature.
     both_ways : bool
-        Of a whole-angle run: turn the self-precession back after half of it.
+        Whole-angle cards only: reverse the self-precession halfway through the run.
     seed : int
         Seed of the noise.
     noiseless : bool
@@ -81,6 +81,11 @@ def loop(
         raise InputError("--row and --hours must be positive, and --rate finite.")
     if hours * 3600 / row > MOST_ROWS:
         raise InputError(f"--hours {hours:g} in rows of {row:g} s are more than {MOST_ROWS} rows; take longer rows.")
+    if both_ways and (keys.mode != "whole-angle" or keys.self_precession_deg_per_s == 0):
+        raise InputError(
+            f"{instrument.path}: --both-ways reverses the self-precession of a whole-angle wave; the card's [loop] has mode"
+            f' "{keys.mode}" and self_precession_deg_per_s = {keys.self_precession_deg_per_s:g}. Leave --both-ways out, or set both keys.'
+        )
     law = law_of(instrument, min(T, instrument.reference_temperature) - 5, max(T, instrument.reference_temperature) + 5)
     frequency = float(np.ravel(law.frequency(T))[0])
     inverse_q, instrument = settled_loss(instrument, T)

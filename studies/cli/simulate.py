@@ -18,7 +18,7 @@ def simulate(
     profile: str,
     *,
     out: str,
-    rate: float = 1.0,
+    row: float = 1.0,
     seed: Seed = 0,
     noiseless: bool = False,
     theory: Literal["solid", "shell"] = "solid",
@@ -46,8 +46,8 @@ def simulate(
         imposed on its own rows. The gyro has settled at the first temperature.
     out : str
         The record to write.
-    rate : float
-        Rows per second; a record has its own.
+    row : float
+        Time between rows in s; a record has its own rows.
     seed : int
         Seed of the noise.
     noiseless : bool
@@ -62,13 +62,16 @@ def simulate(
     import numpy as np
 
     from studies.cli.output import say
+    from studies.errors import InputError
     from studies.instrument.card import load_card
     from studies.record import write_record
     from studies.simulation.chamber import load_drive
     from studies.simulation.virtual_gyro import simulate_run
 
+    if not 0 < row < np.inf:
+        raise InputError(f"--row {row:g}: the time between rows must be positive (s).")
     instrument = load_card(card)
-    run = simulate_run(instrument, load_drive(profile, boundary, rate), rate, seed, not noiseless, theory)
+    run = simulate_run(instrument, load_drive(profile, boundary, 1 / row), 1 / row, seed, not noiseless, theory)
     rows = len(run.record)
     for warning in run.warnings:
         say(f"warning: {warning}")

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from compensation.demodulated import ErrorMap, map_integral_error, measure_rate, relate_rate_to_measured_rate
-from compensation.kalman import expect_mean_nis, model_gyro, run_filter
+from compensation.kalman import LinearModel, expect_mean_nis, model_gyro, noise_of_estimate, run_filter
 from compensation.sensitive_element import tune
 from compensation.spectral import Spectrum, high_pass_spectrum, rate_spectrum, white_spectrum
 from compensation.wiener import WienerFilter, design_wiener_filter, judge_filter, renormalise
@@ -86,7 +86,8 @@ class FilterStudy:
     """Figures 5–7: both Wiener cases, figure 5, and the Kalman run.
 
     Figure 6 is the Kalman filter's estimate of the output, figure 7 of the rate, each against what it estimates;
-    `mean_nis` with its 95 % band; `by_step` the Kalman rate estimate for other sampling steps (s).
+    `mean_nis` with its 95 % band; `by_step` the Kalman rate estimate for other sampling steps (s), and `settled_noise` (rad/s)
+    what the settled filter leaves of the noise in its estimates of output and rate, for the same steps.
     """
 
     wiener: tuple[WienerCase, ...]
@@ -96,6 +97,7 @@ class FilterStudy:
     mean_nis: float
     nis_band: tuple[float, float]
     by_step: tuple[tuple[float, Filtered], ...]
+    settled_noise: tuple[tuple[float, float], ...]
 
 
 def make_pulses(step: float) -> tuple[Real, Real]:
@@ -131,7 +133,18 @@ def study_filters(seed: int = 5) -> FilterStudy:
     figure5 = _filter_wiener(wiener[0], generator)
     figure6, figure7, nis = _filter_kalman(KALMAN_STEP, generator)
     by_step = (*((step, _filter_kalman(step, generator)[1]) for step in STEPS), (KALMAN_STEP, figure7))
-    return FilterStudy(wiener, figure5, figure6, figure7, float(np.mean(nis)), expect_mean_nis(len(nis), 1), by_step)
+    band = expect_mean_nis(len(nis), 1)
+    return FilterStudy(wiener, figure5, figure6, figure7, float(np.mean(nis)), band, by_step, settle_kalman())
+
+
+def settle_kalman() -> tuple[tuple[float, float], ...]:
+    """Return the noise (rad/s) in the settled estimates of output and rate, for the steps of `FilterStudy.by_step`."""
+    spreads = (np.sqrt(np.diag(noise_of_estimate(_kalman_model(step)))) for step in (*STEPS, KALMAN_STEP))
+    return tuple((float(output), float(rate)) for output, rate in spreads)
+
+
+def _kalman_model(step: float) -> LinearModel:
+    return model_gyro(K, ZETA, step, np.array(PROCESS_NOISE), MEASUREMENT_NOISE)
 
 
 def _filter_wiener(case: WienerCase, generator: np.random.Generator) -> Filtered:
@@ -145,7 +158,7 @@ def _filter_wiener(case: WienerCase, generator: np.random.Generator) -> Filtered
 
 def _filter_kalman(step: float, generator: np.random.Generator) -> tuple[Filtered, Filtered, Real]:
     """The estimates of output and rate, and the normalised innovations squared."""
-    model = model_gyro(K, ZETA, step, np.array(PROCESS_NOISE), MEASUREMENT_NOISE)
+    model = _kalman_model(step)
     time, rate = make_pulses(step)
     output = measure_rate(tune(K, ZETA), time, rate)
     noisy = output + np.sqrt(MEASUREMENT_NOISE) * generator.standard_normal(len(time))

@@ -131,10 +131,11 @@ def draw_kalman(study: "FilterStudy") -> Picture:
             axes.legend(ncols=3, loc="upper right", fontsize=8)
             axes.set_ylim(-0.5, 1.75)
         lower.set_xlabel("time (s)")
+    output_noise, rate_noise = study.settled_noise[-1]
     caption = (
         f"Kalman filter with the paper's Q and R, sampled every {1e3 * (six.time[1] - six.time[0]):g} ms: noise of the output"
-        f" {six.noise_before:.4f} → {six.noise_after:.4f} rad/s ({six.noise_before / six.noise_after:.0f} times less); of the rate"
-        f" estimate {seven.noise_after:.4f} rad/s."
+        f" {six.noise_before:.4f} → {output_noise:.4f} rad/s once settled ({six.noise_before / output_noise:.0f} times less); of the rate"
+        f" estimate {rate_noise:.4f} rad/s."
     )
     return draw(made, caption, "Output and rate with their estimates over time.")
 
@@ -142,11 +143,14 @@ def draw_kalman(study: "FilterStudy") -> Picture:
 def step_table(study: "FilterStudy") -> Table:
     """Return the error of the rate estimate for several sampling steps."""
     rows = [
-        [f"{1e3 * step:g}", f"{case.noise_after:.4f}", f"{case.lag_error:.3f}", f"{case.output_error:.3f}"]
-        for step, case in study.by_step
+        [f"{1e3 * step:g}", f"{noise:.4f}", f"{case.lag_error:.3f}", f"{case.output_error:.3f}"]
+        for (step, case), (_, noise) in zip(study.by_step, study.settled_noise, strict=True)
     ]
     columns = ["Step (ms)", "Noise of the estimate (rad/s)", "Lag error (rad/s)", "Lag error of the output (rad/s)"]
-    note = "Rms against pulses of 0.25 s. The paper gives Q per step, but not the step."
+    note = (
+        "Noise: standard deviation in the settled filter, from its Riccati equation. Lag errors: rms against pulses of 0.25 s."
+        " The paper gives Q per step, but not the step."
+    )
     return Table("Rate estimate over the sampling step", columns, rows, note)
 
 

@@ -168,12 +168,12 @@ def drive_by_schedule(profile: Profile, columns: Mapping[str, Array], rate: floa
 def rows_of(profile: Profile, rate: float) -> Array:
     """Return the times (s) of the rows of a run through a profile, `rate` per second."""
     if not (np.isfinite(rate) and rate > 0):
-        raise InputError(f"--rate {rate:g}: the rate must be positive (rows per second).")
+        raise InputError("the time between rows must be positive and finite.")
     count = int(np.floor((profile.end - profile.start) * rate * (1 + 1e-12))) + 1
     if count > MOST_ROWS:
-        raise InputError(f"--rate {rate:g} makes {count} rows; choose a lower rate (at most {MOST_ROWS} rows).")
+        raise InputError(f"rows every {1 / rate:g} s make {count} rows, more than {MOST_ROWS}; take longer rows.")
     if count < 2:
-        raise InputError(f"--rate {rate:g} makes a single row; choose a higher rate.")
+        raise InputError(f"rows every {1 / rate:g} s make a single row of this profile; take shorter rows.")
     return np.minimum(profile.start + np.arange(count) / rate, profile.end)
 
 

@@ -6,7 +6,7 @@ from filterpy.kalman import KalmanFilter
 
 from compensation.demodulated import relate_rate_to_measured_rate
 from compensation.errors import CompensationError
-from compensation.kalman import LinearModel, expect_mean_nis, model_gyro, run_filter, settle
+from compensation.kalman import LinearModel, expect_mean_nis, model_gyro, noise_of_estimate, run_filter, settle
 from compensation.spectral import rate_spectrum, white_spectrum
 from compensation.wiener import design_wiener_filter
 
@@ -69,6 +69,15 @@ def test_filter_settles_to_the_riccati_solution():
     np.testing.assert_allclose(run.covariances[-1], after, rtol=1e-9)
     np.testing.assert_allclose(run.innovation_covariances[-1, 0, 0], before[0, 0] + 0.01, rtol=1e-9)
     np.testing.assert_allclose(gain[:, 0], before[:, 0] / (before[0, 0] + 0.01), rtol=1e-12)
+
+
+def test_noise_of_the_settled_estimate_is_that_of_its_answer_to_an_impulse():
+    """White noise v of variance R through a filter with the impulse response h leaves R Σ h²."""
+    _, _, after = settle(GYRO)
+    impulse = np.zeros(60_000)
+    impulse[0] = 1.0
+    answer = run_filter(GYRO, impulse, np.zeros(2), after).states
+    np.testing.assert_allclose(np.diag(noise_of_estimate(GYRO)), 0.01 * np.sum(answer**2, axis=0), rtol=1e-6)
 
 
 def test_estimates_equal_another_library():

@@ -109,3 +109,24 @@ def test_translational_element_has_the_printed_coefficients() -> None:
     assert (bare.d3, bare.g1) == (1.0, 2.0)
     with pytest.raises(CompensationError, match="proof mass must be positive"):
         translate(1e-6, 0.0, (6000.0, 6000.0), (0.01, 0.01), 6000.0)
+
+
+@pytest.mark.parametrize("excess", [1.001, 30.0])
+def test_more_than_perfect_coherence_is_refused(excess: float) -> None:
+    """φ = c Ω alone has |S_φΩ|² = S_φ S_Ω; a larger cross-spectrum belongs to no two signals, and would give a negative variance."""
+    gain = 0.4
+    noise = Spectrum(tuple(gain**2 * np.array(RATE.numerator)), RATE.denominator)
+    possible = CrossSpectrum(tuple(gain * np.array(RATE.numerator)), RATE.denominator)
+    assert judge_filter(UNITY, GYRO, RATE, noise, cross=possible).error > 0
+    more = CrossSpectrum(tuple(np.sqrt(excess) * np.array(possible.numerator)), RATE.denominator)
+    for call in (judge_filter, lambda _, *rest, **given: design_wiener_filter(*rest, **given)):
+        with pytest.raises(CompensationError, match=f"coherence .* of {excess:.3g}"):
+            call(UNITY, GYRO, RATE, noise, cross=more)
+
+
+def test_a_narrow_peak_of_coherence_is_found() -> None:
+    """|c(jω)|² of a resonance at 7 rad/s with Q = 500 is 1e4 within 0.1 % of it and far below 1 elsewhere."""
+    lag = (1.0, 7.0 / 500, 49.0)
+    cross = CrossSpectrum((0.2, 0.0), lag)
+    with pytest.raises(CompensationError, match="at 7 rad/s"):
+        judge_filter(UNITY, GYRO, white_spectrum(1.0, 1.0), white_spectrum(1.0, 1.0), cross=cross)

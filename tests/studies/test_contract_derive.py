@@ -237,3 +237,12 @@ def test_the_bell_is_derived_beside_its_numbers(capsys):
         status, said = speak(capsys, *words)
         assert status == 2
         assert mend in said.err
+
+
+@pytest.mark.parametrize(("n", "solid"), [(2, 4596.3915), (3, 11921.2280)], ids=["n = 2", "n = 3"])
+def test_code_says_how_far_rayleigh_is_off_for_its_harmonic(n, solid, capsys):
+    """Against three-dimensional frequencies of the free dome, 15 x 0.9 mm, from tests/reference/reference_frequencies.csv."""
+    assumed = frequency_by_quadrature(n, 0.0, 90.0, E=72.7e9, nu=0.17, rho=2203.0, h=0.9e-3, R=15e-3)
+    for language in ("python", "c"):
+        said = speak(capsys, "--code", language, "--harmonic", str(n))[1].out
+        assert f"lower, by {100 * (1 - solid / assumed):.1f} % at h/R = 0.06" in said

@@ -46,3 +46,8 @@ def test_both_languages_agree(tmp_path, capsys):
         rates = (ctypes.c_double * 4)()
         compiled(*(ctypes.c_double(value) for value in values), rates)
         assert list(rates) == pytest.approx(list(space["averaged_rates"](*values)), rel=1e-12)
+
+
+def test_latex_is_plain_ascii(capsys):
+    """Letters that pdflatex does not know end the run of the document that reads the fragment."""
+    assert speak(capsys, "--latex")[1].out.isascii()

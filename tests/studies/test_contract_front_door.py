@@ -38,9 +38,7 @@ def test_a_package_alone_imports_nothing_heavy(package):
 def test_simulate_is_the_command(tmp_path):
     record = studies.simulate("hrg-30mm", "step 20 -10 1h", rate=0.1, seed=3)
     assert (
-        main(
-            ["simulate", "hrg-30mm", "step 20 -10 1h", "--rate", "0.1", "--seed", "3", "--out", str(tmp_path / "r.csv")]
-        )
+        main(["simulate", "hrg-30mm", "step 20 -10 1h", "--row", "10", "--seed", "3", "--out", str(tmp_path / "r.csv")])
         == 0
     )
     for name, values in read_record(tmp_path / "r.csv").columns.items():

@@ -348,7 +348,7 @@ def test_every_shipped_card_works_with_every_command(tmp_path, capsys, name):
         ["modes", name, "--theory", "shell"],
         ["tcf", name, "--theory", "shell"],
         ["thermal", name, "step 20 10 1h"],
-        ["simulate", name, "step 20 10 1h", "--rate", "0.1", "--theory", "shell", "--out", str(tmp_path / "run.csv")],
+        ["simulate", name, "step 20 10 1h", "--row", "10", "--theory", "shell", "--out", str(tmp_path / "run.csv")],
     )
     for command in commands:
         status = main([*command, "--json"])

@@ -142,3 +142,9 @@ def test_the_page_shows_margins_drift_noise_start_and_run(card, tmp_path, capsys
     found = json.loads(capsys.readouterr().out)
     assert f"{found['noise'][-1]['deg_per_rt_h']:.3g} °/√h" in text
     assert "Attack first: <code>loop.pickoff_phase_deg</code>" in text  # 0.5° on the quadrature of 5 mHz
+
+
+@pytest.mark.parametrize("lines", ["", 'mode = "whole-angle"\n'], ids=["force-rebalance", "no self-precession"])
+def test_a_reversal_of_what_does_not_precess_is_refused(card, capsys, lines):
+    assert main(["loop", card(lines), "--both-ways"]) == 2
+    assert "--both-ways reverses the self-precession of a whole-angle wave" in capsys.readouterr().err

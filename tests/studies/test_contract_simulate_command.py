@@ -20,8 +20,8 @@ def test_simulate_writes_a_record_and_one_json_object(tmp_path, capsys):
                 str(out),
                 "--theory",
                 "shell",
-                "--rate",
-                "0.1",
+                "--row",
+                "10",
                 "--json",
             ]
         )
@@ -64,7 +64,7 @@ def test_thermal_prints_time_constants_and_temperatures(capsys):
     [
         (["simulate", "hrg-30mm", "step 20 -90 5h", "--out", "x.csv"], "reaches -90 °C"),
         (["simulate", "hrg-30mm", "stepp 20 -10 5h", "--out", "x.csv"], "'stepp' is no profile"),
-        (["simulate", "hrg-30mm", "soak 20 1h", "--out", "x.csv", "--rate", "-1"], "the rate must be positive"),
+        (["simulate", "hrg-30mm", "soak 20 1h", "--out", "x.csv", "--row", "-1"], "time between rows must be positive"),
         (["simulate", "hrg-30mm", "soak 20 1h", "--out", "x.csv", "--seed", "-1"], "--seed"),
         (["simulate", "hrg-30", "soak 20 1h", "--out", "x.csv"], "did you mean 'hrg-30mm'"),
         (["thermal", "hrg-30mm", "soak 20 1h", "--rows", "1"], "--rows 1"),
@@ -83,10 +83,10 @@ def test_unusable_input_ends_with_status_2_and_one_sentence(arguments, words, ca
 
 def test_the_card_says_how_well_it_knows_a_run(tmp_path, capsys):
     """Frequency and bias within what the shipped uncertainties leave; the wide mount makes it more than any noise."""
-    words = ["simulate", "hrg-30mm", "step 20 0 1h", "--out", str(tmp_path / "run.csv"), "--rate", "0.02"]
+    words = ["simulate", "hrg-30mm", "step 20 0 1h", "--out", str(tmp_path / "run.csv"), "--row", "50"]
     assert main([*words, "--spread", "--json"]) == 0
     spread = json.loads(capsys.readouterr().out)["spread"]
     assert set(spread) >= {"frequency_Hz", "bias_deg_per_h", "inverse_q", "housing_temperature_degC"}
     assert spread["frequency_Hz"] > 0.1
-    assert main([*words[:3], "--out", str(tmp_path / "again.csv"), "--rate", "0.02", "--spread"]) == 0
+    assert main([*words[:3], "--out", str(tmp_path / "again.csv"), "--row", "50", "--spread"]) == 0
     assert "frequency_Hz" in capsys.readouterr().out

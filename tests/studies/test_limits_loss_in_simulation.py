@@ -79,7 +79,7 @@ def test_a_run_through_the_loops_takes_the_anisotropy_at_its_temperature(tmp_pat
     card.write_text(tomli_w.dumps(BARE | tables), encoding="utf-8")
     profile = "soak 20 10min then ramp 20 60 120 then soak 60 100min"
     assert main(["loop", str(card), "--profile", profile, "--row", "60", "--noiseless", "--out", out[0]]) == 0
-    assert main(["simulate", str(card), profile, "--rate", "0.0166666666666667", "--noiseless", "--out", out[1]]) == 0
+    assert main(["simulate", str(card), profile, "--row", "60", "--noiseless", "--out", out[1]]) == 0
     capsys.readouterr()
     loops, settled = (read_record(path) for path in out)
     assert settled["inverse_q"][-1] > 1.3 * settled["inverse_q"][0]

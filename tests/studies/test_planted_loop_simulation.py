@@ -21,7 +21,7 @@ def simulated(tmp_path, card_lines, words=None):
     card, out, schedule = tmp_path / "card.toml", tmp_path / "run.csv", tmp_path / "schedule.csv"
     card.write_text(shipped_cards()["free-dome"].read_text() + card_lines)
     schedule.write_text(SCHEDULE)
-    assert main(["simulate", str(card), words or str(schedule), "--out", str(out), "--noiseless", "--rate", "0.1"]) == 0
+    assert main(["simulate", str(card), words or str(schedule), "--out", str(out), "--noiseless", "--row", "10"]) == 0
     return load_card(card), read_record(out)
 
 

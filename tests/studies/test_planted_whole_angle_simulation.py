@@ -30,7 +30,7 @@ def simulated(tmp_path, lines, schedule, noise=False):
     card, out, path = tmp_path / "card.toml", tmp_path / "run.csv", tmp_path / "schedule.csv"
     card.write_text(shipped_cards()["free-dome"].read_text() + lines)
     path.write_text(schedule)
-    words = ["simulate", str(card), str(path), "--out", str(out), "--rate", "0.1"]
+    words = ["simulate", str(card), str(path), "--out", str(out), "--row", "10"]
     assert main(words if noise else [*words, "--noiseless"]) == 0
     return load_card(card), read_record(out)
 

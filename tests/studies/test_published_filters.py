@@ -46,6 +46,12 @@ def test_kalman_figures(study):
     assert study.mean_nis > study.nis_band[1]
 
 
+def test_noise_over_step_is_that_of_the_settled_filter():
+    """Riccati equation and its Lyapunov equation, solved elsewhere; one run of 1.5 s still shows its start."""
+    found = [rate for _, rate in cvg_filters.settle_kalman()]
+    assert found == pytest.approx([0.0085, 0.0086, 0.0090, 0.0096, 0.0107, 0.0127], abs=5.1e-5)
+
+
 def test_error_map_is_darkest_in_the_middle():
     error_map = study_error_map(11)
     i, j = np.unravel_index(np.argmin(error_map.error), error_map.error.shape)

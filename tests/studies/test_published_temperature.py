@@ -34,9 +34,7 @@ def test_a_simulated_resonator_is_its_own_thermometer(tmp_path, capsys):
     """The curve is fitted to settled points of the same virtual gyro; the ramp in between is then read from f alone."""
     soak = "time_s,chamber_temperature_degC\n0,-20\n9000,-20\n9001,40\n70000,40\n70001,-20\n"
     (tmp_path / "p.csv").write_text(soak.replace("70001,-20\n", "90000,10\n"))
-    assert (
-        main(["simulate", "hrg-30mm", str(tmp_path / "p.csv"), "--rate", "0.05", "--out", str(tmp_path / "r.csv")]) == 0
-    )
+    assert main(["simulate", "hrg-30mm", str(tmp_path / "p.csv"), "--row", "20", "--out", str(tmp_path / "r.csv")]) == 0
     record = read_record(tmp_path / "r.csv")
     T, f = record["resonator_temperature_degC"], record["frequency_Hz"]
     points = [int(np.argmin(np.abs(T - x))) for x in (-19.9, -10, 0, 10, 20, 30, 39.9)]

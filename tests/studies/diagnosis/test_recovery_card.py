@@ -30,7 +30,7 @@ def simulated(card, folder, capsys, profiles=PROFILES):
     records = []
     for k, words in enumerate(profiles):
         out = folder / f"run{k}.csv"
-        assert main(["simulate", str(path), words, "--out", str(out), "--rate", "0.05", "--seed", str(k)]) == 0
+        assert main(["simulate", str(path), words, "--out", str(out), "--row", "20", "--seed", str(k)]) == 0
         records.append(read_record(str(out)))
     capsys.readouterr()
     return records
@@ -72,7 +72,7 @@ def test_what_the_card_says_of_the_bias_by_rate_is_not_found_as_an_effect(shippe
     both = []
     for card in (stated, static):
         save_card(card, tmp_path / "card.toml")
-        words = ["simulate", str(tmp_path / "card.toml"), PROFILES[1], "--rate", "0.05", "--noiseless"]
+        words = ["simulate", str(tmp_path / "card.toml"), PROFILES[1], "--row", "20", "--noiseless"]
         assert main([*words, "--out", str(tmp_path / "run.csv")]) == 0
         both.append(load_campaign([read_record(str(tmp_path / "run.csv"))], 20.0))
     capsys.readouterr()
