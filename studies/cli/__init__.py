@@ -9,6 +9,7 @@ import sys
 import warnings
 from collections.abc import Sequence
 
+from studies.files.given import printable
 from studies.interruption import has_made, heed, let_be
 from studies.threads import ONE_THREAD
 
@@ -76,7 +77,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     debug = "--debug" in words
     words = [word for word in words if word != "--debug"]
     plain = warnings.formatwarning
-    warnings.formatwarning = lambda message, *_, **__: f"hrg: warning: {message}\n"
+    warnings.formatwarning = lambda message, *_, **__: f"hrg: warning: {printable(str(message))}\n"
     try:
         from studies.cli.guard import find_name_clash
 
@@ -102,6 +103,7 @@ def _command_line(words: Sequence[str]) -> "App":
     from cyclopts import App, Group, Parameter
 
     from studies import __version__
+    from studies.files.given import refuse_unsound
 
     app = App(
         name="hrg",
@@ -112,7 +114,7 @@ def _command_line(words: Sequence[str]) -> "App":
         exit_on_error=False,
         print_error=False,
         suppress_keyboard_interrupt=False,
-        default_parameter=Parameter(negative=""),
+        default_parameter=Parameter(negative="", validator=refuse_unsound),
     )
     app.register_install_completion_command(help="Install completion for the shell in use (bash, zsh or fish).")
     groups: dict[str, App] = {}
@@ -183,7 +185,7 @@ def _complain(message: str, status: int, error: BaseException | None = None) -> 
         import traceback
 
         traceback.print_exception(error)
-    print(f"hrg: {message}", file=sys.stderr)
+    print(f"hrg: {printable(message)}", file=sys.stderr)
     return status
 
 

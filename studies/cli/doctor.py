@@ -2,6 +2,12 @@
 
 from studies.cli.output import Answer, answers
 
+OPTIONAL = (
+    # package, extra of pyproject.toml, what it brings
+    ("distributed", "cluster", "for studies on several machines"),
+    ("openpyxl", "excel", "to import spreadsheets"),
+)
+
 
 @answers("hrg.doctor/1")
 def doctor() -> Answer:
@@ -39,16 +45,15 @@ def doctor() -> Answer:
     checks += [(f"package '{name}'", True, str(package_home(name)), "") for name in PACKAGES]
     drawn, remedy = can_draw()
     checks.append(("OpenGL", drawn, "pictures can be drawn" if drawn else "no pictures", remedy))
-    for name, command, brings in (
-        ("C compiler", "cc", "needed only to compile code that 'hrg derive' and models emit"),
-        (
-            "distributed (cluster)",
-            "dask",
-            "needed only for studies on several machines: pip install 'dask[distributed]'",
-        ),
-    ):
-        found = shutil.which(command)
-        checks.append((name, True, found or "not found (optional)", "" if found else brings))
+    compiler = shutil.which("cc")
+    needed = "" if compiler else "needed only to compile code that 'hrg derive' and models emit"
+    checks.append(("C compiler", True, compiler or "not found (optional)", needed))
+    for name, extra, brings in OPTIONAL:
+        try:
+            checks.append((name, True, version(name), ""))
+        except PackageNotFoundError:
+            remedy = f"needed only {brings}: pip install 'hrg-workbench[{extra}]'"
+            checks.append((name, True, "not installed (optional)", remedy))
     healthy = all(ok for _, ok, _, _ in checks)
     fields = ("name", "ok", "found", "remedy")
     described = [dict(zip(fields, c, strict=True)) for c in checks]

@@ -18,33 +18,31 @@ def card(path: str, *, like: str = "hrg-30mm", name: str | None = None) -> int:
     name : str
         Name of the instrument; the file's name unless given.
     """
+    from dataclasses import replace
     from pathlib import Path
 
     from studies.cli.output import say
-    from studies.files.reading import find_shipped, read_bytes
     from studies.files.writing import write_text
-    from studies.instrument.card import load_card, shipped_cards
+    from studies.instrument.card import build_instrument, load_card, spell_card
 
     _refuse_existing(path)
-    load_card(like)
-    text = read_bytes(find_shipped(like, shipped_cards(), "card")).decode("utf-8-sig")
-    lines = [line for line in text.splitlines() if not line.startswith("#")]
-    tables = next(k for k, line in enumerate(lines) if line.startswith("["))
-    lines[:tables] = [_renamed(line, name or Path(path).stem) for line in lines[:tables]]
-    lines += [
-        "",
+    model = load_card(like)
+    note = {"note": "Say here what is measured, printed or assumed."}
+    own = replace(model, name=name or Path(path).stem, content={**model.content, **note})
+    content, text = spell_card(own, path)
+    build_instrument(content, path)
+    lines = [
+        text,
         "# What else a card may say. Remove the # of a line to set it; what stays away has its documented default.",
     ]
-    present = {line.strip("[] ").split(".")[0] for line in lines if line.startswith("[")}
     headings: set[str] = set()
-    for block in _forms(present):
+    for block in _forms(set(content)):
         heading = block[0].partition("]")[0] + "]"
         again = heading in headings and not heading.startswith("[[")
         headings.add(heading)
         more = [f"more keys of {heading}", *block[1:]] if again else block  # a table may be opened once
         lines += [f"# {line}".rstrip() for line in ("", *more)]
     write_text(path, "\n".join(lines) + "\n")
-    load_card(path)
     say(f"{path}: written, like {like}. Correct it, then: hrg modes {path}")
     return 0
 
@@ -103,17 +101,6 @@ def _refuse_existing(path: str) -> None:
 
     if os.path.lexists(path):
         raise InputError(f"{path}: exists and is not overwritten; remove it or choose another name.")
-
-
-def _renamed(line: str, name: str) -> str:
-    import tomli_w
-
-    if line.startswith("name =") or line.startswith("note ="):
-        key = line.partition(" ")[0]
-        return tomli_w.dumps({key: name if key == "name" else "Say here what is measured, printed or assumed."}).rstrip(
-            "\n"
-        )
-    return line
 
 
 def _forms(present: set[str]) -> Iterator[list[str]]:

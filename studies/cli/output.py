@@ -103,15 +103,18 @@ def print_table(title: str, columns: Sequence[str], rows: Sequence[Sequence[obje
     from rich.table import Table
     from rich.text import Text
 
+    from studies.files.given import printable
+
     table = Table(
-        title=Text(title),
+        title=Text(printable(title)),
         title_justify="left",
-        caption=Text(note) if note else None,
+        caption=Text(printable(note)) if note else None,
         caption_justify="left",
         header_style="bold",
     )
     console = Console(width=None if sys.stdout.isatty() else 160)
-    cells = [["" if cell is None else str(cell) for cell in row] for row in rows]
+    cells = [["" if cell is None else printable(str(cell)) for cell in row] for row in rows]
+    columns = [printable(column) for column in columns]
     headings, numeric, widths, least = [], [], [], []
     for k, column in enumerate(columns):
         inside = [row[k] for row in cells]
@@ -139,7 +142,9 @@ def print_table(title: str, columns: Sequence[str], rows: Sequence[Sequence[obje
 
 def say(message: str) -> None:
     """Tell people something beside the result (standard error)."""
-    print(message, file=sys.stderr)
+    from studies.files.given import printable
+
+    print(printable(message), file=sys.stderr)
 
 
 def _looks_numeric(cell: object) -> bool:

@@ -1,12 +1,12 @@
 """TOML files of users: every key is known, has the right type and lies in its range, or the error names it."""
 
-import math
 import tomllib
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
 from studies.errors import InputError, nearest
+from studies.files.given import is_sound, printable
 from studies.files.reading import read_bytes
 
 MOST_BYTES = 16 * 1024**2
@@ -28,11 +28,29 @@ def read_toml(path: str | Path, schema: str | None = None) -> dict[str, Any]:
         raise InputError(f"{path}: not valid TOML: {error}.") from None
     except RecursionError:
         raise InputError(f"{path}: not valid TOML: nested too deeply.") from None
+    for key, text in _texts(content):
+        if text != printable(text):
+            raise InputError(
+                f"{path}: {printable(key)} holds a control character ({printable(text)!s:.60}); remove it."
+            )
     if schema is not None:
         found = content.get("schema")
         if found != schema:
             raise InputError(f'{path}: schema must be "{schema}", not {found!r}; add or correct that line.')
     return content
+
+
+def _texts(content: Any, key: str = "") -> Iterator[tuple[str, str]]:
+    """Yield every text in a file, keys included, and the key where it stands."""
+    if isinstance(content, Mapping):
+        for name, value in content.items():
+            yield name, name
+            yield from _texts(value, name)
+    elif isinstance(content, list):
+        for value in content:
+            yield from _texts(value, key)
+    elif isinstance(content, str):
+        yield key, content
 
 
 class TomlTable:
@@ -107,7 +125,7 @@ def check_number(
     most: float | None = None,
 ) -> float:
     """Return a finite float within its bounds, or say what was found instead."""
-    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+    if isinstance(value, bool) or not isinstance(value, int | float) or not is_sound(value):
         raise InputError(f"{what} must be a finite number, not {value!r}.")
     for bound, bad, words in (
         (above, above is not None and not value > above, "above"),

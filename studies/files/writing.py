@@ -21,12 +21,12 @@ def written_whole(path: str | Path) -> Iterator[IO[bytes]]:
     Parameters
     ----------
     path : str or Path
-        Where the file shall appear; missing folders are made.
+        Where the file shall appear, in a folder that exists: a mistyped one is not made.
 
     Raises
     ------
     InputError
-        The folder cannot be made or written, or the disk is full; nothing is left behind.
+        There is no such folder, it cannot be written, or the disk is full; nothing is left behind.
     """
     temporary: Path | None = None
     try:
@@ -34,7 +34,10 @@ def written_whole(path: str | Path) -> Iterator[IO[bytes]]:
         if target.is_dir():
             raise InputError(f"{path}: is a folder; give the name of a file.")
         special = target.exists() and not target.is_file()
-        target.parent.mkdir(parents=True, exist_ok=True)
+        if not target.parent.is_dir():
+            raise InputError(
+                f"{path}: cannot be written: there is no folder '{target.parent}'; make it, or correct the path."
+            )
         handle, name = tempfile.mkstemp(prefix=".hrg-", dir=None if special else target.parent)
         temporary = Path(name)
         with os.fdopen(handle, "wb") as file:
@@ -72,10 +75,14 @@ def _follow(path: Path) -> Path:
 
 
 def check_folder(path: str | Path) -> Path:
-    """Make a folder for output files and make sure that it can be written."""
+    """Make a folder for output files, in one that exists, and make sure that it can be written."""
     folder = Path(path)
+    if not folder.parent.is_dir():
+        raise InputError(
+            f"{path}: cannot be written: there is no folder '{folder.parent}'; make it, or correct the path."
+        )
     try:
-        folder.mkdir(parents=True, exist_ok=True)
+        folder.mkdir(exist_ok=True)
         with tempfile.TemporaryFile(dir=folder):
             return folder
     except OSError as error:

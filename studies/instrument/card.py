@@ -229,9 +229,15 @@ def build_instrument(content: Mapping[str, Any], path: str = "card") -> Instrume
 
 def save_card(instrument: Instrument, path: str | Path) -> None:
     """Write an instrument as a card, whole or not at all."""
+    write_text(path, spell_card(instrument, path)[1])
+
+
+def spell_card(instrument: Instrument, path: str | Path) -> tuple[dict[str, Any], str]:
+    """Return the content and the text of a card that is to stand at a path; the files that it names are named from there."""
     import tomli_w
 
-    content = {**instrument.content, "schema": SCHEMA, "name": instrument.name}
+    content = {"schema": SCHEMA, "name": instrument.name}
+    content |= {key: value for key, value in instrument.content.items() if key not in content}
 
     def moved(table: Mapping[str, Any]) -> dict[str, Any]:
         own = (Path(instrument.path).parent / table["file"]).resolve()
@@ -242,7 +248,7 @@ def save_card(instrument: Instrument, path: str | Path) -> None:
     maps = content.get("imperfection", {}).get("map", [])
     if maps:
         content["imperfection"] = {**content["imperfection"], "map": [moved(table) for table in maps]}
-    write_text(path, tomli_w.dumps(content))
+    return content, tomli_w.dumps(content)
 
 
 def shipped_cards() -> dict[str, Path]:

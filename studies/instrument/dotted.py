@@ -17,7 +17,12 @@ def look_up(content: Mapping[str, Any], name: str) -> Any:
     found: Any = content
     for word in name.split("."):
         found = found[int(word)] if isinstance(found, list) else found[word]
-    return found["value"] if is_spread(found) else found
+    return plain_number(found)
+
+
+def plain_number(value: Any) -> Any:
+    """Return the number of a value with its uncertainty, anything else as it is."""
+    return value["value"] if is_spread(value) else value
 
 
 def replaced(content: Any, path: list[str], value: Any) -> Any:

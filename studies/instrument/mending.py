@@ -8,10 +8,10 @@ import msgspec
 from msgspec import inspect
 
 from studies.errors import InputError, nearest
+from studies.files.given import is_sound
 from studies.instrument.keys import Path, describe, find, holds_number, known_keys, options
 
 T = TypeVar("T")
-LARGEST = 1e300
 BOUND = {">": "above", ">=": "at least", "<": "below", "<=": "at most"}
 PLACE = re.compile(r" - at `\$(.*?)`$", re.DOTALL)
 WORD = re.compile(r"\.([^.\[\]]+)|\[(\d+)\]")
@@ -30,7 +30,7 @@ def read_keys(raw: Any, keys: type[T], where: str) -> T:
     except msgspec.ValidationError as error:
         raise InputError(mend(str(error), raw, keys, where)) from None
     for path, value in _leaves(raw):
-        if not _is_sound(value):
+        if not is_sound(value):
             raise InputError(f"{spell_place(where, path)} must be a finite number, not {_short(value)}.")
     return found
 
@@ -48,7 +48,7 @@ def mend(refusal: str, raw: Any, keys: Any, where: str) -> str:
     if missing := re.fullmatch(r"Object missing required field `(.*)`", what):
         return f"{spell_table(where, path)}: the key '{missing[1]}' is missing; add it."
     place = spell_place(where, path)
-    if holds_number(node) and not _is_sound(value):
+    if holds_number(node) and not is_sound(value):
         return f"{place} must be a finite number, not {_short(value)}."
     if bound := re.fullmatch(r"Expected `(?:float|int)` (>=|<=|>|<) (\S+)", what):
         return f"{place} must be {BOUND[bound[1]]} {float(bound[2]):g}, not {value:g}."
@@ -109,11 +109,6 @@ def plain_words(node: inspect.Type) -> str:
     if isinstance(one, inspect.TupleType):
         return "[position, value] pairs" if len(one.item_types) == 2 else "lists"
     return "tables" if isinstance(one, inspect.StructType) else "numbers"
-
-
-def _is_sound(value: Any) -> bool:
-    """Whether a value is no number, or a finite one that an instrument can have."""
-    return isinstance(value, bool) or not isinstance(value, int | float) or -LARGEST < value < LARGEST
 
 
 def _leaves(raw: Any, path: Path = ()) -> Iterator[tuple[Path, Any]]:

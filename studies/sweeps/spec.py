@@ -106,7 +106,8 @@ def read_study(source: str | Path | Mapping[str, Any], card: str | None = None) 
             raise InputError(f'study: schema must be "{SCHEMA}", not {content["schema"]!r}.')
     else:
         path = find_shipped(source, shipped_specs(), "study")
-        content, where, folder = read_toml(path, SCHEMA), str(path), path.parent
+        content, folder = read_toml(path, SCHEMA), path.parent
+        where = f"the shipped study '{source}'" if path in shipped_specs().values() else str(path)
         text = path.read_text(encoding="utf-8-sig")
     if card is not None:
         content["card"] = card

@@ -115,6 +115,7 @@ def test_saved_card_loads_equal_even_from_another_folder(tmp_path):
     card.write_text(HRG.replace('name = "fused-silica"', 'name = "glass"\nfile = "mine.toml"'), encoding="utf-8")
     first = load_card(card)
     moved = tmp_path / "b" / "card.toml"
+    moved.parent.mkdir()
     save_card(first.with_table("effect", [LAG]), moved)
     again = load_card(moved)
     assert again.material == first.material

@@ -4,6 +4,7 @@ import json
 import os
 import subprocess
 import sys
+from importlib.metadata import version
 from pathlib import Path
 
 import pytest
@@ -155,3 +156,38 @@ def test_unusable_tables_are_refused(tmp_path, rows, part, capsys):
     path.write_text("temperature_degC,frequency_Hz\n" + rows)
     assert main(["fit", "frequency", str(path)]) == 2
     assert part in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("number", ["inf", "nan", "-1e308", "1e16"])
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["modes", "free-dome", "--amplitude"],
+        ["tcf", "free-dome", "--step"],
+        ["loop", "hrg-30mm-loops", "--rate"],
+        ["simulate", "free-dome", "step 20 -10 5h", "--out", "run.csv", "--rate"],
+    ],
+)
+def test_no_argument_is_infinite_or_near_it(words, number, capsys):
+    assert main([*words, number]) == 2
+    assert "must be a finite number" in capsys.readouterr().err
+
+
+def test_what_a_file_says_cannot_act_on_the_terminal(tmp_path, capsys):
+    """An escape sequence in a card's name is refused; one in a column's name or an argument is spelled out."""
+    card, table = tmp_path / "card.toml", tmp_path / "t.csv"
+    card.write_text('schema = "hrg.card/1"\nname = "a\\u001b[2Jb"\n[resonator]\n')
+    table.write_text("temperature_degC,\x1b[31mfrequency\n20,4432\n")
+    for words in (["modes", str(card)], ["fit", "frequency", str(table)], ["modes", "\x1b]0;x"]):
+        assert main(words) == 2
+        said = capsys.readouterr().err
+        assert r"\x1b" in said
+        assert "\x1b" not in said
+
+
+def test_doctor_looks_for_the_package_of_the_cluster_and_not_for_a_program(capsys, monkeypatch):
+    pytest.importorskip("distributed", reason="the extra 'cluster' (dask[distributed]) is not installed")
+    monkeypatch.setenv("PATH", "")
+    main(["doctor", "--json"])
+    (found,) = [one for one in json.loads(capsys.readouterr().out)["checks"] if one["name"] == "distributed"]
+    assert found["found"] == version("distributed")

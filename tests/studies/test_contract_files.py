@@ -10,7 +10,7 @@ import pytest
 from studies.cli import main
 from studies.errors import InputError
 from studies.files.reading import read_bytes
-from studies.files.writing import write_text
+from studies.files.writing import check_folder, write_text
 
 
 def test_a_link_is_followed_and_stays_a_link(tmp_path):
@@ -48,6 +48,13 @@ def test_what_cannot_be_written_is_named(tmp_path, name):
     with pytest.raises(InputError, match=r"cannot be written|is a folder|zero byte"):
         write_text(str(tmp_path / name), "x")
     assert sorted(os.listdir(tmp_path)) == ["folder", "loop"]
+
+
+def test_a_folder_that_is_not_there_is_named_and_not_made(tmp_path):
+    for write in (lambda path: write_text(path / "page.html", "x"), lambda path: check_folder(path / "out")):
+        with pytest.raises(InputError, match=r"no folder '.*misspelt'"):
+            write(tmp_path / "misspelt")
+    assert os.listdir(tmp_path) == []
 
 
 def test_devices_pipes_and_giants_are_not_read(tmp_path):

@@ -1,12 +1,15 @@
 """`hrg card new` and `hrg study new`: what they write is valid, complete and never written over something."""
 
 import tomllib
+from pathlib import Path
 
 import pytest
 
+import shell
 from studies.cli import main
 from studies.instrument.card import load_card, shipped_cards
 from studies.instrument.registry import card_tables
+from studies.sweeps.parameters import set_parameters
 from studies.sweeps.spec import read_study, shipped_specs
 
 
@@ -62,3 +65,63 @@ def test_nothing_is_overwritten(tmp_path, capsys):
     assert "exists and is not overwritten" in capsys.readouterr().err
     assert main(["card", "new", str(tmp_path / "x.toml"), "--like", "nothing"]) == 2
     assert not (tmp_path / "x.toml").exists()
+
+
+DOTTED = """schema = "hrg.card/1"
+name = "dotted"
+note = '''two
+lines [with] brackets'''
+resonator.shape = "hemisphere"
+resonator.radius_mm = 15.0
+resonator.thickness_mm = [[0.0, 0.95], [1.0, 0.85]]
+resonator.support = "stem"
+resonator.stem = { radius_mm = 2.5, end_mm = -5.0, side = "inner", fillet_mm = 0.5 }
+material = { name = "house-silica", file = "house.toml" }
+"""
+INLINE = """schema = "hrg.card/1"
+name = "inline"
+resonator = { shape = "hemisphere", radius_mm = 15.0, thickness_mm = 0.9 }
+material = { name = "fused-silica" }
+"""
+
+
+@pytest.mark.parametrize("text", [DOTTED, INLINE])
+def test_a_new_card_is_its_model_however_that_is_written(tmp_path, text):
+    """Dotted keys, inline tables, notes of several lines; a file that the model names is found from the new card's folder."""
+    model = tmp_path / "models" / "model.toml"
+    model.parent.mkdir()
+    (tmp_path / "new").mkdir()
+    silica = (Path(shell.__file__).parent / "materials.toml").read_text(encoding="utf-8")
+    (model.parent / "house.toml").write_text(silica.replace("[fused-silica", "[house-silica"), encoding="utf-8")
+    model.write_text(text, encoding="utf-8")
+    assert main(["card", "new", str(tmp_path / "new" / "mine.toml"), "--like", str(model)]) == 0
+    mine, like = load_card(tmp_path / "new" / "mine.toml"), load_card(model)
+    assert mine.name == "mine"
+    assert (mine.resonator, mine.material.value("density", 293.15)) == (
+        like.resonator, like.material.value("density", 293.15),
+    )  # fmt: skip
+
+
+PROFILE = INLINE.replace("0.9", "[[0.0, 0.95], [0.5, 0.95], [1.0, 0.85]]")
+
+
+def test_a_tolerance_of_a_profile_moves_all_of_it_from_its_mean(tmp_path):
+    """The mean of a wall of 0.95 mm that thins to 0.85 over its second half is 0.925."""
+    (tmp_path / "mine.toml").write_text(PROFILE)
+    path = tmp_path / "s.toml"
+    assert main(["study", "new", str(path), "--like", "dimension-tolerance", "--card", "mine.toml"]) == 0
+    study = read_study(path)
+    wall = study.parameters[0]
+    assert (wall.name, wall.nominal) == ("resonator.thickness_mm", pytest.approx(0.925, rel=1e-15))
+    thicker = set_parameters(study.instrument, {wall.name: 0.935})
+    assert [h for _, h in thicker.resonator.thickness] == pytest.approx([0.96e-3, 0.96e-3, 0.86e-3], rel=1e-13)
+
+
+def test_a_shipped_study_that_does_not_fit_a_card_is_named_by_its_name(tmp_path, capsys):
+    bare = 'schema = "hrg.card/1"\nname = "line"\n[resonator]\nshape = "meridian"\nthickness_mm = 0.5\n[material]\nname = "fused-silica"\n'
+    segment = '[[resonator.segment]]\nkind = "line"\nfrom_mm = [10.0, 0.0]\nto_mm = [10.0, 20.0]\n'
+    (tmp_path / "line.toml").write_text(bare + segment)
+    assert main(["study", "run", "dimension-tolerance", "--card", str(tmp_path / "line.toml"), "--dry-run"]) == 2
+    said = capsys.readouterr().err
+    assert "the shipped study 'dimension-tolerance'" in said
+    assert "templates" not in said

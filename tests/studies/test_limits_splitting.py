@@ -287,5 +287,6 @@ def test_a_saved_card_takes_its_maps_along(tmp_path):
         "position," + ",".join(str(a) for a in range(0, 360, 30)) + "\n" + "0.5" + ",0.1" * 12 + "\n"
     )
     instrument = loaded(tmp_path, '[[imperfection.map]]\nof = "wall"\nfile = "wall.csv"\n')
+    (tmp_path / "deeper").mkdir()
     save_card(instrument, tmp_path / "deeper" / "card.toml")
     assert is_imperfect(load_card(tmp_path / "deeper" / "card.toml"))
