@@ -236,7 +236,7 @@ def spell_card(instrument: Instrument, path: str | Path) -> tuple[dict[str, Any]
     """Return the content and the text of a card that is to stand at a path; the files that it names are named from there."""
     import tomli_w
 
-    content = {"schema": SCHEMA, "name": instrument.name}
+    content: dict[str, Any] = {"schema": SCHEMA, "name": instrument.name}
     content |= {key: value for key, value in instrument.content.items() if key not in content}
 
     def moved(table: Mapping[str, Any]) -> dict[str, Any]:
