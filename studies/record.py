@@ -41,7 +41,7 @@ COMPENSATED = "compensated_"
 RESONATOR = "resonator_temperature_degC"
 LIMITS = {
     # what a column can be, by the end of its name: lowest, highest
-    "_Hz": (0.0, 1e12),
+    "_Hz": (1e-6, 1e12),  # 0 is a dropout of the counter
     "_deg_per_h": (-1e10, 1e10),
     "_deg_per_s": (-1e6, 1e6),
     "_V": (-1e5, 1e5),

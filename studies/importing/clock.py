@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 from studies.errors import InputError
 from studies.importing.mapping import NUMERIC_TIMES, SECONDS, UNIX, FileMap
 from studies.importing.raw import RawTable, shorten
+from studies.importing.zone import place_in_zone
 
 if TYPE_CHECKING:
     import numpy as np
@@ -63,9 +64,9 @@ def read_times(table: RawTable, file: "FileMap") -> Times:
             notes += [passed] if nights else []
     _check_span(seconds, table, file)
     if file.timezone is not None and origin is not None and origin.tzinfo is None:
-        import zoneinfo
-
-        origin = origin.replace(tzinfo=zoneinfo.ZoneInfo(file.timezone))
+        origin, seconds, twice = _place(origin, seconds, table, file)
+        if twice:
+            notes.append(f"{twice} rows in the hour that {file.timezone} has twice, told apart by their order")
     if file.clock_rate:
         seconds = seconds / (1 + file.clock_rate)
         notes.append(f"its clock runs {file.clock_rate * 1e6:g} ppm fast: times divided by {1 + file.clock_rate!r}")
@@ -73,6 +74,18 @@ def read_times(table: RawTable, file: "FileMap") -> Times:
         seconds = seconds + file.clock_offset
         notes.append(f"{file.clock_offset:g} s added to its times")
     return Times(seconds, origin, tuple(notes))
+
+
+def _place(
+    origin: datetime.datetime, seconds: "Array", table: RawTable, file: "FileMap"
+) -> "tuple[datetime.datetime, Array, int]":
+    """Place local stamps in their zone; a clock that counts seconds has a local start only."""
+    if file.time_format not in SECONDS:
+        return place_in_zone(origin, seconds, str(file.timezone), table.place)
+    import zoneinfo
+
+    ahead = origin.replace(tzinfo=zoneinfo.ZoneInfo(str(file.timezone))).utcoffset()
+    return origin.replace(tzinfo=datetime.timezone(ahead or datetime.timedelta())), seconds, 0
 
 
 def _check_span(seconds: "Array", table: RawTable, file: "FileMap") -> None:
@@ -96,15 +109,17 @@ def _check_span(seconds: "Array", table: RawTable, file: "FileMap") -> None:
     )
 
 
-def drop_repeated(table: RawTable, times: Times, rule: str) -> "tuple[Times, NDArray[np.intp]]":
+def drop_repeated(table: RawTable, times: Times, file: "FileMap") -> "tuple[Times, NDArray[np.intp]]":
     """Return strictly increasing times and the rows that they belong to; rows without a time are left out.
 
     Raises
     ------
     InputError
-        Times go back, or repeat while the rule is "error".
+        Times go back, or repeat while the map's rule `repeated_times` is "error".
     """
     import numpy as np
+
+    rule = file.repeated_times
 
     rows = np.flatnonzero(np.isfinite(times.seconds))
     if not len(rows):
@@ -114,18 +129,17 @@ def drop_repeated(table: RawTable, times: Times, rule: str) -> "tuple[Times, NDA
     lost = len(times.seconds) - len(rows)
     if lost:
         first = int(np.flatnonzero(~np.isfinite(times.seconds))[0])
-        notes.append(f"{lost} rows without a time left out (first: line {table.line(first)})")
+        notes.append(f"{lost} rows without a time left out (first: {table.place(first)})")
     steps = np.diff(t)
     if (steps < 0).any():
         row = int(rows[int(np.flatnonzero(steps < 0)[0]) + 1])
         raise InputError(
-            f"{table.path}, line {table.line(row)}: the time goes back by {-steps.min():g} s at most; split the file there"
-            " (a restart or a change to winter time), or end it with last_line in the map."
+            f"{table.place(row)}: the time goes back by {-steps.min():g} s at most. {_mend(table, file, row)}"
         )
     same = np.flatnonzero(steps == 0)
     if len(same) and rule == "error":
         raise InputError(
-            f"{table.path}, line {table.line(int(rows[same[0] + 1]))}: the time of the line before is repeated ({len(same)}"
+            f"{table.place(int(rows[same[0] + 1]))}: the time of the line before is repeated ({len(same)}"
             " such rows); set repeated_times = 'first' or 'spread' in the map."
         )
     if len(same) and rule == "first":
@@ -136,6 +150,20 @@ def drop_repeated(table: RawTable, times: Times, rule: str) -> "tuple[Times, NDA
         notes.append(f"{len(same)} repeated times spread evenly up to the next stamp")
         t = _spread(t)
     return Times(t, times.origin, tuple(notes)), rows
+
+
+def _mend(table: RawTable, file: "FileMap", row: int) -> str:
+    if table.begins_part(row):
+        return (
+            "Give files that continue one another in the order of their times; files whose clocks start anew are imported"
+            " one by one."
+        )
+    winter = (
+        ""
+        if file.timezone or file.time_format in SECONDS
+        else ", or a change to winter time: then name 'timezone' in the map"
+    )
+    return f"Is it a restart{winter}? Split the file there, or end it with last_line in the map."
 
 
 def seconds_between(one: datetime.datetime, two: datetime.datetime, path: str) -> float:
@@ -172,7 +200,7 @@ def _read_stamps(table: RawTable, file: "FileMap") -> "tuple[Array, datetime.dat
     bad = np.flatnonzero(np.asarray(stamps.isna()) & ~empty)
     if len(bad):
         raise InputError(
-            f"{table.path}, line {table.line(bad[0])}: '{shorten(text.iloc[bad[0]])}' in column '{name}' is not a time"
+            f"{table.place(bad[0])}: '{shorten(text.iloc[bad[0]])}' in column '{name}' is not a time"
             f" of the form '{file.time_format}'; correct time_format in the map."
         )
     known = stamps.dropna()

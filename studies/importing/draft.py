@@ -50,14 +50,52 @@ def draft_map(paths: Sequence[str]) -> Draft:
     files: list[list[str]] = []
     mapped: list[str] = []
     left_over: list[str] = []
-    for path in paths:
-        written, found, others = _draft_file(path, mapped)
+    groups = _group(paths)
+    for group in groups:
+        written, found, others = _draft_file(group[0], mapped)
+        if len(group) > 1:
+            written.insert(
+                2, f"parts = {len(group)}    # CHECK: these continue one another: {', '.join(map(_comment, group))}"
+            )
         files.append(written)
         mapped += found
         left_over += others
-    notes = _find_offsets(paths, files) if len(paths) > 1 else []
+    notes = _find_offsets([group[0] for group in groups], files) if len(groups) > 1 else []
     text = "\n".join([*head, *(line for written in files for line in ("", *written))])
     return Draft(text + "\n", tuple(dict.fromkeys(mapped)), tuple(left_over), tuple(notes))
+
+
+def _group(paths: Sequence[str]) -> list[list[str]]:
+    """Put files that continue one another into one group: the same columns, and times that go on."""
+    groups: list[list[str]] = []
+    for path in paths:
+        if groups and look_at(path).names == look_at(groups[-1][0]).names and _continues([groups[-1][-1], path]):
+            groups[-1].append(path)
+        else:
+            groups.append([path])
+    return groups
+
+
+def _continues(paths: Sequence[str]) -> bool:
+    """Tell whether the times of one file go on in the other; what the draft leaves to be filled matters to no time."""
+    from studies.importing.join import read_series
+
+    draft = [line.replace("= 0.0    # CHECK", "= 1.0    # CHECK") for line in _draft_file(paths[0], ())[0]]
+    try:
+        (file,) = _load_text("\n".join([f'schema = "{SCHEMA}"', *draft]))
+        return file.sample_period is None and bool(read_series(paths, file))
+    except InputError:
+        return False
+
+
+def _load_text(text: str) -> tuple[FileMap, ...]:
+    import tempfile
+    from pathlib import Path
+
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "map.toml"
+        file.write_text(text, encoding="utf-8")
+        return load_map(file).files
 
 
 def _find_offsets(paths: Sequence[str], files: list[list[str]]) -> list[str]:
@@ -65,23 +103,15 @@ def _find_offsets(paths: Sequence[str], files: list[list[str]]) -> list[str]:
 
     Each file is read by a draft of its own, so that two sensors of one kind, of which a record takes one, are compared too.
     """
-    import tempfile
-    from pathlib import Path
-
     from studies.importing.join import read_series, shift_between
 
-    with tempfile.TemporaryDirectory() as folder:
-        file = Path(folder) / "map.toml"
-        maps: list[FileMap] = []
-        try:
-            for path in paths:
-                own = "\n".join([f'schema = "{SCHEMA}"', *_draft_file(path, ())[0]])
-                file.write_text(own, encoding="utf-8")
-                maps += load_map(file).files
-            series = [read_series(path, one) for path, one in zip(paths, maps, strict=True)]
-            shifts = [shift_between(series[0], other) for other in series]
-        except InputError:  # the draft is not complete yet: nothing can be compared
-            return []
+    try:
+        drafts = ["\n".join([f'schema = "{SCHEMA}"', *_draft_file(path, ())[0]]) for path in paths]
+        maps = [file for draft in drafts for file in _load_text(draft)]
+        series = [read_series([path], one) for path, one in zip(paths, maps, strict=True)]
+        shifts = [shift_between(series[0], other) for other in series]
+    except InputError:  # the draft is not complete yet: nothing can be compared
+        return []
     notes, base = [], series[0]
     for written, path, other, shift in zip(files[1:], paths[1:], series[1:], shifts[1:], strict=True):
         found = [

@@ -1,5 +1,6 @@
 """Columns of several loggers, each with its own clock and rate, brought onto the times of one record."""
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -10,7 +11,7 @@ from compensation.decimation import average_groups
 from studies.errors import InputError
 from studies.importing.clock import drop_repeated, read_times, seconds_between
 from studies.importing.mapping import TABLE_TARGETS, ColumnMap, FileMap, ImportMap
-from studies.importing.raw import RawTable, read_raw
+from studies.importing.raw import RawTable, read_parts, read_raw
 from studies.record import Record, check_plausible
 
 if TYPE_CHECKING:
@@ -53,8 +54,7 @@ def import_records(paths: Sequence[str], import_map: ImportMap) -> dict[str, Rec
     InputError
         A file does not fit its map, or the clocks cannot be placed against each other.
     """
-    _check_count(paths, import_map)
-    series = [read_series(path, file) for path, file in zip(paths, import_map.files, strict=True)]
+    series = [read_series(own, file) for own, file in zip(share_out(paths, import_map), import_map.files, strict=True)]
     base = series[0]
     shifts = [shift_between(base, other) for other in series]
     grid = _lay_grid(base, import_map)
@@ -101,17 +101,25 @@ def import_table(path: str, import_map: ImportMap) -> "tuple[dict[str, Array], t
         raise InputError(f"{path}: no row has both {' and '.join(columns)}.")
     notes = [
         f"imported with {import_map.path}; every change is listed here",
-        f"{' '.join(str(path).split())}, sha256 {table.sha256}, {int(whole.sum())} of {len(whole)} rows",
+        f"{_name_files(table)}, {int(whole.sum())} of {len(whole)} rows",
+        *_report_empty(table, file),
         *(_describe(column, columns[column.target], moved=False) for column in file.columns),
     ]
     notes += [f"source: {import_map.source}"] if import_map.source else []
     return {name: columns[name][whole] for name in TABLE_TARGETS}, tuple(" ".join(note.split()) for note in notes)
 
 
-def _check_count(paths: Sequence[str], import_map: ImportMap) -> None:
-    wanted = len(import_map.files)
-    if len(paths) != wanted:
-        raise InputError(f"{import_map.path}: describes {wanted} raw files, but {len(paths)} are given.")
+def share_out(paths: Sequence[str], import_map: ImportMap) -> list[Sequence[str]]:
+    """Return the raw files of each [[file]] of the map: one, `parts` that continue one another, or all of a single one."""
+    files = import_map.files
+    counts = [file.parts or (len(paths) if len(files) == 1 else 1) for file in files]
+    if sum(counts) != len(paths):
+        raise InputError(
+            f"{import_map.path}: describes {sum(counts)} raw files, but {len(paths)} are given ('parts' in a [[file]] says"
+            " how many files continue one another)."
+        )
+    ends = list(itertools.accumulate(counts))
+    return [paths[end - count : end] for end, count in zip(ends, counts, strict=True)]
 
 
 def _report_gaps(one: ClockedFile) -> list[str]:
@@ -130,19 +138,22 @@ def _report_gaps(one: ClockedFile) -> list[str]:
     ]
 
 
-def read_series(path: str, file: FileMap) -> ClockedFile:
-    """Read one raw file: its clock corrected, its columns converted, rows without a time left out."""
-    table = read_raw(path, file)
-    times, rows = drop_repeated(table, read_times(table, file), file.repeated_times)
+def read_series(paths: Sequence[str], file: FileMap) -> ClockedFile:
+    """Read a raw file, or several that continue one another: clock corrected, columns converted, rows without a time left out."""
+    table = read_parts(paths, file)
+    times, rows = drop_repeated(table, read_times(table, file), file)
     columns = {(column.target, column.axis): convert(table, column)[rows] for column in file.columns}
     _check_lone_values(table, columns, rows)
-    name = " ".join(str(path).split())
     notes = (
-        f"{name}, sha256 {table.sha256}, {len(rows)} rows {_name_clock(file)}",
+        f"{_name_files(table)}, {len(rows)} rows {_name_clock(file)}",
         *times.notes,
-        *_report_overloads(table, file),
+        *_report_empty(table, file),
     )
-    return ClockedFile(file, str(path), times.seconds, times.origin, columns, notes)
+    return ClockedFile(file, table.path, times.seconds, times.origin, columns, notes)
+
+
+def _name_files(table: RawTable) -> str:
+    return " then ".join(f"{' '.join(part.path.split())}, sha256 {part.sha256}" for part in table.parts)
 
 
 def _name_clock(file: FileMap) -> str:
@@ -151,36 +162,40 @@ def _name_clock(file: FileMap) -> str:
     return f"from '{' '.join(file.time)}' ({file.time_format})"
 
 
-def _report_overloads(table: RawTable, file: FileMap) -> list[str]:
-    counts = {column.source: table.count_overloads(column.source) for column in file.columns}
+def _report_empty(table: RawTable, file: FileMap) -> list[str]:
+    """Say which readings of the instruments are no values: overloads, and zeros of what cannot be zero."""
+    overloads = {column.source: table.count_overloads(column.source) for column in file.columns}
+    zeros = {column.source: int(np.count_nonzero(_is_dropout(table, column))) for column in file.columns}
     return [
-        f"{count} readings of '{name}' are an instrument's overload: left empty"
+        f"{count} readings of '{name}' are {what}: left empty"
+        for what, counts in (("an instrument's overload", overloads), ("0, a dropout", zeros))
         for name, count in counts.items()
         if count
     ]
 
 
+def _reading(table: RawTable, column: ColumnMap) -> "Array":
+    return np.asarray(table.numbers(column.source) * column.scale + column.offset)
+
+
+def _is_dropout(table: RawTable, column: ColumnMap) -> "NDArray[np.bool_]":
+    """Tell which readings are 0 where 0 cannot be: a counter without a signal."""
+    return np.asarray((_reading(table, column) == 0) & column.conversion.never_zero)
+
+
 def convert(table: RawTable, column: ColumnMap) -> "Array":
     """Return a raw column in the unit of the record: sign × unit(reading × scale + offset)."""
-    unit = column.conversion
-    reading = table.numbers(column.source) * column.scale + column.offset
-    if unit.divides and (reading == 0).any():
-        row = int(np.flatnonzero(reading == 0)[0])
-        raise InputError(
-            f"{table.path}, line {table.line(row)}: 0 in column '{column.source}' cannot be a {column.unit}; add '0' to"
-            " 'missing' in the map where it marks a missing value."
-        )
-    values = column.sign * unit.convert(reading, *column.settings)
+    reading = np.where(_is_dropout(table, column), np.nan, _reading(table, column))
+    values = column.sign * column.conversion.convert(reading, *column.settings)
     if (
         column.target.endswith("temperature_degC")
         and (outside := np.flatnonzero((values < -200) | (values > 200))).size
     ):
-        line = table.line(outside[0])
         raise InputError(
-            f"{table.path}, line {line}: '{column.source}' becomes {values[outside[0]]:g} °C; check unit, scale and offset"
+            f"{table.place(outside[0])}: '{column.source}' becomes {values[outside[0]]:g} °C; check unit, scale and offset"
             " in the map."
         )
-    check_plausible({column.target: values}, lambda row: f"{table.path}, line {table.line(row)}, '{column.source}'")
+    check_plausible({column.target: values}, lambda row: f"{table.place(row)}, '{column.source}'")
     return np.asarray(values, dtype=float)
 
 

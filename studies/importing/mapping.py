@@ -19,7 +19,8 @@ time = "Zeit"                    # the column with the time; ["Datum", "Zeit"] j
 time_format = "s"                # s, ms, us, ns, min, h, days, unix-s, unix-ms, unix-us, unix-ns, excel-days, iso, or a pattern such as
                                  # "%d.%m.%Y %H:%M:%S"
 sample_period_s = 0.1            # instead of time and time_format: rows without a time, evenly spaced
-timezone = "Europe/Berlin"       # optional: of stamps that do not state one
+timezone = "Europe/Berlin"       # optional: of stamps that do not state one; the hour that comes twice is told by the order of rows
+parts = 3                        # files that continue one another, such as days; default: 1, or all files with a single [[file]]
 start = 2026-01-31T12:00:00      # optional: when a clock that counts from 0 was started
 clock_offset_s = 0.0             # added to this file's times: positive when its clock is behind
 clock_rate_ppm = 0.0             # by how much its clock runs fast
@@ -29,7 +30,8 @@ longest_gap_s = 10.0             # nothing is interpolated across longer gaps; d
 [[file.column]]
 from = "T Gehäuse [K]"           # the name in the raw file
 to = "housing_temperature_degC"  # the column of the record
-unit = "K"                       # see studies.importing.units; (reading × scale + offset) is in this unit
+unit = "K"                       # see studies.importing.units, or as people write it: "°C", "°/s", "mdps", "ppm of 4432.07 Hz";
+                                 # (reading × scale + offset) is in this unit
 scale = 1.0
 offset = 0.0
 sign = 1                         # -1 turns the converted value's sign
@@ -47,7 +49,7 @@ from typing import Literal, cast
 
 from studies.errors import InputError, nearest
 from studies.files.toml import TomlTable, read_toml
-from studies.importing.units import SETTINGS, TARGETS, Unit, units_of
+from studies.importing.units import SETTINGS, TARGETS, Unit, find_spelling, split_nominal, units_of
 
 SCHEMA = "hrg.map/1"
 SEPARATORS = {";": ";", ",": ",", "tab": "\t", "|": "|", "space": r"\s+"}
@@ -74,6 +76,7 @@ FILE_KEYS = (
     "clock_rate_ppm",
     "repeated_times",
     "longest_gap_s",
+    "parts",
     "column",
 )
 COLUMN_KEYS = ("from", "to", "unit", "scale", "offset", "sign", "resample", "axis", *SETTINGS)
@@ -125,6 +128,7 @@ class FileMap:
     longest_gap: float | None = None
     sample_period: float | None = None
     timezone: str | None = None
+    parts: int | None = None
 
 
 @dataclass(frozen=True)
@@ -215,6 +219,7 @@ def _read_file(section: TomlTable, is_table: bool) -> FileMap:
         section.number("longest_gap_s", above=0.0) if "longest_gap_s" in section else None,
         period,
         _read_timezone(section),
+        _line(section, "parts", 1) if "parts" in section else None,
     )
 
 
@@ -224,8 +229,11 @@ def _read_column(section: TomlTable, targets: Sequence[str]) -> ColumnMap:
         what = "table" if targets is TABLE_TARGETS else "record"
         raise InputError(f"{section.where}: to = '{target}' is no column of a {what}{nearest(target, targets)}")
     units: Mapping[str, Unit] = units_of(target)
-    unit = section.text("unit", choices=tuple(units))
-    settings = tuple(section.number(key, above=0.0) for key in units[unit].settings)
+    stated, nominal = split_nominal(section.text("unit"))
+    unit = find_spelling(target, stated) or section.text("unit", choices=tuple(units))
+    settings = tuple(
+        nominal if nominal and key not in section else section.number(key, above=0.0) for key in units[unit].settings
+    )
     for key in SETTINGS:
         if key in section and key not in units[unit].settings:
             raise InputError(f"{section.where}: {key} has no meaning with unit = '{unit}'; remove it.")
@@ -302,7 +310,7 @@ def _read_timezone(section: TomlTable) -> str | None:
 def _line(section: TomlTable, key: str, default: int, least: int = 1) -> int:
     value = section.raw(key, default)
     if isinstance(value, bool) or not isinstance(value, int) or not least <= value <= 10**9:
-        raise InputError(f"{section.where}: {key} must be a line number from {least} up, not {value!r}.")
+        raise InputError(f"{section.where}: {key} must be a whole number from {least} up, not {value!r}.")
     return value
 
 

@@ -4,6 +4,7 @@ import csv
 import hashlib
 import importlib
 import io
+import itertools
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -27,15 +28,28 @@ OVERLOAD = 1e36
 
 
 @dataclass(frozen=True)
-class RawTable:
-    """The cells of one raw file, all text, and where they stood."""
+class Part:
+    """One raw file of a table: its path, its digest, the line of its first row, its number of rows."""
 
     path: str
-    cells: "pd.DataFrame"
-    first_line: int
     sha256: str
+    first_line: int
+    rows: int
+
+
+@dataclass(frozen=True)
+class RawTable:
+    """The cells of one raw file, or of several that continue one another, all text, and where they stood."""
+
+    parts: tuple[Part, ...]
+    cells: "pd.DataFrame"
     decimal: str
     missing: tuple[str, ...]
+
+    @property
+    def path(self) -> str:
+        """The first file's path."""
+        return self.parts[0].path
 
     def joined(self, columns: Sequence[str]) -> "pd.Series[str]":
         """Return several columns joined by a blank, such as a date and a time of day."""
@@ -70,7 +84,7 @@ class RawTable:
         bad = np.flatnonzero(~np.isfinite(values) & ~empty & ~overloaded)
         if len(bad):
             raise InputError(
-                f"{self.path}, line {self.line(bad[0])}: '{shorten(text.iloc[bad[0]])}' in column '{column}' is not a"
+                f"{self.place(bad[0])}: '{shorten(text.iloc[bad[0]])}' in column '{column}' is not a"
                 f" number (decimal = '{self.decimal}'); where it marks a missing value, add it to 'missing' in the map."
             )
         values[overloaded] = np.nan
@@ -82,9 +96,40 @@ class RawTable:
 
         return int(np.count_nonzero(np.isnan(self.numbers(column)) & ~self.is_empty(self.text(column))))
 
-    def line(self, row: int) -> int:
-        """Return the line of the file on which a row (from 0) stands."""
-        return self.first_line + int(row)
+    def place(self, row: int) -> str:
+        """Return the file and the line on which a row (from 0) stands."""
+        left = int(row)
+        for part in self.parts:
+            if left < part.rows:
+                break
+            left -= part.rows
+        return f"{part.path}, line {part.first_line + left}"
+
+    def begins_part(self, row: int) -> bool:
+        """Tell whether a row is the first of a file that continues another."""
+        starts = itertools.accumulate(part.rows for part in self.parts)
+        return row in list(starts)[:-1]
+
+
+def read_parts(paths: Sequence[str | Path], file: "FileMap") -> RawTable:
+    """Read raw files that continue one another as one table.
+
+    Raises
+    ------
+    InputError
+        Their columns differ.
+    """
+    import pandas as pd
+
+    tables = [read_raw(path, file) for path in paths]
+    first = tables[0]
+    for other in tables[1:]:
+        if list(other.cells) != list(first.cells):
+            raise InputError(
+                f"{other.path}: its columns are not those of {first.path}, which it continues; give it a [[file]] of its own."
+            )
+    cells = pd.concat([table.cells for table in tables], ignore_index=True)
+    return RawTable(tuple(part for table in tables for part in table.parts), cells, first.decimal, first.missing)
 
 
 def read_raw(path: str | Path, file: "FileMap") -> RawTable:
@@ -115,7 +160,8 @@ def read_raw(path: str | Path, file: "FileMap") -> RawTable:
         cells = _read_text(path, text, file, names)
     if not len(cells):
         raise InputError(f"{path}: there are no rows from line {file.data_line} on (data_line in the map).")
-    return RawTable(str(path), cells, file.data_line, hashlib.sha256(data).hexdigest(), decimal, file.missing)
+    part = Part(str(path), hashlib.sha256(data).hexdigest(), file.data_line, len(cells))
+    return RawTable((part,), cells, decimal, file.missing)
 
 
 def read_filled(path: str | Path) -> bytes:

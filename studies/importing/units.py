@@ -1,5 +1,6 @@
 """Units that laboratory files use, by the column of the record that they become; each conversion in words and as code."""
 
+import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from math import pi
@@ -20,14 +21,14 @@ if TYPE_CHECKING:
 class Unit:
     """How a reading x in this unit becomes a value of the record.
 
-    `settings` are the keys of the map that the conversion needs besides x, in the order of its arguments; `divides`
-    tells that x = 0 has no meaning.
+    `settings` are the keys of the map that the conversion needs besides x, in the order of its arguments; `never_zero`
+    tells that a reading of 0 is no value: nothing was counted.
     """
 
     convert: "Callable[..., Array]"
     words: str
     settings: tuple[str, ...] = ()
-    divides: bool = False
+    never_zero: bool = False
 
 
 def _times(factor: float, words: str) -> Unit:
@@ -35,7 +36,7 @@ def _times(factor: float, words: str) -> Unit:
 
 
 def _over(numerator: float, words: str) -> Unit:
-    return Unit(lambda x: numerator / x, words, divides=True)
+    return Unit(lambda x: numerator / x, words, never_zero=True)
 
 
 _SAME = Unit(lambda x: x, "x")
@@ -46,17 +47,17 @@ _TEMPERATURE = {
     "degF": Unit(lambda x: (x - 32) / 1.8, "(x - 32) / 1.8"),
 }
 _FREQUENCY = {
-    "Hz": _SAME,
-    "kHz": _times(1e3, "1000 x"),
-    "MHz": _times(1e6, "1e6 x"),
-    "rad/s": _times(1 / (2 * pi), "x / 2 pi"),
+    "Hz": Unit(lambda x: x, "x", never_zero=True),
+    "kHz": Unit(lambda x: 1e3 * x, "1000 x", never_zero=True),
+    "MHz": Unit(lambda x: 1e6 * x, "1e6 x", never_zero=True),
+    "rad/s": Unit(lambda x: x / (2 * pi), "x / 2 pi", never_zero=True),
     "period-s": _over(1.0, "1 / x"),
     "period-ms": _over(1e3, "1000 / x"),
     "period-us": _over(1e6, "1e6 / x"),
     "period-counts": Unit(
-        lambda x, clock, periods: periods * clock / x, "periods clock_Hz / x", ("clock_Hz", "periods"), divides=True
+        lambda x, clock, periods: periods * clock / x, "periods clock_Hz / x", ("clock_Hz", "periods"), never_zero=True
     ),
-    "gate-counts": Unit(lambda x, gate: x / gate, "x / gate_s", ("gate_s",)),
+    "gate-counts": Unit(lambda x, gate: x / gate, "x / gate_s", ("gate_s",), never_zero=True),
     "ppm": Unit(lambda x, nominal: nominal * (1 + 1e-6 * x), "nominal_Hz (1 + x / 1e6)", ("nominal_Hz",)),
     "ppb": Unit(lambda x, nominal: nominal * (1 + 1e-9 * x), "nominal_Hz (1 + x / 1e9)", ("nominal_Hz",)),
 }
@@ -97,6 +98,51 @@ _BY_ENDING: Mapping[str, Mapping[str, Unit]] = {
 def units_of(column: str) -> Mapping[str, Unit]:
     """Return the units from which a column of the record can be made; the first one is its own."""
     return next(units for ending, units in _BY_ENDING.items() if column.endswith(ending))
+
+
+_SPELLINGS = (
+    (r"degrees?|°|º", "deg"),
+    (r"℃|(deg)?celsius", "degC"),
+    (r"℉|(deg)?fahrenheit", "degF"),
+    (r"kelvin", "K"),
+    (r"µ|μ|micro", "u"),
+    (r"milli", "m"),
+    (r"kilo", "k"),
+    (r"hertz", "Hz"),
+    (r"volts?", "V"),
+    (r"radians?", "rad"),
+    (r"dp(?=[sh]$)", "deg/"),
+    (r"per(?!iod)", "/"),
+    (r"(?<=/)sec(onds?)?$", "s"),
+    (r"(?<=/)(hours?|hr)$", "h"),
+    (r"^(turn|rev|revolutions?)$", "turns"),
+)
+_NOMINAL = re.compile(r"(pp[mb])\s+of\s+(.*?)\s*(?:hz)?", re.IGNORECASE)
+
+
+def find_spelling(column: str, text: str) -> str | None:
+    """Return the unit of a column that a text such as "°/s", "mdps" or "deg_per_h" spells; None where it spells none.
+
+    Small and capital letters are the same, except an m: mHz is not MHz.
+    """
+    units = units_of(column)
+    if text in units:
+        return text
+    plain = re.sub(r"[\s_]", "", text)
+    for pattern, word in _SPELLINGS:
+        plain = re.sub(pattern, word, plain, flags=re.IGNORECASE)
+    return next((u for u in units if u.casefold() == plain.casefold() and (u[0] == plain[0] or u[0] not in "mM")), None)
+
+
+def split_nominal(text: str) -> tuple[str, float | None]:
+    """Return the unit and the nominal frequency (Hz) of "ppm of 4432.07 Hz"; other texts as they are, without one."""
+    found = _NOMINAL.fullmatch(text.strip())
+    if not found:
+        return text, None
+    try:
+        return found[1].lower(), float(found[2])
+    except ValueError:  # "ppm of f0": nominal_Hz must say it
+        return found[1].lower(), None
 
 
 TARGETS = tuple(name for name in COLUMNS if name != "time_s")

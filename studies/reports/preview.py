@@ -7,12 +7,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from studies.reports import style
+from studies.reports.gaps import find_gaps
 from studies.reports.page import Block, Chapter, Picture, Table, Text, draw, render_page
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-Columns = Mapping[str, NDArray[np.float64]]
+Array = NDArray[np.float64]
+Columns = Mapping[str, Array]
 FEW = 300  # rows that are drawn as points
 FIRST_ROWS = 5
 
@@ -38,19 +40,34 @@ def draw_columns(columns: Columns) -> "Figure":
     mark = "-" if timed and len(x) >= FEW else "."
     with style.figure(len(shown), height=1.9 * len(shown) + 0.6, squeeze=False, sharex=True) as (figure, axes):
         for axis, name in zip(axes[:, 0], shown, strict=True):
-            axis.plot(x[rows], columns[name][rows], mark, color=style.BLUE, linewidth=0.9)
+            drawn = x[rows], columns[name][rows]
+            if timed:
+                gaps = find_gaps(columns["time_s"], columns[name]) / 3600
+                drawn = _broken(*drawn, gaps)
+                spans = [(begin, end - begin) for begin, end in gaps]
+                axis.broken_barh(
+                    spans, (0, 1), transform=axis.get_xaxis_transform(), color=style.ORANGE, alpha=0.35, linewidth=0.8
+                )
+            axis.plot(*drawn, mark, color=style.BLUE, linewidth=0.9)
             axis.set_title(name.replace("$", r"\$"), fontsize=9, loc="left")
         axes[-1, 0].set_xlabel(label.replace("$", r"\$"))
         made: Figure = figure
     return made
 
 
+def _broken(x: Array, y: Array, gaps: Array) -> tuple[Array, Array]:
+    """Return a line that is interrupted where its column has gaps."""
+    at = np.searchsorted(x, gaps[:, 0], side="right")
+    return np.insert(x, at, gaps[:, 0]), np.insert(y, at, np.nan)
+
+
 def _figure(columns: Columns) -> Picture:
-    return draw(draw_columns(columns), "Every column as it was understood.", "Columns over time.")
+    shaded = " Shaded: no values." if "time_s" in columns else ""
+    return draw(draw_columns(columns), f"Every column as it was understood.{shaded}", "Columns over time.")
 
 
 def _ranges(columns: Columns) -> Table:
-    rows = []
+    rows, timed = [], "time_s" in columns
     for name, values in columns.items():
         known = values[np.isfinite(values)]
         low, high = (f"{known.min():.8g}", f"{known.max():.8g}") if known.size else ("", "")
@@ -63,7 +80,11 @@ def _ranges(columns: Columns) -> Table:
                 str(values.size - known.size),
             ]
         )
-    return Table("Columns", ["Column", "Lowest", "Highest", "Usual step between rows", "Missing"], rows)
+        if timed:
+            gaps = find_gaps(columns["time_s"], values)
+            rows[-1] += [str(len(gaps)), f"{float(np.max(np.ptp(gaps, axis=1))):.6g}" if len(gaps) else ""]
+    names = ["Column", "Lowest", "Highest", "Usual step between rows", "Missing"]
+    return Table("Columns", [*names, *(["Gaps", "Longest gap (s)"] if timed else [])], rows)
 
 
 def _first_rows(columns: Columns) -> Table:

@@ -533,3 +533,146 @@ def test_columns_of_one_quantity_tell_the_offset_before_others(tmp_path):
     draft = draft_map([str(tmp_path / "a.csv"), str(tmp_path / "b.csv")])
     (line,) = [line for line in draft.text.splitlines() if line.startswith("# clock_offset_s") and "CHECK" in line]
     assert float(line.split("=")[1].split("#")[0]) == pytest.approx(7.0, abs=0.5)
+
+
+@pytest.mark.parametrize(
+    ("target", "unit", "reading", "value"),
+    [
+        ("bias_deg_per_h", "°/s", 2.0, 7200.0),
+        ("bias_deg_per_h", "°/h", 2.0, 2.0),
+        ("bias_deg_per_h", "mdps", 2.0, 7.2),
+        ("bias_deg_per_h", "deg_per_h", 2.0, 2.0),
+        ("bias_deg_per_h", "degrees per second", 2.0, 7200.0),
+        ("measured_rate_deg_per_s", "m°/s", 2.0, 0.002),
+        ("housing_temperature_degC", "°C", 25.0, 25.0),
+        ("housing_temperature_degC", "deg F", 77.0, 25.0),
+        ("quadrature_V", "µV", 5.0, 5e-6),
+        ("pattern_angle_deg", "°", 45.0, 45.0),
+        ("frequency_Hz", "ppm of 4400 Hz", 10.0, 4400.044),
+    ],
+)
+def test_units_as_people_write_them(tmp_path, target, unit, reading, value):
+    record = simple(tmp_path, [f"0,{reading}", f"1,{reading}"], column=f'to = "{target}"\nunit = "{unit}"')
+    assert record[target] == pytest.approx(value, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("target", "unit", "part"),
+    [
+        ("frequency_Hz", "mHz", "'mHz' is unknown"),
+        ("quadrature_V", "MV", "'MV' is unknown"),
+        ("bias_deg_per_h", "°/min", "'°/min' is unknown"),
+        ("frequency_Hz", "ppm of f0", "nominal_Hz"),
+    ],
+)
+def test_a_unit_that_could_mean_another_size_is_refused(tmp_path, target, unit, part):
+    with pytest.raises(InputError, match=part):
+        simple(tmp_path, ["0,1", "1,2"], column=f'to = "{target}"\nunit = "{unit}"')
+
+
+def write_days(tmp_path, clock, rows, form="%H:%M:%S"):
+    """Files of a logger that begins a new one at midnight: `rows` are times in s since START's day began."""
+    day = START.replace(hour=0, minute=0)
+    files = []
+    for number in sorted({int(t // 86400) for t in rows}):
+        own = [t for t in rows if int(t // 86400) == number]
+        text = "".join(f"{day + datetime.timedelta(seconds=t):{clock}},{20 + t / 86400:.6f}\n" for t in own)
+        files.append(tmp_path / f"day{number}.csv")
+        files[-1].write_text("clock,T housing [°C]\n" + text)
+    return files
+
+
+@pytest.mark.parametrize("clock", ["%H:%M:%S", "%Y-%m-%d %H:%M:%S"])
+def test_days_that_were_rotated_at_midnight_are_one_record(tmp_path, capsys, clock):
+    """Three days of a row a minute, the first begun at 22:00; one file a day, drafted and imported together."""
+    rows = [60.0 * k for k in range(22 * 60, 60 * 60)]
+    files = write_days(tmp_path, clock, rows)
+    draft, run = tmp_path / "map.toml", tmp_path / "run.csv"
+    assert hrg_import(*files, "--draft", draft) == 0
+    assert tomllib.loads(draft.read_text())["file"][0]["parts"] == len(files) == 3
+    assert hrg_import(*files, "--map", draft, "--out", run) == 0, capsys.readouterr().err
+    record = read_record(run)
+    assert np.allclose(record["time_s"], np.array(rows) - rows[0])
+    assert np.allclose(record["housing_temperature_degC"], 20 + np.array(rows) / 86400, atol=1e-6)
+    assert all(path.name in "".join(record.comments) for path in files)
+
+
+def test_a_fault_in_a_later_day_is_named_by_its_own_file_and_line(tmp_path, capsys):
+    files = write_days(tmp_path, "%Y-%m-%d %H:%M:%S", [3600.0 * k for k in range(60)])
+    draft = tmp_path / "map.toml"
+    hrg_import(*files, "--draft", draft)
+    lines = files[1].read_text().splitlines()
+    files[1].write_text("\n".join([*lines[:4], lines[4].replace(",", ",warm"), *lines[5:]]) + "\n")
+    capsys.readouterr()
+    assert hrg_import(*files, "--map", draft, "--out", tmp_path / "run.csv") == 2
+    assert f"{files[1]}, line 5" in capsys.readouterr().err
+    assert hrg_import(files[2], files[0], files[0], "--map", draft, "--out", tmp_path / "run.csv") == 2
+    assert "in the order of their times" in capsys.readouterr().err
+
+
+def test_two_loggers_of_one_kind_that_ran_together_stay_two_files(tmp_path):
+    for name in ("one.csv", "two.csv"):
+        write_counter(tmp_path / name, np.arange(0.0, 50.0))
+    draft = draft_map([str(tmp_path / "one.csv"), str(tmp_path / "two.csv")])
+    assert [file.get("parts") for file in tomllib.loads(draft.text)["file"]] == [None, None]
+
+
+def local_log(tmp_path, moments, zone="Europe/Berlin", extra=""):
+    """A logger that writes local time; `moments` are UTC."""
+    import zoneinfo
+
+    stamps = [moment.astimezone(zoneinfo.ZoneInfo(zone)).strftime("%Y-%m-%d %H:%M:%S") for moment in moments]
+    form = f'time_format = "%Y-%m-%d %H:%M:%S"\ntimezone = "{zone}"{extra}'
+    return simple(tmp_path, [f"{stamp},{4430 + k}" for k, stamp in enumerate(stamps)], form)
+
+
+@pytest.mark.parametrize(
+    ("begin", "minutes", "step"),
+    [
+        ((2026, 10, 24, 22, 0), 600, 10),  # through the whole change to winter time
+        ((2026, 10, 25, 0, 20), 200, 10),  # begins in the first pass of the hour
+        ((2026, 10, 25, 1, 20), 200, 10),  # begins in the second pass
+        ((2026, 10, 24, 22, 0), 150, 10),  # ends in the first pass
+        ((2026, 10, 24, 22, 0), 220, 10),  # ends in the second pass
+        ((2026, 3, 28, 22, 0), 600, 10),  # the change to summer time: no hour is missing
+    ],
+)
+def test_a_clock_change_takes_and_adds_no_time(tmp_path, begin, minutes, step):
+    start = datetime.datetime(*begin, tzinfo=datetime.UTC)
+    true = np.arange(0.0, 60.0 * minutes, 60.0 * step)
+    record = local_log(tmp_path, [start + datetime.timedelta(seconds=t) for t in true])
+    assert record["time_s"].tolist() == true.tolist()
+    assert record.start == start
+
+
+def test_a_time_that_no_clock_showed_is_named(tmp_path):
+    form = 'time_format = "%Y-%m-%d %H:%M:%S"\ntimezone = "Europe/Berlin"'
+    with pytest.raises(InputError, match=r"line 3: this time does not exist in Europe/Berlin"):
+        simple(tmp_path, ["2026-03-29 01:59:00,1", "2026-03-29 02:30:00,2", "2026-03-29 03:30:00,3"], form)
+    with pytest.raises(InputError, match="timezone"):
+        simple(tmp_path, ["2026-10-25 02:59:00,1", "2026-10-25 02:00:00,2"], 'time_format = "%Y-%m-%d %H:%M:%S"')
+
+
+def test_dropouts_are_left_empty_counted_and_marked(tmp_path, capsys):
+    """A counter that loses its signal writes 0: twice for one row, once for three, and an hour has no rows at all."""
+    from studies.reports.gaps import find_gaps
+
+    t = [10.0 * k for k in range(1000) if not 500 <= k < 860]
+    lost = {100, 200, 201, 202, 900}
+    raw, path, run = tmp_path / "raw.csv", tmp_path / "map.toml", tmp_path / "run.csv"
+    raw.write_text("time_s,frequency Hz\n" + "".join(f"{s},{0 if s / 10 in lost else 4430.5}\n" for s in t))
+    assert hrg_import(raw, "--draft", path) == 0
+    assert hrg_import(raw, "--map", path, "--out", run, "--preview", tmp_path / "page.html") == 0
+    said = capsys.readouterr().out
+    assert "5 readings of 'frequency Hz' are 0, a dropout: left empty" in said
+    record = read_record(run)
+    assert np.count_nonzero(np.isnan(record["frequency_Hz"])) == 5
+    assert np.nanmin(record["frequency_Hz"]) == 4430.5
+    expected = [[990, 1010], [1990, 2030], [4990, 8600], [8990, 9010]]
+    assert find_gaps(record["time_s"], record["frequency_Hz"]).tolist() == expected
+    page = (tmp_path / "page.html").read_text()
+    assert "Longest gap (s)" in page
+    assert "3610" in page
+    raw.write_text("time_s,frequency_Hz\n0,4430\n1,0\n")
+    with pytest.raises(InputError, match=r"line 3.*cannot be a reading"):
+        read_record(raw)
