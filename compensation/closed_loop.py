@@ -6,7 +6,8 @@ In the frame of the commanded wave and over its amplitude, antinode and node are
 
 A the averaged dynamics (`wave`), w what drives the wave from its command: decay, rate, damping and frequency split.
 Between samples the plant is propagated by its matrix exponential with w linear in time, so one sample is a linear map;
-a row of the record is that map to the power of the samples in it. Nothing is lost by the long step, and the noise of the row, with
+a row of the record is that map to the power of the samples in it; where a command comes near the limit of
+its actuator, the row is followed sample by sample, each command is what the actuator gives, and the integral of a channel at its limit waits. Nothing is lost by the long step, and the noise of the row, with
 all that the loops remember of it, is drawn from its exact covariance.
 
 Channels, in this order: amplitude, phase, rate, quadrature. The phase command is a frequency of the oscillator.
@@ -89,7 +90,7 @@ class ClosedLoop:
         if self.turning:
             active[2] = 0.0
             A[2, :] = A[:, 2] = 0.0
-        drive = _drive_matrix(self.drive, self.turning)
+        drive = self._drive_map
         K = np.array([self.loops.gains(name)[0] for name in CHANNELS]) * active
         K_i = np.array([self.loops.gains(name)[1] for name in CHANNELS]) * active
         smoothing = self.loops.smoothing
@@ -125,12 +126,60 @@ class ClosedLoop:
         force[at["wave"]] = whole[1] @ drive
         heat = np.zeros((N, FOUR))
         heat[at["wave"]] = np.diag(active) if self.turning else np.eye(FOUR)
+        limits = self.electronics.actuators
+        finer = limits.stiffness / limits.force if limits.stiff and limits.finite else 1.0  # steps of the stiffness
         covariance = (
             noise.measurement_variance(self.loops.sampling) * reading @ reading.T
-            + noise.command_variance(self.loops.sampling) * force @ np.diag([1.0, 0.0, active[2], 1.0]) @ force.T
+            + noise.command_variance(self.loops.sampling) * force @ np.diag([1.0, 0.0, active[2], finer**2]) @ force.T
             + noise.thermal**2 * T * heat @ heat.T
         )
         return F, covariance
+
+    @cached_property
+    def _drive_map(self) -> Real:
+        """The wave's four rates for the four commands: forces through the channels, phase and stiffness directly."""
+        drive = real_form(self.drive)
+        drive[:, 1] = [0.0, 1.0, 0.0, 0.0]
+        if self.electronics.actuators.stiff:
+            drive[:, 3] = [0.0, 0.0, 0.0, 1.0]
+        if self.turning:
+            drive[2, :] = 0.0
+        return drive
+
+    @cached_property
+    def _sample_root(self) -> Real:
+        return square_root(self.sample[1])
+
+    @cached_property
+    def _at_once(self) -> Real | None:
+        """What a command does to the wave in the sample that made it; None where every command comes later."""
+        late, rest = self.loops.late
+        if late:
+            return None
+        return np.asarray(_held_maps(real_form(self.A), self.loops.step - rest)[1] @ self._drive_map)
+
+    def follow(self, state: Real, samples: int, generator: np.random.Generator | None) -> tuple[Real, bool]:
+        """Return the state after a row, each command limited, and whether any was at its limit.
+
+        A command beyond its limit is what the actuator gives, and the integral of its channel keeps its value (anti-windup).
+        """
+        at, F, limits = self.places, self.sample[0], self.electronics.actuators
+        newest = slice(at["sent"].start, at["sent"].start + FOUR)
+        limited = False
+        for _ in range(samples):
+            before, state = state, F @ state
+            if generator is not None:
+                state = state + self._sample_root @ generator.standard_normal(self.size)
+            lost = limits.give(state[newest]) - state[newest]
+            if np.any(lost):
+                limited = True
+                state[newest] += lost
+                state[at["sum"]] += lost
+                waits = at["integral"].start + np.flatnonzero(lost)
+                state[waits] = before[waits]
+                if self._at_once is not None:
+                    state[at["wave"]] += self._at_once @ lost
+        return state, limited
 
     def require_stable(self) -> None:
         """Raise when the loops together, with the errors of the electronics, do not come to rest."""
@@ -199,8 +248,7 @@ class RowMap:
     @cached_property
     def root(self) -> Real:
         """A square root of the covariance."""
-        values, vectors = np.linalg.eigh(self.covariance)
-        return np.asarray(vectors * np.sqrt(np.clip(values, 0.0, None)))
+        return square_root(self.covariance)
 
     def start(self, state: Real, forcing: tuple[Real, Real], offset: tuple[Real, Real], seconds: float) -> Real:
         """Return the state at the start of a row: sums empty, forcing and offset linear from one end to the other."""
@@ -221,13 +269,10 @@ def real_form(matrix: Complex) -> Real:
     return form
 
 
-def _drive_matrix(channels: Complex, turning: bool) -> Real:
-    """Return the map of the four commands to the wave's four rates: forces through the channels, phase directly."""
-    drive = real_form(channels)
-    drive[:, 1] = [0.0, 1.0, 0.0, 0.0]
-    if turning:
-        drive[2, :] = 0.0
-    return drive
+def square_root(covariance: Real) -> Real:
+    """Return R with R Rᵀ = covariance."""
+    values, vectors = np.linalg.eigh(covariance)
+    return np.asarray(vectors * np.sqrt(np.clip(values, 0.0, None)))
 
 
 def _held_maps(A: Real, time: float) -> tuple[Real, Real, Real]:

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from compensation.actuators import UNLIMITED, Actuators
 from compensation.errors import CompensationError
 from compensation.wave import StandingWave, turn
 
@@ -89,8 +90,9 @@ def thermal_noise(wave: StandingWave, temperature: float, modal_mass: float, amp
 
 @dataclass(frozen=True)
 class Electronics:
-    """Pick-offs, drives and noise of a gyro."""
+    """Pick-offs, drives, noise and actuators of a gyro."""
 
     pickoff: Channels = Channels()
     drive: Channels = Channels()
     noise: LoopNoise = LoopNoise()
+    actuators: Actuators = UNLIMITED

@@ -5,7 +5,9 @@ Settled, and to first order in the errors of the electronics, the rate loop indi
     Ω + Δ(1/τ)/(2 n k) sin 2n(θ − θ_τ) + [(n β − ½ δ sin 2nθ + ½ κ cos 2nθ)/τ − ε ½ Δω sin 2n(θ − θ_ω)] / (n k):
 
 damping anisotropy, the amplitude's drive seen by the rate axis, and quadrature seen through the phase error, with β, δ, κ
-and ε the sums of turn, gain ratio, skew and phase error of pick-off and drive.
+and ε the sums of turn, gain ratio, skew and phase error of pick-off and drive. Where quadrature is nulled by a stiffness the last
+term is absent. Loops that need more than the actuators give do not hold the wave: said before anything is simulated; a rate that is
+beyond the range for a while turns the wave by n k ∫(Ω − Ω_max) dt, until it is back or lost.
 """
 
 from collections.abc import Iterator
@@ -14,6 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from compensation.actuators import RangeUse, require_range
 from compensation.closed_loop import ClosedLoop
 from compensation.controllers import Loops, require_stable
 from compensation.electronics import Electronics
@@ -23,6 +26,8 @@ from compensation.wave import StandingWave, turn
 
 Real = NDArray[np.float64]
 PHYSICAL = ("omega", "tau", "damping_split", "damping_axis", "frequency_split", "frequency_axis")
+LOST = 0.3
+"""Node over antinode at which a wave that its force cannot hold has left its azimuth."""
 ALIKE = 0.01
 """Part of 1/τ, and of n k per rad/s, within which rows share one matrix; what drives the wave is exact in every row."""
 
@@ -32,7 +37,8 @@ class LoopRun:
     """What the loops say, one value a row, each the mean over the row.
 
     `time` (s), `rate` (rad/s, indicated), `quadrature` (1/s, the force over 2ω and amplitude that holds the quadrature:
-    ½ Δω sin 2n(θ − θ_ω)), `decay` (1/s, the amplitude's drive, so 1/τ), `omega` (rad/s), `angle` (rad, azimuth).
+    ½ Δω sin 2n(θ − θ_ω); a stiffness κ counts alike), `decay` (1/s, the amplitude's drive, so 1/τ), `omega` (rad/s), `angle` (rad,
+    azimuth). `limited` counts the rows in which an actuator was at its limit.
     """
 
     time: Real
@@ -41,6 +47,7 @@ class LoopRun:
     decay: Real
     omega: Real
     angle: Real
+    limited: int = 0
 
 
 def simulate_rebalance(
@@ -72,7 +79,8 @@ def simulate_rebalance(
     Raises
     ------
     CompensationError
-        A loop is unstable (said with its margins, before anything is simulated), or the rows are uneven.
+        A loop is unstable (said with its margins, before anything is simulated), the rows are uneven, the loops need more
+        than the actuators give where they are settled, or the wave is lost while an actuator is at its limit.
     """
     t = np.asarray(time, dtype=float)
     samples = samples_in_row(t, loops)
@@ -86,7 +94,7 @@ def simulate_rebalance(
     forcing[:, 2] = rows.coupling * (turning + rows.drift(azimuth))
     forcing[:, 3] = -rows.quadrature(azimuth)
     commands = np.empty((len(t), 4))
-    state = None
+    state, limits, limited = None, electronics.actuators, 0
     for block in _alike(rows, turning, azimuth):
         middle = (block.start + block.stop) // 2
         loop, offset = close_loops(
@@ -95,19 +103,29 @@ def simulate_rebalance(
         if block.start == 0 or azimuth[block.start] != azimuth[block.start - 1]:
             loop.require_stable()
             state = loop.settle(forcing[block.start], offset)
+            held = state[loop.places["sent"]][:4]
+            require_range(limits.use(held[2], held[3], held[0]), f"at {t[block.start]:g} s")
         assert state is not None
-        row = loop.row(samples)
+        row, at = loop.row(samples), loop.places
         draws = generator.standard_normal((block.stop - block.start, loop.size)) if generator is not None else None
         for n in range(block.start, block.stop):
             later = min(n + 1, len(t) - 1)
             end = forcing[later] if azimuth[later] == azimuth[n] else forcing[n]
-            state = row.map @ row.start(state, (forcing[n], end), (offset, offset), samples * loops.step)
+            begun = row.start(state, (forcing[n], end), (offset, offset), samples * loops.step)
+            state = row.map @ begun
             if draws is not None:
                 state += row.root @ draws[n - block.start]
-            commands[n] = state[loop.places["sum"]] / samples
-    return LoopRun(
-        t, -commands[:, 2] / rows.coupling, commands[:, 3], commands[:, 0], start - commands[:, 1], azimuth.copy()
-    )
+            if limits.finite and limits.is_near(state[at["sum"]] / samples, state[at["sent"]][:4]):
+                state, at_limit = loop.follow(begun, samples, generator)
+                limited += at_limit
+                if at_limit and abs(state[at["wave"]][2]) > LOST:
+                    raise CompensationError(
+                        f"at {t[n]:g} s the wave is lost: the force across it is at its limit and no longer holds a rate of"
+                        f" {np.degrees(turning[n]):.4g} °/s; lower the rate or its duration, or raise the range."
+                    )
+            commands[n] = state[at["sum"]] / samples
+    rate_said = -commands[:, 2] / rows.coupling
+    return LoopRun(t, rate_said, commands[:, 3], commands[:, 0], start - commands[:, 1], azimuth.copy(), limited)
 
 
 def settle_rebalance(
@@ -119,9 +137,12 @@ def settle_rebalance(
 ) -> LoopRun:
     """Return what settled loops say, without noise, for any number of rows at once: exact in the electronics' errors.
 
-    Integral control shows the pick-offs their command, C_p (P, S) = (1, 0); the commands c are what that takes,
-    C_d c = (iν − A) C_p⁻¹ (1, 0) + n θ̇ C_p⁻¹ (0, 1), and ν, how far the oscillator is from the mean frequency, makes the
-    amplitude's command real.
+    Integral control shows the pick-offs their command, C_p (P, S) = (1, 0) = C_p m; amplitude a, rate r, quadrature q and ν,
+    how far the oscillator is from the mean frequency, are what that takes:
+
+        C_d (a, r + iq) − iν m = n θ̇ C_p⁻¹ (0, 1) − A m,
+
+    two complex equations; a stiffness acts as iq (m₂, m₁) in the place of C_d (0, iq).
 
     Parameters
     ----------
@@ -148,18 +169,19 @@ def settle_rebalance(
     pickoff = back @ electronics.pickoff.matrix(rows.harmonic) @ R
     drive = back @ electronics.drive.matrix(rows.harmonic) @ R
     moved, across = np.moveaxis(np.linalg.inv(pickoff), -1, 0)[..., None]
-    held = np.linalg.solve(drive, wave.harmonic * turned[:, None, None] * across - A @ moved)[..., 0]
-    shifted = np.linalg.solve(drive, 1j * moved)[..., 0]
-    nu = -held[:, 0].imag / shifted[:, 0].imag
-    command = held + nu[:, None] * shifted
+    needed = wave.harmonic * turned[:, None, None] * across - A @ moved
+    nulling = moved[:, ::-1, 0] if electronics.actuators.stiff else drive[:, :, 1]
+    acting = np.stack([drive[:, :, 0], drive[:, :, 1], 1j * nulling, -1j * moved[..., 0]], axis=-1)
+    whole = np.concatenate([acting.real, acting.imag], axis=1)
+    decay, held, quadrature, nu = np.linalg.solve(whole, np.concatenate([needed.real, needed.imag], axis=1))[..., 0].T
     return LoopRun(
-        np.arange(shape[0], dtype=float),
-        -command[:, 1].real / rows.coupling,
-        command[:, 1].imag,
-        command[:, 0].real,
-        rows.omega + nu,
-        azimuth.copy(),
+        np.arange(shape[0], dtype=float), -held / rows.coupling, quadrature, decay, rows.omega + nu, azimuth.copy()
     )
+
+
+def use_of_range(run: LoopRun, electronics: Electronics, coupling: float) -> RangeUse:
+    """Return the parts of the actuators' limits that a run uses, row by row; `coupling` is n k."""
+    return electronics.actuators.use(coupling * run.rate, run.quadrature, run.decay)
 
 
 def leak_quadrature(quadrature: ArrayLike, phase: ArrayLike, coupling: float = 1.0) -> Real:
@@ -235,8 +257,10 @@ def close_loops(
 ) -> tuple[ClosedLoop, Real]:
     """Return the loops closed about a wave held at an azimuth (rad), and what the pick-offs' errors add to their reading."""
     R = turn(wave.harmonic * angle)
-    locked = settle_rebalance(wave, electronics, rate, angle).omega[0] - float(wave.omega)
-    A = R.T @ wave.envelope(rate) @ R - 1j * locked * np.eye(2)
+    settled = settle_rebalance(wave, electronics, rate, angle)
+    A = R.T @ wave.envelope(rate) @ R - 1j * (settled.omega[0] - float(wave.omega)) * np.eye(2)
+    if electronics.actuators.stiff:
+        A = A + 1j * settled.quadrature[0] * np.array([[0.0, 1.0], [1.0, 0.0]])
     pickoff = R.T @ electronics.pickoff.matrix(wave.harmonic) @ R
     drive = R.T @ electronics.drive.matrix(wave.harmonic) @ R
     seen = pickoff[:, 0]

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from compensation.actuators import require_range
 from compensation.closed_loop import ClosedLoop, RowMap
 from compensation.controllers import Loops, require_stable
 from compensation.electronics import Electronics
@@ -68,7 +69,7 @@ def simulate_whole_angle(
     Raises
     ------
     CompensationError
-        A loop is unstable, or the rows are uneven.
+        A loop is unstable, the rows are uneven, or commanded turn and quadrature need more than the actuators give.
     """
     t = np.asarray(time, dtype=float)
     samples = samples_in_row(t, loops)
@@ -123,6 +124,10 @@ def simulate_whole_angle(
             psi, state = psi_end, new
             total += new[at["sum"]]
         commands[n] = total / samples
+    use = electronics.actuators.use(course.command, commands[:, 3], commands[:, 0])
+    worst = int(np.argmax(np.max([use.across, use.quadrature, use.drive], axis=0)))
+    if use.worst > 1:
+        require_range(electronics.actuators.use(course.command[worst], *commands[worst, [3, 0]]), f"at {t[worst]:g} s")
     after = course.measured(psi)
     theta = measured / rows.harmonic
     turned = np.diff(np.append(theta, after / rows.harmonic)) / h
@@ -172,6 +177,7 @@ class _Course:
         pickoff, drive = self.electronics.pickoff, self.electronics.drive
         self.pickoff = (pickoff.matrix(n) * cmath.exp(-1j * pickoff.phase)).tolist()
         self.drive = (drive.matrix(n) * cmath.exp(1j * pickoff.phase)).tolist()
+        self.stiff = self.electronics.actuators.stiff
         self.ideal = pickoff == type(pickoff)() and drive == type(drive)()
 
     def values(self, row: int, fraction: float) -> list[float]:
@@ -191,8 +197,11 @@ class _Course:
         return psi + (seen - psi + math.pi) % (2 * math.pi) - math.pi
 
     def forces(self, psi: float, command: float, means: Means) -> tuple[complex, complex]:
-        """The forces along and across the wave that commands (along a, across command + i quadrature) become."""
-        along, across = means[0], complex(command, means[1])
+        """The forces along and across the wave that commands (along a, across command + i quadrature) become.
+
+        A stiffness that nulls the quadrature is no force, and goes through no channel.
+        """
+        along, across = means[0], complex(command, 0.0 if self.stiff else means[1])
         if self.ideal:
             return along, across
         seen = self.measured(psi)
@@ -217,12 +226,15 @@ class _Course:
         decay, dc, ds, wc, ws, drift, _, command = self.values(row, fraction)
         c, s = math.cos(2 * psi), math.sin(2 * psi)
         along, across = self.forces(psi, command, means)
+        detuned = wc * s - ws * c
+        if self.stiff:  # couples the patterns as the split does, with the opposite sign
+            detuned -= means[1]
         return np.array(
             [
-                -(decay + dc * c + ds * s) + (wc * s - ws * c) * means[2] + along.real - means[0],
+                -(decay + dc * c + ds * s) + detuned * means[2] + along.real - means[0],
                 drift + wc * c + ws * s + (dc * s - ds * c) * means[2] + along.imag,
                 0.0,
-                -(wc * s - ws * c) * means[3] + across.imag - means[1],
+                -detuned * means[3] + across.imag - means[1],
             ]
         )
 

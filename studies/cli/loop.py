@@ -3,7 +3,8 @@
 With --json one object, schema `hrg.loop/1`: `card`, `mode`, `temperature_degC`, `frequency_Hz`, `quality_factor`,
 `bryan_factor`; `settled` (columns of a record, at rest); `bias` (list of `source`, `deg_per_h`, `sd_deg_per_h`; the last is
 "all"); `noise` (list of `source`, `deg_per_h_over_1s`, `deg_per_rt_h`); `margins` (list of `loop`, `paper`, `crossover_Hz`,
-`phase_margin_deg`, `gain_margin_dB`, `reversal_Hz`); `start` (`locked_s`, `ready_s`); `out` and `rows` of the run, or null.
+`phase_margin_deg`, `gain_margin_dB`, `reversal_Hz`); `start` (`locked_s`, `ready_s`); `range` (parts of the actuators' ranges in
+use: `rate`, `quadrature`, `drive`, `across`: rate and quadrature together where quadrature is a force); `out` and `rows` of the run, or null.
 """
 
 from typing import TYPE_CHECKING, Any
@@ -50,7 +51,7 @@ def loop(
     row : float
         Time between its rows in s.
     rate : float
-        Applied rate in °/s.
+        Applied rate in °/s; one beyond the range of the force is refused.
     profile : str
         Chamber profile, as for hrg simulate: frequency and loss follow the temperature.
     both_ways : bool
@@ -89,7 +90,7 @@ def loop(
     law = law_of(instrument, min(T, instrument.reference_temperature) - 5, max(T, instrument.reference_temperature) + 5)
     frequency = float(np.ravel(law.frequency(T))[0])
     inverse_q, instrument = settled_loss(instrument, T)
-    study = study_loops(instrument, frequency, inverse_q, law.bryan_factor)
+    study = study_loops(instrument, frequency, inverse_q, law.bryan_factor, np.radians(rate))
     run = None
     if out is not None:
         run = _run(
@@ -123,12 +124,12 @@ def loop(
         "bryan_factor": law.bryan_factor,
     }
     yield {**head, **_payload(study), "out": out, "rows": None if run is None else len(run)}
-    from studies.reports.loop import margins_table, noise_table, sources_table
+    from studies.reports.loop import margins_table, noise_table, range_table, sources_table
 
     print(
         f"Loops of {instrument.name}: {keys.mode}, {frequency:.2f} Hz, Q = {1 / inverse_q:.3g}, τ = {float(study.wave.tau):.4g} s"
     )
-    for table in (margins_table(study), sources_table(study), noise_table(study)):
+    for table in (margins_table(study), sources_table(study), noise_table(study), range_table(study)):
         print_table(table.caption, table.columns, table.rows, table.note)
 
 
@@ -160,6 +161,7 @@ def _payload(study: "LoopStudy") -> dict[str, Any]:
             for m in study.margins
         ],
         "start": {"locked_s": study.start.locked, "ready_s": study.start.ready},
+        "range": {name: float(getattr(study.use, name).max()) for name in ("rate", "quadrature", "drive", "across")},
     }
 
 
@@ -180,6 +182,7 @@ def _run(
     import numpy as np
     from scipy.constants import zero_Celsius
 
+    from studies.cli.output import say
     from studies.damping_law import damping_law
     from studies.record import Record, write_record
     from studies.simulation.chamber import load_profile
@@ -219,6 +222,8 @@ def _run(
         columns["rate_deg_per_s"] = np.full(len(time), rate)
         columns["measured_rate_deg_per_s"] = columns.pop("bias_deg_per_h") / 3600
     source = f"loops, {instrument.loop.mode}, " + ("without noise" if seed is None else f"seed {seed}")
+    if run.limited:
+        say(f"warning: an actuator was at its limit in {run.limited} of {len(time)} rows.")
     record = Record(columns, instrument=instrument.name, source=source, path=out)
     write_record(record, out)
     return record

@@ -50,7 +50,7 @@ def loop_page(study: "LoopStudy", temperature_degC: float, run: "Record | None" 
         Chapter("In short", [_facts(study), *_weakest(study)]),
         Chapter("Where drift comes from", [sources_table(study), _around_figure(study), *_slopes(study)]),
         Chapter("Noise of the rate", [noise_table(study), _noise_figure(study)]),
-        Chapter("Margins", [margins_table(study), _bode(study)]),
+        Chapter("Margins", [margins_table(study), _bode(study), range_table(study)]),
         Chapter("Answer to a step", [_steps(study)]),
         Chapter("Start-up", [_start(study)]),
     ]
@@ -86,6 +86,26 @@ def sources_table(study: "LoopStudy") -> Table:
     """Return the bias of each source at the card's azimuth."""
     rows = [[one.name, f"{one.bias:.4g}", f"{one.sd:.2g}"] for one in study.sources]
     return Table("Bias by source, settled", ["source", "°/h", "± °/h"], rows, SHARED_NOTE)
+
+
+def range_table(study: "LoopStudy") -> Table:
+    """Return the parts of the actuators' ranges that the settled loops use."""
+    keys, use = study.instrument.loop, study.use
+    assert keys is not None
+    stiff = keys.quadrature_control == "stiffness"
+    force = f"force, {keys.rate_range_deg_per_s:g} °/s"
+    rows = [
+        ["rate" if keys.mode == "force-rebalance" else "self-precession", force, _percent(use.rate)],
+        ["quadrature", f"stiffness, {keys.quadrature_range_Hz:g} Hz" if stiff else force, _percent(use.quadrature)],
+        ["amplitude", f"drive, {keys.drive_headroom:g} times what holds it", _percent(use.drive)],
+    ]
+    if not stiff:
+        rows.insert(2, ["rate and quadrature together", force, _percent(use.across)])
+    return Table("Range of the actuators in use", ["loop", "actuator and range", "in use"], rows)
+
+
+def _percent(part: np.ndarray) -> str:
+    return f"{100 * float(np.max(part)):.3g} %"
 
 
 def noise_table(study: "LoopStudy") -> Table:

@@ -6,9 +6,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from compensation.actuators import Actuators, RangeUse
 from compensation.controllers import Loops, Margin, require_stable
 from compensation.electronics import Channels, Electronics, LoopNoise, thermal_noise
-from compensation.rebalance import LoopRun, settle_rebalance, simulate_rebalance
+from compensation.rebalance import LoopRun, settle_rebalance, simulate_rebalance, use_of_range
 from compensation.settled_turn import read_turning, turn_settled
 from compensation.wave import StandingWave
 from compensation.whole_angle import WITHOUT_RATE, simulate_whole_angle
@@ -87,7 +88,60 @@ def electronics_of(loop: "Loop", wave: StandingWave, temperature: float, amplitu
         drive=1e-6 * loop.drive_noise_ppm_per_rt_Hz * full / amplitude,
         thermal=thermal,
     )
-    return Electronics(channels("pickoff", 0.0), channels("drive", 1e-3 * loop.misalignment_mrad), noise)
+    actuators = Actuators(
+        force=full / amplitude,
+        drive=loop.drive_headroom * float(np.median(1 / np.asarray(wave.tau))) / amplitude,
+        stiffness=np.pi * loop.quadrature_range_Hz,
+        quadrature=loop.quadrature_control,
+    )
+    return Electronics(channels("pickoff", 0.0), channels("drive", 1e-3 * loop.misalignment_mrad), noise, actuators)
+
+
+def find_range_use(
+    instrument: "Instrument", wave: StandingWave, rate: ArrayLike = 0.0, pattern_angle: ArrayLike | None = None
+) -> RangeUse:
+    """Return what part of the actuators' ranges the settled loops use; a free wave meets the quadrature of every azimuth."""
+    loop = require_loop(instrument)
+    electronics = electronics_of(loop, wave, instrument.reference_temperature)
+    angle = np.radians(instrument.bias.pattern_angle_deg) if pattern_angle is None else np.asarray(pattern_angle)
+    if loop.mode == "whole-angle":
+        turn = wave.harmonic * np.radians(loop.self_precession_deg_per_s)
+        most = 1 / np.asarray(wave.tau) + np.abs(wave.damping_split) / 2
+        return electronics.actuators.use(turn, np.abs(wave.frequency_split) / 2, most)
+    return use_of_range(settle_rebalance(wave, electronics, rate, angle), electronics, wave.coupling)
+
+
+def require_range(instrument: "Instrument", use: RangeUse, rate: ArrayLike, coupling: float) -> None:
+    """Raise naming the key of the actuator that the settled loops overload, and what it can hold."""
+    loop = require_loop(instrument)
+    if use.worst <= 1:
+        return
+    where, held = f"{instrument.path} [loop]", np.degrees(float(np.max(np.abs(rate))))
+    across, quadrature, drive = (float(np.max(x)) for x in (use.across, use.quadrature, use.drive))
+    if drive > 1:
+        raise InputError(
+            f"{where}: holding the amplitude takes {drive:.3g} times the largest drive, drive_headroom ="
+            f" {loop.drive_headroom:g}; raise it, or lower the loss."
+        )
+    if quadrature > 1:
+        stiff = loop.quadrature_control == "stiffness"
+        held_split = loop.quadrature_range_Hz if stiff else coupling * np.radians(loop.rate_range_deg_per_s) / np.pi
+        key = (
+            f"quadrature_range_Hz = {loop.quadrature_range_Hz:g}"
+            if stiff
+            else f"rate_range_deg_per_s = {loop.rate_range_deg_per_s:g}"
+        )
+        raise InputError(
+            f"{where}: the quadrature of the frequency split takes {100 * quadrature:.0f} % of the range that {key} sets, which nulls a"
+            f" split of {1e3 * held_split:.4g} mHz; trim the split, or raise the range"
+            + ("." if stiff else ', or set quadrature_control = "stiffness".')
+        )
+    turned = "the rate" if loop.mode == "force-rebalance" else "the self-precession"
+    size = f" of {held:.4g} °/s" if loop.mode == "force-rebalance" else f" of {loop.self_precession_deg_per_s:g} °/s"
+    raise InputError(
+        f"{where}: {turned}{size} takes {100 * float(np.max(use.rate)):.4g} % of the force that rate_range_deg_per_s ="
+        f" {loop.rate_range_deg_per_s:g} allows ({100 * across:.4g} % with quadrature); lower it, or raise the range."
+    )
 
 
 def loops_of(loop: "Loop") -> Loops:

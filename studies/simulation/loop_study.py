@@ -1,12 +1,13 @@
 """What the loops of a card are like at one temperature: margins, steps, bias by source and azimuth, noise by source, start-up."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from compensation.actuators import RangeUse
 from compensation.closed_loop import ClosedLoop
 from compensation.controllers import Loops, Margin
 from compensation.electronics import Electronics, LoopNoise
@@ -18,8 +19,10 @@ from studies.errors import naming
 from studies.simulation.loop import (
     DEG_PER_H,
     electronics_of,
+    find_range_use,
     loops_of,
     require_loop,
+    require_range,
     require_stable_loops,
     settled_columns,
     wave_of,
@@ -75,7 +78,7 @@ class LoopStudy:
 
     `frequency` (Hz), `inverse_q` and `bryan_factor` are of the resonator; `settled` the columns at rest; `sources` of bias;
     `noise` by source: deg/h of a mean over 1 s, and angle random walk (deg/√h) from a mean over 100 s; `margins`; `start`
-    from rest.
+    from rest; `use` the parts of the actuators' ranges that the settled loops use.
     """
 
     instrument: "Instrument"
@@ -90,6 +93,7 @@ class LoopStudy:
     noise: dict[str, tuple[float, float]]
     margins: tuple[Margin, ...]
     start: StartUp
+    use: RangeUse
 
     @property
     def decay(self) -> float:
@@ -106,19 +110,23 @@ class LoopStudy:
         return _close(self.instrument, self.wave, self.electronics, self.loops)
 
 
-def study_loops(instrument: "Instrument", frequency: float, inverse_q: float, bryan_factor: float) -> LoopStudy:
-    """Return margins, bias by source, noise by source and start of a card's loops.
+def study_loops(
+    instrument: "Instrument", frequency: float, inverse_q: float, bryan_factor: float, rate: float = 0.0
+) -> LoopStudy:
+    """Return margins, bias by source, noise by source, start and range of a card's loops, the range under a rate (rad/s).
 
     Raises
     ------
     InputError
-        The card has no `[loop]`, or a loop is unstable.
+        The card has no `[loop]`, a loop is unstable, or the loops need more than the actuators give.
     """
     loop = require_loop(instrument)
     wave = wave_of(instrument, frequency, inverse_q, bryan_factor)
     electronics, loops = electronics_of(loop, wave, instrument.reference_temperature), loops_of(loop)
     decay = float(1 / np.asarray(wave.tau))
     margins = require_stable_loops(instrument, frequency, inverse_q)
+    use = find_range_use(instrument, wave, rate)
+    require_range(instrument, use, rate, wave.coupling)
     with naming(f"{instrument.path} [loop]"):
         _close(instrument, wave, electronics, loops).require_stable()
         start = start_up(1 / decay, loops, headroom=loop.drive_headroom, offset=2 * np.pi * loop.start_offset_Hz)
@@ -140,6 +148,7 @@ def study_loops(instrument: "Instrument", frequency: float, inverse_q: float, br
         noise,
         margins,
         start,
+        use,
     )
 
 
@@ -253,7 +262,7 @@ def _noise(
         if require_loop(instrument).mode == "whole-angle":
             spread = [_free_spread(wave, only, loops, one) for one in seconds]
         else:
-            held = Electronics(electronics.pickoff, electronics.drive, only)
+            held = replace(electronics, noise=only)
             spread = _held_spread(_close(instrument, wave, held, loops), seconds)
         found[label] = np.array(spread) / wave.coupling * DEG_PER_H
     return found

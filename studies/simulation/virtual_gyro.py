@@ -12,7 +12,7 @@ from studies.law import unknown_slope
 from studies.record import Record
 from studies.simulation.chamber import check_profile
 from studies.simulation.drive import COLUMN, COMMANDS, RATE, Drive, drive_by_profile, rows_of
-from studies.simulation.loop import require_stable_loops
+from studies.simulation.loop import find_range_use, require_range, require_stable_loops, wave_of
 from studies.simulation.noise import bias_noise, frequency_noise, quantise, white_noise
 from studies.simulation.prediction import Prediction, law_for, predict
 from thermal.profile import Profile
@@ -95,6 +95,11 @@ def simulate_run(
         require_stable_loops(instrument, frequency, instrument.loss.inverse_q)
     prediction = predict(instrument, drive, law=law)
     true = dict(prediction.columns)
+    if instrument.loop is not None:
+        wave = wave_of(instrument, true["frequency_Hz"], true["inverse_q"], law.bryan_factor)
+        turned = 0.0 if drive.rate is None else drive.rate
+        use = find_range_use(instrument, wave, turned, drive.commands.get("pattern_angle"))
+        require_range(instrument, use, turned, wave.coupling)
     free = instrument.loop is not None and instrument.loop.mode == "whole-angle"
     if free:  # its rate is what the azimuth does from row to row, and its other columns are means over the same time
         for name in ("frequency_Hz", "bias_deg_per_h", "inverse_q", "quadrature_V"):

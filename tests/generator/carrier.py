@@ -42,6 +42,7 @@ def simulate_carrier(
     *,
     rate: float = 0.0,
     rate_from: float = 0.0,
+    rate_until: float = np.inf,
     angle: float = 0.0,
     precession: float | None = None,
     readings: int = 16,
@@ -56,8 +57,8 @@ def simulate_carrier(
     electronics, loops
         The delay must be whole samples, the sampling interval about a whole number of cycles (half a per cent).
     seconds : float
-    rate, rate_from : float
-        Rate (rad/s), applied from the time `rate_from` (s) on.
+    rate, rate_from, rate_until : float
+        Rate (rad/s), applied between these times (s).
     precession : float, optional
         Whole angle: the wave is free but for this commanded turn of its azimuth (rad/s); else it is held at `angle`.
     readings : int
@@ -77,7 +78,7 @@ def simulate_carrier(
         *(c.matrix(wave.harmonic) for c in (electronics.pickoff, electronics.drive)),
     )
     K, K_i = np.array([loops.gains(name) for name in CHANNELS]).T
-    noise = electronics.noise
+    noise, limits = electronics.noise, electronics.actuators
     start = omega + float(wave.detuning(angle))
     y = np.concatenate([R[:, 0], np.zeros(2)])
     phase, nu = 0.0, 0.0
@@ -91,15 +92,20 @@ def simulate_carrier(
         K[2] = K_i[2] = 0.0
     at = h * np.arange(count + 1)
     for n in range(steps):
-        turning = rate if n * loops.step >= rate_from - 1e-12 else 0.0
+        turning = rate if rate_from - 1e-12 <= n * loops.step < rate_until - 1e-12 else 0.0
         command = waiting[-1].copy()
         if precession is not None:
             command[2] = wave.harmonic * precession
         w = start + nu
-        force = 2j * w * G_d @ R @ np.array([command[0], command[2] + 1j * command[3]])
-        x = _response(wave.carrier(turning), w, force)
+        A, path_map, quadrature = wave.carrier(turning), maps[turning], 1j * command[3]
+        if limits.quadrature == "stiffness":  # a spring 2ωκ that couples the patterns of the frame
+            A = A.copy()
+            A[2:, :2] -= 2 * omega * command[3] * R @ np.array([[0.0, 1.0], [1.0, 0.0]]) @ R.T
+            path_map, quadrature = _free_motion(A, h, count), 0.0
+        force = 2j * w * G_d @ R @ np.array([command[0], command[2] + quadrature])
+        x = _response(A, w, force)
         forced = np.real(np.exp(1j * (phase + w * at))[:, None] * np.concatenate([x, 1j * w * x]))
-        path = maps[turning] @ (y - forced[0]) + forced
+        path = path_map @ (y - forced[0]) + forced
         y = path[-1]
         seen = _pick_off(path[1:], G_p, w)
         if generator is not None and noise.pickoff:
@@ -120,8 +126,11 @@ def simulate_carrier(
         if noise.adc_step:
             error = np.round(error / noise.adc_step) * noise.adc_step
         filtered = filtered + loops.smoothing * (error - filtered)
-        new = -(K * filtered + integral)
-        integral = integral + K_i * loops.step * filtered
+        wanted = -(K * filtered + integral)
+        new = wanted.copy()
+        if limits.quadrature == "force":
+            new[2:] *= min(1.0, limits.force / max(np.hypot(*wanted[2:]), 1e-300))
+        integral = np.where(new == wanted, integral + K_i * loops.step * filtered, integral)
         if noise.dac_step:
             new[[0, 2, 3]] = np.round(new[[0, 2, 3]] / noise.dac_step) * noise.dac_step
         out[n] = new

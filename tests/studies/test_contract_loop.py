@@ -23,6 +23,7 @@ KEYS = [
     "noise",
     "margins",
     "start",
+    "range",
     "out",
     "rows",
 ]
@@ -148,3 +149,40 @@ def test_the_page_shows_margins_drift_noise_start_and_run(card, tmp_path, capsys
 def test_a_reversal_of_what_does_not_precess_is_refused(card, capsys, lines):
     assert main(["loop", card(lines), "--both-ways"]) == 2
     assert "--both-ways reverses the self-precession of a whole-angle wave" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("lines", "words", "said"),
+    [
+        ("", ["--rate", "300"], "the rate of 300 °/s takes 300 % of the force that rate_range_deg_per_s = 100 allows"),
+        ("frequency_split_mHz = 5000.0\n", [], "nulls a split of 306"),
+        (
+            'quadrature_control = "stiffness"\nfrequency_split_mHz = 5000.0\n',
+            [],
+            "quadrature_range_Hz = 1",
+        ),
+        ('mode = "whole-angle"\nself_precession_deg_per_s = 60.0\n', [], "the self-precession of 60 °/s takes 217.7 %"),
+    ],
+    ids=["rate", "split, force", "split, stiffness", "self-precession"],
+)
+def test_what_the_actuators_cannot_hold_is_refused_with_their_range(card, tmp_path, capsys, lines, words, said):
+    """n k Ω, ½ Δω and n θ̇ against n k Ω_max: k = 0.2756 of the dome, so that 100 °/s hold a split of n k Ω_max/π = 306 mHz."""
+    path = card(lines)
+    assert main(["loop", path, *words]) == 2
+    assert said in capsys.readouterr().err
+    if not words:
+        assert main(["simulate", path, "soak 20 10min", "--out", str(tmp_path / "run.csv")]) == 2
+        assert said in capsys.readouterr().err
+
+
+def test_range_in_use_is_stated(card, capsys):
+    """A rate of 59 °/s of 100, and a split that takes eight tenths: √(0.6² + 0.8²); the stiffness takes it off the force."""
+    lines = "frequency_split_mHz = 245.0\n"
+    for quadrature, across, split in (("force", 1.0, 0.8), ("stiffness", 0.59, 0.245)):
+        path = card(f'quadrature_control = "{quadrature}"\n' + lines)
+        assert main(["loop", path, "--json", "--rate", "59"]) == 0
+        found = json.loads(capsys.readouterr().out)["range"]
+        assert found["rate"] == pytest.approx(0.59, rel=1e-3)
+        assert found["quadrature"] == pytest.approx(split, rel=3e-3)
+        assert found["across"] == pytest.approx(across, rel=1e-2)
+        assert found["drive"] == pytest.approx(1 / 20, rel=1e-2)

@@ -22,9 +22,11 @@ quadrature_V_per_Hz = 10.0            # quadrature_V per held split
 pickoff_noise_uV_per_rt_Hz = 1.0      # at the carrier, one-sided
 adc_step_uV = 10.0                    # of a demodulated sample
 rate_range_deg_per_s = 100.0          # largest rate the force can hold
+quadrature_control = "force"          # or "stiffness": what nulls quadrature; a force shares the range with the rate and leaks by phase errors
+quadrature_range_Hz = 1.0             # largest split that the stiffness nulls
 dac_bits = 16                         # over ± that range
 drive_noise_ppm_per_rt_Hz = 0.0       # of that range
-drive_headroom = 20.0                 # largest drive of the amplitude over what holds it
+drive_headroom = 20.0                 # largest drive of the amplitude over what holds it at the reference temperature
 start_offset_Hz = 1.0                 # of the resonance from where the oscillator starts
 vibration_um, modal_mass_mg           # with both, thermomechanical noise is known
 """
@@ -65,6 +67,8 @@ class Loop(Keys, frozen=True, kw_only=True):
     pickoff_noise_uV_per_rt_Hz: Annotated[float, number(least=0.0)] = 1.0
     adc_step_uV: Annotated[float, number(least=0.0)] = 10.0
     rate_range_deg_per_s: Annotated[float, number(above=0.0)] = 100.0
+    quadrature_control: Literal["force", "stiffness"] = "force"
+    quadrature_range_Hz: Annotated[float, number(above=0.0)] = 1.0
     dac_bits: Annotated[int, number(least=2, most=32)] = 16
     drive_noise_ppm_per_rt_Hz: Annotated[float, number(least=0.0)] = 0.0
     drive_headroom: Annotated[float, number(above=1.0)] = 20.0

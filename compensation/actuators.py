@@ -1,0 +1,111 @@
+"""Actuators of a gyro: the largest forces and stiffness that its electrodes give, and the part of them that loops use.
+
+All limits are over 2ω and the commanded amplitude (1/s), as the loops' commands are. One pair of electrodes pushes across the
+wave for rate and quadrature, a quarter cycle apart, so that √(rate² + quadrature²) counts. Quadrature may instead be nulled by a
+stiffness that couples the two patterns, Ẋ ∋ iκ Y and Ẏ ∋ iκ X (the HRG paper's quadrature loop): it follows the motion itself, so
+that no phase error of the electronics turns it into rate, and it leaves the whole force to the rate.
+"""
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from compensation.errors import CompensationError
+
+Real = NDArray[np.float64]
+NEAR = 0.9
+"""Part of a limit from which a row of the record is followed sample by sample."""
+
+
+@dataclass(frozen=True)
+class RangeUse:
+    """Parts of their limits that rate, quadrature and drive use (1): numbers, or one per row."""
+
+    rate: Real
+    quadrature: Real
+    drive: Real
+    shared: bool
+
+    @property
+    def across(self) -> Real:
+        """Part of the force across the wave: of rate and, where it is a force, quadrature together."""
+        return np.hypot(self.rate, self.quadrature) if self.shared else self.rate
+
+    @property
+    def worst(self) -> float:
+        """The largest part of any limit."""
+        return float(max(np.max(x) for x in (self.across, self.quadrature, self.drive)))
+
+
+@dataclass(frozen=True)
+class Actuators:
+    """Limits of the actuators, 1/s.
+
+    Attributes
+    ----------
+    force : float
+        Of the force across the wave.
+    drive : float
+        Of the force along it, which holds the amplitude.
+    stiffness : float
+        Of the stiffness that nulls quadrature, κ = ½ Δω.
+    quadrature : "force" or "stiffness"
+        What the quadrature loop commands.
+    """
+
+    force: float = np.inf
+    drive: float = np.inf
+    stiffness: float = np.inf
+    quadrature: Literal["force", "stiffness"] = "force"
+
+    def __post_init__(self) -> None:
+        for name in ("force", "drive", "stiffness"):
+            if not getattr(self, name) > 0:
+                raise CompensationError(f"the limit of the {name} must be positive.")
+
+    @property
+    def stiff(self) -> bool:
+        """Quadrature is nulled by a stiffness."""
+        return self.quadrature == "stiffness"
+
+    @property
+    def finite(self) -> bool:
+        """There is a limit at all."""
+        return bool(np.isfinite([self.force, self.drive, *([self.stiffness] if self.stiff else [])]).any())
+
+    def use(self, rate: ArrayLike, quadrature: ArrayLike, drive: ArrayLike) -> RangeUse:
+        """Return the parts of the limits that commands (1/s) use."""
+        holds = self.stiffness if self.stiff else self.force
+        parts = (np.abs(x) / limit for x, limit in ((rate, self.force), (quadrature, holds), (drive, self.drive)))
+        return RangeUse(*(np.asarray(part, dtype=float) for part in parts), not self.stiff)
+
+    def give(self, command: Real) -> Real:
+        """Return what is given of commands (amplitude, phase, rate, quadrature): a force across keeps its direction in phase."""
+        amplitude, phase, rate, quadrature = command
+        amplitude = min(max(amplitude, -self.drive), self.drive)
+        if self.stiff:
+            rate = min(max(rate, -self.force), self.force)
+            quadrature = min(max(quadrature, -self.stiffness), self.stiffness)
+        elif (size := float(np.hypot(rate, quadrature))) > self.force:
+            rate, quadrature = rate * self.force / size, quadrature * self.force / size
+        return np.array([amplitude, phase, rate, quadrature])
+
+    def is_near(self, *commands: Real) -> bool:
+        """Whether any of the commands is near a limit."""
+        return any(self.use(c[2], c[3], c[0]).worst > NEAR for c in commands)
+
+
+UNLIMITED = Actuators()
+"""Forces without limits, for quadrature too."""
+
+
+def require_range(use: RangeUse, context: str) -> None:
+    """Raise when settled loops would need more than the actuators give."""
+    if use.worst > 1:
+        raise CompensationError(
+            f"{context}: the loops need {100 * use.worst:.0f} % of what the actuators give (rate {100 * float(np.max(use.rate)):.3g} %,"
+            f" quadrature {100 * float(np.max(use.quadrature)):.3g} %, drive {100 * float(np.max(use.drive)):.3g} % of their ranges); no"
+            " wave is held so."
+        )
