@@ -78,8 +78,11 @@ class Actuators:
     def use(self, rate: ArrayLike, quadrature: ArrayLike, drive: ArrayLike) -> RangeUse:
         """Return the parts of the limits that commands (1/s) use."""
         holds = self.stiffness if self.stiff else self.force
-        parts = (np.abs(x) / limit for x, limit in ((rate, self.force), (quadrature, holds), (drive, self.drive)))
-        return RangeUse(*(np.asarray(part, dtype=float) for part in parts), not self.stiff)
+
+        def part(command: ArrayLike, limit: float) -> Real:
+            return np.asarray(np.abs(command) / limit, dtype=float)
+
+        return RangeUse(part(rate, self.force), part(quadrature, holds), part(drive, self.drive), not self.stiff)
 
     def give(self, command: Real) -> Real:
         """Return what is given of commands (amplitude, phase, rate, quadrature): a force across keeps its direction in phase."""
