@@ -93,7 +93,7 @@ def diagnose(*runs: Run, card: Card | None = None) -> "Diagnosis | TableDiagnosi
     ----------
     runs : records of one gyro or their paths, or the path of one steady-state table
     card : Instrument, path, or name of a card that ships, optional
-        Its own simulation is the baseline. With a steady-state table: path or name.
+        Its own simulation is the baseline.
 
     Raises
     ------
@@ -110,8 +110,7 @@ def diagnose(*runs: Run, card: Card | None = None) -> "Diagnosis | TableDiagnosi
     if any(_is_table(one) for one in runs):
         if len(runs) > 1:
             raise InputError("a steady-state table is diagnosed alone; leave the other files out.")
-        law_card = card.path if isinstance(card, Instrument) else card
-        return diagnose_table(str(runs[0]), None if law_card is None else str(law_card))
+        return diagnose_table(str(runs[0]), None if card is None else open_card(card))
     records = open_records(runs)
     if card is None:
         return investigate(load_campaign(records))

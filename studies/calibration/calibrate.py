@@ -16,6 +16,7 @@ from studies.calibration.observed import HOUSING, QUADRATURE, RESPONSES, SETTLED
 from studies.calibration.priors import Priors, gather_priors
 from studies.calibration.problem import JUMP, SHIFT, CardProblem, State, wide_law
 from studies.calibration.remarks import warn
+from studies.calibration.settled import SettledComparison, compare_settled
 from studies.errors import InputError
 from studies.plausible import check_card_frequency
 from studies.record import Record
@@ -29,6 +30,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 Progress = Callable[[str], None]
 START_STEPS = 3
+EXCLUDED = 6.0  # prior standard deviations that no value of a right card is away
 DIGITS = 12  # of a correlation: the frequency knows two values together a thousand times better than each, and 1 − ρ² is the square
 
 
@@ -90,6 +92,7 @@ class Calibration(Shown):
     ladder : response -> Rung
     held_out : HeldOut, where it was asked for
     warnings : in sentences
+    settled : level and slope of every table beside the card as shipped
     """
 
     drawn_by = "studies.reports.calibration:residual_figure"
@@ -102,11 +105,27 @@ class Calibration(Shown):
     ladder: Mapping[str, Rung]
     held_out: HeldOutRun | None
     warnings: tuple[str, ...]
+    settled: tuple[SettledComparison, ...] = ()
 
     def __repr__(self) -> str:
         told = sum(one.told_by == "data" for one in self.estimates)
         residuals = ", ".join(f"{name} {rung.calibrated:.3g}" for name, rung in self.ladder.items())
         return f"Calibration({self.card.name}: {told} of {len(self.estimates)} values determined by the data; residuals {residuals})"
+
+    @property
+    def unsaved(self) -> str | None:
+        """Why it makes no card: it has not converged, has learnt nothing, or needs values that the card all but excludes."""
+        if not self.fit.converged:
+            return "the fit has not converged. State more values as known (--exact), or leave out the run that differs most"
+        if all(one.told_by == "prior" for one in self.estimates):
+            return "the data determine none of the card's values"
+        far = [one.parameter for one in self.estimates if abs(one.shift_sd) > EXCLUDED]
+        if far:
+            return (
+                f"{', '.join(far)} would have to move by more than {EXCLUDED:g} of the card's standard deviations. Give the value that"
+                " may be wrong a tolerance in the card, or use the data of its own gyro"
+            )
+        return None
 
     def to_frame(self) -> "DataFrame":
         """Return one row an uncertain value, best known first: card, value, interval, shift, width, told by."""
@@ -177,6 +196,7 @@ def calibrate(
     for table in tables:
         check_card_frequency(instrument, table.frequency, table.path)
     problem = _pose(instrument, runs, tables, exact)
+    settled = compare_settled(problem)
     found = fit(problem, progress=progress)
     held_out = None
     if hold_out is not None and len(records) > 1:
@@ -195,6 +215,7 @@ def calibrate(
         ladder,
         held_out,
         warn(found, estimates, ladder),
+        settled,
     )
 
 

@@ -179,9 +179,9 @@ def _levels(
     precision = None if columns is None else np.ones(columns.shape[1])
     stated = None if columns is None else stated_noise(problem.instrument.noise, name)
     noise = estimate_noise(rows, target, columns, precision, kinds, near, stated)
-    if name == SETTLED:  # a reading is not better than its last digit
-        rounding = max(table.resolution for table in problem.tables) / np.sqrt(12.0)
-        return replace(noise, white=max(noise.white, rounding))
+    if name == SETTLED:  # a reading is not better than its last digit, and a level or a slope is no noise
+        least, most = (max(getattr(table, end) for table in problem.tables) for end in ("rounding", "scatter"))
+        return replace(noise, white=float(np.clip(noise.white, least, most)))
     return noise
 
 

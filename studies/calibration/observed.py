@@ -30,6 +30,8 @@ TURNED_MOST = 10  # times as many rows, and three times as many blocks, for wave
 LEAST_ROWS = 10
 MOST_KINKS = 24  # of a run
 LEAST_KINK = 1e-3  # K
+THERMOMETER = 0.3  # K, error of a settled temperature that nothing else tells
+LEAST_SCATTER = 1e-5  # of a frequency, where nothing else tells
 
 
 @dataclass(frozen=True)
@@ -97,6 +99,26 @@ class SettledTable:
     temperature: Array
     frequency: Array
     resolution: float
+
+    @property
+    def rounding(self) -> float:
+        """Noise of the last digit, Hz."""
+        return self.resolution / float(np.sqrt(12.0))
+
+    @property
+    def scatter(self) -> float:
+        """Largest noise that its readings can have, Hz: what they leave of their own parabola.
+
+        Too few of them leave nothing: then what a thermometer good to 0.3 K makes of their slope.
+        """
+        T, f = self.temperature - self.temperature.mean(), self.frequency
+        degree = min(2, len(np.unique(T)) - 1)
+        rest = f - np.polyval(np.polyfit(T, f, degree), T)
+        free = len(f) - degree - 1
+        if degree == 2 and free > 1:
+            return max(float(np.sqrt(rest @ rest / free)), self.rounding)
+        rise = float(np.ptp(f) / np.ptp(T)) if degree > 0 else 0.0
+        return max(THERMOMETER * rise, LEAST_SCATTER * float(np.median(f)), self.rounding)
 
 
 def read_settled(path: str) -> SettledTable:

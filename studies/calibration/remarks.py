@@ -17,6 +17,7 @@ from studies.simulation.virtual_gyro import idle_effects
 TURNED_ON = 2.0  # runs whose offsets are so much larger than the card states
 CONTRADICTION = 5.0  # runs whose offsets are so much larger than what else the noise makes of a run's mean
 MISFIT = 2.0  # residuals that are so much larger than their rows' white noise and what the card states of slow noise
+FAR = 2.0  # prior standard deviations beyond which a value of the card is wrong
 UNSETTLED, UNSETTLED_SD = 0.5, 4.0  # K and standard deviations by which a gyro had not settled at the start
 
 
@@ -29,7 +30,7 @@ def warn(found: CardFit, estimates: Sequence[Estimate], ladder: Mapping[str, Run
         )
     for run in found.problem.runs:
         warnings += [f"{run.record.path}: {idle}" for idle in idle_effects(found.problem.instrument, run.inner)]
-    warnings += [*_unsettled(found), *_misfit(found, ladder)]
+    warnings += [*_moved(estimates), *_unsettled(found), *_misfit(found, ladder)]
     rows = found.problem.rows
     for name, rung in ladder.items():
         stated = found.problem.instrument.noise.bias_turn_on_deg_per_h if name == BIAS else 0.0
@@ -55,6 +56,16 @@ def warn(found: CardFit, estimates: Sequence[Estimate], ladder: Mapping[str, Run
             f" {', '.join(stayed)}."
         )
     return tuple(warnings)
+
+
+def _moved(estimates: Sequence[Estimate]) -> list[str]:
+    """Name the values that the data move by more than two of their prior standard deviations, the furthest first."""
+    far = sorted((one for one in estimates if abs(one.shift_sd) > FAR), key=lambda one: -abs(one.shift_sd))
+    return [
+        f"{one.parameter} moved by {one.shift_sd:+.1f} of the card's standard deviations, to {one.value:.4g}"
+        f" ({one.low:.4g} … {one.high:.4g}): the card is wrong in this value, or in another that does the same."
+        for one in far
+    ]
 
 
 def _misfit(found: CardFit, ladder: Mapping[str, Rung]) -> list[str]:

@@ -8,7 +8,8 @@ parameters that the data ties together but cannot tell apart; `responses`: by na
 (rms of block averages about the mean of each run), `run_offset` (rms of these means) and `outliers`; `held_out`: null, or
 `record` and by response `chamber` and `housing` (`as_shipped`, `calibrated`, null where not measured) beside `noise` and `stated`
 (rms standard deviation that the calibrated values, the run's start and its turn-on leave from the chamber, or null);
-`converged`; `warnings`; `calibrated_card`: path of the saved card or null, as where a fit that has not converged was not saved.
+`settled`: for each steady-state table `temperature_degC`, `level_Hz` and `slope_ppm_per_degC` (or null), each `measured`, `predicted` by the
+card as given, `sd` and `away_sd`; `converged`; `warnings`; `calibrated_card`: path of the saved card, or null where it was not asked for or is refused.
 """
 
 from typing import TYPE_CHECKING, Any
@@ -44,8 +45,8 @@ def calibrate(
     data : str
         Records (CSV), the runs of one device, and steady-state tables (temperature_degC,frequency_Hz).
     save : str
-        Write the calibrated card: most probable values with their posterior widths. A fit that has not converged is not saved
-        (exit status 2).
+        Write the calibrated card: most probable values with their posterior widths. It is not written, with exit status 2, where the
+        fit has not converged, has determined none of the values, or moved one by more than 6 of the card's standard deviations.
     report : str
         Write a page (HTML).
     hold_out : int
@@ -76,11 +77,9 @@ def calibrate(
     found = run(instrument, records, tables, left, exact, progress=say)
     for warning in found.warnings:
         say(f"warning: {warning}")
-    refused = save is not None and not found.fit.converged
+    refused = save is not None and found.unsaved is not None
     if refused:
-        say(
-            f"{save} is not written: what has not converged is no card. Give more of it as known (--exact), or runs that differ less."
-        )
+        say(f"{save} is not written: {found.unsaved}.")
         save = None
     if save is not None:
         save_card(found.instrument, save)
@@ -93,6 +92,8 @@ def calibrate(
     yield _payload(found, list(data), save), 2 if refused else 0
     from studies.reports.calibration import held_out_table, ladder_table, separation_sentences, values_table
 
+    for one in found.settled:
+        print(" ".join(one.sentences))
     for block in (values_table(found, touched=True), ladder_table(found), held_out_table(found)):
         if block is not None:
             print_table(block.caption, block.columns, block.rows, block.note)
@@ -139,6 +140,7 @@ def _payload(found: "Calibration", data: list[str], save: str | None) -> dict[st
                 for name in held.noise
             },
         },
+        "settled": [{"table": one.path} | one.as_dict() for one in found.settled],
         "converged": found.fit.converged,
         "warnings": list(found.warnings),
         "calibrated_card": save,

@@ -27,7 +27,7 @@ def table_chapters(found: "TableDiagnosis") -> list[Chapter]:
     """Return the chapters of a steady-state table: the answer, and who else could have given it."""
     facts = [
         ("Verdict", found.verdict.verdict.replace("-", " "), reason(found.verdict)),
-        ("Law imposed", f"{plain(1e3 * found.law_rms)} mHz", "misfit rms with the law's curvature fixed"),
+        *_law_facts(found),
         ("Curvature", f"{plain(found.curvature_ratio)} times", "the measured one over the law's"),
     ]
     rows = [[name, plain(ssq), plain(loo), plain(score)] for name, ssq, loo, score in found.candidates]
@@ -41,12 +41,34 @@ def table_chapters(found: "TableDiagnosis") -> list[Chapter]:
     ]
 
 
+def _law_facts(found: "TableDiagnosis") -> list[tuple[str, str, str]]:
+    """Return what the law leaves, or the card's level and slope beside the measured."""
+    compared = found.verdict.details.get("settled")
+    if compared is None:
+        return [("Law imposed", f"{plain(1e3 * found.law_rms)} mHz", "misfit rms with the law's curvature fixed")]
+    facts = []
+    for name, key, unit in (("Level", "level_Hz", "Hz"), ("Slope", "slope_ppm_per_degC", "ppm/°C")):
+        one = compared[key]
+        if one is not None:
+            remark = f"the card predicts {plain(one['predicted'], 6)} ± {plain(one['sd'], 2)} {unit}; {one['away_sd']:+.1f} standard deviations"
+            facts.append(
+                (f"{name} at {compared['temperature_degC']:.4g} °C", f"{plain(one['measured'], 6)} {unit}", remark)
+            )
+    return facts
+
+
 def table_residuals(found: "TableDiagnosis") -> Picture:
     """Draw what the law, the baseline and the strongest candidate leave of a steady-state table."""
+    words = (
+        ("card as given", "card calibrated")
+        if found.from_card
+        else ("law imposed, f₀ and slope free", "baseline: curvature free")
+    )
+    first, second = words
     with figure(1, 1, height=3.2) as (canvas, axis):
         # lines in the order of the rows, so that a loop shows as one
-        axis.plot(found.temperature, found.law_residual, "o-", color=VERMILION, label="law imposed, f₀ and slope free")
-        axis.plot(found.temperature, found.baseline_residual, "s-", color=ORANGE, label="baseline: curvature free")
+        axis.plot(found.temperature, found.law_residual, "o-", color=VERMILION, label=first)
+        axis.plot(found.temperature, found.baseline_residual, "s-", color=ORANGE, label=second)
         axis.plot(found.temperature, found.extended_residual, "^-", color=BLACK, label="with the strongest candidate")
         axis.set_xlabel("temperature (°C)")
         axis.set_ylabel("measured − model (Hz)")

@@ -1,6 +1,7 @@
 """`hrg calibrate`: its JSON, its files and what it refuses."""
 
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -34,7 +35,7 @@ def test_the_object_the_card_and_the_page(run, tmp_path, capsys):
     assert main(words) == 0
     answer = json.loads(capsys.readouterr().out)
     assert list(answer) == [
-        "schema", "card", "records", "values", "inseparable", "responses", "held_out", "converged", "warnings",
+        "schema", "card", "records", "values", "inseparable", "responses", "held_out", "settled", "converged", "warnings",
         "calibrated_card",
     ]  # fmt: skip
     assert answer["schema"] == "hrg.calibration/1"
@@ -115,3 +116,31 @@ def test_what_cannot_be_calibrated_is_refused(run, tmp_path, capsys):
         captured = capsys.readouterr()
         assert message in captured.err
         assert captured.out == ""
+
+
+def test_a_table_whose_level_is_not_the_cards_says_what_would_bridge_it_and_saves_nothing(tmp_path, capsys):
+    """The level once went into 112 Hz of noise, with 0 of 27 values determined and the card saved as if it had succeeded."""
+    shipped, card, out = (
+        Path("studies/cards/hrg-30mm.toml"),
+        tmp_path / "thick.toml",
+        tmp_path / "out.toml",
+    )
+    card.write_text(shipped.read_text(encoding="utf-8").replace("0.8558278", "0.88"), encoding="utf-8")
+    assert main(["calibrate", str(card), "studies/papers/hrg_table1.csv", "--save", str(out), "--json"]) == 2
+    said = capsys.readouterr()
+    answer = json.loads(said.out)
+    (level, slope) = (answer["settled"][0][key] for key in ("level_Hz", "slope_ppm_per_degC"))
+    assert level["measured"] == pytest.approx(4432.07, abs=0.05)
+    assert level["away_sd"] < -7.0
+    assert slope["measured"] == pytest.approx(79.2, abs=0.15)
+    assert answer["responses"]["settled_frequency_Hz"]["noise"] < 0.2  # Hz; what the readings leave of a parabola
+    assert answer["responses"]["settled_frequency_Hz"]["run_offset"] < 0.1
+    assert any("shear_modulus.log_value moved by -" in warning for warning in answer["warnings"])
+    assert (
+        "out.toml is not written: material.deviation.shear_modulus.log_value would have to move by more than 6"
+        in said.err
+    )
+    assert not out.exists()
+    assert main(["calibrate", str(card), "studies/papers/hrg_table1.csv"]) == 0
+    text = " ".join(capsys.readouterr().out.split())
+    assert "What would bridge the level, each alone: thinner walls (-2.7" in text

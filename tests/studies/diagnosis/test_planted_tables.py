@@ -3,7 +3,10 @@
 import numpy as np
 import pytest
 
-from studies.diagnosis.table import study_steady_table
+from studies.diagnosis.table import diagnose_table, study_steady_table
+from studies.errors import InputError
+from studies.instrument.card import load_card
+from studies.law import law_of
 
 UP = np.arange(-40.0, 81.0, 10.0)
 CYCLE = np.concatenate([UP, UP[-2::-1]])
@@ -69,3 +72,74 @@ def test_a_dip_in_wandering_rows_is_still_found():
     x = (T - 25.0) / 3.0
     found = study(T, walk + 0.05 * x / (1 + x**2), white=1e-3)
     assert "activity-dip" in {name for cause in found.verdict.causes for name in (cause.effect, *cause.equivalent)}
+
+
+CARD = "hrg-30mm"
+WIDE = np.linspace(-30.0, 70.0, 26)
+
+
+@pytest.fixture(scope="module")
+def own():
+    """What the card itself predicts, °C to Hz."""
+    law = law_of(load_card(CARD))
+    return lambda T: law.frequency(T + 273.15)
+
+
+def beside_card(folder, T, f, card=CARD):
+    path = folder / "table.csv"
+    path.write_text(
+        "temperature_degC,frequency_Hz\n" + "".join(f"{t:.3f},{v:.3f}\n" for t, v in zip(T, f, strict=True))
+    )
+    return diagnose_table(str(path), card)
+
+
+@pytest.mark.parametrize(
+    ("spoil", "said"),
+    [
+        (lambda f: 2.0 * f[13] - f, "26 standard deviations. Read with the sign turned"),
+        (lambda f: 1.5 * f, "is this a record of that gyro"),
+        (lambda f: 8110.0 * (1.0 - 27e-6 * (WIDE - 20.0)), "is this a record of that gyro"),
+        (lambda f: f[13] * (1.0 - 27e-6 * (WIDE - WIDE[13])), "not a table of that gyro"),
+    ],
+    ids=["slope negated", "frequencies x 1.5", "another gyro's", "another gyro's slope"],
+)
+def test_what_is_not_this_cards_table_is_said_to_be_another_gyros(spoil, said, own, tmp_path):
+    """A free level and a free scale of any sign once made each of them `adequate`."""
+    with pytest.raises(InputError, match=said.replace("26", r"\d\d")):
+        beside_card(tmp_path, WIDE, spoil(own(WIDE)))
+
+
+def test_the_cards_own_table_is_adequate_and_moves_nothing(own, tmp_path):
+    found = beside_card(tmp_path, WIDE, own(WIDE) + np.random.default_rng(3).normal(0, 2e-3, WIDE.size))
+    assert found.verdict.verdict == "adequate", found.verdict.causes
+    assert max(abs(one.shift_sd) for one in found.verdict.calibration) < 0.5
+    assert abs(found.verdict.details["settled"]["slope_ppm_per_degC"]["away_sd"]) < 0.2
+
+
+def test_a_slope_four_standard_deviations_off_is_named_as_a_value(tmp_path):
+    card, name = load_card(CARD), "material.deviation.shear_modulus.log_slope_per_K"
+    sd = next(value.sd for value in card.uncertain if value.name == name)
+    law = law_of(card.with_values({name: 4.0 * sd}))
+    f = law.frequency(WIDE + 273.15) + np.random.default_rng(4).normal(0, 2e-3, WIDE.size)
+    found = beside_card(tmp_path, WIDE, f)
+    assert found.verdict.verdict == "explained"
+    assert [(cause.kind, cause.effect) for cause in found.verdict.causes] == [("value", name)]
+    assert found.verdict.calibration[0].shift_sd == pytest.approx(4.0, abs=0.3)
+    assert found.verdict.details["settled"]["slope_ppm_per_degC"]["away_sd"] == pytest.approx(4.0, abs=0.3)
+
+
+def test_a_dip_in_the_cards_own_table_is_named_and_its_values_stay(own, tmp_path):
+    x = (WIDE - 25.0) / 6.0
+    f = own(WIDE) + 0.2 * x / (1 + x**2) + np.random.default_rng(5).normal(0, 2e-3, WIDE.size)
+    found = beside_card(tmp_path, WIDE, f)
+    (cause,) = [one for one in found.verdict.causes if one.kind == "physics"]
+    assert cause.effect == "activity-dip"
+    assert len(cause.equivalent) <= 2
+    assert max(abs(one.shift_sd) for one in found.verdict.calibration) < 2.0
+
+
+def test_a_level_off_by_less_than_three_per_cent_is_a_value_of_the_card(own, tmp_path):
+    """2.7 % is eight standard deviations of the modulus: no noise of the readings."""
+    found = beside_card(tmp_path, WIDE, own(WIDE) * 0.9733)
+    assert [cause.kind for cause in found.verdict.causes] == ["value"]
+    assert "What would bridge the level" in " ".join(found.sentences)

@@ -30,6 +30,26 @@ def test_table1_is_not_identifiable_and_says_what_is_known():
     assert quartic[2] == pytest.approx(0.0216, abs=2e-4)
 
 
+def test_table1_beside_the_papers_card_says_what_an_engineer_asks_first():
+    """The sheet's figures: 79.2 ppm/°C measured at 20 °C (cubic), 88.7 ± 6.3 predicted by the default law, 4432.07 Hz."""
+    found = diagnose_table(TABLE, "hrg-30mm")
+    level, slope = (found.verdict.details["settled"][key] for key in ("level_Hz", "slope_ppm_per_degC"))
+    assert (level["measured"], level["predicted"]) == pytest.approx((4432.07, 4432.07), abs=0.05)
+    assert slope["measured"] == pytest.approx(79.2, abs=0.15)
+    assert slope["predicted"] == pytest.approx(88.7, abs=0.15)
+    assert slope["sd"] == pytest.approx(6.3, abs=0.15)
+    assert slope["away_sd"] == pytest.approx(-1.5, abs=0.1)
+    first = found.verdict.calibration[0]
+    assert first.parameter == "material.deviation.shear_modulus.log_slope_per_K"
+    assert -2.0 < first.shift_sd < -1.0
+    assert found.verdict.verdict == "adequate"  # what calibrate follows to its noise
+    assert not found.verdict.causes
+    text = " ".join(found.sentences)
+    assert "79.2 ppm/°C. hrg-30mm predicts" in text
+    assert "88.7 ± 6.3 ppm/°C" in text
+    assert "free" not in text  # level and slope are values of the card
+
+
 def test_exact_quadratic_table_is_adequate(tmp_path):
     T = np.arange(-20.0, 41.0, 10.0)
     rng = np.random.default_rng(8)

@@ -1,0 +1,75 @@
+"""What a steady-state table says in words: its own shape, how it was approached, what to measure next."""
+
+import numpy as np
+from scipy.stats import f as f_distribution
+
+from compensation.decimation import average_groups
+from studies.effects.states import FloatArray
+
+TURN = 0.1
+"""Part of the covered range that a table must go back for its order to show a direction."""
+MORE = "Measure at five temperatures or more, from below and from above."
+SOAK = "soak time shows an unsettled resonator, the thermometer separates a scale error from a curvature of f"
+
+
+def next_table(T: FloatArray) -> str:
+    """Return what to measure next, which is not what the table has already."""
+    if _turns(T):
+        return f"Repeat the table with two soak times and a second thermometer: {SOAK}."
+    return (
+        "Approach the same temperatures from above and from below, with two soak times and a second thermometer: direction "
+        f"shows hysteresis and stress, {SOAK}."
+    )
+
+
+def table_sentences(T: FloatArray, f: FloatArray, rounding: float) -> list[str]:
+    """Return what readings (°C, Hz) show by themselves: their local slope, whether a cubic is enough, from where they were approached."""
+    out = []
+    order = np.argsort(T, kind="stable")
+    t, g = _merged(T[order], f[order])
+    if t.size >= 5:
+        local = np.diff(g) / np.diff(t) / (0.5 * (g[1:] + g[:-1])) * 1e6
+        lowest = int(np.argmin(local))
+        if t.size <= 30 and 0 < lowest < local.size - 1:
+            middle = 0.5 * (t[lowest] + t[lowest + 1])
+            out.append(
+                f"The local slope falls to {local[lowest]:.1f} ppm/°C near {middle:.0f} °C and rises again to {local[-1]:.1f} ppm/°C."
+            )
+    if 7 <= T.size and t.size >= 7:
+        cubic, quartic = (float(np.sum((f - np.polyval(np.polyfit(T, f, p), T)) ** 2)) for p in (3, 4))
+        freedom = T.size - 5
+        ratio_f = (cubic - quartic) / max(quartic / freedom, rounding**2)
+        chance = float(f_distribution.sf(max(ratio_f, 0.0), 1, freedom))
+        said = "a cubic is not sufficient" if chance < 0.05 else "a cubic is sufficient"
+        if cubic < T.size * rounding**2:
+            out.append("A cubic fits within the rounding of the readings; a cubic is sufficient.")
+        else:
+            out.append(
+                f"Cubic against quartic: {cubic:.3g} and {quartic:.3g} Hz², F(1, {freedom}) = {max(ratio_f, 0.0):.3g}, "
+                f"chance {chance:.2g}; {said}."
+            )
+    both = _turns(T)
+    out.append(
+        f"{T.size} rows, "
+        + (
+            "approached from both sides: hysteresis is tested; ageing and a linear scale error stay hidden."
+            if both
+            else "approached from one side: they cannot tell hysteresis from a curve, nor show ageing or a linear scale error, and an"
+            " unsettled soak stays in the slope."
+        )
+    )
+    return out
+
+
+def _merged(T: FloatArray, f: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Average readings at one temperature."""
+    distinct, place = np.unique(T, return_inverse=True)
+    return distinct, average_groups(f, place)
+
+
+def _turns(T: FloatArray) -> bool:
+    """Whether the rows go up and down again by more than a tenth of their range."""
+    wide = TURN * float(np.ptp(T))
+    back_down = float((np.maximum.accumulate(T) - T).max())
+    back_up = float((T - np.minimum.accumulate(T)).max())
+    return min(back_down, back_up) > wide
