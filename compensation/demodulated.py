@@ -2,7 +2,7 @@
 
 Equation numbers are those of the paper on demodulated dynamics and optimal noise filtering for CVGs. Its equation (7)
 for the complex amplitudes follows from the motion equations (4) without approximation; `motion.propagate_envelope`
-solves it together with everything that (4) leaves out.
+solves it together with everything that (4) leaves out. `compensation.derivation.transfer_functions` derives (8)–(24).
 
 How far to trust which: (12) neglects the reaction of the secondary on the primary, an error of order (Ω/kζ)²; (24) also
 the second derivative, of order ζ + λ/ω, and the mismatch of the two modes.
@@ -36,6 +36,96 @@ def expand_secondary(element: SensitiveElement) -> tuple[complex, ...]:
     e = element
     detuning = (e.k2 - e.omega) * (e.k2 + e.omega)  # k₂² − ω², written so that nothing cancels near resonance
     return 1.0, 2 * (e.zeta2 * e.k2 + 1j * e.omega), detuning + 2j * e.omega * e.zeta2 * e.k2
+
+
+def relate_drive_to_primary(element: SensitiveElement) -> TransferFunction:
+    """A₁(s) / q₁₀(s) = 1 / ((s + jω)² + 2 ζ₁ k₁ (s + jω) + k₁²), in s²: first of eqs. (7); at s = 0 it is (8)."""
+    e = element
+    detuning = (e.k1 - e.omega) * (e.k1 + e.omega)
+    damping = e.zeta1 * e.k1
+    return TransferFunction((1.0,), (1.0, 2 * (damping + 1j * e.omega), detuning + 2j * e.omega * damping))
+
+
+def relate_primary_to_secondary(element: SensitiveElement, rate: float) -> TransferFunction:
+    """A₂(s) / A₁(s) = g₂ Ω (s + jω) / ((s + jω)² + 2 ζ₂ k₂ (s + jω) + k₂²) for a constant rate: second of eqs. (7).
+
+    It holds while the primary still builds up, where (9) and all that follows from it take A₁ as settled.
+    """
+    gain = element.g2 * rate
+    return TransferFunction((gain, 1j * gain * element.omega), expand_secondary(element))
+
+
+def relate_rate_to_slow_secondary(element: SensitiveElement) -> TransferFunction:
+    """W₂(s) with the second derivative of the amplitude neglected: eq. (16), single pole (17)."""
+    e, A1 = element, element.primary_amplitude
+    return TransferFunction((A1, 1j * A1 * e.g2 * e.omega), expand_secondary(e)[1:])
+
+
+def find_poles(element: SensitiveElement) -> NDArray[np.complex128]:
+    """s₁,₂ = −k₂ ζ₂ ± j k₂ √(1 − ζ₂²) − jω (1/s): eq. (15); the first is the slow one, the second is near −2jω."""
+    e = element
+    ring = e.k2 * np.sqrt(1 - e.zeta2**2)
+    return np.array([-e.k2 * e.zeta2 + 1j * (ring - e.omega), -e.k2 * e.zeta2 - 1j * (ring + e.omega)])
+
+
+def find_slow_pole(element: SensitiveElement) -> complex:
+    """s₁ = −(k₂² − ω² + 2jωζ₂k₂) / (2 (ζ₂ k₂ + jω)) (1/s): eq. (17)."""
+    slope, constant = expand_secondary(element)[1:]
+    return complex(-constant / slope)
+
+
+def respond_to_oscillating_rate(element: SensitiveElement, frequency: ArrayLike) -> tuple[Real, Real]:
+    """Return amplitude A(λ) (m per rad/s) and phase φ(λ) (rad) of the secondary for the rate e^{jλt}: eq. (14).
+
+    The phase is taken with the sign of numerator and denominator of (14), so it is right in all four quadrants.
+
+    Parameters
+    ----------
+    element : SensitiveElement
+        The oscillators.
+    frequency : array
+        Angular frequency λ of the rate (rad/s), of either sign: the response is not symmetric.
+    """
+    e, frequency = element, np.asarray(frequency, dtype=float)
+    shifted = frequency + e.omega
+    first, second = e.k1**2 - e.omega**2, e.k2**2 - shifted**2
+    gain = e.q10 * (frequency + e.g2 * e.omega)
+    amplitude = gain / np.sqrt(
+        (second**2 + 4 * e.zeta2**2 * e.k2**2 * shifted**2) * (first**2 + 4 * e.zeta1**2 * e.k1**2 * e.omega**2)
+    )
+    delta = 2 * (e.k2 * e.zeta2 * shifted * first + e.k1 * e.zeta1 * e.omega * second)
+    phase = np.arctan2(second * first - 4 * e.k1 * e.k2 * e.zeta1 * e.zeta2 * e.omega * shifted, delta)
+    return amplitude, phase
+
+
+def split_primary(element: SensitiveElement) -> tuple[float, float]:
+    """Real and imaginary part of A₁ (m): eq. (19).
+
+    The paper prints A₁ᵢ = −2 q₁₀ j ω k₁ ζ₁ / (…); the imaginary *part* is real, so the j there is a slip.
+    """
+    e = element
+    detuning, damping = e.k1**2 - e.omega**2, 2 * e.omega * e.k1 * e.zeta1
+    size = detuning**2 + damping**2
+    return e.q10 * detuning / size, -e.q10 * damping / size
+
+
+def split_secondary(element: SensitiveElement) -> tuple[TransferFunction, TransferFunction]:
+    """Real-coefficient transfer functions from rate to Re A₂ and Im A₂ (m per rad/s): eqs. (21), (22).
+
+    A₂ᵣ = (A₁ᵣ Mᵣᵣ + A₁ᵢ Mᵣᵢ) / P · Ω and A₂ᵢ = (A₁ᵣ Mᵢᵣ + A₁ᵢ Mᵢᵢ) / P · Ω, with M and P as in (22); there
+    Mᵣᵣ = Mᵢᵢ and Mᵢᵣ = −Mᵣᵢ.
+    """
+    e = element
+    A1R, A1I = split_primary(e)
+    inner = np.array([1.0, 2 * e.k2 * e.zeta2, e.k2**2 - e.omega**2])
+    outer = np.array([1.0, e.k2 * e.zeta2])
+    along = np.polyadd(np.polymul([1, 0], inner), 2 * e.g2 * e.omega**2 * outer)
+    across = e.omega * np.polysub(2 * np.polymul([1, 0], outer), e.g2 * inner)
+    P = tuple(np.polyadd(4 * e.omega**2 * np.polymul(outer, outer), np.polymul(inner, inner)))
+    return (
+        TransferFunction(tuple(np.polyadd(A1R * along, A1I * across)), P),
+        TransferFunction(tuple(np.polysub(A1I * along, A1R * across)), P),
+    )
 
 
 def relate_rate_to_tuned_amplitude(element: SensitiveElement) -> TransferFunction:

@@ -1,11 +1,12 @@
 """The derivation of the averaged dynamics as one chain of equations, as text for a terminal and in LaTeX."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from textwrap import fill
 
 import sympy as sp
 
-from compensation.derivation import averaging, demodulated, filters, oscillator
+from compensation.derivation import averaging, demodulated, filters, oscillator, transfer_functions
 
 WIDTH = 120
 # Unicode has no subscript for these; in code they are Delta_tau, psi_tau …
@@ -20,6 +21,9 @@ TYPESET = {oscillator.delta_tau: r"\Delta(1/\tau)", oscillator.delta_omega: r"\D
     for name, latex in (
         ("x''+ω²x", r"\ddot x + \omega^2 x"),
         ("y''+ω²y", r"\ddot y + \omega^2 y"),
+        ("W_2(jλ)", r"W_2(j\lambda)"),
+        ("A(λ)", r"A(\lambda)"),
+        ("φ(λ)", r"\varphi(\lambda)"),
         *((f"{name}'", rf"\dot {name}") for name in ("X", "Y", "a", "q", "A_1", "A_2")),
         ("ψ'", r"\dot\psi"),
         ("φ'", r"\dot\phi"),
@@ -66,7 +70,7 @@ def steps() -> list[Step]:
         Step(
             "7",
             "The paper's amplitude equations, from (4) by x = Im{A exp(jωt)}",
-            tuple(sp.Eq(left, sp.S.Zero, evaluate=False) for left in demodulated.amplitude_equations()),
+            _zero(demodulated.amplitude_equations()),
         ),
         Step("", "Their leading order where A_1, A_2 are slow", _name("A_1' A_2'", demodulated.slow_rates())),
         Step(
@@ -74,6 +78,7 @@ def steps() -> list[Step]:
             "Averaged less the paper's: only the neglected reaction of the secondary",
             _name("ΔA_1' ΔA_2'", demodulated.neglected()),
         ),
+        *_demodulated(),
         Step("25", "Measured over actual rate, 1/τ = kζ", _name("W", [demodulated.measured_rate()])),
         Step(
             "35",
@@ -90,6 +95,33 @@ def steps() -> list[Step]:
             "False rate over a cross-damping ζ_12 that varies, equal modes (paper on cross-damping, (9) from (8))",
             _name("W_12", [filters.tuned_cross_damping()]),
         ),
+    ]
+
+
+def _demodulated() -> list[Step]:
+    """Return eqs. (8)–(24): the settled primary, and what a rate does to the secondary."""
+    found = transfer_functions
+    secondary, slow, parts = found.rate_to_secondary(), found.rate_to_secondary(slow=True), found.real_parts()
+    response, amplitude, phase = found.responses()
+    real, imaginary = found.primary_parts()
+    return [
+        Step("8", "Settled primary", _name("A_1", [found.settled_primary()])),
+        Step("9", "The second of (7) while the primary is settled", _zero([found.settled_equation()])),
+        Step("10-12", "Laplace transform of (9): secondary over rate", _name("W_2", [found.A_1 * secondary])),
+        Step("13", "Its frequency response, for a rate that oscillates at lambda", _name("W_2(jλ)", [response])),
+        Step("14", "Amplitude and phase of (13)", _name("A(λ) φ(λ)", (amplitude, phase))),
+        Step("15", "Poles of (12)", _name("s_1 s_2", found.poles())),
+        Step("16", "Slow motion, without the second derivative", _name("W_2", [found.A_1 * slow])),
+        Step("17", "Its pole", _name("s_1", [found.slow_pole()])),
+        Step(
+            "18, 19", "Real and imaginary part of (8); the copy prints a stray j", _name("A_1R A_1I", (real, imaginary))
+        ),
+        Step(
+            "20-22",
+            "Secondary with real coefficients: A_2R = (A_1R M_RR + A_1I M_RI) W/P, A_2I = (A_1R M_IR + A_1I M_II) W/P, W the rate",
+            _name("M_RR M_RI M_IR M_II P", parts),
+        ),
+        Step("23, 24", "Equal modes, primary at resonance, slow", _name("W_20", [found.tuned_gain()])),
     ]
 
 
@@ -124,6 +156,10 @@ def write_plainly(equation: sp.Eq) -> str:
 def typeset(equation: sp.Eq) -> str:
     """Return one equation in LaTeX."""
     return str(sp.latex(equation, symbol_names=TYPESET))
+
+
+def _zero(expressions: Iterable[sp.Expr]) -> tuple[sp.Eq, ...]:
+    return tuple(sp.Eq(left, sp.S.Zero, evaluate=False) for left in expressions)
 
 
 def _name(names: str, expressions: object) -> tuple[sp.Eq, ...]:

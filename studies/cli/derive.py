@@ -42,7 +42,7 @@ def derive(
     Parameters
     ----------
     dynamics : bool
-        Derive the averaged dynamics of the vibration (Lynch's form, and the CVG paper's equations 7 to 25 from it), and its optimal filters (35, 36).
+        Derive the averaged dynamics of the vibration (Lynch's form; the CVG paper's equations 7 to 25), its transfer functions and poles, and its optimal filters (35, 36).
     bell : bool
         Derive the theory of the bell (BVG paper, equations 1 to 22), beside what is printed, and hold its frequency against the
         solver on the card bvg-bell; about 20 seconds.

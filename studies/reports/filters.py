@@ -16,7 +16,7 @@ SOURCES = (
 
 
 def filter_chapters(study: "FilterStudy", error_map: "ErrorMap") -> list[Chapter]:
-    """Return the chapters for figure 3, the Wiener filters with figure 5, and the Kalman filter with figures 6, 7."""
+    """Return the chapters for the responses (13), (14), figure 3, the Wiener filters with figure 5, and the Kalman filter with figures 6, 7."""
     wiener: list[Block] = [wiener_table(study), draw_filtered(study.figure5, FIGURE5, "Wiener filter")]
     kalman: list[Block] = [
         draw_kalman(study),
@@ -24,6 +24,7 @@ def filter_chapters(study: "FilterStudy", error_map: "ErrorMap") -> list[Chapter
         Text(kalman_sentence(study)),
     ]
     return [
+        Chapter("CVG equations (13), (14): response to a rate that oscillates", [draw_responses(), Text(RESPONSES)]),
         Chapter(
             "CVG figure 3: how far the simplified dynamics reaches",
             [draw_error_map(error_map), Text(map_sentence(error_map))],
@@ -31,6 +32,42 @@ def filter_chapters(study: "FilterStudy", error_map: "ErrorMap") -> list[Chapter
         Chapter("CVG equations (35), (36), figure 5: Wiener filter", wiener),
         Chapter("CVG equations (37)–(41), figures 6 and 7: Kalman filter", kalman),
     ]
+
+
+RESPONSES = (
+    "A rate that oscillates at λ acts as if the excitation were shifted by λ. With equal modes the response is largest for a steady"
+    " rate and falls beyond kζ; a gyro whose modes lie apart responds most where λ is their difference, on one side only."
+)
+APART, LIGHT = 1.02, 0.2
+
+
+def draw_responses() -> Picture:
+    """Draw amplitude and phase (14) over the frequency of the rate, of both signs, for three gyros."""
+    import numpy as np
+
+    from compensation.demodulated import respond_to_oscillating_rate
+    from compensation.sensitive_element import SensitiveElement, tune
+    from studies.papers.cvg_filters import ZETA, K
+
+    tuned = tune(K, ZETA)
+    gyros = {
+        f"equal modes, ζ = {ZETA:g}": tuned,
+        f"k₂ = {APART:g} k₁": SensitiveElement(K, APART * K, ZETA, ZETA, tuned.omega),
+        f"equal modes, ζ = {LIGHT * ZETA:g}": tune(K, LIGHT * ZETA),
+    }
+    frequency = np.linspace(-60.0, 60.0, 1201)
+    with style.figure(2, height=4.6, sharex=True) as (made, (upper, lower)):
+        for name, gyro in gyros.items():
+            amplitude, phase = respond_to_oscillating_rate(gyro, 2 * np.pi * frequency)
+            still, _ = respond_to_oscillating_rate(tuned, 0.0)
+            upper.semilogy(frequency, amplitude / still, label=name)
+            lower.plot(frequency, np.degrees(np.unwrap(phase)))
+        upper.set_ylabel("A(λ) over A(0), tuned")
+        upper.legend(fontsize=8)
+        lower.set_ylabel("phase (°)")
+        lower.set_xlabel("frequency of the rate λ/2π (Hz)")
+    caption = "Amplitude and phase (14) of the secondary per rate, k = 500 Hz; the same excitation for all."
+    return draw(made, caption, "Amplitude and phase over the frequency of the rate.")
 
 
 FIGURE5 = "Square pulses through the full dynamics (1) with white noise (γ = 0.1, B = 3 Hz), and eq. (35) behind it."

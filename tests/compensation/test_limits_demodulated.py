@@ -5,26 +5,24 @@ import pytest
 from scipy.interpolate import CubicSpline
 
 from compensation.demodulated import (
-    map_integral_error,
-    measure_rate,
-    relate_rate_to_measured_rate,
-    relate_rate_to_secondary,
-    relate_rate_to_tuned_amplitude,
-)
-from compensation.errors import CompensationError
-from compensation.motion import demodulate, propagate_envelope
-from compensation.sensitive_element import SensitiveElement, tune
-from tests.compensation.printed_dynamics import (
     find_poles,
     find_slow_pole,
-    integrate_motion,
+    map_integral_error,
+    measure_rate,
     relate_drive_to_primary,
     relate_primary_to_secondary,
+    relate_rate_to_measured_rate,
+    relate_rate_to_secondary,
     relate_rate_to_slow_secondary,
+    relate_rate_to_tuned_amplitude,
     respond_to_oscillating_rate,
     split_primary,
     split_secondary,
 )
+from compensation.errors import CompensationError
+from compensation.motion import demodulate, propagate_envelope
+from compensation.sensitive_element import SensitiveElement, tune
+from tests.compensation.integrated_motion import integrate_motion
 
 MISTUNED = SensitiveElement(3141.0, 3200.0, 0.02, 0.03, 3100.0, q10=2.0, d3=0.6, g1=1.2, g2=1.7)
 TUNED = tune(2 * np.pi * 500, 0.025)
@@ -153,6 +151,59 @@ def test_amplitude_and_phase_are_those_of_the_complex_response():
     np.testing.assert_allclose(
         amplitude * np.exp(1j * phase), relate_rate_to_secondary(MISTUNED).respond(frequency), rtol=1e-12
     )
+
+
+def test_amplitude_response_is_that_of_the_integrated_carrier():
+    """A rate that oscillates at λ: the secondary, through every cycle, has two side bands, A(λ) above and A(−λ) below the carrier."""
+    side = 60.0
+    time = np.arange(0.0, 0.9, 2e-4)
+    motion = integrate_motion(MISTUNED, time, 1e-3 * np.cos(side * time), samples_per_cycle=24)
+    late = motion.time > 0.25
+    t, x = motion.time[late], motion.secondary[late]
+    bands = [MISTUNED.omega, MISTUNED.omega + side, MISTUNED.omega - side]
+    waves = np.column_stack([wave(w * t) for w in bands for wave in (np.cos, np.sin)])
+    found = np.linalg.lstsq(waves, x, rcond=None)[0]
+    for at, sign in ((2, 1), (4, -1)):
+        amplitude, _ = respond_to_oscillating_rate(MISTUNED, sign * side)
+        assert np.hypot(*found[at : at + 2]) == pytest.approx(amplitude * 1e-3 / 2, rel=2e-3)
+
+
+def test_derived_transfer_functions_are_those_of_the_numbers():
+    """Eqs. (8)–(24) as SymPy derives them from (7), at the numbers of a mistuned element."""
+    import sympy
+
+    from compensation.derivation import demodulated as names
+    from compensation.derivation import transfer_functions as derived
+    from compensation.derivation.oscillator import omega
+
+    e, s = MISTUNED, 3.0 + 40j
+    values = {
+        names.k_1: e.k1, names.k_2: e.k2, names.zeta_1: e.zeta1, names.zeta_2: e.zeta2, names.g_2: e.g2, names.q_10: e.q10,
+        omega: e.omega, names.s: s, derived.lam: 41.0, derived.A_1: e.primary_amplitude,
+    }  # fmt: skip
+
+    def number(expression):
+        return complex(sympy.sympify(expression).subs(values).evalf(18))
+
+    A1, W = e.primary_amplitude, relate_rate_to_secondary(e)
+    assert number(derived.settled_primary()) == pytest.approx(A1, rel=1e-12)
+    assert number(derived.rate_to_secondary()) * A1 == pytest.approx(complex(W(s)), rel=1e-10)
+    assert number(derived.rate_to_secondary(slow=True)) * A1 == pytest.approx(
+        complex(relate_rate_to_slow_secondary(e)(s)), rel=1e-10
+    )
+    assert sorted(map(number, derived.poles()), key=abs) == pytest.approx(sorted(find_poles(e), key=abs), rel=1e-9)
+    assert number(derived.slow_pole()) == pytest.approx(find_slow_pole(e), rel=1e-9)
+    response, amplitude, phase = map(number, derived.responses())
+    assert response == pytest.approx(complex(W.respond(41.0)), rel=1e-10)
+    assert amplitude * np.exp(1j * phase) == pytest.approx(response, rel=1e-10)
+    assert tuple(map(number, derived.primary_parts())) == pytest.approx(split_primary(e), rel=1e-12)
+    parts = [number(part) for part in derived.real_parts()]
+    real, imaginary = split_secondary(e)
+    assert (A1.real * parts[0] + A1.imag * parts[1]) / parts[4] == pytest.approx(complex(real(s)), rel=1e-10)
+    assert (A1.real * parts[2] + A1.imag * parts[3]) / parts[4] == pytest.approx(complex(imaginary(s)), rel=1e-10)
+    values |= {derived.k: 300.0, derived.zeta: 0.03}
+    tuned = relate_rate_to_tuned_amplitude(tune(300.0, 0.03, q10=e.q10))(s) * e.g2 / 2
+    assert number(derived.tuned_gain()) == pytest.approx(complex(tuned), rel=1e-10)
 
 
 def test_real_and_imaginary_parts():

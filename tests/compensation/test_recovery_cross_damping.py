@@ -9,7 +9,9 @@ from compensation.cross_damping import (
     RestRun,
     evaluate_cross_damping,
     fit_cross_damping,
+    relate_cross_damping_to_rate,
     relate_cross_damping_to_rate_when_tuned,
+    relate_cross_damping_to_secondary,
     simulate_bias,
 )
 from compensation.demodulated import relate_rate_to_secondary
@@ -17,11 +19,7 @@ from compensation.derivation import filters
 from compensation.errors import CompensationError
 from compensation.motion import demodulate, propagate_envelope
 from compensation.sensitive_element import SensitiveElement, tune
-from tests.compensation.printed_dynamics import (
-    integrate_motion,
-    relate_cross_damping_to_rate,
-    relate_cross_damping_to_secondary,
-)
+from tests.compensation.integrated_motion import integrate_motion
 
 PRINTED = np.array([1.0792e-3, -4.631e-5, 7.7044e-7, -5.8598e-9])
 DEG_PER_H = np.pi / 180 / 3600

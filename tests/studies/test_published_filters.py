@@ -63,5 +63,5 @@ def test_chapters_can_be_drawn(study):
     from studies.reports.filters import filter_chapters
 
     chapters = filter_chapters(study, study_error_map(5))
-    assert [len(chapter.blocks) for chapter in chapters] == [2, 2, 3]
+    assert [len(chapter.blocks) for chapter in chapters] == [2, 2, 2, 3]
     assert cvg_filters.KALMAN_STEP == study.by_step[-1][0]
