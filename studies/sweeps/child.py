@@ -9,12 +9,13 @@ import contextlib
 import json
 import os
 import selectors
+import signal
 import subprocess
 import sys
 import threading
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NoReturn
 
 from studies.errors import InputError
 
@@ -27,6 +28,13 @@ IMPORT_LIMIT = 120.0  # s for the process to start and import the user's module
 
 class FunctionFailed(RuntimeError):
     """The user's function raised, hung, crashed or returned no finite number."""
+
+
+class FunctionLost(RuntimeError):
+    """Somebody else ended the process of the user's function (out of memory, kill): that is no result of the case."""
+
+
+STOPPED = (signal.SIGKILL, signal.SIGTERM, signal.SIGHUP, signal.SIGINT)  # signals that a process does not raise by a fault
 
 
 class Child:
@@ -64,7 +72,7 @@ class Child:
         try:
             self.process.stdin.write(json.dumps({**request, "request": self.asked}).encode() + b"\n")
         except OSError:
-            self.fail("ended its process")
+            self.lose()
         answer = self.read(limit, "one case")
         if answer.get("request") != self.asked:
             self.fail("answered another request than the last")
@@ -80,13 +88,23 @@ class Child:
                 self.fail(f"took longer than its time limit of {limit:g} s for {what} and was stopped")
             piece = os.read(self.process.stdout.fileno(), 65536)
             if not piece:
-                self.fail("ended its process")
+                self.lose()
             self.received += piece
         line, _, self.received = self.received.partition(b"\n")
         answer: dict[str, Any] = json.loads(line)
         return answer
 
-    def fail(self, how: str) -> None:
+    def lose(self) -> NoReturn:
+        """Say how the process ended: by itself, or stopped from outside."""
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            self.process.wait(1.0)  # the pipe closes a moment before the end is known
+        stopped = -(self.process.returncode or 0)
+        if stopped in STOPPED:
+            self.kill()
+            raise FunctionLost(f"{signal.Signals(stopped).name} from outside ended the process of {self.function}")
+        self.fail("ended its process")
+
+    def fail(self, how: str) -> NoReturn:
         """Kill the process and say what the function did."""
         self.kill()
         raise FunctionFailed(f"{self.function} {how}.")
@@ -120,6 +138,8 @@ def ask(function: str, limit: float, case: "Case") -> float:
     ------
     FunctionFailed
         It raised, hung, crashed or returned no finite number.
+    FunctionLost
+        Its process was ended from outside, twice.
     """
     instrument = case.instrument
     request = {
@@ -127,6 +147,13 @@ def ask(function: str, limit: float, case: "Case") -> float:
         "path": instrument.path,
         "parameters": dict(case.parameters),
     }
+    try:
+        return _ask(function, request, limit)
+    except FunctionLost:  # by chance, perhaps; not so the second time
+        return _ask(function, request, limit)
+
+
+def _ask(function: str, request: Mapping[str, Any], limit: float) -> float:
     with _lock:
         child = _children.get(function)
         if child is None or child.process.poll() is not None:

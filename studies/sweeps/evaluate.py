@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from studies.errors import UNUSABLE_INPUT
 from studies.instrument.card import Instrument
 from studies.sweeps.case import Case
-from studies.sweeps.child import FunctionFailed
+from studies.sweeps.child import FunctionFailed, FunctionLost
 from studies.sweeps.parameters import set_parameters
 from studies.sweeps.quantities import library
 from studies.sweeps.row import Row
@@ -60,7 +60,10 @@ def evaluate_case(plan: WorkPlan, parameters: Mapping[str, Any]) -> Row:
         except UNUSABLE_INPUT as error:
             return failed_row(plan, "failed", str(error))
         for name, options, width in plan.asked:
-            numbers, reason = _evaluate(name, options, width, case)
+            try:
+                numbers, reason = _evaluate(name, options, width, case)
+            except FunctionLost as error:
+                return failed_row(plan, "lost", f"{name}: {error}; the next run tries again.")
             values += (number.value for number in numbers)
             errors += (number.error for number in numbers)
             reasons += [reason] if reason else []
@@ -84,6 +87,8 @@ def _evaluate(name: str, options: Mapping[str, Any], width: int, case: Case) -> 
         numbers = library()[name].evaluate(case, options)
     except (*UNUSABLE_INPUT, FunctionFailed) as error:
         return nothing, f"{name}: {error}"
+    except FunctionLost:
+        raise
     except Exception as error:
         return nothing, f"{name}: {type(error).__name__}: {error}"
     if not all(math.isfinite(number.value) for number in numbers):

@@ -48,6 +48,14 @@ def murderer(instrument, parameters):
         time.sleep(600)
     return parameters["user.x"]
 
+def unlucky(instrument, parameters):
+    if parameters["user.x"] == 1 and not os.path.exists("killed"):
+        open("killed", "w").close()
+        os.kill(os.getpid(), 9)
+    if parameters["user.x"] == 2:
+        os.kill(os.getpid(), 15)
+    return parameters["user.x"]
+
 def constant(instrument, parameters):
     return 5.0
 """

@@ -147,6 +147,17 @@ def test_failures_keep_their_reason_and_do_not_stop_the_rest(tmp_path, functions
     assert "one is not welcome" in (tmp_path / "out" / "report.html").read_text()
 
 
+def test_a_function_that_was_killed_is_tried_again_and_its_case_is_lost_and_not_failed(tmp_path, functions, monkeypatch):
+    """As the kernel does when memory runs out: once is chance; twice, the next run tries again."""
+    monkeypatch.chdir(tmp_path)
+    spec = tmp_path / "unlucky.toml"
+    spec.write_text(spec_of("unlucky", 'method = "grid"', 'name = "user.x"\nvalues = [0, 1, 2]'))
+    with contextlib.closing(run_study(spec, tmp_path / "out", workers=1, allow_python=True)) as results:
+        assert results.store.counts() == {"ok": 2, "lost": 1}
+        assert "SIGTERM" in results.remarks[2]
+        assert results.values[1, 0] == 1.0
+
+
 @pytest.mark.slow
 def test_a_design_that_kills_its_worker_is_found_and_the_rest_is_computed(tmp_path, functions, hrg):
     spec = tmp_path / "murder.toml"
