@@ -45,7 +45,8 @@ def run(
     workers : int
         Processes on this machine; one for each core unless given. None are started where a family of designs does it here.
     scheduler : str
-        Address of a Dask scheduler (tcp://HOST:8786), to compute on its workers instead.
+        Address of a Dask scheduler (tcp://HOST:8786), to compute on its workers instead. Use one that you trust: the scheduler
+        and its workers can run code on this machine. A public address needs tls:// and certificates in Dask's configuration.
     card : str
         Another card than the one that the spec names.
     allow_python : bool

@@ -34,7 +34,12 @@ class FunctionLost(RuntimeError):
     """Somebody else ended the process of the user's function (out of memory, kill): that is no result of the case."""
 
 
-STOPPED = (signal.SIGKILL, signal.SIGTERM, signal.SIGHUP, signal.SIGINT)  # signals that a process does not raise by a fault
+STOPPED = (
+    signal.SIGKILL,
+    signal.SIGTERM,
+    signal.SIGHUP,
+    signal.SIGINT,
+)  # signals that a process does not raise by a fault
 
 
 class Child:

@@ -1,23 +1,34 @@
 """Workers on a Dask cluster: the same interface as the pool of processes, for when one machine is not enough.
 
 Start `dask scheduler` on one machine and `dask worker tcp://HOST:8786 --nworkers N --nthreads 1` on each, in the same
-environment with the same version of the workbench.
+environment with the same version of the workbench. Dask sends Python objects: the scheduler, its workers and whoever can
+reach or imitate them can run code on this machine and on each other. So an address without encryption must be private;
+elsewhere `tls://` is needed, with the certificates that Dask's configuration names (`distributed.comm.tls`).
 """
 
+import ipaddress
+import logging
+import socket
+import time
+import warnings
 from collections.abc import Callable
 from concurrent.futures import CancelledError, Future
+from contextlib import suppress
 from importlib import import_module
 from typing import Any
 
-from studies.errors import MissingEnvironment
+from studies.errors import InputError, MissingEnvironment
 
-PATIENCE = 20.0  # s to find the scheduler, and its first worker
+PATIENCE = 20.0  # s to find the scheduler, its first worker, and another after the last one has ended
+GLANCE = 3.0  # s for the scheduler to say which workers it has
+ENCRYPTED = ("tls", "wss")
 
 
 class Cluster:
     """The workers of a Dask scheduler; they belong to whoever started them and go on when the study ends."""
 
     def __init__(self, address: str) -> None:
+        check_private(address)
         try:
             dask: Any = import_module("dask")
             distributed: Any = import_module("distributed")
@@ -26,13 +37,17 @@ class Cluster:
                 "--scheduler needs Dask, which is not installed; install it with pip install 'hrg-workbench[cluster]'."
             ) from None
         self.address = address
+        self.lonely: float | None = None  # since when no worker is left
+        _silence()
+        security = distributed.Security(require_encryption=True) if is_encrypted(address) else None
         try:
             with dask.config.set({"distributed.comm.timeouts.connect": f"{PATIENCE} s"}):
-                self.client = distributed.Client(address, timeout=PATIENCE, set_as_default=False)
+                self.client = distributed.Client(address, timeout=PATIENCE, set_as_default=False, security=security)
                 self.client.wait_for_workers(1, timeout=PATIENCE)
-        except (OSError, TimeoutError, ValueError) as error:
+        except (OSError, TimeoutError, ValueError, TypeError, RuntimeError) as error:
+            more = " Certificates stand under distributed.comm.tls in Dask's configuration." if security else ""
             raise MissingEnvironment(
-                f"{address}: no scheduler with a worker answers ({error}); start both, or correct --scheduler."
+                f"{address}: no scheduler with a worker answers ({error}); start both, or correct --scheduler.{more}"
             ) from error
         self._check_versions()
         self.executor = self.client.get_executor(pure=False, retries=0)
@@ -53,10 +68,37 @@ class Cluster:
         """The scheduler has replaced the lost worker; other tasks go on."""
         return False
 
+    def check(self) -> None:
+        """Say when the last worker has ended; give up when no other comes.
+
+        Raises
+        ------
+        MissingEnvironment
+            No worker has come for `PATIENCE` seconds.
+        """
+        try:
+            there = self.client.sync(self.client.scheduler.ncores, callback_timeout=GLANCE)
+        except (OSError, TimeoutError):  # a scheduler that is lost ends the tasks itself
+            return
+        now = time.monotonic()
+        if there:
+            self.lonely = None
+        elif self.lonely is None:
+            self.lonely = now
+            warnings.warn(
+                f"{self.address}: the last worker has ended; waiting {PATIENCE:g} s for another.", stacklevel=2
+            )
+        elif now - self.lonely > PATIENCE:
+            raise MissingEnvironment(
+                f"{self.address}: no worker is left; everything computed before is kept. Start workers, then run the same"
+                " command again to resume."
+            )
+
     def close(self) -> None:
         """Take back what is queued and leave the cluster."""
-        self.executor.shutdown(wait=False)
-        self.client.close(timeout=5)
+        with suppress(OSError, TimeoutError, RuntimeError, CancelledError):
+            self.executor.shutdown(wait=False)
+            self.client.close(timeout=5)
 
     def _check_versions(self) -> None:
         ours = self.code = describe_code()
@@ -68,6 +110,38 @@ class Cluster:
             raise MissingEnvironment(
                 f"worker {address} has {text}, here is {ours}; install the same versions on every machine."
             )
+
+
+def _silence() -> None:
+    """Keep the libraries from logging tracebacks of connections that end: what is lost is said here, in a sentence."""
+    for name in list(logging.root.manager.loggerDict):
+        if name.partition(".")[0] in ("distributed", "tornado", "asyncio"):
+            logging.getLogger(name).setLevel(logging.CRITICAL)
+
+
+def is_encrypted(address: str) -> bool:
+    """Return whether an address names a protocol with encryption."""
+    return address.partition("://")[0] in ENCRYPTED
+
+
+def check_private(address: str) -> None:
+    """Refuse a public address without encryption: who reaches or imitates the scheduler there could run code here.
+
+    Raises
+    ------
+    InputError
+        The host is public and the protocol not encrypted.
+    """
+    host = address.rpartition("://")[2].rpartition(":")[0].strip("[]")
+    try:
+        found = socket.getaddrinfo(host, None) if host and not is_encrypted(address) else []
+    except OSError:  # the client says that it cannot be found
+        found = []
+    if any(ipaddress.ip_address(str(one[4][0]).partition("%")[0]).is_global for one in found):
+        raise InputError(
+            f"--scheduler {address}: a public address without encryption; whoever reaches or imitates it can run code here."
+            " Use tls:// with certificates (distributed.comm.tls in Dask's configuration), or a private network."
+        )
 
 
 def call_if_same(code: str, function: Callable[..., Any], *arguments: Any) -> Any:

@@ -30,6 +30,7 @@ TASK_SECONDS = 1.0  # a task should last so long: long against its cost, short a
 BATCH, BATCH_VECTORISED = 8, 1024  # cases, where the spec says nothing
 TRIES_ALONE = 2  # of a case whose worker is lost
 STILLBORN = 3  # losses before anything was computed, after which the workers cannot be started
+LOOK_EVERY = 2.0  # s without an answer, after which the workers are looked after
 MOST_TASKS = 2  # queued for each worker, so that millions of cases do not swamp a scheduler
 
 
@@ -110,7 +111,10 @@ def compute(
             _submit(suspects.popleft(), plan, workers, running)
         while batches and not suspects and len(running) < MOST_TASKS * workers.count and not _any_alone(running):
             _submit(_Task([take() for _ in range(min(size, len(batches)))]), plan, workers, running)
-        for future in wait(running, return_when=FIRST_COMPLETED).done:
+        finished = wait(running, LOOK_EVERY, FIRST_COMPLETED).done
+        if not finished:
+            workers.check()
+        for future in finished:
             task = running.pop(future, None)
             if task is None:
                 continue

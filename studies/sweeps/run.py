@@ -57,7 +57,7 @@ def run_study(
         Processes on this machine; one for every core unless given. With 1 everything is computed in this process. In a
         script, more than one need the guard `if __name__ == "__main__":`.
     scheduler : str, optional
-        Address of a Dask scheduler, instead of processes here.
+        Address of a Dask scheduler, instead of processes here; it and its workers can run code here (`studies.sweeps.cluster`).
     allow_python : bool
         Run the user functions that the spec names.
     retry_failed : bool

@@ -35,6 +35,10 @@ class Workers(Protocol):
         """Be usable again after a worker was lost; True when every other running task was lost with it."""
         ...
 
+    def check(self) -> None:
+        """Look after the workers while nothing comes back; MissingEnvironment when none is left."""
+        ...
+
     def close(self) -> None:
         """End every worker at once; what they were doing is lost."""
         ...
@@ -56,6 +60,9 @@ class Here:
     def restart(self) -> bool:
         """Nothing can be lost."""
         return False
+
+    def check(self) -> None:
+        """Nothing can be lost."""
 
     def close(self) -> None:
         """Nothing to end."""
@@ -84,6 +91,9 @@ class Pool:
         self.close()
         self._start()
         return True
+
+    def check(self) -> None:
+        """The pool itself tells of a process that is lost."""
 
     def close(self) -> None:
         """Kill the processes."""

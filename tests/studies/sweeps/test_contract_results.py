@@ -1,16 +1,18 @@
 """Contract of results: the same with any workers, on a cluster, in any order; tables with units; a self-contained page."""
 
 import gc
+import shutil
 import socket
 import sqlite3
 import subprocess
 import sys
 import time
+from contextlib import contextmanager, nullcontext
 from dataclasses import replace
 
 import pytest
 
-from studies.errors import MissingEnvironment
+from studies.errors import InputError, MissingEnvironment
 from studies.reports.sweep import sweep_page
 from studies.sweeps.progress import Lines
 from studies.sweeps.run import run_study
@@ -107,21 +109,15 @@ def answers(address: str) -> bool:
         return probe.connect_ex((host, int(port))) == 0
 
 
-@pytest.fixture
-def cluster():
-    pytest.importorskip("distributed", reason="the extra 'cluster' (dask[distributed]) is not installed")
-    address = f"tcp://127.0.0.1:{free_port()}"
+@contextmanager
+def started(*commands: list[str]):
+    """Run `dask` commands as processes, the first of them a scheduler."""
     quiet = {"DASK_DISTRIBUTED__LOGGING__DISTRIBUTED": "error"}
-    scheduler_words = ["scheduler", "--host", "127.0.0.1", "--port", address.rpartition(":")[2], "--no-dashboard"]
-    worker_words = ["worker", address, "--nworkers", "2", "--nthreads", "1", "--no-dashboard"]
     processes = [
         subprocess.Popen([sys.executable, "-m", "dask", *words], env=environment(**quiet), stderr=subprocess.DEVNULL, stdout=subprocess.DEVNULL)
-        for words in (scheduler_words, worker_words)
+        for words in commands
     ]  # fmt: skip
-    until = time.monotonic() + 600
-    while not answers(address) and time.monotonic() < until:
-        time.sleep(0.2)
-    yield address, processes[0]
+    yield processes
     for process in reversed(processes):
         process.terminate()
     for process in processes:
@@ -132,9 +128,21 @@ def cluster():
             process.wait()
 
 
+@pytest.fixture
+def cluster():
+    pytest.importorskip("distributed", reason="the extra 'cluster' (dask[distributed]) is not installed")
+    address = f"tcp://127.0.0.1:{free_port()}"
+    scheduler = ["scheduler", "--host", "127.0.0.1", "--port", address.rpartition(":")[2], "--no-dashboard"]
+    with started(scheduler, ["worker", address, "--nworkers", "2", "--nthreads", "1", "--no-dashboard"]) as processes:
+        until = time.monotonic() + 120
+        while not answers(address) and time.monotonic() < until:
+            time.sleep(0.2)
+        yield address, *processes
+
+
 @pytest.mark.slow
 def test_two_dask_workers_give_the_same_bits_and_a_lost_scheduler_is_resumable(cluster, results, tmp_path, functions):
-    address, scheduler = cluster
+    address, scheduler, _ = cluster
     spec = tmp_path / "study.toml"
     spec.write_text(
         spec_of("slow", 'method = "latin-hypercube"\ncases = 3000\nbatch = 4', 'name = "user.x"\nlow = 0\nhigh = 1')
@@ -154,7 +162,72 @@ def test_two_dask_workers_give_the_same_bits_and_a_lost_scheduler_is_resumable(c
     _, said = run.communicate(timeout=600)
     assert run.returncode == 3, said
     assert "resume" in said
+    assert "Traceback" not in said
     assert 0 < len(rows_of(tmp_path / "out")) < 3000
+
+
+@pytest.mark.parametrize(
+    ("address", "public"),
+    [
+        ("tcp://8.8.8.8:8786", True), ("8.8.8.8:8786", True), ("tcp://[2001:4860:4860::8888]:8786", True), ("ws://1.1.1.1:80", True),
+        ("tls://8.8.8.8:8786", False), ("tcp://127.0.0.1:8786", False), ("tcp://192.168.1.7:8786", False), ("[::1]:8786", False),
+        ("tcp://10.0.0.9:8786", False), ("tcp://nowhere.invalid:8786", False),
+    ],
+)  # fmt: skip
+def test_a_public_scheduler_needs_encryption(address, public):
+    from studies.sweeps.cluster import check_private
+
+    with pytest.raises(InputError, match="public address without encryption") if public else nullcontext():
+        check_private(address)
+
+
+@pytest.mark.slow
+def test_the_end_of_the_last_worker_is_said_and_the_study_is_resumable(cluster, tmp_path, functions):
+    address, _, worker = cluster
+    spec = tmp_path / "study.toml"
+    spec.write_text(
+        spec_of("slow", 'method = "latin-hypercube"\ncases = 30000\nbatch = 4', 'name = "user.x"\nlow = 0\nhigh = 1')
+    )
+    words = words_of(
+        "study", "run", str(spec), "--out", str(tmp_path / "out"), "--scheduler", address, "--allow-python"
+    )
+    run = subprocess.Popen(
+        words, stderr=subprocess.PIPE, text=True, env=environment(HRG_TEST_LOG=str(tmp_path / "log"))
+    )
+    until = time.monotonic() + 240
+    while run.poll() is None and time.monotonic() < until and not rows_of(tmp_path / "out"):
+        time.sleep(0.1)
+    worker.terminate()
+    _, said = run.communicate(timeout=120)
+    assert run.returncode == 3, said
+    assert "the last worker has ended" in said
+    assert "no worker is left" in said
+    assert "Traceback" not in said
+
+
+@pytest.mark.slow
+def test_a_cluster_with_certificates(tmp_path, results, monkeypatch):
+    """Certificates as `openssl` makes them; the client takes them from Dask's own configuration."""
+    pytest.importorskip("distributed", reason="the extra 'cluster' (dask[distributed]) is not installed")
+    if shutil.which("openssl") is None:
+        pytest.skip("openssl is not installed")
+    key, cert = tmp_path / "key.pem", tmp_path / "cert.pem"
+    ask = f"openssl req -x509 -newkey rsa:2048 -nodes -days 2 -subj /CN=localhost -addext subjectAltName=IP:127.0.0.1 -keyout {key} -out {cert}"
+    subprocess.run(ask.split(), check=True, capture_output=True)
+    address = f"tls://127.0.0.1:{free_port()}"
+    given = ["--tls-ca-file", str(cert), "--tls-cert", str(cert), "--tls-key", str(key)]
+    scheduler = ["scheduler", "--host", "tls://127.0.0.1", "--port", address.rpartition(":")[2], "--no-dashboard"]
+    with started([*scheduler, *given], ["worker", address, "--nthreads", "1", "--no-dashboard", *given]):
+        with pytest.raises(MissingEnvironment, match=r"distributed\.comm\.tls"):
+            run_study(SPEC, scheduler=address)
+        import dask
+
+        tls = "distributed.comm.tls"
+        with dask.config.set(
+            {f"{tls}.ca-file": str(cert), f"{tls}.client.cert": str(cert), f"{tls}.client.key": str(key)}
+        ):
+            again = run_study(SPEC, scheduler=address)
+    assert again.values.tobytes() == results.values.tobytes()
 
 
 def test_missing_dask_is_said(monkeypatch):

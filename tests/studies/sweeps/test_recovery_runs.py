@@ -147,7 +147,9 @@ def test_failures_keep_their_reason_and_do_not_stop_the_rest(tmp_path, functions
     assert "one is not welcome" in (tmp_path / "out" / "report.html").read_text()
 
 
-def test_a_function_that_was_killed_is_tried_again_and_its_case_is_lost_and_not_failed(tmp_path, functions, monkeypatch):
+def test_a_function_that_was_killed_is_tried_again_and_its_case_is_lost_and_not_failed(
+    tmp_path, functions, monkeypatch
+):
     """As the kernel does when memory runs out: once is chance; twice, the next run tries again."""
     monkeypatch.chdir(tmp_path)
     spec = tmp_path / "unlucky.toml"
