@@ -1,5 +1,6 @@
 """Whether a record is of the gyro that a card or a model stands for: a question, with the sentence that confirms it."""
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -14,6 +15,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 ALIKE = 0.03  # relative: what trimming, temperature and small errors of dimensions make of a frequency
 SPREADS = 6.0  # standard deviations of the card's own frequency
+ONE_GYRO, STEEPEST = 5e-3, 3e-4  # relative, and 1/K: what one gyro does from run to run, and over temperature at most
 SAME_GYRO = 0.01  # relative: one gyro over temperature, beyond the range of its model
 
 
@@ -41,6 +43,28 @@ def check_card_frequency(instrument: "Instrument", frequency: Array, path: str) 
         f" known to {100 * spread:.2g} %: is this a record of that gyro? If it is, say so in the card, with a dimension"
         f" that is as uncertain: [resonator] thickness_mm = {{ value = …, relative_sd = {np.ceil(50 * away) / 100:g} }}."
     )
+
+
+def check_one_gyro(readings: "Sequence[tuple[str, Array, Array]]") -> None:
+    """Refuse records of different gyros: path, temperature (°C) and frequency (Hz) of each.
+
+    Raises
+    ------
+    InputError
+        Frequencies further apart than 0.5 % beside what 300 ppm/K make of their temperatures.
+    """
+    levels = []
+    for path, T, f in readings:
+        known = np.isfinite(T) & np.isfinite(f)
+        if known.any():
+            levels.append((float(np.median(f[known])), float(np.median(T[known])), path))
+    for near, warm, path in levels:
+        for other, warmth, first in levels:
+            if abs(float(np.log(near / other))) > ONE_GYRO + STEEPEST * abs(warm - warmth):
+                raise InputError(
+                    f"{path}: frequency_Hz is about {near:.6g} Hz at {warm:.3g} °C, in {first} about {other:.6g} Hz at {warmth:.3g} °C:"
+                    " no gyro changes so much. The records are of different gyros, or one is in another unit: give those of one."
+                )
 
 
 def check_model_frequency(frequency: Array, lowest: float, highest: float, path: str, model: str) -> None:

@@ -174,6 +174,29 @@ def reading_resolution(values: "NDArray[np.float64]") -> float:
     return float(10.0**-decimals)
 
 
+def drop_repeats(records: "Sequence[Record]") -> tuple[list[Record], list[str]]:
+    """Return the records without those that repeat another, whatever the file's name, and a sentence for each that was left out."""
+    kept: list[Record] = []
+    said = []
+    for record in records:
+        twin = next((other for other in kept if _same(record, other)), None)
+        if twin is None:
+            kept.append(record)
+        else:
+            said.append(f"{record.path or 'a record'} repeats {twin.path or 'another'} and is left out.")
+    return kept, said
+
+
+def _same(one: Record, two: Record) -> bool:
+    import numpy as np
+
+    if one.sha256 and one.sha256 == two.sha256:
+        return True
+    return set(one.columns) == set(two.columns) and all(
+        np.array_equal(one.columns[key], two.columns[key], equal_nan=True) for key in one.columns
+    )
+
+
 def read_profile(path: str | Path) -> Columns:
     """Read a chamber profile `time_s,chamber_temperature_degC`, linear between its rows."""
     import numpy as np

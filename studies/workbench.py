@@ -100,6 +100,7 @@ def diagnose(*runs: Run, card: Card | None = None) -> "Diagnosis | TableDiagnosi
     InputError
         Records that cannot be used together.
     """
+    from studies.calibration.misreading import check_readings
     from studies.diagnosis.campaign import load_campaign
     from studies.diagnosis.investigate import investigate
     from studies.diagnosis.table import diagnose_table
@@ -116,6 +117,7 @@ def diagnose(*runs: Run, card: Card | None = None) -> "Diagnosis | TableDiagnosi
         return investigate(load_campaign(records))
     instrument = open_card(card)
     campaign = load_campaign(records, instrument.reference_temperature - zero_Celsius)
+    check_readings(instrument, records)
     instrument.material.check(np.concatenate([run.states.housing for run in campaign.runs]))
     return investigate(campaign, card=instrument)
 

@@ -8,19 +8,22 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import block_diag
 
+from shell.errors import ShellError
 from studies.calibration.ahead import BIAS
 from studies.calibration.estimates import Estimate, estimate, find_groups
 from studies.calibration.fit import CardFit, fit, whitened
 from studies.calibration.ladder import Rung, build_ladder, noise_rms, spread_of, usual_mean
+from studies.calibration.misreading import check_readings
 from studies.calibration.observed import HOUSING, QUADRATURE, RESPONSES, SETTLED, ObservedRun, SettledTable, observe
 from studies.calibration.priors import Priors, gather_priors
 from studies.calibration.problem import JUMP, SHIFT, CardProblem, State, wide_law
 from studies.calibration.remarks import warn
 from studies.calibration.settled import SettledComparison, compare_settled
 from studies.errors import InputError
-from studies.plausible import check_card_frequency
-from studies.record import Record
+from studies.plausible import check_card_frequency, check_one_gyro
+from studies.record import Record, drop_repeats
 from studies.shown import Shown
+from studies.simulation.drive import COLUMN
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -186,6 +189,11 @@ def calibrate(
     """
     if not records and not tables:
         raise InputError("nothing is calibrated without a record or a steady-state table.")
+    given, (records, repeated) = records, drop_repeats(records)
+    if hold_out is not None:  # the one that a repeated record repeats
+        held = given[hold_out % len(given)]
+        hold_out = next((k for k, one in enumerate(records) if one is held), len(records) - 1)
+    tables = [one for k, one in enumerate(tables) if not any(one.repeats(other) for other in tables[:k])]
     loop = instrument.loop
     named = RESPONSES if loop is None else (*RESPONSES, QUADRATURE)
     turning = loop is not None and loop.mode == "whole-angle"
@@ -195,7 +203,15 @@ def calibrate(
             check_card_frequency(instrument, record["frequency_Hz"], record.path)
     for table in tables:
         check_card_frequency(instrument, table.frequency, table.path)
-    problem = _pose(instrument, runs, tables, exact)
+    check_one_gyro(
+        [(record.path, _driving(record), record["frequency_Hz"]) for record in records if "frequency_Hz" in record]
+    )
+    try:
+        problem = _pose(instrument, runs, tables, exact)
+    except ShellError:
+        check_readings(instrument, records)  # a temperature beyond the law may be one in °F
+        raise
+    check_readings(instrument, records, problem.law)
     settled = compare_settled(problem)
     found = fit(problem, progress=progress)
     held_out = None
@@ -214,9 +230,15 @@ def calibrate(
         find_groups(found),
         ladder,
         held_out,
-        warn(found, estimates, ladder),
+        (*repeated, *warn(found, estimates, ladder)),
         settled,
     )
+
+
+def _driving(record: Record) -> Array:
+    """Temperature of a record, °C."""
+    name = next((one for one in COLUMN.values() if one in record), None)
+    return np.full(len(record), np.nan) if name is None else np.asarray(record[name])
 
 
 def _pose(

@@ -100,6 +100,10 @@ class SettledTable:
     frequency: Array
     resolution: float
 
+    def repeats(self, other: "SettledTable") -> bool:
+        """Return whether another table has the same rows."""
+        return np.array_equal(self.temperature, other.temperature) and np.array_equal(self.frequency, other.frequency)
+
     @property
     def rounding(self) -> float:
         """Noise of the last digit, Hz."""

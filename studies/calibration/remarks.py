@@ -10,6 +10,7 @@ from studies.calibration.ahead import BIAS
 from studies.calibration.estimates import SILENT, Estimate
 from studies.calibration.fit import CardFit, stated_noise
 from studies.calibration.ladder import Rung, noise_rms, usual_mean
+from studies.calibration.misreading import bias_in_seconds
 from studies.calibration.observed import UNITS
 from studies.calibration.problem import CardProblem
 from studies.simulation.virtual_gyro import idle_effects
@@ -29,6 +30,8 @@ def warn(found: CardFit, estimates: Sequence[Estimate], ladder: Mapping[str, Run
             f"the fit has not converged in {found.steps} steps: its values may still move and are no result."
         )
     for run in found.problem.runs:
+        said = bias_in_seconds(found.problem.instrument, run.record)
+        warnings += [] if said is None else [said]
         warnings += [f"{run.record.path}: {idle}" for idle in idle_effects(found.problem.instrument, run.inner)]
     warnings += [*_moved(estimates), *_unsettled(found), *_misfit(found, ladder)]
     rows = found.problem.rows

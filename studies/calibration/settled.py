@@ -28,7 +28,7 @@ NOTABLE = 2.0
 """Standard deviations of the level from which on it is said what would bridge it."""
 READ_AS: dict[str, Callable[[Array], Array]] = {
     "in °F": lambda T: (T - zero_Celsius - 32.0) / 1.8 + zero_Celsius,
-    "with the sign turned": lambda T: 2.0 * zero_Celsius - T,
+    "with the opposite sign": lambda T: 2.0 * zero_Celsius - T,
 }
 """What a temperature column may have been, K: not in °C, or not with its sign."""
 

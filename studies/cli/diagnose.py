@@ -120,6 +120,7 @@ def _campaign(
     import numpy as np
     from scipy.constants import zero_Celsius
 
+    from studies.calibration.misreading import check_readings
     from studies.cli.output import print_table, say
     from studies.cli.telling import Told
     from studies.diagnosis.campaign import load_campaign
@@ -134,6 +135,7 @@ def _campaign(
     records = [read_record(path) for path in runs]
     campaign = load_campaign(records, reference)
     if instrument is not None:
+        check_readings(instrument, records)
         instrument.material.check(np.concatenate([np.empty(0), *(run.states.housing for run in campaign.runs)]))
     told = Told("diagnosis")
     diagnosis = investigate(campaign, progress=told, chamber=limits, card=instrument)

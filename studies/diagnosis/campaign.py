@@ -16,7 +16,7 @@ from studies.diagnosis.response import RESPONSES
 from studies.diagnosis.steps import Steps
 from studies.effects.states import FloatArray, States, average
 from studies.errors import InputError
-from studies.record import Record, place_in_time
+from studies.record import Record, drop_repeats, place_in_time
 from studies.rest import LEAST_SPIKE
 
 TEMPERATURES = ("housing_temperature_degC", "chamber_temperature_degC", "resonator_temperature_degC")
@@ -147,7 +147,10 @@ def load_campaign(records: Sequence[Record], reference_degC: float | None = None
         If the records disagree about the gyro, lack a temperature or a response, or use another unit.
     """
     notes: list[str] = []
-    records = _drop_duplicates(records, notes)
+    if not records:
+        raise InputError("a diagnosis needs one record or more.")
+    records, repeated = drop_repeats(records)
+    notes += repeated
     source = _temperature_source(records)
     tables = [_columns(record, source) for record in records]
     check_units(records, tables)
@@ -248,27 +251,6 @@ def _reading_noise(temperature: FloatArray) -> float:
 
 def _without(run: Run, drive: str) -> Run:
     return replace(run, states=replace(run.states, **{drive: None}))  # type: ignore[arg-type]
-
-
-def _drop_duplicates(records: Sequence[Record], notes: list[str]) -> list[Record]:
-    if not records:
-        raise InputError("a diagnosis needs one record or more.")
-    kept: list[Record] = []
-    for record in records:
-        twin = next((other for other in kept if _same(record, other)), None)
-        if twin is None:
-            kept.append(record)
-        else:
-            notes.append(f"{record.path or 'a record'} repeats {twin.path or 'another'} and is left out.")
-    return kept
-
-
-def _same(one: Record, two: Record) -> bool:
-    if one.sha256 and one.sha256 == two.sha256:
-        return True
-    return set(one.columns) == set(two.columns) and all(
-        np.array_equal(one.columns[key], two.columns[key], equal_nan=True) for key in one.columns
-    )
 
 
 def _temperature_source(records: Sequence[Record]) -> str:

@@ -6,10 +6,13 @@ import numpy as np
 
 from studies.effects.states import FloatArray
 from studies.errors import InputError
+from studies.plausible import check_one_gyro
 from studies.record import Record
 
 FEWEST_BINS = 24
 """Values from which on the noise of a response can be told."""
+MOST_LOSS = 30.0
+"""Times by which 1/Q of one gyro may differ from record to record."""
 FASTEST = 1.0
 """Mean rate of temperature over a record, K/s, beyond which its time cannot be in seconds."""
 
@@ -43,17 +46,23 @@ def check_device(records: Sequence[Record], tables: Sequence[dict[str, FloatArra
     if len(names) > 1:
         (one, first), (two, second), *_ = names.items()
         raise InputError(f"{second}: instrument '{two}' is not that of {first}, '{one}'; diagnose one gyro at a time.")
-    for name, most in (("frequency_Hz", 1.03), ("inverse_q", 30.0)):
-        levels = [
-            (float(np.nanmedian(table[name])), record.path)
+    check_one_gyro(
+        [
+            (record.path, table["temperature"], table["frequency_Hz"])
             for record, table in zip(records, tables, strict=True)
-            if name in table
+            if "frequency_Hz" in table
         ]
-        if levels and max(levels)[0] > most * min(levels)[0]:
-            raise InputError(
-                f"{max(levels)[1]}: {name} is about {max(levels)[0]:g}, in {min(levels)[1]} about {min(levels)[0]:g}; "
-                "the records are of different gyros, or one is in another unit."
-            )
+    )
+    levels = [
+        (float(np.nanmedian(table["inverse_q"])), record.path)
+        for record, table in zip(records, tables, strict=True)
+        if "inverse_q" in table
+    ]
+    if levels and max(levels)[0] > MOST_LOSS * min(levels)[0]:
+        raise InputError(
+            f"{max(levels)[1]}: inverse_q is about {max(levels)[0]:g}, in {min(levels)[1]} about {min(levels)[0]:g}; "
+            "the records are of different gyros, or one is in another unit."
+        )
     spreads = []
     for record, table in zip(records, tables, strict=True):
         if "bias_deg_per_h" in table and np.isfinite(table["bias_deg_per_h"]).sum() > FEWEST_BINS:

@@ -14,7 +14,8 @@ if TYPE_CHECKING:
     from shell.resonator import Resonator, Stem, Support
 
 MM = 1e-3
-SMALLEST, LARGEST = 1e-6, 1.0  # m
+SMALLEST, LARGEST = 1e-4, 1.0  # m: micro-hemispheres begin at some tenths of a millimetre
+RADIANS = 2 * math.pi  # no dome ends at so few degrees: the angle is in radians
 Length = Annotated[float, number(above=0.0)]
 NotNegative = Annotated[float, number(least=0.0)]
 Share = Annotated[float, number(least=0.0, most=1.0)]
@@ -93,6 +94,15 @@ class Hemisphere(Stemmed, frozen=True, kw_only=True, tag="hemisphere"):
     radius_mm: Length
     rim_angle_deg: Annotated[float, number(above=0.0, most=180.0)] = 90.0
     pole_angle_deg: Annotated[float, number(least=0.0, below=180.0)] = 0.0
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.rim_angle_deg <= RADIANS:
+            angle = math.degrees(self.rim_angle_deg)
+            raise ValueError(
+                f"rim_angle_deg = {self.rim_angle_deg:g} is no dome; it looks like radians: {self.rim_angle_deg:g} rad are"
+                f" {angle:.4g}°."
+            )
 
     def build(self) -> "Resonator":
         """Return the resonator in SI units."""

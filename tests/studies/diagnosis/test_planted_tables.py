@@ -96,7 +96,7 @@ def beside_card(folder, T, f, card=CARD):
 @pytest.mark.parametrize(
     ("spoil", "said"),
     [
-        (lambda f: 2.0 * f[13] - f, "26 standard deviations. Read with the sign turned"),
+        (lambda f: 2.0 * f[13] - f, "26 standard deviations. Read with the opposite sign"),
         (lambda f: 1.5 * f, "is this a record of that gyro"),
         (lambda f: 8110.0 * (1.0 - 27e-6 * (WIDE - 20.0)), "is this a record of that gyro"),
         (lambda f: f[13] * (1.0 - 27e-6 * (WIDE - WIDE[13])), "not a table of that gyro"),

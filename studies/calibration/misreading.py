@@ -1,0 +1,89 @@
+"""Readings that are not what their column says: temperatures in °F or with the opposite sign, a bias in °/s."""
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.constants import zero_Celsius
+
+from compensation.wander import white_noise
+from shell.errors import ShellError
+from studies.calibration.ahead import BIAS
+from studies.calibration.settled import READ_AS
+from studies.errors import InputError
+from studies.law import law_of
+from studies.simulation.drive import COLUMN, drive_by_record
+from studies.simulation.noise import bias_noise
+from studies.simulation.prediction import predict
+from thermal.errors import ThermalError
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from shell.law import FrequencyLaw
+    from studies.instrument.card import Instrument
+    from studies.record import Record
+
+FREQUENCY = "frequency_Hz"
+ROWS = 400
+FOLLOWED, REFUSED = 0.3, 0.4
+"""Parts of a frequency's changes: left of them by a reading that agrees, and by one that does not."""
+CLEAR = 20.0
+"""Times its own noise by which a frequency must change before it says how a temperature is to be read."""
+SECONDS = 3600.0
+LIKE = 10.0
+"""Times by which the noise of a bias in its right unit may differ from what the card states."""
+
+
+def check_readings(instrument: "Instrument", records: "Sequence[Record]", law: "FrequencyLaw | None" = None) -> None:
+    """Refuse records whose frequency follows the temperatures only if these are read otherwise.
+
+    Raises
+    ------
+    InputError
+        The card leaves most of the frequency's changes, and little of them with the temperatures in °F or with the opposite sign.
+    """
+    for record in records:
+        names = [name for name in COLUMN.values() if name in record]
+        if FREQUENCY not in record or not names:
+            continue
+        known = record[FREQUENCY][np.isfinite(record[FREQUENCY])]
+        changes = float(np.std(known)) if known.size > 2 else 0.0
+        if changes <= CLEAR * white_noise(known):
+            continue
+        left = _left(instrument, record, law or law_of(instrument))
+        if left < REFUSED * changes:
+            continue
+        whole = law_of(instrument)
+        for words, read in READ_AS.items():
+            columns = {name: read(record[name] + zero_Celsius) - zero_Celsius for name in names}
+            other = _left(instrument, record.with_columns(columns), whole)
+            if other < min(FOLLOWED * changes, left / 3):
+                raise InputError(
+                    f"{record.path}: frequency_Hz does not follow the temperatures as the card predicts, but does so if they are read"
+                    f" {words}: {other:.2g} Hz of its {changes:.2g} Hz (rms) then remain. Correct {' and '.join(names)}."
+                )
+
+
+def bias_in_seconds(instrument: "Instrument", record: "Record") -> str | None:
+    """Return a sentence where a bias scatters 3600 times less than the card states, as one in °/s does; else None."""
+    if BIAS not in record or len(record) < ROWS // 10:
+        return None
+    stated = bias_noise(instrument.noise).white / np.sqrt(float(np.median(np.diff(record["time_s"]))))
+    scatter = white_noise(record[BIAS])
+    if stated <= 0 or not stated / LIKE < SECONDS * scatter < stated * LIKE:
+        return None
+    return (
+        f"{record.path}: {BIAS} scatters by {scatter:.2g} °/h from row to row, {stated / scatter:.0f} times less than the card states:"
+        " it looks like °/s; multiply the column by 3600."
+    )
+
+
+def _left(instrument: "Instrument", record: "Record", law: "FrequencyLaw") -> float:
+    """Rms of measured minus predicted frequency about its mean, with the card as given; infinite where it cannot be predicted."""
+    time = record["time_s"]
+    places = np.unique(np.linspace(0, len(time) - 1, min(ROWS, len(time))).astype(int))
+    try:
+        found = predict(instrument, drive_by_record(record, time=time[places]), (), law)
+    except (ShellError, ThermalError):
+        return np.inf
+    return float(np.nanstd(record[FREQUENCY][places] - found.columns[FREQUENCY]))

@@ -1,0 +1,109 @@
+"""Mistakes of the person at the bench end in their cause: °F, a turned sign, °/s, a file given twice, two gyros, metres and radians."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from studies.calibration.calibrate import calibrate
+from studies.calibration.misreading import bias_in_seconds, check_readings
+from studies.calibration.observed import observe, read_settled
+from studies.diagnosis.campaign import load_campaign
+from studies.errors import InputError
+from studies.instrument.card import load_card, save_card
+from studies.simulation.chamber import load_profile
+from studies.simulation.virtual_gyro import simulate_run
+
+TEMPERATURES = ("housing_temperature_degC", "chamber_temperature_degC")
+
+
+@pytest.fixture(scope="module")
+def card():
+    return load_card("hrg-30mm")
+
+
+@pytest.fixture(scope="module")
+def record(card):
+    made = simulate_run(card, load_profile("cycle 20 -15 40 0.5 30min 1"), 1 / 60, 1).record
+    return dataclasses.replace(made, path="run.csv")
+
+
+def spoilt(record, **changed):
+    return record.with_columns({name: read(record[name]) for name, read in changed.items()})
+
+
+def with_temperatures(record, read):
+    return spoilt(record, **dict.fromkeys(TEMPERATURES, read))
+
+
+@pytest.mark.parametrize(
+    ("read", "said"),
+    [(lambda T: 1.8 * T + 32.0, "read in °F"), (lambda T: -T, "read with the opposite sign")],
+    ids=["degF", "sign"],
+)
+def test_temperatures_that_are_something_else_are_named(read, said, card, record):
+    """In °F the fit once converged, the modulus six standard deviations off; with the sign turned it ended after 30 steps."""
+    with pytest.raises(InputError, match=f"run.csv: frequency_Hz does not follow the temperatures .* {said}"):
+        calibrate(card, [with_temperatures(record, read)])
+
+
+def test_temperatures_in_fahrenheit_beyond_the_law_are_named_and_not_its_range(card, record):
+    far = with_temperatures(record, lambda T: 1.8 * (T + 60.0) + 32.0)
+    own = spoilt(far, frequency_Hz=lambda f: f + 4432.0 * 88.7e-6 * 60.0)
+    with pytest.raises(InputError, match="read in °F"):
+        check_readings(card, [own])
+
+
+def test_a_right_record_and_one_of_a_card_somewhat_off_are_not_questioned(card, record):
+    check_readings(card, [record])
+    stiff = next(v for v in card.uncertain if v.name == "material.deviation.shear_modulus.log_slope_per_K")
+    check_readings(card.with_values({stiff.name: 3.0 * stiff.sd, "thermal.mount_conductance_W_per_K": 0.007}), [record])
+    flat = spoilt(record, frequency_Hz=lambda f: 4432.0 + 1e-3 * np.random.default_rng(1).standard_normal(f.size))
+    check_readings(card, [flat])
+
+
+def test_a_bias_in_degrees_per_second_is_named(card, record):
+    assert bias_in_seconds(card, record) is None
+    said = bias_in_seconds(card, spoilt(record, bias_deg_per_h=lambda b: b / 3600.0))
+    assert said is not None
+    assert "run.csv" in said
+    assert "it looks like °/s; multiply the column by 3600" in said
+
+
+def test_a_record_given_twice_counts_once_and_holds_nothing_out(card, record):
+    known = [value.name for value in card.uncertain if not value.name.startswith("loss.")]
+    again = dataclasses.replace(record, path="copy.csv")
+    found = calibrate(card, [record, again], hold_out=1, exact=known, profile=False)
+    assert any("copy.csv repeats run.csv and is left out" in warning for warning in found.warnings)
+    assert found.held_out is None
+    assert len(found.fit.problem.runs) == len(observe([record]))
+    table = read_settled("studies/papers/hrg_table1.csv")
+    assert len(calibrate(card, [], [table, table], profile=False).fit.problem.tables) == 1
+
+
+def test_two_gyros_are_not_mixed(card, record):
+    """2.8 % apart at one temperature: a diagnosis without a card once added three effects."""
+    other = dataclasses.replace(spoilt(record, frequency_Hz=lambda f: f * 4555.0 / 4432.0), path="other.csv")
+    with pytest.raises(InputError, match="The records are of different gyros"):
+        load_campaign([record, other])
+    with pytest.raises(InputError, match="The records are of different gyros"):
+        calibrate(card, [record, other])
+
+
+@pytest.mark.parametrize(
+    ("changed", "said"),
+    [
+        ({"radius_mm": 0.015, "thickness_mm": 0.0009}, "Lengths are in mm, not in m"),
+        ({"rim_angle_deg": 1.5708}, "it looks like radians: 1.5708 rad are 90°"),
+    ],
+    ids=["metres", "radians"],
+)
+def test_a_card_in_metres_or_radians_is_implausible(changed, said, tmp_path):
+    text = tmp_path / "card.toml"
+    save_card(load_card("free-dome"), text)
+    lines = [line for line in text.read_text(encoding="utf-8").splitlines() if line.split(" = ")[0] not in changed]
+    place = lines.index("[resonator]") + 1
+    lines[place:place] = [f"{name} = {value}" for name, value in changed.items()]
+    text.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    with pytest.raises(InputError, match=said):
+        load_card(text).resonator  # noqa: B018
