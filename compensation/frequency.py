@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import elementwise
 
 from compensation.errors import CompensationError
-from compensation.polynomial import PolynomialFit, fit_polynomial
+from compensation.polynomial import PolynomialFit, count_apart, fit_polynomial
 from compensation.regression import FTest, compare_nested
 
 Array = NDArray[np.float64]
@@ -266,7 +266,7 @@ def compare_orders(
     F(1, m − p) = (SSE_k − SSE_{k+1}) / (SSE_{k+1} / (m − p)). The search for the recommended order starts at
     1 and stops where the next order does not help, so a cubic without any quadratic part can be missed.
     """
-    readings = np.unique(np.asarray(temperature_degC, dtype=np.float64)).size
+    readings = count_apart(temperature_degC)
     highest = min(highest, readings - 2)
     if highest < 1:
         raise CompensationError(

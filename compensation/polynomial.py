@@ -14,6 +14,8 @@ from compensation.errors import CompensationError
 from compensation.regression import LinearFit, fit_linear
 
 Array = NDArray[np.float64]
+APART = 0.01
+"""Part of the span of x by which two values are apart; closer ones tell a polynomial hardly more than one does."""
 
 
 @dataclass(frozen=True)
@@ -76,6 +78,16 @@ class PolynomialFit:
         )
 
 
+def count_apart(x: ArrayLike) -> int:
+    """Return how many values are apart from each other by `APART` of their span: readings of one soak are one value."""
+    values = np.unique(np.asarray(x, dtype=np.float64))
+    last, count = -np.inf, 0
+    for value in values:
+        if value - last > APART * np.ptp(values):
+            last, count = value, count + 1
+    return count
+
+
 def fit_polynomial(
     x: ArrayLike, y: ArrayLike, order: int, name: str = "x", least_variance: float = 0.0
 ) -> PolynomialFit:
@@ -103,15 +115,15 @@ def fit_polynomial(
         raise CompensationError(f"'{name}' and its observations must be equally long, not {x.shape} and {y.shape}.")
     if not np.all(np.isfinite(x)):
         raise CompensationError(f"'{name}' has missing or infinite values; remove those rows.")
-    distinct = np.unique(x).size
-    if distinct == 1:
+    distinct = count_apart(x)
+    if np.ptp(x) == 0:
         raise CompensationError(
             f"'{name}' is constant ({x[0]:g}): nothing can be learnt from it; record data in which it varies."
         )
     if distinct <= order or x.size <= order + 1:
         raise CompensationError(
             f"order {order} needs at least {order + 1} different values of '{name}' and {order + 2} rows, "
-            f"not {distinct} and {x.size}; lower the order or measure more."
+            f"not {distinct} and {x.size} (values within {APART:.0%} of their span count as one); lower the order or measure more."
         )
     # A centre and span with few bits make the scaled variable exact for tabulated values.
     half_span = float(2.0 ** np.ceil(np.log2(np.ptp(x) / 2)))

@@ -3,6 +3,9 @@
 A moment is settled when what is left of the change, |dT/dt| τ of the sensor and |df/dt| τ over the slope of the frequency,
 is small: τ the slowest time constant, about 3 000 s for the gyro of the paper's Figure 3, or what the records show where that
 is longer. Slopes are taken over as many blocks as the noise asks for.
+
+A hold that ends before it has settled is extrapolated along the exponential of its last third, f = a + b exp(−t/τ), where the error
+of that is small enough: the error of a by the noise, a share of what is left, and what the second half of the hold would say.
 """
 
 from collections.abc import Sequence
@@ -28,22 +31,24 @@ LEAST = 600.0  # s, of a soak
 USUAL_SLOPE = 8e-5  # 1/K, relative, where a record is too even to show its own
 HELD = 0.5  # K, within which a temperature is held
 STANDS_OUT = 5.0  # scatters of a block, by which an exponential is seen
+UNTRUE = 0.2  # of what is left at the end of a hold: error of its extrapolation (0.06 to 0.14 in simulated steps of 10 and 20 K)
 HOUR = 3600.0
 TEMPERATURES = ("housing_temperature_degC", "chamber_temperature_degC")
 
 
 @dataclass(frozen=True)
 class Soak:
-    """One settled part.
+    """One settled part, or the settled state that the end of a hold is extrapolated to.
 
     Attributes
     ----------
     path : of its record
     start, end : float, s
-    temperature_degC, frequency_Hz : float, means
-    error_Hz : float, of the mean frequency: its scatter, and what is left to settle
-    left_K : float, largest estimate of what is left to settle
+    temperature_degC, frequency_Hz : float, means, or the extrapolated state
+    error_Hz : float, of the frequency: its scatter, and what is left to settle
+    left_K : float, largest estimate of what is left to settle; of an extrapolated state its error
     time_constant : float, s, by which that is judged
+    extrapolated_K : float, from the last reading to the state; 0 of a settled part
     """
 
     path: str
@@ -54,6 +59,7 @@ class Soak:
     error_Hz: float
     left_K: float
     time_constant: float
+    extrapolated_K: float = 0.0
 
 
 def find_soaks(records: Sequence[Record], time_constant: float = 3000.0, tolerance: float = 0.05) -> tuple[Soak, ...]:
@@ -73,7 +79,11 @@ def find_soaks(records: Sequence[Record], time_constant: float = 3000.0, toleran
     """
     if not (time_constant > 0 and tolerance > 0):
         raise InputError("a time constant and a tolerance must be positive.")
-    return tuple(soak for one in _judge(records, time_constant, tolerance) for soak in _soaks_of(one, tolerance))
+    found = []
+    for one in _judge(records, time_constant, tolerance):
+        soaks = _soaks_of(one, tolerance)
+        found += sorted([*soaks, *_extrapolated(one, soaks, tolerance)], key=lambda soak: soak.start)
+    return tuple(found)
 
 
 def settled_table(soaks: Sequence[Soak], where: str, advice: str = "") -> tuple[Array, Array, float]:
@@ -223,6 +233,58 @@ def _soaks_of(one: _Judged, tolerance: float) -> list[Soak]:
             ends, means = (float(t[rows[0]]), float(t[rows[-1]])), (float(T[rows].mean()), float(f[rows].mean()))
             found.append(Soak(one.seen.path, *ends, *means, uncertainty, float(left[rows].max()), one.time_constant))
     return found
+
+
+def _extrapolated(one: _Judged, soaks: Sequence[Soak], tolerance: float) -> list[Soak]:
+    """Return the states that holds without a settled part would settle at, where their error is within the tolerance."""
+    found = []
+    for rows in (rows[: -one.reach] for rows in _holds(one.seen.drive)):
+        t = one.time[rows]
+        settled = any(soak.start < t[-1] and soak.end > t[0] for soak in soaks) if len(rows) else True
+        if settled or not _is_whole(one.time, rows, one.reach):
+            continue
+        half, third = (rows[-(len(rows) // part) :] for part in (2, 3))
+        early, late = (_asymptote(one.time[part], one.seen.frequency[part]) for part in (half, third))
+        if early is None or late is None:
+            continue
+        left = abs(late.left) * max(one.time_constant / late.time_constant, 1.0)
+        error = float(np.linalg.norm([late.error, UNTRUE * left, early.value - late.value]))
+        if error > tolerance * one.seen.slope:
+            continue
+        T = late.extrapolate(one.time[third], one.seen.temperature[third])
+        ends = float(one.time[third[0]]), float(one.time[third[-1]])
+        shares = error / one.seen.slope, late.time_constant, abs(late.left) / one.seen.slope
+        found.append(Soak(one.seen.path, *ends, T, late.value, error, *shares))
+    return found
+
+
+@dataclass(frozen=True)
+class _Asymptote:
+    """Where y = a + b exp(−t/τ) leads: a with its error, what is left at the last time, τ (s)."""
+
+    value: float
+    error: float
+    left: float
+    time_constant: float
+
+    def extrapolate(self, t: Array, y: Array) -> float:
+        """Return where another column settles with the same time constant."""
+        return float(np.linalg.lstsq(_decay(t, self.time_constant), y, rcond=None)[0][0])
+
+
+def _decay(t: Array, tau: float) -> Array:
+    return np.column_stack([np.ones(len(t)), np.exp(-(t - t[-1]) / tau)])
+
+
+def _asymptote(t: Array, y: Array) -> _Asymptote | None:
+    tau = _time_constant(t, y)
+    if not np.isfinite(tau):
+        return None
+    X = _decay(t, tau)
+    (a, b), *_ = np.linalg.lstsq(X, y, rcond=None)
+    J = np.column_stack([X, b * X[:, 1] * (t - t[-1]) / tau**2])
+    variance = float(np.sum((y - X @ [a, b]) ** 2)) / max(len(t) - 3, 1)
+    return _Asymptote(float(a), float(np.sqrt(variance * np.linalg.pinv(J.T @ J)[0, 0])), float(b), tau)
 
 
 def _is_whole(time: Array, rows: NDArray[np.intp], reach: int) -> bool:

@@ -1,7 +1,8 @@
 """`hrg fit frequency`: f(T) and its inverse from a steady-state table, or from the settled parts of records.
 
 With --json one object, schema `hrg.fit-frequency/1`; from records it has besides `soaks`: `[{record, start_s, end_s,
-temperature_degC, frequency_Hz, error_Hz, left_K}]`, `left_K` what may be left of the change, and `time_constant_s` by which.
+temperature_degC, frequency_Hz, error_Hz, left_K, extrapolated_K}]`, `left_K` what may be left of the change, `extrapolated_K` by how
+much the end of a hold was extrapolated along its exponential (0 where it had settled), and `time_constant_s` of the slowest.
 """
 
 from typing import TYPE_CHECKING
@@ -30,7 +31,7 @@ def fit_frequency(
     ----------
     table : str
         A CSV file with the columns temperature_degC,frequency_Hz; or a record, whose settled parts (soaks) are found and become
-        such a table.
+        such a table. A hold that ends a little before it has settled is extrapolated along its own exponential.
     more : str
         Further records of the same device.
     time_constant : float
@@ -58,6 +59,7 @@ def fit_frequency(
     from studies.reports import frequency as page
 
     soaks: tuple[Soak, ...] = ()
+    shown = time_constant
     if more or "time_s" in read_header(table):
         from studies.record import read_record
         from studies.settled import advise_hold, find_soaks, settled_table
@@ -66,15 +68,21 @@ def fit_frequency(
         soaks = find_soaks(records, time_constant, left)
         T, f, step = settled_table(soaks, table, advise_hold(records, time_constant, left) if len(soaks) < 2 else "")
         sha256 = records[0].sha256
-        shown = soaks[0].time_constant
+        shown = max(soak.time_constant for soak in soaks)
         if shown > time_constant:
             say(
                 f"the records show a time constant of {shown / 60:.0f} min; it takes the place of {time_constant / 60:.0f} min."
             )
         for soak in soaks:
+            what = "extrapolated" if soak.extrapolated_K else "settled"
+            left = (
+                f"{soak.extrapolated_K:.2g} K beyond its last reading, with a time constant of {soak.time_constant / 60:.0f} min"
+                if soak.extrapolated_K
+                else f"at most {soak.left_K:.2g} K left to settle"
+            )
             say(
-                f"settled: {soak.path}, {soak.start:.0f} to {soak.end:.0f} s: {soak.temperature_degC:.3f} °C,"
-                f" {soak.frequency_Hz:.5f} Hz ± {soak.error_Hz:.1g}; at most {soak.left_K:.2g} K left to settle."
+                f"{what}: {soak.path}, {soak.start:.0f} to {soak.end:.0f} s: {soak.temperature_degC:.3f} °C,"
+                f" {soak.frequency_Hz:.5f} Hz ± {soak.error_Hz:.1g}; {left}."
             )
     else:
         data = read_frequency_table(table)
@@ -109,7 +117,7 @@ def fit_frequency(
         "calculated_degC": study.calculated_degC,
         "error_degC": study.error_degC,
         "recommended_order": study.orders.recommended,
-        **({"soaks": [_describe(soak) for soak in soaks], "time_constant_s": soaks[0].time_constant} if soaks else {}),
+        **({"soaks": [_describe(soak) for soak in soaks], "time_constant_s": shown} if soaks else {}),
     }
     for block in (page.coefficients_table(study), page.inverse_table(study), page.order_table(study)):
         print_table(block.caption, block.columns, block.rows, block.note)
@@ -125,4 +133,5 @@ def _describe(soak: "Soak") -> dict[str, str | float]:
         "frequency_Hz": soak.frequency_Hz,
         "error_Hz": soak.error_Hz,
         "left_K": soak.left_K,
+        "extrapolated_K": soak.extrapolated_K,
     }

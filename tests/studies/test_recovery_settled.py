@@ -44,6 +44,43 @@ def test_what_has_not_settled_is_no_soak(run):
         find_soaks([Record({"time_s": np.arange(100.0), "housing_temperature_degC": np.ones(100)})])
 
 
+@pytest.mark.parametrize(
+    ("profile", "expected"),
+    [("staircase -20 60 10 4h", range(-20, 61, 10)), ("staircase 40 -20 20 4h", range(40, -21, -20))],
+)
+def test_holds_that_end_before_they_have_settled_are_extrapolated_onto_the_law(profile, expected):
+    """Nine soaks of 4 h, of which the last readings are 20 to 70 mK short of the law; the extrapolated ones lie on it."""
+    run = simulate_run(load_card("hrg-30mm"), load_profile(profile), 1 / 30, 3)
+    soaks = find_soaks([run.record])
+    assert [round(soak.temperature_degC) for soak in soaks] == list(expected)
+    extrapolated = [soak for soak in soaks if soak.extrapolated_K]
+    assert len(extrapolated) >= len(soaks) - 2
+    for soak in soaks:
+        slope = float(run.law.slope(293.15) * run.law.frequency(293.15))
+        exact = float(run.law.frequency(soak.temperature_degC + 273.15))
+        assert abs(soak.frequency_Hz - exact) < 2 * soak.error_Hz
+        assert soak.error_Hz < 0.05 * slope
+    for soak in extrapolated:
+        end = float(np.interp(soak.end, run.record["time_s"], run.record["resonator_temperature_degC"]))
+        assert soak.extrapolated_K == pytest.approx(abs(soak.temperature_degC - end), rel=0.35)
+
+
+def test_a_hold_far_from_settled_is_not_extrapolated():
+    record = simulate_run(load_card("hrg-30mm"), load_profile("staircase -20 40 20 2h"), 1 / 30, 3).record
+    assert [round(soak.temperature_degC) for soak in find_soaks([record])] == [-20]
+
+
+def test_two_temperatures_are_no_polynomial(tmp_path, capsys):
+    """Readings of two soaks, scattered by millikelvins, are two temperatures however many they are."""
+    path = tmp_path / "two.csv"
+    noise = np.random.default_rng(1).normal(scale=2e-3, size=10)
+    T = np.repeat([-10.0, 40.0], 5) + noise
+    path.write_text("temperature_degC,frequency_Hz\n" + "".join(f"{t:.4f},{4424 + 0.37 * t:.4f}\n" for t in T))
+    assert main(["fit", "frequency", str(path)]) == 2
+    assert "not 2 and 10" in capsys.readouterr().err
+    assert main(["fit", "frequency", str(path), "--order", "2"]) == 2
+
+
 def test_what_is_advised_settles(tmp_path, capsys):
     card, path = load_card("hrg-30mm"), str(tmp_path / "run.csv")
     record = simulate_run(card, load_profile("staircase -20 40 20 3h"), 1 / 30, 3).record
@@ -58,7 +95,7 @@ def test_what_is_advised_settles(tmp_path, capsys):
     longer = simulate_run(card, load_profile(f"staircase -20 40 20 {60 * hours:.0f}min"), 1 / 30, 4).record
     assert [round(soak.temperature_degC) for soak in find_soaks([longer])] == [-20, 0, 20, 40]
     shorter = simulate_run(card, load_profile(f"staircase -20 40 20 {60 * (hours - 0.7):.0f}min"), 1 / 30, 4).record
-    assert len(find_soaks([shorter])) < 4
+    assert sum(not soak.extrapolated_K for soak in find_soaks([shorter])) < 4
 
 
 def test_the_command_takes_a_record(run, tmp_path, capsys):
@@ -68,7 +105,7 @@ def test_the_command_takes_a_record(run, tmp_path, capsys):
     answer = json.loads(capsys.readouterr().out)
     assert answer["schema"] == "hrg.fit-frequency/1"
     assert list(answer["soaks"][0]) == [
-        "record", "start_s", "end_s", "temperature_degC", "frequency_Hz", "error_Hz", "left_K",
+        "record", "start_s", "end_s", "temperature_degC", "frequency_Hz", "error_Hz", "left_K", "extrapolated_K",
     ]  # fmt: skip
     slope = float(run.law.slope(273.15) * run.law.frequency(273.15))
     assert answer["coefficients"][1] == pytest.approx(slope, rel=2e-3)
