@@ -284,13 +284,16 @@ def compare_orders(
     return OrderComparison(fits, tests, level, recommended)
 
 
-def disagreement_degC(
-    one: FrequencyFit, other: FrequencyFit, temperature_degC: ArrayLike, slope_temperature_degC: float = 20.0
-) -> Array:
-    """Return how far two curves differ at T, as a temperature: Δf(T) over df/dT of `one` at one temperature.
+def misreading_degC(one: FrequencyFit, other: FrequencyFit, temperature_degC: ArrayLike) -> Array:
+    """Return the error of the temperature that `one` reads from the frequency of `other`: T' - T, one(T') = other(T).
 
-    The slope is taken inside the measured range because outside it the two slopes differ as well.
+    NaN where `one` does not reach that frequency within the span of its range.
     """
     T = np.asarray(temperature_degC, dtype=np.float64)
-    difference = other.frequency(T, extrapolate=True) - one.frequency(T, extrapolate=True)
-    return np.asarray(difference / one.slope(slope_temperature_degC))
+    reach = np.ptp(one.temperature_range_degC)
+
+    def excess(read: Array, f: Array) -> Array:
+        return one.frequency(read, extrapolate=True) - f
+
+    found = elementwise.find_root(excess, (T - reach, T + reach), args=(other.frequency(T, extrapolate=True),))
+    return np.asarray(np.where(found.success, found.x, np.nan) - T)

@@ -5,11 +5,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from compensation.errors import CompensationError
-from compensation.frequency import disagreement_degC
+from compensation.frequency import misreading_degC
 from studies.reports import style
 from studies.reports.page import Block, Chapter, Facts, Picture, Table, Text, draw, render_page
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
     from compensation.frequency import FrequencyFit
     from studies.papers.hrg import FrequencyStudy
 
@@ -172,24 +174,36 @@ def order_sentence(study: "FrequencyStudy") -> str:
 def _extrapolation(study: "FrequencyStudy", other: "FrequencyFit") -> Picture:
     low, high = study.fit.temperature_range_degC
     T = np.linspace(low - 20, high + 20, 200)
-    difference = disagreement_degC(study.fit, other, T, (low + high) / 2)
-    ends = disagreement_degC(study.fit, other, np.array([low - 20, high + 20]), (low + high) / 2)
+    names = name_order(study.fit.order), name_order(other.order)
+    # Which of the two holds out there is not known, so each is read at the other's frequency.
+    both = {
+        f"{names[0]} read at the frequency of the {names[1]}": (study.fit, other),
+        f"{names[1]} read at the frequency of the {names[0]}": (other, study.fit),
+    }
+    ends = [np.sort(np.abs([misreading_degC(*pair, T[k]) for pair in both.values()])) for k in (0, -1)]
     with style.figure(height=2.8) as (made, axes):
         axes.axvspan(low, high, color=style.SKY, alpha=0.18, label="measured range")
         axes.axhline(0, color=style.BLACK, linewidth=0.8)
-        axes.plot(
-            T, difference, color=style.VERMILION, label=f"{name_order(other.order)} − {name_order(study.fit.order)}"
-        )
+        for (label, pair), colour in zip(both.items(), (style.VERMILION, style.BLUE), strict=True):
+            axes.plot(T, misreading_degC(*pair, T), color=colour, label=label)
         axes.set_xlabel("temperature (°C)")
-        axes.set_ylabel("difference (°C)")
-        axes.legend()
+        axes.set_ylabel("error of reading (°C)")
+        axes.legend(fontsize=8)
     caption = (
-        f"Outside the measured range the two fits part: {ends[0]:+.1f} °C at {low - 20:g} °C and {ends[1]:+.1f} °C at"
-        f" {high + 20:g} °C. Neither should be extrapolated."
+        f"Outside the measured range the two fits part: their readings differ by {_between(ends[0])} at {low - 20:g} °C"
+        f" and by {_between(ends[1])} at {high + 20:g} °C. Neither should be extrapolated."
     )
     return draw(
         made, caption, "Difference of two fits over temperature, small inside the measured range, large outside."
     )
+
+
+def _between(ends: "NDArray[np.float64]") -> str:
+    """Write the two readings' difference; a curve that turns round has none."""
+    if not np.isfinite(ends).all():
+        return "more than the range" if not np.isfinite(ends).any() else f"{np.nanmin(ends):.1f} °C or more"
+    low, high = (f"{end:.1f}" for end in ends)
+    return f"{low} °C" if low == high else f"{low} to {high} °C"
 
 
 def _fits(study: "FrequencyStudy") -> "list[tuple[FrequencyFit, str, str]]":

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from compensation.frequency import compare_orders, disagreement_degC, fit_frequency
+from compensation.frequency import compare_orders, fit_frequency, misreading_degC
 
 REFERENCE = Path(__file__).parents[1] / "reference"
 TABLE1 = np.loadtxt(REFERENCE / "hrg_f_vs_T_wang2012.csv", delimiter=",", skiprows=4)
@@ -62,4 +62,11 @@ def test_the_f_test_asks_for_the_quartic():
 
 
 def test_cubic_and_quartic_part_outside_the_range():
-    assert disagreement_degC(fit(3), fit(4), [-40.0, 60.0]) == pytest.approx([2.4, 2.4], abs=0.05)
+    """The theory sheet: at -40 and 60 °C the readings differ by 1.7 °C one way and by 2.0 °C the other."""
+    ways = [misreading_degC(fit(3), fit(4), [-40.0, 60.0]), misreading_degC(fit(4), fit(3), [-40.0, 60.0])]
+    for there in np.sort(np.abs(ways), axis=0).T:
+        assert there == pytest.approx([1.7, 2.0], abs=0.055)
+    # Roots of the difference by numpy's companion matrix.
+    cubic, quartic = np.polyfit(*TABLE1.T, 3), np.polyfit(*TABLE1.T, 4)
+    root = np.roots(np.polysub(cubic, [np.polyval(quartic, 60.0)]))
+    assert ways[0][1] == pytest.approx(root[np.isreal(root)][0].real - 60.0, abs=1e-6)
