@@ -75,14 +75,14 @@ def fit_frequency(
             )
         for soak in soaks:
             what = "extrapolated" if soak.extrapolated_K else "settled"
-            left = (
+            how = (
                 f"{soak.extrapolated_K:.2g} K beyond its last reading, with a time constant of {soak.time_constant / 60:.0f} min"
                 if soak.extrapolated_K
                 else f"at most {soak.left_K:.2g} K left to settle"
             )
             say(
                 f"{what}: {soak.path}, {soak.start:.0f} to {soak.end:.0f} s: {soak.temperature_degC:.3f} °C,"
-                f" {soak.frequency_Hz:.5f} Hz ± {soak.error_Hz:.1g}; {left}."
+                f" {soak.frequency_Hz:.5f} Hz ± {soak.error_Hz:.1g}; {how}."
             )
     else:
         data = read_frequency_table(table)

@@ -42,6 +42,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 SCHEMA = "hrg.model/1"
+WIDENED = 0.05  # of a fitted range, on each side
 Setting = float | str | Sequence[float]
 KEYS = ("schema", "kind", "compensates", "made_by", "settings", "validity", "part", "source")
 
@@ -156,6 +157,11 @@ class Model:
                 f"model was fitted to ({np.mean(outside):.1%} of the rows); calibrate over that range, or add "
                 "--extrapolate."
             )
+
+
+def widen(low: float, high: float) -> tuple[float, float]:
+    """Return a fitted range wider by a twentieth on each side: readings scatter about the means that were fitted."""
+    return low - WIDENED * (high - low), high + WIDENED * (high - low)
 
 
 def make_part(

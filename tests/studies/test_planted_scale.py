@@ -89,6 +89,31 @@ def test_saved_model_is_the_fitted_chain_and_compensates(records, tmp_path):
         compensate(model, data.with_columns({"housing_temperature_degC": data["housing_temperature_degC"] + 20}))
 
 
+def test_the_records_of_the_fit_are_compensated(tmp_path, capsys):
+    """At 100 Hz a fit is of block averages: neither their narrower range nor an outlier refuses the rows they are made of."""
+    records, model = [], tmp_path / "model.toml"
+    for name, run in zip(("rates", "rest", "turning"), simulate_runs(np.random.default_rng(2)), strict=True):
+        rows = slice(0, None, 2)
+        output = run.output[rows].copy()
+        output[777] += 1e6
+        lines = [
+            f"{t:.3f},{T - 273.15:.6f},{counts:.6f},{rate / DEG:.9g}"
+            for t, T, counts, rate in zip(run.time[rows], run.temperature[rows], output, run.rate[rows], strict=True)
+        ]
+        records.append(str(tmp_path / f"{name}.csv"))
+        header = "time_s,housing_temperature_degC,output_counts,rate_deg_per_s"
+        Path(records[-1]).write_text("\n".join([header, *lines]) + "\n")
+    assert main(["fit", "scale", *records, "--save", str(model)]) == 0
+    for record in records:
+        assert main(["compensate", str(model), record, "--out", str(tmp_path / "out.csv")]) == 0, (
+            capsys.readouterr().err
+        )
+    far = read_record(records[2])
+    hot = far.with_columns({"housing_temperature_degC": far["housing_temperature_degC"] + 20})
+    with pytest.raises(InputError, match="extrapolate"):
+        compensate(read_model(model), hot)
+
+
 def test_gaps(records, tmp_path):
     """With the filter a gap is refused; without it the row stays empty."""
     models = [tmp_path / "with.toml", tmp_path / "without.toml"]

@@ -24,7 +24,7 @@ from compensation.memory import NO_MEMORY, Memory, follow_lag, follow_play
 from compensation.samples import check_time
 from studies.errors import InputError, nearest
 from studies.models.bias_c import CausalBias, write_c
-from studies.models.file import Model, ModelSource, make_part
+from studies.models.file import Model, ModelSource, make_part, widen
 from studies.record import COMPENSATED, Record
 
 if TYPE_CHECKING:
@@ -32,7 +32,6 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 OUTPUTS = {"bias_deg_per_h": "deg/h", "measured_rate_deg_per_s": "deg/s"}
-WIDENED = 0.05
 BLOCK = 10.0  # s over which the frequency is averaged before it is used
 TEST_ROWS = 80  # of the emitted code
 LEAST_BLOCKS = 3  # and half a window, before a causal rate is known
@@ -57,7 +56,7 @@ def save_bias(
         compensates=output,
         parts=(make_part("bias", ("constant", *names), fit.coefficients, units, fit.covariance),),
         settings=settings,
-        validity={column: _widen(*fit.state_range), rate_name(column): _widen(*fit.rate_range)},
+        validity={column: widen(*fit.state_range), rate_name(column): widen(*fit.rate_range)},
         sources=sources,
         made_by=made_by,
     )
@@ -240,7 +239,3 @@ def _reference_key(column: str) -> str:
 
 def _variable(column: str) -> Variable:
     return FREQUENCY if column == "frequency_Hz" else TEMPERATURE
-
-
-def _widen(low: float, high: float) -> tuple[float, float]:
-    return low - WIDENED * (high - low), high + WIDENED * (high - low)

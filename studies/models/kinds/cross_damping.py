@@ -13,7 +13,7 @@ from scipy.constants import zero_Celsius
 
 from studies.errors import InputError
 from studies.models.c_source import head, polynomial, self_test
-from studies.models.file import Model, ModelPart, ModelSource, make_part
+from studies.models.file import Model, ModelPart, ModelSource, make_part, widen
 from studies.record import COMPENSATED, Record
 from studies.rest import celsius_range
 
@@ -42,7 +42,7 @@ def save_cross_damping(
             "g2": fit.g2,
             "temperature_column": temperature_column,
         },
-        validity={temperature_column: celsius_range(fit.lowest, fit.highest)},
+        validity={temperature_column: widen(*celsius_range(fit.lowest, fit.highest))},
         sources=sources,
         made_by=made_by,
     )

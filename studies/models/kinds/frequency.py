@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from studies.errors import InputError, naming
 from studies.models.c_source import head, polynomial, self_test
-from studies.models.file import Model, ModelSource, make_part
+from studies.models.file import Model, ModelSource, make_part, widen
 from studies.plausible import check_model_frequency
 from studies.record import COMPENSATED, RESONATOR, Record
 from studies.rest import TEMPERATURES
@@ -22,7 +22,6 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 VARIABLE = "temperature_degC"
-WIDENED = 0.05
 
 
 def save_frequency(fit: "FrequencyFit", sources: tuple[ModelSource, ...], made_by: str) -> Model:
@@ -159,7 +158,7 @@ def _is_monotonic(model: Model) -> bool:
 def _widen(fit: "FrequencyFit") -> tuple[float, float]:
     """Return the fitted range, wider by a twentieth on each side, but not beyond where the curve turns round."""
     low, high = fit.temperature_range_degC
-    margin = WIDENED * (high - low)
-    turns = fit.polynomial.turning_points(low - margin, high + margin)
+    lowest, highest = widen(low, high)
+    turns = fit.polynomial.turning_points(lowest, highest)
     below, above = turns[turns <= low], turns[turns >= high]
-    return max([low - margin, *below.tolist()]), min([high + margin, *above.tolist()])
+    return max([lowest, *below.tolist()]), min([highest, *above.tolist()])

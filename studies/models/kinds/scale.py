@@ -1,7 +1,8 @@
 """Models of kind `scale`: the compensation chain (32)–(36) of the BVG paper, and its C code.
 
 The file has the parts "rough" (null, scale), "bias", "scale_over_rate" and "scale_over_temperature" (c0, c1, c2 in °C
-and °/s), and the settings `fir_taps` and `sampling_s` (empty and 0 without a filter) and `temperature_column`.
+and °/s), and the settings `fir_taps` and `sampling_s` (empty and 0 without a filter) and `temperature_column`. Ranges are
+those of the fit, widened by 5 % of their length, because readings scatter; outliers, which the fit leaves out, are not judged.
 """
 
 import math
@@ -14,9 +15,9 @@ from scipy.constants import zero_Celsius
 
 from studies.errors import InputError
 from studies.models.c_source import head, polynomial
-from studies.models.file import Model, ModelPart, ModelSource, make_part
+from studies.models.file import Model, ModelPart, ModelSource, make_part, widen
 from studies.record import COMPENSATED, Record
-from studies.rest import celsius_range
+from studies.rest import celsius_range, drop_spikes
 
 if TYPE_CHECKING:
     from compensation.bell import BellChain, PolynomialCurve
@@ -52,11 +53,13 @@ def save_scale(
             "fir_taps": tuple(float(tap) for tap in chain.taps),
         },
         validity={
-            temperature_column: celsius_range(
-                max(chain.bias.lowest, chain.scale_over_temperature.lowest),
-                min(chain.bias.highest, chain.scale_over_temperature.highest),
+            temperature_column: widen(
+                *celsius_range(
+                    max(chain.bias.lowest, chain.scale_over_temperature.lowest),
+                    min(chain.bias.highest, chain.scale_over_temperature.highest),
+                )
             ),
-            RATE: (chain.scale_over_rate.lowest / DEG, chain.scale_over_rate.highest / DEG),
+            RATE: widen(chain.scale_over_rate.lowest / DEG, chain.scale_over_rate.highest / DEG),
         },
         sources=sources,
         made_by=made_by,
@@ -109,15 +112,17 @@ def compensate(model: Model, record: Record, *, extrapolate: bool) -> dict[str, 
         )
     if np.count_nonzero(complete) < 2:
         raise InputError(f"no two rows have both {output} and {column}; nothing can be compensated.")
-    model.check_range(column, record[column], extrapolate)
+    judged = drop_spikes(complete, record[output], record[column])
+    model.check_range(column, record[column][judged], extrapolate)
     compensated = np.full(len(record), np.nan)
     result = apply_chain(
         chain,
         record["time_s"][complete],
         record[output][complete],
         record[column][complete] + zero_Celsius,
-        extrapolate=extrapolate,
+        extrapolate=True,
     )
+    model.check_range(RATE, result.bias_compensated[judged[complete]] / DEG, extrapolate)
     compensated[complete] = result.filtered / DEG
     return {f"{COMPENSATED}{RATE}": compensated}
 
