@@ -7,7 +7,7 @@ derived from (23) anew. With k = b / (2 m₀), eq. (21), the second equation giv
 
     Ω = [ f_q / m₀ − q̈ − ω_n² q − (c₁/m₀) p ] / (4 k ṗ),
 
-which is singular wherever ṗ passes zero; so it is taken for the amplitudes of p = Im{P e^{jωt}}. The coupling c₁ then
+and the first its second form with p and q exchanged; each is singular wherever ṗ (or q̇) passes zero; so they are taken for the amplitudes of p = Im{P e^{jωt}}. The coupling c₁ then
 stands in quadrature to the rate and drops out.
 """
 
@@ -81,6 +81,35 @@ def read_rate_from_loop(
     growth = 2j * omega * np.gradient(Q, t, edge_order=2 if len(t) > 2 else 1)
     numerator = F / r.m0 - r.c1 / r.m0 * P - (r.omega**2 - omega**2) * Q - growth
     return np.asarray((numerator / (4 * r.precession_factor * 1j * omega * P)).real, dtype=float)
+
+
+def read_rate_from_drive(
+    resonator: BellResonator, omega: float, time: ArrayLike, p: ArrayLike, q: ArrayLike, force: ArrayLike
+) -> Real:
+    """Return the rate (rad/s) from the force on the driven axis: second form of eq. (24).
+
+    The first of (23) gives Ω = [p̈ + ω_n² p + (c₁/m₀) q − f_p/m₀] / (4 k q̇); for amplitudes
+    Ω = Re{ [(ω_n² − ω²) P + 2jω Ṗ + (c₁/m₀) Q − F/m₀] / (4 k jω Q) }. It needs an axis q that moves: open loop.
+
+    Parameters
+    ----------
+    resonator, omega, time, p, q
+        As for `read_rate_from_loop`.
+    force : complex array (N,)
+        Amplitude F of f_p (N).
+
+    Raises
+    ------
+    CompensationError
+        When a column is not finite or the axis q does not vibrate.
+    """
+    r = resonator
+    if np.any(np.asarray(q) == 0):
+        raise CompensationError(
+            "the axis q does not vibrate; the drive's force tells no rate where the loop holds q at rest."
+        )
+    # (23) is the same for the two axes exchanged and the rate reversed
+    return -read_rate_from_loop(r, omega, time, q, p, force)
 
 
 def scale_of_rebalance(resonator: BellResonator, omega: float, amplitude: float) -> float:
