@@ -7,8 +7,8 @@ derived from (23) anew. With k = b / (2 m₀), eq. (21), the second equation giv
 
     Ω = [ f_q / m₀ − q̈ − ω_n² q − (c₁/m₀) p ] / (4 k ṗ),
 
-and the first its second form with p and q exchanged; each is singular wherever ṗ (or q̇) passes zero; so they are taken for the amplitudes of p = Im{P e^{jωt}}. The coupling c₁ then
-stands in quadrature to the rate and drops out.
+and the first its second form, with p and q exchanged. Each is singular wherever ṗ (or q̇) passes zero, so they are taken for the
+amplitudes of p = Im{P e^{jωt}}. The coupling c₁ then stands in quadrature to the rate and drops out.
 """
 
 from dataclasses import dataclass

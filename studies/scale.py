@@ -54,7 +54,8 @@ class StepFigures:
 class ScaleStudy:
     """The chain, its runs, its figures on them, and rms error (°/s) before and after on blocks left out of the fit.
 
-    `averaged` tells that a run was long and the fit, and this error, are of its block averages.
+    `averaged` tells that a run was long and the fit, and this error, are of its block averages; `rough_run` that the rough null and
+    scale have a run of their own.
     """
 
     chain: BellChain
@@ -66,6 +67,7 @@ class ScaleStudy:
     error_before: float
     error_held_out: float
     averaged: bool
+    rough_run: bool = False
 
 
 def judge_steps(chain: BellChain, rates: BellRun, rest: BellRun, turning: BellRun) -> list[StepFigures]:
@@ -125,6 +127,7 @@ def study_scale(records: "Sequence[Record]", cutoff: float | None, order: int) -
         if kind not in sorted_runs:
             raise InputError(f"no record is a run {kind}, which {equation} needs; record one and give it too.")
     rates, rest, turning = (sorted_runs[kind][0] for kind in KINDS)
+    rough = _thin(sorted_runs[ROUGH][0]) if ROUGH in sorted_runs else None
     sampling = float(np.median(np.diff(rest.time)))
     runs = (rates, rest, turning)
     shortest = min(len(run.time) for run in runs)
@@ -134,13 +137,17 @@ def study_scale(records: "Sequence[Record]", cutoff: float | None, order: int) -
         )
     thin = (_thin(rates), _thin(rest), _thin(turning))
     with naming(", ".join(path for _, path in sorted_runs.values())):
-        chain = fit_chain(*thin, cutoff=cutoff, order=order, sampling=sampling)
-        before, after = _hold_out(thin)
+        chain = fit_chain(*thin, rough=rough, cutoff=cutoff, order=order, sampling=sampling)
+        before, after = _hold_out(thin, rough)
         figures = judge_steps(chain, rates, rest, turning)
     averaged = any(len(less.time) < len(run.time) for less, run in zip(thin, runs, strict=True))
-    return ScaleStudy(chain, runs, output, column, left_out, figures, before, after, averaged)
+    return ScaleStudy(chain, runs, output, column, left_out, figures, before, after, averaged, rough is not None)
 
 
+ROUGH = "at rest and then at one rate"
+"""The paper's run for the rough null and scale, equation (33); without one they come from the run of several rates."""
+PLATEAU = 0.05
+"""Part of a run's rows from which an applied rate counts as a plateau."""
 KINDS = {
     "of several rates at one temperature": "equation (35)",
     "at rest over temperature": "equation (34)",
@@ -154,7 +161,10 @@ def _classify(run: BellRun, path: str) -> str:
     if np.ptp(run.rate) > max(LARGEST_REST * DEG, STEADY * np.max(np.abs(run.rate))):
         if swept:
             raise InputError(f"{path}: both rate and temperature change; the chain needs them one at a time.")
-        return several
+        levels, counts = np.unique(same_rate(run.rate), return_counts=True)
+        held = levels[counts > PLATEAU * len(run.rate)]
+        two = len(held) == 2 and float(np.min(np.abs(held))) <= LARGEST_REST * DEG
+        return ROUGH if two else several
     if not swept:
         raise InputError(f"{path}: neither rate nor temperature changes; nothing can be learnt from this run.")
     return at_rest if abs(np.mean(run.rate)) <= LARGEST_REST * DEG else turning
@@ -191,12 +201,12 @@ def _thin(run: BellRun) -> BellRun:
     return BellRun(*(values[steady] for values in (blocks.time, mean["output"], mean["temperature"], mean["rate"])))
 
 
-def _hold_out(runs: tuple[BellRun, BellRun, BellRun]) -> tuple[float, float]:
+def _hold_out(runs: tuple[BellRun, BellRun, BellRun], rough: BellRun | None = None) -> tuple[float, float]:
     """Rms error (°/s) of the rough and of the compensated rate on fifths of every run that the fit has not seen."""
     before, after = [], []
     for block in range(BLOCKS):
         seen, unseen = zip(*(_cut(run, block) for run in runs), strict=True)
-        chain = fit_chain(*seen, cutoff=None)
+        chain = fit_chain(*seen, rough=rough, cutoff=None)
         for run in unseen:
             result = apply_chain(chain, run.time, run.output, run.temperature, extrapolate=True)
             before.append(result.rough - run.rate)

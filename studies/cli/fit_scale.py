@@ -16,7 +16,8 @@ def fit_scale(
 
     Three records, in any order, each with time_s, rate_deg_per_s (the applied rate), a temperature, and
     output_counts or measured_rate_deg_per_s: several rates at one temperature; at rest over temperature;
-    at one rate over temperature.
+    at one rate over temperature. A fourth one at rest and then at one rate, at one temperature (the paper's five minutes of rest
+    and +100 °/s), gives the rough null and scale (33); without it they come from the run of several rates.
 
     Parameters
     ----------
@@ -46,7 +47,8 @@ def fit_scale(
 
     if not data:
         raise InputError(
-            "name three records (CSV): several rates, at rest over temperature, one rate over temperature."
+            "name three records (CSV): several rates, at rest over temperature, one rate over temperature; and, if there is one,"
+            " a run at rest and then at one rate."
         )
     records = [read_record(path) for path in data]
     study = study_scale(records, None if no_filter else cutoff, order)
@@ -57,6 +59,8 @@ def fit_scale(
         say(f"model: {save}")
     if study.left_out:
         say(f"{study.left_out} rows with an empty cell or an outlier were left out.")
+    if study.rough_run:
+        say("rough null and scale: from the run at rest and then at one rate.")
     if study.averaged:
         say("long runs were averaged in blocks for the fit; the held-out error is that of the blocks.")
     if report is not None:

@@ -15,7 +15,7 @@ EQUATIONS = (
     ("(21), (22)", "k = b/(2m₀), ω² = c₀/m₀", "hold for n = 2"),
     ("(23)", "the same with forces", "holds"),
     ("(24)–(26)", "rate from p, q and f_q", "printed with ω² q̇ for ω² q and f_q for f_q/m₀, and singular twice in every period; taken for amplitudes they hold"),
-    ("(27)–(29)", "charge of the piezo elements, displacement, rate from charges", "hold with the mends of (26)"),
+    ("(27)–(29)", "charge of the piezo elements, displacement, rate from charges", "(27) has σ_νν for σ_θθ: across a free wall it is zero, and σ_φφ alone is a fraction of the charge (below); (28), (29) hold with the mends of (26). Section 2.2 senses with elements 2, 6 and drives with 4, 8; section 3.2, (27) and (28) sense with 4, 8 and drive with 2, 6: taken here. The rate is the same"),
     ("(30), (31)", "Ω = K A_q; scale, null and noise", "hold where the loop rests: K = 1/(4 k m₀ ω P)"),
 )  # fmt: skip
 
@@ -76,6 +76,19 @@ def theory_chapters(theory: BellTheory, reading: LoopReading) -> list[Chapter]:
             ["planted", f"{reading.planted:.6g} rad/s"],
             ["error of the mean read in open loop, (25)", _error(reading.open_loop, reading.planted)],
             ["error of the mean read in force rebalance, (26)", _error(reading.rebalance, reading.planted)],
+            [
+                "error of the mean read from the driven axis in open loop, second form of (24)",
+                _error(reading.second_form, reading.planted),
+            ],
+            [
+                "error of the mean read from the charges of the elements, (27)–(29)",
+                _error(reading.from_charges, reading.planted),
+            ],
+            [
+                "amplifiers of elements 3 and 7 per µm of the mouth (PZT-5A, 6 × 3 mm, 1 nF: assumed)",
+                f"{reading.volts_per_um:.3g} V",
+            ],
+            ["part of the charge that (27) as printed leaves", f"{100 * reading.printed_share:.0f} %"],
             ["error of Ω = K A_q with K = 1/(4 k m₀ ω P), (30)", f"{1e6 * reading.scale_error:+.2g} ppm"],
             [
                 "part of the time with ṗ below a tenth of its amplitude, where (24) fails",

@@ -275,3 +275,30 @@ def test_the_command_compensates_a_record_of_raw_counts(records, tmp_path, capsy
     assert column["rows_not_compensated"] == 0
     assert column["stability_after"] > 0
     assert "compensated_measured_rate_deg_per_s" in read_record(out)
+
+
+def test_rough_calibration_of_the_paper_is_taken(records, tmp_path, capsys):
+    """Five minutes of rest, then +100 °/s (eq. 33): null = mean at rest, scale = 100 °/s over the difference of the means."""
+    generator = np.random.default_rng(9)
+    output = np.where(np.arange(6000) < 3000, -690.0, 3500.0) + generator.normal(0, 3.0, 6000)
+    lines = ["time_s,housing_temperature_degC,output_counts,rate_deg_per_s"]
+    lines += [f"{0.1 * i:.1f},25.0,{output[i]:.6f},{0 if i < 3000 else 100}" for i in range(6000)]
+    rough = tmp_path / "rough.csv"
+    rough.write_text("\n".join(lines) + "\n")
+    assert main(["fit", "scale", str(rough), *records, "--json"]) == 0
+    said = capsys.readouterr()
+    assert "rough null and scale: from the run at rest and then at one rate" in said.err
+    found = json.loads(said.out)["parts"]["rough"]
+    step = output[3000:].mean() - output[:3000].mean()
+    assert found["null"]["value"] == pytest.approx(output[:3000].mean(), rel=1e-6)
+    assert found["scale"]["value"] == pytest.approx(100 / step, rel=1e-6)
+
+
+def test_rate_is_read_from_the_bells_own_elements():
+    """(27)–(29) and the second form of (24) on the card's bell; σ_φφ alone is near ν/(1 + ν) = 0.23 where the wall only bends around."""
+    from studies.papers.bvg_theory import read_planted_rate
+
+    reading = read_planted_rate(2.0)
+    assert reading.from_charges == pytest.approx(2.0, rel=1e-6)
+    assert reading.second_form == pytest.approx(2.0, rel=1e-4)
+    assert 0.1 < reading.printed_share < 0.25
