@@ -74,8 +74,3 @@ def stated_loss(instrument: "Instrument", model: "LossModel") -> StatedLoss | No
     budget = model.budget(instrument.reference_temperature)
     low, high = (float(end[0]) for end in budget.interval)
     return StatedLoss(stated, float(budget.inverse_q[0]) / stated, low / stated, high / stated)
-
-
-def write_quality(Q: float) -> str:
-    """Return a Q to three digits, 7.28e6 for 7.28e+06."""
-    return f"{Q:.3g}".replace("e+0", "e").replace("e+", "e")

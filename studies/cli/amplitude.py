@@ -2,6 +2,8 @@
 
 from typing import TYPE_CHECKING, Any
 
+from studies.results import Column, Table
+
 if TYPE_CHECKING:
     from shell.modes import Mode
 
@@ -37,24 +39,21 @@ def describe_amplitude(found: "list[Mode]", amplitude: float) -> "dict[int, dict
     return entries
 
 
-def print_amplitude(found: "list[Mode]", amplitude: "dict[int, dict[str, Any]]") -> None:
-    """Print a table of it."""
-    from studies.cli.output import print_table
-
-    rows = [
-        [
-            str(m.harmonic),
-            str(m.index),
-            *(f"{s[name]:+.4g}" for name in ("shift_ppb", "static_ppb", "inertial_ppb", "shift_Hz_per_um2")),
-        ]
-        for m in found
-        if (s := amplitude.get(id(m)))
+def amplitude_table(modes: "list[dict[str, Any]]") -> Table:
+    """The table of modes with `amplitude`."""
+    rows = [row for row in modes if "amplitude" in row]
+    columns = [
+        Column("harmonic", "n"),
+        Column("index", "index"),
+        Column("amplitude.shift_ppb", "shift", "ppb", "+.4g"),
+        Column("amplitude.static_ppb", "static", "ppb", "+.4g"),
+        Column("amplitude.inertial_ppb", "inertial", "ppb", "+.4g"),
+        Column("amplitude.shift_Hz_per_um2", "coefficient", "Hz/µm²", "+.4g"),
     ]
-    largest = next(iter(amplitude.values()))["amplitude_um"]
+    largest = f" of {rows[0]['amplitude']['amplitude_um']:g} µm" if rows else ""
     note = (
-        "Largest displacement of a standing wave; the shift goes with its square. By geometry alone: the bent shape stiffens, the"
-        " motion at twice the frequency that relieves it loads. Elastic constants of higher order, which in thick shells may"
-        " count as much, and the springs of electrodes come besides."
+        "Standing wave; the shift is proportional to the square of the largest displacement. Geometric nonlinearity only: the static"
+        " part stiffens, the inertia of the motion at twice the frequency softens. Third-order elastic constants, which may matter as much in thick shells,"
+        " and electrostatic springs are not included."
     )
-    columns = ["n", "index", "shift (ppb)", "bent shape", "motion at 2f", "Hz/µm²"]
-    print_table(f"Amplitude of {largest:g} µm", columns, rows, note)
+    return Table(f"Effect of an amplitude{largest}", rows, columns, note)

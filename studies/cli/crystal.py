@@ -2,6 +2,8 @@
 
 from typing import TYPE_CHECKING, Any
 
+from studies.results import Column, Table
+
 if TYPE_CHECKING:
     from shell.cubic import Cubic
     from shell.modes import Mode
@@ -29,24 +31,14 @@ def crystal_pairs(found: "list[Mode]", crystal: "Cubic | None", tolerance: float
     return entries
 
 
-def print_crystal(found: "list[Mode]", pairs: "dict[int, dict[str, Any]]") -> None:
-    """Print a table of it."""
-    from studies.cli.output import print_table
-
-    rows = [
-        [
-            str(m.harmonic),
-            f"{p['antinode_along_100_Hz']:.4f}",
-            f"{p['other_Hz']:.4f}",
-            f"{p['split_Hz']:.4f}",
-            f"{p['relative_error_estimate']:.0e}",
-        ]
-        for m in found
-        if (p := pairs.get(id(m)))
+def crystal_table(modes: "list[dict[str, Any]]") -> Table:
+    """The table of modes with `crystal`."""
+    columns = [
+        Column("harmonic", "n"),
+        Column("crystal.antinode_along_100_Hz", "antinode along [100]", "Hz", ".4f"),
+        Column("crystal.other_Hz", "other mode", "Hz", ".4f"),
+        Column("crystal.split_Hz", "split", "Hz", ".4f"),
+        Column("crystal.relative_error_estimate", "solver error, relative", form=".0e"),
     ]
-    columns = ["n", "antinode along [100] (Hz)", "the other (Hz)", "split (Hz)", "rel. error"]
-    note = (
-        "Of the crystal with [001] along the axis. The table above, and every other command, take the isotropic mean of its"
-        " elastic constants (Voigt)."
-    )
-    print_table("Pairs in the crystal", columns, rows, note)
+    note = "[001] along the axis. The table above and every other command use the isotropic (Voigt) mean of the elastic constants."
+    return Table("Pairs of the anisotropic crystal", [row for row in modes if "crystal" in row], columns, note)

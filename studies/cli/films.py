@@ -2,6 +2,8 @@
 
 from typing import TYPE_CHECKING, Any
 
+from studies.results import Column, Table
+
 if TYPE_CHECKING:
     from shell.modes import Mode
     from studies.instrument.card import Instrument
@@ -26,19 +28,24 @@ def describe_films(found: "list[Mode]", instrument: "Instrument") -> "dict[int, 
     }
 
 
-def print_films(found: "list[Mode]", films: "dict[int, list[dict[str, Any]]]") -> None:
-    """Print a table of it."""
-    from studies.cli.output import print_table
-
+def films_table(modes: "list[dict[str, Any]]") -> Table:
+    """The table of modes with `films`, a row for each film."""
     rows = [
-        [
-            str(m.harmonic),
-            str(m.index),
-            one["film"],
-            f"no {' or '.join(one['missing'])}" if one["shift_ppm"] is None else f"{one['shift_ppm']:+.4g}",
-        ]
-        for m in found
-        for one in films[id(m)]
+        {
+            **row,
+            **film,
+            "shift_ppm": f"unknown without {' and '.join(film['missing'])}"
+            if film["shift_ppm"] is None
+            else film["shift_ppm"],
+        }
+        for row in modes
+        for film in row.get("films", ())
     ]
-    note = "By stiffness and mass, to first order in the thickness; the frequencies above are those of the bare wall."
-    print_table("Films", ["n", "index", "film", "shift (ppm)"], rows, note)
+    columns = [
+        Column("harmonic", "n"),
+        Column("index", "index"),
+        Column("film", "film"),
+        Column("shift_ppm", "shift", "ppm", "+.4g"),
+    ]
+    note = "By stiffness and mass, to first order in the thickness. The frequencies above are those of the bare wall."
+    return Table("Effect of the films", rows, columns, note)

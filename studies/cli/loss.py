@@ -10,12 +10,22 @@ where nothing varies around) with `inverse_q_split`, `damping_axis_deg`, `larges
 from typing import TYPE_CHECKING, Any, Literal
 
 from studies.cli.arguments import FromDegC, ToDegC, lay_temperatures
-from studies.cli.output import Answer, answers
+from studies.cli.output import answers
+from studies.results import Chapter, Column, Facts, Figure, Result, Sentence, Table, rows_of
 
 if TYPE_CHECKING:
     from shell.damping.budget import Budget, LossPart
     from studies.loss import LossModel
     from studies.loss_account import DampingAround, StatedLoss
+
+WALL = (
+    "The cost of a surface treatment depends on its place: a damaged layer or a film dissipates in proportion to the energy, heat in"
+    " a film to the square of the area strain, gas damping to the normal motion. A film or a scratch does least harm where these"
+    " curves are low."
+)
+SQUEEZE = (
+    "the share of elastic energy with volume change, relative to a bent beam; twist and pure shear produce no heat."
+)
 
 
 @answers("hrg.loss/1")
@@ -28,8 +38,7 @@ def loss(
     harmonic: int = 2,
     theory: Literal["solid", "shell"] = "solid",
     anchor: bool = False,
-    report: str | None = None,
-) -> Answer:
+) -> Result:
     """Show Q over temperature, where its loss comes from, and which part to attack first.
 
     Heat through the wall, loss of the bulk and of the surface follow from geometry and material; films, gas, activated losses,
@@ -51,10 +60,9 @@ def loss(
         solid (three-dimensional) or shell (Naghdi).
     anchor : bool
         Compute what a stem sends into the body that it stands on (a second or two).
-    report : str
-        Write a page (HTML).
     """
-    from studies.cli.output import say
+    import numpy as np
+
     from studies.instrument.card import load_card
     from studies.loss import loss_model
     from studies.loss_account import damping_around, stated_loss
@@ -65,27 +73,26 @@ def loss(
     model = loss_model(instrument, harmonic, theory, anchor)
     budget = model.budget(T)
     around, stated = damping_around(model, budget), stated_loss(instrument, model)
-    if report is not None:
-        from studies.files.writing import write_text
-        from studies.reports.loss import loss_page
-
-        write_text(report, loss_page(instrument, model, budget, theory))
-        say(f"report: {report}")
-    described = _describe(model, budget, theory)
-    yield {
+    payload = {
         "schema": "hrg.loss/1",
         "card": instrument.name,
-        **described,
+        **_describe(model, budget, theory),
         "anisotropy": _around(around),
         "left_out": list(model.left_out),
-        "stated": _stated(stated),
-    }
-    _print(instrument.name, model, budget, theory)
-    if around is not None:
-        _print_around(budget, around)
-    _print_advice(model, budget)
-    if stated is not None:
-        _print_stated(stated)
+        "stated": None if stated is None else {
+            "inverse_q": stated.inverse_q,
+            "explained": stated.explained,
+            "explained_low": stated.low,
+            "explained_high": stated.high,
+        },
+    }  # fmt: skip
+    at = int(np.argmin(abs(T - model.vibration.reference)))
+    return Result(
+        payload,
+        f"Loss budget of {instrument.name}",
+        f"1/Q of the mode n = {harmonic} at {model.frequency:.1f} Hz as a sum of parts, each computed from the mode ({theory} theory).",
+        _parts(payload, model, budget, stated, at),
+    )
 
 
 def _describe(model: "LossModel", budget: "Budget", theory: str) -> "dict[str, Any]":
@@ -112,29 +119,6 @@ def _describe(model: "LossModel", budget: "Budget", theory: str) -> "dict[str, A
     }
 
 
-def _around(found: "DampingAround | None") -> "dict[str, Any] | None":
-    import numpy as np
-
-    if found is None:
-        return None
-    return {
-        "inverse_q_split": found.split,
-        "damping_axis_deg": np.degrees(found.axis),
-        "largest_drift_deg_per_h": found.drift,
-    }
-
-
-def _stated(found: "StatedLoss | None") -> "dict[str, Any] | None":
-    if found is None:
-        return None
-    return {
-        "inverse_q": found.inverse_q,
-        "explained": found.explained,
-        "explained_low": found.low,
-        "explained_high": found.high,
-    }
-
-
 def _part(part: "LossPart") -> "dict[str, Any]":
     low, high = part.interval
     return {
@@ -148,93 +132,118 @@ def _part(part: "LossPart") -> "dict[str, Any]":
     }
 
 
-def _print(name: str, model: "LossModel", budget: "Budget", theory: str) -> None:
+def _around(found: "DampingAround | None") -> "dict[str, Any] | None":
     import numpy as np
-    from scipy.constants import zero_Celsius
 
-    from studies.cli.output import print_table
-    from studies.loss_account import write_quality
+    if found is None:
+        return None
+    return {
+        "inverse_q_split": found.split,
+        "damping_axis_deg": np.degrees(found.axis),
+        "largest_drift_deg_per_h": found.drift,
+    }
+
+
+def _parts(
+    payload: "dict[str, Any]", model: "LossModel", budget: "Budget", stated: "StatedLoss | None", at: int
+) -> "list[Chapter]":
+    """What people read: the answer, the parts, their course, where on the wall, around the axis, what is left out."""
+    import numpy as np
+
+    from shell.damping.thermoelastic import trace_share
+    from studies.reports import loss as pictures
+
+    degrees, around = payload["temperature_degC"], payload["anisotropy"]
+    low, high = budget.interval
+    over = {
+        "T": degrees,
+        "inverse_q": budget.inverse_q,
+        "q": payload["q"],
+        "q_low": 1 / high,
+        "q_high": 1 / low,
+        "slope": budget.slope,
+    }
+    share, half, without = {}, {}, {}
+    for part in budget.parts:
+        share[part.name] = 100 * part.inverse_q[at] / budget.inverse_q[at]
+        half[part.name] = 1 / (budget.inverse_q[at] - part.inverse_q[at] / 2)
+        rest = float(budget.without(part.name)[at])
+        without[part.name] = rest if np.isfinite(rest) else "nothing left"
+    rows = [
+        {
+            **entry,
+            "share": share[part.name],
+            "half": half[part.name],
+            "without": without[part.name],
+            "advice": _sentence(part.advice),
+        }
+        for entry, part in zip(payload["parts"], budget.parts, strict=True)
+    ]
+    picked = sorted({0, at, len(degrees) - 1})
+    name = Column("name", "part")
+    interval = Column("inverse_q", "90 % interval", "1e-9", digits=2, scale=1e9, interval=(f"low.{at}", f"high.{at}"))
+    values = [Column(f"inverse_q.{k}", f"1/Q at {degrees[k]:.0f} °C", "1e-9", ".3g", scale=1e9) for k in picked]
+    damped = [] if around is None else rows_of({"T": degrees, **around})
+    T = Column("T", "T", "°C", ".1f")
+    words = [f"Attack first: {budget.first.name}. {_sentence(budget.first.advice)}"]
+    words += [f"Least known: {budget.least_known.name}. Its uncertainty moves the sum most."]
+    if stated is not None:
+        words += [f"{stated.verdict}"] if stated.verdict else []
+    return [
+        Chapter("In short", [
+            Facts(_facts(budget, stated, at, degrees[at])),
+            *(Sentence(one) for one in words),
+            Figure(lambda: pictures.bars(budget, at), f"Parts of 1/Q at {degrees[at]:g} °C with 90 % intervals."),
+        ]),
+        Chapter(f"Parts at {degrees[at]:g} °C", [
+            Table("Share and gain", rows, [
+                name, Column("share", "share", "%", ".3g"), *values, interval, Column(f"slope_per_K.{at}", "slope", "%/°C", "+.2f", scale=100.0),
+                Column("half", "Q with half of it", digits=3), Column("without", "Q without it", digits=3),
+            ], "Largest first; all but 1/Q at the temperature above."),
+            Table("Remedies and sources", rows, [
+                name, Column("relative_sd", "standard uncertainty", "%", ".0f", scale=100.0), Column("advice", "remedy"), Column("source", "source"),
+            ]),
+        ]),
+        Chapter("Over temperature", [
+            Table("Q", rows_of(over), [
+                T, Column("q", "Q", digits=3), Column("q", "90 % interval", digits=3, interval=("q_low", "q_high")),
+                Column("inverse_q", "1/Q", "1e-9", ".3g", scale=1e9), Column("slope", "slope of 1/Q", "%/°C", "+.2f", scale=100.0),
+            ]),
+            *([Figure(lambda: pictures.course(budget, stated, model.vibration.reference), "1/Q and its parts.")] if len(degrees) > 1 else []),
+        ]),
+        Chapter("Along the meridian", [
+            Sentence(WALL, where="page"),
+            Sentence(f"Thermoelastic participation {trace_share(model.vibration.solution):.3g}: {SQUEEZE}", where="page"),
+            Figure(lambda: pictures.along(model), "Energy, area strain and normal motion of the faces, each per area over its mean."),
+        ]),
+        Chapter("Around the axis", [
+            Table("Damping anisotropy", damped, [
+                T, Column("inverse_q_split", "Δ(1/Q)", "1e-9", ".3g", scale=1e9), Column("damping_axis_deg", "axis", "°", ".2f"),
+                Column("largest_drift_deg_per_h", "largest drift", "°/h"),
+            ], "Axis: azimuth of the pattern with the largest damping. The drift goes as sin 2n of the angle from it."),
+        ]),
+        Chapter("Not included", [Sentence(_sentence(f"not included: {words}")) for words in model.left_out]),
+    ]  # fmt: skip
+
+
+def _facts(budget: "Budget", stated: "StatedLoss | None", at: int, degrees: float) -> "list[tuple[str, str, str]]":
+    import numpy as np
+
     from studies.reports.digits import plain
 
-    low, high = budget.interval
-    rows = [
-        [
-            f"{T - zero_Celsius:.1f}",
-            write_quality(1 / total),
-            f"{write_quality(1 / most)} … {write_quality(1 / least)}",
-            f"{1e9 * total:.3g}",
-            f"{rise:+.2f}",
-        ]
-        for T, total, least, most, rise in zip(
-            budget.temperatures, budget.inverse_q, low, high, 100 * budget.slope, strict=True
-        )
+    low, high = (float(end[at]) for end in budget.interval)
+    without = float(budget.without(budget.first.name)[at])
+    gain = f"Q would be {plain(without)} without it" if np.isfinite(without) else "no other part is known"
+    facts = [
+        (f"Q at {degrees:g} °C", plain(1 / budget.inverse_q[at]), f"90 %: {plain(1 / high)} … {plain(1 / low)}"),
+        ("Largest part", budget.first.name, gain),
     ]
-    title = f"{name}, n = {model.harmonic}, {model.frequency:.1f} Hz, {theory}"
-    print_table(title, ["T (°C)", "Q", "90 %", "1/Q (1e-9)", "1/Q (%/°C)"], rows)
-    middle = int(np.argmin(abs(budget.temperatures - model.vibration.reference)))
-    shown = sorted({0, middle, len(budget.temperatures) - 1})
-    table = []
-    for part in budget.parts:
-        least, most = (1e9 * float(end[middle]) for end in part.interval)
-        share = 100 * part.inverse_q[middle] / budget.inverse_q[middle]
-        table.append(
-            [
-                part.name,
-                f"{share:.3g} %",
-                *(f"{1e9 * part.inverse_q[k]:.3g}" for k in shown),
-                f"{plain(least, 2)} … {plain(most, 2)}",
-                f"{100 * part.slope[middle]:+.2f}",
-                part.source,
-            ]
-        )
-    degrees = [f"{budget.temperatures[k] - zero_Celsius:.0f} °C" for k in shown]
-    note = f"1/Q in 1e-9; share, 90 % interval and slope at {budget.temperatures[middle] - zero_Celsius:.0f} °C."
-    print_table("Parts", ["part", "share", *degrees, "90 %", "%/°C", "source"], table, note)
-
-
-def _print_around(budget: "Budget", around: "DampingAround") -> None:
-    import numpy as np
-    from scipy.constants import zero_Celsius
-
-    from studies.cli.output import print_table
-
-    columns = ["T (°C)", "Δ(1/Q) (1e-9)", "axis (°)", "drift at most (°/h)"]
-    lines = [
-        [f"{T - zero_Celsius:.1f}", f"{1e9 * split:.3g}", f"{axis:.2f}", f"{drift:.4g}"]
-        for T, split, axis, drift in zip(
-            budget.temperatures, around.split, np.degrees(around.axis), around.drift, strict=True
-        )
-    ]
-    print_table("Around the axis", columns, lines, "Axis: azimuth of the pattern that is damped most.")
-
-
-def _print_advice(model: "LossModel", budget: "Budget") -> None:
-    import numpy as np
-
-    from studies.loss_account import write_quality
-
-    middle = int(np.argmin(abs(budget.temperatures - model.vibration.reference)))
-    without, first = float(budget.without(budget.first.name)[middle]), budget.first
-    gain = (
-        "nothing known would be left" if not np.isfinite(without) else f"without it Q would be {write_quality(without)}"
-    )
-    print(f"Attack first: {first.name}; {gain}. {_sentence(first.advice)}")
-    known = budget.least_known.name
-    print("It is also the least known." if known == first.name else f"Least known: {known}.")
-    for sentence in model.left_out:
-        print(f"Not in the budget: {sentence}")
-
-
-def _print_stated(stated: "StatedLoss") -> None:
-    from studies.loss_account import write_quality
-
-    share, low, high = (100 * part for part in (stated.explained, stated.low, stated.high))
-    print(
-        f"The card states Q = {write_quality(1 / stated.inverse_q)}: the parts explain {share:.0f} % of its loss (90 %: {low:.0f} … {high:.0f} %)."
-    )
-    if stated.verdict:
-        print(stated.verdict)
+    if stated is not None:
+        share, least, most = (100 * part for part in (stated.explained, stated.low, stated.high))
+        remark = f"90 %: {least:.0f} … {most:.0f} %; the card states Q = {plain(1 / stated.inverse_q)}"
+        facts.append(("Explained share of the stated loss", f"{share:.0f} %", remark))
+    return facts
 
 
 def _sentence(words: str) -> str:
-    return words[:1].upper() + words[1:] + "." if words else ""
+    return words[:1].upper() + words[1:] + "." * (not words.endswith(".")) if words else ""

@@ -14,12 +14,32 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import Parameter
 
-from studies.cli.output import Answer, answers
+from studies.cli.output import answers
+from studies.results import Blocks, Column, Result, Table, Where
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from shell.modes import Mode
     from shell.resonator import Resonator
     from studies.instrument.card import Instrument
+    from studies.reports.page import Block
+
+THEORIES = {
+    "solid": "three-dimensional elasticity",
+    "shell": "Naghdi shell theory",
+    "rayleigh": "Rayleigh's closed form",
+}
+COLUMNS = (
+    Column("harmonic", "n"),
+    Column("index", "index"),
+    Column("label", "kind"),
+    Column("frequency_Hz", "f", "Hz", ".4f"),
+    Column("bryan_factor", "Bryan factor", form=".5f"),
+    Column("relative_error_estimate", "solver error, relative", form=".0e"),
+    Column("material_uncertainty_Hz", "material uncertainty", "Hz", ".2g"),
+    Column("frequency_per_thickness_Hz_per_um", "per wall thickness", "Hz/µm", "+.3g"),
+)
 
 
 @answers("hrg.modes/1")
@@ -34,7 +54,7 @@ def modes(
     sensitivities: bool = False,
     spin: float | None = None,
     amplitude: float | None = None,
-) -> Answer:
+) -> Result:
     """Compute the lowest modes of a resonator: frequency, Bryan factor, energies, sensitivities.
 
     Parameters
@@ -54,21 +74,20 @@ def modes(
     sensitivities : bool
         Show how each frequency follows E, nu, rho, thickness and radius, and where its energy is.
     spin : float
-        Rate of spin about the axis in °/s: the two waves that run around, and what the second order of the rate does to both.
+        Rate of rotation about the axis in °/s: frequencies of the two travelling waves, with second-order effects.
     amplitude : float
-        Largest displacement in µm: what the nonlinear geometry of a large vibration does to the frequency.
+        Largest displacement in µm: shift of the frequency by geometric nonlinearity.
     """
     from dataclasses import asdict
 
     from scipy.constants import zero_Celsius
 
     from shell.modes import solve_modes
-    from studies.cli.amplitude import describe_amplitude, print_amplitude
-    from studies.cli.crystal import crystal_pairs, print_crystal
-    from studies.cli.films import describe_films, print_films
-    from studies.cli.mount import describe_mount, print_mount
-    from studies.cli.output import print_table
-    from studies.cli.spin import print_spin, spin_pairs
+    from studies.cli.amplitude import amplitude_table, describe_amplitude
+    from studies.cli.crystal import crystal_pairs, crystal_table
+    from studies.cli.films import describe_films, films_table
+    from studies.cli.mount import describe_mount, mount_table
+    from studies.cli.spin import spin_pairs, spin_table
     from studies.errors import InputError, naming
     from studies.instrument.card import load_card
 
@@ -80,17 +99,20 @@ def modes(
         raise InputError(f"--tolerance {tolerance:g}: it is a relative error between 0 and 1.")
     instrument = load_card(card)
     T = instrument.reference_temperature if temperature is None else temperature + zero_Celsius
+    detailed = theory != "rayleigh"
     with naming(instrument.path):
         resonator, elastic = instrument.at(T)
         found = [m for n in harmonic for m in solve_modes(resonator, elastic, n, count, theory, tolerance)]
-        detailed = theory != "rayleigh"
-        films = describe_films(found, instrument) if detailed else {}
-        mount = describe_mount(found, instrument, T)
-        crystal = crystal_pairs(found, instrument.keys("material").cubic, tolerance)
+        more: dict[str, dict[int, Any]] = {
+            # key of a mode in the JSON: what of it is known, by the identity of the mode
+            "split": _find_splits(instrument, found, T) if detailed else {},
+            "spin": {} if spin is None else spin_pairs(found, elastic, spin),
+            "amplitude": {} if amplitude is None else describe_amplitude(found, amplitude),
+            "mount": describe_mount(found, instrument, T),
+            "films": describe_films(found, instrument) if detailed else {},
+            "crystal": crystal_pairs(found, instrument.keys("material").cubic, tolerance),
+        }
     share, mean = _material_share(instrument, T), _mean_thickness(resonator)
-    split = _find_splits(instrument, found, T) if detailed else {}
-    spinning = {} if spin is None else spin_pairs(found, elastic, spin)
-    large = {} if amplitude is None else describe_amplitude(found, amplitude)
     entries = []
     for m in found:
         entry = {
@@ -109,65 +131,42 @@ def modes(
                 "sensitivities": asdict(m.sensitivities),
                 "energy_fractions": asdict(m.energy_fractions),
             }
-        if id(m) in split:
-            entry["split"] = split[id(m)]
-        for key, known in (
-            ("spin", spinning),
-            ("amplitude", large),
-            ("mount", mount),
-            ("films", films),
-            ("crystal", crystal),
-        ):
-            if id(m) in known:
-                entry[key] = known[id(m)]
-        entries.append(entry)
-    yield {
-        "schema": "hrg.modes/1",
-        "card": instrument.name,
-        "temperature_degC": T - zero_Celsius,
-        "theory": theory,
-        "modes": entries,
-    }
-    rows = [
-        [
-            str(m.harmonic),
-            str(m.index),
-            m.label,
-            f"{m.frequency:.4f}",
-            f"{m.bryan_factor:.5f}",
-            f"{m.relative_error_estimate:.0e}",
-            f"{share * m.frequency:.2g}" if share else "—",
-            f"{_per_micrometre(m, mean):+.3g}" if detailed else "",
-        ]
-        for m in found
+        entries.append(entry | {key: known[id(m)] for key, known in more.items() if id(m) in known})
+    head = {"card": instrument.name, "temperature_degC": T - zero_Celsius, "theory": theory}
+    name = f"{instrument.name} at {T - zero_Celsius:g} °C, {theory}"
+    special = [
+        make(entries) for make in (_split_table, spin_table, amplitude_table, mount_table, films_table, crystal_table)
     ]
-    columns = ["n", "index", "kind", "f (Hz)", "Bryan", "rel. error", "± Hz", "Hz/µm"]
-    spread = (
-        "what the material's published values leave (one standard deviation)"
-        if share
-        else "not known: the card gives its material without uncertainty"
+    return Result(
+        {"schema": "hrg.modes/1", **head, "modes": entries},
+        f"Modes of {instrument.name}",
+        f"Natural frequencies and Bryan factors at {T - zero_Celsius:g} °C, {THEORIES[theory]}.",
+        [
+            Table(name, entries, COLUMNS, _note(theory, share)),
+            *special,
+            *_detail_tables(entries if detailed else [], "everywhere" if sensitivities else "page"),
+            Blocks(lambda: _view(instrument, sorted(set(harmonic)), T)),
+        ],
     )
-    note = (
-        f"The relative error is the solver's, against the exact solution of the same theory; ± Hz is {spread};"
-        " Hz/µm of wall thickness."
-    )
+
+
+def _view(instrument: "Instrument", harmonics: list[int], T: float) -> "Sequence[Block]":
+    """The lowest modes, to be turned."""
+    from studies.reports.mode_picture import view_blocks
+    from studies.reports.scenes import show_mode
+
+    return view_blocks([show_mode(instrument, n, temperature=T) for n in harmonics])
+
+
+def _note(theory: str, share: float) -> str:
     if theory == "rayleigh":
-        note = "Rayleigh's closed form ignores the free edge: on a hemisphere it lies several per cent too high."
-    print_table(f"{instrument.name} at {T - zero_Celsius:g} °C, {theory}", columns, rows, note)
-    if split:
-        _print_splits(found, split)
-    if spinning:
-        print_spin(found, spinning)
-    if large:
-        print_amplitude(found, large)
-    if mount:
-        print_mount(found, mount)
-    if films:
-        print_films(found, films)
-    if crystal:
-        print_crystal(found, crystal)
-    if sensitivities and detailed:
-        _print_details(found)
+        return "Rayleigh's closed form ignores the free edge: on a hemisphere it lies several per cent too high."
+    spread = (
+        "from the published values of the material, one standard deviation"
+        if share
+        else "not known: the card gives none"
+    )
+    return f"Solver error: against the exact solution of the same theory. Material uncertainty: {spread}."
 
 
 def _find_splits(instrument: "Instrument", found: "list[Mode]", T: float) -> "dict[int, dict[str, Any]]":
@@ -202,27 +201,6 @@ def _find_splits(instrument: "Instrument", found: "list[Mode]", T: float) -> "di
     return entries
 
 
-def _print_splits(found: "list[Mode]", split: "dict[int, dict[str, Any]]") -> None:
-    from studies.cli.output import print_table
-
-    rows = [
-        [
-            str(m.harmonic),
-            str(m.index),
-            f"{s['slow_Hz']:.5f}",
-            f"{s['fast_Hz']:.5f}",
-            f"{s['split_Hz']:.5f}",
-            f"{s['every_order_split_Hz']:.5f}",
-            f"{s['slow_axis_deg']:.2f}",
-            f"{s['shift_ppm']:+.3f}",
-        ]
-        for m in found
-        if (s := split.get(id(m)))
-    ]
-    columns = ["n", "index", "slow (Hz)", "fast (Hz)", "split (Hz)", "every order", "slow axis (°)", "shift (ppm)"]
-    print_table("Pairs with the card's imperfection and electrodes", columns, rows, "Antinode of the slower mode.")
-
-
 def _material_share(instrument: "Instrument", T: float) -> float:
     import numpy as np
 
@@ -240,27 +218,28 @@ def _per_micrometre(mode: "Mode", thickness: float) -> float:
     return float(mode.frequency * mode.sensitivities.thickness / thickness * 1e-6)
 
 
-def _print_details(found: "list[Mode]") -> None:
-    from studies.cli.output import print_table
+def _split_table(modes: "list[dict[str, Any]]") -> Table:
+    columns = [
+        *COLUMNS[:2],
+        Column("split.slow_Hz", "slow", "Hz", ".5f"),
+        Column("split.fast_Hz", "fast", "Hz", ".5f"),
+        Column("split.split_Hz", "split", "Hz", ".5f"),
+        Column("split.every_order_split_Hz", "split, all orders", "Hz", ".5f"),
+        Column("split.slow_axis_deg", "slow axis", "°", ".2f"),
+        Column("split.shift_ppm", "shift", "ppm", "+.3f"),
+    ]
+    rows = [row for row in modes if "split" in row]
+    return Table("Pairs with imperfections and electrodes", rows, columns, "Slow axis: an antinode of the slower mode.")
 
-    names = ["n", "index"]
-    slopes = [
-        [
-            str(m.harmonic),
-            str(m.index),
-            *(f"{x:+.4f}" for x in (s.E, s.nu, s.rho, s.thickness, s.radius)),
-            f"{1e3 * m.modal_mass:.4f}",
-        ]
-        for m in found
-        for s in [m.sensitivities]
+
+def _detail_tables(modes: "list[dict[str, Any]]", where: Where) -> list[Table]:
+    names = {"E": "ln E", "nu": "ν", "rho": "ln ρ", "thickness": "ln h", "radius": "ln r"}
+    slopes = [Column(f"sensitivities.{key}", name, form="+.4f") for key, name in names.items()]
+    kinds = {"bending": "bending", "membrane": "membrane", "shear": "transverse shear", "root": "root", "stem": "stem"}
+    shares = [Column(f"energy_fractions.{key}", name, form=".3f", scale=100.0) for key, name in kinds.items()]
+    mass = Column("modal_mass_kg", "modal mass", "g", ".4f", scale=1e3)
+    note = "ν at constant E; ln r scales every length but the thickness. Modal mass for a largest displacement of 1."
+    return [
+        Table("Derivatives of ln f", modes, [*COLUMNS[:2], *slopes, mass], note, where),
+        Table("Strain energy (%)", modes, [*COLUMNS[:2], *shares], "Root: the solid cap, fillet or corner.", where),
     ]
-    columns = [*names, "ln E", "ν", "ln ρ", "ln h", "ln r", "modal mass (g)"]
-    note = "ν at constant E; ln r moves every length but the thickness. Modal mass for a largest displacement of 1."
-    print_table("Derivatives of ln f", columns, slopes, note)
-    shares = [
-        [str(m.harmonic), str(m.index), *(f"{100 * x:.3f}" for x in (e.bending, e.membrane, e.shear, e.root, e.stem))]
-        for m in found
-        for e in [m.energy_fractions]
-    ]
-    columns = [*names, "bending", "membrane", "transverse shear", "root", "stem"]
-    print_table("Shares of the strain energy (%)", columns, shares, "Root: the solid cap, fillet or corner.")

@@ -2,6 +2,8 @@
 
 from typing import TYPE_CHECKING, Any
 
+from studies.results import Column, Table
+
 if TYPE_CHECKING:
     from shell.modes import Mode
     from studies.instrument.card import Instrument
@@ -32,24 +34,19 @@ def describe_mount(found: "list[Mode]", instrument: "Instrument", T: float) -> "
     return entries
 
 
-def print_mount(found: "list[Mode]", mount: "dict[int, dict[str, Any]]") -> None:
-    """Print a table of it."""
-    from studies.cli.output import print_table
-
-    rows = [
-        [
-            str(m.harmonic),
-            str(m.index),
-            f"{s['per_strain']:+.4g}",
-            f"{s['shift_ppm']:+.4g}",
-            f"{s['slope_ppm_per_degC']:+.3g}",
-        ]
-        for m in found
-        if (s := mount.get(id(m)))
+def mount_table(modes: "list[dict[str, Any]]") -> Table:
+    """The table of modes with `mount`."""
+    rows = [row for row in modes if "mount" in row]
+    columns = [
+        Column("harmonic", "n"),
+        Column("index", "index"),
+        Column("mount.per_strain", "per strain", form="+.4g"),
+        Column("mount.shift_ppm", "shift", "ppm", "+.4g"),
+        Column("mount.slope_ppm_per_degC", "slope", "ppm/°C", "+.3g"),
     ]
-    strain = next(iter(mount.values()))["strain_ppm"]
+    strain = rows[0]["mount"]["strain_ppm"] if rows else 0.0
     note = (
-        f"The base has grown by {strain:.4g} ppm more than the resonator since they were joined. By the stress and the shape that this"
-        " gives, to first order; the frequencies above are those without it, those of hrg tcf and of simulations have it."
+        f"The base has expanded {strain:.4g} ppm more than the resonator since they were joined. First order in the resulting stress"
+        " and deformation. The frequencies above do not include it; those of hrg tcf and of simulations do."
     )
-    print_table("Mount", ["n", "index", "per strain", "shift (ppm)", "slope (ppm/°C)"], rows, note)
+    return Table("Thermal mismatch with the base", rows, columns, note)

@@ -2,6 +2,8 @@
 
 from typing import TYPE_CHECKING, Any
 
+from studies.results import Column, Table
+
 if TYPE_CHECKING:
     from shell.elastic import Elastic
     from shell.modes import Mode
@@ -43,24 +45,21 @@ def spin_pairs(found: "list[Mode]", elastic: "Elastic", rate: float) -> "dict[in
     return entries
 
 
-def print_spin(found: "list[Mode]", spin: "dict[int, dict[str, Any]]") -> None:
-    """Print a table of it."""
-    from studies.cli.output import print_table
-
-    rows = [
-        [
-            str(m.harmonic),
-            f"{s['lower_wave_Hz']:.5f}",
-            f"{s['upper_wave_Hz']:.5f}",
-            *(f"{s[name]:+.3g}" for name in ("shift_ppm", "stress_ppm", "centrifugal_ppm", "coriolis_ppm")),
-        ]
-        for m in found
-        if (s := spin.get(id(m)))
+def spin_table(modes: "list[dict[str, Any]]") -> Table:
+    """The table of modes with `spin`."""
+    rows = [row for row in modes if "spin" in row]
+    columns = [
+        Column("harmonic", "n"),
+        Column("spin.lower_wave_Hz", "lower wave", "Hz", ".5f"),
+        Column("spin.upper_wave_Hz", "upper wave", "Hz", ".5f"),
+        Column("spin.shift_ppm", "shift of the mean", "ppm", "+.3g"),
+        Column("spin.stress_ppm", "by stress", "ppm", "+.3g"),
+        Column("spin.centrifugal_ppm", "centrifugal", "ppm", "+.3g"),
+        Column("spin.coriolis_ppm", "Coriolis", "ppm", "+.3g"),
     ]
-    rate = next(iter(spin.values()))["rate_deg_per_s"]
-    columns = ["n", "lower wave (Hz)", "upper wave (Hz)", "mean (ppm)", "stress", "centrifugal", "Coriolis"]
+    rate = f" at {rows[0]['spin']['rate_deg_per_s']:g} °/s" if rows else ""
     note = (
-        "In the frame of the resonator. The waves lie apart by Bryan's effect; their mean moves by the second order in the rate:"
-        " stress of the spin, centrifugal softening, Coriolis forces."
+        "In the frame of the resonator. Bryan's effect separates the two waves; their mean shifts with the square of the rate,"
+        " by the stress of rotation, centrifugal softening and Coriolis forces."
     )
-    print_table(f"Spin of {rate:g} °/s", columns, rows, note)
+    return Table(f"Effects of rotation{rate}", rows, columns, note)

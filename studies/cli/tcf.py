@@ -3,16 +3,19 @@
 from typing import TYPE_CHECKING, Any, Literal
 
 from studies.cli.arguments import FromDegC, ToDegC, lay_temperatures
-from studies.cli.output import Answer, answers
+from studies.cli.output import answers
+from studies.results import Column, Figure, Result, Table, rows_of
 
 if TYPE_CHECKING:
     import numpy as np
+    from matplotlib.figure import Figure as Drawing
     from numpy.typing import NDArray
 
     from shell.law import FrequencyLaw
 
 MOST_HARMONIC = 50  # a law of a higher one takes minutes
-PARTS = ("E", "nu", "rho", "h", "r", "base")
+PARTS = {"E": "E", "nu": "μ", "rho": "ρ", "h": "h", "r": "r", "base": "base"}
+CAPTION = "Slope of the frequency with its standard deviation (band), and its parts."
 LEAST = 0.005  # ppm/°C, that is shown
 
 
@@ -26,7 +29,7 @@ def tcf(
     harmonic: int = 2,
     theory: Literal["solid", "shell", "rayleigh"] = "solid",
     measured: str | None = None,
-) -> Answer:
+) -> Result:
     """Show the frequency over temperature, its slope in ppm/°C, and the slope's parts from E, μ, ρ, h, r and a [mount].
 
     Parameters
@@ -47,9 +50,6 @@ def tcf(
         A steady-state table (temperature_degC,frequency_Hz) whose local slopes stand beside; with the card hrg-30mm it is
         the HRG paper's Table 1 unless another is given.
     """
-    from scipy.constants import zero_Celsius
-
-    from studies.cli.output import print_table
     from studies.errors import InputError
     from studies.instrument.card import load_card
     from studies.law import check_slope_known, law_of
@@ -65,7 +65,7 @@ def tcf(
     law = law_of(instrument, float(T[0]), float(T[-1]), theory, harmonic)
     points, moves = _points(law, T), _moves(law, T)
     local = _measured_slopes(instrument.name, measured)
-    yield {
+    payload = {
         "schema": "hrg.tcf/1",
         "card": instrument.name,
         "theory": theory,
@@ -74,34 +74,66 @@ def tcf(
         "relative_error": law.error,
         "points": points,
         "prior": moves,
-        "measured": [{"temperature_degC": T, "slope_ppm_per_degC": s} for T, s in local],
+        "measured": local,
     }
-    shown_parts = PARTS if law.mount else PARTS[:-1]
-    rows = [
-        [f"{p['temperature_degC']:.1f}", f"{p['frequency_Hz']:.3f}"]
-        + [f"{p['parts_ppm_per_degC'][k]:+.2f}" for k in shown_parts]
-        + [f"{p['slope_ppm_per_degC']:.2f} ± {p['uncertainty_ppm_per_degC']:.1f}"]
-        for p in points
-    ]
-    columns = ["T (°C)", "f (Hz)", "E", "μ", "ρ", "h", "r", *(["base"] if law.mount else []), "slope"]
-    note = f"Slopes in ppm/°C; ± is one standard deviation by the prior of law '{instrument.material.law}'."
+    parts = [name for name in PARTS if name != "base" or law.mount]
+    note = f"Slopes in ppm/°C; ±: one standard deviation by the prior of the law '{instrument.material.law}'."
     if law.mount:
-        note += " Base: the stress of the card's [mount], which expands otherwise."
-    print_table(f"{instrument.name}, n = {harmonic}, {theory}", columns, rows, note)
-    if moves:
-        shown = sorted({0, len(T) // 2, len(T) - 1})
-        print_table(
-            "Uncertainty of the law: change of the slope by one standard deviation (ppm/°C)",
-            ["Coefficient", "Standard deviation", *(f"at {T[k] - zero_Celsius:g} °C" for k in shown)],
-            [
-                [m["coefficient"], f"{m['sd']:.2g}", *(f"{m['moves_slope_ppm_per_degC'][k]:+.2f}" for k in shown)]
-                for m in moves
-                if max(map(abs, m["moves_slope_ppm_per_degC"])) >= LEAST
-            ],
-        )
-    if local:
-        beside = [[f"{T:.1f}", f"{s:.2f}"] for T, s in local]
-        print_table("Measured, between neighbouring points", ["T (°C)", "slope (ppm/°C)"], beside)
+        note += " Base: stress from the thermal mismatch of the card's [mount]."
+    columns = [
+        Column("temperature_degC", "T", "°C", ".1f"),
+        Column("frequency_Hz", "f", "Hz", ".3f"),
+        *(Column(f"parts_ppm_per_degC.{name}", PARTS[name], form="+.2f") for name in parts),
+        Column("slope_ppm_per_degC", "slope", error="uncertainty_ppm_per_degC"),
+    ]
+    shown = sorted({0, len(T) // 2, len(T) - 1})
+    at = [
+        Column(f"moves_slope_ppm_per_degC.{k}", f"at {points[k]['temperature_degC']:g} °C", form="+.2f") for k in shown
+    ]
+    uncertain = [one for one in moves if max(map(abs, one["moves_slope_ppm_per_degC"])) >= LEAST]
+    return Result(
+        payload,
+        f"Frequency of {instrument.name} over temperature",
+        f"Mode n = {harmonic}, {theory} theory: the slope of the frequency and its parts from elastic constants, density and dimensions.",
+        [
+            Table(f"{instrument.name}, n = {harmonic}, {theory}", points, columns, note),
+            *([Figure(lambda: _curves(points, parts, local), CAPTION)] if len(points) > 1 else []),
+            Table(
+                "Uncertainty of the law: change of the slope by one standard deviation (ppm/°C)",
+                uncertain,
+                [Column("coefficient", "coefficient"), Column("sd", "standard deviation", form=".2g"), *at],
+            ),
+            Table(
+                "Measured slope between neighbouring points",
+                local,
+                [Column("temperature_degC", "T", "°C", ".1f"), Column("slope_ppm_per_degC", "slope", "ppm/°C", ".2f")],
+            ),
+        ],
+    )
+
+
+def _curves(points: "list[dict[str, Any]]", parts: list[str], local: "list[dict[str, float]]") -> "Drawing":
+    """The slope, its uncertainty and its parts over temperature."""
+    import numpy as np
+
+    from studies.reports import style
+
+    T, slope, sd = (
+        np.array([p[key] for p in points])
+        for key in ("temperature_degC", "slope_ppm_per_degC", "uncertainty_ppm_per_degC")
+    )
+    with style.figure(height=4.0) as (made, axis):
+        axis.fill_between(T, slope - sd, slope + sd, color=style.BLACK, alpha=0.12, linewidth=0)
+        axis.plot(T, slope, color=style.BLACK, linewidth=2.2, label="slope")
+        colours = (style.BLUE, style.VERMILION, style.GREEN, style.ORANGE, style.PURPLE, style.SKY)
+        for name, colour in zip(parts, colours, strict=False):
+            axis.plot(T, [p["parts_ppm_per_degC"][name] for p in points], "--", color=colour, label=PARTS[name])
+        if local:
+            axis.plot(*zip(*(one.values() for one in local), strict=True), "k.", label="measured")
+        axis.set_xlabel("temperature (°C)")
+        axis.set_ylabel("ppm/°C")
+        axis.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
+        return made
 
 
 def _points(law: "FrequencyLaw", T: "NDArray[np.float64]") -> "list[dict[str, Any]]":
@@ -131,8 +163,8 @@ def _moves(law: "FrequencyLaw", T: "NDArray[np.float64]") -> "list[dict[str, Any
     ]
 
 
-def _measured_slopes(card: str, path: str | None) -> list[tuple[float, float]]:
-    """Return (temperature, slope in ppm/°C) between neighbouring points of a table; empty without one."""
+def _measured_slopes(card: str, path: str | None) -> "list[dict[str, float]]":
+    """Return the slope between neighbouring points of a table; empty without one."""
     from studies.papers import hrg
     from studies.record import read_frequency_table
 
@@ -144,4 +176,4 @@ def _measured_slopes(card: str, path: str | None) -> list[tuple[float, float]]:
     else:
         return []
     at, slopes = hrg.local_slopes(T, f)
-    return list(zip(at.tolist(), slopes.tolist(), strict=True))
+    return rows_of({"temperature_degC": at, "slope_ppm_per_degC": slopes})

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import IO
 
 from studies.errors import InputError
+from studies.files.paths import claim
 
 
 @contextmanager
@@ -26,13 +27,14 @@ def written_whole(path: str | Path) -> Iterator[IO[bytes]]:
     Raises
     ------
     InputError
-        There is no such folder, it cannot be written, or the disk is full; nothing is left behind.
+        There is no such folder, it cannot be written, the disk is full, or the running command reads this file; nothing is left behind.
     """
     temporary: Path | None = None
     try:
         target = _follow(Path(path))
         if target.is_dir():
             raise InputError(f"{path}: is a folder; give the name of a file.")
+        claim(target)
         special = target.exists() and not target.is_file()
         if not target.parent.is_dir():
             raise InputError(

@@ -14,9 +14,14 @@ def plain(value: float | None, digits: int = 3) -> str:
         return "0"
     size = abs(float(f"{value:.{digits - 1}e}"))
     if not SMALLEST <= size < LARGEST:
-        return f"{value:.{digits - 1}e}"
+        return short_exponent(f"{value:.{digits - 1}e}")
     text = f"{value:.{max(digits - 1 - math.floor(math.log10(size)), 0)}f}"
     return text.rstrip("0").rstrip(".") if "." in text else text
+
+
+def short_exponent(text: str) -> str:
+    """Return 7.28e6 for 7.28e+06."""
+    return text.replace("e+0", "e").replace("e+", "e").replace("e-0", "e-")
 
 
 def to_error(value: float, error: float) -> tuple[str, str]:
@@ -39,7 +44,7 @@ def to_interval(value: float, low: float, high: float) -> list[str]:
 
     def write(x: float) -> str:
         digits = math.floor(math.log10(abs(x))) - last if x else -1
-        return f"{x:.{digits}e}" if digits >= 0 else "0"
+        return short_exponent(f"{x:.{digits}e}") if digits >= 0 else "0"
 
     return [write(x) for x in (value, low, high)]
 

@@ -150,7 +150,11 @@ def test_anchor_of_a_stem(capsys):
 
 @pytest.mark.parametrize(
     ("quality", "words"),
-    [(4e6, "More is lost than these parts allow"), (2.5e7, "the parts explain"), (9e8, "one of them is too large")],
+    [
+        (4e6, "More is lost than these parts allow"),
+        (2.5e7, "Explained share of the stated loss"),
+        (9e8, "one of them is too large"),
+    ],
 )
 def test_a_measured_q_stands_beside_what_the_parts_explain(capsys, tmp_path, quality, words):
     path = tmp_path / "card.toml"
@@ -200,11 +204,11 @@ def test_the_page_says_what_to_attack_first_and_what_each_part_is_worth(capsys, 
     assert status == 0
     found, text = json.loads(out), page.read_text(encoding="utf-8")
     assert "Loss budget of &lt;dome&gt;" in text
-    for chapter in ("In short", "What each part is worth", "Over temperature", "Where on the wall", "Around the axis"):
+    for chapter in ("In short", "Parts at 20 °C", "Over temperature", "Along the meridian", "Around the axis"):
         assert f">{chapter}<" in text
     assert "Attack first: film gold." in text
     at = found["temperature_degC"].index(20.0)
-    assert f"without it Q = {found['attack_first']['q_without'][at]:.3g}".replace("e+0", "e") in text
+    assert f"Q would be {found['attack_first']['q_without'][at]:.2e} without it".replace("e+0", "e") in text
     assert found["left_out"][0][1:] in text
     assert _run(capsys, str(path), "--report", str(page), "--from", "20", "--to", "20")[0] == 0
 

@@ -1,0 +1,164 @@
+"""Paths that a command reads and writes: those that it is given, and those that its files lead to.
+
+A card names tables of departures, a spec names a card, a fleet its records, the folder of a study its spec. A name that stands
+anywhere in a TOML file, or in the spec of a study's store, and is a file beside it, counts as read. So no key of any format has to
+be known here.
+"""
+
+import json
+import os
+import sqlite3
+import tomllib
+from collections.abc import Iterator, Mapping
+from contextlib import closing, contextmanager, suppress
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+from studies.errors import InputError
+
+OUTPUTS = {
+    # argument of a command that names what is written: how people give it
+    **{name: f"--{name}" for name in ("out", "save", "report", "emit", "draft", "preview", "fmu", "c")},
+    "map_file": "--map",
+}
+SHIPPED = ("cards", "sweeps/templates")
+STORE, STORE_FILES = "study.sqlite", ("study.sqlite", "study.sqlite-wal", "study.sqlite-shm", "lock")
+RECORDS = ("*.csv", "*.toml", "*/*.csv", "*/*.toml")  # of a folder, or of a folder of folders
+LONGEST_TOML = 2**22  # bytes
+
+_read: dict[object, str] = {}
+_written: set[object] = set()
+
+
+@contextmanager
+def guarded(arguments: Mapping[str, Any]) -> Iterator[None]:
+    """Keep what a command reads from being overwritten by what it writes, while it runs.
+
+    Raises
+    ------
+    InputError
+        An output is a file that is read too, two outputs are one file, or the folder of an output does not exist.
+    """
+    outputs = {name: value for name, value in arguments.items() if name in OUTPUTS and isinstance(value, str)}
+    words = [word for name, value in arguments.items() if name not in OUTPUTS for word in _words(value)]
+    try:
+        for word in words:
+            for path in _read_with(word):
+                _read.setdefault(
+                    _identity(path), word if _identity(path) == _identity(Path(word)) else f"{path} of {word}"
+                )
+        seen: dict[object, str] = {}
+        for name, value in outputs.items():
+            given = f"{OUTPUTS[name]} {value}".strip()
+            _check_folder(Path(value), given)
+            _spare_read(Path(value), given)
+            if not _is_special(Path(value)) and seen.setdefault(_identity(Path(value)), given) != given:
+                raise InputError(
+                    f"{seen[_identity(Path(value))]} and {given}: two outputs would be one file; name two files."
+                )
+        yield
+    finally:
+        _read.clear()
+        _written.clear()
+
+
+def claim(path: Path) -> None:
+    """Refuse to write a file that the running command reads, or has written already under another name.
+
+    Raises
+    ------
+    InputError
+        It is one of them.
+    """
+    _spare_read(path, str(path))
+    if _identity(path) in _written and not _is_special(path):
+        raise InputError(f"{path}: two outputs would be one file; name two files.")
+    _written.add(_identity(path))
+
+
+def _spare_read(path: Path, given: str) -> None:
+    read = _read.get(_identity(path))
+    if read is not None and path.is_file():
+        raise InputError(
+            f"{given}: the same command reads this file ({read}), and writing it would destroy it; choose another name."
+        )
+
+
+def _check_folder(path: Path, given: str) -> None:
+    parent = path.parent
+    if not parent.is_dir():
+        raise InputError(f"{given}: cannot be written: there is no folder '{parent}'; make it, or correct the path.")
+
+
+def _words(value: object) -> Iterator[str]:
+    """Yield what may be a path in an argument, such as A=a1.csv,a2.csv of a fleet."""
+    for word in value if isinstance(value, tuple | list) else [value]:
+        if isinstance(word, str):
+            pieces = (part for piece in (word, word.partition("=")[2]) for part in piece.split(","))
+            yield from dict.fromkeys(one for one in (word, *pieces) if one)
+
+
+def _read_with(word: str) -> Iterator[Path]:
+    """Yield the file that a word names, the files of a folder, or the card that ships under this name, and all that they lead to."""
+    pending = [Path(word), *(Path(str(files("studies"))) / folder / f"{word}.toml" for folder in SHIPPED)]
+    if _exists(pending[0]) and pending[0].is_dir():
+        pending = list(_inside(pending[0]))
+    seen = set()
+    while pending:
+        path = pending.pop()
+        if _identity(path) in seen or not _exists(path) or not path.is_file():
+            continue
+        seen.add(_identity(path))
+        yield path
+        if path.suffix == ".toml" and path.stat().st_size < LONGEST_TOML:
+            with suppress(OSError, ValueError, RecursionError):  # the command itself says what is wrong with it
+                pending += [path.parent / text for text in _texts(tomllib.loads(path.read_text(encoding="utf-8-sig")))]
+
+
+def _inside(folder: Path) -> Iterator[Path]:
+    """Yield the files that make up a folder of a study, or of records."""
+    if not (folder / STORE).is_file():
+        yield from (path for pattern in RECORDS for path in folder.glob(pattern))
+        return
+    yield from (folder / name for name in STORE_FILES)
+    alone = not (folder / f"{STORE}-wal").exists()  # immutable: opening leaves no file beside it
+    place = f"{(folder / STORE).resolve().as_uri()}?{'immutable=1' if alone else 'mode=ro'}"
+    with (
+        suppress(sqlite3.Error, ValueError, TypeError, RecursionError),
+        closing(sqlite3.connect(place, uri=True)) as store,
+    ):
+        for beside, spec, card in store.execute("SELECT folder, spec_text, instrument FROM study").fetchall():
+            for text in (*_texts(tomllib.loads(spec)), *_texts(json.loads(card))):
+                yield from (Path(beside) / text, Path(text))
+
+
+def _texts(content: object) -> Iterator[str]:
+    """Yield every text of a parsed document that could be the name of a file."""
+    if isinstance(content, str):
+        if 0 < len(content) < 4096 and "\0" not in content and "\n" not in content:
+            yield content
+    elif isinstance(content, dict | list):
+        for item in content.values() if isinstance(content, dict) else content:
+            yield from _texts(item)
+
+
+def _identity(path: Path) -> object:
+    """Return what two names of one file have in common."""
+    try:
+        status = path.stat()
+        return status.st_dev, status.st_ino
+    except (OSError, ValueError):
+        return os.path.realpath(path) if "\0" not in str(path) else str(path)
+
+
+def _exists(path: Path) -> bool:
+    try:
+        return path.exists()
+    except (OSError, ValueError):
+        return False
+
+
+def _is_special(path: Path) -> bool:
+    """Return whether a path is a device or a pipe, which keeps what it is."""
+    return _exists(path) and not path.is_file() and not path.is_dir()

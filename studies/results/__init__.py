@@ -1,0 +1,194 @@
+"""Answers of commands: declared once, shown as text on a terminal, as one JSON object and as a page.
+
+A command returns a `Result`: the object for programs (`payload`), and what people read of it, in reading order: facts, sentences,
+tables, figures. A `Table` shows rows of the payload: a `Column` names the key that it shows, its heading, unit and digits, so that a
+column is added in one place.
+"""
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from math import isfinite
+from typing import TYPE_CHECKING, Any, Literal
+
+from studies.reports.digits import plain, short_exponent, to_error
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure as Drawing
+
+    from studies.reports.page import Block
+
+Payload = Mapping[str, Any]
+Where = Literal["everywhere", "page", "terminal"]
+
+
+@dataclass(frozen=True)
+class Column:
+    """One quantity of a table.
+
+    Attributes
+    ----------
+    key : str
+        Where a row has it: a key, or keys and places in a list joined by dots ("split.slow_Hz"); what a row lacks leaves the cell empty.
+    heading, unit : str
+        What people read above it.
+    form : str
+        A format such as ".4f" or "+.3g"; without one a number has `digits` significant digits and no exponent where it can be avoided.
+    error : str
+        The key of its standard error: the value is written as far as the error's second digit, with ± and the error.
+    interval : (str, str)
+        Keys of the ends of its interval, shown as "low … high" instead of the value.
+    scale : float
+        What the row has times this is shown, for example 1e6 for ppm.
+    """
+
+    key: str
+    heading: str
+    unit: str = ""
+    form: str = ""
+    digits: int = 4
+    error: str = ""
+    interval: tuple[str, str] | None = None
+    scale: float = 1.0
+
+    @property
+    def title(self) -> str:
+        """Heading and unit."""
+        return f"{self.heading} ({self.unit})" if self.unit else self.heading
+
+    def write(self, row: Payload) -> str:
+        """Return the cell of a row: here a number becomes text."""
+        if self.interval is not None:
+            low, high = (self._number(find(row, key)) for key in self.interval)
+            return f"{low} … {high}" if low else ""
+        value = find(row, self.key)
+        error = find(row, self.error) if self.error else None
+        if error and isinstance(value, float | int):
+            return " ± ".join(to_error(value * self.scale, error * self.scale))
+        return self._number(value)
+
+    def _number(self, value: object) -> str:
+        if value is None or isinstance(value, str):
+            return value or ""
+        if isinstance(value, list | tuple):
+            return ", ".join(map(str, value))
+        if not isinstance(value, float | int) or isinstance(value, bool):
+            return str(value)
+        if isinstance(value, int) and not self.form and self.scale == 1.0:
+            return str(value)
+        shown = value * self.scale
+        text = format(shown, self.form) if self.form and isfinite(shown) else plain(shown, self.digits)
+        if not text.strip("-0."):
+            text = text.replace("-", "+" if self.form.startswith("+") else "")
+        return short_exponent(text)
+
+
+def find(row: Payload, key: str) -> Any:
+    """Return what a row has under keys, or places in a list, joined by dots; None where it has none."""
+    value: Any = row
+    for step in key.split("."):
+        if isinstance(value, Mapping):
+            value = value.get(step)
+        elif value is not None:
+            value = value[int(step)]
+    return value.item() if hasattr(value, "item") else value
+
+
+def rows_of(columns: Mapping[str, Iterable[Any]]) -> list[dict[str, Any]]:
+    """Return rows of data that stand as columns, such as {"time_s": array, ...}."""
+    plain_columns = [list(values.tolist() if hasattr(values, "tolist") else values) for values in columns.values()]
+    return [dict(zip(columns, row, strict=True)) for row in zip(*plain_columns, strict=True)]
+
+
+@dataclass(frozen=True)
+class Table:
+    """Rows of the payload as people see them; without rows it is not shown, and neither is a column of which no row has anything."""
+
+    title: str
+    rows: Sequence[Payload]
+    columns: Sequence[Column]
+    note: str = ""
+    where: Where = "everywhere"
+    sortable: bool = False
+
+    def cells(self) -> tuple[list[str], list[list[str]]]:
+        """Return headings and rows of text."""
+        written = [(column.title, [column.write(row) for row in self.rows]) for column in self.columns]
+        shown = [(title, cells) for title, cells in written if any(cells)]
+        return [title for title, _ in shown], [list(row) for row in zip(*(cells for _, cells in shown), strict=True)]
+
+
+@dataclass(frozen=True)
+class Facts:
+    """A few numbers that carry the answer: (label, value, remark)."""
+
+    facts: Sequence[tuple[str, str, str]]
+    where: Where = "everywhere"
+
+
+@dataclass(frozen=True)
+class Sentence:
+    """What is said: plain, lead, note, warning, or source for text that keeps its lines."""
+
+    text: str
+    kind: str = "plain"
+    where: Where = "everywhere"
+
+
+@dataclass(frozen=True)
+class Figure:
+    """A picture of the page, drawn only when the page is written; `alt` stands for it where it cannot be seen."""
+
+    draw: "Callable[[], Drawing]"
+    caption: str
+    alt: str = ""
+
+
+@dataclass(frozen=True)
+class Blocks:
+    """Ready blocks of the page, such as a view of modes to turn; made only when the page is written."""
+
+    make: "Callable[[], Sequence[Block]]"
+
+
+Part = Table | Facts | Sentence | Figure | Blocks
+
+
+@dataclass(frozen=True)
+class Chapter:
+    """A heading of the page and what stands under it; the terminal shows the parts without it."""
+
+    title: str
+    parts: Sequence[Part]
+
+
+@dataclass(frozen=True)
+class Result:
+    """What a command answers.
+
+    Attributes
+    ----------
+    payload : Mapping
+        The object for programs, with its `schema`.
+    title, lead : str
+        Of the page: a name, and one sentence of what it shows.
+    parts : Sequence[Chapter | Part]
+        What people read, in reading order; parts before the first chapter stand under "In short".
+    status : int
+        The exit status, where it is not 0.
+    printed : str
+        What the terminal shows instead of the parts, such as code or LaTeX.
+    """
+
+    payload: Payload
+    title: str
+    lead: str = ""
+    parts: Sequence[Chapter | Part] = ()
+    status: int = 0
+    printed: str | None = None
+    sources: Sequence[str] = field(default=())
+
+    @property
+    def chapters(self) -> list[Chapter]:
+        """The parts by chapter."""
+        loose = [part for part in self.parts if not isinstance(part, Chapter)]
+        return [*([Chapter("In short", loose)] if loose else []), *(p for p in self.parts if isinstance(p, Chapter))]

@@ -1,0 +1,128 @@
+"""Outputs never destroy inputs: every path that a command reads, directly or through a file, against every path that it writes."""
+
+import shutil
+from pathlib import Path
+
+import pytest
+
+from studies.cli import main
+
+INPUTS = Path(__file__).parents[1] / "golden" / "inputs"
+MAPPED = """schema = "hrg.card/1"
+name = "mapped"
+[resonator]
+shape = "hemisphere"
+radius_mm = 15.0
+thickness_mm = 0.9
+[material]
+name = "fused-silica"
+[[imperfection.map]]
+of = "outer"
+file = "outer.csv"
+"""
+STUDY = """schema = "hrg.study/1"
+name = "one"
+card = "mapped.toml"
+[sampling]
+method = "grid"
+[[parameter]]
+name = "resonator.radius_mm"
+values = [15.0]
+[[quantity]]
+name = "frequency"
+theory = "shell"
+"""
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    shutil.copytree(INPUTS, tmp_path, dirs_exist_ok=True)
+    (tmp_path / "mapped.toml").write_text(MAPPED)
+    (tmp_path / "spec.toml").write_text(STUDY)
+    (tmp_path / "fleet.toml").write_text('[devices]\nA = ["run1.csv"]\nB = ["run2.csv"]\n')
+    (tmp_path / "scanned-inner.csv").write_text((tmp_path / "inner.csv").read_text())
+    (tmp_path / "link.csv").symlink_to(tmp_path / "run1.csv")
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def contents(folder):
+    return {path.name: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        "loss mapped.toml --report mapped.toml",
+        "loss mapped.toml --report outer.csv",
+        "simulate mapped.toml soak_20_1h --out outer.csv",
+        "simulate hrg-30mm run1.csv --out run1.csv",
+        "simulate hrg-30mm run1.csv --out link.csv",
+        "simulate hrg-30mm run1.csv --out ../{name}/run1.csv",
+        "scan free-dome inner.csv outer.csv --theory shell --map inner.csv",
+        "scan free-dome none scanned-inner.csv --theory shell --save outer.csv --map outer.csv",
+        "diagnose --device A=run1.csv --device B=run2.csv --report run2.csv",
+        "diagnose --device A=run1.csv,run2.csv --report run2.csv",
+        "diagnose --fleet fleet.toml --report run1.csv",
+        "diagnose run1.csv --card mapped.toml --report outer.csv",
+        "calibrate hrg-30mm run1.csv --save run1.csv",
+        "import raw.csv --map map.toml --out map.toml",
+        "import raw.csv --draft raw.csv",
+        "mesh mapped.toml --out ./outer.csv",
+        "fit cross-damping cross.csv --frequency 5000 --quality 20000 --save m.toml --report m.toml",
+        "fit cross-damping cross.csv --frequency 5000 --quality 20000 --save m.toml --report ../{name}/m.toml",
+        "study run spec.toml --out mapped.toml",
+    ],
+)
+def test_an_output_onto_an_input_or_another_output_is_refused_before_any_work(folder, words, capsys):
+    before = contents(folder)
+    assert (
+        main(
+            [
+                word.replace("_", " ") if word.startswith("soak") else word
+                for word in words.format(name=folder.name).split()
+            ]
+        )
+        == 2
+    )
+    assert contents(folder) == before
+    told = capsys.readouterr()
+    assert told.out == ""
+    assert told.err.startswith("hrg: ")
+
+
+@pytest.mark.slow
+def test_the_folder_of_a_study_keeps_its_store_its_lock_and_what_its_spec_names(folder, capsys):
+    assert main(["study", "run", "spec.toml", "--out", "study", "--workers", "1", "--quiet"]) == 0
+    before = contents(folder)
+    for name in ("study/study.sqlite", "study/lock", "mapped.toml", "outer.csv"):
+        for command in ("export", "report"):
+            assert main(["study", command, "study", "--out", name]) == 2, name
+            assert "destroy" in capsys.readouterr().err
+    assert contents(folder) == before
+    for _ in range(2):  # a table of before may be written anew
+        assert main(["study", "export", "study"]) == 0
+
+
+def test_a_table_beside_a_saved_card_does_not_replace_the_points_that_it_was_made_from(folder, capsys):
+    """`scan --save scanned.toml` writes scanned-outer.csv too."""
+    shutil.copy("outer.csv", "scanned-outer.csv")
+    before = contents(folder)
+    words = "scan free-dome none scanned-outer.csv --theory shell --harmonic 2 --highest 6 --save scanned.toml"
+    assert main(words.split()) == 2
+    assert "scanned-outer.csv" in capsys.readouterr().err
+    assert contents(folder) == before
+
+
+@pytest.mark.parametrize("option", ["nowhere/out.csv", "outer.csv/out.csv"])
+def test_the_folder_of_an_output_must_be_there(folder, option, capsys):
+    assert main(["simulate", "hrg-30mm", "soak 20 1h", "--out", option]) == 2
+    assert "cannot be written" in capsys.readouterr().err
+    assert not (folder / "nowhere").exists()
+
+
+def test_devices_may_be_given_twice(folder):
+    assert main(["mesh", "free-dome", "--around", "8", "--out", "mesh.inp"]) == 0
+    assert main(["mesh", "free-dome", "--around", "8", "--out", "mesh.inp"]) == 0
+    words = "fit cross-damping cross.csv --frequency 5000 --quality 20000 --save /dev/null --report /dev/null"
+    assert main(words.split()) == 0
