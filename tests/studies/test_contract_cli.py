@@ -165,7 +165,7 @@ def test_unusable_tables_are_refused(tmp_path, rows, part, capsys):
         ["modes", "free-dome", "--amplitude"],
         ["tcf", "free-dome", "--step"],
         ["loop", "hrg-30mm-loops", "--rate"],
-        ["simulate", "free-dome", "step 20 -10 5h", "--out", "run.csv", "--rate"],
+        ["simulate", "free-dome", "step 20 -10 5h", "--out", "run.csv", "--row"],
     ],
 )
 def test_no_argument_is_infinite_or_near_it(words, number, capsys):
