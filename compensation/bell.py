@@ -13,8 +13,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.constants import zero_Celsius
 
+from compensation.constants import zero_Celsius
 from compensation.errors import CompensationError
 from compensation.fir import smooth
 from compensation.samples import read_columns, require_regular

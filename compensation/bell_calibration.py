@@ -9,10 +9,10 @@ from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.constants import zero_Celsius
 
 from compensation.bell import BellChain, PolynomialCurve
 from compensation.coloured import correlated_covariance
+from compensation.constants import zero_Celsius
 from compensation.errors import CompensationError
 from compensation.fir import design_smoother
 from compensation.polynomial import fit_polynomial

@@ -14,9 +14,9 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.constants import zero_Celsius
 
 from compensation.coloured import coloured_covariance, fit_coloured
+from compensation.constants import zero_Celsius
 from compensation.decimation import average_blocks
 from compensation.derivative import differentiate
 from compensation.errors import CompensationError

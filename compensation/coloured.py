@@ -18,8 +18,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import linalg, optimize, signal
+from scipy import linalg, optimize
 
+from compensation.recursion import recur
 from compensation.regression import LinearFit, fit_linear
 
 Array = NDArray[np.float64]
@@ -70,9 +71,13 @@ def whiten(Z: Array, noise: Wander | float, runs: Runs) -> Array:
     noise = noise if isinstance(noise, Wander) else Wander(noise)
     if noise.smoothing == noise.memory == noise.innovation == 1.0:
         return Z
-    numerator, denominator = [1.0, -noise.memory], [1.0, -noise.smoothing]
-    filtered = np.concatenate([signal.lfilter(numerator, denominator, Z[run], axis=0) for run in runs])
+    filtered = np.concatenate([_filter(Z[run], noise.memory, noise.smoothing) for run in runs])
     return filtered if noise.innovation == 1.0 else filtered / noise.innovation
+
+
+def _filter(values: Array, zero: float, pole: float) -> Array:
+    """(1 − zero·L)/(1 − pole·L) along the first axis, from rest."""
+    return recur(pole, np.concatenate([values[:1], values[1:] - zero * values[:-1]]))
 
 
 def restricted_deviance(X: Array, y: Array, noise: Wander | float, runs: Runs, ridge: float = 0.0) -> float:
@@ -172,13 +177,8 @@ def coloured_covariance(fit: LinearFit, coloured: ColouredFit, runs: Runs) -> Ar
     (XᵀX)⁻¹ Xᵀ Σ X (XᵀX)⁻¹ with Σ = σ² L Lᵀ and L the filter (1 − θ L)/(1 − L).
     """
     theta = coloured.theta
-    if theta == 1.0:
-        half = fit.design
-    else:
-        half = np.concatenate(
-            [signal.lfilter([1.0, -theta], [1.0, -1.0], fit.design[run][::-1], axis=0) for run in runs]
-        )
-    root = half @ fit.bread
+    half = [fit.design[run] if theta == 1.0 else _filter(fit.design[run][::-1], theta, 1.0) for run in runs]
+    root = np.concatenate(half) @ fit.bread
     return np.asarray(coloured.white_deviation**2 * root.T @ root)
 
 

@@ -14,7 +14,6 @@ from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.optimize import brentq
 
 from compensation.errors import CompensationError
 
@@ -148,6 +147,8 @@ def _margin(loops: Loops, name: str, decay: float) -> Margin:
     L = loops.open_loop(name, decay, grid)
     angle = np.unwrap(np.angle(L))
     angle -= 2 * np.pi * np.round((angle[0] + np.pi / 2) / (2 * np.pi))  # starts between −180° and 0
+
+    from scipy.optimize import brentq
 
     def level(f: float) -> float:
         return float(np.log(np.abs(loops.open_loop(name, decay, f))))

@@ -16,9 +16,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.constants import zero_Celsius
 
 from compensation.coloured import correlated_covariance
+from compensation.constants import zero_Celsius
 from compensation.demodulated import expand_secondary, relate_rate_to_secondary
 from compensation.errors import CompensationError
 from compensation.regression import fit_linear, refuse_constant_columns

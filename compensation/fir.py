@@ -38,10 +38,7 @@ def design_smoother(sampling: float, cutoff: float, order: int = 50) -> Real:
 
 def smooth(values: ArrayLike, taps: Real) -> Real:
     """Return the causal FIR output, settled on the first value at the start, as firmware computes it."""
-    from scipy.signal import lfilter
-
     x = np.asarray(values, dtype=float)
     if not len(taps):
         return x
-    before = np.full(len(taps) - 1, x[0])
-    return np.asarray(lfilter(taps, [1.0], np.r_[before, x])[len(before) :], dtype=float)
+    return np.convolve(np.r_[np.full(len(taps) - 1, x[0]), x], taps, mode="valid")

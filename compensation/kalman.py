@@ -224,8 +224,8 @@ def expect_mean_nis(rows: int, degrees: int, probability: float = 0.95) -> tuple
     Innovations are white, so this holds for NIS over time; NEES values of one run are correlated and must be averaged
     over independent runs instead.
     """
-    from scipy.stats import chi2
+    from scipy.special import chdtri
 
     beside = (1 - probability) / 2
-    low, high = chi2.ppf(beside, rows * degrees), chi2.ppf(1 - beside, rows * degrees)
+    low, high = chdtri(rows * degrees, 1 - beside), chdtri(rows * degrees, beside)
     return float(low) / rows, float(high) / rows

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy import linalg, stats
+from scipy import linalg, special
 
 from compensation.errors import CompensationError
 
@@ -203,7 +203,7 @@ def compare_nested(small: LinearFit, large: LinearFit) -> FTest:
     left = large.sum_of_squares / large.degrees_of_freedom
     # Rounded readings can lie on a curve exactly; then any reduction is infinitely significant.
     statistic = max(reduction, 0.0) / left if left else math.inf if reduction > 0 else 0.0
-    p_value = float(stats.f.sf(statistic, extra, large.degrees_of_freedom))
+    p_value = float(special.fdtrc(extra, large.degrees_of_freedom, statistic))
     return FTest(statistic, extra, large.degrees_of_freedom, p_value)
 
 

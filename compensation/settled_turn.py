@@ -15,7 +15,6 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.interpolate import CubicHermiteSpline
 
 from compensation.electronics import Electronics
 from compensation.errors import CompensationError
@@ -138,6 +137,8 @@ def _integrate(
     angle: float,
 ) -> Real:
     """The azimuth at the rows: Runge-Kutta steps of what departs from the turn that rate and command would make alone."""
+    from scipy.interpolate import CubicHermiteSpline
+
     k, n = rows.bryan_factor, rows.harmonic
     shown, arriving = _channels(electronics, n)
     picked = np.unique(np.linspace(0, len(t) - 1, min(len(t), TIMES)).round().astype(int))

@@ -12,7 +12,7 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy import optimize, stats
+from scipy import optimize, special
 
 from compensation.errors import CompensationError
 
@@ -124,8 +124,8 @@ def allan_deviation(
         deviation=deviation,
         degrees_of_freedom=edf,
         noise=noise,
-        low=deviation * np.sqrt(edf / stats.chi2.isf(tail, edf)),
-        high=deviation * np.sqrt(edf / stats.chi2.ppf(tail, edf)),
+        low=deviation * np.sqrt(edf / special.chdtri(edf, tail)),
+        high=deviation * np.sqrt(edf / special.chdtri(edf, 1 - tail)),
         confidence=confidence,
     )
 

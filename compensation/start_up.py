@@ -140,7 +140,7 @@ def fit_run_down(time: ArrayLike, amplitude: ArrayLike, confidence: float = 0.95
     CompensationError
         The amplitude is not positive, or does not decay.
     """
-    from scipy import stats
+    from scipy import special
 
     t, a = read_columns(time=time, amplitude=amplitude)
     check_time(t)
@@ -154,7 +154,7 @@ def fit_run_down(time: ArrayLike, amplitude: ArrayLike, confidence: float = 0.95
     weight = a / a.max()
     X = np.stack([weight, weight * (t - t[0])], axis=1)
     fit = fit_linear(X, weight * np.log(a), ("ln a0", "decay"), constant=False)
-    reach = float(stats.t.ppf(0.5 + confidence / 2, fit.degrees_of_freedom)) * float(fit.standard_errors[1])
+    reach = float(special.stdtrit(fit.degrees_of_freedom, 0.5 + confidence / 2)) * float(fit.standard_errors[1])
     decay = -float(fit.coefficients[1])
     if decay - reach <= 0:
         raise CompensationError(

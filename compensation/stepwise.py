@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import linalg, stats
+from scipy import linalg, special
 
 from compensation.errors import CompensationError
 
@@ -171,7 +171,7 @@ class _Search:
         without, within = self.sum_of_squares(small), self.sum_of_squares(large)
         freedom = self.rows - self.forced - len(large)
         F = max(without - within, 0.0) / max(within / freedom, 1e-300)
-        return F, float(stats.f.sf(F, 1, freedom))
+        return F, float(special.fdtrc(1, freedom, F))
 
     def _own_part(self, chosen: Sequence[str], name: str) -> float:
         k = self.names.index(name)

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from compensation.errors import CompensationError
+from compensation.recursion import recur
 from compensation.samples import check_time, is_regular
 
 Complex = NDArray[np.complex128]
@@ -186,9 +187,8 @@ def _step(A: Complex, B: Complex, steps: NDArray[np.float64]) -> tuple[Complex, 
 
 
 def _march_evenly(A: Complex, B: Complex, t: NDArray[np.float64], u: NDArray[Any], x0: Complex) -> Complex:
-    """States on an even grid; the Schur form turns the recursion into a chain of first-order filters."""
+    """States on an even grid; the Schur form turns the recursion into a chain of first-order ones."""
     from scipy.linalg import schur
-    from scipy.signal import lfilter
 
     step = np.array([(t[-1] - t[0]) / (len(t) - 1)])
     (transition,), (held,), (ramp,) = _step(A, B, step)
@@ -200,7 +200,7 @@ def _march_evenly(A: Complex, B: Complex, t: NDArray[np.float64], u: NDArray[Any
     z[:, 0] = Z.conj().T @ x0
     for i in reversed(range(len(B))):
         driven = forcing[i] + T[i, i + 1 :] @ z[i + 1 :, :-1]
-        z[i, 1:] = lfilter([1.0], [1.0, -T[i, i]], driven, zi=[T[i, i] * z[i, 0]])[0]
+        z[i] = recur(T[i, i], np.r_[z[i, 0], driven])
     states: Complex = Z @ z
     return states
 

@@ -19,7 +19,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy import stats
+from scipy import special
 
 from compensation.coloured import fit_coloured
 from compensation.errors import CompensationError
@@ -105,7 +105,7 @@ def fit_whole_angle(
         )
     turn_rate = np.diff(theta)
     both_ways = np.ptp(_smooth(turn_rate)) > LEAST_CONTRAST * np.max(np.abs(_smooth(turn_rate)))
-    z = float(stats.norm.ppf(0.5 + confidence / 2))
+    z = float(special.ndtri(0.5 + confidence / 2))
     undetermined: list[str] = []
     estimates: dict[str, tuple[float, float]] = {}
     # Of the rows' means, all but the last: where the wave is at both ends of the row.

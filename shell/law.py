@@ -21,8 +21,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.constants import zero_Celsius
 
+from shell.constants import zero_Celsius
 from shell.elastic import Elastic
 from shell.errors import ShellError
 from shell.levels import Theory

@@ -14,8 +14,8 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.constants import zero_Celsius
 
+from shell.constants import zero_Celsius
 from shell.elastic import Elastic
 from shell.errors import ShellError
 from shell.property import FORMS, LISTS, PROPERTIES, ROOM, SIGNED, Array, Property, coefficient_names

@@ -15,7 +15,8 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.constants import zero_Celsius
+
+from shell.constants import zero_Celsius
 
 Array = NDArray[np.float64]
 ROOM = 20.0 + zero_Celsius

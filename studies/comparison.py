@@ -4,8 +4,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from scipy.constants import zero_Celsius
-
+from shell.constants import zero_Celsius
 from studies.shown import Shown
 
 if TYPE_CHECKING:

@@ -287,8 +287,7 @@ def _others(
     vibration: "Vibration", parts: "LossParts", spread: Mapping[str, float], left_out: list[str]
 ) -> "list[LossCause]":
     """Gas, activated losses, and what leaves through the mount as the card gives it."""
-    from scipy.constants import zero_Celsius
-
+    from shell.constants import zero_Celsius
     from shell.damping.budget import activated_cause, constant_cause, gas_cause
     from shell.damping.gas import GASES
 

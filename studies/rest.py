@@ -5,8 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from scipy.constants import zero_Celsius
-
+from shell.constants import zero_Celsius
 from studies.errors import InputError
 
 if TYPE_CHECKING:

@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.constants import zero_Celsius
 
 from compensation.bell import BellChain, apply_chain
 from compensation.bell_calibration import BellRun, fit_chain
@@ -14,6 +13,7 @@ from compensation.decimation import average_blocks
 from compensation.linearity import measure_linearity, same_rate
 from compensation.samples import is_regular
 from compensation.stability import allan_deviation
+from shell.constants import zero_Celsius
 from studies.errors import InputError, naming
 from studies.models.kinds.scale import RAW
 from studies.rest import LARGEST_REST, MOST_ROWS, TEMPERATURES, choose_column, drop_spikes

@@ -5,8 +5,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy.constants import zero_Celsius
 
+from shell.constants import zero_Celsius
 from studies.errors import InputError
 from studies.files.columns import read_header
 from studies.instrument.card import Instrument, load_card

@@ -1,6 +1,8 @@
 """Contract of the house: `studies` joins three packages that know nothing of each other, and no imports run in a circle."""
 
 import ast
+import subprocess
+import sys
 from graphlib import TopologicalSorter
 from pathlib import Path
 
@@ -61,3 +63,23 @@ def test_heavy_packages_are_imported_where_they_are_needed(name):
     lazy = LAZY if name.split(".")[1:2] == ["derivation"] else LAZY | {"sympy"}
     found = {i.split(".")[0] for i in imports(MODULES[name], top_only=True)}
     assert not found & lazy
+
+
+@pytest.mark.parametrize(
+    ("words", "spared"),
+    [
+        ("cards", {"scipy", "pandas"}),
+        ("modes free-dome", {"scipy.constants", "scipy.optimize", "scipy.signal", "pandas"}),
+        ("simulate free-dome run.csv --out out.csv", {"scipy.signal", "scipy.stats", "pandas"}),
+        ("calibrate free-dome run.csv", {"scipy.signal", "scipy.stats", "pandas"}),
+        ("diagnose run.csv", {"scipy.signal", "scipy.stats", "pandas"}),
+    ],
+)
+def test_a_command_loads_no_package_for_one_number(words, spared, tmp_path):
+    """What takes longer to load than all that it does there: 0.1 to 0.5 s of processor time each."""
+    rows = [f"{60 * k},{20 + 10 * (1 - 0.9**k):.4f},{5000 + 4 * (1 - 0.8**k):.6f}" for k in range(60)]
+    (tmp_path / "run.csv").write_text("\n".join(["time_s,housing_temperature_degC,frequency_Hz", *rows]) + "\n")
+    run = f"import sys; from studies.cli import main; main({words.split()!r}); print(*sys.modules, file=sys.stderr)"
+    ended = subprocess.run([sys.executable, "-c", run], cwd=tmp_path, capture_output=True, text=True, timeout=120)
+    assert not spared & set(ended.stderr.split())
+    assert "studies.instrument.card" in ended.stderr or "diagnose" in words

@@ -2,7 +2,7 @@
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.signal import lfilter
+from scipy.linalg import lapack
 
 from thermal.errors import ThermalError
 from thermal.network import Array
@@ -36,15 +36,13 @@ def lag(time: ArrayLike, temperature: ArrayLike, time_constant: float, initial: 
 
 
 def scan(decay: Array, forced: Array, start: Array) -> Array:
-    """Run x_{k+1} = decay_k x_k + forced_k from `start`; shapes (N, m), (N, m), (m,) give (N + 1, m)."""
-    states = np.empty((len(forced) + 1, len(start)))
-    states[0] = start
-    if len(decay) > 1 and np.ptp(decay, axis=0).max() <= 1e-12:
-        for m, factor in enumerate(decay[0]):
-            states[1:, m] = lfilter([1.0], [1.0, -factor], forced[:, m], zi=[factor * start[m]])[0]
-        return states
-    state = start
-    for k in range(len(forced)):
-        state = decay[k] * state + forced[k]
-        states[k + 1] = state
+    """Run x_{k+1} = decay_k x_k + forced_k from `start`; shapes (N, m), (N, m), (m,) give (N + 1, m).
+
+    The rows x_{k+1} − decay_k x_k = forced_k are a triangular system with one band below its diagonal of ones.
+    """
+    states = np.vstack([start, forced])
+    band = np.ones((2, len(states)), order="F")
+    for m in range(len(start)):
+        band[1, :-1] = -decay[:, m]
+        states[:, m] = lapack.dtbtrs(band, states[:, m : m + 1], uplo="L", diag="U")[0][:, 0]
     return states

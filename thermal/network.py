@@ -15,10 +15,10 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.constants import Stefan_Boltzmann
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
 
+from thermal.constants import Stefan_Boltzmann
 from thermal.errors import ThermalError
 from thermal.profile import Profile
 

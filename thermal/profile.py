@@ -18,8 +18,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.constants import zero_Celsius
 
+from thermal.constants import zero_Celsius
 from thermal.errors import ThermalError
 
 Points = list[tuple[float, float]]

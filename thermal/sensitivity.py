@@ -12,8 +12,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.constants import Stefan_Boltzmann
 
+from thermal.constants import Stefan_Boltzmann
 from thermal.network import Array, Network
 from thermal.profile import Profile
 from thermal.steady import find_steady_state

@@ -15,8 +15,8 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.constants import Stefan_Boltzmann
 
+from thermal.constants import Stefan_Boltzmann
 from thermal.errors import ThermalError
 from thermal.forcing import MOST_ROWS, find_corners, initial_state, source_powers
 from thermal.network import Array, Network, linearise

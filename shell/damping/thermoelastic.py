@@ -16,7 +16,6 @@ of a shell κ_φ + κ_θ = 0, and a bare dome warms only near its free edge.
 """
 
 import numpy as np
-from scipy.interpolate import BarycentricInterpolator
 from scipy.special import spherical_jn
 
 from shell.damping.conduction import conduct_in_cells
@@ -59,6 +58,8 @@ def _through_wall(solution: Solution, index: int, x: float) -> float:
     low, high = float(h.min()), float(h.max())
     if high - low < 1e-12 * high:
         return float(np.einsum("es,esl,lm,esm->", volume, moments, _wall(degree, high, x), moments))
+    from scipy.interpolate import BarycentricInterpolator
+
     nodes = np.cos((2 * np.arange(NODES) + 1) * np.pi / (2 * NODES))
     logs = np.log(low * high) / 2 + np.log(high / low) / 2 * nodes
     table = BarycentricInterpolator(logs, np.array([_wall(degree, float(np.exp(one)), x) for one in logs]))

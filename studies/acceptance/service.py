@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy import signal, stats
+from scipy import special
 
 from compensation.regression import fit_linear
 from studies.acceptance.measure import CONFIDENCE, YEAR, Found, Measured
@@ -26,6 +26,8 @@ def measure_transfer(record: "Record") -> Found:
 
     H(f) = S_xy/S_xx where the applied rate has power and coherence; |H| has the relative error √((1 - γ²)/(2 γ² n)) of n segments.
     """
+    from scipy import signal
+
     time, x, y = (record[name] for name in ("time_s", "rate_deg_per_s", "measured_rate_deg_per_s"))
     step = np.diff(time)
     if len(time) < LEAST or np.ptp(step) > 1e-3 * float(np.median(step)) or not np.isfinite(x + y).all():
@@ -45,7 +47,7 @@ def measure_transfer(record: "Record") -> Found:
     gain, phase = np.abs(H), np.unwrap(np.angle(H))
     error = np.sqrt((1 - squared) / (2 * squared * SEGMENTS))
     start = float(np.median(gain[:3]))
-    z = float(stats.norm.ppf(0.5 + CONFIDENCE / 2))
+    z = float(special.ndtri(0.5 + CONFIDENCE / 2))
 
     def falls(curve: np.ndarray) -> float | None:
         below = np.flatnonzero(curve < HALF * start)
@@ -71,7 +73,7 @@ def measure_transfer(record: "Record") -> Found:
     low = f <= (value or f[-1]) / 2
     if low.sum() >= 3:
         fit = fit_linear(2 * np.pi * f[low][:, None], -phase[low], ["delay"])
-        reach = float(stats.t.ppf(0.5 + CONFIDENCE / 2, fit.degrees_of_freedom)) * float(fit.standard_errors[1])
+        reach = float(special.stdtrit(fit.degrees_of_freedom, 0.5 + CONFIDENCE / 2)) * float(fit.standard_errors[1])
         delay = float(fit.coefficients[1])
         found["delay_ms"] = Measured(1e3 * delay, 1e3 * (delay - reach), 1e3 * (delay + reach), source)
     return found
@@ -99,7 +101,7 @@ def measure_storage(record: "Record") -> Found:
         sides.append((float(fit.coefficients[0]), float(np.sqrt(row @ fit.covariance @ row))))
     (before, one), (after, two) = sides
     error = (after - before + 45.0) % 90.0 - 45.0
-    reach = float(stats.norm.ppf(0.5 + CONFIDENCE / 2)) * math.hypot(one, two)
+    reach = float(special.ndtri(0.5 + CONFIDENCE / 2)) * math.hypot(one, two)
     return {"angle_storage_error_deg": Measured(error, error - reach, error + reach, (record.path,))}
 
 
@@ -114,7 +116,7 @@ def measure_life(records: "Sequence[Record]", output: str) -> Found:
     bias = np.array([float(np.nanmean(record[output])) for record in dated])
     fit = fit_linear(((at - at.mean()) / YEAR)[:, None], bias, ["year"])
     value = float(fit.coefficients[1])
-    reach = float(stats.t.ppf(0.5 + CONFIDENCE / 2, fit.degrees_of_freedom)) * float(fit.standard_errors[1])
+    reach = float(special.stdtrit(fit.degrees_of_freedom, 0.5 + CONFIDENCE / 2)) * float(fit.standard_errors[1])
     return {
         "bias_trend_deg_per_h_per_year": Measured(value, value - reach, value + reach, tuple(r.path for r in dated))
     }

@@ -3,9 +3,9 @@
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.constants import zero_Celsius
 
 from compensation.wander import white_noise
+from shell.constants import zero_Celsius
 from shell.errors import ShellError
 from studies.calibration.ahead import BIAS
 from studies.calibration.settled import READ_AS

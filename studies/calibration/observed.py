@@ -5,10 +5,10 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.constants import zero_Celsius
 
 from compensation.decimation import average_groups
 from compensation.spikes import find_spikes
+from shell.constants import zero_Celsius
 from studies.errors import InputError
 from studies.record import Record, place_in_time
 from studies.simulation.drive import COLUMN, Drive, drive_by_record

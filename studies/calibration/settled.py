@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.constants import zero_Celsius
 
+from shell.constants import zero_Celsius
 from studies.calibration.observed import SETTLED, SettledTable
 from studies.errors import InputError
 

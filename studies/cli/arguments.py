@@ -21,8 +21,8 @@ MOST_TEMPERATURES = 10_000
 def lay_temperatures(from_degC: float, to_degC: float, step: float) -> "Array":
     """Return the temperatures (K) of --from, --to and --step."""
     import numpy as np
-    from scipy.constants import zero_Celsius
 
+    from shell.constants import zero_Celsius
     from studies.errors import InputError
 
     asked = f"--from {from_degC:g} --to {to_degC:g} --step {step:g}"

@@ -93,8 +93,7 @@ def materials(name: str = "") -> Answer:
     name : str
         Show one material's laws with their properties, sources and ranges.
     """
-    from scipy.constants import zero_Celsius
-
+    from shell.constants import zero_Celsius
     from shell.materials import read_materials
     from studies.cli.output import print_table
     from studies.errors import InputError, nearest
@@ -153,7 +152,7 @@ def _correlated(prior: "Prior", k: int) -> list[int]:
 
 
 def _describe(law: "Material") -> "dict[str, Any]":
-    from scipy.constants import zero_Celsius
+    from shell.constants import zero_Celsius
 
     return {
         "name": law.name,

@@ -118,8 +118,8 @@ def _campaign(
 ) -> Answer:
     """Diagnose the records of one gyro."""
     import numpy as np
-    from scipy.constants import zero_Celsius
 
+    from shell.constants import zero_Celsius
     from studies.calibration.misreading import check_readings
     from studies.cli.output import print_table, say
     from studies.cli.telling import Told

@@ -44,8 +44,8 @@ def electrodes(
     import math
 
     import numpy as np
-    from scipy.constants import zero_Celsius
 
+    from shell.constants import zero_Celsius
     from shell.electrodes import reach, trim_voltages
     from shell.modes import solve_modes
     from studies.cli.output import say

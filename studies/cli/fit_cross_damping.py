@@ -46,8 +46,7 @@ def fit_cross_damping(
     """
     import math
 
-    from scipy.constants import zero_Celsius
-
+    from shell.constants import zero_Celsius
     from studies.cli.output import print_table, say
     from studies.cross_damping import study_cross_damping
     from studies.errors import InputError, naming
@@ -109,8 +108,8 @@ def _summarise(study: "CrossDampingStudy", data: "RestData") -> dict[str, Any]:
     import math
 
     import numpy as np
-    from scipy.constants import zero_Celsius
 
+    from shell.constants import zero_Celsius
     from studies.models.kinds.cross_damping import OUTPUTS
 
     unit, model = OUTPUTS[data.output], study.model

@@ -64,8 +64,8 @@ def loop(
         Write a page (HTML).
     """
     import numpy as np
-    from scipy.constants import zero_Celsius
 
+    from shell.constants import zero_Celsius
     from studies.cli.output import print_table, say
     from studies.damping_law import settled_loss
     from studies.errors import InputError
@@ -180,8 +180,8 @@ def _run(
     seed: int | None,
 ) -> "Record":
     import numpy as np
-    from scipy.constants import zero_Celsius
 
+    from shell.constants import zero_Celsius
     from studies.cli.output import say
     from studies.damping_law import damping_law
     from studies.record import Record, write_record

@@ -96,7 +96,7 @@ def loss(
 
 
 def _describe(model: "LossModel", budget: "Budget", theory: str) -> "dict[str, Any]":
-    from scipy.constants import zero_Celsius
+    from shell.constants import zero_Celsius
 
     low, high = budget.interval
     return {

@@ -49,8 +49,7 @@ def mesh(
     from pathlib import Path
     from typing import cast
 
-    from scipy.constants import zero_Celsius
-
+    from shell.constants import zero_Celsius
     from shell.inertia import weigh
     from shell.volume import build_volume
     from shell.volume_files import VolumeKind, encode_volume

@@ -80,8 +80,7 @@ def modes(
     """
     from dataclasses import asdict
 
-    from scipy.constants import zero_Celsius
-
+    from shell.constants import zero_Celsius
     from shell.modes import solve_modes
     from studies.cli.amplitude import amplitude_table, describe_amplitude
     from studies.cli.crystal import crystal_pairs, crystal_table

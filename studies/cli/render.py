@@ -63,8 +63,7 @@ def render(
     import os
     from pathlib import Path
 
-    from scipy.constants import zero_Celsius
-
+    from shell.constants import zero_Celsius
     from studies.cli.output import say
     from studies.errors import InputError
     from studies.files.writing import written_whole
@@ -112,8 +111,7 @@ def _solve(
     kind: str,
 ) -> "list[ModeScene]":
     """Solve every mode that is to be shown: cards × temperatures × harmonics."""
-    from scipy.constants import zero_Celsius
-
+    from shell.constants import zero_Celsius
     from studies.errors import InputError
     from studies.instrument.card import load_card
     from studies.reports.scenes import show_mode
@@ -152,8 +150,7 @@ def _picture(
 
 
 def _page(shown: "Sequence[ModeScene]") -> bytes:
-    from scipy.constants import zero_Celsius
-
+    from shell.constants import zero_Celsius
     from studies.reports.mode_picture import view_blocks
     from studies.reports.page import Chapter, Table, render_page
 

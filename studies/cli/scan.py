@@ -70,8 +70,7 @@ def scan(
     save : str
         Card to write: this one with the fitted faces as its imperfection, in tables beside it.
     """
-    from scipy.constants import zero_Celsius
-
+    from shell.constants import zero_Celsius
     from studies.cli.output import say
     from studies.errors import InputError, naming
     from studies.instrument.card import load_card

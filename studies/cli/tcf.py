@@ -137,7 +137,7 @@ def _curves(points: "list[dict[str, Any]]", parts: list[str], local: "list[dict[
 
 
 def _points(law: "FrequencyLaw", T: "NDArray[np.float64]") -> "list[dict[str, Any]]":
-    from scipy.constants import zero_Celsius
+    from shell.constants import zero_Celsius
 
     parts = law.parts(T)
     f, slope, spread = law.frequency(T), 1e6 * parts.total, 1e6 * law.slope_uncertainty(T)

@@ -33,8 +33,8 @@ def thermal(card: str, profile: str, *, rows: int = 13) -> Answer:
         Rows of the table, evenly spaced in time.
     """
     import numpy as np
-    from scipy.constants import zero_Celsius
 
+    from shell.constants import zero_Celsius
     from studies.cli.output import print_table
     from studies.errors import InputError
     from studies.instrument.card import load_card

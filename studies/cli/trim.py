@@ -101,8 +101,8 @@ def trim(
         Page to write, for the technician.
     """
     import numpy as np
-    from scipy.constants import zero_Celsius
 
+    from shell.constants import zero_Celsius
     from studies.cli.output import say
     from studies.errors import naming
     from studies.instrument.card import load_card

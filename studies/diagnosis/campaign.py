@@ -5,11 +5,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from scipy.constants import zero_Celsius
 
 from compensation.lines import Line, find_line
 from compensation.spikes import find_spike_groups, find_spikes, find_step
 from compensation.wander import white_noise
+from shell.constants import zero_Celsius
 from studies.diagnosis.checks import FEWEST_BINS, check_device, check_units
 from studies.diagnosis.drives import drives, stretches
 from studies.diagnosis.response import RESPONSES

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
-from scipy.stats import t as student
+from scipy.special import gammaln
 
 from compensation.wander import Covariance, Eigenbasis, flicker, gauss_markov, random_walk
 from studies.diagnosis.constants import CONSTANTS
@@ -44,7 +44,8 @@ def student_log(square: FloatArray, freedom: float) -> float:
     scale = max(float(np.mean(square)), 1e-300)
     for _ in range(30):
         scale = float(np.mean((freedom + 1.0) * square / (freedom + square / scale)))
-    return float(student.logpdf(np.sqrt(square / scale), freedom).sum() - 0.5 * square.size * np.log(scale))
+    norm = gammaln((freedom + 1.0) / 2.0) - gammaln(freedom / 2.0) - 0.5 * np.log(np.pi * freedom * scale)
+    return float(square.size * norm - (freedom + 1.0) / 2.0 * np.log1p(square / (freedom * scale)).sum())
 
 
 def tails_of(values: FloatArray) -> float:

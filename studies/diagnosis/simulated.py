@@ -11,8 +11,8 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar, cast
 
 import numpy as np
-from scipy.constants import zero_Celsius
 
+from shell.constants import zero_Celsius
 from shell.errors import ShellError
 from studies.diagnosis.baseline import START, Tangent, View, remembering
 from studies.diagnosis.campaign import Campaign

@@ -12,9 +12,9 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy.constants import zero_Celsius
 
 from compensation.decimation import average_groups
+from shell.constants import zero_Celsius
 from studies.calibration.observed import SETTLED, read_settled
 from studies.diagnosis.constants import CONSTANTS
 from studies.diagnosis.table_forms import Candidate, best_by_words, rms, span_alike, weigh_forms

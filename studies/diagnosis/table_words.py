@@ -1,7 +1,7 @@
 """What a steady-state table says in words: its own shape, how it was approached, what to measure next."""
 
 import numpy as np
-from scipy.stats import f as f_distribution
+from scipy.special import fdtrc
 
 from compensation.decimation import average_groups
 from studies.effects.states import FloatArray
@@ -39,7 +39,7 @@ def table_sentences(T: FloatArray, f: FloatArray, rounding: float) -> list[str]:
         cubic, quartic = (float(np.sum((f - np.polyval(np.polyfit(T, f, p), T)) ** 2)) for p in (3, 4))
         freedom = T.size - 5
         ratio_f = (cubic - quartic) / max(quartic / freedom, rounding**2)
-        chance = float(f_distribution.sf(max(ratio_f, 0.0), 1, freedom))
+        chance = float(fdtrc(1, freedom, max(ratio_f, 0.0)))
         said = "a cubic is not sufficient" if chance < 0.05 else "a cubic is sufficient"
         if cubic < T.size * rounding**2:
             out.append("A cubic fits within the rounding of the readings; a cubic is sufficient.")

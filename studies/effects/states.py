@@ -6,7 +6,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import lfilter
+
+from compensation.recursion import recur
 
 FloatArray = NDArray[np.float64]
 
@@ -142,9 +143,7 @@ def lag(drive: FloatArray, step: float, tau: float) -> FloatArray:
     decay = np.exp(-ratio)
     ramp = -np.expm1(-ratio) / ratio if ratio > 1e-12 else 1.0
     ahead, behind = 1.0 - ramp, ramp - decay
-    start = drive[:1] * (1.0 - ahead)
-    out, _ = lfilter([ahead, behind], [1.0, -decay], drive, axis=0, zi=start)
-    return np.asarray(out)
+    return recur(decay, np.concatenate([drive[:1], ahead * drive[1:] + behind * drive[:-1]]))
 
 
 def play(drive: FloatArray, radius: float | Sequence[float], start: float = 0.0) -> FloatArray:

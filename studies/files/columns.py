@@ -31,6 +31,8 @@ _UNUSUAL = re.compile(rb"[^0-9eE+.,\r\n-]")
 _SOMETHING = re.compile(rb"\S")
 HEAD = 1 << 20
 """Bytes in which comments and header are looked for first."""
+FEW = 400_000
+"""Numbers that are read before pandas, which reads faster, is loaded."""
 ROWS_AT_ONCE = 200_000
 """Rows that are parsed at once, so that a large table costs its numbers and little more."""
 PORTION = 1 << 23
@@ -168,7 +170,6 @@ def _check_names(
 def _parse_fast(path: str | Path, start: int, names: list[str]) -> "tuple[Table, str] | None":
     """Parse a clean table quickly, never all of its text in memory; None when the careful way must decide."""
     import numpy as np
-    import pandas as pd
 
     with opened(path) as file:
         if (found := _scan(file, start, len(names))) is None:
@@ -177,6 +178,12 @@ def _parse_fast(path: str | Path, start: int, names: list[str]) -> "tuple[Table,
         file.seek(body)
         table, done = np.empty((len(names), rows)), 0
         try:
+            if table.size <= FEW:
+                cells = b",".join(file.read().split()).split(b",")
+                table[:] = np.reshape([float(cell or b"nan") for cell in cells], (rows, -1)).T
+                return dict(zip(names, table, strict=True)), sha256
+            import pandas as pd
+
             with pd.read_csv(
                 file,
                 names=names,

@@ -6,8 +6,7 @@ from dataclasses import dataclass
 from math import pi
 from typing import TYPE_CHECKING
 
-from scipy.constants import zero_Celsius
-
+from shell.constants import zero_Celsius
 from studies.record import COLUMNS
 
 if TYPE_CHECKING:

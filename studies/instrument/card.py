@@ -12,8 +12,7 @@ from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from scipy.constants import zero_Celsius
-
+from shell.constants import zero_Celsius
 from studies.errors import InputError, nearest
 from studies.files.reading import find_shipped, list_shipped
 from studies.files.toml import read_toml

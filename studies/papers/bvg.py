@@ -9,12 +9,12 @@ from importlib.resources import files
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.constants import zero_Celsius
 
 from compensation.bell import BellChain, PolynomialCurve, invert_chain
 from compensation.bell_calibration import BellRun, fit_chain
 from compensation.fir import design_smoother
 from compensation.linearity import measure_linearity
+from shell.constants import zero_Celsius
 from studies.scale import StepFigures, judge_steps
 
 Real = NDArray[np.float64]

@@ -9,11 +9,11 @@ from importlib.resources import files
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.constants import zero_Celsius
 
 from compensation.cross_damping import RestRun, evaluate_cross_damping, fit_cross_damping, simulate_bias
 from compensation.improvement import Change, compare_outputs
 from compensation.transfer import TransferFunction
+from shell.constants import zero_Celsius
 from studies.cross_damping import CrossDampingStudy, study_cross_damping
 
 Real = NDArray[np.float64]

@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.constants import zero_Celsius
 
 from compensation.decimation import average_groups
 from compensation.frequency import FrequencyFit, OrderComparison, compare_orders, fit_frequency
+from shell.constants import zero_Celsius
 
 if TYPE_CHECKING:
     from shell.law import SlopeParts

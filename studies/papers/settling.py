@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.constants import zero_Celsius
 
+from shell.constants import zero_Celsius
 from shell.law import FrequencyLaw
 from studies.law import law_of
 from studies.simulation.heat_path import build_network, build_shell_and_stem

@@ -5,8 +5,8 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.constants import zero_Celsius
 
+from shell.constants import zero_Celsius
 from studies.reports import style
 from studies.reports.digits import to_error
 from studies.reports.page import Block, Chapter, Facts, Picture, Table, Text, draw, render_page

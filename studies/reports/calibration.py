@@ -4,8 +4,8 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.constants import zero_Celsius
 
+from shell.constants import zero_Celsius
 from studies.calibration.observed import HOUSING, QUADRATURE, SETTLED
 from studies.reports import style
 from studies.reports.digits import plain, to_interval

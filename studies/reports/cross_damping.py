@@ -3,10 +3,10 @@
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.constants import zero_Celsius
 
 from compensation.decimation import average_blocks
 from compensation.improvement import AVERAGING
+from shell.constants import zero_Celsius
 from studies.models.kinds.cross_damping import OUTPUTS
 from studies.reports import style
 from studies.reports.digits import lowered, raised, to_error

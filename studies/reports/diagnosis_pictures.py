@@ -3,8 +3,8 @@
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.constants import zero_Celsius
 
+from shell.constants import zero_Celsius
 from studies.diagnosis.held_out import residuals
 from studies.diagnosis.planning.next_run import NextRun
 from studies.diagnosis.response import RESPONSES

@@ -3,8 +3,8 @@
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.constants import zero_Celsius
 
+from shell.constants import zero_Celsius
 from studies.reports import style
 
 if TYPE_CHECKING:

@@ -4,8 +4,7 @@ from collections.abc import Sequence
 from math import degrees
 from typing import TYPE_CHECKING
 
-from scipy.constants import zero_Celsius
-
+from shell.constants import zero_Celsius
 from studies.reports.page import Block, Text
 
 if TYPE_CHECKING:

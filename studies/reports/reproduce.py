@@ -5,9 +5,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy.constants import zero_Celsius
 
 from compensation.frequency import fit_frequency
+from shell.constants import zero_Celsius
 from studies.papers import hrg
 from studies.papers.settling import NETWORKS, ROOM_degC
 from studies.reports import gyro_papers, style

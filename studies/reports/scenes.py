@@ -4,8 +4,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
-from scipy.constants import zero_Celsius
-
+from shell.constants import zero_Celsius
 from studies.errors import InputError
 from studies.instrument.card import Instrument
 

@@ -4,8 +4,7 @@ import os
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from scipy.constants import zero_Celsius
-
+from shell.constants import zero_Celsius
 from studies.errors import InputError
 
 if TYPE_CHECKING:

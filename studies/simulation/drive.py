@@ -6,8 +6,8 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.constants import zero_Celsius
 
+from shell.constants import zero_Celsius
 from studies.errors import InputError
 from studies.record import Record
 from studies.simulation.heat_path import SENSOR

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.constants import zero_Celsius
 
+from shell.constants import zero_Celsius
 from studies.damping_law import DampingLaw, damping_law
 from studies.errors import InputError
 from studies.instrument.dotted import look_up

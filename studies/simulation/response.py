@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.constants import zero_Celsius
 
+from shell.constants import zero_Celsius
 from studies.errors import InputError, naming
 from studies.simulation.drive import Drive
 from studies.simulation.heat_path import SENSOR

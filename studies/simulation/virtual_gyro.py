@@ -5,8 +5,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.constants import zero_Celsius
 
+from shell.constants import zero_Celsius
 from studies.instrument.tables.noise import SILENT
 from studies.law import unknown_slope
 from studies.record import Record

@@ -4,8 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from scipy.constants import zero_Celsius
-
+from shell.constants import zero_Celsius
 from studies.instrument.card import Instrument
 
 if TYPE_CHECKING:

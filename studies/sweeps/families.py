@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.constants import zero_Celsius
 
+from shell.constants import zero_Celsius
 from shell.family import MOST_SOLVES, Axis, Family, FamilyResult, build_family
 from shell.law import slope_parts
 from studies.errors import UNUSABLE_INPUT, InputError

@@ -10,8 +10,8 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from scipy.constants import zero_Celsius
 
+from shell.constants import zero_Celsius
 from studies.errors import InputError, nearest
 from studies.instrument.card import Instrument
 from studies.instrument.dotted import look_up, names, plain_number

@@ -4,8 +4,7 @@ from collections.abc import Iterator, Mapping
 from itertools import chain, product
 from typing import TYPE_CHECKING, Any
 
-from scipy.constants import zero_Celsius
-
+from shell.constants import zero_Celsius
 from studies.errors import UNUSABLE_INPUT, InputError
 from studies.sweeps.parameters import TEMPERATURE, set_parameters
 

@@ -172,6 +172,7 @@ def test_unwritable_place_is_refused(tmp_path):
 def test_a_large_table_costs_its_numbers_not_its_text(tmp_path, monkeypatch):
     path, rows = tmp_path / "run.csv", 60_000
     write_record(Record({"time_s": np.arange(rows) / 7, "frequency_Hz": 4432 + np.sin(np.arange(rows))}, ""), path)
+    monkeypatch.setattr(columns, "FEW", 0)
     whole = read_record(path)
     for name, value in {"ROWS_AT_ONCE": 5003, "PORTION": 1 << 16, "HEAD": 1 << 12}.items():
         monkeypatch.setattr(columns, name, value)

@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from scipy.stats import t as student
+from scipy.special import stdtrit
 
 from compensation.coloured import Wander, estimate_wander
 from studies.calibration.lags.followers import Follower, make_series
@@ -221,7 +221,7 @@ def _refuse_constant(problem: LagProblem, solution: LagSolution, noise: Wander) 
 
 
 def _estimates(problem: LagProblem, solution: LagSolution, confidence: float) -> dict[str, LagEstimate]:
-    quantile = float(student.ppf((1 + confidence) / 2, problem.rows - problem.count))
+    quantile = float(stdtrit(problem.rows - problem.count, (1 + confidence) / 2))
     errors = np.sqrt(np.diag(solution.covariance))
     scales = problem.scales(solution.parameters)
     estimates = {}

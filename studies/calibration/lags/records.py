@@ -4,9 +4,9 @@ from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.constants import zero_Celsius
 
 from compensation.spikes import find_spikes
+from shell.constants import zero_Celsius
 from studies.calibration.lags.followers import make_series
 from studies.calibration.lags.housing_run import HousingRun
 from studies.calibration.lags.identification import FrequencyPolynomial, Identification, identify, identify_lags

@@ -5,8 +5,8 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy.constants import zero_Celsius
 
+from shell.constants import zero_Celsius
 from studies.diagnosis.campaign import load_campaign
 from studies.diagnosis.fleet.comparison import Standing, against_others, compare
 from studies.diagnosis.fleet.outcome import Fleet, Share, Value

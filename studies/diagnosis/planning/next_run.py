@@ -15,8 +15,8 @@ from dataclasses import dataclass, replace
 from typing import Any, cast
 
 import numpy as np
-from scipy.constants import zero_Celsius
 
+from shell.constants import zero_Celsius
 from studies.diagnosis.baseline import Baseline, Followed, Reading
 from studies.diagnosis.campaign import Campaign
 from studies.diagnosis.constants import CONSTANTS

@@ -12,8 +12,8 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
-from scipy.constants import zero_Celsius
 
+from shell.constants import zero_Celsius
 from studies.diagnosis.campaign import Campaign, load_campaign
 from studies.diagnosis.inquiry import Thermometer, begin, read_thermometer
 from studies.diagnosis.model import Fit

@@ -4,8 +4,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from scipy.constants import zero_Celsius
 
+from shell.constants import zero_Celsius
 from studies.diagnosis.campaign import Campaign
 from studies.diagnosis.planning.chamber import Chamber, limited
 from studies.effects.states import FloatArray, States, lag

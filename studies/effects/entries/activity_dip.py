@@ -1,8 +1,8 @@
 """Activity dip: a spurious mode crosses the working mode at one temperature."""
 
 import numpy as np
-from scipy.constants import zero_Celsius
 
+from shell.constants import zero_Celsius
 from studies.effects.effect import Coefficient, Effect, Parameter, Shape, Span
 from studies.effects.states import FloatArray, States
 

@@ -1,9 +1,9 @@
 """Cross-damping: the damping axes do not follow the wave, and their coupling changes with temperature."""
 
 import numpy as np
-from scipy.constants import zero_Celsius
 
 from compensation.wave import see_across
+from shell.constants import zero_Celsius
 from studies.effects.curves import ORDERS, smoothness, waves
 from studies.effects.effect import Coefficient, Effect, Parameter, Shape, Span
 from studies.effects.states import FloatArray, States, lag

@@ -1,8 +1,8 @@
 """Curvature: the frequency law has more curvature than the material law."""
 
 import numpy as np
-from scipy.constants import zero_Celsius
 
+from shell.constants import zero_Celsius
 from studies.effects.curves import smoothness, waves
 from studies.effects.effect import Coefficient, Effect, Parameter, Shape, Span
 from studies.effects.states import FloatArray, States

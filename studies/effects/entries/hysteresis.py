@@ -1,8 +1,8 @@
 """Hysteresis: a response that depends on where the temperature came from, however slowly."""
 
 import numpy as np
-from scipy.constants import zero_Celsius
 
+from shell.constants import zero_Celsius
 from studies.effects.effect import Coefficient, Effect, Parameter, Shape, Span
 from studies.effects.states import FloatArray, States, play
 

@@ -1,8 +1,8 @@
 """Loss peak: a Debye relaxation damps the resonator around one temperature."""
 
 import numpy as np
-from scipy.constants import zero_Celsius
 
+from shell.constants import zero_Celsius
 from shell.damping.anelastic import activated_loss, activation_energy
 from studies.effects.effect import Coefficient, Effect, Parameter, Shape, Span
 from studies.effects.states import FloatArray, States

@@ -38,8 +38,7 @@ and its axis from the parts and not from `[bias]`.
 
 from typing import Annotated, Literal
 
-from scipy.constants import zero_Celsius
-
+from shell.constants import zero_Celsius
 from studies.instrument.keys import Keys, number
 from studies.instrument.registry import CardTable
 

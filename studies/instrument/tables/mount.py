@@ -7,8 +7,7 @@ joined_at_degC = 20.0                # where the joint is free of stress; the re
 
 from typing import TYPE_CHECKING, Annotated
 
-from scipy.constants import zero_Celsius
-
+from shell.constants import zero_Celsius
 from studies.instrument.keys import Keys, number
 from studies.instrument.registry import CardPlace, CardTable
 

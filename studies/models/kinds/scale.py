@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.constants import zero_Celsius
 
+from shell.constants import zero_Celsius
 from studies.errors import InputError
 from studies.models.c_source import head, polynomial
 from studies.models.file import Model, ModelPart, ModelSource, make_part, widen

@@ -1,8 +1,8 @@
 """What a polynomial compensation leaves of the frequency over temperature (HRG paper eqs. 16-18, Table 2)."""
 
 import numpy as np
-from scipy.constants import zero_Celsius
 
+from shell.constants import zero_Celsius
 from studies.errors import InputError
 from studies.sweeps.case import Case, Options
 from studies.sweeps.quantity import HARMONIC, THEORY, Column, Number, Quantity, mode_stem, number, whole
