@@ -72,6 +72,28 @@ def principal_radii() -> dict[str, Radii]:
 
 
 @cache
+def domain() -> tuple[sp.Eq, ...]:
+    """Return the ends of BVG paper eq. (2): faces at υ = ∓h/2 (here z), a full turn, and φ from φ_t at the top to φ_b at the mouth.
+
+    At the mouth x = R_b, z = −L − S the gradient of (1) gives tan φ_b = R_b S²/((R_b² − R²) S) = R_b S/(R_b² − R²).
+    """
+    lower, upper, whole = sp.symbols("z_1 z_2 theta_2")
+    return (
+        sp.Eq(lower, -h / 2, evaluate=False),
+        sp.Eq(upper, h / 2, evaluate=False),
+        sp.Eq(whole, 2 * sp.pi, evaluate=False),
+        sp.Eq(sp.tan(phi_b), R_b * S / (R_b**2 - R**2), evaluate=False),
+    )
+
+
+@cache
+def lengths() -> tuple[sp.Expr, sp.Expr, sp.Expr, sp.Expr]:
+    """Return BVG paper eq. (4): ρ_z = ρ₁ + υ, r_z = (ρ₂ + υ) sin φ, ∂ρ_z/∂υ and ∂ρ_z/∂φ."""
+    along = rho_1(phi) + z
+    return along, (rho_2(phi) + z) * sp.sin(phi), along.diff(z), along.diff(phi)
+
+
+@cache
 def hooke_in_three_dimensions() -> dict[str, sp.Expr]:
     """Return BVG paper eq. (5): σᵢᵢ = λε + 2Gεᵢᵢ, σᵢⱼ = 2Gεᵢⱼ with G = E/2(1+ν), λ = 2Gν/(1−2ν), ε = Σ εᵢᵢ."""
     shear = E / (2 * (1 + nu))

@@ -39,9 +39,17 @@ def _shape() -> list[Step]:
     return [
         Step("1", "Meridian: hemisphere, cylinder, hyperbola (height z_a)", bell.meridian()),
         Step(
+            "2", "Ends of the domain: faces, a full turn, the mouth (the top is where the stem begins)", bell.domain()
+        ),
+        Step(
             "3",
             "Principal radii of the hyperbola; its roots and the minus are lost in print",
             name_expressions("rho_1 rho_2", *radii["hyperbola"]),
+        ),
+        Step(
+            "4",
+            "Lengths per φ and around at the height υ (here z), and their derivatives",
+            name_expressions("rho_z r_z rho_z,z rho_z,phi", *bell.lengths()),
         ),
     ]
 
@@ -75,8 +83,19 @@ def _motion() -> list[Step]:
             bell_dynamics.printed_slow_accelerations(), bell_dynamics.slow_accelerations(), strict=True
         )
     )
+    _, coriolis, euler, centripetal = bell_dynamics.acceleration_parts()
     return [
-        Step("12", "Acceleration of a point, from (8)–(11)", _along("a", bell_dynamics.accelerations())),
+        Step(
+            "8-10",
+            "Displacement u_φ, u_υ, u_θ along the three directions, and the rate",
+            _along("Omega", bell_dynamics.rate_vector()),
+        ),
+        Step(
+            "11",
+            "Acceleration: that of u, and what the rate adds: Coriolis (C), Euler (E), centripetal (N)",
+            (*_along("C", coriolis), *_along("E", euler), *_along("N", centripetal)),
+        ),
+        Step("12", "Acceleration of a point, their sum", _along("a", bell_dynamics.accelerations())),
         Step("13", "The same of a slow, steady rate", _along("a", bell_dynamics.slow_accelerations())),
         Step("13 as printed", "has cos φ for sin φ and lacks u_φ in the third: its excess", _along("d", printed)),
         Step(

@@ -86,14 +86,25 @@ def equilibrium_defect() -> tuple[sp.Expr, sp.Expr, sp.Expr]:
 
 
 @cache
-def accelerations() -> tuple[sp.Expr, sp.Expr, sp.Expr]:
-    """Return BVG paper eq. (12) from (8)–(11): ü + 2 Ω×u̇ + Ω̇×u + Ω×(Ω×u) with Ω = Ω (cos φ υ̂ − sin φ φ̂).
+def rate_vector() -> sp.Matrix:
+    """Return BVG paper eq. (10), Ω = Ω (cos φ υ̂ − sin φ φ̂), along φ, υ, θ."""
+    return sp.ImmutableMatrix(Omega_t * sp.Matrix([-sp.sin(phi), sp.cos(phi), 0]))
 
-    Along φ, υ, θ, right-handed in this order as the paper's signs are; minus signs and dots are lost in print.
+
+@cache
+def acceleration_parts() -> tuple[sp.Matrix, sp.Matrix, sp.Matrix, sp.Matrix]:
+    """Return the terms of BVG paper eq. (11), for the displacement u = u_φ φ̂ + u_υ υ̂ + u_θ θ̂ of (8), (9).
+
+    Relative ü, Coriolis' 2 Ω×u̇, Euler's Ω̇×u and the centripetal Ω×(Ω×u); right-handed along φ, υ, θ as the paper's signs are.
     """
-    turn = Omega_t * sp.Matrix([-sp.sin(phi), sp.cos(phi), 0])
-    u = sp.Matrix([moving(i) for i in range(3)])
-    whole = u.diff(t, 2) + 2 * turn.cross(u.diff(t)) + turn.diff(t).cross(u) + turn.cross(turn.cross(u))
+    turn, u = rate_vector(), sp.ImmutableMatrix([moving(i) for i in range(3)])
+    return u.diff(t, 2), 2 * turn.cross(u.diff(t)), turn.diff(t).cross(u), turn.cross(turn.cross(u))
+
+
+@cache
+def accelerations() -> tuple[sp.Expr, sp.Expr, sp.Expr]:
+    """Return BVG paper eq. (12), the sum of (11) along φ, υ, θ; minus signs and dots are lost in print."""
+    whole = sum(acceleration_parts(), sp.zeros(3, 1))
     along, normal, around = (sp.expand(component) for component in whole)
     return along, normal, sp.expand(around.subs(sp.sin(phi) ** 2, 1 - sp.cos(phi) ** 2))
 

@@ -6,11 +6,12 @@ judgement that the paper lacks. Gyros are drawn from typical values; nothing is 
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cache
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 
 from compensation.bias import BiasRun, prepare_run
 from compensation.bias_selection import HeldOutRows, Method, bias_stability, fit_bias, score_runs
@@ -25,6 +26,7 @@ CARD = "hrg-30mm"
 COOLING, WARMING = "step 25 -20 5h", "step -20 25 5h"
 ROWS_PER_SECOND = 0.1
 PAPER_BEFORE, PAPER_AFTER = 3.0143, 0.5848
+Trace: TypeAlias = tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]
 METHODS: tuple[Method, ...] = ("paper", "guarded")
 
 
@@ -32,7 +34,8 @@ METHODS: tuple[Method, ...] = ("paper", "guarded")
 class TwinFit:
     """One method, fitted to one or several runs of a gyro, and judged on a new cooling and a new warming run.
 
-    `training` is the bias stability (°/h) of the first cooling run before and after.
+    `training` is the bias stability (°/h) of the first cooling run before and after; `trace` that run as figure 6 shows it: time (s),
+    bias and what compensation leaves (°/h).
     """
 
     method: Method
@@ -41,6 +44,7 @@ class TwinFit:
     training: tuple[float, float]
     cooling: HeldOutRows
     warming: HeldOutRows
+    trace: Trace = field(compare=False)
 
     @property
     def training_gain(self) -> float:
@@ -128,6 +132,7 @@ def study_twin(seed: int) -> tuple[TwinFit, ...]:
                     (bias_stability(first), bias_stability(first, left)),
                     score_runs(fit, [cooling], extrapolate=True),
                     score_runs(fit, [warming], extrapolate=True),
+                    (first.time, first.bias, left),
                 )
             )
     return tuple(fits)

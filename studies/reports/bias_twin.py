@@ -31,9 +31,33 @@ def twin_chapters(twins: Twins) -> list[Chapter]:
     return [
         Chapter(
             "Figure 6: compensated bias on data that the fit has not seen",
-            [Text(told), twin_table(twins), twin_figure(twins), terms_table(twins)],
+            [Text(told), trace_figure(twins), twin_table(twins), twin_figure(twins), terms_table(twins)],
         )
     ]
+
+
+def trace_figure(twins: Twins) -> Picture:
+    """Draw figure 6 (a) and (b) of the virtual gyro whose improvement on its run is the median one."""
+    ranked = sorted(_fits(twins, "paper", 1), key=lambda fit: fit.training_gain)
+    fit = ranked[len(ranked) // 2]
+    time, bias, left = fit.trace
+    hours = time / 3600
+    with style.figure(2, height=4.4, sharex=True) as (figure, (upper, lower)):
+        upper.plot(hours, bias, color=style.BLUE, linewidth=0.8, label="output")
+        upper.plot(hours, bias - left, color=style.VERMILION, label="model, eq. (22)")
+        lower.plot(hours, left, color=style.BLUE, linewidth=0.8, label="compensated")
+        middle, span = float(np.mean(left)), float(np.ptp(bias)) or 1.0  # the scale of (a)
+        lower.set_ylim(middle - 0.6 * span, middle + 0.6 * span)
+        for axes in (upper, lower):
+            axes.set_ylabel("bias (°/h)")
+            axes.legend(fontsize=8, loc="upper right")
+        lower.set_xlabel("time (h)")
+    before, after = fit.training
+    caption = (
+        f"Figure 6 of the virtual gyro with the median improvement on its run, 25 to −20 °C: (a) output and model, (b) compensated:"
+        f" {before:.3g} → {after:.3g} °/h, {fit.training_gain:.2f} times; the paper's gyro {PAPER_BEFORE} → {PAPER_AFTER} °/h."
+    )
+    return draw(figure, caption, "Bias over time with the model, and the compensated bias below it.")
 
 
 def twin_table(twins: Twins) -> Table:

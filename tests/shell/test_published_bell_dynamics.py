@@ -99,3 +99,25 @@ def test_parts_of_the_temperature_coefficient_add_up_to_its_derivative():
 def test_free_expansion_leaves_half_of_the_shear_modulus_and_of_the_expansion():
     """Theory sheet, section 1: TCF = ½ G'/G + ½ α."""
     assert sp.simplify(free_expansion() - G(temperature).diff(temperature) / (2 * G(temperature)) - alpha / 2) == 0
+
+
+def test_mouth_of_the_domain_lies_on_the_hyperbola():
+    """(2): the normal at φ_b belongs to the point x = R_b, z = −L − S of (1)."""
+    from shell.derivation.bell import L, R, R_b, S, domain, phi, point_of_hyperbola
+
+    values = {R: 12.5, R_b: 15.0, S: 6.0, L: 10.0}
+    mouth = sp.atan(domain()[-1].rhs.subs(values))
+    at = [float(coordinate.subs(values).subs(phi, mouth)) for coordinate in point_of_hyperbola()]
+    assert at == pytest.approx([15.0, -16.0], rel=1e-12)
+
+
+def test_coriolis_euler_and_centripetal_terms_against_a_turning_frame():
+    """(11): a point that rests in a frame turning about the axis has only Euler's and the centripetal acceleration, ε × r and −Ω² r."""
+    relative, coriolis, euler, centripetal = bell.acceleration_parts()
+    still = {bell.moving(i).diff(t, k): 0 for i in range(3) for k in (2, 1)}
+    assert all(sp.simplify(x.subs(still)) == 0 for x in (*relative, *coriolis))
+    x = [bell.moving(i) for i in range(3)]
+    radial = x[0] * sp.cos(phi) + x[1] * sp.sin(phi)  # away from the axis; φ̂ and υ̂ lie in the plane of the meridian
+    expected = [-(bell.Omega_t**2) * part for part in (radial * sp.cos(phi), radial * sp.sin(phi), x[2])]
+    assert all(sp.simplify(a - b) == 0 for a, b in zip(centripetal, expected, strict=True))
+    assert sp.simplify(euler.dot(euler) - bell.Omega_t.diff(t) ** 2 * (radial**2 + x[2] ** 2)) == 0
