@@ -29,6 +29,7 @@ from compensation.stability import AllanDeviation, NoiseCoefficients, allan_devi
 from studies.errors import InputError, naming
 from studies.models import Model, compensate, source_of
 from studies.models.kinds.bias import OUTPUTS, save_bias
+from studies.plausible import records_of_one_gyro
 from studies.record import COMPENSATED, Record
 from studies.rest import LARGEST_REST, TEMPERATURES, choose_column
 
@@ -122,8 +123,9 @@ def study_bias(
     Raises
     ------
     InputError
-        A record that lacks a column or was not at rest; the message names the file.
+        A record that lacks a column or was not at rest, records of different gyros; the message names the file.
     """
+    records = records_of_one_gyro(records, progress)
     output, column = find_output(records), find_state(records, over)
     width = choose_width(records) if width is None else width
     window = 3 * width if window is None else window

@@ -1,6 +1,6 @@
 """Whether a record is of the gyro that a card or a model stands for: a question, with the sentence that confirms it."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,6 +11,7 @@ from studies.errors import InputError
 
 if TYPE_CHECKING:
     from studies.instrument.card import Instrument
+    from studies.record import Record
 
 Array = NDArray[np.float64]
 ALIKE = 0.03  # relative: what trimming, temperature and small errors of dimensions make of a frequency
@@ -45,26 +46,51 @@ def check_card_frequency(instrument: "Instrument", frequency: Array, path: str) 
     )
 
 
-def check_one_gyro(readings: "Sequence[tuple[str, Array, Array]]") -> None:
-    """Refuse records of different gyros: path, temperature (°C) and frequency (Hz) of each.
+def check_one_gyro(readings: "Sequence[tuple[str, Array | None, Array]]") -> None:
+    """Refuse records of different gyros: path, temperature (°C; None where it is not known) and frequency (Hz) of each.
 
     Raises
     ------
     InputError
-        Frequencies further apart than 0.5 % beside what 300 ppm/K make of their temperatures.
+        Frequencies further apart than 0.5 % beside what 300 ppm/K make of their temperatures, or beside what they span
+        themselves where a temperature is not known.
     """
     levels = []
     for path, T, f in readings:
-        known = np.isfinite(T) & np.isfinite(f)
+        known = np.isfinite(f) if T is None else np.isfinite(T) & np.isfinite(f)
         if known.any():
-            levels.append((float(np.median(f[known])), float(np.median(T[known])), path))
-    for near, warm, path in levels:
-        for other, warmth, first in levels:
-            if abs(float(np.log(near / other))) > ONE_GYRO + STEEPEST * abs(warm - warmth):
+            level, warm = float(np.median(f[known])), np.nan if T is None else float(np.median(T[known]))
+            levels.append((level, warm, float(np.ptp(f[known])) / level, path))
+    for near, warm, span, path in levels:
+        for other, warmth, spanned, first in levels:
+            moved = STEEPEST * abs(warm - warmth)
+            if abs(float(np.log(near / other))) > ONE_GYRO + (moved if np.isfinite(moved) else span + spanned):
+                at, there = (f" at {T:.3g} °C" if np.isfinite(T) else "" for T in (warm, warmth))
                 raise InputError(
-                    f"{path}: frequency_Hz is about {near:.6g} Hz at {warm:.3g} °C, in {first} about {other:.6g} Hz at {warmth:.3g} °C:"
+                    f"{path}: frequency_Hz is about {near:.6g} Hz{at}, in {first} about {other:.6g} Hz{there}:"
                     " no gyro changes so much. The records are of different gyros, or one is in another unit: give those of one."
                 )
+
+
+def records_of_one_gyro(records: "Sequence[Record]", say: Callable[[str], None]) -> "list[Record]":
+    """Return the records that a fit may take: one given twice counts once, which is said, and all are of one gyro.
+
+    Raises
+    ------
+    InputError
+        Records of different gyros; see `check_one_gyro`.
+    """
+    from studies.record import drop_repeats
+    from studies.rest import TEMPERATURES
+
+    def thermometer(record: "Record") -> Array | None:
+        return next((record[name] for name in TEMPERATURES if name in record), None)
+
+    kept, repeated = drop_repeats(records)
+    for sentence in repeated:
+        say(sentence)
+    check_one_gyro([(r.path or "a record", thermometer(r), r["frequency_Hz"]) for r in kept if "frequency_Hz" in r])
+    return kept
 
 
 def check_model_frequency(frequency: Array, lowest: float, highest: float, path: str, model: str) -> None:

@@ -53,13 +53,14 @@ def fit_cross_damping(
     from studies.files.writing import write_text
     from studies.models import source_of, write_model
     from studies.models.kinds.cross_damping import OUTPUTS, save_cross_damping
+    from studies.plausible import records_of_one_gyro
     from studies.record import read_record
     from studies.reports import cross_damping as page
     from studies.rest import gather_rest
 
     if not data:
         raise InputError("name at least one record (CSV) of a gyro at rest.")
-    records = [read_record(path) for path in data]
+    records = records_of_one_gyro([read_record(path) for path in data], say)
     carrier = frequency if frequency is not None else _median(records, "frequency_Hz", "--frequency")
     quality = quality if quality is not None else _quality(records)
     if not (0 < carrier < 1e9 and 1 < quality < 1e12):

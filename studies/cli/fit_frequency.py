@@ -61,10 +61,11 @@ def fit_frequency(
     soaks: tuple[Soak, ...] = ()
     shown = time_constant
     if more or "time_s" in read_header(table):
+        from studies.plausible import records_of_one_gyro
         from studies.record import read_record
         from studies.settled import advise_hold, find_soaks, settled_table
 
-        records = [read_record(path) for path in (table, *more)]
+        records = records_of_one_gyro([read_record(path) for path in (table, *more)], say)
         soaks = find_soaks(records, time_constant, left)
         T, f, step = settled_table(soaks, table, advise_hold(records, time_constant, left) if len(soaks) < 2 else "")
         sha256 = records[0].sha256

@@ -27,6 +27,7 @@ SYMBOLS = {
     "f^2*fdot": "f²·ḟ", "f*fdot^2": "f·ḟ²", "play": "loop",
 }  # fmt: skip
 ORDER = list(SYMBOLS)
+MOST_RUNS = 12  # that are drawn
 METHOD = {"guarded": "guarded", "paper": "as the paper does"}
 Method = Literal["guarded", "paper"]
 
@@ -243,23 +244,32 @@ def noise_table(study: "BiasStudy") -> Table:
 
 
 def runs_figure(study: "BiasStudy", method: Method) -> Picture:
-    """Draw the averages before and after, and the model, for the first runs: like the paper's figure 6."""
+    """Draw the averages before and after, and the model, three runs beside each other: like the paper's figure 6."""
     unit = OUTPUTS[study.output].replace("deg", "°")
-    fit, shown = study.by(method).fit, study.runs[:3]
-    with style.figure(2, len(shown), height=4.6, squeeze=False, sharex="col", sharey="row") as (figure, axes):
+    fit, shown = study.by(method).fit, study.runs[:MOST_RUNS]
+    columns = min(len(shown), 3)
+    rows = -(-len(shown) // columns)
+    with style.figure(2 * rows, columns, height=4.6 * rows, squeeze=False, sharey="row") as (figure, axes):
         for k, run in enumerate(shown):
+            above, below = axes[2 * (k // columns) : 2 * (k // columns) + 2, k % columns]
             predicted = run.bias - fit.left(run)
             hours = run.time / 3600
             offset = np.mean(run.bias - predicted)
-            axes[0, k].plot(hours, run.bias, ".", color=style.SKY, markersize=3, label="output")
-            axes[0, k].plot(hours, predicted + offset, color=style.VERMILION, label="model")
-            axes[1, k].plot(hours, run.bias - predicted - offset, ".", color=style.BLUE, markersize=3)
-            axes[1, k].set_xlabel("Time (h)")
-            axes[0, k].set_title(f"run {k + 1}", fontsize=10)
-        axes[0, 0].set_ylabel(f"Output ({unit})")
-        axes[1, 0].set_ylabel(f"Compensated ({unit})")
+            above.plot(hours, run.bias, ".", color=style.SKY, markersize=3, label="output")
+            above.plot(hours, predicted + offset, color=style.VERMILION, label="model")
+            below.plot(hours, run.bias - predicted - offset, ".", color=style.BLUE, markersize=3)
+            below.set_xlabel("Time (h)")
+            above.set_title(f"run {k + 1}", fontsize=10)
+            if k % columns == 0:
+                above.set_ylabel(f"Output ({unit})")
+                below.set_ylabel(f"Compensated ({unit})")
+        for empty in axes[-2:, len(shown) - (rows - 1) * columns :].flat:
+            empty.set_axis_off()
         axes[0, 0].legend()
-        caption = "Averages of the output with the model (above) and residuals (below), as in the paper's figure 6."
+        first = f" The first {MOST_RUNS} of {len(study.runs)} runs." if len(study.runs) > MOST_RUNS else ""
+        caption = (
+            f"Averages of the output with the model (above) and residuals (below), as in the paper's figure 6.{first}"
+        )
         return draw(figure, caption, "Zero-rate output over time before and after compensation.")
 
 

@@ -313,3 +313,40 @@ def test_compensate_says_what_it_needs(calibrated, tmp_path, capsys):
     (tmp_path / "bad.toml").write_text(text, encoding="utf-8")
     assert main(["compensate", str(tmp_path / "bad.toml"), run, "--out", str(tmp_path / "o.csv")]) == 2
     assert "unknown term 'fdott'; did you mean 'fdot'" in capsys.readouterr().err
+
+
+def test_a_run_given_twice_is_not_held_out(calibrated, tmp_path, capsys):
+    """Twice the same two runs: no run is unseen by the others then, so they count once."""
+    one, two = (calibrated / f"run{k}.csv" for k in (0, 1))
+    again = tmp_path / "again.csv"
+    shutil.copy(one, again)
+    assert main(["fit", "bias", str(one), str(two), "--json"]) == 0
+    once = json.loads(capsys.readouterr().out)
+    assert main(["fit", "bias", str(one), str(two), str(one), str(again), "--json"]) == 0
+    captured = capsys.readouterr()
+    twice = json.loads(captured.out)
+    assert twice["methods"] == once["methods"]
+    assert twice["rows"] == once["rows"]
+    assert "again.csv repeats" in captured.err
+
+
+def test_two_gyros_are_not_fitted_together(calibrated, tmp_path, capsys):
+    """The frequencies of the two gyros are 4433 and 4556 Hz, and no record has a thermometer."""
+
+    def move(columns):
+        columns["frequency_Hz"] = columns["frequency_Hz"] + 123.0
+
+    other = tmp_path / "other.csv"
+    write_record(make_record(7, spoil=move), other)
+    assert main(["fit", "bias", str(calibrated / "run0.csv"), str(other)]) == 2
+    assert "different gyros" in capsys.readouterr().err
+
+
+def test_every_run_is_drawn():
+    """Four runs are four pairs of pictures."""
+    from studies.bias import study_bias
+    from studies.reports.bias import runs_figure
+
+    study = study_bias([make_record(k, cooling=k % 2 == 0) for k in range(4)])
+    figure = runs_figure(study, "guarded").figure
+    assert [axes.get_title() for axes in figure.axes if axes.get_title()] == [f"run {k}" for k in range(1, 5)]
