@@ -37,6 +37,7 @@ Over = Literal["auto", "frequency", "temperature"]
 Array = NDArray[np.float64]
 METHODS: tuple[Method, ...] = ("guarded", "paper")
 AVERAGING, ROWS = 100.0, 150  # s; rows that a run should leave
+FEWEST = 3  # averages over AVERAGING that a run has at least: stability is their standard deviation
 LOWEST_FREQUENCY = 100.0  # Hz
 FEWEST_FOR_ALLAN = 30
 """Samples below which an Allan deviation says nothing."""
@@ -126,6 +127,7 @@ def study_bias(
         A record that lacks a column or was not at rest, records of different gyros; the message names the file.
     """
     records = records_of_one_gyro(records, progress)
+    check_lengths(records)
     output, column = find_output(records), find_state(records, over)
     width = choose_width(records) if width is None else width
     window = 3 * width if window is None else window
@@ -179,6 +181,22 @@ def _spectrum(values: Array, step: float) -> Stability | None:
         return None
     allan = allan_deviation(values, step)
     return Stability(allan, fit_noise(allan))
+
+
+def check_lengths(records: Sequence[Record]) -> None:
+    """Refuse a run too short for the averages by which its stability is judged, as one whose time is in hours is."""
+    for record in records:
+        lasts = float(np.ptp(record["time_s"]))
+        if lasts < FEWEST * AVERAGING:
+            hint = (
+                " Is its time in hours or minutes? time_s is in seconds; 'hrg import' converts."
+                if lasts < AVERAGING
+                else ""
+            )
+            raise InputError(
+                f"{record.path or 'record'}: lasts {lasts:.3g} s; bias stability is judged on averages over {AVERAGING:g} s, of"
+                f" which a run needs {FEWEST} or more.{hint}"
+            )
 
 
 def choose_width(records: Sequence[Record]) -> float:

@@ -8,6 +8,7 @@ import os
 import sys
 import warnings
 from collections.abc import Sequence
+from itertools import takewhile
 
 from studies.files.given import printable
 from studies.interruption import has_made, heed, let_be
@@ -139,11 +140,13 @@ def _command_line(words: Sequence[str]) -> "App":
 
 def _judge(error: Exception, words: Sequence[str]) -> tuple[str, int]:
     """Return the sentence that a user reads of an error, and the exit status."""
-    from cyclopts import CycloptsError
+    from cyclopts import CycloptsError, UnusedCliTokensError
 
     from studies.errors import UNUSABLE_INPUT, MissingEnvironment
 
     match error:
+        case UnusedCliTokensError():
+            return _say_unused(error.unused_tokens or [], words), 2
         case CycloptsError():
             asked = " ".join(["hrg", *_command_words(words), "--help"])
             return f"{' '.join(str(error).split())} See '{asked}'.", 2
@@ -156,6 +159,18 @@ def _judge(error: Exception, words: Sequence[str]) -> tuple[str, int]:
     return f"internal fault: {type(error).__name__}: {error}. Run again with --debug and report it.", 1
 
 
+def _say_unused(unused: Sequence[str], words: Sequence[str]) -> str:
+    """Say which words no argument takes, and that a profile in words is one argument."""
+    named = ", ".join(f"'{word}'" for word in unused)
+    before = list(words[: words.index(unused[0])]) if unused and unused[0] in words else []
+    if before and before[-1] in PROFILE_WORDS:
+        whole = " ".join([before[-1], *takewhile(lambda word: not word.startswith("-") or word[1:2].isdigit(), unused)])
+        return f'a profile of several words stands in quotes: "{whole}".'
+    asked = " ".join(["hrg", *_command_words(words), "--help"])
+    return f"{named}: more words than this command takes; a text with blanks stands in quotes. See '{asked}'."
+
+
+PROFILE_WORDS = ("soak", "step", "ramp", "staircase", "cycle")
 CHAPTERS = {
     # of the list of commands
     "Design a resonator": ("modes", "tcf", "loss", "loop", "compare", "render", "mesh", "study", "derive"),

@@ -9,6 +9,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 AVERAGE = 100.0  # s
+NOISE = 0.02  # relative: what the noise of a model's inputs may add to a record that has nothing to compensate
 
 
 @answers("hrg.compensate/1")
@@ -80,6 +81,13 @@ def compensate(
                     "stability_after": _stability(record["time_s"], after),
                     "rows_not_compensated": int(np.count_nonzero(missing)),
                 }
+    for name, facts in columns.items():
+        was, now = facts["stability_before"], facts["stability_after"]
+        if was is not None and now is not None and now > was * (1 + NOISE):
+            say(
+                f"warning: {name} is worse than the record: standard deviation of {AVERAGE:g} s averages {was:.4g} → {now:.4g}."
+                " Is the model of this gyro, with this sign of the output? Do not use it otherwise."
+            )
     yield {
         "schema": "hrg.compensate/1",
         "model": model,

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 GYROS = 12
 
 
-@answers("?")
+@answers("hrg.reproduce/1")
 def reproduce(*, out: str = "report") -> Answer:
     """Recompute the papers' tables and figures from their data and from virtual gyros, beside what first principles predict.
 

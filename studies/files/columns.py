@@ -29,6 +29,7 @@ LARGEST = 1e20
 # Anything but plain decimal numbers, commas and line ends: 'nan', quotes, comments, blanks.
 _UNUSUAL = re.compile(rb"[^0-9eE+.,\r\n-]")
 _SOMETHING = re.compile(rb"\S")
+IMPORT = " 'hrg import' brings laboratory files with other names, units and notations into this form."
 HEAD = 1 << 20
 """Bytes in which comments and header are looked for first."""
 FEW = 400_000
@@ -110,7 +111,7 @@ def _check_text(path: str | Path, data: bytes) -> bytes:
             data.decode()
         except UnicodeDecodeError as error:
             line = data.count(b"\n", 0, error.start) + 1
-            raise InputError(f"{path}, line {line}: not UTF-8 text; save the file as UTF-8 (CSV).") from None
+            raise InputError(f"{path}, line {line}: not UTF-8 text; save the file as UTF-8 (CSV).{IMPORT}") from None
     if not _SOMETHING.search(data):
         raise InputError(f"{path}: the file is empty; it needs a header line and rows of numbers.")
     return data
@@ -160,10 +161,10 @@ def _check_names(
         if counts[name] > 1:
             raise InputError(f"{where}: the column '{name}' stands twice; remove one.")
         if name not in known and not any(name.startswith(prefix) for prefix in prefixes):
-            raise InputError(f"{where}: unknown column '{name}'{nearest(name, known)}")
+            raise InputError(f"{where}: unknown column '{name}'{nearest(name, known)}{IMPORT}")
     for name in required:
         if name not in counts:
-            raise InputError(f"{where}: the column '{name}' is missing; the header has {', '.join(names)}.")
+            raise InputError(f"{where}: the column '{name}' is missing; the header has {', '.join(names)}.{IMPORT}")
     return names
 
 

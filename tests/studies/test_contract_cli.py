@@ -191,3 +191,18 @@ def test_doctor_looks_for_the_package_of_the_cluster_and_not_for_a_program(capsy
     main(["doctor", "--json"])
     (found,) = [one for one in json.loads(capsys.readouterr().out)["checks"] if one["name"] == "distributed"]
     assert found["found"] == version("distributed")
+
+
+def test_a_profile_without_quotes_is_told_where_they_stand(capsys):
+    assert main(["thermal", "hrg-30mm", "step", "20", "-10", "5h"]) == 2
+    said = capsys.readouterr().err
+    assert '"step 20 -10 5h"' in said
+    assert "Unused" not in said
+    assert main(["modes", "free-dome", "3"]) == 2
+    assert "more words than this command takes" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_help_names_the_schema(command, capsys):
+    main([*command.split(), "--help"])
+    assert "schema ?" not in " ".join(capsys.readouterr().out.split())

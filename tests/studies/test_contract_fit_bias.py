@@ -350,3 +350,33 @@ def test_every_run_is_drawn():
     study = study_bias([make_record(k, cooling=k % 2 == 0) for k in range(4)])
     figure = runs_figure(study, "guarded").figure
     assert [axes.get_title() for axes in figure.axes if axes.get_title()] == [f"run {k}" for k in range(1, 5)]
+
+
+def test_time_in_hours_is_said_and_not_judged(tmp_path, capsys):
+    """Five hours read as 5 s hold no average over 100 s; no figure is 'nan times' better."""
+    record = make_record(3)
+    path = tmp_path / "hours.csv"
+    write_record(record.with_columns({"time_s": TIME / 3600}), path)
+    assert main(["fit", "bias", str(path)]) == 2
+    captured = capsys.readouterr()
+    assert "in hours" in captured.err
+    assert "nan" not in captured.out
+
+
+def test_a_compensation_that_does_harm_is_said(calibrated, tmp_path, capsys):
+    """The model's terms with their signs turned double the error that they should take away."""
+    run, out = calibrated / "run0.csv", tmp_path / "out.csv"
+    assert main(["compensate", str(calibrated / "m.toml"), str(run), "--out", str(out)]) == 0
+    assert "worse" not in capsys.readouterr().err
+    flipped = tmp_path / "flipped.csv"
+    record = read_record(run)
+    write_record(record.with_columns({"bias_deg_per_h": -record["bias_deg_per_h"]}), flipped)
+    assert main(["compensate", str(calibrated / "m.toml"), str(flipped), "--out", str(out)]) == 0
+    assert "worse than the record" in capsys.readouterr().err
+
+
+def test_a_laboratory_file_is_sent_to_the_import(calibrated, tmp_path, capsys):
+    raw = tmp_path / "raw.csv"
+    raw.write_text("t [s],f [Hz]\n0,4430\n1,4430\n")
+    assert main(["compensate", str(calibrated / "m.toml"), str(raw), "--out", str(tmp_path / "out.csv")]) == 2
+    assert "hrg import" in capsys.readouterr().err
