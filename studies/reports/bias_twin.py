@@ -50,7 +50,7 @@ def trace_figure(twins: Twins) -> Picture:
         lower.set_ylim(middle - 0.6 * span, middle + 0.6 * span)
         for axes in (upper, lower):
             axes.set_ylabel("bias (°/h)")
-            axes.legend(fontsize=8, loc="upper right")
+            axes.legend(fontsize=8)
         lower.set_xlabel("time (h)")
     before, after = fit.training
     caption = (

@@ -36,7 +36,7 @@ def test_a_package_alone_imports_nothing_heavy(package):
 
 
 def test_simulate_is_the_command(tmp_path):
-    record = studies.simulate("hrg-30mm", "step 20 -10 1h", rate=0.1, seed=3)
+    record = studies.simulate("hrg-30mm", "step 20 -10 1h", row=10, seed=3)
     assert (
         main(["simulate", "hrg-30mm", "step 20 -10 1h", "--row", "10", "--seed", "3", "--out", str(tmp_path / "r.csv")])
         == 0
@@ -46,7 +46,7 @@ def test_simulate_is_the_command(tmp_path):
 
 
 def test_records_show_themselves_shortly_and_as_tables_and_pictures():
-    record = studies.simulate(studies.load_card("free-dome"), "step 20 -10 1h", rate=0.1)
+    record = studies.simulate(studies.load_card("free-dome"), "step 20 -10 1h", row=10)
     assert repr(record) == (
         "Record(free-dome, 361 rows over 1 h: time_s, chamber_temperature_degC, housing_temperature_degC,"
         " resonator_temperature_degC, frequency_Hz, bias_deg_per_h, inverse_q)"
