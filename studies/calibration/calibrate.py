@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from scipy.linalg import block_diag
 
 from shell.errors import ShellError
+from studies.calibration.agreement import keep_agreeing, put_back
 from studies.calibration.ahead import BIAS
 from studies.calibration.estimates import Estimate, estimate, find_groups
 from studies.calibration.fit import CardFit, fit, whitened
@@ -220,7 +221,9 @@ def calibrate(
         held_out = predict_held_out(instrument, runs, tables, hold_out, exact, found)
     if profile:
         progress("intervals")
-    estimates = estimate(found, profile)
+    estimates, kept = estimate(found, profile), keep_agreeing(found)
+    if kept is not found:
+        estimates, found = put_back(estimates, kept), kept
     ladder = build_ladder(found)
     return Calibration(
         instrument,
@@ -302,7 +305,7 @@ def predict_held_out(
     problem = replace(whole.problem, runs=seen)
     start = np.concatenate([whole.point[:count], np.zeros(problem.count - count)])
     without = fit(problem, start)
-    values = without.point[:count]
+    values = keep_agreeing(without).point[:count]
     inner = replace(whole.problem, runs=(replace(run, outer=None),), tables=())
     responses = [name for name in inner.responses if name not in (HOUSING, SETTLED)]
     by_housing = dict.fromkeys(responses, (0.0, 0.0))

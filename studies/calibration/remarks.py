@@ -7,7 +7,7 @@ import numpy as np
 
 from compensation.correlated import Noise
 from studies.calibration.ahead import BIAS
-from studies.calibration.estimates import SILENT, Estimate
+from studies.calibration.estimates import SILENT, TOLD, Estimate
 from studies.calibration.fit import CardFit, stated_noise
 from studies.calibration.ladder import Rung, noise_rms, usual_mean
 from studies.calibration.misreading import bias_in_seconds
@@ -33,7 +33,8 @@ def warn(found: CardFit, estimates: Sequence[Estimate], ladder: Mapping[str, Run
         said = bias_in_seconds(found.problem.instrument, run.record)
         warnings += [] if said is None else [said]
         warnings += [f"{run.record.path}: {idle}" for idle in idle_effects(found.problem.instrument, run.inner)]
-    warnings += [*_moved(estimates), *_unsettled(found), *_misfit(found, ladder)]
+    misfit = _misfit(found, ladder)
+    warnings += [*_moved(estimates), *([] if misfit else _unsettled(found)), *misfit]
     rows = found.problem.rows
     for name, rung in ladder.items():
         stated = found.problem.instrument.noise.bias_turn_on_deg_per_h if name == BIAS else 0.0
@@ -86,19 +87,19 @@ def _misfit(found: CardFit, ladder: Mapping[str, Rung]) -> list[str]:
 
 
 def _unsettled(found: CardFit) -> list[str]:
-    """Name the runs that began in the midst of a change, with the part that was furthest from being settled."""
+    """Name the runs that the fit begins in the midst of a change, where the data determine it, with the part that was furthest from being settled."""
     problem, count = found.problem, len(found.problem.priors.values)
     spread = np.sqrt(np.diag(found.covariance)[count:])
     furthest: dict[int, tuple[float, str]] = {}
     for (k, name, sd), u, own in zip(problem.starts, found.point[count:], spread, strict=True):
         lump, away, run = name.removeprefix("initial."), float(sd * u), problem.parts[k].run
-        known = abs(u) > UNSETTLED_SD * own and abs(away) > UNSETTLED
+        known = own < TOLD and abs(u) > UNSETTLED_SD * own and abs(away) > UNSETTLED
         if lump in ("base", "resonator") and known and abs(away) > abs(furthest.get(run, (0.0, ""))[0]):
             furthest[run] = away, lump
     return [
-        f"{problem.runs[run].record.path}: the gyro had not settled when this run began: its {lump} was {abs(away):.2g} K"
-        f" {'warmer' if away > 0 else 'colder'} than its {_settled_by(problem, run)}; a prediction from the chamber alone"
-        " does not know of that."
+        f"{problem.runs[run].record.path}: the fit needs a {lump} that begins {abs(away):.2g} K"
+        f" {'warmer' if away > 0 else 'colder'} than its {_settled_by(problem, run)}, as in a gyro that had not settled when the run began;"
+        " a prediction from the chamber alone does not know of that."
         for run, (away, lump) in sorted(furthest.items())
     ]
 

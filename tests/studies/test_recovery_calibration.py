@@ -163,9 +163,19 @@ def test_a_run_that_began_in_the_midst_of_a_change_is_explained_and_what_its_cha
         expected = np.hypot(held.stated["frequency_Hz"], rung.noise)
         assert held.chamber["frequency_Hz"][1] < 3 * expected
         assert held.stated["frequency_Hz"] < most
-        assert any("3.csv: the gyro had not settled when this run began" in one for one in found.warnings) == (
-            runs[0] is late
-        )
+        assert any("3.csv: the fit needs a " in one for one in found.warnings) == (runs[0] is late)
+
+
+@pytest.mark.slow
+def test_where_nothing_is_wrong_the_card_stays_and_an_unseen_bias_is_as_it_was(card):
+    """Terms of the bias that followed the noise of one run once made that of another ten times worse."""
+    found = calibrate(card, [measure(card, UNSEEN, 3)], profile=False)
+    true, again = (measure(one, PROFILES[0], 0, noise=False) for one in (card, found.instrument))
+    assert np.sqrt(np.mean((again["bias_deg_per_h"] - true["bias_deg_per_h"]) ** 2)) < 3e-3
+    assert {one.parameter for one in found.estimates if abs(one.shift_sd) > 0.5} == set()
+    assert all(one.low <= one.value <= one.high for one in found.estimates)
+    assert next(one for one in found.estimates if one.parameter == "loss.inverse_q").told_by == "data"
+    assert not found.warnings
 
 
 def test_the_baseline_is_the_linear_problem_about_the_calibrated_values(found):

@@ -1,0 +1,72 @@
+"""Values with which the data agree: they stay as the card has them.
+
+A fit follows the noise of its own runs. The values z of one table of the card (posterior covariance C, the prior included) that together lie
+within what that noise moves, zᵀ C⁻¹ z below the 90 % quantile of χ² of as many degrees of freedom, are held at the card's, z = 0, and
+the others are solved for anew, if that costs the fit no more than the same quantile.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from scipy.linalg import block_diag, null_space
+from scipy.stats import chi2
+
+from studies.calibration.estimates import Estimate
+from studies.calibration.fit import CardFit, objective, whitened
+
+AGREEING = 0.9  # quantile up to which values of a table are where the card has them
+STEPS = 3
+ZERO = 1e-9  # prior standard deviations: what rounding leaves of a value that is held
+
+
+def keep_agreeing(found: CardFit) -> CardFit:
+    """Return the fit with the values of each table that the data do not contradict at the card's."""
+    problem, priors = found.problem, found.problem.priors
+    z = priors.standard(found.point[: len(priors.values)])
+    C = priors.root @ found.covariance[: len(z), : len(z)] @ priors.root.T
+    tables: dict[str, list[int]] = {}
+    for k, name in enumerate(priors.names):
+        tables.setdefault(name.split(".", maxsplit=1)[0], []).append(k)
+    costs = {
+        name: float(z[own] @ np.linalg.solve(C[np.ix_(own, own)], z[own])) / float(chi2.ppf(AGREEING, len(own)))
+        for name, own in tables.items()
+    }
+    agreeing = sorted((name for name in tables if costs[name] < 1.0), key=lambda name: costs[name])
+    while agreeing:
+        held = [k for name in agreeing for k in tables[name]]
+        kept = _hold(found, held)
+        risen = objective(problem, kept.state, found.noise, found.rows) - objective(
+            problem, found.state, found.noise, found.rows
+        )
+        if risen < chi2.ppf(AGREEING, len(held)):
+            return kept
+        agreeing.pop()
+    return found
+
+
+def _hold(found: CardFit, held: Sequence[int]) -> CardFit:
+    """Solve for the coordinates u whose values `held` are the card's, in the noise of the fit."""
+    problem = found.problem
+    root = block_diag(problem.priors.root, np.eye(problem.count - len(problem.priors.values)))
+    ways = null_space(root[list(held)])
+    state = found.state
+    for _ in range(STEPS):
+        J, r = whitened(problem, state, found.noise, found.rows)
+        target = np.concatenate([r + J @ state.point, np.zeros(problem.count)])
+        sizes = np.linalg.lstsq(np.vstack([J @ ways, ways]), target, rcond=None)[0]
+        state = problem.evaluate(np.clip(ways @ sizes, *problem.ends))
+    return replace(found, state=state)
+
+
+def put_back(estimates: Sequence[Estimate], kept: CardFit) -> tuple[Estimate, ...]:
+    """Return estimates with the values of the kept fit; intervals stay, and hold them."""
+    priors = kept.problem.priors
+    point = kept.point[: len(priors.values)]
+    at, z = priors.at(point), priors.standard(point)
+    out = []
+    for one, prior, shift in zip(estimates, priors.values, z, strict=True):
+        value = prior.value if abs(shift) < ZERO else at[one.parameter]
+        low, high = min(one.low, value), max(one.high, value)
+        out.append(replace(one, value=value, low=low, high=high, shift_sd=0.0 if abs(shift) < ZERO else float(shift)))
+    return tuple(out)
