@@ -2,14 +2,17 @@
 
 from typing import TYPE_CHECKING, Any
 
-from studies.cli.output import Answer, answers
+from studies.cli.output import answers
+from studies.results import Column, Facts, Result, Table
 
 if TYPE_CHECKING:
     from shell.materials import Material, Prior
 
+LEAD = "The instrument cards that ship with the package."
+
 
 @answers("hrg.cards/1; hrg.card-values/1 for one card")
-def cards(card: str = "") -> Answer:
+def cards(card: str = "") -> Result:
     """List the instrument cards that ship with the package, or what one card weighs and its uncertain values.
 
     A number of a card may carry its uncertainty: { value = 0.0118, relative_sd = 0.3 }, { value = ..., sd = ... }, or
@@ -21,32 +24,33 @@ def cards(card: str = "") -> Answer:
     card : str
         Path of a card, or the name of one that ships: show its mass, moments of inertia and uncertain values.
     """
-    from studies.cli.output import print_table
     from studies.instrument.card import load_card, shipped_cards
 
     if card:
-        return (yield from _show_values(card))
-    found = [load_card(path) for path in shipped_cards().values()]
+        return _show_values(card)
     entries = [
         {
-            "name": card.name,
-            "shape": card.keys("resonator").shape,
-            "material": card.material.name,
-            "note": card.note,
-            "path": card.path,
+            "name": one.name,
+            "shape": one.keys("resonator").shape,
+            "material": one.material.name,
+            "note": one.note,
+            "path": one.path,
         }
-        for card in found
+        for one in map(load_card, shipped_cards().values())
     ]
-    yield {"schema": "hrg.cards/1", "cards": entries}
-    rows = [[c.name, c.keys("resonator").shape, c.material.name, c.note] for c in found]
-    print_table("Cards", ["Name", "Shape", "Material", "What is printed, what is illustrative"], rows)
+    columns = [
+        Column("name", "name"),
+        Column("shape", "shape"),
+        Column("material", "material"),
+        Column("note", "what is printed, what is illustrative"),
+    ]
+    return Result({"schema": "hrg.cards/1", "cards": entries}, "Cards", LEAD, [Table("Cards", entries, columns)])
 
 
-def _show_values(card: str) -> Answer:
+def _show_values(card: str) -> Result:
     from dataclasses import asdict
 
     from shell.inertia import weigh
-    from studies.cli.output import print_table
     from studies.instrument.card import load_card
 
     instrument = load_card(card)
@@ -55,37 +59,47 @@ def _show_values(card: str) -> Answer:
     saved, held = instrument.part("posterior").intervals, {one.name: one.value for one in values}
     intervals = {name: (low, high) for name, (low, high) in saved.items() if low <= held.get(name, low) <= high}
     mass = weigh(instrument.resonator, instrument.material.elastic(instrument.reference_temperature).rho)
-    yield {
+    entries = [
+        {**asdict(one), "stated": one.name in stated}
+        | ({"interval": intervals[one.name]} if one.name in intervals else {})
+        for one in values
+    ]
+    payload = {
         "schema": "hrg.card-values/1",
         "card": instrument.name,
-        "values": [
-            {**asdict(one), "stated": one.name in stated}
-            | ({"interval": intervals[one.name]} if one.name in intervals else {})
-            for one in values
-        ],
+        "values": entries,
         "correlations": [[*pair, correlation] for pair, correlation in instrument.correlation.items()],
         "mass_properties": asdict(mass),
     }
-    print(
-        f"{instrument.name}: {1e3 * mass.mass:.5g} g, {1e9 * mass.volume:.5g} mm³, centre at z = {1e3 * mass.center:.5g} mm;"
-    )
-    print(f"moments of inertia {1e9 * mass.axial:.5g} (axis) and {1e9 * mass.transverse:.5g} g mm² (across)")
-    print(f"{instrument.name}: what is uncertain (± one standard deviation; everything else is exact)")
-    tables: dict[str, list[list[str]]] = {}
-    for one in values:
-        table, key = one.name.split(".", 1)
-        origin = "card" if one.name in stated else "default"
-        row = [key, f"{one.value:.4g}", f"{one.sd:.2g}", origin]
-        if intervals:
-            row.append("{:.4g} to {:.4g}".format(*intervals[one.name]) if one.name in intervals else "")
-        tables.setdefault(table, []).append(row)
-    for table, rows in tables.items():
-        print_table(f"[{table}]", ["Key", "Value", "±", "From", *(["90 %"] if intervals else [])], rows)
-    return 0
+    rows = [row | {"from": "card" if row["stated"] else "default"} for row in entries]
+    columns = [
+        Column("key", "key"),
+        Column("value", "value", form=".4g"),
+        Column("sd", "±", form=".2g"),
+        Column("from", "from"),
+        Column("interval", "90 % interval", interval=("interval.0", "interval.1")),
+    ]
+    tables = {
+        table: [row | {"key": row["name"].partition(".")[2]} for row in rows if row["name"].partition(".")[0] == table]
+        for table in dict.fromkeys(row["name"].partition(".")[0] for row in rows)
+    }
+    return Result(
+        payload,
+        f"Card {instrument.name}",
+        "Mass properties, and every value that is uncertain (± one standard deviation); all others are exact.",
+        [
+            Facts([
+                ("Mass", f"{1e3 * mass.mass:.5g} g", f"{1e9 * mass.volume:.5g} mm³"),
+                ("Centre of mass", f"z = {1e3 * mass.center:.5g} mm", ""),
+                ("Moments of inertia", f"{1e9 * mass.axial:.5g} g mm² (axis)", f"{1e9 * mass.transverse:.5g} g mm² (across)"),
+            ]),
+            *(Table(f"[{table}]", found, columns) for table, found in tables.items()),
+        ],
+    )  # fmt: skip
 
 
 @answers("hrg.materials-list/1")
-def materials(name: str = "") -> Answer:
+def materials(name: str = "") -> Result:
     """List the materials and their published laws.
 
     Parameters
@@ -93,58 +107,69 @@ def materials(name: str = "") -> Answer:
     name : str
         Show one material's laws with their properties, sources and ranges.
     """
-    from shell.constants import zero_Celsius
     from shell.materials import read_materials
-    from studies.cli.output import print_table
     from studies.errors import InputError, nearest
 
     table = read_materials()
     if name and name not in table:
         raise InputError(f"unknown material '{name}'{nearest(name, table)}")
-    chosen = {key: laws for key, laws in table.items() if name in ("", key)}
-    yield {
-        "schema": "hrg.materials-list/1",
-        "materials": [_describe(law) for laws in chosen.values() for law in laws.values()],
-    }
-    rows = []
-    for key, laws in chosen.items():
-        for k, law in enumerate(laws.values()):
-            low, high = law.lowest - zero_Celsius, law.highest - zero_Celsius
-            lacking = ", ".join(_lacking(law)) or "nothing"
-            rows.append([key if k == 0 else "", law.law, f"{low:g} to {high:g}", lacking, law.source])
-    print_table(
+    laws = [law for key, laws in table.items() if name in ("", key) for law in laws.values()]
+    entries = [_describe(law) for law in laws]
+    rows = [row | {"lacks": ", ".join(row["lacks"]) or "nothing"} for row in entries]
+    columns = [
+        Column("name", "name"),
+        Column("law", "law"),
+        Column("range_degC", "range", "°C", "g", interval=("range_degC.0", "range_degC.1")),
+        Column("lacks", "lacks"),
+        Column("source", "source"),
+    ]
+    return Result(
+        {"schema": "hrg.materials-list/1", "materials": entries},
         "Materials",
-        ["Name", "Law", "Range (°C)", "Lacks", "Source"],
-        rows,
-        "The first law of a material is its default.",
+        "Materials and their published laws over temperature.",
+        [
+            Table("Materials", rows, columns, "The first law of a material is its default."),
+            *(part for law in laws if name for part in _law_tables(law)),
+        ],
     )
-    if name:
-        for law in chosen[name].values():
-            _print_law(law)
 
 
-def _print_law(law: "Material") -> None:
+def _law_tables(law: "Material") -> list[Table]:
     from shell.property import PROPERTIES
-    from studies.cli.output import print_table
 
-    rows = []
-    for key, prop in law.properties.items():
-        numbers = ", ".join(f"{k} = {v}" for k, v in prop.numbers.items())
-        spread = ", ".join(f"{k} ± {v:g}" for k, v in prop.uncertainty.items())
-        rows.append([key, PROPERTIES[key], prop.form, numbers, spread, prop.source])
-    columns = ["Property", "Unit", "Form", "Numbers", "Standard uncertainty", "Source"]
-    print_table(f"{law.name}, law '{law.law}'", columns, rows, law.note)
+    properties = [
+        {
+            "property": key,
+            "unit": PROPERTIES[key],
+            "form": prop.form,
+            "numbers": ", ".join(f"{k} = {v}" for k, v in prop.numbers.items()),
+            "uncertainty": ", ".join(f"{k} ± {v:g}" for k, v in prop.uncertainty.items()),
+            "source": prop.source,
+        }
+        for key, prop in law.properties.items()
+    ]
+    columns = [Column(key, key) for key in ("property", "unit", "form", "numbers", "uncertainty", "source")]
     prior = law.prior
-    if prior.names:
-        beside = [
-            ", ".join(f"{prior.correlation[k, j]:+.2f} with {prior.names[j]}" for j in _correlated(prior, k))
-            for k in range(len(prior.names))
-        ]
-        open_ones = [[name, f"{sd:.2g}", c] for name, sd, c in zip(prior.names, prior.sd, beside, strict=True)]
-        note = "p(T) = law(T) exp(a + b x + ½ c x²), x = T − 20 °C: log_value, log_slope, log_curvature; without log, + instead of exp."
-        print_table(
-            f"Uncertainty of law '{law.law}'", ["Coefficient", "Standard deviation", "Correlation"], open_ones, note
-        )
+    coefficients = [
+        {
+            "name": prior.names[k],
+            "sd": float(prior.sd[k]),
+            "correlation": ", ".join(
+                f"{prior.correlation[k, j]:+.2f} with {prior.names[j]}" for j in _correlated(prior, k)
+            ),
+        }
+        for k in range(len(prior.names))
+    ]
+    note = "p(T) = law(T) exp(a + b x + ½ c x²), x = T − 20 °C: log_value, log_slope, log_curvature; without log, + instead of exp."
+    open_ones = [
+        Column("name", "coefficient"),
+        Column("sd", "standard deviation", form=".2g"),
+        Column("correlation", "correlation"),
+    ]
+    return [
+        Table(f"{law.name}, law '{law.law}'", properties, columns, law.note),
+        Table(f"Uncertainty of law '{law.law}'", coefficients, open_ones, note),
+    ]
 
 
 def _correlated(prior: "Prior", k: int) -> list[int]:

@@ -4,13 +4,15 @@ With --json one object, schema `hrg.compare/1`: `cards`, `figures` (name, unit, 
 its values, null where a card has none).
 """
 
-import math
+from math import isfinite
+from typing import Any
 
-from studies.cli.output import Answer, answers
+from studies.cli.output import answers
+from studies.results import Column, Result, Sentence, Table
 
 
 @answers("hrg.compare/1")
-def compare(*card: str) -> Answer:
+def compare(*card: str) -> Result:
     """Show designs side by side: where their cards differ, and what that does to modes, slope and settling.
 
     Parameters
@@ -18,7 +20,6 @@ def compare(*card: str) -> Answer:
     card : str
         Two or more cards: paths, or names of those that ship (hrg cards).
     """
-    from studies.cli.output import print_table
     from studies.comparison import compare as compare_designs
     from studies.errors import InputError
     from studies.instrument.card import load_card
@@ -35,31 +36,33 @@ def compare(*card: str) -> Answer:
         }
         for row in found.figures
     ]
-    yield {"schema": "hrg.compare/1", "cards": found.names, "figures": figures, "differing": found.differing}
+    payload = {"schema": "hrg.compare/1", "cards": found.names, "figures": figures, "differing": found.differing}
     names = [f"{name} ({k})" if found.names.count(name) > 1 else name for k, name in enumerate(found.names, 1)]
-    rows = []
-    for row in found.figures:
-        cells = [_with_uncertainty(one.value, one.uncertainty) for one in row]
-        rows.append([row[0].name, row[0].unit, *cells])
-    note = "± is one standard deviation from the material's published values, common to designs of one material."
-    print_table("Designs", ["Quantity", "Unit", *names], rows, note)
-    if found.differing:
-        differing = [
-            [key, *("—" if v is None else _short(v) for v in values)] for key, values in found.differing.items()
-        ]
-        print_table("Where the cards differ", ["Key", *names], differing)
-    else:
-        print("The cards are the same.")
+    note = "±: one standard deviation from the published values of the material, common to designs of one material."
+    keys = [
+        {"key": key, "values": ["—" if v is None else _short(v) for v in values]}
+        for key, values in found.differing.items()
+    ]
+    return Result(
+        payload,
+        "Comparison of designs",
+        f"{', '.join(names)}: natural frequencies, slope, settling, and the keys in which the cards differ.",
+        [
+            Table("Designs", _known(figures), [
+                Column("name", "quantity"), Column("unit", "unit"),
+                *(Column(f"values.{k}", name, error=f"uncertainties.{k}") for k, name in enumerate(names)),
+            ], note),
+            Table("Where the cards differ", keys, [
+                Column("key", "key"), *(Column(f"values.{k}", name) for k, name in enumerate(names)),
+            ]),
+            *([] if keys else [Sentence("The cards are the same.")]),
+        ],
+    )  # fmt: skip
 
 
-def _with_uncertainty(value: float, uncertainty: float) -> str:
-    """Write a value to the second digit of its uncertainty; "not known" for NaN."""
-    if math.isnan(value):
-        return "not known"
-    if not uncertainty > 0:
-        return f"{value:.4g}" if abs(value) < 1e4 else f"{value:.0f}"
-    digits = max(1 - math.floor(math.log10(uncertainty)), 0)
-    return f"{value:.{digits}f} ± {uncertainty:.{digits}f}"
+def _known(figures: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Say of values that are not known that they are not."""
+    return [row | {"values": [value if isfinite(value) else "not known" for value in row["values"]]} for row in figures]
 
 
 def _short(value: object) -> str:

@@ -12,12 +12,11 @@ CVG paper on demodulated dynamics.
 
 from typing import TYPE_CHECKING, Any, Literal
 
-from studies.cli.output import Answer, answers
+from studies.cli.output import answers
+from studies.results import Chapter, Column, Part, Result, Sentence, Table
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
-
-    from shell.derivation.chain import Step
+    from collections.abc import Callable, Iterable
 
 MOST_HARMONIC = 100  # the closed forms of higher ones take minutes
 
@@ -32,7 +31,7 @@ def derive(
     harmonic: int = 2,
     pole_angle_deg: float = 0.0,
     rim_angle_deg: float = 90.0,
-) -> Answer:
+) -> Result:
     """Derive the frequency of the inextensional spherical shell, HRG paper equations (1)-(15).
 
     Prints the chain of equations for any harmonic n, from the displacements to the frequency, and its
@@ -75,7 +74,7 @@ def derive(
             raise InputError(f"{which} holds for any harmonic and shape; leave out --harmonic and the angles.")
         if bell and code is not None:
             raise InputError("--bell has equations and numbers but no design code; leave out --code.")
-        return (yield from _derive_bell(latex) if bell else _derive_dynamics(latex, code))
+        return _derive_bell(latex) if bell else _derive_dynamics(latex, code)
     if not 0 <= pole_angle_deg < rim_angle_deg < 180:
         raise InputError(
             f"a dome from {pole_angle_deg:g} to {rim_angle_deg:g} degrees has no inextensional mode: the pole angle must "
@@ -94,70 +93,81 @@ def derive(
                 f"from {pole_angle_deg:g} to {rim_angle_deg:g} degrees the closed forms of harmonic {harmonic} cancel"
                 " to nothing; take a wider cap."
             )
-    text = {} if code is None else {"code": {"language": code, "text": emit_code(case, code)}}
-    yield _payload(case, pole_angle_deg, rim_angle_deg) | text
+    payload = _payload(case, pole_angle_deg, rim_angle_deg)
+    text = emit_text(steps(case)) if code is None and not latex else emit_latex(steps(case), HRG_TITLE)
     if code is not None:
-        print(emit_code(case, code), end="")
-    else:
-        print(emit_latex(steps(case), HRG_TITLE) if latex else emit_text(steps(case)), end="")
+        text = emit_code(case, code)
+        payload["code"] = {"language": code, "text": text}
+    lead = f"HRG paper, equations (1) to (15), closed forms for n = {harmonic} from {pole_angle_deg:g}° to {rim_angle_deg:g}°."
+    return Result(payload, "Frequency of the inextensional shell", lead, _chapters(payload["equations"]), printed=text)
 
 
-def _derive_dynamics(latex: bool, code: Literal["python", "c"] | None) -> Answer:
+def _derive_dynamics(latex: bool, code: Literal["python", "c"] | None) -> Result:
     from compensation.derivation import chain
     from compensation.derivation.design_code import emit_code
 
-    text = {} if code is None else {"code": {"language": code, "text": emit_code(code)}}
-    equations = [
-        {
-            "number": step.number or None,
-            "title": step.title,
-            "latex": [chain.typeset(equation) for equation in step.equations],
-            "plain": [chain.write_plainly(equation) for equation in step.equations],
-        }
-        for step in chain.steps()
-    ]
-    yield {"schema": "hrg.derive-dynamics/1", "equations": equations} | text
+    equations = _equations(chain.steps(), chain.typeset, chain.write_plainly)
+    payload: dict[str, Any] = {"schema": "hrg.derive-dynamics/1", "equations": equations}
+    text = chain.emit_text() if code is None and not latex else chain.emit_latex()
     if code is not None:
-        print(emit_code(code), end="")
-    else:
-        print(chain.emit_latex() if latex else chain.emit_text(), end="")
-    return 0
+        text = emit_code(code)
+        payload["code"] = {"language": code, "text": text}
+    lead = "Averaged equations of amplitude, quadrature, precession and phase of the standing wave."
+    return Result(payload, "Dynamics of the standing wave", lead, _chapters(equations), printed=text)
 
 
-def _derive_bell(latex: bool) -> Answer:
+def _derive_bell(latex: bool) -> Result:
     import dataclasses
 
     from shell.derivation.bell_chain import bell_steps
-    from shell.derivation.emit import BELL_TITLE, emit_latex, emit_text
-    from studies.cli.output import print_table, say
+    from shell.derivation.emit import BELL_TITLE, emit_latex, emit_text, typeset, write_plainly
+    from studies.cli.output import say
     from studies.papers.bvg_theory import compare_bell_theory
 
     say("deriving the bell's equations ...")
     steps = bell_steps()
+    equations = _equations(steps, typeset, write_plainly)
+    payload = {"schema": "hrg.derive-bell/1", "equations": equations, "numbers": None}
+    title, lead = "Theory of the bell", "BVG paper, equations (1) to (22), beside what is printed."
     if latex:
-        print(emit_latex(steps, BELL_TITLE), end="")
-        return 0
+        return Result(payload, title, lead, _chapters(equations), printed=emit_latex(steps, BELL_TITLE))
     theory = compare_bell_theory()
-    yield {"schema": "hrg.derive-bell/1", "equations": _equations(steps), "numbers": dataclasses.asdict(theory)}
-    print(emit_text(steps))
-    rows = [
-        [row.name, f"{row.frequency:.6g}", f"{row.precession_factor:.5f}", f"{row.membrane_share:.3g}"]
-        for row in (*theory.rows, theory.free, theory.solid)
+    numbers = [dataclasses.asdict(row) for row in (*theory.rows, theory.free, theory.solid)]
+    columns = [
+        Column("name", "pattern"),
+        Column("frequency", "f", "Hz", ".6g"),
+        Column("precession_factor", "precession factor", form=".5f"),
+        Column("membrane_share", "membrane share of the energy", form=".3g"),
     ]
-    columns = ["pattern", "f (Hz)", "precession factor", "membrane share of the energy"]
-    print_table(f"(21), (22) with these patterns, and the solver: card {theory.card}", columns, rows)
-    return 0
+    table = Table(f"Equations (21), (22) with these patterns, and the solver: card {theory.card}", numbers, columns)
+    parts: list[Chapter | Part] = [
+        Sentence(emit_text(steps), "source", "terminal"),
+        Chapter("Against the solver", [table]),
+        *_chapters(equations),
+    ]
+    return Result(payload | {"numbers": dataclasses.asdict(theory)}, title, lead, parts)
 
 
-def _equations(steps: "Iterable[Step]") -> list[dict[str, Any]]:
-    from shell.derivation.emit import typeset, write_plainly
+def _chapters(equations: list[dict[str, Any]]) -> list[Chapter]:
+    """The steps of a derivation, for a page."""
+    return [
+        Chapter(
+            f"({step['number']}) {step['title']}" if step["number"] else step["title"],
+            [Sentence("\n".join(step["plain"]), "source", "page")],
+        )
+        for step in equations
+    ]
 
+
+def _equations(
+    steps: "Iterable[Any]", typeset: "Callable[[Any], str]", write: "Callable[[Any], str]"
+) -> list[dict[str, Any]]:
     return [
         {
             "number": step.number or None,
             "title": step.title,
             "latex": [typeset(equation) for equation in step.equations],
-            "plain": [write_plainly(equation) for equation in step.equations],
+            "plain": [write(equation) for equation in step.equations],
         }
         for step in steps
     ]
@@ -165,6 +175,7 @@ def _equations(steps: "Iterable[Step]") -> list[dict[str, Any]]:
 
 def _payload(case: Any, pole_angle_deg: float, rim_angle_deg: float) -> dict[str, Any]:
     from shell.derivation.chain import steps
+    from shell.derivation.emit import typeset, write_plainly
 
     return {
         "schema": "hrg.derive/1",
@@ -175,5 +186,5 @@ def _payload(case: Any, pole_angle_deg: float, rim_angle_deg: float) -> dict[str
         "J": {"closed_form": str(case.mass), "value": float(case.mass.evalf(20))},
         "bryan_factor": {"closed_form": str(case.precession), "value": float(case.precession.evalf(20))},
         "d_ln_f_d_rim_angle_per_rad": float(case.rim_derivative.evalf(20)),
-        "equations": _equations(steps(case)),
+        "equations": _equations(steps(case), typeset, write_plainly),
     }

@@ -1,6 +1,7 @@
 """`hrg doctor`: what this environment has and what it lacks."""
 
-from studies.cli.output import Answer, answers
+from studies.cli.output import answers
+from studies.results import Column, Result, Table
 
 OPTIONAL = (
     # package, extra of pyproject.toml, what it brings
@@ -10,7 +11,7 @@ OPTIONAL = (
 
 
 @answers("hrg.doctor/1")
-def doctor() -> Answer:
+def doctor() -> Result:
     """Show versions, OpenGL and the optional parts, with the remedy for what is missing.
 
     Exit status 3 when pictures cannot be drawn.
@@ -22,7 +23,6 @@ def doctor() -> Answer:
 
     from shell.render import can_draw
     from studies.cli.guard import PACKAGES, package_home
-    from studies.cli.output import print_table
 
     checks = [("Python", True, platform.python_version(), "")]
     for name in (
@@ -55,8 +55,13 @@ def doctor() -> Answer:
             remedy = f"needed only {brings}: pip install 'hrg-workbench[{extra}]'"
             checks.append((name, True, "not installed (optional)", remedy))
     healthy = all(ok for _, ok, _, _ in checks)
-    fields = ("name", "ok", "found", "remedy")
-    described = [dict(zip(fields, c, strict=True)) for c in checks]
-    yield {"schema": "hrg.doctor/1", "healthy": healthy, "checks": described}, 0 if healthy else 3
-    rows = [[name, "ok" if ok else "missing", found, remedy] for name, ok, found, remedy in checks]
-    print_table("Environment", ["Part", "State", "Found", "Remedy"], rows)
+    described = [dict(zip(("name", "ok", "found", "remedy"), check, strict=True)) for check in checks]
+    rows = [{**check, "state": "ok" if check["ok"] else "missing"} for check in described]
+    columns = [Column("name", "part"), Column("state", "state"), Column("found", "found"), Column("remedy", "remedy")]
+    return Result(
+        {"schema": "hrg.doctor/1", "healthy": healthy, "checks": described},
+        "Environment",
+        "Versions, OpenGL and optional parts.",
+        [Table("Environment", rows, columns)],
+        status=0 if healthy else 3,
+    )

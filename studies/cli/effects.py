@@ -2,14 +2,15 @@
 
 from typing import TYPE_CHECKING, Any
 
-from studies.cli.output import Answer, answers
+from studies.cli.output import answers
+from studies.results import Column, Result, Sentence, Table
 
 if TYPE_CHECKING:
     from studies.effects import Effect
 
 
 @answers("hrg.effects/1")
-def effects(name: str = "") -> Answer:
+def effects(name: str = "") -> Result:
     """List the physical effects that a diagnosis can name and an `[[effect]]` table of a card can have.
 
     Parameters
@@ -17,26 +18,45 @@ def effects(name: str = "") -> Answer:
     name : str
         Show one effect: parameters, units, bounds, drives, source, isolating experiment.
     """
-    from studies.cli.output import print_table
     from studies.effects import find_effect, library
 
     chosen = [find_effect(name)] if name else list(library().values())
-    yield {"schema": "hrg.effects/1", "effects": [describe(effect) for effect in chosen]}
+    entries = [describe(effect) for effect in chosen]
+    payload = {"schema": "hrg.effects/1", "effects": entries}
     if not name:
-        rows = [[e.name, ", ".join(_words(e)), e.summary] for e in chosen]
-        print_table("Effects", ["Name", "Acts on", "What happens"], rows, "hrg effects NAME shows one of them in full.")
-        return 0
-    effect = chosen[0]
-    print(f"{effect.name}: {effect.summary}.")
-    rows = [[p["name"], p["kind"], p["bounds"], p["meaning"]] for p in parameters(effect)]
-    print_table("Parameters of its [[effect]] table", ["Key", "Kind", "Bounds", "Meaning"], rows)
-    print(f"Acts on: {', '.join(_words(effect))}.")
-    if effect.needs:
-        print(f"Drive that must be recorded and vary: {', '.join(DRIVES[need] for need in effect.needs)}.")
-    print(f"To isolate it: {effect.isolate}.")
-    if effect.sensor:
-        print(f"Sensor that would show it: {effect.sensor}.")
-    print(f"Source: {effect.source}.")
+        rows = [{**entry, "acts": _words(effect)} for entry, effect in zip(entries, chosen, strict=True)]
+        columns = [Column("name", "name"), Column("acts", "acts on"), Column("summary", "description")]
+        table = Table("Effects", rows, columns, "hrg effects NAME shows one of them in full.")
+        return Result(
+            payload, "Effects", "What a diagnosis can name, and an [[effect]] table of a card can have.", [table]
+        )
+    effect, entry = chosen[0], entries[0]
+    said = {
+        "Acts on": ", ".join(_words(effect)),
+        "Drive that must be recorded and vary": ", ".join(entry["drives"]),
+        "To isolate it": effect.isolate,
+        "Sensor that would show it": effect.sensor,
+        "Source": effect.source,
+    }
+    return Result(
+        payload,
+        f"Effect {effect.name}",
+        f"{effect.summary}.",
+        [
+            Sentence(f"{effect.name}: {effect.summary}.", where="terminal"),
+            Table(
+                "Parameters of its [[effect]] table",
+                entry["parameters"],
+                [
+                    Column("name", "key"),
+                    Column("kind", "kind"),
+                    Column("bounds", "bounds"),
+                    Column("meaning", "meaning"),
+                ],
+            ),
+            *(Sentence(f"{label}: {words}.") for label, words in said.items() if words),
+        ],
+    )
 
 
 DRIVES = {

@@ -8,10 +8,12 @@ a split was given: {voltages_V, left_Hz, shift_ppm}.
 
 from typing import TYPE_CHECKING, Any
 
-from studies.cli.output import Answer, answers
+from studies.cli.output import answers
+from studies.results import Column, Result, Sentence, Table
 
 if TYPE_CHECKING:
     from studies.instrument.tables.electrodes import ElectrodeKeys
+    from studies.results import Part
 
 
 @answers("hrg.electrodes/1")
@@ -23,7 +25,7 @@ def electrodes(
     axis: float | None = None,
     limit: float = 100.0,
     temperature: float | None = None,
-) -> Answer:
+) -> Result:
     """Show what the card's table [electrodes] does to a pair: softening, split, coefficients, pull-in, trim voltages.
 
     Parameters
@@ -48,7 +50,6 @@ def electrodes(
     from shell.constants import zero_Celsius
     from shell.electrodes import reach, trim_voltages
     from shell.modes import solve_modes
-    from studies.cli.output import say
     from studies.errors import InputError, naming
     from studies.instrument.card import load_card
     from studies.splitting import SplitPair
@@ -101,38 +102,52 @@ def electrodes(
             "shift_ppm": 1e6 * trim.shift,
         },
     }
-    yield payload
-    _print(payload, None if trim is None else abs(wave) * mode.frequency, keys)
-    if trim is None and abs(wave) > 0:
-        say(
-            f"The card's split of {1e3 * abs(wave) * mode.frequency:.4g} mHz is beyond what {limit:g} V null: hrg trim."
-        )
+    return Result(
+        payload,
+        f"Electrodes of {instrument.name}",
+        f"Effect of the electrodes on the pair n = {harmonic} at {mode.frequency:.3f} Hz and {T - zero_Celsius:g} °C.",
+        _parts(payload, abs(wave) * mode.frequency, keys),
+    )
 
 
-def _print(payload: dict[str, Any], nulled: float | None, keys: "ElectrodeKeys") -> None:
-    """Print tables of it; `nulled` is the split in Hz that the trim voltages null."""
+def _parts(payload: "dict[str, Any]", split: float, keys: "ElectrodeKeys") -> "list[Part]":
+    """What people read; `split` in Hz is the one to be nulled."""
     from math import isinf
 
-    from studies.cli.output import print_table
-
-    factor, limit = payload["pull_in_factor"], payload["limit_V"]
-    rows = [
-        ["softening by the card's voltages (ppm)", f"{payload['softening_ppm']:+.4f}"],
-        ["split by them (mHz)", f"{1e3 * payload['split_Hz']:.4f}"],
-        ["per volt on all electrodes (ppm/V)", f"{payload['per_volt_ppm']:+.4f}"],
-        ["per kelvin by the gap (ppm/K)", f"{payload['per_kelvin_ppm']:+.5f}"],
-        ["voltages can grow before pull-in by", "without end" if isinf(factor) else f"{factor:.3g} times"],
-        [f"split that {limit:g} V null, any axis (mHz)", f"{1e3 * payload['reach_Hz']:.3f}"],
-    ]
+    factor, limit, trim = payload["pull_in_factor"], payload["limit_V"], payload["trim"]
     where = f"{payload['frequency_Hz']:.3f} Hz at {payload['temperature_degC']:g} °C"
-    print_table(f"{payload['card']}, n = {payload['harmonic']}, {where}", ["electrodes", "value"], rows)
-    trim = payload["trim"]
-    if trim is None or nulled is None:
-        return
-    step = 360 / keys.count
-    print_table(
-        f"Trim voltages that null {1e3 * nulled:.4g} mHz, besides the card's own",
-        ["electrode", "azimuth (°)", "V"],
-        [[str(k), f"{keys.azimuth_deg + step * k:.2f}", f"{v:.3f}"] for k, v in enumerate(trim["voltages_V"]) if v > 0],
-        f"They soften the pair by {abs(trim['shift_ppm']):.3g} ppm. Voltages add in squares: trim_V of the card.",
+    quantities = (
+        ("softening by the card's voltages", payload["softening_ppm"], "ppm", "+.4f"),
+        ("split by the card's voltages", 1e3 * payload["split_Hz"], "mHz", ".4f"),
+        ("sensitivity to all voltages", payload["per_volt_ppm"], "ppm/V", "+.4f"),
+        ("sensitivity to temperature, by the gap", payload["per_kelvin_ppm"], "ppm/K", "+.5f"),
+        ("pull-in safety factor of the voltages", factor, "", ".3g"),
+        (f"largest split that {limit:g} V null on any axis", 1e3 * payload["reach_Hz"], "mHz", ".3f"),
     )
+    rows = [
+        {"quantity": name, "value": "unlimited" if isinf(value) else format(value, form), "unit": unit}
+        for name, value, unit, form in quantities
+    ]
+    columns = [Column("quantity", "quantity"), Column("value", "value"), Column("unit", "unit")]
+    parts: list[Part] = [Table(f"{payload['card']}, n = {payload['harmonic']}, {where}", rows, columns)]
+    if trim is None and split > 0:
+        parts.append(
+            Sentence(f"{limit:g} V cannot null the card's split of {1e3 * split:.4g} mHz; see hrg trim.", "warning")
+        )
+    if trim is not None:
+        step = 360 / keys.count
+        voltages = [
+            {"electrode": k, "azimuth": keys.azimuth_deg + step * k, "voltage": v}
+            for k, v in enumerate(trim["voltages_V"])
+            if v > 0
+        ]
+        note = f"They soften the pair by {abs(trim['shift_ppm']):.3g} ppm. Voltages add in squares: trim_V of the card."
+        columns = [
+            Column("electrode", "electrode"),
+            Column("azimuth", "azimuth", "°", ".2f"),
+            Column("voltage", "voltage", "V", ".3f"),
+        ]
+        parts.append(
+            Table(f"Trim voltages that null {1e3 * split:.4g} mHz, besides the card's own", voltages, columns, note)
+        )
+    return parts

@@ -4,7 +4,8 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from studies.cli.output import Answer, answers
+from studies.cli.output import answers
+from studies.results import Result, Sentence
 
 KINDS = (".vtu", ".msh", ".inp")
 
@@ -19,7 +20,7 @@ def mesh(
     spacing_mm: Annotated[float | None, Parameter(show_default=False)] = None,
     complete: bool = False,
     temperature: Annotated[float | None, Parameter(show_default=False)] = None,
-) -> Answer:
+) -> Result:
     """Mesh the solid for a finite-element program: shell, roots, fillets, corners and stem, node on node.
 
     The elements are quadratic hexahedra, and wedges on the axis; all nodes lie on the true surfaces. The ending of --out
@@ -53,7 +54,6 @@ def mesh(
     from shell.inertia import weigh
     from shell.volume import build_volume
     from shell.volume_files import VolumeKind, encode_volume
-    from studies.cli.output import say
     from studies.errors import InputError, naming
     from studies.files.writing import written_whole
     from studies.instrument.card import load_card
@@ -87,7 +87,7 @@ def mesh(
     with written_whole(out) as file:
         file.write(data)
     exact = weigh(resonator, elastic.rho)
-    yield {
+    payload = {
         "schema": "hrg.mesh/1",
         "card": instrument.name,
         "temperature_degC": T - zero_Celsius,
@@ -100,12 +100,12 @@ def mesh(
         "volume_mm3": 1e9 * exact.volume,
         "mass_g": 1e3 * exact.mass,
     }
-    say(
-        f"{out}: {len(found.nodes):,} nodes, {len(found.hexahedra):,} hexahedra, {len(found.wedges):,} wedges, "
-        f"{len(found.held):,} nodes held. The solid has {1e9 * exact.volume:.6g} mm³ and {1e3 * exact.mass:.5g} g."
-        + (
-            " The mesh has the departures of the card's [imperfection]; masses and changes of the material are not in it."
-            if fields is not None
-            else ""
-        )
+    said = (
+        f"{out}: {len(found.nodes):,} nodes, {len(found.hexahedra):,} hexahedra, {len(found.wedges):,} wedges,"
+        f" {len(found.held):,} nodes held. The solid has {1e9 * exact.volume:.6g} mm³ and {1e3 * exact.mass:.5g} g."
+    )
+    if fields is not None:
+        said += " The mesh includes the geometric departures of the card's [imperfection], but not its masses or material variations."
+    return Result(
+        payload, f"Mesh of {instrument.name}", f"Quadratic elements at {T - zero_Celsius:g} °C.", [Sentence(said)]
     )

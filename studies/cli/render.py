@@ -4,7 +4,8 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 from cyclopts import Parameter
 
-from studies.cli.output import Answer, answers
+from studies.cli.output import answers
+from studies.results import Blocks, Chapter, Column, Result, Sentence, Table
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -13,6 +14,13 @@ if TYPE_CHECKING:
 
 KINDS = (".png", ".webp", ".gif", ".html", ".glb", ".stl", ".ply")
 MOST = 4  # resonators in one picture
+COLUMNS = (
+    Column("card", "card"),
+    Column("temperature_degC", "T", "°C", "g"),
+    Column("harmonic", "n"),
+    Column("index", "index"),
+    Column("frequency_Hz", "f", "Hz", ".4f"),
+)
 
 
 @answers("hrg.render/1")
@@ -27,7 +35,7 @@ def render(
     field: str | None = None,
     view: Literal["oblique", "axis", "side"] = "oblique",
     swing_mm: float | None = None,
-) -> Answer:
+) -> Result:
     """Show a mode shape: the real solid, its nodes (red) and antinodes (black dots), the undeformed shape in grey.
 
     The ending of --out chooses: .png a picture, .webp or .gif a looping animation, .html an interactive page that works
@@ -64,9 +72,9 @@ def render(
     from pathlib import Path
 
     from shell.constants import zero_Celsius
-    from studies.cli.output import say
     from studies.errors import InputError
     from studies.files.writing import written_whole
+    from studies.reports.mode_picture import view_blocks
     from studies.reports.scenes import read_field
 
     kind = Path(out).suffix.lower()
@@ -98,8 +106,16 @@ def render(
         }
         for one in shown
     ]
-    yield {"schema": "hrg.render/1", "file": out, "bytes": len(data), "modes": modes}
-    say(f"{out}: {'; '.join(one.title.replace(chr(10), ', ') for one in shown)}.")
+    return Result(
+        {"schema": "hrg.render/1", "file": out, "bytes": len(data), "modes": modes},
+        f"Mode shapes of {', '.join(dict.fromkeys(one.instrument.name for one in shown))}",
+        f"The modes of {out}.",
+        [
+            Sentence(f"{out}: {'; '.join(one.title.replace(chr(10), ', ') for one in shown)}.", where="terminal"),
+            Table("Modes", modes, COLUMNS, where="page"),
+            Blocks(lambda: view_blocks(shown[:1])),
+        ],
+    )
 
 
 def _solve(
@@ -152,16 +168,22 @@ def _picture(
 def _page(shown: "Sequence[ModeScene]") -> bytes:
     from shell.constants import zero_Celsius
     from studies.reports.mode_picture import view_blocks
-    from studies.reports.page import Chapter, Table, render_page
+    from studies.results.page import render_result
 
     first = shown[0]
     rows = [
-        [str(one.mode.harmonic), str(one.mode.index), f"{one.mode.frequency:.4f}", f"{one.mode.bryan_factor:.5f}"]
+        {
+            "harmonic": one.mode.harmonic,
+            "index": one.mode.index,
+            "frequency_Hz": one.mode.frequency,
+            "bryan_factor": one.mode.bryan_factor,
+        }
         for one in shown
     ]
-    table = Table("Modes of this page", ["n", "Index", "Frequency (Hz)", "Bryan factor"], rows)
     lead = f"Mode shapes of {first.instrument.name} at {first.temperature - zero_Celsius:g} °C, {first.mode.theory} theory."
-    return render_page(first.instrument.name, lead, [Chapter("Mode shapes", [*view_blocks(shown), table])]).encode()
+    table = Table("Modes of this page", rows, [*COLUMNS[2:], Column("bryan_factor", "Bryan factor", form=".5f")])
+    chapter = Chapter("Mode shapes", [Blocks(lambda: view_blocks(shown)), table])
+    return render_result(Result({}, first.instrument.name, lead, [chapter])).encode()
 
 
 def _mesh(

@@ -9,7 +9,8 @@ rms over the run, that the card's uncertainties leave), `warnings`.
 from typing import Literal
 
 from studies.cli.arguments import Seed
-from studies.cli.output import Answer, answers
+from studies.cli.output import answers
+from studies.results import Column, Figure, Result, Sentence, Table
 
 
 @answers("hrg.simulate/1")
@@ -24,7 +25,7 @@ def simulate(
     theory: Literal["solid", "shell"] = "solid",
     boundary: Literal["chamber", "housing"] | None = None,
     spread: bool = False,
-) -> Answer:
+) -> Result:
     """Run a virtual gyro through a chamber profile, or drive it as a record was driven, and write the record.
 
     A card with [loop] in mode whole-angle has a wave that turns: with the applied rate, its self-precession, and what damping
@@ -102,14 +103,24 @@ def simulate(
         "spread": known,
         "warnings": list(run.warnings),
     }
-    yield summary
     span = float(np.ptp(run.record["resonator_temperature_degC"]))
-    print(
-        f"{out}: {rows} rows over {run.record['time_s'][-1] - run.record['time_s'][0]:g} s; the resonator's temperature"
-        f" covers {span:.2f} °C; the frequency law lies within {run.law.interpolation_error:.0e} of the solver, the"
-        f" solver within {run.law.solver_error:.0e} of its theory."
+    length = run.record["time_s"][-1] - run.record["time_s"][0]
+    return Result(
+        summary,
+        f"Virtual run of {instrument.name}",
+        f"A run through {profile}; the {summary['boundary']} is imposed.",
+        [
+            Sentence(f"{out}: {rows} rows over {length:g} s; the resonator's temperature covers {span:.2f} °C."),
+            Sentence(
+                f"Frequency law: interpolation error {run.law.interpolation_error:.0e}, solver error"
+                f" {run.law.solver_error:.0e}, both relative."
+            ),
+            *(Sentence(one, "warning", "page") for one in run.warnings),
+            Table(
+                "Uncertainty of the prediction (standard deviation, rms over the run)",
+                [{"column": name, "sd": value} for name, value in (known or {}).items()],
+                [Column("column", "column"), Column("sd", "standard deviation", digits=3)],
+            ),
+            Figure(run.record.plot, "The columns of the record."),
+        ],
     )
-    if known is not None:
-        print("The card's uncertainties leave (standard deviation, rms over the run):")
-        for name, value in known.items():
-            print(f"  {name}: {value:.3g}")

@@ -1,12 +1,25 @@
 """`hrg temperature`: the resonator's temperature from its own frequency."""
 
-from studies.cli.output import Answer, answers
+from typing import TYPE_CHECKING
 
-AVERAGE = 100.0  # s
+from studies.cli.output import answers
+from studies.results import Figure, Result, Sentence
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure as Drawing
+
+    from studies.cli.arguments import Array
+    from studies.record import Record
+
+SOURCES = ("Wang X. et al., Sensors 2012, 12, 6434 (the HRG paper), eqs. (16)–(18), Table 2, figure 5.",)
+NOTE = (
+    "The curve was fitted to settled readings. The frequency shows the resonator's own temperature, weighted by the mode; the housing"
+    " leads it while the temperature changes."
+)
 
 
 @answers("hrg.temperature/1")
-def temperature(model: str, run: str, /, *, out: str | None = None, report: str | None = None) -> Answer:
+def temperature(model: str, run: str, /, *, out: str | None = None) -> Result:
     """Turn the frequency of a record into the resonator's temperature (HRG paper, equation 18, Table 2 and Figure 5).
 
     No thermometer is needed: the resonator is its own. The record is written again with a column
@@ -20,14 +33,11 @@ def temperature(model: str, run: str, /, *, out: str | None = None, report: str 
         A record (CSV) with frequency_Hz.
     out : str
         Where the record with the temperature goes.
-    report : str
-        Write a page (HTML) with the temperature over time.
     """
     import numpy as np
 
     from studies.cli.output import say
     from studies.errors import InputError, naming
-    from studies.files.writing import write_text
     from studies.models import read_model
     from studies.models.kinds.frequency import find_temperature, temperature_error
     from studies.record import read_record, write_record
@@ -56,19 +66,41 @@ def temperature(model: str, run: str, /, *, out: str | None = None, report: str 
     if out is not None:
         write_record(record.with_columns({"resonator_temperature_degC": found}), out)
         say(f"record: {out}")
-    if report is not None:
-        from studies.reports.temperature import temperature_page
-
-        write_text(report, temperature_page(record, found, run, model, facts))
-        say(f"report: {report}")
-    yield {"schema": "hrg.temperature/1", "model": model, "run": run, "out": out, **facts}
-    print(
-        f"{run}: the resonator went from {facts['lowest_degC']:.3f} to {facts['highest_degC']:.3f} °C;"
-        f" the curve is certain to {facts['curve_uncertainty_K']:.2g} K (one standard deviation)."
-    )
+    payload = {"schema": "hrg.temperature/1", "model": model, "run": run, "out": out, **facts}
+    low, high, sd = (float(facts[key]) for key in ("lowest_degC", "highest_degC", "curve_uncertainty_K"))
+    said = [
+        f"{run}: resonator temperature {low:.3f} to {high:.3f} °C; uncertainty of the curve {sd:.2g} K (one standard deviation)."
+    ]
     if true is not None:
-        print(
+        said.append(
             f"The record's own, simulated temperature differs by {facts['rms_difference_from_simulated_K']:.2g} K rms."
         )
     if facts["rows_without_frequency"]:
-        print(f"{facts['rows_without_frequency']} rows have no frequency and stay empty.")
+        said.append(f"{facts['rows_without_frequency']} rows have no frequency and stay empty.")
+    return Result(
+        payload,
+        "The resonator as its own thermometer",
+        f"The resonator's temperature in {run}, read from its frequency with {model}.",
+        [
+            *(Sentence(one) for one in said),
+            Figure(lambda: _figure(record, found), "Temperature of the resonator over time."),
+            Sentence(NOTE, "note", "page"),
+        ],
+        sources=SOURCES,
+    )
+
+
+def _figure(record: "Record", found: "Array") -> "Drawing":
+    from studies.reports import style
+
+    rows = style.few_rows(len(record))
+    hours = record["time_s"][rows] / 3600
+    with style.figure(height=3.6) as (made, axes):
+        for label, colour in (("housing", style.ORANGE), ("chamber", style.GREEN)):
+            if f"{label}_temperature_degC" in record:
+                axes.plot(hours, record[f"{label}_temperature_degC"][rows], color=colour, linewidth=0.9, label=label)
+        axes.plot(hours, found[rows], color=style.BLUE, label="resonator, from its frequency")
+        axes.set_xlabel("time (h)")
+        axes.set_ylabel("temperature (°C)")
+        axes.legend()
+        return made

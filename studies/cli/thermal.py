@@ -8,14 +8,20 @@ relative change per relative change of each constant; `energy_balance_error`, re
 
 from typing import TYPE_CHECKING, Any
 
-from studies.cli.output import Answer, answers
+from studies.cli.output import answers
+from studies.results import Column, Figure, Result, Table, rows_of
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure as Drawing
+
+    from studies.cli.arguments import Array
     from thermal.network import Network
+    from thermal.profile import Profile
+    from thermal.transient import Transient
 
 
 @answers("hrg.thermal/1")
-def thermal(card: str, profile: str, *, rows: int = 13) -> Answer:
+def thermal(card: str, profile: str, *, rows: int = 13) -> Result:
     """Show time constants, what decides them, and the temperatures of housing, base, stem and shell in time.
 
     The heat path is the card's table [thermal] with its defaults (studies/instrument/tables/thermal.py).
@@ -35,7 +41,6 @@ def thermal(card: str, profile: str, *, rows: int = 13) -> Answer:
     import numpy as np
 
     from shell.constants import zero_Celsius
-    from studies.cli.output import print_table
     from studies.errors import InputError
     from studies.instrument.card import load_card
     from studies.simulation.chamber import check_profile, load_profile
@@ -63,7 +68,9 @@ def thermal(card: str, profile: str, *, rows: int = 13) -> Answer:
     names = [*shown, "shell", "rim"]
     energy = check_energy(network, {"chamber": chamber}, transient)
     influence = _influence(network, T0)
-    yield {
+    temperatures = {name: T[:, k] for k, name in enumerate(names)}
+    housed = {"time_s": time, "chamber_temperature_degC": chamber.at(time) - zero_Celsius}
+    payload = {
         "schema": "hrg.thermal/1",
         "card": instrument.name,
         "radiation": not network.is_linear,
@@ -71,32 +78,60 @@ def thermal(card: str, profile: str, *, rows: int = 13) -> Answer:
         "shell_and_stem_time_constants_s": alone.time_constants,
         "slowest_time_constant_sensitivity": influence,
         "energy_balance_error": energy.error,
-        "time_s": time,
-        "chamber_temperature_degC": chamber.at(time) - zero_Celsius,
-        "temperature_degC": {name: T[:, k] for k, name in enumerate(names)},
+        **housed,
+        "temperature_degC": temperatures,
     }
-    print_table(
-        f"{instrument.name}: time constants at {T0 - zero_Celsius:g} °C (s)",
-        ["network", "slowest", "second", "third"],
+    constants = [
+        {"network": words, "tau": modes.time_constants[:3].tolist() + [None] * 3}
+        for words, modes in (("whole heat path", whole), ("shell and stem alone", alone))
+    ]
+    decisive = [{"constant": name, "effect": value} for name, value in list(influence.items())[:6]]
+    return Result(
+        payload,
+        f"Heat path of {instrument.name}",
+        f"Time constants and temperatures of the heat path for the chamber profile {profile}.",
         [
-            [label, *(f"{tau:.0f}" for tau in (*modes.time_constants[:3], *[np.nan] * 3)[:3])]
-            for label, modes in (("whole heat path", whole), ("shell and stem alone", alone))
+            Table(
+                f"{instrument.name}: time constants at {T0 - zero_Celsius:g} °C",
+                constants,
+                [Column("network", "network")]
+                + [Column(f"tau.{k}", name, "s", ".0f") for k, name in enumerate(("slowest", "second", "third"))],
+            ),
+            Table(
+                "What decides the slowest time constant",
+                decisive,
+                [Column("constant", "constant"), Column("effect", "relative change per relative change", form="+.3f")],
+            ),
+            Figure(lambda: _curves(transient, chamber, np.array([*picks, mean, rim]), names), "Temperatures in time."),
+            Table(
+                "Temperatures (°C)" + (", with radiation" if not network.is_linear else ", linearised"),
+                rows_of(housed | temperatures),
+                [Column("time_s", "time", "s", ".0f"), Column("chamber_temperature_degC", "chamber", form=".3f")]
+                + [Column(name, name, form=".3f") for name in names],
+                f"Shell: its mean. The heat balance closes to {energy.error:.0e} of the heat that flowed.",
+            ),
         ],
     )
-    print_table(
-        "What decides the slowest one",
-        ["constant", "relative change per relative change"],
-        [[name, f"{value:+.3f}"] for name, value in list(influence.items())[:6]],
-    )
-    print_table(
-        "Temperatures (°C)" + (", with radiation" if not network.is_linear else ", linearised"),
-        ["time (s)", "chamber", *names],
-        [
-            [f"{t:.0f}", f"{c:.3f}", *(f"{value:.3f}" for value in row)]
-            for t, c, row in zip(time, chamber.at(time) - zero_Celsius, T, strict=True)
-        ],
-        f"Energy balance closed to {energy.error:.0e} of the heat that flowed; 'shell' is its mean.",
-    )
+
+
+def _curves(transient: "Transient", chamber: "Profile", weights: "Array", names: list[str]) -> "Drawing":
+    """Chamber and nodes over the whole profile."""
+    import numpy as np
+
+    from shell.constants import zero_Celsius
+    from studies.reports import style
+
+    time = np.linspace(chamber.start, chamber.end, 600)
+    T = transient.observe(time, weights) - zero_Celsius
+    with style.figure() as (made, axis):
+        axis.plot(time / 3600, chamber.at(time) - zero_Celsius, color=style.BLACK, linestyle=":", label="chamber")
+        colours = (style.ORANGE, style.GREEN, style.SKY, style.BLUE, style.VERMILION)
+        for k, (name, colour) in enumerate(zip(names, colours, strict=True)):
+            axis.plot(time / 3600, T[:, k], color=colour, label=name)
+        axis.set_xlabel("time (h)")
+        axis.set_ylabel("temperature (°C)")
+        axis.legend()
+        return made
 
 
 def _influence(network: "Network", T0: float) -> "dict[str, Any]":

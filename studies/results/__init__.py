@@ -62,7 +62,7 @@ class Column:
             return f"{low} … {high}" if low else ""
         value = find(row, self.key)
         error = find(row, self.error) if self.error else None
-        if error and isinstance(value, float | int):
+        if error and isfinite(error) and isinstance(value, float | int):
             return " ± ".join(to_error(value * self.scale, error * self.scale))
         return self._number(value)
 
