@@ -3,7 +3,7 @@
 from typing import TYPE_CHECKING
 
 from studies.cli.output import answers
-from studies.results import Figure, Result, Sentence
+from studies.results import Facts, Figure, Result, Sentence
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure as Drawing
@@ -68,9 +68,12 @@ def temperature(model: str, run: str, /, *, out: str | None = None) -> Result:
         say(f"record: {out}")
     payload = {"schema": "hrg.temperature/1", "model": model, "run": run, "out": out, **facts}
     low, high, sd = (float(facts[key]) for key in ("lowest_degC", "highest_degC", "curve_uncertainty_K"))
-    said = [
-        f"{run}: resonator temperature {low:.3f} to {high:.3f} °C; uncertainty of the curve {sd:.2g} K (one standard deviation)."
+    cells = [
+        ("Lowest", f"{low:.3f} °C", ""),
+        ("Highest", f"{high:.3f} °C", ""),
+        ("Uncertainty of the curve", f"± {sd:.2g} K", "one standard deviation of the fitted f(T)"),
     ]
+    said = []
     if true is not None:
         said.append(
             f"The record's own, simulated temperature differs by {facts['rms_difference_from_simulated_K']:.2g} K rms."
@@ -82,6 +85,7 @@ def temperature(model: str, run: str, /, *, out: str | None = None) -> Result:
         "The resonator as its own thermometer",
         f"The resonator's temperature in {run}, read from its frequency with {model}.",
         [
+            Facts(cells),
             *(Sentence(one) for one in said),
             Figure(lambda: _figure(record, found), "Temperature of the resonator over time."),
             Sentence(NOTE, "note", "page"),
