@@ -83,6 +83,8 @@ def changed_lines(was: str, now: str) -> list[str]:
     old, new = was.splitlines(), now.splitlines()
     found = [f"{len(old)} -> {len(new)} lines"] if len(old) != len(new) else []
     for a, b in zip(old, new, strict=False):
+        if a == b:
+            continue
         numbers = zip(NUMBER.findall(a), NUMBER.findall(b), strict=False)
         near = all(abs(number(x) - number(y)) <= 5e-3 * max(abs(number(x)), abs(number(y))) for x, y in numbers)
         if not near or NUMBER.sub("#", a) != NUMBER.sub("#", b):
