@@ -197,7 +197,8 @@ def bias_slopes(study: LoopStudy) -> tuple[BiasSlope, ...]:
             low, high = _ends(one.value, one.sd, one.name)
             slope = (bias({one.name: high}) - bias({one.name: low})) / (high - low)
             found.append(BiasSlope(one.name, one.value, one.sd, slope))
-    return tuple(sorted(found, key=lambda one: -one.effect))
+    # equal effects, such as those of the two phase errors, stand in the card's order, not in that of rounding
+    return tuple(sorted(found, key=lambda one: -float(f"{one.effect:.9g}")))
 
 
 def _bias_of(
