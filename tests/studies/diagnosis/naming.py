@@ -1,7 +1,7 @@
 """Whether a verdict names what was hidden: the checks that hide-and-find tests share, and that a stubbed engine must fail."""
 
 WIDEST = 8
-"""Names in one set, about a quarter of the library: naming everything is no answer."""
+"""Names in one set, a third of the library: naming everything is no answer."""
 
 
 def names_of(cause):
