@@ -31,6 +31,7 @@ def derive(
     harmonic: int = 2,
     pole_angle_deg: float = 0.0,
     rim_angle_deg: float = 90.0,
+    out: str | None = None,
 ) -> Result:
     """Derive the frequency of the inextensional spherical shell, HRG paper equations (1)-(15).
 
@@ -55,7 +56,13 @@ def derive(
         Polar angle where the shell starts; above 0 the pole is open.
     rim_angle_deg : float
         Polar angle where the shell ends.
+    out : str
+        Write the text, LaTeX or code to this file instead of the terminal.
     """
+    if out is not None:
+        same = derive.__wrapped__  # type: ignore[attr-defined]
+        shape_of = {"harmonic": harmonic, "pole_angle_deg": pole_angle_deg, "rim_angle_deg": rim_angle_deg}
+        return _into_file(out, same(dynamics=dynamics, bell=bell, latex=latex, code=code, **shape_of))
     from math import radians
 
     from shell.derivation.chain import DerivedCase, steps
@@ -100,6 +107,24 @@ def derive(
         payload["code"] = {"language": code, "text": text}
     lead = f"HRG paper, equations (1) to (15), closed forms for n = {harmonic} from {pole_angle_deg:g}° to {rim_angle_deg:g}°."
     return Result(payload, "Frequency of the inextensional shell", lead, _chapters(payload["equations"]), printed=text)
+
+
+def _into_file(out: str, result: Result) -> Result:
+    """Write what a derivation prints to a file, whole or not at all; the terminal is then left alone."""
+    import io
+    from contextlib import redirect_stdout
+    from dataclasses import replace
+
+    from studies.cli.output import say
+    from studies.files.writing import write_text
+    from studies.results.terminal import print_result
+
+    text = io.StringIO()
+    with redirect_stdout(text):
+        print_result(result)
+    write_text(out, text.getvalue())
+    say(f"written: {out}")
+    return replace(result, printed="")
 
 
 def _derive_dynamics(latex: bool, code: Literal["python", "c"] | None) -> Result:

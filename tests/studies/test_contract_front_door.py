@@ -9,14 +9,23 @@ import numpy as np
 import pytest
 
 import compensation
+import compensation.derivation
 import shell
+import shell.derivation
 import studies
 import studies.papers
 import thermal
 from studies.cli import main
 from studies.record import read_record
 
-PACKAGES = {"shell": shell, "thermal": thermal, "compensation": compensation, "studies": studies}
+PACKAGES = {
+    "shell": shell,
+    "thermal": thermal,
+    "compensation": compensation,
+    "studies": studies,
+    "shell.derivation": shell.derivation,
+    "compensation.derivation": compensation.derivation,
+}
 
 
 @pytest.mark.parametrize("package", PACKAGES)
