@@ -13,7 +13,7 @@ from shell.imperfection import CoupledHarmonics, Imperfection, Pair, Split, find
 from shell.modes import solve_modes
 from shell.scan.alignment import RigidMotion, align
 from shell.scan.projection import Projector, check_unit
-from shell.scan.survey import Face, survey, survey_map
+from shell.scan.survey import Face, rigid_shapes, survey, survey_map
 from studies.errors import InputError
 from studies.files.clouds import FaceGrid, Unit, read_cloud
 
@@ -119,7 +119,8 @@ def scan_faces(
     resonator, elastic : of the card at the temperature.
     files : "inner" and/or "outer" with their paths.
     unit : of the points.
-    frames : "own" aligns each face by itself; "common" keeps them where they lie to each other.
+    frames : "own" aligns each face by itself, so that its first wave holds no rigid motion; "common" keeps them where they lie
+        to each other.
     harmonics : n of the splits.
     highest : wave around up to which the faces are fitted, at least twice the highest harmonic.
     say : hears what is being done.
@@ -143,7 +144,9 @@ def scan_faces(
             motions |= dict.fromkeys(names, motion)
         for name, points in clouds.items():
             say(f"fitting the {name} face: {len(points)} points")
-            faces[name] = survey(points, SIDES[name], motions[name], projector, files[name], highest)
+            face = survey(points, SIDES[name], motions[name], projector, files[name], highest)
+            alone = frames == "own" or len(clouds) == 1
+            faces[name] = face.centred(rigid_shapes(face.waves, projector)) if alone else face
     for name, cloud in read.items():
         if isinstance(cloud, FaceGrid):
             faces[name] = survey_map(cloud.position, cloud.azimuth, cloud.values, SIDES[name], files[name], highest)

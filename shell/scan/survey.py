@@ -7,7 +7,7 @@ left out. The noise is what the fit leaves between the cells, so that form which
 """
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TypeAlias
 
@@ -25,6 +25,7 @@ from shell.scan.waves import WaveBasis
 
 ROWS, COLUMNS = 72, 288  # cells along the meridian and around
 SAMPLE = 25_000  # points of the first fit
+RIGID = 1e-6  # of the largest: a motion that moves the face along itself shows nothing
 HOLE = 25.0  # growth of a variance by gaps from which on the waves are not told
 Points: TypeAlias = tuple[Array, Array, Array]
 """Position, azimuth and how far points stand out of the material."""
@@ -116,8 +117,33 @@ class Face:
         return found, covariance + self.motion.tilt_error**2 * parts.T @ parts
 
     def at(self, position: float, order: int) -> tuple[complex, Array]:
-        """c_m at a position and the covariance of its parts, m."""
-        return self._combine(self.waves.along(np.array([position]))[0], order)
+        """c_m at a position and the covariance of its parts, m; the axis of a dome is as uncertain as its edge leaves it."""
+        where = np.array([position])
+        found, covariance = self._combine(self.waves.along(where)[0], order)
+        if self.turns is None or self.motion is None:
+            return found, covariance
+        parts = np.array([[z.real, z.imag] for z in (complex(turn[0]) for turn in self.turns(where, order))])
+        return found, covariance + self.motion.tilt_error**2 * parts.T @ parts
+
+    def centred(self, rigid: Array) -> "Face":
+        """Return the face without what a rigid motion makes of its first wave: only the frame holds that.
+
+        The motion was found from points that also show form, which pushes it aside where they are uneven or have gaps.
+
+        Parameters
+        ----------
+        rigid : (polynomials, k), coefficients of the normal displacement along the meridian by each motion.
+        """
+        count = len(rigid)
+        u, size, _ = np.linalg.svd(rigid, full_matrices=False)
+        u = u[:, size > RIGID * size.max(initial=0.0)]
+        keep = np.eye(count) - u @ u.T
+        coefficients = self.coefficients.copy()
+        coefficients[1] = keep @ coefficients[1]
+        turn = np.eye(len(self.covariance))
+        for first in (count, 2 * count):  # cosine and sine of wave 1
+            turn[first : first + count, first : first + count] = keep
+        return replace(self, coefficients=coefficients, covariance=turn @ self.covariance @ turn.T)
 
     def _combine(self, L: Array, order: int) -> tuple[complex, Array]:
         if order > self.highest:
@@ -196,6 +222,18 @@ def survey_map(
     portions = (place(there[k : k + CHUNK]) for k in range(0, len(there), CHUNK))
     sums, used = _sum_cells(waves, rough, limit, portions)
     return _finish(waves, sums, rough, side, (len(there), used), None, name)
+
+
+def rigid_shapes(waves: WaveBasis, projector: Projector) -> Array:
+    """Coefficients of the normal displacement n_r cos θ by a shift and (z n_r - r n_z) cos θ by a tilt, (polynomials, 2)."""
+    line = projector.line
+    x = line.arc_length / projector.resonator.length
+    inside = (x >= waves.low) & (x <= waves.high)
+    middle = float(line.z[inside].mean())
+    shapes = np.column_stack(
+        [line.normal_r, ((line.z - middle) * line.normal_r - line.r * line.normal_z) / projector.resonator.size]
+    )
+    return np.asarray(np.linalg.lstsq(waves.along(x[inside]), shapes[inside], rcond=None)[0])
 
 
 def _stride(count: int) -> int:

@@ -11,8 +11,9 @@ from shell.meridian import cylinder, hemisphere
 from shell.modes import solve_modes
 from shell.scan.alignment import align
 from shell.scan.projection import Projector
-from shell.scan.survey import survey
+from shell.scan.survey import rigid_shapes, survey
 from shell.trimming import SplitReading, plan_trim
+from studies.scan import polar_intervals
 from studies.trim import Teeth, rim_sites, tooth_sites
 from tests.generator.scans import dome_points
 
@@ -54,6 +55,23 @@ def test_frame_noise_and_outliers_are_found(projector):
     assert face.noise == pytest.approx(100e-9, rel=0.03)
     assert 20 < face.outliers < 60
     assert abs(face.at(1.0, 2)[0]) == pytest.approx(2e-6, rel=0.02)
+
+
+def test_no_first_wave_is_seen_where_none_is(projector):
+    """Tilt, shift, gaps and waves 2 and 3 but no wave 1: its 90 % interval holds 0, and those of the others their amplitudes."""
+    held = {1: 0, 2: 0, 3: 0}
+    for seed in range(8):
+        planted = [(2, 4e-6, 0.4, 2), (3, 2e-6, 1.0, 1)]
+        points = dome_points(
+            np.random.default_rng(seed), 20000, planted, 1, tilt_deg=1.0, shift=1e-4, gaps=0.1 * (seed % 2)
+        )
+        face = survey(points, 1, align([(points, 1)], projector, ["face"]), projector, "face")
+        face = face.centred(rigid_shapes(face.waves, projector))
+        for order, amplitude in ((1, 0.0), (2, 4e-6), (3, 2e-6)):
+            size, _ = polar_intervals(*face.at(1.0, order), order)
+            held[order] += size.low <= amplitude <= size.high
+    assert min(held.values()) >= 5  # of 8: fewer is less likely than 1 in 100 where 90 % are held
+    assert held[1] >= 7
 
 
 def test_a_turned_over_dome_is_put_upright(projector):
