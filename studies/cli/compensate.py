@@ -1,12 +1,17 @@
 """`hrg compensate`: apply a saved model to a record, or turn it into C for firmware."""
 
+from functools import partial
 from typing import TYPE_CHECKING
 
-from studies.cli.output import Answer, answers
+from studies.cli.output import answers
+from studies.results import Figure, Result, Sentence
 
 if TYPE_CHECKING:
     import numpy as np
+    from matplotlib.figure import Figure as Drawing
     from numpy.typing import NDArray
+
+    from studies.record import Record
 
 AVERAGE = 100.0  # s
 NOISE = 0.02  # relative: what the noise of a model's inputs may add to a record that has nothing to compensate
@@ -21,7 +26,7 @@ def compensate(
     out: str | None = None,
     extrapolate: bool = False,
     emit: str | None = None,
-) -> Answer:
+) -> Result:
     """Write a record again with compensated_… columns, from a model that one of the hrg fit commands saved.
 
     The model refuses values that its fit has not seen. A frequency model takes the housing's temperature, without it the
@@ -81,14 +86,32 @@ def compensate(
                     "stability_after": _stability(record["time_s"], after),
                     "rows_not_compensated": int(np.count_nonzero(missing)),
                 }
+    said: list[Sentence] = []
+    if RESONATOR in added:
+        said.append(Sentence(
+            f"{out}: {RESONATOR}, by the frequency: {run} has no other thermometer, and a frequency that is compensated by"
+            " itself is the same in every row. hrg fit bias --over temperature compensates the other outputs over it."
+        ))  # fmt: skip
+        if empty := int(np.count_nonzero(np.isnan(result[RESONATOR]))):
+            stay = "row stays" if empty == 1 else "rows stay"
+            said.append(Sentence(f"{empty} {stay} empty: no frequency, or one outside the range of the model."))
     for name, facts in columns.items():
-        was, now = facts["stability_before"], facts["stability_after"]
+        was, now, lost = (facts[key] for key in ("stability_before", "stability_after", "rows_not_compensated"))
         if was is not None and now is not None and now > was * (1 + NOISE):
-            say(
-                f"warning: {name} is worse than the record: standard deviation of {AVERAGE:g} s averages {was:.4g} → {now:.4g}."
-                " Is the model of this gyro, with this sign of the output? Do not use it otherwise."
+            words = (
+                f"{name} is worse than the record: standard deviation of {AVERAGE:g} s averages {was:.4g} → {now:.4g}."
             )
-    yield {
+            words += " Is the model of this gyro, with this sign of the output? Do not use it otherwise."
+            say(f"warning: {words}")
+            said.append(Sentence(words, "warning", "page"))
+        earlier = "" if was is None else f"{was:.4g} → "
+        unit = "" if unit_of(name) == "1" else f" {unit_of(name)}"
+        later = "too few rows for it" if now is None else f"{now:.4g}{unit}"
+        said.append(Sentence(f"{out}: {name}; standard deviation of {AVERAGE:g} s averages: {earlier}{later}"))
+        if lost:
+            words = "an input is missing there, or too few samples for its rate lie before them"
+            said.append(Sentence(f"{lost:g} rows stay empty: {words}."))
+    payload = {
         "schema": "hrg.compensate/1",
         "model": model,
         "kind": loaded.kind,
@@ -97,25 +120,29 @@ def compensate(
         "added": added,
         "columns": columns,
     }
-    if RESONATOR in added:
-        print(
-            f"{out}: {RESONATOR}, by the frequency: {run} has no other thermometer, and a frequency that is compensated by"
-            " itself is the same in every row. hrg fit bias --over temperature compensates the other outputs over it."
+    pictures = [Figure(partial(_compare, record, result, name), f"{name} beside the record.") for name in columns]
+    title, lead = f"Compensation of {run or model}", f"Model of kind {loaded.kind}: {model}."
+    return Result(payload, title, lead, [*said, *pictures])
+
+
+def _compare(record: "Record", result: "Record", name: str) -> "Drawing":
+    from studies.record import COMPENSATED
+    from studies.reports import style
+
+    rows = style.few_rows(len(result))
+    with style.figure() as (made, axis):
+        original = name.removeprefix(COMPENSATED)
+        if original in record:
+            axis.plot(
+                result["time_s"][rows] / 3600, record[original][rows], color=style.ORANGE, linewidth=0.8, label="record"
+            )
+        axis.plot(
+            result["time_s"][rows] / 3600, result[name][rows], color=style.BLUE, linewidth=0.8, label="compensated"
         )
-        if empty := int(np.count_nonzero(np.isnan(result[RESONATOR]))):
-            print(
-                f"{empty} {'row stays' if empty == 1 else 'rows stay'} empty: no frequency, or one outside the range of the model."
-            )
-    for name, facts in columns.items():
-        from_what = "" if facts["stability_before"] is None else f"{facts['stability_before']:.4g} → "
-        unit = "" if unit_of(name) == "1" else f" {unit_of(name)}"
-        figure = "too few rows for it" if facts["stability_after"] is None else f"{facts['stability_after']:.4g}{unit}"
-        print(f"{out}: {name}; standard deviation of {AVERAGE:g} s averages: {from_what}{figure}")
-        if facts["rows_not_compensated"]:
-            print(
-                f"{facts['rows_not_compensated']} rows stay empty: an input is missing there, or too few samples for its rate"
-                " lie before them."
-            )
+        axis.set_xlabel("time (h)")
+        axis.set_ylabel(original)
+        axis.legend()
+        return made
 
 
 def _stability(time: "NDArray[np.float64]", values: "NDArray[np.float64]") -> float | None:

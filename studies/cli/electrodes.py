@@ -117,17 +117,14 @@ def _parts(payload: "dict[str, Any]", split: float, keys: "ElectrodeKeys") -> "l
     factor, limit, trim = payload["pull_in_factor"], payload["limit_V"], payload["trim"]
     where = f"{payload['frequency_Hz']:.3f} Hz at {payload['temperature_degC']:g} °C"
     quantities = (
-        ("softening by the card's voltages", payload["softening_ppm"], "ppm", "+.4f"),
-        ("split by the card's voltages", 1e3 * payload["split_Hz"], "mHz", ".4f"),
-        ("sensitivity to all voltages", payload["per_volt_ppm"], "ppm/V", "+.4f"),
-        ("sensitivity to temperature, by the gap", payload["per_kelvin_ppm"], "ppm/K", "+.5f"),
-        ("pull-in safety factor of the voltages", factor, "", ".3g"),
-        (f"largest split that {limit:g} V null on any axis", 1e3 * payload["reach_Hz"], "mHz", ".3f"),
+        ("softening by the card's voltages", payload["softening_ppm"], "ppm"),
+        ("split by the card's voltages", 1e3 * payload["split_Hz"], "mHz"),
+        ("sensitivity to all voltages", payload["per_volt_ppm"], "ppm/V"),
+        ("sensitivity to temperature, by the gap", payload["per_kelvin_ppm"], "ppm/K"),
+        ("pull-in safety factor of the voltages", "unlimited" if isinf(factor) else factor, ""),
+        (f"largest split that {limit:g} V null on any axis", 1e3 * payload["reach_Hz"], "mHz"),
     )
-    rows = [
-        {"quantity": name, "value": "unlimited" if isinf(value) else format(value, form), "unit": unit}
-        for name, value, unit, form in quantities
-    ]
+    rows = [{"quantity": name, "value": value, "unit": unit} for name, value, unit in quantities]
     columns = [Column("quantity", "quantity"), Column("value", "value"), Column("unit", "unit")]
     parts: list[Part] = [Table(f"{payload['card']}, n = {payload['harmonic']}, {where}", rows, columns)]
     if trim is None and split > 0:

@@ -7,16 +7,20 @@ With --json one object, schema `hrg.fit-thermal/1`: `data`, `confidence`, `estim
 
 from typing import TYPE_CHECKING, Any
 
-from studies.cli.output import Answer, answers
+from studies.cli.output import answers
+from studies.results import Column, Figure, Result, Sentence, Table
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure as Drawing
+
     from studies.calibration.lags.identification import Identification
+    from studies.cli.arguments import Array
 
 UNITS = {"offset": "Hz", "slope": "Hz/K", "curvature": "Hz/K²", "cubic": "Hz/K³"}
 
 
 @answers("hrg.fit-thermal/1")
-def fit_thermal(*data: str, card: str | None = None, lags: int | None = None, confidence: float = 0.9) -> Answer:
+def fit_thermal(*data: str, card: str | None = None, lags: int | None = None, confidence: float = 0.9) -> Result:
     """Identify how the resonator lags behind its housing, with intervals, and say what the records do not determine.
 
     The records need time_s, frequency_Hz and housing_temperature_degC (or chamber_temperature_degC). The initial state of
@@ -35,7 +39,7 @@ def fit_thermal(*data: str, card: str | None = None, lags: int | None = None, co
         Of the intervals.
     """
     from studies.calibration.lags.records import fit_thermal_constants
-    from studies.cli.output import print_table, say
+    from studies.cli.output import say
     from studies.cli.telling import Told
     from studies.errors import InputError
     from studies.instrument.card import load_card
@@ -53,23 +57,53 @@ def fit_thermal(*data: str, card: str | None = None, lags: int | None = None, co
     for warning in found.warnings:
         say(f"warning: {warning}")
     white, wandering = found.noise.innovation, float(found.residual.std())
+    wanders = []
     if wandering > 3 * white:
-        say(
-            f"note: the residual ({wandering:.2g} Hz) is {wandering / white:.1f} times its white part: the noise wanders, or"
-            " the gyro is more than this chain of lags; then the constants are effective ones, outside their intervals."
+        wanders.append(
+            f"the residual ({wandering:.2g} Hz) is {wandering / white:.1f} times its white part: the noise is coloured, or the gyro"
+            " is more than this chain of lags; then the constants are effective ones, outside their intervals."
         )
-    yield _payload(found, list(data))
-    rows = []
-    for name, estimate in found.estimates.items():
-        unit = UNITS.get(name, "s" if name.startswith("time_constant") else "")
-        if estimate.value is None:
-            rows.append([name, "not determined", "", "", unit])
-        else:
-            rows.append([name, *to_interval(estimate.value, estimate.low, estimate.high), unit])
+        say(f"note: {wanders[0]}")
+    payload = _payload(found, list(data))
+    rows = [
+        {
+            "constant": name,
+            "unit": UNITS.get(name, "s" if name.startswith("time_constant") else ""),
+            "value": "not determined",
+        }
+        | (
+            {}
+            if e.value is None
+            else dict(zip(("value", "low", "high"), to_interval(e.value, e.low, e.high), strict=True))
+        )
+        for name, e in found.estimates.items()
+    ]
+    columns = [Column(key, key) for key in ("constant", "value", "low", "high", "unit")]
     note = f"Intervals of {100 * confidence:g} %; rows of {found.row_step:g} s; residual {found.residual.std():.2g} Hz."
-    print_table("Thermal constants", ["constant", "value", "low", "high", "unit"], rows, note)
-    for direction in found.undetermined:
-        print(f"the records do not determine this combination: {direction}")
+    return Result(
+        payload,
+        "Thermal lags of the resonator",
+        f"Time constants of the resonator behind its housing, from {', '.join(data)}.",
+        [
+            Table("Thermal constants", rows, columns, note),
+            *(Sentence(f"Not determined by the records: {direction}", "warning") for direction in found.undetermined),
+            *(Sentence(words, "warning", "page") for words in (*found.warnings, *wanders)),
+            Figure(lambda: _residual(found.residual, found.row_step), "Residual of the frequency, all runs in order."),
+        ],
+    )
+
+
+def _residual(residual: "Array", step: float) -> "Drawing":
+    import numpy as np
+
+    from studies.reports import style
+
+    with style.figure(height=2.6) as (made, axis):
+        rows = style.few_rows(len(residual))
+        axis.plot(step / 3600 * np.arange(len(residual))[rows], residual[rows], ".", color=style.BLUE, markersize=3)
+        axis.set_xlabel("time, gaps left out (h)")
+        axis.set_ylabel("residual (Hz)")
+        return made
 
 
 def _payload(found: "Identification", data: list[str]) -> "dict[str, Any]":

@@ -7,7 +7,8 @@ With --json one object, schema `hrg.fit-whole-angle/1`: `data`, `confidence`, `e
 from math import degrees, pi
 from typing import TYPE_CHECKING
 
-from studies.cli.output import Answer, answers
+from studies.cli.output import answers
+from studies.results import Column, Result, Sentence, Table
 
 if TYPE_CHECKING:
     from compensation.wave_fit import WaveFit
@@ -37,7 +38,7 @@ def fit_whole_angle(
     quadrature_volts_per_hertz: float | None = None,
     confidence: float = 0.95,
     save: str | None = None,
-) -> Answer:
+) -> Result:
     """Fit damping and frequency split with their axes, gain ratio and phase error to a whole-angle run, with intervals.
 
     The record needs time_s, pattern_angle_deg (unwrapped) and bias_deg_per_h or measured_rate_deg_per_s (the indicated rate,
@@ -60,7 +61,7 @@ def fit_whole_angle(
     save : str
         Write the card with the values found and their uncertainties.
     """
-    from studies.cli.output import print_table, say
+    from studies.cli.output import say
     from studies.errors import InputError
     from studies.instrument.card import load_card, save_card
     from studies.law import law_of
@@ -83,7 +84,7 @@ def fit_whole_angle(
     if save is not None and instrument is not None:
         save_card(_with_estimates(instrument, estimates), save)
         say(f"card: {save}")
-    yield {
+    payload = {
         "schema": "hrg.fit-whole-angle/1",
         "data": run,
         "confidence": confidence,
@@ -91,12 +92,17 @@ def fit_whole_angle(
         "undetermined": list(found.undetermined),
         "saved": save,
     }
-    rows = [[key, *(f"{e[name]:.5g}" for name in ("value", "low", "high"))] for key, e in estimates.items()]
-    print_table(
-        "Whole-angle run", ["key of the card", "value", "low", "high"], rows, f"Intervals of {100 * confidence:g} %."
+    rows = [{"key": key, **estimate} for key, estimate in estimates.items()]
+    columns = [Column("key", "key of the card"), *(Column(name, name, digits=5) for name in ("value", "low", "high"))]
+    return Result(
+        payload,
+        "Whole-angle run",
+        f"Splits, axes, gain ratio and phase error from {run}.",
+        [
+            Table("Whole-angle run", rows, columns, f"Intervals of {100 * confidence:g} %."),
+            *(Sentence(f"Not determined: {sentence}", "warning") for sentence in found.undetermined),
+        ],
     )
-    for sentence in found.undetermined:
-        print(f"not determined: {sentence}")
 
 
 def _fit_record(
