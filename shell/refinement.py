@@ -22,7 +22,10 @@ UNDONE = 1e-4  # share of the tolerance, as error of ω², at which the iteratio
 MEMORY = 1.5e9  # bytes of element matrices beyond which a level is not tried
 FLOOR = 3e-10  # relative error of a frequency by rounding and iteration: measured up to 2.5e-10
 DOUBT = 10.0  # the most by which an estimate is raised for what the one before it missed, and if waves are not resolved
-PART = 0.25  # of the tolerance, that one kind of error may take where the sum is too large
+AIM = 0.7  # of the tolerance, that the sum of all kinds of error should be at the next level
+PART = 0.1  # of the tolerance, that one kind of error may keep
+STEP = 0.04  # what one step of its ladder leaves of a kind of error: measured 0.02 to 0.13
+AT_MOST = 2  # steps at once
 LOOSE = 3e-4  # tolerance from which on the rough level is the first
 HALF_WAVES = 0.8  # along the meridian for each mode; the others twist and stretch
 AT_ONCE = 2.5  # by which elements are cut at most before the modes are solved anew
@@ -72,15 +75,25 @@ def refine(
         errors = [sum(parts) for parts in zip(lacking.sum(axis=0).tolist(), lost, undone, strict=True)]
         if max(errors) <= tolerance or max(lost) > lacking.sum(axis=0).max():
             break
-        largest = lacking.max(axis=1)
-        raised = {
-            kind for kind, part in zip(KINDS, largest, strict=True) if part > min(PART * tolerance, largest.max())
-        }
-        finer = level.raised(theory, raised)
-        if finer == level:
+        largest: dict[Kind, float] = dict(zip(KINDS, lacking.max(axis=1).tolist(), strict=True))
+        level, raised = choose_finer(level, theory, largest, tolerance)
+        if not raised:
             break
-        level = finer
     return solutions, [error + FLOOR for error in errors]
+
+
+def choose_finer(level: Level, theory: Theory, lacking: dict[Kind, float], tolerance: float) -> tuple[Level, set[Kind]]:
+    """The next level, and what is finer there: step by step in the largest error left, until their sum should be small enough."""
+    finer, left, raised = level, dict(lacking), list[Kind]()
+    while not raised or sum(left.values()) > AIM * tolerance:
+        worth = [kind for kind in KINDS if left[kind] >= min(PART * tolerance, max(left.values()))]
+        able = [kind for kind in worth if raised.count(kind) < AT_MOST and finer.raised(theory, {kind}) != finer]
+        if not able:
+            break
+        kind = max(able, key=lambda kind: left[kind])
+        finer, left[kind] = finer.raised(theory, {kind}), STEP * left[kind]
+        raised.append(kind)
+    return finer, set(raised)
 
 
 def _first_level(resonator: Resonator, n: int, count: int, theory: Theory, tolerance: float) -> Level:

@@ -28,7 +28,7 @@ Pair: TypeAlias = tuple[Array, Array]
 PORTION = 16  # elements integrated at a time
 TINY = 160  # unknowns of a dense matrix
 FEW = 12  # elements that are handled one by one
-KEPT = 3_000_000  # numbers that a system may keep for the next material (24 MB)
+KEPT = 8_000_000  # numbers that a system may keep for the next material (64 MB)
 
 
 @dataclass(frozen=True, eq=False)
