@@ -69,7 +69,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "effects": ("studies.cli.effects:effects", "The physical effects that a diagnosis can name and a card can have."),
     "doctor": ("studies.cli.doctor:doctor", "Show what this environment has and what it lacks."),
 }
-EPILOGUE = "Every command that computes takes --json. --debug shows the traceback of an error."
+EPILOGUE = "Every command that computes takes --json and --report FILE.html. --debug shows the traceback of an error."
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -43,7 +43,7 @@ def answers(schema: str) -> Callable[[Callable[..., Any]], Callable[..., int]]:
                     write_text(report, render_result(result))
                     say(f"report: {report}")
                 if json:
-                    print_json(result.payload)
+                    print_json(result.payload | ({"report": report} if "report" in result.payload else {}))
                 else:
                     print_result(result)
                 return int(result.status)

@@ -168,7 +168,7 @@ class Result:
     Attributes
     ----------
     payload : Mapping
-        The object for programs, with its `schema`.
+        The object for programs, with its `schema`; a key `report` gets the path of the page.
     title, lead : str
         Of the page: a name, and one sentence of what it shows.
     parts : Sequence[Chapter | Part]
@@ -179,7 +179,7 @@ class Result:
         What the terminal shows instead of the parts, such as code or LaTeX.
     """
 
-    payload: Payload
+    payload: dict[str, Any]
     title: str
     lead: str = ""
     parts: Sequence[Chapter | Part] = ()
