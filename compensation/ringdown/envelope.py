@@ -1,0 +1,191 @@
+"""Complex amplitudes of a decay, from raw samples of the carrier or from a lock-in amplifier.
+
+Raw samples x(t) = Re{z e^{2πi f_c t}} are mixed with e^{−2πi f_c t} and averaged over blocks of whole carrier periods; the
+average of an exponential over a block is corrected where it is fitted. Blocks with lost samples count what they have.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from compensation.errors import CompensationError
+
+Real = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+MOST_BLOCKS = 4096
+CHUNK = 1 << 18
+
+
+@dataclass(frozen=True)
+class Envelope:
+    """Complex amplitudes about a carrier.
+
+    Attributes
+    ----------
+    time : array (rows,), s
+        Middle of each block, from the first sample of the record.
+    values : array (channels, rows)
+        z of each channel, in the unit of the record, by rows; NaN where a block has no samples.
+    carrier : float, Hz
+        The frequency that turns e^{2πi f t}: f_c of raw samples, the reference of a lock-in.
+    width : float, s
+        Length of a block.
+    clipped : float
+        Part of the raw samples at the ends of their range where the record is flat there; 0 of a lock-in.
+    lost : float
+        Part of the time without samples.
+    """
+
+    time: Real
+    values: Complex
+    carrier: float
+    width: float
+    clipped: float = 0.0
+    lost: float = 0.0
+
+    def within(self, start: float, end: float) -> "Envelope":
+        """The rows between two times (s)."""
+        keep = (self.time >= start) & (self.time <= end)
+        return Envelope(self.time[keep], self.values[:, keep], self.carrier, self.width, self.clipped, self.lost)
+
+
+def find_carrier(samples: ArrayLike, rate: float) -> float:
+    """Return the frequency (Hz) of the largest line of evenly sampled raw data, within 1/1000 of its resolution.
+
+    The spectrum of the strongest stretch of at most 2¹⁸ rows under a Hann window, its peak by the parabola of the logarithm.
+    """
+    x = np.asarray(samples, dtype=np.float64)
+    length = min(x.size, CHUNK)
+    starts = range(0, x.size - length + 1, max(length, 1))
+    at = max(starts, key=lambda k: float(np.var(x[k : k + length])))
+    stretch = x[at : at + length]
+    stretch = np.nan_to_num(stretch - np.nanmean(stretch))
+    spectrum = np.abs(np.fft.rfft(stretch * np.hanning(length)))
+    peak = int(np.argmax(spectrum[1:-1])) + 1
+    left, middle, right = np.log(spectrum[peak - 1 : peak + 2] + 1e-300)
+    curve = left - 2 * middle + right
+    return float((peak + (0.5 * (left - right) / curve if curve else 0.0)) * rate / length)
+
+
+def mix_down(time: ArrayLike, channels: ArrayLike, carrier: float | None = None) -> Envelope:
+    """Return the complex amplitudes of raw samples.
+
+    Parameters
+    ----------
+    time : array (N,)
+        Seconds, evenly spaced but for lost rows.
+    channels : array (channels, N)
+        Raw samples of one or two pick-offs; NaN is a lost sample.
+    carrier : float, optional
+        Hz; the largest line where it is not given.
+    """
+    t = np.asarray(time, dtype=np.float64)
+    x = np.atleast_2d(np.asarray(channels, dtype=np.float64))
+    if t.size < 64:
+        raise CompensationError(f"a decay of raw samples needs 64 rows or more, not {t.size}.")
+    step = float(np.median(np.diff(t[:CHUNK])))
+    rate = 1 / step
+    if carrier is None:
+        carrier = find_carrier(x[int(np.argmax(np.nanvar(x, axis=1)))], rate)
+    if not 0 < carrier < rate / 2:
+        raise CompensationError(
+            f"the frequency {carrier:.6g} Hz is not below half the sampling rate of {rate:.6g} Hz; sample faster."
+        )
+    period = rate / carrier  # in samples
+    size = _choose_block(max(t.size / MOST_BLOCKS, 8 * period), period)
+    rows = np.rint((t - t[0]) / step).astype(np.int64)
+    block = rows // size
+    count = int(block[-1]) + 1
+    total = np.zeros((x.shape[0], count), dtype=complex)
+    weight = np.zeros((x.shape[0], count))
+    level = np.nanmean(x, axis=1)
+    for k in range(0, t.size, CHUNK):
+        part = slice(k, k + CHUNK)
+        turn = 2 * np.exp(-2j * np.pi * carrier * (t[part] - t[0]))
+        first = int(block[part][0])
+        for c in range(x.shape[0]):
+            fine = np.isfinite(x[c, part])
+            value = np.where(fine, x[c, part] - level[c], 0.0)
+            mixed = value * turn
+            index = block[part] - first
+            got = np.bincount(index, mixed.real) + 1j * np.bincount(index, mixed.imag)
+            total[c, first : first + got.size] += got
+            weight[c, first : first + got.size] += np.bincount(index, fine)
+    enough = weight >= 0.5 * size
+    values = np.where(enough, total / np.where(enough, weight, 1.0), np.nan + 0j)
+    middle: Real = (np.arange(count, dtype=np.float64) * size + (size - 1) / 2) * step
+    keep = np.all(np.isfinite(values), axis=0)
+    return Envelope(
+        middle[keep],
+        values[:, keep],
+        carrier,
+        size * step,
+        _clipped(x),
+        1 - float(np.sum(weight)) / (weight.size * size),
+    )
+
+
+def _choose_block(least: float, period: float) -> int:
+    """Return the samples of a block, at least so many, that hold a whole number of half periods as nearly as may be."""
+    sizes = np.arange(int(np.ceil(least)), int(np.ceil(1.3 * least + 2 * period)) + 1)
+    return int(sizes[int(np.argmin(np.abs(np.sin(2 * np.pi * sizes / period)) / sizes))])
+
+
+def from_lock_in(time: ArrayLike, amplitudes: ArrayLike, carrier: float = 0.0) -> Envelope:
+    """Return the complex amplitudes of a lock-in's rows, averaged to a few thousand blocks where there are more.
+
+    Parameters
+    ----------
+    time : array (N,)
+        Seconds.
+    amplitudes : array (channels, N)
+        X + iY, or R e^{iφ}, about the reference frequency `carrier` (Hz).
+    """
+    t = np.asarray(time, dtype=np.float64)
+    z = np.atleast_2d(np.asarray(amplitudes, dtype=np.complex128))
+    keep = np.isfinite(t) & np.all(np.isfinite(z), axis=0)
+    lost = 1 - float(np.mean(keep))
+    t, z = t[keep], z[:, keep]
+    if t.size < 16:
+        raise CompensationError(f"a decay needs 16 rows or more with a value in every channel, not {t.size}.")
+    step = float(np.median(np.diff(t)))
+    return thin(Envelope(t - t[0], z, carrier, step, 0.0, lost), MOST_BLOCKS)
+
+
+def estimate_noise(values: Complex) -> float:
+    """Return the variance of white noise, summed over the channels, from second differences: six times it, no slow signal.
+
+    The median of |n|² of complex noise is ln 2 times its mean.
+    """
+    return float(np.sum(np.median(np.abs(np.diff(values, 2, axis=1)) ** 2, axis=1)) / (6 * np.log(2)))
+
+
+def thin(envelope: Envelope, rows: int) -> Envelope:
+    """Average neighbouring rows down to `rows`, as far as that costs no more than 2 % of the signal's power."""
+    z, noise = envelope.values, estimate_noise(envelope.values)
+    signal = max(float(np.sum(np.mean(np.abs(z) ** 2, axis=1))) - noise, 1e-300)
+    size = z.shape[1] // rows
+    while size > 1:
+        count = z.shape[1] // size
+        means = z[:, : count * size].reshape(len(z), count, size).mean(axis=2)
+        if float(np.sum(np.mean(np.abs(means) ** 2, axis=1))) - noise / size > 0.98 * signal:
+            time = envelope.time[: count * size].reshape(count, size).mean(axis=1)
+            return replace(envelope, time=time, values=means, width=envelope.width * size)
+        size //= 2
+    return envelope
+
+
+def _clipped(x: Real) -> float:
+    """Part of the samples that stand at the two ends of their range, beyond what a sine leaves there."""
+    worst = 0.0
+    for channel in x:
+        fine = channel[np.isfinite(channel)]
+        if not fine.size:
+            continue
+        low, high = float(fine.min()), float(fine.max())
+        span = high - low
+        loudest = fine[: max(fine.size // 10, 64)]
+        at_ends = float(np.mean((loudest <= low + 1e-6 * span) | (loudest >= high - 1e-6 * span)))
+        worst = max(worst, at_ends if at_ends > 0.01 else 0.0)
+    return worst

@@ -1,0 +1,216 @@
+"""Decay of an amplitude or a power that was recorded without its phase, such as a spectrum analyser's trace in dB.
+
+    L(t) = ln a(t) = c − t/τ + e(t),   var e = v₀ + ½ (σ/a)²
+
+v₀ is the scatter of the reading, σ the noise that adds to the amplitude and takes over as it decays. The line is fitted with
+these weights, so the late record counts for what it tells; it ends where a < 3 σ, because a logarithm of noise is biased.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy import stats
+from scipy.optimize import minimize
+
+from compensation.errors import CompensationError
+
+Real = NDArray[np.float64]
+BINS = 100
+DROP = 0.25
+"""Fall of ln a from one hundredth of the record to the next that is no decay but a drive switched off, where it is six times the usual step."""
+FLOOR = 3.0
+
+
+@dataclass(frozen=True)
+class TraceDecay:
+    """Decay time of a trace without phase.
+
+    Attributes
+    ----------
+    decay, sd : float, 1/s
+        1/τ of the amplitude, and its standard deviation with the correlation of the scatter counted.
+    low, high : float
+        90 % interval of 1/τ.
+    amplitude, noise : float
+        a at the start of the window and σ, in the unit of the record.
+    window : (float, float)
+        Seconds that were used.
+    bound : float
+        Standard deviation that the Cramér–Rao bound of uncorrelated scatter allows.
+    remarks : tuple of str
+    """
+
+    decay: float
+    sd: float
+    low: float
+    high: float
+    amplitude: float
+    noise: float
+    window: tuple[float, float]
+    bound: float
+    remarks: tuple[str, ...]
+
+
+def analyse_trace(time: ArrayLike, amplitude: ArrayLike, *, confidence: float = 0.9) -> TraceDecay:
+    """Find the free part of a trace and return its decay.
+
+    Parameters
+    ----------
+    time : array (N,)
+        Seconds.
+    amplitude : array (N,)
+        Positive; the root of a power.
+
+    Raises
+    ------
+    CompensationError
+        A trace that does not decay, or of fewer than 32 rows.
+    """
+    t, a = np.asarray(time, dtype=np.float64), np.asarray(amplitude, dtype=np.float64)
+    keep = np.isfinite(t) & np.isfinite(a) & (a > 0)
+    t, L = t[keep], np.log(a[keep])
+    if t.size < 32:
+        raise CompensationError(f"a decay needs 32 rows or more with a positive amplitude, not {t.size}.")
+    first = _find_release(t, L)
+    last = t.size
+    noise = scatter = 0.0
+    slope = level = 0.0
+    for _ in range(12):
+        weights = (
+            1.0 / (scatter + _noise_part(level + slope * (t[first:last] - t[first]), noise))
+            if scatter
+            else np.ones(last - first)
+        )
+        slope, level = _fit_line(t[first:last] - t[first], L[first:last], weights)
+        if not slope < 0:
+            break
+        line = level + slope * (t[first:] - t[first])
+        scatter, noise = _fit_scatter(line[: last - first], L[first:last])
+        above = np.flatnonzero(line > np.log(FLOOR * noise)) if noise > 0 else np.arange(line.size)
+        end = first + max(int(above[-1]) + 1 if above.size else 0, min(32, line.size))
+        if end == last:
+            break
+        last = end
+    straight = _find_straight(
+        t[first:last] - t[first],
+        L[first:last],
+        1.0 / (scatter + _noise_part(level + slope * (t[first:last] - t[first]), noise)),
+    )
+    bent, last = straight < last - first, first + straight
+    used, x = L[first:last], t[first:last] - t[first]
+    slope, level = _fit_line(x, used, 1.0 / (scatter + _noise_part(level + slope * x, noise)))
+    line = level + slope * x
+    weights = 1.0 / (scatter + _noise_part(line, noise))
+    bound = float(1 / np.sqrt(np.sum(weights * (x - np.average(x, weights=weights)) ** 2)))
+    widening = _widen((used - line) * np.sqrt(weights))
+    sd = bound * widening
+    if not -slope > 2 * sd:
+        raise CompensationError(
+            f"nothing decays in this trace (1/τ = {-slope:.3g} ± {sd:.2g} 1/s); record a free ring-down, longer."
+        )
+    reach = float(stats.norm.isf((1 - confidence) / 2)) * sd
+    said = []
+    if first:
+        said.append(f"the first {t[first] - t[0]:.4g} s are no free decay (drive or release) and are left out.")
+    if bent:
+        said.append(
+            f"after {t[last - 1]:.4g} s the decay bends (interference, a second mode, or the amplitude matters): only what is straight is used."
+        )
+    elif last < t.size:
+        said.append(f"the last {t[-1] - t[last - 1]:.4g} s are below {FLOOR:g} times the noise and are left out.")
+    if x[-1] * -slope < 0.5:
+        said.append("the amplitude falls by less than 40 % in the window: a bend would not be seen; record longer.")
+    return TraceDecay(
+        -slope,
+        sd,
+        -slope - reach,
+        -slope + reach,
+        float(np.exp(level)),
+        noise,
+        (float(t[first]), float(t[last - 1])),
+        bound,
+        tuple(said),
+    )
+
+
+def _find_release(t: Real, L: Real) -> int:
+    """Return the first row of the free decay: after the last sudden fall in the first half, or after a plateau."""
+    size = max(1, t.size // BINS)
+    count = t.size // size
+    means = L[: count * size].reshape(count, size).mean(axis=1)
+    steps = -np.diff(means)
+    usual = float(np.median(np.abs(steps)))
+    half = steps[: count // 2]
+    sudden = np.flatnonzero(half > max(DROP, 6 * usual))
+    if sudden.size:
+        return (int(sudden[-1]) + 2) * size
+    # a plateau: the knee of two lines, the first of them level
+    t_mean = t[: count * size].reshape(count, size).mean(axis=1)
+    best, knee = np.inf, 0
+    for k in range(0, count // 2):
+        flat = means[: k + 1]
+        slope, level = _fit_line(t_mean[k:] - t_mean[k], means[k:], np.ones(count - k))
+        left = float(
+            np.sum((flat - means[: k + 1].mean()) ** 2)
+            + np.sum((means[k:] - level - slope * (t_mean[k:] - t_mean[k])) ** 2)
+        )
+        if left < best:
+            best, knee = left, k
+    return knee * size if knee > 2 else 0
+
+
+def _noise_part(line: Real, noise: float) -> Real:
+    return np.asarray(0.5 * noise**2 * np.exp(-2 * line))
+
+
+def _fit_line(x: Real, y: Real, weights: Real) -> tuple[float, float]:
+    middle_x, middle_y = np.average(x, weights=weights), np.average(y, weights=weights)
+    slope = float(np.sum(weights * (x - middle_x) * (y - middle_y)) / np.sum(weights * (x - middle_x) ** 2))
+    return slope, float(middle_y - slope * middle_x)
+
+
+def _fit_scatter(line: Real, L: Real) -> tuple[float, float]:
+    """Return v₀ and σ by maximum likelihood of the residual about the line."""
+    squares = (L - line) ** 2
+    top = float(line.max())
+
+    def cost(point: Real) -> float:
+        variance = np.exp(point[0]) + _noise_part(line, float(np.exp(point[1])))
+        return float(np.sum(np.log(variance) + squares / variance))
+
+    start = np.log([np.median(squares) + 1e-12, np.exp(float(line.min())) + 1e-300])
+    solved = minimize(cost, start, method="Nelder-Mead", bounds=[(-40, 5), (top - 40, top)])
+    return float(np.exp(solved.x[0])), float(np.exp(solved.x[1]))
+
+
+def _widen(scaled: Real) -> float:
+    """Return the root of the largest ratio between the variance of block means and that of independent rows."""
+    widest, size = 1.0, 2
+    while scaled.size // size >= 6:
+        count = scaled.size // size
+        means = scaled[: count * size].reshape(count, size).mean(axis=1)
+        widest = max(widest, size * float(np.mean(means**2)))
+        size *= 2
+    return float(np.sqrt(widest))
+
+
+def _find_straight(x: Real, y: Real, weights: Real) -> int:
+    """Return the rows from the start that one line foretells: each next fortieth within four standard deviations of it."""
+    size = max(4, x.size // 40)
+    rows = min(x.size, 6 * size)
+    while rows + size <= x.size:
+        w, u = weights[:rows], x[:rows]
+        slope, level = _fit_line(u, y[:rows], w)
+        scaled = (y[:rows] - level - slope * u) * np.sqrt(w)
+        blocks = scaled[: rows // size * size].reshape(-1, size).mean(axis=1)
+        spread = max(float(np.sum(blocks**2)) / max(len(blocks) - 2, 1), 1.0 / size)  # variance of a block's mean
+        middle = np.average(u, weights=w)
+        following = slice(rows, rows + size)
+        ahead = float(np.mean(x[following])) - middle
+        known = spread * size * (1 / np.sum(w) + ahead**2 / np.sum(w * (u - middle) ** 2))
+        miss = float(np.mean(y[following] - level - slope * x[following]))
+        if miss**2 > 16 * (known + spread / float(np.mean(weights[following]))):
+            return rows
+        rows += size
+    return x.size

@@ -1,0 +1,81 @@
+"""Whiteness of what a decay's fit leaves: how much wider the bound must be, lines in it, and a start that is not free decay."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import stats
+
+Real = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+BLOCKS = 64
+RARE = 1e-3
+"""Probability below which noise is not held for the reason."""
+
+
+@dataclass(frozen=True)
+class Leftover:
+    """What a residual (channels, rows) shows beside white noise.
+
+    Attributes
+    ----------
+    widening : float
+        √ of the largest ratio between the variance of block means and what white noise leaves of it, at least 1.
+    early : bool
+        Whether the first rows miss by more than the rest: a transient, or a drive that still acts.
+    line : float or None
+        Frequency (Hz, from the carrier) of a line in the residual, None where there is none.
+    amplitude : float
+        Of that line, in the unit of the record.
+    """
+
+    widening: float
+    early: bool
+    line: float | None
+    amplitude: float
+
+
+def examine(time: Real, residual: Complex) -> Leftover:
+    """Return what a residual shows: a ratio of variances over block lengths, its first blocks, its largest line."""
+    channels, rows = residual.shape
+    variance = np.mean(np.abs(residual) ** 2, axis=1)
+    scaled = residual / np.sqrt(variance)[:, None]
+    widest = 1.0
+    size = 2
+    while rows // size >= 8:
+        count = rows // size
+        means = scaled[:, : count * size].reshape(channels, count, size).mean(axis=2)
+        ratio = size * float(np.mean(np.abs(means) ** 2))
+        if ratio > stats.chi2.isf(RARE, 2 * channels * count) / (2 * channels * count):
+            widest = max(widest, ratio)
+        size *= 2
+    count = min(BLOCKS, rows // 4)
+    size = rows // count
+    energy = np.mean(np.abs(scaled[:, : count * size].reshape(channels, count, size).mean(axis=2)) ** 2, axis=0)
+    early = False
+    for first in (1, 2, 4, 8):
+        if first <= count // 4:
+            rest = float(np.mean(energy[first:]))
+            bound = stats.f.isf(RARE / 4, 2 * channels * first, 2 * channels * (count - first))
+            early |= float(np.mean(energy[:first])) > max(bound, 1.0) * max(rest, 1e-300)
+    line, amplitude = _find_line(time, scaled, np.sqrt(variance))
+    return Leftover(float(np.sqrt(widest)), bool(early), line, amplitude)
+
+
+def _find_line(time: Real, scaled: Complex, sd: Real) -> tuple[float | None, float]:
+    """Return the largest line of the residual where its power passes what the noise beside it has once in a thousand records."""
+    step = float(np.median(np.diff(time)))
+    grid = np.rint((time - time[0]) / step).astype(int)
+    if grid[-1] > 8 * time.size:
+        return None, 0.0
+    even = np.zeros((scaled.shape[0], int(grid[-1]) + 1), dtype=complex)
+    even[:, grid] = scaled
+    power = np.sum(np.abs(np.fft.fft(even * np.hanning(even.shape[1]), axis=1)) ** 2, axis=0)
+    at = int(np.argmax(power))
+    near = np.take(power, np.arange(at - 40, at + 41), mode="wrap")
+    level = float(np.median(near)) / stats.chi2.median(2 * scaled.shape[0]) * 2
+    if power[at] < level * stats.chi2.isf(RARE / power.size, 2 * scaled.shape[0]) / 2:
+        return None, 0.0
+    frequency = float(np.fft.fftfreq(power.size, step)[at])
+    tone = np.exp(-2j * np.pi * frequency * (time - time[0]))
+    return frequency, float(np.sqrt(np.sum(np.abs(np.mean(scaled * sd[:, None] * tone, axis=1)) ** 2)))
