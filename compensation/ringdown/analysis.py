@@ -14,12 +14,17 @@ from compensation.ringdown.whiteness import Leftover, examine
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
-STARTS = (0.0, 0.02, 0.05, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5, 0.6)
-"""Parts of the energetic record at which a free decay may begin."""
-SEARCH_ROWS = 400
+LATER = (0.35, 0.6, 0.15)
+"""Parts of the record at whose end a free decay is looked for, where the whole is none."""
+HALVINGS = 4
+LEAST_ROWS = 64
+SEARCH_ROWS, ROWS = 300, 1024
 PAYS = 20.0
 """Least fall of −2 ln L, over the widening², for which a rate beyond the linear ones is named (e^-10 of odds)."""
 WHITE = 1.3
+LENGTHS = ("split_Hz", "damping_split_per_s")
+RESOLVED = 3.0
+"""Standard deviations above zero from which a split has an axis."""
 LINES = 3
 DRAWS = 2000
 BEYOND = {
@@ -85,7 +90,7 @@ def analyse_decay(envelope: Envelope, *, harmonic: int = 2, confidence: float = 
     end = _find_end(envelope)
     whole = envelope.within(envelope.time[0], end)
     start = _find_start(whole)
-    free = whole.within(start, end)
+    free = thin(whole.within(start, end), ROWS)
     fit, beyond, lines = _fit_all(free)
     left = examine(free.time, fit.residual)
     _check_decays(fit)
@@ -117,22 +122,34 @@ def _find_end(envelope: Envelope) -> float:
 
 
 def _find_start(whole: Envelope) -> float:
-    """Return the first time from which one decay describes all that follows, its first rows as well as the rest."""
-    span = float(whole.time[-1] - whole.time[0])
-    found: list[tuple[float, float]] = []
-    for part in STARTS:
-        start = float(whole.time[0] + part * span)
-        tried = thin(whole.within(start, float(whole.time[-1])), SEARCH_ROWS)
-        if tried.time.size < 64:
-            break
+    """Return the first time from which one decay describes all that follows, its first rows as well as the rest.
+
+    Where that is not the whole record, the last start that fails and the first that does are brought together by halving.
+    """
+    first, last = float(whole.time[0]), float(whole.time[-1])
+    judged: list[tuple[float, float]] = []
+
+    def describes(start: float) -> bool:
+        tried = thin(whole.within(start, last), SEARCH_ROWS)
+        if tried.time.size < LEAST_ROWS:
+            return False
         fit = _fit_modes(tried)
         left = _examine_without_lines(tried, fit)
         if not _plain(left):
             fit, left, _ = _extend(tried, fit, left, ())
-        if _plain(left):
-            return start
-        found.append((left.widening + (10.0 if left.early else 0.0), start))
-    return min(found)[1] if found else float(whole.time[0])
+        judged.append((left.widening + (10.0 if left.early else 0.0), start))
+        return _plain(left)
+
+    if describes(first):
+        return first
+    good = next((start for part in LATER if describes(start := first + part * (last - first))), None)
+    if good is None:
+        return min(judged)[1] if judged else first
+    bad = max((start for _, start in judged if start < good), default=first)
+    for _ in range(HALVINGS):
+        middle = (bad + good) / 2
+        bad, good = (bad, middle) if describes(middle) else (middle, good)
+    return good
 
 
 def _plain(left: Leftover) -> bool:
@@ -274,7 +291,14 @@ def _estimate(fit: DecayFit, harmonic: int, confidence: float) -> dict[str, Esti
             value %= period
             away = (away + period / 2) % period - period / 2
         low, high = np.quantile(away, [(1 - confidence) / 2, (1 + confidence) / 2])
-        found[name] = Estimate(float(value), float(np.sqrt(np.mean(away**2))), float(value + low), float(value + high))
+        sd = float(np.sqrt(np.mean(away**2)))
+        if name in LENGTHS and value < RESOLVED * sd:  # the length of a vector near zero has a limit above alone
+            low, high = -value, float(np.quantile(away, confidence))
+        found[name] = Estimate(float(value), sd, float(value + low), float(value + high))
+    for length, axis in zip(LENGTHS, ("frequency_axis_deg", "damping_axis_deg"), strict=True):
+        if axis in found and found[length].value < RESOLVED * found[length].sd:  # any azimuth may be the axis
+            value, half = found[axis].value, 90 / harmonic
+            found[axis] = Estimate(value, half / float(np.sqrt(3)), value - half, value + half)
     return found
 
 
@@ -312,18 +336,14 @@ def _undetermined(fit: DecayFit, estimates: Mapping[str, Estimate]) -> list[str]
     if "split_Hz" in estimates:
         split = estimates["split_Hz"]
         width = 1 / (np.pi * estimates["decay_time_s"].value)
-        if not split.value > 3 * split.sd:
-            said.append(
-                f"the split is not resolved: below {split.value + 1.645 * split.sd:.3g} Hz; its axis is not determined."
-            )
+        if not split.value > RESOLVED * split.sd:
+            said.append(f"the split is not resolved: below {split.high:.3g} Hz; its axis is not determined.")
         elif split.value < width:
             said.append(
                 f"the split of {split.value:.3g} Hz is less than the line width of {width:.3g} Hz: the modes overlap."
             )
     if "damping_split_per_s" in estimates:
         split = estimates["damping_split_per_s"]
-        if not split.value > 3 * split.sd:
-            said.append(
-                f"the damping split is not resolved: below {split.value + 1.645 * split.sd:.3g} 1/s; its axis is not determined."
-            )
+        if not split.value > RESOLVED * split.sd:
+            said.append(f"the damping split is not resolved: below {split.high:.3g} 1/s; its axis is not determined.")
     return said

@@ -162,14 +162,14 @@ def estimate_noise(values: Complex) -> float:
 
 
 def thin(envelope: Envelope, rows: int) -> Envelope:
-    """Average neighbouring rows down to `rows`, as far as that costs no more than 2 % of the signal's power."""
+    """Average neighbouring rows down to `rows`, as far as that costs no more than 0.2 % of the signal's power."""
     z, noise = envelope.values, estimate_noise(envelope.values)
     signal = max(float(np.sum(np.mean(np.abs(z) ** 2, axis=1))) - noise, 1e-300)
     size = z.shape[1] // rows
     while size > 1:
         count = z.shape[1] // size
         means = z[:, : count * size].reshape(len(z), count, size).mean(axis=2)
-        if float(np.sum(np.mean(np.abs(means) ** 2, axis=1))) - noise / size > 0.98 * signal:
+        if float(np.sum(np.mean(np.abs(means) ** 2, axis=1))) - noise / size > 0.998 * signal:
             time = envelope.time[: count * size].reshape(count, size).mean(axis=1)
             return replace(envelope, time=time, values=means, width=envelope.width * size)
         size //= 2

@@ -154,19 +154,29 @@ def _fit_from(envelope: Envelope, time: Real, names: tuple[str, ...], guess: Dec
             return _flatten((model(point) - z) / weight[:, None])
 
         solved = least_squares(
-            residuals, point, method="lm", x_scale="jac", xtol=1e-14, ftol=1e-14, gtol=1e-14, max_nfev=30 * point.size
+            residuals, point, method="lm", x_scale="jac", xtol=1e-12, ftol=1e-12, gtol=1e-12, max_nfev=12 * point.size
         )
         point = np.asarray(solved.x)
         r = z - model(point)
         freedom = max(1.0, r.shape[1] - point.size / (2 * z.shape[0]))
-        noise: Real = np.asarray(np.sqrt(np.sum(np.abs(r) ** 2, axis=1) / freedom), dtype=np.float64)
+        noise = np.sqrt(np.sum(np.abs(r) ** 2, axis=1) / freedom)
         weight = np.maximum(noise, 1e-12 * size)
     # each real part has half of the complex variance
     J = _differentiate(lambda point: _flatten(model(point) / weight[:, None]), point)
     bound = 0.5 * np.linalg.pinv(J.T @ J, rcond=1e-15, hermitian=True)
     units = np.concatenate([scale, np.full(2 * channels, size)])
     decay, start = of(point)
-    return DecayFit(envelope, decay, start, names, bound * np.outer(units, units), noise, r, 1.0, summed)
+    return DecayFit(
+        envelope,
+        decay,
+        start,
+        names,
+        (bound * np.outer(units, units)).astype(np.float64),
+        noise.astype(np.float64),
+        r,
+        1.0,
+        summed,
+    )
 
 
 def _flatten(values: Complex) -> Real:

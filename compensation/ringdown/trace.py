@@ -145,8 +145,10 @@ def _find_release(t: Real, L: Real) -> int:
     sudden = np.flatnonzero(half > max(DROP, 6 * usual))
     if sudden.size:
         return (int(sudden[-1]) + 2) * size
-    # a plateau: the knee of two lines, the first of them level
-    t_mean = t[: count * size].reshape(count, size).mean(axis=1)
+    # a plateau: the knee of two lines, the first of them level, above the noise floor
+    floor = np.flatnonzero(means < float(np.median(means[-(count // 10) :])) + np.log(FLOOR))
+    count = max(int(floor[0]), 12) if floor.size and floor[0] < count else count
+    means, t_mean = means[:count], t[: count * size].reshape(count, size).mean(axis=1)
     best, knee = np.inf, 0
     for k in range(0, count // 2):
         flat = means[: k + 1]

@@ -41,6 +41,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
         "studies.cli.fit_whole_angle:fit_whole_angle",
         "Splits, axes and gains from a whole-angle run.",
     ),
+    "fit ringdown": ("studies.cli.fit_ringdown:fit_ringdown", "Frequencies, Q and axes from free decays."),
     "calibrate": ("studies.cli.calibrate:calibrate", "The card's uncertain values from records, with intervals."),
     "diagnose": ("studies.cli.diagnose:diagnose", "What the simulation gets wrong, why, and what the repair is worth."),
     "acceptance": ("studies.cli.acceptance:acceptance", "The tests of IEEE 1431 from records, against limits."),

@@ -1,0 +1,299 @@
+"""Ring-down files: decays as a laboratory records them, what one says of a gyro, and what many say together.
+
+A file is a table with the column `time_s` and one of these groups, for one pick-off (cos) or two (cos along 0°, sin along
+90°/n of the shell):
+
+- raw samples: `pickoff_cos_V`, `pickoff_sin_V`;
+- a lock-in's pairs: `amplitude_cos_V`, `phase_cos_deg` and the same with sin, or `in_phase_cos_V`, `out_of_phase_cos_V`; a
+  comment `# reference_frequency_Hz: 7000.0` gives its reference;
+- a power without phase: `power_dBm` (or `power_dB`).
+
+Comments `# pressure_Pa: …`, `# temperature_degC: …` and `# start: …` say where and when; a trace of a membrane or
+quartz laboratory with `%` comments and a last comment `time [s], power [dBm]` is read as it is.
+"""
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from math import pi
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from studies.errors import InputError, naming
+from studies.files.columns import Columns, read_columns
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from compensation.ringdown.analysis import RingDown
+    from compensation.ringdown.envelope import Envelope
+    from compensation.ringdown.trace import TraceDecay
+    from studies.instrument.card import Instrument
+
+PARTS = ("cos", "sin")
+RAW = tuple(f"pickoff_{part}_V" for part in PARTS)
+POLAR = tuple((f"amplitude_{part}_V", f"phase_{part}_deg") for part in PARTS)
+CARTESIAN = tuple((f"in_phase_{part}_V", f"out_of_phase_{part}_V") for part in PARTS)
+POWERS = ("power_dBm", "power_dB")
+KNOWN = ("time_s", *RAW, *(name for pair in (*POLAR, *CARTESIAN) for name in pair), *POWERS)
+NOTES = ("reference_frequency_Hz", "pressure_Pa", "temperature_degC")
+NOTE = re.compile(r"^\W*(\w+):\s*([-+.\deE]+)\s*$")
+FOREIGN = {
+    "Frequency [Hz]": ("reference_frequency_Hz", 1.0, 0.0),
+    "Temperature [K]": ("temperature_degC", 1.0, -273.15),
+    "Pressure [mBar]": ("pressure_Pa", 100.0, 0.0),
+}
+
+
+@dataclass(frozen=True)
+class Decay:
+    """One decay: what was read and what it says.
+
+    Attributes
+    ----------
+    path : str
+    notes : mapping
+        Numbers of the comments, by their key.
+    phased : RingDown or None
+        From amplitudes with phase.
+    trace : TraceDecay or None
+        From a power without phase.
+    frequency : float or None, Hz
+    inverse_q : tuple of float or None
+        1/Q with the ends of its 90 % interval.
+    """
+
+    path: str
+    notes: Mapping[str, float]
+    phased: "RingDown | None" = None
+    trace: "TraceDecay | None" = None
+    envelope: "Envelope | None" = field(default=None, repr=False)
+    time: "NDArray[np.float64] | None" = field(default=None, repr=False)
+    amplitude: "NDArray[np.float64] | None" = field(default=None, repr=False)
+
+    @property
+    def frequency(self) -> float | None:
+        """Mean frequency (Hz); a trace has that of its comments."""
+        if self.phased is not None:
+            found = self.phased.estimates["frequency_Hz"].value
+            return found if self.phased.fit.envelope.carrier else None
+        return self.notes.get("reference_frequency_Hz")
+
+    @property
+    def inverse_q(self) -> tuple[float, float, float] | None:
+        """1/Q and the ends of its 90 % interval; None where the frequency is not known."""
+        if self.phased is not None:
+            e = self.phased.estimates.get("inverse_q")
+            return None if e is None else (e.value, e.low, e.high)
+        assert self.trace is not None
+        if self.frequency is None:
+            return None
+        rates = (self.trace.decay, self.trace.low, self.trace.high)
+        return tuple(rate / (pi * self.frequency) for rate in rates)  # type: ignore[return-value]
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """What is not as it should be."""
+        one = self.phased or self.trace
+        return one.remarks if one is not None else ()
+
+
+def read_decay(
+    path: str | Path, *, frequency: float | None = None, harmonic: int = 2, expected: float | None = None
+) -> Decay:
+    """Read one decay and analyse it.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file; the module says what it may hold.
+    frequency : float, optional
+        Hz: carrier of raw samples, reference of a lock-in, frequency of a trace; in place of the file's.
+    harmonic : int
+        n, 2 unless said otherwise.
+    expected : float, optional
+        Hz: what a card predicts; raw samples whose frequency is an alias of it are refused.
+
+    Raises
+    ------
+    InputError
+        Columns that are no decay, or a decay that cannot be analysed, with the file's name.
+    """
+    import numpy as np
+
+    from compensation.ringdown.analysis import analyse_decay
+    from compensation.ringdown.envelope import from_lock_in, mix_down
+    from compensation.ringdown.trace import analyse_trace
+
+    table, notes = _read(path)
+    if frequency is not None:
+        notes = {**notes, "reference_frequency_Hz": frequency}
+    columns, time = table.values, table.values["time_s"]
+    if time.size > 1 and not np.all(np.diff(time) > 0):
+        row = int(np.flatnonzero(np.diff(time) <= 0)[0]) + 1
+        raise InputError(
+            f"{path}, line {table.line(row)}: time_s does not increase; a decay is one record in order of time."
+        )
+    reference = notes.get("reference_frequency_Hz")
+    with naming(path):
+        power = next((name for name in POWERS if name in columns), None)
+        if power is not None:
+            amplitude = 10 ** (columns[power] / 20)
+            return Decay(str(path), notes, trace=analyse_trace(time, amplitude), time=time, amplitude=amplitude)
+        raw = [columns[name] for name in RAW if name in columns]
+        if raw:
+            envelope = mix_down(time, np.array(raw), reference)
+            if expected is not None:
+                _refuse_alias(path, envelope.carrier, 1 / float(np.median(np.diff(time))), expected)
+        else:
+            envelope = from_lock_in(time, np.array(_pairs(path, columns)), reference or 0.0)
+        return Decay(str(path), notes, phased=analyse_decay(envelope, harmonic=harmonic), envelope=envelope)
+
+
+def _read(path: str | Path) -> tuple[Columns, dict[str, float]]:
+    """Return the table and the numbers of its comments; traces with % comments have two columns and no header."""
+    try:
+        with open(path, encoding="utf-8", errors="replace") as file:
+            foreign = file.read(1) == "%"
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read ({error.strerror}).") from None
+    if foreign:
+        return _read_trace(path)
+    table = read_columns(path, KNOWN, ["time_s"])
+    if len(table.values) < 2:
+        raise InputError(
+            f"{path}: only time_s; a decay needs {RAW[0]}, {POLAR[0][0]} with {POLAR[0][1]}, or {POWERS[0]} beside it."
+        )
+    notes = {}
+    for comment in table.comments:
+        match = NOTE.match(comment)
+        if match and match[1] in NOTES:
+            notes[match[1]] = float(match[2])
+    return table, notes
+
+
+def _read_trace(path: str | Path) -> tuple[Columns, dict[str, float]]:
+    import numpy as np
+
+    lines = Path(path).read_text(encoding="utf-8", errors="replace").splitlines()
+    comments = [line.lstrip("% ").strip() for line in lines if line.startswith("%")]
+    if not comments or comments[-1] != "time [s], power [dBm]":
+        raise InputError(
+            f"{path}: comments with % are read of traces whose last comment is 'time [s], power [dBm]' only; give the file a header line."
+        )
+    notes = {}
+    for comment in comments:
+        name, _, text = comment.partition(":")
+        if name in FOREIGN:
+            key, factor, shift = FOREIGN[name]
+            try:
+                notes[key] = factor * float(text) + shift
+            except ValueError:
+                raise InputError(f"{path}: the comment '{name}' holds no number: {text.strip()!r}.") from None
+    try:
+        rows = np.array(
+            [[float(cell) for cell in line.split(",")] for line in lines if line and not line.startswith("%")]
+        )
+    except ValueError as error:
+        raise InputError(f"{path}: {error}; every row needs a time and a power.") from None
+    if rows.ndim != 2 or rows.shape[1] != 2:
+        raise InputError(f"{path}: every row needs a time and a power.")
+    return Columns(str(path), {"time_s": rows[:, 0], "power_dBm": rows[:, 1]}, tuple(comments)), notes
+
+
+def _pairs(path: str | Path, columns: Mapping[str, "NDArray[np.float64]"]) -> list["NDArray[np.complex128]"]:
+    import numpy as np
+
+    found: list[NDArray[np.complex128]] = []
+    for first, second in (*POLAR, *CARTESIAN):
+        if (first in columns) != (second in columns):
+            raise InputError(f"{path}: {first} and {second} belong together; one of them is missing.")
+        if first in columns and (first, second) in POLAR:
+            found.append(np.asarray(columns[first] * np.exp(1j * np.radians(columns[second]))))
+        elif first in columns:
+            found.append(np.asarray(columns[first] + 1j * columns[second]))
+    if len(found) > len(PARTS):
+        raise InputError(f"{path}: a channel is given twice, as amplitude and phase and in two components; keep one.")
+    return found
+
+
+def _refuse_alias(path: str | Path, found: float, rate: float, expected: float) -> None:
+    """Refuse samples in which the expected frequency appears folded about half of the sampling rate."""
+    folded = abs((expected + rate / 2) % rate - rate / 2)
+    if expected > rate / 2 and abs(found - folded) < 0.02 * rate:
+        raise InputError(
+            f"{path}: the card's {expected:.6g} Hz cannot be in samples at {rate:.6g} Hz; the line at {found:.6g} Hz is its alias. "
+            f"Sample above {2 * expected:.4g} Hz, or give --frequency {expected:.6g} to a lock-in's record."
+        )
+
+
+def with_decay(instrument: "Instrument", decay: Decay, harmonic: int = 2) -> "Instrument":
+    """Return the card with what a decay of two channels says: split and slow axis, 1/Q, damping split and axis.
+
+    Raises
+    ------
+    InputError
+        A decay of one channel: it has no axes.
+    """
+    if decay.phased is None or "frequency_axis_deg" not in decay.phased.estimates:
+        raise InputError(
+            f"{decay.path}: a card takes a split with its axis, and for that both pick-offs; this decay has one channel."
+        )
+    e = decay.phased.estimates
+    imperfection = dict(instrument.content.get("imperfection", {}))
+    imperfection["split"] = {
+        "harmonic": harmonic,
+        "split_Hz": e["split_Hz"].value,
+        "slow_axis_deg": (e["frequency_axis_deg"].value + 90 / harmonic) % (180 / harmonic),
+    }
+    instrument = instrument.with_table("imperfection", imperfection)
+    tau = e["decay_time_s"].value
+    sizes: dict[str, Mapping[str, float]] = {
+        "bias.damping_anisotropy": {
+            "value": e["damping_split_per_s"].value * tau,
+            "sd": e["damping_split_per_s"].sd * tau,
+        },
+        "bias.damping_axis_deg": {"value": e["damping_axis_deg"].value, "sd": e["damping_axis_deg"].sd},
+    }
+    if "inverse_q" in e:
+        sizes["loss.inverse_q"] = {"value": e["inverse_q"].value, "sd": e["inverse_q"].sd}
+    return instrument.with_values(sizes)
+
+
+@dataclass(frozen=True)
+class GasLaw:
+    """1/Q over pressure, 1/Q = 1/Q₀ + s p: free-molecular gas takes momentum in proportion to its pressure.
+
+    Values with their standard deviations from the scatter of the decays about the line.
+    """
+
+    inverse_q0: float
+    inverse_q0_sd: float
+    slope: float
+    slope_sd: float
+    scatter: float
+
+
+def fit_gas(decays: Sequence[Decay]) -> GasLaw | None:
+    """Fit 1/Q over pressure to decays that say both; None of fewer than four or of one pressure.
+
+    The scatter between decays is far more than each one's interval, so it is taken as a part of 1/Q: weights 1/(1/Q)².
+    """
+    import numpy as np
+
+    rows = [
+        (d.notes["pressure_Pa"], d.inverse_q[0]) for d in decays if d.inverse_q is not None and "pressure_Pa" in d.notes
+    ]
+    if len(rows) < 4 or len({p for p, _ in rows}) < 3:
+        return None
+    p, y = np.array(rows).T
+    weight = 1 / y
+    X = np.stack([np.ones_like(p), p], axis=1)
+    for _ in range(20):  # the weight of a row is that of the line there, not of its own error
+        found = np.linalg.lstsq(X * weight[:, None], y * weight, rcond=None)[0]
+        weight = 1 / np.maximum(X @ found, 0.1 * y)
+    r = (y - X @ found) * weight
+    scatter = float(np.sqrt(np.sum(r**2) / (len(rows) - 2)))
+    sd = scatter * np.sqrt(np.diag(np.linalg.inv((X * weight[:, None]).T @ (X * weight[:, None]))))
+    return GasLaw(float(found[0]), float(sd[0]), float(found[1]), float(sd[1]), scatter)
