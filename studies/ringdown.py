@@ -13,11 +13,11 @@ quartz laboratory with `%` comments and a last comment `time [s], power [dBm]` i
 """
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from math import pi
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from studies.errors import InputError, naming
 from studies.files.columns import Columns, read_columns
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from compensation.ringdown.analysis import RingDown
+    from compensation.ringdown.analysis import Estimate, RingDown
     from compensation.ringdown.envelope import Envelope
     from compensation.ringdown.trace import TraceDecay
     from studies.instrument.card import Instrument
@@ -48,21 +48,7 @@ FOREIGN = {
 
 @dataclass(frozen=True)
 class Decay:
-    """One decay: what was read and what it says.
-
-    Attributes
-    ----------
-    path : str
-    notes : mapping
-        Numbers of the comments, by their key.
-    phased : RingDown or None
-        From amplitudes with phase.
-    trace : TraceDecay or None
-        From a power without phase.
-    frequency : float or None, Hz
-    inverse_q : tuple of float or None
-        1/Q with the ends of its 90 % interval.
-    """
+    """One decay: what was read and what it says, with its phase (`phased`) or without (`trace`, of `time` and `amplitude`)."""
 
     path: str
     notes: Mapping[str, float]
@@ -73,30 +59,85 @@ class Decay:
     amplitude: "NDArray[np.float64] | None" = field(default=None, repr=False)
 
     @property
-    def frequency(self) -> float | None:
-        """Mean frequency (Hz); a trace has that of its comments."""
-        if self.phased is not None:
-            found = self.phased.estimates["frequency_Hz"].value
-            return found if self.phased.fit.envelope.carrier else None
-        return self.notes.get("reference_frequency_Hz")
+    def _one(self) -> "RingDown | TraceDecay":
+        one = self.phased or self.trace
+        assert one is not None
+        return one
 
     @property
-    def inverse_q(self) -> tuple[float, float, float] | None:
-        """1/Q and the ends of its 90 % interval; None where the frequency is not known."""
-        if self.phased is not None:
-            e = self.phased.estimates.get("inverse_q")
-            return None if e is None else (e.value, e.low, e.high)
-        assert self.trace is not None
-        if self.frequency is None:
-            return None
-        rates = (self.trace.decay, self.trace.low, self.trace.high)
-        return tuple(rate / (pi * self.frequency) for rate in rates)  # type: ignore[return-value]
+    def window(self) -> tuple[float, float]:
+        """Seconds of the record that are free decay."""
+        return self._one.window
 
     @property
     def remarks(self) -> tuple[str, ...]:
-        """What is not as it should be."""
-        one = self.phased or self.trace
-        return one.remarks if one is not None else ()
+        """What is not as it should be, a sentence each."""
+        return self._one.remarks
+
+    @property
+    def estimates(self) -> "Mapping[str, Estimate]":
+        """Values by name; those of a trace are its rate and, where the frequency is known, 1/Q."""
+        from compensation.ringdown.analysis import Estimate
+
+        if self.phased is not None:
+            return self.phased.estimates
+        assert self.trace is not None
+        t = self.trace
+        found = {"decay_per_s": Estimate(t.decay, t.sd, t.low, t.high)}
+        if self.frequency is not None:
+            unit = pi * self.frequency
+            found["inverse_q"] = Estimate(t.decay / unit, t.sd / unit, t.low / unit, t.high / unit)
+        return found
+
+    @property
+    def frequency(self) -> float | None:
+        """Mean frequency (Hz); a trace has that of its comments."""
+        if self.phased is not None:
+            return self.phased.estimates["frequency_Hz"].value if self.phased.fit.envelope.carrier else None
+        return self.notes.get("reference_frequency_Hz")
+
+    @property
+    def inverse_q(self) -> "Estimate | None":
+        """1/Q; None where the frequency is not known."""
+        return self.estimates.get("inverse_q")
+
+    @property
+    def noise(self) -> list[float]:
+        """Standard deviation of the noise of a row, by channel, in the unit of the record."""
+        return self.phased.fit.noise.tolist() if self.phased is not None else [self.trace.noise] if self.trace else []
+
+    @property
+    def widening(self) -> float:
+        """Standard deviations over the Cramér–Rao bound of white noise."""
+        return (
+            self.phased.fit.widening
+            if self.phased is not None
+            else self.trace.sd / self.trace.bound
+            if self.trace
+            else 1.0
+        )
+
+    @property
+    def interference(self) -> list[float]:
+        """Frequencies (Hz) of lines that are no decay."""
+        return (
+            [self.phased.fit.envelope.carrier + line for line in self.phased.lines] if self.phased is not None else []
+        )
+
+    def curves(self) -> "Iterator[tuple[NDArray[Any], NDArray[Any], NDArray[Any], NDArray[Any]]]":
+        """Yield time, level (dB), fitted level and residual of each channel, within the window."""
+        import numpy as np
+
+        if self.phased is not None:
+            fit = self.phased.fit
+            for z, r in zip(fit.envelope.values, fit.residual, strict=True):
+                yield fit.envelope.time, 20 * np.log10(np.abs(z)), 20 * np.log10(np.abs(z - r)), r
+        elif self.trace is not None and self.time is not None and self.amplitude is not None:
+            level = 20 * np.log10(self.amplitude)
+            start, end = self.trace.window
+            fitted = 20 * np.log10(self.trace.amplitude) - 20 / np.log(10) * self.trace.decay * (self.time - start)
+            fitted[(self.time < start) | (self.time > end)] = np.nan
+            yield self.time, level, fitted, level - fitted
 
 
 def read_decay(
@@ -283,7 +324,9 @@ def fit_gas(decays: Sequence[Decay]) -> GasLaw | None:
     import numpy as np
 
     rows = [
-        (d.notes["pressure_Pa"], d.inverse_q[0]) for d in decays if d.inverse_q is not None and "pressure_Pa" in d.notes
+        (d.notes["pressure_Pa"], d.inverse_q.value)
+        for d in decays
+        if d.inverse_q is not None and "pressure_Pa" in d.notes
     ]
     if len(rows) < 4 or len({p for p, _ in rows}) < 3:
         return None

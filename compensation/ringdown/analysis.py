@@ -28,9 +28,9 @@ RESOLVED = 3.0
 LINES = 3
 DRAWS = 2000
 BEYOND = {
-    "hardening": "the frequency depends on the amplitude (cubic stiffness)",
-    "thickening": "the damping depends on the amplitude",
-    "chirp": "the frequency drifts with time",
+    "hardening": "The frequency depends on the amplitude (cubic stiffness)",
+    "thickening": "The damping depends on the amplitude",
+    "chirp": "The frequency drifts with time",
 }
 
 
@@ -309,11 +309,11 @@ def _remark(
     first = float(envelope.time[0])
     if start > first:
         said.append(
-            f"the first {start - first:.4g} s are no free decay (drive, transient or release) and are left out."
+            f"The first {start - first:.4g} s are no free decay (drive, transient or release) and are left out."
         )
     said += [f"{BEYOND[name]}." for name in beyond]
     for line in lines:
-        said.append(f"interference at {envelope.carrier + line:.6g} Hz is taken out; find its source.")
+        said.append(f"Interference at {envelope.carrier + line:.6g} Hz is taken out; find its source.")
     if envelope.clipped:
         said.append(
             f"{100 * envelope.clipped:.2g} % of the first samples are clipped: the early decay is distorted; lower the gain."
@@ -322,12 +322,12 @@ def _remark(
         said.append(f"{100 * envelope.lost:.2g} % of the samples are lost.")
     if left.widening > 1:
         said.append(
-            f"what the fit leaves is not white noise: intervals are {left.widening:.3g} times as wide as the Cramér–Rao bound of white noise."
+            f"What the fit leaves is not white noise: intervals are {left.widening:.3g} times as wide as the Cramér–Rao bound of white noise."
         )
     if left.early:
-        said.append("the first rows of the window still miss the fit: no part of this record is a plain free decay.")
+        said.append("The first rows of the window still miss the fit: no part of this record is a plain free decay.")
     if left.widening > 3:
-        said.append("poor fit: take the values as indications.")
+        said.append("Poor fit: take the values as indications.")
     return said
 
 
@@ -337,13 +337,13 @@ def _undetermined(fit: DecayFit, estimates: Mapping[str, Estimate]) -> list[str]
         split = estimates["split_Hz"]
         width = 1 / (np.pi * estimates["decay_time_s"].value)
         if not split.value > RESOLVED * split.sd:
-            said.append(f"the split is not resolved: below {split.high:.3g} Hz; its axis is not determined.")
+            said.append(f"The split is not resolved: below {split.high:.3g} Hz; its axis is not determined.")
         elif split.value < width:
             said.append(
-                f"the split of {split.value:.3g} Hz is less than the line width of {width:.3g} Hz: the modes overlap."
+                f"The split of {split.value:.3g} Hz is less than the line width of {width:.3g} Hz: the modes overlap."
             )
     if "damping_split_per_s" in estimates:
         split = estimates["damping_split_per_s"]
         if not split.value > RESOLVED * split.sd:
-            said.append(f"the damping split is not resolved: below {split.high:.3g} 1/s; its axis is not determined.")
+            said.append(f"The damping split is not resolved: below {split.high:.3g} 1/s; its axis is not determined.")
     return said

@@ -112,15 +112,15 @@ def analyse_trace(time: ArrayLike, amplitude: ArrayLike, *, confidence: float = 
     reach = float(stats.norm.isf((1 - confidence) / 2)) * sd
     said = []
     if first:
-        said.append(f"the first {t[first] - t[0]:.4g} s are no free decay (drive or release) and are left out.")
+        said.append(f"The first {t[first] - t[0]:.4g} s are no free decay (drive or release) and are left out.")
     if bent:
         said.append(
-            f"after {t[last - 1]:.4g} s the decay bends (interference, a second mode, or the amplitude matters): only what is straight is used."
+            f"After {t[last - 1]:.4g} s the decay bends (interference, a second mode, or the amplitude matters): only what is straight is used."
         )
     elif last < t.size:
-        said.append(f"the last {t[-1] - t[last - 1]:.4g} s are below {FLOOR:g} times the noise and are left out.")
+        said.append(f"The last {t[-1] - t[last - 1]:.4g} s are below {FLOOR:g} times the noise and are left out.")
     if x[-1] * -slope < 0.5:
-        said.append("the amplitude falls by less than 40 % in the window: a bend would not be seen; record longer.")
+        said.append("The amplitude falls by less than 40 % in the window: a bend would not be seen; record longer.")
     return TraceDecay(
         -slope,
         sd,

@@ -1,66 +1,96 @@
 """`hrg fit ringdown`: frequencies, Q and axes from free decays.
 
-With --json one object, schema `hrg.fit-ringdown/1`: `decays` (a list: `data`, `window_s`, `carrier_Hz`, `estimates` by name with
-`value`, `sd`, `low`, `high`, `noise`, `widening`, `interference_Hz`, `remarks`), `gas` (1/Q over pressure: `inverse_q0`,
-`slope_per_Pa`, their `_sd`, `scatter`; null without pressures), `saved`.
+With --json one object, schema `hrg.fit-ringdown/1`: `decays` (a list: `data`, `window_s`, `frequency_Hz`, `q` with `q_low` and
+`q_high`, `estimates` (rows of `name`, `value`, `sd`, `low`, `high`), `noise`, `widening` of the Cramér–Rao bound,
+`interference_Hz`, `remarks`), `gas` (1/Q over pressure: `inverse_q0`, `slope_per_Pa`, their `_sd`, `scatter`; null without
+pressures), `saved`.
 """
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from studies.cli.output import Answer, answers
+from studies.cli.output import answers
+from studies.results import Chapter, Column, Figure, Result, Sentence, Table
 
 if TYPE_CHECKING:
-    from studies.ringdown import Decay
+    from matplotlib.figure import Figure as Drawing
+
+    from studies.ringdown import Decay, GasLaw
+
+QUANTITIES = {
+    "frequency_1_Hz": "frequency of the upper mode (Hz)",
+    "frequency_2_Hz": "frequency of the lower mode (Hz)",
+    "frequency_Hz": "mean frequency (Hz)",
+    "split_Hz": "frequency split (Hz)",
+    "frequency_axis_deg": "axis of the upper mode (°)",
+    "q_1": "Q of the upper mode",
+    "q_2": "Q of the lower mode",
+    "inverse_q": "mean 1/Q",
+    "decay_time_s": "decay time of the amplitude (s)",
+    "decay_per_s": "decay rate of the amplitude (1/s)",
+    "damping_split_per_s": "damping split Δ(1/τ) (1/s)",
+    "damping_axis_deg": "axis of most damping (°)",
+    "hardening_Hz": "frequency shift due to amplitude, at the start (Hz)",
+    "thickening_per_s": "extra damping due to amplitude, at the start (1/s)",
+    "drift_Hz_per_s": "drift of the frequency (Hz/s)",
+}
+ESTIMATE = (
+    Column("quantity", "quantity"),
+    Column("value", "value", error="sd"),
+    Column("low", "90 % interval", interval=("low", "high"), digits=9),
+)
+DECAY = (
+    Column("file", "file"),
+    Column("frequency_Hz", "f", "Hz", digits=9),
+    Column("q", "Q"),
+    Column("q", "90 % interval of Q", interval=("q_low", "q_high")),
+    Column("window_s", "free decay", "s", interval=("window_s.0", "window_s.1")),
+    Column("widening", "interval / Cramér–Rao bound", digits=2),
+)
+GAS = (
+    Column("inverse_q0", "1/Q without gas", error="inverse_q0_sd"),
+    Column("slope_per_Pa", "d(1/Q)/dp", "1/Pa", error="slope_per_Pa_sd"),
+    Column("scatter", "scatter between decays", "%", digits=2, scale=100.0),
+)
 
 
 @answers("hrg.fit-ringdown/1")
 def fit_ringdown(
-    *data: str,
-    card: str | None = None,
-    frequency: float | None = None,
-    harmonic: int = 2,
-    save: str | None = None,
-    report: str | None = None,
-) -> Answer:
-    """Fit frequencies, Q and the axes of elasticity and damping to ring-downs, with intervals beside the Cramér–Rao bound.
+    *data: str, card: str | None = None, frequency: float | None = None, harmonic: int = 2, save: str | None = None
+) -> Result:
+    """Fit frequencies, Q and the axes of elasticity and damping to ring-downs, with 90 % intervals.
 
     A file holds one decay: time_s and pickoff_cos_V (and pickoff_sin_V) as raw samples, amplitude_cos_V with phase_cos_deg
-    (and the same with sin) from a lock-in amplifier, or power_dBm. The free part is found by the program: drive, transient and
-    noise floor are left out. Several files are several decays of one resonator; with '# pressure_Pa:' comments 1/Q is
-    fitted over pressure.
+    (and the same with sin) from a lock-in amplifier, or power_dBm. The drive, the release transient and the noise floor are
+    found and left out. Several files are several decays of one resonator; with '# pressure_Pa:' comments, 1/Q is fitted
+    against pressure.
 
     Parameters
     ----------
     data : str
         The files.
     card : str
-        The resonator's card: an alias of its frequency is recognised, and --save writes it with what was found.
+        The resonator's card: an aliased frequency is recognised by it, and --save writes it with the values found.
     frequency : float
         Carrier or reference frequency in Hz, in place of the file's comment.
     harmonic : int
-        Harmonic number n of the pattern.
+        Circumferential harmonic n.
     save : str
-        Write the card with the split, its axis, 1/Q and the damping axis of the (first) decay.
-    report : str
-        Write a page with the decays and what the fit leaves.
+        Write the card with the split, its axis, 1/Q and the damping axis of the first decay.
     """
-    from studies.cli.output import print_table, say
+    from studies.cli.output import say
     from studies.errors import InputError
-    from studies.files.writing import write_text
     from studies.instrument.card import load_card, save_card
-    from studies.reports.ringdown import decay_tables, ringdown_page
+    from studies.law import law_of
     from studies.ringdown import fit_gas, read_decay, with_decay
 
     if not data:
         raise InputError("name at least one file (CSV) with a free decay.")
     if save is not None and card is None:
-        raise InputError("--save writes the card with what was found; name it by --card.")
+        raise InputError("--save writes the card with the values found; name the card by --card.")
     instrument = load_card(card) if card else None
     expected = None
     if instrument is not None:
-        from studies.law import law_of
-
         T = instrument.reference_temperature
         expected = float(law_of(instrument, T - 5, T + 5).frequency(T))
     decays = []
@@ -71,58 +101,99 @@ def fit_ringdown(
     if save is not None and instrument is not None:
         save_card(with_decay(instrument, decays[0], harmonic), save)
         say(f"card: {save}")
-    if report is not None:
-        write_text(report, ringdown_page(decays, gas))
-        say(f"report: {report}")
-    yield {
-        "schema": "hrg.fit-ringdown/1",
-        "decays": [_payload(decay) for decay in decays],
-        "gas": None
-        if gas is None
-        else {
-            "inverse_q0": gas.inverse_q0,
-            "inverse_q0_sd": gas.inverse_q0_sd,
-            "slope_per_Pa": gas.slope,
-            "slope_per_Pa_sd": gas.slope_sd,
-            "scatter": gas.scatter,
-        },
-        "saved": save,
-    }
-    for table in decay_tables(decays, gas):
-        print_table(table.caption, table.columns, table.rows, table.note)
-    for decay in decays:
-        for remark in decay.remarks:
-            print(f"{Path(decay.path).name}: {remark}" if len(decays) > 1 else remark)
+    rows = [_row(decay) for decay in decays]
+    law = None if gas is None else _gas_row(gas)
+    remarks = [Sentence(f"{row['file']}: {' '.join(row['remarks'])}", "warning") for row in rows if row["remarks"]]
+    values = [Table(f"Ring-down {row['file']}", row["estimates"], ESTIMATE) for row in rows]
+    return Result(
+        {"schema": "hrg.fit-ringdown/1", "decays": rows, "gas": law, "saved": save},
+        "Ring-down",
+        f"Free decay of {data[0]}." if len(data) == 1 else f"{len(data)} free decays of one resonator.",
+        [
+            *(values if len(rows) <= 3 else []),
+            Table("Decays", rows, DECAY),
+            Table(
+                "1/Q against pressure, 1/Q₀ + s p",
+                [law] if law else [],
+                GAS,
+                "±: one standard deviation, from the scatter.",
+            ),
+            *([Figure(lambda: _draw_pressure(decays, gas), "1/Q against pressure.")] if gas else []),
+            *remarks,
+            Chapter("Records and fits", [_figure(decay) for decay in decays]),
+        ],
+    )
 
 
-def _payload(decay: "Decay") -> dict[str, Any]:
-    from dataclasses import asdict
-
-    if decay.phased is not None:
-        found = decay.phased
-        return {
-            "data": decay.path,
-            "window_s": found.window,
-            "carrier_Hz": found.fit.envelope.carrier or None,
-            "estimates": {name: asdict(e) for name, e in found.estimates.items()},
-            "noise": found.fit.noise.tolist(),
-            "widening": found.fit.widening,
-            "interference_Hz": [found.fit.envelope.carrier + line for line in found.lines],
-            "remarks": found.remarks,
-        }
-    trace = decay.trace
-    assert trace is not None
-    estimates = {"decay_per_s": {"value": trace.decay, "sd": trace.sd, "low": trace.low, "high": trace.high}}
-    if decay.inverse_q is not None:
-        value, low, high = decay.inverse_q
-        estimates["inverse_q"] = {"value": value, "sd": trace.sd * value / trace.decay, "low": low, "high": high}
+def _row(decay: "Decay") -> dict[str, Any]:
+    q = decay.inverse_q
+    estimates = decay.estimates
     return {
         "data": decay.path,
-        "window_s": trace.window,
-        "carrier_Hz": decay.frequency,
-        "estimates": estimates,
-        "noise": [trace.noise],
-        "widening": trace.sd / trace.bound,
-        "interference_Hz": [],
-        "remarks": trace.remarks,
+        "file": Path(decay.path).name,
+        "window_s": list(decay.window),
+        "frequency_Hz": decay.frequency,
+        "q": None if q is None else 1 / q.value,
+        "q_low": None if q is None else 1 / q.high,
+        "q_high": None if q is None or q.low <= 0 else 1 / q.low,
+        "estimates": [
+            {"name": name, "quantity": QUANTITIES[name], "value": e.value, "sd": e.sd, "low": e.low, "high": e.high}
+            for name in QUANTITIES
+            if (e := estimates.get(name)) is not None
+        ],
+        "noise": decay.noise,
+        "widening": decay.widening,
+        "interference_Hz": decay.interference,
+        "remarks": list(decay.remarks),
     }
+
+
+def _gas_row(gas: "GasLaw") -> dict[str, float]:
+    return {
+        "inverse_q0": gas.inverse_q0,
+        "inverse_q0_sd": gas.inverse_q0_sd,
+        "slope_per_Pa": gas.slope,
+        "slope_per_Pa_sd": gas.slope_sd,
+        "scatter": gas.scatter,
+    }
+
+
+def _figure(decay: "Decay") -> Figure:
+    return Figure(lambda: _draw(decay), f"{Path(decay.path).name}: record, fitted decay (orange), residual.")
+
+
+def _draw(decay: "Decay") -> "Drawing":
+    import numpy as np
+
+    from studies.reports import style
+
+    with style.figure(2, 1, height=4.6, sharex=True) as (drawn, (top, bottom)):
+        for time, values, fitted, residual in decay.curves():
+            rows = style.few_rows(time.size)
+            top.plot(time[rows], values[rows], ".", markersize=1.5)
+            top.plot(time[rows], fitted[rows], color=style.ORANGE, linewidth=1)
+            bottom.plot(time[rows], np.real(residual[rows]), ".", markersize=1.5)
+        top.set_ylabel("level (dB)")
+        bottom.set_ylabel("residual")
+        bottom.set_xlabel("time (s)")
+    return drawn
+
+
+def _draw_pressure(decays: "list[Decay]", gas: "GasLaw | None") -> "Drawing":
+    import numpy as np
+
+    from studies.reports import style
+
+    assert gas is not None
+    points = [
+        (d.notes["pressure_Pa"], d.inverse_q) for d in decays if d.inverse_q is not None and "pressure_Pa" in d.notes
+    ]
+    p = np.array([pressure for pressure, _ in points])
+    y = np.array([(q.value, q.value - q.low, q.high - q.value) for _, q in points])
+    with style.figure() as (drawn, axes):
+        axes.errorbar(p, y[:, 0], y[:, 1:].T, fmt="o", color=style.BLUE, markersize=4)
+        grid = np.geomspace(max(p[p > 0].min() / 2, 1e-12), p.max() * 1.5, 200)
+        axes.loglog(grid, gas.inverse_q0 + gas.slope * grid, color=style.ORANGE)
+        axes.set_xlabel("pressure (Pa)")
+        axes.set_ylabel("1/Q")
+    return drawn

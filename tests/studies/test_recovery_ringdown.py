@@ -1,0 +1,102 @@
+"""hrg fit ringdown on files of a resonator whose values are known, and on files that are no ring-down."""
+
+import json
+
+import numpy as np
+import pytest
+
+from studies.cli import main
+from studies.instrument.card import load_card
+from tests.compensation.two_oscillators import Gyro, noisy
+
+GYRO = Gyro(4599.75, 4599.63, 9.0e5, 1.1e6, np.radians(31), np.radians(70))
+TIME = np.arange(0.0, 120.0, 0.1)
+
+
+def write(path, columns, comments=()):
+    lines = [*(f"# {one}" for one in comments), ",".join(columns)]
+    lines += [",".join(f"{value:.9g}" for value in row) for row in zip(*columns.values(), strict=True)]
+    path.write_text("\n".join(lines) + "\n")
+    return str(path)
+
+
+@pytest.fixture
+def lock_in(tmp_path):
+    z = noisy(GYRO.envelope(TIME, 4599.7, [1.0, 0.8j]), 0.003, np.random.default_rng(1))
+    columns = {"time_s": TIME}
+    for part, channel in zip(("cos", "sin"), z, strict=True):
+        columns[f"amplitude_{part}_V"], columns[f"phase_{part}_deg"] = np.abs(channel), np.degrees(np.angle(channel))
+    return write(tmp_path / "decay.csv", columns, ["reference_frequency_Hz: 4599.7"])
+
+
+def test_a_lock_in_file_gives_split_axes_and_q_and_a_card_that_has_them(lock_in, tmp_path, capsys):
+    card, page = tmp_path / "measured.toml", tmp_path / "page.html"
+    words = ["fit", "ringdown", lock_in, "--card", "free-dome", "--save", str(card), "--report", str(page), "--json"]
+    assert main(words) == 0
+    (decay,) = json.loads(capsys.readouterr().out)["decays"]
+    found = {row["name"]: row for row in decay["estimates"]}
+    truth = {
+        "split_Hz": 0.12,
+        "frequency_axis_deg": 31.0,
+        "damping_axis_deg": 70.0,
+        "inverse_q": (1 / 9e5 + 1 / 1.1e6) / 2,
+    }
+    for name, value in truth.items():
+        assert abs(found[name]["value"] - value) < 4 * found[name]["sd"], name
+    assert found["split_Hz"]["sd"] < 1e-4
+    split = load_card(str(card)).content["imperfection"]["split"]
+    assert split["split_Hz"] == pytest.approx(0.12, abs=1e-3)
+    assert split["slow_axis_deg"] == pytest.approx(76.0, abs=0.5)
+    assert "Axis of the upper mode".lower() in page.read_text().lower()
+
+
+def test_raw_samples_and_their_alias(tmp_path, capsys):
+    time = np.arange(40_000) / 16_000
+    gyro = Gyro(4600.0, 4598.0, 8e3, 8e3, 0.2, 0.2)
+    x = gyro.samples(time, [1.0, 1.0]) + 0.01 * np.random.default_rng(2).standard_normal((2, time.size))
+    good = write(tmp_path / "raw.csv", {"time_s": time, "pickoff_cos_V": x[0], "pickoff_sin_V": x[1]})
+    assert main(["fit", "ringdown", good, "--card", "free-dome", "--json"]) == 0
+    (decay,) = json.loads(capsys.readouterr().out)["decays"]
+    found = {row["name"]: row["value"] for row in decay["estimates"]}
+    assert found["split_Hz"] == pytest.approx(2.0, rel=0.01)
+    assert found["q_1"] == pytest.approx(8e3, rel=0.01)
+    slow = write(tmp_path / "slow.csv", {"time_s": time[::4], "pickoff_cos_V": x[0, ::4]})
+    assert main(["fit", "ringdown", slow, "--card", "free-dome"]) == 2
+    said = capsys.readouterr().err
+    assert "alias" in said
+    assert "slow.csv" in said
+
+
+@pytest.mark.parametrize(
+    ("columns", "said"),
+    [
+        ({"time_s": TIME}, "only time_s"),
+        ({"time_s": TIME, "amplitude_cos_V": np.exp(-TIME)}, "belong together"),
+        ({"time_s": TIME[::-1], "power_dBm": -TIME}, "does not increase"),
+        ({"time_s": TIME, "power_dBm": 0 * TIME + np.sin(TIME)}, "nothing decays"),
+        ({"time_s": TIME[:10], "power_dBm": -TIME[:10]}, "32 rows"),
+        ({"time_s": TIME, "voltage": TIME}, "voltage"),
+    ],
+)
+def test_what_is_no_ring_down_is_refused_with_its_file(tmp_path, capsys, columns, said):
+    path = write(tmp_path / "x.csv", columns)
+    assert main(["fit", "ringdown", path]) == 2
+    err = capsys.readouterr().err
+    assert said in err
+    assert "x.csv" in err
+
+
+def test_decays_over_pressure_give_the_gas_law(tmp_path, capsys):
+    """1/Q = 1e-7 + 5e-5 p planted in ten traces of power."""
+    random = np.random.default_rng(3)
+    paths = []
+    for k, p in enumerate(np.geomspace(1e-5, 2e-2, 10)):
+        rate = np.pi * 2e5 * (1e-7 + 5e-5 * p)
+        t = np.linspace(0, 5 / rate, 2000)
+        power = 20 * np.log10(np.abs(noisy(np.exp(-rate * t) + 0j, 0.01, random)))
+        comments = [f"pressure_Pa: {p:.6g}", "reference_frequency_Hz: 2e5"]
+        paths.append(write(tmp_path / f"p{k}.csv", {"time_s": t, "power_dBm": power}, comments))
+    assert main(["fit", "ringdown", *paths, "--json"]) == 0
+    gas = json.loads(capsys.readouterr().out)["gas"]
+    assert gas["inverse_q0"] == pytest.approx(1e-7, rel=0.03)
+    assert gas["slope_per_Pa"] == pytest.approx(5e-5, rel=0.03)
