@@ -5,9 +5,11 @@ import shlex
 import shutil
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from studies.cli import main
+from tests.compensation.two_oscillators import Gyro, noisy
 
 ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -20,6 +22,19 @@ LOGGER = (
 )
 
 
+def _decay():
+    """A lock-in's record of a decay with a split of 0.12 Hz."""
+    time = np.arange(0.0, 60.0, 0.1)
+    z = noisy(
+        Gyro(4599.75, 4599.63, 9e5, 1.1e6, 0.5, 1.2).envelope(time, 4599.7, [1.0, 0.8j]),
+        0.003,
+        np.random.default_rng(1),
+    )
+    columns = [time, *(part for channel in z for part in (np.abs(channel), np.degrees(np.angle(channel))))]
+    rows = "\n".join(",".join(f"{value:.9g}" for value in row) for row in zip(*columns, strict=True))
+    return f"# reference_frequency_Hz: 4599.7\ntime_s,amplitude_cos_V,phase_cos_deg,amplitude_sin_V,phase_sin_deg\n{rows}\n"
+
+
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     """A working folder as the README's reader has it: the card saved, a logger's file at hand."""
@@ -27,6 +42,7 @@ def folder(tmp_path_factory):
     (card,) = (text for kind, text in BLOCKS if kind == "toml")
     (made / "my-gyro.toml").write_text(card, encoding="utf-8")
     (made / "logger.csv").write_text(LOGGER, encoding="utf-8")
+    (made / "decay.csv").write_text(_decay(), encoding="utf-8")
     shutil.copytree(ROOT / "studies" / "papers", made / "studies" / "papers")
     return made
 

@@ -37,7 +37,7 @@ QUANTITIES = {
 ESTIMATE = (
     Column("quantity", "quantity"),
     Column("value", "value", error="sd"),
-    Column("low", "90 % interval", interval=("low", "high"), digits=9),
+    Column("low", "90 % interval", interval=("low", "high"), error="sd"),
 )
 DECAY = (
     Column("file", "file"),

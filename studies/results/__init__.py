@@ -36,7 +36,7 @@ class Column:
     error : str
         The key of its standard error: the value is written as far as the error's second digit, with ± and the error.
     interval : (str, str)
-        Keys of the ends of its interval, shown as "low … high" instead of the value.
+        Keys of the ends of its interval, shown as "low … high" instead of the value; with `error` to its second digit too.
     scale : float
         What the row has times this is shown, for example 1e6 for ppm.
     """
@@ -58,7 +58,11 @@ class Column:
     def write(self, row: Payload) -> str:
         """Return the cell of a row: here a number becomes text."""
         if self.interval is not None:
-            low, high = (self._number(find(row, key)) for key in self.interval)
+            error = find(row, self.error) if self.error else None
+            ends = [find(row, key) for key in self.interval]
+            low, high = (
+                to_error(end * self.scale, error * self.scale)[0] if error else self._number(end) for end in ends
+            )
             return f"{low} … {high}" if low else ""
         value = find(row, self.key)
         error = find(row, self.error) if self.error else None

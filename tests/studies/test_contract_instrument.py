@@ -56,6 +56,7 @@ COMMANDS = {
     "plan": ["diagnose", "--plan", "step 20 -10 5h", "--card", "CARD"],
     "fit thermal": ["fit", "thermal", "RUN", "--card", "CARD"],
     "fit whole-angle": ["fit", "whole-angle", "RUN", "--card", "CARD"],
+    "fit ringdown": ["fit", "ringdown", "RUN", "--card", "CARD"],
     "acceptance": ["acceptance", "CARD", "RUN"],
     "calibrate": ["calibrate", "CARD", "RUN"],
     "electrodes": ["electrodes", "CARD"],
