@@ -1,6 +1,6 @@
 from .errors import InputError
 from .instrument.card import Instrument, load_card, save_card
-from .loss import LossModel, loss_model
+from .loss.model import LossModel, loss_model
 from .models import read_model, write_model
 from .record import Record, read_record, write_record
 from .sweeps.run import run_study

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
 def describe_films(found: "list[Mode]", instrument: "Instrument") -> "dict[int, list[dict[str, Any]]]":
     """Every film and its shift in ppm, null where its numbers are not known, by the identity of the mode."""
-    from studies.films import film_shifts
+    from studies.loss.films import film_shifts
 
     shifts = {id(m): film_shifts(instrument, m) for m in found}
     return {

@@ -67,10 +67,10 @@ def loop(
 
     from shell.constants import zero_Celsius
     from studies.cli.output import print_table, say
-    from studies.damping_law import settled_loss
     from studies.errors import InputError
     from studies.instrument.card import load_card
     from studies.law import law_of
+    from studies.loss.damping_law import settled_loss
     from studies.simulation.drive import MOST_ROWS
     from studies.simulation.loop import require_loop
     from studies.simulation.loop_study import study_loops
@@ -183,7 +183,7 @@ def _run(
 
     from shell.constants import zero_Celsius
     from studies.cli.output import say
-    from studies.damping_law import damping_law
+    from studies.loss.damping_law import damping_law
     from studies.record import Record, write_record
     from studies.simulation.chamber import load_profile
     from studies.simulation.loop import columns_of, run_loops, without_loop

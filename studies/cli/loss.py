@@ -15,8 +15,8 @@ from studies.results import Chapter, Column, Facts, Figure, Result, Sentence, Ta
 
 if TYPE_CHECKING:
     from shell.damping.budget import Budget, LossPart
-    from studies.loss import LossModel
-    from studies.loss_account import DampingAround, StatedLoss
+    from studies.loss.account import DampingAround, StatedLoss
+    from studies.loss.model import LossModel
 
 WALL = (
     "The cost of a surface treatment depends on its place: a damaged layer or a film dissipates in proportion to the energy, heat in"
@@ -64,8 +64,8 @@ def loss(
     import numpy as np
 
     from studies.instrument.card import load_card
-    from studies.loss import loss_model
-    from studies.loss_account import damping_around, stated_loss
+    from studies.loss.account import damping_around, stated_loss
+    from studies.loss.model import loss_model
 
     temperatures = lay_temperatures(from_degC, to_degC, step)
     instrument = load_card(card)

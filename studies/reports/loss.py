@@ -11,8 +11,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from shell.damping.budget import Budget, LossPart
-    from studies.loss import LossModel
-    from studies.loss_account import StatedLoss
+    from studies.loss.account import StatedLoss
+    from studies.loss.model import LossModel
 
 COLOURS = (style.BLUE, style.VERMILION, style.GREEN, style.ORANGE, style.PURPLE, style.SKY, style.YELLOW)
 DASHES = ("-", "--", ":")

@@ -24,8 +24,8 @@ from thermal.meridian import cell_names, energy_weights
 
 if TYPE_CHECKING:
     from shell.law import FrequencyLaw
-    from studies.damping_law import DampingLaw
     from studies.instrument.card import Instrument
+    from studies.loss.damping_law import DampingLaw
 
 Array = NDArray[np.float64]
 

@@ -9,7 +9,7 @@ from collections.abc import Callable
 import numpy as np
 
 from studies.instrument.card import load_card
-from studies.loss import loss_model
+from studies.loss.model import loss_model
 
 PARTS = {
     "pressure_Pa": 1e-3,

@@ -8,7 +8,7 @@ import tomli_w
 
 from studies.cli import main
 from studies.instrument.card import build_instrument, load_card, shipped_cards
-from studies.loss import loss_model
+from studies.loss.model import loss_model
 
 DOME = {
     "schema": "hrg.card/1",

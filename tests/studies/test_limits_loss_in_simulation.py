@@ -5,10 +5,10 @@ import pytest
 import tomli_w
 
 from studies.cli import main
-from studies.damping_law import damping_law, settled_loss
 from studies.instrument.card import build_instrument
 from studies.instrument.tables.bias import Bias
-from studies.loss import loss_model
+from studies.loss.damping_law import damping_law, settled_loss
+from studies.loss.model import loss_model
 from studies.record import read_record
 from studies.simulation.virtual_gyro import simulate_run
 from thermal.profile import Profile

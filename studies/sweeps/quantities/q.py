@@ -1,6 +1,6 @@
 """Q of a mode from its loss budget, and the share that heat takes of its loss."""
 
-from studies.loss import loss_model
+from studies.loss.model import loss_model
 from studies.sweeps.case import Case, Options
 from studies.sweeps.quantity import HARMONIC, TEMPERATURE, THEORY, Column, Number, Quantity, mode_stem
 

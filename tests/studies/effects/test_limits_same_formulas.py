@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from compensation.cross_damping import evaluate_cross_damping, relate_cross_damping_to_rate_when_tuned, simulate_bias
-from studies.damping_law import damping_law
 from studies.effects import States, apply_effect
 from studies.instrument.card import load_card
+from studies.loss.damping_law import damping_law
 from studies.simulation.drive import Drive
 from studies.simulation.prediction import law_for, predict
 from studies.simulation.response import Temperatures, read_out

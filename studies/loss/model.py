@@ -1,4 +1,4 @@
-"""The loss budget of an instrument: from its card to the causes of loss of one solved mode."""
+"""Loss budget of an instrument: from its card to the causes of loss of one solved mode."""
 
 import cmath
 import math
@@ -8,7 +8,7 @@ from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 from studies.errors import InputError, naming
-from studies.films import film_numbers
+from studies.loss.films import film_losses
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -16,18 +16,13 @@ if TYPE_CHECKING:
     from shell.damping.anchor import Unbalance
     from shell.damping.anisotropy import Complex, Ripple
     from shell.damping.budget import Budget, LossCause, Vibration
-    from shell.damping.film import LossyFilm
     from shell.damping.heat import Heat
     from shell.elastic import Elastic
     from shell.levels import Theory
     from shell.modes import Mode
     from shell.resonator import Resonator
     from studies.instrument.card import Instrument
-    from studies.instrument.tables.loss_parts import FilmKeys, LossParts
-
-FILM_NUMBERS = ("youngs_modulus_GPa", "poisson_ratio", "loss")
-FILM_HEAT = ("expansion_per_K", "conductivity_W_per_m_K")
-FILM_CAPACITY = ("heat_capacity_J_per_kg_K", "density_kg_m3")
+    from studies.instrument.tables.loss_parts import LossParts
 
 
 @dataclass(frozen=True)
@@ -103,9 +98,10 @@ def loss_model(
         causes += _of_material(instrument, parts, spread, left_out)
         for number, keys in enumerate(parts.film):
             place = f"{instrument.path} [[loss.film]] number {number + 1}"
-            found, waves = _film(keys, vibration, heat, place, f"loss.film.{number}", spread)
-            if any(cause.name == found[0].name for cause in causes):
-                found, waves = _renamed(found, waves, number + 1)
+            found, waves = film_losses(keys, vibration, heat, place, f"loss.film.{number}", spread)
+            if any(cause.name == found[0].name for cause in causes):  # another film of the same material
+                found = [replace(cause, name=f"{cause.name} ({number + 1})") for cause in found]
+                waves = [replace(wave, part=f"{wave.part} ({number + 1})") for wave in waves]
             causes += found
             ripples += waves
         ripples += _surface_ripple(parts, vibration, causes)
@@ -190,52 +186,6 @@ def _of_material(
     return causes
 
 
-def _film(
-    keys: "FilmKeys",
-    vibration: "Vibration",
-    heat: "Callable[[float], Heat] | None",
-    where: str,
-    name: str,
-    spread: Mapping[str, float],
-) -> "tuple[list[LossCause], list[Ripple]]":
-    """A film's causes of loss, and how they vary around."""
-    from shell.damping.anisotropy import Ripple, film_weight
-    from shell.damping.budget import film_causes
-    from shell.damping.film import check_film, thickness_power
-    from shell.damping.sources import film_names, known_film
-
-    known = known_film(keys.material)
-    numbers = film_numbers(keys, (*FILM_NUMBERS, *FILM_HEAT, *FILM_CAPACITY))
-    missing = [key for key in FILM_NUMBERS if numbers[key] is None]
-    if missing:
-        listed = "" if known else f" (films of the table: {', '.join(film_names())})"
-        raise InputError(
-            f"{where}: no source states {' and '.join(missing)} of the film '{keys.material}'{listed}; add it."
-        )
-    with naming(where):
-        relative = (spread.get(f"{name}.thickness_nm", 0.0), spread.get(f"{name}.loss", 0.0))
-        film = _build_film(keys, numbers, known.get("heat_capacity_J_per_m3_K"))
-        check_film(film, vibration.thinnest)
-        causes = film_causes(keys.material, film, heat, relative, str(known.get("source", "given in the card")))
-        if keys.anisotropy is None:
-            return causes, []
-        angle = math.radians(keys.anisotropy_angle_deg)
-        waves = [Ripple(causes[0].name, keys.anisotropy, angle, film_weight(film, vibration.faces))]
-        if len(causes) > 1 and heat is not None:  # heat follows ε_s + ε_θ alone
-            T0 = vibration.reference
-            power = thickness_power(film, heat(T0), float(vibration.omega(T0)))
-            waves.append(Ripple(causes[1].name, keys.anisotropy, angle, power))
-        return causes, waves
-
-
-def _renamed(causes: "list[LossCause]", waves: "list[Ripple]", number: int) -> "tuple[list[LossCause], list[Ripple]]":
-    """Tell a second film of the same material apart by its number."""
-    return (
-        [replace(cause, name=f"{cause.name} ({number})") for cause in causes],
-        [replace(wave, part=f"{wave.part} ({number})") for wave in waves],
-    )
-
-
 def _surface_ripple(parts: "LossParts", vibration: "Vibration", causes: "Sequence[LossCause]") -> "list[Ripple]":
     from shell.damping.anisotropy import Ripple, surface_weight
 
@@ -259,28 +209,6 @@ def _unbalance(resonator: "Resonator", elastic: "Elastic") -> "Unbalance":
     from shell.damping.anchor import unbalance_loss
 
     return unbalance_loss(_solve(resonator, elastic, 2, "solid"), elastic)
-
-
-def _build_film(keys: "FilmKeys", numbers: Mapping[str, Any], capacity: float | None) -> "LossyFilm":
-    """`capacity` per volume (J/(m³ K)) counts where the card or the table has none per mass."""
-    from shell.damping.film import LossyFilm
-    from shell.damping.heat import Heat
-
-    heat = None
-    if all(numbers[key] is not None for key in FILM_CAPACITY):
-        capacity = numbers["density_kg_m3"] * numbers["heat_capacity_J_per_kg_K"]
-    if capacity is not None and all(numbers[key] is not None for key in FILM_HEAT):
-        heat = Heat(numbers["expansion_per_K"], capacity, numbers["conductivity_W_per_m_K"])
-    return LossyFilm(
-        1e-9 * keys.thickness_nm,
-        1e9 * numbers["youngs_modulus_GPa"],
-        numbers["poisson_ratio"],
-        numbers["loss"],
-        heat,
-        ("inner", "outer") if keys.face == "both" else (keys.face,),
-        (keys.from_position, keys.to_position),
-        keys.coverage,
-    )
 
 
 def _others(

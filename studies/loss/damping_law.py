@@ -5,7 +5,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from studies.loss import loss_model
+from studies.loss.model import loss_model
 
 if TYPE_CHECKING:
     import numpy as np

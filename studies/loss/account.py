@@ -12,7 +12,7 @@ from shell.damping.anisotropy import describe_wave
 if TYPE_CHECKING:
     from shell.damping.budget import Budget
     from studies.instrument.card import Instrument
-    from studies.loss import LossModel
+    from studies.loss.model import LossModel
 
 Array = NDArray[np.float64]
 

@@ -1,0 +1,143 @@
+"""Films of a card ([[loss.film]]): their numbers, their losses, and what each does to a frequency by its stiffness and mass."""
+
+import math
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from studies.errors import InputError, naming
+
+if TYPE_CHECKING:
+    from shell.damping.anisotropy import Ripple
+    from shell.damping.budget import LossCause, Vibration
+    from shell.damping.film import LossyFilm
+    from shell.damping.heat import Heat
+    from shell.modes import Mode
+    from shell.quadrature import Array
+    from studies.instrument.card import Instrument
+    from studies.instrument.tables.loss_parts import FilmKeys
+
+ELASTIC = ("youngs_modulus_GPa", "poisson_ratio", "density_kg_m3")
+LOSSY = ("youngs_modulus_GPa", "poisson_ratio", "loss")
+THERMAL = ("expansion_per_K", "conductivity_W_per_m_K")
+CAPACITY = ("heat_capacity_J_per_kg_K", "density_kg_m3")
+
+
+@dataclass(frozen=True)
+class FilmShift:
+    """What one film does to a mode: δf/f, or None with the keys that no source states of it."""
+
+    material: str
+    relative: float | None
+    missing: tuple[str, ...] = ()
+
+
+def film_numbers(keys: "FilmKeys", names: Iterable[str]) -> dict[str, Any]:
+    """Return the named numbers of a film, from the card or else from the table of films; None where neither has them."""
+    from shell.damping.sources import known_film
+
+    known = known_film(keys.material)
+    given = {name: getattr(keys, name) for name in names}
+    return {name: known.get(name) if value is None else value for name, value in given.items()}
+
+
+def film_shifts(instrument: "Instrument", mode: "Mode") -> tuple[FilmShift, ...]:
+    """Return what every film of the card does to a mode, to first order in its thickness.
+
+    Raises
+    ------
+    ShellError
+        A film is too thick for that.
+    """
+    films = instrument.part("loss", "loss_parts").film
+    if not films:
+        return ()
+    from shell.elastic import Elastic
+    from shell.film import Film, film_shift
+
+    found = []
+    for keys in films:
+        numbers = film_numbers(keys, ELASTIC)
+        missing = tuple(name for name, value in numbers.items() if value is None)
+        relative = None
+        if not missing:
+            E, nu, rho = numbers.values()
+            film = Film(Elastic(1e9 * E, nu, rho), partial(_thickness, keys), keys.face)
+            relative = film_shift(mode, film)
+        found.append(FilmShift(keys.material, relative, missing))
+    return tuple(found)
+
+
+def film_losses(
+    keys: "FilmKeys",
+    vibration: "Vibration",
+    heat: "Callable[[float], Heat] | None",
+    where: str,
+    name: str,
+    spread: Mapping[str, float],
+) -> "tuple[list[LossCause], list[Ripple]]":
+    """Return a film's causes of loss, and how they vary around.
+
+    Raises
+    ------
+    InputError
+        No source states a number of the film; or it is too thick.
+    """
+    from shell.damping.anisotropy import Ripple, film_weight
+    from shell.damping.budget import film_causes
+    from shell.damping.film import check_film, thickness_power
+    from shell.damping.sources import film_names, known_film
+
+    known = known_film(keys.material)
+    numbers = film_numbers(keys, (*LOSSY, *THERMAL, *CAPACITY))
+    missing = [key for key in LOSSY if numbers[key] is None]
+    if missing:
+        listed = "" if known else f" (films of the table: {', '.join(film_names())})"
+        raise InputError(
+            f"{where}: no source states {' and '.join(missing)} of the film '{keys.material}'{listed}; add it."
+        )
+    with naming(where):
+        relative = (spread.get(f"{name}.thickness_nm", 0.0), spread.get(f"{name}.loss", 0.0))
+        film = _build_film(keys, numbers, known.get("heat_capacity_J_per_m3_K"))
+        check_film(film, vibration.thinnest)
+        causes = film_causes(keys.material, film, heat, relative, str(known.get("source", "given in the card")))
+        if keys.anisotropy is None:
+            return causes, []
+        angle = math.radians(keys.anisotropy_angle_deg)
+        waves = [Ripple(causes[0].name, keys.anisotropy, angle, film_weight(film, vibration.faces))]
+        if len(causes) > 1 and heat is not None:  # heat follows ε_s + ε_θ alone
+            T0 = vibration.reference
+            power = thickness_power(film, heat(T0), float(vibration.omega(T0)))
+            waves.append(Ripple(causes[1].name, keys.anisotropy, angle, power))
+        return causes, waves
+
+
+def _build_film(keys: "FilmKeys", numbers: Mapping[str, Any], capacity: float | None) -> "LossyFilm":
+    """`capacity` per volume (J/(m³ K)) counts where the card or the table has none per mass."""
+    from shell.damping.film import LossyFilm
+    from shell.damping.heat import Heat
+
+    heat = None
+    if all(numbers[key] is not None for key in CAPACITY):
+        capacity = numbers["density_kg_m3"] * numbers["heat_capacity_J_per_kg_K"]
+    if capacity is not None and all(numbers[key] is not None for key in THERMAL):
+        heat = Heat(numbers["expansion_per_K"], capacity, numbers["conductivity_W_per_m_K"])
+    return LossyFilm(
+        1e-9 * keys.thickness_nm,
+        1e9 * numbers["youngs_modulus_GPa"],
+        numbers["poisson_ratio"],
+        numbers["loss"],
+        heat,
+        ("inner", "outer") if keys.face == "both" else (keys.face,),
+        (keys.from_position, keys.to_position),
+        keys.coverage,
+    )
+
+
+def _thickness(keys: "FilmKeys", position: "Array") -> "Array":
+    """Mean thickness, m, where a pattern covers a share of the film's part of the meridian."""
+    covered = (position >= keys.from_position) & (position <= keys.to_position)
+    return np.asarray(1e-9 * keys.thickness_nm * keys.coverage * covered)
