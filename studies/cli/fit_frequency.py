@@ -1,16 +1,29 @@
 """`hrg fit frequency`: f(T) and its inverse from a steady-state table, or from the settled parts of records.
 
-With --json one object, schema `hrg.fit-frequency/1`; from records it has besides `soaks`: `[{record, start_s, end_s,
-temperature_degC, frequency_Hz, error_Hz, left_K, extrapolated_K}]`, `left_K` what may be left of the change, `extrapolated_K` by how
-much the end of a hold was extrapolated along its exponential (0 where it had settled), and `time_constant_s` of the slowest.
+With --json one object, schema `hrg.fit-frequency/1`; from records also `soaks`: `[{record, start_s, end_s, temperature_degC,
+frequency_Hz, error_Hz, left_K, extrapolated_K}]` and `time_constant_s`. `left_K` is the settling error; `extrapolated_K` is the
+distance from the last reading to the settled state of a hold that was extrapolated along its exponential (0 otherwise).
 """
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from studies.cli.output import Answer, answers
+from studies.cli.output import answers
+from studies.results import Chapter, Column, Result, Sentence, Table
 
 if TYPE_CHECKING:
+    from studies.cli.arguments import Array
+    from studies.models import ModelSource
     from studies.settled import Soak
+
+SOAKS = (
+    Column("record", "Record"),
+    Column("start_s", "From", "s", ".0f"),
+    Column("end_s", "To", "s", ".0f"),
+    Column("temperature_degC", "Temperature", "°C", ".3f"),
+    Column("frequency_Hz", "Frequency", "Hz", error="error_Hz"),
+    Column("left_K", "Settling error", "K", digits=2),
+    Column("extrapolated_K", "Extrapolated by", "K", digits=2),
+)
 
 
 @answers("hrg.fit-frequency/1")
@@ -21,91 +34,49 @@ def fit_frequency(
     reference_temperature: float = 0.0,
     resolution: float | None = None,
     save: str | None = None,
-    report: str | None = None,
     time_constant: float = 3000.0,
     left: float = 0.05,
-) -> Answer:
-    """Fit the frequency over temperature by a polynomial and invert it (HRG paper, equations 16 to 18, Table 2).
+) -> Result:
+    """Fit a polynomial to frequency over temperature and invert it (HRG paper, equations 16 to 18, Table 2).
 
     Parameters
     ----------
     table : str
-        A CSV file with the columns temperature_degC,frequency_Hz; or a record, whose settled parts (soaks) are found and become
-        such a table. A hold that ends a little before it has settled is extrapolated along its own exponential.
+        A CSV file with the columns temperature_degC,frequency_Hz, or a record. The settled parts (soaks) of a record become
+        the points of the fit; a hold that ends shortly before it settles is extrapolated along its exponential.
     more : str
-        Further records of the same device.
+        More records of the same gyro.
     time_constant : float
-        Slowest time constant of the gyro in s, from which follows how settled a record is; hrg fit thermal measures it. A longer
-        one that the records show takes its place.
+        Slowest time constant of the gyro in s, used to judge whether a record has settled; hrg fit thermal measures it. If the
+        records show a longer one, that one is used.
     left : float
-        Departure from the settled temperature, in K, within which a record counts as settled.
+        Largest remaining temperature change, in K, that counts as settled.
     order : int
-        Order of the polynomial; the paper takes 3.
+        Order of the polynomial; the paper uses 3.
     reference_temperature : float
-        Temperature T0 in °C about which the coefficients are given.
+        Temperature T0 in °C about which the polynomial is expanded.
     resolution : float
-        Step of the frequency readings in Hz; by default the last digit that stands in the file.
+        Resolution of the frequency readings in Hz; by default the last digit in the file.
     save : str
-        Write the model (TOML), for hrg compensate.
-    report : str
-        Write a page (HTML).
+        Write the model (TOML) for hrg compensate.
     """
-    from studies.cli.output import print_table, say
+    from studies.cli.output import say
     from studies.errors import naming
-    from studies.files.columns import read_header
-    from studies.files.writing import write_text
+    from studies.models import write_model
+    from studies.models.kinds.frequency import save_frequency
     from studies.papers.hrg import study_table
-    from studies.record import read_frequency_table, reading_resolution
-    from studies.reports import frequency as page
+    from studies.reports import frequency as parts
 
-    soaks: tuple[Soak, ...] = ()
-    shown = time_constant
-    if more or "time_s" in read_header(table):
-        from studies.plausible import records_of_one_gyro
-        from studies.record import read_record
-        from studies.settled import advise_hold, find_soaks, settled_table
-
-        records = records_of_one_gyro([read_record(path) for path in (table, *more)], say)
-        soaks = find_soaks(records, time_constant, left)
-        T, f, step = settled_table(soaks, table, advise_hold(records, time_constant, left) if len(soaks) < 2 else "")
-        sha256 = records[0].sha256
-        shown = max(soak.time_constant for soak in soaks)
-        if shown > time_constant:
-            say(
-                f"the records show a time constant of {shown / 60:.0f} min; it takes the place of {time_constant / 60:.0f} min."
-            )
-        for soak in soaks:
-            what = "extrapolated" if soak.extrapolated_K else "settled"
-            how = (
-                f"{soak.extrapolated_K:.2g} K beyond its last reading, with a time constant of {soak.time_constant / 60:.0f} min"
-                if soak.extrapolated_K
-                else f"at most {soak.left_K:.2g} K left to settle"
-            )
-            say(
-                f"{what}: {soak.path}, {soak.start:.0f} to {soak.end:.0f} s: {soak.temperature_degC:.3f} °C,"
-                f" {soak.frequency_Hz:.5f} Hz ± {soak.error_Hz:.1g}; {how}."
-            )
-    else:
-        data = read_frequency_table(table)
-        T, f, sha256 = data.values["temperature_degC"], data.values["frequency_Hz"], data.sha256
-        step = reading_resolution(f)
-    step = resolution if resolution is not None else step
+    T, f, step, source, soaks = _read_points((table, *more), time_constant, left)
     with naming(table):
-        study = study_table(T, f, order, reference_temperature, step)
-    if save is not None:
-        from pathlib import Path
-
-        from studies.models import ModelSource, write_model
-        from studies.models.kinds.frequency import save_frequency
-
-        source = ModelSource(Path(table).name, sha256, len(f))
-        write_model(save_frequency(study.fit, (source,), "hrg-workbench, hrg fit frequency"), save)
-        say(f"model: {save}")
-    if report is not None:
-        write_text(report, page.frequency_page(study, table))
-        say(f"report: {report}")
+        study = study_table(T, f, order, reference_temperature, step if resolution is None else resolution)
     fit = study.fit
-    yield {
+    if save is not None:
+        write_model(save_frequency(fit, (source,), "hrg-workbench, hrg fit frequency"), save)
+        say(f"model: {save}")
+    rows = [_describe(soak) for soak in soaks]
+    slowest = max((soak.time_constant for soak in soaks), default=0.0)
+    payload = {
         "schema": "hrg.fit-frequency/1",
         "table": table,
         "order": fit.order,
@@ -118,14 +89,59 @@ def fit_frequency(
         "calculated_degC": study.calculated_degC,
         "error_degC": study.error_degC,
         "recommended_order": study.orders.recommended,
-        **({"soaks": [_describe(soak) for soak in soaks], "time_constant_s": shown} if soaks else {}),
+        **({"soaks": rows, "time_constant_s": slowest} if soaks else {}),
     }
-    for block in (page.coefficients_table(study), page.inverse_table(study), page.order_table(study)):
-        print_table(block.caption, block.columns, block.rows, block.note)
-    print(page.order_sentence(study))
+    low, high = fit.temperature_range_degC
+    figures = [parts.fit_figure(study), parts.error_figure(study)]
+    note = f"Judged with a time constant of {slowest / 60:.0f} min."
+    return Result(
+        payload,
+        "Frequency over temperature",
+        f"{len(f)} settled points of {table} from {low:g} to {high:g} °C, fitted with a {parts.name_order(fit.order)}.",
+        [
+            parts.facts(study),
+            Sentence(parts.order_sentence(study)),
+            Chapter("Settled parts", [Table("Settled parts of the records", rows, SOAKS, note)]),
+            Chapter("Fit and inverse", [parts.coefficients_table(study), parts.inverse_table(study), *figures]),
+            Chapter("Order of the polynomial", parts.order_parts(study)),
+        ],
+        sources=parts.SOURCES,
+    )
 
 
-def _describe(soak: "Soak") -> dict[str, str | float]:
+def _read_points(
+    paths: tuple[str, ...], time_constant: float, left: float
+) -> "tuple[Array, Array, float, ModelSource, tuple[Soak, ...]]":
+    """Return temperatures (°C), frequencies (Hz), their resolution (Hz), their source, and the soaks where they are of records."""
+    from pathlib import Path
+
+    from studies.cli.output import say
+    from studies.files.columns import read_header
+    from studies.models import ModelSource
+    from studies.plausible import records_of_one_gyro
+    from studies.record import read_frequency_table, read_record, reading_resolution
+    from studies.settled import advise_hold, find_soaks, settled_table
+
+    first = paths[0]
+    soaks: tuple[Soak, ...] = ()
+    if len(paths) == 1 and "time_s" not in read_header(first):
+        data = read_frequency_table(first)
+        T, f, sha256 = data.values["temperature_degC"], data.values["frequency_Hz"], data.sha256
+        step = reading_resolution(f)
+    else:
+        records = records_of_one_gyro([read_record(path) for path in paths], say)
+        soaks = find_soaks(records, time_constant, left)
+        T, f, step = settled_table(soaks, first, advise_hold(records, time_constant, left) if len(soaks) < 2 else "")
+        sha256 = records[0].sha256
+        shown = max(soak.time_constant for soak in soaks)
+        if shown > time_constant:
+            say(
+                f"the records show a time constant of {shown / 60:.0f} min, used instead of {time_constant / 60:.0f} min."
+            )
+    return T, f, step, ModelSource(Path(first).name, sha256, len(f)), soaks
+
+
+def _describe(soak: "Soak") -> dict[str, Any]:
     return {
         "record": soak.path,
         "start_s": soak.start,

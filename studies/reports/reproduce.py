@@ -14,10 +14,11 @@ from studies.reports import gyro_papers, style
 from studies.reports.bias_twin import twin_chapters
 from studies.reports.diagnosis import headline
 from studies.reports.diagnosis_table import table_chapters
-from studies.reports.frequency import coefficients_table, error_figure, fit_figure, order_chapter
+from studies.reports.frequency import coefficients_table, error_figure, fit_figure, order_parts, order_sentence
 from studies.reports.page import Block, Chapter, Facts, Picture, Table, Text, draw, render_page
 from studies.reports.settling import settling_chapter
 from studies.reports.theories import theories_chapter
+from studies.results.page import make_blocks
 
 if TYPE_CHECKING:
     from studies.diagnosis.table import TableDiagnosis
@@ -58,9 +59,11 @@ def reproduce_page(parts: "Reproduction", mode: Sequence[Block]) -> str:
     chapters = [
         Chapter("In short", [_facts(parts), *_short(parts)]),
         _first_diagnosis(parts),
-        Chapter(figure_4, [_table1(study), coefficients_table(study), fit_figure(study)]),
-        Chapter("Table 2 and figure 5(a): temperature from frequency", [_table2(study), error_figure(study)]),
-        order_chapter(study),
+        Chapter(figure_4, [_table1(study), *make_blocks(coefficients_table(study), fit_figure(study))]),
+        Chapter(
+            "Table 2 and figure 5(a): temperature from frequency", [_table2(study), *make_blocks(error_figure(study))]
+        ),
+        Chapter("Order of the polynomial", [Text(order_sentence(study)), *make_blocks(*order_parts(study))]),
         Chapter("What first principles predict", _physics(physics, study)),
         Chapter("The mode", list(mode)),
         theories_chapter(),

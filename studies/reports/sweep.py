@@ -225,6 +225,7 @@ def _over_temperature(results: "Results") -> list[Block]:
     """Return the HRG paper's Table 1, its cubic and Table 2 where only the temperature was varied."""
     from studies.papers.hrg import study_table
     from studies.reports import frequency
+    from studies.results.page import make_blocks
 
     study = results.study
     columns = [column for column in study.columns if column.stem.startswith("frequency")]
@@ -233,8 +234,8 @@ def _over_temperature(results: "Results") -> list[Block]:
     T, f = results.parameter(TEMPERATURE).astype(float), results.column(columns[0].name)
     try:
         fit = study_table(T, f)
-        tables: list[Block] = [frequency.coefficients_table(fit), frequency.inverse_table(fit)]
-        return [*tables, frequency.fit_figure(fit), frequency.order_table(fit)]
+        tables = frequency.coefficients_table(fit), frequency.inverse_table(fit)
+        return list(make_blocks(*tables, frequency.fit_figure(fit), frequency.order_table(fit)))
     except UNUSABLE_INPUT as error:
         return [Text(f"No cubic over temperature: {error}", "warning")]
 

@@ -1,6 +1,6 @@
 """Results as a page: one self-contained HTML file."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 from studies.reports import page
 from studies.results import Blocks, Facts, Figure, Part, Result, Sentence, Table
@@ -8,10 +8,13 @@ from studies.results import Blocks, Facts, Figure, Part, Result, Sentence, Table
 
 def render_result(result: Result) -> str:
     """Return the page as HTML text."""
-    chapters = [
-        page.Chapter(chapter.title, [b for part in chapter.parts for b in _blocks(part)]) for chapter in result.chapters
-    ]
+    chapters = [page.Chapter(chapter.title, make_blocks(*chapter.parts)) for chapter in result.chapters]
     return page.render_page(result.title, result.lead, [one for one in chapters if one.blocks], result.sources)
+
+
+def make_blocks(*parts: Part) -> Sequence[page.Block]:
+    """Return parts as blocks of a page."""
+    return [block for part in parts for block in _blocks(part)]
 
 
 def _blocks(part: Part) -> Iterator[page.Block]:
