@@ -10,7 +10,8 @@ use: `rate`, `quadrature`, `drive`, `across`: rate and quadrature together where
 from typing import TYPE_CHECKING, Any
 
 from studies.cli.arguments import Seed
-from studies.cli.output import Answer, answers
+from studies.cli.output import answers
+from studies.results import Result
 
 if TYPE_CHECKING:
     from studies.record import Record
@@ -30,8 +31,7 @@ def loop(
     both_ways: bool = False,
     seed: Seed = 0,
     noiseless: bool = False,
-    report: str | None = None,
-) -> Answer:
+) -> Result:
     """Study the loops of a card: stability margins, bias and noise by source, start-up; with --out also a run through them.
 
     The card's table [loop] says how the gyro is read; loss, damping anisotropy and azimuth come from [loss] and [bias]. A
@@ -60,17 +60,16 @@ def loop(
         Seed of the noise.
     noiseless : bool
         Leave out noise.
-    report : str
-        Write a page (HTML).
     """
     import numpy as np
 
     from shell.constants import zero_Celsius
-    from studies.cli.output import print_table, say
+    from studies.cli.output import say
     from studies.errors import InputError
     from studies.instrument.card import load_card
     from studies.law import law_of
     from studies.loss.damping_law import settled_loss
+    from studies.reports.loop import loop_lead, loop_parts
     from studies.simulation.drive import MOST_ROWS
     from studies.simulation.loop import require_loop
     from studies.simulation.loop_study import study_loops
@@ -108,12 +107,6 @@ def loop(
             None if noiseless else seed,
         )
         say(f"record: {out}, {len(run)} rows")
-    if report is not None:
-        from studies.files.writing import write_text
-        from studies.reports.loop import loop_page
-
-        write_text(report, loop_page(study, T - zero_Celsius, run))
-        say(f"report: {report}")
     head = {
         "schema": "hrg.loop/1",
         "card": instrument.name,
@@ -123,14 +116,9 @@ def loop(
         "quality_factor": 1 / inverse_q,
         "bryan_factor": law.bryan_factor,
     }
-    yield {**head, **_payload(study), "out": out, "rows": None if run is None else len(run)}
-    from studies.reports.loop import margins_table, noise_table, range_table, sources_table
-
-    print(
-        f"Loops of {instrument.name}: {keys.mode}, {frequency:.2f} Hz, Q = {1 / inverse_q:.3g}, τ = {float(study.wave.tau):.4g} s"
-    )
-    for table in (margins_table(study), sources_table(study), noise_table(study), range_table(study)):
-        print_table(table.caption, table.columns, table.rows, table.note)
+    payload = {**head, **_payload(study), "out": out, "rows": None if run is None else len(run)}
+    lead, parts = loop_lead(study, T - zero_Celsius), loop_parts(study, payload, run)
+    return Result(payload, f"Loops of {instrument.name}", lead, parts)
 
 
 def _paper(name: str) -> str:

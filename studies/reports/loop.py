@@ -1,12 +1,14 @@
-"""The page of a card's loops: margins, answers to a step, start-up, where drift comes from, noise by source, and a run."""
+"""Tables and pictures of a card's loops: margins, step response, start-up, bias and noise by source, and a run."""
 
-from typing import TYPE_CHECKING
+from dataclasses import asdict
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from compensation.controllers import Loops
 from studies.reports import style
-from studies.reports.page import Block, Chapter, Facts, Picture, Table, Text, draw, render_page
+from studies.reports.digits import plain
+from studies.reports.page import Block, Picture, draw
+from studies.results import Blocks, Chapter, Column, Facts, Sentence, Table
 from studies.simulation.loop_study import answer_steps, bias_around, bias_slopes, noise_over
 
 if TYPE_CHECKING:
@@ -23,9 +25,7 @@ NOISE_NAMES = {
     "all": "all",
 }
 MODES = {"force-rebalance": "force-to-rebalance", "whole-angle": "whole-angle"}
-SHARED_NOTE = (
-    "± one standard deviation, from the card's uncertain values; all: with the axes and the split that they share."
-)
+SHARED_NOTE = "±: one standard deviation, from the card's uncertain values; all: with their common axes and split."
 LENGTHS = tuple(np.geomspace(0.01, 1e4, 25))
 COLUMNS = {
     # of a run, as far as it has them: label of the axis
@@ -35,108 +35,107 @@ COLUMNS = {
     "quadrature_V": "quadrature (V)",
     "frequency_Hz": "frequency (Hz)",
 }
+MARGINS = (
+    Column("loop", "loop"),
+    Column("paper", "name in the paper"),
+    Column("crossover_Hz", "gain crossover", "Hz", ".3g"),
+    Column("phase_margin_deg", "phase margin", "°", ".0f"),
+    Column("gain_margin_dB", "gain margin", "dB", ".1f"),
+    Column("reversal_Hz", "phase crossover", "Hz", ".3g"),
+)
+SOURCES = (Column("source", "source"), Column("deg_per_h", "bias", "°/h"), Column("sd_deg_per_h", "±", "°/h", digits=2))
+NOISE = (
+    Column("source", "source"),
+    Column("deg_per_h_over_1s", "over 1 s", "°/h", digits=3),
+    Column("deg_per_rt_h", "angle random walk", "°/√h", digits=3),
+)
+RANGES = (
+    Column("loop", "loop"),
+    Column("actuator", "actuator and range"),
+    Column("use", "in use", "%", digits=3, scale=100.0),
+)
+SLOPES = (
+    Column("key", "key of the card"),
+    Column("value", "value"),
+    Column("sd", "±", digits=3),
+    Column("slope", "°/h per unit", digits=3),
+    Column("effect", "effect", "°/h", digits=3),
+)
 SMALLEST = 1e-4  # of the largest effect on the bias: smaller ones are not listed
 MOST_POINTS = 3000  # drawn of a run; longer ones are averaged
 
 
-def loop_page(study: "LoopStudy", temperature_degC: float, run: "Record | None" = None) -> str:
-    """Return the page."""
+def loop_lead(study: "LoopStudy", temperature_degC: float) -> str:
+    """Return what the page is about."""
     mode = study.instrument.loop.mode if study.instrument.loop is not None else ""
-    lead = (
+    return (
         f"The loops that read {study.instrument.name} in {MODES[mode]} mode at {temperature_degC:g} °C: {study.frequency:.2f} Hz,"
-        f" Q = {_short(1 / study.inverse_q)}, the vibration decays with a time constant of {_short(1 / study.decay)} s."
+        f" Q = {plain(1 / study.inverse_q)}, decay time constant of the vibration {plain(1 / study.decay)} s."
     )
+
+
+def loop_parts(study: "LoopStudy", payload: dict[str, Any], run: "Record | None" = None) -> list[Chapter]:
+    """Return what people read of the loops, of which `payload` holds the numbers."""
+    keys, start = study.instrument.loop, study.start
+    begun = (
+        f"From rest with {keys.drive_headroom if keys is not None else 0.0:g} times the holding drive: locked after {start.locked:.3g} s,"
+        f" amplitude within 1 % after {start.ready:.4g} s."
+    )
+    noise = [row | {"source": NOISE_NAMES[row["source"]]} for row in payload["noise"]]
     chapters = [
-        Chapter("In short", [_facts(study), *_weakest(study)]),
-        Chapter("Where drift comes from", [sources_table(study), _around_figure(study), *_slopes(study)]),
-        Chapter("Noise of the rate", [noise_table(study), _noise_figure(study)]),
-        Chapter("Margins", [margins_table(study), _bode(study), range_table(study)]),
-        Chapter("Answer to a step", [_steps(study)]),
-        Chapter("Start-up", [_start(study)]),
-    ]
-    if run is not None:
-        chapters.append(Chapter("A run through the loops", _run(run)))
-    return render_page(f"Loops of {study.instrument.name}", lead, chapters)
+        Chapter("In short", [Facts(_facts(study)), *_weakest(study)]),
+        Chapter("Where drift comes from", [
+            Table("Bias by source, settled", payload["bias"], SOURCES, SHARED_NOTE),
+            Blocks(lambda: [_around_figure(study)]), *_slopes(study),
+        ]),
+        Chapter("Noise of the rate", [
+            Table("Noise of the rate by source", noise, NOISE, "°/√h from a mean over 100 s."), Blocks(lambda: [_noise_figure(study)]),
+        ]),
+        Chapter("Margins", [
+            Table("Margins", payload["margins"], MARGINS, begun), Blocks(lambda: [_bode(study)]),
+            Table("Range of the actuators in use", _ranges(study), RANGES),
+        ]),
+        Chapter("Step response", [Blocks(lambda: [_steps(study)])]),
+        Chapter("Start-up", [Blocks(lambda: [_start(study)])]),
+    ]  # fmt: skip
+    return [*chapters, *([Chapter("A run through the loops", [Blocks(lambda: _run(run))])] if run is not None else [])]
 
 
-def margins_table(study: "LoopStudy") -> Table:
-    """Return crossover and margins of each loop, and how a start goes."""
-    rows = [
-        [
-            m.loop,
-            Loops.PAPER[m.loop],
-            f"{m.crossover:.3g}",
-            f"{np.degrees(m.phase):.0f}",
-            f"{20 * np.log10(m.gain):.1f}",
-            f"{m.reversal:.3g}",
-        ]
-        for m in study.margins
-    ]
-    columns = ["loop", "paper", "gain 1 at Hz", "phase margin °", "gain margin dB", "turns over at Hz"]
-    keys = study.instrument.loop
-    headroom = keys.drive_headroom if keys is not None else 0.0
-    note = (
-        f"From rest with {headroom:g} times the holding drive: locked after {study.start.locked:.3g} s, amplitude within 1 % after"
-        f" {study.start.ready:.4g} s."
-    )
-    return Table("Margins", columns, rows, note)
-
-
-def sources_table(study: "LoopStudy") -> Table:
-    """Return the bias of each source at the card's azimuth."""
-    rows = [[one.name, f"{one.bias:.4g}", f"{one.sd:.2g}"] for one in study.sources]
-    return Table("Bias by source, settled", ["source", "°/h", "± °/h"], rows, SHARED_NOTE)
-
-
-def range_table(study: "LoopStudy") -> Table:
-    """Return the parts of the actuators' ranges that the settled loops use."""
+def _ranges(study: "LoopStudy") -> list[dict[str, Any]]:
+    """The parts of the actuators' ranges that the settled loops use."""
     keys, use = study.instrument.loop, study.use
     assert keys is not None
     stiff = keys.quadrature_control == "stiffness"
     force = f"force, {keys.rate_range_deg_per_s:g} °/s"
-    rows = [
-        ["rate" if keys.mode == "force-rebalance" else "self-precession", force, _percent(use.rate)],
-        ["quadrature", f"stiffness, {keys.quadrature_range_Hz:g} Hz" if stiff else force, _percent(use.quadrature)],
-        ["amplitude", f"drive, {keys.drive_headroom:g} times what holds it", _percent(use.drive)],
+    found = [
+        ("rate" if keys.mode == "force-rebalance" else "self-precession", force, use.rate),
+        ("quadrature", f"stiffness, {keys.quadrature_range_Hz:g} Hz" if stiff else force, use.quadrature),
+        *([] if stiff else [("rate and quadrature together", force, use.across)]),
+        ("amplitude", f"drive, {keys.drive_headroom:g} times the holding drive", use.drive),
     ]
-    if not stiff:
-        rows.insert(2, ["rate and quadrature together", force, _percent(use.across)])
-    return Table("Range of the actuators in use", ["loop", "actuator and range", "in use"], rows)
+    return [{"loop": loop, "actuator": actuator, "use": float(np.max(part))} for loop, actuator, part in found]
 
 
-def _percent(part: np.ndarray) -> str:
-    return f"{100 * float(np.max(part)):.3g} %"
-
-
-def noise_table(study: "LoopStudy") -> Table:
-    """Return the noise of each source."""
-    rows = [[NOISE_NAMES[name], f"{one:.3g}", f"{walk:.3g}"] for name, (one, walk) in study.noise.items()]
-    note = "°/√h from a mean over 100 s."
-    return Table("Noise of the rate by source", ["source", "°/h over 1 s", "°/√h"], rows, note)
-
-
-def _facts(study: "LoopStudy") -> Facts:
+def _facts(study: "LoopStudy") -> list[tuple[str, str, str]]:
     total = study.sources[-1]
     single = [(name, one) for name, (one, _) in study.noise.items() if name != "all"]
     loudest = NOISE_NAMES[max(single, key=lambda pair: pair[1])[0]] if single else "none"
     phase = min(study.margins, key=lambda m: m.phase)
     gain = min(study.margins, key=lambda m: m.gain)
     largest = max(study.sources[:-1], key=lambda one: one.sd)
-    return Facts(
-        [
-            ("Bias", f"{total.bias:.3g} ± {total.sd:.2g} °/h", f"most of the ±: {largest.name}"),
-            ("Angle random walk", f"{study.noise['all'][1]:.3g} °/√h", f"loudest over 1 s: {loudest}"),
-            (
-                "Least margins",
-                f"{np.degrees(phase.phase):.0f}°, {20 * np.log10(gain.gain):.0f} dB",
-                f"{phase.loop} loop" if phase.loop == gain.loop else f"{phase.loop} loop, {gain.loop} loop",
-            ),
-            ("Amplitude ready", f"{study.start.ready:.3g} s", f"phase locked after {study.start.locked:.2g} s"),
-        ]
-    )
+    return [
+        ("Bias", f"{plain(total.bias)} ± {plain(total.sd, 2)} °/h", f"largest contribution to the ±: {largest.name}"),
+        ("Angle random walk", f"{study.noise['all'][1]:.3g} °/√h", f"largest source over 1 s: {loudest}"),
+        (
+            "Smallest margins",
+            f"{np.degrees(phase.phase):.0f}°, {20 * np.log10(gain.gain):.0f} dB",
+            f"{phase.loop} loop" if phase.loop == gain.loop else f"{phase.loop} loop, {gain.loop} loop",
+        ),
+        ("Amplitude ready", f"{study.start.ready:.3g} s", f"phase locked after {study.start.locked:.2g} s"),
+    ]
 
 
-def _weakest(study: "LoopStudy") -> list[Text]:
+def _weakest(study: "LoopStudy") -> list[Sentence]:
     """What to attack first."""
     slopes = bias_slopes(study)
     if not slopes or slopes[0].effect == 0:
@@ -144,22 +143,22 @@ def _weakest(study: "LoopStudy") -> list[Text]:
     total, first = study.sources[-1].sd, slopes[0]
     share = (first.effect / total) ** 2 if total > 0 else 0.0
     return [
-        Text(
-            f"Attack first: `{first.key}`. What is not known of it (± {first.sd:.3g}) is worth {first.effect:.3g} °/h,"
-            f" {100 * share:.0f} % of the variance of the bias. A steady bias can be calibrated; what drifts by age or temperature"
-            " drifts by these slopes."
+        Sentence(
+            f"Attack first: {first.key}. Its uncertainty (± {first.sd:.3g}) contributes {first.effect:.3g} °/h,"
+            f" {100 * share:.0f} % of the variance of the bias. A steady bias can be calibrated; drift with age or temperature follows"
+            " these slopes."
         )
     ]
 
 
-def _slopes(study: "LoopStudy") -> list[Block]:
+def _slopes(study: "LoopStudy") -> list[Table]:
     slopes = bias_slopes(study)
-    found = [one for one in slopes if one.effect > SMALLEST * slopes[0].effect]
-    if not found:
-        return []
-    rows = [[one.key, f"{one.value:.4g}", f"{one.sd:.3g}", f"{one.slope:.3g}", f"{one.effect:.3g}"] for one in found]
-    columns = ["Value of the card", "Now", "±", "°/h per its unit", "Worth (°/h)"]
-    return [Table("What moves the bias, largest first", columns, rows, "The unit is that of the key's name.")]
+    rows = [asdict(one) | {"effect": one.effect} for one in slopes if one.effect > SMALLEST * slopes[0].effect]
+    return [
+        Table(
+            "Sensitivity of the bias, largest effect first", rows, SLOPES, "The unit is that of the key's name.", "page"
+        )
+    ]
 
 
 def _around_figure(study: "LoopStudy") -> Picture:
@@ -180,7 +179,7 @@ def _around_figure(study: "LoopStudy") -> Picture:
         axis.set_xlabel("azimuth of the wave (°)")
         axis.set_ylabel("bias (°/h)")
         axis.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), fontsize=9)
-        words = "The bias over the azimuth of the wave, by source: what goes when that error is mended."
+        words = "The bias over the azimuth of the wave, by source: the part that vanishes without that error."
         return draw(made, words, words)
 
 
@@ -235,7 +234,7 @@ def _bode(study: "LoopStudy") -> Picture:
         lower.set_ylabel("phase (°)")
         lower.set_xlabel("frequency (Hz)")
         upper.legend(fontsize=9)
-        words = "Open loops over frequency. Dots: gain 1, the phase margin is the way down to −180°; squares: where the phase passes −180°."
+        words = "Open loops over frequency. Dots: gain crossover, with the phase margin above −180°; squares: phase crossover."
         return draw(made, words, words)
 
 
@@ -245,10 +244,12 @@ def _steps(study: "LoopStudy") -> Picture:
             dash = ("-", "-", "--", ":")[k % 4]
             axis.semilogx(time[1:], answer[1:], dash, color=COLOURS[k], label=name)
         axis.axhline(1.0, color=style.BLACK, linewidth=0.8)
-        axis.set_xlabel("time after the jump (s)")
-        axis.set_ylabel("command, over what it comes to")
+        axis.set_xlabel("time after the step (s)")
+        axis.set_ylabel("command, over its final value")
         axis.legend(fontsize=9)
-        words = "What each loop commands after what it holds has jumped: rate, quadrature, frequency, drive of the amplitude."
+        words = (
+            "Command of each loop after a step of its disturbance: rate, quadrature, frequency, drive of the amplitude."
+        )
         return draw(made, words, words)
 
 
@@ -292,7 +293,3 @@ def _run(run: "Record") -> list[Block]:
         axes[-1, 0].set_xlabel("time (h)")
         words = f"The record {run.path}" + (f", means of {width} rows." if width > 1 else ".")
         return [draw(made, words, "The columns of the run over time.")]
-
-
-def _short(value: float) -> str:
-    return f"{value:.3g}".replace("e+0", "e").replace("e+", "e")
