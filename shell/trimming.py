@@ -1,6 +1,6 @@
 r"""Which masses to take off where, so that a split vanishes and the balance is kept.
 
-A mass μ_j taken off at the azimuth θ_j moves the wave of the split of harmonic n by μ_j w_n exp(2 i n θ_j), w_n > 0, and the
+A mass μ_j taken off at the azimuth θ_j moves the wave of the split of harmonic n by μ_j w_n exp(2 i n θ_j), and the
 harmonics of the mass around by μ_j exp(i k θ_j). The least mass that nulls the splits z_n is a linear programme,
 
     min Σ μ_j,   Σ μ_j w_nj exp(2 i n θ_j) = -φ z_n,   |u_k - Σ μ_j exp(i k θ_j)| <= |u_k|  (k = 1, 2, 3),   0 <= μ_j <= capacity,
@@ -22,7 +22,6 @@ from shell.quadrature import Array
 BALANCED = (1, 2, 3)  # harmonics of the mass that must not grow
 SURE = 2.0  # standard errors of the gain that a round leaves room for
 DIRECTIONS = 24  # sides of the polygon that stands for a circle
-MOST_ROUNDS = 6
 
 
 @dataclass(frozen=True)
@@ -80,7 +79,7 @@ class Sites:
     Attributes
     ----------
     azimuth : rad, (sites,). position : of the meridian, (sites,). capacity : most mass at each, kg, (sites,).
-    gain : w_n of each site per harmonic n, relative split per kg, > 0, n -> (sites,).
+    gain : w_n of each site per harmonic n, relative split per kg, of either sign, n -> (sites,).
     """
 
     azimuth: Array
@@ -125,17 +124,16 @@ class Round:
 
 @dataclass(frozen=True)
 class TrimPlan:
-    """Rounds of cuts; the first is to be made as it stands, those after it are what is expected before measuring anew."""
+    """One round of cuts. The next is planned from what is measured after it."""
 
     before: tuple[ExpectedSplit, ...]
-    rounds: tuple[Round, ...]
-    unbalance: Mapping[int, complex]
+    round: Round
     goal: float
 
     @property
-    def mass(self) -> float:
-        """All that is expected to be taken off, kg."""
-        return sum(one.mass for one in self.rounds)
+    def is_enough(self) -> bool:
+        """Whether the goal is expected to be met, in 95 of 100 cases."""
+        return all(state.most <= self.goal for state in self.round.after)
 
 
 def plan_trim(
@@ -147,7 +145,7 @@ def plan_trim(
     gain_error: float = 0.03,
     unbalance: Mapping[int, complex] | None = None,
 ) -> TrimPlan:
-    """Rounds of cuts that bring the splits below the goal.
+    """The next round of cuts, which brings the splits towards the goal and not beyond.
 
     Parameters
     ----------
@@ -167,41 +165,22 @@ def plan_trim(
         raise ShellError("the goal is a positive split in Hz.")
     known = dict(unbalance or {})
     before = tuple(ExpectedSplit(r.harmonic, r.frequency, r.wave, r.error) for r in readings)
-    states, spent, rounds = before, np.zeros(len(sites.azimuth)), []
-    reading_errors = {r.harmonic: r.error for r in readings}
-    for _ in range(MOST_ROUNDS):
-        share = _share(states, goal, removal_error, gain_error)
-        masses = _least_mass(states, sites, share, sites.capacity - spent, known)
-        spent = spent + masses
-        after = []
-        for state in states:
-            moves = masses * sites.gain[state.harmonic] * np.exp(2j * state.harmonic * sites.azimuth)
-            total = complex(moves.sum())
-            # what is left before it is measured: the reading, the error of each cut and that of all
-            spread = (
-                state.error**2 + removal_error**2 * float((abs(moves) ** 2).sum()) / 2 + (gain_error * abs(total)) ** 2
-            )
-            after.append(ExpectedSplit(state.harmonic, state.frequency, state.wave + total, sqrt(spread)))
-        known = {k: u - complex(masses @ np.exp(1j * k * sites.azimuth)) for k, u in known.items()}
-        cuts = tuple(
-            Cut(float(a), float(p), float(m))
-            for a, p, m in zip(sites.azimuth, sites.position, masses, strict=True)
-            if m > 1e-6 * masses.max()
-        )
-        rounds.append(Round(cuts, share, tuple(after), dict(known)))
-        if all(state.most <= goal for state in after):
-            break
-        # the next round starts from a new reading of what is expected to be left
-        states = tuple(ExpectedSplit(s.harmonic, s.frequency, _typical(s), reading_errors[s.harmonic]) for s in after)
-        if all(state.hertz < max(goal / 2, 2 * state.error * state.frequency) for state in states):
-            break
-    return TrimPlan(before, tuple(rounds), dict(unbalance or {}), goal)
-
-
-def _typical(state: ExpectedSplit) -> complex:
-    """A wave of the size that is to be expected after a round: its most probable value, grown by its error."""
-    size = sqrt(abs(state.wave) ** 2 + state.error**2)
-    return state.wave / abs(state.wave) * size if abs(state.wave) > 0 else complex(size)
+    share = _share(before, goal, removal_error, gain_error)
+    masses = _least_mass(before, sites, share, sites.capacity, known)
+    after = []
+    for state in before:
+        moves = masses * sites.gain[state.harmonic] * np.exp(2j * state.harmonic * sites.azimuth)
+        total = complex(moves.sum())
+        # what is left before it is measured: the reading, the error of each cut and that of all
+        spread = state.error**2 + removal_error**2 * float((abs(moves) ** 2).sum()) / 2 + (gain_error * abs(total)) ** 2
+        after.append(ExpectedSplit(state.harmonic, state.frequency, state.wave + total, sqrt(spread)))
+    known = {k: u - complex(masses @ np.exp(1j * k * sites.azimuth)) for k, u in known.items()}
+    cuts = tuple(
+        Cut(float(a), float(p), float(m))
+        for a, p, m in zip(sites.azimuth, sites.position, masses, strict=True)
+        if m > 1e-6 * masses.max()
+    )
+    return TrimPlan(before, Round(cuts, share, tuple(after), known), goal)
 
 
 def _share(states: Sequence[ExpectedSplit], goal: float, removal_error: float, gain_error: float) -> float:
@@ -219,7 +198,7 @@ def _least_mass(
     wanted: list[float] = []
     for state in states:
         gain = sites.gain[state.harmonic]
-        scale = float(gain.max())
+        scale = float(abs(gain).max())
         column = gain / scale * np.exp(2j * state.harmonic * sites.azimuth)
         rows += [column.real, column.imag]
         target = -share * state.wave / scale

@@ -1,14 +1,19 @@
-"""Trimming of a card's resonator: the sites that its rim or teeth offer, and a plan for measured splits."""
+"""Trimming of a card's resonator: the sites that its rim or teeth offer, and a plan for measured splits.
+
+What a groove does depends on its depth: the shape derivative holds for shallow, wide ones alone. So a plan is made, its cuts are
+solved (shell.groove), and made again with what they do, until the depth stays.
+"""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from math import pi
+from dataclasses import dataclass, replace
+from math import hypot, pi
 from typing import TYPE_CHECKING, Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from shell.errors import ShellError
+from shell.groove import Groove, GrooveSplit, solve_groove
 from shell.imperfection import Pair
 from shell.modes import solve_modes
 from shell.trimming import Sites, SplitReading, TrimPlan, plan_trim
@@ -24,16 +29,12 @@ CutKind: TypeAlias = Literal["mass", "edge", "inner", "outer"]
 
 
 @dataclass(frozen=True)
-class Groove:
-    """A cut: width along the circle and length along the meridian (m), and the share of the wall that it may take."""
+class Tool:
+    """What cuts: width along the circle and length along the meridian (m), and the share of the wall that it may take."""
 
     width: float = 0.5e-3
     length: float = 0.5e-3
     depth_limit: float = 0.3
-
-    def depth(self, mass: float, density: float) -> float:
-        """Depth of a cut that takes off a mass, m."""
-        return mass / (density * self.width * self.length)
 
 
 @dataclass(frozen=True)
@@ -45,7 +46,62 @@ class Teeth:
     limit: float
 
 
-GROOVE = Groove()
+@dataclass(frozen=True)
+class PlannedCut:
+    """A groove as it is planned at one position, and what it does.
+
+    groove : of the mean mass. splits : by harmonic n. first : relative split per kg by the shape derivative, by n.
+    scatter : relative, of the masses of the cuts there.
+    """
+
+    groove: Groove
+    splits: Mapping[int, GrooveSplit]
+    first: Mapping[int, float]
+    scatter: float
+
+    @property
+    def mass(self) -> float:
+        """What one cut removes, kg."""
+        return next(iter(self.splits.values())).mass
+
+    @property
+    def error(self) -> float:
+        """Relative standard error of what the cut does: of its relieved stress, and that it changes with the depth."""
+        return max(hypot(x.error, x.relief * self.scatter) / abs(x.wave) for x in self.splits.values())
+
+    def gain(self, harmonic: int) -> float:
+        """The change of the split over that by the shape derivative."""
+        split = self.splits[harmonic]
+        return split.wave / (split.mass * self.first[harmonic])
+
+    def depth(self, mass: float) -> float:
+        """Depth of a cut of some mass, m."""
+        return self.groove.depth * mass / self.mass
+
+    def check(self) -> None:
+        """Refuse a cut of which too little is known."""
+        if SURE * self.error > LEAST_KNOWN:
+            raise ShellError(
+                f"a cut {1e3 * self.groove.width:.3g} mm wide and {1e6 * self.groove.depth:.3g} µm deep here changes the split by "
+                f"{self.gain(next(iter(self.splits))):.2f} ± {100 * SURE * self.error:.0f} % of what a shallow one does: what its mass and the stress "
+                f"it relieves do nearly cancel. {WIDER}"
+            )
+
+
+@dataclass(frozen=True)
+class CardPlan:
+    """A plan and the grooves that it makes, by position (none for teeth and masses)."""
+
+    plan: TrimPlan
+    cuts: Mapping[float, PlannedCut]
+
+
+SURE = 1.645  # standard errors of a 90 % interval
+LEAST_KNOWN = 0.5  # half-width of that of the gain, relative, with which a cut is still planned
+SAME_DEPTH = 0.03
+MOST_PLANS = 8
+WIDER = "Make wider, shallower cuts (--width-mm), or use teeth."
+TOOL = Tool()
 MOST_TEETH = 1000
 NARROWEST = 1e-6  # m: no tool cuts a groove that is narrower
 
@@ -57,14 +113,14 @@ def rim_sites(
     axis: float,
     *,
     heights: Sequence[float] = (1.0,),
-    groove: Groove = GROOVE,
+    tool: Tool = TOOL,
     kind: CutKind = "mass",
 ) -> Sites:
     """Grooves side by side around the shell, one of them on the antinode at `axis` (rad), at positions of the meridian.
 
     Their number is a multiple of 4n for every harmonic, so that the antinodes of each are among them and balance each other.
     """
-    if not (groove.width >= NARROWEST and NARROWEST <= groove.length < np.inf and 0 < groove.depth_limit < 1):
+    if not (tool.width >= NARROWEST and NARROWEST <= tool.length < np.inf and 0 < tool.depth_limit < 1):
         raise InputError(
             f"a cut is at least {1e6 * NARROWEST:g} µm wide and long, and takes a share of the wall between 0 and 1."
         )
@@ -73,15 +129,17 @@ def rim_sites(
     for x in heights:
         place = resonator.at([x * resonator.length])
         circle = 2 * pi * float(place.r[0])
-        if not groove.width <= circle:
+        if not tool.width <= circle:
             raise InputError(
-                f"a cut of {1e3 * groove.width:g} mm is wider than the circle it lies on ({1e3 * circle:.3g} mm)."
+                f"a cut of {1e3 * tool.width:g} mm is wider than the circle it lies on ({1e3 * circle:.3g} mm)."
             )
-        room = int(circle / groove.width)
+        room = int(circle / tool.width)
         count = max(step, room // step * step)
         azimuth.append(axis + 2 * pi * np.arange(count) / count)
         position.append(np.full(count, x))
-        most = density * groove.width * groove.length * groove.depth_limit * float(place.thickness[0])
+        # through the wall off the edge, as long as the share of the wall is thick; else that share deep
+        across = float(place.thickness[0]) if kind == "edge" else tool.length
+        most = density * tool.width * across * tool.depth_limit * float(place.thickness[0])
         capacity.append(np.full(count, most * min(1.0, room / count)))
     around, along = np.concatenate(azimuth) % (2 * pi), np.concatenate(position)
     return Sites(around, along, np.concatenate(capacity), _gains(pairs, along, kind))
@@ -111,11 +169,6 @@ def _gains(pairs: Mapping[int, Pair], position: Array, kind: CutKind = "mass") -
     found = {}
     for n, pair in pairs.items():
         gain = {float(x): -_effect(pair, float(x), kind) for x in np.unique(position)}
-        weak = [x for x, value in gain.items() if not value > 0]
-        if weak:
-            raise ShellError(
-                f"material at position {weak[0]:.3g} does not lower the mode n = {n} with its antinode there: choose a place nearer the rim."
-            )
         found[n] = np.array([gain[float(x)] for x in position])
     return found
 
@@ -127,27 +180,34 @@ def plan_for_card(
     *,
     goal: float,
     heights: Sequence[float] = (1.0,),
-    groove: Groove = GROOVE,
+    tool: Tool = TOOL,
     kind: CutKind = "mass",
     teeth: Teeth | None = None,
     removal_error: float = 0.02,
     gain_error: float = 0.03,
     gain: float = 1.0,
     unbalance: Mapping[int, complex] | None = None,
-) -> tuple[TrimPlan, Sites]:
+) -> CardPlan:
     """A plan for splits measured on a card's resonator.
 
     Parameters
     ----------
     resonator, elastic : of the card at the temperature.
     measured : (harmonic, split in Hz, azimuth of the slow axis in rad, reading error in Hz), one for each harmonic.
-    goal : Hz. heights : positions of the cuts. groove, teeth : what is cut. removal_error, gain_error, unbalance : see `plan_trim`.
-    gain : effect of the last round over its prediction, which scales what a mass is taken to do.
+    goal : Hz. heights : positions of the cuts. tool, teeth : what is cut. removal_error, gain_error, unbalance : see `plan_trim`.
+    gain : effect of the last round over its prediction, of either sign, which scales what a cut is taken to do.
+
+    Raises
+    ------
+    ShellError
+        The sites cannot take off what is needed, or what the cuts do is not known well enough.
     """
     if not 0 < goal < np.inf:
         raise InputError("the goal is a positive split in Hz.")
-    if not 0 < gain < np.inf:
-        raise InputError("the gain is the measured change of the split over the predicted one, a positive number.")
+    if gain == 0 or not np.isfinite(gain):
+        raise InputError(
+            "the gain is the measured change of the split over the predicted one, a number of either sign, not 0."
+        )
     if not (0 <= removal_error < 1 and 0 <= gain_error < 1):
         raise InputError("the relative standard errors of the cuts lie in 0 ... 1 (0.02 is 2 %).")
     if not all(np.isfinite((split, axis)).all() and 0 <= error < np.inf for _, split, axis, error in measured):
@@ -164,13 +224,51 @@ def plan_for_card(
     sites = (
         tooth_sites(pairs, teeth)
         if teeth is not None
-        else rim_sites(resonator, pairs, elastic.rho, largest.slow_axis, heights=heights, groove=groove, kind=kind)
+        else rim_sites(resonator, pairs, elastic.rho, largest.slow_axis, heights=heights, tool=tool, kind=kind)
     )
-    sites = Sites(sites.azimuth, sites.position, sites.capacity, {n: gain * w for n, w in sites.gain.items()})
-    plan = plan_trim(
-        readings, sites, goal=goal, removal_error=removal_error, gain_error=gain_error, unbalance=unbalance
+
+    def plan_with(gains: Mapping[int, Array], error: float) -> TrimPlan:
+        scaled = replace(sites, gain={n: gain * w for n, w in gains.items()})
+        return plan_trim(
+            readings, scaled, goal=goal, removal_error=removal_error, gain_error=error, unbalance=unbalance
+        )
+
+    if teeth is not None or kind == "mass":
+        return CardPlan(plan_with(sites.gain, gain_error), {})
+    cuts: dict[float, PlannedCut] = {}
+    for _ in range(MOST_PLANS):
+        gains = {n: w * np.array([_ratio(cuts, x, n) for x in sites.position]) for n, w in sites.gain.items()}
+        plan = plan_with(gains, hypot(gain_error, max((cut.error for cut in cuts.values()), default=0.0)))
+        planned = {x: _typical(plan, x) for x in sorted({cut.position for cut in plan.round.cuts})}
+        if all(x in cuts and abs(mass / cuts[x].mass - 1) < SAME_DEPTH for x, (mass, _) in planned.items()):
+            used = {x: cuts[x] for x in planned}
+            for cut in used.values():
+                cut.check()
+            return CardPlan(plan, used)
+        for x, (mass, spread) in planned.items():
+            wall = float(resonator.at([x * resonator.length]).thickness[0])
+            depth = (
+                cuts[x].depth(mass)
+                if x in cuts
+                else mass / (elastic.rho * tool.width * (wall if kind == "edge" else tool.length))
+            )
+            groove = Groove(kind, x, tool.width, tool.length, depth)
+            first = {n: float(w[sites.position == x][0]) for n, w in sites.gain.items()}
+            cuts[x] = PlannedCut(groove, {n: solve_groove(pair, groove) for n, pair in pairs.items()}, first, spread)
+    raise ShellError(
+        f"no depth of these cuts is found that does what the plan needs: the stress that narrow grooves relieve undoes what their mass does. {WIDER}"
     )
-    return plan, sites
+
+
+def _ratio(cuts: Mapping[float, PlannedCut], position: float, harmonic: int) -> float:
+    return cuts[position].gain(harmonic) if position in cuts else 1.0
+
+
+def _typical(plan: TrimPlan, position: float) -> tuple[float, float]:
+    """Mean mass of the cuts at a position, weighted by itself, and its relative scatter."""
+    masses = np.array([cut.mass for cut in plan.round.cuts if cut.position == position])
+    mean = float(masses @ masses / masses.sum())
+    return mean, float(np.sqrt(masses @ (masses - mean) ** 2 / masses.sum()) / mean)
 
 
 def other_cuts(resonator: "Resonator", elastic: "Elastic", harmonic: int, kind: CutKind) -> dict[str, float]:

@@ -1,10 +1,11 @@
 """`hrg trim`: measured splits to a plan of cuts.
 
-With --json one object, schema `hrg.trim/1`: `card`, `temperature_degC`, `goal_Hz`, `cut`; `before` and each round's `after`, lists of {harmonic,
+With --json one object, schema `hrg.trim/1`: `card`, `temperature_degC`, `goal_Hz`, `cut`; `before` and the round's `after`, lists of {harmonic,
 frequency_Hz, split_Hz, error_Hz, most_Hz, slow_axis_deg}, `most_Hz` not exceeded in 95 of 100 cases; `rounds` of {share, mass_ug, cuts, after,
-unbalance}, `cuts` of {azimuth_deg, position, height_mm, mass_ug, depth_um}; `mass_ug` of all rounds; `other_cuts`, what one kilogram
-does as another kind of cut over what it does as this one; `measure`, what to measure between the rounds, in sentences. Only the
-first round is to be cut as it stands.
+unbalance}, `cuts` of {azimuth_deg, position, height_mm, mass_ug, depth_um (null for teeth and masses)}; `mass_ug`; `gains`, for each position and n the change of the split by the
+planned groove over that by the shape derivative, with its 90 % interval; `other_cuts`, what one kilogram
+does as another kind of cut over what it does as this one; `measure`, what to measure after the round, in sentences. `rounds` holds
+one: the next is planned from what is measured after it.
 """
 
 from typing import TYPE_CHECKING, Annotated, Any, Literal
@@ -14,10 +15,9 @@ from cyclopts import Parameter
 from studies.cli.output import Answer, answers
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from shell.resonator import Resonator
-    from shell.trimming import ExpectedSplit, Round, TrimPlan
+    from shell.trimming import ExpectedSplit
+    from studies.trim import CardPlan
 
 MANY = Parameter(consume_multiple=True)
 
@@ -50,8 +50,10 @@ def trim(
 ) -> Answer:
     """Plan the cuts that null measured splits with the least mass, keep the balance, and do not overshoot.
 
-    Cut the first round, measure, and plan again with the new splits; the later rounds are predictions. What removing
-    material does depends on where it is removed: off the rim's edge or a face it takes strain energy along, a tooth hardly any.
+    Make the cuts, measure, and plan again with the new splits. What removing material does depends on where it is removed:
+    off the rim's edge or a face it takes strain energy along, a tooth hardly any. A narrow, deep groove also relieves stress
+    beside it, which can cancel or reverse its effect; this is solved for the planned depth. Wide, shallow cuts and teeth are
+    the most predictable.
 
     Parameters
     ----------
@@ -92,7 +94,7 @@ def trim(
     gain_error : float
         Relative standard error that all cuts share.
     gain : float
-        Measured over predicted change of the split in the last round.
+        Measured over predicted change of the split in the last round; negative if it changed the other way.
     temperature : float
         Temperature in °C; the card's reference temperature unless given.
     out : str
@@ -106,22 +108,21 @@ def trim(
     from studies.cli.output import say
     from studies.errors import naming
     from studies.instrument.card import load_card
-    from studies.trim import Groove, Teeth, other_cuts, plan_for_card
+    from studies.trim import Teeth, Tool, other_cuts, plan_for_card
 
     measured = _from_scan(scan, harmonic) if scan is not None else _given(split, axis, harmonic, reading_error)
     instrument = load_card(card)
     T = instrument.reference_temperature if temperature is None else temperature + zero_Celsius
-    groove = Groove(1e-3 * width_mm, 1e-3 * length_mm, depth_limit)
+    tool = Tool(1e-3 * width_mm, 1e-3 * length_mm, depth_limit)
     with naming(instrument.path):
         resonator, elastic = instrument.at(T)
-    plan, _ = plan_for_card(
-        resonator, elastic, measured, goal=goal, heights=position, groove=groove, kind=cut,
+    planned = plan_for_card(
+        resonator, elastic, measured, goal=goal, heights=position, tool=tool, kind=cut,
         teeth=Teeth(teeth, np.deg2rad(tooth_azimuth), 1e-9 * tooth_limit_ug) if teeth else None,
         removal_error=removal_error, gain_error=gain_error, gain=gain, unbalance=_unbalance(unbalance),
     )  # fmt: skip
+    plan = planned.plan
     others = other_cuts(resonator, elastic, measured[0][0], cut)
-
-    depth = None if teeth else lambda mass: 1e6 * groove.depth(mass, elastic.rho)
     payload: dict[str, Any] = {
         "schema": "hrg.trim/1",
         "card": instrument.name,
@@ -129,10 +130,11 @@ def trim(
         "goal_Hz": goal,
         "cut": cut,
         "before": [_state(s) for s in plan.before],
-        "rounds": [_round(one, resonator, depth) for one in plan.rounds],
-        "mass_ug": 1e9 * plan.mass,
+        "rounds": [_round(planned, resonator)],
+        "mass_ug": 1e9 * plan.round.mass,
+        "gains": gains(planned),
         "other_cuts": others,
-        "measure": measure_between(plan),
+        "measure": measure_after(planned),
     }
     if out is not None:
         from studies.files.writing import write_text
@@ -150,9 +152,27 @@ def trim(
         say(sentence)
 
 
-def _round(one: "Round", resonator: "Resonator", depth: "Callable[[float], float] | None") -> dict[str, Any]:
-    """One round of cuts; `depth` in µm of a cut by its mass, where it is a groove."""
+def gains(planned: "CardPlan") -> list[dict[str, float]]:
+    """The change by each planned groove over that by the shape derivative, with its 90 % interval."""
+    from studies.trim import SURE
+
+    return [
+        {
+            "position": x,
+            "harmonic": n,
+            "value": cut.gain(n),
+            "low": cut.gain(n) - SURE * cut.error * abs(cut.gain(n)),
+            "high": cut.gain(n) + SURE * cut.error * abs(cut.gain(n)),
+        }
+        for x, cut in planned.cuts.items()
+        for n in cut.splits
+    ]
+
+
+def _round(planned: "CardPlan", resonator: "Resonator") -> dict[str, Any]:
     import numpy as np
+
+    one, cuts = planned.plan.round, planned.cuts
 
     return {
         "share": one.share,
@@ -163,7 +183,7 @@ def _round(one: "Round", resonator: "Resonator", depth: "Callable[[float], float
                 "position": c.position,
                 "height_mm": 1e3 * float(resonator.at([c.position * resonator.length]).z[0]),
                 "mass_ug": 1e9 * c.mass,
-                "depth_um": None if depth is None else depth(c.mass),
+                "depth_um": 1e6 * cuts[c.position].depth(c.mass) if cuts else None,
             }
             for c in one.cuts
         ],
@@ -187,7 +207,7 @@ def _print(payload: dict[str, Any]) -> None:
         for k, one in rounds
         for c in one["cuts"]
     ]
-    note = f"{payload['mass_ug']:.3g} µg in all. Cut round 1 only, then measure and plan again."
+    note = f"{payload['mass_ug']:.3g} µg in all. Make these cuts, measure, and plan again."
     columns = ["round", "azimuth (°)", "height (mm)", "mass (µg)", "depth (µm)"]
     print_table(f"{payload['card']}: cuts", columns, cuts, note)
     splits = [
@@ -204,23 +224,33 @@ def _print(payload: dict[str, Any]) -> None:
     print_table("Splits as expected", columns, splits)
 
 
-def measure_between(plan: "TrimPlan") -> list[str]:
-    """What to measure between the rounds, and what to make of it."""
+def measure_after(planned: "CardPlan") -> list[str]:
+    """How sure the cuts are, what to measure after them, and what to make of it."""
     from studies.reports.digits import to_error
 
-    found = []
-    for k, one in enumerate(plan.rounds[:-1], 1):
-        for state in one.after:
-            spread = state.error * state.frequency
-            found.append(
-                f"After round {k} measure the split of n = {state.harmonic} to ± {1e3 * min(plan.goal / 4, max(spread / 5, plan.goal / 10)):.2g} mHz, and its axis. "
-                f"Expected: {' ± '.join(to_error(1e3 * state.hertz, 1e3 * spread))} mHz. If it lies outside twice that, plan the next "
-                "round with `--gain`, the measured over the predicted change."
-            )
-    if plan.rounds:
+    plan, found = planned.plan, []
+    for entry in gains(planned):
+        value, error = entry["value"], (entry["high"] - entry["low"]) / 2
+        number, spread = to_error(value, error)
         found.append(
-            "Let the shell return to its temperature before each reading, and read the same mode on the same electrodes."
+            f"A groove of this depth at position {entry['position']:g} changes the split of n = {entry['harmonic']} by {number} ± {spread} (90 %) of what "
+            "a wide, shallow cut of its mass does."
         )
+        if abs(value - 1) > 0.15 or error > 0.15:
+            found.append(
+                "It relieves much stress beside it: wider, shallower cuts (`--width-mm`) or teeth are more predictable."
+            )
+    for state in plan.round.after:
+        spread_Hz = state.error * state.frequency
+        expected = " ± ".join(to_error(1e3 * state.hertz, 1e3 * spread_Hz))
+        found.append(
+            f"After the cuts measure the split of n = {state.harmonic} to ± {1e3 * min(plan.goal / 4, max(spread_Hz / 5, plan.goal / 10)):.2g} mHz, and its axis. "
+            f"Expected: {expected} mHz. If it lies outside twice that, plan the next round with `--gain`, the measured over the predicted change "
+            "(negative if the split changed the other way)."
+        )
+    found.append(
+        "Let the shell return to its temperature before each reading, and read the same mode on the same electrodes."
+    )
     return found
 
 

@@ -10,7 +10,7 @@ from studies.reports.style import BLUE, GREEN, VERMILION, figure
 if TYPE_CHECKING:
     from shell.trimming import TrimPlan
 
-LEAD = "Cut round 1, let the shell return to temperature, measure, and plan again: later rounds are predictions, not instructions."
+LEAD = "Make these cuts, let the shell return to temperature, measure, and plan the next round from the measurement."
 
 
 def write_trim_page(path: str, plan: "TrimPlan", payload: dict[str, Any]) -> None:
@@ -21,37 +21,36 @@ def write_trim_page(path: str, plan: "TrimPlan", payload: dict[str, Any]) -> Non
 
 
 def _chapters(plan: "TrimPlan", payload: dict[str, Any]) -> list[Chapter]:
-    before, last, first = payload["before"], payload["rounds"][-1]["after"], payload["rounds"][0]
+    before, last, first = payload["before"], payload["rounds"][0]["after"], payload["rounds"][0]
     axes = ", ".join(f"n = {s['harmonic']} at {s['slow_axis_deg']:.1f}°" for s in before)
     facts = Facts([
         ("Split now", ", ".join(f"{1e3 * s['split_Hz']:.3g} mHz" for s in before), f"slow axis of {axes}"),
-        ("Round 1 takes", f"{first['mass_ug']:.3g} µg", f"{len(first['cuts'])} cuts, {100 * first['share']:.0f} % of the split"),
-        ("Expected at the end", f"below {1e3 * max(s['most_Hz'] for s in last):.2g} mHz", f"goal {1e3 * plan.goal:.2g} mHz, {len(plan.rounds)} rounds"),
+        ("This round takes", f"{first['mass_ug']:.3g} µg", f"{len(first['cuts'])} cuts, {100 * first['share']:.0f} % of the split"),
+        ("Expected after it", f"below {1e3 * max(s['most_Hz'] for s in last):.2g} mHz", f"goal {1e3 * plan.goal:.2g} mHz" + ("" if plan.is_enough else ": a further round is needed")),
     ])  # fmt: skip
-    measure = [Text(sentence.replace("--gain", "`--gain`")) for sentence in payload["measure"]]
+    measure = [Text(sentence) for sentence in payload["measure"]]
     kinds = ", ".join(f"{kind} {value:+.2f}" for kind, value in payload["other_cuts"].items()).replace("-", "−")
     warning = Text(
         f"Planned as '{payload['cut']}'. The same mass at the rim moves the split, relative to this kind of cut, by: {kinds}. A negative "
-        "number moves it the other way. If round 1 shows another effect than predicted, plan the next with `--gain`.",
+        "number moves it the other way. If the cuts show another effect than predicted, plan the next round with `--gain`.",
         "note",
     )
     return [
-        Chapter("What to do", [facts, _cuts(payload, 1), *measure, warning]),
+        Chapter("What to do", [facts, _cuts(payload), *measure, warning]),
         Chapter("Where", [_polar(plan, payload)]),
-        Chapter("What is expected", [_states(payload), *(_cuts(payload, k) for k in range(2, len(plan.rounds) + 1))]),
+        Chapter("What is expected", [_states(payload)]),
     ]
 
 
-def _cuts(payload: dict[str, Any], number: int) -> Table:
-    one = payload["rounds"][number - 1]
+def _cuts(payload: dict[str, Any]) -> Table:
+    one = payload["rounds"][0]
     columns, rows = ["Cut", "Azimuth (°)", "Height z (mm)", "Mass (µg)"], []
     deep = one["cuts"][0]["depth_um"] is not None
-    columns += ["Depth (µm)"] * deep + ["Done"] * (number == 1)
+    columns += ["Depth (µm)"] * deep + ["Done"]
     for k, c in enumerate(_in_order(one["cuts"]), 1):
         row = [str(k), f"{c['azimuth_deg']:.2f}", f"{c['height_mm']:.3f}", f"{c['mass_ug']:.3f}"]
-        rows.append([*row, *([f"{c['depth_um']:.3f}"] if deep else []), *(["☐"] if number == 1 else [])])
-    title = f"Round {number}: cut this" if number == 1 else f"Round {number}, predicted: plan again before cutting"
-    return Table(title, columns, rows, f"{one['mass_ug']:.4g} µg together.")
+        rows.append([*row, *([f"{c['depth_um']:.3f}"] if deep else []), "☐"])
+    return Table("Cut this", columns, rows, f"{one['mass_ug']:.4g} µg together.")
 
 
 def _in_order(cuts: list[dict[str, Any]]) -> list[dict[str, Any]]:
@@ -61,7 +60,7 @@ def _in_order(cuts: list[dict[str, Any]]) -> list[dict[str, Any]]:
 def _states(payload: dict[str, Any]) -> Table:
     stages = [
         ("measured", payload["before"]),
-        *((f"after round {k}", one["after"]) for k, one in enumerate(payload["rounds"], 1)),
+        ("after the cuts, expected", payload["rounds"][0]["after"]),
     ]
     rows = [
         [label, str(s["harmonic"]), f"{1e3 * s['split_Hz']:.3f}", f"{1e3 * s['error_Hz']:.3f}", f"{1e3 * s['most_Hz']:.3f}", f"{s['slow_axis_deg']:.1f}"]
@@ -73,13 +72,13 @@ def _states(payload: dict[str, Any]) -> Table:
 
 def _polar(plan: "TrimPlan", payload: dict[str, Any]) -> Picture:
     """Cuts as wedges on the rim; the split as a rose around it, before and as expected after round 1."""
-    first, cuts = plan.rounds[0], _in_order(payload["rounds"][0]["cuts"])
+    first, cuts = plan.round, _in_order(payload["rounds"][0]["cuts"])
     theta = np.linspace(0, 2 * np.pi, 721)
     with figure(1, 2, 4.2, subplot_kw={"projection": "polar"}) as (made, axes):
         for ax, states, title in zip(
             axes,
             (plan.before, first.after),
-            ("Now, with the cuts of round 1", "After round 1, as expected"),
+            ("Now, with the cuts", "After the cuts, as expected"),
             strict=True,
         ):
             size = max(s.hertz for s in plan.before)
@@ -101,4 +100,4 @@ def _polar(plan: "TrimPlan", payload: dict[str, Any]) -> Picture:
             ax.set_title(title, fontsize=10)
             ax.legend(loc="lower center", bbox_to_anchor=(0.5, -0.28), fontsize=8)
         caption = "The rim over azimuth. Waves stand out where the slower mode swings (dashed: its antinodes); black: the cuts of the table."
-        return draw(made, caption, "polar pictures of the split before and after the first round of cuts")
+        return draw(made, caption, "polar pictures of the split before and after the cuts")

@@ -45,7 +45,7 @@ def simulate(seed, coupled, pair, mass, rounds=3, goal=5e-4):
         axis = float(np.angle(-z) / 4)
         sites = rim_sites(pair.resonator, {2: pair}, RHO, axis)
         plan = plan_trim([SplitReading.of(2, f, abs(z) * f, axis, 1e-4)], sites, goal=goal)
-        for cut in plan.rounds[0].cuts:
+        for cut in plan.round.cuts:
             removed = cut.mass * all_gain * (1 + 0.02 * rng.standard_normal())
             gone.append(PointMass(-removed, cut.azimuth, cut.position))
             for k in unbalance:

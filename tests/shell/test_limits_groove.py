@@ -1,0 +1,43 @@
+"""Grooves against an independent three-dimensional model, and against the limits of shallow, wide cuts."""
+
+import csv
+from pathlib import Path
+
+import pytest
+
+from shell.elastic import Elastic
+from shell.groove import Groove, solve_groove
+from shell.imperfection import Pair
+from shell.meridian import hemisphere
+from shell.modes import solve_modes
+
+SILICA = Elastic(72.6283391332881e9, 0.1663662749173554, 2203.0)
+REFERENCE = Path(__file__).parents[1] / "reference" / "grooves.csv"
+CUTS = list(csv.DictReader(line for line in REFERENCE.read_text(encoding="utf-8").splitlines() if line[0] != "#"))
+
+
+@pytest.fixture(scope="module")
+def pair():
+    return Pair(solve_modes(hemisphere(15e-3, 0.9e-3), SILICA, 2)[0])
+
+
+@pytest.mark.parametrize(
+    "row", [pytest.param(row, marks=[pytest.mark.slow] * (row["face"] == "outer"), id=f"{row['face']}-{row['position']}-{row['width_mm']}-{row['depth_um']}") for row in CUTS]
+)  # fmt: skip
+def test_a_real_groove_lies_in_the_interval(pair, row):
+    """NGSolve with the real cut (tests/reference/grooves.csv) lies within the stated 90 % interval; the shape derivative does not."""
+    width, length, depth = (1e-3 * float(row["width_mm"]), 1e-3 * float(row["length_mm"] or 1), 1e-6 * float(row["depth_um"]))  # fmt: skip
+    found = solve_groove(pair, Groove(row["face"], float(row["position"]), width, length, depth))
+    four, true = 4 * pair.mode.frequency, float(row["order4_Hz"])
+    assert 4e9 * found.mass == pytest.approx(float(row["mass_ug"]), rel=1e-3)
+    assert abs(four * found.wave - true) < 1.645 * four * found.error
+
+
+def test_a_shallow_wide_cut_is_the_shape_derivative(pair):
+    """Hadamard's formula is exact as depth over width goes to 0: the relieved share falls in proportion."""
+    shares = []
+    for depth in (20e-6, 5e-6):
+        found = solve_groove(pair, Groove("edge", 1.0, 4e-3, 1e-3, depth))
+        shares.append(abs(found.relief / found.layer))
+    assert shares[1] < 0.5 * shares[0] < 0.05
+    assert found.layer / found.mass == pytest.approx(-pair.edging()[1], rel=0.1)
