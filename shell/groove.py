@@ -16,9 +16,11 @@ from functools import cache
 from typing import Literal, TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.sparse import csc_matrix
 from scipy.sparse.linalg import splu
 
+from shell.constraints import Index
 from shell.errors import ShellError, mm
 from shell.imperfection import Pair
 from shell.imperfection.pair import WAVE
@@ -78,7 +80,7 @@ class _Grid:
     s: Array
     theta: Array
     eta: Array
-    gone: Array
+    gone: NDArray[np.bool_]
     is_rim: bool
 
 
@@ -222,7 +224,7 @@ class _Nodes:
         self.ends = ends.reshape(2, -1)
         self.theta = np.broadcast_to(theta, shape).ravel()
 
-    def free(self, kind: int) -> Array:
+    def free(self, kind: int) -> Index:
         """Unknowns, three a node along the radius, circle and axis, of cos nθ (0) or sin nθ (1), between its mirror planes."""
         free = np.repeat((self.used & ~self.held)[:, None], 3, axis=1)
         even, odd = self.ends[::-1] if kind else self.ends
@@ -238,7 +240,7 @@ class _Nodes:
         rows, columns = np.concatenate([k, k, k + 1, k + 1, k + 2]), np.concatenate([k, k + 1, k, k + 1, k + 2])
         return csc_matrix((np.concatenate([c, -s, s, c, one]), (rows, columns)))
 
-    def strains(self, which: Array) -> tuple[Array, Array]:
+    def strains(self, which: Index) -> tuple[Array, Array]:
         """Strain (elements, points, 6, 81) of elements in x, y, z and volumes (elements, points)."""
         values, slopes, _, w = _quadratic(3)
         parts = [
@@ -280,7 +282,7 @@ def _loads(pair: Pair, grid: _Grid, nodes: _Nodes, lam: float, G: float, rho: fl
     i, j, k = np.unravel_index(gone, grid.gone.shape)
     loads = np.zeros((2, 3 * len(nodes.points)))
 
-    def points(knots: Array, cell: Array) -> Array:
+    def points(knots: Array, cell: Index) -> Array:
         return np.asarray((knots[cell, None] * (1 - x) + knots[cell + 1, None] * (1 + x)) / 2)
 
     eta, theta = points(grid.eta, k), points(grid.theta, j)

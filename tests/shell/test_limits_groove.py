@@ -25,7 +25,7 @@ def pair():
     "row", [pytest.param(row, marks=[pytest.mark.slow] * (row["face"] == "outer"), id=f"{row['face']}-{row['position']}-{row['width_mm']}-{row['depth_um']}") for row in CUTS]
 )  # fmt: skip
 def test_a_real_groove_lies_in_the_interval(pair, row):
-    """NGSolve with the real cut (tests/reference/grooves.csv) lies within the stated 90 % interval; the shape derivative does not."""
+    """NGSolve with the real cut (tests/reference/grooves.csv) lies within the stated 90 % interval."""
     width, length, depth = (1e-3 * float(row["width_mm"]), 1e-3 * float(row["length_mm"] or 1), 1e-6 * float(row["depth_um"]))  # fmt: skip
     found = solve_groove(pair, Groove(row["face"], float(row["position"]), width, length, depth))
     four, true = 4 * pair.mode.frequency, float(row["order4_Hz"])
