@@ -131,8 +131,8 @@ def status(folder: str) -> Answer:
         Folder of the study (hrg study run --out).
     """
     from studies.cli.output import print_table
+    from studies.sweeps.opening import is_running
     from studies.sweeps.results import open_results
-    from studies.sweeps.store import is_running
 
     results = open_results(folder)
     found = _status(results, folder, is_running(folder))
@@ -168,7 +168,8 @@ def report(folder: str, *, out: str | None = None) -> Answer:
     say("drawing the page, with mode shapes where the study has modes ...")
     write_text(page, sweep_page(results))
     yield {**summarise(results), "report": str(page)}
-    print(f"report: {page}")
+    _say_unfinished(results)
+    print(f"report on {_done(results)} cases: {page}")
 
 
 @answers("hrg.study-export/1")
@@ -195,9 +196,25 @@ def export(folder: str, *, out: str | None = None) -> Answer:
         "table": str(path),
         "units_file": str(units),
         "rows": len(results),
+        "done": results.done,
+        "cases": results.total,
     }
-    yield {**payload, "columns": results.table().attrs["units"]}
-    print(f"{len(results)} cases: {path}; units: {units}")
+    yield {**payload, "columns": results.units}
+    _say_unfinished(results)
+    print(f"{_done(results)} cases: {path}; units: {units}")
+
+
+def _done(results: "Results") -> str:
+    return str(len(results)) if results.done == results.total else f"{results.done} of {results.total}"
+
+
+def _say_unfinished(results: "Results") -> None:
+    from studies.cli.output import say
+
+    if results.done < results.total:
+        say(
+            f"note: the study is not finished, {results.done} of {results.total} cases are done; run it again to resume."
+        )
 
 
 def _status(results: "Results", folder: str, running: bool) -> dict[str, Any]:
@@ -214,7 +231,7 @@ def _status(results: "Results", folder: str, running: bool) -> dict[str, Any]:
         "failed": done - counts.get("ok", 0),
         "lost": counts.get("lost", 0),
         "reasons": [{"reason": reason, "cases": count} for reason, count in results.store.reasons()],
-        "seconds_each": results.store.seconds() / done if done else None,
+        "seconds_each": results.store.seconds / done if done else None,
         "runs": len(results.store.runs()),
     }
 

@@ -1,6 +1,6 @@
 """The page of a parametric study: what was asked, what came out, what matters, and where it comes from."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -37,7 +37,7 @@ METHODS = {
 def sweep_page(results: "Results") -> str:
     """Return the page of a study as HTML."""
     study = results.study
-    done = len(results)
+    done = len(results) if results.done == results.total else f"{results.done} of {results.total}"
     lead = f"{done} designs by {METHODS[study.sampling.method]} about the card {study.instrument.name}."
     if study.note != "-":
         lead = f"{study.note} {lead}"
@@ -61,6 +61,8 @@ def summarise(results: "Results") -> dict[str, Any]:
         "schema": "hrg.study-report/1",
         "study": results.study.name,
         "cases": len(results),
+        "done": results.done,
+        "total": results.total,
         "failed": len(results.failed),
         "columns": {c.name: {"unit": c.unit, **_numbers(results, c)} for c in results.study.columns},
         "searches": results.store.findings(),
@@ -86,7 +88,7 @@ def _numbers(results: "Results", column: "Column") -> dict[str, float | None]:
     y = y[np.isfinite(y)]
     place = [c.name for c in results.study.columns].index(column.name)
     nominal = results.nominal.values[place] if results.nominal is not None else np.nan
-    errors = results.errors[:, place]
+    errors = results.error(column.name)
     error = float(np.nanmax(errors)) if np.isfinite(errors).any() else np.nan
     numbers: dict[str, Any] = {"mean": np.mean, "deviation": np.std, "least": np.min, "greatest": np.max}
     over_all = {name: float(function(y)) if y.size else np.nan for name, function in numbers.items()}
@@ -104,7 +106,7 @@ def _yield(results: "Results") -> "Yield | None":
 
 
 def _short(results: "Results") -> list[Block]:
-    facts = [("Designs", str(len(results)), f"of {results.total}; {len(results.failed)} failed")]
+    facts = [("Designs", str(results.done), f"of {results.total}; {len(results.failed)} failed")]
     for column in main_columns(results)[:2]:
         n = _numbers(results, column)
         unit = "" if column.unit == "1" else f" {column.unit}"
@@ -115,7 +117,7 @@ def _short(results: "Results") -> list[Block]:
         words = "of the designs" if found.low is None else f"95 % interval {percent(found.low)} … {percent(found.high)}"
         facts.append(("Meet every requirement", percent(found.share), words))
     blocks: list[Block] = [Facts(facts)]
-    if len(results) < results.total and not results.about["repeats"]:
+    if results.done < results.total:
         blocks.append(Text("The study is not finished: run it again to resume, then make this page again.", "warning"))
     return blocks
 
@@ -149,7 +151,7 @@ def _failures(results: "Results") -> list[Chapter]:
         return []
     rows = [[str(count), reason] for reason, count in results.store.reasons()]
     examples = [
-        [*map(number, results.design(place).values()), results.remarks[place]]
+        [*map(number, results.design(place).values()), results.remark(place)]
         for place in results.failed[:MOST_ROWS].tolist()
     ]
     words = "These designs have no value and are left out of every number on this page."
@@ -192,7 +194,7 @@ def _digits(n: Mapping[str, Any], key: str) -> str:
 
 def _designs(results: "Results") -> Table:
     columns = main_columns(results)
-    places = list(range(len(results)))
+    places: Sequence[int] = range(len(results))
     note = "Click a heading to sort."
     if len(places) > MOST_ROWS:
         order = np.argsort(results.column(columns[0].name), kind="stable")

@@ -22,11 +22,6 @@ def digest(value: Any) -> str:
     return blake2b(spell(value).encode(), digest_size=16).hexdigest()
 
 
-def case_key(base: str, parameters: str) -> bytes:
-    """Return the key of a case from the study's base digest and the spelled parameters."""
-    return blake2b(f"{base}{parameters}".encode(), digest_size=16).digest()
-
-
 def spell_material(material: "Material") -> str:
     """Return a material's laws with all their numbers, so that an edited material file changes every key."""
     properties = {

@@ -69,12 +69,14 @@ def count_cases(study: "Study") -> int:
     return study.sampling.cases * (d + 2 if method == "sensitivity" else 1)
 
 
-def decode_row(study: "Study", row: list[float]) -> dict[str, Any]:
-    """Return the parameters of one design by name: texts for their places."""
-    return {
-        p.name: p.values[int(value)] if isinstance(p.nominal, str) else value
-        for p, value in zip(study.parameters, row, strict=True)
-    }
+def coding(study: "Study") -> tuple[tuple[str, tuple[str, ...]], ...]:
+    """Return the names of the parameters, each with its texts, the nominal one last (`studies.sweeps.block.decode`)."""
+    return tuple((p.name, (*p.values, p.nominal) if isinstance(p.nominal, str) else ()) for p in study.parameters)
+
+
+def nominal_row(study: "Study") -> Array:
+    """Return the nominal design as a row of a design, array (parameters,)."""
+    return np.array([-1.0 if isinstance(p.nominal, str) else float(p.nominal) for p in study.parameters])
 
 
 def nominal_design(study: "Study") -> dict[str, Any]:
@@ -174,6 +176,9 @@ def _quantile(parameter: "StudyParameter", p: Array) -> Array:
 
 
 def _unique(values: Array) -> Design:
+    if any(len(np.unique(column)) == len(values) for column in values.T):  # a sample; a million rows take a second
+        rows = np.arange(len(values))
+        return Design(values, rows, rows)
     _, first, inverse = np.unique(values, axis=0, return_index=True, return_inverse=True)
     order = np.argsort(first)
     place = np.empty_like(order)

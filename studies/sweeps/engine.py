@@ -11,13 +11,14 @@ from collections.abc import Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from dataclasses import dataclass
 from math import ceil
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from studies.errors import MissingEnvironment
-from studies.sweeps.canonical import case_key, spell
-from studies.sweeps.design import decode_row
-from studies.sweeps.evaluate import WorkPlan, evaluate_task, failed_row
-from studies.sweeps.row import Row
+from studies.sweeps.block import Batch, Cases, join
+from studies.sweeps.evaluate import WorkPlan, evaluate_task, failed_cases
 
 if TYPE_CHECKING:
     from studies.sweeps.definition import Study
@@ -27,23 +28,11 @@ if TYPE_CHECKING:
     from studies.sweeps.workers import Workers
 
 TASK_SECONDS = 1.0  # a task should last so long: long against its cost, short against what kill -9 may lose
-BATCH, BATCH_VECTORISED = 8, 1024  # cases, where the spec says nothing
+BATCH, BATCH_VECTORISED = 8, 16384  # cases, where the spec says nothing
 TRIES_ALONE = 2  # of a case whose worker is lost
 STILLBORN = 3  # losses before anything was computed, after which the workers cannot be started
 LOOK_EVERY = 2.0  # s without an answer, after which the workers are looked after
 MOST_TASKS = 2  # queued for each worker, so that millions of cases do not swamp a scheduler
-
-
-class Item(NamedTuple):
-    """One design to compute: its position among the unique designs, its key, its parameters as data and spelled."""
-
-    position: int | None
-    key: bytes
-    parameters: dict[str, Any]
-    spelled: str
-
-
-Batch = Sequence[Item]
 
 
 @dataclass
@@ -53,43 +42,35 @@ class _Task:
     tries: int = 0  # that were alone and lost their worker
 
 
-def make_item(base: str, position: int | None, parameters: dict[str, Any]) -> Item:
-    """Return the design with these parameters and its key."""
-    spelled = spell(parameters)
-    return Item(position, case_key(base, spelled), parameters, spelled)
-
-
 @dataclass
 class Batches:
-    """Batches still to be computed, made when they are taken: `places` of the unique designs in each."""
+    """Batches of a design still to be computed, made when they are taken: `places` of the unique designs in each."""
 
-    study: "Study"
     design: "Design"
-    base: str
-    places: deque[list[int]]
+    places: deque[NDArray[np.intp]]
 
     def __len__(self) -> int:
         return len(self.places)
 
-    def take(self) -> Batch:
+    def popleft(self) -> Batch:
         """Return the next batch."""
         places = self.places.popleft()
-        rows = self.design.values[self.design.unique[places]].tolist()
-        named = (decode_row(self.study, row) for row in rows)
-        return [make_item(self.base, place, values) for place, values in zip(places, named, strict=True)]
+        return Batch(places, self.design.values[self.design.unique[places]])
 
 
-def missing_batches(study: "Study", design: "Design", base: str, store: "Store", vectorised: bool) -> Batches:
+def missing_batches(study: "Study", design: "Design", store: "Store", vectorised: bool) -> Batches:
     """Return, in order, the cases that the store lacks, in the batches that the spec fixes."""
-    done = store.done()
-    size = study.sampling.batch or (BATCH_VECTORISED if vectorised else BATCH)
-    places: deque[list[int]] = deque()
-    for first in range(0, len(design.unique), size):
-        batch = list(range(first, min(first + size, len(design.unique))))
-        lacking = [place for place in batch if place not in done]
-        if lacking:
-            places.append(lacking)
-    return Batches(study, design, base, places)
+    count, done = len(design.unique), store.done()
+    lacking = np.ones(count, dtype=bool)
+    lacking[: len(done)] = ~done[:count]
+    places = np.flatnonzero(lacking)
+    parts = np.split(places, np.searchsorted(places, range(0, count, batch_size(study, vectorised))))
+    return Batches(design, deque(part for part in parts if len(part)))
+
+
+def batch_size(study: "Study", vectorised: bool) -> int:
+    """Return the number of cases that are computed and kept together."""
+    return study.sampling.batch or (BATCH_VECTORISED if vectorised else BATCH)
 
 
 def compute(
@@ -102,7 +83,6 @@ def compute(
     MissingEnvironment
         The store cannot be written, or all workers are gone for good; what was computed before is kept.
     """
-    take = batches.take if isinstance(batches, Batches) else batches.popleft
     suspects: deque[_Task] = deque()
     running: dict[Future[Any], _Task] = {}
     size, losses, computed = 1, 0, False
@@ -110,7 +90,7 @@ def compute(
         if suspects and not running:
             _submit(suspects.popleft(), plan, workers, running)
         while batches and not suspects and len(running) < MOST_TASKS * workers.count and not _any_alone(running):
-            _submit(_Task([take() for _ in range(min(size, len(batches)))]), plan, workers, running)
+            _submit(_Task([batches.popleft() for _ in range(min(size, len(batches)))]), plan, workers, running)
         finished = wait(running, LOOK_EVERY, FIRST_COMPLETED).done
         if not finished:
             workers.check()
@@ -119,7 +99,7 @@ def compute(
             if task is None:
                 continue
             try:
-                rows: list[list[Row]] = future.result()
+                found: list[Cases] = future.result()
             except workers.lost as error:
                 losses += 1
                 if losses >= STILLBORN and not computed:
@@ -137,9 +117,9 @@ def compute(
                 raise MissingEnvironment(
                     f"the workers are gone ({error}); everything computed before is kept. Run the same command again to resume."
                 ) from error
-            _keep(task, rows, store, progress)
+            _keep(found, store, progress)
             computed = True
-            each = sum(row.seconds for batch in rows for row in batch) / len(rows)
+            each = sum(cases.seconds for cases in found) / len(found)
             size = max(1, min(int(TASK_SECONDS / max(each, 1e-9)), ceil(len(batches) / (8 * workers.count))))
 
 
@@ -148,18 +128,13 @@ def _any_alone(running: dict[Future[Any], _Task]) -> bool:
 
 
 def _submit(task: _Task, plan: WorkPlan, workers: "Workers", running: dict[Future[Any], _Task]) -> None:
-    batches = [[item.parameters for item in batch] for batch in task.batches]
-    running[workers.submit(evaluate_task, plan, batches)] = task
+    running[workers.submit(evaluate_task, plan, task.batches)] = task
 
 
-def _keep(task: _Task, rows: list[list[Row]], store: "Store", progress: "Progress") -> None:
-    pairs = [
-        (item, row)
-        for batch, found in zip(task.batches, rows, strict=True)
-        for item, row in zip(batch, found, strict=True)
-    ]
-    store.add((item.key, item.position, item.spelled, row) for item, row in pairs)
-    progress.advance(len(pairs), sum(row.status != "ok" for _, row in pairs))
+def _keep(found: Sequence[Cases], store: "Store", progress: "Progress") -> None:
+    cases = join(found)
+    store.add(cases)
+    progress.advance(len(cases.batch), cases.failed)
 
 
 def _divide(task: _Task, plan: WorkPlan, suspects: deque[_Task], store: "Store", progress: "Progress") -> None:
@@ -167,9 +142,10 @@ def _divide(task: _Task, plan: WorkPlan, suspects: deque[_Task], store: "Store",
     if not task.alone:
         suspects.extend(_Task([batch], alone=True) for batch in task.batches)
     elif len(task.batches[0]) > 1:
-        suspects.extendleft(_Task([[item]], alone=True) for item in reversed(task.batches[0]))
+        batch = task.batches[0]
+        suspects.extendleft(_Task([batch.part(k, k + 1)], alone=True) for k in reversed(range(len(batch))))
     elif task.tries + 1 < TRIES_ALONE:
         suspects.appendleft(_Task(task.batches, alone=True, tries=task.tries + 1))
     else:
         reason = "the worker process ended each time it computed this case alone (killed or crashed); the next run tries again."
-        _keep(task, [[failed_row(plan, "lost", reason)]], store, progress)
+        _keep([failed_cases(plan, task.batches[0], "lost", reason)], store, progress)

@@ -5,15 +5,18 @@ import time
 import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
 
 from studies.errors import UNUSABLE_INPUT
 from studies.instrument.card import Instrument
+from studies.sweeps.block import Batch, Cases, Remark, decode, each_design, join
 from studies.sweeps.case import Case
 from studies.sweeps.child import FunctionFailed, FunctionLost
+from studies.sweeps.design import coding
 from studies.sweeps.parameters import set_parameters
 from studies.sweeps.quantities import library
-from studies.sweeps.row import Row
 
 if TYPE_CHECKING:
     from studies.sweeps.definition import Study
@@ -21,7 +24,15 @@ if TYPE_CHECKING:
     from studies.sweeps.families import Families
     from studies.sweeps.quantity import Number
 
-Batch = Sequence[Mapping[str, Any]]
+
+class Row(NamedTuple):
+    """What became of one design: `remark` is the reason of a failure, or a warning of the solver."""
+
+    status: str
+    remark: str
+    values: tuple[float, ...]
+    errors: tuple[float, ...]
+    seconds: float
 
 
 @dataclass(frozen=True)
@@ -29,6 +40,7 @@ class WorkPlan:
     """What a worker must know of a study; without families small, so that it travels with every task."""
 
     instrument: Instrument
+    coding: tuple[tuple[str, tuple[str, ...]], ...]
     asked: tuple[tuple[str, Mapping[str, Any], int], ...]
     families: "Families | None" = None
     derived: "tuple[Derived, ...]" = ()
@@ -37,14 +49,54 @@ class WorkPlan:
     def of(cls, study: "Study", families: "Families | None" = None) -> "WorkPlan":
         """Return the plan of a study."""
         asked = tuple((one.quantity.name, one.options, len(one.columns)) for one in study.asked)
-        return cls(study.instrument, asked, families, study.derived)
+        return cls(study.instrument, coding(study), asked, families, study.derived)
+
+    @property
+    def width(self) -> int:
+        """The number of columns of results."""
+        return sum(width for _, _, width in self.asked)
 
 
-def evaluate_task(plan: WorkPlan, batches: Sequence[Batch]) -> list[list[Row]]:
-    """Evaluate several batches of parameters by name; called in a worker."""
-    if plan.families is not None:
-        return [plan.families.evaluate(batch) for batch in batches]
-    return [[evaluate_case(plan, parameters) for parameters in batch] for batch in batches]
+def evaluate_task(plan: WorkPlan, batches: Sequence[Batch]) -> list[Cases]:
+    """Evaluate several batches of designs; called in a worker."""
+    return [_evaluate_together(plan, batch) if plan.families else _evaluate_each(plan, batch) for batch in batches]
+
+
+def _evaluate_each(plan: WorkPlan, batch: Batch) -> Cases:
+    rows = [evaluate_case(plan, design) for design in each_design(decode(plan.coding, batch.designs), len(batch))]
+    remarks: dict[tuple[str, str], list[int]] = {}
+    for place, row in enumerate(rows):
+        if row.remark or row.status != "ok":
+            remarks.setdefault((row.status, row.remark), []).append(place)
+    return Cases(
+        batch,
+        np.array([row.values for row in rows]),
+        np.array([row.errors for row in rows]),
+        sum(row.seconds for row in rows),
+        tuple(Remark(*key, places) for key, places in remarks.items()),
+    )
+
+
+def _evaluate_together(plan: WorkPlan, batch: Batch) -> Cases:
+    """Evaluate a batch through families; where one of its designs cannot be computed, by halves."""
+    assert plan.families is not None
+    began = time.perf_counter()
+    try:
+        values, errors = plan.families.evaluate(decode(plan.coding, batch.designs), len(batch))
+    except UNUSABLE_INPUT as error:
+        if len(batch) == 1:
+            return failed_cases(plan, batch, "failed", str(error))
+        middle = len(batch) // 2
+        return join(
+            [_evaluate_together(plan, part) for part in (batch.part(0, middle), batch.part(middle, len(batch)))]
+        )
+    return Cases(batch, values, errors, time.perf_counter() - began)
+
+
+def failed_cases(plan: WorkPlan, batch: Batch, status: str, reason: str) -> Cases:
+    """Return designs without values, for one reason."""
+    nothing = np.full((len(batch), plan.width), math.nan)
+    return Cases(batch, nothing, nothing, 0.0, (Remark(status, reason, range(len(batch))),))
 
 
 def evaluate_case(plan: WorkPlan, parameters: Mapping[str, Any]) -> Row:
@@ -74,8 +126,8 @@ def evaluate_case(plan: WorkPlan, parameters: Mapping[str, Any]) -> Row:
 
 
 def failed_row(plan: WorkPlan, status: str, reason: str) -> Row:
-    """Return the row of a case that cannot be built, or whose worker did not survive it."""
-    nothing = (math.nan,) * sum(width for _, _, width in plan.asked)
+    """Return the row of a case that cannot be built, or whose function's process was ended."""
+    nothing = (math.nan,) * plan.width
     return Row(status, reason, nothing, nothing, 0.0)
 
 

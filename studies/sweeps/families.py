@@ -5,7 +5,6 @@ temperature follow exactly. Its error is judged by full solves that it has not s
 more solves than half the designs, every design is solved in full. No result depends on the other designs of its batch.
 """
 
-import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
@@ -21,7 +20,6 @@ from studies.errors import UNUSABLE_INPUT, InputError
 from studies.instrument.card import Instrument
 from studies.sweeps.parameters import TEMPERATURE, set_parameters
 from studies.sweeps.quantities.tcf import PARTS, STEEPEST
-from studies.sweeps.row import Row
 
 if TYPE_CHECKING:
     from shell.materials import Material
@@ -31,7 +29,7 @@ if TYPE_CHECKING:
     from studies.sweeps.design import Design
 
 Array = NDArray[np.float64]
-Designs = Sequence[Mapping[str, Any]]
+Designs = Mapping[str, NDArray[Any]]  # columns of parameters by name
 FEWEST = 64  # cases from which a family may cost less than solving each design
 SHARE = 2  # designs for each full solve that a family may take, so that it at least halves the work
 TOLERANCE = 1e-6  # of the family against the full solve
@@ -50,25 +48,24 @@ class Families:
     asked: tuple[tuple[str, "Options", int], ...]
     members: Mapping[tuple[int, int, str], Family]
 
-    def evaluate(self, designs: Designs) -> list[Row]:
-        """Evaluate a batch; where it contains a design that cannot be computed, each design for itself."""
-        began = time.perf_counter()
-        try:
-            found = [FAST[name](self, options, designs) for name, options, _ in self.asked]
-        except UNUSABLE_INPUT as error:
-            if len(designs) > 1:
-                return [row for design in designs for row in self.evaluate([design])]
-            nothing = (float("nan"),) * sum(width for _, _, width in self.asked)
-            return [Row("failed", str(error), nothing, nothing, time.perf_counter() - began)]
-        values, errors = (np.concatenate([one[part] for one in found], axis=1).tolist() for part in (0, 1))
-        each = (time.perf_counter() - began) / len(designs)
-        return [Row("ok", "", tuple(v), tuple(e), each) for v, e in zip(values, errors, strict=True)]
+    def evaluate(self, designs: Designs, count: int) -> tuple[Array, Array]:
+        """Evaluate designs together: values and errors, arrays (designs, columns).
+
+        Raises
+        ------
+        ShellError, InputError
+            One of the designs cannot be computed.
+        """
+        found = [FAST[name](self, options, designs, count) for name, options, _ in self.asked]
+        values, errors = (np.concatenate([one[part] for one in found], axis=1) for part in (0, 1))
+        return values, errors
 
     def modes(self, options: "Options", designs: Designs, bodies: "_Bodies") -> tuple[Family, FamilyResult]:
         """Return the family that a quantity asks for and what it gives."""
         family = self.members[_key(options)]
-        values = np.array([[design[axis.name] for axis in family.axes] for design in designs], dtype=float)
-        values = values.reshape(len(designs), len(family.axes))
+        values = np.empty((len(bodies.T), len(family.axes)))
+        for k, axis in enumerate(family.axes):
+            values[:, k] = designs[axis.name]
         return family, family.evaluate(values, nu=bodies.nu, E=bodies.E, rho=bodies.rho, growth=bodies.growth)
 
 
@@ -81,7 +78,7 @@ class _Bodies:
     E: Array
     nu: Array
     rho: Array
-    materials: "list[tuple[Material, list[int]]]"
+    materials: "list[tuple[Material, Any]]"
 
 
 def why_not(study: "Study") -> str:
@@ -124,7 +121,8 @@ def build_families(study: "Study", design: "Design", most: int = MOST_SOLVES) ->
     sloped = {_key(one.options) for one in study.asked if one.quantity.name == "tcf"}
     members: dict[tuple[int, int, str], Family] = {}
     try:
-        nu = _describe(study.instrument, _ends(study, design), None).nu
+        ends = _ends(study, design)
+        nu = _describe(study.instrument, ends, len(ends[TEMPERATURE]), None).nu
         beyond = MARGIN * float(np.ptp(nu))
         for one in study.asked:
             key = harmonic, index, theory = _key(one.options)
@@ -165,30 +163,30 @@ def choose_solver(study: "Study", design: "Design") -> "Families | None":
     return None
 
 
-def _frequency(families: Families, options: "Options", designs: Designs) -> tuple[Array, Array]:
-    bodies = _describe(families.instrument, designs, options["temperature_degC"])
+def _frequency(families: Families, options: "Options", designs: Designs, count: int) -> tuple[Array, Array]:
+    bodies = _describe(families.instrument, designs, count, options["temperature_degC"])
     family, found = families.modes(options, designs, bodies)
     error = found.frequency * (family.error.frequency + family.theory_error)
     return found.frequency[:, None], error[:, None]
 
 
-def _bryan_factor(families: Families, options: "Options", designs: Designs) -> tuple[Array, Array]:
-    bodies = _describe(families.instrument, designs, options["temperature_degC"])
+def _bryan_factor(families: Families, options: "Options", designs: Designs, count: int) -> tuple[Array, Array]:
+    bodies = _describe(families.instrument, designs, count, options["temperature_degC"])
     family, found = families.modes(options, designs, bodies)
-    return found.bryan_factor[:, None], np.full((len(designs), 1), family.error.bryan_factor + family.theory_error)
+    return found.bryan_factor[:, None], np.full((count, 1), family.error.bryan_factor + family.theory_error)
 
 
-def _tcf(families: Families, options: "Options", designs: Designs) -> tuple[Array, Array]:
+def _tcf(families: Families, options: "Options", designs: Designs, count: int) -> tuple[Array, Array]:
     """Return the five parts of d ln f/dT (HRG paper eq. 15) and their sum."""
-    bodies = _describe(families.instrument, designs, options["temperature_degC"])
+    bodies = _describe(families.instrument, designs, count, options["temperature_degC"])
     family, found = families.modes(options, designs, bodies)
-    parts, scale = np.empty((len(designs), 5)), np.empty((len(designs), 2))
+    parts, scale = np.empty((count, 5)), np.empty((count, 2))
     for material, places in bodies.materials:
         T = bodies.T[places]
         found_parts = slope_parts(material, T, found.by_nu[places], found.by_thickness[places])
         parts[places] = np.stack([getattr(found_parts, name) for name in PARTS], axis=1)
         scale[places] = abs(np.stack([material.slope("poisson_ratio", T), material.value("expansion", T)], axis=1))
-    level, nothing = STEEPEST * family.theory_error, np.zeros(len(designs))
+    level, nothing = STEEPEST * family.theory_error, np.zeros(count)
     of_nu, of_h = (family.error.by_nu + level) * scale[:, 0], (family.error.by_thickness + level) * scale[:, 1]
     # the parts of h and r add up to −alpha whatever the slope by h
     errors = np.stack([of_nu, nothing, of_nu, nothing, of_h, of_h], axis=1)
@@ -202,20 +200,20 @@ def _key(options: "Options") -> tuple[int, int, Any]:
     return options["harmonic"], options.get("index", 0), options["theory"]
 
 
-def _describe(instrument: Instrument, designs: Designs, temperature_degC: float | None) -> _Bodies:
+def _describe(instrument: Instrument, designs: Designs, count: int, temperature_degC: float | None) -> _Bodies:
     """Return what designs are made of; one material for all that share its parameters."""
-    count, reference = len(designs), instrument.reference_temperature
-    if temperature_degC is None:
-        T = np.array([design.get(TEMPERATURE, reference - zero_Celsius) for design in designs], dtype=float)
+    reference = instrument.reference_temperature
+    given = designs.get(TEMPERATURE, reference - zero_Celsius) if temperature_degC is None else temperature_degC
+    T = np.broadcast_to(np.asarray(given, dtype=float), (count,)) + zero_Celsius
+    names = [name for name in designs if name.startswith(MATERIAL)]
+    groups: dict[tuple[Any, ...], Any] = {}
+    if names:
+        for place, values in enumerate(zip(*(designs[name].tolist() for name in names), strict=True)):
+            groups.setdefault(values, []).append(place)
     else:
-        T = np.full(count, temperature_degC)
-    T = T + zero_Celsius
-    names = [name for name in designs[0] if name.startswith(MATERIAL)]
-    groups: dict[tuple[Any, ...], list[int]] = {}
-    for place, design in enumerate(designs):
-        groups.setdefault(tuple(design[name] for name in names), []).append(place)
+        groups[()] = slice(None)
     constants = np.empty((4, count))
-    materials: list[tuple[Material, list[int]]] = []
+    materials: list[tuple[Material, Any]] = []
     for values, places in groups.items():
         material = set_parameters(instrument, dict(zip(names, values, strict=True))).material
         there = T[places]
@@ -236,7 +234,7 @@ def _range(study: "Study", design: "Design", k: int) -> tuple[float, float]:
     return min(float(values.min()), p.low, float(p.nominal)), max(float(values.max()), p.high, float(p.nominal))
 
 
-def _ends(study: "Study", design: "Design") -> list[dict[str, Any]]:
+def _ends(study: "Study", design: "Design") -> dict[str, NDArray[Any]]:
     """Return designs at the ends of temperature and every material parameter, which bound ν of all designs."""
     fixed = [T for T in (one.options["temperature_degC"] for one in study.asked) if T is not None]
     choices: dict[str, Sequence[Any]] = {}
@@ -247,4 +245,7 @@ def _ends(study: "Study", design: "Design") -> list[dict[str, Any]]:
             choices[p.name] = p.values if isinstance(p.nominal, str) else _range(study, design, k)
     reference = study.instrument.reference_temperature - zero_Celsius
     choices[TEMPERATURE] = [*choices.get(TEMPERATURE, [reference]), *fixed]
-    return [dict(zip(choices, values, strict=True)) for values in product(*choices.values())]
+    return {
+        name: np.array(column)
+        for name, column in zip(choices, zip(*product(*choices.values()), strict=True), strict=True)
+    }

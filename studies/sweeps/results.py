@@ -1,22 +1,22 @@
 """The results of a study: a table with units, columns as arrays, failures, outcomes of searches."""
 
-import json
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from studies.instrument.card import build_instrument
 from studies.shown import Shown
+from studies.sweeps.block import decode
 from studies.sweeps.definition import Study
-from studies.sweeps.design import nominal_design
-from studies.sweeps.engine import make_item
+from studies.sweeps.design import coding, nominal_row
+from studies.sweeps.opening import open_store
 from studies.sweeps.spec import check_study
-from studies.sweeps.store import Store, Stored, open_store
+from studies.sweeps.store import Store, Stored
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -24,30 +24,24 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True)
-class _Loaded:
-    parameters: Mapping[str, NDArray[Any]]
-    numbers: Array
-    failed: NDArray[np.bool_]
-    remarks: list[str]
+class Chunk(NamedTuple):
+    """Some thousand cases in order: parameters by name, values and errors (m, columns), status and remark by row."""
 
-    def take(self, places: list[int]) -> "_Loaded":
-        return _Loaded(
-            {name: values[places] for name, values in self.parameters.items()},
-            self.numbers[places],
-            self.failed[places],
-            [self.remarks[place] for place in places],
-        )
+    parameters: Mapping[str, NDArray[Any]]
+    values: Array
+    errors: Array
+    remarks: Mapping[int, tuple[str, str]]
 
 
 @dataclass(frozen=True, repr=False)
 class Results(Shown):
-    """What a store holds of a study; cases stand in the order of the spec's design."""
+    """What a store holds of a study; cases stand in the order of the spec's design, those that are computed."""
 
     drawn_by = "studies.reports.sweep_figures:first_figure"
 
     study: Study
     store: Store = field(repr=False)
+    _read: dict[int, Array] = field(default_factory=dict, repr=False, compare=False)
 
     @cached_property
     def about(self) -> Mapping[str, Any]:
@@ -59,97 +53,143 @@ class Results(Shown):
         """Number of different designs that the study has."""
         return int(self.about["cases"])
 
+    @property
+    def done(self) -> int:
+        """Number of different designs that are computed."""
+        return int(self.store.done().sum())
+
     def __len__(self) -> int:
-        """Return the number of computed cases, a design that the spec repeats as often as it does."""
-        return len(self._loaded.remarks)
+        return self.done if self._repeats is None else len(self._repeats)
 
     @property
     def values(self) -> Array:
-        """All results, shape (cases, columns); NaN where a quantity failed."""
-        return self._loaded.numbers[:, : len(self.study.columns)]
+        """Results, shape (cases, columns); NaN where a case failed."""
+        return np.stack([self.column(column.name) for column in self.study.columns], axis=1)
 
     @property
     def errors(self) -> Array:
         """Estimates of the numerical error, shape and units as `values`; NaN where there is none."""
-        return self._loaded.numbers[:, len(self.study.columns) :]
-
-    @property
-    def remarks(self) -> list[str]:
-        """For every case why it failed, or what the solver warned of; mostly empty."""
-        return self._loaded.remarks
-
-    @property
-    def failed(self) -> NDArray[np.intp]:
-        """The places of the cases that failed."""
-        return np.flatnonzero(self._loaded.failed)
+        return np.stack([self.error(column.name) for column in self.study.columns], axis=1)
 
     def column(self, name: str) -> Array:
         """Return one column of results."""
-        return self.values[:, [column.name for column in self.study.columns].index(name)]
+        return self._column(1 + len(self.study.names) + self._place(name))
+
+    def error(self, name: str) -> Array:
+        """Return the estimates of the numerical error of one column."""
+        return self._column(1 + len(self.study.names) + len(self.study.columns) + self._place(name))
 
     def parameter(self, name: str) -> NDArray[Any]:
         """Return one parameter of every case."""
-        return self._loaded.parameters[name]
+        place = self.study.names.index(name)
+        return decode([coding(self.study)[place]], self._column(1 + place)[:, None])[name]
 
     def design(self, place: int) -> dict[str, Any]:
         """Return the parameters of one case by name."""
         return {name: self.parameter(name)[place].item() for name in self.study.names}
 
+    def remark(self, place: int) -> str:
+        """Return why a case failed, or what the solver warned of; mostly nothing."""
+        return self._remarks.get(place, ("", ""))[1]
+
+    @property
+    def remarks(self) -> list[str]:
+        """The remark of every case."""
+        return [self.remark(place) for place in range(len(self))]
+
     @cached_property
-    def _loaded(self) -> "_Loaded":
-        """Read the store into columns: a million cases as rows of Python objects would fill the memory."""
-        names = self.study.names
-        columns: dict[str, list[Any]] = {name: [] for name in names}
-        numbers, failed, remarks, place_of = bytearray(), bytearray(), [], {}
-        for place, (position, parameters, status, remark, packed) in enumerate(self.store.rows()):
-            place_of[position] = place
-            for name, value in json.loads(parameters).items():
-                columns[name].append(value)
-            numbers += packed
-            failed.append(status != "ok")
-            remarks.append(remark)
-        loaded = _Loaded(
-            {name: np.array(columns[name]) for name in names},
-            np.frombuffer(numbers, "<f8").reshape(len(remarks), 2 * len(self.study.columns)),
-            np.frombuffer(failed, np.bool_),
-            remarks,
-        )
-        repeats = [place_of[position] for position in self.about["repeats"] if position in place_of]
-        return loaded.take(repeats) if repeats else loaded
+    def failed(self) -> NDArray[np.intp]:
+        """The places of the cases that failed."""
+        return np.array(sorted(k for k, (status, _) in self._remarks.items() if status != "ok"), dtype=np.intp)
 
     @cached_property
     def nominal(self) -> Stored | None:
         """The nominal design, None before it has been computed."""
-        return self.store.find(make_item(self.about["identity"]["base"], None, nominal_design(self.study)).key)
+        return self.store.find(nominal_row(self.study))
+
+    def chunks(self) -> Iterator[Chunk]:
+        """Give all cases, some thousand at a time."""
+        d, w = len(self.study.names), len(self.study.columns)
+        columns = range(1, 1 + d + 2 * w)
+        remarks: Mapping[int, tuple[str, str]]
+        streams: Iterator[tuple[NDArray[Any], Array]]
+        if self._repeats is not None:
+            streams = iter([(np.arange(len(self)), np.array([self._column(k) for k in columns]))])
+            remarks = self._remarks
+        else:
+            streams, remarks = self.store.read(columns), self.store.remarks()
+        for places, found in streams:
+            there = {row: remarks[k] for row, k in enumerate(places.tolist()) if k in remarks} if remarks else {}
+            yield Chunk(decode(coding(self.study), found[:d].T), found[d : d + w].T, found[d + w :].T, there)
 
     def table(self) -> "pd.DataFrame":
         """Return one row a case: parameters, results, numerical errors, status, remark; `attrs["units"]` by column."""
         import pandas as pd
 
         columns: dict[str, Any] = {name: self.parameter(name) for name in self.study.names}
-        units = {p.name: p.unit for p in self.study.parameters}
-        for place, column in enumerate(self.study.columns):
-            columns[column.name] = self.values[:, place]
-            units[column.name] = column.unit
-            if np.isfinite(self.errors[:, place]).any():
-                columns[f"{column.name}_error"] = self.errors[:, place]
-                units[f"{column.name}_error"] = column.unit
-        columns["status"] = np.where(self._loaded.failed, "failed", "ok")
-        columns["remark"] = self.remarks
-        table = pd.DataFrame(columns)
-        table.attrs = {"study": self.study.name, "units": units}
+        for column, judged in zip(self.study.columns, self.judged, strict=True):
+            columns[column.name] = self.column(column.name)
+            if judged:
+                columns[f"{column.name}_error"] = self.error(column.name)
+        status = np.full(len(self), "ok", dtype=object)
+        status[self.failed] = "failed"
+        table = pd.DataFrame({**columns, "status": status, "remark": self.remarks})
+        table.attrs = {"study": self.study.name, "units": self.units}
         return table
+
+    @property
+    def judged(self) -> list[bool]:
+        """For every column whether some case has an estimate of its error."""
+        return self.store.judged.tolist() or [False] * len(self.study.columns)
+
+    @property
+    def units(self) -> dict[str, str]:
+        """The unit of every column of the table that has one."""
+        units = {p.name: p.unit for p in self.study.parameters}
+        for column, judged in zip(self.study.columns, self.judged, strict=True):
+            units |= dict.fromkeys([column.name, *([f"{column.name}_error"] if judged else [])], column.unit)
+        return units
 
     def to_frame(self) -> "pd.DataFrame":
         """Return `table()`, by the name that every result has."""
         return self.table()
 
     def __repr__(self) -> str:
-        return f"Results({self.study.name}: {len(self)} of {self.total} cases, {len(self.failed)} failed)"
+        return f"Results({self.study.name}: {self.done} of {self.total} cases, {len(self.failed)} failed)"
 
     def close(self) -> None:
         """Close the store."""
         self.store.close()
+
+    def _place(self, name: str) -> int:
+        return [column.name for column in self.study.columns].index(name)
+
+    def _column(self, k: int) -> Array:
+        if k not in self._read:
+            found = [columns[0] for _, columns in self.store.read([k])]
+            whole = np.concatenate(found) if found else np.empty(0)
+            self._read[k] = whole if self._repeats is None else whole[self._repeats]
+        return self._read[k]
+
+    @cached_property
+    def _repeats(self) -> NDArray[np.intp] | None:
+        """For every design of the spec its row among those that are computed, where the spec repeats some."""
+        if not self.about["repeats"]:
+            return None
+        done = np.zeros(self.total, dtype=bool)
+        done[: len(self.store.done())] = self.store.done()[: self.total]
+        places = np.array(self.about["repeats"])
+        return np.asarray((np.cumsum(done) - 1)[places[done[places]]])
+
+    @cached_property
+    def _remarks(self) -> dict[int, tuple[str, str]]:
+        """Status and remark by the place of a case among these results."""
+        there = np.flatnonzero(self.store.done())
+        rows = np.arange(len(there)) if self._repeats is None else self._repeats
+        if not self.store.remarks():
+            return {}
+        said = {int(np.searchsorted(there, place)): one for place, one in self.store.remarks().items()}
+        return {place: said[row] for place, row in enumerate(rows.tolist()) if row in said}
 
 
 def open_results(folder: str | Path) -> Results:

@@ -1,5 +1,6 @@
 """Run a study from spec to store: check, resume, compute, search."""
 
+import json
 import os
 import time
 import warnings
@@ -9,19 +10,23 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from studies.errors import InputError
-from studies.sweeps.canonical import PHYSICS_VERSION, digest, spell_material
+from studies.sweeps.block import Batch
+from studies.sweeps.canonical import PHYSICS_VERSION, digest, spell, spell_material
 from studies.sweeps.definition import FREE, Study
-from studies.sweeps.design import Design, draw, nominal_design
+from studies.sweeps.design import Design, draw, nominal_row
 from studies.sweeps.engine import BATCH, BATCH_VECTORISED, compute, missing_batches
 from studies.sweeps.evaluate import WorkPlan, evaluate_task
 from studies.sweeps.families import Families, choose_solver, why_not
+from studies.sweeps.opening import claim_store
 from studies.sweeps.progress import Silent, shown_progress
 from studies.sweeps.provenance import describe_environment
 from studies.sweeps.results import Results, open_results
-from studies.sweeps.search import run_searches
+from studies.sweeps.search import name_search, run_searches
 from studies.sweeps.spec import read_study
-from studies.sweeps.store import Store, claim_store, memory_store
+from studies.sweeps.store import FILE, Store, memory_store
 from studies.sweeps.workers import Here, Pool, Workers
 
 STORE_SECONDS = 3e-5  # for one case to be hashed, committed and counted
@@ -75,26 +80,18 @@ def run_study(
     study = read_study(source, card)
     sources = check_functions(study, allow_python)
     design = draw(study)
-    families = choose_solver(study, design)
-    identity = identify(study, design, sources, families)
+    fresh = out is None or not (Path(out) / FILE).exists()
+    families = choose_solver(study, design) if fresh else None  # before a folder is made for what cannot be computed
     store = memory_store() if out is None else claim_store(out)
     try:
-        _describe(store, study, design, identity)
-        damaged = store.forget_damaged()
-        if damaged:
-            warnings.warn(f"{len(damaged)} damaged cases are computed again (first: case {damaged[0]}).", stacklevel=2)
-        _tell_other_versions(store)
         store.forget("lost", *(["failed"] if retry_failed else []))
-        crew = Here() if families else None
-        _run(
-            store,
-            study,
-            design,
-            identity["base"],
-            WorkPlan.of(study, families),
-            crew or _hire(workers, scheduler),
-            show_progress,
-        )
+        if fresh or not _is_finished(store, study, design, sources):
+            if not fresh:
+                families = choose_solver(study, design)
+            _describe(store, study, design, identify(study, design, sources, _describe_families(families)))
+            _tell_other_versions(store)
+            crew = Here() if families else _hire(workers, scheduler)
+            _run(store, study, design, WorkPlan.of(study, families), crew, show_progress)
     except BaseException:
         store.close()
         raise
@@ -125,22 +122,22 @@ def estimate_study(study: Study, workers: int | None = None) -> Effort:
     import resource
 
     began = time.perf_counter()
-    design, parameters = draw(study), nominal_design(study)
+    design = draw(study)
     families = choose_solver(study, design)
     plan = WorkPlan.of(study, families)
     if families is None:
         count, size, trials = workers or cores(), BATCH, 1
-        evaluate_task(plan, [[parameters]])  # the first time imports and builds what later cases share
+        evaluate_task(plan, [_nominal(study, 1)])  # the first time imports and builds what later cases share
     else:
         count, size, trials = 1, BATCH_VECTORISED, 1000
     training = time.perf_counter() - began if families else 0.0
     began = time.perf_counter()
-    evaluate_task(plan, [[parameters] * trials])
+    evaluate_task(plan, [_nominal(study, trials)])
     each = (time.perf_counter() - began) / trials + STORE_SECONDS
     cases = len(design.unique)
     resident = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
     processes = 1 if families else 1 + count
-    row = 8 * (len(study.parameters) + 2 * len(study.columns)) + 200
+    row = 16 * (len(study.parameters) + len(study.columns))  # the designs, and what is read back
     return Effort(
         cases=cases,
         batches=-(-cases // (study.sampling.batch or size)),
@@ -150,6 +147,10 @@ def estimate_study(study: Study, workers: int | None = None) -> Effort:
         solver="family" if families else "full",
         why_full="" if families else why_not(study),
     )
+
+
+def _nominal(study: Study, count: int) -> Batch:
+    return Batch(np.full(count, -1), np.tile(nominal_row(study), (count, 1)))
 
 
 def cores() -> int:
@@ -171,8 +172,8 @@ def check_functions(study: Study, allowed: bool) -> dict[str, str]:
     return {Path(function).name: check_function(function) for function in study.functions}
 
 
-def identify(study: Study, design: Design, sources: Mapping[str, str], families: Families | None) -> dict[str, Any]:
-    """Return everything that the results depend on; `base` is its hash, part of the key of every case."""
+def identify(study: Study, design: Design, sources: Mapping[str, str], solver: Any) -> dict[str, Any]:
+    """Return everything that the results depend on; `base` is the hash of the physics in it."""
     physics = {
         "card": {
             key: value for key, value in study.instrument.content.items() if key not in ("schema", "name", "note")
@@ -181,7 +182,7 @@ def identify(study: Study, design: Design, sources: Mapping[str, str], families:
         "material_laws": digest(spell_material(study.instrument.material)),
         "quantity": study.content["quantity"],
         "functions": dict(sources),
-        "solver": _describe_families(families) if families else "full",
+        "solver": solver,
         "physics_version": PHYSICS_VERSION,
     }
     spec = {key: value for key, value in study.content.items() if key not in (*FREE, "card", "quantity")}
@@ -209,6 +210,19 @@ def _describe(store: Store, study: Study, design: Design, identity: Mapping[str,
     )
 
 
+def _is_finished(store: Store, study: Study, design: Design, sources: Mapping[str, str]) -> bool:
+    """Return whether everything that is asked is in the store; if so its families need not be built again to know it."""
+    done = int(store.done().sum()) == len(design.unique) and store.find(nominal_row(study)) is not None
+    if not done or not {name_search(search) for search in study.searches} <= store.findings().keys():
+        return False
+    solver = store.about()["identity"]["solver"]
+    identity = identify(study, design, sources, solver)
+    if json.loads(spell(identity)) != store.about()["identity"]:
+        return False
+    _describe(store, study, design, identity)
+    return True
+
+
 def _tell_other_versions(store: Store) -> None:
     """Warn when earlier results come from other versions of what computes: digits may differ between them."""
     now = describe_environment()["packages"]
@@ -220,7 +234,9 @@ def _tell_other_versions(store: Store) -> None:
         warnings.warn(f"earlier results were computed with {', '.join(others)}; last digits may differ.", stacklevel=3)
 
 
-def _describe_families(families: Families) -> list[Any]:
+def _describe_families(families: Families | None) -> Any:
+    if families is None:
+        return "full"
     return [
         [
             *key,
@@ -233,17 +249,15 @@ def _describe_families(families: Families) -> list[Any]:
     ]
 
 
-def _run(
-    store: Store, study: Study, design: Design, base: str, plan: WorkPlan, crew: Workers, show_progress: bool
-) -> None:
+def _run(store: Store, study: Study, design: Design, plan: WorkPlan, crew: Workers, show_progress: bool) -> None:
     outcome = "stopped"
     store.begin_run(describe_environment())
     try:
-        batches = missing_batches(study, design, base, store, plan.families is not None)
+        batches = missing_batches(study, design, store, plan.families is not None)
         done = sum(store.counts().values())
         with shown_progress(len(design.unique), done) if show_progress else nullcontext(Silent()) as progress:
             compute(plan, batches, crew, store, progress)
-        run_searches(study, base, plan, crew, store)
+        run_searches(study, plan, crew, store)
         outcome = "finished"
     except KeyboardInterrupt:
         outcome = "interrupted"

@@ -1,19 +1,20 @@
 """Searches beyond the sampled designs: the worst case over a box, the design that has wanted values, the tolerances to ask for.
 
-Every design that a search looks at is kept in the store under its key, and the search takes the same path every time:
+Every design that a search looks at is kept in the store, and the search takes the same path every time:
 resumed, it walks over what is already there.
 """
 
 from collections import deque
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from itertools import product
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from studies.sweeps.design import decode_row, draw, nominal_design
-from studies.sweeps.engine import Batch, compute, make_item
+from studies.sweeps.block import Batch, decode, each_design
+from studies.sweeps.design import draw, nominal_row
+from studies.sweeps.engine import BATCH_VECTORISED, compute
 from studies.sweeps.progress import Silent
 from studies.sweeps.tolerance import place_limits
 
@@ -34,38 +35,41 @@ class SearchFailed(RuntimeError):
 
 
 class Explorer:
-    """Designs of a study by their parameters, computed when the store lacks them."""
+    """Designs of a study, rows as in its design, computed when the store lacks them."""
 
-    def __init__(self, study: "Study", base: str, plan: "WorkPlan", workers: "Workers", store: "Store") -> None:
-        self.study, self.base, self.plan, self.workers, self.store = study, base, plan, workers, store
+    def __init__(self, study: "Study", plan: "WorkPlan", workers: "Workers", store: "Store") -> None:
+        self.study, self.plan, self.workers, self.store = study, plan, workers, store
         self.columns = [column.name for column in study.columns]
 
-    def cases(self, designs: Sequence[Mapping[str, Any]]) -> "list[Stored]":
+    def cases(self, designs: Array) -> "list[Stored]":
         """Return designs as the store has them, after computing those that lack."""
-        items = [make_item(self.base, None, dict(design)) for design in designs]
-        lacking: deque[Batch] = deque()
-        for item in {item.key: item for item in items}.values():
-            if self.store.find(item.key) is None:
-                lacking.append([item])
-        compute(self.plan, lacking, self.workers, self.store, Silent())
-        found = [self.store.find(item.key) for item in items]
+        lacking = {design.tobytes(): design for design in designs if self.store.find(design) is None}
+        if lacking:
+            rows, size = np.array(list(lacking.values())), BATCH_VECTORISED if self.plan.families else 1
+            parts = np.split(rows, range(size, len(rows), size))
+            batches = deque(Batch(np.full(len(part), -1), part) for part in parts)
+            compute(self.plan, batches, self.workers, self.store, Silent())
+        found = [self.store.find(design) for design in designs]
         return [case for case in found if case is not None]
 
-    def values(self, designs: Sequence[Mapping[str, Any]], columns: Sequence[str]) -> Array:
+    def values(self, designs: Array, columns: Sequence[str]) -> Array:
         """Return columns of designs, shape (designs, columns); SearchFailed names a design that cannot be computed."""
-        places = [self.columns.index(column) for column in columns]
         cases = self.cases(designs)
-        values = np.array([[case.values[place] for place in places] for case in cases])
-        for case, row in zip(cases, values, strict=True):
+        values = np.array([case.values for case in cases])[:, [self.columns.index(column) for column in columns]]
+        for design, case, row in zip(designs, cases, values, strict=True):
             if not np.isfinite(row).all():
-                raise SearchFailed(f"at {dict(case.parameters)}: {case.remark}")
+                raise SearchFailed(f"at {self.name(design)}: {case.remark}")
         return values
 
+    def name(self, design: Array) -> dict[str, Any]:
+        """Return the parameters of a design by name."""
+        return each_design(decode(self.plan.coding, design[None]), 1)[0]
 
-def run_searches(study: "Study", base: str, plan: "WorkPlan", workers: "Workers", store: "Store") -> None:
+
+def run_searches(study: "Study", plan: "WorkPlan", workers: "Workers", store: "Store") -> None:
     """Compute the nominal design and every search of a study, and keep what they find."""
-    explorer = Explorer(study, base, plan, workers, store)
-    explorer.cases([nominal_design(study)])
+    explorer = Explorer(study, plan, workers, store)
+    explorer.cases(nominal_row(study)[None])
     for search in study.searches:
         try:
             found = SEARCHES[search.kind](explorer, search)
@@ -95,26 +99,27 @@ def find_worst_case(explorer: Explorer, search: "Search") -> dict[str, Any]:
     study = explorer.study
     free = [p for p in study.parameters if not isinstance(p.nominal, str)]
     starts = _starts(free)
-    at_starts = explorer.values([_place(study, free, x) for x in starts], [search.column])[:, 0]
+    at_starts = explorer.values(_place(study, free, starts), [search.column])[:, 0]
     found: dict[str, Any] = {"column": search.column, "designs": len(starts)}
     for name, sign in (("least", 1.0), ("greatest", -1.0)):
         best = int(np.argmin(sign * at_starts))
         scale = sign / (float(np.ptp(at_starts)) or 1.0)
 
         def value(x: Array, scale: float = scale) -> float:
-            return float(scale * explorer.values([_place(study, free, x)], [search.column])[0, 0])
+            return float(scale * explorer.values(_place(study, free, x[None]), [search.column])[0, 0])
 
         def slope(x: Array, scale: float = scale) -> Array:
-            pairs = [_around(x, k) for k in range(len(free))]
-            values = explorer.values([_place(study, free, end) for pair in pairs for end in pair], [search.column])
+            pairs = np.array([_around(x, k) for k in range(len(free))])
+            values = explorer.values(_place(study, free, pairs.reshape(-1, len(free))), [search.column])
             apart = np.array([np.abs(one - other).max() for one, other in pairs])
             return np.asarray(scale * (values[1::2, 0] - values[::2, 0]) / apart)
 
         box = [(0.0, 1.0)] * len(free)
         outcome = minimize(value, starts[best], jac=slope, method="L-BFGS-B", bounds=box, options={"maxfun": 200})
         x = outcome.x if outcome.fun < scale * at_starts[best] else starts[best]
-        design = _place(study, free, x)
-        found[name] = {"value": float(explorer.values([design], [search.column])[0, 0]), "parameters": design}
+        design = _place(study, free, x[None])
+        value_there = float(explorer.values(design, [search.column])[0, 0])
+        found[name] = {"value": value_there, "parameters": explorer.name(design[0])}
     return found
 
 
@@ -130,28 +135,28 @@ def invert(explorer: Explorer, search: "Search") -> dict[str, Any]:
     wanted = np.array([search.targets[column] for column in columns])
     middle = np.array([_share(p, float(p.nominal)) for p in free])
     steps = [middle, *(_moved(middle, k) for k in range(len(free)))]
-    first = explorer.values([_place(study, free, x) for x in steps], columns)
+    first = explorer.values(_place(study, free, np.array(steps)), columns)
     scale = np.maximum(np.abs(first[1:] - first[0]).max(axis=0) / STEP, 1e-12 * np.abs(wanted) + 1e-300)
 
     def deviation(x: Array) -> Array:
-        return np.asarray((explorer.values([_place(study, free, x)], columns)[0] - wanted) / scale)
+        return np.asarray((explorer.values(_place(study, free, x[None]), columns)[0] - wanted) / scale)
 
     def slopes(x: Array) -> Array:
-        designs = [_place(study, free, x), *(_place(study, free, _moved(x, k)) for k in range(len(free)))]
-        values = explorer.values(designs, columns)
+        around = np.array([x, *(_moved(x, k) for k in range(len(free)))])
+        values = explorer.values(_place(study, free, around), columns)
         moved = np.array([_moved(x, k)[k] - x[k] for k in range(len(free))])
         return np.asarray(((values[1:] - values[0]) / moved[:, None] / scale).T)
 
     outcome = least_squares(
         deviation, np.clip(middle, 1e-6, 1 - 1e-6), slopes, bounds=(0.0, 1.0), xtol=1e-12, max_nfev=40
     )
-    design = _place(study, free, outcome.x)
-    values = explorer.values([design], columns)[0]
-    errors = np.array([explorer.cases([design])[0].errors[explorer.columns.index(column)] for column in columns])
+    design = _place(study, free, outcome.x[None])
+    values = explorer.values(design, columns)[0]
+    errors = explorer.cases(design)[0].errors[[explorer.columns.index(column) for column in columns]]
     allowed = np.fmax(np.nan_to_num(errors), 1e-6 * np.abs(wanted))
     singular = np.linalg.svd(slopes(outcome.x), compute_uv=False)
     return {
-        "parameters": design,
+        "parameters": explorer.name(design[0]),
         "targets": dict(search.targets),
         "values": dict(zip(columns, values.tolist(), strict=True)),
         "reached": bool((np.abs(values - wanted) <= allowed).all()),
@@ -169,18 +174,17 @@ def find_tolerance(explorer: Explorer, search: "Search") -> dict[str, Any]:
     from scipy.stats import binom
 
     study = explorer.study
-    nominal, rows = nominal_design(study), draw(study).values
-    drawn = [decode_row(study, row.tolist()) for row in rows]
+    nominal, drawn = nominal_row(study), draw(study).values
+    varied = np.array([p.name in search.vary for p in study.parameters])
     columns = [requirement.column for requirement in study.requirements]
-    middle = explorer.values([nominal], columns)[0]
+    middle = explorer.values(nominal[None], columns)[0]
     limits = [_ends_of(one, value) for one, value in zip(study.requirements, middle, strict=True)]
     for column, value, (low, high) in zip(columns, middle, limits, strict=True):
         if not low <= value <= high:
             raise SearchFailed(f"the nominal design itself has {column} = {value:g}, beyond its limits")
     count, factor, bounds = len(drawn), 1.0, [0.0, np.inf]
     for _ in range(MOST_FACTORS):
-        designs = [_scaled(design, nominal, search.vary, factor) for design in drawn]
-        values = explorer.values(designs, columns)
+        values = explorer.values(np.where(varied, nominal + factor * (drawn - nominal), drawn), columns)
         used = np.max([place_limits(*one) for one in zip(values.T, middle, *np.transpose(limits), strict=True)], axis=0)
         used = np.sort(used)
         passed = int((used <= 1).sum())
@@ -219,16 +223,6 @@ def _ends_of(requirement: "Requirement", nominal: float) -> tuple[float, float]:
     return low, np.inf if requirement.high is None else requirement.high
 
 
-def _scaled(
-    design: Mapping[str, Any], nominal: Mapping[str, Any], vary: Sequence[str], factor: float
-) -> dict[str, Any]:
-    """The design at a factor of its distance from the nominal one."""
-    return {
-        name: float(nominal[name] + factor * (value - nominal[name])) if name in vary else value
-        for name, value in design.items()
-    }
-
-
 def _tolerance(parameter: "StudyParameter", factor: float) -> dict[str, Any]:
     """What a parameter's tolerance becomes."""
     middle = float(parameter.nominal)
@@ -251,10 +245,12 @@ def _starts(free: "Sequence[StudyParameter]") -> Array:
     return np.array([middle, *faces])
 
 
-def _place(study: "Study", free: "Sequence[StudyParameter]", x: Array) -> dict[str, Any]:
-    """Return the design at shares 0 ... 1 of the free parameters' ranges, the others nominal."""
-    moved = {p.name: float(p.low + share * (p.high - p.low)) for p, share in zip(free, x, strict=True)}
-    return {**nominal_design(study), **moved}
+def _place(study: "Study", free: "Sequence[StudyParameter]", shares: Array) -> Array:
+    """Return designs at shares 0 ... 1 of the free parameters' ranges, array (m, free); the others are nominal."""
+    designs = np.tile(nominal_row(study), (len(shares), 1))
+    for p, share in zip(free, shares.T, strict=True):
+        designs[:, study.names.index(p.name)] = p.low + share * (p.high - p.low)
+    return designs
 
 
 def _share(parameter: "StudyParameter", value: float) -> float:

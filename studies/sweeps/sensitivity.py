@@ -122,8 +122,7 @@ def local_slopes(results: "Results", column: str) -> list[LocalSlope]:
             f"local slopes need a study with method = 'one-at-a-time', not '{study.sampling.method}'; change [sampling]."
         )
     y = _complete(results, column)
-    place = [c.name for c in study.columns].index(column)
-    error = float(np.nan_to_num(results.errors[:, place]).max(initial=0.0))
+    error = float(np.nan_to_num(results.error(column)).max(initial=0.0))
     slopes = []
     for k, parameter in enumerate(study.parameters):
         rows = [0, *range(1 + 4 * k, 5 + 4 * k)]
@@ -175,9 +174,9 @@ def linear_shares(results: "Results", column: str) -> LinearShares | None:
 
 def _complete(results: "Results", column: str) -> Array:
     """Return a column of which every case is there, or refuse with the list."""
-    if len(results) < _expected(results):
+    if results.done < results.total:
         raise InputError(
-            f"{_expected(results) - len(results)} cases are not computed yet; run the study again to resume it."
+            f"{results.total - results.done} cases are not computed yet; run the study again to resume it."
         )
     y = results.column(column)
     lacking = np.flatnonzero(~np.isfinite(y))
@@ -189,10 +188,6 @@ def _complete(results: "Results", column: str) -> Array:
     return y
 
 
-def _expected(results: "Results") -> int:
-    return len(results.about["repeats"]) or results.total
-
-
 def _list(results: "Results", places: Sequence[int]) -> str:
-    words = [f"case {place} ({results.remarks[place]})" for place in places[:SHOWN]]
+    words = [f"case {place} ({results.remark(place)})" for place in places[:SHOWN]]
     return "; ".join(words) + (f"; and {len(places) - SHOWN} more" if len(places) > SHOWN else "")

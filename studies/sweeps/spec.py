@@ -9,7 +9,7 @@ card = "hrg-30mm"                  # a shipped card, or the path of one beside t
 method = "sobol"                   # grid | list | latin-hypercube | sobol | sensitivity | one-at-a-time
 cases = 1024                       # not for grid, list and one-at-a-time; a power of two for sobol and sensitivity
 seed = 1
-# batch = 8                        # cases that are computed and kept together; 1024 with families
+# batch = 8                        # cases that are computed and kept together; 16384 with families
 # solver = "auto"                  # family: interpolated between full solves, with its error; full: every design by the solver
 
 [[parameter]]

@@ -114,7 +114,7 @@ def test_a_request_to_end_counts_as_ctrl_c(tmp_path):
     words = ["study", "run", str(tmp_path / "study.toml"), "--out", str(tmp_path / "out"), "--workers", "1"]
     environment = {**os.environ, "PYTHONPATH": os.getcwd()}
     process = subprocess.Popen([sys.executable, "-c", code, *words], stderr=subprocess.PIPE, text=True, env=environment)
-    while not (tmp_path / "out" / "study.sqlite").exists():
+    while not (tmp_path / "out" / "study.store").exists():
         assert process.poll() is None, process.stderr.read()
     threading.Event().wait(1.0)
     process.terminate()

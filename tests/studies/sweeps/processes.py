@@ -1,9 +1,10 @@
 """User functions that cost nothing, the specs around them, and how the command line is started as a process."""
 
 import os
-import sqlite3
 import sys
 from pathlib import Path
+
+from studies.sweeps.opening import open_store
 
 ROOT = Path(__file__).parents[3]
 FUNCTIONS = """
@@ -71,18 +72,19 @@ def environment(**more: str) -> dict[str, str]:
 
 
 def rows_of(folder: Path) -> list[tuple[int, str, bytes]]:
-    path = folder / "study.sqlite"
-    if not path.exists():
+    """Return place, status and values of the cases in a store, also while it is written."""
+    if not (folder / "study.store").exists():
         return []
-    connection = sqlite3.connect(f"file:{path}?mode=ro", uri=True, timeout=10)
-    try:
-        return connection.execute(
-            "SELECT position, status, numbers FROM run_case WHERE position IS NOT NULL"
-        ).fetchall()
-    except sqlite3.OperationalError:  # the tables are not there yet
-        return []
-    finally:
-        connection.close()
+    with open_store(folder) as store:
+        if store.study is None:
+            return []
+        d, w = len(store.study["spec"].get("parameter", [])), len(store.judged)
+        remarks = store.remarks()
+        return [
+            (place, remarks.get(place, ("ok", ""))[0], values.tobytes())
+            for places, columns in store.read(range(1 + d, 1 + d + w))
+            for place, values in zip(places.tolist(), columns.T, strict=True)
+        ]
 
 
 def spec_of(function: str, sampling: str, *parameters: str, more: str = "", limit: float = 30.0) -> str:

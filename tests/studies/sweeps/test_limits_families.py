@@ -1,11 +1,13 @@
 """Studies through families: every design within its stated error of the full solve, alone or among others."""
 
+import numpy as np
 import pytest
 
 from studies.errors import InputError
 from studies.instrument.card import shipped_cards
+from studies.sweeps.block import Batch
 from studies.sweeps.design import draw
-from studies.sweeps.evaluate import WorkPlan, evaluate_case
+from studies.sweeps.evaluate import WorkPlan, evaluate_case, evaluate_task
 from studies.sweeps.families import Families, choose_solver
 from studies.sweeps.run import estimate_study, run_study
 from studies.sweeps.spec import read_study
@@ -62,19 +64,22 @@ def test_designs_lie_within_their_stated_error_of_the_full_solve(results):
 
 
 def test_a_design_is_the_same_alone_and_among_others(spec, results):
-    families = choose_solver(results.study, draw(results.study))
-    row = families.evaluate([results.design(7)])[0]
-    assert row.values == tuple(results.values[7])
+    design = draw(results.study)
+    plan = WorkPlan.of(results.study, choose_solver(results.study, design))
+    (alone,) = evaluate_task(plan, [Batch(np.array([7]), design.values[7:8])])
+    assert alone.values.tobytes() == results.values[7].tobytes()
     smaller = run_study({**spec, "sampling": {**spec["sampling"], "batch": 7}})
     assert smaller.values.tobytes() == results.values.tobytes()
 
 
 def test_a_design_that_cannot_be_computed_fails_alone(results):
-    families = choose_solver(results.study, draw(results.study))
-    outside = {**results.design(0), "resonator.thickness_mm": 2.0}
-    rows = families.evaluate([results.design(0), outside, results.design(1)])
-    assert [row.status for row in rows] == ["ok", "failed", "ok"]
-    assert rows[1].remark
+    design = draw(results.study)
+    plan = WorkPlan.of(results.study, choose_solver(results.study, design))
+    designs = design.values[:5].copy()
+    designs[1, results.study.names.index("resonator.thickness_mm")] = 2.0
+    (found,) = evaluate_task(plan, [Batch(np.arange(5), designs)])
+    assert [(remark.status, list(remark.rows)) for remark in found.remarks] == [("failed", [1])]
+    assert np.isfinite(found.values).all(axis=1).tolist() == [True, False, True, True, True]
 
 
 def vary(card):
