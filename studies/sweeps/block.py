@@ -46,7 +46,7 @@ class Remark(NamedTuple):
 
     status: str
     text: str
-    rows: Sequence[int]
+    rows: list[int]
 
 
 @dataclass(frozen=True)

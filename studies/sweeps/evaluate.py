@@ -96,7 +96,7 @@ def _evaluate_together(plan: WorkPlan, batch: Batch) -> Cases:
 def failed_cases(plan: WorkPlan, batch: Batch, status: str, reason: str) -> Cases:
     """Return designs without values, for one reason."""
     nothing = np.full((len(batch), plan.width), math.nan)
-    return Cases(batch, nothing, nothing, 0.0, (Remark(status, reason, range(len(batch))),))
+    return Cases(batch, nothing, nothing, 0.0, (Remark(status, reason, list(range(len(batch)))),))
 
 
 def evaluate_case(plan: WorkPlan, parameters: Mapping[str, Any]) -> Row:

@@ -84,12 +84,12 @@ def run_study(
     families = choose_solver(study, design) if fresh else None  # before a folder is made for what cannot be computed
     store = memory_store() if out is None else claim_store(out)
     try:
+        _tell_other_versions(store)
         store.forget("lost", *(["failed"] if retry_failed else []))
         if fresh or not _is_finished(store, study, design, sources):
             if not fresh:
                 families = choose_solver(study, design)
             _describe(store, study, design, identify(study, design, sources, _describe_families(families)))
-            _tell_other_versions(store)
             crew = Here() if families else _hire(workers, scheduler)
             _run(store, study, design, WorkPlan.of(study, families), crew, show_progress)
     except BaseException:

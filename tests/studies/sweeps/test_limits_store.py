@@ -100,6 +100,7 @@ def test_a_flipped_bit_in_any_byte_is_found(tmp_path):
             assert content_of(store) == whole
 
 
+@pytest.mark.slow
 def test_every_page_flipped_swapped_or_lost_is_found_and_mended(tmp_path):
     file, whole = make(tmp_path, 6000, 500)
     pages = [file[k : k + PAGE] for k in range(0, len(file), PAGE)]
@@ -116,6 +117,7 @@ def test_every_page_flipped_swapped_or_lost_is_found_and_mended(tmp_path):
             assert check_damage(tmp_path, damaged, 6000, 500, whole) <= 2500
 
 
+@pytest.mark.slow
 def test_a_write_that_was_torn_at_any_byte_is_no_damage(tmp_path):
     file, whole = make(tmp_path, 24, 8)
     for end in range(0, len(file), 5):
