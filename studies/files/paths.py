@@ -7,7 +7,6 @@ be known here.
 
 import json
 import os
-import sqlite3
 import tomllib
 from collections.abc import Iterator, Mapping
 from contextlib import closing, contextmanager, suppress
@@ -28,7 +27,7 @@ RECORDS = ("*.csv", "*.toml", "*/*.csv", "*/*.toml")  # of a folder, or of a fol
 LONGEST_TOML = 2**22  # bytes
 
 _read: dict[object, str] = {}
-_written: set[object] = set()
+_written: set[str] | None = None  # while a command runs; from Python a file may be written again and again
 
 
 @contextmanager
@@ -42,6 +41,8 @@ def guarded(arguments: Mapping[str, Any]) -> Iterator[None]:
     """
     outputs = {name: value for name, value in arguments.items() if name in OUTPUTS and isinstance(value, str)}
     words = [word for name, value in arguments.items() if name not in OUTPUTS for word in _words(value)]
+    global _written
+    _written = set()
     try:
         for word in words:
             for path in _read_with(word):
@@ -60,7 +61,7 @@ def guarded(arguments: Mapping[str, Any]) -> Iterator[None]:
         yield
     finally:
         _read.clear()
-        _written.clear()
+        _written = None
 
 
 def claim(path: Path) -> None:
@@ -71,10 +72,12 @@ def claim(path: Path) -> None:
     InputError
         It is one of them.
     """
+    if _written is None:
+        return
     _spare_read(path, str(path))
-    if _identity(path) in _written and not _is_special(path):
+    if str(path.resolve()) in _written and not _is_special(path):
         raise InputError(f"{path}: two outputs would be one file; name two files.")
-    _written.add(_identity(path))
+    _written.add(str(path.resolve()))
 
 
 def _spare_read(path: Path, given: str) -> None:
@@ -121,6 +124,8 @@ def _inside(folder: Path) -> Iterator[Path]:
     if not (folder / STORE).is_file():
         yield from (path for pattern in RECORDS for path in folder.glob(pattern))
         return
+    import sqlite3
+
     yield from (folder / name for name in STORE_FILES)
     alone = not (folder / f"{STORE}-wal").exists()  # immutable: opening leaves no file beside it
     place = f"{(folder / STORE).resolve().as_uri()}?{'immutable=1' if alone else 'mode=ro'}"

@@ -42,12 +42,12 @@ def answer(name: str) -> tuple[dict[str, Any], str]:
 
     case, out = CASES[name], io.StringIO()
     words = [*shlex.split(case["words"]), "--json", *(["--report", "page.html"] if case.get("page") else [])]
-    with workplace() as folder, contextlib.redirect_stderr(io.StringIO()):
+    with workplace() as folder, contextlib.redirect_stderr(io.StringIO()) as told:
         for before in case.get("before", ()):
             with contextlib.redirect_stdout(io.StringIO()):
-                assert main(shlex.split(before)) == 0, before
+                assert main(shlex.split(before)) == 0, (before, told.getvalue())
         with contextlib.redirect_stdout(out):
-            assert main(words) == 0, words
+            assert main(words) == 0, (words, told.getvalue())
         reader = _Text()
         if case.get("page"):
             reader.feed(Path("page.html").read_text(encoding="utf-8").replace(str(folder), "FOLDER"))

@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 
 from studies.cli import main
+from studies.files.writing import write_text
 
 INPUTS = Path(__file__).parents[1] / "golden" / "inputs"
 MAPPED = """schema = "hrg.card/1"
@@ -126,3 +127,9 @@ def test_devices_may_be_given_twice(folder):
     assert main(["mesh", "free-dome", "--around", "8", "--out", "mesh.inp"]) == 0
     words = "fit cross-damping cross.csv --frequency 5000 --quality 20000 --save /dev/null --report /dev/null"
     assert main(words.split()) == 0
+
+
+def test_from_python_a_file_may_be_written_again(tmp_path):
+    for text in ("a", "b"):
+        write_text(tmp_path / "file.txt", text)
+    assert (tmp_path / "file.txt").read_text() == "b"
