@@ -28,7 +28,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "tcf": ("studies.cli.tcf:tcf", "Frequency against temperature and its parts."),
     "loss": ("studies.cli.loss:loss", "Q over temperature: where the loss comes from, and what to attack first."),
     "simulate": ("studies.cli.simulate:simulate", "A virtual run of a card through a chamber profile."),
-    "loop": ("studies.cli.loop:loop", "The loops of a card: margins, bias and noise by source, start-up, runs."),
+    "loop": ("studies.cli.loop:loop", "Control loops: stability margins, bias and noise by source, start-up, runs."),
     "thermal": ("studies.cli.thermal:thermal", "Temperatures of the heat path for a chamber profile."),
     "fit frequency": ("studies.cli.fit_frequency:fit_frequency", "f(T) and its inverse from a steady-state table."),
     "fit bias": (

@@ -1,10 +1,11 @@
-"""`hrg loop`: the loops of a card: margins, bias and noise by source, start-up, and a run through them.
+"""`hrg loop`: the control loops of a card: margins, bias and noise by source, start-up, and a run through them.
 
 With --json one object, schema `hrg.loop/1`: `card`, `mode`, `temperature_degC`, `frequency_Hz`, `quality_factor`,
 `bryan_factor`; `settled` (columns of a record, at rest); `bias` (list of `source`, `deg_per_h`, `sd_deg_per_h`; the last is
 "all"); `noise` (list of `source`, `deg_per_h_over_1s`, `deg_per_rt_h`); `margins` (list of `loop`, `paper`, `crossover_Hz`,
-`phase_margin_deg`, `gain_margin_dB`, `reversal_Hz`); `start` (`locked_s`, `ready_s`); `range` (parts of the actuators' ranges in
-use: `rate`, `quadrature`, `drive`, `across`: rate and quadrature together where quadrature is a force); `out` and `rows` of the run, or null.
+`phase_margin_deg`, `gain_margin_dB`, `reversal_Hz`, the phase crossover); `start` (`locked_s`, `ready_s`); `range` (parts of the
+actuators' ranges in use: `rate`, `quadrature`, `drive`, `across`: rate and quadrature together where quadrature is nulled by a
+force); `out` and `rows` of the run, or null.
 """
 
 from typing import TYPE_CHECKING, Any
@@ -23,20 +24,20 @@ def loop(
     card: str,
     *,
     temperature: float | None = None,
-    out: str | None = None,
-    hours: float = 1.0,
-    row: float = 1.0,
     rate: float = 0.0,
+    out: str | None = None,
+    hours: float | None = None,
+    row: float | None = None,
     profile: str | None = None,
     both_ways: bool = False,
     seed: Seed = 0,
     noiseless: bool = False,
 ) -> Result:
-    """Study the loops of a card: stability margins, bias and noise by source, start-up; with --out also a run through them.
+    """Analyze the control loops of a card: stability margins, bias and noise by source, start-up; --out adds a simulated run.
 
-    The card's table [loop] says how the gyro is read; loss, damping anisotropy and azimuth come from [loss] and [bias]. A
-    loop that is unstable is refused with its margin. A run has what the loops make of the wave; offset, polynomial and
-    effects of the card are those of hrg simulate, where a card's loops count as settled.
+    The card's table [loop] describes the readout; damping and its anisotropy come from [loss] and [bias]. A card with an
+    unstable loop is rejected, with the margin. The run contains only what the loops do: bias offset, bias polynomial and
+    [[effect]] tables are applied by hrg simulate, which treats the loops as settled.
 
     Parameters
     ----------
@@ -44,22 +45,22 @@ def loop(
         Path of a card, or the name of one that ships (hrg cards).
     temperature : float
         In °C; the card's reference temperature unless given.
-    out : str
-        Write a record of a run through the loops.
-    hours : float
-        Its length, when no profile is given.
-    row : float
-        Time between its rows in s.
     rate : float
-        Applied rate in °/s; one beyond the range of the force is refused.
+        Applied rate in °/s, within the range of the actuators.
+    out : str
+        Simulate a run and write it as a record.
+    hours : float
+        Length of the run; 1 unless --hours or --profile is given.
+    row : float
+        Time between rows of the run in s; 1 unless given.
     profile : str
-        Chamber profile, as for hrg simulate: frequency and loss follow the temperature.
+        Chamber profile of the run, as for hrg simulate; frequency and loss follow the temperature.
     both_ways : bool
-        Whole-angle cards only: reverse the self-precession halfway through the run.
+        Reverse the self-precession halfway through the run (whole-angle cards only).
     seed : int
-        Seed of the noise.
+        Seed of the noise of the run.
     noiseless : bool
-        Leave out noise.
+        Run without noise.
     """
     import numpy as np
 
@@ -69,45 +70,31 @@ def loop(
     from studies.instrument.card import load_card
     from studies.law import law_of
     from studies.loss.damping_law import settled_loss
-    from studies.reports.loop import loop_lead, loop_parts
-    from studies.simulation.drive import MOST_ROWS
+    from studies.reports.loop import describe, loop_parts
     from studies.simulation.loop import require_loop
     from studies.simulation.loop_study import study_loops
 
     instrument = load_card(card)
     keys = require_loop(instrument)
-    T = instrument.reference_temperature if temperature is None else temperature + zero_Celsius
-    if not (0 < row < np.inf and 0 < hours < np.inf and np.isfinite(rate)):
-        raise InputError("--row and --hours must be positive, and --rate finite.")
-    if hours * 3600 / row > MOST_ROWS:
-        raise InputError(f"--hours {hours:g} in rows of {row:g} s are more than {MOST_ROWS} rows; take longer rows.")
     if both_ways and (keys.mode != "whole-angle" or keys.self_precession_deg_per_s == 0):
         raise InputError(
             f"{instrument.path}: --both-ways reverses the self-precession of a whole-angle wave; the card's [loop] has mode"
             f' "{keys.mode}" and self_precession_deg_per_s = {keys.self_precession_deg_per_s:g}. Leave --both-ways out, or set both keys.'
         )
-    law = law_of(instrument, min(T, instrument.reference_temperature) - 5, max(T, instrument.reference_temperature) + 5)
+    given = {"hours": hours, "row": row, "profile": profile, "both-ways": both_ways, "noiseless": noiseless}
+    _check_run([name for name, value in given.items() if value not in (None, False)], out, hours, row)
+    reference = instrument.reference_temperature
+    T = reference if temperature is None else temperature + zero_Celsius
+    law = law_of(instrument, min(T, reference) - 5, max(T, reference) + 5)
     frequency = float(np.ravel(law.frequency(T))[0])
     inverse_q, instrument = settled_loss(instrument, T)
     study = study_loops(instrument, frequency, inverse_q, law.bryan_factor, np.radians(rate))
     run = None
     if out is not None:
-        run = _run(
-            instrument,
-            T,
-            law.bryan_factor,
-            frequency,
-            inverse_q,
-            out,
-            hours,
-            row,
-            rate,
-            profile,
-            both_ways,
-            None if noiseless else seed,
-        )
+        drawn = None if noiseless else seed
+        run = _run(study, T, out, hours or 1.0, row or 1.0, rate, profile, both_ways, drawn)
         say(f"record: {out}, {len(run)} rows")
-    head = {
+    payload = {
         "schema": "hrg.loop/1",
         "card": instrument.name,
         "mode": keys.mode,
@@ -115,20 +102,35 @@ def loop(
         "frequency_Hz": frequency,
         "quality_factor": 1 / inverse_q,
         "bryan_factor": law.bryan_factor,
+        **_describe(study),
+        "out": out,
+        "rows": None if run is None else len(run),
     }
-    payload = {**head, **_payload(study), "out": out, "rows": None if run is None else len(run)}
-    lead, parts = loop_lead(study, T - zero_Celsius), loop_parts(study, payload, run)
-    return Result(payload, f"Loops of {instrument.name}", lead, parts)
+    return Result(payload, f"Loops of {instrument.name}", describe(payload), loop_parts(study, payload, run))
 
 
-def _paper(name: str) -> str:
-    from compensation.controllers import Loops
+def _check_run(given: list[str], out: str | None, hours: float | None, row: float | None) -> None:
+    """Refuse options of a run where none is written, and a run without an end."""
+    from studies.errors import InputError
+    from studies.simulation.drive import MOST_ROWS
 
-    return Loops.PAPER[name]
+    if given and out is None:
+        named = ", ".join(f"--{name}" for name in given)
+        raise InputError(f"{named}: only for a simulated run; add --out RUN.csv to write one, or leave it out.")
+    if "hours" in given and "profile" in given:
+        raise InputError("--hours: the profile sets the length of the run; leave out --hours or --profile.")
+    for name, value in (("hours", hours), ("row", row)):
+        if value is not None and not 0 < value < float("inf"):
+            raise InputError(f"--{name} {value:g}: must be positive.")
+    hours, row = hours or 1.0, row or 1.0
+    if hours * 3600 / row > MOST_ROWS:
+        raise InputError(f"--hours {hours:g} --row {row:g}: more than {MOST_ROWS} rows; increase --row.")
 
 
-def _payload(study: "LoopStudy") -> dict[str, Any]:
+def _describe(study: "LoopStudy") -> dict[str, Any]:
     from math import degrees, log10
+
+    from compensation.controllers import Loops
 
     return {
         "settled": study.settled,
@@ -140,7 +142,7 @@ def _payload(study: "LoopStudy") -> dict[str, Any]:
         "margins": [
             {
                 "loop": m.loop,
-                "paper": _paper(m.loop),
+                "paper": Loops.PAPER[m.loop],
                 "crossover_Hz": m.crossover,
                 "phase_margin_deg": degrees(m.phase),
                 "gain_margin_dB": 20 * log10(m.gain),
@@ -154,11 +156,8 @@ def _payload(study: "LoopStudy") -> dict[str, Any]:
 
 
 def _run(
-    instrument: Any,
+    study: "LoopStudy",
     temperature: float,
-    bryan_factor: float,
-    frequency: float,
-    inverse_q: float,
     out: str,
     hours: float,
     row: float,
@@ -167,6 +166,7 @@ def _run(
     both_ways: bool,
     seed: int | None,
 ) -> "Record":
+    """Run the wave through the loops and write the record."""
     import numpy as np
 
     from shell.constants import zero_Celsius
@@ -174,44 +174,34 @@ def _run(
     from studies.loss.damping_law import damping_law
     from studies.record import Record, write_record
     from studies.simulation.chamber import load_profile
-    from studies.simulation.loop import columns_of, run_loops, without_loop
+    from studies.simulation.loop import columns_of, require_loop, run_loops, without_loop
     from studies.simulation.virtual_gyro import simulate_run
 
-    columns: dict[str, Any] = {}
-    damping = None
-    f, loss = np.array(frequency), np.array(inverse_q)
+    instrument, damping = study.instrument, None
+    f, loss = np.array(study.frequency), np.array(study.inverse_q)
     if profile is not None:
         thermal = simulate_run(without_loop(instrument), load_profile(profile), 1 / row, noise=False).record
-        time = thermal["time_s"]
-        f, loss = thermal["frequency_Hz"], thermal["inverse_q"]
+        time, f, loss = thermal["time_s"], thermal["frequency_Hz"], thermal["inverse_q"]
         names = ("chamber_temperature_degC", "housing_temperature_degC", "resonator_temperature_degC")
         columns = {name: thermal[name] for name in names if name in thermal}
-        warmed = thermal["resonator_temperature_degC"] + zero_Celsius
-        law = damping_law(instrument, float(warmed.min()), float(warmed.max()))
-        damping = law.wave(warmed) if law is not None and law.wave is not None else None
+        T = thermal["resonator_temperature_degC"] + zero_Celsius
+        law = damping_law(instrument, float(T.min()), float(T.max()))
+        damping = law.wave(T) if law is not None and law.wave is not None else None
     else:
         time = np.asarray(row * np.arange(int(hours * 3600 / row * (1 + 1e-12)) + 1), dtype=float)
         columns = {"chamber_temperature_degC": np.full(len(time), temperature - zero_Celsius)}
     generator = None if seed is None else np.random.default_rng(seed)
     run = run_loops(
-        instrument,
-        time,
-        f,
-        loss,
-        bryan_factor,
-        rate=np.radians(rate),
-        both_ways=both_ways,
-        damping=damping,
-        generator=generator,
-    )
-    found = columns_of(instrument.loop, run)
-    columns = {"time_s": time, **columns, **found}
+        instrument, time, f, loss, study.bryan_factor, rate=np.radians(rate), both_ways=both_ways, damping=damping, generator=generator
+    )  # fmt: skip
+    keys = require_loop(instrument)
+    columns = {"time_s": time, **columns, **columns_of(keys, run)}
     if rate:
         columns["rate_deg_per_s"] = np.full(len(time), rate)
         columns["measured_rate_deg_per_s"] = columns.pop("bias_deg_per_h") / 3600
-    source = f"loops, {instrument.loop.mode}, " + ("without noise" if seed is None else f"seed {seed}")
     if run.limited:
-        say(f"warning: an actuator was at its limit in {run.limited} of {len(time)} rows.")
+        say(f"warning: an actuator saturated in {run.limited} of {len(time)} rows.")
+    source = f"loops, {keys.mode}, " + ("without noise" if seed is None else f"seed {seed}")
     record = Record(columns, instrument=instrument.name, source=source, path=out)
     write_record(record, out)
     return record

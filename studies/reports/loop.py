@@ -1,4 +1,4 @@
-"""Tables and pictures of a card's loops: margins, step response, start-up, bias and noise by source, and a run."""
+"""Tables and pictures of a card's loops: bias over azimuth, noise, open loops, step responses, start-up, and a run."""
 
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
@@ -6,26 +6,19 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from studies.reports import style
-from studies.reports.digits import plain
-from studies.reports.page import Block, Picture, draw
-from studies.results import Blocks, Chapter, Column, Facts, Sentence, Table
+from studies.reports.digits import plain, to_error
+from studies.results import Chapter, Column, Facts, Figure, Sentence, Table
 from studies.simulation.loop_study import answer_steps, bias_around, bias_slopes, noise_over
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from matplotlib.figure import Figure as Drawing
+
     from studies.record import Record
-    from studies.simulation.loop_study import LoopStudy
+    from studies.simulation.loop_study import BiasSlope, LoopStudy
 
 COLOURS = (style.BLUE, style.VERMILION, style.GREEN, style.PURPLE, style.ORANGE, style.SKY, style.YELLOW)
-NOISE_NAMES = {
-    "pickoff": "pick-off noise",
-    "adc_step": "ADC steps",
-    "dac_step": "DAC steps",
-    "drive": "drive noise",
-    "thermal": "thermomechanical",
-    "all": "all",
-}
-MODES = {"force-rebalance": "force-to-rebalance", "whole-angle": "whole-angle"}
-SHARED_NOTE = "±: one standard deviation, from the card's uncertain values; all: with their common axes and split."
 LENGTHS = tuple(np.geomspace(0.01, 1e4, 25))
 COLUMNS = {
     # of a run, as far as it has them: label of the axis
@@ -35,133 +28,124 @@ COLUMNS = {
     "quadrature_V": "quadrature (V)",
     "frequency_Hz": "frequency (Hz)",
 }
-MARGINS = (
-    Column("loop", "loop"),
-    Column("paper", "name in the paper"),
-    Column("crossover_Hz", "gain crossover", "Hz", ".3g"),
-    Column("phase_margin_deg", "phase margin", "°", ".0f"),
-    Column("gain_margin_dB", "gain margin", "dB", ".1f"),
-    Column("reversal_Hz", "phase crossover", "Hz", ".3g"),
-)
-SOURCES = (Column("source", "source"), Column("deg_per_h", "bias", "°/h"), Column("sd_deg_per_h", "±", "°/h", digits=2))
-NOISE = (
-    Column("source", "source"),
-    Column("deg_per_h_over_1s", "over 1 s", "°/h", digits=3),
-    Column("deg_per_rt_h", "angle random walk", "°/√h", digits=3),
-)
-RANGES = (
-    Column("loop", "loop"),
-    Column("actuator", "actuator and range"),
-    Column("use", "in use", "%", digits=3, scale=100.0),
-)
-SLOPES = (
-    Column("key", "key of the card"),
-    Column("value", "value"),
-    Column("sd", "±", digits=3),
-    Column("slope", "°/h per unit", digits=3),
-    Column("effect", "effect", "°/h", digits=3),
-)
-SMALLEST = 1e-4  # of the largest effect on the bias: smaller ones are not listed
 MOST_POINTS = 3000  # drawn of a run; longer ones are averaged
+NAMES = {
+    # of sources in the JSON: what people read
+    "pickoff": "pick-off noise",
+    "adc_step": "ADC quantization",
+    "dac_step": "DAC quantization",
+    "drive": "drive noise",
+    "thermal": "thermomechanical noise",
+    "turn of the drives": "drive misalignment",
+    "gain ratios": "gain mismatch",
+    "phase errors on the quadrature": "phase errors acting on quadrature",
+    "skewed axes": "axis skew",
+    "all": "total",
+}
+SMALLEST = 1e-4  # of the largest effect on the bias: smaller ones are not listed
+SOURCE = Column("name", "source")
 
 
-def loop_lead(study: "LoopStudy", temperature_degC: float) -> str:
-    """Return what the page is about."""
-    mode = study.instrument.loop.mode if study.instrument.loop is not None else ""
-    return (
-        f"The loops that read {study.instrument.name} in {MODES[mode]} mode at {temperature_degC:g} °C: {study.frequency:.2f} Hz,"
-        f" Q = {plain(1 / study.inverse_q)}, decay time constant of the vibration {plain(1 / study.decay)} s."
-    )
+def describe(payload: "Mapping[str, Any]") -> str:
+    """Return mode, temperature, frequency and damping in one line."""
+    mode = {"force-rebalance": "Force-to-rebalance", "whole-angle": "Whole-angle"}[payload["mode"]]
+    f, q = payload["frequency_Hz"], payload["quality_factor"]
+    return f"{mode} mode at {payload['temperature_degC']:g} °C: {f:.2f} Hz, Q = {plain(q)}, decay time constant {plain(q / (np.pi * f))} s."
 
 
-def loop_parts(study: "LoopStudy", payload: dict[str, Any], run: "Record | None" = None) -> list[Chapter]:
-    """Return what people read of the loops, of which `payload` holds the numbers."""
-    keys, start = study.instrument.loop, study.start
-    begun = (
-        f"From rest with {keys.drive_headroom if keys is not None else 0.0:g} times the holding drive: locked after {start.locked:.3g} s,"
-        f" amplitude within 1 % after {start.ready:.4g} s."
-    )
-    noise = [row | {"source": NOISE_NAMES[row["source"]]} for row in payload["noise"]]
-    chapters = [
-        Chapter("In short", [Facts(_facts(study)), *_weakest(study)]),
-        Chapter("Where drift comes from", [
-            Table("Bias by source, settled", payload["bias"], SOURCES, SHARED_NOTE),
-            Blocks(lambda: [_around_figure(study)]), *_slopes(study),
+def loop_parts(study: "LoopStudy", payload: dict[str, Any], run: "Record | None") -> list[Chapter]:
+    """What people read: the answer, bias, noise, stability, start-up, the run."""
+
+    def named(key: str) -> list[dict[str, Any]]:
+        return [one | {"name": NAMES.get(one["source"], one["source"])} for one in payload[key]]
+
+    slopes = bias_slopes(study)
+    moving = [asdict(s) | {"effect": s.effect} for s in slopes if s.effect > SMALLEST * slopes[0].effect]
+    headroom, offset = study.instrument.loop.drive_headroom, study.instrument.loop.start_offset_Hz  # type: ignore[union-attr]
+    start = f"Start from rest with {headroom:g} times the steady-state drive: phase locked after {study.start.locked:.3g} s, amplitude within 1 % after {study.start.ready:.4g} s."
+    return [
+        Chapter("In short", [
+            Sentence(f"Loops of {payload['card']}: {describe(payload)}", where="terminal"),
+            Facts(_facts(study, payload), "page"),
+            *_largest(slopes, study.sources[-1].sd),
         ]),
-        Chapter("Noise of the rate", [
-            Table("Noise of the rate by source", noise, NOISE, "°/√h from a mean over 100 s."), Blocks(lambda: [_noise_figure(study)]),
+        Chapter("Bias", [
+            Table("Bias by source, settled", named("bias"), [SOURCE, Column("deg_per_h", "bias", "°/h", error="sd_deg_per_h")],
+                "± one standard deviation, from the card's uncertain values. Total: including split and axis angles, which several sources share."),
+            Figure(lambda: _around(study), "Bias by source over the azimuth of the standing wave; removing an error removes its curve."),
+            Table("Sensitivity of the bias to the card's values", moving, [
+                Column("key", "key of the card"), Column("value", "value", error="sd"), Column("slope", "slope", "°/h per unit of the key", digits=3),
+                Column("effect", "1 σ effect", "°/h", digits=3),
+            ], "Largest first.", "page"),
         ]),
-        Chapter("Margins", [
-            Table("Margins", payload["margins"], MARGINS, begun), Blocks(lambda: [_bode(study)]),
-            Table("Range of the actuators in use", _ranges(study), RANGES),
+        Chapter("Rate noise", [
+            Table("Rate noise by source", named("noise"), [
+                SOURCE, Column("deg_per_h_over_1s", "1 s average", "°/h", digits=3), Column("deg_per_rt_h", "angle random walk", "°/√h", ".3g"),
+            ], "Standard deviations; the angle random walk is taken from 100 s averages."),
+            Figure(lambda: _noise(study), "Noise of the averaged rate: white angle noise falls as 1/t, white rate noise as 1/√t."),
         ]),
-        Chapter("Step response", [Blocks(lambda: [_steps(study)])]),
-        Chapter("Start-up", [Blocks(lambda: [_start(study)])]),
+        Chapter("Stability and range", [
+            Table("Stability margins", payload["margins"], [
+                Column("loop", "loop"), Column("paper", "symbol in the BVG paper"), Column("crossover_Hz", "gain crossover", "Hz", ".3g"),
+                Column("phase_margin_deg", "phase margin", "°", ".0f"), Column("gain_margin_dB", "gain margin", "dB", ".1f"),
+                Column("reversal_Hz", "phase crossover", "Hz", ".3g"),
+            ]),
+            Figure(lambda: _bode(study), "Open-loop frequency response. Dots: gain crossover; squares: phase crossover (−180°)."),
+            Table("Actuator range in use", _ranges(study, payload), [
+                Column("loop", "loop"), Column("actuator", "actuator and range"), Column("use", "in use", "%", ".3g", scale=100.0),
+            ]),
+        ]),
+        Chapter("Step response", [Figure(lambda: _steps(study),
+            "Command of each loop after a unit step of its input: rate, quadrature, resonance frequency, amplitude disturbance.")]),
+        Chapter("Start-up", [Sentence(start), Figure(lambda: _start(study),
+            f"Start from rest, the oscillator {offset:g} Hz and 90° off resonance. Dotted: amplitude within 1 %; phase locked.")]),
+        *([] if run is None else [Chapter("Simulated run", [Figure(lambda: _course(run), f"The record {run.path}.")])]),
     ]  # fmt: skip
-    return [*chapters, *([Chapter("A run through the loops", [Blocks(lambda: _run(run))])] if run is not None else [])]
 
 
-def _ranges(study: "LoopStudy") -> list[dict[str, Any]]:
-    """The parts of the actuators' ranges that the settled loops use."""
-    keys, use = study.instrument.loop, study.use
+def _ranges(study: "LoopStudy", payload: dict[str, Any]) -> list[dict[str, Any]]:
+    keys, use = study.instrument.loop, payload["range"]
     assert keys is not None
     stiff = keys.quadrature_control == "stiffness"
     force = f"force, {keys.rate_range_deg_per_s:g} °/s"
-    found = [
-        ("rate" if keys.mode == "force-rebalance" else "self-precession", force, use.rate),
-        ("quadrature", f"stiffness, {keys.quadrature_range_Hz:g} Hz" if stiff else force, use.quadrature),
-        *([] if stiff else [("rate and quadrature together", force, use.across)]),
-        ("amplitude", f"drive, {keys.drive_headroom:g} times the holding drive", use.drive),
-    ]
-    return [{"loop": loop, "actuator": actuator, "use": float(np.max(part))} for loop, actuator, part in found]
+    turning = "rate" if keys.mode == "force-rebalance" else "self-precession"
+    rows = [(turning, force, "rate"), ("quadrature", f"stiffness, {keys.quadrature_range_Hz:g} Hz" if stiff else force, "quadrature"),
+            *([] if stiff else [(f"{turning} and quadrature", force, "across")]),
+            ("amplitude", f"drive, {keys.drive_headroom:g} times the steady-state drive", "drive")]  # fmt: skip
+    return [{"loop": loop, "actuator": actuator, "use": use[key]} for loop, actuator, key in rows]
 
 
-def _facts(study: "LoopStudy") -> list[tuple[str, str, str]]:
-    total = study.sources[-1]
-    single = [(name, one) for name, (one, _) in study.noise.items() if name != "all"]
-    loudest = NOISE_NAMES[max(single, key=lambda pair: pair[1])[0]] if single else "none"
-    phase = min(study.margins, key=lambda m: m.phase)
-    gain = min(study.margins, key=lambda m: m.gain)
-    largest = max(study.sources[:-1], key=lambda one: one.sd)
+def _facts(study: "LoopStudy", payload: dict[str, Any]) -> list[tuple[str, str, str]]:
+    total, noise = study.sources[-1], payload["noise"]
+    largest = max(study.sources[:-1], key=lambda one: one.sd).name
+    single = [one for one in noise if one["source"] != "all"]
+    loudest = max(single, key=lambda one: one["deg_per_h_over_1s"])["source"] if single else ""
+    phase, gain = (min(payload["margins"], key=lambda m: m[key]) for key in ("phase_margin_deg", "gain_margin_dB"))
+    loops = " and ".join(dict.fromkeys((phase["loop"], gain["loop"])))
     return [
-        ("Bias", f"{plain(total.bias)} ± {plain(total.sd, 2)} °/h", f"largest contribution to the ±: {largest.name}"),
-        ("Angle random walk", f"{study.noise['all'][1]:.3g} °/√h", f"largest source over 1 s: {loudest}"),
-        (
-            "Smallest margins",
-            f"{np.degrees(phase.phase):.0f}°, {20 * np.log10(gain.gain):.0f} dB",
-            f"{phase.loop} loop" if phase.loop == gain.loop else f"{phase.loop} loop, {gain.loop} loop",
-        ),
-        ("Amplitude ready", f"{study.start.ready:.3g} s", f"phase locked after {study.start.locked:.2g} s"),
-    ]
+        ("Bias", f"{' ± '.join(to_error(total.bias, total.sd))} °/h", f"least certain: {NAMES.get(largest, largest)}"),
+        ("Angle random walk", f"{noise[-1]['deg_per_rt_h']:.3g} °/√h", f"largest source over 1 s: {NAMES.get(loudest, 'none')}"),
+        ("Smallest margins", f"{phase['phase_margin_deg']:.0f}°, {gain['gain_margin_dB']:.0f} dB", f"{loops} loop"),
+        ("Start-up", f"{study.start.ready:.3g} s", f"phase locked after {study.start.locked:.2g} s"),
+    ]  # fmt: skip
 
 
-def _weakest(study: "LoopStudy") -> list[Sentence]:
-    """What to attack first."""
-    slopes = bias_slopes(study)
+def _largest(slopes: "tuple[BiasSlope, ...]", sd: float) -> list[Sentence]:
+    """What to improve first."""
     if not slopes or slopes[0].effect == 0:
         return []
-    total, first = study.sources[-1].sd, slopes[0]
-    share = (first.effect / total) ** 2 if total > 0 else 0.0
+    first, share = slopes[0], (slopes[0].effect / sd) ** 2 if sd > 0 else 0.0
     return [
         Sentence(
-            f"Attack first: {first.key}. Its uncertainty (± {first.sd:.3g}) contributes {first.effect:.3g} °/h,"
-            f" {100 * share:.0f} % of the variance of the bias. A steady bias can be calibrated; drift with age or temperature follows"
-            " these slopes."
+            f"Largest contribution to the uncertainty of the bias: {first.key}. Its standard deviation of {first.sd:.3g} contributes"
+            f" {first.effect:.3g} °/h, {100 * share:.0f} % of the variance. A constant bias can be calibrated out; drift of these"
+            " values with age or temperature changes the bias in proportion to the slopes."
         )
     ]
 
 
-def _slopes(study: "LoopStudy") -> list[Table]:
-    slopes = bias_slopes(study)
-    rows = [asdict(one) | {"effect": one.effect} for one in slopes if one.effect > SMALLEST * slopes[0].effect]
-    return [
-        Table(
-            "Sensitivity of the bias, largest effect first", rows, SLOPES, "The unit is that of the key's name.", "page"
-        )
-    ]
-
-
-def _around_figure(study: "LoopStudy") -> Picture:
+def _around(study: "LoopStudy") -> "Drawing":
+    """Return the bias of each source over the azimuth of the wave."""
     azimuth = np.linspace(0.0, np.pi / 2, 181)
     parts = bias_around(study, azimuth)
     with style.figure(height=3.4) as (made, axis):
@@ -172,18 +156,18 @@ def _around_figure(study: "LoopStudy") -> Picture:
                 values,
                 color=style.BLACK if strong else COLOURS[k % len(COLOURS)],
                 linewidth=2.2 if strong else 1.4,
-                label=name,
+                label=NAMES.get(name, name),
             )
         at = np.degrees(study.angle % (np.pi / 2))
-        axis.axvline(at, color=style.BLACK, linestyle=":", linewidth=1.0, label="the card's azimuth")
+        axis.axvline(at, color=style.BLACK, linestyle=":", linewidth=1.0, label="azimuth of the card")
         axis.set_xlabel("azimuth of the wave (°)")
         axis.set_ylabel("bias (°/h)")
         axis.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), fontsize=9)
-        words = "The bias over the azimuth of the wave, by source: the part that vanishes without that error."
-        return draw(made, words, words)
+        return made
 
 
-def _noise_figure(study: "LoopStudy") -> Picture:
+def _noise(study: "LoopStudy") -> "Drawing":
+    """Return the noise of each source over the averaging time."""
     found = noise_over(study, LENGTHS)
     with style.figure(height=3.4) as (made, axis):
         for k, (name, values) in enumerate(found.items()):
@@ -193,16 +177,16 @@ def _noise_figure(study: "LoopStudy") -> Picture:
                 np.where(values > 0, values, np.nan),
                 color=style.BLACK if strong else COLOURS[k % len(COLOURS)],
                 linewidth=2.2 if strong else 1.4,
-                label=NOISE_NAMES[name],
+                label=NAMES[name],
             )
-        axis.set_xlabel("time over which the rate is averaged (s)")
+        axis.set_xlabel("averaging time (s)")
         axis.set_ylabel("standard deviation (°/h)")
         axis.legend(fontsize=9)
-        words = "Noise of the averaged rate by source: white in angle it falls as 1/t, white in rate as 1/√t."
-        return draw(made, words, words)
+        return made
 
 
-def _bode(study: "LoopStudy") -> Picture:
+def _bode(study: "LoopStudy") -> "Drawing":
+    """Return gain and phase of the open loops over frequency."""
     half = study.loops.sampling / 2
     low = min(m.crossover for m in study.margins) / 30
     f = np.geomspace(low, half * (1 - 1e-6), 600)
@@ -234,49 +218,42 @@ def _bode(study: "LoopStudy") -> Picture:
         lower.set_ylabel("phase (°)")
         lower.set_xlabel("frequency (Hz)")
         upper.legend(fontsize=9)
-        words = "Open loops over frequency. Dots: gain crossover, with the phase margin above −180°; squares: phase crossover."
-        return draw(made, words, words)
+        return made
 
 
-def _steps(study: "LoopStudy") -> Picture:
+def _steps(study: "LoopStudy") -> "Drawing":
+    """Return the command of each loop after a step."""
     with style.figure(height=3.0) as (made, axis):
         for k, (name, (time, answer)) in enumerate(answer_steps(study).items()):
             dash = ("-", "-", "--", ":")[k % 4]
             axis.semilogx(time[1:], answer[1:], dash, color=COLOURS[k], label=name)
         axis.axhline(1.0, color=style.BLACK, linewidth=0.8)
         axis.set_xlabel("time after the step (s)")
-        axis.set_ylabel("command, over its final value")
+        axis.set_ylabel("command / final value")
         axis.legend(fontsize=9)
-        words = (
-            "Command of each loop after a step of its disturbance: rate, quadrature, frequency, drive of the amplitude."
-        )
-        return draw(made, words, words)
+        return made
 
 
-def _start(study: "LoopStudy") -> Picture:
+def _start(study: "LoopStudy") -> "Drawing":
+    """Return amplitude and phase error of a start from rest."""
     start = study.start
-    keys = study.instrument.loop
     last = max(int(np.searchsorted(start.time, 1.6 * start.ready)), 2) if np.isfinite(start.ready) else None
     shown = slice(0, last, max((last or len(start.time)) // MOST_POINTS, 1))
     with style.figure(1, 2, height=2.8) as (made, (left, right)):
         left.plot(start.time[shown], start.amplitude[shown], color=style.BLUE)
         left.axvline(start.ready, color=style.BLACK, linestyle=":", linewidth=1.0)
         left.set_xlabel("time (s)")
-        left.set_ylabel("amplitude over its command")
+        left.set_ylabel("amplitude / command")
         early = slice(0, max(int(np.searchsorted(start.time, 5 / study.loops.phase)), 2))
         right.plot(start.time[early], np.degrees(start.phase_error[early]), color=style.VERMILION)
         right.axvline(start.locked, color=style.BLACK, linestyle=":", linewidth=1.0)
         right.set_xlabel("time (s)")
         right.set_ylabel("phase error (°)")
-        offset = keys.start_offset_Hz if keys is not None else 0.0
-        words = (
-            f"From rest, the oscillator {offset:g} Hz and a quarter cycle off: the amplitude, ready at the dotted line, and the"
-            " phase of the oscillator, locked there."
-        )
-        return draw(made, words, words)
+        return made
 
 
-def _run(run: "Record") -> list[Block]:
+def _course(run: "Record") -> "Drawing":
+    """Return the columns of a run over time."""
     names = [name for name in COLUMNS if name in run]
     time = run["time_s"] / 3600
     width = max(len(time) // MOST_POINTS, 1)
@@ -291,5 +268,4 @@ def _run(run: "Record") -> list[Block]:
             axis.set_ylabel(COLUMNS[name], fontsize=9)
             axis.ticklabel_format(axis="y", useOffset=False)
         axes[-1, 0].set_xlabel("time (h)")
-        words = f"The record {run.path}" + (f", means of {width} rows." if width > 1 else ".")
-        return [draw(made, words, "The columns of the run over time.")]
+        return made

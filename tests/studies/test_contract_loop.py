@@ -130,25 +130,41 @@ def test_the_page_shows_margins_drift_noise_start_and_run(card, tmp_path, capsys
     text = page.read_text(encoding="utf-8")
     for chapter in (
         "In short",
-        "Where drift comes from",
-        "Noise of the rate",
-        "Margins",
-        "Answer to a step",
+        "Bias",
+        "Rate noise",
+        "Stability and range",
+        "Step response",
         "Start-up",
     ):
         assert f">{chapter}<" in text
     assert all(f">{paper}<" in text for paper in loops)
     assert (">GR<" in text) == (mode == "force-rebalance")
-    assert "A run through the loops" in text
+    assert ">Simulated run<" in text
     found = json.loads(capsys.readouterr().out)
     assert f"{found['noise'][-1]['deg_per_rt_h']:.3g} °/√h" in text
-    assert "Attack first: <code>loop.pickoff_phase_deg</code>" in text  # 0.5° on the quadrature of 5 mHz
+    assert "uncertainty of the bias: loop.pickoff_phase_deg." in text  # 0.5° on the quadrature of 5 mHz
 
 
 @pytest.mark.parametrize("lines", ["", 'mode = "whole-angle"\n'], ids=["force-rebalance", "no self-precession"])
 def test_a_reversal_of_what_does_not_precess_is_refused(card, capsys, lines):
     assert main(["loop", card(lines), "--both-ways"]) == 2
     assert "--both-ways reverses the self-precession of a whole-angle wave" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["--hours", "2"], "--hours: only for a simulated run; add --out"),
+        (["--row", "10", "--noiseless"], "--row, --noiseless: only for a simulated run"),
+        (["--profile", "soak 20 1h"], "--profile: only for a simulated run"),
+        (["--hours", "2", "--profile", "soak 20 1h", "--out", "run.csv"], "leave out --hours or --profile"),
+        (["--hours", "-1", "--out", "run.csv"], "--hours -1: must be positive"),
+        (["--hours", "1e9", "--out", "run.csv"], "more than"),
+    ],
+)
+def test_options_of_a_run_are_never_ignored(card, capsys, words, said):
+    assert main(["loop", card(""), *words]) == 2
+    assert said in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(
