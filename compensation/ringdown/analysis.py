@@ -7,27 +7,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from compensation.errors import CompensationError
-from compensation.ringdown.envelope import Envelope, estimate_noise, thin
-from compensation.ringdown.fit import DecayFit, fit_decay
+from compensation.ringdown.envelope import Envelope, thin
+from compensation.ringdown.fit import DecayFit
 from compensation.ringdown.model import Decay
+from compensation.ringdown.terms import fit_terms
 from compensation.ringdown.whiteness import Leftover, examine
+from compensation.ringdown.window import find_end, find_start
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
-LATER = (0.35, 0.6, 0.15)
-"""Parts of the record at whose end a free decay is looked for, where the whole is none."""
-HALVINGS = 4
-LEAST_ROWS = 64
-SEARCH_ROWS, ROWS = 300, 1024
-PAYS = 20.0
-"""Least fall of −2 ln L, over the widening², for which a rate beyond the linear ones is named (e^-10 of odds)."""
-WHITE = 1.3
-LENGTHS = ("split_Hz", "damping_split_per_s")
 RESOLVED = 3.0
 """Standard deviations above zero from which a split has an axis."""
-LINES = 3
+LENGTHS = ("split_Hz", "damping_split_per_s")
+ROWS = 1024
 DRAWS = 2000
-BEYOND = {
+SAID_OF = {
     "hardening": "The frequency depends on the amplitude (cubic stiffness)",
     "thickening": "The damping depends on the amplitude",
     "chirp": "The frequency drifts with time",
@@ -87,11 +81,11 @@ def analyse_decay(envelope: Envelope, *, harmonic: int = 2, confidence: float = 
         A record without a decay, or two channels that are one.
     """
     _check(envelope)
-    end = _find_end(envelope)
+    end = find_end(envelope)
     whole = envelope.within(envelope.time[0], end)
-    start = _find_start(whole)
+    start = find_start(whole)
     free = thin(whole.within(start, end), ROWS)
-    fit, beyond, lines = _fit_all(free)
+    fit, beyond, lines = fit_terms(free)
     left = examine(free.time, fit.residual)
     _check_decays(fit)
     fit = replace(fit, covariance=fit.covariance * left.widening**2, widening=left.widening)
@@ -107,133 +101,6 @@ def _check(envelope: Envelope) -> None:
         gain = np.vdot(x, y) / np.vdot(x, x)
         if np.linalg.norm(y - gain * x) < 1e-9 * np.linalg.norm(y):
             raise CompensationError("the two channels are one and the same signal; give each pick-off its own column.")
-
-
-def _find_end(envelope: Envelope) -> float:
-    """Return the time after which the amplitude is below half of the noise of a row, for good."""
-    z = envelope.values
-    noise = estimate_noise(z)
-    count = min(64, z.shape[1] // 8)
-    size = z.shape[1] // count
-    energy = np.sum(np.abs(z[:, : count * size]) ** 2, axis=0).reshape(count, size).mean(axis=1) - noise
-    above = np.flatnonzero(energy > 0.25 * noise)
-    last = int(above[-1]) + 1 if above.size else count
-    return float(envelope.time[min(last * size, envelope.time.size) - 1])
-
-
-def _find_start(whole: Envelope) -> float:
-    """Return the first time from which one decay describes all that follows, its first rows as well as the rest.
-
-    Where that is not the whole record, the last start that fails and the first that does are brought together by halving.
-    """
-    first, last = float(whole.time[0]), float(whole.time[-1])
-    judged: list[tuple[float, float]] = []
-
-    def describes(start: float) -> bool:
-        tried = thin(whole.within(start, last), SEARCH_ROWS)
-        if tried.time.size < LEAST_ROWS:
-            return False
-        fit = _fit_modes(tried)
-        left = _examine_without_lines(tried, fit)
-        if not _plain(left):
-            fit, left, _ = _extend(tried, fit, left, ())
-        judged.append((left.widening + (10.0 if left.early else 0.0), start))
-        return _plain(left)
-
-    if describes(first):
-        return first
-    good = next((start for part in LATER if describes(start := first + part * (last - first))), None)
-    if good is None:
-        return min(judged)[1] if judged else first
-    bad = max((start for _, start in judged if start < good), default=first)
-    for _ in range(HALVINGS):
-        middle = (bad + good) / 2
-        bad, good = (bad, middle) if describes(middle) else (middle, good)
-    return good
-
-
-def _plain(left: Leftover) -> bool:
-    return not left.early and left.widening < WHITE
-
-
-def _examine_without_lines(envelope: Envelope, fit: DecayFit) -> Leftover:
-    """Examine a residual less its largest lines: interference is no reason to shorten the window."""
-    residual = fit.residual
-    for _ in range(LINES):
-        left = examine(envelope.time, residual)
-        if left.line is None:
-            break
-        tone = np.exp(2j * np.pi * left.line * envelope.time)
-        residual = residual - np.outer(np.mean(residual * tone.conj(), axis=1), tone)
-    return examine(envelope.time, residual)
-
-
-def _extend(
-    envelope: Envelope, fit: DecayFit, left: Leftover, beyond: tuple[str, ...]
-) -> tuple[DecayFit, Leftover, tuple[str, ...]]:
-    """Add rates beyond the linear ones, the best first, while they pay."""
-    modes = 1 if fit.one_mode else 2
-    while len(beyond) < len(BEYOND):
-        rivals = {
-            name: fit_decay(envelope, extra=(*beyond, name), modes=modes, starts=[fit.decay])
-            for name in BEYOND
-            if name not in beyond
-        }
-        name = min(rivals, key=lambda one: rivals[one].cost)
-        after = examine(envelope.time, rivals[name].residual)
-        if not fit.cost - rivals[name].cost > PAYS * after.widening**2:
-            break
-        fit, left, beyond = rivals[name], after, (*beyond, name)
-    return fit, left, beyond
-
-
-def _fit_all(envelope: Envelope) -> tuple[DecayFit, tuple[str, ...], list[float]]:
-    """Fit one mode or two, the rates beyond the linear ones that pay, and lines that are no decay."""
-    lines: list[float] = []
-    data = envelope
-    fit = _fit_modes(data)
-    left = examine(data.time, fit.residual)
-    beyond: tuple[str, ...] = ()
-    while not _plain(left) or left.line is not None:
-        fit, left, beyond = _extend(data, fit, left, beyond)
-        if left.line is None or len(lines) == LINES:
-            break
-        lines.append(left.line)
-        data, fit = _without_lines(envelope, fit, lines, beyond)
-        left = examine(data.time, fit.residual)
-    return replace(fit, envelope=envelope), beyond, lines
-
-
-def _fit_modes(envelope: Envelope) -> DecayFit:
-    """Two channels: two modes, which one mode is too. One channel: the second mode where it pays."""
-    if envelope.values.shape[0] == 2:
-        return fit_decay(envelope)
-    one = fit_decay(envelope, modes=1)
-    two = fit_decay(envelope, modes=2)
-    left = examine(envelope.time, two.residual)
-    apart = np.abs(np.diff(two.decay.rates)[0]) > 0
-    return two if apart and one.cost - two.cost > PAYS * left.widening**2 and np.all(two.decay.rates.real < 0) else one
-
-
-def _without_lines(
-    envelope: Envelope, fit: DecayFit, lines: list[float], beyond: tuple[str, ...]
-) -> tuple[Envelope, DecayFit]:
-    """Take lines of constant amplitude out of the data, in turn with the decay."""
-    data = envelope
-    for _ in range(3):
-        left = envelope.values - (data.values - fit.residual)
-        step = 1 / (envelope.time[-1] - envelope.time[0])
-        tones = np.zeros_like(left)
-        for k, line in enumerate(lines):
-            near = line + step * np.linspace(-1, 1, 81)
-            basis = np.exp(2j * np.pi * np.outer(near, envelope.time))
-            power = np.sum(np.abs((left - tones) @ basis.conj().T) ** 2, axis=0)
-            lines[k] = float(near[int(np.argmax(power))])
-            tone = np.exp(2j * np.pi * lines[k] * envelope.time)
-            tones += np.outer(np.mean((left - tones) * tone.conj(), axis=1), tone)
-        data = replace(envelope, values=envelope.values - tones)
-        fit = fit_decay(data, extra=beyond, modes=1 if fit.one_mode else 2, starts=[fit.decay])
-    return data, fit
 
 
 def _check_decays(fit: DecayFit) -> None:
@@ -311,7 +178,7 @@ def _remark(
         said.append(
             f"The first {start - first:.4g} s are no free decay (drive, transient or release) and are left out."
         )
-    said += [f"{BEYOND[name]}." for name in beyond]
+    said += [f"{SAID_OF[name]}." for name in beyond]
     for line in lines:
         said.append(f"Interference at {envelope.carrier + line:.6g} Hz is taken out; find its source.")
     if envelope.clipped:
@@ -333,6 +200,8 @@ def _remark(
 
 def _undetermined(fit: DecayFit, estimates: Mapping[str, Estimate]) -> list[str]:
     said = []
+    if fit.one_mode:
+        said.append("One mode is seen: a second one is not excited, or its split is not resolved; there are no axes.")
     if "split_Hz" in estimates:
         split = estimates["split_Hz"]
         width = 1 / (np.pi * estimates["decay_time_s"].value)

@@ -1,0 +1,55 @@
+"""Window of a ring-down: from where one decay describes all that follows, to where it is lost in the noise."""
+
+import numpy as np
+
+from compensation.ringdown.envelope import Envelope, estimate_noise, thin
+from compensation.ringdown.terms import examine_without_lines, extend, fit_modes, is_plain
+
+LATER = (0.35, 0.6, 0.15)
+"""Parts of the record at whose end a free decay is looked for, where the whole is none."""
+HALVINGS = 4
+LEAST_ROWS = 64
+SEARCH_ROWS = 300
+
+
+def find_end(envelope: Envelope) -> float:
+    """Return the time after which the amplitude is below half of the noise of a row, for good."""
+    z = envelope.values
+    noise = estimate_noise(z)
+    count = min(64, z.shape[1] // 8)
+    size = z.shape[1] // count
+    energy = np.sum(np.abs(z[:, : count * size]) ** 2, axis=0).reshape(count, size).mean(axis=1) - noise
+    above = np.flatnonzero(energy > 0.25 * noise)
+    last = int(above[-1]) + 1 if above.size else count
+    return float(envelope.time[min(last * size, envelope.time.size) - 1])
+
+
+def find_start(whole: Envelope) -> float:
+    """Return the first time from which one decay describes all that follows, its first rows as well as the rest.
+
+    Where that is not the whole record, the last start that fails and the first that does are brought together by halving.
+    """
+    first, last = float(whole.time[0]), float(whole.time[-1])
+    judged: list[tuple[float, float]] = []
+
+    def describes(start: float) -> bool:
+        tried = thin(whole.within(start, last), SEARCH_ROWS)
+        if tried.time.size < LEAST_ROWS:
+            return False
+        fit = fit_modes(tried)
+        left = examine_without_lines(tried, fit)
+        if not is_plain(left):
+            fit, left, _ = extend(tried, fit, left, ())
+        judged.append((left.widening + (10.0 if left.early else 0.0), start))
+        return is_plain(left)
+
+    if describes(first):
+        return first
+    good = next((start for part in LATER if describes(start := first + part * (last - first))), None)
+    if good is None:
+        return min(judged)[1] if judged else first
+    bad = max((start for _, start in judged if start < good), default=first)
+    for _ in range(HALVINGS):
+        middle = (bad + good) / 2
+        bad, good = (bad, middle) if describes(middle) else (middle, good)
+    return good
