@@ -100,8 +100,8 @@ def fit_whole_angle(
     x = 2 * harmonic * theta
     if np.ptp(x) < LEAST_TURN:
         raise CompensationError(
-            f"the wave turned by {np.degrees(np.ptp(theta)):.3g}°; the fit needs {180 / harmonic:g}° or more:"
-            " precess it, or record longer."
+            f"the wave precesses by only {np.degrees(np.ptp(theta)):.3g}°; the fit needs {180 / harmonic:g}° or more:"
+            " precess it faster or record longer."
         )
     turn_rate = np.diff(theta)
     both_ways = np.ptp(_smooth(turn_rate)) > LEAST_CONTRAST * np.max(np.abs(_smooth(turn_rate)))
@@ -131,11 +131,11 @@ def fit_whole_angle(
         estimates["decay"] = driven[2], driven[3]
     C, C_cov, epsilon = _join(S, S_cov, driven, W)
     if not both_ways:
-        undetermined.append("gain ratio and skew: the wave turned at one rate only; turn it both ways")
-    if epsilon is None:
         undetermined.append(
-            "phase error: it needs the drive's effort (inverse_q) and a split (frequency or quadrature)"
+            "gain ratio and skew, because the wave precesses at one rate only; precess it in both directions"
         )
+    if epsilon is None:
+        undetermined.append("phase error, which needs the drive effort (inverse_q) and the frequency or quadrature")
     else:
         estimates["phase_error"] = epsilon
     estimates["rate"] = mean[0] / coupling, mean[1] / coupling
@@ -201,7 +201,7 @@ def _driven(
 ) -> tuple[Real, Real, float, float] | None:
     """Return C, its covariance, and 1/τ with its deviation, from the drive's effort."""
     if decay is None:
-        undetermined.append("1/τ: the drive's effort (inverse_q) is not recorded")
+        undetermined.append("1/τ, because the drive effort (inverse_q) is not recorded")
         return None
     (column,) = read_columns(decay=decay)
     X = np.stack([np.ones_like(swell), x.cosine / 2, x.sine / 2, *leaks], axis=1)
@@ -232,7 +232,7 @@ def _detuned(
         b, covariance = _white(X, column[:-1], ["sin", "cos", "mean", *names])
         found.append((b[:2], covariance[:2, :2]))
     if not found:
-        undetermined.append("frequency split: neither frequency nor quadrature is recorded")
+        undetermined.append("frequency split, because neither frequency nor quadrature is recorded")
         return None
     weights = [np.linalg.inv(covariance) for _, covariance in found]
     covariance = np.linalg.inv(sum(weights, np.zeros((2, 2))))

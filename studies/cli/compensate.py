@@ -1,20 +1,33 @@
 """`hrg compensate`: apply a saved model to a record, or turn it into C for firmware."""
 
-from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from studies.cli.output import answers
-from studies.results import Figure, Result, Sentence
+from studies.results import Column, Figure, Result, Sentence, Table
 
 if TYPE_CHECKING:
-    import numpy as np
     from matplotlib.figure import Figure as Drawing
-    from numpy.typing import NDArray
 
+    from studies.cli.arguments import Array
     from studies.record import Record
 
 AVERAGE = 100.0  # s
 NOISE = 0.02  # relative: what the noise of a model's inputs may add to a record that has nothing to compensate
+WORSE = (
+    "{} is worse than the record: the standard deviation of {:g} s averages goes from {:.4g} to {:.4g}. Use it only if the model"
+    " is of this gyro and this sign of the output."
+)
+OWN_THERMOMETER = (
+    "{1} has no thermometer, so {0} has the resonator's temperature, found from the frequency, instead of a compensated frequency."
+    " To compensate other outputs over this temperature, use hrg fit bias --over temperature."
+)
+COLUMNS = (
+    Column("name", "Column"),
+    Column("stability_before", "Before"),
+    Column("stability_after", "After"),
+    Column("unit", "Unit"),
+    Column("rows_not_compensated", "Empty rows"),
+)
 
 
 @answers("hrg.compensate/1")
@@ -27,11 +40,11 @@ def compensate(
     extrapolate: bool = False,
     emit: str | None = None,
 ) -> Result:
-    """Write a record again with compensated_… columns, from a model that one of the hrg fit commands saved.
+    """Apply a model saved by one of the hrg fit commands: write the record with compensated_… columns added.
 
-    The model refuses values that its fit has not seen. A frequency model takes the housing's temperature, without it the
-    resonator's or the chamber's; of a record without any thermometer the frequency is its own, and the resonator's
-    temperature is added instead, as hrg temperature does.
+    Inputs outside the fitted range are refused. A frequency model uses the temperature of the housing, or else of the
+    resonator or the chamber. If the record has no thermometer, the resonator's temperature is found from the frequency and
+    added instead, as hrg temperature does.
 
     Parameters
     ----------
@@ -40,9 +53,9 @@ def compensate(
     run : str
         The record (CSV) to compensate.
     out : str
-        Where the record with the added columns goes.
+        Write the record with the added columns.
     extrapolate : bool
-        Apply the model outside the range of its fit too; of a record without a thermometer, leave the rows empty there.
+        Apply the model outside its fitted range too; in a record without a thermometer, leave those rows empty.
     emit : str
         Write the model as C99 source for firmware.
     """
@@ -52,21 +65,19 @@ def compensate(
     from studies.cli.output import say
     from studies.errors import InputError
     from studies.files.writing import write_text
-    from studies.instrument.units import unit_of
     from studies.record import COMPENSATED, RESONATOR, read_record, write_record
 
     loaded = models.read_model(model)
     if (run is None) != (out is None):
-        raise InputError(
-            "a record needs --out for the result, and --out needs a record: hrg compensate MODEL RUN --out FILE."
-        )
+        raise InputError("a record and --out go together: hrg compensate MODEL RUN --out FILE.")
     if run is None and emit is None:
         raise InputError("nothing to do: give a record and --out FILE, or --emit FILE.c.")
     if emit is not None:
         write_text(emit, models.emit_c(loaded))
         say(f"C source: {emit}")
-    columns: dict[str, dict[str, float | None]] = {}
+    columns: dict[str, dict[str, Any]] = {}
     added: list[str] = []
+    parts: list[Table | Sentence | Figure] = []
     if run is not None and out is not None:
         say(f"reading {run}")
         record = read_record(run)
@@ -74,43 +85,16 @@ def compensate(
         write_record(
             result, out, lambda rows: say(f"written {rows:,} of {len(result):,} rows") if rows % 500_000 == 0 else None
         )
+        say(f"record: {out}")
         added = [name for name in result.columns if name not in record]
-        for name in result.columns:
-            if name.startswith(COMPENSATED) and name not in record:
-                original, after = name.removeprefix(COMPENSATED), result[name]
-                # A rate made from raw counts has no uncompensated column of its own in the record.
-                before = record.columns.get(original)
-                missing = np.isnan(after) if before is None else np.isnan(after) & ~np.isnan(before)
-                columns[name] = {
-                    "stability_before": None if before is None else _stability(record["time_s"], before),
-                    "stability_after": _stability(record["time_s"], after),
-                    "rows_not_compensated": int(np.count_nonzero(missing)),
-                }
-    said: list[Sentence] = []
-    if RESONATOR in added:
-        said.append(Sentence(
-            f"{out}: {RESONATOR}, by the frequency: {run} has no other thermometer, and a frequency that is compensated by"
-            " itself is the same in every row. hrg fit bias --over temperature compensates the other outputs over it."
-        ))  # fmt: skip
-        if empty := int(np.count_nonzero(np.isnan(result[RESONATOR]))):
-            stay = "row stays" if empty == 1 else "rows stay"
-            said.append(Sentence(f"{empty} {stay} empty: no frequency, or one outside the range of the model."))
-    for name, facts in columns.items():
-        was, now, lost = (facts[key] for key in ("stability_before", "stability_after", "rows_not_compensated"))
-        if was is not None and now is not None and now > was * (1 + NOISE):
-            words = (
-                f"{name} is worse than the record: standard deviation of {AVERAGE:g} s averages {was:.4g} → {now:.4g}."
-            )
-            words += " Is the model of this gyro, with this sign of the output? Do not use it otherwise."
-            say(f"warning: {words}")
-            said.append(Sentence(words, "warning", "page"))
-        earlier = "" if was is None else f"{was:.4g} → "
-        unit = "" if unit_of(name) == "1" else f" {unit_of(name)}"
-        later = "too few rows for it" if now is None else f"{now:.4g}{unit}"
-        said.append(Sentence(f"{out}: {name}; standard deviation of {AVERAGE:g} s averages: {earlier}{later}"))
-        if lost:
-            words = "an input is missing there, or too few samples for its rate lie before them"
-            said.append(Sentence(f"{lost:g} rows stay empty: {words}."))
+        columns = {name: _judge(record, result, name) for name in added if name.startswith(COMPENSATED)}
+        parts = _show(record, result, columns)
+        if RESONATOR in added:
+            parts.append(Sentence(OWN_THERMOMETER.format(out, run)))
+            if empty := int(np.count_nonzero(np.isnan(result[RESONATOR]))):
+                stay = "row stays" if empty == 1 else "rows stay"
+                parts.append(Sentence(f"{empty} {stay} empty: the frequency is missing, or outside the fitted range."))
+            parts.append(Figure(lambda: _draw(record, result, RESONATOR), "Temperature of the resonator."))
     payload = {
         "schema": "hrg.compensate/1",
         "model": model,
@@ -120,32 +104,64 @@ def compensate(
         "added": added,
         "columns": columns,
     }
-    pictures = [Figure(partial(_compare, record, result, name), f"{name} beside the record.") for name in columns]
-    title, lead = f"Compensation of {run or model}", f"Model of kind {loaded.kind}: {model}."
-    return Result(payload, title, lead, [*said, *pictures])
+    return Result(payload, "Compensation of a record", f"{run or 'No record'}, compensated with {model}.", parts)
 
 
-def _compare(record: "Record", result: "Record", name: str) -> "Drawing":
+def _judge(record: "Record", result: "Record", name: str) -> dict[str, Any]:
+    """Return the stability of a column before and after, and how many of its rows stay empty."""
+    import numpy as np
+
+    from studies.record import COMPENSATED
+
+    # A rate made from raw counts has no uncompensated column of its own in the record.
+    after, before = result[name], record.columns.get(name.removeprefix(COMPENSATED))
+    missing = np.isnan(after) if before is None else np.isnan(after) & ~np.isnan(before)
+    return {
+        "stability_before": None if before is None else _stability(record["time_s"], before),
+        "stability_after": _stability(record["time_s"], after),
+        "rows_not_compensated": int(np.count_nonzero(missing)),
+    }
+
+
+def _show(record: "Record", result: "Record", columns: dict[str, dict[str, Any]]) -> list[Table | Sentence | Figure]:
+    from studies.cli.output import say
+    from studies.instrument.units import unit_of
+
+    rows = [{"name": name, "unit": unit_of(name).removeprefix("1") or ""} | one for name, one in columns.items()]
+    note = f"Before, after: standard deviation of {AVERAGE:g} s averages."
+    if any(one["rows_not_compensated"] for one in rows):
+        note += " Empty rows: an input is missing, or there are too few earlier samples for its rate."
+    parts: list[Table | Sentence | Figure] = [Table("Compensated columns", rows, COLUMNS, note)]
+    for name, one in columns.items():
+        was, now = one["stability_before"], one["stability_after"]
+        if now is None:
+            parts.append(Sentence(f"{name}: too few rows for {AVERAGE:g} s averages."))
+        elif was is not None and now > was * (1 + NOISE):
+            say(f"warning: {WORSE.format(name, AVERAGE, was, now)}")
+            parts.append(Sentence(WORSE.format(name, AVERAGE, was, now), "warning", "page"))
+        parts.append(Figure(lambda name=name: _draw(record, result, name), f"{name} over time."))  # type: ignore[misc]
+    return parts
+
+
+def _draw(record: "Record", result: "Record", name: str) -> "Drawing":
+    """Draw a column that was added, with what it compensates where the record has that."""
+    from studies.instrument.units import unit_of
     from studies.record import COMPENSATED
     from studies.reports import style
 
-    rows = style.few_rows(len(result))
-    with style.figure() as (made, axis):
-        original = name.removeprefix(COMPENSATED)
-        if original in record:
-            axis.plot(
-                result["time_s"][rows] / 3600, record[original][rows], color=style.ORANGE, linewidth=0.8, label="record"
-            )
-        axis.plot(
-            result["time_s"][rows] / 3600, result[name][rows], color=style.BLUE, linewidth=0.8, label="compensated"
-        )
-        axis.set_xlabel("time (h)")
-        axis.set_ylabel(original)
-        axis.legend()
+    rows = style.few_rows(len(record))
+    hours = record["time_s"][rows] / 3600
+    with style.figure(height=3.4) as (made, axes):
+        if before := name.removeprefix(COMPENSATED) in record:
+            axes.plot(hours, record[name.removeprefix(COMPENSATED)][rows], color=style.ORANGE, label="before")
+        axes.plot(hours, result[name][rows], color=style.BLUE, label="after" if before else name)
+        axes.set_xlabel("time (h)")
+        axes.set_ylabel(unit_of(name))
+        axes.legend()
         return made
 
 
-def _stability(time: "NDArray[np.float64]", values: "NDArray[np.float64]") -> float | None:
+def _stability(time: "Array", values: "Array") -> float | None:
     """Return the standard deviation of block averages, missing values left out; None of too few rows."""
     from compensation.decimation import average_blocks
     from compensation.errors import CompensationError

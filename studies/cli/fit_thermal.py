@@ -5,38 +5,44 @@ With --json one object, schema `hrg.fit-thermal/1`: `data`, `confidence`, `estim
 `initial_departure_K` per run, `residual_rms_Hz`, `row_step_s` of the averaged rows, `warnings`.
 """
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from studies.cli.output import answers
-from studies.results import Column, Figure, Result, Sentence, Table
+from studies.results import Column, Figure, Payload, Result, Sentence, Table
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure as Drawing
 
     from studies.calibration.lags.identification import Identification
-    from studies.cli.arguments import Array
 
-UNITS = {"offset": "Hz", "slope": "Hz/K", "curvature": "Hz/K²", "cubic": "Hz/K³"}
+NAMES = {
+    "radiated_share": ("Radiated share of the heat exchange at 20 °C", ""),
+    "offset": ("Frequency at the middle temperature", "Hz"),
+    "slope": ("Slope of the frequency", "Hz/K"),
+    "curvature": ("Second-order coefficient", "Hz/K²"),
+    "cubic": ("Third-order coefficient", "Hz/K³"),
+}
+COLOURED = 3.0  # residual over its white part, above which the chain of lags is in doubt
 
 
 @answers("hrg.fit-thermal/1")
 def fit_thermal(*data: str, card: str | None = None, lags: int | None = None, confidence: float = 0.9) -> Result:
-    """Identify how the resonator lags behind its housing, with intervals, and say what the records do not determine.
+    """Find the time constants with which the resonator follows its housing, with intervals, and what the records leave open.
 
-    The records need time_s, frequency_Hz and housing_temperature_degC (or chamber_temperature_degC). The initial state of
-    every run is unknown and fitted; the noise may drift. The lags are in series, and radiation makes a share of their
-    conductance at 20 °C. Intervals hold for a gyro that is such a chain; a residual above the noise says that it is not.
+    The records need time_s, frequency_Hz and housing_temperature_degC (or chamber_temperature_degC). The model is a series of
+    lags with heat exchange by conduction and radiation. The initial temperatures of each run are fitted, and the noise may
+    drift. The intervals hold only for a gyro that fits this model; a residual well above the white noise shows a misfit.
 
     Parameters
     ----------
     data : str
-        One or more records (CSV): steps, ramps or cycles.
+        One or more records (CSV) with steps, ramps or cycles of temperature.
     card : str
-        A card whose law gives the curvature of the frequency over temperature; without it a curvature is fitted.
+        A card whose law gives the curvature of frequency over temperature; without it the curvature is fitted.
     lags : int
-        Number of lags; as many as the records support unless given.
+        Number of lags; by default as many as the records support.
     confidence : float
-        Of the intervals.
+        Confidence level of the intervals.
     """
     from studies.calibration.lags.records import fit_thermal_constants
     from studies.cli.output import say
@@ -44,80 +50,84 @@ def fit_thermal(*data: str, card: str | None = None, lags: int | None = None, co
     from studies.errors import InputError
     from studies.instrument.card import load_card
     from studies.record import read_record
-    from studies.reports.digits import to_interval
 
     if not data:
         raise InputError("name at least one record (CSV) with a step, a ramp or a cycle of temperature.")
     if not 0 < confidence < 1:
-        raise InputError(f"--confidence {confidence:g}: a confidence lies between 0 and 1, such as 0.9.")
+        raise InputError(f"--confidence {confidence:g}: a confidence level lies between 0 and 1, such as 0.9.")
     records = [read_record(path) for path in data]
     told = Told("lags")
     found = fit_thermal_constants(records, load_card(card) if card else None, lags, confidence, told)
     told.done()
     for warning in found.warnings:
         say(f"warning: {warning}")
-    white, wandering = found.noise.innovation, float(found.residual.std())
-    wanders = []
-    if wandering > 3 * white:
-        wanders.append(
-            f"the residual ({wandering:.2g} Hz) is {wandering / white:.1f} times its white part: the noise is coloured, or the gyro"
-            " is more than this chain of lags; then the constants are effective ones, outside their intervals."
-        )
-        say(f"note: {wanders[0]}")
-    payload = _payload(found, list(data))
-    rows = [
-        {
-            "constant": name,
-            "unit": UNITS.get(name, "s" if name.startswith("time_constant") else ""),
-            "value": "not determined",
-        }
-        | (
-            {}
-            if e.value is None
-            else dict(zip(("value", "low", "high"), to_interval(e.value, e.low, e.high), strict=True))
-        )
+    rms, white = float(found.residual.std()), found.noise.innovation
+    estimates = {
+        name: {"value": e.value, "low": e.low, "high": e.high, "determined": e.value is not None}
         for name, e in found.estimates.items()
+    }
+    payload = {
+        "schema": "hrg.fit-thermal/1",
+        "data": list(data),
+        "confidence": found.confidence,
+        "estimates": estimates,
+        "undetermined": [direction.parts for direction in found.undetermined],
+        "initial_departure_K": [departure.tolist() for departure in found.departures],
+        "residual_rms_Hz": rms,
+        "row_step_s": found.row_step,
+        "warnings": list(found.warnings),
+    }
+    rows = [dict(zip(("name", "unit"), _name(name), strict=True)) | e for name, e in estimates.items()]
+    columns = [
+        Column("name", "Constant"),
+        Column("shown", "Value"),
+        Column("range", f"{100 * confidence:g} % interval"),
+        Column("unit", "Unit"),
     ]
-    columns = [Column(key, key) for key in ("constant", "value", "low", "high", "unit")]
-    note = f"Intervals of {100 * confidence:g} %; rows of {found.row_step:g} s; residual {found.residual.std():.2g} Hz."
+    note = f"Fitted to averages over {found.row_step:g} s; rms residual {rms:.2g} Hz."
     return Result(
         payload,
-        "Thermal lags of the resonator",
-        f"Time constants of the resonator behind its housing, from {', '.join(data)}.",
+        "Thermal time constants",
+        f"Lag of the resonator behind its housing in {', '.join(data)}.",
         [
-            Table("Thermal constants", rows, columns, note),
-            *(Sentence(f"Not determined by the records: {direction}", "warning") for direction in found.undetermined),
-            *(Sentence(words, "warning", "page") for words in (*found.warnings, *wanders)),
-            Figure(lambda: _residual(found.residual, found.row_step), "Residual of the frequency, all runs in order."),
+            Table("Thermal constants", [row | _write(row) for row in rows], columns, note),
+            *(Sentence(OPEN.format(_combine(one.parts)), "warning") for one in found.undetermined),
+            *([Sentence(MISFIT.format(rms / white), "warning")] if rms > COLOURED * white else []),
+            Figure(lambda: _draw(found), "Residual of the frequency, all runs in order."),
         ],
     )
 
 
-def _residual(residual: "Array", step: float) -> "Drawing":
-    import numpy as np
+OPEN = "The records do not determine this combination of relative changes: {}."
+MISFIT = (
+    "The residual is {:.1f} times its white part. Either the noise drifts or the gyro is not a chain of this many lags; in the"
+    " second case the constants are effective values and may lie outside their intervals."
+)
 
+
+def _name(key: str) -> tuple[str, str]:
+    """Return the name and the unit of a constant."""
+    return NAMES.get(key) or (key.replace("_", " ").capitalize(), "s" if key.startswith("time_constant") else "")
+
+
+def _write(row: Payload) -> dict[str, str]:
+    from studies.reports.digits import to_interval
+
+    if row["value"] is None:
+        return {"shown": "not determined", "range": ""}
+    value, low, high = to_interval(*(row[key] for key in ("value", "low", "high")))
+    return {"shown": value, "range": f"{low} … {high}"}
+
+
+def _combine(parts: dict[str, float]) -> str:
+    return " ".join(f"{share:+.2f} × {_name(key)[0].lower()}" for key, share in parts.items())
+
+
+def _draw(found: "Identification") -> "Drawing":
     from studies.reports import style
 
-    with style.figure(height=2.6) as (made, axis):
-        rows = style.few_rows(len(residual))
-        axis.plot(step / 3600 * np.arange(len(residual))[rows], residual[rows], ".", color=style.BLUE, markersize=3)
-        axis.set_xlabel("time, gaps left out (h)")
-        axis.set_ylabel("residual (Hz)")
+    with style.figure(height=2.8) as (made, axes):
+        axes.plot(1e3 * found.residual, ".", markersize=2, color=style.BLUE)
+        axes.set_xlabel(f"row ({found.row_step:g} s each)")
+        axes.set_ylabel("residual (mHz)")
         return made
-
-
-def _payload(found: "Identification", data: list[str]) -> "dict[str, Any]":
-    return {
-        "schema": "hrg.fit-thermal/1",
-        "data": data,
-        "confidence": found.confidence,
-        "estimates": {
-            name: {"value": e.value, "low": e.low, "high": e.high, "determined": e.value is not None}
-            for name, e in found.estimates.items()
-        },
-        "undetermined": [direction.parts for direction in found.undetermined],
-        "initial_departure_K": [departure.tolist() for departure in found.departures],
-        "residual_rms_Hz": float(found.residual.std()),
-        "row_step_s": found.row_step,
-        "warnings": list(found.warnings),
-    }

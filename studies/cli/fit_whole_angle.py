@@ -16,17 +16,21 @@ if TYPE_CHECKING:
     from studies.instrument.tables.loop import Loop
 
 KEYS = {
-    # estimate: key of the card, factor to its unit
-    "decay": ("loss.inverse_q", 0.0),
-    "damping_split": ("bias.damping_anisotropy", 0.0),
-    "damping_axis": ("bias.damping_axis_deg", degrees(1)),
-    "frequency_split": ("loop.frequency_split_mHz", 1e3 / (2 * pi)),
-    "frequency_axis": ("loop.frequency_axis_deg", degrees(1)),
-    "gain_ratio": ("loop.pickoff_gain_ratio", 1.0),
-    "skew": ("loop.pickoff_skew_mrad", 1e3),
-    "phase_error": ("loop.pickoff_phase_deg", degrees(1)),
-    "rate": ("bias.offset_deg_per_h", degrees(3600)),
+    # estimate: key of the card, factor to its unit, name, unit
+    "decay": ("loss.inverse_q", 0.0, "Mean loss 1/Q", ""),
+    "damping_split": ("bias.damping_anisotropy", 0.0, "Damping split Δ(1/τ) over 1/τ", ""),
+    "damping_axis": ("bias.damping_axis_deg", degrees(1), "Damping axis", "°"),
+    "frequency_split": ("loop.frequency_split_mHz", 1e3 / (2 * pi), "Frequency split", "mHz"),
+    "frequency_axis": ("loop.frequency_axis_deg", degrees(1), "Frequency axis", "°"),
+    "gain_ratio": ("loop.pickoff_gain_ratio", 1.0, "Pick-off gain ratio", ""),
+    "skew": ("loop.pickoff_skew_mrad", 1e3, "Pick-off skew", "mrad"),
+    "phase_error": ("loop.pickoff_phase_deg", degrees(1), "Phase error", "°"),
+    "rate": ("bias.offset_deg_per_h", degrees(3600), "Mean bias", "°/h"),
 }
+SPLIT_PER_S = "damping_split_per_s"  # where 1/τ is not known
+NAMES = {key: (name, unit) for key, _, name, unit in KEYS.values()} | {SPLIT_PER_S: ("Damping split Δ(1/τ)", "1/s")}
+KEYS_OF_CARD = tuple(key for key, *_ in KEYS.values() if key != "bias.offset_deg_per_h")
+NO_SCALE = "note: quadrature_V is not used because its scale is unknown; give --quadrature-volts-per-hertz or a card with [loop]."
 
 
 @answers("hrg.fit-whole-angle/1")
@@ -39,27 +43,27 @@ def fit_whole_angle(
     confidence: float = 0.95,
     save: str | None = None,
 ) -> Result:
-    """Fit damping and frequency split with their axes, gain ratio and phase error to a whole-angle run, with intervals.
+    """Find damping and frequency splits with their axes, gain ratio and phase error in a whole-angle run, with intervals.
 
-    The record needs time_s, pattern_angle_deg (unwrapped) and bias_deg_per_h or measured_rate_deg_per_s (the indicated rate,
-    less the commanded turn); inverse_q (the drive's effort), frequency_Hz and quadrature_V where they were
-    recorded, rate_deg_per_s where a rate was applied. Turn the wave both ways: one way does not determine the gain ratio. The
-    phase error is that of the whole path; the drives' own gain ratio is taken from the card.
+    The record needs time_s, pattern_angle_deg (unwrapped) and bias_deg_per_h or measured_rate_deg_per_s (the indicated rate
+    less the commanded precession). It may have inverse_q (drive effort), frequency_Hz, quadrature_V, and rate_deg_per_s if a
+    rate was applied. Precess the wave in both directions: one direction does not determine the gain ratio. The phase error is
+    that of the whole path; the gain ratio of the drives is taken from the card.
 
     Parameters
     ----------
     run : str
         The record (CSV).
     card : str
-        Its card: gives the Bryan factor, the scale of quadrature_V, and the drives' gains.
+        Its card: gives the Bryan factor, the scale of quadrature_V and the gains of the drives.
     bryan_factor : float
-        In place of the card's.
+        Bryan factor, used instead of the card's.
     quadrature_volts_per_hertz : float
-        Scale of quadrature_V; without it and without a card, that column is left out.
+        Scale of quadrature_V; without it and without a card, that column is not used.
     confidence : float
-        Of the intervals.
+        Confidence level of the intervals.
     save : str
-        Write the card with the values found and their uncertainties.
+        Write the card with the estimates and their uncertainties.
     """
     from studies.cli.output import say
     from studies.errors import InputError
@@ -67,14 +71,14 @@ def fit_whole_angle(
     from studies.law import law_of
 
     if not 0 < confidence < 1:
-        raise InputError(f"--confidence {confidence:g}: a confidence lies between 0 and 1, such as 0.95.")
+        raise InputError(f"--confidence {confidence:g}: a confidence level lies between 0 and 1, such as 0.95.")
     instrument = load_card(card) if card else None
     if save is not None and instrument is None:
-        raise InputError("--save writes the card with the values found; name it by --card.")
+        raise InputError("--save writes a card with the estimates: name the card to start from with --card.")
     loop = instrument.loop if instrument is not None else None
     if bryan_factor is None:
         if instrument is None:
-            raise InputError("the Bryan factor is not known: name the card by --card, or give --bryan-factor.")
+            raise InputError("the Bryan factor is not known: name the card with --card, or give --bryan-factor.")
         T = instrument.reference_temperature
         bryan_factor = law_of(instrument, T - 5, T + 5).bryan_factor
     if quadrature_volts_per_hertz is None and loop is not None:
@@ -92,15 +96,21 @@ def fit_whole_angle(
         "undetermined": list(found.undetermined),
         "saved": save,
     }
-    rows = [{"key": key, **estimate} for key, estimate in estimates.items()]
-    columns = [Column("key", "key of the card"), *(Column(name, name, digits=5) for name in ("value", "low", "high"))]
+    rows = [{"name": NAMES[key][0], "unit": NAMES[key][1], "key": key} | e for key, e in estimates.items()]
+    columns = [
+        Column("name", "Quantity"),
+        Column("value", "Value", error="sd"),
+        Column("low", f"{100 * confidence:g} % interval", interval=("low", "high"), error="sd"),
+        Column("unit", "Unit"),
+        Column("key", "Key of the card"),
+    ]
     return Result(
         payload,
-        "Whole-angle run",
-        f"Splits, axes, gain ratio and phase error from {run}.",
+        "Errors of a whole-angle gyro",
+        f"Damping, splits, gains and phase error found in {run}.",
         [
-            Table("Whole-angle run", rows, columns, f"Intervals of {100 * confidence:g} %."),
-            *(Sentence(f"Not determined: {sentence}", "warning") for sentence in found.undetermined),
+            Table("Estimates", rows, columns, "±: one standard deviation."),
+            *(Sentence(f"Not determined: {sentence}.", "warning") for sentence in found.undetermined),
         ],
     )
 
@@ -123,12 +133,12 @@ def _fit_record(
     if "quadrature_V" in record and volts_per_hertz is not None:
         quadrature = np.pi * record["quadrature_V"] / volts_per_hertz
     elif "quadrature_V" in record:
-        say(
-            "note: quadrature_V is left out, its scale is unknown; give --quadrature-volts-per-hertz or a card with [loop]."
-        )
+        say(NO_SCALE)
     if "inverse_q" in record:
         if frequency is None:
-            raise InputError(f"{path}: inverse_q is a rate of decay only with frequency_Hz; add that column.")
+            raise InputError(
+                f"{path}: inverse_q gives the decay rate only together with frequency_Hz; add that column."
+            )
         decay = np.pi * frequency * record["inverse_q"]
     with naming(path):
         found = fit(
@@ -148,7 +158,7 @@ def _fit_record(
 
 
 def _with_estimates(instrument: "Instrument", estimates: dict[str, dict[str, float]]) -> "Instrument":
-    """The card with the values found and their uncertainties; an anisotropy below 0 is none."""
+    """Return the card with the estimates and their uncertainties; an anisotropy below 0 is left out."""
     values = {
         key: {"value": e["value"], "sd": e["sd"]}
         for key, e in estimates.items()
@@ -159,21 +169,16 @@ def _with_estimates(instrument: "Instrument", estimates: dict[str, dict[str, flo
     return instrument.with_values(values)
 
 
-KEYS_OF_CARD = tuple(key for key, _ in KEYS.values() if key != "bias.offset_deg_per_h")
-
-
 def _in_card_units(found: "WaveFit", frequency: float | None) -> dict[str, dict[str, float]]:
     """Return the estimates by the keys of a card; anisotropy over 1/τ, and 1/Q, where drive effort and frequency are known."""
-    from math import pi
-
     estimates = {}
     for name, e in found.estimates.items():
-        key, factor = KEYS[name]
+        key, factor, *_ = KEYS[name]
         if name == "decay" and frequency is not None:
             factor = 1 / (pi * frequency)
         elif name == "damping_split":
             if "decay" not in found.estimates:
-                key, factor = "damping_split_per_s", 1.0
+                key, factor = SPLIT_PER_S, 1.0
             else:
                 factor = 1 / found.estimates["decay"].value
         estimates[key] = {part: getattr(e, part) * factor for part in ("value", "sd", "low", "high")}

@@ -92,5 +92,5 @@ def test_one_way_leaves_gain_ratio_open_and_says_so():
 
 def test_a_wave_that_hardly_turned_is_refused():
     time = np.arange(0.0, 100.0)
-    with pytest.raises(CompensationError, match=r"the wave turned by 10°; the fit needs 90°"):
+    with pytest.raises(CompensationError, match=r"the wave precesses by only 10°; the fit needs 90°"):
         fit_whole_angle(time, np.radians(10) * time / 99, 0 * time, coupling=0.554)

@@ -47,7 +47,7 @@ def test_no_command_writes_over_what_it_reads(words, model, tmp_path, capsys):
     names = {"MODEL": model, "RUN": run}
     before = [Path(path).read_text() for path in (model, run)]
     assert main([names.get(word, word) for word in words]) == 2
-    assert "this file is read by the same command" in capsys.readouterr().err
+    assert "the same command reads this file" in capsys.readouterr().err
     assert [Path(path).read_text() for path in (model, run)] == before
 
 

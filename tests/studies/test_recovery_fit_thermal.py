@@ -40,7 +40,7 @@ def test_one_lag_without_radiation_is_found_with_its_interval(tmp_path, capsys):
     assert share["low"] < 0.0 < share["high"]
     assert answer["undetermined"] == []
     assert main(["fit", "thermal", str(path), "--lags", "1"]) == 0
-    assert "time_constant_1" in capsys.readouterr().out
+    assert "Time constant 1" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize("row", [0, 1, 200, -1])
