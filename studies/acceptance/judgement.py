@@ -112,6 +112,6 @@ def judge(records: "Sequence[Record]", limits: Limits, output: str = "bias_deg_p
     used: dict[str, str] = {record.path: test for test, group in sorted_runs.items() for record in group}
     for test in ("warm-up", "scale-factor", "run-down", "transfer", "angle-storage"):
         for record in sorted_runs.get(test, [])[1:]:
-            used[record.path] = f"{test}, not used: the first record of this test counts"
-    used |= {record.path: "no test: it shows none of them" for record in left}
+            used[record.path] = f"{test}, not used: only the first record of this test counts"
+    used |= {record.path: "no test: its columns fit none" for record in left}
     return Acceptance(lines, ELSEWHERE, used, band, allan, noise)

@@ -40,7 +40,7 @@ def read_limits(path: str | Path) -> Limits:
     section = top.section("limits", BY_KEY)
     limits = {key: section.number(key, above=0.0) for key in section.values}
     if not limits:
-        raise InputError(f"{path} [limits]: there is no limit; add one, such as bias_deg_per_h = 5.0.")
+        raise InputError(f"{path} [limits]: no limit is given; add one, such as bias_deg_per_h = 5.0.")
     band = None
     if "warm_up" in top:
         band = top.section("warm_up", ("band_deg_per_h",)).number("band_deg_per_h", above=0.0)

@@ -120,7 +120,9 @@ def measure_temperature(records: "Sequence[Record]", output: str) -> Found:
         if output in record:
             blocks = average_blocks(record["time_s"], {"output": record[output], "T": record[column]}, BLOCK)
             if len(blocks.time) < 10:
-                raise InputError(f"{record.path}: a test over temperature needs ten means over {BLOCK:g} s or more.")
+                raise InputError(
+                    f"{record.path}: a test over temperature needs at least ten averages of {BLOCK:g} s; record longer."
+                )
             T = blocks.columns["T"]
             columns["output"].append(blocks.columns["output"])
             columns["temperature"].append(T)
@@ -179,7 +181,7 @@ def measure_scale(record: "Record") -> Found:
             levels.append((float(applied[settled].mean()), float(y.mean()), float(y.std(ddof=1) / math.sqrt(len(y)))))
     rates, means, errors = np.array(levels).T if levels else np.zeros((3, 0))
     if len(np.unique(same_rate(rates))) < 3:
-        raise InputError(f"{record.path}: a scale factor needs three constant rates or more, of eight rows each.")
+        raise InputError(f"{record.path}: a scale factor needs at least three constant rates of eight rows each.")
     full, source = float(np.abs(rates).max()), (record.path,)
     with naming(record.path):
         line = measure_linearity(rates, means)
@@ -219,7 +221,7 @@ def measure_warm_up(record: "Record", output: str, band: float | None) -> tuple[
     blocks = average_blocks(record["time_s"], {"output": record[output]}, width)
     y, t = blocks.columns["output"], blocks.time - record["time_s"][0]
     if len(y) < 20:
-        raise InputError(f"{record.path}: a warm-up needs twenty means over {width:g} s; record longer.")
+        raise InputError(f"{record.path}: a warm-up needs at least twenty averages of {width:g} s; record longer.")
     scatter = float(np.std(np.diff(y[3 * len(y) // 4 :]))) / math.sqrt(2)
     band = band if band is not None else 3 * scatter
     final = float(y[3 * len(y) // 4 :].mean())
@@ -234,8 +236,8 @@ def measure_warm_up(record: "Record", output: str, band: float | None) -> tuple[
     value, low, high = (last_above(level) for level in (band, band + margin, band - margin))
     if value > 0.75 * t[-1]:
         raise InputError(
-            f"{record.path}: the output leaves the band of ±{band:g} deg/h in the last quarter of the record: it has not"
-            " warmed up, or the band is narrower than its noise; record longer or widen [warm_up] band_deg_per_h."
+            f"{record.path}: the output leaves the band of ±{band:g} °/h in the last quarter of the record: the gyro has not"
+            " warmed up, or the band is narrower than the noise. Record longer or widen [warm_up] band_deg_per_h."
         )
     return {"warm_up_time_s": Measured(value, max(low - width / 2, 0.0), high + width / 2, (record.path,))}, band
 

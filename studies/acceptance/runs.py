@@ -31,7 +31,7 @@ def test_of(record: "Record", output: str) -> Test | None:
         key, colon, name = (part.strip() for part in comment.partition(":"))
         if colon and key == "test":
             if name not in get_args(Test):
-                raise InputError(f"{record.path}: '# {comment}' names no test{nearest(name, get_args(Test))}")
+                raise InputError(f"{record.path}: '# {comment}' is not a known test{nearest(name, get_args(Test))}")
             return name  # type: ignore[return-value]
     if "vibration_amplitude_V" in record:
         return "run-down"

@@ -32,7 +32,7 @@ def measure_transfer(record: "Record") -> Found:
     step = np.diff(time)
     if len(time) < LEAST or np.ptp(step) > 1e-3 * float(np.median(step)) or not np.isfinite(x + y).all():
         raise InputError(
-            f"{record.path}: a transfer function needs {LEAST} even rows or more of both rates, without gaps."
+            f"{record.path}: a transfer function needs both rates in {LEAST} or more evenly spaced rows without gaps."
         )
     rate, size = 1 / float(np.median(step)), max(2 * len(x) // (SEGMENTS + 1), 16)
     f, across = signal.csd(x, y, rate, nperseg=size)
@@ -41,7 +41,7 @@ def measure_transfer(record: "Record") -> Found:
     kept = (f > 0) & (applied > HEARD * applied[1:].max()) & (coherence > COHERENT)
     if kept.sum() < 4:
         raise InputError(
-            f"{record.path}: the applied rate tells of {int(kept.sum())} frequencies; sweep it over the band."
+            f"{record.path}: the applied rate covers only {int(kept.sum())} frequencies; sweep it over the bandwidth."
         )
     f, H, squared = f[kept], across[kept] / applied[kept], coherence[kept]
     gain, phase = np.abs(H), np.unwrap(np.angle(H))
@@ -86,11 +86,11 @@ def measure_storage(record: "Record") -> Found:
     keep = np.isfinite(record["pattern_angle_deg"])
     time, angle = record["time_s"][keep], record["pattern_angle_deg"][keep]
     if len(time) < 2 * LEAST // 5:
-        raise InputError(f"{record.path}: angle storage needs twenty rows or more before and after the gap.")
+        raise InputError(f"{record.path}: angle storage needs at least twenty rows before and after the gap.")
     at = int(np.argmax(np.diff(time))) + 1
     if np.diff(time)[at - 1] < 10 * np.median(np.diff(time)) or min(at, len(time) - at) < LEAST // 5:
         raise InputError(
-            f"{record.path}: angle storage needs a gap in the rows, where the power was off, and twenty rows before and after it."
+            f"{record.path}: angle storage needs a gap in time while the power was off, with at least twenty rows before and after it."
         )
     sides = []
     for part in (slice(0, at), slice(at, None)):

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from math import isfinite
 from typing import TYPE_CHECKING, Any, Literal
 
-from studies.reports.digits import plain, short_exponent, to_error
+from studies.reports.digits import plain, short_exponent, to_error, to_interval
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure as Drawing
@@ -36,7 +36,10 @@ class Column:
     error : str
         The key of its standard error: the value is written as far as the error's second digit, with ± and the error.
     interval : (str, str)
-        Keys of the ends of its interval, shown as "low … high" instead of the value; with `error` to its second digit too.
+        Keys of the ends of its interval, shown as "low … high" instead of the value; with `error` to its second digit too, with digits=0
+        to the second digit of the width.
+    within : (str, str)
+        Keys of the ends of its interval: the value is written to the second digit of the width.
     scale : float
         What the row has times this is shown, for example 1e6 for ppm.
     """
@@ -48,6 +51,7 @@ class Column:
     digits: int = 4
     error: str = ""
     interval: tuple[str, str] | None = None
+    within: tuple[str, str] | None = None
     scale: float = 1.0
 
     @property
@@ -57,11 +61,15 @@ class Column:
 
     def write(self, row: Payload) -> str:
         """Return the cell of a row: here a number becomes text."""
+        ends = self.within or (self.interval if not self.digits else None)
+        if ends is not None and all(isinstance(find(row, key), float | int) for key in (self.key, *ends)):
+            value, low, high = to_interval(*(float(find(row, key)) * self.scale for key in (self.key, *ends)))
+            return value if self.within else f"{low} … {high}"
         if self.interval is not None:
             error = find(row, self.error) if self.error else None
-            ends = [find(row, key) for key in self.interval]
             low, high = (
-                to_error(end * self.scale, error * self.scale)[0] if error else self._number(end) for end in ends
+                to_error(end * self.scale, error * self.scale)[0] if error else self._number(end)
+                for end in (find(row, key) for key in self.interval)
             )
             return f"{low} … {high}" if low else ""
         value = find(row, self.key)

@@ -112,7 +112,7 @@ def test_a_limit_without_a_record_is_said_and_leaves_the_verdict_open(folder, ca
     status, found, said = judged(capsys, folder, ("rundown",), "--limits", path)
     assert status == 0
     assert found["verdict"] == "incomplete"
-    assert "limits scale_factor_error_ppm, which no record gives: a record with rate_deg_per_s" in said
+    assert "limits scale_factor_error_ppm, but no record gives it; it needs a record with rate_deg_per_s" in said
 
 
 @pytest.mark.parametrize(
@@ -120,7 +120,7 @@ def test_a_limit_without_a_record_is_said_and_leaves_the_verdict_open(folder, ca
     [
         ("bias_deg_per_hour = 5", "unknown key 'bias_deg_per_hour'; did you mean 'bias_deg_per_h'?"),
         ("bias_deg_per_h = -5", "must be above 0"),
-        ("", "there is no limit"),
+        ("", "no limit is given"),
     ],
 )
 def test_unusable_limits_are_refused(folder, capsys, text, message):
@@ -143,7 +143,7 @@ def test_a_record_that_shows_no_test_is_named(folder, tmp_path, capsys):
     write_record(Record({"time_s": t, "bias_deg_per_h": np.sin(t)}), tmp_path / "short.csv")
     status, found, said = judged(capsys, tmp_path, ("short",))
     assert status == 0
-    assert "serves no test" in said
+    assert "its columns fit none of the tests" in said
     assert found["verdict"] == "incomplete"
 
 
