@@ -9,7 +9,7 @@ that it served), `warm_up_band_deg_per_h`, `report`.
 from typing import TYPE_CHECKING, Any
 
 from studies.cli.output import answers
-from studies.results import Chapter, Column, Facts, Figure, Result, Sentence, Table
+from studies.results import Chapter, Column, Facts, Figure, Part, Result, Sentence, Table
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure as Drawing
@@ -81,13 +81,14 @@ def acceptance(card: str, *runs: str, limits: str | None = None, output: str = "
     for line in lines:
         if line["limit"] is not None and line["needs"]:
             say(f"warning: {allowed.path} limits {line['key']}, but no record gives it; it needs {line['needs']}.")
+    elsewhere = [{"section": s, "test": test, "needs": needs} for s, test, needs in found.elsewhere]
     payload = {
         "schema": "hrg.acceptance/1",
         "card": instrument.name,
         "verdict": found.verdict,
         "confidence": CONFIDENCE,
         "quantities": lines,
-        "elsewhere": [{"section": s, "test": test, "needs": needs} for s, test, needs in found.elsewhere],
+        "elsewhere": elsewhere,
         "records": found.used,
         "warm_up_band_deg_per_h": found.band,
         "report": None,
@@ -103,7 +104,7 @@ def acceptance(card: str, *runs: str, limits: str | None = None, output: str = "
         for line, one in zip(lines, found.lines, strict=True)
     ]
     missing = [row for row in rows if row["needs"]]
-    missing += [{**one, "words": one["test"], "limited": "no"} for one in payload["elsewhere"]]
+    missing += [{**one, "words": one["test"], "limited": "no"} for one in elsewhere]
     missing.sort(key=lambda row: float(row["section"].split("–")[0].split(".")[1]))
     files = [
         {
@@ -120,7 +121,7 @@ def acceptance(card: str, *runs: str, limits: str | None = None, output: str = "
     )
     if found.band is not None:
         note += f" Warm-up ends when the output stays within ±{found.band:.3g} °/h of its final value."
-    parts = [
+    parts: list[Chapter | Part] = [
         Facts(_facts(found)),
         Chapter("Quantities", [Table("Measured, in the order of IEEE Std 1431", [row for row in rows if not row["needs"]], MEASURED, note)]),
         Chapter("Drift (12.11)", _drift(found)),
