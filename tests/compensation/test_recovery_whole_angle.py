@@ -86,7 +86,7 @@ def test_one_way_leaves_gain_ratio_open_and_says_so():
     wave = from_quality(4432.0, 1e6, damping_anisotropy=0.03, frequency_split=0.01)
     fit = run_and_fit(wave, Electronics(noise=NOISE), lambda t: np.radians(0.5), 0, seconds=1800.0)
     assert "gain_ratio" not in fit.estimates
-    assert any("turn it both ways" in sentence for sentence in fit.undetermined)
+    assert any("precess it in both directions" in sentence for sentence in fit.undetermined)
     assert fit.estimates["damping_split"].value == pytest.approx(wave.damping_split, rel=0.02)
 
 
