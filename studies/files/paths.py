@@ -9,12 +9,13 @@ import json
 import os
 import tomllib
 from collections.abc import Iterator, Mapping
-from contextlib import closing, contextmanager, suppress
+from contextlib import contextmanager, suppress
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
 from studies.errors import InputError
+from studies.sweeps.sealed import SealedFile
 
 OUTPUTS = {
     # argument of a command that names what is written: how people give it
@@ -22,7 +23,7 @@ OUTPUTS = {
     "map_file": "--map",
 }
 SHIPPED = ("cards", "sweeps/templates")
-STORE, STORE_FILES = "study.sqlite", ("study.sqlite", "study.sqlite-wal", "study.sqlite-shm", "lock")
+STORE, STORE_FILES = "study.store", ("study.store", "lock")
 RECORDS = ("*.csv", "*.toml", "*/*.csv", "*/*.toml")  # of a folder, or of a folder of folders
 LONGEST_TOML = 2**22  # bytes
 
@@ -127,15 +128,12 @@ def _inside(folder: Path) -> Iterator[Path]:
     import sqlite3
 
     yield from (folder / name for name in STORE_FILES)
-    alone = not (folder / f"{STORE}-wal").exists()  # immutable: opening leaves no file beside it
-    place = f"{(folder / STORE).resolve().as_uri()}?{'immutable=1' if alone else 'mode=ro'}"
-    with (
-        suppress(sqlite3.Error, ValueError, TypeError, RecursionError),
-        closing(sqlite3.connect(place, uri=True)) as store,
-    ):
-        for beside, spec, card in store.execute("SELECT folder, spec_text, instrument FROM study").fetchall():
-            for text in (*_texts(tomllib.loads(spec)), *_texts(json.loads(card))):
-                yield from (Path(beside) / text, Path(text))
+    with suppress(OSError, ValueError, TypeError, RecursionError), (folder / STORE).open("rb") as file:
+        for block in SealedFile(file).scan():
+            if block.kind == "study":
+                study = json.loads(block.content)
+                for text in (*_texts(study["spec"]), *_texts(study["instrument"])):
+                    yield from (Path(study["folder"]) / text, Path(text))
 
 
 def _texts(content: object) -> Iterator[str]:

@@ -96,7 +96,7 @@ def test_an_output_onto_an_input_or_another_output_is_refused_before_any_work(fo
 def test_the_folder_of_a_study_keeps_its_store_its_lock_and_what_its_spec_names(folder, capsys):
     assert main(["study", "run", "spec.toml", "--out", "study", "--workers", "1", "--quiet"]) == 0
     before = contents(folder)
-    for name in ("study/study.sqlite", "study/lock", "mapped.toml", "outer.csv"):
+    for name in ("study/study.store", "study/lock", "mapped.toml", "outer.csv"):
         for command in ("export", "report"):
             assert main(["study", command, "study", "--out", name]) == 2, name
             assert "destroy" in capsys.readouterr().err
