@@ -125,7 +125,6 @@ def _inside(folder: Path) -> Iterator[Path]:
     if not (folder / STORE).is_file():
         yield from (path for pattern in RECORDS for path in folder.glob(pattern))
         return
-    import sqlite3
 
     yield from (folder / name for name in STORE_FILES)
     with suppress(OSError, ValueError, TypeError, RecursionError), (folder / STORE).open("rb") as file:
