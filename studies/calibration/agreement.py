@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 from scipy.linalg import block_diag, null_space
-from scipy.stats import chi2
+from scipy.special import chdtri
 
 from studies.calibration.estimates import Estimate
 from studies.calibration.fit import CardFit, objective, whitened
@@ -29,7 +29,7 @@ def keep_agreeing(found: CardFit) -> CardFit:
     for k, name in enumerate(priors.names):
         tables.setdefault(name.split(".", maxsplit=1)[0], []).append(k)
     costs = {
-        name: float(z[own] @ np.linalg.solve(C[np.ix_(own, own)], z[own])) / float(chi2.ppf(AGREEING, len(own)))
+        name: float(z[own] @ np.linalg.solve(C[np.ix_(own, own)], z[own])) / float(chdtri(len(own), 1 - AGREEING))
         for name, own in tables.items()
     }
     agreeing = sorted((name for name in tables if costs[name] < 1.0), key=lambda name: costs[name])
@@ -39,7 +39,7 @@ def keep_agreeing(found: CardFit) -> CardFit:
         risen = objective(problem, kept.state, found.noise, found.rows) - objective(
             problem, found.state, found.noise, found.rows
         )
-        if risen < chi2.ppf(AGREEING, len(held)):
+        if risen < chdtri(len(held), 1 - AGREEING):
             return kept
         agreeing.pop()
     return found
