@@ -11,7 +11,7 @@ snr     rms of what the refitted generic baseline cannot absorb over rms of the 
 runs    1 to 6, or None to draw. folder: gets `run_1.csv` …, `card.toml`, `truth.json`.
 
 `python -m tests.stranger OUT --count N --seed S` writes N campaigns;
-`python -m tests.stranger.score OUT` asks `hrg diagnose` about them and prints the marks.
+`tests/benchmarks/judge.py` asks `hrg diagnose` about such campaigns and compares the answers of two commits.
 """
 
 from tests.stranger.campaign import make_campaign

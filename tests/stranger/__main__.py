@@ -5,7 +5,7 @@ Beside each campaign `ideal.json`: what an ideal predictor leaves of held-out ro
 
 import argparse
 import json
-from itertools import cycle, islice
+from itertools import cycle
 from pathlib import Path
 
 from tests.stranger.aliens import ALIENS
@@ -13,6 +13,7 @@ from tests.stranger.campaign import make_campaign
 from tests.stranger.effects import EFFECTS
 from tests.stranger.ideal import ideal_ratios
 from tests.stranger.noise import FAMILIES
+from tests.stranger.truth import Truth
 
 SNRS = (0.3, 1.0, 3.0, 6.0, 12.0)
 ALIEN_SNRS = (3.0, 6.0, 12.0)
@@ -35,17 +36,24 @@ def plan(count: int) -> list[tuple[str, str | None, float | None]]:
     return out
 
 
+def make_one(seed: int, index: int, folder: Path) -> tuple[Truth, dict[str, float]]:
+    """Write campaign `index` of the plan; return its truth and what an ideal predictor leaves of held-out rows."""
+    kind, name, snr = plan(index + 1)[index]
+    truth = make_campaign(seed, kind, name, snr, folder=folder)
+    return truth, ideal_ratios(truth)
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("out", type=Path)
     parser.add_argument("--count", type=int, default=60)
     parser.add_argument("--seed", type=int, default=0)
     given = parser.parse_args()
-    for i, (kind, name, snr) in enumerate(islice(plan(given.count), given.count)):
+    for i in range(given.count):
         folder = given.out / f"s{given.seed + i:04d}"
-        truth = make_campaign(given.seed + i, kind, name, snr, folder=folder)
-        (folder / "ideal.json").write_text(json.dumps(ideal_ratios(truth)))
-        print(f"s{given.seed + i:04d} {kind:6} {'+'.join(h.effect for h in truth.hidden) or name}", flush=True)
+        truth, ideal = make_one(given.seed + i, i, folder)
+        (folder / "ideal.json").write_text(json.dumps(ideal))
+        print(folder.name, truth.kind, "+".join(h.effect for h in truth.hidden), flush=True)
 
 
 if __name__ == "__main__":

@@ -6,6 +6,8 @@ import pytest
 from studies.diagnosis.constants import CONSTANTS
 from studies.diagnosis.verdict import Cause, doubted
 from tests.benchmarks.diagnosis.calibrate import doubts
+from tests.benchmarks.diagnosis.marks import calibration_error
+from tests.benchmarks.diagnosis.marks import compare as compare_engines
 from tests.benchmarks.diagnosis.plan_check import agreement, compare, simulated_shares
 from tests.benchmarks.diagnosis.scoring import band, confusion, exact_set, first_right, reliability, said
 
@@ -122,3 +124,26 @@ def test_a_further_name_has_a_doubt_of_its_own_and_a_value_that_of_the_first():
     causes = [Cause(name, "frequency_Hz", 1.0, (), {}, 10.0, kind) for name, kind in (("E", "value"), ("jump", "physics"), ("leak", "physics"))]  # fmt: skip
     left = [1.0 - cause.probability for cause in doubted(causes)]
     assert left == pytest.approx([CONSTANTS[name] for name in ("doubt", "doubt", "doubt_further")])
+
+
+def line(key, kind, hidden, verdict, *names):
+    causes = [{"effect": name, "probability": 0.9} for name in names]
+    truth = {"kind": kind, "hidden": hidden, "effects": "", "snr": 3.0, "verdicts": ["explained"]}
+    return {"case": key, "commit": "c", "seconds": 1.0, "MB": 1.0, "card": False, "truth": truth, "verdict": verdict, "causes": causes, "responses": {}}  # fmt: skip
+
+
+def test_an_engine_that_loses_more_campaigns_than_chance_is_worse():
+    """Of eight campaigns the new one loses five and wins none: 1 in 32 by chance. A second, wrong name makes an answer wrong."""
+    keys = [f"a:{k}" for k in range(8)]
+    old = [line(k, "effect", [["jump"]], "explained", "jump") for k in keys]
+    new = [line(k, "effect", [["jump"]], "explained", *(["jump"] if i < 3 else ["jump", "leak"])) for i, k in enumerate(keys)]  # fmt: skip
+    rows = {row.split("  ")[1]: row for row in compare_engines(old, new).splitlines() if row.startswith("  one")}
+    assert "lost 5 won 0   WORSE" in rows["one effect, SNR ≥ 2: right class"]
+    again = compare_engines(old, old)
+    assert "WORSE" not in again
+    assert "lost 0 won 0" in again
+
+
+def test_a_probability_of_nine_tenths_that_is_right_nine_times_in_ten_has_no_error():
+    assert calibration_error([(0.9, True)] * 9 + [(0.9, False)]) == pytest.approx(0, abs=1e-12)
+    assert calibration_error([(0.95, False)] * 4) == pytest.approx(0.95)
