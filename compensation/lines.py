@@ -9,8 +9,8 @@ from scipy.fft import next_fast_len, rfft
 from scipy.ndimage import median_filter, uniform_filter1d
 from scipy.special import gammaincc, gammaln
 
+from compensation.noise import white_rms
 from compensation.spikes import find_step
-from compensation.wander import white_noise
 
 Array = NDArray[np.float64]
 AROUND = 101
@@ -95,4 +95,4 @@ def _fast(time: Array, values: Array, sampling: float, slowest: float) -> Array:
 def _of_rounding(values: Array) -> float:
     """Return the amplitude of the first line that rounding makes of a slope; noise of a step or more blurs it."""
     step = find_step(values)
-    return step / np.pi if white_noise(values) < step else 0.0
+    return step / np.pi if white_rms(values) < step else 0.0

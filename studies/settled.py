@@ -18,7 +18,7 @@ from scipy.optimize import minimize_scalar
 
 from compensation.decimation import average_blocks
 from compensation.errors import CompensationError
-from compensation.wander import white_noise
+from compensation.noise import white_rms
 from studies.errors import InputError
 from studies.record import Record
 
@@ -214,7 +214,7 @@ def _shown(seen: Sequence[_Seen], tolerance: float) -> float:
 
 def _judge_one(one: _Seen, time_constant: float, tolerance: float) -> _Judged:
     t, T, f = one.time, one.temperature, one.frequency
-    noise = time_constant * max(white_noise(T), white_noise(f) / one.slope) / one.width
+    noise = time_constant * max(white_rms(T), white_rms(f) / one.slope) / one.width
     # A line through blocks −r … r has a slope that scatters by σ/√Σk².
     r = np.arange(REACH, FARTHEST + 1)
     quiet = np.flatnonzero(noise <= UNSEEN * tolerance * np.sqrt(r * (r + 1) * (2 * r + 1) / 3))

@@ -366,7 +366,10 @@ def _refit_start(problem: CardProblem, point: Array, whole: CardFit) -> State:
     """Residuals with the values of a point and the run's own initial state refitted."""
     instrument = problem.instrument_at(point)
     known = replace(problem, instrument=instrument, priors=Priors((), np.eye(0)), law=problem.law_at(instrument))
-    noise = {name: replace(whole.noise[name], offset=1e3 * whole.noise[name].white) for name in known.responses}
+    noise = {
+        name: replace(whole.noise[name], offset=1e3 * whole.noise[name].white / known.rows[name].span ** 0.5)
+        for name in known.responses
+    }
     start = np.zeros(known.count)
     for _ in range(START_STEPS):
         J, r = whitened(known, known.evaluate(start), noise, known.rows)

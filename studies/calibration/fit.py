@@ -1,7 +1,7 @@
 """Most probable values: Gauss–Newton steps in coloured noise that is estimated beside them.
 
 At first the noise of each response is all of its residual; once a whole step has kept what it promised, its levels are those of
-highest marginal likelihood, the free coordinates integrated out (`compensation.correlated`); where steps then leave no less, the
+highest marginal likelihood, the free coordinates integrated out (`compensation.noise_rows`); where steps then leave no less, the
 model cannot follow all responses at once, and the noise of each is judged given the others. With rows whitened by it,
 (JᵀJ + 1) Δ = Jᵀ r − u, damped until the step keeps its promise, then bent as the valley bends. Blocks whose innovation stands
 out by more than 5 standard deviations are given the variance that they show: one outlier moves nothing.
@@ -15,9 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
 
-from compensation.correlated import KINDS, Noise, NoiseRows, estimate_noise
 from compensation.errors import CompensationError
-from compensation.wander import FLICKER_TIMES, HOUR
+from compensation.noise import Noise
+from compensation.noise_rows import KINDS, NoiseRows, estimate_noise
 from shell.errors import ShellError
 from studies.calibration.observed import SETTLED
 from studies.calibration.problem import CardProblem, Progress, State
@@ -190,17 +190,9 @@ def _larger(one: Noise, other: Noise) -> Noise:
 
 
 def stated_noise(noise: "NoiseKeys", response: str) -> Noise | None:
-    """Slow levels and offset of a response as a card's `[noise]` states them; None where it says nothing of them.
-
-    1/f noise of Allan deviation a, S = h/f, a² = 2 ln 2 · h, has the variance h ln 4 = a² per factor of 4 in time: one of
-    the exponentials of which `flicker` is the mean.
-    """
-    slow = {"frequency_Hz": frequency_noise, "bias_deg_per_h": bias_noise}
-    if response not in slow:
-        return None
-    levels = slow[response](noise)
-    flicker, walk = levels.flicker * np.sqrt(len(FLICKER_TIMES)), levels.walk * np.sqrt(HOUR)
-    return Noise(0.0, flicker=flicker, walk=walk, offset=levels.offset)
+    """Slow levels and offset of a response as a card's `[noise]` states them; None where it says nothing of them."""
+    stated = {"frequency_Hz": frequency_noise, "bias_deg_per_h": bias_noise}
+    return replace(stated[response](noise), white=0.0) if response in stated else None
 
 
 def _spare_outliers(rows: NoiseRows, state: State, name: str, noise: Noise) -> tuple[NoiseRows, int]:
@@ -212,9 +204,9 @@ def _spare_outliers(rows: NoiseRows, state: State, name: str, noise: Noise) -> t
     if not beyond:
         return rows, 0
     stretched = tuple(
-        v * np.where(ratio[s] > 1, 25.0 * ratio[s], 1.0) for v, s in zip(rows.variances, rows.slices, strict=True)
+        v * np.where(ratio[s] > 1, 25.0 * ratio[s], 1.0) for v, s in zip(rows.stretch, rows.slices, strict=True)
     )
-    return NoiseRows(rows.times, stretched), beyond
+    return replace(rows, stretch=stretched), beyond
 
 
 def whitened(

@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from compensation.correlated import Noise
+from compensation.noise import Noise
 from studies.calibration.fit import CardFit
 from studies.calibration.problem import CardProblem, State
 

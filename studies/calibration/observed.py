@@ -45,6 +45,7 @@ class BlockMeans:
     counts : array, values in each block
     time, value : arrays, means
     spikes : number of values left out
+    step : usual time from one predicted row to the next, s
     """
 
     rows: Rows
@@ -53,6 +54,7 @@ class BlockMeans:
     time: Array
     value: Array
     spikes: int
+    step: float
 
     def average(self, column: Array) -> Array:
         """Means of a predicted column over the same values, along the first axis."""
@@ -60,9 +62,9 @@ class BlockMeans:
         return np.asarray(total / self.counts.reshape(-1, *[1] * (total.ndim - 1)))
 
     @property
-    def variance(self) -> Array:
-        """White variance of each block over that of a usual one."""
-        return np.asarray(np.median(self.counts) / self.counts)
+    def span(self) -> Array:
+        """Seconds of each block that have values."""
+        return np.asarray(self.counts * self.step)
 
 
 @dataclass(frozen=True)
@@ -220,4 +222,12 @@ def _block(time: Array, column: Array, most: int) -> BlockMeans | None:
         return np.asarray(np.add.reduceat(values, edges) / counts)
 
     middle = float(np.median(column[rows]))
-    return BlockMeans(rows, edges, counts, mean(time[rows]), middle + mean(column[rows] - middle), int(spikes.sum()))
+    return BlockMeans(
+        rows,
+        edges,
+        counts,
+        mean(time[rows]),
+        middle + mean(column[rows] - middle),
+        int(spikes.sum()),
+        float(np.median(np.diff(time))),
+    )

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from compensation.correlated import NoiseRows
+from compensation.noise_rows import NoiseRows
 from studies.calibration.observed import HOUSING, QUADRATURE, RESPONSES, SETTLED, ObservedRun, SettledTable
 from studies.calibration.priors import Priors
 from studies.calibration.start import start_spread
@@ -130,7 +130,7 @@ class CardProblem:
         found = {
             name: NoiseRows.of(
                 [self.runs[part.run].responses[name].time for part in self.members(name)],
-                [self.runs[part.run].responses[name].variance for part in self.members(name)],
+                [self.runs[part.run].responses[name].span for part in self.members(name)],
             )
             for name in self.responses
             if name != SETTLED

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from compensation.correlated import Noise
+from compensation.noise import Noise
 from studies.calibration.ahead import BIAS
 from studies.calibration.estimates import SILENT, TOLD, Estimate
 from studies.calibration.fit import CardFit, stated_noise

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from compensation.wander import white_noise
+from compensation.noise import white_rms
 from studies.calibration.observed import ObservedRun
 from studies.simulation.heat_path import build_network, slowest_lag
 
@@ -43,5 +43,5 @@ def _rate(time: Array, value: Array, window: float) -> float:
     """Rate (per s) that the first rows leave likely, rms: of a straight line through them, and of its noise."""
     count = min(max(int(np.searchsorted(time - time[0], window)), LEAST_ROWS), len(time))
     t = time[:count] - time[:count].mean()
-    spread = white_noise(value)
+    spread = white_rms(value)
     return float(np.hypot(t @ value[:count] / (t @ t), spread / np.sqrt(t @ t)))

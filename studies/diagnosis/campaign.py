@@ -7,8 +7,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from compensation.lines import Line, find_line
+from compensation.noise import white_rms
 from compensation.spikes import find_spike_groups, find_spikes, find_step
-from compensation.wander import white_noise
 from shell.constants import zero_Celsius
 from studies.diagnosis.checks import FEWEST_BINS, check_device, check_units
 from studies.diagnosis.drives import drives, stretches
@@ -166,7 +166,7 @@ def load_campaign(records: Sequence[Record], reference_degC: float | None = None
     rows = max(1, round(sum(spans) / MOST_BINS / sampling))
     for name in responses:
         readings = [(table["time_s"], table[name]) for table in tables if name in table]
-        line = fast_line(readings, sampling, rows * sampling, white_noise(*(values for _, values in readings)))
+        line = fast_line(readings, sampling, rows * sampling, white_rms(*(values for _, values in readings)))
         if line is not None and line.period / RESOLVED > max(sum(spans) / MOST_RESOLVED, max(spans) / LONGEST_RUN):
             rows = min(rows, max(1, int(line.period / RESOLVED / sampling)))
     whole = -(-rows // FINEST)
@@ -244,7 +244,7 @@ def _reading_noise(temperature: FloatArray) -> float:
     known = temperature[np.isfinite(temperature)]
     steps = np.abs(np.diff(known))
     rounding = float(steps[steps > 1e-9].min()) / np.sqrt(12.0) if (steps > 1e-9).any() else 0.0
-    white = white_noise(known)
+    white = white_rms(known)
     distinct = np.unique(known).size
     return float(max(white, rounding)) if distinct < 0.5 * known.size else white
 

@@ -6,7 +6,7 @@ from typing import cast
 
 import numpy as np
 
-from compensation.wander import white_noise
+from compensation.noise import white_rms
 from studies.diagnosis import held_out
 from studies.diagnosis.baseline import Baseline, Followed, Lagged, Reading, bends_of
 from studies.diagnosis.campaign import Campaign
@@ -142,7 +142,7 @@ def again(plain: Fit) -> Callable[[float], Baseline]:
 
 def row_noise(campaign: Campaign, column: str) -> float:
     """Return the white noise of one row of the record, from second differences."""
-    return white_noise(*(run.row_responses[column] for run in campaign.runs))
+    return white_rms(*(run.row_responses[column] for run in campaign.runs))
 
 
 def _jitter(campaign: Campaign, column: str) -> FloatArray:

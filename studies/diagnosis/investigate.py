@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.special import erf
 
-from compensation.wander import white_noise
+from compensation.noise import white_rms
 from studies.diagnosis import held_out
 from studies.diagnosis.baseline import first_stretches
 from studies.diagnosis.campaign import Campaign
@@ -248,7 +248,7 @@ def _result(
             else f"held-out residuals cover {share_known}: the others cannot be predicted from {rest}"
         )
     noise = min(value for value in (reached.residual_rms, reached.held_out_rms) if value is not None)
-    white = white_noise(*held_out.residuals(final, campaign))
+    white = white_rms(*held_out.residuals(final, campaign))
     white = white or float(np.sqrt(final.solved.variance * inquiry.problem.noise.rows))
     if verdict != "unexplained" and noise > CONSTANTS["wander_usual"] * white:
         remarks.append(

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from compensation.wander import white_noise
+from compensation.noise import white_rms
 from studies.diagnosis.campaign import Campaign
 from studies.diagnosis.noise import NoiseModels
 from studies.diagnosis.response import RESPONSES, Response
@@ -97,7 +97,7 @@ def pose(campaign: Campaign, column: str, tau: float, keep: Sequence["np.ndarray
 def white_level(campaign: Campaign, column: str) -> float:
     """Return the white noise of a step of the grid, from second differences."""
     parts = [run.responses[column] for run in campaign.runs]
-    if (level := white_noise(*parts)) > 0.0:
+    if (level := white_rms(*parts)) > 0.0:
         return level
     values = np.concatenate(parts)
     return max(1e-9 * float(np.nanmax(np.abs(values))), 1e-300)

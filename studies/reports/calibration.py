@@ -155,11 +155,11 @@ def noise_table(found: "Calibration") -> Table:
         [
             NAMES[name],
             SHOWN[name][0],
-            *(plain(SHOWN[name][1] * level) for level in (n.white, n.flicker, n.walk, n.offset)),
+            *(plain(SHOWN[name][1] * level) for level in (n.white, n.flicker, 60.0 * n.walk, n.offset)),
         ]
         for name, n in found.fit.noise.items()
     ]
-    note = "White: rms of a block average. Walk: standard deviation after 1 h. Offset: of a run's turn-on."
+    note = "White: Allan deviation at 1 s. Flicker: its flat part. Walk: standard deviation of the change in 1 h. Offset: of a run's turn-on."
     return Table("Noise, estimated", ["Response", "Unit", "White", "Flicker", "Walk", "Offset"], rows, note)
 
 

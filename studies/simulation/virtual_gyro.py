@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from compensation.noise import Noise
 from shell.constants import zero_Celsius
 from studies.instrument.tables.noise import SILENT
 from studies.law import unknown_slope
@@ -13,7 +14,7 @@ from studies.record import Record
 from studies.simulation.chamber import check_profile
 from studies.simulation.drive import COLUMN, COMMANDS, RATE, Drive, drive_by_profile, rows_of
 from studies.simulation.loop import find_range_use, require_range, require_stable_loops, wave_of
-from studies.simulation.noise import bias_noise, frequency_noise, quantise, white_noise
+from studies.simulation.noise import bias_noise, frequency_noise, quantise
 from studies.simulation.prediction import Prediction, law_for, predict
 from thermal.profile import Profile
 
@@ -158,11 +159,11 @@ def _observe(
     """
     count = len(true["frequency_Hz"])
     housing = true["housing_temperature_degC"]
-    scatter = white_noise(count, rate, levels.housing_white_K, generator)
+    scatter = Noise(levels.housing_white_K).draw(count, rate, generator)
     frequency = true["frequency_Hz"] + frequency_noise(levels).draw(count, rate, generator)
     wander = bias_noise(levels).draw(count, rate, generator)
     bias = true["bias_deg_per_h"] + wander
-    loss = true["inverse_q"] * (1 + white_noise(count, rate, levels.inverse_q_white, generator))
+    loss = true["inverse_q"] * (1 + Noise(levels.inverse_q_white).draw(count, rate, generator))
     read = {
         "housing_temperature_degC": quantise(housing + scatter, levels.housing_resolution_degC) if sensed else housing,
         "resonator_temperature_degC": true["resonator_temperature_degC"],
@@ -171,12 +172,12 @@ def _observe(
         "inverse_q": loss,
     }
     if "quadrature_V" in true:
-        read["quadrature_V"] = true["quadrature_V"] + white_noise(count, rate, levels.quadrature_white_V, generator)
+        read["quadrature_V"] = true["quadrature_V"] + Noise(levels.quadrature_white_V).draw(count, rate, generator)
     if "pattern_angle_deg" in true:
         read["pattern_angle_deg"] = true["pattern_angle_deg"]
     if turns_by is not None:  # what scatters as a rate has turned the wave
         angle = true["pattern_angle_deg"] + turns_by / rate / 3600 * np.cumsum(np.append(0.0, wander[:-1]))
-        read["pattern_angle_deg"] = angle + white_noise(count, rate, levels.pattern_angle_white_deg, generator)
+        read["pattern_angle_deg"] = angle + Noise(levels.pattern_angle_white_deg).draw(count, rate, generator)
     return read
 
 

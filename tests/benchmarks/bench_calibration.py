@@ -22,7 +22,7 @@ from itertools import cycle
 import numpy as np
 from numpy.typing import NDArray
 
-from compensation.correlated import Noise
+from compensation.noise import Noise
 from studies.calibration.calibrate import Calibration, calibrate
 from studies.calibration.fit import CardFit, stated_noise
 from studies.calibration.observed import HOUSING
@@ -152,7 +152,7 @@ def ideal_errors(
     fit: CardFit, levels: NoiseKeys, ahead: Array, drive: Drive, generator: np.random.Generator
 ) -> list[Array]:
     """Draw errors of a predicted frequency that are left where the levels of all noise are known: (JᵀJ + 1)⁻¹ with them."""
-    rate, problem = 1 / float(np.median(np.diff(drive.time))), fit.problem
+    problem = fit.problem
     total = np.eye(problem.count)
     for name in problem.responses:
         blocks = [problem.runs[part.run].responses[name] for part in problem.members(name)]
@@ -162,8 +162,7 @@ def ideal_errors(
             "inverse_q": levels.inverse_q_white * float(np.mean(np.concatenate([one.value for one in blocks]))),
             HOUSING: levels.housing_white_K,
         }[name]
-        counts = float(np.median(np.concatenate([one.counts for one in blocks])))
-        noise = replace(stated_noise(levels, name) or Noise(0.0), white=white * np.sqrt(rate / counts))
+        noise = replace(stated_noise(levels, name) or Noise(), white=white)
         J = problem.rows[name].whiten(fit.state.slope[name], noise)
         total = total + J.T @ J
     count = ahead.shape[1]

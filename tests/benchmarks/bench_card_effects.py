@@ -18,11 +18,10 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
-from scipy.fft import irfft, next_fast_len
-from scipy.linalg import toeplitz
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
+from compensation.noise import Noise
 from shell.errors import ShellError
 from studies.diagnosis.campaign import load_campaign
 from studies.diagnosis.evidence import SCALES
@@ -35,7 +34,7 @@ from studies.errors import InputError
 from studies.instrument.card import Instrument, load_card
 from studies.simulation.chamber import load_drive
 from studies.simulation.drive import drive_by_profile, rows_of
-from studies.simulation.noise import NoiseLevels, bias_noise, frequency_noise
+from studies.simulation.noise import bias_noise, frequency_noise
 from studies.simulation.virtual_gyro import simulate_run
 from tests.benchmarks.diagnosis.ceiling import PRICE, above
 from tests.benchmarks.diagnosis.scoring import short_rate
@@ -246,19 +245,14 @@ def noise_of(card, response, drives):
     if response != "inverse_q":
         return (bias_noise if response == "bias_deg_per_h" else frequency_noise)(card.noise)
     quiet, noisy = (run(card, drives[:1], 0, noise)[0][response] for noise in (False, True))
-    return NoiseLevels(white=float(np.std(noisy - quiet)) / np.sqrt(RATE))
+    return Noise(white=float(np.std(noisy - quiet)) / np.sqrt(RATE))
 
 
 def covariance(levels, own, mask, rows):
     """Covariance of the means of a run's rows over the steps of its grid, of white noise, flicker and a walk."""
-    count, time = own.row_time.size, own.time[mask] - own.row_time[0]
-    length = next_fast_len(2 * count, real=True)
-    power = np.zeros(length // 2 + 1)
-    power[1:] = levels.flicker**2 / (2.0 * np.log(2.0)) / (2.0 * np.arange(1, power.size))  # S(f) = h/f, line by line
-    flicker = toeplitz(irfft(power, length)[:count] * length)
-    means = np.stack([own.steps.means(column) for column in np.eye(count)], axis=1)[mask]
-    walk = levels.walk**2 * np.minimum.outer(time, time)
-    return np.eye(time.size) * levels.white**2 * RATE / rows + walk + means @ flicker @ means.T
+    step = float(own.time[1] - own.time[0])
+    white = np.eye(int(mask.sum())) * levels.white**2 * RATE / rows
+    return white + replace(levels, white=0.0).covariance(own.time[mask], step)
 
 
 def summarise(cases):

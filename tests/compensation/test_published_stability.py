@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from compensation.errors import CompensationError
+from compensation.noise import Noise
 from compensation.stability import allan_deviation, equivalent_freedom, fit_noise
-from studies.simulation.noise import flicker_noise
 
 REFERENCE = Path(__file__).parents[1] / "reference"
 
@@ -85,7 +85,7 @@ def test_white_noise_shows_no_random_walk():
 
 def test_flicker_is_read_at_its_flat_part():
     readings = [
-        allan_deviation(flicker_noise(30000, 0.5, np.random.default_rng(seed)), 1.0).deviation[12:24].mean()
+        allan_deviation(Noise(flicker=0.5).draw(30000, 1.0, np.random.default_rng(seed)), 1.0).deviation[12:24].mean()
         for seed in range(20)
     ]
     assert np.mean(readings) == pytest.approx(0.5, rel=0.05)

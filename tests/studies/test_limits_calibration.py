@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from compensation.correlated import NoiseRows
+from compensation.noise_rows import NoiseRows
 from studies.calibration.ahead import spread_of_prediction
 from studies.calibration.calibrate import calibrate
 from studies.calibration.estimates import NINETY, estimate

@@ -190,7 +190,7 @@ def covariance_of_noise(model: Fit, rows: int, step: float) -> FloatArray:
     """Return the covariance of the noise of one further run."""
     s = model.solved
     time = np.asarray(np.arange(rows) * step, dtype=float)
-    wander = [*KERNELS.values()][s.kind](time)
+    wander = [*KERNELS.values()][s.kind](time, step)
     return np.asarray(s.variance * (np.eye(rows) + SHARES[s.share] * wander))
 
 

@@ -64,7 +64,7 @@ def above(campaign, plain, rows, noise, white):
     columns = problem.split(problem.stack(tangent.columns))
 
     def ratio(kernel, share):
-        wander = [share * white * kernel(t) for t in times] if share else [0.0] * len(times)
+        wander = [share * white * kernel(t, campaign.step) for t in times] if share else [0.0] * len(times)
         return 0.5 * _divergence(target, columns, tangent.prior, noise, wander)
 
     known = ratio(None, 0.0)

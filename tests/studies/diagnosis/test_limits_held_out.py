@@ -20,7 +20,9 @@ def test_a_column_that_no_row_shows_is_as_unknown_as_one_that_hardly_shows(wides
     def deviation(size):
         column = size * np.sin(t / 900.0)[:, None]
         prior, owner = np.array([np.inf, 0.2]), np.array([-1, 0])
-        model = Linear(y, np.concatenate([level, column], axis=1), prior, owner, NoiseModels.of([t], 1.0), 0.05, widest)
+        model = Linear(
+            y, np.concatenate([level, column], axis=1), prior, owner, NoiseModels.of([t], 1.0, 144.0), 0.05, widest
+        )
         return np.sqrt(solve(model, 0, np.array([0.5])).covariance[1, 1])
 
     assert deviation(0.0) == pytest.approx(deviation(1e-9), rel=1e-6)
@@ -35,7 +37,9 @@ def test_a_value_of_a_card_is_never_less_known_than_stated(sigma):
     t = np.arange(400) * 60.0
     columns = np.stack([np.ones(t.size), 1e-4 * np.sin(t / 900.0)], axis=1)
     y, prior = 3.0 + 1e-2 * rng.standard_normal(t.size), np.array([np.inf, 1.0])
-    solved = solve(Linear(y, columns, prior, np.array([-1, -1]), NoiseModels.of([t], 1.0), sigma, 1.0), 0, np.empty(0))
+    solved = solve(
+        Linear(y, columns, prior, np.array([-1, -1]), NoiseModels.of([t], 1.0, 144.0), sigma, 1.0), 0, np.empty(0)
+    )
     assert np.sqrt(solved.covariance[1, 1]) == pytest.approx(1.0, rel=0.1)
     assert abs(solved.coefficients[1]) < 0.5
 

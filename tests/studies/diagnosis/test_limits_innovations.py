@@ -71,7 +71,7 @@ def test_a_high_level_hides_nothing():
     columns = np.stack([np.ones(200), np.sin(t / 3000.0)], axis=1)
     y = 0.07 * rng.standard_normal(200)
     found = [
-        solve(Linear(y + level, columns, np.full(2, np.inf), np.full(2, -1), NoiseModels.of([t], 1.0), 0.07), 0)
+        solve(Linear(y + level, columns, np.full(2, np.inf), np.full(2, -1), NoiseModels.of([t], 1.0, 144.0), 0.07), 0)
         for level in (0.0, 25e6)
     ]
     assert found[1].log_evidence == pytest.approx(found[0].log_evidence, abs=1e-3)

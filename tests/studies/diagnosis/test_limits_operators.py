@@ -5,10 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from compensation.wander import Eigenbasis
 from studies.diagnosis.campaign import load_campaign
 from studies.diagnosis.evidence import Grams, Linear, solve
-from studies.diagnosis.noise import KERNELS, SHARES, NoiseModels
+from studies.diagnosis.noise import KERNELS, SHARES, Eigenbasis, NoiseModels
 from studies.effects import States, apply_effect, find_effect
 from studies.effects.states import average, lag, play, remembered
 from studies.record import Record
@@ -51,7 +50,7 @@ def test_evidence_is_that_of_the_full_covariance(kind):
     flat = np.stack([np.ones(90), t / 1e4], axis=1)
     ours = np.stack([np.sin(t / 3000.0), np.cos(t / 900.0)], axis=1)
     y = flat @ [1.0, 0.5] - 0.3 * ours[:, 0] + rng.standard_normal(90) + np.cumsum(rng.standard_normal(90)) * 0.1
-    noise = NoiseModels.of([t], 1.0)
+    noise = NoiseModels.of([t], 1.0, 144.0)
     prior = np.array([np.inf, np.inf, 2.0, 0.5])
     model = Linear(y, np.concatenate([flat, ours], axis=1), prior, np.array([-1, -1, 0, 0]), noise, 0.7)
     share, scale = 5, 0.1
@@ -74,7 +73,7 @@ def test_a_solution_holds_the_coefficients_of_generalised_least_squares():
     t = np.arange(0.0, 28800.0, 144.0)
     columns = np.stack([np.ones(200), t / 1e4, np.sin(t / 3000.0)], axis=1)
     y = columns @ [1.0, 0.5, -0.3] + 0.1 * rng.standard_normal(200)
-    noise = NoiseModels.of([t], 1.0)
+    noise = NoiseModels.of([t], 1.0, 144.0)
     found = solve(Linear(y, columns, np.full(3, np.inf), np.full(3, -1), noise, 0.1), 0)
     basis = noise.bases[found.kind]
     covariance = basis.vectors[0] @ np.diag(1.0 + SHARES[found.share] * basis.eigenvalues) @ basis.vectors[0].T
@@ -89,7 +88,7 @@ def test_a_solution_holds_the_coefficients_of_generalised_least_squares():
 
 def test_walk_kernel_is_brownian_with_a_past():
     t = np.array([0.0, 7200.0, 28800.0])
-    basis = Eigenbasis.of([t], KERNELS["random walk"])
+    basis = Eigenbasis.of([t], KERNELS["random walk"], 0.1)
     covariance = basis.vectors[0] @ np.diag(basis.eigenvalues) @ basis.vectors[0].T
     assert np.allclose(covariance, [[0.5, 0.5, 0.5], [0.5, 0.75, 0.75], [0.5, 0.75, 1.5]])
 

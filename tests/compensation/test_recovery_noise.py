@@ -1,14 +1,13 @@
-"""The one model of correlated noise: against its own definition, drawn noise, and the restricted likelihood."""
+"""Levels of noise come back from draws by restricted likelihood, with and without a prior."""
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from scipy.linalg import block_diag
 from scipy.stats import chi2
 
-from compensation.correlated import Noise, NoiseRows, estimate_noise
 from compensation.errors import CompensationError
-from compensation.wander import HOUR
+from compensation.noise import Noise
+from compensation.noise_rows import NoiseRows, estimate_noise
 
 Array = NDArray[np.float64]
 GAPPED = np.cumsum(np.concatenate([np.full(60, 80.0), [4000.0], np.full(50, 130.0)]))
@@ -20,44 +19,17 @@ def draw(rows: NoiseRows, noise: Noise, generator: np.random.Generator) -> Array
     return np.concatenate([L @ generator.standard_normal(len(L)) for L in parts])
 
 
-def test_whitened_rows_have_the_identity_as_covariance():
-    rows = NoiseRows.of([EVEN, GAPPED, EVEN], [np.ones(200), np.linspace(0.5, 3.0, 111), np.ones(200)])
-    noise = Noise(0.2, 0.3, 0.1, 0.5)
-    covariance = block_diag(*[rows.covariance(run, noise) for run in range(3)])
-    W = rows.whiten(np.eye(rows.count), noise)
-    assert W @ covariance @ W.T == pytest.approx(np.eye(rows.count), abs=1e-9)
-
-
-def test_the_walk_grows_with_the_root_of_time_and_the_offset_is_shared():
-    rows = NoiseRows.of([np.array([0.0, 3600.0, 4 * 3600.0])])
-    walk = rows.covariance(0, Noise(0.0, walk=2.0))
-    assert np.diag(walk) == pytest.approx([0.0, 4.0, 16.0])
-    assert rows.covariance(0, Noise(0.0, offset=3.0)) == pytest.approx(np.full((3, 3), 9.0))
-
-
-def test_flicker_has_a_spectrum_of_1_over_f():
-    """S(f) = 2 Σ 2τ/(1 + (2πfτ)²) of the exponentials; between 1/(60 h) and 1/(5 min) f S(f) is even within 30 %."""
-    t = 30.0 * np.arange(2.0)
-    rows = NoiseRows.of([t])
-    assert rows.covariance(0, Noise(0.0, flicker=2.0))[0, 0] == pytest.approx(4.0)
-    lags = np.linspace(0.0, 40 * 86400.0, 2_000_001)
-    covariance = np.mean([np.exp(-lags / tau) for tau in 60.0 * 4.0 ** np.arange(7)], axis=0)
-    f = np.geomspace(1 / (20 * HOUR), 1 / 600.0, 8)
-    product = [x * np.trapezoid(covariance * np.cos(2 * np.pi * x * lags), lags) for x in f]
-    assert np.ptp(product) / np.mean(product) < 0.3
-
-
 def test_levels_are_recovered_from_drawn_noise():
     generator = np.random.default_rng(11)
     rows = NoiseRows.of([EVEN] * 4)
     columns = np.column_stack([np.ones(800), np.tile(np.sin(EVEN / 3000.0), 4)])
-    true = Noise(0.15, 0.25, 0.02)
+    true = Noise(1.5, 0.1, 3e-4)
     found = [estimate_noise(rows, draw(rows, true, generator) + columns @ [3.0, -1.0], columns) for _ in range(12)]
-    assert np.median([n.white for n in found]) == pytest.approx(0.15, rel=0.05)
-    assert np.median([n.flicker for n in found]) == pytest.approx(0.25, rel=0.2)
-    quiet = [estimate_noise(rows, draw(rows, Noise(0.15), generator), columns) for _ in range(6)]
-    assert max(n.flicker for n in quiet) < 0.06
-    assert max(n.walk for n in quiet) < 0.03
+    assert np.median([n.white for n in found]) == pytest.approx(1.5, rel=0.05)
+    assert np.median([n.flicker for n in found]) == pytest.approx(0.1, rel=0.2)
+    quiet = [estimate_noise(rows, draw(rows, Noise(1.5), generator), columns) for _ in range(6)]
+    assert max(n.flicker for n in quiet) < 0.025
+    assert max(n.walk for n in quiet) < 5e-4
 
 
 def test_what_is_stated_of_the_noise_helps_where_rows_say_little_and_yields_where_they_say_much():
@@ -65,8 +37,8 @@ def test_what_is_stated_of_the_noise_helps_where_rows_say_little_and_yields_wher
     generator = np.random.default_rng(8)
     few, many = NoiseRows.of([EVEN] * 2), NoiseRows.of([EVEN] * 4)
     trends = np.kron(np.eye(2), np.column_stack([np.ones(200), EVEN / 2e4, np.log1p(EVEN / 5e3)]))
-    true = Noise(0.2, 0.5, 0.6)
-    drawn = [draw(few, true, generator) for _ in range(4)]
+    true = Noise(2.0, 0.2, 0.01)
+    drawn = [draw(few, true, generator) for _ in range(12)]
 
     def missed(stated: Noise | None) -> float:
         found = [estimate_noise(few, r, trends, stated=stated).walk for r in drawn]
@@ -74,9 +46,9 @@ def test_what_is_stated_of_the_noise_helps_where_rows_say_little_and_yields_wher
 
     assert missed(true) < 0.5
     assert missed(true) < 0.5 * missed(None)
-    loud = [draw(many, Noise(0.2, walk=2.0), generator) for _ in range(2)]
-    found = [estimate_noise(many, r, stated=Noise(0.0, flicker=0.02, walk=0.1)).walk for r in loud]
-    assert np.median(found) == pytest.approx(2.0, rel=0.35)
+    loud = [draw(many, Noise(2.0, walk=2.0 / 60), generator) for _ in range(2)]
+    found = [estimate_noise(many, r, stated=Noise(0.0, flicker=0.008, walk=0.1 / 60)).walk for r in loud]
+    assert np.median(found) == pytest.approx(2.0 / 60, rel=0.35)
 
 
 @pytest.mark.slow
@@ -88,7 +60,7 @@ def test_tests_at_the_estimated_noise_keep_their_level():
     X = np.column_stack([np.ones(360), np.tile(np.sin(t / 2500.0), 3), np.tile(t / t[-1], 3)])
     beyond = 0
     for _ in range(60):
-        r = draw(rows, Noise(0.15, 0.2, 0.05), generator)
+        r = draw(rows, Noise(1.5, 0.08, 8e-4), generator)
         noise = estimate_noise(rows, r, X)
         W = rows.whiten(np.column_stack([X, r]), noise)
         covariance = np.linalg.inv(W[:, :3].T @ W[:, :3])
@@ -100,8 +72,8 @@ def test_tests_at_the_estimated_noise_keep_their_level():
 def test_a_prior_narrows_and_its_absence_is_restricted_likelihood():
     generator = np.random.default_rng(2)
     rows = NoiseRows.of([EVEN[:50]])
-    X, r = np.column_stack([np.ones(50), EVEN[:50] / HOUR]), generator.standard_normal(50)
-    noise = Noise(1.1)
+    X, r = np.column_stack([np.ones(50), EVEN[:50] / 3600.0]), generator.standard_normal(50)
+    noise = Noise(1.1 * np.sqrt(96.0))
     V = 1.21 * np.eye(50) + X @ X.T / 4.0
     exact = np.linalg.slogdet(V)[1] + r @ np.linalg.solve(V, r)
     given = rows.deviance(r, X, np.full(2, 4.0), noise)
@@ -114,7 +86,7 @@ def test_a_prior_narrows_and_its_absence_is_restricted_likelihood():
 def test_the_unit_of_the_signal_does_not_matter():
     generator = np.random.default_rng(8)
     rows = NoiseRows.of([EVEN, GAPPED])
-    r = draw(rows, Noise(0.2, 0.2), generator)
+    r = draw(rows, Noise(2.0, 0.1), generator)
     one, other = estimate_noise(rows, r), estimate_noise(rows, 1e-9 * r)
     assert 1e-9 * one.white == pytest.approx(other.white, rel=1e-3)
     assert 1e-9 * one.flicker == pytest.approx(other.flicker, rel=1e-2)

@@ -1,17 +1,13 @@
-"""Correlated noise of several runs: white, flicker, a random walk and a run's own offset, with their likelihood.
+"""Likelihood of noise in the rows of several runs: whitening, and levels by restricted likelihood with a prior.
 
-The noise of rows i, j of one run has the covariance
-
-    Σ_ij = white² v_i δ_ij + flicker² F(t_i, t_j) + walk² W(t_i, t_j) + offset²,
-
-F and W those of flicker noise and a random walk (`wander`); runs are independent. Rows may be uneven and have gaps;
-v_i is a row's relative white variance, 1/count of a block average. Levels come from the marginal likelihood of
-r ~ N(0, Σ + X Λ⁻¹ Xᵀ), X the columns of what else is unknown and Λ the precision of its prior, 0 for none:
+Levels of r ~ N(0, Σ + X Λ⁻¹ Xᵀ), Σ the covariance of `noise.Noise`, X the columns of what else is unknown and Λ the precision of
+its prior, 0 for none, are those of the highest marginal likelihood
 
     −2 ln L = ln|Σ| + ln|Λ + XᵀΣ⁻¹X| + rᵀΣ⁻¹r − bᵀ(Λ + XᵀΣ⁻¹X)⁻¹b,   b = XᵀΣ⁻¹r
 
-(restricted likelihood of Patterson & Thompson 1971, Biometrika 58, 545, where Λ = 0). A run takes N³/3 operations per
-evaluation, once for all runs of equal rows: average long records to some hundred rows.
+(restricted likelihood of Patterson & Thompson 1971, Biometrika 58, 545, where Λ = 0), beside a weak prior of the levels. Rows may be
+uneven and have gaps. A run takes N³/3 operations per evaluation, once for all runs of equal rows: average long records to some
+hundred rows.
 """
 
 from collections.abc import Sequence
@@ -25,37 +21,26 @@ from scipy.linalg import cho_factor, cho_solve, solve_triangular
 from scipy.optimize import minimize
 
 from compensation.errors import CompensationError
-from compensation.wander import HOUR, flicker, random_walk
+from compensation.noise import SLOW_TIMES, Noise, flicker, random_walk
 
 Array = NDArray[np.float64]
-LEAST, MOST = -7.0, 5.0  # ln of a slow level over the white one, one row each
+LEAST, MOST = -7.0, 5.0  # ln of the rms of slow noise within a run over that of a row's white noise
 KINDS = ("white", "flicker", "walk", "offset")
 USUAL, SPREAD = -1.0, 3.0  # their weak prior, which keeps a level that the rows say nothing about from running away
 STATED_SPREAD = 1.5  # the same about ln of a level that is stated: a factor of 3
 
 
 @dataclass(frozen=True)
-class Noise:
-    """Levels in the signal's unit: rms of the white noise of a row with v = 1, of the flicker, of the walk after 1 h
-    and of the offsets of runs.
-    """
-
-    white: float
-    flicker: float = 0.0
-    walk: float = 0.0
-    offset: float = 0.0
-
-
-@dataclass(frozen=True)
 class NoiseRows:
-    """Rows of all runs in order: their times and relative white variances, one array a run."""
+    """Rows of all runs in order: their times and spans (s), one array a run, and what their white variance is multiplied by."""
 
     times: tuple[Array, ...]
-    variances: tuple[Array, ...]
+    spans: tuple[Array, ...]
+    stretch: tuple[Array, ...]
 
     @classmethod
-    def of(cls, times: Sequence[Array], variances: Sequence[Array] | None = None) -> "NoiseRows":
-        """Make rows from times (s), with v = 1 unless given.
+    def of(cls, times: Sequence[Array], spans: Sequence[Array] | None = None) -> "NoiseRows":
+        """Make rows from times (s) and what each is the mean over (s): a usual step of its run unless given.
 
         Raises
         ------
@@ -66,8 +51,9 @@ class NoiseRows:
             raise CompensationError("correlated noise needs rows in every run.")
         if any((np.diff(t) <= 0).any() for t in times):
             raise CompensationError("the times of a run must increase.")
-        chosen = variances if variances is not None else [np.ones(len(t)) for t in times]
-        return cls(tuple(np.asarray(t, dtype=float) for t in times), tuple(np.asarray(v, dtype=float) for v in chosen))
+        own = tuple(np.asarray(t, dtype=float) for t in times)
+        wide = [np.full(len(t), np.median(np.diff(t)) if len(t) > 1 else 1.0) for t in own] if spans is None else spans
+        return cls(own, tuple(np.asarray(w, dtype=float) for w in wide), tuple(np.ones(len(t)) for t in own))
 
     @property
     def count(self) -> int:
@@ -82,21 +68,26 @@ class NoiseRows:
 
     @cached_property
     def _groups(self) -> tuple[tuple[Array, Array, tuple[int, ...]], ...]:
-        """Flicker and walk matrices of every distinct set of times, and the runs that have it."""
+        """Flicker and walk matrices of every distinct set of rows, and the runs that have it."""
         found: dict[bytes, tuple[Array, Array, list[int]]] = {}
-        for run, (t, v) in enumerate(zip(self.times, self.variances, strict=True)):
+        for run, (t, spans, stretch) in enumerate(zip(self.times, self.spans, self.stretch, strict=True)):
             x = np.round(t - t[0], 3)
-            key = x.tobytes() + np.round(v, 9).tobytes()
+            key = x.tobytes() + np.round(spans, 6).tobytes() + np.round(stretch, 9).tobytes()
             if key not in found:
-                found[key] = (flicker(x), random_walk(x), [])
+                found[key] = (flicker(x, spans), random_walk(x, spans), [])
             found[key][2].append(run)
         return tuple((F, W, tuple(runs)) for F, W, runs in found.values())
+
+    @property
+    def span(self) -> float:
+        """Span of a usual row, s."""
+        return float(np.median(np.concatenate(self.spans)))
 
     def covariance(self, run: int, noise: Noise) -> Array:
         """Covariance of the rows of one run."""
         F, W = next((F, W) for F, W, runs in self._groups if run in runs)
         total: Array = noise.flicker**2 * F + noise.walk**2 * W + noise.offset**2
-        total[np.diag_indices_from(total)] += noise.white**2 * self.variances[run]
+        total[np.diag_indices_from(total)] += noise.white**2 * self.stretch[run] / self.spans[run]
         return total
 
     def whiten(self, columns: Array, noise: Noise) -> Array:
@@ -176,13 +167,18 @@ def estimate_noise(
     spread = float(np.median(np.abs(step))) / 0.954 if step.size else 0.0
     spread = max(spread, 1e-14 * float(np.abs(target).max()), 1e-300)
     free = [kind for kind in KINDS[1:] if kind in kinds and (kind != "offset" or len(rows.times) > 1)]
-    hours = max(max(float(np.ptp(t)) for t in rows.times) / HOUR, 1e-9)
+    root = float(np.sqrt(rows.span))
+    seconds = max(max(float(np.ptp(t)) for t in rows.times), 1e-6)
+    unit = {
+        "flicker": SLOW_TIMES**-0.5,
+        "walk": seconds**-0.5,
+        "offset": 1.0,
+    }  # of a level whose rms in a run is about 1
 
     def levels(x: Array) -> Noise:
         white = float(spread * np.exp(x[0]))
-        slow = {kind: float(white * np.exp(one)) for kind, one in zip(free, x[1:], strict=True)}
-        slow["walk"] = slow.get("walk", 0.0) / float(np.sqrt(hours))
-        return Noise(white, **slow)
+        slow = {kind: white * unit[kind] * float(np.exp(one)) for kind, one in zip(free, x[1:], strict=True)}
+        return Noise(white * root, **slow)
 
     said = {kind: getattr(stated, kind) for kind in free if stated is not None and getattr(stated, kind) > 0}
 
@@ -197,8 +193,9 @@ def estimate_noise(
 
     first = np.array([-0.3, *[USUAL] * len(free)])
     if near is not None and near.white > 0:
-        slow = {kind: getattr(near, kind) * (np.sqrt(hours) if kind == "walk" else 1.0) / near.white for kind in free}
-        first = np.log([near.white / spread, *(max(one, np.exp(LEAST)) for one in slow.values())])
+        white = near.white / root
+        slow = [max(getattr(near, kind) / unit[kind] / white, float(np.exp(LEAST))) for kind in free]
+        first = np.log([white / spread, *slow])
         first[1:] = np.clip(first[1:], LEAST, MOST)
     bounds = [(-12.0, 12.0), *[(LEAST, MOST)] * len(free)]
     found = minimize(objective, first, method="L-BFGS-B", bounds=bounds, options={"ftol": 1e-9, "eps": 1e-4})
