@@ -11,10 +11,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from compensation.bell import BellChain, PolynomialCurve
-from compensation.coloured import correlated_covariance
 from compensation.constants import zero_Celsius
 from compensation.errors import CompensationError
 from compensation.fir import design_smoother
+from compensation.noise_regression import correlated_covariance
 from compensation.polynomial import fit_polynomial
 from compensation.samples import read_columns, require_regular
 

@@ -15,12 +15,12 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from compensation.coloured import coloured_covariance, fit_coloured
 from compensation.constants import zero_Celsius
 from compensation.decimation import average_blocks
 from compensation.derivative import differentiate
 from compensation.errors import CompensationError
 from compensation.memory import NO_MEMORY, Memory, follow_lag, follow_play
+from compensation.noise_regression import coloured_covariance, fit_coloured
 from compensation.regression import fit_linear
 from compensation.stepwise import StepwiseSelection
 

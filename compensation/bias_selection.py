@@ -17,9 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from compensation.bias import PARENTS, TERMS, BiasDesign, BiasFit, BiasRun, fit_terms
-from compensation.coloured import estimate_theta, whiten
 from compensation.errors import CompensationError
 from compensation.memory import NO_MEMORY, Memory
+from compensation.noise_regression import estimate_theta, whiten
 from compensation.stepwise import StepwiseSelection, select_stepwise
 
 Array = NDArray[np.float64]

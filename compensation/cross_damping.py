@@ -17,10 +17,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from compensation.coloured import correlated_covariance
 from compensation.constants import zero_Celsius
 from compensation.demodulated import expand_secondary, relate_rate_to_secondary
 from compensation.errors import CompensationError
+from compensation.noise_regression import correlated_covariance
 from compensation.regression import fit_linear, refuse_constant_columns
 from compensation.samples import check_time, read_columns
 from compensation.sensitive_element import SensitiveElement

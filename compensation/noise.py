@@ -23,7 +23,7 @@ from scipy.fft import irfft, rfft
 Array = NDArray[np.float64]
 FLAT = math.sqrt(2 * math.log(2) / math.pi)
 """Allan deviation of flicker noise of bias instability B = 1."""
-FLICKER_TIMES: Array = 60.0 * 4.0 ** np.arange(-11, 7)
+FLICKER_TIMES = np.asarray(60.0 * 4.0 ** np.arange(-11, 7), dtype=np.float64)
 """Correlation times of flicker noise, s."""
 SLOW_TIMES = 7
 """How many of them are a minute and longer: flicker noise of a = 1 has this variance in rows of some seconds to minutes."""

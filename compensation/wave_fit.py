@@ -21,8 +21,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import special
 
-from compensation.coloured import fit_coloured
 from compensation.errors import CompensationError
+from compensation.noise_regression import fit_coloured
 from compensation.samples import read_columns, require_regular
 
 Real = NDArray[np.float64]

@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import special
 
-from compensation.coloured import fit_coloured
 from compensation.decimation import average_blocks
 from compensation.linearity import measure_linearity, same_rate
+from compensation.noise_regression import fit_coloured
 from compensation.regression import fit_linear
 from compensation.stability import AllanDeviation, NoiseCoefficients, allan_deviation, fit_noise
 from compensation.start_up import fit_run_down

@@ -5,10 +5,10 @@ import pytest
 
 from compensation.bias import TERMS, prepare_run, term_columns
 from compensation.bias_selection import NoHeldOut, bias_stability, fit_bias, score_held_out, score_runs
-from compensation.coloured import estimate_theta, fit_coloured
 from compensation.decimation import average_blocks
 from compensation.derivative import differentiate
 from compensation.errors import CompensationError
+from compensation.noise_regression import estimate_theta, fit_coloured
 from compensation.regression import fit_linear
 from compensation.spikes import find_spikes
 from compensation.stepwise import select_stepwise

@@ -14,11 +14,11 @@ from scipy.optimize import brentq
 from scipy.signal import lfilter
 from scipy.stats import f as fisher
 
-from compensation.coloured import estimate_wander
 from studies.calibration.lags.followers import Constant, make_lags
 from studies.calibration.lags.housing_run import HousingRun, even_rows, row_step
 from studies.calibration.lags.identification import FrequencyPolynomial, Identification, identify, identify_lags
 from studies.calibration.lags.least_squares import solve
+from studies.calibration.lags.wander import estimate_wander
 from thermal.errors import ThermalError
 from thermal.lag import lag
 from thermal.network import Boundary, Conductor, Network, Node, Radiator, assemble

@@ -1,7 +1,7 @@
 """Thermal constants from a record of frequency and housing temperature, with honest intervals.
 
 f(t) = f₀ + a₁ x + a₂ x² + a₃ x³ + noise, x = T_r(t) − T_ref, T_r following the housing (`followers`) from an
-unknown initial state. The noise is white with a wandering level (`compensation.coloured`); the fit is generalised
+unknown initial state. The noise is white with a wandering level (`studies.calibration.lags.wander`); the fit is generalised
 least squares with the noise re-estimated by restricted likelihood, and the intervals are those of Student's t.
 """
 
@@ -11,10 +11,10 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.special import stdtrit
 
-from compensation.coloured import Wander, estimate_wander
 from studies.calibration.lags.followers import Follower, make_series
 from studies.calibration.lags.housing_run import HousingRun, even_rows, row_step
 from studies.calibration.lags.least_squares import LagProblem, LagSolution, solve
+from studies.calibration.lags.wander import Wander, estimate_wander
 from thermal.errors import ThermalError
 from thermal.network import Array
 

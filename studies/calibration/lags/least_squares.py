@@ -8,9 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
-from compensation.coloured import Runs, Wander, runs_between, whiten
+from compensation.noise_regression import Runs, runs_between
 from studies.calibration.lags.followers import Follower
 from studies.calibration.lags.housing_run import EvenRun
+from studies.calibration.lags.wander import Wander, whiten
 from thermal.errors import ThermalError
 from thermal.network import Array
 

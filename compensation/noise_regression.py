@@ -1,26 +1,29 @@
-"""Least squares when the errors remember: white noise and a wandering level, estimated from the same rows.
+"""Least squares when the errors remember: white noise and a random walk, estimated from the same rows.
 
-White noise plus a first-order wander x' = ρ x + … is in its steady state (1 − ρL) ε = (1 − θL) e with white e, L the step
-back and θ ≤ ρ ≤ 1: θ = ρ is white noise alone, θ = 0 the wander alone, ρ = 1 a random walk. Filtering y and every column
-with (1 − ρL)/(1 − θL) makes ordinary least squares and its F-tests valid again; both numbers come from restricted
-likelihood (Patterson & Thompson 1971, Biometrika 58, 545), which does not take the freedom of the fit for quietness.
+Rows that are means over equal steps have differences of white noise and a walk that remember one step: 1 + θ² on the diagonal of their
+covariance and −θ beside it, in units of the innovations, with θ = 1 for white noise and √3 − 2 for a walk alone. In levels of
+`noise.Noise` that is N²/Δ = θ + (1 − θ)²/6 and K² Δ = (1 − θ)². The factor of this tridiagonal matrix whitens y and every column, exactly
+and in O(rows), which makes ordinary least squares and its F-tests valid again; θ comes from restricted likelihood (Patterson & Thompson
+1971, Biometrika 58, 545), which does not take the freedom of the fit for quietness.
 
 Newey–West covariances, even prewhitened, do not do here: on records of noise alone, regressed on a smooth
 temperature, they call a term significant at 5 % in 60 to 85 % of the cases once a random walk or flicker noise
-is present; with this filter the rate stays near 5 %.
+is present; with this factor the rate stays near 5 %.
 
-Rows that are not even, several kinds of wander at once and offsets of runs are in `correlated`.
+Rows that are not even, flicker noise and offsets of runs are in `noise_rows`.
 """
 
 import itertools
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg, optimize
+from scipy.linalg import lapack
 
-from compensation.recursion import recur
+from compensation.noise import Noise
 from compensation.regression import LinearFit, fit_linear
 
 Array = NDArray[np.float64]
@@ -29,21 +32,6 @@ GAP = 1.5
 """A step of more than this many usual ones is a gap: the memory of the noise is not carried across it."""
 ROUNDING = 1e-12
 """Residuals below this part of the observations are rounding, which remembers nothing."""
-STARTS = ((7.0, 3.0), (3.0, 0.0))  # logits of ρ and of θ/ρ
-ENDS = (-14.0, 14.0)  # bounds of both logits
-SLOWER = 2.71  # growth of −2 ln L that is allowed for a slower wander: 90 % quantile of χ², one degree of freedom
-STRONGER = 1.0  # the same for a stronger one: one standard deviation
-HALVINGS = 8
-RIDGE = 1e-6  # keeps columns that the record cannot tell apart from deciding about the noise
-
-
-@dataclass(frozen=True)
-class Wander:
-    """Noise (1 − ρL) ε = (1 − θL) e: `smoothing` θ, `memory` ρ and the standard deviation of e, the innovation."""
-
-    smoothing: float
-    memory: float = 1.0
-    innovation: float = 1.0
 
 
 @dataclass(frozen=True)
@@ -63,29 +51,42 @@ class ColouredFit:
         return float(np.sqrt(self.regression.variance))
 
 
-def whiten(Z: Array, noise: Wander | float, runs: Runs) -> Array:
-    """Filter the columns of Z (m, k), or the vector Z, with (1 − ρL)/(1 − θL)/σ, starting anew with every run.
+def noise_of(theta: float, innovation: float = 1.0, step: float = 1.0) -> Noise:
+    """Return the levels of the noise of a θ, its innovations (one row each) and the step of the rows, s."""
+    white = max(theta + (1.0 - theta) ** 2 / 6.0, 0.0)
+    return Noise(
+        white=innovation * float(np.sqrt(white * step)), walk=innovation * (1.0 - theta) / float(np.sqrt(step))
+    )
 
-    A number is the θ of a random walk in white noise, ρ = σ = 1.
-    """
-    noise = noise if isinstance(noise, Wander) else Wander(noise)
-    if noise.smoothing == noise.memory == noise.innovation == 1.0:
+
+def whiten(Z: Array, theta: float, runs: Runs) -> Array:
+    """Return the columns of Z (m, k), or the vector Z, in rows whose noise is white of one innovation, run by run."""
+    if theta == 1.0:
         return Z
-    filtered = np.concatenate([_filter(Z[run], noise.memory, noise.smoothing) for run in runs])
-    return filtered if noise.innovation == 1.0 else filtered / noise.innovation
+    columns = Z.reshape(len(Z), -1)
+    parts = [np.diff(columns[run], axis=0, prepend=np.zeros((1, columns.shape[1]))) for run in runs]
+    solved = [lapack.dtbtrs(_factor(theta, len(part)), part, uplo="L")[0] for part in parts]
+    return np.concatenate(solved).reshape(Z.shape)
 
 
-def _filter(values: Array, zero: float, pole: float) -> Array:
-    """(1 − zero·L)/(1 − pole·L) along the first axis, from rest."""
-    return recur(pole, np.concatenate([values[:1], values[1:] - zero * values[:-1]]))
+@lru_cache(maxsize=64)
+def _factor(theta: float, rows: int) -> Array:
+    """Triangular factor, in two bands, of the covariance of a first row and the differences after it."""
+    bands = np.empty((2, rows))
+    bands[0], bands[1] = 1.0 + theta**2, -theta
+    bands[0, 0] = (1.0 + theta**2) / 2.0
+    return np.asarray(linalg.cholesky_banded(bands, lower=True))
 
 
-def restricted_deviance(X: Array, y: Array, noise: Wander | float, runs: Runs, ridge: float = 0.0) -> float:
-    """Return −2 ln L = (m − k) ln RSS + ln det XᵀX of the whitened rows; columns of X should be of length one."""
+def restricted_deviance(X: Array, y: Array, theta: float, runs: Runs) -> float:
+    """Return −2 ln L = (m − k) ln RSS + ln det XᵀX + ln det Σ of the whitened rows; columns of X should be of length one."""
     # The triangle R of [X, y]: its last corner is the root of RSS, the rest the determinant.
-    R = _diagonal(np.column_stack([whiten(X, noise, runs), whiten(y, noise, runs)]))
-    rest, determinant = np.maximum(R[-1], 1e-300), np.maximum(R[:-1] + ridge, 1e-300)
-    return float(2 * (y.size - X.shape[1]) * np.log(rest) + 2 * np.sum(np.log(determinant)))
+    both = np.column_stack([whiten(X, theta, runs), whiten(y, theta, runs)])
+    R = np.maximum(np.abs(np.diag(linalg.qr(both, mode="r", check_finite=False)[0])), 1e-300)
+    total = 2 * (y.size - X.shape[1]) * np.log(R[-1]) + 2 * np.sum(np.log(R[:-1]))
+    if theta != 1.0:
+        total += 2 * sum(float(np.sum(np.log(_factor(theta, run.stop - run.start)[0]))) for run in runs)
+    return float(total)
 
 
 def estimate_theta(X: Array, y: Array, runs: Runs, caution: float = 0.0) -> float:
@@ -120,38 +121,6 @@ def estimate_theta(X: Array, y: Array, runs: Runs, caution: float = 0.0) -> floa
     return float(theta)
 
 
-def estimate_wander(X: Array, y: Array, runs: Runs) -> Wander:
-    """Return the slowest, and then the strongest, wander that y = X b + ε does not contradict, X (m, k).
-
-    A record says little about the slowest part of its noise, and a wander that is taken for too fast or too weak makes
-    intervals too short.
-    """
-    X, free = _unit(X), y.size - X.shape[1]
-
-    def criterion(memory: float, share: float) -> float:
-        return restricted_deviance(X, y, _of_logits(memory, share), runs, RIDGE)
-
-    def at_memory(memory: float) -> tuple[float, float]:
-        found = optimize.minimize_scalar(
-            lambda share: criterion(memory, share), bounds=ENDS, method="bounded", options={"xatol": 0.1}
-        )
-        return float(found.fun), float(found.x)
-
-    def both(logits: Array) -> float:
-        return criterion(float(logits[0]), float(logits[1]))
-
-    best = min(
-        (optimize.minimize(both, np.array(start), method="L-BFGS-B", bounds=[ENDS, ENDS]) for start in STARTS),
-        key=lambda result: float(result.fun),
-    )
-    memory = _farthest(lambda memory: at_memory(memory)[0], float(best.x[0]), ENDS[1], float(best.fun) + SLOWER)
-    value, share = at_memory(memory)
-    share = _farthest(lambda share: criterion(memory, share), share, ENDS[0], value + STRONGER)
-    noise = _of_logits(memory, share)
-    rest = _diagonal(np.column_stack([whiten(X, noise, runs), whiten(y, noise, runs)]))[-1]
-    return Wander(noise.smoothing, noise.memory, max(float(rest) / np.sqrt(free), 1e-12))
-
-
 def fit_coloured(X: Array, y: Array, names: Sequence[str], runs: Runs, theta: float | None = None) -> ColouredFit:
     """Fit y = X b by generalised least squares under white noise plus a random walk.
 
@@ -174,11 +143,19 @@ def fit_coloured(X: Array, y: Array, names: Sequence[str], runs: Runs, theta: fl
 def coloured_covariance(fit: LinearFit, coloured: ColouredFit, runs: Runs) -> Array:
     """Return the covariance of ordinary least-squares coefficients when the errors are those of `coloured`.
 
-    (XᵀX)⁻¹ Xᵀ Σ X (XᵀX)⁻¹ with Σ = σ² L Lᵀ and L the filter (1 − θ L)/(1 − L).
+    (XᵀX)⁻¹ Xᵀ Σ X (XᵀX)⁻¹ with Σ = σ² S F Fᵀ Sᵀ, F the factor and S the sum that undoes differences.
     """
-    theta = coloured.theta
-    half = [fit.design[run] if theta == 1.0 else _filter(fit.design[run][::-1], theta, 1.0) for run in runs]
-    root = np.concatenate(half) @ fit.bread
+    half = fit.design
+    if coloured.theta != 1.0:
+        parts = []
+        for run in runs:
+            summed = np.cumsum(fit.design[run][::-1], axis=0)[::-1]
+            diagonal, below = _factor(coloured.theta, len(summed))
+            part = diagonal[:, None] * summed
+            part[:-1] += below[:-1, None] * summed[1:]
+            parts.append(part)
+        half = np.concatenate(parts)
+    root = half @ fit.bread
     return np.asarray(coloured.white_deviation**2 * root.T @ root)
 
 
@@ -216,22 +193,3 @@ def runs_between(breaks: Sequence[int], count: int) -> Runs:
 def _unit(X: Array) -> Array:
     scale = np.linalg.norm(X, axis=0)
     return np.asarray(X / np.where(scale > 0, scale, 1.0))
-
-
-def _farthest(criterion: Callable[[float], float], start: float, end: float, allowed: float) -> float:
-    """Go from `start` towards `end` as far as the criterion is allowed."""
-    if criterion(end) <= allowed:
-        return end
-    for _ in range(HALVINGS):
-        middle = (start + end) / 2
-        start, end = (middle, end) if criterion(middle) <= allowed else (start, middle)
-    return start
-
-
-def _diagonal(columns: Array) -> Array:
-    return np.asarray(np.abs(np.diag(linalg.qr(columns, mode="r", check_finite=False)[0])))
-
-
-def _of_logits(memory: float, share: float) -> Wander:
-    rho, part = 1 / (1 + np.exp(-memory)), 1 / (1 + np.exp(-share))
-    return Wander(float(rho * part), float(rho))
