@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from compensation.wander import white_noise
+from compensation.noise import white_rms
 from shell.constants import zero_Celsius
 from shell.errors import ShellError
 from studies.calibration.ahead import BIAS
@@ -48,7 +48,7 @@ def check_readings(instrument: "Instrument", records: "Sequence[Record]", law: "
             continue
         known = record[FREQUENCY][np.isfinite(record[FREQUENCY])]
         changes = float(np.std(known)) if known.size > 2 else 0.0
-        if changes <= CLEAR * white_noise(known):
+        if changes <= CLEAR * white_rms(known):
             continue
         left = _left(instrument, record, law or law_of(instrument))
         if left < REFUSED * changes:
@@ -69,7 +69,7 @@ def bias_in_seconds(instrument: "Instrument", record: "Record") -> str | None:
     if BIAS not in record or len(record) < ROWS // 10:
         return None
     stated = bias_noise(instrument.noise).white / np.sqrt(float(np.median(np.diff(record["time_s"]))))
-    scatter = white_noise(record[BIAS])
+    scatter = white_rms(record[BIAS])
     if stated <= 0 or not stated / LIKE < SECONDS * scatter < stated * LIKE:
         return None
     return (
