@@ -45,7 +45,7 @@ from studies.record import write_record
 from studies.simulation.chamber import load_profile
 from studies.simulation.virtual_gyro import simulate_run
 from tests.benchmarks.bench_calibration import PROFILES
-from tests.benchmarks.bench_card_effects import CARDS, make_case, run
+from tests.benchmarks.diagnosis.card_cases import CARDS, SEEN, ceiling, make_case, run
 from tests.benchmarks.diagnosis.marks import compare, read_lines
 from tests.benchmarks.history import commit
 from tests.generator.measured import DATA, bring_in
@@ -82,14 +82,15 @@ def make_stranger(folder: Path, seed: int, first: int) -> Line:
     }
 
 
-def make_card(folder: Path, seed: int) -> Line:
-    case = make_case(seed, False)
+def make_card(folder: Path, seed: int, ideal: bool) -> Line:
+    case = make_case(seed)
     names = [case.name, *(e for own in library()[case.name].equivalents.values() for e in own)] if case.name else []
     return {
         "kind": "effect" if case.name else "null",
         "hidden": [names] if names else [],
         "effects": case.name,
         "snr": case.snr,
+        **({"reach": (2.0 * max(ceiling(seed), 0.0)) ** 0.5} if ideal and names and case.snr <= SEEN else {}),
         "verdicts": ["explained", "not-identifiable"] if names else ["adequate"],
         "card": case.card.name,
         "files": written(folder, run(case.device, case.drives, seed)),
@@ -119,7 +120,7 @@ def make_measured(folder: Path, name: str) -> Line:
     return {**own, "files": [str(f.resolve()) for f in files]}
 
 
-def find_case(root: Path, name: str) -> Line:
+def find_case(_: Path, root: Path, name: str) -> Line:
     """Return the truth of an examination's campaign: a list with `id`, or names with `hidden`."""
     every = json.loads((root / "truth.json").read_text())
     truth = every[name] if isinstance(every, dict) else next(t for t in every if t["id"] == name)
@@ -201,19 +202,15 @@ def campaigns(given: argparse.Namespace) -> Iterator[tuple[str, Callable[[Path],
     first = given.seed
     asked = [
         [(f"stranger:{s}", partial(make_stranger, seed=s, first=first)) for s in range(first, first + given.stranger)],
-        [(f"card:{s}", partial(make_card, seed=s)) for s in range(first, first + given.cards)],
+        [(f"card:{s}", partial(make_card, seed=s, ideal=given.ceilings)) for s in range(first, first + given.cards)],
         [(f"device:{s}", partial(make_device, seed=s)) for s in range(first, first + given.devices)],
         [(f"measured:{n}", partial(make_measured, name=n)) for n in (*MEASURED, "resistor", "voltmeter_sweep")] * given.measured,
     ]  # fmt: skip
     for root in given.folder:
         names = sorted(p.name for p in (root / "cases").iterdir())
-        asked.append([(f"{root.name}:{n}", partial(_found, root=root, name=n)) for n in names])
+        asked.append([(f"{root.name}:{n}", partial(find_case, root=root, name=n)) for n in names])
     for group in zip_longest(*asked):
         yield from (one for one in group if one is not None)
-
-
-def _found(folder: Path, root: Path, name: str) -> Line:
-    return find_case(root, name)
 
 
 def ask(given: argparse.Namespace) -> None:
@@ -249,6 +246,9 @@ def main() -> None:
     for kind in ("stranger", "cards", "devices"):
         one.add_argument(f"--{kind}", type=int, default=0)
     one.add_argument("--measured", action="store_true")
+    one.add_argument(
+        "--ceilings", action="store_true", help="what an ideal detector sees of cards at SNR 3 and below (slow)"
+    )
     one.add_argument("--folder", type=Path, action="append", default=[])
     one.add_argument("--seed", type=int, default=910000)
     one.add_argument("--minutes", type=float, default=1e9)

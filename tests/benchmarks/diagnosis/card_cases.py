@@ -1,32 +1,20 @@
-"""Hide effects in cards, run the virtual gyro, and ask the diagnosis with the plain card: what is right, by SNR.
-
-    python tests/benchmarks/bench_card_effects.py cases.jsonl --minutes 5 [--seed N] [--plain]    append cases and sum up
-    python tests/benchmarks/bench_card_effects.py cases.jsonl --ceilings    what an ideal detector sees of those at SNR 1 and 3
+"""Campaigns of the virtual gyro of a shipped card that hides one effect, or none.
 
 Every case: a shipped card, one to four runs of chamber programmes in words, one effect of the library with a shape and
 coefficients off any grid, scaled to its SNR in 120 s means after a least-squares baseline; one case in four hides nothing.
-`--plain` hides nothing in all of them.
 """
 
-import argparse
-import json
-import sys
 import tempfile
-import time
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
 import numpy as np
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
-
 from compensation.noise import Noise
-from shell.errors import ShellError
 from studies.diagnosis.campaign import load_campaign
 from studies.diagnosis.evidence import SCALES
 from studies.diagnosis.inquiry import begin, read_thermometer
-from studies.diagnosis.investigate import investigate
 from studies.diagnosis.problem import span_of
 from studies.diagnosis.simulated import simulate_baseline
 from studies.effects import library
@@ -36,8 +24,7 @@ from studies.simulation.chamber import load_drive
 from studies.simulation.drive import drive_by_profile, rows_of
 from studies.simulation.noise import bias_noise, frequency_noise
 from studies.simulation.virtual_gyro import simulate_run
-from tests.benchmarks.diagnosis.ceiling import PRICE, above
-from tests.benchmarks.diagnosis.scoring import short_rate
+from tests.benchmarks.diagnosis.ceiling import above
 from thermal.profile import Profile
 
 CARDS = ("hrg-30mm", "cvg-25mm", "bvg-bell", "hrg-30mm-loops")
@@ -159,14 +146,14 @@ class Case:
     snr: float = 0.0
 
 
-def make_case(seed, plain):
+def make_case(seed):
     """Return a case."""
     rng = np.random.default_rng(seed)
     card = load_card(CARDS[int(rng.integers(len(CARDS)))])
     acting = [(name, r) for name, effect in library().items() for r in effect.sizes if name != "clock-offset"]
     name, response = acting[int(rng.integers(len(acting)))]
     effect, snr = library()[name], SNRS[int(rng.integers(len(SNRS)))]
-    hidden = not plain and seed % 4 != 0
+    hidden = seed % 4 != 0
     with tempfile.TemporaryDirectory() as place:
         folder = Path(place)
         profiles = [folder / f"profile{k}.csv" for k in range(int(rng.integers(1, 5)))]
@@ -197,36 +184,9 @@ def make_case(seed, plain):
     return Case(card, hiding(values), drives, seed, name, response, snr)
 
 
-def answer(seed, plain):
-    """Make and diagnose one case, with the card and, where nothing is hidden, without."""
-    made = make_case(seed, plain)
-    campaign = load_campaign(run(made.device, made.drives, seed))
-    started = time.process_time()
-    found = investigate(campaign, card=made.card, advise=False).verdict
-    named = [c for c in found.causes if c.kind == "physics"]
-    case = {
-        "seed": seed,
-        "card": made.card.name,
-        "runs": len(made.drives),
-        "hidden": made.name,
-        "response": made.response,
-        "snr": made.snr,
-        "seconds": time.process_time() - started,
-        "verdict": found.verdict,
-        "names": [c.effect for c in found.causes],
-        "sets": [[*c.names] for c in named],
-        "stated": [c.probability for c in named],
-        "values": [c.effect for c in found.causes if c.kind == "value"],
-        "left": {k: r.left_over_input for k, r in found.responses.items()},
-    }
-    if not made.name:
-        case["alone"] = investigate(campaign, advise=False, score_held_out=True).verdict.verdict
-    return case
-
-
 def ceiling(seed):
-    """Return what an ideal detector would see of a case: it knows form and noise, but the card's values no better than the card."""
-    made = make_case(seed, False)
+    """Return the mean log likelihood ratio of a detector that knows form and noise, but the card's values no better than the card."""
+    made = make_case(seed)
     campaign = load_campaign(run(made.card, made.drives, seed))
     plain = begin(campaign, "frequency_Hz", None, partial(simulate_baseline, campaign, made.card))
     if made.response != "frequency_Hz":
@@ -237,7 +197,7 @@ def ceiling(seed):
         rows.append(own.steps.means(silent[own.record][made.response]))
         noise.append(covariance(levels, own, mask, plain.problem.noise.rows))
     found = above(campaign, plain, rows, noise, levels.white**2 * RATE / plain.problem.noise.rows)
-    return [found.known, found.wandering]
+    return found.known
 
 
 def noise_of(card, response, drives):
@@ -253,77 +213,3 @@ def covariance(levels, own, mask, rows):
     step = float(own.time[1] - own.time[0])
     white = np.eye(int(mask.sum())) * levels.white**2 * RATE / rows
     return white + replace(levels, white=0.0).covariance(own.time[mask], step)
-
-
-def summarise(cases):
-    """Rates with 90 % bands."""
-    lines = []
-
-    def row(label, chosen, holds):
-        lines.append(f"{label:44} {short_rate(sum(bool(holds(c)) for c in chosen), len(chosen))}")
-
-    def equals(name):
-        return {name, *(e for own in library()[name].equivalents.values() for e in own)}
-
-    def hit(c):
-        return any(equals(c["hidden"]) & set(names) for names in c["sets"])
-
-    nulls = [c for c in cases if not c["hidden"]]
-    for card in CARDS:
-        row(
-            f"nothing hidden, {card}: adequate",
-            [c for c in nulls if c["card"] == card],
-            lambda c: c["verdict"] == "adequate",
-        )
-    row("nothing hidden: adequate", nulls, lambda c: c["verdict"] == "adequate")
-    row("nothing hidden, no card: adequate", nulls, lambda c: c["alone"] == "adequate")
-    for snr in sorted(SNRS):
-        own = [c for c in cases if c["hidden"] and c["snr"] == snr]
-        row(f"SNR {snr:g}: in the strongest set", own, lambda c: c["sets"] and equals(c["hidden"]) & set(c["sets"][0]))
-        row(
-            "    right class",
-            own,
-            lambda c: c["verdict"] in ("explained", "not-identifiable") and hit(c) and len(c["sets"]) == 1,
-        )
-        row("    unexplained", own, lambda c: c["verdict"] == "unexplained")
-    hidden = [c for c in cases if c["hidden"]]
-    for snr in sorted({c["snr"] for c in hidden if "ceiling" in c}):
-        own = [c for c in hidden if c["snr"] == snr and "ceiling" in c]
-        for k, word in enumerate(("knows the noise", "does not know whether it wanders")):
-            seen = [c for c in own if c["ceiling"][k] > PRICE]
-            row(f"SNR {snr:g}: seen by an ideal that {word}", own, lambda c, k=k: c["ceiling"][k] > PRICE)
-            row("    of these in a set", seen, hit)
-    row("a value of the card named beside", hidden, lambda c: c["values"])
-    row("something named that is not there", hidden, lambda c: any(not equals(c["hidden"]) & set(s) for s in c["sets"]))
-    return "\n".join(lines)
-
-
-def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("cases", type=Path)
-    parser.add_argument("--minutes", type=float, default=5.0)
-    parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--plain", action="store_true", help="hide nothing")
-    parser.add_argument("--ceilings", action="store_true", help="what an ideal detector sees of the cases of the file")
-    given = parser.parse_args()
-    if given.ceilings:
-        cases = [json.loads(line) for line in given.cases.read_text().splitlines()]
-        for case in cases:
-            if case["hidden"] and case["snr"] <= SEEN and "ceiling" not in case:
-                case["ceiling"] = ceiling(case["seed"])
-        given.cases.write_text("".join(json.dumps(case, default=float) + "\n" for case in cases))
-        given.minutes = 0.0
-    end, seed = time.process_time() + 60 * given.minutes, given.seed
-    with given.cases.open("a") as file:
-        while time.process_time() < end:
-            try:
-                file.write(json.dumps(answer(seed, given.plain), default=float) + "\n")
-            except (InputError, ShellError) as error:
-                print(f"seed {seed}: {error}")
-            file.flush()
-            seed += 1
-    print(summarise([json.loads(line) for line in given.cases.read_text().splitlines()]))
-
-
-if __name__ == "__main__":
-    main()
