@@ -15,9 +15,11 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import optimize, special
 
 from compensation.errors import CompensationError
+from compensation.noise import FLAT, Noise
 
 Array = NDArray[np.float64]
-FLAT = math.sqrt(2 * math.log(2) / math.pi)  # 0.664, Allan deviation of flicker noise with B = 1
+UNITS = (Noise(white=1.0), Noise(flicker=FLAT), Noise(walk=1.0))
+"""N, B and K of 1."""
 NoiseKind = Literal["phase", "white", "flicker", "random walk"]
 # Slope of log σ against log τ: quantisation, angle random walk, bias instability, rate random walk.
 SLOPES: dict[NoiseKind, float] = {"phase": -1.0, "white": -0.5, "flicker": 0.0, "random walk": 0.5}
@@ -62,9 +64,14 @@ class NoiseCoefficients:
     K_uncertainty: float
     misfit: float
 
+    @property
+    def noise(self) -> Noise:
+        """The levels of a noise with these coefficients, in the signal's unit and s."""
+        return Noise(self.N, FLAT * self.B, self.K)
+
     def deviation(self, tau: ArrayLike) -> Array:
         """Return the Allan deviation of these three noises at τ (s)."""
-        return np.asarray(np.sqrt(_basis(np.asarray(tau, dtype=np.float64)) @ [self.N**2, self.B**2, self.K**2]))
+        return np.asarray(np.sqrt(self.noise.allan_variance(tau)))
 
 
 def allan_deviation(
@@ -193,7 +200,7 @@ def _correlation(allan: AllanDeviation, c: Array) -> Array:
 
 
 def _basis(tau: Array) -> Array:
-    return np.stack([1 / tau, np.full_like(tau, FLAT**2), tau / 3], axis=-1)
+    return np.stack([one.allan_variance(tau) for one in UNITS], axis=-1)
 
 
 def _overlapping(x: Array, m: int, step: float) -> float:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from compensation.bias import SELECTED_BY_THE_PAPER, TERMS
-from compensation.stability import FLAT
+from compensation.noise import FLAT
 from studies.models.kinds.bias import OUTPUTS
 from studies.reports import style
 from studies.reports.digits import plain, raised, to_error

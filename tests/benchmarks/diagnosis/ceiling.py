@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import cholesky, solve_triangular
 
+from compensation.noise import gauss_markov
 from studies.diagnosis.campaign import load_campaign
 from studies.diagnosis.constants import CONSTANTS
 from studies.diagnosis.inquiry import begin, read_thermometer
@@ -99,12 +100,5 @@ def covariance(family, level, run, mask, rows):
     if family == "walk":
         out += level**2 * np.minimum.outer(time, time) / float(np.ptp(run.row_time))
     for tau in {"flicker": TAUS, "correlated": (1500.0,)}.get(family, ()):
-        out += level**2 * averaged(np.abs(time[:, None] - time), tau, step)
+        out += level**2 * gauss_markov(time, step, tau)
     return out
-
-
-def averaged(apart, tau, step):
-    """Covariance e^(−|t|/τ) of means over steps that lie `apart`."""
-    ratio = step / tau
-    within = 2.0 / ratio * (1.0 - (1.0 - np.exp(-ratio)) / ratio)
-    return np.where(apart < 0.5 * step, within, np.exp(-apart / tau) * (np.sinh(0.5 * ratio) / (0.5 * ratio)) ** 2)
