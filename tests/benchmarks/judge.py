@@ -4,6 +4,8 @@
         [--folder DIR …] [--seed 910000] [--minutes M] [--jobs 1]
     python tests/benchmarks/judge.py compare OLD.jsonl[.gz] NEW.jsonl[.gz]
 
+Answers of earlier commits, to compare with: tests/reference/judge_*.jsonl.gz (same kinds, counts and seed).
+
 `ask` appends one line a campaign and passes over those that the file holds, so it goes on where it was stopped. Campaigns stay in
 the data folder: asked again with it, another commit answers to the same bytes. Kinds of campaigns:
 
