@@ -127,7 +127,7 @@ def scan_faces(
     """
     if 2 * max(harmonics) > highest:
         raise InputError(
-            f"the split of n = {max(harmonics)} comes from wave {2 * max(harmonics)}: fit up to it (--highest)."
+            f"the split of n = {max(harmonics)} needs harmonic {2 * max(harmonics)} of the faces; set --highest to at least that."
         )
     read = {name: read_cloud(path, unit) for name, path in files.items()}
     clouds = {name: cloud for name, cloud in read.items() if not isinstance(cloud, FaceGrid)}
@@ -158,7 +158,7 @@ def scan_faces(
     )
     splits = []
     for n in harmonics:
-        say(f"splitting n = {n}")
+        say(f"computing the split of n = {n}")
         (mode,) = solve_modes(resonator, elastic, n, theory=theory)
         splits.append(_split(Pair(mode), CoupledHarmonics(mode, elastic, n + 8), faces, imperfection))
     return Scan(faces, imperfection, tuple(splits), _waves(faces), _roundness(faces))
@@ -173,7 +173,7 @@ def _check_wall(faces: dict[str, Face], resonator: "Resonator") -> None:
     wall = nominal + sum(np.array([face.profile(float(at), theta) for at in x]) for face in faces.values())
     if np.any(wall <= 0):
         raise ShellError(
-            "the measured faces cross each other: they are not in one frame or not of one resonator; check the files."
+            "the measured faces cross each other: they do not share one frame, or belong to different resonators; check the files."
         )
 
 

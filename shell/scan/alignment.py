@@ -164,13 +164,13 @@ def _check(samples: list[tuple[Array, int]], projector: Projector, motion: Rigid
         if abs(middle + side * h) < 0.3 * h and spread < LOOSE * h:
             here, there = ("outer", "inner") if side > 0 else ("inner", "outer")
             raise ShellError(
-                f"{name}: the points given for the {here} face lie on the {there} one: exchange the files."
+                f"{name}: the points given for the {here} face lie on the {there} face; exchange the files."
             )
         if abs(middle) > 0.5 * h or spread > LOOSE * h:
-            frames = "; the faces may not share one frame (hrg scan --frames own)" if len(names) > 1 else ""
+            frames = "; perhaps the faces do not share one frame (hrg scan --frames own)" if len(names) > 1 else ""
             raise ShellError(
-                f"{name}: the points cannot be brought onto the face of the card: after the best alignment they lie "
-                f"{1e3 * middle:.3g} mm off and scatter by {1e3 * spread:.3g} mm{frames}. Check the card's dimensions and the unit."
+                f"{name}: the points do not fit the face of the card: after alignment they are "
+                f"{1e3 * middle:.3g} mm off with a scatter of {1e3 * spread:.3g} mm{frames}. Check the card's dimensions and the unit."
             )
 
 

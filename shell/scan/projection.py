@@ -99,5 +99,5 @@ def check_unit(points: Array, resonator: Resonator, name: str) -> None:
         hint = f" ({guess[power]}?)" if power in guess else ""
         raise ShellError(
             f"{name}: the points span {1e3 * measured:.4g} mm, the resonator of the card {1e3 * nominal:.4g} mm{hint}; "
-            "give the unit of the file, or the right card."
+            "state the unit of the file, or use the card of this resonator."
         )

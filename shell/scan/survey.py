@@ -147,7 +147,7 @@ class Face:
 
     def _combine(self, L: Array, order: int) -> tuple[complex, Array]:
         if order > self.highest:
-            raise ShellError(f"the waves were fitted up to {self.highest}; wave {order} asks for more.")
+            raise ShellError(f"harmonics are fitted up to {self.highest}; harmonic {order} is beyond.")
         count = len(L)
         first = order * 2 * count - count if order else 0
         rows = np.zeros((2, len(self.covariance)))
@@ -194,7 +194,7 @@ def survey(
     low, high = (float(q) for q in np.percentile(x, [0.05, 99.95]))
     low, high = max(low, 0.0), min(high, 1.0)
     if len(off) < 500 or not high - low > 0.05:
-        raise ShellError(f"{name}: {len(off)} points on the face are too few to fit its waves.")
+        raise ShellError(f"{name}: {len(off)} points on the face are too few to fit harmonics.")
     waves = WaveBasis(low, high, highest, degree)
     rough, limit = waves.fit_roughly(x, theta, off)
     portions = (place(points[k : k + CHUNK]) for k in range(0, len(points), CHUNK))
@@ -278,8 +278,8 @@ def _finish(
     if not growth < HOLE:
         times = f"{np.sqrt(growth):.0f}" if growth < 1e6 else "more than 1000"
         raise ShellError(
-            f"{name}: the gaps between the points are larger than the waves up to {waves.highest} allow (the error of the worst grows "
-            f"{times} times): measure the missing places, or fit fewer waves (hrg scan --highest)."
+            f"{name}: the gaps between the points are too large for harmonics up to {waves.highest} (the error of the worst grows "
+            f"{times} times): measure the missing places, or fit fewer harmonics (hrg scan --highest)."
         )
     change = inverse @ (design.T @ (count * left))
     rest = left - design @ change

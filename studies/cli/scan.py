@@ -1,9 +1,9 @@
-"""`hrg scan`: measured faces of a shell to wall maps, waves around and frequency splits.
+"""`hrg scan`: wall maps, circumferential harmonics and frequency splits from measured faces of a shell.
 
 With --json one object, schema `hrg.scan/1`: `card`, `temperature_degC`; `faces` of inner and outer with `file`, `points`, `outliers`,
-`noise_um` of one point, `position` covered, `offset_um`, `tilt_deg` of the alignment, `told` (which of x, y, z, tilts the shape tells);
-`splits`, one per harmonic, with `split_Hz`, `relative_ppm`, `slow_axis_deg` as {value, low, high} (90 %; the axis null where no split is
-told from 0), `shift_ppm`, and `every_order` {split_Hz, slow_axis_deg, shift_ppm} of the coupled harmonics; `waves` of each face, the wall and
+`noise_um` of one point, `position` covered, `offset_um`, `tilt_deg` of the alignment, `told` (which of x, y, z and the tilts the shape determines);
+`splits`, one per harmonic, with `split_Hz`, `relative_ppm`, `slow_axis_deg` as {value, low, high} (90 %; the axis null where
+the split is not significant), `shift_ppm`, and `every_order` {split_Hz, slow_axis_deg, shift_ppm} of the coupled harmonics; `waves` of each face, the wall and
 the offset {quantity, order, position, amplitude_um {value, low, high}, azimuth_deg}; `roundness` {face, position, peak_to_valley_um, rms_um}.
 """
 
@@ -11,13 +11,46 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import Parameter
 
-from studies.cli.output import Answer, answers
+from studies.cli.output import answers
+from studies.results import Chapter, Column, Facts, Figure, Result, Sentence, Table
 
 if TYPE_CHECKING:
     from studies.instrument.card import Instrument
     from studies.scan import Scan, ScanInterval
 
 NONE = "none"
+SPLITS = (
+    Column("harmonic", "n"),
+    Column("frequency_Hz", "frequency", "Hz", ".3f"),
+    Column("split_Hz.value", "split", "mHz", scale=1e3),
+    Column("split_Hz", "90 % interval", "mHz", scale=1e3, interval=("split_Hz.low", "split_Hz.high")),
+    Column("slow_axis_deg.value", "slow axis", "°", ".2f"),
+    Column("slow_axis_deg", "90 % interval", "°", ".2f", interval=("slow_axis_deg.low", "slow_axis_deg.high")),
+    Column("every_order.split_Hz", "split, all orders", "mHz", scale=1e3),
+    Column("every_order.slow_axis_deg", "slow axis, all orders", "°", ".2f"),
+)
+HARMONICS = (
+    Column("order", "harmonic"),
+    Column("amplitude_um.value", "amplitude", "µm", ".3f"),
+    Column("amplitude_um", "90 % interval", "µm", ".3f", interval=("amplitude_um.low", "amplitude_um.high")),
+    Column("crest", "azimuth of a crest", "°", ".1f"),
+)
+FACES = (
+    Column("face", "face"),
+    Column("file", "file"),
+    Column("points", "points"),
+    Column("outliers", "outliers"),
+    Column("noise_um", "noise", "nm", ".1f", scale=1e3),
+    Column("position", "positions", form=".3f", interval=("position.0", "position.1")),
+    *(Column(f"offset_um.{k}", f"offset {axis}", "µm", ".1f") for k, axis in enumerate("xyz")),
+    Column("tilt_deg", "tilt", "°", ".3f"),
+)
+ROUNDNESS = (
+    Column("face", "face"),
+    Column("position", "position", form=".3f"),
+    Column("peak_to_valley_um", "peak to valley", "µm", ".3f"),
+    Column("rms_um", "rms", "µm", ".3f"),
+)
 
 
 @answers("hrg.scan/1")
@@ -33,42 +66,39 @@ def scan(
     temperature: float | None = None,
     theory: Literal["solid", "shell"] = "solid",
     map_file: Annotated[str | None, Parameter(name="--map")] = None,
-    report: str | None = None,
     save: str | None = None,
-) -> Answer:
-    """Turn measured points of one or both faces into wall and offset maps, circumferential harmonics, and frequency splits with intervals.
+) -> Result:
+    """Compute wall maps, circumferential harmonics and frequency splits, with intervals, from measured faces of a shell.
 
-    Points are x y z text (comments behind #), .ply or .stl; or a table over position and azimuth: first line
-    "position,0,5,10,…" with azimuths in degrees, then a line per position (0 ... 1 of the meridian) with how far the face
-    stands out of the material in µm. Each face is brought onto the card's resonator; gaps and outliers are allowed.
-    A shift of one sphere against the other is no harmonic of the wall unless both share one frame (--frames common).
+    Points are x y z text (comments after #), .ply or .stl; or a table over position and azimuth: first line
+    "position,0,5,10,…" with azimuths in degrees, then a line per position (0 ... 1 along the meridian) with the deviation of
+    the face in µm, positive away from the material. Faces are aligned with the card's resonator; gaps and outliers are
+    allowed. Eccentricity of the two spheres is part of the wall only if both share one frame (--frames common).
 
     Parameters
     ----------
     card : str
         Path of a card, or the name of one that ships (hrg cards).
     inner : str
-        Points of the inner face; none if only the outer one was measured.
+        Points of the inner face; none if only the outer face was measured.
     outer : str
-        Points of the outer face; none if only the inner one was measured.
+        Points of the outer face; none if only the inner face was measured.
     unit : str
         Unit of the points.
     frames : str
-        own: each face was measured in a frame of its own. common: both in one frame, and eccentricity counts.
+        own: each face has its own coordinate frame. common: both share one frame, and eccentricity counts.
     harmonic : tuple[int, ...]
-        Harmonics n whose splits are wanted.
+        Harmonics n of the splits.
     highest : int
-        Highest circumferential harmonic that is fitted, at least twice the highest n.
+        Highest circumferential harmonic of the fit, at least twice the highest n.
     temperature : float
         Temperature in °C; the card's reference temperature unless given.
     theory : str
         solid (three-dimensional) or shell (Naghdi).
     map_file : str
-        CSV to write: position, azimuth and the departures of faces, wall and middle surface.
-    report : str
-        Page to write: unwrapped maps, harmonics, roundness, splits.
+        Write a CSV file: position, azimuth, and deviations of faces, wall and middle surface.
     save : str
-        Card to write: this one with the fitted faces as its imperfection, in tables beside it.
+        Write a card with the fitted faces as its imperfection; the tables are written beside it.
     """
     from shell.constants import zero_Celsius
     from studies.cli.output import say
@@ -78,9 +108,9 @@ def scan(
 
     files = {name: path for name, path in (("inner", inner), ("outer", outer)) if path != NONE}
     if not files:
-        raise InputError("no face is given: name the file of the inner face, of the outer face, or both.")
+        raise InputError("no face given: name the file of the inner face, of the outer face, or of both.")
     if min(harmonic) < 1:
-        raise InputError(f"--harmonic {min(harmonic)}: pairs have harmonics from 1 up.")
+        raise InputError(f"--harmonic {min(harmonic)}: split modes have n = 1 or higher.")
     instrument = load_card(card)
     T = instrument.reference_temperature if temperature is None else temperature + zero_Celsius
     with naming(instrument.path):
@@ -93,70 +123,59 @@ def scan(
 
         write_text(map_file, _map_csv(found))
         say(f"wrote {map_file}")
-    if report is not None:
-        from studies.reports.scan import write_scan_page
-
-        write_scan_page(report, found, instrument.name, files)
-        say(f"wrote {report}")
     if save is not None:
         _save(save, instrument, found)
         say(f"wrote {save}")
     payload = _payload(found, instrument.name, T - zero_Celsius, files)
-    yield payload
-    _print(found, payload)
-
-
-def _print(found: "Scan", payload: dict[str, Any]) -> None:
-    from math import degrees
-
-    from studies.cli.output import print_table
-
-    faces = payload["faces"]
-    splits = [
-        [
-            str(entry["harmonic"]),
-            f"{entry['split_Hz']['value']:.5f}",
-            f"{entry['split_Hz']['low']:.5f} … {entry['split_Hz']['high']:.5f}",
-            f"{axis['value']:.2f}" if (axis := entry["slow_axis_deg"]) else "not told",
-            f"{axis['low']:.2f} … {axis['high']:.2f}" if axis else "",
-            f"{entry['every_order']['split_Hz']:.5f}",
-            f"{entry['every_order']['slow_axis_deg']:.2f}",
-        ]
-        for entry in payload["splits"]
-    ]
-    print_table(
-        f"{payload['card']}: splits by the measured {' and '.join(faces)} face{'s' if len(faces) > 1 else ''}",
-        ["n", "split (Hz)", "90 %", "slow axis (°)", "90 %", "with every order (Hz)", "axis (°)"],
-        splits,
-        "First order: harmonic 2n alone; every order: with the products of two harmonics."
-        + (" One face: the other is assumed perfect." if len(faces) == 1 else ""),
+    return Result(
+        payload,
+        f"Scan of {instrument.name}",
+        "Measured faces, aligned with the card's resonator and fitted with circumferential harmonics, and the resulting frequency splits.",
+        _parts(found, payload),
     )
-    places = [
-        [
-            name,
-            str(face["points"]),
-            str(face["outliers"]),
-            f"{1e3 * face['noise_um']:.1f}",
-            "" if face["tilt_deg"] is None else f"{face['tilt_deg']:.3f}",
-            "" if face["offset_um"] is None else ", ".join(f"{x:.1f}" for x in face["offset_um"]),
-        ]
-        for name, face in faces.items()
-    ]
-    print_table("Faces", ["face", "points", "left out", "noise (nm)", "tilt (°)", "offset (µm)"], places)
+
+
+def _parts(found: "Scan", payload: dict[str, Any]) -> "list[Chapter]":
+    """What people read: splits, maps, harmonics, roundness, faces."""
+    from studies.reports import scan as pictures
+
+    faces, splits = payload["faces"], payload["splits"]
     quantity = "wall" if len(faces) == 2 else next(iter(faces))
     rim = max(w.position for w in found.waves)
     waves = [
-        [
-            str(w.order),
-            f"{1e6 * w.amplitude.value:.3f}",
-            f"{1e6 * w.amplitude.low:.3f} … {1e6 * w.amplitude.high:.3f}",
-            f"{degrees(w.azimuth):.1f}" if w.order else "",
-        ]
-        for w in found.waves
-        if w.quantity == quantity and w.position == rim
+        w | {"crest": w["azimuth_deg"] if w["order"] else None}
+        for w in payload["waves"]
+        if w["quantity"] == quantity and w["position"] == rim
     ]
-    title = f"Circumferential harmonics of the {quantity} at position {rim:.3f} (µm)"
-    print_table(title, ["wave", "amplitude", "90 %", "crest at (°)"], waves)
+    note = "First order: from harmonic 2n alone. All orders: with products of harmonics. Slow axis: an antinode of the slower mode."
+    if any(one["slow_axis_deg"] is None for one in splits):
+        note += " No slow axis: the split is not significant."
+    only = "Only one face was measured; the other is assumed perfect." if len(faces) == 1 else ""
+    return [
+        Chapter("In short", [Facts(_facts(payload), "page"), *([Sentence(only, "warning")] if only else []),
+            Table("Frequency splits from the measured faces", splits, SPLITS, note)]),
+        Chapter("Maps", [Figure(lambda: pictures.maps(found), "Fitted deviations over azimuth and meridian.")]),
+        Chapter("Circumferential harmonics", [
+            Figure(lambda: pictures.harmonics(found), "Amplitudes at the rim with 90 % intervals; harmonic 2n splits the modes n."),
+            Table(f"Circumferential harmonics of the {quantity} at position {rim:.3f}", waves, HARMONICS),
+        ]),
+        Chapter("Roundness", [Table("Roundness of circles", payload["roundness"], ROUNDNESS,
+            "From harmonic 2 upwards; harmonic 1 is the eccentricity of the circle.", "page")]),
+        Chapter("Faces", [Table("Faces as read", [{"face": name} | face for name, face in faces.items()], FACES)]),
+    ]  # fmt: skip
+
+
+def _facts(payload: dict[str, Any]) -> "list[tuple[str, str, str]]":
+    from studies.reports.digits import to_interval
+
+    main = min(payload["splits"], key=lambda one: abs(one["harmonic"] - 2))
+    split, low, high = to_interval(*(1e3 * main["split_Hz"][key] for key in ("value", "low", "high")))
+    axis, noise = main["slow_axis_deg"], [1e3 * face["noise_um"] for face in payload["faces"].values()]
+    return [
+        (f"Split of n = {main['harmonic']}", f"{split} mHz", f"90 %: {low} … {high} mHz"),
+        ("Slow axis", f"{axis['value']:.1f}°" if axis else "undetermined", "antinode of the slower mode: remove mass there" if axis else ""),
+        ("Noise of a point", ", ".join(f"{one:.0f} nm" for one in noise), " and ".join(payload["faces"])),
+    ]  # fmt: skip
 
 
 def _payload(found: "Scan", name: str, temperature: float, files: dict[str, str]) -> dict[str, Any]:
@@ -223,7 +242,7 @@ def _payload(found: "Scan", name: str, temperature: float, files: dict[str, str]
 
 
 def _save(path: str, instrument: "Instrument", found: "Scan") -> None:
-    """The card with the faces as maps, whose tables are written first."""
+    """Write the card with the faces as maps, and their tables first."""
     from pathlib import Path
 
     import numpy as np

@@ -1,4 +1,4 @@
-"""Measured points of a surface: x y z text, PLY or STL, or a table of departures over position and azimuth."""
+"""Measured points of a surface: x y z text, PLY or STL, or a table of deviations over position and azimuth."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -57,7 +57,7 @@ def _first_line(path: Path) -> tuple[str, int]:
                 if line.strip() and not line.lstrip().startswith("#"):
                     return line.strip(), number
     except UnicodeDecodeError:
-        raise InputError(f"{path}: not UTF-8 text; points are read from x y z text, .ply, .stl or a table.") from None
+        raise InputError(f"{path}: not UTF-8 text; points must be x y z text, .ply, .stl or a table.") from None
     raise InputError(f"{path}: has no points.")
 
 
@@ -76,7 +76,7 @@ def _read_text(path: Path, first: str) -> "Array":
     except (ValueError, pd.errors.ParserError) as error:
         reason = " ".join(str(error).split())
         raise InputError(
-            f"{path}: is not a table of x y z ({reason}); each line has three numbers, decimals with a point, headings behind #."
+            f"{path}: is not a table of x y z ({reason}); each line needs three numbers with decimal points; comments start with #."
         ) from None
     points = np.concatenate(kept)
     if not len(points):
@@ -112,22 +112,24 @@ def _read_grid(path: Path, skipped: int) -> FaceGrid:
         table = pd.read_csv(path, skiprows=skipped, comment="#", dtype=float, index_col=0)
         azimuth = np.deg2rad(table.columns.to_numpy(dtype=float))
     except (ValueError, pd.errors.ParserError) as error:
-        raise InputError(f"{path}: is not a table of departures over position and azimuth ({error}).") from None
+        raise InputError(f"{path}: is not a table of deviations over position and azimuth ({error}).") from None
     position = table.index.to_numpy(dtype=float)
     order = np.argsort(position)
     if len(position) < 1 or np.any(np.diff(position[order]) <= 0) or position.min() < 0 or position.max() > 1:
         raise InputError(
-            f"{path}: the positions of a table lie in 0 (start of the meridian) ... 1 (rim), none of them twice."
+            f"{path}: the positions must lie between 0 (start of the meridian) and 1 (rim), each only once."
         )
     step = 2 * np.pi / max(len(azimuth), 1)
     if len(azimuth) < 8 or np.any(abs(np.diff(azimuth) - step) > 0.01 * step):
         raise InputError(
-            f"{path}: the azimuths do not close the circle: {len(azimuth)} columns ask for steps of {np.rad2deg(step):.4g}°; "
-            "leave out a column that repeats the first at 360°, or fill the missing ones with empty cells."
+            f"{path}: the azimuths do not close the circle: {len(azimuth)} columns need steps of {np.rad2deg(step):.4g}°; "
+            "remove a column that repeats the first at 360°, or add missing columns with empty cells."
         )
     values = 1e-6 * table.to_numpy()[order]
     if not np.isfinite(values).any():
         raise InputError(f"{path}: every cell of the table is empty; there is nothing to fit.")
     if np.nanmax(abs(values)) > 2e-3:
-        raise InputError(f"{path}: departures of {1e3 * np.nanmax(abs(values)):.3g} mm: the table's cells are in µm.")
+        raise InputError(
+            f"{path}: deviations up to {1e3 * np.nanmax(abs(values)):.3g} mm; the cells of the table must be in µm."
+        )
     return FaceGrid(position[order], azimuth, values)

@@ -96,9 +96,11 @@ def test_scan_refuses_what_it_cannot_use(faces, tmp_path, capsys):
     assert "µm read as mm" in failing(capsys, "scan", "free-dome", "none", wrong)
     assert "exchange the files" in failing(capsys, "scan", "free-dome", faces["outer"], faces["inner"])
     np.savetxt(wrong, points[np.abs(np.arctan2(points[:, 1], points[:, 0])) > 0.6])
-    assert "gaps between the points are larger" in failing(capsys, "scan", "free-dome", "none", wrong, "--harmonic", 2)
+    assert "gaps between the points are too large" in failing(
+        capsys, "scan", "free-dome", "none", wrong, "--harmonic", 2
+    )
     np.savetxt(wrong, points * [1.0, 1.15, 1.0])
-    assert "cannot be brought onto the face" in failing(capsys, "scan", "free-dome", "none", wrong, "--harmonic", 2)
+    assert "do not fit the face" in failing(capsys, "scan", "free-dome", "none", wrong, "--harmonic", 2)
     shifted = tmp_path / "shifted.asc"
     np.savetxt(shifted, np.loadtxt(faces["inner"]) + np.array([3.0, 0.0, 2.0]))
     assert "--frames own" in failing(capsys, "scan", "free-dome", shifted, faces["outer"], "--frames", "common")
@@ -108,7 +110,7 @@ def test_scan_refuses_what_it_cannot_use(faces, tmp_path, capsys):
     wrong.write_text("# nothing\n")
     assert "has no points" in failing(capsys, "scan", "free-dome", "none", wrong)
     assert "there is no such file" in failing(capsys, "scan", "free-dome", "none", tmp_path / "none.asc")
-    assert "no face is given" in failing(capsys, "scan", "free-dome", "none")
+    assert "no face given" in failing(capsys, "scan", "free-dome", "none")
     assert "--highest" in failing(capsys, "scan", "free-dome", faces["inner"], "--harmonic", 7)
 
 
@@ -133,9 +135,9 @@ def test_a_table_of_departures_must_close_the_circle(tmp_path, capsys):
     write(np.arange(0, 180, 7.5))
     assert "do not close the circle" in failing(capsys, "scan", "free-dome", "none", path)
     write(np.arange(0, 360, 7.5), 1e4)
-    assert "cells are in µm" in failing(capsys, "scan", "free-dome", "none", path)
+    assert "cells of the table must be in µm" in failing(capsys, "scan", "free-dome", "none", path)
     write(np.arange(0, 360, 7.5), gap=20)
-    assert "gaps between the points are larger" in failing(capsys, "scan", "free-dome", "none", path)
+    assert "gaps between the points are too large" in failing(capsys, "scan", "free-dome", "none", path)
 
 
 def test_a_measured_gain_turns_the_cuts_to_the_other_antinodes(capsys):

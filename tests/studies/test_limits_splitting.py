@@ -184,7 +184,7 @@ def test_commands_refuse_a_voltage_beyond_pull_in_and_a_map_with_holes(tmp_path,
     (tmp_path / "wall.csv").write_text("position," + ",".join(str(a) for a in angles) + "\n" + "\n".join(rows))
     (tmp_path / "card.toml").write_text(CARD + '[[imperfection.map]]\nof = "wall"\nfile = "wall.csv"\n')
     assert main(["modes", str(tmp_path / "card.toml")]) == 2
-    assert "gaps between the points are larger" in capsys.readouterr().err
+    assert "gaps between the points are too large" in capsys.readouterr().err
 
 
 def test_a_simulated_run_is_softened_by_the_volts_and_the_gap(tmp_path):
