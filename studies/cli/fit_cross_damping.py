@@ -2,13 +2,38 @@
 
 from typing import TYPE_CHECKING, Any
 
-from studies.cli.output import Answer, answers
+from studies.cli.output import answers
+from studies.results import Chapter, Column, Facts, Figure, Result, Sentence, Table
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure as Drawing
+
     from compensation.improvement import Change
     from studies.cross_damping import CrossDampingStudy
     from studies.record import Record
     from studies.rest import RestData
+
+LABELS = {
+    "training": "fitted, rows",
+    "training_averages_100s": "fitted, 100 s averages",
+    "held_out": "held out, rows",
+    "held_out_averages_100s": "held out, 100 s averages",
+}
+COEFFICIENTS = (
+    Column("name", "Coefficient"),
+    Column("value", "Value", error="error"),
+    Column("unit", "Unit"),
+    Column("ratio", "Ratio to ζ₀"),
+)
+USELESS = (
+    "On held-out data the compensation does not improve the output: beyond its noise, this record shows no cross-damping that varies"
+    " with temperature."
+)
+SCALE = (
+    "The output depends only on the product of cross-damping and frequency, so an error of the given frequency scales all coefficients."
+    " A constant bias of any other origin is included in ζ₀."
+)
+HELD_OUT = "Before: standard deviation; after: rms. Held out: each run, or each fifth of a single run, predicted from the others."
 
 
 @answers("hrg.fit-cross-damping/1")
@@ -19,43 +44,38 @@ def fit_cross_damping(
     order: int = 3,
     calibration_temperature: float = 20.0,
     save: str | None = None,
-    report: str | None = None,
-) -> Answer:
+) -> Result:
     """Fit the cross-damping of a cylindrical gyro over temperature (CVG cross-damping paper, equations 9 and 10).
 
-    The records are of a gyro at rest: time_s, a temperature, and bias_deg_per_h or measured_rate_deg_per_s.
-    Only the product of cross-damping and frequency is seen in the output, so the scale of the coefficients
-    is as good as the frequency given.
+    The records are of a gyro at rest: time_s, a temperature, and bias_deg_per_h or measured_rate_deg_per_s. The output depends
+    only on the product of cross-damping and frequency, so the coefficients are only as accurate as the given frequency.
 
     Parameters
     ----------
     data : str
         One or more records (CSV).
     frequency : float
-        Natural frequency in Hz; by default the median of the records' frequency_Hz.
+        Natural frequency in Hz; by default the median of frequency_Hz in the records.
     quality : float
-        Quality factor Q, from which the relative damping 1/(2Q) follows; by default from the records' inverse_q.
+        Quality factor Q, which gives the relative damping 1/(2Q); by default from inverse_q in the records.
     order : int
-        Highest power of the temperature; the paper takes 3.
+        Highest power of the temperature; the paper uses 3.
     calibration_temperature : float
-        Temperature in °C from which the shift T is counted.
+        Temperature in °C about which the polynomial is expanded.
     save : str
-        Write the model (TOML), for hrg compensate.
-    report : str
-        Write a page (HTML).
+        Write the model (TOML) for hrg compensate.
     """
     import math
 
     from shell.constants import zero_Celsius
-    from studies.cli.output import print_table, say
+    from studies.cli.output import say
     from studies.cross_damping import study_cross_damping
     from studies.errors import InputError, naming
-    from studies.files.writing import write_text
     from studies.models import source_of, write_model
     from studies.models.kinds.cross_damping import OUTPUTS, save_cross_damping
     from studies.plausible import records_of_one_gyro
     from studies.record import read_record
-    from studies.reports import cross_damping as page
+    from studies.reports.cross_damping import SOURCES, draw_runs
     from studies.rest import gather_rest
 
     if not data:
@@ -65,11 +85,11 @@ def fit_cross_damping(
     quality = quality if quality is not None else _quality(records)
     if not (0 < carrier < 1e9 and 1 < quality < 1e12):
         raise InputError(
-            f"a frequency of {carrier:g} Hz with Q = {quality:g} is no resonator; give --frequency and --quality."
+            f"{carrier:g} Hz with Q = {quality:g} is not a resonator; correct --frequency and --quality, or the columns of the record."
         )
     if not abs(calibration_temperature) <= 1000:
         raise InputError(
-            f"--calibration-temperature {calibration_temperature:g} °C is not a temperature of a gyro: give one within the range of the record, in °C."
+            f"--calibration-temperature {calibration_temperature:g} °C: no gyro has this temperature; give one within the record, in °C."
         )
     gathered = gather_rest(records, OUTPUTS)
     with naming(", ".join(data)):
@@ -80,28 +100,119 @@ def fit_cross_damping(
             calibration_temperature=calibration_temperature + zero_Celsius,
             order=order,
         )
-    model = save_cross_damping(
-        study.model,
-        gathered.output,
-        gathered.temperature_column,
-        tuple(source_of(record) for record in records),
-        "hrg-workbench, hrg fit cross-damping",
-    )
     if save is not None:
-        write_model(model, save)
+        sources = tuple(source_of(record) for record in records)
+        made_by = "hrg-workbench, hrg fit cross-damping"
+        write_model(
+            save_cross_damping(study.model, gathered.output, gathered.temperature_column, sources, made_by), save
+        )
         say(f"model: {save}")
-    if gathered.left_out:
-        say(f"{gathered.left_out} rows with an empty cell or an outlier were left out.")
-    if gathered.block_s:
-        say(f"long records were averaged over {gathered.block_s:g} s before the fit.")
-    if report is not None:
-        write_text(report, page.cross_damping_page(study, gathered, ", ".join(data)))
-        say(f"report: {report}")
-    yield {"schema": "hrg.fit-cross-damping/1", "records": list(data), **_summarise(study, gathered)}
-    for block in (page.coefficients_table(study), page.improvement_table(study, gathered)):
-        print_table(block.caption, block.columns, block.rows, block.note)
-    if not study.is_useful:
-        print(page.USELESS)
+    summary = _summarise(study, gathered)
+    unit = {"bias_deg_per_h": "°/h", "measured_rate_deg_per_s": "°/s"}[gathered.output]
+    changes = [{"label": label} | summary[key] for key, label in LABELS.items()]
+    before_after = Column("before", "Before", unit), Column("after", "After", unit)
+    fitted, held_out = study.training.averages, study.held_out.averages
+    facts = [
+        ("Improvement, fitted data", f"{fitted.ratio:.2f}×", "100 s averages"),
+        (
+            "Improvement, held-out data",
+            f"{held_out.ratio:.2f}×",
+            f"100 s averages; rows {study.held_out.rows.ratio:.2f}×",
+        ),
+        (
+            "Residual, held-out data",
+            f"{summary['held_out_averages_100s']['after']:.3g} {unit}",
+            "rms of 100 s averages",
+        ),
+        (
+            "Effect of the filter (9)",
+            f"{summary['dynamic_part']:.2g} {unit}",
+            "largest change that it makes to the correction",
+        ),
+    ]
+    return Result(
+        {"schema": "hrg.fit-cross-damping/1", "records": list(data), **summary},
+        "Cross-damping over temperature",
+        f"Zero-rate output of {', '.join(data)}, fitted with a cross-damping of order {order} in temperature.",
+        [
+            Facts(facts),
+            *([] if study.is_useful else [Sentence(USELESS, "warning")]),
+            *(Sentence(sentence) for sentence in _left_out(gathered)),
+            Chapter(
+                "Output before and after",
+                [
+                    Figure(
+                        lambda: draw_runs(study.runs, study.model, OUTPUTS[gathered.output], unit),
+                        "Temperature, and zero-rate output before and after compensation, 100 s averages.",
+                    ),
+                    Table(
+                        "Zero-rate output",
+                        changes,
+                        [Column("label", "Data"), *before_after, Column("improvement", "Improvement", form=".2f")],
+                        HELD_OUT,
+                    ),
+                ],
+            ),
+            Chapter(
+                "Cross-damping over temperature",
+                [
+                    Figure(
+                        lambda: _draw_curve(study),
+                        "Cross-damping over temperature, relative to its value at calibration.",
+                    ),
+                    Table(
+                        f"Cross-damping about {calibration_temperature:g} °C",
+                        _coefficients(summary),
+                        COEFFICIENTS,
+                        "The errors allow for white noise plus a random walk of the bias.",
+                    ),
+                    Sentence(SCALE, "note", "page"),
+                ],
+            ),
+        ],
+        sources=SOURCES,
+    )
+
+
+def _left_out(data: "RestData") -> list[str]:
+    """Say which rows were left out or averaged before the fit."""
+    said = [f"{data.left_out} rows with an empty cell or an outlier were left out."] if data.left_out else []
+    return said + ([f"Long records were averaged over {data.block_s:g} s before the fit."] if data.block_s else [])
+
+
+def _coefficients(summary: dict[str, Any]) -> list[dict[str, Any]]:
+    from studies.reports.digits import lowered, raised
+
+    values, errors = summary["coefficients"], summary["standard_errors"]
+    units = ["", "per °C", *(f"per °C{raised(i)}" for i in range(2, len(values)))]
+    return [
+        {"name": f"ζ{lowered(i)}", "value": value, "error": error, "unit": units[i], "ratio": value / values[0]}
+        for i, (value, error) in enumerate(zip(values, errors, strict=True))
+    ]
+
+
+def _draw_curve(study: "CrossDampingStudy") -> "Drawing":
+    """Draw ζ₁₂(T) over its value at calibration, with its 90 % band."""
+    import numpy as np
+
+    from shell.constants import zero_Celsius
+    from studies.reports import style
+
+    model = study.model
+    T = np.linspace(model.lowest, model.highest, 200)
+    powers = (T - model.calibration_temperature)[:, None] ** np.arange(len(model.coefficients))
+    size = model.coefficients[0]
+    spread = 1.645 * np.sqrt(np.einsum("ni,ij,nj->n", powers, model.covariance, powers)) / abs(size)
+    middle = powers @ model.coefficients / size
+    with style.figure(height=3.0) as (made, axes):
+        axes.fill_between(
+            T - zero_Celsius, middle - spread, middle + spread, color=style.SKY, alpha=0.4, label="90 % band"
+        )
+        axes.plot(T - zero_Celsius, middle, color=style.BLUE, label="fitted")
+        axes.set_xlabel("temperature (°C)")
+        axes.set_ylabel("ζ₁₂ / ζ₀")
+        axes.legend()
+        return made
 
 
 def _summarise(study: "CrossDampingStudy", data: "RestData") -> dict[str, Any]:

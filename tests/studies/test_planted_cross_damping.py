@@ -196,4 +196,4 @@ def test_a_turning_gyro_and_a_missing_frequency_are_refused(record, tmp_path, ca
     assert main(["fit", "cross-damping"]) == 2
     for wrong in (["--frequency", "-1", "--quality", "100"], ["--frequency", "5000", "--quality", "0.5"]):
         assert main(["fit", "cross-damping", record, *wrong]) == 2
-        assert "no resonator" in capsys.readouterr().err
+        assert "is not a resonator" in capsys.readouterr().err
