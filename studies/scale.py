@@ -121,20 +121,18 @@ def study_scale(records: "Sequence[Record]", cutoff: float | None, order: int) -
         left_out += missing
         kind = _classify(run, record.path)
         if kind in sorted_runs:
-            raise InputError(f"{record.path} and {sorted_runs[kind][1]} are both runs {kind}; give one of each kind.")
+            raise InputError(f"{record.path} and {sorted_runs[kind][1]} are both runs {kind}; give only one of them.")
         sorted_runs[kind] = (run, record.path)
     for kind, equation in KINDS.items():
         if kind not in sorted_runs:
-            raise InputError(f"no record is a run {kind}, which {equation} needs; record one and give it too.")
+            raise InputError(f"no record is a run {kind}, which {equation} needs; add one.")
     rates, rest, turning = (sorted_runs[kind][0] for kind in KINDS)
     rough = _thin(sorted_runs[ROUGH][0]) if ROUGH in sorted_runs else None
     sampling = float(np.median(np.diff(rest.time)))
     runs = (rates, rest, turning)
     shortest = min(len(run.time) for run in runs)
     if cutoff is not None and order >= shortest:
-        raise InputError(
-            f"a FIR filter of order {order} is longer than a run of {shortest} rows; take a lower --order."
-        )
+        raise InputError(f"a FIR filter of order {order} is longer than a run of {shortest} rows; lower --order.")
     thin = (_thin(rates), _thin(rest), _thin(turning))
     with naming(", ".join(path for _, path in sorted_runs.values())):
         chain = fit_chain(*thin, rough=rough, cutoff=cutoff, order=order, sampling=sampling)
@@ -160,13 +158,13 @@ def _classify(run: BellRun, path: str) -> str:
     swept = float(np.ptp(run.temperature)) > SWEPT
     if np.ptp(run.rate) > max(LARGEST_REST * DEG, STEADY * np.max(np.abs(run.rate))):
         if swept:
-            raise InputError(f"{path}: both rate and temperature change; the chain needs them one at a time.")
+            raise InputError(f"{path}: both rate and temperature change; change one at a time.")
         levels, counts = np.unique(same_rate(run.rate), return_counts=True)
         held = levels[counts > PLATEAU * len(run.rate)]
         two = len(held) == 2 and float(np.min(np.abs(held))) <= LARGEST_REST * DEG
         return ROUGH if two else several
     if not swept:
-        raise InputError(f"{path}: neither rate nor temperature changes; nothing can be learnt from this run.")
+        raise InputError(f"{path}: neither rate nor temperature changes; it cannot calibrate the chain.")
     return at_rest if abs(np.mean(run.rate)) <= LARGEST_REST * DEG else turning
 
 

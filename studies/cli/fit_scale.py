@@ -1,6 +1,30 @@
 """`hrg fit scale`: bias and scale of a bell-shaped gyro, step by step."""
 
-from studies.cli.output import Answer, answers
+import re
+from typing import TYPE_CHECKING, Any
+
+from studies.cli.output import answers
+from studies.results import Chapter, Column, Facts, Figure, Result, Sentence, Table
+
+if TYPE_CHECKING:
+    from studies.scale import ScaleStudy
+
+STEPS = {
+    "rough": "null and scale (33)",
+    "bias": "bias (34)",
+    "scale_over_rate": "scale over rate (35)",
+    "scale_over_temperature": "scale over temperature (36)",
+}
+COEFFICIENTS = (
+    Column("step", "Step"),
+    Column("name", "Coefficient"),
+    Column("value", "Value", error="standard_error"),
+    Column("unit", "Unit"),
+)
+NOTE = (
+    "Each step is fitted to the output of the steps before it; its errors assume that those are exact, and allow for white noise plus"
+    " a random walk. Temperature in °C, rate in °/s."
+)
 
 
 @answers("hrg.fit-scale/1")
@@ -10,45 +34,41 @@ def fit_scale(
     order: int = 50,
     no_filter: bool = False,
     save: str | None = None,
-    report: str | None = None,
-) -> Answer:
-    """Fit null, bias over temperature, scale over rate and over temperature (BVG paper, equations 32 to 36).
+) -> Result:
+    """Fit null, bias over temperature, and scale over rate and over temperature (BVG paper, equations 32 to 36).
 
-    Three records, in any order, each with time_s, rate_deg_per_s (the applied rate), a temperature, and
-    output_counts or measured_rate_deg_per_s: several rates at one temperature; at rest over temperature;
-    at one rate over temperature. A fourth one at rest and then at one rate, at one temperature (the paper's five minutes of rest
-    and +100 °/s), gives the rough null and scale (33); without it they come from the run of several rates.
+    Give three records in any order, each with time_s, rate_deg_per_s (the applied rate), a temperature, and output_counts or
+    measured_rate_deg_per_s: several rates at one temperature; at rest over temperature; at one rate over temperature. A fourth
+    record at one temperature, first at rest and then at one rate (the paper: five minutes of rest, then +100 °/s), gives the
+    rough null and scale (33); without it they are found from the record with several rates.
 
     Parameters
     ----------
     data : str
         The records (CSV).
     cutoff : float
-        Cut-off of the FIR filter in Hz; below half the output rate.
+        Cut-off frequency of the FIR filter in Hz; below half the output rate.
     order : int
-        Order of the FIR filter; the paper takes 50.
+        Order of the FIR filter; the paper uses 50.
     no_filter : bool
-        Leave the FIR filter out: gaps are then allowed.
+        Omit the FIR filter; the record may then have gaps.
     save : str
-        Write the model (TOML), for hrg compensate.
-    report : str
-        Write a page (HTML).
+        Write the model (TOML) for hrg compensate.
     """
     import dataclasses
 
-    from studies.cli.output import print_table, say
+    from studies.cli.output import say
     from studies.errors import InputError
-    from studies.files.writing import write_text
     from studies.models import source_of, write_model
     from studies.models.kinds.scale import save_scale
     from studies.record import read_record
-    from studies.reports import bell as page
+    from studies.reports.bell import SOURCES, draw_steps, steps_table
     from studies.scale import study_scale
 
     if not data:
         raise InputError(
-            "name three records (CSV): several rates, at rest over temperature, one rate over temperature; and, if there is one,"
-            " a run at rest and then at one rate."
+            "name three records (CSV): several rates, at rest over temperature, one rate over temperature; a fourth at rest and then"
+            " at one rate is optional."
         )
     records = [read_record(path) for path in data]
     study = study_scale(records, None if no_filter else cutoff, order)
@@ -57,41 +77,81 @@ def fit_scale(
     if save is not None:
         write_model(model, save)
         say(f"model: {save}")
-    if study.left_out:
-        say(f"{study.left_out} rows with an empty cell or an outlier were left out.")
-    if study.rough_run:
-        say("rough null and scale: from the run at rest and then at one rate.")
-    if study.averaged:
-        say("long runs were averaged in blocks for the fit; the held-out error is that of the blocks.")
-    if report is not None:
-        write_text(report, page.scale_page(study, ", ".join(data)))
-        say(f"report: {report}")
-    yield {
+    parts: dict[str, dict[str, dict[str, Any]]] = {
+        part.name: {
+            name: {"value": value, "standard_error": error, "unit": unit}
+            for name, value, error, unit in zip(part.names, part.values, part.standard_errors, part.units, strict=True)
+        }
+        for part in model.parts
+    }
+    steps = [dataclasses.asdict(figures) for figures in study.figures]
+    payload = {
         "schema": "hrg.fit-scale/1",
         "records": list(data),
         "output": study.output,
         "temperature": study.temperature_column,
-        "parts": {
-            part.name: {
-                name: {"value": value, "standard_error": error, "unit": unit}
-                for name, value, error, unit in zip(
-                    part.names, part.values, part.standard_errors, part.units, strict=True
-                )
-            }
-            for part in model.parts
-        },
-        "steps": [dataclasses.asdict(figures) for figures in study.figures],
+        "parts": parts,
+        "steps": steps,
         "error_before_deg_per_s": study.error_before,
         "error_held_out_deg_per_s": study.error_held_out,
         "filter_delay_s": study.chain.delay,
         "rows_left_out": study.left_out,
     }
-    for block in (
-        page.coefficients_table(study.chain, study.output),
-        page.steps_table(study.figures, "After each step"),
-    ):
-        print_table(block.caption, block.columns, block.rows, block.note)
-    print(
-        f"Rate error on blocks left out of the fit: {study.error_before:.4f} °/s rough,"
-        f" {study.error_held_out:.4f} °/s compensated (before the filter)."
+    rows = [
+        {"step": STEPS.get(step, step), "name": name} | one | {"unit": _spell_unit(one["unit"])}
+        for step, found in parts.items()
+        for name, one in found.items()
+    ]
+    shown = [step for step in steps if step["step"] != "filtered" or len(study.chain.taps)]
+    caption = "Rate error after the first step (rough) and after all steps (compensated), before the filter."
+    return Result(
+        payload,
+        "Bias and scale of a bell-shaped gyro",
+        f"Null, bias over temperature, and scale over rate and temperature, fitted step by step to {', '.join(data)}.",
+        [
+            _facts(study),
+            *(Sentence(sentence) for sentence in _remarks(study)),
+            Chapter(
+                "Output after each step",
+                [
+                    steps_table(shown, "Output after each step, fitted records"),
+                    Figure(lambda: draw_steps(study.chain, study.runs), caption),
+                ],
+            ),
+            Chapter("Coefficients", [Table("Coefficients", rows, COEFFICIENTS, NOTE)]),
+        ],
+        sources=SOURCES,
     )
+
+
+def _facts(study: "ScaleStudy") -> Facts:
+    first, last = study.figures[0], next(f for f in study.figures if f.step == "temperature_compensated")
+    error = f"{study.error_before:.4f} → {study.error_held_out:.4f} °/s"
+    facts = [("Rate error, held-out data", error, "rms, rough → compensated, before the filter")]
+    if first.nonlinearity is not None and last.nonlinearity is not None:
+        change = f"{100 * first.nonlinearity:.3f} → {100 * last.nonlinearity:.3f} %"
+        facts.append(("Nonlinearity", change, "largest deviation from a line, of full scale"))
+    facts.append(
+        ("Output at rest", f"{first.at_rest:.4f} → {last.at_rest:.4f} °/s", "standard deviation over temperature")
+    )
+    if len(study.chain.taps):
+        facts.append(("Filter delay", f"{study.chain.delay:.2f} s", f"FIR with {len(study.chain.taps)} taps"))
+    return Facts(facts)
+
+
+def _remarks(study: "ScaleStudy") -> list[str]:
+    """Say how the records were used."""
+    said = {
+        f"{study.left_out} rows with an empty cell or an outlier were left out.": study.left_out,
+        "The rough null and scale are from the record at rest and then at one rate.": study.rough_run,
+        "Long records were averaged in blocks before the fit; the held-out error is that of the blocks.": study.averaged,
+    }
+    return [sentence for sentence, true in said.items() if true]
+
+
+def _spell_unit(unit: str) -> str:
+    """Return a unit of a model file as people write it: °/s/°C² for deg/s/degC^2."""
+    from studies.reports.digits import raised
+
+    spelled = unit.replace("deg/s per counts", "°/s per count").replace("deg", "°").removeprefix("1") or ""
+    return re.sub(r"\^(\d+)", lambda power: raised(int(power[1])), re.sub("^/", "per ", spelled))

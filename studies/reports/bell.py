@@ -1,21 +1,25 @@
-"""Chapters and page of the four-step chain of a bell-shaped gyro, and the BVG paper's claims beside it."""
+"""Output of the four-step chain of a bell-shaped gyro, and the chapters on the BVG paper's claims for `hrg reproduce`."""
 
-from collections.abc import Callable, Sequence
-from dataclasses import replace
+from collections.abc import Sequence
+from dataclasses import asdict, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from shell.constants import zero_Celsius
+from studies import results
 from studies.reports import style
-from studies.reports.digits import to_error
-from studies.reports.page import Block, Chapter, Facts, Picture, Table, Text, draw, render_page
+from studies.reports.page import Block, Chapter, Picture, Table, Text, draw
+from studies.results import Column
+from studies.results.page import make_blocks
 
 if TYPE_CHECKING:
-    from compensation.bell import BellChain, PolynomialCurve
+    from matplotlib.figure import Figure as Drawing
+
+    from compensation.bell import BellChain
     from compensation.bell_calibration import BellRun
     from studies.papers.bvg import BellTwin, Claims
-    from studies.scale import ScaleStudy, StepFigures
+    from studies.results import Payload
 
 SOURCES = ("Su Z., Liu N., Li Q., Sensors 2015, 15, 23684–23705, doi:10.3390/s150923684: equations (1)–(36).",)
 NAMES = {
@@ -25,21 +29,17 @@ NAMES = {
     "temperature_compensated": "scale over temperature (36)",
     "filtered": "FIR filter",
 }
+ERRORS = "Rate error after the first step (rough) and after all steps (compensated), before the filter."
 DEG = float(np.pi / 180)
-
-
-def scale_page(study: "ScaleStudy", source: str) -> str:
-    """Return the page for a user's own records."""
-    lead = f"Null, bias over temperature, scale over rate and over temperature of {source}, fitted step by step."
-    chapters = [
-        Chapter("In short", [_facts(study)]),
-        Chapter(
-            "After each step",
-            [steps_table(study.figures, "On the runs that were fitted"), draw_steps(study.chain, study.runs)],
-        ),
-        Chapter("Coefficients", [coefficients_table(study.chain, study.output)]),
-    ]
-    return render_page("Bias and scale of a bell-shaped gyro", lead, chapters, SOURCES)
+STEP_COLUMNS = (
+    Column("name", "After"),
+    Column("nonlinearity", "Nonlinearity", "%", ".4f", scale=100.0),
+    Column("at_rest", "σ at rest", "°/s", ".4f"),
+    Column("turning", "σ at constant rate", "°/s", ".4f"),
+    Column("bias_instability", "Bias instability", "°/h", ".2f"),
+    Column("random_walk_1s", "Random walk at 1 s", "°/√h", ".3f"),
+    Column("random_walk_100s", "Random walk at 100 s", "°/√h", ".3f"),
+)
 
 
 def bell_chapters(twin: "BellTwin") -> list[Chapter]:
@@ -49,9 +49,11 @@ def bell_chapters(twin: "BellTwin") -> list[Chapter]:
             "BVG equations (32)–(36): the compensation chain on a virtual gyro",
             [
                 Text(TWIN),
-                steps_table(twin.held_out, "Runs that the fit has not seen"),
-                steps_table(twin.fitted, "Runs that were fitted"),
-                draw_steps(twin.chain, twin.runs),
+                *make_blocks(
+                    steps_table([asdict(step) for step in twin.held_out], "Held-out runs"),
+                    steps_table([asdict(step) for step in twin.fitted], "Fitted runs"),
+                ),
+                draw(draw_steps(twin.chain, twin.runs), ERRORS, "Rate error before and after compensation."),
                 draw_allan(twin.chain, twin.runs[1]),
             ],
         ),
@@ -65,75 +67,13 @@ TWIN = (
 )
 
 
-def _facts(study: "ScaleStudy") -> Facts:
-    last = next(f for f in study.figures if f.step == "temperature_compensated")
-    first = study.figures[0]
-    linear = "—"
-    if first.nonlinearity is not None and last.nonlinearity is not None:
-        linear = f"{100 * first.nonlinearity:.3f} → {100 * last.nonlinearity:.3f} %"
-    return Facts(
-        [
-            (
-                "Rate error, held out",
-                f"{study.error_before:.4f} → {study.error_held_out:.4f} °/s",
-                "rms, on fifths of each run left out",
-            ),
-            ("Nonlinearity", linear, "largest deviation from the line over full scale"),
-            ("At rest", f"{first.at_rest:.4f} → {last.at_rest:.4f} °/s", "standard deviation, before the filter"),
-            ("Filter delay", f"{study.chain.delay:.2f} s", f"FIR with {len(study.chain.taps)} taps"),
-        ]
-    )
-
-
-def steps_table(figures: "Sequence[StepFigures]", caption: str) -> Table:
-    """Return the figures of merit after every step."""
-
-    def show(value: float | None, form: str) -> str:
-        return "" if value is None else format(value, form)
-
-    kinds: list[tuple[str, Callable[[StepFigures], str]]] = [
-        ("After", lambda f: NAMES[f.step]),
-        ("Nonlinearity (%)", lambda f: show(f.nonlinearity and 100 * f.nonlinearity, ".4f")),
-        ("σ at rest (°/s)", lambda f: f"{f.at_rest:.4f}"),
-        ("σ turning (°/s)", lambda f: f"{f.turning:.4f}"),
-        ("Bias instability (°/h)", lambda f: show(f.bias_instability, ".2f")),
-        ("Random walk at 1 s (°/√h)", lambda f: show(f.random_walk_1s, ".3f")),
-        ("at 100 s (°/√h)", lambda f: show(f.random_walk_100s, ".3f")),
-    ]
-    # A column is left out where the runs are too short for it.
-    shown = [(name, cell) for name, cell in kinds if any(cell(f) for f in figures)]
-    columns = [name for name, _ in shown]
-    rows = [[cell(f) for _, cell in shown] for f in figures]
+def steps_table(steps: "Sequence[Payload]", title: str) -> results.Table:
+    """Return the figures of merit after every step; a column is left out where the records are too short for it."""
+    rows = [{**step, "name": NAMES[step["step"]]} for step in steps]
     note = "σ: standard deviation over the temperature run."
-    if any("instability" in name for name, _ in shown):
-        note += " Bias instability: lowest Allan deviation over 0.664. A filter lowers the random walk read at 1 s; at 100 s it cannot."
-    return Table(caption, columns, rows, note)
-
-
-def coefficients_table(chain: "BellChain", output: str) -> Table:
-    """Return the coefficients with their standard errors, in °C and °/s."""
-    raw = "counts" if output == "output_counts" else "°/s"
-    errors = np.sqrt(np.diag(chain.rough_covariance))
-    rows = [
-        ["rough (33)", "null", *to_error(chain.null, errors[0]), raw],
-        ["rough (33)", "scale", *to_error(chain.scale / DEG, errors[1] / DEG), f"°/s per {raw}"],
-    ]
-    curves: list[tuple[str, PolynomialCurve, float, float, tuple[str, ...]]] = [
-        ("bias (34)", chain.bias, 1.0, 0.0, ("°/s", "°/s per °C", "°/s per °C²")),
-        ("scale over rate (35)", chain.scale_over_rate, 1.0, 1.0, ("°/s", "ratio", "per °/s")),
-        ("scale over temperature (36)", chain.scale_over_temperature, 0.0, 0.0, ("ratio", "per °C", "per °C²")),
-    ]
-    for name, curve, y, x, units in curves:
-        size = DEG ** (x * np.arange(len(curve.coefficients)) - y)
-        spread = size * np.sqrt(np.diag(curve.covariance))
-        for i, (value, error) in enumerate(zip(size * curve.coefficients, spread, strict=True)):
-            rows.append([name, f"c{i}", *to_error(value, error), units[i] if i < len(units) else ""])
-    note = (
-        "Each step is fitted to what the steps before it deliver, and its errors hold given those. Temperature from 0 °C. The errors"
-        " allow for white noise plus a random walk."
-    )
-    columns = ["Step", "Coefficient", "Value", "Standard error", "Unit"]
-    return Table("Coefficients of the chain", columns, rows, note)
+    if any(step["bias_instability"] is not None for step in steps):
+        note += " Bias instability: minimum of the Allan deviation over 0.664. A filter lowers the random walk at 1 s, not at 100 s."
+    return results.Table(title, rows, STEP_COLUMNS, note)
 
 
 def claim_blocks(claims: "Claims") -> list[Block]:
@@ -194,7 +134,7 @@ def claim_blocks(claims: "Claims") -> list[Block]:
     return [Table("Printed claims", ["Claim", "Printed", "Ours", "Verdict"], rows, note)]
 
 
-def draw_steps(chain: "BellChain", runs: "tuple[BellRun, BellRun, BellRun]") -> Picture:
+def draw_steps(chain: "BellChain", runs: "tuple[BellRun, BellRun, BellRun]") -> "Drawing":
     """Draw the error of the rate before and after: at rest and turning over temperature, and over the applied rate."""
     from compensation.bell import apply_chain
 
@@ -220,13 +160,9 @@ def draw_steps(chain: "BellChain", runs: "tuple[BellRun, BellRun, BellRun]") -> 
         axes[0].set_ylabel("rate error (°/s)")
         axes[0].set_title("at rest", fontsize=10)
         axes[1].set_title("several rates", fontsize=10)
-        axes[2].set_title("turning", fontsize=10)
+        axes[2].set_title("constant rate", fontsize=10)
         axes[0].legend(markerscale=6, fontsize=8)
-    return draw(
-        made,
-        "Error of the rate after the rough step and after all steps, before the filter.",
-        "Three panels of rate error, before and after compensation.",
-    )
+        return made
 
 
 def draw_allan(chain: "BellChain", rest: "BellRun") -> Picture:
