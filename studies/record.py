@@ -93,7 +93,7 @@ class Record:
 
     def plot(self) -> "Figure":
         """Draw every column over time."""
-        from studies.reports.preview import draw_columns
+        from studies.reports.columns import draw_columns
 
         return draw_columns(self.columns)
 

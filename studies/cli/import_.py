@@ -1,10 +1,16 @@
-"""`hrg import`: laboratory files into the record format, by a map that states every change."""
+"""`hrg import`: laboratory files into the record format, by a map that states every change.
+
+With --json one object, schema `hrg.import/1`: `start` (of the clock, or null), `record`, `rows`, `columns` (each with `missing` values),
+`notes` (every change), and `axes` (name to record) where the columns name several. With --draft schema `hrg.import-draft/1`: `map`,
+`mapped`, `left_over`.
+"""
 
 from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
-from studies.cli.output import Answer, answers
+from studies.cli.output import answers
+from studies.results import Chapter, Column, Figure, Result, Sentence, Table, rows_of
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -16,6 +22,17 @@ if TYPE_CHECKING:
 
     Columns = Mapping[str, NDArray[np.float64]]
 
+FIRST_ROWS = 5
+RANGES = (
+    Column("column", "column"),
+    Column("low", "minimum", form=".8g"),
+    Column("high", "maximum", form=".8g"),
+    Column("step", "median step between rows", form=".3g"),
+    Column("missing", "missing values"),
+    Column("gaps", "gaps"),
+    Column("longest_s", "longest gap", "s", ".6g"),
+)
+
 
 @answers("hrg.import/1, with --draft hrg.import-draft/1")
 def import_(
@@ -23,14 +40,13 @@ def import_(
     map_: Annotated[str | None, Parameter(name="--map")] = None,
     out: str | None = None,
     draft: str | None = None,
-    preview: str | None = None,
-) -> Answer:
-    """Bring laboratory files into the record format, or draft the map that says how.
+) -> Result:
+    """Convert laboratory files to the record format, or draft the map that describes the conversion.
 
     First 'hrg import RAW --draft MAP.toml', then read and correct the map, then 'hrg import RAW --map MAP.toml --out RUN.csv'.
-    Several raw files, such as two loggers, are joined on their clocks onto the times of the first.
-    What was changed is listed in the header of the record. Columns that name an axis make one record for each: RUN_x.csv,
-    RUN_y.csv … All keys of a map: python -m pydoc studies.importing.mapping.
+    Several raw files, such as those of two loggers, are joined by their clocks on the times of the first. The header of the
+    record lists every change; --report shows each column over time. Columns that name an axis give one record per axis:
+    RUN_x.csv, RUN_y.csv … All keys of a map: python -m pydoc studies.importing.mapping.
 
     Parameters
     ----------
@@ -41,25 +57,22 @@ def import_(
     out : str
         The record to write.
     draft : str
-        Write a map drafted from the files instead; a file that exists is not overwritten.
-    preview : str
-        Write a page (HTML) that shows what was understood: every column over time, gaps, changes.
+        Draft a map from the files instead; an existing file is not overwritten.
     """
     from studies.errors import InputError
 
     if not raw:
-        raise InputError("the raw file is missing: 'hrg import RAW --draft MAP.toml' drafts a map from it.")
+        raise InputError("no raw file given: 'hrg import RAW --draft MAP.toml' drafts a map from it.")
     if draft is not None and map_ is None and out is None:
-        return (yield from _draft(raw, draft))
+        return _draft(raw, draft)
     if draft is not None or map_ is None or out is None:
         raise InputError("give either --draft MAP.toml, or both --map MAP.toml and --out RUN.csv.")
-    return (yield from _import(raw, map_, out, preview))
+    return _import(raw, map_, out)
 
 
-def _draft(raw: tuple[str, ...], path: str) -> Answer:
+def _draft(raw: tuple[str, ...], path: str) -> Result:
     import os
 
-    from studies.cli.output import say
     from studies.errors import InputError
     from studies.files.writing import write_text
     from studies.importing.draft import draft_map
@@ -68,51 +81,47 @@ def _draft(raw: tuple[str, ...], path: str) -> Answer:
         raise InputError(f"{path}: exists and is not overwritten; remove it or choose another name for the draft.")
     draft = draft_map(raw)
     write_text(path, draft.text)
-    yield {"schema": "hrg.import-draft/1", "map": path, "mapped": draft.mapped, "left_over": draft.left_over}
-    for note in draft.notes:
-        say(note)
-    say(
-        f"{path}: drafted. Mapped: {', '.join(draft.mapped) or 'nothing'}. Left over: {', '.join(draft.left_over) or 'nothing'}."
+    mapped, left = (", ".join(names) or "none" for names in (draft.mapped, draft.left_over))
+    return Result(
+        {"schema": "hrg.import-draft/1", "map": path, "mapped": draft.mapped, "left_over": draft.left_over},
+        "Draft of a map",
+        "What was recognized in the raw files.",
+        [
+            *(Sentence(note, "note") for note in draft.notes),
+            Sentence(f"{path}: drafted. Mapped columns: {mapped}. Unmapped columns: {left}."),
+            Sentence("Next: read the map, correct the lines marked CHECK, then run hrg import with --map and --out."),
+        ],
     )
-    say("Read it, correct what is marked with CHECK, then run hrg import with --map and --out.")
 
 
-def _import(raw: tuple[str, ...], path: str, out: str, preview: str | None) -> Answer:
-    from studies.cli.output import say
-    from studies.files.writing import write_text
+def _import(raw: tuple[str, ...], path: str, out: str) -> Result:
+    from pathlib import Path
+
     from studies.importing.join import import_records
     from studies.importing.mapping import load_map
     from studies.record import write_record
-    from studies.reports.preview import import_page
 
     import_map = load_map(path)
     if import_map.is_table:
-        return (yield from _import_table(raw, import_map, out, preview))
+        return _import_table(raw, import_map, out)
     records = import_records(raw, import_map)
-    files = {axis: _with_axis(out, axis) for axis in records}
+    files = {axis: str(Path(out).with_stem(f"{Path(out).stem}_{axis}")) if axis else out for axis in records}
     for axis, record in records.items():
         write_record(record, files[axis])
-    if preview is not None:
-        write_text(
-            preview, import_page({files[axis]: record.columns for axis, record in records.items()}, record.comments)
-        )
-        say(f"preview: {preview}")
-    described = [_payload(files[axis], record.columns, record.comments) for axis, record in records.items()]
     first = next(iter(records.values()))
-    start = first.start.isoformat() if first.start else None
-    more = {"axes": {axis: files[axis] for axis in records}} if len(records) > 1 else {}
-    yield {"schema": "hrg.import/1", "start": start, **described[0], **more}
-    for axis, record in records.items():
-        _show(files[axis], record.columns)
-    print("\n".join(record.comments))
+    return _show(
+        {files[axis]: record.columns for axis, record in records.items()},
+        first.comments,
+        first.start.isoformat() if first.start else None,
+        {"axes": files} if len(records) > 1 else {},
+    )
 
 
-def _import_table(raw: tuple[str, ...], import_map: "ImportMap", out: str, preview: str | None) -> Answer:
-    from studies.cli.output import say
+def _import_table(raw: tuple[str, ...], import_map: "ImportMap", out: str) -> Result:
+    """Convert a table of settled readings."""
     from studies.errors import InputError
     from studies.files.writing import write_text
     from studies.importing.join import import_table
-    from studies.reports.preview import import_page
 
     if len(raw) != 1:
         raise InputError(f"{import_map.path}: describes one table, but {len(raw)} raw files are given.")
@@ -120,40 +129,59 @@ def _import_table(raw: tuple[str, ...], import_map: "ImportMap", out: str, previ
     rows = zip(*(values.tolist() for values in columns.values()), strict=True)
     text = "".join(f"# {note}\n" for note in notes) + ",".join(columns) + "\n"
     write_text(out, text + "".join(",".join(f"{value:.12g}" for value in row) + "\n" for row in rows))
-    if preview is not None:
-        write_text(preview, import_page({out: columns}, notes))
-        say(f"preview: {preview}")
-    yield {"schema": "hrg.import/1", "start": None, **_payload(out, columns, notes)}
-    _show(out, columns)
-    print("\n".join(notes))
+    return _show({out: columns}, notes, None, {})
 
 
-def _with_axis(out: str, axis: str) -> str:
-    from pathlib import Path
-
-    return str(Path(out).with_stem(f"{Path(out).stem}_{axis}")) if axis else out
-
-
-def _payload(out: str, columns: "Columns", notes: "Sequence[str]") -> dict[str, Any]:
+def _show(records: "Mapping[str, Columns]", notes: "Sequence[str]", start: str | None, more: dict[str, Any]) -> Result:
     import numpy as np
 
-    return {
+    from studies.reports.columns import draw_columns
+
+    out, columns = next(iter(records.items()))
+    payload = {
+        "schema": "hrg.import/1",
+        "start": start,
         "record": out,
         "rows": len(next(iter(columns.values()))),
         "columns": {name: {"missing": int(np.isnan(v).sum())} for name, v in columns.items()},
         "notes": list(notes),
+        **more,
     }
+    chapters = []
+    for name, found in records.items():
+        rows = rows_of({key: values[:FIRST_ROWS] for key, values in found.items()})
+        caption = "All columns." + (" Shaded: no values." if "time_s" in found else "")
+        chapters.append(
+            Chapter(
+                name,
+                [
+                    Figure(lambda found=found: draw_columns(found), caption),  # type: ignore[misc]
+                    Table(f"{name}: {len(next(iter(found.values())))} rows", _ranges(found), RANGES),
+                    Table("First rows", rows, [Column(key, key, form=".10g") for key in found], where="page"),
+                ],
+            )
+        )
+    chapters.append(Chapter("Changes", [Sentence("\n".join(notes), "source")]))
+    lead = "The data as converted. Compare them with what you know about the run before you use them."
+    return Result(payload, "Import", lead, chapters)
 
 
-def _show(out: str, columns: "Columns") -> None:
+def _ranges(columns: "Columns") -> list[dict[str, Any]]:
+    """Range, usual step, missing values and, over time, gaps of each column."""
     import numpy as np
 
-    from studies.cli.output import print_table
+    from studies.reports.columns import find_gaps
 
     rows = []
     for name, values in columns.items():
         known = values[np.isfinite(values)]
-        span = (f"{known.min():.8g}", f"{known.max():.8g}") if len(known) else ("", "")
-        rows.append([name, *span, str(len(values) - len(known))])
-    count = len(next(iter(columns.values())))
-    print_table(f"{out}: {count} rows", ["Column", "Lowest", "Highest", "Missing"], rows)
+        row: dict[str, Any] = {"column": name, "missing": values.size - known.size}
+        if known.size:
+            row |= {"low": known.min(), "high": known.max()}
+        if known.size > 1:
+            row["step"] = np.median(np.abs(np.diff(known)))
+        if "time_s" in columns:
+            gaps = find_gaps(columns["time_s"], values)
+            row |= {"gaps": len(gaps), "longest_s": float(np.max(np.ptp(gaps, axis=1))) if len(gaps) else None}
+        rows.append(row)
+    return rows

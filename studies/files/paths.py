@@ -19,7 +19,7 @@ from studies.sweeps.sealed import SealedFile
 
 OUTPUTS = {
     # argument of a command that names what is written: how people give it
-    **{name: f"--{name}" for name in ("out", "save", "report", "emit", "draft", "preview", "fmu", "c")},
+    **{name: f"--{name}" for name in ("out", "save", "report", "emit", "draft", "fmu", "c")},
     "map_file": "--map",
 }
 SHIPPED = ("cards", "sweeps/templates")

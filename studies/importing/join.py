@@ -253,13 +253,13 @@ def shift_between(base: ClockedFile, other: ClockedFile) -> float:
     if base.origin is None or other.origin is None:
         lost = base if base.origin is None else other
         raise InputError(
-            f"{lost.path}: counts from 0 while another file has dates; say when its clock was started ('start' in the map)."
+            f"{lost.path}: its clock counts from 0 while another file has dates; give the time at which it started ('start' in the map)."
         )
     shift = seconds_between(base.origin, other.origin, other.path)
     first, last = other.time[0] + shift, other.time[-1] + shift
     if other is not base and (last < base.time[0] or first > base.time[-1]):
         raise InputError(
-            f"{other.path}: lies wholly {'before' if last < base.time[0] else 'after'} {base.path} (from {first - base.time[0]:g}"
+            f"{other.path}: is entirely {'before' if last < base.time[0] else 'after'} {base.path} (from {first - base.time[0]:g}"
             f" to {last - base.time[0]:g} s of the record); check the dates, 'start' and clock_offset_s."
         )
     return shift

@@ -182,7 +182,7 @@ def _read_file(section: TomlTable, is_table: bool) -> FileMap:
     targets = TABLE_TARGETS if is_table else TARGETS
     columns = tuple(_read_column(part, targets) for part in section.sections("column", COLUMN_KEYS))
     if not columns:
-        raise InputError(f"{where}: no [[file.column]] says which column becomes what; add one.")
+        raise InputError(f"{where}: a [[file.column]] table that assigns a column is missing; add one.")
     missing = [target for target in TABLE_TARGETS if target not in {column.target for column in columns}]
     if is_table and missing:
         raise InputError(f"{where}: a table needs a column that becomes {' and one that becomes '.join(missing)}.")
@@ -248,7 +248,7 @@ def _read_column(section: TomlTable, targets: Sequence[str]) -> ColumnMap:
     offset = section.number("offset", 0.0)
     axis = section.text("axis") if "axis" in section else ""
     if axis and not axis.isalnum():
-        raise InputError(f"{section.where}: axis = '{axis}' becomes part of a file's name; take letters and digits.")
+        raise InputError(f"{section.where}: axis = '{axis}' becomes part of a file name; use letters and digits only.")
     return ColumnMap(section.text("from"), target, unit, scale, offset, sign, resample, settings, axis)
 
 

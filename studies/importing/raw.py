@@ -126,7 +126,7 @@ def read_parts(paths: Sequence[str | Path], file: "FileMap") -> RawTable:
     for other in tables[1:]:
         if list(other.cells) != list(first.cells):
             raise InputError(
-                f"{other.path}: its columns are not those of {first.path}, which it continues; give it a [[file]] of its own."
+                f"{other.path}: its columns differ from those of {first.path}; give it a [[file]] table of its own."
             )
     cells = pd.concat([table.cells for table in tables], ignore_index=True)
     return RawTable(tuple(part for table in tables for part in table.parts), cells, first.decimal, first.missing)
@@ -205,7 +205,7 @@ def read_sheet(path: str | Path, sheet: str | None) -> list[list[str]]:
         if cells > MOST_CELLS:
             raise InputError(
                 f"{path}: its sheet reaches to row {page.max_row}, column {page.max_column}; {MOST_CELLS:,} cells are the"
-                " most. Delete what stands far from the table, or export the sheet as CSV."
+                " most. Delete cells far from the table, or export the sheet as CSV."
             )
         return [[_cell_text(value) for value in row] for row in page.iter_rows(values_only=True)]
     except InputError:

@@ -16,6 +16,6 @@ def bring_in(raw, folder, *edits, preview=False):
         assert old in text
         text = text.replace(old, new)
     draft.write_text(text, encoding="utf-8")
-    seen = ["--preview", str(folder / "preview.html")] if preview else []
+    seen = ["--report", str(folder / "preview.html")] if preview else []
     assert main(["import", str(DATA / raw), "--map", str(draft), "--out", str(run), *seen]) == 0
     return run

@@ -53,7 +53,7 @@ def test_a_drafted_map_reads_a_german_logger(tmp_path, capsys):
     t = np.arange(0.0, 300.0)
     write_logger(raw, t)
     assert hrg_import(raw, "--draft", out) == 0
-    assert "Left over: Bemerkung" in capsys.readouterr().err
+    assert "Unmapped columns: Bemerkung" in capsys.readouterr().out
     assert hrg_import(raw, "--map", out, "--out", run, "--json") == 0
     told = json.loads(capsys.readouterr().out)
     assert (told["schema"], told["rows"], told["start"]) == ("hrg.import/1", 300, START.isoformat())
@@ -149,10 +149,10 @@ def test_a_clock_without_a_date_needs_start(tmp_path):
     path = tmp_path / "map.toml"
     text = MAP.format(start="2026-01-31T23:58:00", offset=0.0, rate=0.0)
     path.write_text(text.replace("start = 2026-01-31T23:58:00\n", ""))
-    with pytest.raises(InputError, match="say when its clock was started"):
+    with pytest.raises(InputError, match="say the time at which it started"):
         import_records([str(one), str(two)], load_map(path))[""]
     path.write_text(text.replace("23:58:00", "12:00:00"))
-    with pytest.raises(InputError, match="lies wholly before"):
+    with pytest.raises(InputError, match="is entirely before"):
         import_records([str(one), str(two)], load_map(path))[""]
 
 
@@ -655,14 +655,14 @@ def test_a_time_that_no_clock_showed_is_named(tmp_path):
 
 def test_dropouts_are_left_empty_counted_and_marked(tmp_path, capsys):
     """A counter that loses its signal writes 0: twice for one row, once for three, and an hour has no rows at all."""
-    from studies.reports.gaps import find_gaps
+    from studies.reports.columns import find_gaps
 
     t = [10.0 * k for k in range(1000) if not 500 <= k < 860]
     lost = {100, 200, 201, 202, 900}
     raw, path, run = tmp_path / "raw.csv", tmp_path / "map.toml", tmp_path / "run.csv"
     raw.write_text("time_s,frequency Hz\n" + "".join(f"{s},{0 if s / 10 in lost else 4430.5}\n" for s in t))
     assert hrg_import(raw, "--draft", path) == 0
-    assert hrg_import(raw, "--map", path, "--out", run, "--preview", tmp_path / "page.html") == 0
+    assert hrg_import(raw, "--map", path, "--out", run, "--report", tmp_path / "page.html") == 0
     said = capsys.readouterr().out
     assert "5 readings of 'frequency Hz' are 0, a dropout: left empty" in said
     record = read_record(run)
@@ -671,7 +671,7 @@ def test_dropouts_are_left_empty_counted_and_marked(tmp_path, capsys):
     expected = [[990, 1010], [1990, 2030], [4990, 8600], [8990, 9010]]
     assert find_gaps(record["time_s"], record["frequency_Hz"]).tolist() == expected
     page = (tmp_path / "page.html").read_text()
-    assert "Longest gap (s)" in page
+    assert "longest gap (s)" in page
     assert "3610" in page
     raw.write_text("time_s,frequency_Hz\n0,4430\n1,0\n")
     with pytest.raises(InputError, match=r"line 3.*cannot be a reading"):

@@ -14,7 +14,6 @@ from studies.results.terminal import print_result
 
 OLD = {
     # commands that still print for themselves and have no page, and why
-    "import": "its --preview is its page",
     "study run": "hrg study report makes its page",
     "study status": "hrg study report makes its page",
     "study report": "writes a page",

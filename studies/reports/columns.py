@@ -1,0 +1,64 @@
+"""Pictures of records: every column over time, with its gaps."""
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from studies.reports import style
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+Array = NDArray[np.float64]
+Columns = Mapping[str, Array]
+FEW = 300  # rows that are drawn as points
+LONG = 10.0  # usual steps between two values that make a gap, whatever the rows between them hold
+SKIPPED = 1.5  # the same where rows between them are empty
+
+
+def draw_columns(columns: Columns) -> "Figure":
+    """Return a figure with every column over time, or over the first column of a table of settled readings."""
+    names = list(columns)
+    timed = names[0] == "time_s"
+    x, label = (columns["time_s"] / 3600, "Time (h)") if timed else (columns[names[0]], names[0])
+    shown = names[1:]
+    rows = style.few_rows(len(x))
+    mark = "-" if timed and len(x) >= FEW else "."
+    with style.figure(len(shown), height=1.9 * len(shown) + 0.6, squeeze=False, sharex=True) as (figure, axes):
+        for axis, name in zip(axes[:, 0], shown, strict=True):
+            drawn = x[rows], columns[name][rows]
+            if timed:
+                gaps = find_gaps(columns["time_s"], columns[name]) / 3600
+                drawn = _broken(*drawn, gaps)
+                spans = [(begin, end - begin) for begin, end in gaps]
+                axis.broken_barh(
+                    spans, (0, 1), transform=axis.get_xaxis_transform(), color=style.ORANGE, alpha=0.35, linewidth=0.8
+                )
+            axis.plot(*drawn, mark, color=style.BLUE, linewidth=0.9)
+            axis.set_title(name.replace("$", r"\$"), fontsize=9, loc="left")
+        axes[-1, 0].set_xlabel(label.replace("$", r"\$"))
+        made: Figure = figure
+    return made
+
+
+def _broken(x: Array, y: Array, gaps: Array) -> tuple[Array, Array]:
+    """Return a line that is interrupted where its column has gaps."""
+    at = np.searchsorted(x, gaps[:, 0], side="right")
+    return np.insert(x, at, gaps[:, 0]), np.insert(y, at, np.nan)
+
+
+def find_gaps(time: Array, values: Array) -> Array:
+    """Return begin and end of every gap of a column, (k, 2): the times of the values beside it, or the ends of the record."""
+    rows = np.flatnonzero(np.isfinite(values))
+    if rows.size < 2:
+        return np.array([[time[0], time[-1]]]) if time.size > 1 else np.empty((0, 2))
+    steps = np.diff(time[rows])
+    usual = float(np.median(steps))
+    at = np.flatnonzero((steps > LONG * usual) | ((np.diff(rows) > 1) & (steps > SKIPPED * usual)))
+    inner = np.column_stack([time[rows[at]], time[rows[at + 1]]])
+    ends = [(time[0], time[rows[0]]), (time[rows[-1]], time[-1])]
+    outer = [end for end in ends if end[1] - end[0] > usual / 2]
+    found = np.concatenate([inner, np.array(outer).reshape(-1, 2)])
+    return np.asarray(found[np.argsort(found[:, 0])])
