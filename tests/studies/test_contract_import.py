@@ -149,7 +149,7 @@ def test_a_clock_without_a_date_needs_start(tmp_path):
     path = tmp_path / "map.toml"
     text = MAP.format(start="2026-01-31T23:58:00", offset=0.0, rate=0.0)
     path.write_text(text.replace("start = 2026-01-31T23:58:00\n", ""))
-    with pytest.raises(InputError, match="say the time at which it started"):
+    with pytest.raises(InputError, match="give the time at which it started"):
         import_records([str(one), str(two)], load_map(path))[""]
     path.write_text(text.replace("23:58:00", "12:00:00"))
     with pytest.raises(InputError, match="is entirely before"):
