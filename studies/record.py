@@ -227,7 +227,7 @@ def write_record(record: Record, path: str | Path, progress: Callable[[int], Non
     notes += [f"# resolution {name}: {value!r}" for name, value in record.resolution.items()]
     with written_whole(path) as file:
         file.write("".join(f"{note}\n" for note in [*notes, ",".join(record.columns)]).encode())
-        for begin in range(0, len(record), 100_000):
+        for begin in range(0, max(map(len, record.columns.values()), default=0), 100_000):
             part = np.column_stack([values[begin : begin + 100_000] for values in record.columns.values()])
             lines = [",".join([repr(x) if x == x else "" for x in row]) for row in part.tolist()]
             file.write(("\n".join(lines) + "\n").encode())

@@ -54,7 +54,8 @@ def test_no_more_is_left_than_is_said(hours, lags):
     assert len(soaks) >= 5
     for soak in soaks:
         inside = (record["time_s"] >= soak.start) & (record["time_s"] <= soak.end)
-        assert np.abs(away[inside]).max() < 1.1 * 0.05
+        if not soak.extrapolated_K:  # an extrapolated state is where the hold leads, not where its rows are
+            assert np.abs(away[inside]).max() < 1.1 * 0.05
         exact = _frequency(round(soak.temperature_degC))
         assert abs(soak.frequency_Hz - exact) < 1.2 * soak.error_Hz + 5e-4
     assert soaks[0].time_constant == pytest.approx(max(3000.0, *lags), rel=0.06)

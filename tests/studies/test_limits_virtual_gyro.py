@@ -275,11 +275,11 @@ def test_a_material_without_heat_capacity_is_asked_for_by_its_key():
 def test_unusable_runs_are_refused(card, law, tmp_path):
     with pytest.raises(ThermalError, match=r"reaches -80 °C at 0 s, outside the range of fused-silica"):
         run(card, law, "step 20 -80 1h")
-    with pytest.raises(InputError, match="the rate must be positive"):
+    with pytest.raises(InputError, match="time between rows must be positive"):
         run(card, law, rate=0.0)
-    with pytest.raises(InputError, match="choose a lower rate"):
+    with pytest.raises(InputError, match="take longer rows"):
         run(card, law, rate=1e6)
-    with pytest.raises(InputError, match="choose a higher rate"):
+    with pytest.raises(InputError, match="take shorter rows"):
         run(card, law, rate=1e-6)
     with pytest.raises(InputError, match="there is no such file"):
         load_profile(str(tmp_path / "absent.csv"))
