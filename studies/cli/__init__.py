@@ -33,9 +33,9 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "fit frequency": ("studies.cli.fit_frequency:fit_frequency", "f(T) and its inverse from a steady-state table."),
     "fit bias": (
         "studies.cli.fit_bias:fit_bias",
-        "Bias over frequency or temperature and its rate, selected stepwise.",
+        "Bias over frequency or temperature and its rate.",
     ),
-    "fit thermal": ("studies.cli.fit_thermal:fit_thermal", "Lags of the resonator behind its housing, from records."),
+    "fit thermal": ("studies.cli.fit_thermal:fit_thermal", "Thermal time constants of a gyro from records."),
     "fit cross-damping": ("studies.cli.fit_cross_damping:fit_cross_damping", "Cross-damping bias over temperature."),
     "fit whole-angle": (
         "studies.cli.fit_whole_angle:fit_whole_angle",

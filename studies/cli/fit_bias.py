@@ -1,8 +1,16 @@
-"""`hrg fit bias`: the zero-rate output as a function of the gyro's own frequency and its rate."""
+"""`hrg fit bias`: the zero-rate output as a function of the gyro's own frequency and its rate of change.
+
+With --json one object, schema `hrg.fit-bias/1`. `methods.guarded` and `methods.paper` hold coefficients in the unit of `output` per
+powers of Hz and Hz/s, the `path` of the selection, and stability `before` and `after` with their ratio, on the fitted data and held
+out (null when nothing can be held out). `over` is the column that the bias is a function of, `reference` its value from which changes
+are counted; a temperature acts behind `lag_s` and a hysteresis loop of `play_half_width_degC` (0: none). `allan` is of the longest run, N in
+unit·√s, B in unit, K in unit/√s; null for runs too short for it.
+"""
 
 from typing import TYPE_CHECKING, Any, Literal
 
-from studies.cli.output import Answer, answers
+from studies.cli.output import answers
+from studies.results import Chapter, Result, Sentence
 
 if TYPE_CHECKING:
     from studies.bias import BiasStudy, Judged, Stability
@@ -18,43 +26,40 @@ def fit_bias(
     over: Literal["auto", "frequency", "temperature"] = "auto",
     save: str | None = None,
     emit: str | None = None,
-    report: str | None = None,
-) -> Answer:
-    """Fit the bias over the change of frequency and its rate, stepwise (HRG paper, equations 19 to 22).
+) -> Result:
+    """Fit the bias over the change of frequency and its rate, with stepwise selection (HRG paper, equations 19 to 22).
 
-    The records are of a gyro at rest while its temperature changes: time_s, bias_deg_per_h or measured_rate_deg_per_s,
-    and frequency_Hz or, for a gyro whose frequency is not measured, a temperature; a lag and a hysteresis
-    loop are added where they improve the fit. Terms are selected in two ways, shown side by side: as the paper does, and guarded against
-    autocorrelated noise. Give several runs, cooling and warming: then whole runs are held out.
+    The records are of a gyro at rest while its temperature changes: time_s, bias_deg_per_h or measured_rate_deg_per_s, and
+    frequency_Hz or, if the frequency is not measured, a temperature; with a temperature, a lag and a hysteresis loop are added if
+    they improve the fit. Terms are selected in two ways, shown side by side: as in the paper, and guarded against autocorrelated
+    noise. Give several runs, cooling and warming, so that whole runs can be held out.
 
     Parameters
     ----------
     data : str
         One or more records (CSV).
     method : str
-        Which selection the saved model takes.
+        Selection whose model is saved.
     average : float
-        Seconds that are averaged into one row before the fit: 100, or less for a short run.
+        Seconds averaged into one row before the fit; by default 100, or less for a short run.
     window : float
-        Seconds over which the rate is taken: three times the average unless given.
+        Seconds over which the rate is taken; by default three times the average.
     causal : bool
-        Take the rate from past samples only, as firmware must; it lags by half the window.
+        Take the rate from past samples only, as firmware must; it then lags by half the window.
     over : str
-        What the bias is a function of; auto takes the frequency where every record has it, else a temperature.
+        Variable of the fit; auto is the frequency if every record has it, else a temperature.
     save : str
-        Write the model (TOML), for hrg compensate.
+        Write the model (TOML) for hrg compensate.
     emit : str
         Write the model as C99 source for firmware.
-    report : str
-        Write a page (HTML).
     """
     from studies.bias import study_bias
-    from studies.cli.output import print_table, say
+    from studies.cli.output import say
     from studies.errors import InputError
     from studies.files.writing import write_text
     from studies.models import emit_c, write_model
     from studies.record import read_record
-    from studies.reports import bias as page
+    from studies.reports import bias as parts
 
     if not data:
         raise InputError("name at least one record (CSV) of a gyro at rest while its temperature changes.")
@@ -69,30 +74,34 @@ def fit_bias(
     if emit is not None:
         write_text(emit, emit_c(study.model))
         say(f"C source: {emit}")
-    if report is not None:
-        write_text(report, page.bias_page(study, ", ".join(data), method))
-        say(f"report: {report}")
-    yield _payload(study, method, data)
-    tables = [
-        page.path_table(study.by(method)),
-        page.coefficients_table(study.by(method), study.output),
-        page.gain_table(study),
-    ]
-    tables += [page.noise_table(study)] if study.before else []
-    for block in tables:
-        print_table(block.caption, block.columns, block.rows, block.note)
-    print(page.verdict(study, method))
+    judged, other = study.by(method), study.by("paper" if method == "guarded" else "guarded")
+    variable = judged.fit.variable.name
+    return Result(
+        _payload(study, method, data),
+        f"Bias over {variable} and its rate",
+        f"Zero-rate output of {', '.join(data)}, with terms selected from the nine of the HRG paper's equation (21).",
+        [
+            parts.facts(study, method),
+            Sentence(parts.verdict(study, method)),
+            Chapter("Before and after", [parts.runs_figure(study, method), parts.gain_table(study)]),
+            Chapter(
+                "Selection of terms",
+                [parts.path_table(judged), parts.path_table(other, "page"), Sentence(parts.PATH_NOTE, "note", "page")],
+            ),
+            Chapter(
+                "Coefficients",
+                [
+                    parts.coefficients_table(judged, study.output),
+                    Sentence(parts.how_rows_were_made(study), "note", "page"),
+                ],
+            ),
+            Chapter("Stability", parts.stability_parts(study)),
+        ],
+        sources=parts.SOURCES,
+    )
 
 
 def _payload(study: "BiasStudy", method: str, data: tuple[str, ...]) -> dict[str, Any]:
-    """Return the object of schema hrg.fit-bias/1.
-
-    `methods.guarded` and `methods.paper` hold coefficients in the unit of `output` per powers of Hz and Hz/s, the
-    selection's `path`, and stability `before` and `after` with their ratio, on the fitted data and held out (null
-    when nothing can be held out). `over` is the column that the bias is a function of, `reference` its value from which
-    changes are counted; a temperature acts behind `lag_s` and a loop of `play_half_width_degC` (0: none). `allan` is of
-    the longest run, N in unit·√s, B in unit, K in unit/√s; null for runs too short for it.
-    """
     return {
         "schema": "hrg.fit-bias/1",
         "data": data,

@@ -348,7 +348,7 @@ def test_every_run_is_drawn():
     from studies.reports.bias import runs_figure
 
     study = study_bias([make_record(k, cooling=k % 2 == 0) for k in range(4)])
-    figure = runs_figure(study, "guarded").figure
+    figure = runs_figure(study, "guarded").draw()
     assert [axes.get_title() for axes in figure.axes if axes.get_title()] == [f"run {k}" for k in range(1, 5)]
 
 
