@@ -163,13 +163,13 @@ def prepare_run(
     f = blocks.columns[variable.name]
     if f.size < 3:
         raise CompensationError(
-            f"averaging over {width:g} s leaves {f.size} rows, and three are the least; record longer or average less."
+            f"averaging over {width:g} s leaves {f.size} rows, but at least three are needed; record longer or average less."
         )
     f = follow_lag(blocks.time, f, memory.lag)
     play = follow_play(f, memory.play) - f
     if np.ptp(blocks.columns["bias"]) <= 1e-13 * np.max(np.abs(blocks.columns["bias"])):
         raise CompensationError(
-            f"the bias is constant ({blocks.columns['bias'][0]:g}): nothing can be learnt from it; check the column."
+            f"the bias is constant ({blocks.columns['bias'][0]:g}): there is nothing to fit; check the column."
         )
     window = max(window, 3 * width, 2.05 * float(np.median(np.diff(blocks.time))))  # three rows, in bursts too
     derivative = differentiate(blocks.time, f, window, causal=causal)
@@ -226,8 +226,8 @@ class BiasDesign:
             self.constants[rows, k] = 1.0
         if np.ptp(self.state) <= 1e-12 * np.max(np.abs(self.state)):
             raise CompensationError(
-                f"the {self.variable.name} is constant ({self.state[0]:g} {self.variable.unit}): nothing can be learnt from"
-                " it; record a run in which the temperature changes."
+                f"the {self.variable.name} is constant ({self.state[0]:g} {self.variable.unit}): there is nothing to fit;"
+                " record a run in which the temperature changes."
             )
         if self.bias.size <= len(runs) + len(self.names):
             raise CompensationError(

@@ -177,8 +177,8 @@ def invert(curve: Callable[[Array], Array], span: tuple[float, float], frequency
     turn = find_turn(curve, span)
     if turn is not None:
         raise CompensationError(
-            f"the curve turns round at {turn:.1f} °C, so two temperatures have the same frequency there and it cannot"
-            " be inverted; fit a narrower range of temperature or another order."
+            f"the curve has a turning point at {turn:.1f} °C: two temperatures have the same frequency there, so it cannot"
+            " be inverted. Fit a narrower range of temperature or another order."
         )
     low, high = np.sort(curve(np.array(span)))
     known = np.isfinite(frequency)
@@ -240,7 +240,7 @@ def fit_frequency(
         raise CompensationError(f"a frequency must be positive, not {f[f <= 0][0]:g} Hz.")
     if np.ptp(f) == 0:
         raise CompensationError(
-            f"'frequency' is constant ({f[0]:g} Hz): it says nothing of temperature; check the column."
+            f"'frequency' is constant ({f[0]:g} Hz): it does not depend on temperature; check the column."
         )
     coefficients, covariance = polynomial.about(reference_temperature_degC)
     return FrequencyFit(

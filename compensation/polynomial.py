@@ -118,7 +118,7 @@ def fit_polynomial(
     distinct = count_apart(x)
     if np.ptp(x) == 0:
         raise CompensationError(
-            f"'{name}' is constant ({x[0]:g}): nothing can be learnt from it; record data in which it varies."
+            f"'{name}' is constant ({x[0]:g}): there is nothing to fit; record data in which it varies."
         )
     if distinct <= order or x.size <= order + 1:
         raise CompensationError(

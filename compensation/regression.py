@@ -186,7 +186,7 @@ def refuse_constant_columns(X: Array, names: Sequence[str]) -> None:
     for name, column in zip(names, X.T, strict=True):
         if np.ptp(column) <= 1e-13 * np.max(np.abs(column)):
             raise CompensationError(
-                f"column '{name}' is constant ({column[0]:g}): nothing can be learnt from it; leave it out or "
+                f"column '{name}' is constant ({column[0]:g}): it determines nothing; leave it out or "
                 "record data in which it varies."
             )
 

@@ -217,7 +217,7 @@ def find_output(records: Sequence[Record]) -> str:
         where = record.path or "record"
         if "rate_deg_per_s" in record and np.any(np.abs(record["rate_deg_per_s"]) > LARGEST_REST):
             raise InputError(
-                f"{where}: rate_deg_per_s is not zero; a bias is fitted to runs at rest ('hrg fit scale' else)."
+                f"{where}: rate_deg_per_s is not zero; bias is fitted to runs at rest. Use hrg fit scale for runs with an applied rate."
             )
     for name in OUTPUTS:
         if all(name in record for record in records):

@@ -97,8 +97,8 @@ def settled_table(soaks: Sequence[Soak], where: str, advice: str = "") -> tuple[
     T, f = np.array([s.temperature_degC for s in soaks]), np.array([s.frequency_Hz for s in soaks])
     if np.count_nonzero(np.diff(np.sort(T)) > 0.5) < 1:
         raise InputError(
-            f"{where}: {len(soaks)} settled {'part' if len(soaks) == 1 else 'parts'}, where a fit over temperature needs several temperatures; {advice}soak longer, or"
-            " allow more to be left (--left), or give a shorter --time-constant."
+            f"{where}: found {len(soaks) or 'no'} settled {'part' if len(soaks) == 1 else 'parts'}; a fit over temperature needs at least two"
+            f" temperatures 0.5 °C apart. {advice[:1].upper()}{advice[1:]}{'S' if not advice else 's'}oak longer, raise --left, or lower --time-constant."
         )
     return T, f, float(np.sqrt(12.0) * max(s.error_Hz for s in soaks))
 
@@ -121,7 +121,7 @@ def advise_hold(records: Sequence[Record], time_constant: float, tolerance: floa
     found = [_settling(one, rows, tolerance) for one, rows in moving if np.ptp(one.time[rows]) > 0.9 * longest]
     speed, own, needed = max(found, key=lambda one: one[2])  # the temperature that settles most slowly
     moves = (
-        f"the frequency still moves {speed * HOUR:.2g} Hz/h at the end of the longest hold that has not settled,"
+        f"the frequency still drifts by {speed * HOUR:.2g} Hz/h at the end of the longest hold that has not settled,"
         f" {longest / HOUR:.1f} h"
     )
     if not np.isfinite(own):

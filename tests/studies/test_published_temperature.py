@@ -76,4 +76,4 @@ def test_a_curve_that_turns_round_is_not_inverted(tmp_path, capsys):
     if (tmp_path / "m.toml").exists():
         (tmp_path / "r.csv").write_text("time_s,frequency_Hz\n0,4428\n1,4429\n")
         assert main(["temperature", str(tmp_path / "m.toml"), str(tmp_path / "r.csv"), "--json"]) == 2
-    assert "turns round" in capsys.readouterr().err
+    assert "turning point" in capsys.readouterr().err

@@ -110,4 +110,4 @@ def test_the_command_takes_a_record(run, tmp_path, capsys):
     slope = float(run.law.slope(273.15) * run.law.frequency(273.15))
     assert answer["coefficients"][1] == pytest.approx(slope, rel=2e-3)
     assert main(["fit", "frequency", str(path), "--time-constant", "1e7"]) == 2
-    assert "settled parts, where a fit over temperature needs several temperatures" in capsys.readouterr().err
+    assert "a fit over temperature needs at least two temperatures" in capsys.readouterr().err
