@@ -97,7 +97,7 @@ def fit_frequency(
     return Result(
         payload,
         "Frequency over temperature",
-        f"{len(f)} settled points of {table} from {low:g} to {high:g} °C, fitted with a {parts.name_order(fit.order)}.",
+        f"{len(f)} settled points of {table} from {low:.4g} to {high:.4g} °C, fitted with a {parts.name_order(fit.order)}.",
         [
             parts.facts(study),
             Sentence(parts.order_sentence(study)),

@@ -33,7 +33,7 @@ def facts(study: "FrequencyStudy") -> Facts:
     middle = float(np.mean(fit.temperature_range_degC))
     return Facts(
         [
-            (f"Slope at {middle:g} °C", f"{float(fit.slope_ppm(middle)):.2f} ppm/°C", "middle of the range"),
+            (f"Slope at {middle:.3g} °C", f"{float(fit.slope_ppm(middle)):.2f} ppm/°C", "middle of the range"),
             ("Largest temperature error", f"{np.abs(study.error_degC).max():.3f} °C", "temperature from frequency"),
             ("Leave-one-out error", f"{fit.leave_one_out_rms:.4f} Hz", "rms of points left out of the fit"),
             ("Order supported by the data", name_order(study.orders.recommended), "F-test at the 5 % level"),
@@ -61,7 +61,7 @@ def inverse_table(study: "FrequencyStudy") -> Table:
     rows = rows_of(
         {
             "frequency": study.frequency,
-            "actual": study.temperature_degC,
+            "actual": np.round(study.temperature_degC, 3),
             "calculated": study.calculated_degC,
             "error": study.error_degC,
             "residual": study.fit.residuals,
@@ -192,7 +192,7 @@ def _extrapolation(study: "FrequencyStudy", other: "FrequencyFit") -> Figure:
 
     caption = (
         f"Temperature read with the wrong one of the two polynomials. Outside the measured range they differ by {differ(low - BEYOND)}"
-        f" at {low - BEYOND:g} °C and by {differ(high + BEYOND)} at {high + BEYOND:g} °C: do not extrapolate either."
+        f" at {low - BEYOND:.3g} °C and by {differ(high + BEYOND)} at {high + BEYOND:.3g} °C: do not extrapolate either."
     )
     return Figure(draw, caption, "Difference of two fits: small inside the measured range, large outside.")
 
