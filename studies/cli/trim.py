@@ -1,4 +1,4 @@
-"""`hrg trim`: measured splits to a plan of cuts.
+"""`hrg trim`: a plan of trimming cuts from measured frequency splits.
 
 With --json one object, schema `hrg.trim/1`: `card`, `temperature_degC`, `goal_Hz`, `cut`; `before` and the round's `after`, lists of {harmonic,
 frequency_Hz, split_Hz, error_Hz, most_Hz, slow_axis_deg}, `most_Hz` not exceeded in 95 of 100 cases; `rounds` of {share, mass_ug, cuts, after,
@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import Parameter
 
-from studies.cli.output import Answer, answers
+from studies.cli.output import answers
+from studies.results import Chapter, Column, Facts, Figure, Result, Sentence, Table
 
 if TYPE_CHECKING:
     from shell.resonator import Resonator
@@ -20,6 +21,22 @@ if TYPE_CHECKING:
     from studies.trim import CardPlan
 
 MANY = Parameter(consume_multiple=True)
+CUTS = (
+    Column("number", "cut"),
+    Column("azimuth_deg", "azimuth", "°", ".2f"),
+    Column("height_mm", "height z", "mm", ".3f"),
+    Column("mass_ug", "mass", "µg", ".3f"),
+    Column("depth_um", "depth", "µm", ".3f"),
+    Column("done", "done"),
+)
+STATES = (
+    Column("state", "state"),
+    Column("harmonic", "n"),
+    Column("split_Hz", "split", "mHz", ".3f", scale=1e3),
+    Column("error_Hz", "standard error", "mHz", ".3f", scale=1e3),
+    Column("most_Hz", "95 % upper limit", "mHz", ".3f", scale=1e3),
+    Column("slow_axis_deg", "slow axis", "°", ".2f"),
+)
 
 
 @answers("hrg.trim/1")
@@ -46,14 +63,13 @@ def trim(
     gain: float = 1.0,
     temperature: float | None = None,
     out: str | None = None,
-    report: str | None = None,
-) -> Answer:
-    """Plan the cuts that null measured splits with the least mass, keep the balance, and do not overshoot.
+) -> Result:
+    """Plan the cuts that null measured splits with the least mass, preserve the balance, and do not overshoot.
 
-    Make the cuts, measure, and plan again with the new splits. What removing material does depends on where it is removed:
-    off the rim's edge or a face it takes strain energy along, a tooth hardly any. A narrow, deep groove also relieves stress
-    beside it, which can cancel or reverse its effect; this is solved for the planned depth. Wide, shallow cuts and teeth are
-    the most predictable.
+    Make the cuts, measure, and plan the next round from the new splits. The effect of a cut depends on its place: off the edge
+    or a face it also removes strain energy; a tooth carries almost none. A narrow, deep groove relieves stress beside it, which
+    can cancel or reverse its effect; the plan solves this for the planned depth. Wide, shallow cuts and teeth are the most
+    predictable.
 
     Parameters
     ----------
@@ -62,55 +78,54 @@ def trim(
     split : tuple[float, ...]
         Measured splits in Hz, one for each --harmonic.
     axis : tuple[float, ...]
-        Azimuths in degrees of an antinode of the slower mode of each.
+        Azimuth in degrees of an antinode of the slower mode, one for each split.
     harmonic : tuple[int, ...]
-        Their harmonics n.
+        Harmonic n of each split.
     reading_error : float
         Standard error of the splits in Hz.
     scan : str
-        What hrg scan --json wrote, instead of --split and --axis: the splits of --harmonic with its intervals.
+        Output of hrg scan --json, instead of --split and --axis: the splits of --harmonic and their intervals.
     goal : float
-        Split in Hz that is good enough.
+        Largest acceptable split in Hz.
     cut : str
-        mass (teeth, lumps, added or taken), edge (off the rim, through the wall), inner or outer (off that face).
+        mass (unstrained mass, such as teeth or lumps), edge (off the rim, through the wall), inner or outer (off that face).
     position : tuple[float, ...]
-        Where along the meridian cuts may be made, 0 ... 1 (rim).
+        Permitted positions of cuts along the meridian, 0 ... 1 (rim).
     width_mm : float
-        Width of a cut along the circle.
+        Width of a cut along the circumference.
     length_mm : float
         Length of a cut along the meridian.
     depth_limit : float
-        Share of the wall that cuts may take.
+        Largest depth of a cut, as a fraction of the wall.
     teeth : int
-        Number of teeth at the rim, the only places for cuts then.
+        Number of teeth at the rim; cuts are then made on teeth only.
     tooth_azimuth : float
         Azimuth of the first tooth in degrees.
     tooth_limit_ug : float
-        Most that may be taken off each tooth.
+        Largest mass to remove from a tooth.
     unbalance : tuple[str, ...]
-        Known harmonics of the mass, such as 1:120@35 (k = 1, 120 µg at 35°); those that are not given are not changed.
+        Known mass imbalance to correct, by harmonic, such as 1:120@35 (k = 1, 120 µg at 35°); other harmonics are preserved.
     removal_error : float
         Relative standard error of the mass of each cut.
     gain_error : float
-        Relative standard error that all cuts share.
+        Relative standard error common to all cuts.
     gain : float
-        Measured over predicted change of the split in the last round; negative if it changed the other way.
+        Measured over predicted change of the split in the last round; negative if the split changed in the opposite direction.
     temperature : float
         Temperature in °C; the card's reference temperature unless given.
     out : str
-        CSV of the cuts to write, for the machine.
-    report : str
-        Page to write, for the technician.
+        Write the cuts as CSV, for the machine.
     """
     import numpy as np
 
     from shell.constants import zero_Celsius
+    from studies.cli.measured_splits import pair_splits, read_scan, read_unbalance
     from studies.cli.output import say
     from studies.errors import naming
     from studies.instrument.card import load_card
     from studies.trim import Teeth, Tool, other_cuts, plan_for_card
 
-    measured = _from_scan(scan, harmonic) if scan is not None else _given(split, axis, harmonic, reading_error)
+    measured = read_scan(scan, harmonic) if scan is not None else pair_splits(split, axis, harmonic, reading_error)
     instrument = load_card(card)
     T = instrument.reference_temperature if temperature is None else temperature + zero_Celsius
     tool = Tool(1e-3 * width_mm, 1e-3 * length_mm, depth_limit)
@@ -119,7 +134,7 @@ def trim(
     planned = plan_for_card(
         resonator, elastic, measured, goal=goal, heights=position, tool=tool, kind=cut,
         teeth=Teeth(teeth, np.deg2rad(tooth_azimuth), 1e-9 * tooth_limit_ug) if teeth else None,
-        removal_error=removal_error, gain_error=gain_error, gain=gain, unbalance=_unbalance(unbalance),
+        removal_error=removal_error, gain_error=gain_error, gain=gain, unbalance=read_unbalance(unbalance),
     )  # fmt: skip
     plan = planned.plan
     others = other_cuts(resonator, elastic, measured[0][0], cut)
@@ -141,15 +156,47 @@ def trim(
 
         write_text(out, _csv(payload))
         say(f"wrote {out}")
-    if report is not None:
-        from studies.reports.trim import write_trim_page
+    return Result(
+        payload,
+        f"Trimming plan for {instrument.name}",
+        "Make these cuts, let the shell return to its temperature, measure, and plan the next round from the measurement.",
+        _parts(planned, payload),
+    )
 
-        write_trim_page(report, plan, payload)
-        say(f"wrote {report}")
-    yield payload
-    _print(payload)
-    for sentence in payload["measure"]:
-        say(sentence)
+
+def _parts(planned: "CardPlan", payload: dict[str, Any]) -> "list[Chapter]":
+    """What people read: the cuts and what to measure, where they are, the splits expected."""
+    from studies.reports.digits import plain
+    from studies.reports.trim import polar
+
+    first, plan = payload["rounds"][0], planned.plan
+    in_order = sorted(first["cuts"], key=lambda one: (one["azimuth_deg"], one["position"]))
+    cuts = [{"number": k, "done": "☐"} | one for k, one in enumerate(in_order, 1)]
+    states = [
+        {"state": label} | one
+        for label, splits in (("measured", payload["before"]), ("expected after the cuts", first["after"]))
+        for one in splits
+    ]
+    axes = ", ".join(f"n = {one['harmonic']} at {one['slow_axis_deg']:.1f}°" for one in payload["before"])
+    limit = f"below {plain(1e3 * max(one['most_Hz'] for one in first['after']))} mHz"
+    goal = f"goal {plain(1e3 * plan.goal)} mHz" + ("" if plan.is_enough else ": another round is needed")
+    kinds = ", ".join(f"{kind} {value:+.2f}" for kind, value in payload["other_cuts"].items()).replace("-", "−")
+    return [
+        Chapter("Cuts", [
+            Facts([
+                ("Measured split", ", ".join(f"{plain(1e3 * one['split_Hz'], 4)} mHz" for one in payload["before"]), f"slow axis of {axes}"),
+                ("Mass to remove", f"{first['mass_ug']:.3g} µg", f"{len(cuts)} cuts, {100 * first['share']:.0f} % of the split"),
+                ("Expected split", limit, f"95 % limit; {goal}"),
+            ]),
+            Table("Cuts of this round", cuts, CUTS, f"Total {first['mass_ug']:.4g} µg."),
+            *map(Sentence, payload["measure"]),
+            Sentence(f"Cut type of this plan: {payload['cut']}. Effect of the same mass at the rim by cut type, relative to this one: {kinds}."
+                " Negative: the split changes in the opposite direction.", "note", "page"),
+        ]),
+        Chapter("Position of the cuts", [Figure(lambda: polar(plan, cuts),
+            "Rim over azimuth. Curves bulge where the slower mode has its antinodes (dashed); black bars: the cuts of the table, by mass.")]),
+        Chapter("Expected result", [Table("Splits before and after the cuts", states, STATES)]),
+    ]  # fmt: skip
 
 
 def gains(planned: "CardPlan") -> list[dict[str, float]]:
@@ -192,40 +239,8 @@ def _round(planned: "CardPlan", resonator: "Resonator") -> dict[str, Any]:
     }
 
 
-def _print(payload: dict[str, Any]) -> None:
-    from studies.cli.output import print_table
-
-    rounds = [*enumerate(payload["rounds"], 1)]
-    cuts = [
-        [
-            str(k),
-            f"{c['azimuth_deg']:.2f}",
-            f"{c['height_mm']:.3f}",
-            f"{c['mass_ug']:.3f}",
-            "" if c["depth_um"] is None else f"{c['depth_um']:.3f}",
-        ]
-        for k, one in rounds
-        for c in one["cuts"]
-    ]
-    note = f"{payload['mass_ug']:.3g} µg in all. Make these cuts, measure, and plan again."
-    columns = ["round", "azimuth (°)", "height (mm)", "mass (µg)", "depth (µm)"]
-    print_table(f"{payload['card']}: cuts", columns, cuts, note)
-    splits = [
-        [
-            label,
-            str(s["harmonic"]),
-            *(f"{1e3 * s[key]:.3f}" for key in ("split_Hz", "error_Hz", "most_Hz")),
-            f"{s['slow_axis_deg']:.2f}",
-        ]
-        for label, states in [("measured", payload["before"]), *((str(k), one["after"]) for k, one in rounds)]
-        for s in states
-    ]
-    columns = ["after round", "n", "split (mHz)", "error (mHz)", "95 % below (mHz)", "slow axis (°)"]
-    print_table("Splits as expected", columns, splits)
-
-
 def measure_after(planned: "CardPlan") -> list[str]:
-    """How sure the cuts are, what to measure after them, and what to make of it."""
+    """Return how certain the cuts are, what to measure after them, and how to use it."""
     from studies.reports.digits import to_error
 
     plan, found = planned.plan, []
@@ -233,96 +248,24 @@ def measure_after(planned: "CardPlan") -> list[str]:
         value, error = entry["value"], (entry["high"] - entry["low"]) / 2
         number, spread = to_error(value, error)
         found.append(
-            f"A groove of this depth at position {entry['position']:g} changes the split of n = {entry['harmonic']} by {number} ± {spread} (90 %) of what "
-            "a wide, shallow cut of its mass does."
+            f"A groove of this depth at position {entry['position']:g} has {number} ± {spread} (90 %) times the effect of "
+            f"a wide, shallow cut of the same mass on the split of n = {entry['harmonic']}."
         )
         if abs(value - 1) > 0.15 or error > 0.15:
             found.append(
-                "It relieves much stress beside it: wider, shallower cuts (`--width-mm`) or teeth are more predictable."
+                "Stress relief beside the groove is large; wider, shallower cuts (--width-mm) or teeth are more predictable."
             )
     for state in plan.round.after:
         spread_Hz = state.error * state.frequency
         expected = " ± ".join(to_error(1e3 * state.hertz, 1e3 * spread_Hz))
         found.append(
-            f"After the cuts measure the split of n = {state.harmonic} to ± {1e3 * min(plan.goal / 4, max(spread_Hz / 5, plan.goal / 10)):.2g} mHz, and its axis. "
-            f"Expected: {expected} mHz. If it lies outside twice that, plan the next round with `--gain`, the measured over the predicted change "
-            "(negative if the split changed the other way)."
+            f"After the cuts, measure the split of n = {state.harmonic} to ± {1e3 * min(plan.goal / 4, max(spread_Hz / 5, plan.goal / 10)):.2g} mHz, and its axis. "
+            f"Expected: {expected} mHz. If it is off by more than twice that error, plan the next round with --gain, the measured over the predicted change "
+            "(negative if the split changed in the opposite direction)."
         )
     found.append(
-        "Let the shell return to its temperature before each reading, and read the same mode on the same electrodes."
+        "Let the shell return to its temperature before each reading, and measure the same mode with the same electrodes."
     )
-    return found
-
-
-def _given(
-    split: tuple[float, ...], axis: tuple[float, ...], harmonic: tuple[int, ...], error: float
-) -> list[tuple[int, float, float, float]]:
-    from math import radians
-
-    from studies.errors import InputError
-
-    if not split or not len(split) == len(axis) == len(harmonic):
-        raise InputError(
-            f"{len(split)} splits, {len(axis)} axes and {len(harmonic)} harmonics were given: each split in Hz (--split) needs its axis "
-            "in degrees (--axis) and its n (--harmonic)."
-        )
-    if min(harmonic) < 1:
-        raise InputError(f"--harmonic {min(harmonic)}: pairs have harmonics from 1 up.")
-    return [(n, s, radians(a), error) for n, s, a in zip(harmonic, split, axis, strict=True)]
-
-
-def _from_scan(path: str, harmonic: tuple[int, ...]) -> list[tuple[int, float, float, float]]:
-    from json import loads
-    from math import radians
-
-    from studies.errors import InputError
-    from studies.files.reading import read_bytes
-    from studies.files.toml import check_number
-
-    refused = InputError(f'{path}: is not what hrg scan --json writes (schema "hrg.scan/1").')
-    data = read_bytes(path)
-    try:
-        content = loads(data)
-        if content["schema"] != "hrg.scan/1":
-            raise refused
-        entries = {entry["harmonic"]: entry for entry in content["splits"]}
-    except (ValueError, KeyError, TypeError, RecursionError):
-        raise refused from None
-    found = []
-    for n in harmonic:
-        if n not in entries:
-            raise InputError(f"{path}: has no split of n = {n}: it has {', '.join(str(k) for k in entries)}.")
-        try:
-            axis, size = entries[n]["slow_axis_deg"], entries[n]["split_Hz"]
-            if axis is None:
-                raise InputError(
-                    f"{path}: the split of n = {n} cannot be distinguished from 0: measure better, do not cut."
-                )
-            numbers = [size["value"], axis["value"], size["low"], size["high"]]
-        except (KeyError, TypeError):
-            raise refused from None
-        split, degrees, low, high = (check_number(x, f"{path}: the split of n = {n}") for x in numbers)
-        found.append((n, split, radians(degrees), (high - low) / 3.29))
-    return found
-
-
-def _unbalance(words: tuple[str, ...]) -> dict[int, complex]:
-    import cmath
-    import re
-    from math import radians
-
-    from studies.errors import InputError
-
-    found = {}
-    for word in words:
-        match = re.fullmatch(r"([123]):([0-9.]+(?:e-?[0-9]+)?)@(-?[0-9.]+)", word)
-        try:
-            k, size, angle = match.groups() if match else ("", "", "")
-            found[int(k)] = 1e-9 * float(size) * cmath.exp(1j * int(k) * radians(float(angle)))
-            if not cmath.isfinite(found[int(k)]):
-                raise ValueError
-        except ValueError:
-            raise InputError(f"--unbalance {word}: write k:µg@degrees, such as 1:120@35, with k 1, 2 or 3.") from None
     return found
 
 

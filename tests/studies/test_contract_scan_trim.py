@@ -65,7 +65,7 @@ def test_a_plan_is_one_object_a_table_for_the_machine_and_a_page(tmp_path, capsy
     assert 0.9 < first["share"] < 1
     rows = list(csv.DictReader((tmp_path / "cuts.csv").read_text().splitlines()))
     assert sum(float(r["mass_ug"]) for r in rows) == pytest.approx(found["mass_ug"], rel=1e-4)
-    assert "Cut this" in (tmp_path / "trim.html").read_text(encoding="utf-8")
+    assert "Cuts of this round" in (tmp_path / "trim.html").read_text(encoding="utf-8")
 
 
 def test_a_scan_can_be_trimmed(faces, tmp_path, capsys):
