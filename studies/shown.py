@@ -28,7 +28,9 @@ class Shown:
         module, _, name = self.drawn_by.partition(":")
         if not module:
             raise NotImplementedError
-        figure: Figure = getattr(import_module(module), name)(self).figure
+        figure: Figure = getattr(import_module(module), name)(
+            self
+        ).figure  # of a picture of a page; a figure's is itself
         return figure
 
     def _repr_html_(self) -> str:

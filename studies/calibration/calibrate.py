@@ -120,14 +120,14 @@ class Calibration(Shown):
     def unsaved(self) -> str | None:
         """Why it makes no card: it has not converged, has learnt nothing, or needs values that the card all but excludes."""
         if not self.fit.converged:
-            return "the fit has not converged. State more values as known (--exact), or leave out the run that differs most"
+            return "the fit did not converge. Keep more values fixed (--exact), or leave out the run that differs most"
         if all(one.told_by == "prior" for one in self.estimates):
             return "the data determine none of the card's values"
         far = [one.parameter for one in self.estimates if abs(one.shift_sd) > EXCLUDED]
         if far:
             return (
                 f"{', '.join(far)} would have to move by more than {EXCLUDED:g} of the card's standard deviations. Give the value that"
-                " may be wrong a tolerance in the card, or use the data of its own gyro"
+                " may be wrong a tolerance in the card, or check that the data are of this gyro"
             )
         return None
 
@@ -189,7 +189,7 @@ def calibrate(
         Records or a card that cannot be used.
     """
     if not records and not tables:
-        raise InputError("nothing is calibrated without a record or a steady-state table.")
+        raise InputError("no data given; calibration needs a record or a steady-state table.")
     given, (records, repeated) = records, drop_repeats(records)
     if hold_out is not None:  # the one that a repeated record repeats
         held = given[hold_out % len(given)]
@@ -254,7 +254,7 @@ def _pose(
             from studies.errors import nearest
 
             raise InputError(
-                f"{instrument.path}: '{name}' is no uncertain value of the card{nearest(name, sorted(known))}"
+                f"{instrument.path}: '{name}' is not an uncertain value of the card{nearest(name, sorted(known))}"
             )
     return CardProblem(instrument, priors, runs, wide_law(instrument, runs, tables), tables)
 

@@ -103,7 +103,7 @@ def fit(problem: CardProblem, start: Array | None = None, progress: Progress = l
                 rows[name], outliers[name] = _spare_outliers(problem.rows[name], state, name, noise[name])
         linear = _Linear.of(problem, state, noise, rows)
         size = linear.fall(linear.step(np.inf)[0])
-        progress(f"step {step}: −2 ln L should fall by {size:.2g}")
+        progress(f"step {step}: −2 ln L decreases by about {size:.2g}")
         if size < CLOSE and straight and step > 3:
             converged = True
             break

@@ -59,8 +59,8 @@ def check_readings(instrument: "Instrument", records: "Sequence[Record]", law: "
             other = _left(instrument, record.with_columns(columns), whole)
             if other < min(FOLLOWED * changes, left / 3):
                 raise InputError(
-                    f"{record.path}: frequency_Hz does not follow the temperatures as the card predicts, but does so if they are read"
-                    f" {words}: {other:.2g} Hz of its {changes:.2g} Hz (rms) then remain. Correct {' and '.join(names)}."
+                    f"{record.path}: frequency_Hz does not follow the temperatures as the card predicts, unless they are read {words}:"
+                    f" {other:.2g} Hz of its {changes:.2g} Hz (rms) then remain. Correct {' and '.join(names)}."
                 )
 
 
@@ -74,7 +74,7 @@ def bias_in_seconds(instrument: "Instrument", record: "Record") -> str | None:
         return None
     return (
         f"{record.path}: {BIAS} scatters by {scatter:.2g} °/h from row to row, {stated / scatter:.0f} times less than the card states:"
-        " it looks like °/s; multiply the column by 3600."
+        " the column is probably in °/s; multiply it by 3600."
     )
 
 

@@ -26,9 +26,7 @@ def warn(found: CardFit, estimates: Sequence[Estimate], ladder: Mapping[str, Run
     """Return the warnings of a calibration."""
     warnings = []
     if not found.converged:
-        warnings.append(
-            f"the fit has not converged in {found.steps} steps: its values may still move and are no result."
-        )
+        warnings.append(f"the fit did not converge in {found.steps} steps; its values are not final.")
     for run in found.problem.runs:
         said = bias_in_seconds(found.problem.instrument, run.record)
         warnings += [] if said is None else [said]
@@ -41,22 +39,21 @@ def warn(found: CardFit, estimates: Sequence[Estimate], ladder: Mapping[str, Run
         usual = usual_mean(found, name)
         if len(rows[name].times) > 1 and rung.offset > max(CONTRADICTION * usual, TURNED_ON * stated):
             warnings.append(
-                f"the runs contradict each other in {name}: after the calibration their means lie {rung.offset:.3g}"
-                f" {UNITS[name]} (rms) from the model, where the noise within a run explains {usual:.2g}"
+                f"the runs disagree in {name}: after the calibration their means lie {rung.offset:.3g} {UNITS[name]}"
+                f" (rms) from the model, but the noise within a run explains only {usual:.2g}"
                 + (f" and the card states {stated:.3g} from turn-on to turn-on" if stated else "")
-                + "; are they of one device"
-                + ("?" if stated else " and one turn-on?")
+                + (". Are they of one device?" if stated else ". Are they of one device and one turn-on?")
             )
     for name, count in found.outliers.items():
         if count:
             warnings.append(
-                f"{count} {'block' if count == 1 else 'blocks'} of {name} stood out of the noise and were given less weight."
+                f"{count} {'block' if count == 1 else 'blocks'} of {name} {'is an outlier and was' if count == 1 else 'are outliers and were'} given less weight."
             )
     stayed = [one.parameter for one in estimates if one.width >= SILENT]
     told = sum(rows[name].count for name in rows)
     if len(estimates) > told:
         warnings.append(
-            f"{len(estimates)} uncertain values, but {told} data: {len(stayed)} of the values stayed at their prior:"
+            f"{len(estimates)} uncertain values, but only {told} data; {len(stayed)} values stay at their prior:"
             f" {', '.join(stayed)}."
         )
     return tuple(warnings)
@@ -67,7 +64,7 @@ def _moved(estimates: Sequence[Estimate]) -> list[str]:
     far = sorted((one for one in estimates if abs(one.shift_sd) > FAR), key=lambda one: -abs(one.shift_sd))
     return [
         f"{one.parameter} moved by {one.shift_sd:+.1f} of the card's standard deviations, to {one.value:.4g}"
-        f" ({one.low:.4g} … {one.high:.4g}): the card is wrong in this value, or in another that does the same."
+        f" ({one.low:.4g} … {one.high:.4g}): the card is wrong in this value, or in another with the same effect."
         for one in far
     ]
 
@@ -80,8 +77,8 @@ def _misfit(found: CardFit, ladder: Mapping[str, Rung]) -> list[str]:
         usual = noise_rms(found, name, replace(slow, white=found.noise[name].white, offset=0.0))
         if rung.calibrated > MISFIT * usual:
             said.append(
-                f"the model does not follow {name}: it leaves {rung.calibrated:.2g} {UNITS[name]} (rms), where the noise of the rows"
-                f" is {usual:.2g}; the values carry this misfit. hrg diagnose with --card looks for what the card lacks."
+                f"poor fit in {name}: residual {rung.calibrated:.2g} {UNITS[name]} (rms), noise {usual:.2g}. The calibrated values"
+                f" absorb part of this misfit; hrg diagnose --card looks for the missing effect."
             )
     return said
 
@@ -97,9 +94,9 @@ def _unsettled(found: CardFit) -> list[str]:
         if lump in ("base", "resonator") and known and abs(away) > abs(furthest.get(run, (0.0, ""))[0]):
             furthest[run] = away, lump
     return [
-        f"{problem.runs[run].record.path}: the fit needs a {lump} that begins {abs(away):.2g} K"
-        f" {'warmer' if away > 0 else 'colder'} than its {_settled_by(problem, run)}, as in a gyro that had not settled when the run began;"
-        " a prediction from the chamber alone does not know of that."
+        f"{problem.runs[run].record.path}: the fit needs a {lump} that starts {abs(away):.2g} K"
+        f" {'warmer' if away > 0 else 'colder'} than the {_settled_by(problem, run)}, as if the gyro had not settled when the run began."
+        " A prediction from the chamber alone does not include this."
         for run, (away, lump) in sorted(furthest.items())
     ]
 

@@ -120,9 +120,9 @@ def compare_settled(problem: "CardProblem") -> tuple[SettledComparison, ...]:
                     f"{table.path}: frequency_Hz changes by {slope.measured:.1f} ppm/°C at {one.temperature_degC:.4g} °C, where the"
                     f" card {one.card} predicts {slope.predicted:.1f} ± {slope.sd:.1f}: {abs(slope.away):.0f} standard deviations. "
                     + (
-                        f"Read {words}, the temperatures agree with the card: correct temperature_degC."
+                        f"If the temperatures are read {words}, the table agrees with the card; correct temperature_degC."
                         if words
-                        else "This is not a table of that gyro; give the card of the gyro that was measured."
+                        else "This table is of another gyro; give the card of the gyro that was measured."
                     )
                 )
         found.append(one)
@@ -167,19 +167,19 @@ def _bridges(problem: "CardProblem", level: Compared, row: Array) -> tuple[str, 
     said = [
         f"{more if away / power > 0 else less} ({100 * np.expm1(away / power):+.2g} %)" for power, more, less in ways
     ]
-    text = [f"What would bridge the level, each alone: {', '.join(said)}."]
+    text = [f"Any one of these would remove the difference in level: {', '.join(said)}."]
     names = problem.priors.names
     acting = [k for k, name in enumerate(names) if name.startswith(("resonator.", "material.", "mount."))]
     per_sd = np.linalg.solve(problem.priors.root.T, row[: len(names)]) / level.predicted
     best = max(acting, key=lambda k: abs(per_sd[k]), default=None)
     if best is not None and per_sd[best] != 0.0:
         text.append(
-            f"Of the values that the card calls uncertain, {names[best]} would bridge it with"
-            f" {abs(away / per_sd[best]):.1f} of its standard deviations."
+            f"Among the card's uncertain values, {names[best]} would remove it with a change of"
+            f" {abs(away / per_sd[best]):.1f} standard deviations."
         )
     if not any(name.startswith("resonator.") for name in names):
         text.append(
-            "The card gives no dimension a tolerance, such as thickness_mm = { value = …, relative_sd = 0.02 }."
+            "The card states no tolerance for any dimension, such as thickness_mm = { value = …, relative_sd = 0.02 }."
         )
     return tuple(text)
 

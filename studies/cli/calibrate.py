@@ -1,6 +1,6 @@
 """`hrg calibrate`: the card's uncertain values from records, with intervals and shifts.
 
-With --json one object, schema `hrg.calibration/1`:
+Schema hrg.calibration/1:
 `card`, `records`; `values`: `[{parameter, unit, card, value, low, high, shift_sd, width, told_by, bound, interval}]`, `low`
 and `high` a 90 % interval, `shift_sd` the move in prior standard deviations, `width` posterior over prior standard deviation,
 `told_by` "data", "prior" or "both", `bound` "low", "high" or null, `interval` "normal" or "profile"; `inseparable`: groups of
@@ -14,7 +14,8 @@ card as given, `sd` and `away_sd`; `converged`; `warnings`; `calibrated_card`: p
 
 from typing import TYPE_CHECKING, Any
 
-from studies.cli.output import Answer, answers
+from studies.cli.output import answers
+from studies.results import Result
 
 if TYPE_CHECKING:
     from studies.calibration.calibrate import Calibration
@@ -23,82 +24,59 @@ VALUE = ("parameter", "unit", "card", "value", "low", "high", "shift_sd", "width
 
 
 @answers("hrg.calibration/1")
-def calibrate(
-    card: str,
-    *data: str,
-    save: str | None = None,
-    report: str | None = None,
-    hold_out: int = 0,
-    exact: tuple[str, ...] = (),
-) -> Answer:
+def calibrate(card: str, *data: str, save: str | None = None, hold_out: int = 0, exact: tuple[str, ...] = ()) -> Result:
     """Find the most probable values of a card, given its uncertainties and records of the device.
 
-    Every number of the card that is uncertain may move, within its prior: { value = …, relative_sd = … } in the card, or the
-    documented uncertainty of its key (hrg cards CARD lists them). The noise of every response, the initial temperatures and
-    the offsets of the runs are estimated at the same time. Frequency, bias and 1/Q are driven by the measured housing where there
-    is one; with a chamber column the housing is explained too.
+    Every uncertain value of the card may change within its prior: { value = …, relative_sd = … } in the card, or the documented
+    uncertainty of its key (hrg cards CARD lists them). The noise of every response, the initial temperatures and the offsets of the
+    runs are estimated together with them. The measured housing temperature drives frequency, bias and 1/Q; without it the chamber
+    does. With both, the housing temperature is fitted too.
 
     Parameters
     ----------
     card : str
         Path of a card, or the name of one that ships (hrg cards).
     data : str
-        Records (CSV), the runs of one device, and steady-state tables (temperature_degC,frequency_Hz).
+        Records (CSV) of one device, and steady-state tables (temperature_degC,frequency_Hz).
     save : str
-        Write the calibrated card: most probable values with their posterior widths. It is not written, with exit status 2, where the
-        fit has not converged, has determined none of the values, or moved one by more than 6 of the card's standard deviations.
-    report : str
-        Write a page (HTML).
+        Write the calibrated card: most probable values with their posterior widths. Not saved, with exit status 2, if the fit
+        did not converge, determined no value, or moved one by more than 6 of the card's standard deviations.
     hold_out : int
-        Number of the record, from 1, that a second calibration without it predicts; the last of several unless given.
+        Number of the record, from 1, to predict by a second calibration without it; by default the last of several.
     exact : str
-        A value that is not to move, such as thermal.film_emissivity; may be given more than once.
+        A value to keep fixed, such as thermal.film_emissivity; may be given more than once.
     """
     from studies.calibration.calibrate import calibrate as run
     from studies.calibration.observed import read_settled
-    from studies.cli.output import print_table, say
+    from studies.cli.output import say
     from studies.errors import InputError
     from studies.files.columns import read_header
-    from studies.files.writing import write_text
     from studies.instrument.card import load_card, save_card
     from studies.record import read_record
+    from studies.reports import calibration as parts
 
     if not data:
-        raise InputError("name at least one record (CSV) or steady-state table to calibrate with.")
+        raise InputError("no data given; name at least one record (CSV) or steady-state table.")
     instrument = load_card(card)
     settled = [path for path in data if "time_s" not in (names := read_header(path)) and "temperature_degC" in names]
-    paths = [path for path in data if path not in settled]
-    if not 0 <= hold_out <= len(paths):
-        there = "is 1 record" if len(paths) == 1 else f"are {len(paths)} records"
+    records = [read_record(path) for path in data if path not in settled]
+    if not 0 <= hold_out <= len(records):
+        there = "is 1 record" if len(records) == 1 else f"are {len(records)} records"
         raise InputError(f"--hold-out {hold_out}: there {there}, numbered from 1.")
-    records = [read_record(path) for path in paths]
-    tables = [read_settled(path) for path in settled]
     left = (hold_out or len(records)) - 1 if len(records) > 1 else None
-    found = run(instrument, records, tables, left, exact, progress=say)
+    found = run(instrument, records, [read_settled(path) for path in settled], left, exact, progress=say)
     for warning in found.warnings:
         say(f"warning: {warning}")
     refused = save is not None and found.unsaved is not None
     if refused:
-        say(f"{save} is not written: {found.unsaved}.")
+        say(f"{save} not saved: {found.unsaved}.")
         save = None
     if save is not None:
         save_card(found.instrument, save)
         say(f"card: {save}")
-    if report is not None:
-        from studies.reports.calibration import calibration_page
-
-        write_text(report, calibration_page(found, list(data)))
-        say(f"report: {report}")
-    yield _payload(found, list(data), save), 2 if refused else 0
-    from studies.reports.calibration import held_out_table, ladder_table, separation_sentences, values_table
-
-    for one in found.settled:
-        print(" ".join(one.sentences))
-    for block in (values_table(found, touched=True), ladder_table(found), held_out_table(found)):
-        if block is not None:
-            print_table(block.caption, block.columns, block.rows, block.note)
-    for sentence in separation_sentences(found):
-        print(sentence)
+    payload = _payload(found, list(data), save)
+    title, lead = f"Calibration of {found.card.name}", parts.lead(found, data)
+    return Result(payload, title, lead, parts.calibration_parts(found, payload), 2 if refused else 0)
 
 
 def _payload(found: "Calibration", data: list[str], save: str | None) -> dict[str, Any]:
@@ -109,37 +87,34 @@ def _payload(found: "Calibration", data: list[str], save: str | None) -> dict[st
     def pair(values: tuple[float, float] | None) -> dict[str, float] | None:
         return None if values is None else {"as_shipped": values[0], "calibrated": values[1]}
 
+    responses = {
+        name: {
+            "unit": UNITS[name],
+            "as_shipped": rung.as_shipped,
+            "calibrated": rung.calibrated,
+            "noise": rung.noise,
+            "run_offset": rung.offset,
+            "outliers": found.fit.outliers[name],
+        }
+        for name, rung in found.ladder.items()
+    }
+    predicted = None if held is None else {
+        name: {
+            "chamber": pair(held.chamber.get(name)),
+            "housing": pair(held.housing.get(name)),
+            "stated": held.stated.get(name),
+            "noise": held.noise[name],
+        }
+        for name in held.noise
+    }  # fmt: skip
     return {
         "schema": "hrg.calibration/1",
         "card": found.card.name,
         "records": data,
         "values": [{key: getattr(one, key) for key in VALUE} for one in found.estimates],
         "inseparable": [list(group) for group in found.groups],
-        "responses": {
-            name: {
-                "unit": UNITS[name],
-                "as_shipped": rung.as_shipped,
-                "calibrated": rung.calibrated,
-                "noise": rung.noise,
-                "run_offset": rung.offset,
-                "outliers": found.fit.outliers[name],
-            }
-            for name, rung in found.ladder.items()
-        },
-        "held_out": None
-        if held is None
-        else {
-            "record": held.path,
-            "responses": {
-                name: {
-                    "chamber": pair(held.chamber.get(name)),
-                    "housing": pair(held.housing.get(name)),
-                    "stated": held.stated.get(name),
-                    "noise": held.noise[name],
-                }
-                for name in held.noise
-            },
-        },
+        "responses": responses,
+        "held_out": None if held is None else {"record": held.path, "responses": predicted},
         "settled": [{"table": one.path} | one.as_dict() for one in found.settled],
         "converged": found.fit.converged,
         "warnings": list(found.warnings),

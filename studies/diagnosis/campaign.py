@@ -148,7 +148,7 @@ def load_campaign(records: Sequence[Record], reference_degC: float | None = None
     """
     notes: list[str] = []
     if not records:
-        raise InputError("a diagnosis needs one record or more.")
+        raise InputError("no records given; a diagnosis needs at least one.")
     records, repeated = drop_repeats(records)
     notes += repeated
     source = _temperature_source(records)
@@ -159,7 +159,7 @@ def load_campaign(records: Sequence[Record], reference_degC: float | None = None
     responses, skipped = _usable_responses(records, tables)
     offsets, timed = place_in_time(records)
     if not timed and len(records) > 1:
-        notes.append("not every record says when it starts: they are taken one after the other, with unknown gaps.")
+        notes.append("not every record states its start; the records are treated as consecutive, with unknown gaps.")
     spans = [float(table["time_s"][-1] - table["time_s"][0]) for table in tables]
     sampling = max(float(np.median(np.diff(table["time_s"]))) if table["time_s"].size > 1 else 1.0 for table in tables)
     # whole rows to a bin: the mean of rows is then compared with the mean of the model at the same moments
@@ -175,7 +175,7 @@ def load_campaign(records: Sequence[Record], reference_degC: float | None = None
     temperature = np.concatenate([table["temperature"] for table in tables])
     reading = max(_reading_noise(table["temperature"]) for table in tables)
     if not np.isfinite(temperature).any():
-        raise InputError(f"{records[0].path}: {source} has no value at all.")
+        raise InputError(f"{records[0].path}: {source} has no values.")
     middle = 0.5 * (np.nanmin(temperature) + np.nanmax(temperature)) + zero_Celsius
     reference = middle if reference_degC is None else reference_degC + zero_Celsius
     runs: list[Run] = []
@@ -200,7 +200,7 @@ def load_campaign(records: Sequence[Record], reference_degC: float | None = None
         responses = ()
     parts = Counter(run.label for run in runs)
     notes += [
-        f"{label}: long gaps split it into {count} stretches, each of which starts at an unknown temperature."
+        f"{label}: long gaps split it into {count} parts, each with an unknown initial temperature."
         for label, count in parts.items()
         if count > 1
     ]
@@ -208,7 +208,7 @@ def load_campaign(records: Sequence[Record], reference_degC: float | None = None
         if any(getattr(run.states, drive) is None for run in runs) and any(
             getattr(run.states, drive) is not None for run in runs
         ):
-            notes.append(f"{drive} is not in every record and is left out.")
+            notes.append(f"{drive} is not in every record and was left out.")
             runs = [_without(run, drive) for run in runs]
     return Campaign(
         tuple(runs),
@@ -308,7 +308,7 @@ def _usable_responses(
         elif np.ptp(values) == 0.0:
             skipped[name] = "constant"
         elif constant:
-            skipped[name] = "the temperature never changes: a stuck sensor, or nothing to learn from"
+            skipped[name] = "the temperature never changes (is the sensor stuck?)"
         else:
             usable.append(name)
     if not usable and not skipped:

@@ -35,8 +35,8 @@ def check_units(records: Sequence[Record], tables: Sequence[dict[str, FloatArray
         lasts = float(np.ptp(table["time_s"]))
         if np.subtract(*np.percentile(temperature, [95, 5])) > FASTEST * max(lasts, 1e-9):
             raise InputError(
-                f"{where}: the temperature moves by {np.ptp(temperature):.3g} K within {lasts:.3g} s; no chamber does. "
-                "time_s must be in seconds: is it in minutes or hours?"
+                f"{where}: the temperature changes by {np.ptp(temperature):.3g} K within {lasts:.3g} s, faster than any "
+                "chamber. time_s must be in seconds: is it in minutes or hours?"
             )
 
 

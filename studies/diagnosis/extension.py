@@ -57,8 +57,8 @@ def extend(
     from studies.calibration.calibrate import calibrate
 
     if not diagnosis.inquiries:
-        raise InputError("nothing could be fitted, so there is no extended model to save.")
-    progress("calibrating what is saved")
+        raise InputError("no extended model to save: nothing could be fitted.")
+    progress("calibrating the extended card")
     entries = [own for own in instrument.content.get("effect", []) if _is_in_the_baseline(own)]
     for column, inquiry in diagnosis.inquiries.items():
         model = prune(inquiry.final)

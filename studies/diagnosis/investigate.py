@@ -103,7 +103,7 @@ def investigate(
         rows = sum(int(np.isfinite(run.responses[column]).sum()) for run in campaign.runs)
         if rows < FEWEST_BINS + 2 * len(campaign.runs):
             continue
-        tell(f"{RESPONSES[column].word}: baseline, then every effect")
+        tell(f"{RESPONSES[column].word}: baseline, then all effects")
         simulated = card is not None and RESPONSES[column].thermometer
         make = partial(simulate_baseline, campaign, card) if simulated and card is not None else None
         if column == "bias_deg_per_h":
@@ -175,8 +175,8 @@ def _doubt_turn_on(
         return campaign, inquiry
     path = campaign.runs[order[int(np.argmax(furthest)) + 1]].label
     note = (
-        f"{path}: its bias lies {furthest.max():.2g} °/h from the runs before and after it, where the card states"
-        f" {campaign.turn_on:.2g} °/h from turn-on to turn-on: every run has been given an offset of its own."
+        f"{path}: its bias lies {furthest.max():.2g} °/h from the runs before and after it, but the card states"
+        f" {campaign.turn_on:.2g} °/h from turn-on to turn-on; each run was therefore given its own offset."
     )
     return replace(free, notes=(*free.notes, note)), without
 
@@ -236,8 +236,8 @@ def _result(
     if verdict == "adequate" and beyond is not None and beyond > WORSE * reached.residual_rms:
         response = inquiry.problem.response
         remarks.append(
-            f"the values that the other runs give predict a run to {beyond * response.scale:.3g} "
-            f"{response.shown} only: they are not determined without it"
+            f"values fitted to the other runs predict this run only to {beyond * response.scale:.3g} "
+            f"{response.shown}; without it they are not determined"
         )
     if reached.foretold < FORETOLD:
         rest = "the other runs" if len(campaign.records) > 1 else "the rest of the record"
@@ -245,14 +245,14 @@ def _result(
         remarks.append(
             f"no held-out residual: {'no row' if reached.foretold < 0.005 else 'only ' + share_known} can be predicted from {rest}"
             if reached.held_out_rms is None
-            else f"held-out residuals cover {share_known}: the others cannot be predicted from {rest}"
+            else f"held-out residuals cover {share_known}; the others cannot be predicted from {rest}"
         )
     noise = min(value for value in (reached.residual_rms, reached.held_out_rms) if value is not None)
     white = white_rms(*held_out.residuals(final, campaign))
     white = white or float(np.sqrt(final.solved.variance * inquiry.problem.noise.rows))
     if verdict != "unexplained" and noise > CONSTANTS["wander_usual"] * white:
         remarks.append(
-            f"what is left is {noise / white:.2g} times its white noise: it wanders within a run, which is taken for noise"
+            f"the residual is {noise / white:.2g} times its white noise; its slow part within a run is treated as coloured noise"
         )
     return ResponseResult(
         verdict,
@@ -306,9 +306,9 @@ def _apart(campaign: Campaign, inquiry: Inquiry) -> list[str]:
     white = float(np.sqrt(final.solved.variance))
     text = (
         f"the runs lie {apart * response.scale:.3g} {response.shown} (rms) apart, {apart / max(final.wander, white):.0f} "
-        "times the residual within them: ageing, a clock, handling, or drift between runs"
+        "times the residual within them: ageing, clock error, handling, or drift between runs"
     )
-    return [text if campaign.timed else text + "; start times ('# start' in the records) would show which"]
+    return [text if campaign.timed else text + "; start times ('# start' in the records) would show which of these"]
 
 
 def _delayed(inquiry: Inquiry) -> list[str]:
@@ -321,8 +321,8 @@ def _delayed(inquiry: Inquiry) -> list[str]:
     if abs(delay) < max(SURE_DELAY * final.deviation_of("delay"), LEAST_DELAY * prior):
         return []
     return [
-        f"it follows its temperature {abs(delay):.2g} s {'later' if delay > 0.0 else 'sooner'} than one lag says, as sensors and "
-        "clocks may: a lag of the thermometer or an effect of the rate of that size looks the same"
+        f"it follows the temperature {abs(delay):.2g} s {'later' if delay > 0.0 else 'earlier'} than one lag predicts, as "
+        "sensors and clocks may; a thermometer lag or a rate effect of this size looks the same"
     ]
 
 
@@ -333,9 +333,9 @@ def _turned_on(inquiry: Inquiry) -> list[str]:
     if not response.own_offset or apart <= usual:
         return []
     return [
-        f"the runs lie {apart * response.scale:.3g} {response.shown} (rms) apart, which is taken for an offset of each turn-on: "
-        "ageing or a jump between runs would look the same; a saved model states it as turn-on, "
-        "and a card that states bias_turn_on_deg_per_h tells them apart"
+        f"the runs lie {apart * response.scale:.3g} {response.shown} (rms) apart, which is treated as a turn-on offset; "
+        "ageing or a jump between runs would look the same. A saved model states it as turn-on; "
+        "a card with bias_turn_on_deg_per_h distinguishes them"
     ]
 
 

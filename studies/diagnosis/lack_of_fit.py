@@ -25,7 +25,7 @@ TEMPERATURE_ORDERS, TIME_ORDERS = 24, 24
 STRONG = {"frequency_Hz": 1e-4, "bias_deg_per_h": 10.0, "inverse_q": 0.3}
 
 
-WANDER = "time: it wanders far beyond its white noise"
+WANDER = "time: slow drift far beyond its white noise"
 
 
 @dataclass(frozen=True)
@@ -280,7 +280,7 @@ def fitful(model: Fit) -> tuple[str, float]:
                 weak = max((1.0 - part * strong) / (1.0 - part), 0.3)
                 mixed = (1 - part) / weak * np.exp(-power / weak) + part / strong * np.exp(-power / strong)
                 best = max(best, float(np.sum(np.log(mixed + 1e-300) + power)))
-    return "time: an oscillation that comes and goes", best - 3.0
+    return "time: an intermittent oscillation", best - 3.0
 
 
 CELLS = (8, 16, 32, 64, 128)

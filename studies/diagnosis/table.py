@@ -142,10 +142,10 @@ def study_steady_table(
     law_rms, ratio = rms(law_left), _curvature(T, f) / _curvature(T, law_values)
     slope = float(np.polyfit(T, f, 1)[0])
     said = [
-        f"Misfit with the law's curvature fixed ({law_name}): {law_rms:.3f} Hz rms, "
+        f"Residual with the curvature of the law ({law_name}): {law_rms:.3f} Hz rms, "
         f"equivalent to a temperature error of {law_rms / max(abs(slope), 1e-12):.2f} °C.",
-        f"The measured curvature is {ratio:.1f} times the law's. With a free curvature the misfit is {rms(left):.3f} Hz rms "
-        f"({rms(lone):.3f} Hz leave-one-out); rounding alone would leave {rounding:.4f} Hz.",
+        f"The measured curvature is {ratio:.1f} times the law's. With a free curvature the residual is {rms(left):.3f} Hz rms "
+        f"({rms(lone):.3f} Hz leave-one-out); rounding alone would give {rounding:.4f} Hz.",
     ]
     scatter = float(np.linalg.norm(left)) / np.sqrt(max(T.size - 3, 1))
     fits = _Fits(T, f, rounding, scatter, law_left, left, lone, law_rms, ratio)
@@ -172,10 +172,10 @@ def study_calibrated_table(found: "Calibration") -> TableDiagnosis:
     shifts = tuple(Shift(m.parameter, m.card, m.value, m.low, m.high, m.shift_sd) for m in moved)
     said = list(compared.sentences)
     if shifts:
-        most = ", ".join(f"{one.parameter} ({one.shift_sd:+.2f} of its standard deviations)" for one in shifts[:2])
-        said.append(f"What takes up the difference: {most}.")
+        most = ", ".join(f"{one.parameter} ({one.shift_sd:+.2f} standard deviations)" for one in shifts[:2])
+        said.append(f"The calibration changes most: {most}.")
     said.append(
-        f"The card as given leaves {rms(shipped):.3f} Hz rms, calibrated {rms(left):.3f} Hz; rounding alone would leave {rounding:.4f} Hz."
+        f"Residual with the card as given: {rms(shipped):.3f} Hz rms; calibrated: {rms(left):.3f} Hz; rounding alone would give {rounding:.4f} Hz."
     )
     fits = _Fits(T, f, rounding, max(table.scatter, rounding), shipped, left, lone, rms(shipped), ratio)
     return _study(base, fits, said, shifts, found)
@@ -229,7 +229,7 @@ def _study(
     distinct = np.unique(T).size
     base_rms, lone = rms(left), rms(fits.lone)
     if distinct < FEWEST_POINTS and found is None:
-        remark = f"{distinct} temperatures; a baseline of three numbers needs five or more to be tested"
+        remark = f"{distinct} temperatures are too few: testing a baseline of three parameters needs five or more"
         sentences[:] = [remark + "."]
         return answer(
             "not-identifiable",
@@ -261,13 +261,13 @@ def _study(
         state = "not-identifiable" if wanders else "explained" if values else "adequate"
         if wanders:
             sentences.append(
-                f"The rows drift: the residual is {base_rms:.3g} Hz rms where neighbouring rows agree to {white:.2g} Hz. A drift"
-                " between the rows and a slow effect of temperature look alike in one table."
+                f"The rows drift: the residual is {base_rms:.3g} Hz rms, but neighbouring rows agree to {white:.2g} Hz. One table"
+                " cannot distinguish a drift between the rows from a slow effect of temperature."
             )
         elif ranked and (short := 2.0 * (ranked[0].log_evidence - nothing)) > UNNAMED:
             sentences.append(
-                f"What is left, {base_rms:.3g} Hz rms, counts as noise: the likeliest form, {ranked[0].words}, has an evidence of {short:.1f},"
-                f" and {-2.0 * prior:.0f} are asked for a name."
+                f"The remaining residual of {base_rms:.3g} Hz rms is treated as noise: the best candidate, {ranked[0].words}, has an evidence of"
+                f" {short:.1f}, below the {-2.0 * prior:.0f} needed to name it."
             )
         result = ResponseResult(state, base_rms, (base_rms, lone), None, "structure" if wanders else "none")
         return answer(state, values, result, next_table(T) if wanders else None, forms=forms)
@@ -293,7 +293,7 @@ def _study(
     causes = sorted((cause, *wrong_values(shifts)), key=lambda one: -one.evidence)
     state = "not-identifiable" if len(names) > 1 else "explained"
     if len(names) > 1:
-        sentences.append(f"The table cannot separate these: {', '.join(names)}.")
+        sentences.append(f"The table cannot distinguish between {', '.join(names)}.")
     result = ResponseResult(state, noise, (base_rms, lone), (rms(winner.residual), winner.loo), "none")
     return answer(state, doubted(causes), result, next_table(T), winner.residual, forms)
 

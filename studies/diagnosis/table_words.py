@@ -9,7 +9,7 @@ from studies.effects.states import FloatArray
 TURN = 0.1
 """Part of the covered range that a table must go back for its order to show a direction."""
 MORE = "Measure at five temperatures or more, from below and from above."
-SOAK = "soak time shows an unsettled resonator, the thermometer separates a scale error from a curvature of f"
+SOAK = "the soak time shows whether the resonator had settled, the thermometer distinguishes a scale error from a curvature of f"
 
 
 def next_table(T: FloatArray) -> str:
@@ -17,7 +17,7 @@ def next_table(T: FloatArray) -> str:
     if _turns(T):
         return f"Repeat the table with two soak times and a second thermometer: {SOAK}."
     return (
-        "Approach the same temperatures from above and from below, with two soak times and a second thermometer: direction "
+        "Approach the same temperatures from above and from below, with two soak times and a second thermometer: the direction "
         f"shows hysteresis and stress, {SOAK}."
     )
 
@@ -46,16 +46,16 @@ def table_sentences(T: FloatArray, f: FloatArray, rounding: float) -> list[str]:
         else:
             out.append(
                 f"Cubic against quartic: {cubic:.3g} and {quartic:.3g} Hz², F(1, {freedom}) = {max(ratio_f, 0.0):.3g}, "
-                f"chance {chance:.2g}; {said}."
+                f"p = {chance:.2g}; {said}."
             )
     both = _turns(T)
     out.append(
         f"{T.size} rows, "
         + (
-            "approached from both sides: hysteresis is tested; ageing and a linear scale error stay hidden."
+            "approached from both sides: they show hysteresis, but not ageing or a linear scale error."
             if both
-            else "approached from one side: they cannot tell hysteresis from a curve, nor show ageing or a linear scale error, and an"
-            " unsettled soak stays in the slope."
+            else "approached from one side: they cannot distinguish hysteresis from curvature or show ageing or a linear scale error, and"
+            " incomplete settling biases the slope."
         )
     )
     return out

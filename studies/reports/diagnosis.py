@@ -1,24 +1,58 @@
-"""The page of a diagnosis: verdict, cause, size, gain and a picture first; the evidence after it."""
+"""Parts of a diagnosis: the verdict, its causes, sizes and gain, and the evidence after them."""
 
-from typing import TYPE_CHECKING
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING, Any
 
 from studies.diagnosis.response import RESPONSES
 from studies.diagnosis.verdict import Cause, Verdict
 from studies.instrument.units import split_unit, unit_of
-from studies.reports.diagnosis_pictures import before_and_after, ladder, next_run_picture, residual_views
-from studies.reports.digits import plain, to_interval
-from studies.reports.page import Block, Chapter, Facts, Table, Text, render_page
+from studies.reports import diagnosis_pictures as pictures
+from studies.reports.digits import plain
+from studies.results import Chapter, Column, Facts, Figure, Part, Sentence, Table
 
 if TYPE_CHECKING:
     from studies.diagnosis.investigate import Diagnosis
 
 NAMES = {column: response.word for column, response in RESPONSES.items()}
 WORDS = {
-    "adequate": "The simulation is adequate: nothing beyond noise is left.",
-    "explained": "Explained: {} nine tenths of the structure or more.",
-    "not-identifiable": "Not identifiable: these data cannot decide between several causes.",
-    "unexplained": "Unexplained: there is structure that no known effect explains.",
+    "adequate": "Adequate: the simulation agrees with the data to within noise.",
+    "explained": "Explained: {} at least 90 % of the structure in the residual.",
+    "not-identifiable": "Not identifiable: these data cannot distinguish between the possible causes.",
+    "unexplained": "Unexplained: no known effect explains the structure in the residual.",
 }
+CAUSES = (
+    Column("cause", "cause"),
+    Column("or", "or equally"),
+    Column("response", "response"),
+    Column("peak", "peak to peak"),
+    Column("probability", "probability", form=".2f"),
+    Column("name", "parameter"),
+    Column("value", "value", within=("low", "high")),
+    Column("value", "90 % interval", interval=("low", "high"), digits=0),
+)
+NUMBERS = {
+    "baseline": "baseline",
+    "extended": "with causes",
+    "noise": "noise",
+    "white": "white noise",
+    "wander": "coloured noise",
+}
+RESULTS = (
+    Column("response", "response"),
+    Column("verdict", "verdict"),
+    *(Column(key, heading, digits=3) for key, heading in NUMBERS.items()),
+    Column("gain", "gain", digits=3),
+    Column("explained_share", "explained", "%", ".1f", scale=100.0),
+    Column("left", "lack of fit"),
+)
+METHOD = (
+    "The baseline is calibrated first. Without a card it is the frequency through one thermal lag with free f0, slope and curvature,"
+    " the bias as a cubic in the frequency change with an offset for each run, and 1/Q as a quadratic in temperature. Each effect in"
+    " the library is a family of curves with a prior on its size. Models with no, one or several effects are compared by their"
+    " marginal likelihood in white and coloured noise. Effects that fit equally well are named as a set; the other responses help"
+    " to decide between them. Smooth generic functions of time, temperature, rate, history and drives detect structure that no"
+    " effect explains. A cause is rejected if it makes the prediction of held-out rows worse."
+)
 
 
 def shown(column: str, value: float | None, digits: int = 3) -> str:
@@ -29,16 +63,13 @@ def shown(column: str, value: float | None, digits: int = 3) -> str:
 
 def headline(verdict: Verdict) -> str:
     """Return the verdict in one or two sentences."""
-    text = _sentence(verdict)
-    if verdict.causes:
-        causes = "; ".join(name_cause(cause) for cause in verdict.causes)
-        text += f" {causes[0].upper()}{causes[1:]}."
-    return text
+    causes = "; ".join(map(name_cause, verdict.causes))
+    return f"{_sentence(verdict)} {causes[0].upper()}{causes[1:]}." if causes else _sentence(verdict)
 
 
 def _sentence(verdict: Verdict) -> str:
-    causes = "the named causes remove" if len(verdict.causes) > 1 else "the named cause removes"
-    return WORDS[verdict.verdict].format(causes)
+    removes = "the named causes remove" if len(verdict.causes) > 1 else "the named cause removes"
+    return WORDS[verdict.verdict].format(removes)
 
 
 def reason(verdict: Verdict) -> str:
@@ -48,7 +79,7 @@ def reason(verdict: Verdict) -> str:
 
 def name_cause(cause: Cause) -> str:
     """Return a cause, or its set, with response and probability."""
-    *others, last = [cause.effect, *cause.equivalent]
+    *others, last = cause.names
     names = f"one of {', '.join(others)} and {last}" if len(others) > 1 else " or ".join([*others, last])
     return f"{names} in the {NAMES[cause.response]} (probability {cause.probability:.2f})"
 
@@ -65,125 +96,109 @@ def spell_parameter(name: str) -> tuple[str, float]:
 
 def cause_table(verdict: Verdict) -> Table:
     """Return the causes with their size in the record and their parameters."""
-    rows = []
+    rows: list[dict[str, Any]] = []
     for cause in verdict.causes:
-        first = True
+        head: dict[str, Any] = {
+            "cause": cause.effect,
+            "or": ", ".join(cause.equivalent),
+            "response": NAMES[cause.response],
+            "peak": shown(cause.response, cause.peak),
+            "probability": cause.probability,
+        }
         for name, p in cause.parameters.items():
-            lead = (
-                [
-                    cause.effect,
-                    ", ".join(cause.equivalent) or "—",
-                    NAMES[cause.response],
-                    shown(cause.response, cause.peak),
-                    f"{cause.probability:.2f}",
-                ]
-                if first
-                else [""] * 5
-            )
             words, factor = spell_parameter(name)
-            value, low, high = to_interval(*(factor * x for x in (p.value, p.low, p.high)))
-            rows.append([*lead, words, value, f"{low} … {high}" if p.high > p.low else "exact"])
-            first = False
-    return Table(
-        "Causes",
-        ("Cause", "Or equally", "In", "Peak to peak", "Probability", "Parameter", "Value", "90 % interval"),
-        rows,
-        "Peak to peak: what the cause changes in this record. Further coefficients of a cause are in the saved card.",
-    )
+            rows.append(
+                head | {"name": words, "value": factor * p.value, "low": factor * p.low, "high": factor * p.high}
+            )
+            head = {}
+    note = "Peak to peak: change of the response in this record due to the cause. The saved card has all coefficients of a cause."
+    return Table("Causes", rows, CAUSES, note)  # fmt: skip
 
 
 def response_table(verdict: Verdict) -> Table:
-    """Return every response with its residuals on rows that the fit has not seen."""
+    """Return every response with its residuals on held-out rows."""
     rows = []
-    for name, result in verdict.responses.items():
-        extended = result.extended or (None, None)
-        scale = RESPONSES[name].scale
-        cells = (result.baseline[1], extended[1], result.noise, result.white, result.wander)
-        left = result.left_over + (f" in {result.left_over_input}" if result.left_over_input else "")
-        rows.append(
-            [
-                f"{NAMES[name]} ({RESPONSES[name].shown})",
-                result.verdict,
-                *(plain(None if value is None else value * scale) for value in cells),
-                plain(result.gain),
-                "—" if result.explained_share is None else f"{100 * result.explained_share:.1f} %",
-                left,
-            ]
-        )
-    return Table(
-        "Responses: residual rms",
-        (
-            "Response",
-            "Verdict",
-            "Baseline",
-            "With causes",
-            "Noise",
-            "White",
-            "Wander",
-            "Gain",
-            "Explained",
-            "Left over",
-        ),
-        rows,
-        "Baseline and with causes: on rows left out of the fit. Noise: what no model removed, its white part a row and its "
-        "wander within a run. Explained: part of the structure that the causes remove.",
+    for name, one in verdict.responses.items():
+        numbers: Mapping[str, float | None] = {
+            "baseline": one.baseline[1],
+            "extended": (one.extended or (None, None))[1],
+            "noise": one.noise,
+            "white": one.white,
+            "wander": one.wander,
+        }
+        rows.append({
+            **{key: None if value is None else value * RESPONSES[name].scale for key, value in numbers.items()},
+            "response": f"{NAMES[name]} ({RESPONSES[name].shown})",
+            "verdict": one.verdict,
+            "gain": one.gain,
+            "explained_share": one.explained_share,
+            "left": one.left_over + (f" in {one.left_over_input}" if one.left_over_input else ""),
+        })  # fmt: skip
+    note = (
+        "Rms residuals. Baseline and with causes: on rows left out of the fit. Noise: what no model removes, with its white part for"
+        " each row and its coloured part within a run. Explained: share of the structure that the causes remove."
     )
+    return Table("Responses", rows, RESULTS, note)
 
 
-def remarks(verdict: Verdict) -> list[str]:
-    """Return what must be said of a response beside its numbers, a sentence each."""
-    found = [(NAMES[name], result.remark) for name, result in verdict.responses.items() if result.remark]
-    return [f"{name[:1].upper()}{name[1:]}: {remark}." for name, remark in found]
+def remarks(verdict: Verdict) -> list[Sentence]:
+    """Return remarks on responses, and the notes."""
+    found = [f"{NAMES[name]}: {one.remark}." for name, one in verdict.responses.items() if one.remark]
+    return [Sentence(f"{words[:1].upper()}{words[1:]}", "note") for words in (*found, *verdict.notes)]
 
 
-def diagnosis_page(diagnosis: "Diagnosis") -> str:
-    """Return the page as HTML."""
+def next_step(verdict: Verdict) -> list[Sentence]:
+    """Return what to measure next."""
+    return [Sentence(f"Next experiment: {verdict.next_experiment}", "note")] if verdict.next_experiment else []
+
+
+def diagnosis_parts(diagnosis: "Diagnosis") -> list[Chapter]:
+    """Return what people read of the diagnosis of a campaign."""
     verdict = diagnosis.verdict
-    first: list[Block] = [Facts(_facts(verdict))]
-    if diagnosis.inquiries:
-        first.append(ladder(diagnosis))
-    if verdict.next_experiment:
-        first.append(Text(f"Next experiment: {verdict.next_experiment}", "note"))
     files = ", ".join(dict.fromkeys(run.label for run in diagnosis.campaign.runs))
-    first.append(Text(f"Files read: {files}."))
-    main = _main_response(verdict)
-    pictures: list[Block] = []
+    physics = [cause for cause in verdict.causes if cause.kind == "physics"]
+    return [
+        Chapter("The answer", [
+            Sentence(headline(verdict), where="terminal"),
+            Facts(_facts(verdict), "page"),
+            *([Figure(lambda: pictures.ladder(diagnosis), "Rms residual of each response; for the frequency also as a temperature error. Calibrated and with causes: on held-out rows where these can be predicted, else on the rows of the fit.")] if diagnosis.inquiries else []),
+            *next_step(verdict),
+            Sentence(f"Files read: {files}.", where="page"),
+        ]),
+        Chapter("The residual, and the next run", list(_residual(diagnosis))),
+        Chapter("Causes and numbers", [
+            cause_table(verdict), response_table(verdict), *remarks(verdict),
+            *(Sentence(f"{cause.effect}: {_summary(cause)}", where="page") for cause in physics),
+        ]),
+        *(Chapter(f"Residual of the {NAMES[name]}", list(_alternatives(diagnosis, name))) for name in diagnosis.inquiries),
+        Chapter("Method", [Sentence(METHOD, where="page")]),
+    ]  # fmt: skip
+
+
+def _residual(diagnosis: "Diagnosis") -> Iterator[Part]:
+    main, run = _main_response(diagnosis.verdict), diagnosis.verdict.next_run
     if main is not None and main in diagnosis.inquiries:
-        pictures.append(before_and_after(diagnosis, main))
-    if verdict.next_run is not None:
-        pictures.append(next_run_picture(verdict.next_run))
-    chapters = [
-        Chapter("The answer", first),
-        *([Chapter("The residual, and the next run", pictures)] if pictures else []),
-        Chapter(
-            "Causes and numbers",
-            [
-                *([cause_table(verdict)] if verdict.causes else []),
-                response_table(verdict),
-                *(Text(remark, "note") for remark in remarks(verdict)),
-                *(Text(f"{cause.effect}: {_summary(cause)}") for cause in verdict.causes if cause.kind == "physics"),
-                *(Text(f"{note[:1].upper()}{note[1:]}", "note") for note in verdict.notes),
-            ],
-        ),
-    ]
-    chapters += [
-        Chapter(
-            f"Residual of the {NAMES[response]}", [residual_views(diagnosis, response), *_rivals(diagnosis, response)]
-        )
-        for response in diagnosis.inquiries
-    ]
-    chapters.append(Chapter("How it was found", [Text(METHOD)]))
-    return render_page("Diagnosis of a campaign", headline(verdict), chapters)
+        when = " before and after the named causes are added" if diagnosis.inquiries[main].final.terms else ""
+        yield Figure(lambda: pictures.before_and_after(diagnosis, main), f"Residual of the {NAMES[main]}{when}.")
+    if run is not None:
+        yield Figure(lambda: pictures.next_run_picture(run), f"Suggested next run: {run.profile}.")
 
 
-METHOD = (
-    "The baseline is calibrated first: without a card, the frequency through one thermal lag with free f0, slope and curvature, the "
-    "bias as a cubic in the change of frequency with an offset per run, 1/Q as a quadratic in temperature. Every effect of the "
-    "library is a family of curves with a prior on its size. Models with none, one or several of them are compared by their "
-    "marginal likelihood in white noise with a wander; equal ones are named as a set, and the other responses vote. Generic smooth "
-    "functions of time, temperature, rate, history and drives look for what no effect explains. A cause is refused where "
-    "the model with it is worse on rows that the fit has not seen."
-)
+def _alternatives(diagnosis: "Diagnosis", response: str) -> Iterator[Part]:
+    inquiry = diagnosis.inquiries[response]
+    caption = f"Baseline residual of the {NAMES[response]} (averages over {diagnosis.campaign.step:.0f} s) against its inputs."
+    yield Figure(lambda: pictures.residual_views(diagnosis, response), caption)
+    for place in inquiry.selection.places:
+        rows = [
+            {"name": name, "evidence": 2.0 * (rival.score - place.without.score)}
+            for name, rival in zip(place.names, place.rivals, strict=True)
+        ]
+        columns = (Column("name", "effect"), Column("evidence", "evidence", form=".1f"))
+        yield Table(f"Alternatives to {place.names[0]}", rows, columns, where="page")  # fmt: skip
+    left = inquiry.leftover
+    if left.significant:
+        words = f"Lack of fit: strongest against {left.input}, evidence {2.0 * left.evidence:.0f}."
+        yield Sentence(words, where="page")
 
 
 def _summary(cause: Cause) -> str:
@@ -196,16 +211,17 @@ def _summary(cause: Cause) -> str:
 def _facts(verdict: Verdict) -> list[tuple[str, str, str]]:
     facts = [("Verdict", verdict.verdict.replace("-", " "), reason(verdict))]
     for cause in verdict.causes[:3]:
-        size = shown(cause.response, cause.peak)
-        sure = f"{size} peak to peak in the {NAMES[cause.response]}; probability {cause.probability:.2f}"
-        facts.append(("Cause", " or ".join(cause.names), sure))
+        size = f"{shown(cause.response, cause.peak)} peak to peak in the {NAMES[cause.response]}"
+        facts.append(("Cause", " or ".join(cause.names), f"{size}; probability {cause.probability:.2f}"))
     main = _main_response(verdict)
     if main is not None:
         result = verdict.responses[main]
         if result.gain is not None:
-            facts.append(("Gain", f"{plain(result.gain)} times", f"of the {NAMES[main]}, on rows left out of the fit"))
+            facts.append(
+                ("Gain", f"{plain(result.gain)} times", f"smaller residual of the {NAMES[main]} on held-out rows")
+            )
         facts.append(("Noise", shown(main, result.noise), f"rms of the {NAMES[main]} that no model removes"))
-    return facts
+    return facts  # fmt: skip
 
 
 def _main_response(verdict: Verdict) -> str | None:
@@ -213,18 +229,3 @@ def _main_response(verdict: Verdict) -> str | None:
         return verdict.causes[0].response
     ranked = sorted(verdict.responses, key=lambda name: -verdict.responses[name].left_over_evidence)
     return next((name for name in ranked if verdict.responses[name].noise is not None), None)
-
-
-def _rivals(diagnosis: "Diagnosis", response: str) -> list[Block]:
-    inquiry = diagnosis.inquiries[response]
-    blocks: list[Block] = []
-    for place in inquiry.selection.places:
-        nothing = place.without.score
-        rows = [[n, f"{2.0 * (r.score - nothing):.1f}"] for n, r in zip(place.names, place.rivals, strict=True)]
-        blocks.append(Table(f"Alternatives to {place.names[0]}", ("Effect", "Evidence"), rows))
-    left = inquiry.leftover
-    if left.significant:
-        blocks.append(
-            Text(f"Unmodelled structure: strongest against {left.input}, evidence {2.0 * left.evidence:.0f}.")
-        )
-    return blocks

@@ -10,14 +10,15 @@ from studies.diagnosis.planning.next_run import NextRun
 from studies.diagnosis.response import RESPONSES
 from studies.diagnosis.verdict import ResponseResult
 from studies.reports.digits import plain
-from studies.reports.page import Picture, draw
 from studies.reports.style import BLACK, BLUE, ORANGE, VERMILION, figure
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure as Drawing
+
     from studies.diagnosis.investigate import Diagnosis
 
 
-def ladder(diagnosis: "Diagnosis") -> Picture:
+def ladder(diagnosis: "Diagnosis") -> "Drawing":
     """Draw what is left of every response: as shipped, calibrated, with the named physics, noise; on held-out rows."""
     columns = [c for c in diagnosis.verdict.responses if c in diagnosis.inquiries]
     with figure(1, len(columns), height=3.0, squeeze=False) as (canvas, axes):
@@ -41,11 +42,7 @@ def ladder(diagnosis: "Diagnosis") -> Picture:
             axis.set_ylim(0.0, 1.3 * max(values, default=1.0))
             axis.set_title(f"{response.word} ({response.shown})", loc="left", fontsize=10)
             axis.grid(visible=False, axis="x")
-        return draw(
-            canvas,
-            "Residual of each response, rms; calibrated and with causes: on rows left out of the fit, where the others foretell them, else on the rows of the fit. Of the frequency also as an error of temperature.",
-            "Bars of the residual rms of each response from the calibrated simulation to the noise.",
-        )
+        return canvas
 
 
 def rungs(result: ResponseResult) -> list[tuple[str, float | None]]:
@@ -78,14 +75,14 @@ def as_temperature(diagnosis: "Diagnosis", column: str, value: float) -> str | N
     )
 
 
-def before_and_after(diagnosis: "Diagnosis", response: str) -> Picture:
+def before_and_after(diagnosis: "Diagnosis", response: str) -> "Drawing":
     """Draw the residual over the campaign before and, if anything is named, after the extension; the noise as a band."""
     inquiry, unit = diagnosis.inquiries[response], RESPONSES[response]
     noise = (diagnosis.verdict.responses[response].noise or 0.0) * unit.scale
-    strips = [(inquiry.plain, "the calibrated simulation", VERMILION)]
+    strips = [(inquiry.plain, "calibrated simulation", VERMILION)]
     if inquiry.final.terms:
-        strips = [(inquiry.plain, "before: the calibrated simulation", VERMILION)]
-        strips.append((inquiry.final, "after: with the named causes", BLUE))
+        strips = [(inquiry.plain, "calibrated simulation", VERMILION)]
+        strips.append((inquiry.final, "with the named causes", BLUE))
     with figure(len(strips), 1, height=2.0 * len(strips), sharex=True, sharey=True, squeeze=False) as (canvas, grid):
         axes = grid[:, 0]
         for axis, (model, title, colour) in zip(axes, strips, strict=True):
@@ -95,17 +92,12 @@ def before_and_after(diagnosis: "Diagnosis", response: str) -> Picture:
                 axis.plot((begin + time - time[0]) / 3600.0, values, color=colour, linewidth=0.6)
                 begin += float(run.row_time[-1] - run.row_time[0])
                 axis.axvline(begin / 3600.0, color="#b0b6bd", linewidth=0.8)
-            axis.axhspan(-2 * noise, 2 * noise, color=ORANGE, alpha=0.25, label="noise, ± 2 rms")
+            axis.axhspan(-2 * noise, 2 * noise, color=ORANGE, alpha=0.25, label="noise, ±2 rms")
             axis.set_title(title, loc="left", fontsize=10)
             axis.set_ylabel(f"residual ({unit.shown})")
         axes[0].legend(loc="upper right")
-        axes[-1].set_xlabel("time of the runs one after the other (h)")
-        when = " before and after the extension" if inquiry.final.terms else ""
-        return draw(
-            canvas,
-            f"Residual of the {unit.word}{when}.",
-            f"The {unit.word} residual over time{when}; the last strip has rms {plain(noise)} {unit.shown}.",
-        )
+        axes[-1].set_xlabel("time, runs in sequence (h)")
+        return canvas
 
 
 def _thinned(time: np.ndarray, values: np.ndarray, most: int = 500) -> tuple[np.ndarray, np.ndarray]:
@@ -113,7 +105,7 @@ def _thinned(time: np.ndarray, values: np.ndarray, most: int = 500) -> tuple[np.
     return time[::step], values[::step]
 
 
-def residual_views(diagnosis: "Diagnosis", response: str) -> Picture:
+def residual_views(diagnosis: "Diagnosis", response: str) -> "Drawing":
     """Draw the baseline's residual against temperature (heating and cooling), rate, frequency and the drives."""
     campaign, inquiry, unit = diagnosis.campaign, diagnosis.inquiries[response], RESPONSES[response]
     fit = inquiry.plain
@@ -150,14 +142,10 @@ def residual_views(diagnosis: "Diagnosis", response: str) -> Picture:
         for axis in flat[::columns]:
             axis.set_ylabel(f"residual ({unit.shown})")
         flat[0].legend(markerscale=4)
-        return draw(
-            canvas,
-            f"Baseline residual of the {unit.word} (means over {campaign.step:.0f} s) against its inputs.",
-            f"Scatter of the {unit.word} residual against temperature, rate, frequency and drives.",
-        )
+        return canvas
 
 
-def next_run_picture(run: NextRun) -> Picture:
+def next_run_picture(run: NextRun) -> "Drawing":
     """Draw the suggested run: the chamber's temperature, and the drives that step."""
     rows = 1 + len(run.drives)
     heights = [2.0] + [0.7] * len(run.drives)
@@ -174,4 +162,4 @@ def next_run_picture(run: NextRun) -> Picture:
             axis.locator_params(axis="y", nbins=3)
             axis.margins(y=0.2)
         axes[-1, 0].set_xlabel("time (h)")
-        return draw(canvas, f"Suggested next run: {run.profile}.", f"Chamber profile of the next run: {run.profile}.")
+        return canvas

@@ -1,42 +1,50 @@
-"""What a fleet of one design shares, and which device is not like the others: sentences, tables, and a page."""
+"""Parts of a fleet's diagnosis: what devices of one design have in common, and which of them differs."""
 
 from typing import TYPE_CHECKING
 
 from studies.diagnosis.fleet.outcome import Fleet, Share, Value
 from studies.reports.diagnosis import NAMES, cause_table, remarks, response_table
 from studies.reports.digits import plain
-from studies.reports.page import Block, Chapter, Picture, Table, Text, draw, render_page
 from studies.reports.style import BLUE, VERMILION, figure
+from studies.results import Chapter, Column, Figure, Part, Sentence, Table
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure as Drawing
 
-COLUMNS = 3
+ACROSS, MOST = 3, 6
 KINDS = {"all": "all devices", "all but": "all but {0}", "alone": "{0} alone", "own": "each device its own"}
 METHOD = (
-    "Every device is diagnosed alone. For each cause that any of them shows, the evidence for every effect in its place is summed "
-    "over the devices: one cause of the design costs its prior once, a device that differs costs besides. A value is far where it "
-    "lies beyond three standard deviations of what the other devices, as scattered as they are, foretell; of two devices "
-    "values cannot say which is the odd one."
+    "Each device is diagnosed alone. For each cause that any of them shows, the evidence for every alternative effect is summed over"
+    " the devices. A cause of the design pays its prior once; a device that differs pays an extra prior. A value is flagged if it"
+    " lies more than three standard deviations from the prediction of the other devices, including their scatter. With two devices,"
+    " values alone cannot show which one differs."
+)
+SHARES = (
+    Column("cause", "cause"),
+    Column("response", "response"),
+    Column("devices", "devices"),
+    Column("probability", "probability", form=".2f"),
+    Column("evidence", "evidence", digits=3),
+    Column("sizes", "size in each device"),
+    Column("coefficient", "coefficient"),
+)
+DEVICES = (
+    Column("device", "device"),
+    Column("verdict", "verdict"),
+    Column("causes", "causes"),
+    Column("differs", "differs from the others"),
 )
 
 
 def headline(fleet: Fleet) -> str:
-    """Return what the fleet has in common and who is the odd one out, in a few sentences."""
-    common = [one for one in fleet.shares if one.kind in ("all", "all but")]
-    parts = [
-        "Common to the design: " + ", ".join(f"{_names(one)} ({NAMES[one.response]})" for one in common) + "."
-        if common
-        else "No cause is common to the devices."
-    ]
-    odd = fleet.odd
-    if odd is not None:
-        parts.append(f"The odd one out is {odd}: {'; '.join(fleet.reasons[odd])}.")
-    elif any(fleet.reasons.values()):
-        parts.append("Several devices differ from the others.")
-    else:
-        parts.append("No device differs from the others.")
-    return " ".join(parts)
+    """Return what the fleet has in common and which device differs, in a few sentences."""
+    common = [f"{_names(one)} ({NAMES[one.response]})" for one in fleet.shares if one.kind in ("all", "all but")]
+    first = f"Common to the design: {', '.join(common)}." if common else "The devices have no cause in common."
+    if fleet.odd is not None:
+        return f"{first} Device {fleet.odd} differs from the others: {'; '.join(fleet.reasons[fleet.odd])}."
+    several = any(fleet.reasons.values())
+    return f"{first} {'Several devices differ' if several else 'No device differs'} from the others."
 
 
 def _names(share: Share) -> str:
@@ -44,79 +52,86 @@ def _names(share: Share) -> str:
 
 
 def share_table(fleet: Fleet) -> Table:
-    """Return the causes over the fleet as a table."""
+    """Return the causes over the fleet."""
     rows = [
-        [
-            _names(one),
-            NAMES[one.response],
-            KINDS[one.kind].format(one.odd),
-            f"{one.probability:.2f}",
-            plain(one.evidence),
-            ", ".join(f"{device} {plain(size.value)}" for device, size in one.sizes.items()) or "—",
-            one.coefficient or "—",
-        ]
+        {
+            "cause": _names(one),
+            "response": NAMES[one.response],
+            "devices": KINDS[one.kind].format(one.odd),
+            "probability": one.probability,
+            "evidence": one.evidence,
+            "sizes": ", ".join(f"{device} {plain(size.value)}" for device, size in one.sizes.items()),
+            "coefficient": one.coefficient or "",
+        }
         for one in fleet.shares
     ]
-    columns = (
-        "Cause",
-        "Response",
-        "Who has it",
-        "Probability",
-        "Evidence",
-        "Size of each device",
-        "Which is",
-    )
-    return Table("Causes over the fleet", columns, rows)
-
-
-def value_table(fleet: Fleet) -> Table:
-    """Return the values of every device as a table, those first in which a device is odd."""
-    devices = list(fleet.devices)
-    ordered = sorted(fleet.values, key=lambda value: -max(map(abs, value.odd.values()), default=0.0))
-    rows = [
-        [
-            value.name,
-            *(plain(value.of[d].value) + (" !" if d in value.odd else "") if d in value.of else "—" for d in devices),
-            plain(value.common),
-            plain(value.scatter),
-        ]
-        for value in ordered
-    ]
-    note = "!: far from what the others foretell; it is left out of mean and scatter."
-    return Table("Values of every device", ("Value", *devices, "Mean", "Scatter"), rows, note)
+    return Table("Causes", rows, SHARES, "Size: value of the coefficient named in the last column.")
 
 
 def device_table(fleet: Fleet) -> Table:
-    """Return one row a device: its verdict, its causes, and why it is odd."""
+    """Return one row a device: its verdict, its causes, and how it differs."""
     rows = [
-        [
-            name,
-            one.verdict.verdict,
-            ", ".join(" or ".join(cause.names) for cause in one.verdict.causes) or "—",
-            "; ".join(fleet.reasons[name]) or "—",
-        ]
+        {
+            "device": name,
+            "verdict": one.verdict.verdict,
+            "causes": ", ".join(" or ".join(cause.names) for cause in one.verdict.causes),
+            "differs": "; ".join(fleet.reasons[name]),
+        }
         for name, one in fleet.devices.items()
     ]
-    return Table("Every device alone", ("Device", "Verdict", "Causes", "Differs from the others"), rows)
+    return Table("Devices", rows, DEVICES)
 
 
-def value_picture(fleet: Fleet, most: int = 6) -> Picture | None:
-    """Draw values of the devices with their 90 % intervals, over the mean of those that are alike."""
-    shown = sorted(fleet.values, key=lambda v: -max(map(abs, v.odd.values()), default=0.0))[:most]
-    if not shown:
-        return None
-    devices = list(fleet.devices)
-    rows = -(-len(shown) // COLUMNS)
-    with figure(rows, COLUMNS, height=2.4 * rows, squeeze=False) as (canvas, axes):
-        for axis in axes.flat[len(shown) :]:
+def _ordered(fleet: Fleet) -> list[Value]:
+    return sorted(fleet.values, key=lambda value: -max(map(abs, value.odd.values()), default=0.0))
+
+
+def value_table(fleet: Fleet) -> Table:
+    """Return the values of every device, those first in which a device differs."""
+    rows = [
+        {
+            "value": value.name,
+            "of": {d: plain(own.value) + (" !" if d in value.odd else "") for d, own in value.of.items()},
+            "common": value.common,
+            "scatter": value.scatter,
+        }
+        for value in _ordered(fleet)
+    ]
+    each = [(f"of.{device}", device) for device in fleet.devices]
+    columns = (Column("value", "value"), *(Column(key, heading) for key, heading in each))
+    ends = (Column("common", "mean", digits=3), Column("scatter", "scatter", digits=3))
+    note = "!: far from the prediction of the other devices; left out of mean and scatter."
+    return Table("Values of the devices", rows, (*columns, *ends), note)
+
+
+def fleet_parts(fleet: Fleet) -> list[Chapter]:
+    """Return what people read of a fleet."""
+    caption = "Values of the devices with 90 % intervals; the line is the mean of those that agree."
+    values: list[Part] = [Figure(lambda: _draw_values(fleet), caption)] if fleet.values else []
+    return [
+        Chapter("The answer", [Sentence(headline(fleet), where="terminal"), share_table(fleet), device_table(fleet)]),
+        Chapter("Values", [*values, value_table(fleet)]),
+        *(Chapter(f"Device {name}", [
+            *_on_page(cause_table(one.verdict), response_table(one.verdict)),
+            *(Sentence(said.text, said.kind, "page") for said in remarks(one.verdict)),
+        ]) for name, one in fleet.devices.items()),
+        Chapter("Method", [Sentence(METHOD, where="page")]),
+    ]  # fmt: skip
+
+
+def _on_page(*tables: Table) -> list[Table]:
+    return [Table(one.title, one.rows, one.columns, one.note, "page") for one in tables]
+
+
+def _draw_values(fleet: Fleet) -> "Drawing":
+    drawn, devices = _ordered(fleet)[:MOST], list(fleet.devices)
+    rows = -(-len(drawn) // ACROSS)
+    with figure(rows, ACROSS, height=2.4 * rows, squeeze=False) as (canvas, axes):
+        for axis in axes.flat[len(drawn) :]:
             axis.set_visible(False)
-        for axis, value in zip(axes.flat, shown, strict=False):
+        for axis, value in zip(axes.flat, drawn, strict=False):
             _draw_value(axis, value, devices)
-        return draw(
-            canvas,
-            "Values of every device with 90 % intervals; the line is the mean of those that are alike.",
-            "values of the devices beside each other",
-        )
+        return canvas
 
 
 def _draw_value(axis: "Axes", value: Value, devices: list[str]) -> None:
@@ -129,21 +144,3 @@ def _draw_value(axis: "Axes", value: Value, devices: list[str]) -> None:
     axis.set_xticks(range(len(devices)), devices)
     axis.set_xlim(-0.5, len(devices) - 0.5)
     axis.set_title(value.name.rpartition(".")[2].replace(": ", "\n"), fontsize=7)
-
-
-def fleet_page(fleet: Fleet) -> str:
-    """Return the page as HTML."""
-    first: list[Block] = [device_table(fleet)]
-    if fleet.shares:
-        first.insert(0, share_table(fleet))
-    chapters = [Chapter("The answer", first)]
-    picture = value_picture(fleet)
-    if picture is not None:
-        chapters.append(Chapter("Values", [picture, value_table(fleet)]))
-    for name, one in fleet.devices.items():
-        own: list[Block] = [cause_table(one.verdict)] if one.verdict.causes else []
-        said = [*remarks(one.verdict), *one.verdict.notes]
-        own += [response_table(one.verdict), *(Text(words, "note") for words in said)]
-        chapters.append(Chapter(f"Device {name}", own))
-    chapters.append(Chapter("How it was found", [Text(METHOD)]))
-    return render_page("Diagnosis of a fleet", headline(fleet), chapters)

@@ -1,68 +1,69 @@
-"""What a planned campaign could tell apart: two sentences, a table, and a page."""
+"""Parts of a plan: which effects a campaign can identify, how small they may be, and what would be named instead."""
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from studies.diagnosis.planning.plan import Outlook, Plan, effect_of
 from studies.diagnosis.planning.rehearsal import NOTHING
 from studies.diagnosis.response import RESPONSES
-from studies.reports.page import Chapter, Facts, Picture, Table, Text, draw, render_page
 from studies.reports.style import figure
+from studies.results import Chapter, Column, Facts, Figure, Sentence, Table
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure as Drawing
 
 SEEN = 0.02
 """Share below which an answer is not listed."""
 SNR_WORDS = (
-    "SNR: rms of what the refitted simulation cannot absorb of the effect, over the rms of the noise of one row of the record; "
-    "many rows make an effect visible that is far below the noise of one."
+    "SNR: rms of the part of the effect that the refitted simulation cannot absorb, over the rms noise of one row of the record."
+    " With many rows an effect far below the noise of one row can be identified."
 )
+SENSORS = (Column("sensor", "sensor"), Column("count", "sets"), Column("pairs", "effects distinguished"))
 
 
 def headline(outlook: Outlook) -> str:
-    """Return what the campaign is good for, in a few sentences."""
+    """Return what the campaign can identify, in a few sentences."""
     effects = list(outlook.close.confusion)
-    parts = []
-    for plan in outlook.plans:
-        sure = sum(1 for key in effects if (least := outlook.smallest(key)) is not None and least <= plan.snr)
-        size = f" ({_size_words(plan)})" if plan.sizes else ""
-        parts.append(f"{sure} of {len(effects)} at SNR {plan.snr:g}{size}")
-    text = f"Effects that this campaign would name rightly nine times in ten: {', '.join(parts)}."
+    parts = [
+        f"{_sure(outlook, plan)} of {len(effects)} at SNR {plan.snr:g}" + (f" ({_sizes(plan)})" if plan.sizes else "")
+        for plan in outlook.plans
+    ]
+    text = f"Effects identified in at least 90 % of cases: {', '.join(parts)}."
     never = [key for key in effects if outlook.smallest(key) is None]
     if never:
         text += f" Not even at SNR {outlook.plans[0].snr:g}: {', '.join(map(shown_key, never))}."
     for reason in dict.fromkeys(outlook.close.invisible.values()):
         names = [name for name, why in outlook.close.invisible.items() if why == reason]
-        text += f" Not testable, {reason}: {', '.join(names)}."
+        text += f" Not testable ({reason}): {', '.join(names)}."
     return text
 
 
 def plan_table(outlook: Outlook) -> Table:
-    """Return the prediction as a table, the effects that are easiest to name first."""
+    """Return the prediction as a table, the effects that are easiest to identify first."""
     close = outlook.close
-    order = sorted(close.confusion, key=lambda key: [-_named(plan, key) for plan in reversed(outlook.plans)])
     rows = [
-        [
-            shown_key(key),
-            *(f"{100 * _named(plan, key):.0f}" for plan in outlook.plans),
-            _listed(close.sets[key], ()),
-            _listed(close.confusion[key], (effect_of(key),)),
-            f"{100 * close.survives[key]:.0f}",
-        ]
-        for key in order
+        {
+            "effect": shown_key(key),
+            "named": [_named(plan, key) for plan in outlook.plans],
+            "set": _listed(close.sets[key], ()),
+            "instead": _listed(close.confusion[key], (effect_of(key),)),
+            "survives": close.survives[key],
+        }
+        for key in _ranked(outlook)
     ]
-    rows += [[name, *["0"] * len(outlook.plans), "—", why, "0"] for name, why in close.invisible.items()]
-    return Table(
-        f"What this campaign could tell apart, {close.cases} cases each",
-        (
-            "Hidden effect",
-            *(f"Named rightly at SNR {plan.snr:g} (%)" for plan in outlook.plans),
-            f"As a set with (SNR {close.snr:g})",
-            f"Said instead (SNR {close.snr:g})",
-            "Survives the baseline (%)",
-        ),
-        rows,
-        "Named rightly: the answer, alone or as a set, holds the effect. " + SNR_WORDS,
-    )
+    nothing = {"named": [0.0] * len(outlook.plans), "survives": 0.0}
+    rows += [{"effect": name, "instead": why, **nothing} for name, why in close.invisible.items()]
+    columns = [
+        Column("effect", "hidden effect"),
+        *(Column(f"named.{k}", f"identified at SNR {plan.snr:g}", "%", ".0f", scale=100.0) for k, plan in enumerate(outlook.plans)),
+        Column("set", f"as a set with (SNR {close.snr:g})"),
+        Column("instead", f"named instead (SNR {close.snr:g})"),
+        Column("survives", "not absorbed by the baseline", "%", ".0f", scale=100.0),
+    ]  # fmt: skip
+    note = "Identified: the answer is the effect, or a set that contains it. " + SNR_WORDS
+    return Table(f"Effects that this campaign can identify, {close.cases} cases each", rows, columns, note)
 
 
 def shown_key(key: str) -> str:
@@ -72,97 +73,91 @@ def shown_key(key: str) -> str:
     return key
 
 
+def _ranked(outlook: Outlook) -> list[str]:
+    return sorted(outlook.close.confusion, key=lambda key: [-_named(plan, key) for plan in reversed(outlook.plans)])
+
+
+def _sure(outlook: Outlook, plan: Plan) -> int:
+    return sum((least := outlook.smallest(key)) is not None and least <= plan.snr for key in outlook.close.confusion)
+
+
 def _named(plan: Plan, key: str) -> float:
     return plan.outcome(key)["named"] if key in plan.confusion else 0.0
 
 
 def _listed(shares: dict[str, float], but: tuple[str, ...]) -> str:
     words = (f"{name} {100 * share:.0f} %" for name, share in shares.items() if name not in but and share >= SEEN)
-    return ", ".join(words) or "—"
+    return ", ".join(words)
 
 
-def plan_page(outlook: Outlook, profiles: Sequence[str]) -> str:
-    """Return the page of a plan as HTML."""
-    effects = list(outlook.close.confusion)
-    facts = []
-    for plan in outlook.plans:
-        sure = sum(1 for key in effects if (least := outlook.smallest(key)) is not None and least <= plan.snr)
-        facts.append((f"Named nine times in ten, SNR {plan.snr:g}", f"{sure} of {len(effects)}", _size_words(plan)))
-    facts.append(("Chamber time", f"{outlook.close.hours:.3g} h", "of all planned runs"))
-    facts.append(("Not testable", str(len(outlook.close.invisible)), "a drive that is not stepped, or no change"))
-    runs = Table("Planned runs", ("Run", "Chamber"), [[str(k + 1), words] for k, words in enumerate(profiles)])
-    return render_page(
-        "What a planned campaign could tell apart",
-        headline(outlook),
-        [
-            Chapter("In short", [Facts(facts), runs, _ladder(outlook)]),
-            Chapter("Every effect", [plan_table(outlook), *_sensor_table(outlook.close)]),
-            Chapter("What would be said", [_matrix(outlook.close)]),
-            Chapter(
-                "How it was predicted",
-                [
-                    Text(
-                        "A gyro without effects goes through the planned runs with nominal physics. Every effect is hidden in it "
-                        f"{outlook.close.cases} times at each SNR, with random shapes, under white noise and, in every second "
-                        "case, slow noise besides; the answers count by the rules of the diagnosis. " + SNR_WORDS
-                    )
-                ],
-            ),
-        ],
+def _sizes(plan: Plan) -> str:
+    return ", ".join(f"{value:.2g} {key.split(' / ')[1]}" for key, value in plan.sizes.items()) + " rms"
+
+
+def plan_parts(outlook: Outlook, profiles: Sequence[str]) -> list[Chapter]:
+    """Return what people read of a plan."""
+    close = outlook.close
+    total = len(close.confusion)
+    facts = [
+        (f"Identified at SNR {plan.snr:g}", f"{_sure(outlook, plan)} of {total}", f"in at least 90 % of cases; {_sizes(plan)}")
+        for plan in outlook.plans
+    ]  # fmt: skip
+    facts.append(("Chamber time", f"{close.hours:.3g} h", "of all planned runs"))
+    facts.append(("Not testable", str(len(close.invisible)), "the plan does not excite these effects"))
+    runs = [{"run": k + 1, "chamber": words} for k, words in enumerate(profiles)]
+    sensors = [
+        {"sensor": name, "count": len(pairs), "pairs": ", ".join(pairs)} for name, pairs in close.sensors.items()
+    ]
+    shares = "How often each effect is identified (%), in white noise and with coloured noise added."
+    confusion = (
+        f"Rows: hidden effect; columns: answer; % of {close.cases} cases at SNR {close.snr:g}. Nothing: not detected."
     )
+    method = (
+        "A gyro without effects goes through the planned runs with nominal physics. Each effect is added"
+        f" {close.cases} times at each SNR, with random shapes, in white noise and, in every second case, also in coloured noise."
+        f" The answers follow the rules of the diagnosis. {SNR_WORDS}"
+    )
+    note = f"Sets at SNR {close.snr:g}. A sensor costs no chamber time; the most useful is listed first."
+    return [
+        Chapter("In short", [
+            Sentence(headline(outlook), where="terminal"),
+            Facts(facts, "page"),
+            Table("Planned runs", runs, (Column("run", "run"), Column("chamber", "chamber")), where="page"),
+            Figure(lambda: _draw_shares(outlook), shares),
+        ]),
+        Chapter("All effects", [
+            plan_table(outlook),
+            Table("Sensors that distinguish effects without a further run", sensors, SENSORS, note, "page"),
+        ]),
+        Chapter("What would be named", [Figure(lambda: _draw_confusion(close), confusion)]),
+        Chapter("Method", [Sentence(method, where="page")]),
+    ]  # fmt: skip
 
 
-def _sensor_table(plan: Plan) -> list[Table]:
-    """Return what would part the sets without chamber time."""
-    if not plan.sensors:
-        return []
-    rows = [[sensor, str(len(pairs)), ", ".join(pairs)] for sensor, pairs in plan.sensors.items()]
-    note = f"Sets at SNR {plan.snr:g}. A sensor costs no chamber hour; the first parts the most sets."
-    return [Table("Instead of a further run: sensors that part sets", ("Sensor", "Sets", "Which"), rows, note)]
-
-
-def _size_words(plan: Plan) -> str:
-    sizes = ", ".join(f"{value:.2g} {key.split(' / ')[1]}" for key, value in plan.sizes.items())
-    return f"{sizes} rms"
-
-
-def _ladder(outlook: Outlook) -> Picture:
-    """Draw how often each effect is named at each SNR, under white and with slow noise."""
-    keys = sorted(outlook.close.confusion, key=lambda key: [-_named(plan, key) for plan in reversed(outlook.plans)])
+def _draw_shares(outlook: Outlook) -> "Drawing":
+    """How often each effect is named at each SNR, under white and with slow noise."""
+    keys = _ranked(outlook)
     columns = [(plan, noise) for plan in outlook.plans for noise in plan.by_noise]
-    shares = np.array(
-        [[plan.by_noise[noise].get(key, {}).get(effect_of(key), 0.0) for plan, noise in columns] for key in keys]
-    )
-    labels = [f"SNR {plan.snr:g}\n{noise} noise" for plan, noise in columns]
-    return _map(
-        shares,
-        list(map(shown_key, keys)),
-        labels,
-        "How often each effect would be named rightly, %: white noise, and slow noise besides.",
-    )
+    shares = [[plan.by_noise[noise].get(key, {}).get(effect_of(key), 0.0) for plan, noise in columns] for key in keys]
+    return _map(shares, keys, [f"SNR {plan.snr:g}\n{noise} noise" for plan, noise in columns])
 
 
-def _matrix(plan: Plan) -> Picture:
-    """Draw the confusion matrix."""
+def _draw_confusion(plan: Plan) -> "Drawing":
     keys = sorted(plan.confusion)
     said = {name for shares in plan.confusion.values() for name in shares} | {effect_of(key) for key in keys}
     names = [*sorted(said - {NOTHING}), NOTHING]
-    shares = np.array([[plan.confusion[key].get(name, 0.0) for name in names] for key in keys])
-    caption = (
-        f"Rows the hidden effect, columns the answer, % of {plan.cases} cases at SNR {plan.snr:g}; nothing: it would stay "
-        "unseen."
-    )
-    return _map(shares, list(map(shown_key, keys)), names, caption, 55.0)
+    return _map([[plan.confusion[key].get(name, 0.0) for name in names] for key in keys], keys, names, 55.0)
 
 
-def _map(shares: np.ndarray, rows: Sequence[str], columns: Sequence[str], caption: str, turn: float = 0.0) -> Picture:
-    with figure(height=0.25 * len(rows) + (1.8 if turn else 0.8)) as (made, axes):
+def _map(table: list[list[float]], keys: list[str], columns: Sequence[str], turn: float = 0.0) -> "Drawing":
+    shares = np.array(table)
+    with figure(height=0.25 * len(keys) + (1.8 if turn else 0.8)) as (made, axes):
         axes.imshow(shares, cmap="Blues", vmin=0.0, vmax=1.0, aspect="auto")
         axes.grid(False)
         side = {"ha": "right", "rotation_mode": "anchor"} if turn else {"ha": "center"}
         axes.set_xticks(range(len(columns)), columns, rotation=turn, fontsize=8, **side)
-        axes.set_yticks(range(len(rows)), rows, fontsize=8)
+        axes.set_yticks(range(len(keys)), list(map(shown_key, keys)), fontsize=8)
         for i, j in zip(*np.nonzero(np.round(100 * shares)), strict=True):
             colour = "w" if shares[i, j] > 0.55 else "k"
             axes.text(j, i, f"{100 * shares[i, j]:.0f}", ha="center", va="center", fontsize=7, color=colour)
-        return draw(made, caption, caption)
+        return made

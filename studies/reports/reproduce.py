@@ -13,7 +13,7 @@ from studies.papers.settling import NETWORKS, ROOM_degC
 from studies.reports import gyro_papers, style
 from studies.reports.bias_twin import twin_chapters
 from studies.reports.diagnosis import headline
-from studies.reports.diagnosis_table import table_chapters
+from studies.reports.diagnosis_table import table_parts
 from studies.reports.frequency import coefficients_table, error_figure, fit_figure, order_parts, order_sentence
 from studies.reports.page import Block, Chapter, Facts, Picture, Table, Text, draw, render_page
 from studies.reports.settling import settling_chapter
@@ -280,10 +280,10 @@ def _slope_figure(physics: "PhysicsComparison", study: "FrequencyStudy") -> Pict
 
 def _first_diagnosis(parts: "Reproduction") -> Chapter:
     """Return what `hrg diagnose` says of Table 1."""
-    answer, candidates = table_chapters(parts.diagnosis)
     verdict = Text(headline(parts.diagnosis.verdict), "warning")
-    shown = [block for block in answer.blocks if not isinstance(block, Facts)]
-    return Chapter("Where measurement and physics differ: a first diagnosis", [verdict, *shown, *candidates.blocks])
+    blocks = make_blocks(*(part for chapter in table_parts(parts.diagnosis) for part in chapter.parts))
+    shown = [block for block in blocks if not isinstance(block, Facts)]
+    return Chapter("Where measurement and physics differ: a first diagnosis", [verdict, *shown])
 
 
 def _step_inverse(settling: "SettlingStudy") -> Picture:

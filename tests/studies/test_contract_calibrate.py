@@ -65,7 +65,7 @@ def test_what_has_not_converged_is_no_card(tmp_path, monkeypatch, capsys):
     said = capsys.readouterr()
     answer = json.loads(said.out)
     assert (answer["converged"], answer["calibrated_card"]) == (False, None)
-    assert "calibrated.toml is not written" in said.err
+    assert "calibrated.toml not saved" in said.err
     assert not card.exists()
     assert main(words) == 0
 
@@ -110,7 +110,7 @@ def test_what_cannot_be_calibrated_is_refused(run, tmp_path, capsys):
         (["calibrate", "hrg-30mm"], "name at least one record"),
         (["calibrate", "hrg-30mm", str(bare)], "add the column housing_temperature_degC or chamber_temperature_degC"),
         (["calibrate", "hrg-30mm", str(run), "--hold-out", "3"], "there is 1 record, numbered from 1"),
-        (["calibrate", "hrg-30mm", str(run), "--exact", "thermal.film"], "is no uncertain value of the card"),
+        (["calibrate", "hrg-30mm", str(run), "--exact", "thermal.film"], "is not an uncertain value of the card"),
     ):
         assert main(words) == 2
         captured = capsys.readouterr()
@@ -137,10 +137,9 @@ def test_a_table_whose_level_is_not_the_cards_says_what_would_bridge_it_and_save
     assert answer["responses"]["settled_frequency_Hz"]["run_offset"] < 0.1
     assert any("shear_modulus.log_value moved by -" in warning for warning in answer["warnings"])
     assert (
-        "out.toml is not written: material.deviation.shear_modulus.log_value would have to move by more than 6"
-        in said.err
+        "out.toml not saved: material.deviation.shear_modulus.log_value would have to move by more than 6" in said.err
     )
     assert not out.exists()
     assert main(["calibrate", str(card), "studies/papers/hrg_table1.csv"]) == 0
     text = " ".join(capsys.readouterr().out.split())
-    assert "What would bridge the level, each alone: thinner walls (-2.7" in text
+    assert "Any one of these would remove the difference in level: thinner walls (-2.7" in text

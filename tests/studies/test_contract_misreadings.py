@@ -67,7 +67,7 @@ def test_a_bias_in_degrees_per_second_is_named(card, record):
     said = bias_in_seconds(card, spoilt(record, bias_deg_per_h=lambda b: b / 3600.0))
     assert said is not None
     assert "run.csv" in said
-    assert "it looks like °/s; multiply the column by 3600" in said
+    assert "the column is probably in °/s; multiply it by 3600" in said
 
 
 def test_a_record_given_twice_counts_once_and_holds_nothing_out(card, record):

@@ -50,7 +50,7 @@ def diagnose_fleet(
         Fewer than two devices, or records that cannot be used.
     """
     if len(devices) < 2:
-        raise InputError("a fleet has two devices or more: --device A=a1.csv,a2.csv --device B=b1.csv.")
+        raise InputError("a fleet needs at least two devices: --device A=a1.csv,a2.csv --device B=b1.csv.")
     found: dict[str, Diagnosis] = {}
     for name, records in devices.items():
 
@@ -59,7 +59,7 @@ def diagnose_fleet(
 
         campaign = load_campaign(records, None if card is None else card.reference_temperature - zero_Celsius)
         found[name] = investigate(campaign, score_held_out=score_held_out, advise=False, progress=tell, card=card)
-    progress("what they share")
+    progress("common causes")
     shares = []
     for response, names in _places(found):
         scored = {

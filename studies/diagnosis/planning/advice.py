@@ -78,23 +78,23 @@ def _separate(
     exact = [name for name in cause.equivalent if name in effect.equivalents.get(cause.response, ())]
     names = [cause.effect, *(name for name in cause.equivalent if name not in exact)]
     sensors = {find_effect(name).sensor for name in cause.names} - {""}
-    sensor = f" Without a run: {'; or '.join(sorted(sensors))}." if sensors else ""
-    further = f"No run separates {cause.effect} from {', '.join(exact)}: {effect.isolate}."
+    sensor = f" Alternatively, without a run: {'; or '.join(sorted(sensors))}." if sensors else ""
+    further = f"No run can distinguish {cause.effect} from {', '.join(exact)}: {effect.isolate}."
     if place is not None and len(names) > 1:
         scored = between_rivals(campaign, place, names, _clock_for(cause, clock), chamber)
         if scored and scored[0].evidence > SMALLEST:
-            text, run = _told(scored, f"To separate {cause.effect} from {' and '.join(names[1:])}, run")
+            text, run = _told(scored, f"To distinguish {cause.effect} from {' and '.join(names[1:])}, run")
             return (f"{text} {further}" if exact else f"{text}{sensor}"), run
     if exact:
         return further, None
-    return f"To separate {cause.effect} from {', '.join(names[1:])}: {effect.isolate}.{sensor}", None
+    return f"To distinguish {cause.effect} from {', '.join(names[1:])}: {effect.isolate}.{sensor}", None
 
 
 def _detect(campaign: Campaign, models: Mapping[str, Fit], chamber: Chamber | None) -> Advice:
     scored = to_detect(campaign, models, chamber)
     if not scored:
         return None, None
-    return _told(scored, "No cause is named; a hidden one would show best in")
+    return _told(scored, "No cause is named. A hidden cause would show best in")
 
 
 def _told(scored: Sequence[Scored], begin: str) -> Advice:
@@ -103,7 +103,7 @@ def _told(scored: Sequence[Scored], begin: str) -> Advice:
     run = as_next_run(best, None if repeat is None else repeat.evidence)
     text = f"{begin} {_name(best)} ({best.programme.hours:.2g} h): expected evidence {best.evidence:.0f}"
     if best.pair[1] == NOTHING:
-        text += " for an effect with evidence 10 today"
+        text += " for an effect whose evidence is 10 now"
     if repeat is not None and repeat is not best:
         text += f", against {repeat.evidence:.0f} for a {repeat.programme.profile} ({repeat.programme.hours:.2g} h)"
     return f"{text}.", run
@@ -129,12 +129,12 @@ def _look_again(
     )
     if (line := inquiries[name].leftover.line) is not None:
         hours = longest_resolved(line.period) / 3600.0
-        text = f"{name} holds a line of {line.period:.3g} s, which means over {campaign.step:.3g} s do not show: "
-        return f"{text}diagnose a stretch of at most {hours:.2g} h by itself, on a grid that resolves it.", None
+        text = f"{name} has a periodic component of {line.period:.3g} s, which averages over {campaign.step:.3g} s do not resolve: "
+        return f"{text}diagnose a part of at most {hours:.2g} h by itself, so that the finer grid resolves it.", None
     seen = results[name].left_over_input
     programme = programme_for(campaign, seen, chamber)
     repeat = candidates(campaign, (), chamber)[0]
     scored = Scored(programme, 0.0, ("", ""))
-    text = f"{name} holds structure in {seen} that no known effect has: run a {repeat.profile} unchanged to see whether it comes back"
-    text += "." if programme.repeats else f", then {_name(scored)}, which varies that alone."
+    text = f"{name} has structure in {seen} that no known effect explains: run a {repeat.profile} unchanged to see whether it recurs"
+    text += "." if programme.repeats else f", then {_name(scored)}, which varies only that."
     return text, as_next_run(scored, None, expected=False)

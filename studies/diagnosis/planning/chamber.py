@@ -43,7 +43,7 @@ def parse_chamber(words: str) -> Chamber:
             raise ValueError
     except ValueError:
         raise InputError(
-            f'--chamber "{words}": say how fast (K/min) and between which temperatures (°C), as in "rate 3 range -40 85".'
+            f'--chamber "{words}": state the rate (K/min) and the temperature range (°C), as in "rate 3 range -40 85".'
         ) from None
     return Chamber(rate, low, high)
 

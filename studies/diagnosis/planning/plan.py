@@ -179,14 +179,14 @@ def require_reach(chamber: Chamber, words: str) -> None:
     fastest = float(np.max(np.abs(np.diff(values)) / np.maximum(np.diff(time), 1e-9))) * 60.0
     if fastest > 1.001 * chamber.rate:
         raise InputError(
-            f'"{words}" asks for {fastest:.3g} K/min, but the chamber does {chamber.rate:g}; use slower ramps there.'
+            f'"{words}" needs {fastest:.3g} K/min, but the chamber reaches only {chamber.rate:g}; use slower ramps.'
         )
     low, high = float(values.min()), float(values.max())
     allowed = chamber.within(low, high)
     if low < allowed[0] - 1e-6 or high > allowed[1] + 1e-6:
         raise InputError(
             f'"{words}" runs from {low:g} to {high:g} °C, but the chamber reaches {allowed[0]:g} to {allowed[1]:g} °C;'
-            " plan within its range, or state another one with --chamber."
+            " plan within its range, or state another range with --chamber."
         )
 
 
@@ -235,9 +235,9 @@ def predict(
     for plan in plans:
         plan.invisible.update(
             {
-                name: "this plan does not vary the quantity that drives the effect"
+                name: "the plan does not vary the quantity that drives the effect"
                 if effect.needs
-                else "it needs more runs, or a temperature that varies"
+                else "it needs more runs or a varying temperature"
                 for name, effect in library().items()
                 if not any(effect_of(key) == name for key in plan.confusion)
             }

@@ -8,7 +8,9 @@ import pytest
 from studies.diagnosis.planning.chamber import limited, parse_chamber
 from studies.diagnosis.planning.plan import Outlook, Plan, imagine, predict, require_reach
 from studies.errors import InputError
-from studies.reports.plan import headline, plan_page, plan_table
+from studies.reports.plan import headline, plan_parts, plan_table
+from studies.results import Result
+from studies.results.page import render_result
 from thermal.profile import parse_profile
 
 WORDS = "cycle 20 -15 40 0.5 30min 1"
@@ -111,8 +113,9 @@ def test_the_smallest_effect_is_named_at_every_larger_size_too():
     assert "2 of 3 at SNR 1, 1 of 3 at SNR 0.3, 0 of 3 at SNR 0.1" in words
     assert "Not even at SNR 1: ageing" in words
     assert "no wall: leak" in words
-    rows = {row[0]: row[1:4] for row in plan_table(outlook).rows}
+    rows = {row[0]: row[1:4] for row in plan_table(outlook).cells()[1]}
     assert rows["jump"] == ["100", "90", "20"]
-    page = plan_page(outlook, ["cycle 20 -15 40 0.5 30min 1"])
+    parts = plan_parts(outlook, ["cycle 20 -15 40 0.5 30min 1"])
+    page = render_result(Result({}, "Planned campaign", words, parts))
     assert "cycle 20 -15 40 0.5 30min 1" in page
     assert words.split(".")[0] in page

@@ -107,7 +107,7 @@ def test_the_common_cause_and_the_odd_one_of_three(tmp_path, capsys):
     assert any("alone has jump" in why for why in found["devices"]["B"]["odd"])
     lags = next(value for value in found["values"] if value["name"] == "time_constant_s")
     assert lags["common"] == pytest.approx(1500.0, rel=0.06)
-    assert "The odd one out is B" in page.read_text(encoding="utf-8")
+    assert "Device B differs from the others" in page.read_text(encoding="utf-8")
 
 
 def test_a_manifest_names_devices_beside_it(tmp_path):
@@ -119,11 +119,11 @@ def test_a_manifest_names_devices_beside_it(tmp_path):
     manifest.write_text('[devices]\nA = "a.csv"\n')
     with pytest.raises(InputError, match="A needs a list of records"):
         read_fleet([], str(manifest))
-    with pytest.raises(InputError, match="say a name"):
+    with pytest.raises(InputError, match="give a unique name"):
         read_fleet(["a.csv"])
 
 
 def test_one_device_is_no_fleet(tmp_path, capsys):
     write_record(device(0, np.random.default_rng(1), 0.0, 0.0)[0], tmp_path / "a.csv")
     assert main(["diagnose", "--device", f"A={tmp_path / 'a.csv'}"]) == 2
-    assert "two devices or more" in capsys.readouterr().err
+    assert "needs at least two devices" in capsys.readouterr().err

@@ -80,7 +80,7 @@ def test_a_gap_in_a_log_is_no_turn_on():
         records.append(bench.record(number, hole, bias_deg_per_h=bias))
     campaign = load_campaign(records)
     assert len(campaign.runs) == 4
-    assert sum("split it into 2 stretches" in note for note in campaign.notes) == 2
+    assert sum("split it into 2 parts" in note for note in campaign.notes) == 2
     verdict = investigate(campaign, advise=False).verdict
     result = verdict.responses["bias_deg_per_h"]
     assert (verdict.verdict, verdict.causes) == ("adequate", ())
@@ -137,7 +137,7 @@ def test_a_delay_is_said():
         bench = Bench(corners, seed=number + 11)
         records.append(bench.record(number, frequency_Hz=bench.frequency(1e-3, late=-12.0)))
     result = told(records).responses["frequency_Hz"]
-    assert "12 s sooner" in result.remark
+    assert "12 s earlier" in result.remark
 
 
 def test_uneven_stamps_on_a_ramp_are_no_noise():

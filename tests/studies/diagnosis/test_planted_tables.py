@@ -145,4 +145,16 @@ def test_a_level_off_by_less_than_three_per_cent_is_a_value_of_the_card(own, tmp
     """2.7 % is eight standard deviations of the modulus: no noise of the readings."""
     found = beside_card(tmp_path, WIDE, own(WIDE) * 0.9733)
     assert [cause.kind for cause in found.verdict.causes] == ["value"]
-    assert "What would bridge the level" in " ".join(found.sentences)
+    assert "would remove the difference in level" in " ".join(found.sentences)
+
+
+def test_the_papers_slope_is_shown_to_the_digits_of_the_cards_uncertainty():
+    """Wang et al. 2012, Table 1: 79.2 ppm/°C at 20 °C; the card knows it to ± 6.3."""
+    from studies.papers import hrg
+    from studies.reports.diagnosis_table import law_facts
+
+    (slope,) = [
+        one for one in law_facts(diagnose_table(str(hrg.table1_path()), "hrg-30mm")) if one[0].startswith("Slope")
+    ]
+    assert slope[1] == "79.2 ppm/°C"
+    assert "88.7 ± 6.3" in slope[2]

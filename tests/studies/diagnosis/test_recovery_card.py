@@ -186,5 +186,5 @@ def test_what_has_not_converged_is_no_card(shipped, tmp_path, capsys, monkeypatc
     assert main(words) == 2
     out, err = capsys.readouterr()
     assert json.loads(out)["extended_model"] is None
-    assert "not converged" in err
+    assert "not saved" in err
     assert not (tmp_path / "out.toml").exists()
