@@ -20,6 +20,7 @@ SNR_WORDS = (
     "SNR: rms of the part of the effect that the refitted simulation cannot absorb, over the rms noise of one row of the record."
     " With many rows an effect far below the noise of one row can be identified."
 )
+NOISE = {"slow": "coloured"}
 SENSORS = (Column("sensor", "sensor"), Column("count", "sets"), Column("pairs", "effects distinguished"))
 
 
@@ -139,7 +140,7 @@ def _draw_shares(outlook: Outlook) -> "Drawing":
     keys = _ranked(outlook)
     columns = [(plan, noise) for plan in outlook.plans for noise in plan.by_noise]
     shares = [[plan.by_noise[noise].get(key, {}).get(effect_of(key), 0.0) for plan, noise in columns] for key in keys]
-    return _map(shares, keys, [f"SNR {plan.snr:g}\n{noise} noise" for plan, noise in columns])
+    return _map(shares, keys, [f"SNR {plan.snr:g}\n{NOISE.get(noise, noise)} noise" for plan, noise in columns])
 
 
 def _draw_confusion(plan: Plan) -> "Drawing":

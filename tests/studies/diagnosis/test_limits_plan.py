@@ -112,7 +112,7 @@ def test_the_smallest_effect_is_named_at_every_larger_size_too():
     words = headline(outlook)
     assert "2 of 3 at SNR 1, 1 of 3 at SNR 0.3, 0 of 3 at SNR 0.1" in words
     assert "Not even at SNR 1: ageing" in words
-    assert "no wall: leak" in words
+    assert "Not testable (no wall): leak" in words
     rows = {row[0]: row[1:4] for row in plan_table(outlook).cells()[1]}
     assert rows["jump"] == ["100", "90", "20"]
     parts = plan_parts(outlook, ["cycle 20 -15 40 0.5 30min 1"])

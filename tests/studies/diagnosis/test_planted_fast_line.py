@@ -61,7 +61,7 @@ def test_a_line_that_no_grid_resolves_is_said_to_be_there():
     assert verdict.verdict == "unexplained"
     assert result.left_over == "structure"
     assert "a line of 17 s" in result.left_over_input
-    assert "a stretch of at most 2.3 h" in verdict.next_experiment
+    assert "a part of at most 2.3 h" in verdict.next_experiment
 
 
 @pytest.mark.slow
