@@ -70,7 +70,7 @@ def test_commands_of_the_first_hour_run_in_order(folder, monkeypatch, capsys):
             continue
         assert status == 0, f"{line}: {told}"
         if words[:2] == ["fit", "bias"]:
-            assert "times on held-out runs" in said, "the example shows what the text beside it promises"
+            assert "Improvement, held-out data" in said, "the example shows what the text beside it promises"
         if words[:1] == ["calibrate"]:
             assert "79.2 ppm/°C. hrg-30mm predicts" in said
             assert "88.7 ± 6.3 ppm/°C" in said

@@ -40,7 +40,7 @@ def test_heating_against_cooling_shows_a_loop(repeats):
     found = study(T, 0.004 * play(T, 12.0))
     assert len(found.verdict.causes) == 1
     check_first(found.verdict, "hysteresis", WIDEST)
-    assert any("both sides: hysteresis is tested" in sentence for sentence in found.sentences)
+    assert any("both sides: they show hysteresis" in sentence for sentence in found.sentences)
 
 
 def test_one_loop_could_be_a_drift_and_is_not_adequate():
@@ -99,10 +99,10 @@ def beside_card(folder, T, f, card=CARD):
 @pytest.mark.parametrize(
     ("spoil", "said"),
     [
-        (lambda f: 2.0 * f[13] - f, "26 standard deviations. Read with the opposite sign"),
+        (lambda f: 2.0 * f[13] - f, "26 standard deviations. If the temperatures are read with the opposite sign"),
         (lambda f: 1.5 * f, "is this a record of that gyro"),
         (lambda f: 8110.0 * (1.0 - 27e-6 * (WIDE - 20.0)), "is this a record of that gyro"),
-        (lambda f: f[13] * (1.0 - 27e-6 * (WIDE - WIDE[13])), "not a table of that gyro"),
+        (lambda f: f[13] * (1.0 - 27e-6 * (WIDE - WIDE[13])), "This table is of another gyro"),
     ],
     ids=["slope negated", "frequencies x 1.5", "another gyro's", "another gyro's slope"],
 )
