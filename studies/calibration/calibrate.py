@@ -166,6 +166,7 @@ def calibrate(
     exact: Sequence[str] = (),
     profile: bool = True,
     progress: Progress = lambda _: None,
+    keep: bool = True,
 ) -> Calibration:
     """Find the most probable values of a card, given its uncertainties and records of the device.
 
@@ -180,6 +181,9 @@ def calibrate(
         Place of a record that a second calibration, without it, predicts.
     exact : names
         Values of the card that are not to move.
+    keep : bool
+        Whether values with which the data agree stay as the card has them (`keep_agreeing`); not beside an effect that a diagnosis
+        has found, where the device is not the card's.
     profile : bool
         Whether intervals follow the likelihood where it is bent.
 
@@ -221,7 +225,7 @@ def calibrate(
         held_out = predict_held_out(instrument, runs, tables, hold_out, exact, found)
     if profile:
         progress("intervals")
-    estimates, kept = estimate(found, profile), keep_agreeing(found)
+    estimates, kept = estimate(found, profile), keep_agreeing(found) if keep else found
     if kept is not found:
         estimates, found = put_back(estimates, kept), kept
     ladder = build_ladder(found)

@@ -64,7 +64,7 @@ def extend(
         model = prune(inquiry.final)
         entries += [entry_of(model, k, column) for k, term in enumerate(model.terms) if not term.effect.once]
     extended = instrument.with_table("effect", entries)
-    return calibrate(extended, without_events(diagnosis, records), profile=False, progress=progress)
+    return calibrate(extended, without_events(diagnosis, records), profile=False, progress=progress, keep=False)
 
 
 def _is_in_the_baseline(entry: dict[str, Any]) -> bool:
