@@ -17,14 +17,14 @@ GYROS = 12
 
 @answers("hrg.reproduce/1")
 def reproduce(*, out: str = "report") -> Answer:
-    """Recompute the papers' tables and figures from their data and from virtual gyros, beside what first principles predict.
+    """Recompute the tables and figures of the papers and compare them with first-principles predictions.
 
     Writes report.html, summary.json, table1.csv and table2.csv.
 
     Parameters
     ----------
     out : str
-        Folder for the files; made when it does not exist.
+        Folder for the files; created if it does not exist.
     """
     from studies.cli.output import dump_json
     from studies.files.writing import check_folder, write_text
@@ -51,7 +51,7 @@ def reproduce(*, out: str = "report") -> Answer:
     sensitivity = summary["sensitivity_ppm_per_degC"]
     print(
         f"slope at 20 °C: measured {sensitivity['measured']:.1f}, predicted {sensitivity['simulated']:.1f}"
-        f" ± {sensitivity['uncertainty']:.1f} ppm/°C; Table 2 reproduced, largest error"
+        f" ± {sensitivity['uncertainty']:.1f} ppm/°C; largest temperature error in Table 2"
         f" {max(abs(study.error_degC)):.3f} °C."
     )
     print(f"report: {folder / 'report.html'}")
@@ -67,18 +67,18 @@ def _reproduce() -> "Reproduction":
     from studies.reports.gyro_papers import reproduce_gyro_papers
     from studies.reports.reproduce import Reproduction
 
-    say("1/5 the card's modes over temperature, and a first diagnosis of Table 1 ...")
+    say("1/5 modes over temperature and a first diagnosis of Table 1 ...")
     instrument = load_card(hrg.CARD)
     study = hrg.study_table(*hrg.printed_table1(), resolution=hrg.RESOLUTION)
     physics = hrg.compare_physics(study, instrument)
     diagnosis = diagnose_table(str(hrg.table1_path()))
-    say("2/5 the resonator settling after a step (figure 3) ...")
+    say("2/5 settling after a temperature step (figure 3) ...")
     settling = study_settling(instrument)
-    say(f"3/5 {GYROS} virtual gyros, cooled and compensated (figure 6) ...")
+    say(f"3/5 {GYROS} virtual gyros: bias compensation (figure 6) ...")
     twins = [bias_twin.study_twin(seed) for seed in range(GYROS)]
     say("4/5 the CVG and BVG papers ...")
     chapters, summary = reproduce_gyro_papers(GYROS)
-    say("5/5 drawing the page ...")
+    say("5/5 writing the page ...")
     return Reproduction(study, physics, diagnosis, settling, twins, chapters, summary)
 
 

@@ -77,7 +77,7 @@ def _bandwidth() -> Claim:
         "force rebalance improves the bandwidth",
         "BVG paper, section 3.2; W(s) = kζ/(s + kζ), CVG eq. (25), is the open gyro",
         f"open {1e3 * decay / (2 * np.pi):.2g} mHz at Q = 1e7, closed {closed:.0f} Hz with a phase margin of"
-        f" {np.degrees(margin.phase):.0f}° (sampled at {loops.sampling:g} Hz, {1e3 * loops.delay:g} ms late)",
+        f" {np.degrees(margin.phase):.0f}° (sampling {loops.sampling:g} Hz, delay {1e3 * loops.delay:g} ms)",
         "met",
     )
 
@@ -92,8 +92,8 @@ def _accuracy() -> Claim:
     return Claim(
         "force rebalance improves the accuracy",
         "BVG paper, section 3.2",
-        f"the bias is the same held ({held:.1f} °/h) and free ({free:.1f} °/h): no loop touches damping anisotropy, gains and"
-        " phases; scale and bandwidth improve",
+        f"the bias is the same with force rebalance ({held:.1f} °/h) and with a free wave ({free:.1f} °/h): no loop corrects damping"
+        " anisotropy, gain errors or phase errors; scale factor and bandwidth improve",
         "not met",
     )
 
@@ -109,8 +109,8 @@ def _stability() -> Claim:
     return Claim(
         f"a bias stability of {STABILITY_deg_per_h:g} °/h under force rebalance with a split of {1e3 * SPLIT_Hz:g} mHz, Q > 2e6",
         "Micromachines 2021, 266",
-        f"only if the phase of the loop stays within {1e6 * phase:.1f} µrad, or the wave stands within {60 * within:.1f}′ of a"
-        f" principal axis with 0.1 mrad; a phase error is worth {slope / 1e3:.0f} °/h per mrad at the worst azimuth",
+        f"only if the loop phase is stable to {1e6 * phase:.1f} µrad, or to 0.1 mrad with the wave within {60 * within:.1f}′ of a"
+        f" principal axis; a phase error causes {slope / 1e3:.0f} °/h per mrad at the worst azimuth",
         "met on a condition",
     )
 
@@ -131,7 +131,7 @@ def _resolution(seed: int) -> Claim:
     return Claim(
         f"the quadrature force under self-precession resolves {1e3 * RESOLVED_Hz:g} mHz",
         "Microsystems & Nanoengineering 2025, s41378-025-00872-z (abstract)",
-        f"finds {value:.4f} mHz ({low:.4f} … {high:.4f}) in half an hour, pick-off noise of 10 ppm/√Hz",
+        f"result {value:.4f} mHz ({low:.4f} … {high:.4f}) in half an hour, with pick-off noise of 10 ppm/√Hz",
         "met" if high - low < value else "not met",
     )
 
@@ -144,7 +144,7 @@ def _nonlinearity() -> Claim:
     return Claim(
         f"scale factor nonlinearity of {1e6 * NONLINEARITY:g} ppm in whole-angle mode",
         "title of a paper on a micro-shell",
-        f"at Q = 1e6 and 1 % of anisotropy only above {np.degrees(rate):.1f} °/s, where √(Ω² − Ω_d²) departs from Ω by less;"
-        " below it the drift must be compensated over the azimuth",
+        f"at Q = 1e6 and 1 % damping anisotropy only above {np.degrees(rate):.1f} °/s, where √(Ω² − Ω_d²) is closer to Ω than that;"
+        " below this rate the drift must be compensated over the azimuth",
         "met on a condition",
     )

@@ -57,13 +57,13 @@ def bell_chapters(twin: "BellTwin") -> list[Chapter]:
                 draw_allan(twin.chain, twin.runs[1]),
             ],
         ),
-        Chapter("BVG: what the printed coefficients can explain", claim_blocks(twin.claims)),
+        Chapter("BVG: check of the published claims", claim_blocks(twin.claims)),
     ]
 
 
 TWIN = (
-    "A virtual gyro that the printed coefficients compensate exactly, with the printed random walk of 2.78 °/√h as white noise and"
-    " an assumed wander of 20 °/h per √h. Nothing is tuned to the printed results."
+    "A virtual gyro that the published coefficients compensate exactly, with the published angle random walk of 2.78 °/√h as white noise"
+    " and an assumed bias random walk of 20 °/h per √h. Nothing was tuned to the published results."
 )
 
 
@@ -81,13 +81,13 @@ def claim_blocks(claims: "Claims") -> list[Block]:
     short = dict(claims.averaging)
     rows = [
         [
-            "σ that (34) takes out at rest",
+            "σ removed by (34) at rest",
             f"{claims.bias_deviation[1]:.4f} °/s",
             f"{claims.bias_deviation[0]:.4f} °/s",
             "agrees",
         ],
         [
-            "σ that (36) takes out at 300 °/s",
+            "σ removed by (36) at 300 °/s",
             f"{claims.scale_deviation[1]:.4f} °/s",
             f"{claims.scale_deviation[0]:.4f} °/s",
             "agrees within 12 %",
@@ -96,19 +96,19 @@ def claim_blocks(claims: "Claims") -> list[Block]:
             "Nonlinearity before (35)",
             "0.2 %",
             f"{100 * claims.curvature_nonlinearity:.2f} %",
-            "the quadratic makes 0.7 of it",
+            "the quadratic term explains 0.7 of it",
         ],
-        ["What (35) makes of −361.4 °/s", "−360 °/s (applied)", f"{claims.mapped[0]:.1f} °/s", "disagrees by 0.8 %"],
-        ["… and (36) at 25 °C after it", "−360 °/s (applied)", f"{claims.mapped[1]:.1f} °/s", "disagrees by 1.1 %"],
+        ["−361.4 °/s after (35)", "−360 °/s (applied)", f"{claims.mapped[0]:.1f} °/s", "disagrees by 0.8 %"],
+        ["… and after (36) at 25 °C", "−360 °/s (applied)", f"{claims.mapped[1]:.1f} °/s", "disagrees by 1.1 %"],
         [
             "Factor (36) at 25 °C, where (35) was fitted",
-            "1, if both are right",
+            "1, if both are correct",
             f"{claims.mapped[1] / claims.mapped[0]:.4f}",
             "disagrees by 0.3 %",
         ],
         [
             "σ of 2.78 °/√h at 10 Hz",
-            "0.0619 °/s in all",
+            "0.0619 °/s in total",
             f"{claims.noise_deviation:.4f} °/s",
             "cannot both be white noise",
         ],
@@ -116,22 +116,22 @@ def claim_blocks(claims: "Claims") -> list[Block]:
             "Random walk after the filter, read at 1 s",
             "3.98 times lower",
             f"{short[1.0]:.2f} times lower",
-            f"a cut-off of {claims.cutoff_for_printed:.2f} Hz would do it",
+            f"a cut-off of {claims.cutoff_for_printed:.2f} Hz would be needed",
         ],
         [
             "Random walk after the filter, read at 100 s",
             "3.98 times lower",
             f"{short[100.0]:.3f} times lower",
-            "no filter of 5 s can",
+            "impossible with a filter of 5 s",
         ],
-        ["Cut-off of the filter", "200 Hz", "below 5 Hz", "impossible at an output every 0.1 s"],
+        ["Cut-off of the filter", "200 Hz", "below 5 Hz", "impossible with a sampling interval of 0.1 s"],
         ["Rough scale", "0.0242 in (33), 0.00242 in the text", "0.0242 used", "misprint"],
     ]
     note = (
-        "Ours: computed from the printed coefficients over −45…55 °C and ±360 °/s; filter of order 50, cut-off 1 Hz. The bias instability"
-        " of 20.5 → 4.67 °/h depends on the length and ramp of a record that is not printed, so it can be neither confirmed nor refuted."
+        "Recomputed from the published coefficients over −45 … 55 °C and ±360 °/s; filter of order 50, cut-off 1 Hz. The bias instability"
+        " of 20.5 → 4.67 °/h depends on the length and temperature ramp of an unpublished record and cannot be checked."
     )
-    return [Table("Printed claims", ["Claim", "Printed", "Ours", "Verdict"], rows, note)]
+    return [Table("Published claims", ["Claim", "Published", "Recomputed", "Verdict"], rows, note)]
 
 
 def draw_steps(chain: "BellChain", runs: "tuple[BellRun, BellRun, BellRun]") -> "Drawing":
@@ -186,7 +186,8 @@ def draw_allan(chain: "BellChain", rest: "BellRun") -> Picture:
         axes.set_ylabel("Allan deviation (°/h)")
         axes.legend()
     caption = (
-        "Allan deviation at rest while the temperature rises, with its 68 % band. The dotted line is the length of the filter: to its"
-        " right filtered and unfiltered are the same, so a random walk read there cannot have become smaller. This is a run that was fitted: the fit itself lowers the longest times."
+        "Allan deviation at rest during the temperature ramp, with its 68 % band. The dotted line marks the filter length; at longer"
+        " averaging times filtering changes nothing, so it cannot reduce a random walk read there. The run was used for the fit, which"
+        " lowers the curve at the longest times."
     )
     return draw(made, caption, "Allan deviation over averaging time, three curves.")

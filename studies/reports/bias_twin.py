@@ -21,16 +21,17 @@ def twin_chapters(twins: Twins) -> list[Chapter]:
     mended = sum(fit.warming.gain < 1 for fit in _fits(twins, "guarded", 3))
     harmed = sum(fit.warming.gain < 1 for fit in paper)
     told = (
-        f"The paper fits six of nine terms to one cooling run, and reports that run: {PAPER_BEFORE} → {PAPER_AFTER} °/h,"
-        f" {PAPER_BEFORE / PAPER_AFTER:.2f} times. Its data are not printed, so {len(twins)} virtual gyros with typical loss, gradient,"
-        f" hysteresis and noise stand for them; nothing was tuned to the paper's figures (median {before:.2g} → {after:.2g} °/h). On"
-        f" a second cooling run like the first the same models improve the bias {cooling.median:.2f} times (median). Applied to"
-        f" warming they make {harmed} of the {len(twins)} gyros worse than no compensation. Models fitted to three runs (cooling and"
-        f" warming), selected with autocorrelated noise in mind, made {mended or 'none'} of the {len(twins)} gyros worse."
+        f"The paper fits six of nine terms to one cooling run and reports the improvement on the same run: {PAPER_BEFORE} →"
+        f" {PAPER_AFTER} °/h, a factor of {PAPER_BEFORE / PAPER_AFTER:.2f}. Its data are not published, so {len(twins)} virtual gyros"
+        f" with typical loss, gradients, hysteresis and noise replace them; nothing was tuned to the published figures (median"
+        f" {before:.2g} → {after:.2g} °/h). On a second cooling run the same models reduce the bias variation by a factor of"
+        f" {cooling.median:.2f} (median). On a warming run they make {harmed} of the {len(twins)} gyros worse than without"
+        f" compensation. Models fitted to three runs (cooling and warming), with terms selected for autocorrelated noise, make"
+        f" {mended or 'none'} of the {len(twins)} gyros worse."
     )
     return [
         Chapter(
-            "Figure 6: compensated bias on data that the fit has not seen",
+            "Figure 6: compensated bias on held-out runs",
             [Text(told), trace_figure(twins), twin_table(twins), twin_figure(twins), terms_table(twins)],
         )
     ]
@@ -54,15 +55,15 @@ def trace_figure(twins: Twins) -> Picture:
         lower.set_xlabel("time (h)")
     before, after = fit.training
     caption = (
-        f"Figure 6 of the virtual gyro with the median improvement on its run, 25 to −20 °C: (a) output and model, (b) compensated:"
-        f" {before:.3g} → {after:.3g} °/h, {fit.training_gain:.2f} times; the paper's gyro {PAPER_BEFORE} → {PAPER_AFTER} °/h."
+        f"Figure 6 for the virtual gyro with the median improvement, cooled from 25 to −20 °C: (a) output and model, (b) compensated"
+        f" output. Bias {before:.3g} → {after:.3g} °/h, a factor of {fit.training_gain:.2f}; in the paper {PAPER_BEFORE} → {PAPER_AFTER} °/h."
     )
     return draw(figure, caption, "Bias over time with the model, and the compensated bias below it.")
 
 
 def twin_table(twins: Twins) -> Table:
     """Return the table paper / ours on the training run / ours held out: median and 90 % range over the gyros."""
-    rows = [["the paper", "1 cooling", f"{PAPER_BEFORE / PAPER_AFTER:.2f}", "not given", "not given"]]
+    rows = [["the paper's gyro", "1 cooling", f"{PAPER_BEFORE / PAPER_AFTER:.2f}", "not given", "not given"]]
     for method in METHODS:
         for runs, label in ((1, "1 cooling"), (3, "cooling, warming, cooling")):
             fits = _fits(twins, method, runs)
@@ -74,11 +75,11 @@ def twin_table(twins: Twins) -> Table:
                     [fit.warming.gain for fit in fits],
                 )
             ]
-            rows.append([f"twins, {METHOD[method]}", label, *cells])
+            rows.append([f"virtual gyros, {METHOD[method]}", label, *cells])
     columns = ["Selection", "Fitted to", "On the training run", "Held out: new cooling run", "Held out: warming run"]
     note = (
-        "How many times smaller the standard deviation of 100 s averages becomes: median (5 %…95 % of the gyros; how many of"
-        " them became worse)."
+        "Factor by which the standard deviation of 100 s averages falls: median (5 % … 95 % range of the gyros; number that got"
+        " worse)."
     )
     return Table("Improvement of the bias stability", columns, rows, note)
 
@@ -97,7 +98,7 @@ def terms_table(twins: Twins) -> Table:
                 *(f"{round(share * len(twins))} of {len(twins)}" for share in shares),
             ]
         )
-    columns = ["", "Term", "in eq. (22)", *(f"twins, {METHOD[method]}" for method in METHODS)]
+    columns = ["", "Term", "In eq. (22)", *(f"Virtual gyros, {METHOD[method]}" for method in METHODS)]
     return Table("How often a term is selected from one cooling run", columns, rows)
 
 
@@ -116,13 +117,13 @@ def twin_figure(twins: Twins) -> Picture:
         axes.plot(ends, ends, color=style.BLACK, linewidth=0.8)
         axes.axhline(1.0, color=style.BLACK, linewidth=0.8, linestyle=":")
         axes.axvline(
-            PAPER_BEFORE / PAPER_AFTER, color=style.ORANGE, linestyle="--", label="the paper's 5.15 on its run"
+            PAPER_BEFORE / PAPER_AFTER, color=style.ORANGE, linestyle="--", label="paper: 5.15 on its training run"
         )
         axes.set_xlim(0.9, ends[1])
-        axes.set_xlabel("Times better on the training run")
-        axes.set_ylabel("Times better, held out")
+        axes.set_xlabel("improvement factor, training run")
+        axes.set_ylabel("improvement factor, held-out run")
         axes.legend()
-        caption = "One dot or cross per virtual gyro, fitted to one cooling run as the paper does; below the dotted line compensation does harm."
+        caption = "Each marker is one virtual gyro, fitted to one cooling run as in the paper. Below the dotted line compensation makes the bias worse."
         return draw(figure, caption, "Improvement on held-out runs against improvement on the training run.")
 
 

@@ -26,24 +26,24 @@ def twin_chapters(twin: "CrossDampingTwin") -> list[Chapter]:
     unit = paper.DEG_PER_H
     low, middle, high = twin.spread
     told = (
-        f'The paper prints the shape of ζ₁₂(T) and "approximately {paper.PRINTED_IMPROVEMENT:g} times". The twin takes that shape at'
-        f" {paper.BIAS_AT_CALIBRATION:g} °/h for 20 °C, a random walk of {paper.RANDOM_WALK:g} °/√h, a bias that wanders by"
-        f" {paper.WANDER:g} °/h per √h, and a resonator {paper.LAG:g} s behind its sensor: typical values, not tuned to 8. Fitted on"
-        f" one run it improves the output {twin.study.training.rows.ratio:.1f} times there and {twin.improvement.ratio:.1f} times on the"
-        f" next run; over seeds {middle:.1f} times (90 %: {low:.1f}…{high:.1f}) on runs that were not fitted. The figure hangs"
-        " on that lag, which the paper does not give: see the table."
+        f'The paper gives the shape of ζ₁₂(T) and an improvement of "approximately {paper.PRINTED_IMPROVEMENT:g} times". The virtual gyro has that shape, scaled to'
+        f" {paper.BIAS_AT_CALIBRATION:g} °/h at 20 °C, an angle random walk of {paper.RANDOM_WALK:g} °/√h, a bias random walk of"
+        f" {paper.WANDER:g} °/h per √h, and a resonator that lags its sensor by {paper.LAG:g} s: typical values, not tuned to the published"
+        f" factor. A model fitted to one run improves that run by a factor of {twin.study.training.rows.ratio:.1f} and the next run by"
+        f" {twin.improvement.ratio:.1f}; over many noise seeds the factor on held-out runs is {middle:.1f} (90 %: {low:.1f}…{high:.1f})."
+        " The result depends on the lag, which the paper does not give (see the table)."
     )
     shape = (
-        "Shape only: taken as absolute values the printed coefficients would mean"
-        f" {paper.count_bias_of_printed_values():.0f} rad/s of bias at {paper.FREQUENCY:g} Hz. The filter (9) itself moves the"
-        f" correction by at most {twin.study.memory / unit:.2g} °/h: its time constant is below a second, the temperature's is minutes."
+        "Only the shape is used: as absolute values the published coefficients would mean a bias of"
+        f" {paper.count_bias_of_printed_values():.0f} rad/s at {paper.FREQUENCY:g} Hz. The filter (9) itself changes the"
+        f" correction by at most {twin.study.memory / unit:.2g} °/h: its time constant is less than a second, while the temperature changes over minutes."
     )
     drawn = draw_runs((*twin.study.runs, twin.second), twin.study.model, unit, "°/h")
     picture = draw(
         drawn, "Temperature, and zero-rate output before and after compensation, 100 s averages.", "Runs over time."
     )
     chapter = Chapter(
-        "CVG figures 1 and 2: cross-damping compensated",
+        "CVG figures 1 and 2: cross-damping compensation",
         [Text(told), picture, determinants_table(twin), Text(shape, "note")],
     )
     return [chapter]
@@ -56,10 +56,10 @@ def determinants_table(twin: "CrossDampingTwin") -> Table:
     ]
     columns = ["Lag (s)", *(f"{noise:g} °/√h" for noise in twin.noises)]
     note = (
-        "Median over seeds, on runs that were not fitted. Without lag the wander of the bias sets the limit; with it, the part of the"
-        " temperature that the sensor does not show."
+        "Median over noise seeds, on held-out runs. Without a lag, the random walk of the bias sets the limit; with a lag, the"
+        " temperature difference between sensor and resonator."
     )
-    return Table("Times better, by lag of the resonator and white noise", columns, rows, note)
+    return Table("Improvement factor by resonator lag and white noise", columns, rows, note)
 
 
 def draw_runs(runs: "tuple[RestRun, ...]", model: "CrossDampingModel", unit: float, name: str) -> "Drawing":

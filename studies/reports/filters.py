@@ -24,9 +24,9 @@ def filter_chapters(study: "FilterStudy", error_map: "ErrorMap") -> list[Chapter
         Text(kalman_sentence(study)),
     ]
     return [
-        Chapter("CVG equations (13), (14): response to a rate that oscillates", [draw_responses(), Text(RESPONSES)]),
+        Chapter("CVG equations (13), (14): response to an oscillating rate", [draw_responses(), Text(RESPONSES)]),
         Chapter(
-            "CVG figure 3: how far the simplified dynamics reaches",
+            "CVG figure 3: accuracy of the simplified dynamics",
             [draw_error_map(error_map), Text(map_sentence(error_map))],
         ),
         Chapter("CVG equations (35), (36), figure 5: Wiener filter", wiener),
@@ -35,8 +35,8 @@ def filter_chapters(study: "FilterStudy", error_map: "ErrorMap") -> list[Chapter
 
 
 RESPONSES = (
-    "A rate that oscillates at λ acts as if the excitation were shifted by λ. With equal modes the response is largest for a steady"
-    " rate and falls beyond kζ; a gyro whose modes lie apart responds most where λ is their difference, on one side only."
+    "A rate that oscillates at λ acts like an excitation shifted by λ. With matched modes the response is largest for a constant"
+    " rate and falls off above kζ. With split modes it is largest where λ equals the frequency difference, on one side only."
 )
 APART, LIGHT = 1.02, 0.2
 
@@ -51,9 +51,9 @@ def draw_responses() -> Picture:
 
     tuned = tune(K, ZETA)
     gyros = {
-        f"equal modes, ζ = {ZETA:g}": tuned,
+        f"matched modes, ζ = {ZETA:g}": tuned,
         f"k₂ = {APART:g} k₁": SensitiveElement(K, APART * K, ZETA, ZETA, tuned.omega),
-        f"equal modes, ζ = {LIGHT * ZETA:g}": tune(K, LIGHT * ZETA),
+        f"matched modes, ζ = {LIGHT * ZETA:g}": tune(K, LIGHT * ZETA),
     }
     frequency = np.linspace(-60.0, 60.0, 1201)
     with style.figure(2, height=4.6, sharex=True) as (made, (upper, lower)):
@@ -62,15 +62,17 @@ def draw_responses() -> Picture:
             still, _ = respond_to_oscillating_rate(tuned, 0.0)
             upper.semilogy(frequency, amplitude / still, label=name)
             lower.plot(frequency, np.degrees(np.unwrap(phase)))
-        upper.set_ylabel("A(λ) over A(0), tuned")
+        upper.set_ylabel("A(λ) / A(0) of the matched gyro")
         upper.legend(fontsize=8)
         lower.set_ylabel("phase (°)")
         lower.set_xlabel("frequency of the rate λ/2π (Hz)")
-    caption = "Amplitude and phase (14) of the secondary per rate, k = 500 Hz; the same excitation for all."
+    caption = (
+        "Amplitude and phase (14) of the secondary mode per unit rate, k = 500 Hz, the same excitation for all gyros."
+    )
     return draw(made, caption, "Amplitude and phase over the frequency of the rate.")
 
 
-FIGURE5 = "Square pulses through the full dynamics (1) with white noise (γ = 0.1, B = 3 Hz), and eq. (35) behind it."
+FIGURE5 = "Square pulses through the full dynamics (1) with white noise (γ = 0.1, B = 3 Hz), filtered by eq. (35)."
 
 
 def draw_error_map(error_map: "ErrorMap") -> Picture:
@@ -87,12 +89,12 @@ def draw_error_map(error_map: "ErrorMap") -> Picture:
             extend="both",
         )
         bar = made.colorbar(shades, ax=axes)
-        bar.set_label("log₁₀ of J over ∫A² dt")
+        bar.set_label("log₁₀ (J / ∫A² dt)")
         axes.plot([1.0], [1.0], "+", color="white", markersize=10)
         axes.set_xlabel("δk = k₂/k₁")
         axes.set_ylabel("δζ = ζ₂/ζ₁")
         axes.grid(visible=False)
-    caption = "Integral error (26) of the simplified transfer function (24) against the full equations (1)."
+    caption = "Integral error (26) of the simplified transfer function (24) relative to the full equations (1)."
     return draw(made, caption, "A map of the error, least where both modes agree.")
 
 
@@ -106,10 +108,10 @@ def map_sentence(error_map: "ErrorMap") -> str:
         return float(np.sqrt(error_map.error[i, j]))
 
     return (
-        "The paper prints neither the range nor the time over which it integrates; here the transient lasts five time"
-        " constants, and J is divided by the integral of the tuned amplitude squared. The rms error of the amplitude is"
+        "The paper states neither the range nor the integration time. Here the transient lasts five time constants, and J is"
+        " divided by the integral of the squared amplitude of the tuned gyro. The rms error of the amplitude is"
         f" {100 * at(1.0, 1.0):.2f} % when tuned, {100 * at(1.02, 1.0):.0f} % at δk = 1.02, {100 * at(1.0, 1.2):.0f} % at δζ = 1.2"
-        f" and {100 * at(1.02, 0.8):.0f} % at both δk = 1.02 and δζ = 0.8: less damping makes up for detuning along the dark arc."
+        f" and {100 * at(1.02, 0.8):.0f} % at δk = 1.02 with δζ = 0.8: lower damping compensates for detuning along the dark arc."
     )
 
 
@@ -126,10 +128,10 @@ def wiener_table(study: "FilterStudy") -> Table:
         ]
         for case in study.wiener
     ]
-    columns = ["Noise", "Error, optimum", "Error, as printed", "of it distortion", "of it noise", "G(0) of the optimum"]
+    columns = ["Noise", "Error, optimum", "Error, as printed", "Distortion part", "Noise part", "G(0) of the optimum"]
     note = (
-        "Error variance over the variance of the rate. The printed filters are the optimum scaled to G(0) W(0) = 1: a constant"
-        " rate is then read without error, and the mean square error grows."
+        "Error variance divided by the variance of the rate. The printed filters are the optimum scaled to G(0) W(0) = 1, which removes"
+        " the error for a constant rate but increases the mean square error."
     )
     return Table("Wiener filters for k = 500 Hz, ζ = 0.025, γ = 0.1, B = 3 Hz", columns, rows, note)
 
@@ -145,9 +147,9 @@ def draw_filtered(case: "Filtered", caption: str, name: str) -> Picture:
         axes.set_ylabel("rate (rad/s)")
         axes.legend(ncols=3, loc="upper right")
     numbers = (
-        f" Noise {case.noise_before:.3f} → {case.noise_after:.3f} rad/s ({case.noise_before / case.noise_after:.1f} times less);"
-        f" error to the true rate {case.error_before:.3f} → {case.error_after:.3f} rad/s, of which the filter's lag makes"
-        f" {case.lag_error:.3f}."
+        f" Noise {case.noise_before:.3f} → {case.noise_after:.3f} rad/s (factor {case.noise_before / case.noise_after:.1f});"
+        f" error relative to the true rate {case.error_before:.3f} → {case.error_after:.3f} rad/s, of which {case.lag_error:.3f}"
+        " from the lag of the filter."
     )
     return draw(made, caption + numbers, "Square pulses, a noisy output and a filtered one.")
 
@@ -170,9 +172,9 @@ def draw_kalman(study: "FilterStudy") -> Picture:
         lower.set_xlabel("time (s)")
     output_noise, rate_noise = study.settled_noise[-1]
     caption = (
-        f"Kalman filter with the paper's Q and R, sampled every {1e3 * (six.time[1] - six.time[0]):g} ms: noise of the output"
-        f" {six.noise_before:.4f} → {output_noise:.4f} rad/s once settled ({six.noise_before / output_noise:.0f} times less); of the rate"
-        f" estimate {rate_noise:.4f} rad/s."
+        f"Kalman filter with the paper's Q and R, sampled every {1e3 * (six.time[1] - six.time[0]):g} ms: output noise"
+        f" {six.noise_before:.4f} → {output_noise:.4f} rad/s once settled (factor {six.noise_before / output_noise:.0f}); noise of the"
+        f" rate estimate {rate_noise:.4f} rad/s."
     )
     return draw(made, caption, "Output and rate with their estimates over time.")
 
@@ -185,10 +187,10 @@ def step_table(study: "FilterStudy") -> Table:
     ]
     columns = ["Step (ms)", "Noise of the estimate (rad/s)", "Lag error (rad/s)", "Lag error of the output (rad/s)"]
     note = (
-        "Noise: standard deviation in the settled filter, from its Riccati equation. Lag errors: rms against pulses of 0.25 s."
-        " The paper gives Q per step, but not the step."
+        "Noise: standard deviation of the settled filter, from its Riccati equation. Lag errors: rms for pulses of 0.25 s."
+        " The paper gives Q per step but not the step."
     )
-    return Table("Rate estimate over the sampling step", columns, rows, note)
+    return Table("Rate estimate by sampling step", columns, rows, note)
 
 
 def kalman_sentence(study: "FilterStudy") -> str:
@@ -196,6 +198,6 @@ def kalman_sentence(study: "FilterStudy") -> str:
     low, high = study.nis_band
     inside = "inside" if low <= study.mean_nis <= high else "outside"
     return (
-        f"The mean normalised innovation squared is {study.mean_nis:.2f}, {inside} its 95 % band {low:.3f}…{high:.3f}: square pulses"
-        " are not the random walk that Q describes, so the filter is surer of itself than it should be at every edge."
+        f"The mean normalised innovation squared is {study.mean_nis:.2f}, {inside} its 95 % band {low:.3f} … {high:.3f}. Square pulses"
+        " are not the random walk that Q assumes, so the filter is overconfident at every edge."
     )

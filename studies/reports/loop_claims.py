@@ -18,12 +18,12 @@ def claims_chapter(found: "LoopClaims") -> Chapter:
     """Return the chapter."""
     (drift, drift_closed), (mean, mean_closed) = found.drift, found.mean_rate
     text = (
-        f"One per cent of damping anisotropy at Q = 1e7 drifts by {drift:.3f} °/h in the twin ({drift_closed:.3f} in closed form);"
-        f" under the earth's 15.041 °/h a free wave indicates {mean:.3f} °/h in the mean ({mean_closed:.3f}), and nothing below"
-        " the drift, where it locks."
+        f"A damping anisotropy of 1 % at Q = 1e7 causes a drift of {drift:.3f} °/h in the simulation ({drift_closed:.3f} in closed form)."
+        f" At the earth rate of 15.041 °/h a free wave indicates {mean:.3f} °/h on average ({mean_closed:.3f} in closed form). Below"
+        " the drift rate the wave locks and indicates nothing."
     )
     rows = [[claim.verdict, f"{claim.claim} ({claim.source})", claim.twin] for claim in found.claims]
     return Chapter(
-        "Loops: what is claimed, and what the twin says",
-        [Text(text), Table("Claims of loops", ["Verdict", "Claim and source", "Twin"], rows)],
+        "Control loops: published claims and simulation",
+        [Text(text), Table("Published claims", ["Verdict", "Claim and source", "Simulation"], rows)],
     )

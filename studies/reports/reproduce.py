@@ -52,8 +52,8 @@ def reproduce_page(parts: "Reproduction", mode: Sequence[Block]) -> str:
     """Return the whole page; `mode` shows the mode shape."""
     study, physics = parts.study, parts.physics
     lead = (
-        "The HRG paper's Table 1, Table 2 and figures 3 to 6 recomputed from its measured data and from virtual gyros, what"
-        " first-principles physics predicts, and where the two differ; then the two CVG papers and the BVG paper."
+        "Tables 1 and 2 and figures 3 to 6 of the HRG paper, recomputed from its measured data and from virtual gyros and compared"
+        " with first-principles predictions; then the two CVG papers and the BVG paper."
     )
     figure_4 = "Table 1 and figure 4: frequency over temperature"
     chapters = [
@@ -64,11 +64,11 @@ def reproduce_page(parts: "Reproduction", mode: Sequence[Block]) -> str:
             "Table 2 and figure 5(a): temperature from frequency", [_table2(study), *make_blocks(error_figure(study))]
         ),
         Chapter("Order of the polynomial", [Text(order_sentence(study)), *make_blocks(*order_parts(study))]),
-        Chapter("What first principles predict", _physics(physics, study)),
-        Chapter("The mode", list(mode)),
+        Chapter("First-principles prediction", _physics(physics, study)),
+        Chapter("Mode shape", list(mode)),
         theories_chapter(),
         settling_chapter(parts.settling),
-        Chapter("Figure 5(b): temperature from the frequency of a step", [_step_inverse(parts.settling)]),
+        Chapter("Figure 5(b): temperature from frequency during a step", [_step_inverse(parts.settling)]),
         *twin_chapters(parts.twins),
         *parts.gyro_chapters,
     ]
@@ -127,7 +127,7 @@ def _facts(parts: "Reproduction") -> Facts:
             (
                 "Measured slope at 20 °C",
                 f"{float(study.fit.slope_ppm(20.0)):.1f} ppm/°C",
-                "cubic on Table 1; the paper says about 80",
+                "cubic fitted to Table 1; the paper says about 80",
             ),
             (
                 "Predicted slope at 20 °C",
@@ -137,7 +137,7 @@ def _facts(parts: "Reproduction") -> Facts:
             (
                 "Temperature from frequency",
                 f"within {np.abs(study.error_degC).max():.3f} °C",
-                "largest error of Table 2, as printed",
+                "largest error in Table 2, as in the paper",
             ),
             (
                 "Misfit with the silica law's curvature fixed",
@@ -157,24 +157,24 @@ def _short(parts: "Reproduction") -> list[Text]:
     slopes = [value for _, value, _ in physics.laws]
     return [
         Text(
-            "The two coefficients that the paper prints of its cubic are reproduced to their last digit, and the temperatures of its"
-            f" Table 2 within {_farthest(study):.4f} °C; at −10 °C its own columns differ (−10.058, but an error of 0.0578; ours is"
-            f" {study.error_degC[1]:.4f}). Its"
-            f" conclusion that higher orders have little effect is not reproduced: the residual sum of squares is {better.sum_of_squares:.1e} Hz² for a quartic, against"
+            "The two published coefficients of the cubic are reproduced to the last digit, and the temperatures of Table 2 to within"
+            f" {_farthest(study):.4f} °C. At −10 °C the columns of the paper disagree: it gives −10.058 °C but an error of 0.0578 °C"
+            f" (here {study.error_degC[1]:.4f} °C). The paper concludes that higher orders have little effect; this is not reproduced."
+            f" The residual sum of squares is {better.sum_of_squares:.1e} Hz² for a quartic and"
             f" {study.fit.sum_of_squares:.2e} Hz² for the cubic, and the quartic predicts omitted points"
             f" {study.fit.leave_one_out_rms / better.leave_one_out_rms:.1f} times better."
         ),
         Text(
-            f"Physics gives the size of the slope: the prediction at 20 °C lies {abs(away):.1f} standard deviations"
-            f" {'above' if away > 0 else 'below'} the measurement, and the published laws of fused silica themselves span"
-            f" {min(slopes):.0f} to {max(slopes):.0f} ppm/°C. It does not settle the curvature: that of the table is"
-            f" {parts.diagnosis.curvature_ratio:.2f} times that of the default law, a parabola through published statements"
-            " about its maximum near 1100 °C. The slope of silica also vanishes near −200 °C, so that not even the sign of the"
-            f" second derivative is settled in between: {physics.curvature_law:.2f} ± {physics.curvature_uncertainty:.2f}"
-            f" ppm/°C² is what the sources allow, and the measured value of {physics.curvature_measured:.2f} ppm/°C² lies {away_curvature:.1f} standard"
-            " deviations away. A slope that falls to 25 °C and rises again is beyond a constant curvature."
-            " Seven points, each approached once, cannot say whether that is the glass, the thermometer, the mounting or"
-            " the soak: a staircase up and down with a second thermometer would.",
+            f"Physics predicts the magnitude of the slope: at 20 °C the prediction is {abs(away):.1f} standard deviations"
+            f" {'above' if away > 0 else 'below'} the measurement, and the published laws of fused silica range from"
+            f" {min(slopes):.0f} to {max(slopes):.0f} ppm/°C. Physics does not determine the curvature. The measured curvature is"
+            f" {parts.diagnosis.curvature_ratio:.2f} times that of the default law, a parabola based on published statements about the"
+            " maximum near 1100 °C. The slope for silica also vanishes near −200 °C, so even the sign of the second derivative between"
+            f" these temperatures is uncertain: the sources allow {physics.curvature_law:.2f} ± {physics.curvature_uncertainty:.2f}"
+            f" ppm/°C², and the measured {physics.curvature_measured:.2f} ppm/°C² is {away_curvature:.1f} standard deviations away."
+            " No constant curvature describes a slope that falls up to 25 °C and then rises."
+            " Seven points, each approached once, cannot show whether the cause is the glass, the thermometer, the mounting or"
+            " the soak; a staircase up and down with a second thermometer could.",
             "note",
         ),
     ]
@@ -192,9 +192,11 @@ def _table1(study: "FrequencyStudy") -> Table:
     ]
     note = (
         f"Largest residual {1e3 * np.abs(study.fit.residuals).max():.1f} mHz = {100 * study.fit.largest_residual_of_span:.2f} % of the"
-        " span; the paper prints 0.12 %."
+        " span; the paper gives 0.12 %."
     )
-    return Table("Table 1 and its cubic", ["T (°C)", "Measured (Hz)", "Cubic (Hz)", "Residual (mHz)"], rows, note)
+    return Table(
+        "Table 1 and the fitted cubic", ["T (°C)", "Measured (Hz)", "Cubic (Hz)", "Residual (mHz)"], rows, note
+    )
 
 
 def _table2(study: "FrequencyStudy") -> Table:
@@ -214,13 +216,13 @@ def _table2(study: "FrequencyStudy") -> Table:
     columns = [
         "f (Hz)",
         "Actual (°C)",
-        "Printed (°C)",
-        "Ours (°C)",
-        "Ours − printed",
-        "Printed error",
-        "Our error (°C)",
+        "Paper (°C)",
+        "Here (°C)",
+        "Here − paper (°C)",
+        "Error in the paper (°C)",
+        "Error here (°C)",
     ]
-    return Table("Table 2, printed and recomputed", columns, rows, "Error is actual minus calculated temperature.")
+    return Table("Table 2, published and recomputed", columns, rows, "Error: actual minus calculated temperature.")
 
 
 def _physics(physics: "PhysicsComparison", study: "FrequencyStudy") -> list[Block]:
@@ -234,21 +236,21 @@ def _physics(physics: "PhysicsComparison", study: "FrequencyStudy") -> list[Bloc
     ]
     columns = ["T (°C)", "E", "μ", "ρ", "h", "r", "Predicted", "Measured"]
     parts = Table(
-        "Slope of ln f and its parts (ppm/°C), equation (15)",
+        "Slope of ln f and its contributions (ppm/°C), equation (15)",
         columns,
         rows,
-        "Measured: between neighbouring points of Table 1, ± 0.09 from rounding; at 20 °C the cubic's slope. The uncertainty is one"
-        " standard deviation by the law's prior: its stated numbers, and a curvature that no source settles.",
+        "Measured: from neighbouring points of Table 1 (± 0.09 from rounding); at 20 °C, the slope of the cubic. The uncertainty is one"
+        " standard deviation of the prior on the law: its published values, and a curvature that no source determines.",
     )
     laws = Table(
         "Slope at 20 °C by published law of fused silica",
         ["Law", "Slope (ppm/°C)", "Uncertainty"],
         [[name, f"{value:.1f}", f"{u:.1f}"] for name, value, u in physics.laws],
-        "The laws differ by more than any of them admits: most of the spread is the literature's, not the solver's.",
+        "The laws differ by more than any stated uncertainty: most of the spread comes from the literature, not from the solver.",
     )
     return [
         Text(
-            f"The card '{physics.instrument.name}' stands for the paper's resonator, whose geometry is not printed:"
+            f"The paper does not give the geometry of its resonator. The card '{physics.instrument.name}' represents it."
             f" {physics.instrument.note}"
         ),
         parts,
@@ -274,7 +276,9 @@ def _slope_figure(physics: "PhysicsComparison", study: "FrequencyStudy") -> Pict
         axes.set_xlabel("temperature (°C)")
         axes.set_ylabel("slope of ln f (ppm/°C)")
         axes.legend()
-    caption = "The prediction has the right size; the measured slope falls faster and turns up above 25 °C."
+    caption = (
+        "The predicted slope has the right magnitude. The measured slope falls faster and rises again above 25 °C."
+    )
     return draw(made, caption, "Predicted and measured slopes over temperature.")
 
 
@@ -283,7 +287,7 @@ def _first_diagnosis(parts: "Reproduction") -> Chapter:
     verdict = Text(headline(parts.diagnosis.verdict), "warning")
     blocks = make_blocks(*(part for chapter in table_parts(parts.diagnosis) for part in chapter.parts))
     shown = [block for block in blocks if not isinstance(block, Facts)]
-    return Chapter("Where measurement and physics differ: a first diagnosis", [verdict, *shown])
+    return Chapter("Differences between measurement and physics: a first diagnosis", [verdict, *shown])
 
 
 def _step_inverse(settling: "SettlingStudy") -> Picture:
@@ -310,7 +314,7 @@ def _step_inverse(settling: "SettlingStudy") -> Picture:
         lower.set_ylabel("error (mK)")
         lower.set_xlabel("time (h)")
     caption = (
-        "A virtual step from 20 to -10 °C, since the paper's record is not printed: the temperature that a cubic through nine"
-        " of its points calculates from the frequency, and its error against the temperature that the mode sees."
+        "A virtual step from 20 to −10 °C (the paper does not publish its record): the temperature calculated from the frequency"
+        " with a cubic fitted to nine points, and its error relative to the effective temperature of the mode."
     )
     return draw(made, caption, "Temperature and frequency fall together; the error stays far below a millikelvin.")

@@ -21,12 +21,12 @@ COLOURS = {
 def settling_chapter(study: "SettlingStudy") -> Chapter:
     """Return the chapter: Figure 3, the share of the step that is left, and the soak error of Table 1."""
     return Chapter(
-        "Figure 3: how the resonator settles, and what soak does to Table 1",
+        "Figure 3: settling of the resonator, and effect of the soak time on Table 1",
         [
             Text(
-                "The paper gives no heat path. Shell and stem follow from geometry and material; one constant, the"
-                " conductance of the base's mount, is identified from the statement that 95 % of a step is made after"
-                " 9 000 s. That less than 1 % is left after 15 000 s is then a prediction, and it holds."
+                "The paper gives no heat path. Shell and stem follow from geometry and material. One constant, the"
+                " conductance between base and housing, is identified from the statement that a step is 95 % complete after"
+                " 9 000 s. The model then predicts that less than 1 % remains after 15 000 s, as the paper states."
             ),
             step_figure(study),
             step_table(study),
@@ -55,12 +55,12 @@ def step_figure(study: "SettlingStudy") -> Picture:
             lower.set_ylim(0.05, 120)
             lower.set_xlabel("time (10³ s)")
         axes[0][0].set_ylabel("frequency (Hz)")
-        axes[1][0].set_ylabel("step left (%)")
+        axes[1][0].set_ylabel("remaining step (%)")
         axes[0][0].legend(fontsize=8)
     return draw(
         made,
-        "The virtual gyro in the steps of the paper's figure 3; dotted: 9 000 s and 15 000 s.",
-        "Frequency and the share of the step left, over time, for a step to -10 and a step to 40 degrees.",
+        "The virtual gyro after the temperature steps of figure 3; dotted lines: 9 000 s and 15 000 s.",
+        "Frequency and remaining part of the step over time, for a step to −10 and a step to 40 degrees.",
     )
 
 
@@ -77,8 +77,15 @@ def step_table(study: "SettlingStudy") -> Table:
         ]
         for curve in study.curves
     ]
-    columns = ["Step", "Network", "Left at 9 000 s (%)", "Left at 15 000 s (%)", "95 % made (s)", "99 % made (s)"]
-    note = "The mount is identified from the mean of the radiative column at 9 000 s; all else is predicted."
+    columns = [
+        "Step",
+        "Heat path",
+        "Remaining at 9 000 s (%)",
+        "Remaining at 15 000 s (%)",
+        "95 % complete (s)",
+        "99 % complete (s)",
+    ]
+    note = "The mount conductance is identified from the mean of the two radiative steps at 9 000 s; all other values are predictions."
     return Table("Settling after a chamber step", columns, rows, note)
 
 
@@ -95,11 +102,11 @@ def soak_figure(study: "SettlingStudy") -> Picture:
                 POINTS_degC, 1e3 * soak.error, line + "o", color=colour, alpha=strength, markersize=3, label=label
             )
         axes.set_xlabel("chamber temperature (°C)")
-        axes.set_ylabel("read − settled (mHz)")
+        axes.set_ylabel("reading − settled (mHz)")
         axes.legend(fontsize=7, ncols=2)
     return draw(
         made,
-        "What a soak of 4 to 5 h from room temperature leaves in the seven points.",
+        "Frequency error of the seven points after a soak of 4 to 5 h from room temperature.",
         "Frequency error of the seven points for three soak times in two networks.",
     )
 
@@ -111,10 +118,13 @@ def soak_table(study: "SettlingStudy") -> Table:
         for soak in study.soaks
     ]
     slope, curvature = study.measured_slope - study.law_slope, study.measured_curvature - study.law_curvature
-    rows.append(["to be explained", "measured minus the card's law", f"{slope:+.3f}", f"{curvature:+.4f}"])
-    columns = ["Soak", "Network", "Slope at 20 °C (ppm/°C)", "Curvature (ppm/°C²)"]
-    note = "From a quadratic through the logarithms of the seven frequencies."
-    return Table("What incomplete soak adds to Table 1", columns, rows, note)
+    rows.append(["measured minus predicted", "", f"{slope:+.3f}", f"{curvature:+.4f}"])
+    columns = ["Soak", "Heat path", "Slope at 20 °C (ppm/°C)", "Curvature (ppm/°C²)"]
+    note = (
+        "From a quadratic fitted to the logarithms of the seven frequencies. From room: each point starts at room temperature;"
+        " upwards: each point starts at the one before."
+    )
+    return Table("Effect of an incomplete soak on Table 1", columns, rows, note)
 
 
 def soak_sentence(study: "SettlingStudy") -> str:
@@ -127,12 +137,12 @@ def soak_sentence(study: "SettlingStudy") -> str:
     missing = study.measured_curvature - study.law_curvature
     against = "opposite to" if largest.curvature * missing < 0 else "of the same sign as"
     return (
-        f"Incomplete soak from room temperature flattens the slope: by {abs(largest.slope):.2f} ppm/°C at most here, of"
-        f" the {abs(study.measured_slope - study.law_slope):.1f} by which the measured slope lies below the card's law."
-        f" In a linear network it hardly curves it (up to"
-        f" {max(abs(soak.curvature) for soak in linear):.4f} ppm/°C², from the law's own curvature); radiation leaves"
-        f" {largest.curvature:+.4f} ppm/°C², {against} the {missing:+.3f} that are missing. Points taken one after another"
-        f" upwards change the slope by {max((s.slope for s in upwards), key=abs):+.3f} ppm/°C and the curvature by"
-        f" {max((s.curvature for s in upwards), key=abs):+.4f} ppm/°C² at most. Soak cannot be the cause of the measured"
+        f"An incomplete soak from room temperature reduces the slope by at most {abs(largest.slope):.2f} ppm/°C here, of"
+        f" the {abs(study.measured_slope - study.law_slope):.1f} ppm/°C between measurement and prediction."
+        f" With a linear heat path it hardly changes the curvature (by up to"
+        f" {max(abs(soak.curvature) for soak in linear):.4f} ppm/°C², from the curvature of the law itself). Radiation adds"
+        f" {largest.curvature:+.4f} ppm/°C², {against} the difference of {missing:+.3f} ppm/°C² to be explained. With points taken"
+        f" in ascending order the slope changes by at most {max((s.slope for s in upwards), key=abs):+.3f} ppm/°C and the curvature by"
+        f" at most {max((s.curvature for s in upwards), key=abs):+.4f} ppm/°C². An incomplete soak cannot explain the measured"
         " curvature."
     )

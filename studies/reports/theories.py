@@ -13,7 +13,14 @@ def theories_chapter() -> Chapter:
     limit = theories.thin_limit(rows[-1], rows[-2])
     slopes = theories.slopes_by_theory()
     at = next(row for row in rows if row.ratio == 0.06)
-    columns = ["h/R", "Rayleigh (Hz)", "Shell (Hz)", "Solid (Hz)", "Rayleigh over solid (%)", "the same over √(h/R)"]
+    columns = [
+        "h/R",
+        "Rayleigh (Hz)",
+        "Shell (Hz)",
+        "Solid (Hz)",
+        "Rayleigh above solid (%)",
+        "Relative excess / √(h/R)",
+    ]
     cells = [
         [
             f"{r.ratio:g}",
@@ -27,21 +34,21 @@ def theories_chapter() -> Chapter:
     ]
     slope_rows = [[theory, f"{1e6 * slope:.2f}"] for theory, slope in slopes.items()]
     return Chapter(
-        "Which theory a number comes from",
+        "Comparison of theories",
         [
             Text(
-                f"Rayleigh's closed form, the paper's equation (13), ignores the free edge. At h/R = 0.06 it lies"
-                f" {100 * at.excess:.1f} % above the solid; the excess closes only like √(h/R), with a coefficient that"
-                f" tends to {limit:.2f}. The other frequencies and slopes of silica on this page"
-                " are of the solid."
+                f"Rayleigh's closed form, equation (13) of the paper, ignores the free edge. At h/R = 0.06 it is"
+                f" {100 * at.excess:.1f} % above the solid model. The excess falls only as √(h/R), with a coefficient that"
+                f" tends to {limit:.2f}. All other frequencies and slopes of silica on this page"
+                " come from the solid model."
             ),
-            Table("Free hemisphere of 15 mm, n = 2", columns, cells),
+            Table("Free hemisphere of 15 mm radius, n = 2", columns, cells),
             _closing_figure(rows, limit),
             Table(
                 "Slope at 20 °C by theory (ppm/°C), h/R = 0.06, default law",
                 ["Theory", "Slope"],
                 slope_rows,
-                "The free edge moves the simple rule ½ G′/G + ½ α, which is Rayleigh's, by several ppm/°C.",
+                "The free edge changes the slope by several ppm/°C from Rayleigh's simple rule, ½ G′/G + ½ α.",
             ),
         ],
     )
@@ -50,7 +57,7 @@ def theories_chapter() -> Chapter:
 def _closing_figure(rows: list[theories.TheoryComparison], limit: float) -> Picture:
     ratio = np.array([r.ratio for r in rows])
     with style.figure(height=2.9) as (made, axes):
-        axes.loglog(ratio, [100 * r.excess for r in rows], "o-", color=style.BLUE, label="Rayleigh over solid")
+        axes.loglog(ratio, [100 * r.excess for r in rows], "o-", color=style.BLUE, label="Rayleigh above solid")
         axes.loglog(
             ratio,
             [100 * abs(r.shell / r.solid - 1) for r in rows],
@@ -64,6 +71,6 @@ def _closing_figure(rows: list[theories.TheoryComparison], limit: float) -> Pict
         axes.legend()
     return draw(
         made,
-        "Rayleigh's excess closes like √(h/R); shell theory is within 0.1 % of the solid everywhere.",
+        "The excess of Rayleigh's form falls as √(h/R); shell theory is within 0.1 % of the solid model everywhere.",
         "Differences of the theories over thickness, double logarithmic.",
     )

@@ -18,4 +18,4 @@ def test_drift_mean_rate_and_verdicts():
         "met on a condition",
     ]
     # ε π Δf/(n k) = 0.065 deg/h at 60 mHz: 0.93 µrad
-    assert "within 0.9 µrad" in found.claims[2].twin
+    assert "stable to 0.9 µrad" in found.claims[2].twin
