@@ -23,17 +23,20 @@ for _name, _count in ONE_THREAD.items():  # read by the libraries when numpy is 
 
 COMMANDS: dict[str, tuple[str, str]] = {
     # name: (module:function, one line of help)
-    "reproduce": ("studies.cli.reproduce:reproduce", "The HRG paper's tables and figures from its own data."),
+    "reproduce": ("studies.cli.reproduce:reproduce", "Recompute the tables and figures of the source papers."),
     "modes": ("studies.cli.modes:modes", "Frequencies, Bryan factors and sensitivities of the modes."),
-    "tcf": ("studies.cli.tcf:tcf", "Frequency against temperature and its parts."),
-    "loss": ("studies.cli.loss:loss", "Q over temperature: where the loss comes from, and what to attack first."),
-    "simulate": ("studies.cli.simulate:simulate", "A virtual run of a card through a chamber profile."),
+    "tcf": ("studies.cli.tcf:tcf", "Temperature coefficient of the frequency and its contributions."),
+    "loss": ("studies.cli.loss:loss", "Q over temperature, with loss contributions and what to reduce first."),
+    "simulate": ("studies.cli.simulate:simulate", "Simulate a run of an instrument through a chamber profile."),
     "loop": ("studies.cli.loop:loop", "Control loops: stability margins, bias and noise by source, start-up, runs."),
-    "thermal": ("studies.cli.thermal:thermal", "Temperatures of the heat path for a chamber profile."),
-    "fit frequency": ("studies.cli.fit_frequency:fit_frequency", "f(T) and its inverse from a steady-state table."),
+    "thermal": ("studies.cli.thermal:thermal", "Temperatures along the heat path for a chamber profile."),
+    "fit frequency": (
+        "studies.cli.fit_frequency:fit_frequency",
+        "f(T) and its inverse from a steady-state table or records.",
+    ),
     "fit bias": (
         "studies.cli.fit_bias:fit_bias",
-        "Bias over frequency or temperature and its rate.",
+        "Bias model over frequency or temperature and their rates.",
     ),
     "fit thermal": ("studies.cli.fit_thermal:fit_thermal", "Thermal time constants of a gyro from records."),
     "fit cross-damping": ("studies.cli.fit_cross_damping:fit_cross_damping", "Cross-damping bias over temperature."),
@@ -42,33 +45,39 @@ COMMANDS: dict[str, tuple[str, str]] = {
         "Splits, axes and gains from a whole-angle run.",
     ),
     "fit ringdown": ("studies.cli.fit_ringdown:fit_ringdown", "Frequencies, Q and axes from free decays."),
-    "calibrate": ("studies.cli.calibrate:calibrate", "The card's uncertain values from records, with intervals."),
-    "diagnose": ("studies.cli.diagnose:diagnose", "What the simulation gets wrong, why, and what the repair is worth."),
-    "acceptance": ("studies.cli.acceptance:acceptance", "The tests of IEEE 1431 from records, against limits."),
-    "derive": ("studies.cli.derive:derive", "The symbolic derivation, as equations, LaTeX or code."),
-    "render": ("studies.cli.render:render", "A mode shape as picture, animation, page or mesh."),
-    "mesh": ("studies.cli.mesh:mesh", "The solid as a quadratic mesh for a finite-element program."),
+    "calibrate": (
+        "studies.cli.calibrate:calibrate",
+        "Estimate the uncertain values of a card from records, with intervals.",
+    ),
+    "diagnose": (
+        "studies.cli.diagnose:diagnose",
+        "Find what the simulation gets wrong, its cause, and the gain from correcting it.",
+    ),
+    "acceptance": ("studies.cli.acceptance:acceptance", "Evaluate records against limits with the tests of IEEE 1431."),
+    "derive": ("studies.cli.derive:derive", "Symbolic derivation as equations, LaTeX or code."),
+    "render": ("studies.cli.render:render", "Mode shape as a picture, animation, page or mesh."),
+    "mesh": ("studies.cli.mesh:mesh", "Quadratic mesh of the solid for a finite-element program."),
     "scan": ("studies.cli.scan:scan", "Wall maps, harmonics and frequency splits from measured faces."),
-    "trim": ("studies.cli.trim:trim", "A plan of trimming cuts from measured splits."),
+    "trim": ("studies.cli.trim:trim", "Plan trimming cuts from measured splits."),
     "electrodes": (
         "studies.cli.electrodes:electrodes",
-        "Softening, split, pull-in and trim voltages of a card's electrodes.",
+        "Electrode softening, split, pull-in and trim voltages.",
     ),
     "import": ("studies.cli.import_:import_", "Convert laboratory files to the record format."),
-    "compensate": ("studies.cli.compensate:compensate", "Apply a saved model to a record, or emit it as C."),
-    "temperature": ("studies.cli.temperature:temperature", "The resonator's temperature from its own frequency."),
-    "fit scale": ("studies.cli.fit_scale:fit_scale", "Bias and scale of a bell-shaped gyro, step by step."),
+    "compensate": ("studies.cli.compensate:compensate", "Apply a saved model to a record, or emit it as C code."),
+    "temperature": ("studies.cli.temperature:temperature", "Resonator temperature from its frequency."),
+    "fit scale": ("studies.cli.fit_scale:fit_scale", "Bias and scale factor of a bell-shaped gyro, step by step."),
     "study run": ("studies.cli.study:run", "Run or resume a parametric study."),
-    "study status": ("studies.cli.study:status", "How far a study is, and what failed."),
-    "study report": ("studies.cli.study:report", "One page: results, sensitivities, yield, provenance."),
-    "study export": ("studies.cli.study:export", "The results as CSV, with the units beside."),
-    "compare": ("studies.cli.compare:compare", "Designs side by side: where cards differ, and what that does."),
-    "cards": ("studies.cli.cards:cards", "The instrument cards that ship; what is uncertain in a card."),
-    "card new": ("studies.cli.new:card", "A card of your own to start from."),
-    "study new": ("studies.cli.new:study", "The spec of a study to start from."),
-    "materials": ("studies.cli.cards:materials", "The materials and their published laws."),
-    "effects": ("studies.cli.effects:effects", "The physical effects that a diagnosis can name and a card can have."),
-    "doctor": ("studies.cli.doctor:doctor", "Show what this environment has and what it lacks."),
+    "study status": ("studies.cli.study:status", "Show the progress of a study and its failed cases."),
+    "study report": ("studies.cli.study:report", "Write a page: results, sensitivities, yield and provenance."),
+    "study export": ("studies.cli.study:export", "Export the results as CSV, with a file of units."),
+    "compare": ("studies.cli.compare:compare", "Compare designs: differences between cards and their effects."),
+    "cards": ("studies.cli.cards:cards", "List the built-in instrument cards, or the uncertain values of a card."),
+    "card new": ("studies.cli.new:card", "Write a card template."),
+    "study new": ("studies.cli.new:study", "Write a study template."),
+    "materials": ("studies.cli.cards:materials", "List the materials and their published laws."),
+    "effects": ("studies.cli.effects:effects", "List the physical effects for diagnosis and cards."),
+    "doctor": ("studies.cli.doctor:doctor", "Check the environment for missing programs and packages."),
 }
 EPILOGUE = "Every command that computes takes --json and --report FILE.html. --debug shows the traceback of an error."
 
@@ -109,7 +118,7 @@ def _command_line(words: Sequence[str]) -> "App":
 
     app = App(
         name="hrg",
-        help="Study workbench for hemispherical, cylindrical and bell-shaped resonator gyroscopes.",
+        help="Workbench for hemispherical, cylindrical and bell-shaped resonator gyroscopes.",
         help_epilogue=EPILOGUE,
         version=f"hrg-workbench {__version__}",
         result_action="return_value",
@@ -166,25 +175,25 @@ def _say_unused(unused: Sequence[str], words: Sequence[str]) -> str:
     before = list(words[: words.index(unused[0])]) if unused and unused[0] in words else []
     if before and before[-1] in PROFILE_WORDS:
         whole = " ".join([before[-1], *takewhile(lambda word: not word.startswith("-") or word[1:2].isdigit(), unused)])
-        return f'a profile of several words stands in quotes: "{whole}".'
+        return f'put a profile of several words in quotes: "{whole}".'
     asked = " ".join(["hrg", *_command_words(words), "--help"])
-    return f"{named}: more words than this command takes; a text with blanks stands in quotes. See '{asked}'."
+    return f"{named}: too many arguments; put text with spaces in quotes. See '{asked}'."
 
 
 PROFILE_WORDS = ("soak", "step", "ramp", "staircase", "cycle")
 CHAPTERS = {
     # of the list of commands
     "Design a resonator": ("modes", "tcf", "loss", "loop", "compare", "render", "mesh", "study", "derive"),
-    "Make it": ("scan", "trim", "electrodes"),
-    "Run it": ("simulate", "thermal", "import"),
-    "Explain and accept": ("calibrate", "diagnose", "effects", "acceptance"),
+    "Manufacture": ("scan", "trim", "electrodes"),
+    "Simulate and import": ("simulate", "thermal", "import"),
+    "Calibrate, diagnose and accept": ("calibrate", "diagnose", "effects", "acceptance"),
     "Compensate": ("fit", "compensate", "temperature"),
-    "What there is": ("cards", "card", "materials", "reproduce", "doctor"),
+    "Library and setup": ("cards", "card", "materials", "reproduce", "doctor"),
 }
 GROUPS = {
-    "card": "Make a card of your own.",
-    "fit": "Calibrate a compensation model from measured data.",
-    "study": "Parametric studies: new, run, status, report, export.",
+    "card": "Write your own card.",
+    "fit": "Fit a compensation model to measured data.",
+    "study": "Parametric studies: create, run, monitor, report, export.",
 }
 
 
@@ -213,7 +222,7 @@ def describe_environment_error(error: BaseException) -> str:
         return f"a text cannot be shown or read here ({error}); set PYTHONUTF8=1, or rename the file."
     assert isinstance(error, OSError)
     named = f"{os.fsdecode(error.filename)!r}: " if error.filename else ""
-    return f"{named}the system refuses ({error.strerror or error}); check its rights, its place and the disk."
+    return f"{named}the system refuses ({error.strerror or error}); check permissions, path and disk space."
 
 
 def run() -> None:

@@ -7,16 +7,16 @@ from cyclopts import Parameter
 
 
 def card(path: str, *, like: str = "hrg-30mm", name: str | None = None) -> int:
-    """Write a card to start from: a shipped one, with every further table that a card may have as comments below.
+    """Write a card template: a copy of a built-in card, with all other optional tables as comments.
 
     Parameters
     ----------
     path : str
-        The card (TOML) to write; a file that exists is not overwritten.
+        The card (TOML) to write; an existing file is not overwritten.
     like : str
-        A shipped card, or the path of one, to start from (hrg cards).
+        A built-in card (see hrg cards), or the path of a card, to copy.
     name : str
-        Name of the instrument; the file's name unless given.
+        Name of the instrument; default: the name of the file.
     """
     from dataclasses import replace
     from pathlib import Path
@@ -27,13 +27,13 @@ def card(path: str, *, like: str = "hrg-30mm", name: str | None = None) -> int:
 
     _refuse_existing(path)
     model = load_card(like)
-    note = {"note": "Say here what is measured, printed or assumed."}
+    note = {"note": "State here which values are measured, published or assumed."}
     own = replace(model, name=name or Path(path).stem, content={**model.content, **note})
     content, text = spell_card(own, path)
     build_instrument(content, path)
     lines = [
         text,
-        "# What else a card may say. Remove the # of a line to set it; what stays away has its documented default.",
+        "# Optional entries. Remove the # of a line to set it; entries left out have their documented default.",
     ]
     headings: set[str] = set()
     for block in _forms(set(content)):
@@ -43,7 +43,7 @@ def card(path: str, *, like: str = "hrg-30mm", name: str | None = None) -> int:
         more = [f"more keys of {heading}", *block[1:]] if again else block  # a table may be opened once
         lines += [f"# {line}".rstrip() for line in ("", *more)]
     write_text(path, "\n".join(lines) + "\n")
-    say(f"{path}: written, like {like}. Correct it, then: hrg modes {path}")
+    say(f"{path}: written as a copy of {like}. Edit it, then run: hrg modes {path}")
     return 0
 
 
@@ -53,16 +53,16 @@ def study(
     like: str = "dimension-tolerance",
     card_: Annotated[str | None, Parameter(name="--card")] = None,
 ) -> int:
-    """Write the spec of a study to start from.
+    """Write a template for the spec of a study.
 
     Parameters
     ----------
     path : str
-        The spec (TOML) to write; a file that exists is not overwritten.
+        The spec (TOML) to write; an existing file is not overwritten.
     like : str
-        A shipped study: frequency-over-temperature, dimension-tolerance, dimension-influence, split-tolerance.
+        A built-in study: frequency-over-temperature, dimension-tolerance, dimension-influence, split-tolerance.
     card_ : str
-        The card that it studies: a shipped one, or a path as seen from the spec.
+        The card to study: a built-in one, or a path relative to the spec.
     """
     import tomllib
 
@@ -80,7 +80,7 @@ def study(
         old, new = (tomli_w.dumps({"card": one}).rstrip("\n") for one in (stated, card_))
         text = text.replace(old, new)
     write_text(path, "\n".join([text.rstrip("\n"), "", *_study_form()]) + "\n")
-    say(f"{path}: written, like {like}. Correct it, then: hrg study run {path} --dry-run")
+    say(f"{path}: written as a copy of {like}. Edit it, then run: hrg study run {path} --dry-run")
     return 0
 
 
@@ -90,7 +90,7 @@ def _study_form() -> list[str]:
 
     lines = (studies.sweeps.spec.__doc__ or "").splitlines()
     first, last = (k for k, line in enumerate(lines) if line.startswith("```"))
-    form = ["What a study may say, by an example:", "", *lines[first + 3 : last]]
+    form = ["All entries of a study, by example:", "", *lines[first + 3 : last]]
     return [f"# {line}".rstrip() for line in form]
 
 
@@ -100,7 +100,7 @@ def _refuse_existing(path: str) -> None:
     from studies.errors import InputError
 
     if os.path.lexists(path):
-        raise InputError(f"{path}: exists and is not overwritten; remove it or choose another name.")
+        raise InputError(f"{path}: already exists and is not overwritten; remove it or choose another name.")
 
 
 def _forms(present: set[str]) -> Iterator[list[str]]:

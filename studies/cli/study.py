@@ -24,37 +24,37 @@ def run(
     dry_run: bool = False,
     quiet: bool = False,
 ) -> Answer:
-    """Run a parametric study, or resume it; what is computed is never computed twice nor lost.
+    """Run or resume a parametric study. Finished cases are kept and never computed again.
 
-    Exit status 4 means that it is finished and some cases failed: their reasons are in the results.
+    Exit status 4: the study is finished but some cases failed; the results give the reasons.
 
     Parameters
     ----------
     spec : str
-        Path of a spec, or the name of one that ships: frequency-over-temperature, dimension-tolerance, dimension-influence,
-        split-tolerance. A spec is a TOML file. At its top: schema = "hrg.study/1", name, card (a shipped one, or a path beside the spec).
+        Path of a spec, or the name of a built-in one: frequency-over-temperature, dimension-tolerance, dimension-influence,
+        split-tolerance. A spec is a TOML file. At its top: schema = "hrg.study/1", name, card (a built-in one, or a path relative to the spec).
         [sampling]: method = grid, list, latin-hypercube, sobol, sensitivity or one-at-a-time; cases, seed, batch, solver.
-        [[parameter]]: name (a key of the card such as resonator.thickness_mm, or temperature_degC, or user.NAME for a
-        function of yours) with tolerance, or low and high, or values; nominal, count, distribution = uniform, normal (with
+        [[parameter]]: name (a key of the card such as resonator.thickness_mm, or temperature_degC, or user.NAME for your own
+        function) with tolerance, or low and high, or values; nominal, count, distribution = uniform, normal (with
         standard_deviation), triangular or log-uniform. [[quantity]]: name = bryan-factor, compensation-residual, frequency,
-        mode-separation, python, q, split, tcf or thermal-time-constants, with harmonic, index, theory, temperature_degC, label and keys of its own.
+        mode-separation, python, q, split, tcf or thermal-time-constants, with harmonic, index, theory, temperature_degC, label and its own keys.
         [[requirement]]: column with within (of target), or low, high. [[search]]: kind = worst-case with column,
-        inversion with vary and targets, or tolerance with share (which tolerances that share of designs keeps). Example and details: python -m pydoc studies.sweeps.spec.
+        inversion with vary and targets, or tolerance with share (the tolerances with which that share of designs meets the requirements). Example and details: python -m pydoc studies.sweeps.spec.
     out : str
-        Folder for the study's store; needed except with --dry-run. Running again with the same folder resumes.
+        Folder for the results; required except with --dry-run. Run again with the same folder to resume.
     workers : int
-        Processes on this machine; one for each core unless given. None are started where a family of designs does it here.
+        Processes on this machine; default: one per core. Interpolated designs need no extra processes.
     scheduler : str
-        Address of a Dask scheduler (tcp://HOST:8786), to compute on its workers instead. Use one that you trust: the scheduler
+        Address of a Dask scheduler (tcp://HOST:8786) whose workers compute the study. Use only one that you trust: the scheduler
         and its workers can run code on this machine. A public address needs tls:// and certificates in Dask's configuration.
     card : str
-        Another card than the one that the spec names.
+        Card to use instead of the one in the spec.
     allow_python : bool
-        Run the Python functions that the spec names. Read them first.
+        Allow the Python functions named in the spec to run. Read them first.
     retry_failed : bool
-        Compute again what failed in an earlier run; cases whose worker was lost are always tried again.
+        Compute failed cases again; cases whose worker was lost are always repeated.
     dry_run : bool
-        Say how many cases, how long and how much memory; keep nothing.
+        Estimate the number of cases, time and memory; save nothing.
     quiet : bool
         Show no progress.
     """
@@ -65,9 +65,9 @@ def run(
     from studies.sweeps.validity import find_invalid
 
     if workers is not None and workers < 1:
-        raise InputError(f"--workers {workers}: at least one is needed.")
+        raise InputError(f"--workers {workers}: must be at least 1.")
     if workers is not None and scheduler is not None:
-        raise InputError("--workers and --scheduler: give one of them.")
+        raise InputError("--workers and --scheduler cannot be combined: give one of them.")
     if dry_run:
         study = read_study(spec, card)
         check_functions(study, allow_python)
@@ -93,7 +93,7 @@ def run(
             show_progress=not quiet,
         )
     except KeyboardInterrupt:
-        say(f"hrg: interrupted; what was computed is kept in {out}. Run the same command again to resume.")
+        say(f"hrg: interrupted; finished cases are kept in {out}. Run the same command again to resume.")
         return 130
     failed = _failed(results)
     yield _status(results, out, running=False), 4 if failed else 0
@@ -108,9 +108,9 @@ def _print_tolerances(results: "Results") -> None:
 
     for found in results.store.findings().values():
         if found.get("kind") == "tolerance" and "failed" not in found:
-            heading = f"Tolerances that {100 * found['share']:g} % of designs keep"
+            heading = f"Tolerances with which {100 * found['share']:g} % of designs meet the requirements"
             print_table(
-                heading, ["parameter", "asked", "found"], describe_tolerances(results, found), tell_tolerance(found)
+                heading, ["parameter", "specified", "found"], describe_tolerances(results, found), tell_tolerance(found)
             )
         elif found.get("kind") == "tolerance":
             print(f"No tolerances were found: {found['failed']}")
@@ -123,7 +123,7 @@ def _failed(results: "Results") -> int:
 
 @answers("hrg.study-status/1")
 def status(folder: str) -> Answer:
-    """Show how far a study is, what failed and why; also while it runs.
+    """Show the progress of a study and the failed cases with their reasons, also while it runs.
 
     Parameters
     ----------
@@ -141,20 +141,20 @@ def status(folder: str) -> Answer:
         [key.replace("_", " "), _words(found[key])]
         for key in ("state", "cases", "done", "failed", "seconds_each", "runs")
     ]
-    print_table(results.study.name, ["what", "value"], rows, results.study.note.strip("-"))
+    print_table(results.study.name, ["item", "value"], rows, results.study.note.strip("-"))
     _print_reasons(results)
 
 
 @answers("hrg.study-report/1")
 def report(folder: str, *, out: str | None = None) -> Answer:
-    """Write one self-contained HTML page: what was asked, results, pictures, sensitivities, yield, provenance.
+    """Write a self-contained HTML page: definition, results, figures, sensitivities, yield and provenance.
 
     Parameters
     ----------
     folder : str
         Folder of the study (hrg study run --out).
     out : str
-        The page; report.html in the folder unless given.
+        The page; default: report.html in the folder.
     """
     from pathlib import Path
 
@@ -165,7 +165,7 @@ def report(folder: str, *, out: str | None = None) -> Answer:
 
     results = open_results(folder)
     page = Path(out) if out else Path(folder) / "report.html"
-    say("drawing the page, with mode shapes where the study has modes ...")
+    say("writing the page, with mode shapes if the study has modes ...")
     write_text(page, sweep_page(results))
     yield {**summarise(results), "report": str(page)}
     _say_unfinished(results)
@@ -174,14 +174,14 @@ def report(folder: str, *, out: str | None = None) -> Answer:
 
 @answers("hrg.study-export/1")
 def export(folder: str, *, out: str | None = None) -> Answer:
-    """Write the results as CSV, and the unit of every column as JSON beside it.
+    """Write the results as CSV, and the unit of every column to a JSON file.
 
     Parameters
     ----------
     folder : str
         Folder of the study (hrg study run --out).
     out : str
-        The CSV file; results.csv in the folder unless given.
+        The CSV file; default: results.csv in the folder.
     """
     from pathlib import Path
 
@@ -213,7 +213,7 @@ def _say_unfinished(results: "Results") -> None:
 
     if results.done < results.total:
         say(
-            f"note: the study is not finished, {results.done} of {results.total} cases are done; run it again to resume."
+            f"note: the study is not finished: {results.done} of {results.total} cases are done. Run it again to resume."
         )
 
 
@@ -248,9 +248,9 @@ def _estimate_words(estimate: "Effort") -> str:
     return (
         f"{estimate.cases} cases in {estimate.batches} batch{'es' * (estimate.batches != 1)}, {SOLVERS[estimate.solver]}"
         + (f" ({estimate.why_full})" if estimate.why_full else "")
-        + "; one takes"
-        f" {estimate.seconds_each:.3g} s, all about {_duration(estimate.seconds)}; memory about {estimate.memory_MB:.0f} MB."
-        " Nothing was kept."
+        + ";"
+        f" {estimate.seconds_each:.3g} s per case, about {_duration(estimate.seconds)} in total; memory about {estimate.memory_MB:.0f} MB."
+        " Nothing was saved."
     )
 
 

@@ -25,11 +25,11 @@ if TYPE_CHECKING:
 MOST_ROWS = 300
 ENDS = 20  # designs shown from each end when there are more than MOST_ROWS
 METHODS = {
-    "grid": "every combination of the values",
-    "list": "the combinations that the spec lists",
+    "grid": "all combinations of the values",
+    "list": "the combinations listed in the spec",
     "latin-hypercube": "a Latin hypercube",
     "sobol": "a scrambled Sobol sequence",
-    "sensitivity": "Saltelli's design for Sobol indices",
+    "sensitivity": "the Saltelli design for Sobol indices",
     "one-at-a-time": "one parameter at a time about the nominal design",
 }
 
@@ -38,7 +38,7 @@ def sweep_page(results: "Results") -> str:
     """Return the page of a study as HTML."""
     study = results.study
     done = len(results) if results.done == results.total else f"{results.done} of {results.total}"
-    lead = f"{done} designs by {METHODS[study.sampling.method]} about the card {study.instrument.name}."
+    lead = f"{done} designs ({METHODS[study.sampling.method]}) based on the card {study.instrument.name}."
     if study.note != "-":
         lead = f"{study.note} {lead}"
     chapters = [
@@ -115,10 +115,10 @@ def _short(results: "Results") -> list[Block]:
     found = _yield(results)
     if found is not None:
         words = "of the designs" if found.low is None else f"95 % interval {percent(found.low)} … {percent(found.high)}"
-        facts.append(("Meet every requirement", percent(found.share), words))
+        facts.append(("Meet all requirements", percent(found.share), words))
     blocks: list[Block] = [Facts(facts)]
     if results.done < results.total:
-        blocks.append(Text("The study is not finished: run it again to resume, then make this page again.", "warning"))
+        blocks.append(Text("The study is not finished. Run it again to resume, then write this page again.", "warning"))
     return blocks
 
 
@@ -139,11 +139,13 @@ def _asked(results: "Results") -> list[Block]:
         for one in study.asked
         for c in one.columns[:1]
     ]
-    words = f"Sampled by {METHODS[sampling.method]}"
+    words = f"Sampling: {METHODS[sampling.method]}"
     words += f", seed {sampling.seed}" if sampling.method in ("latin-hypercube", "sobol", "sensitivity") else ""
     full = results.about["identity"]["solver"] == "full"
-    solver = "every design solved in full" if full else "interpolated between full solves, with the error of that"
-    return [parameters, Table("Quantities", ["Column", "What", "Options"], rows), Text(f"{words}; {solver}.")]
+    solver = (
+        "every design solved in full" if full else "interpolated between full solves, with a stated interpolation error"
+    )
+    return [parameters, Table("Quantities", ["Column", "Quantity", "Options"], rows), Text(f"{words}; {solver}.")]
 
 
 def _failures(results: "Results") -> list[Chapter]:
@@ -154,7 +156,7 @@ def _failures(results: "Results") -> list[Chapter]:
         [*map(number, results.design(place).values()), results.remark(place)]
         for place in results.failed[:MOST_ROWS].tolist()
     ]
-    words = "These designs have no value and are left out of every number on this page."
+    words = "These designs have no result and are excluded from all figures on this page."
     heads = [figures.label(p.name, p.unit) for p in results.study.parameters]
     return [
         Chapter(
@@ -182,9 +184,9 @@ def _statistics(results: "Results") -> Table:
             ]
         )
         rows[-1].append(plain(n["error"], 2) if n["error"] is not None and np.isfinite(n["error"]) else "")
-    heads = ["Quantity", "Unit", "Nominal", "Mean", "Standard deviation", "Least", "Greatest", "Numerical error"]
-    note = "The numerical error is the largest estimate of the solver for any design, against the exact solution of its theory."
-    return Table("All designs with a value", heads, rows, note)
+    heads = ["Quantity", "Unit", "Nominal", "Mean", "Standard deviation", "Minimum", "Maximum", "Numerical error"]
+    note = "The numerical error is the largest error estimate of the solver over all designs, relative to the exact solution of its theory."
+    return Table("All designs with a result", heads, rows, note)
 
 
 def _digits(n: Mapping[str, Any], key: str) -> str:
@@ -200,7 +202,7 @@ def _designs(results: "Results") -> Table:
         order = np.argsort(results.column(columns[0].name), kind="stable")
         order = order[np.isfinite(results.column(columns[0].name)[order])]
         places = [*order[:ENDS].tolist(), *order[-ENDS:].tolist()]
-        note += f" Shown: of {len(results)} designs, the {ENDS} with the least and the {ENDS} with the greatest {columns[0].label}; hrg study export writes all."
+        note += f" Of {len(results)} designs, the {ENDS} with the lowest and the {ENDS} with the highest {columns[0].label} are shown; hrg study export writes all."
     rows = []
     for place in places:
         numbers = (results.column(column.name)[place] for column in columns)
@@ -253,12 +255,12 @@ def _shapes(results: "Results") -> list[Chapter]:
     designs = {"Nominal design": nominal_design(study)}
     y = results.column(column.name)
     if np.isfinite(y).any() and any(name.startswith("resonator.") for name in study.names):
-        designs[f"Least {column.label}"] = results.design(int(np.nanargmin(y)))
-        designs[f"Greatest {column.label}"] = results.design(int(np.nanargmax(y)))
+        designs[f"Minimum {column.label}"] = results.design(int(np.nanargmin(y)))
+        designs[f"Maximum {column.label}"] = results.design(int(np.nanargmax(y)))
     blocks: list[Block] = []
     for title, design in designs.items():
         words = ", ".join(f"{name} = {number(value)}" for name, value in design.items())
-        blocks.append(Text(f"{title}: {words or 'the card'}."))
+        blocks.append(Text(f"{title}: {words or 'as in the card'}."))
         blocks += mode_blocks(set_parameters(study.instrument, design, study.derived), (n,))
     return [Chapter("Mode shapes", blocks)]
 
@@ -273,7 +275,7 @@ def _provenance(results: "Results") -> list[Block]:
         rows.append([str(count), run["started_utc"], ended, outcome, commit[:12], lock])
         environments.setdefault(f"{versions}; {machine}", []).append(str(count))
     facts = [
-        ["study made", about["created_utc"]],
+        ["study created", about["created_utc"]],
         ["physics version", identity["physics_version"]],
         ["hash of card, material, quantities and physics", identity["base"]],
         ["hash of the designs", identity["design"]],
@@ -282,7 +284,7 @@ def _provenance(results: "Results") -> list[Block]:
         *([f"user function {name}", source] for name, source in identity["functions"].items()),
     ]
     heads = ["Run", "Started", "Ended", "Outcome", "Commit", "Lock file"]
-    blocks: list[Block] = [Table("Identity", ["What", "Value"], facts), Table("Runs", heads, rows)]
+    blocks: list[Block] = [Table("Identity", ["Item", "Value"], facts), Table("Runs", heads, rows)]
     blocks += [Text(f"Run {', '.join(runs)}: {versions}.") for versions, runs in environments.items()]
     return [*blocks, Text(about["spec_text"], "source")] if about["spec_text"] else blocks
 
@@ -316,6 +318,6 @@ def _distribution(parameter: "StudyParameter") -> str:
         return "values"
     if parameter.distribution == "normal":
         return f"normal, standard deviation {number(parameter.standard_deviation)}" + (
-            "" if parameter.bounded else ", no ends"
+            "" if parameter.bounded else ", unbounded"
         )
     return parameter.distribution + (f", {parameter.count} points" if parameter.count else "")

@@ -31,13 +31,13 @@ def influence_chapters(results: "Results") -> list[Chapter]:
                 blocks += _shares(results, column)
         except InputError as error:
             blocks.append(Text(str(error), "warning"))
-    return [Chapter("Which parameter matters", blocks)] if blocks else []
+    return [Chapter("Influence of the parameters", blocks)] if blocks else []
 
 
 def _sobol(results: "Results", column: "Column") -> list[Block]:
     found = sobol_indices(results, column.name)
     if found.variance == 0:
-        return [Text(f"{column.label} is the same for every design: no parameter has any influence on it.", "note")]
+        return [Text(f"{column.label} is the same for every design: no parameter influences it.", "note")]
     rows = []
     for k, name in enumerate(found.parameters):
         first = [f"{found.first[k]:.4f}", f"{found.first_low[k]:.4f} … {found.first_high[k]:.4f}"]
@@ -47,7 +47,7 @@ def _sobol(results: "Results", column: "Column") -> list[Block]:
         f"Sobol indices of {column.label}",
         heads,
         rows,
-        "A parameter whose total interval includes zero has no visible influence.",
+        "A parameter whose total interval includes zero has no significant influence.",
         True,
     )
     return [table, figures.sobol_figure(found, column)]
@@ -60,8 +60,10 @@ def _slopes(results: "Results", column: "Column") -> list[Block]:
     for slope in found:
         unit = _slope_unit(column.unit, units[slope.parameter])
         rows.append([slope.parameter, f"{slope.slope:.6g}", f"{slope.uncertainty:.2g}", unit, f"{slope.swing:.6g}"])
-    heads = ["Parameter", "Slope", "±", "Unit", f"Swing over the range ({column.unit})"]
-    note = "± includes the curvature beyond the outer levels and the solver's error; a slope smaller than that is not significant."
+    heads = ["Parameter", "Slope", "±", "Unit", f"Change over the range ({column.unit})"]
+    note = (
+        "± includes curvature beyond the outer levels and the solver error; a slope smaller than ± is not significant."
+    )
     return [
         Table(f"Slopes of {column.label} at the nominal design", heads, rows, note, True),
         figures.tornado_figure(found, column),
@@ -77,11 +79,11 @@ def _shares(results: "Results", column: "Column") -> list[Block]:
         [name, f"{slope:.6g}", f"{half:.2g}", _slope_unit(column.unit, units[name]), percent(share)]
         for name, slope, half, share in zip(found.parameters, found.slope, found.half_width, found.share, strict=True)
     ]
-    note = f"A linear law explains {percent(found.r_squared)} of the variance; ± is half a 95 % interval; a slope smaller than that is not significant."
+    note = f"A linear model explains {percent(found.r_squared)} of the variance. ± is half of the 95 % interval; a slope smaller than ± is not significant."
     return [
         Table(
             f"Linear influence on {column.label}",
-            ["Parameter", "Slope", "±", "Unit", "Share of the variance"],
+            ["Parameter", "Slope", "±", "Unit", "Share of variance"],
             rows,
             note,
             True,
@@ -105,20 +107,22 @@ def tolerance_chapters(results: "Results") -> list[Chapter]:
             rows.append(
                 [limits.column, number(limits.low), number(limits.high), *_yield_cells(results, (requirement,))]
             )
-        rows.append(["all together", "", "", *_yield_cells(results, study.requirements)])
+        rows.append(["all requirements", "", "", *_yield_cells(results, study.requirements)])
         reach = find_reach(results, study.requirements)
     except InputError as error:
         return [Chapter("Tolerances", [Text(str(error), "warning")])]
-    note = "A design without a value counts as failing for the lower end of the interval and as passing for the upper."
-    heads = ["Requirement", "From", "To", "Designs that meet it", "95 % interval", "Without a value"]
+    note = (
+        "For the interval, a design without a result counts as failed at the lower end and as passed at the upper end."
+    )
+    heads = ["Requirement", "From", "To", "Designs that meet it", "95 % interval", "Without a result"]
     if reach.part is None:
-        words = "No sampled design fails: the tolerances may be wider than the ranges that were asked for."
+        words = "No sampled design fails: the tolerances can be wider than the ranges of the study."
     else:
         words = (
-            f"The largest box about the nominal design without a failing one covers {100 * reach.part:.3g} % of every range"
+            f"The largest box around the nominal design without a failed design covers {100 * reach.part:.3g} % of every range"
             f" ({reach.inside} designs inside): "
             + ", ".join(_reach(p, reach.part) for p in study.parameters if not isinstance(p.nominal, str))
-            + ". It is based on the sampled designs alone; a worst-case search tests it."
+            + ". This is based on the sampled designs only; confirm it with a worst-case search."
         )
     found = _findings(results, "tolerance")
     return [Chapter("Tolerances", [*found, Table("Yield", heads, rows, note), Text(words, "note")])]
@@ -165,31 +169,31 @@ def _worst_case(results: "Results", found: Mapping[str, Any]) -> list[Block]:
         for end in ("least", "greatest")
     ]
     heads = ["", found["column"], *(figures.label(p.name, p.unit) for p in results.study.parameters)]
-    note = "From the worst corner of the box, a bounded quasi-Newton search; text parameters stay nominal."
-    return [Table(f"Worst cases of {found['column']} over the box", heads, rows, note)]
+    note = "Bounded quasi-Newton search from the worst corner of the box; text parameters keep their nominal value."
+    return [Table(f"Worst cases of {found['column']} within the ranges", heads, rows, note)]
 
 
 def _inversion(results: "Results", found: Mapping[str, Any]) -> list[Block]:
     rows = [[column, number(wanted), number(found["values"][column])] for column, wanted in found["targets"].items()]
     design = ", ".join(f"{name} = {number(value)}" for name, value in found["parameters"].items())
     if found["reached"]:
-        words, kind = f"The targets are met with {design}.", "note"
+        words, kind = f"The targets are met by {design}.", "note"
     else:
-        limits = f" It lies on the limits of {', '.join(found['at_limit'])}." if found["at_limit"] else ""
-        words, kind = f"No design in the ranges meets the targets; the nearest has {design}.{limits}", "warning"
+        limits = f" It is at the limit of {', '.join(found['at_limit'])}." if found["at_limit"] else ""
+        words, kind = f"No design within the ranges meets the targets. The closest is {design}.{limits}", "warning"
     if found["condition"] and found["condition"] > 1e3:
-        words += f" The targets hardly distinguish the parameters (condition {found['condition']:.1e})."
-    return [Table("Design by inversion", ["Column", "Wanted", "Found"], rows), Text(words, kind)]
+        words += f" The targets barely separate the parameters (condition number {found['condition']:.1e})."
+    return [Table("Design by inversion", ["Column", "Target", "Found"], rows), Text(words, kind)]
 
 
 def _tolerances(results: "Results", found: Mapping[str, Any]) -> list[Block]:
     rows = describe_tolerances(results, found)
     head = f"Tolerances with which {100 * found['share']:g} % of designs meet the requirements"
     note = (
-        f"{tell_tolerance(found)} Every one of the {found['cases']} drawn designs is moved along its line through the nominal one;"
-        " the interval is that of a quantile of so many draws, 90 %."
+        f"{tell_tolerance(found)} Each of the {found['cases']} sampled designs is scaled along its line through the nominal design;"
+        " the interval is the 90 % interval of the quantile for this number of samples."
     )
-    return [Table(head, ["Parameter", "Asked", "Found"], rows, note)]
+    return [Table(head, ["Parameter", "Specified", "Found"], rows, note)]
 
 
 def describe_tolerances(results: "Results", found: Mapping[str, Any]) -> list[list[str]]:
@@ -210,7 +214,7 @@ def tell_tolerance(found: Mapping[str, Any]) -> str:
     """Say by which factor tolerances may be wider, in a sentence."""
     low, high = found["low"], found["high"]
     return (
-        f"{100 * found['share']:g} % of designs meet the requirements where the tolerances are {found['factor']:.3g} times those of"
+        f"{100 * found['share']:g} % of designs meet the requirements if the tolerances are {found['factor']:.3g} times those of"
         f" the study ({low:.3g} … {high:.3g})."
     )
 

@@ -60,13 +60,13 @@ def spread_figure(results: "Results", column: "Column", limits: "list[Requiremen
             if y.min() - near <= end <= y.max() + near:
                 axes.axvline(end, color=style.VERMILION, linestyle="--", label=f"required: {end:.8g}")
             else:
-                axes.plot([], [], color=style.VERMILION, linestyle="--", label=f"required: {end:.8g}, off the picture")
+                axes.plot([], [], color=style.VERMILION, linestyle="--", label=f"required: {end:.8g}, outside the plot")
         axes.set_xlabel(column_label(column))
         axes.set_ylabel("designs")
         axes.ticklabel_format(axis="x", useOffset=False)
         if axes.get_legend_handles_labels()[0]:
             axes.legend(fontsize=8, loc="lower left", bbox_to_anchor=(0, 1), ncols=3)
-    return draw(made, f"Spread of {column.label} over {len(y)} designs.", f"Histogram of {column.label}.")
+    return draw(made, f"Distribution of {column.label} over {len(y)} designs.", f"Histogram of {column.label}.")
 
 
 def response_figure(results: "Results", column: "Column") -> Picture | None:
@@ -98,7 +98,7 @@ def response_figure(results: "Results", column: "Column") -> Picture | None:
             panel.set_visible(False)
         for panel in axes[:, 0]:
             panel.set_ylabel(column_label(column), fontsize=9)
-    words = f"How {column.label} follows the parameters."
+    words = f"{column.label} by parameter."
     return draw(made, words, f"{column.label} over each parameter.")
 
 
@@ -119,7 +119,7 @@ def _map(results: "Results", column: "Column") -> Picture:
         axes.set_xlabel(label(one.name, one.unit))
         axes.set_ylabel(label(other.name, other.unit))
         made.colorbar(picture, label=column_label(column), format="%.6g")
-    caption = f"Map of {column.label}; empty where a design failed."
+    caption = f"Map of {column.label}; failed designs are left blank."
     return draw(made, caption, f"Map of {column.label} over two parameters.")
 
 

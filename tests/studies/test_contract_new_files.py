@@ -62,7 +62,7 @@ def test_nothing_is_overwritten(tmp_path, capsys):
     for words in (["card", "new"], ["study", "new"]):
         assert main([*words, str(path)]) == 2
     assert path.read_text() == "mine"
-    assert "exists and is not overwritten" in capsys.readouterr().err
+    assert "already exists and is not overwritten" in capsys.readouterr().err
     assert main(["card", "new", str(tmp_path / "x.toml"), "--like", "nothing"]) == 2
     assert not (tmp_path / "x.toml").exists()
 

@@ -62,7 +62,7 @@ def test_page_is_self_contained_and_escapes(results, monkeypatch):
     page = sweep_page(hostile)
     assert "<script>alert" not in page
     assert "https://" not in page.split("<footer")[0]
-    for part in ("Which parameter matters", "Tolerances", "Provenance", "sortable", "resonator.thickness_mm"):
+    for part in ("Influence of the parameters", "Tolerances", "Provenance", "sortable", "resonator.thickness_mm"):
         assert part in page
 
 
