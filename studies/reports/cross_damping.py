@@ -30,7 +30,7 @@ def twin_chapters(twin: "CrossDampingTwin") -> list[Chapter]:
         f" {paper.BIAS_AT_CALIBRATION:g} °/h at 20 °C, an angle random walk of {paper.RANDOM_WALK:g} °/√h, a bias random walk of"
         f" {paper.WANDER:g} °/h per √h, and a resonator that lags its sensor by {paper.LAG:g} s: typical values, not tuned to the published"
         f" factor. A model fitted to one run improves that run by a factor of {twin.study.training.rows.ratio:.1f} and the next run by"
-        f" {twin.improvement.ratio:.1f}; over many noise seeds the factor on held-out runs is {middle:.1f} (90 %: {low:.1f}…{high:.1f})."
+        f" {twin.improvement.ratio:.1f}; over the noise seeds the factor on held-out runs is {middle:.1f} (90 %: {low:.1f}…{high:.1f})."
         " The result depends on the lag, which the paper does not give (see the table)."
     )
     shape = (
