@@ -148,7 +148,7 @@ def test_text_of_users_is_escaped_in_a_page(tmp_path):
         ("0,4424.9\n0,4424.9\n0,4424.9\n0,4424.9\n0,4424.9\n", "constant"),
         ("0,4424.9\n10,4428.5\n", "different values"),
         ("0,4424\n10,4424\n20,4424\n30,4424\n40,4424\n50,4424\n", "constant"),
-        ("0,4424\n10,4430\n20,4432\n30,4430\n40,4424\n50,4414\n", "turns"),
+        ("0,4424\n10,4430\n20,4432\n30,4430\n40,4424\n50,4414\n", "turning point"),
     ],
 )
 def test_unusable_tables_are_refused(tmp_path, rows, part, capsys):
