@@ -20,7 +20,7 @@ import tomli_w
 from compensation.frequency import fit_frequency
 from studies.acceptance.limits import read_limits
 from studies.cli import main
-from studies.cli.trim import _from_scan
+from studies.cli.measured_splits import read_scan
 from studies.errors import UNUSABLE_INPUT, MissingEnvironment
 from studies.files.clouds import read_cloud
 from studies.importing.draft import draft_map
@@ -377,9 +377,9 @@ def test_mutated_splits_of_a_scan_never_harm(tmp_path):
     for case in range(CASES):
         text = json.dumps(mutate_content(SCAN, rng, tmp_path / "evaluated"))
         path.write_bytes(mutate_text(text, rng) if rng.random() < 0.3 else text.encode())
-        accepted += check(lambda file: _from_scan(str(file), (2,)), path, f"scan {case}", harmed)
+        accepted += check(lambda file: read_scan(str(file), (2,)), path, f"scan {case}", harmed)
     path.write_text("[" * 100_000)
-    accepted += check(lambda file: _from_scan(str(file), (2,)), path, "nested deeply", harmed)
+    accepted += check(lambda file: read_scan(str(file), (2,)), path, "nested deeply", harmed)
     assert not harmed
     assert 0 < accepted < CASES
 
