@@ -147,11 +147,12 @@ def _texts(content: object) -> Iterator[str]:
 
 def _identity(path: Path) -> object:
     """Return what two names of one file have in common."""
-    try:
+    with suppress(OSError, ValueError):
         status = path.stat()
         return status.st_dev, status.st_ino
-    except (OSError, ValueError):
-        return os.path.realpath(path) if "\0" not in str(path) else str(path)
+    with suppress(OSError, ValueError):  # the current folder may have been removed
+        return os.path.realpath(path)
+    return str(path)
 
 
 def _exists(path: Path) -> bool:

@@ -288,8 +288,8 @@ def test_folder_that_cannot_be_made_and_folder_without_study(tmp_path, functions
     spec.write_text(spec_of("square", 'method = "grid"', 'name = "user.x"\nvalues = [1]'))
     (tmp_path / "file").write_text("")
     done = hrg("study", "run", spec, "--out", tmp_path / "file" / "out", "--allow-python")
-    assert done.returncode == 3
-    assert "cannot be written" in done.stderr
+    assert done.returncode == 2
+    assert "there is no folder" in done.stderr
     done = hrg("study", "status", tmp_path)
     assert done.returncode == 2
     assert "no study" in done.stderr
