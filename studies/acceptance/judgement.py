@@ -80,7 +80,7 @@ class Acceptance:
         return "incomplete" if kinds & {"undecided", "missing"} or not kinds else "pass"
 
 
-def judge(records: "Sequence[Record]", limits: Limits, output: str = "bias_deg_per_h") -> Acceptance:
+def judge(records: "Sequence[Record]", limits: Limits | None = None, output: str = "bias_deg_per_h") -> Acceptance:
     """Measure what the records give and set it against the limits.
 
     Raises
@@ -92,7 +92,9 @@ def judge(records: "Sequence[Record]", limits: Limits, output: str = "bias_deg_p
     found: Found = measure_seal(records)
     allan = noise = band = None
     if "warm-up" in sorted_runs:
-        more, band = measure_warm_up(sorted_runs["warm-up"][0], output, limits.warm_up_band)
+        more, band = measure_warm_up(
+            sorted_runs["warm-up"][0], output, None if limits is None else limits.warm_up.band_deg_per_h
+        )
         found |= more
     if "temperature" in sorted_runs:
         found |= measure_temperature(sorted_runs["temperature"], output)
@@ -108,7 +110,7 @@ def judge(records: "Sequence[Record]", limits: Limits, output: str = "bias_deg_p
     for record in sorted_runs.get("angle-storage", [])[:1]:
         found |= measure_storage(record)
     found |= measure_life(sorted_runs.get("drift", []), output)
-    lines = tuple(JudgedQuantity(q, found.get(q.key), limits.limits.get(q.key)) for q in QUANTITIES)
+    lines = tuple(JudgedQuantity(q, found.get(q.key), None if limits is None else limits.of(q.key)) for q in QUANTITIES)
     used: dict[str, str] = {record.path: test for test, group in sorted_runs.items() for record in group}
     for test in ("warm-up", "scale-factor", "run-down", "transfer", "angle-storage"):
         for record in sorted_runs.get(test, [])[1:]:

@@ -1,47 +1,55 @@
-"""Limits of an acceptance test.
+"""Limits of an acceptance test, `schema = "hrg.limits/1"`: a limit for each quantity that `hrg acceptance` knows."""
 
-schema = "hrg.limits/1"
-[limits]                                    # any of the quantities that hrg acceptance lists
-angle_random_walk_deg_per_rt_h = 0.01       # at most, in size; run_down_time_s and quality_factor: at least
-bias_deg_per_h = 5.0
-[warm_up]                                   # may be left out
-band_deg_per_h = 1.0                        # about the final output; three times the scatter of its means unless given
-"""
+from typing import Annotated, Any
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
-from pathlib import Path
+import msgspec
 
-from studies.acceptance.quantities import BY_KEY
-from studies.errors import InputError
-from studies.files.toml import TomlTable, read_toml
+from studies.acceptance.quantities import QUANTITIES
+from studies.schema.keys import Keys, number, says
 
 SCHEMA = "hrg.limits/1"
 
 
-@dataclass(frozen=True)
-class Limits:
-    """Limits by quantity, in its unit; the band of the warm-up (deg/h)."""
+class WarmUp(Keys, frozen=True, kw_only=True):
+    """When the output counts as settled."""
 
-    limits: Mapping[str, float] = field(default_factory=dict)
-    warm_up_band: float | None = None
-    path: str = ""
+    band_deg_per_h: (
+        Annotated[float, number("about the final output; three times the scatter of its means unless given", above=0.0)]
+        | None
+    ) = None
 
 
-def read_limits(path: str | Path) -> Limits:
-    """Read a file of limits.
+def _declare_quantities() -> Any:
+    """Declare a key for every quantity of the test."""
 
-    Raises
-    ------
-    InputError
-        A quantity that no acceptance test has, or a limit that is not a positive number.
-    """
-    top = TomlTable(read_toml(path, SCHEMA), str(path), ("schema", "limits", "warm_up"))
-    section = top.section("limits", BY_KEY)
-    limits = {key: section.number(key, above=0.0) for key in section.values}
-    if not limits:
-        raise InputError(f"{path} [limits]: no limit is given; add one, such as bias_deg_per_h = 5.0.")
-    band = None
-    if "warm_up" in top:
-        band = top.section("warm_up", ("band_deg_per_h",)).number("band_deg_per_h", above=0.0)
-    return Limits(limits, band, str(path))
+    def check(limits: Any) -> None:
+        if not any(getattr(limits, key) is not None for key in limits.__struct_fields__):
+            raise ValueError("no limit is given; add one, such as bias_deg_per_h = 5.0.")
+
+    fields: list[Any] = [
+        (
+            q.key,
+            Annotated[float, number(f"{q.words}; {'at most, in size' if q.upper else 'at least'}", above=0.0)] | None,
+            None,
+        )
+        for q in QUANTITIES
+    ]
+    return msgspec.defstruct(
+        "QuantityLimits", fields, bases=(Keys,), namespace={"__post_init__": check}, frozen=True, kw_only=True
+    )
+
+
+QuantityLimits: Any = _declare_quantities()
+
+
+class Limits(Keys, frozen=True, kw_only=True):
+    """What an acceptance test is judged by."""
+
+    schema: Annotated[str, says("of the file")] = SCHEMA
+    limits: QuantityLimits
+    warm_up: WarmUp = WarmUp()
+
+    def of(self, key: str) -> float | None:
+        """Return the limit of a quantity, None where it has none."""
+        limit: float | None = getattr(self.limits, key)
+        return limit

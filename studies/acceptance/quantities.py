@@ -82,7 +82,6 @@ QUANTITIES = (
     TestedQuantity("delay_ms", "12.15", "output delay within half the bandwidth", "ms", SHAKEN),
     TestedQuantity("bias_trend_deg_per_h_per_year", "12.18", "bias drift over the records", "deg/h/year", LIFE),
 )
-BY_KEY = {quantity.key: quantity for quantity in QUANTITIES}
 
 ELSEWHERE = (
     # section, test, what would be needed

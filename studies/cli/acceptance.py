@@ -58,19 +58,20 @@ def acceptance(card: str, *runs: str, limits: str | None = None, output: str = "
         Column with the zero-rate output to judge, such as compensated_bias_deg_per_h.
     """
     from studies.acceptance.judgement import judge
-    from studies.acceptance.limits import Limits, read_limits
+    from studies.acceptance.limits import SCHEMA, Limits
     from studies.acceptance.measure import CONFIDENCE
     from studies.cli.output import say
     from studies.errors import InputError
     from studies.instrument.card import load_card
     from studies.record import read_record
     from studies.reports.digits import plain
+    from studies.schema.reader import read_file
 
     instrument = load_card(card)
     if not runs:
         raise InputError("no record given; name at least one record (CSV) of the gyro.")
     records = [read_record(path) for path in runs]
-    allowed = read_limits(limits) if limits is not None else Limits()
+    allowed = None if limits is None else read_file(limits, Limits, SCHEMA)
     found = judge(records, allowed, output)
     lines = [_line(line) for line in found.lines]
     for record in records:
@@ -80,7 +81,7 @@ def acceptance(card: str, *runs: str, limits: str | None = None, output: str = "
             say(f"warning: {record.path} is not used: its columns fit none of the tests.")
     for line in lines:
         if line["limit"] is not None and line["needs"]:
-            say(f"warning: {allowed.path} limits {line['key']}, but no record gives it; it needs {line['needs']}.")
+            say(f"warning: {limits} limits {line['key']}, but no record gives it; it needs {line['needs']}.")
     elsewhere = [{"section": s, "test": test, "needs": needs} for s, test, needs in found.elsewhere]
     payload = {
         "schema": "hrg.acceptance/1",

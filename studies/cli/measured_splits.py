@@ -26,7 +26,7 @@ def read_scan(path: str, harmonic: tuple[int, ...]) -> list[tuple[int, float, fl
 
     from studies.errors import InputError
     from studies.files.reading import read_bytes
-    from studies.files.toml import check_number
+    from studies.schema.reader import read_keys
 
     refused = InputError(f'{path}: is not output of hrg scan --json (schema "hrg.scan/1").')
     data = read_bytes(path)
@@ -50,7 +50,7 @@ def read_scan(path: str, harmonic: tuple[int, ...]) -> list[tuple[int, float, fl
             numbers = [size["value"], axis["value"], size["low"], size["high"]]
         except (KeyError, TypeError):
             raise refused from None
-        split, degrees, low, high = (check_number(x, f"{path}: the split of n = {n}") for x in numbers)
+        split, degrees, low, high = (read_keys(x, float, f"{path}: the split of n = {n}") for x in numbers)
         found.append((n, split, radians(degrees), (high - low) / 3.29))
     return found
 

@@ -1,56 +1,10 @@
 """TOML files of users: every key is known, has the right type and lies in its range, or the error names it."""
 
-import tomllib
-from collections.abc import Collection, Iterator, Mapping
-from pathlib import Path
+from collections.abc import Collection, Mapping
 from typing import Any
 
 from studies.errors import InputError, nearest
-from studies.files.given import is_sound, printable
-from studies.files.reading import read_bytes
-
-MOST_BYTES = 16 * 1024**2
-
-
-def read_toml(path: str | Path, schema: str | None = None) -> dict[str, Any]:
-    """Read a TOML file and check its `schema` key.
-
-    Raises
-    ------
-    InputError
-        No such file, not UTF-8, a syntax error (with its line), or another schema.
-    """
-    try:
-        content = tomllib.loads(read_bytes(path, MOST_BYTES).decode("utf-8-sig"))
-    except UnicodeDecodeError:
-        raise InputError(f"{path}: not UTF-8 text; save the file as UTF-8.") from None
-    except tomllib.TOMLDecodeError as error:
-        raise InputError(f"{path}: not valid TOML: {error}.") from None
-    except RecursionError:
-        raise InputError(f"{path}: not valid TOML: nested too deeply.") from None
-    for key, text in _texts(content):
-        if text != printable(text):
-            raise InputError(
-                f"{path}: {printable(key)} holds a control character ({printable(text)!s:.60}); remove it."
-            )
-    if schema is not None:
-        found = content.get("schema")
-        if found != schema:
-            raise InputError(f'{path}: schema must be "{schema}", not {found!r}; add or correct that line.')
-    return content
-
-
-def _texts(content: Any, key: str = "") -> Iterator[tuple[str, str]]:
-    """Yield every text in a file, keys included, and the key where it stands."""
-    if isinstance(content, Mapping):
-        for name, value in content.items():
-            yield name, name
-            yield from _texts(value, name)
-    elif isinstance(content, list):
-        for value in content:
-            yield from _texts(value, key)
-    elif isinstance(content, str):
-        yield key, content
+from studies.files.given import is_sound
 
 
 class TomlTable:

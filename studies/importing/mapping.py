@@ -48,8 +48,9 @@ from pathlib import Path
 from typing import Literal, cast
 
 from studies.errors import InputError, nearest
-from studies.files.toml import TomlTable, read_toml
+from studies.files.toml import TomlTable
 from studies.importing.units import SETTINGS, TARGETS, Unit, find_spelling, split_nominal, units_of
+from studies.schema.reader import read_toml
 
 SCHEMA = "hrg.map/1"
 SEPARATORS = {";": ";", ",": ",", "tab": "\t", "|": "|", "space": r"\s+"}

@@ -15,13 +15,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 from shell.constants import zero_Celsius
 from studies.errors import InputError, nearest
 from studies.files.reading import find_shipped, list_shipped
-from studies.files.toml import read_toml
 from studies.files.writing import write_text
 from studies.instrument.dotted import replaced
-from studies.instrument.keys import Keys, number
-from studies.instrument.mending import read_keys
 from studies.instrument.registry import CardPlace, ReadTable, card_tables, read_table
 from studies.instrument.uncertain import UncertainValue
+from studies.schema.keys import Keys, number
+from studies.schema.reader import read_keys, read_toml
 
 if TYPE_CHECKING:
     from shell.elastic import Elastic

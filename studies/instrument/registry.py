@@ -9,9 +9,8 @@ from pathlib import Path
 from typing import Any
 
 from studies.errors import InputError, nearest
-from studies.instrument.keys import describe, holds_value, known_keys, structs
-from studies.instrument.mending import read_keys
-from studies.instrument.uncertain import UncertainValue, gather_uncertain, split_spreads
+from studies.instrument.uncertain import UncertainValue, read_uncertain
+from studies.schema.keys import describe, holds_value, known_keys, structs
 
 TABLES = "studies.instrument.tables"
 
@@ -38,7 +37,7 @@ class CardTable:
     table : str
         Its name in the card; several entries may share a table and own different keys of it.
     keys : type
-        Class of its keys (`keys.Table`), or a union of classes that a tag tells apart.
+        Class of its keys (`studies.schema.keys.Keys`), or a union of classes that a tag tells apart.
     part : str
         Name of what it becomes in `Instrument.parts`; that of the table unless given.
     build : callable (keys, place) -> part
@@ -113,38 +112,33 @@ def read_table(name: str, raw: Any, place: CardPlace) -> ReadTable:
     read: dict[str, Any] = {}
     parts: dict[str, Any] = {}
     uncertain: list[UncertainValue] = []
-    stated = frozenset[str]()
+    stated: set[str] = set()
     for entry, keys in zip(entries, own, strict=True):
         mine = {key: value for key, value in given.items() if key in keys or len(entries) == 1}
-        bare, spreads = split_spreads(mine, entry.keys, place.where)
-        found = read[entry.name] = read_keys(bare, entry.keys, place.where)
-        if raw is not None or not entry.optional:
-            uncertain += gather_uncertain(name, bare, found, entry.keys, spreads, place.where)
-        parts[entry.name] = entry.build(found, place)
-        stated |= _dotted(name, spreads)
-    return ReadTable(read, parts, tuple(uncertain), stated)
+        found, not_exact, said = read_uncertain(mine, entry.keys, place.where, name)
+        uncertain += not_exact if raw is not None or not entry.optional else []
+        stated |= said
+        read[entry.name], parts[entry.name] = found, entry.build(found, place)
+    return ReadTable(read, parts, tuple(uncertain), frozenset(stated))
 
 
 def _read_array(entry: CardTable, raw: Any, place: CardPlace) -> ReadTable:
     assert entry.keys_of is not None
     if not isinstance(raw, list | None):
         raise InputError(f"{place.where}: {entry.table} must be an array of tables ([[{entry.table}]]).")
-    parts, uncertain, stated = [], [], frozenset[str]()
+    parts: list[Any] = []
+    uncertain: list[UncertainValue] = []
+    stated: set[str] = set()
     for number, member in enumerate(raw or []):
         where = f"{place.where.removesuffix(f'[{entry.table}]')}[[{entry.table}]] number {number + 1}"
         if not isinstance(member, Mapping):
             raise InputError(f"{where}: must be a table, not {member!r:.60}.")
         keys = entry.keys_of(member, where)
-        bare, spreads = split_spreads(member, keys, where)
-        read = read_keys(bare, keys, where)
-        uncertain += gather_uncertain(f"{entry.table}.{number}", bare, read, keys, spreads, where)
-        parts.append(entry.build(read, CardPlace(where, place.folder, place.reference_temperature)))
-        stated |= _dotted(f"{entry.table}.{number}", spreads)
-    return ReadTable({}, {entry.name: tuple(parts)}, tuple(uncertain), stated)
-
-
-def _dotted(name: str, paths: Iterable[tuple[str | int, ...]]) -> frozenset[str]:
-    return frozenset(".".join([name, *map(str, path)]) for path in paths)
+        found, not_exact, said = read_uncertain(member, keys, where, f"{entry.table}.{number}")
+        uncertain += not_exact
+        stated |= said
+        parts.append(entry.build(found, CardPlace(where, place.folder, place.reference_temperature)))
+    return ReadTable({}, {entry.name: tuple(parts)}, tuple(uncertain), frozenset(stated))
 
 
 def possible_keys(content: Mapping[str, Any]) -> Iterable[str]:

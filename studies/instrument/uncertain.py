@@ -16,10 +16,12 @@ from dataclasses import dataclass
 from functools import reduce
 from typing import TYPE_CHECKING, Annotated, Any
 
+from msgspec import inspect
+
 from studies.errors import InputError
-from studies.instrument.keys import Keys, Path, bounds, find, holds_number, number, priors
-from studies.instrument.mending import read_keys, spell_place
 from studies.instrument.units import unit_of
+from studies.schema.keys import Keys, Path, bounds, describe, number, priors
+from studies.schema.reader import read_keys
 
 if TYPE_CHECKING:
     import numpy as np
@@ -102,69 +104,48 @@ def is_spread(raw: Any) -> bool:
     return isinstance(raw, Mapping) and "value" in raw and 1 < len(raw) and set(raw) <= set(SPREAD_KEYS)
 
 
-def split_spreads(raw: Any, keys: Any, where: str) -> tuple[Any, dict[Path, Spread]]:
-    """Return a table with plain numbers in the place of those with uncertainties, and these by their paths.
+def read_uncertain(raw: Any, keys: Any, where: str, name: str) -> "tuple[Any, list[UncertainValue], set[str]]":
+    """Read a table of a card into its class.
 
-    `keys` is the class of the table: a mapping is a number with its uncertainty where the class has a number.
-    """
-    return _split(raw, keys, raw, where, ())
-
-
-def _split(raw: Any, keys: Any, table: Any, where: str, path: Path) -> tuple[Any, dict[Path, Spread]]:
-    if isinstance(raw, Mapping):
-        if set(raw) & set(SPREAD_KEYS) and holds_number(find(keys, path, table)):
-            place = spell_place(where, path)
-            spread = read_keys(raw, Spread, place)
-            if spread.value == 0 and spread.relative_sd:
-                raise InputError(f"{place}: a part of 0 is 0; give sd instead of relative_sd.")
-            return spread.value, {path: spread}
-        pairs = {key: _split(value, keys, table, where, (*path, key)) for key, value in raw.items()}
-        return {key: bare for key, (bare, _) in pairs.items()}, _joined(found for _, found in pairs.values())
-    if isinstance(raw, list):
-        parts = [_split(value, keys, table, where, (*path, place)) for place, value in enumerate(raw)]
-        return [bare for bare, _ in parts], _joined(found for _, found in parts)
-    return raw, {}
-
-
-def gather_uncertain(
-    name: str, bare: Any, part: Any, keys: Any, spreads: Mapping[Path, Spread], where: str
-) -> list[UncertainValue]:
-    """Return the uncertain numbers of a table: those that the card states, and those that its keys document.
+    Returns
+    -------
+    table
+    uncertain : those of its numbers that are not exact, as the card states or as their keys document.
+    stated : names of the numbers whose uncertainty the card states.
 
     Parameters
     ----------
     name : of the table, with the place in an array of tables: "thermal", "effect.0".
-    bare, part : its plain content, and the same read into its class.
     """
-    found = {}
-    for path, spread in spreads.items():
-        low, high = bounds(find(keys, path, bare))
-        _check_ends(spread, low, high, spell_place(where, path))
-        if spread.width > 0:
-            key = ".".join(str(word) for word in path)
-            found[key] = _make(f"{name}.{key}", spread, low, high)
-    for path, prior in priors(keys, bare):
-        value = reduce(lambda one, word: one[word] if isinstance(word, int) else getattr(one, word), path, part)
-        if path not in spreads and value is not None:
-            spread, key = Spread(value=value, **prior), ".".join(str(word) for word in path)
-            if spread.width > 0:
-                found[key] = _make(f"{name}.{key}", spread, *bounds(find(keys, path, bare)))
-    return list(found.values())
+    stated: dict[Path, UncertainValue] = {}
+
+    def take(raw: Mapping[str, Any], path: Path, node: inspect.Type, place: str) -> Any:
+        if not set(raw) & set(SPREAD_KEYS):
+            return raw
+        spread = read_keys(raw, Spread, place)
+        if spread.value == 0 and spread.relative_sd:
+            raise InputError(f"{place}: a part of 0 is 0; give sd instead of relative_sd.")
+        low, high = bounds(node)
+        for word, end in (("low", spread.low), ("high", spread.high)):
+            if end is not None and not low <= end <= high:
+                raise InputError(
+                    f"{place}: {word} = {end:g} lies beyond {low if end < low else high:g}, which the key allows."
+                )
+        stated[path] = _make(name, path, spread, low, high)
+        return spread.value
+
+    table = read_keys(raw, keys, where, take)
+    documented = []
+    for path, node in priors(describe(keys), raw):
+        value = reduce(lambda one, word: one[word] if isinstance(word, int) else getattr(one, word), path, table)
+        if path not in stated and value is not None:
+            documented.append(_make(name, path, Spread(value=value, **(node.extra or {})), *bounds(node)))
+    uncertain = [one for one in (*stated.values(), *documented) if one.sd > 0]
+    return table, uncertain, {one.name for one in stated.values()}
 
 
-def _make(name: str, spread: Spread, low: float, high: float) -> UncertainValue:
+def _make(table: str, path: Path, spread: Spread, low: float, high: float) -> UncertainValue:
+    name = ".".join(map(str, (table, *path)))
     ends = (low if spread.low is None else spread.low, high if spread.high is None else spread.high)
     logarithmic = low >= 0.0 and spread.value > 0.0
     return UncertainValue(name, spread.value, spread.width, *ends, logarithmic, unit_of(name))
-
-
-def _check_ends(spread: Spread, low: float, high: float, place: str) -> None:
-    for name, end in (("low", spread.low), ("high", spread.high)):
-        if end is not None and not low <= end <= high:
-            raise InputError(
-                f"{place}: {name} = {end:g} lies beyond {low if end < low else high:g}, which the key allows."
-            )
-
-
-def _joined(parts: Any) -> dict[Path, Spread]:
-    return {path: spread for part in parts for path, spread in part.items()}

@@ -1,41 +1,22 @@
 """The model file `hrg.model/1`: a fitted compensation as a small TOML that people and firmware engineers read.
 
-    schema = "hrg.model/1"
-    kind = "bias"                       # the module of studies.models that applies it
-    compensates = "bias_deg_per_h"      # the column of a record that gets a compensated copy
-    made_by = "hrg-workbench, hrg fit bias --method guarded"
-
-    [settings]                          # what the formula needs beside coefficients: numbers, texts, lists of numbers
-    reference_frequency_Hz = 4432.07
-
-    [validity]                          # lowest and highest value of each variable that the fit has seen
-    frequency_Hz = [4416.97, 4439.2]
-
-    [[part]]                            # one set of coefficients that was fitted together
-    name = "bias"
-    coefficients = [
-        {name = "constant", value = 1.5, unit = "deg/h"},        # ± 0.02
-    ]
-    covariance = [[4e-4]]               # of the coefficients in this order; [] where it is unknown
-
-    [[source]]                          # the records that it was fitted to
-    path = "run1.csv"
-    sha256 = "…"
-    rows = 1800
-
-Numbers keep all their digits, so a model that was saved and read computes the same to the last bit. The text is laid out here,
-not by tomli-w, for the comments: how well each coefficient is known.
+`hrg keys model` lists its keys. Numbers keep all their digits, so a model that was saved and read computes the same to the last
+bit. The text is laid out here, not by tomli-w, for the comments: how well each coefficient is known.
 """
 
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
+
+import msgspec
 
 from studies.errors import InputError
-from studies.files.toml import TomlTable, check_number, read_toml
 from studies.files.writing import write_text
+from studies.schema.keys import Keys, number, says
+from studies.schema.reader import read_file, read_keys
+from studies.schema.spelling import spell_value
 
 if TYPE_CHECKING:
     import numpy as np
@@ -43,8 +24,68 @@ if TYPE_CHECKING:
 
 SCHEMA = "hrg.model/1"
 WIDENED = 0.05  # of a fitted range, on each side
-Setting = float | str | Sequence[float]
-KEYS = ("schema", "kind", "compensates", "made_by", "settings", "validity", "part", "source")
+Setting = float | str | tuple[float, ...]
+
+
+class Coefficient(Keys, frozen=True, kw_only=True):
+    """A coefficient of a formula."""
+
+    name: Annotated[str, says("of the term", example="constant")]
+    value: Annotated[float, number("all digits", example=1.5)]
+    unit: Annotated[str, says("of the value", example="deg/h")]
+
+
+class PartKeys(Keys, frozen=True, kw_only=True):
+    """One set of coefficients that was fitted together."""
+
+    name: Annotated[str, says("by which the kind knows it", example="bias")]
+    coefficients: Annotated[tuple[Coefficient, ...], says("one or more", least=1)]
+    covariance: Annotated[tuple[tuple[float, ...], ...], says("of the coefficients in this order; [] unknown")] = ()
+
+    def __post_init__(self) -> None:
+        names = [one.name for one in self.coefficients]
+        if len(set(names)) < len(names):
+            raise ValueError("two coefficients have the same name; rename one.")
+        if len(self.covariance) not in (0, len(names)) or any(len(row) != len(names) for row in self.covariance):
+            raise ValueError(f"covariance must be {len(names)} lists of {len(names)} numbers, or [].")
+        if any(row[k] < 0 for k, row in enumerate(self.covariance)):
+            raise ValueError("covariance has a negative variance on its diagonal.")
+
+    @property
+    def part(self) -> "ModelPart":
+        """The part, column by column."""
+        names, values, units = zip(*((one.name, one.value, one.unit) for one in self.coefficients), strict=True)
+        return ModelPart(self.name, names, values, units, self.covariance)
+
+
+class ModelSource(msgspec.Struct, frozen=True):
+    """A record that a model was fitted to."""
+
+    path: Annotated[str, says("name of the file", example="run1.csv")]
+    sha256: Annotated[str, says("of its bytes", example="ab12")]
+    rows: Annotated[int, number("in it", least=0, example=1800)]
+
+
+class ModelKeys(Keys, frozen=True, kw_only=True):
+    """A fitted compensation."""
+
+    schema: Annotated[str, says("of the file")] = SCHEMA
+    kind: Annotated[str, says("frequency, bias, scale or cross-damping", example="bias")]
+    compensates: Annotated[str, says("the column of a record that gets a compensated copy", example="bias_deg_per_h")]
+    made_by: Annotated[str, says("the command that fitted it")] = ""
+    settings: Annotated[dict[str, Setting], says("what the formula needs beside its coefficients")] = msgspec.field(
+        default_factory=dict
+    )
+    validity: Annotated[
+        dict[str, tuple[float, float]], says("lowest and highest value of each variable that the fit has seen")
+    ] = msgspec.field(default_factory=dict)
+    part: Annotated[tuple[PartKeys, ...], says("what was fitted together; one or more", least=1)]
+    source: Annotated[tuple[ModelSource, ...], says("the records that it was fitted to")] = ()
+
+    def __post_init__(self) -> None:
+        for key, (low, high) in self.validity.items():
+            if not low < high:
+                raise ValueError(f"[validity] {key}: the lowest value {low:g} must be below the highest {high:g}.")
 
 
 @dataclass(frozen=True)
@@ -66,15 +107,6 @@ class ModelPart:
         if not self.covariance:
             return (math.nan,) * len(self.values)
         return tuple(math.sqrt(row[k]) for k, row in enumerate(self.covariance))
-
-
-@dataclass(frozen=True)
-class ModelSource:
-    """A record that a model was fitted to."""
-
-    path: str
-    sha256: str
-    rows: int
 
 
 @dataclass(frozen=True)
@@ -122,7 +154,8 @@ class Model:
         where = f"{self.path or 'model'} [settings]"
         if key not in self.settings:
             raise InputError(f"{where}: the key '{key}' is missing; add it.")
-        return check_number(self.settings[key], f"{where}: {key}", above=above, least=least)
+        kind: Any = Annotated[float, number(above=above, least=least)]
+        return float(read_keys(self.settings[key], kind, f"{where}: {key}"))
 
     def range_of(self, variable: str) -> tuple[float, float]:
         """Return the lowest and highest value of a variable that the fit has seen.
@@ -189,25 +222,24 @@ def write_model(model: Model, path: str | Path) -> None:
 
 def format_model(model: Model) -> str:
     """Return the text of a model's file."""
-    lines = [
-        f"schema = {_text(SCHEMA)}",
-        f"kind = {_text(model.kind)}",
-        f"compensates = {_text(model.compensates)}",
-        f"made_by = {_text(model.made_by)}",
-    ]
+    head = {"schema": SCHEMA, "kind": model.kind, "compensates": model.compensates, "made_by": model.made_by}
+    lines = [f"{key} = {spell_value(value)}" for key, value in head.items()]
     for title, table in (("settings", model.settings), ("validity", model.validity)):
         if table:
-            lines += ["", f"[{title}]", *(f"{key} = {_value(value)}" for key, value in table.items())]
+            lines += ["", f"[{title}]", *(f"{key} = {spell_value(value)}" for key, value in table.items())]
     for part in model.parts:
-        lines += ["", "[[part]]", f"name = {_text(part.name)}", "coefficients = ["]
+        lines += ["", "[[part]]", f"name = {spell_value(part.name)}", "coefficients = ["]
         for name, value, unit, error in zip(part.names, part.values, part.units, part.standard_errors, strict=True):
-            entry = f"    {{name = {_text(name)}, value = {value!r}, unit = {_text(unit)}}},"
+            entry = f"    {{name = {spell_value(name)}, value = {value!r}, unit = {spell_value(unit)}}},"
             lines.append(entry if math.isnan(error) else f"{entry:<72}  # ± {error:.2g}")
-        rows = ",\n    ".join(_value(row) for row in part.covariance)
+        rows = ",\n    ".join(spell_value(row) for row in part.covariance)
         lines += ["]", f"covariance = [\n    {rows},\n]" if rows else "covariance = []"]
     for source in model.sources:
-        lines += ["", "[[source]]", f"path = {_text(source.path)}", f"sha256 = {_text(source.sha256)}"]
-        lines.append(f"rows = {source.rows}")
+        lines += [
+            "",
+            "[[source]]",
+            *(f"{key} = {spell_value(getattr(source, key))}" for key in source.__struct_fields__),
+        ]
     return "\n".join(lines) + "\n"
 
 
@@ -219,91 +251,6 @@ def read_model(path: str | Path) -> Model:
     InputError
         Not such a file: the message names the key and the mend.
     """
-    top = TomlTable(read_toml(path, SCHEMA), str(path), KEYS)
-    parts = tuple(_read_part(section) for section in top.sections("part", ("name", "coefficients", "covariance")))
-    if not parts:
-        raise InputError(f"{path}: a model needs at least one [[part]] with coefficients.")
-    return Model(
-        kind=top.text("kind"),
-        compensates=top.text("compensates"),
-        parts=parts,
-        settings=_read_settings(top),
-        validity=_read_validity(top),
-        sources=tuple(
-            ModelSource(s.text("path"), s.text("sha256"), int(s.number("rows", least=0)))
-            for s in top.sections("source", ("path", "sha256", "rows"))
-        ),
-        made_by=top.text("made_by", ""),
-        path=str(path),
-    )
-
-
-def _read_settings(top: TomlTable) -> dict[str, Setting]:
-    settings: dict[str, Setting] = {}
-    if "settings" not in top:
-        return settings
-    table = top.section("settings", tuple(top.raw("settings")) if isinstance(top.raw("settings"), dict) else ())
-    for key, value in table.values.items():
-        where = f"{table.where}: {key}"
-        if isinstance(value, str):
-            settings[key] = value
-        elif isinstance(value, list):
-            settings[key] = tuple(check_number(item, where) for item in value)
-        else:
-            settings[key] = check_number(value, where)
-    return settings
-
-
-def _read_validity(top: TomlTable) -> dict[str, tuple[float, float]]:
-    ranges: dict[str, tuple[float, float]] = {}
-    if "validity" not in top:
-        return ranges
-    table = top.section("validity", tuple(top.raw("validity")) if isinstance(top.raw("validity"), dict) else ())
-    for key, value in table.values.items():
-        where = f"{table.where}: {key}"
-        if not isinstance(value, list) or len(value) != 2:
-            raise InputError(f"{where} must be a list [lowest, highest], not {value!r}.")
-        low, high = (check_number(item, where) for item in value)
-        if not low < high:
-            raise InputError(f"{where}: the lowest value {low:g} must be below the highest {high:g}.")
-        ranges[key] = (low, high)
-    return ranges
-
-
-def _read_part(section: TomlTable) -> ModelPart:
-    coefficients = section.sections("coefficients", ("name", "value", "unit"))
-    if not coefficients:
-        raise InputError(f"{section.where}: 'coefficients' needs at least one {{name, value, unit}}.")
-    names = tuple(c.text("name") for c in coefficients)
-    if len(set(names)) < len(names):
-        raise InputError(f"{section.where}: two coefficients have the same name; rename one.")
-    covariance = section.raw("covariance", [])
-    shaped = isinstance(covariance, list) and all(
-        isinstance(row, list) and len(row) == len(names) for row in covariance
-    )
-    if not shaped or len(covariance) not in (0, len(names)):
-        raise InputError(f"{section.where}: covariance must be {len(names)} lists of {len(names)} numbers, or [].")
-    rows = tuple(tuple(check_number(v, f"{section.where}: covariance") for v in row) for row in covariance)
-    if any(row[k] < 0 for k, row in enumerate(rows)):
-        raise InputError(f"{section.where}: covariance has a negative variance on its diagonal.")
-    return ModelPart(
-        section.text("name"),
-        names,
-        tuple(c.number("value") for c in coefficients),
-        tuple(c.text("unit") for c in coefficients),
-        rows,
-    )
-
-
-def _value(value: Any) -> str:
-    if isinstance(value, str):
-        return _text(value)
-    if isinstance(value, list | tuple):
-        return f"[{', '.join(_value(item) for item in value)}]"
-    return repr(float(value))
-
-
-def _text(text: str) -> str:
-    import tomli_w
-
-    return tomli_w.dumps({"x": text}).removeprefix("x = ").rstrip("\n")
+    keys = read_file(path, ModelKeys, SCHEMA)
+    parts = tuple(one.part for one in keys.part)
+    return Model(keys.kind, keys.compensates, parts, keys.settings, keys.validity, keys.source, keys.made_by, str(path))

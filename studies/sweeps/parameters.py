@@ -15,10 +15,10 @@ from shell.constants import zero_Celsius
 from studies.errors import InputError, nearest
 from studies.instrument.card import Instrument
 from studies.instrument.dotted import look_up, names, plain_number
-from studies.instrument.keys import Keys
 from studies.instrument.material_values import LAW
 from studies.instrument.registry import possible_keys
 from studies.instrument.tables.material import GIVEN
+from studies.schema.keys import Keys
 from studies.sweeps.expressions import Derived, fill_in
 
 TEMPERATURE = "temperature_degC"

@@ -65,8 +65,9 @@ from typing import Any
 
 from studies.errors import InputError
 from studies.files.reading import find_shipped, list_shipped
-from studies.files.toml import TomlTable, read_toml
+from studies.files.toml import TomlTable
 from studies.instrument.card import Instrument, load_card
+from studies.schema.reader import read_toml
 from studies.sweeps.definition import Study
 from studies.sweeps.tables import (
     read_asked,

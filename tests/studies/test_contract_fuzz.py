@@ -18,7 +18,8 @@ import pytest
 import tomli_w
 
 from compensation.frequency import fit_frequency
-from studies.acceptance.limits import read_limits
+from studies.acceptance.limits import SCHEMA as LIMITS_SCHEMA
+from studies.acceptance.limits import Limits
 from studies.cli import main
 from studies.cli.measured_splits import read_scan
 from studies.errors import UNUSABLE_INPUT, MissingEnvironment
@@ -30,6 +31,7 @@ from studies.instrument.card import load_card, shipped_cards
 from studies.models import ModelSource, compensate, emit_c, read_model, write_model
 from studies.models.kinds.frequency import save_frequency
 from studies.record import read_frequency_table, read_profile, read_record
+from studies.schema.reader import read_file
 from studies.simulation.chamber import load_drive
 from studies.sweeps.spec import read_study, shipped_specs
 
@@ -234,7 +236,7 @@ def documents(tmp_path):
     raw.write_text(raw_text(), encoding="utf-8")
     text = draft_map([str(raw)]).text
     found.append(("map", text, lambda path: import_records([str(raw)], load_map(path))[""]))
-    found.append(("limits", LIMITS, read_limits))
+    found.append(("limits", LIMITS, lambda path: read_file(path, Limits, LIMITS_SCHEMA)))
     found += [(f"study {name}", path.read_text(), read_study) for name, path in shipped_specs().items()]
     return found
 

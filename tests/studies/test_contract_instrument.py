@@ -16,9 +16,9 @@ from studies.cli import main
 from studies.effects import library
 from studies.errors import InputError
 from studies.instrument.card import build_instrument, load_card, save_card, shipped_cards
-from studies.instrument.keys import describe, known_keys, structs
 from studies.instrument.registry import card_tables
 from studies.instrument.units import unit_of
+from studies.schema.keys import describe, known_keys, structs
 from studies.sweeps.parameters import find_nominal
 
 HRG = tomllib.loads(shipped_cards()["hrg-30mm"].read_text(encoding="utf-8"))

@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from compensation.wave import feign_rate, see_across
-from studies.instrument.keys import Keys, number
 from studies.instrument.registry import CardTable
+from studies.schema.keys import Keys, number
 
 Array = NDArray[np.float64]
 DEG_PER_H = np.degrees(1.0) * 3600.0  # of 1 rad/s

@@ -17,8 +17,8 @@ import msgspec
 import numpy as np
 
 from studies.errors import InputError
-from studies.instrument.keys import Keys, number
 from studies.instrument.registry import CardPlace, CardTable
+from studies.schema.keys import Keys, number
 
 if TYPE_CHECKING:
     from studies.effects import Effect

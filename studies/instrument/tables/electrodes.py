@@ -22,8 +22,8 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import numpy as np
 
-from studies.instrument.keys import Keys, number
 from studies.instrument.registry import CardPlace, CardTable
+from studies.schema.keys import Keys, number
 
 if TYPE_CHECKING:
     from shell.electrodes import Electrodes

@@ -29,8 +29,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from studies.errors import InputError
-from studies.instrument.keys import Keys, number
 from studies.instrument.registry import CardPlace, CardTable
+from studies.schema.keys import Keys, number
 
 if TYPE_CHECKING:
     from shell.imperfection import Field, Imperfection

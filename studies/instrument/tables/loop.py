@@ -33,8 +33,8 @@ vibration_um, modal_mass_mg           # with both, thermomechanical noise is kno
 
 from typing import Annotated, Literal
 
-from studies.instrument.keys import Keys, number
 from studies.instrument.registry import CardTable
+from studies.schema.keys import Keys, number
 
 Band = Annotated[float, number(above=0.0)]
 

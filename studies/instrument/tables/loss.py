@@ -11,8 +11,8 @@ from typing import Annotated
 import numpy as np
 from numpy.typing import NDArray
 
-from studies.instrument.keys import Keys, number
 from studies.instrument.registry import CardTable
+from studies.schema.keys import Keys, number
 
 
 class Loss(Keys, frozen=True, kw_only=True):

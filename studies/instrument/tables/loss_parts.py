@@ -39,8 +39,8 @@ and its axis from the parts and not from `[bias]`.
 from typing import Annotated, Literal
 
 from shell.constants import zero_Celsius
-from studies.instrument.keys import Keys, number
 from studies.instrument.registry import CardTable
+from studies.schema.keys import Keys, number
 
 Positive = Annotated[float, number(above=0.0)]
 Share = Annotated[float, number(least=0.0, most=1.0)]

@@ -21,8 +21,8 @@ from typing import TYPE_CHECKING, Annotated
 import msgspec
 
 from studies.errors import InputError, naming
-from studies.instrument.keys import Keys, number
 from studies.instrument.registry import CardPlace, CardTable
+from studies.schema.keys import Keys, number
 
 if TYPE_CHECKING:
     from shell.cubic import Cubic

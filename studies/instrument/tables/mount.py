@@ -8,8 +8,8 @@ joined_at_degC = 20.0                # where the joint is free of stress; the re
 from typing import TYPE_CHECKING, Annotated
 
 from shell.constants import zero_Celsius
-from studies.instrument.keys import Keys, number
 from studies.instrument.registry import CardPlace, CardTable
+from studies.schema.keys import Keys, number
 
 if TYPE_CHECKING:
     from shell.mount import Mount

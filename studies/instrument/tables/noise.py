@@ -20,8 +20,8 @@ housing_resolution_degC = 0.0
 
 from typing import Annotated
 
-from studies.instrument.keys import Keys, number
 from studies.instrument.registry import CardTable
+from studies.schema.keys import Keys, number
 
 Level = Annotated[float, number(least=0.0)]
 

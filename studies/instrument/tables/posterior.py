@@ -9,8 +9,8 @@ A value's own sd and the correlations hold together near the most probable card:
 Where the likelihood is bent the interval is not symmetric about the value, and may be many times as wide as that sd.
 """
 
-from studies.instrument.keys import Keys
 from studies.instrument.registry import CardTable
+from studies.schema.keys import Keys
 
 
 class Correlations(Keys, frozen=True, kw_only=True):

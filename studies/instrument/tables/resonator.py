@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import msgspec
 
 from studies.errors import InputError, naming
-from studies.instrument.keys import Keys, number
 from studies.instrument.registry import CardPlace, CardTable
+from studies.schema.keys import Keys, number
 
 if TYPE_CHECKING:
     from shell.resonator import Resonator, Stem, Support

@@ -21,8 +21,8 @@ uncertainties: what is known before a thermal record has been seen.
 
 from typing import Annotated
 
-from studies.instrument.keys import Keys, number
 from studies.instrument.registry import CardTable
+from studies.schema.keys import Keys, number
 
 IDENTIFIED_MOUNT = 0.0118  # W/K, for the card hrg-30mm; see studies.papers.settling
 Length = Annotated[float, number(above=0.0)]

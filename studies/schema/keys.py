@@ -1,0 +1,122 @@
+"""Classes of keys: a field says name (with its unit), type, default, bounds, uncertainty and meaning of one key."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from functools import lru_cache
+from typing import Any
+
+import msgspec
+from msgspec import inspect
+
+Path = tuple[str | int, ...]
+
+
+class Keys(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """A table of a file; its fields are the keys, in the units of their names."""
+
+
+def number(
+    meaning: str = "",
+    *,
+    above: float | None = None,
+    least: float | None = None,
+    below: float | None = None,
+    most: float | None = None,
+    sd: float | None = None,
+    relative_sd: float | None = None,
+    example: Any = None,
+) -> msgspec.Meta:
+    """Annotate a number with its meaning, its bounds, and the uncertainty that it has where a card states none.
+
+    Parameters
+    ----------
+    above, least, below, most : bounds, in the unit of the key.
+    sd, relative_sd : standard deviation of the default and of any plain number in the card, in the unit of the key or as a
+        part of the value; without either a plain number is taken as exact.
+    example : what stands in the forms for a key without a default.
+    """
+    prior = {key: value for key, value in (("sd", sd), ("relative_sd", relative_sd)) if value is not None}
+    ends: Any = {"gt": above, "ge": least, "lt": below, "le": most}
+    return msgspec.Meta(
+        **ends,
+        description=meaning or None,
+        examples=None if example is None else [example],
+        extra=prior or None,
+    )
+
+
+def says(meaning: str, *, example: Any = None, least: int | None = None, most: int | None = None) -> msgspec.Meta:
+    """Annotate a text, a truth, a list or a table with its meaning; `least` and `most` are lengths."""
+    examples = None if example is None else [example]
+    return msgspec.Meta(description=meaning, examples=examples, min_length=least, max_length=most)
+
+
+@lru_cache(maxsize=256)
+def describe(keys: Any) -> inspect.Type:
+    """Return msgspec's description of a table's type."""
+    return inspect.type_info(keys)
+
+
+def plain(node: inspect.Type) -> inspect.Type:
+    """Return a description without what annotates it."""
+    while isinstance(node, inspect.Metadata):
+        node = node.type
+    return node
+
+
+def options(node: inspect.Type) -> Sequence[inspect.Type]:
+    """Return the types that a value may have."""
+    node = plain(node)
+    return [plain(one) for one in node.types] if isinstance(node, inspect.UnionType) else [node]
+
+
+def structs(node: inspect.Type, value: Any = None) -> list[inspect.StructType]:
+    """Return the tables that a value may be; of shapes that a tag tells apart, the one that `value` names."""
+    found = [one for one in options(node) if isinstance(one, inspect.StructType)]
+    tagged = [one for one in found if isinstance(value, Mapping) and one.tag == value.get(str(one.tag_field))]
+    return tagged or found
+
+
+def number_in(node: inspect.Type) -> inspect.FloatType | inspect.IntType | None:
+    """Return the number that a place may hold."""
+    return next((one for one in options(node) if isinstance(one, inspect.FloatType | inspect.IntType)), None)
+
+
+def holds_value(node: inspect.Type) -> bool:
+    """Return whether a place may hold a number, a text or a truth: neither a table nor tables."""
+    single = inspect.FloatType | inspect.IntType | inspect.StrType | inspect.LiteralType | inspect.BoolType
+    return any(isinstance(one, single) for one in options(node))
+
+
+def known_keys(node: inspect.Type, raw: Any = None) -> list[str]:
+    """Return the keys that a table may have."""
+    found: list[str] = []
+    for struct in structs(node, raw):
+        found += [struct.tag_field] if struct.tag_field else []
+        found += [field.encode_name for field in struct.fields if field.encode_name not in found]
+    return found
+
+
+def bounds(node: inspect.Type) -> tuple[float, float]:
+    """Return the lowest and highest number that a place may hold."""
+    one = number_in(node)
+    low = [float(end) for end in (one.gt, one.ge) if end is not None] if one else []
+    high = [float(end) for end in (one.lt, one.le) if end is not None] if one else []
+    return max(low, default=-float("inf")), min(high, default=float("inf"))
+
+
+def priors(node: inspect.Type, raw: Any, before: Path = ()) -> Iterator[tuple[Path, inspect.Metadata]]:
+    """Yield the places of a table that are uncertain where the card does not say so, with their description."""
+    for struct in structs(node, raw):
+        for field in struct.fields:
+            path = (*before, field.encode_name)
+            inner = raw.get(field.encode_name) if isinstance(raw, Mapping) else None
+            for one in field.type.types if isinstance(field.type, inspect.UnionType) else (field.type,):
+                if isinstance(one, inspect.Metadata) and one.extra:
+                    yield path, one
+                    continue
+                bare = plain(one)
+                if isinstance(inner, list) and isinstance(bare, inspect.ListType | inspect.VarTupleType):
+                    for place, member in enumerate(inner):
+                        yield from priors(bare.item_type, member, (*path, place))
+                elif isinstance(inner, Mapping) and structs(bare):
+                    yield from priors(bare, inner, path)
