@@ -90,7 +90,7 @@ class Electrodes:
         size = self.pair.resonator.size
         if self.gap > 0.2 * size:
             raise ShellError(
-                f"a gap of {1e3 * self.gap:g} mm is no gap beside a radius of {1e3 * size:g} mm: is it in µm?"
+                f"a gap of {1e3 * self.gap:g} mm is too wide for a radius of {1e3 * size:g} mm: is it in µm?"
             )
         for one in self.electrodes:
             if not (one.width > 0 and 0 <= one.first < one.last <= 1):
@@ -137,7 +137,7 @@ class Electrodes:
         )
         if self.pull_in < 1.0:
             raise ShellError(
-                f"the electrodes pull the shell in: {self.voltages.max():g} V is {1 / self.pull_in:.3g} times what it bears at "
+                f"the electrodes pull in the shell: {self.voltages.max():g} V is {1 / self.pull_in:.3g} times the pull-in voltage at "
                 f"a gap of {1e6 * self.gap:g} µm. Lower the voltage or widen the gap."
             )
         return split

@@ -74,7 +74,7 @@ def film_shift(mode: Mode, film: Film) -> float:
         t = film.at(group.table.position)
         if np.any(t > THICKEST * wall):
             raise ShellError(
-                f"a film of {float(np.max(t / wall)):.2g} of the wall is no film: to first order it may be at most {THICKEST:g}."
+                f"a film of {float(np.max(t / wall)):.2g} of the wall is too thick for the first-order theory of films (at most {THICKEST:g})."
             )
         moved = sum(surface_energies(solution, number, film.elastic))
         changed += float(np.sum(moved[..., on] * (2 * t / wall)[..., None]))  # type: ignore[index]

@@ -65,7 +65,7 @@ class SplitReading(SplitWave):
         if split < 2 * error:
             raise ShellError(
                 f"the split of n = {harmonic}, {1e3 * split:.3g} mHz, cannot be distinguished from its reading error of {1e3 * error:.3g} mHz: "
-                "measure better, do not cut."
+                "measure more accurately before cutting."
             )
         return cls(
             harmonic, frequency, complex(-split / frequency * np.exp(2j * harmonic * slow_axis)), error / frequency

@@ -193,7 +193,7 @@ def _turn(section: Pieces, around: int, size: float) -> Volume:
     axial: NDArray[np.bool_] = np.all(_sides(inner), axis=2)  # (side, quadrilateral)
     touching = inner.any(axis=(1, 2))
     if np.any(axial.sum(axis=0) != touching):
-        raise ShellError("an element meets the axis with a corner instead of a side.")
+        raise ShellError("an element touches the axis at a corner instead of along a side.")
     widths = np.where(on_axis, 1, 2 * around)
     first = np.cumsum(widths) - widths
     theta = pi * np.arange(2 * around) / around

@@ -240,7 +240,7 @@ def find_state(records: Sequence[Record], over: Over = "auto") -> str:
     for record in records:
         where = record.path or "record"
         if "frequency_Hz" not in record:
-            raise InputError(f"{where}: the column 'frequency_Hz' is missing; take --over temperature.")
+            raise InputError(f"{where}: the column 'frequency_Hz' is missing; use --over temperature.")
         frequency = record["frequency_Hz"]
         typical = float(np.nanmedian(frequency)) if np.isfinite(frequency).any() else LOWEST_FREQUENCY
         if 0 < typical < LOWEST_FREQUENCY:

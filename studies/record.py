@@ -247,7 +247,7 @@ def check_plausible(columns: "Mapping[str, NDArray[np.float64]]", where: Callabl
         if len(outside):
             row = int(outside[0])
             raise InputError(
-                f"{where(row)}: {name} = {values[row]:g} cannot be a reading ({limits[0]:g} to {limits[1]:g} can); check its"
+                f"{where(row)}: {name} = {values[row]:g} is not a possible reading (allowed: {limits[0]:g} to {limits[1]:g}); check its"
                 " unit, or leave the cell empty where the value is missing."
             )
 

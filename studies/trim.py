@@ -82,9 +82,9 @@ class PlannedCut:
         """Refuse a cut of which too little is known."""
         if SURE * self.error > LEAST_KNOWN:
             raise ShellError(
-                f"a cut {1e3 * self.groove.width:.3g} mm wide and {1e6 * self.groove.depth:.3g} µm deep here changes the split by "
-                f"{self.gain(next(iter(self.splits))):.2f} ± {100 * SURE * self.error:.0f} % of what a shallow one does: what its mass and the stress "
-                f"it relieves do nearly cancel. {WIDER}"
+                f"a cut {1e3 * self.groove.width:.3g} mm wide and {1e6 * self.groove.depth:.3g} µm deep at this place changes the split by "
+                f"{self.gain(next(iter(self.splits))):.2f} ± {100 * SURE * self.error:.0f} % of the change by a shallow cut: mass removal and stress "
+                f"relief nearly cancel. {WIDER}"
             )
 
 
@@ -162,7 +162,7 @@ def _effect(pair: Pair, position: float, kind: CutKind) -> float:
         return pair.mass(position)[1]
     if kind == "edge":
         if position != 1.0:
-            raise InputError("a cut off the edge lies at position 1; take inner or outer for cuts off a face.")
+            raise InputError("an edge cut lies at position 1; use inner or outer for cuts into a face.")
         return pair.edging()[1]
     return pair.shaving(position, 1 if kind == "outer" else -1)[1]
 
@@ -258,7 +258,7 @@ def plan_for_card(
             first = {n: float(w[sites.position == x][0]) for n, w in sites.gain.items()}
             cuts[x] = PlannedCut(groove, {n: solve_groove(pair, groove) for n, pair in pairs.items()}, first, spread)
     raise ShellError(
-        f"no depth of these cuts is found that does what the plan needs: the stress that narrow grooves relieve undoes what their mass does. {WIDER}"
+        f"no depth of these cuts achieves the plan: the stress that narrow grooves relieve cancels the effect of the mass they remove. {WIDER}"
     )
 
 

@@ -226,13 +226,15 @@ def _check_names(network: Network) -> None:
         for end in (part.one, part.other):
             if end not in names:
                 kind = type(part).__name__.lower()
-                raise ThermalError(f"the {kind} '{part.name}' ends at '{end}', which is no node{_nearest(end, names)}")
+                raise ThermalError(
+                    f"the {kind} '{part.name}' ends at '{end}', which is not a node{_nearest(end, names)}"
+                )
         if part.one == part.other:
             raise ThermalError(f"the link '{part.name}' joins a node to itself.")
     inner = [node.name for node in network.nodes]
     for source in network.sources:
         if source.node not in inner:
-            raise ThermalError(f"a source heats '{source.node}', which is no node{_nearest(source.node, inner)}")
+            raise ThermalError(f"a source heats '{source.node}', which is not a node{_nearest(source.node, inner)}")
 
 
 def _check_values(network: Network) -> None:

@@ -85,7 +85,7 @@ class Profile:
         """Value and slope of the straight piece at each time; at a jump, of the piece after it."""
         time = np.asarray(time, dtype=float)
         if time.size and not (time.min() >= self.start and time.max() <= self.end):
-            raise ThermalError(f"the profile covers {self.start:g} to {self.end:g} s only; lengthen it.")
+            raise ThermalError(f"the profile covers only {self.start:g} to {self.end:g} s; lengthen it.")
         piece = np.searchsorted(self.time, time, side="right") - 1
         last = self.time.size - 2 if self.time[-1] > self.time[-2] else self.time.size - 3
         inside = np.minimum(piece, last)
@@ -128,7 +128,7 @@ def parse_profile(words: str) -> Profile:
             raise ThermalError(f"the profile '{words}' has an empty part. {_forms()}")
         kind, *arguments = sentence
         if kind not in FORMS:
-            raise ThermalError(f"'{kind}' is no profile. {_forms()}")
+            raise ThermalError(f"'{kind}' is not a kind of profile. {_forms()}")
         names, build = FORMS[kind]
         if len(arguments) != len(names):
             raise ThermalError(

@@ -62,7 +62,7 @@ class Transient:
         """
         time = np.asarray(time, dtype=float)
         if time.size and not (time.min() >= self.start and time.max() <= self.end):
-            raise ThermalError(f"the transient covers {self.start:g} to {self.end:g} s only.")
+            raise ThermalError(f"the transient covers only {self.start:g} to {self.end:g} s.")
         sums = np.empty((time.size, len(weights)))
         for k in range(0, time.size, BLOCK):
             sums[k : k + BLOCK] = self.evaluate(time[k : k + BLOCK]) @ weights.T

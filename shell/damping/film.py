@@ -76,7 +76,7 @@ def check_film(film: LossyFilm, wall: float) -> None:
     if film.thickness > THICKEST * wall:
         raise ShellError(
             f"the film ({mm(film.thickness)}) is more than {100 * THICKEST:.0f} % of the wall ({mm(wall)}): the mode would change;"
-            " make it a wall of its own."
+            " model it as a wall of its own."
         )
 
 

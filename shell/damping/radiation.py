@@ -115,7 +115,7 @@ def radiating_mode(waves: RadiatingBody, frequency: float) -> Radiating:
             before = now
         shift = before
     raise ShellError(
-        f"no mode of the resonator on its base settles near {frequency:.6g} Hz: take another stem or base."
+        f"no mode of the resonator on its base converges near {frequency:.6g} Hz: use another stem or base."
     )
 
 

@@ -159,7 +159,7 @@ def _check_names(
     counts = Counter(names)
     for name in names:
         if counts[name] > 1:
-            raise InputError(f"{where}: the column '{name}' stands twice; remove one.")
+            raise InputError(f"{where}: the column '{name}' appears twice; remove one.")
         if name not in known and not any(name.startswith(prefix) for prefix in prefixes):
             raise InputError(f"{where}: unknown column '{name}'{nearest(name, known)}{IMPORT}")
     for name in required:
@@ -247,7 +247,7 @@ def _parse_by_line(path: str | Path, body: str, names: list[str], first_line: in
                     rows.append([np.nan] * len(names))
                 continue
             if cells[0].startswith("#"):
-                raise InputError(f"{path}, line {number}: comments may stand only above the header; move it there.")
+                raise InputError(f"{path}, line {number}: comments are allowed only above the header; move it there.")
             if len(cells) != len(names):
                 raise InputError(
                     f"{path}, line {number}: {len(cells)} values where the header has {len(names)} columns"
@@ -268,7 +268,7 @@ def _check_size(columns: Columns) -> None:
         if len(large):
             row = int(large[0])
             raise InputError(
-                f"{columns.path}, line {columns.line(row)}: {name} = {values[row]:g} cannot be a reading; correct it."
+                f"{columns.path}, line {columns.line(row)}: {name} = {values[row]:g} is not a possible reading; correct it."
             )
 
 

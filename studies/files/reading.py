@@ -44,7 +44,7 @@ def check_file(path: str | Path, most: int = MOST_BYTES) -> Path:
             raise InputError(f"{path}: is a device or a pipe, not a file; save what it gives and name that file.")
         if about.st_size > most:
             raise InputError(
-                f"{path}: has {about.st_size / 1e6:,.0f} MB, and {most / 1e6:,.0f} MB are the most that is read; split it or"
+                f"{path}: has {about.st_size / 1e6:,.0f} MB, above the limit of {most / 1e6:,.0f} MB; split it or"
                 " record at a lower rate."
             )
         return Path(path)
@@ -76,6 +76,6 @@ def find_shipped(name: str | Path, shipped: dict[str, Path], kind: str) -> Path:
         return path
     if str(name) not in shipped:
         raise InputError(
-            f"there is no shipped {kind} '{name}' (a {kind} of your own: give its path){nearest(str(name), shipped)}"
+            f"there is no built-in {kind} '{name}' (for a {kind} of your own, give its path){nearest(str(name), shipped)}"
         )
     return shipped[str(name)]

@@ -104,8 +104,8 @@ def _check_span(seconds: "Array", table: RawTable, file: "FileMap") -> None:
     ]
     hint = f" time_format = {' or '.join(better)} would be possible." if better else " Check the dates."
     raise InputError(
-        f"{table.path}: with time_format = '{file.time_format}' its times span {span / 31557600:.3g} years, which is no"
-        f" run.{hint}"
+        f"{table.path}: with time_format = '{file.time_format}' its times span {span / 31557600:.3g} years, too long for"
+        f" one run.{hint}"
     )
 
 
@@ -134,12 +134,12 @@ def drop_repeated(table: RawTable, times: Times, file: "FileMap") -> "tuple[Time
     if (steps < 0).any():
         row = int(rows[int(np.flatnonzero(steps < 0)[0]) + 1])
         raise InputError(
-            f"{table.place(row)}: the time goes back by {-steps.min():g} s at most. {_mend(table, file, row)}"
+            f"{table.place(row)}: the time goes backwards (by up to {-steps.min():g} s). {_mend(table, file, row)}"
         )
     same = np.flatnonzero(steps == 0)
     if len(same) and rule == "error":
         raise InputError(
-            f"{table.place(int(rows[same[0] + 1]))}: the time of the line before is repeated ({len(same)}"
+            f"{table.place(int(rows[same[0] + 1]))}: this line repeats the time of the line before ({len(same)}"
             " such rows); set repeated_times = 'first' or 'spread' in the map."
         )
     if len(same) and rule == "first":

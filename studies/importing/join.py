@@ -241,7 +241,7 @@ def _lay_grid(base: ClockedFile, import_map: ImportMap) -> "Array":
     count = np.floor((base.time[-1] - base.time[0]) / import_map.step) + 1
     if not count <= LARGEST:
         raise InputError(
-            f"{import_map.path}: step_s = {import_map.step:g} makes {count:.3g} rows; {LARGEST:,} is the most."
+            f"{import_map.path}: step_s = {import_map.step:g} makes {count:.3g} rows, more than the limit of {LARGEST:,}; increase step_s."
         )
     return np.asarray(base.time[0] + import_map.step * np.arange(int(count)))
 
@@ -298,5 +298,5 @@ def _later(origin: "datetime.datetime", seconds: float) -> "datetime.datetime":
         return origin + datetime.timedelta(seconds=seconds)
     except OverflowError:
         raise InputError(
-            f"the first time of the record, {seconds:g} s after {origin}, is no date; check time_format."
+            f"the first time of the record, {seconds:g} s after {origin}, is not a date; check time_format."
         ) from None

@@ -165,14 +165,14 @@ def load_map(path: str | Path) -> ImportMap:
         raise InputError(f"{path}: a table [[file]] is missing; 'hrg import RAW --draft MAP.toml' drafts one.")
     step = top.number("step_s", above=0.0) if "step_s" in top else None
     if is_table and (len(files) > 1 or step is not None):
-        raise InputError(f"{path}: target = 'table' goes with one [[file]] and without step_s.")
+        raise InputError(f"{path}: target = 'table' needs exactly one [[file]] and no step_s.")
     seen: dict[tuple[str, str], int] = {}
     for number, file in enumerate(files, 1):
         for column in file.columns:
             for axis in {"", column.axis}:
                 if (column.target, axis) in seen and (axis or not column.axis):
                     raise InputError(
-                        f"{path}: '{column.target}' is filled twice, by files {seen[column.target, axis]} and {number}."
+                        f"{path}: '{column.target}' is assigned twice, by [[file]] {seen[column.target, axis]} and {number}."
                     )
             seen[column.target, column.axis] = number
     return ImportMap(files, step, _text(top, "instrument"), _text(top, "source"), is_table, str(path))
@@ -228,7 +228,7 @@ def _read_column(section: TomlTable, targets: Sequence[str]) -> ColumnMap:
     target = section.text("to")
     if target not in targets:
         what = "table" if targets is TABLE_TARGETS else "record"
-        raise InputError(f"{section.where}: to = '{target}' is no column of a {what}{nearest(target, targets)}")
+        raise InputError(f"{section.where}: to = '{target}' is not a column of a {what}{nearest(target, targets)}")
     units: Mapping[str, Unit] = units_of(target)
     stated, nominal = split_nominal(section.text("unit"))
     unit = find_spelling(target, stated) or section.text("unit", choices=tuple(units))
@@ -237,7 +237,7 @@ def _read_column(section: TomlTable, targets: Sequence[str]) -> ColumnMap:
     )
     for key in SETTINGS:
         if key in section and key not in units[unit].settings:
-            raise InputError(f"{section.where}: {key} has no meaning with unit = '{unit}'; remove it.")
+            raise InputError(f"{section.where}: {key} cannot be combined with unit = '{unit}'; remove it.")
     scale = section.number("scale", 1.0)
     if scale == 0:
         raise InputError(f"{section.where}: scale must not be 0.")
@@ -302,7 +302,7 @@ def _read_timezone(section: TomlTable) -> str | None:
         zoneinfo.ZoneInfo(name)
     except (zoneinfo.ZoneInfoNotFoundError, ValueError, OSError):
         raise InputError(
-            f"{section.where}: timezone = '{name}' is not known here; take a name such as 'Europe/Berlin' or 'UTC'"
+            f"{section.where}: timezone = '{name}' is unknown; use a name such as 'Europe/Berlin' or 'UTC'"
             " (a machine without a time zone database needs 'pip install tzdata')."
         ) from None
     return name

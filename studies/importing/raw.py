@@ -204,8 +204,8 @@ def read_sheet(path: str | Path, sheet: str | None) -> list[list[str]]:
         cells = (page.max_row or 0) * (page.max_column or 0)
         if cells > MOST_CELLS:
             raise InputError(
-                f"{path}: its sheet reaches to row {page.max_row}, column {page.max_column}; {MOST_CELLS:,} cells are the"
-                " most. Delete cells far from the table, or export the sheet as CSV."
+                f"{path}: its sheet extends to row {page.max_row}, column {page.max_column}, more than the limit of {MOST_CELLS:,}"
+                " cells. Delete cells far from the table, or export the sheet as CSV."
             )
         return [[_cell_text(value) for value in row] for row in page.iter_rows(values_only=True)]
     except InputError:

@@ -105,7 +105,7 @@ def compute(
                 if losses >= STILLBORN and not computed:
                     raise MissingEnvironment(
                         "the worker processes end before they compute anything. In a script, call run_study under"
-                        " 'if __name__ == \"__main__\":' or with workers=1; else look for what ends them (memory?)."
+                        " 'if __name__ == \"__main__\":' or with workers=1; otherwise check what ends them (memory?)."
                     ) from error
                 _divide(task, plan, suspects, store, progress)
                 if workers.restart():

@@ -98,7 +98,7 @@ def _look_up(one: Derived, name: str, values: Mapping[str, Any], in_card: LookUp
                 f"{one.where}: '{name}' is neither a parameter nor a key of the card{nearest(name, values)}"
             )
     if isinstance(found, str) or found is None:
-        raise InputError(f"{one.where}: '{name}' has no number that could be used.")
+        raise InputError(f"{one.where}: '{name}' has no usable number.")
     return float(found)
 
 
@@ -111,7 +111,7 @@ def _check(node: ast.expr, text: str, where: str) -> None:
     elif _spell(node) is None and not (
         isinstance(node, ast.Constant) and isinstance(node.value, int | float) and not isinstance(node.value, bool)
     ):
-        raise InputError(f"{where}: '{text}' holds more than numbers, names of parameters, + - * / ** and brackets.")
+        raise InputError(f"{where}: '{text}' may contain only numbers, names of parameters, + - * / ** and brackets.")
 
 
 def _spell(node: ast.expr) -> str | None:
@@ -136,7 +136,7 @@ def _evaluate(node: ast.expr, known: Mapping[str, Any]) -> float:
     if isinstance(node, ast.BinOp):
         left, right = _evaluate(node.left, known), _evaluate(node.right, known)
         if isinstance(node.op, ast.Pow) and abs(right) > MOST_POWER:
-            raise ValueError(f"a power of {right:g}")
+            raise ValueError(f"the exponent {right:g} is too large")
         return BINARY[type(node.op)](left, right)
     if isinstance(node, ast.UnaryOp):
         return UNARY[type(node.op)](_evaluate(node.operand, known))

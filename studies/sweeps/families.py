@@ -159,7 +159,7 @@ def choose_solver(study: "Study", design: "Design") -> "Families | None":
     if isinstance(found, Families):
         return found
     if wanted == "family":
-        raise InputError(f"solver = 'family' does not go: {found}. Take solver = 'full'.")
+        raise InputError(f"solver = 'family' cannot be used: {found}. Use solver = 'full'.")
     return None
 
 

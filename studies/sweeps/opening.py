@@ -30,7 +30,9 @@ def open_store(folder: str | Path) -> Store:
     path = Path(folder) / FILE
     _refuse_former(folder)
     if not os.path.isfile(path):
-        raise InputError(f"{folder}: there is no study in it (no {FILE}); give the folder of 'hrg study run --out'.")
+        raise InputError(
+            f"{folder}: there is no study in it (no {FILE}); give the folder that was named with 'hrg study run --out'."
+        )
     try:
         store = Store(path.open("rb", buffering=0), path)
     except OSError as error:
@@ -105,7 +107,7 @@ def _lock(lock: IO[str], folder: str | Path) -> None:
         lock.seek(0)
         owner = lock.read().strip() or "another process"
         raise InputError(
-            f"{folder}: {owner} is running this study; wait for it, or take another folder with --out."
+            f"{folder}: {owner} is running this study; wait for it, or use another folder with --out."
         ) from None
     lock.truncate(0)
     lock.write(f"process {os.getpid()}, since {now_utc()},")
@@ -128,6 +130,6 @@ def _leave_out(file: SealedFile, path: Path) -> None:
 def _refuse_former(folder: str | Path) -> None:
     if os.path.isfile(Path(folder) / FORMER) and not os.path.isfile(Path(folder) / FILE):
         raise InputError(
-            f"{folder}: its results stand in {FORMER}, which an earlier version of the workbench wrote. Export them with that"
+            f"{folder}: its results are in {FORMER}, written by an earlier version of the workbench. Export them with that"
             " version (hrg study export), or run the study again into another folder."
         )

@@ -190,7 +190,7 @@ def find_tolerance(explorer: Explorer, search: "Search") -> dict[str, Any]:
         passed = int((used <= 1).sum())
         rank = min(int(np.ceil(search.share * count)), count) - 1
         if not used[rank] > 0:
-            raise SearchFailed("the designs do not come nearer to their limits, however wide the tolerances")
+            raise SearchFailed("the designs never reach their limits, however wide the tolerances")
         bounds[0 if used[rank] <= 1 else 1] = factor
         if abs(used[rank] - 1) < 1e-3 or bounds[1] - bounds[0] < 1e-3 * factor:
             break

@@ -182,8 +182,8 @@ def _complete(results: "Results", column: str) -> Array:
     lacking = np.flatnonzero(~np.isfinite(y))
     if lacking.size:
         raise InputError(
-            f"{lacking.size} of {len(y)} cases have no {column}, and none is made up: {_list(results, lacking.tolist())}."
-            " Mend the ranges, or the function, and run a new study."
+            f"{lacking.size} of {len(y)} cases have no {column}(missing values are not filled in): {_list(results, lacking.tolist())}."
+            " Correct the ranges, or the function, and run a new study."
         )
     return y
 

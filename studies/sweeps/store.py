@@ -171,7 +171,7 @@ class Store:
             shown = "; ".join(changes[:SHOWN_CHANGES])
             more = f"; and {len(changes) - SHOWN_CHANGES} more" if len(changes) > SHOWN_CHANGES else ""
             raise InputError(
-                f"{self.path.parent}: holds results of a study that differs: {shown}{more}. Take another folder with"
+                f"{self.path.parent}: holds results of a study that differs: {shown}{more}. Use another folder with"
                 " --out, or undo the change."
             )
 

@@ -24,7 +24,7 @@ def read_sampling(top: TomlTable) -> Sampling:
     method = part.text("method", choices=METHODS)
     free = method in ("latin-hypercube", "sobol", "sensitivity")
     if not free and "cases" in part:
-        raise InputError(f"{part.where}: method = '{method}' has as many cases as its values say; leave cases out.")
+        raise InputError(f"{part.where}: method = '{method}' takes the number of cases from the values; remove cases.")
     cases = _whole(part, "cases", None if free else 1, 1, MOST_CASES)
     if method in ("sobol", "sensitivity") and cases & (cases - 1):
         power = 1 << cases.bit_length()
@@ -51,7 +51,7 @@ def read_parameter(part: TomlTable, instrument: Instrument, method: str) -> Stud
     distribution = part.text("distribution", "uniform", DISTRIBUTIONS)
     deviation = part.number("standard_deviation", above=0.0) if distribution == "normal" else None
     if distribution != "normal" and "standard_deviation" in part:
-        raise InputError(f"{where}: standard_deviation goes with distribution = 'normal'.")
+        raise InputError(f"{where}: standard_deviation is only for distribution = 'normal'.")
     if found is None and "nominal" not in part:
         found = (part.number("low") + part.number("high")) / 2
     middle = part.number("nominal", found)
@@ -60,7 +60,7 @@ def read_parameter(part: TomlTable, instrument: Instrument, method: str) -> Stud
         raise InputError(f"{where}: a log-uniform parameter must be positive, not from {low:g}.")
     count = _whole(part, "count", None, 2, 1_000_000) if method == "grid" else None
     if method != "grid" and "count" in part:
-        raise InputError(f"{where}: count goes with method = 'grid'.")
+        raise InputError(f"{where}: count is only for method = 'grid'.")
     bounded = deviation is None or any(key in part for key in ("low", "high", "tolerance"))
     return StudyParameter(name, middle, low, high, distribution, deviation, (), count, bounded)
 
@@ -97,7 +97,7 @@ def _ends(part: TomlTable, where: str, middle: float, deviation: float | None) -
 
 def _listed(part: TomlTable, name: str, where: str, found: float | str | None, method: str) -> StudyParameter:
     if method not in ("grid", "list"):
-        raise InputError(f"{where}: values go with method = 'grid' or 'list'; with '{method}' give low and high.")
+        raise InputError(f"{where}: values are only for method = 'grid' or 'list'; for '{method}' give low and high.")
     values = part.raw("values")
     if not isinstance(values, list) or not values:
         raise InputError(f"{where}: values must be a list with at least one entry.")
@@ -152,7 +152,7 @@ def read_requirement(part: TomlTable, columns: Sequence[str]) -> Requirement:
     if within is None and low is None and high is None:
         raise InputError(f"{part.where}: give within (and target), or low and/or high.")
     if (within is None and target is not None) or (within is not None and (low is not None or high is not None)):
-        raise InputError(f"{part.where}: within goes with target, low and high go without them.")
+        raise InputError(f"{part.where}: give either target and within, or low and/or high.")
     return Requirement(column, low, high, target, within)
 
 
@@ -208,5 +208,5 @@ def refuse_twins(names: Sequence[str], what: str) -> None:
     seen: set[str] = set()
     for name in names:
         if name in seen:
-            raise InputError(f"{what} '{name}' stands there twice.")
+            raise InputError(f"{what} '{name}' is given twice.")
         seen.add(name)

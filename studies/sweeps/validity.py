@@ -95,4 +95,4 @@ def check_sample(study: "Study", where: str) -> None:
             f" '{study.sampling.method}'."
         )
     if not study.requirements:
-        raise InputError(f"{where}: a search for tolerances needs a [[requirement]] that the designs shall keep.")
+        raise InputError(f"{where}: a search for tolerances needs a [[requirement]] that the designs must meet.")

@@ -117,7 +117,7 @@ def test_coefficients_are_the_slopes_of_the_softening(pair):
 
 
 def test_bad_electrodes_are_refused(pair):
-    with pytest.raises(ShellError, match="pull the shell in"):
+    with pytest.raises(ShellError, match="pull in the shell"):
         Electrodes(pair, ring_of_electrodes(1, 1.0, 20000.0), 50e-6).soften()
     with pytest.raises(ShellError, match="is it in µm"):
         Electrodes(pair, ring_of_electrodes(1, 1.0, 100.0), 50e-3)

@@ -158,7 +158,9 @@ def test_the_depth_of_a_cut_of_the_edge_removes_its_mass_through_the_wall(capsys
 
 
 def test_trim_refuses_what_it_should_not_cut(tmp_path, capsys):
-    assert "measure better, do not cut" in failing(capsys, "trim", "free-dome", "--split", "1e-4", "--axis", "3")
+    assert "measure more accurately before cutting" in failing(
+        capsys, "trim", "free-dome", "--split", "1e-4", "--axis", "3"
+    )
     assert "beyond the wall" in failing(capsys, "trim", "free-dome", "--split", "500", "--axis", "3")
     assert "1 splits, 0 axes" in failing(capsys, "trim", "free-dome", "--split", "0.1")
     assert "write k:µg@degrees" in failing(

@@ -63,7 +63,7 @@ def test_thermal_prints_time_constants_and_temperatures(capsys):
     ("arguments", "words"),
     [
         (["simulate", "hrg-30mm", "step 20 -90 5h", "--out", "x.csv"], "reaches -90 °C"),
-        (["simulate", "hrg-30mm", "stepp 20 -10 5h", "--out", "x.csv"], "'stepp' is no profile"),
+        (["simulate", "hrg-30mm", "stepp 20 -10 5h", "--out", "x.csv"], "'stepp' is not a kind of profile"),
         (["simulate", "hrg-30mm", "soak 20 1h", "--out", "x.csv", "--row", "-1"], "time between rows must be positive"),
         (["simulate", "hrg-30mm", "soak 20 1h", "--out", "x.csv", "--seed", "-1"], "--seed"),
         (["simulate", "hrg-30", "soak 20 1h", "--out", "x.csv"], "did you mean 'hrg-30mm'"),

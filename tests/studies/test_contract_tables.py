@@ -124,7 +124,7 @@ def test_record_survives_writing_and_reading_to_the_last_bit(tmp_path_factory, v
 def test_numbers_that_no_instrument_reads_are_refused(tmp_path, number):
     path = tmp_path / "run.csv"
     path.write_text(f"time_s,bias_deg_per_h\n0,1\n1,{number}\n")
-    with pytest.raises(InputError, match=r"run\.csv, line 3: bias_deg_per_h = .* cannot be a reading"):
+    with pytest.raises(InputError, match=r"run\.csv, line 3: bias_deg_per_h = .* is not a possible reading"):
         read_record(path)
 
 

@@ -170,7 +170,7 @@ def test_wrong_tables_are_refused(tmp_path, table, words):
 
 def test_a_voltage_beyond_pull_in_names_its_table(tmp_path):
     instrument = loaded(tmp_path, "[electrodes]\ngap_um = 10.0\nvoltage_V = 2000.0\n")
-    with pytest.raises(InputError, match=r"\[electrodes\].*pull the shell in"):
+    with pytest.raises(InputError, match=r"\[electrodes\].*pull in the shell"):
         _ = split_of(instrument).split
 
 

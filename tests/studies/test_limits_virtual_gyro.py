@@ -283,7 +283,7 @@ def test_unusable_runs_are_refused(card, law, tmp_path):
         run(card, law, rate=1e-6)
     with pytest.raises(InputError, match="there is no such file"):
         load_profile(str(tmp_path / "absent.csv"))
-    with pytest.raises(ThermalError, match="'jump' is no profile"):
+    with pytest.raises(ThermalError, match="'jump' is not a kind of profile"):
         load_profile("jump 20 30")
 
 

@@ -50,7 +50,7 @@ def test_the_value_at_a_jump_is_the_one_after_it():
     ("words", "message"),
     [
         ("", "A profile is one of: soak T DURATION"),
-        ("jump 20 30", "'jump' is no profile"),
+        ("jump 20 30", "'jump' is not a kind of profile"),
         ("step 20 -10", "has 2 values, but the form is 'step FROM TO DURATION'"),
         ("step 20 cold 5h", r"'cold' stands where the profile needs a number \(TO\)"),
         ("soak 20 5d", "a duration such as 5h, 30min or 90s"),

@@ -22,8 +22,8 @@ LINK = Conductor("chamber", "shell", 1e-3)
         ([Boundary("chamber"), Node("shell", float("nan")), LINK], "must be positive, not nan"),
         ([*ROOM, Conductor("chamber", "shell", -1.0)], "conductance 'chamber-shell' must be positive"),
         ([*ROOM, LINK, Radiator("chamber", "shell", 0.0)], "exchange area 'chamber-shell' must be positive"),
-        ([*ROOM, Conductor("chambr", "shell", 1.0)], "'chambr', which is no node; did you mean 'chamber'"),
-        ([*ROOM, LINK, Source("shel", 1.0)], "heats 'shel', which is no node; did you mean 'shell'"),
+        ([*ROOM, Conductor("chambr", "shell", 1.0)], "'chambr', which is not a node; did you mean 'chamber'"),
+        ([*ROOM, LINK, Source("shel", 1.0)], "heats 'shel', which is not a node; did you mean 'shell'"),
         ([*ROOM, LINK, Source("shell", float("inf"))], "power put into 'shell' must be a number"),
         ([*ROOM, LINK, Node("stem", 1.0)], "node 'stem' is isolated"),
         ([*ROOM, LINK, Node("a", 1.0), Node("b", 1.0), Conductor("a", "b", 1.0)], "no path leads from 'a', 'b'"),
@@ -62,7 +62,7 @@ def test_a_profile_that_cannot_be_is_refused(time, value, words):
 
 def test_a_profile_is_not_read_outside_its_time_or_used_outside_the_materials_range():
     profile = parse_profile("step 20 -80 5h")
-    with pytest.raises(ThermalError, match="covers 0 to 18000 s only"):
+    with pytest.raises(ThermalError, match="covers only 0 to 18000 s"):
         profile.at([18001.0])
     with pytest.raises(ThermalError, match=r"reaches -80 °C at 0 s, outside fused silica \(-60 to 150 °C\)"):
         profile.require_within(213.15, 423.15, "fused silica")
@@ -82,7 +82,7 @@ def test_transients_refuse_what_they_lack():
         propagate(network, {"chamber": constant(-10.0, 3600.0)})
     with pytest.raises(ThermalError, match="1 temperatures above 0 K"):
         propagate(network, {"chamber": hour}, initial=[300.0, 300.0])
-    with pytest.raises(ThermalError, match="covers 0 to 3600 s only"):
+    with pytest.raises(ThermalError, match="covers only 0 to 3600 s"):
         propagate(network, {"chamber": hour}).at([4000.0])
     with pytest.raises(ThermalError, match="no node 'shel'"):
         propagate(network, {"chamber": hour}).node("shel", [0.0])

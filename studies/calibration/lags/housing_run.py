@@ -72,7 +72,7 @@ class EvenRun:
 def row_step(runs: Sequence[HousingRun], most: int) -> float:
     """Distance (s) of even rows that suits all runs: at most `most` of them, none finer than the finest run."""
     if min(len(run.time) for run in runs) < 2:
-        raise ThermalError("a run of one row identifies nothing.")
+        raise ThermalError("one row cannot determine time constants.")
     finest = min(float(np.median(np.diff(run.time))) for run in runs)
     wanted = max(float(np.ptp(run.time)) for run in runs) / (most - 1)
     # A whole number of samples in every row: with one sample more here than there the rows' mean times would jitter.
@@ -88,10 +88,10 @@ def even_rows(run: HousingRun, step: float) -> EvenRun:
     row = ((run.time - run.time[0] + half_sample) // step).astype(np.intp)
     count = int(row[-1]) + 1
     if count < LEAST_ROWS:
-        raise ThermalError(f"a run needs at least {LEAST_ROWS} rows to identify anything, not {count}.")
+        raise ThermalError(f"a run needs at least {LEAST_ROWS} rows, not {count}.")
     known_f, known_T = np.isfinite(run.frequency), np.isfinite(run.housing_temperature)
     if not known_f.any() or not known_T.any():
-        raise ThermalError("a run without any frequency or housing temperature identifies nothing.")
+        raise ThermalError("a run needs readings of both frequency and housing temperature.")
     members = np.bincount(row, minlength=count)
     full = members == members.max()
     offset = (np.bincount(row, run.time, count)[full] / members[full] - step * np.flatnonzero(full)).mean()

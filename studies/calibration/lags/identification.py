@@ -107,7 +107,7 @@ def identify(
         For a record that is constant within its noise, or too short.
     """
     if not runs:
-        raise ThermalError("nothing is identified without a run.")
+        raise ThermalError("no run given; name at least one record.")
     if not 0 < confidence < 1:
         raise ThermalError(f"a confidence lies between 0 and 1, not at {confidence:g}.")
     step = row_step(runs, ROWS)
@@ -177,7 +177,7 @@ def _best_start(
 ) -> Follower:
     """Return the follower whose fit under white noise is closest: the lags found so far and one more."""
     if not runs:
-        raise ThermalError("nothing is identified without a run.")
+        raise ThermalError("no run given; name at least one record.")
     step = row_step(runs, ROWS)
     even = tuple(even_rows(run, step) for run in runs)
     span = max(float(np.ptp(run.time)) for run in runs)

@@ -100,7 +100,7 @@ class Hemisphere(Stemmed, frozen=True, kw_only=True, tag="hemisphere"):
         if self.rim_angle_deg <= RADIANS:
             angle = math.degrees(self.rim_angle_deg)
             raise ValueError(
-                f"rim_angle_deg = {self.rim_angle_deg:g} is no dome; it looks like radians: {self.rim_angle_deg:g} rad are"
+                f"rim_angle_deg = {self.rim_angle_deg:g} is too small for a dome; it looks like radians: {self.rim_angle_deg:g} rad are"
                 f" {angle:.4g}°."
             )
 

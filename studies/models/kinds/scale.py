@@ -196,7 +196,7 @@ def _load_curve(
 def _rough_scale(model: Model, rough: ModelPart) -> float:
     scale = _coefficient(model, rough, "scale")
     if scale == 0:
-        raise InputError(f"{model.path}: [[part]] rough: scale is 0, so that the output would not count; correct it.")
+        raise InputError(f"{model.path}: [[part]] rough: scale is 0, so the output has no effect; correct it.")
     return scale
 
 

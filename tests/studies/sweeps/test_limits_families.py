@@ -127,7 +127,7 @@ def test_where_families_do_not_go_auto_solves_in_full_and_family_is_refused(spec
     study = read_study(changed)
     assert choose_solver(study, draw(study)) is None
     study = read_study({**changed, "sampling": {**spec["sampling"], "solver": "family"}})
-    with pytest.raises(InputError, match=f"does not go: .*{reason}"):
+    with pytest.raises(InputError, match=f"cannot be used: .*{reason}"):
         choose_solver(study, draw(study))
 
 

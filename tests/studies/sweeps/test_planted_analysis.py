@@ -86,7 +86,7 @@ def test_sobol_refuses_failed_cases_and_lists_them(tmp_path, functions):
     )
     results = study(tmp_path, "fail", {"method": "sensitivity", "cases": 16, "seed": 1}, *box("x", "y", low=0, high=1))
     assert results.failed.size
-    with pytest.raises(InputError, match="none is made up") as caught:
+    with pytest.raises(InputError, match="missing values are not filled in") as caught:
         sobol_indices(results, "fail")
     assert "too far" in str(caught.value)
     table = results.table()
