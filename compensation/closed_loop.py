@@ -71,6 +71,15 @@ class ClosedLoop:
         return places
 
     @property
+    def kept(self) -> NDArray[np.intp]:
+        """Places of what the loops remember from sample to sample: wave, filtered, integral, sent."""
+        at = self.places
+        kept = np.r_[at["wave"], at["filtered"], at["integral"], at["sent"]]
+        if self.turning:
+            kept = kept[~np.isin(kept, [at[name].start + 2 for name in ("wave", "filtered", "integral")])]
+        return np.asarray(kept, dtype=np.intp)
+
+    @property
     def size(self) -> int:
         """Length of the state."""
         return int(self.places["wave_sum"].stop)
@@ -90,7 +99,7 @@ class ClosedLoop:
         if self.turning:
             active[2] = 0.0
             A[2, :] = A[:, 2] = 0.0
-        drive = self._drive_map
+        drive = self.drive_map
         K = np.array([self.loops.gains(name)[0] for name in CHANNELS]) * active
         K_i = np.array([self.loops.gains(name)[1] for name in CHANNELS]) * active
         smoothing = self.loops.smoothing
@@ -136,7 +145,7 @@ class ClosedLoop:
         return F, covariance
 
     @cached_property
-    def _drive_map(self) -> Real:
+    def drive_map(self) -> Real:
         """The wave's four rates for the four commands: forces through the channels, phase and stiffness directly."""
         drive = real_form(self.drive)
         drive[:, 1] = [0.0, 1.0, 0.0, 0.0]
@@ -156,7 +165,7 @@ class ClosedLoop:
         late, rest = self.loops.late
         if late:
             return None
-        return np.asarray(_held_maps(real_form(self.A), self.loops.step - rest)[1] @ self._drive_map)
+        return np.asarray(_held_maps(real_form(self.A), self.loops.step - rest)[1] @ self.drive_map)
 
     def follow(self, state: Real, samples: int, generator: np.random.Generator | None) -> tuple[Real, bool]:
         """Return the state after a row, each command limited, and whether any was at its limit.
@@ -183,11 +192,7 @@ class ClosedLoop:
 
     def require_stable(self) -> None:
         """Raise when the loops together, with the errors of the electronics, do not come to rest."""
-        at = self.places
-        kept = np.r_[at["wave"], at["filtered"], at["integral"], at["sent"]]
-        if self.turning:
-            kept = kept[~np.isin(kept, [at[name].start + 2 for name in ("wave", "filtered", "integral")])]
-        F = self.sample[0][np.ix_(kept, kept)]
+        F = self.sample[0][np.ix_(self.kept, self.kept)]
         radius = float(np.max(np.abs(np.linalg.eigvals(F))))
         if radius >= 1:
             raise CompensationError(
@@ -200,10 +205,7 @@ class ClosedLoop:
         at, F = self.places, self.sample[0]
         state = np.zeros(self.size)
         state[at["forcing"]], state[at["offset"]] = forcing, offset
-        kept = np.r_[at["wave"], at["filtered"], at["integral"], at["sent"]]
-        if self.turning:
-            kept = kept[~np.isin(kept, [at[name].start + 2 for name in ("wave", "filtered", "integral")])]
-        given = np.r_[at["forcing"], at["offset"]]
+        kept, given = self.kept, np.r_[at["forcing"], at["offset"]]
         left = np.eye(len(kept)) - F[np.ix_(kept, kept)]
         state[kept] = np.linalg.solve(left, F[np.ix_(kept, given)] @ state[given])
         return state

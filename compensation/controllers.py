@@ -81,7 +81,7 @@ class Loops:
         T, (whole, rest) = self.step, self.late
         z = np.exp(2j * np.pi * np.asarray(frequency, dtype=float) * T)
         d = 0.0 if loop == "phase" else decay
-        now, late = _held(d, T - rest), np.exp(-d * (T - rest)) * _held(d, rest)
+        now, late = held(d, T - rest), np.exp(-d * (T - rest)) * held(d, rest)
         plant = (now + late / z) / (z - np.exp(-d * T)) * z ** (-whole)
         K, K_i = self.gains(loop)
         a = self.smoothing
@@ -136,7 +136,7 @@ def _calm_bandwidth(loops: Loops, name: str, decay: float) -> float:
     return bandwidth
 
 
-def _held(decay: float, time: float) -> float:
+def held(decay: float, time: float) -> float:
     """∫₀ᵗ e^{−ds} ds."""
     return time if decay == 0 else float(-np.expm1(-decay * time) / decay)
 

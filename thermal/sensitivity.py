@@ -96,6 +96,7 @@ def respond(
     weights: Array,
     changes: Sequence[NetworkChange] = (),
     departure: Array | None = None,
+    longest: float | None = None,
 ) -> ObservedSums:
     """Temperatures of a network at the rows, with derivatives by every change.
 
@@ -106,6 +107,8 @@ def respond(
     weights : array (sums, n), of the nodes
     departure : array (n,), K, optional
         Of the initial state from the steady state before the profiles begin.
+    longest : float, s, optional
+        As for `run_sweeps`.
 
     Raises
     ------
@@ -117,7 +120,7 @@ def respond(
     begin = min(profile.start for profile in boundaries.values())
     steady = find_steady_state(network, first, begin)
     n = network.count
-    swept = run_sweeps(network, boundaries, steady[:n] if departure is None else steady[:n] + departure)
+    swept = run_sweeps(network, boundaries, steady[:n] if departure is None else steady[:n] + departure, longest)
     T, rate = _observe(swept, boundaries, rows, weights)
     if not changes:
         empty = np.zeros((0, *T.shape))

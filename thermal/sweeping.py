@@ -136,8 +136,13 @@ def sweep(network: Network, boundaries: Mapping[str, Profile], initial: ArrayLik
     return run_sweeps(network, boundaries, initial).transient()
 
 
-def run_sweeps(network: Network, boundaries: Mapping[str, Profile], initial: ArrayLike | None = None) -> Sweep:
-    """Sweep until no temperature changes by more than 1e-7 K.
+def run_sweeps(
+    network: Network,
+    boundaries: Mapping[str, Profile],
+    initial: ArrayLike | None = None,
+    longest: float | None = None,
+) -> Sweep:
+    """Sweep until no temperature changes by more than 1e-7 K, with knots at most `longest` (s) apart, `LONGEST_ROW` when absent.
 
     Raises
     ------
@@ -145,7 +150,7 @@ def run_sweeps(network: Network, boundaries: Mapping[str, Profile], initial: Arr
         Profiles that do not fit the network, or radiation so strong that the sweeps do not converge.
     """
     corners = find_corners(network, boundaries)
-    knots = _choose_knots(corners, boundaries)
+    knots = _choose_knots(corners, boundaries, longest or LONGEST_ROW)
     T0 = initial_state(network, boundaries, initial)
     held = hold(boundaries, tuple(b.name for b in network.boundaries), knots, len(corners) > MOST_CORNERS)
     linear = linearise(network, float(held.mean()))
@@ -246,12 +251,12 @@ def _mean_around(profile: Profile, time: Array, reach: Array) -> Array:
     return mean
 
 
-def _choose_knots(corners: Array, boundaries: Mapping[str, Profile]) -> Array:
-    """Corners, or of very many only the jumps, divided until no interval is longer than `LONGEST_ROW`."""
+def _choose_knots(corners: Array, boundaries: Mapping[str, Profile], longest: float) -> Array:
+    """Corners, or of very many only the jumps, divided until no interval is longer than `longest` (s)."""
     if len(corners) > MOST_CORNERS:
         jumps = [profile.jumps for profile in boundaries.values()]
         corners = np.unique(np.concatenate([corners[[0, -1]], *jumps]))
-    parts = np.ceil(np.diff(corners) / LONGEST_ROW)
+    parts = np.ceil(np.diff(corners) / longest)
     if parts.sum() > MOST_ROWS:
         raise ThermalError(f"the profile is too long to be swept ({np.ptp(corners):.3g} s); shorten it.")
     counts = parts.astype(np.intp)

@@ -28,6 +28,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "tcf": ("studies.cli.tcf:tcf", "Temperature coefficient of the frequency and its contributions."),
     "loss": ("studies.cli.loss:loss", "Q over temperature, with loss contributions and what to reduce first."),
     "simulate": ("studies.cli.simulate:simulate", "Simulate a run of an instrument through a chamber profile."),
+    "twin": ("studies.cli.twin:twin", "Write the virtual gyro of a card as an FMU or as C."),
     "loop": ("studies.cli.loop:loop", "Control loops: stability margins, bias and noise by source, start-up, runs."),
     "thermal": ("studies.cli.thermal:thermal", "Temperatures along the heat path for a chamber profile."),
     "fit frequency": (
@@ -185,7 +186,7 @@ CHAPTERS = {
     # of the list of commands
     "Design a resonator": ("modes", "tcf", "loss", "loop", "compare", "render", "mesh", "study", "derive"),
     "Manufacture": ("scan", "trim", "electrodes"),
-    "Simulate and import": ("simulate", "thermal", "import"),
+    "Simulate and import": ("simulate", "twin", "thermal", "import"),
     "Calibrate, diagnose and accept": ("calibrate", "diagnose", "effects", "acceptance"),
     "Compensate": ("fit", "compensate", "temperature"),
     "Library and setup": ("cards", "card", "materials", "reproduce", "doctor"),

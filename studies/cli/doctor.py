@@ -7,6 +7,7 @@ OPTIONAL = (
     # package, extra of pyproject.toml, what it brings
     ("distributed", "cluster", "for studies on several machines"),
     ("openpyxl", "excel", "to import spreadsheets"),
+    ("fmpy", "twin", "to run FMUs from Python"),
 )
 
 
@@ -46,7 +47,7 @@ def doctor() -> Result:
     drawn, remedy = can_draw()
     checks.append(("OpenGL", drawn, "pictures can be drawn" if drawn else "no pictures", remedy))
     compiler = shutil.which("cc")
-    needed = "" if compiler else "needed only to compile code that 'hrg derive' and models emit"
+    needed = "" if compiler else "needed only to compile code that 'hrg twin', 'hrg derive' and models emit"
     checks.append(("C compiler", True, compiler or "not found (optional)", needed))
     for name, extra, brings in OPTIONAL:
         try:

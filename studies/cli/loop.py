@@ -5,7 +5,8 @@ With --json one object, schema `hrg.loop/1`: `card`, `mode`, `temperature_degC`,
 "all"); `noise` (list of `source`, `deg_per_h_over_1s`, `deg_per_rt_h`); `margins` (list of `loop`, `paper`, `crossover_Hz`,
 `phase_margin_deg`, `gain_margin_dB`, `reversal_Hz`, the phase crossover); `start` (`locked_s`, `ready_s`); `range` (parts of the
 actuators' ranges in use: `rate`, `quadrature`, `drive`, `across`: rate and quadrature together where quadrature is nulled by a
-force); `out` and `rows` of the run, or null.
+force); `out` and `rows` of the run, or null. --state-space writes another object, schema `hrg.state-space/1` (see
+`studies.simulation.state_space`).
 """
 
 from typing import TYPE_CHECKING, Any
@@ -26,6 +27,7 @@ def loop(
     temperature: float | None = None,
     rate: float = 0.0,
     out: str | None = None,
+    state_space: str | None = None,
     hours: float | None = None,
     row: float | None = None,
     profile: str | None = None,
@@ -49,6 +51,8 @@ def loop(
         Applied rate in °/s, within the range of the actuators.
     out : str
         Simulate a run and write it as a record.
+    state_space : str
+        Write the wave and the closed loops as A, B, C, D, and each loop's transfer function: a .json or a .mat file.
     hours : float
         Length of the run; 1 unless --hours or --profile is given.
     row : float
@@ -73,6 +77,7 @@ def loop(
     from studies.reports.loop import describe, loop_parts
     from studies.simulation.loop import require_loop
     from studies.simulation.loop_study import study_loops
+    from studies.simulation.state_space import write_state_space
 
     instrument = load_card(card)
     keys = require_loop(instrument)
@@ -89,6 +94,9 @@ def loop(
     frequency = float(np.ravel(law.frequency(T))[0])
     inverse_q, instrument = settled_loss(instrument, T)
     study = study_loops(instrument, frequency, inverse_q, law.bryan_factor, np.radians(rate))
+    if state_space is not None:
+        write_state_space(study, state_space)
+        say(f"state space: {state_space}")
     run = None
     if out is not None:
         drawn = None if noiseless else seed

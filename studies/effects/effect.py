@@ -316,5 +316,8 @@ def apply_effects(entries: Sequence[tuple[str, str, Mapping[str, Numbers]]], sta
             if stage == (2 if not effect.thermal else int(effect.sees_heat)):
                 target, change = apply_effect(name, parameters, warmed if stage else states, response)
                 changes[target] = changes.get(target, np.zeros_like(states.time)) + change
-        warmed = replace(states, resonator=states.resonator + changes.get("resonator_temperature", 0.0))
+        if "resonator_temperature" in changes:
+            warming = changes["resonator_temperature"]
+            rate = None if states.known_rate is None else states.known_rate + np.gradient(warming, states.step)
+            warmed = replace(states, resonator=states.resonator + warming, known_rate=rate)
     return changes

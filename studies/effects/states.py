@@ -40,6 +40,8 @@ class States:
         What is left of an initial offset of the resonator, e^(−t/τ), once there is a lag.
     before : (K,) array or None
         Temperatures at which the resonator turned in the runs before, K: all that a loop may remember of them.
+    known_rate : (N,) array or None
+        Rate of the resonator temperature, K/s, where a simulation knows it.
     rows : int
         Readings at even moments of which a sample is the mean.
     record : int
@@ -62,6 +64,7 @@ class States:
     before: FloatArray | None = None
     rows: int = 1
     record: int = -1
+    known_rate: FloatArray | None = None
 
     @property
     def step(self) -> float:
@@ -75,7 +78,9 @@ class States:
 
     @property
     def rate(self) -> FloatArray:
-        """Rate of the resonator temperature, K/s."""
+        """Rate of the resonator temperature, K/s: as it is known, else differences of the samples."""
+        if self.known_rate is not None:
+            return self.known_rate
         if self.time.size < 2:
             return np.zeros_like(self.time)
         return np.asarray(np.gradient(self.resonator, self.step))
@@ -101,12 +106,13 @@ class States:
             fading=average(self.fading, group) if isinstance(self.fading, np.ndarray) else self.fading,
             spread=average(self.excess**2, group) - average(self.excess, group) ** 2,
             rows=group * self.rows,
+            known_rate=mean(self.known_rate),
         )
 
     def with_lag(self, tau: float) -> "States":
         """Return the same run with the resonator following the housing through the lag `tau`, s."""
         fading = np.exp(-(self.time - self.time[0]) / tau)
-        return replace(self, tau=tau, resonator=lag(self.housing, self.step, tau), fading=fading)
+        return replace(self, tau=tau, resonator=lag(self.housing, self.step, tau), fading=fading, known_rate=None)
 
 
 def remembered(runs: Sequence[States]) -> list[FloatArray]:

@@ -21,6 +21,7 @@ OUTPUTS = {
     # argument of a command that names what is written: how people give it
     **{name: f"--{name}" for name in ("out", "save", "report", "emit", "draft", "fmu", "c")},
     "map_file": "--map",
+    "state_space": "--state-space",
 }
 SHIPPED = ("cards", "sweeps/templates")
 STORE, STORE_FILES = "study.store", ("study.store", "lock")

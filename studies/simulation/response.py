@@ -99,7 +99,7 @@ def read_out(
     """
     reference = instrument.reference_temperature
     housing, resonator, *uneven = found.value.T
-    changes = _apply_effects(instrument, drive, housing, resonator, tau)
+    changes = _apply_effects(instrument, drive, housing, resonator, found.rate[:, 1], tau)
     warmed, rate = resonator, found.rate[:, 1]
     if "resonator_temperature" in changes:
         warmed = resonator + changes["resonator_temperature"]
@@ -146,7 +146,7 @@ def check_loss(instrument: "Instrument", inverse_q: Array) -> None:
 
 
 def _apply_effects(
-    instrument: "Instrument", drive: Drive, housing: Array, resonator: Array, tau: float
+    instrument: "Instrument", drive: Drive, housing: Array, resonator: Array, rate: Array, tau: float
 ) -> Mapping[str, Array]:
     """Sum what the card's effects add to the resonator's temperature (K) and to the responses; they need even rows."""
     if not instrument.effects:
@@ -171,6 +171,7 @@ def _apply_effects(
         campaign_time=even + drive.start,
         housing=onto(housing),
         resonator=onto(resonator),
+        known_rate=onto(rate),
         tau=tau,
         reference=instrument.reference_temperature,
         **driven,

@@ -17,6 +17,7 @@ from studies.simulation.loop import find_range_use, require_range, require_stabl
 from studies.simulation.noise import bias_noise, draw_noise, frequency_noise, quantise
 from studies.simulation.prediction import Prediction, law_for, predict
 from thermal.profile import Profile
+from thermal.sweeping import LONGEST_ROW
 
 if TYPE_CHECKING:
     from shell.law import FrequencyLaw
@@ -36,6 +37,8 @@ DIGITS = {
     "inverse_q": 16,
 }
 COMMAND_DIGITS = 9
+FINEST, MOST_STEPS = 15.0, 20_000
+"""Steps of the heat path (s) with which temperatures are exact to a tenth of the digits that are recorded, and how many of them."""
 
 
 @dataclass(frozen=True)
@@ -94,7 +97,7 @@ def simulate_run(
     if instrument.loop is not None:
         frequency = float(law.frequency(instrument.reference_temperature))
         require_stable_loops(instrument, frequency, instrument.loss.inverse_q)
-    prediction = predict(instrument, drive, law=law)
+    prediction = predict(instrument, drive, law=law, longest=_longest_step(drive))
     true = dict(prediction.columns)
     if instrument.loop is not None:
         wave = wave_of(instrument, true["frequency_Hz"], true["inverse_q"], law.bryan_factor)
@@ -143,6 +146,11 @@ def simulate_run(
     if why := unknown_slope(instrument):
         warnings += (f"the frequency follows no temperature: {why}",)
     return VirtualRun(record, prediction, warnings)
+
+
+def _longest_step(drive: Drive) -> float:
+    """Return the steps (s) of the heat path of a run: as fine as its digits ask for, coarser where it lasts days."""
+    return min(max(FINEST, float(np.ptp(drive.time)) / MOST_STEPS), LONGEST_ROW)
 
 
 def _observe(

@@ -1,0 +1,106 @@
+"""`hrg twin`: the virtual gyro of a card as C11 and as an FMU, with the numbers of `hrg simulate` and no Python inside.
+
+With --json one object, schema `hrg.twin/1`: `card`, `boundary` (what is an input: "chamber" or "housing"), `fmu` and `c` (what was
+written, or null), `fmi` (the version, or null), `compiled` (whether the FMU holds a binary; null without an FMU), `bytes` (of the FMU,
+or null), `inputs` and `parameters` (lists of `name`, `unit`, `start`), `outputs` (list of `name`, `unit`).
+"""
+
+from typing import Literal
+
+from studies.cli.output import answers
+from studies.results import Column, Result, Sentence, Table
+
+
+@answers("hrg.twin/1")
+def twin(
+    card: str,
+    *,
+    fmu: str | None = None,
+    c: str | None = None,
+    fmi: Literal["2.0", "3.0"] = "3.0",
+    boundary: Literal["chamber", "housing"] = "chamber",
+    theory: Literal["solid", "shell"] = "solid",
+) -> Result:
+    """Write the virtual gyro of a card as an FMU for co-simulation, or as C11.
+
+    The heat path, the frequency law, bias, 1/Q, effects, settled loops and noise are those of hrg simulate; without noise the
+    numbers are the same to 1e-9. Noise has the levels of [noise]: white, flicker as a sum of first-order processes, random walk.
+    Parameters are named as in the card; shape, material laws and the number of cells are fixed when the twin is written.
+
+    Parameters
+    ----------
+    card : str
+        Path of a card, or the name of one that ships (hrg cards).
+    fmu : str
+        The FMU to write, with its sources; it holds a binary for 64-bit Linux if a C compiler is found (the variable CC, cc or gcc).
+    c : str
+        A folder for the C sources, made if absent. main.c runs a profile (CSV) and writes a record: cc -std=c11 -O2 *.c -lm -o twin
+    fmi : str
+        Version of the FMU.
+    boundary : str
+        Temperature that is an input: that of the chamber, or of the housing itself.
+    theory : str
+        Of the shell: solid (three-dimensional) or shell (Naghdi).
+    """
+    import os
+
+    from studies.errors import InputError
+    from studies.files.writing import check_folder, write_text
+    from studies.instrument.card import load_card
+    from studies.twin.fmu import write_fmu
+    from studies.twin.plan import input_starts, plan_twin, symbol
+    from studies.twin.source import PROGRAM, exposed, outputs_of, sources
+
+    if fmu is None and c is None:
+        raise InputError("nothing to do: give --fmu FILE.fmu, --c FOLDER, or both.")
+    plan = plan_twin(load_card(card), boundary, theory)
+    sentences, compiled = [], None
+    if c is not None:
+        folder = check_folder(c)
+        for name, text in sources(plan, PROGRAM).items():
+            write_text(folder / name, text)
+        sentences.append(Sentence(f"{c}: C11 sources; compile with cc -std=c11 -O2 *.c -lm -o twin."))
+    if fmu is not None:
+        compiled = write_fmu(plan, fmu, fmi)
+        size = os.path.getsize(fmu)
+        sentences.append(Sentence(f"{fmu}: FMI {fmi} for co-simulation, {size / 1000:.0f} kB, with its sources."))
+        if not compiled:
+            sentences.append(
+                Sentence(
+                    "The FMU has no binary, because no C compiler for 64-bit Linux was found: the importing tool must compile its"
+                    " sources. Install gcc or set CC, and run this command again for a binary.",
+                    "warning",
+                )
+            )
+    parameters = [
+        {"name": key, "unit": symbol(key), "start": value}
+        for key, value in plan.parameters.items()
+        if exposed(plan, key)
+    ]
+    inputs = [{"name": name, "unit": symbol(name), "start": start} for name, start in input_starts(plan).items()]
+    outputs = [{"name": name, "unit": symbol(name)} for name in outputs_of(plan)]
+    payload = {
+        "schema": "hrg.twin/1",
+        "card": plan.instrument.name,
+        "boundary": boundary,
+        "fmu": fmu,
+        "c": c,
+        "fmi": fmi if fmu is not None else None,
+        "compiled": compiled,
+        "bytes": None if fmu is None else size,
+        "inputs": inputs,
+        "outputs": outputs,
+        "parameters": parameters,
+    }
+    columns = (Column("name", "name"), Column("unit", "unit"), Column("start", "start", digits=6))
+    return Result(
+        payload,
+        f"Twin of {plan.instrument.name}",
+        "The virtual gyro for other programs, from the numbers of the card.",
+        [
+            *sentences,
+            Table("Inputs", inputs, columns),
+            Table("Outputs", outputs, columns[:2]),
+            Table("Parameters", parameters, columns, where="page"),
+        ],
+    )

@@ -1,0 +1,286 @@
+"""Tables of a card for the C twin: parameters by the card's names, heat path, law, effects; and what cannot be carried."""
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shell.constants import zero_Celsius
+from studies.errors import InputError
+from studies.instrument.imperfect import is_imperfect
+from studies.instrument.tables.loop import Loop
+from studies.instrument.units import unit_of
+from studies.simulation.heat_path import SENSOR, build_network, slowest_lag, with_sensor
+from studies.simulation.response import observed_rows
+from thermal.network import assemble
+from thermal.resonator import describe_resonator
+
+if TYPE_CHECKING:
+    from scipy.interpolate import CubicSpline
+
+    from shell.law import FrequencyLaw
+    from shell.levels import Theory
+    from studies.instrument.card import Instrument
+    from studies.simulation.drive import Boundary
+    from thermal.network import Network
+
+Array = NDArray[np.float64]
+TABLES = ("thermal", "loss", "bias", "noise", "loop")
+FIXED = ("thermal.cells", "thermal.stem_radius_mm", "thermal.stem_length_mm")
+"""Numbers of those tables that have become part of the network."""
+OF_LOOPS = ("gain", "phase_d", "phase_deg", "skew", "misalignment", "split", "axis", "per_Hz", "range", "headroom")
+"""Parts of the names of those keys of [loop] that act on settled loops."""
+MEMORY = 16  # numbers that one effect may remember
+CAPACITY_STEP = 0.25  # K, of the knots of a heat capacity that varies
+
+
+@dataclass(frozen=True)
+class Spline:
+    """Even knots from `first` (K), and four rows of coefficients, the highest power first."""
+
+    first: float
+    step: float
+    coefficients: Array
+
+
+@dataclass(frozen=True)
+class EffectRow:
+    """One effect: its name, target ("temperature" or a response) and the places of its shape and weights among the parameters."""
+
+    name: str
+    target: str
+    shape: int
+    weights: int
+    count: int
+
+
+@dataclass(frozen=True)
+class Plan:
+    """Numbers of one card that the C code runs on.
+
+    Attributes
+    ----------
+    boundary : "chamber" or "housing"
+    parameters : mapping from key of the card to number; keys that begin with "." are no keys of a card
+    network : Network
+        Of unit constants, so that its links and capacities are the factors of the parameters.
+    rows : array (5, nodes)
+        Resonator's mean temperature and what is uneven in it.
+    constants : mapping from macro to number
+    splines : mapping of "law", "heat_capacity", "loss" and the two parts of "wave"
+    """
+
+    instrument: "Instrument"
+    boundary: "Boundary"
+    parameters: dict[str, float]
+    network: "Network"
+    rows: Array
+    uneven: Array
+    constants: dict[str, float]
+    splines: dict[str, Spline]
+    effects: tuple[EffectRow, ...]
+
+    @property
+    def key_of(self) -> dict[str, str]:
+        """The parameter that scales a capacity, link or radiator, by its name; of shell and stem, by "shell"."""
+        return {
+            "housing": "thermal.housing_heat_capacity_J_per_K",
+            SENSOR: "thermal.housing_heat_capacity_J_per_K",
+            "base": "thermal.base_heat_capacity_J_per_K",
+            "chamber-housing": "thermal.chamber_conductance_W_per_K",
+            "housing-base": "thermal.mount_conductance_W_per_K",
+            "radiated housing-base": "thermal.mount_exchange_cm2",
+            "radiated": "thermal.film_emissivity",
+            "conducted": "thermal.conductivity_W_per_m_K",
+            "shell": "thermal.heat_capacity_J_per_kg_K",
+        }
+
+
+def plan_twin(instrument: "Instrument", boundary: "Boundary" = "chamber", theory: "Theory" = "solid") -> Plan:
+    """Return what the C code needs of a card.
+
+    Raises
+    ------
+    InputError
+        A card of which a part cannot be carried: which, and what to do.
+    """
+    from studies.law import law_of
+
+    _refuse(instrument)
+    law = law_of(instrument, theory=theory)
+    path = instrument.heat_path
+    unit = replace(
+        path,
+        volumetric_capacity=float(instrument.material.value("density", instrument.reference_temperature)),
+        conductivity=1.0,
+        emissivity=1.0,
+        base_capacity=1.0,
+        housing_capacity=1.0,
+        mount_conductance=1.0,
+        mount_exchange=1e-4,
+        chamber_conductance=1.0,
+        drive_power=1.0,
+    )
+    network = assemble(describe_resonator(unit))
+    if boundary == "housing":
+        from studies.simulation.heat_path import behind_housing
+
+        network = behind_housing(network)
+    else:
+        network = with_sensor(network, 1.0)
+    parameters = dict(_card_numbers(instrument))
+    parameters["thermal.conductivity_W_per_m_K"] = path.conductivity
+    splines = {"law": _spline(law._spline), **_splines(instrument, law)}
+    density = float(instrument.material.value("density", instrument.reference_temperature))
+    capacity = path.volumetric_capacity
+    parameters["thermal.heat_capacity_J_per_kg_K"] = math.nan if callable(capacity) else capacity / density
+    effects = tuple(_place_effects(instrument, parameters))
+    rows = observed_rows(instrument, law, tuple(node.name for node in network.nodes))[1:6]
+    uneven = law.uneven_slopes(instrument.reference_temperature)
+    return Plan(
+        instrument, boundary, parameters, network, rows, uneven, _constants(instrument, law, boundary), splines, effects
+    )
+
+
+def _refuse(instrument: "Instrument") -> None:
+    """Raise for what the C code does not hold."""
+    if instrument.loop is not None and instrument.loop.mode == "whole-angle":
+        raise InputError(
+            f'{instrument.path} [loop]: mode = "whole-angle" cannot be carried: the twin holds its wave; set mode ='
+            ' "force-rebalance", or use the records of hrg simulate.'
+        )
+    for effect in instrument.effects:
+        if effect.name.replace("-", "_") not in EFFECTS:
+            raise InputError(
+                f"{instrument.path} [[effect]]: '{effect.name}' cannot be carried; leave this effect out of the card."
+            )
+
+
+EFFECTS = (
+    "second_lag", "thermometer_scale", "thermometer_lag", "self_heating", "radiation", "clock_offset", "activity_dip", "ageing",
+    "amplitude_frequency", "axis_rotation", "clock_drift", "cross_damping", "curvature", "electrostatic_softening", "hysteresis", "jump",
+    "leak", "loss_peak", "mounting_stress", "periodic", "quadrature_leakage", "rate_bias", "rate_frequency",
+)  # fmt: skip
+"""Effects that effects.c has."""
+
+
+def _card_numbers(instrument: "Instrument") -> Iterator[tuple[str, float]]:
+    """Yield the numbers of the tables that act, by their dotted keys."""
+    for table in TABLES:
+        keys = (instrument.loop or Loop()) if table == "loop" else getattr(instrument, table)
+        if table == "loop" and instrument.loop is None:
+            continue
+        for name in keys.__struct_fields__:
+            value, key = getattr(keys, name), f"{table}.{name}"
+            wanted = table != "loop" or any(part in name for part in OF_LOOPS)
+            if isinstance(value, bool | str) or key in FIXED or not wanted:
+                continue
+            yield key, math.nan if value is None else float(value)
+
+
+def _splines(instrument: "Instrument", law: "FrequencyLaw") -> dict[str, Spline]:
+    """Splines of a heat capacity that varies, and of the parts of a loss budget."""
+    from scipy.interpolate import CubicSpline
+
+    from studies.loss.damping_law import NODE_STEP, damping_law
+
+    found: dict[str, Spline] = {}
+    if callable(instrument.heat_path.volumetric_capacity):
+        T = np.arange(law.lowest, law.highest + CAPACITY_STEP, CAPACITY_STEP)
+        found["heat_capacity"] = _spline(CubicSpline(T, instrument.material.value("heat_capacity", T)))
+    damping = damping_law(instrument, law.lowest, law.highest)
+    if damping is not None:
+        T = np.linspace(law.lowest, law.highest, 4 * math.ceil((law.highest - law.lowest) / NODE_STEP))
+        found["loss"] = _spline(CubicSpline(T, np.log(damping.inverse_q(T))))
+        if damping.wave is not None:
+            wave = damping.wave(T)
+            found |= {"wave_0": _spline(CubicSpline(T, wave.real)), "wave_1": _spline(CubicSpline(T, wave.imag))}
+    return found
+
+
+def _spline(curve: "CubicSpline") -> Spline:
+    x = curve.x
+    return Spline(float(x[0]), float(x[-1] - x[0]) / (len(x) - 1), np.asarray(curve.c))
+
+
+def _place_effects(instrument: "Instrument", parameters: dict[str, float]) -> Iterator[EffectRow]:
+    """Add the shapes and weights of the card's effects to the parameters, and yield their rows."""
+    from studies.effects import find_effect
+    from studies.effects.effect import check_effect
+
+    for number, one in enumerate(instrument.effects, 1):
+        effect = find_effect(one.name)
+        shape, weights = check_effect(one.name, one.parameters, one.response)
+        names = [f"effect.{number}.{p.name}" for p in effect.shape]
+        for name, c in zip(effect.coefficient_names(one.response), effect.coefficients, strict=True):
+            more = range(len(c.spread))
+            given = name in one.parameters
+            names += [
+                ("" if given else ".") + f"effect.{number}.{name}" + (f".{k + 1}" if len(more) > 1 else "")
+                for k in more
+            ]
+        first = len(parameters)
+        for name, value in zip(names, [*shape, *weights], strict=True):
+            parameters[name] = float(value)
+        target = "temperature" if effect.thermal else one.response
+        yield EffectRow(one.name, target, first, first + len(shape), len(weights))
+
+
+def _constants(instrument: "Instrument", law: "FrequencyLaw", boundary: "Boundary") -> dict[str, float]:
+    """Numbers that are no keys of the card: the solver's, and those of imperfection and electrodes."""
+    from shell.electrodes import soften_at_gap
+    from studies.splitting import mean_shift, reference_split
+
+    T0 = instrument.reference_temperature
+    keys = instrument.part("electrodes").keys if instrument.part("electrodes").are_charged else None
+    split, shift, own, per_volt = 0j, 0.0, 0.0, 0.0
+    if is_imperfect(instrument):
+        found = reference_split(instrument).split
+        split = complex(found.frequency * found.wave)
+        at = np.array([T0])
+        shift = float(np.ravel(mean_shift(instrument, at))[0])
+    if keys is not None:
+        shift = float(reference_split(instrument).imperfection.shift)
+        own = float(np.ravel(mean_shift(instrument, at))[0]) - shift
+        commanded = mean_shift(instrument, at, np.array([keys.voltage_V**2 + 1.0]))
+        per_volt = float(np.ravel(commanded)[0]) - shift - own
+        per_volt /= float(soften_at_gap(1.0, 1.0))
+    lag = slowest_lag(build_network(instrument, boundary=boundary), T0) if instrument.effects else 1.0
+    return {
+        "REFERENCE": T0,
+        "REFERENCE_FREQUENCY": float(law.frequency(T0)),
+        "LOWEST": law.lowest,
+        "HIGHEST": law.highest,
+        "BRYAN": law.bryan_factor,
+        "LAG": lag,
+        "SPLIT_RE": split.real,
+        "SPLIT_IM": split.imag,
+        "SHIFT": shift,
+        "SOFTENING": own,
+        "PER_SQUARE_VOLT": per_volt,
+        "VOLTAGE_SQUARED": 0.0 if keys is None else keys.voltage_V**2,
+        "GAP_EXPANSION": 0.0 if keys is None else keys.gap_expansion_per_K,
+    }
+
+
+def symbol(name: str) -> str:
+    """Return the unit of a parameter, an input or an output; rates stand without brackets where nothing else is beside them."""
+    unit = unit_of(name)
+    return unit[1:-1] if unit.startswith("(") and unit.endswith(")") else unit
+
+
+def input_starts(plan: Plan) -> dict[str, float]:
+    """Return the inputs of an FMU by name, with their values at the start."""
+    card: Any = plan.instrument
+    return {
+        f"{plan.boundary}_temperature_degC": card.reference_temperature - zero_Celsius,
+        f"{plan.boundary}_temperature_slope_K_per_s": 0.0,
+        "rate_deg_per_s": 0.0,
+        "commanded_drive_amplitude_V": 0.0,
+        "commanded_electrode_bias_V": math.sqrt(plan.constants["VOLTAGE_SQUARED"]),
+        "commanded_quadrature_V": 0.0,
+        "commanded_pattern_angle_deg": card.bias.pattern_angle_deg,
+    }

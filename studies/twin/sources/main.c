@@ -1,0 +1,157 @@
+/* twin PROFILE.csv RECORD.csv [row=1] [seed=0 | noiseless] [full]: a run through a profile, row by row.
+ *
+ * The profile has the columns time_s and chamber_temperature_degC (housing_temperature_degC where the card was carried for
+ * it), linear between its rows, and any of drive_amplitude_V, electrode_bias_V, quadrature_V, pattern_angle_deg and
+ * rate_deg_per_s. `full` writes 17 digits. Exit status: 0 done, 2 unusable input.
+ */
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "twin.h"
+
+enum { TIME, BOUNDARY, FIRST_COMMAND, COLUMNS = FIRST_COMMAND + TWIN_COMMANDS, LONGEST_LINE = 4096 };
+static const char *const names[COLUMNS] = {"time_s", TWIN_BOUNDARY, "rate_deg_per_s", "drive_amplitude_V", "electrode_bias_V", "quadrature_V", "pattern_angle_deg"};
+
+typedef struct { double (*rows)[COLUMNS]; long count, place; int has[COLUMNS]; } Profile;
+
+static int complain(const char *file, long line, const char *what) {
+    fprintf(stderr, "%s, line %ld: %s\n", file, line, what);
+    return 2;
+}
+
+static int load(const char *file, Profile *profile) {
+    FILE *in = fopen(file, "r");
+    char line[LONGEST_LINE];
+    int order[64], width = 0;
+    long number = 0;
+    if (!in) return complain(file, 0, "cannot be read.");
+    while (fgets(line, sizeof line, in)) {
+        int k = 0;
+        double row[COLUMNS] = {0};
+        ++number;
+        line[strcspn(line, "\r\n")] = 0;
+        if (!*line || *line == '#') continue;
+        for (char *cell = line, *next = line; next && k < 64; cell = next, ++k) {
+            next = strchr(cell, ',');
+            if (next) *next++ = 0;
+            if (!width || !profile->rows) {
+                order[k] = -1;
+                for (int c = 0; c < COLUMNS; ++c)
+                    if (!strcmp(cell, names[c])) order[k] = c, profile->has[c] = 1;
+                if (order[k] < 0) return fclose(in), complain(file, number, "unknown column; main.c lists them.");
+            } else {
+                char *end;
+                const double value = strtod(cell, &end);
+                if (k >= width || end == cell || *end || !isfinite(value)) return fclose(in), complain(file, number, "a cell is no number.");
+                row[order[k]] = value;
+            }
+        }
+        if (!width) {
+            width = k;
+            profile->rows = malloc(sizeof *profile->rows);
+            if (!profile->rows || !profile->has[TIME] || !profile->has[BOUNDARY])
+                return fclose(in), complain(file, number, "needs the columns time_s and " TWIN_BOUNDARY ".");
+            continue;
+        }
+        if (k != width) return fclose(in), complain(file, number, "has fewer cells than the header.");
+        if (profile->count && row[TIME] < profile->rows[profile->count - 1][TIME]) return fclose(in), complain(file, number, "time_s goes back.");
+        void *more = realloc(profile->rows, (size_t)(profile->count + 1) * sizeof *profile->rows);
+        if (!more) return fclose(in), complain(file, number, "not enough memory.");
+        profile->rows = more;
+        memcpy(profile->rows[profile->count++], row, sizeof row);
+    }
+    fclose(in);
+    return profile->count > 1 ? 0 : complain(file, number, "a profile needs at least two rows.");
+}
+
+/* The value at a time, after a jump; the time never goes back. */
+static double value_at(Profile *profile, double time, int column) {
+    while (profile->place < profile->count - 2 && profile->rows[profile->place + 1][TIME] <= time) ++profile->place;
+    const double *a = profile->rows[profile->place], *b = a + COLUMNS;
+    return b[TIME] <= time ? b[column] : a[column] + (b[column] - a[column]) / (b[TIME] - a[TIME]) * (time - a[TIME]);
+}
+
+/* Heat from one row to the next, in pieces between which the profile is straight. */
+static const char *heat_to(Twin *twin, Profile *profile, double start, double time) {
+    const char *fault = NULL;
+    double now = start;
+    while (now < time && !fault) {
+        const double from = value_at(profile, now, BOUNDARY);
+        const double *corner = profile->rows[profile->place + 1];
+        const double until = corner[TIME] > now && corner[TIME] < time ? corner[TIME] : time;
+        const double *last = corner - COLUMNS;
+        const double slope = corner[TIME] > last[TIME] ? (corner[BOUNDARY] - last[BOUNDARY]) / (corner[TIME] - last[TIME]) : 0.0;
+        fault = twin_heat(twin, until - now, from + 273.15, from + slope * (until - now) + 273.15);
+        now = until;
+    }
+    return fault;
+}
+
+/* Commands whose columns stand among those of the loops. */
+static int said_by_loops(int command) { return TWIN_LOOPS && (command == IN_QUADRATURE || command == IN_ANGLE); }
+
+static int write_rows(Twin *twin, Profile *profile, FILE *out, double row, int full) {
+    const double start = profile->rows[0][TIME], end = profile->rows[profile->count - 1][TIME];
+    const long count = (long)floor((end - start) / row * (1 + 1e-12)) + 1;
+    const char *fault = twin_settle(twin, profile->rows[0][BOUNDARY] + 273.15);
+    TwinInput in = {{0}, {0}};
+    double now = start;
+    twin->step = row;
+    fprintf(out, "# instrument: %s\n# source: simulated\ntime_s%s", TWIN_NAME, TWIN_SENSOR >= 0 ? "," TWIN_BOUNDARY : "");
+    for (int k = 0; k < TWIN_OUTPUTS - 1; ++k)
+        fprintf(out, ",%s", twin_columns[k]);
+    for (int c = FIRST_COMMAND + 1; c < COLUMNS; ++c)
+        if (profile->has[c] && !said_by_loops(c - FIRST_COMMAND)) fprintf(out, ",%s", names[c]);
+    if (profile->has[FIRST_COMMAND]) fprintf(out, ",%s,%s", names[FIRST_COMMAND], twin_columns[TWIN_OUTPUTS - 1]);
+    fputc('\n', out);
+    for (long n = 0; n < count && !fault; ++n) {
+        const double time = fmin(start + (double)n * row, end);
+        fault = heat_to(twin, profile, now, time);
+        twin->time = time - start;
+        now = time;
+        for (int c = 0; c < TWIN_COMMANDS; ++c) {
+            in.given[c] = profile->has[FIRST_COMMAND + c];
+            in.value[c] = value_at(profile, time, FIRST_COMMAND + c);
+        }
+        if (n == 0) twin->boundary = value_at(profile, time, BOUNDARY) + 273.15;
+        if (!fault) fault = twin_row(twin, &in);
+        if (!fault && twin->actuator_use > 1) fault = "the settled loops need more than the actuators give; lower the rate or raise the ranges of [loop].";
+        if (fault) break;
+        fprintf(out, "%.*f", full ? 17 : 9, time);
+        if (TWIN_SENSOR >= 0) fprintf(out, full ? ",%.17g" : ",%.6f", value_at(profile, time, BOUNDARY));
+        if (TWIN_LOOPS && in.given[IN_QUADRATURE]) twin->out[TWIN_QUADRATURE] = in.value[IN_QUADRATURE];
+        for (int k = 0; k < TWIN_OUTPUTS - 1; ++k)
+            full ? fprintf(out, ",%.17g", twin->out[k]) : fprintf(out, ",%.*f", twin_digits[k], twin->out[k]);
+        for (int c = 1; c < TWIN_COMMANDS; ++c)
+            if (in.given[c] && !said_by_loops(c)) fprintf(out, full ? ",%.17g" : ",%.9f", in.value[c]);
+        if (in.given[IN_RATE]) fprintf(out, full ? ",%.17g,%.17g" : ",%.9f,%.9f", in.value[IN_RATE], twin->out[TWIN_OUTPUTS - 1]);
+        fputc('\n', out);
+    }
+    return fault ? (fprintf(stderr, "at %g s: %s\n", now, fault), 2) : 0;
+}
+
+int main(int argc, char **argv) {
+    Profile profile = {0};
+    double row = argc > 3 ? atof(argv[3]) : 1.0;
+    const int full = argc > 5 && !strcmp(argv[5], "full");
+    if (argc < 3 || !(row > 0)) return fprintf(stderr, "usage: twin PROFILE.csv RECORD.csv [row=1] [seed=0 | noiseless] [full]\n"), 2;
+    Twin *twin = malloc(sizeof *twin);
+    FILE *out = NULL;
+    int status = twin ? load(argv[1], &profile) : 2;
+    if (!status) {
+        out = fopen(argv[2], "w");
+        if (!out) status = complain(argv[2], 0, "cannot be written.");
+    }
+    if (!status) {
+        twin_defaults(twin);
+        twin->noise = !(argc > 4 && !strcmp(argv[4], "noiseless"));
+        twin_seed(twin, argc > 4 ? strtoull(argv[4], NULL, 10) : 0);
+        status = write_rows(twin, &profile, out, row, full);
+    }
+    if (out && fclose(out) && !status) status = complain(argv[2], 0, "cannot be written.");
+    free(profile.rows);
+    free(twin);
+    return status;
+}

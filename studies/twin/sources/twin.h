@@ -1,0 +1,80 @@
+/* A virtual gyro: heat path, frequency, zero-rate output, 1/Q, effects, settled loops and noise, row by row.
+ *
+ * card.h and card.c hold the numbers of one card; everything else is the same for all. Temperatures are in kelvin inside,
+ * in degC at inputs and outputs. A function that can fail returns NULL, or a sentence that says why.
+ *
+ *     twin_defaults(&twin);            the card's parameters; change twin.p[P_...] here
+ *     twin_settle(&twin, 293.15);      the steady state at this temperature of the boundary
+ *     twin_row(&twin, &in);            the outputs twin.out[OUT_...] at this moment
+ *     twin_heat(&twin, h, T0, T1);     h seconds on; the boundary goes from T0 to T1 (K) in a straight line
+ */
+#ifndef TWIN_H
+#define TWIN_H
+
+#include <stdint.h>
+
+#include "card.h"
+
+enum { IN_RATE, IN_AMPLITUDE, IN_VOLTAGE, IN_QUADRATURE, IN_ANGLE, TWIN_COMMANDS };
+enum { TARGET_TEMPERATURE, TARGET_FREQUENCY, TARGET_BIAS, TARGET_LOSS, TARGETS };
+enum { FLICKER_TIMES = 18 };
+
+typedef struct { int one, other, parameter; double factor; } TwinLink; /* conductance or exchange area = p * factor */
+typedef struct { int parameter; double factor; } TwinCapacity;         /* p * factor; of shell and stem over T besides */
+typedef struct { int kind, target, memory, shape, weights, count; } TwinEffect; /* memory; places in p; weights in use */
+typedef struct { double first, step; int count; const double *coefficients; } TwinSpline; /* 4 rows, highest power first */
+
+/* deg/s, V, V, V, deg; a command that is not given does not act, and the azimuth is the card's. */
+typedef struct { double value[TWIN_COMMANDS]; int given[TWIN_COMMANDS]; } TwinInput;
+
+typedef struct { double markov[FLICKER_TIMES], walk, offset; int begun; } TwinNoise;
+
+typedef struct {
+    double p[TWIN_PARAMETERS];
+    double time, step, row_time; /* since the start; between rows; of the last row, below 0 before the first */
+    double boundary, T[TWIN_NODES];
+    double out[TWIN_OUTPUTS];
+    double actuator_use; /* largest part of an actuator's range that the settled loops need; above 1 they cannot hold the wave */
+    int noise;
+    double capacity[TWIN_NODES], power[TWIN_NODES], area[TWIN_RADIATORS], conductance[TWIN_LINKS];
+    double rate[TWIN_NODES], shape[TWIN_NODES][TWIN_NODES]; /* modes of the linearised network */
+    double scratch[TWIN_NODES * TWIN_NODES];
+    double length, weight[2][3][TWIN_NODES];                /* of the last step: t^k phi_k, half and whole */
+    double memory[TWIN_MEMORY], last_change;
+    uint64_t random[4];
+    double spare;
+    int has_spare;
+    TwinNoise of_frequency, of_bias;
+} Twin;
+
+extern const double twin_start[TWIN_PARAMETERS];
+extern const char *const twin_parameter_names[TWIN_PARAMETERS]; /* as in the card; "" where there is no key */
+extern const TwinLink twin_links[TWIN_LINKS], twin_radiators[TWIN_RADIATORS];
+extern const TwinCapacity twin_capacities[TWIN_NODES];
+extern const double twin_power_shares[TWIN_NODES];
+extern const double twin_rows[5][TWIN_NODES]; /* resonator, and what is uneven in it */
+extern const double twin_uneven[4];
+extern const TwinSpline twin_law, twin_heat_capacity, twin_loss, twin_wave[2];
+extern const TwinEffect twin_effects[TWIN_EFFECTS];
+extern const char *const twin_columns[TWIN_OUTPUTS];
+extern const int twin_digits[TWIN_OUTPUTS];
+
+void twin_defaults(Twin *twin);
+void twin_seed(Twin *twin, uint64_t seed);
+const char *twin_settle(Twin *twin, double boundary);
+const char *twin_heat(Twin *twin, double h, double from, double to);
+const char *twin_row(Twin *twin, const TwinInput *in);
+
+/* Of the parts. */
+double twin_effect(Twin *twin, const TwinEffect *effect, const TwinInput *in, double h, double housing, double resonator, double rate);
+#if TWIN_LOOPS
+void twin_settle_loops(Twin *twin, double frequency, double loss, const double *wave, double rate, double angle, double *said);
+#endif
+void twin_warming(const Twin *twin, double *rate);
+double twin_spline(const TwinSpline *spline, double x, double *slope);
+double twin_normal(Twin *twin);
+double twin_draw(Twin *twin, TwinNoise *noise, double white, double flicker, double walk, double offset, double span);
+int twin_solve(int n, double *matrix, double *right);
+void twin_modes(int n, double *matrix, double *vectors);
+
+#endif

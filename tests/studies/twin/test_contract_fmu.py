@@ -1,0 +1,136 @@
+"""FMUs in FMPy, what the archive holds, and what is said of a card that cannot be carried or of a missing compiler."""
+
+import json
+import zipfile
+
+import numpy as np
+import pytest
+
+from studies.cli import main
+from studies.instrument.card import load_card, save_card
+from studies.simulation.drive import drive_by_profile, rows_of
+from studies.simulation.virtual_gyro import simulate_run
+from studies.twin import fmu as fmus
+from studies.twin.plan import plan_twin
+from tests.studies.twin.building import needs_compiler
+from thermal.profile import Profile
+
+TIME, LEVEL = np.array([0.0, 600.0, 2400.0, 5400.0]), np.array([20.0, 20.0, 35.0, 35.0])
+
+
+def simulate_fmpy(path, start):
+    fmpy = pytest.importorskip("fmpy", reason="fmpy is not installed; it is in the extra 'test'")
+    pytest.importorskip("lxml")
+    slopes = np.append(np.diff(LEVEL) / np.diff(TIME), 0.0)
+    rows = np.arange(0.0, TIME[-1] + 1, 1.0)
+    inputs = np.zeros(
+        rows.size,
+        dtype=[
+            ("time", float),
+            ("chamber_temperature_degC", float),
+            ("chamber_temperature_slope_K_per_s", float),
+            ("rate_deg_per_s", float),
+        ],
+    )
+    inputs["time"], inputs["chamber_temperature_degC"], inputs["rate_deg_per_s"] = (
+        rows,
+        np.interp(rows, TIME, LEVEL),
+        0.01,
+    )
+    inputs["chamber_temperature_slope_K_per_s"] = slopes[np.minimum(np.searchsorted(TIME, rows, side="right") - 1, 2)]
+    with zipfile.ZipFile(path) as archive:
+        text = archive.read("modelDescription.xml").decode()
+    outputs = [
+        "housing_temperature_degC",
+        "resonator_temperature_degC",
+        "frequency_Hz",
+        "bias_deg_per_h",
+        "inverse_q",
+        "measured_rate_deg_per_s",
+    ]
+    options = {
+        "input": inputs,
+        "output": outputs,
+        "start_values": start,
+        "stop_time": TIME[-1],
+        "step_size": 1.0,
+        "output_interval": 1.0,
+    }
+    return fmpy.simulate_fmu(str(path), validate=True, fmi_type="CoSimulation", **options), text
+
+
+@needs_compiler
+@pytest.mark.slow
+@pytest.mark.parametrize("version", ["2.0", "3.0"])
+def test_limits_fmu_in_fmpy(version, tmp_path):
+    """The official description is valid, and the FMU's outputs are the simulation's to 1e-9, with a parameter of the card changed."""
+    path = tmp_path / "twin.fmu"
+    assert main(["twin", "hrg-30mm-loops", "--fmu", str(path), "--fmi", version]) == 0
+    assert path.stat().st_size < 1e6
+    moved = {"thermal.mount_conductance_W_per_K": 0.02, "bias.damping_anisotropy": 0.02}
+    found, text = simulate_fmpy(path, {"noise": False, **moved})
+    instrument = load_card("hrg-30mm-loops").with_values(moved)
+    profile = Profile(TIME, LEVEL + 273.15)
+    drive = drive_by_profile(profile, rows_of(profile, 1.0))
+    drive = type(drive)(drive.time, "chamber", profile, rate=np.full(drive.time.size, np.radians(0.01)))
+    run = simulate_run(instrument, drive, noise=False)
+    expected = dict(run.prediction.columns) | {"housing_temperature_degC": run.prediction.housing - 273.15}
+    assert found["time"].size == drive.time.size
+    for name in (
+        "housing_temperature_degC",
+        "resonator_temperature_degC",
+        "frequency_Hz",
+        "bias_deg_per_h",
+        "inverse_q",
+    ):
+        assert np.abs(found[name] - expected[name]).max() < 1e-9 * np.abs(expected[name]).max(), name
+    assert 'unit="W/K"' in text
+
+
+@needs_compiler
+@pytest.mark.slow
+def test_contract_fmu_draws_by_its_seed(tmp_path):
+    """Noise is on by default; a seed repeats its run."""
+    path = tmp_path / "twin.fmu"
+    fmus.write_fmu(plan_twin(load_card("free-dome")), path, "3.0")
+    one, again, other = (simulate_fmpy(path, {"seed": seed})[0]["frequency_Hz"] for seed in (1, 1, 2))
+    assert np.array_equal(one, again)
+    assert 0.5 < np.std(one - other) / (2e-3 * np.sqrt(2)) < 2.0
+
+
+def test_contract_without_compiler(tmp_path, monkeypatch, capsys):
+    """The FMU then has its sources only, and the command says so."""
+    monkeypatch.setattr(fmus, "compiler", lambda: None)
+    path = tmp_path / "twin.fmu"
+    assert main(["twin", "free-dome", "--fmu", str(path), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["compiled"] is False
+    assert main(["twin", "free-dome", "--fmu", str(path)]) == 0
+    assert "no C compiler" in " ".join(capsys.readouterr().out.split())
+    with zipfile.ZipFile(path) as archive:
+        names = archive.namelist()
+    assert not [name for name in names if name.startswith("binaries")]
+    assert {"modelDescription.xml", "sources/fmi.c", "sources/card.c", "sources/buildDescription.xml"} <= set(names)
+
+
+def test_contract_failure_keeps_the_old_file(tmp_path, monkeypatch):
+    path = tmp_path / "twin.fmu"
+    path.write_text("old")
+    monkeypatch.setattr(
+        zipfile.ZipFile, "writestr", lambda *_, **__: (_ for _ in ()).throw(OSError(28, "No space left on device"))
+    )
+    assert main(["twin", "free-dome", "--fmu", str(path)]) == 2
+    assert path.read_text() == "old"
+    assert [one.name for one in tmp_path.iterdir()] == ["twin.fmu"]
+
+
+def test_contract_bad_input(tmp_path, capsys):
+    """Neither output; a part of the card that cannot be carried; a name that would end a C text."""
+    assert main(["twin", "free-dome"]) == 2
+    assert "--fmu" in capsys.readouterr().err
+    turning = tmp_path / "turning.toml"
+    save_card(load_card("hrg-30mm-loops").with_table("loop", {"mode": "whole-angle"}), turning)
+    assert main(["twin", str(turning), "--c", str(tmp_path / "c")]) == 2
+    error = capsys.readouterr().err
+    assert "turning.toml [loop]" in error
+    assert "force-rebalance" in error
+    assert not (tmp_path / "c").exists()

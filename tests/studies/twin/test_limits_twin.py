@@ -1,0 +1,243 @@
+"""The C twin against the simulation that it stands for: shipped cards, every effect, drives, noise, sanitizers."""
+
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from compensation.noise import Noise
+from studies.cli import main
+from studies.effects import library
+from studies.instrument.card import load_card, save_card, shipped_cards
+from studies.record import read_record
+from tests.studies.twin.building import (
+    SANITIZED,
+    STRICT,
+    compile_twin,
+    needs_compiler,
+    run_twin,
+    simulated,
+    worst,
+    write_profile,
+)
+from thermal.profile import Profile
+
+pytestmark = needs_compiler
+HERE = Path(__file__).parent
+HOUR = 3600.0
+TEN_HOURS = {
+    "time_s": [0.0, 0.0, 5 * HOUR, 5 * HOUR + 3000.0, 10 * HOUR],
+    "chamber_temperature_degC": [20.0, -10.0, -10.0, 40.0, 40.0],
+}
+RAMPS = {
+    "time_s": np.array([0.0, 600.0, 4000.0, 4600.0, 9000.0]),
+    "chamber_temperature_degC": [20.0, 20.0, 45.0, 5.0, 15.0],
+    "rate_deg_per_s": [0.0, 0.02, -0.03, 0.01, 0.0],
+    "drive_amplitude_V": [1.0, 1.0, 1.3, 0.8, 1.0],
+    "electrode_bias_V": [80.0, 80.0, 110.0, 90.0, 80.0],
+    "quadrature_V": [0.1, 0.2, -0.1, 0.3, 0.1],
+    "pattern_angle_deg": [20.0, 20.0, 31.0, 12.0, 25.0],
+}
+SHAPES = {
+    # a shape in the middle of what is reached, where the middle of the bounds is not
+    "temperature_degC": 22.0,
+    "width_K": 2.0,
+    "half_width_K": 3.0,
+    "from_degC": 5.0,
+    "to_degC": 40.0,
+    "second_time_constant_s": 900.0,
+    "relaxation_time_s": 1500.0,
+    "period_s": 1234.5,
+    "onset_s": 1000.0,
+    "time_s": 4321.0,
+    "filling_s": 5000.0,
+    "pole_s": 40.0,
+    "axis_deg": 7.0,
+    "share_of_form": 0.2,
+    "rotation_deg_per_10K": 3.0,
+}
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    return tmp_path_factory.mktemp("twin")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("card", sorted(shipped_cards()))
+def test_limits_shipped_card_over_ten_hours(card, folder):
+    """A step, a ramp and soaks, ten hours at 1 Hz: every column to 1e-9 of its largest value."""
+    instrument = load_card(card)
+    profile = write_profile(folder / "ten.csv", TEN_HOURS)
+    found = run_twin(compile_twin(instrument, folder / card, (*STRICT, "-O2")), profile)
+    expected = simulated(
+        instrument, Profile(np.array(TEN_HOURS["time_s"]), 273.15 + np.array(TEN_HOURS["chamber_temperature_degC"]))
+    )
+    assert set(expected) < set(found)
+    assert {name: error for name, error in worst(found, expected).items() if error > 1e-9} == {}
+
+
+def one_effect(name, response):
+    effect = library()[name]
+    shape = {p.name: min(max(SHAPES.get(p.name, p.low), p.low), p.high) for p in effect.shape}
+    size = {"frequency_Hz": 1e-3, "bias_deg_per_h": 1.0, "inverse_q": 1e-9}[response] if not effect.thermal else 0.05
+    size *= 100.0 if name == "rate-frequency" else 1.0
+    keys = zip(effect.coefficient_names(response), effect.coefficients, strict=True)
+    weights = {
+        key: size * c.spread[0] if len(c.spread) == 1 else [size * float(part) for part in c.spread] for key, c in keys
+    }
+    return {"name": name, "response": response, **shape, **weights}
+
+
+CASES = [(name, response) for name, effect in sorted(library().items()) for response in effect.responses]
+BY_DIFFERENCES = {"thermometer-lag": 3e-6, "clock-offset": 1e-7, "rate-frequency": 1e-9, "rate-bias": 1e-9}
+"""The simulation takes these rates as differences between its rows; the twin has them exactly."""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("name", "response"), CASES)
+def test_limits_effect(name, response, folder):
+    """Every effect of the library alone, with all its coefficients, through ramps with moving commands."""
+    instrument = load_card("free-dome").with_table("effect", [one_effect(name, response)])
+    profile = write_profile(folder / "ramps.csv", RAMPS)
+    found = run_twin(compile_twin(instrument, folder / "effect"), profile, 2.0)
+    expected = simulated(instrument, profile, 2.0)
+    bare = simulated(load_card("free-dome"), profile, 2.0)
+    moved = max(np.abs(expected[column] - bare[column]).max() / np.abs(bare[column]).max() for column in bare)
+    assert moved > 1e-8 or name == "jump"
+    allowed = BY_DIFFERENCES.get(name, 1e-9)
+    assert {column: error for column, error in worst(found, expected).items() if error > allowed} == {}
+
+
+@pytest.mark.slow
+def test_limits_everything_at_once(folder):
+    """Loops with every error of their electronics, electrodes, a polynomial bias and a linear heat path."""
+    errors = {
+        f"{side}_{key}": 0.01 for side in ("pickoff", "drive") for key in ("gain_ratio", "phase_deg", "skew_mrad")
+    }
+    loop = {
+        **errors,
+        "frequency_split_mHz": 2.0,
+        "frequency_axis_deg": 7.0,
+        "misalignment_mrad": 0.3,
+        "drive_phase_difference_deg": 0.02,
+    }
+    bias = {
+        "offset_deg_per_h": 0.3,
+        "k1_deg_per_h_per_Hz": 0.1,
+        "k4_deg_per_h_s_per_Hz": 30.0,
+        "k9_deg_per_h_s2_per_Hz3": 5.0,
+    }
+    profile = write_profile(folder / "ramps.csv", {k: v for k, v in RAMPS.items() if k != "quadrature_V"})
+    for control, radiates in (("force", True), ("stiffness", False)):
+        instrument = (
+            load_card("hrg-30mm-loops")
+            .with_table("loop", {**loop, "quadrature_control": control})
+            .with_table("bias", bias)
+        )
+        instrument = instrument.with_table("thermal", {"radiation": radiates, "drive_power_mW": 2.0, "cells": 8})
+        found = run_twin(compile_twin(instrument, folder / control), profile, 2.0)
+        expected = simulated(instrument, profile, 2.0)
+        assert {name: error for name, error in worst(found, expected).items() if error > 1e-9} == {}, control
+
+
+def test_limits_imposed_housing(folder):
+    """The housing itself imposed, without the lag of its sensor: as a record of straight lines drives the simulation."""
+    instrument = load_card("hrg-30mm").with_table("noise", {"housing_lag_s": 0.0})
+    time = np.arange(0.0, 7200.0, 120.0)
+    columns = {"time_s": time, "housing_temperature_degC": 20.0 + 0.004 * time}
+    profile = write_profile(folder / "housing.csv", columns)
+    found = run_twin(compile_twin(instrument, folder / "housing", boundary="housing"), profile, 120.0)
+    expected = simulated(instrument, profile)
+    assert {name: error for name, error in worst(found, expected).items() if error > 1e-9} == {}
+
+
+def test_contract_record_of_the_program(folder, capsys):
+    """Columns, order and digits of `hrg simulate --noiseless`, which reads what the twin writes."""
+    card = folder / "card.toml"
+    save_card(load_card("hrg-30mm-loops"), card)
+    profile = write_profile(folder / "short.csv", {k: v for k, v in RAMPS.items() if k != "electrode_bias_V"})
+    assert (
+        main(["simulate", str(card), str(profile), "--out", str(folder / "python.csv"), "--noiseless", "--row", "10"])
+        == 0
+    )
+    program = compile_twin(load_card(card), folder / "record")
+    run_twin(program, profile, 10.0, full=False)
+    python, c = read_record(folder / "python.csv"), read_record(folder / "record" / "record.csv")
+    assert list(c.columns) == list(python.columns)
+    for name in python.columns:
+        np.testing.assert_allclose(
+            c[name], python[name], rtol=0, atol=1.01e-6 if "temperature" in name or "bias" in name else 1.01e-8
+        )
+
+
+@pytest.mark.parametrize(
+    "noise",
+    [Noise(white=1.0), Noise(flicker=1.0), Noise(walk=1.0), Noise(0.3, 0.5, 0.02)],
+    ids=["white", "flicker", "walk", "all"],
+)
+def test_limits_allan_variance_of_the_draws(noise, folder):
+    """Draws of the C code, 64 runs of 4096 rows of 2 s, against the closed-form Allan variance; 5 standard errors of their scatter."""
+    program = compile_twin(load_card("free-dome"), folder / "draws", main=str(HERE / "draw.c"))
+    runs, rows, span = 64, 4096, 2.0
+    words = [program, *map(repr, (noise.white, noise.flicker, noise.walk, noise.offset, span)), str(runs), str(rows)]
+    values = np.array(subprocess.run(words, check=True, capture_output=True, text=True).stdout.split(), float).reshape(
+        runs, rows
+    )
+    for count in (1, 8, 64, 512):
+        means = values.reshape(runs, rows // count, count).mean(axis=2)
+        each = (np.diff(means, axis=1) ** 2).mean(axis=1) / 2
+        scatter = each.std(ddof=1) / np.sqrt(runs)
+        assert abs(each.mean() - noise.allan_variance(count * span)) < 5 * scatter
+        assert scatter < 0.2 * each.mean()
+
+
+def test_limits_draws_are_normal_and_seeded(folder):
+    """Moments of 262 144 white draws within 5 standard errors; the same seed gives the same run, another one does not."""
+    program = compile_twin(load_card("free-dome"), folder / "draws", main=str(HERE / "draw.c"))
+    words = [program, "1.0", "0.0", "0.0", "0.0", "1.0", "64", "4096"]
+    x = np.array(subprocess.run(words, check=True, capture_output=True, text=True).stdout.split(), float)
+    for power, moment, variance in ((1, 0.0, 1.0), (2, 1.0, 2.0), (3, 0.0, 15.0), (4, 3.0, 96.0)):
+        assert abs((x**power).mean() - moment) < 5 * np.sqrt(variance / x.size)
+    assert np.unique(x).size == x.size
+    twin, profile = (
+        compile_twin(load_card("free-dome"), folder / "seeds"),
+        write_profile(folder / "short.csv", {k: TEN_HOURS[k][1:3] for k in TEN_HOURS}),
+    )
+    one, again, other = (run_twin(twin, profile, 60.0, seed)["frequency_Hz"] for seed in (3, 3, 4))
+    assert np.array_equal(one, again)
+    assert not np.array_equal(one, other)
+
+
+@pytest.mark.slow
+def test_limits_sanitizers(folder):
+    """All effects at once, loops and noise, and an FMU's life, under the address and undefined-behaviour sanitizers."""
+    entries = [one_effect(name, library()[name].responses[0]) for name in sorted(library())]
+    entries = [entry | {"share_of_form": 1.0} if entry["name"] == "radiation" else entry for entry in entries]
+    instrument = load_card("hrg-30mm-loops").with_table("effect", entries)
+    profile = write_profile(folder / "ramps.csv", RAMPS)
+    program = compile_twin(instrument, folder / "sane", SANITIZED)
+    assert np.isfinite(run_twin(program, profile, 5.0, 7)["frequency_Hz"]).all()
+    assert subprocess.run([program, profile], capture_output=True, check=False).returncode == 2
+    for bad in (
+        "time_s\n0\n1\n",
+        "time_s,chamber_temperature_degC\n0,20\n1,x\n",
+        "time_s,chamber_temperature_degC\n1,20\n0,20\n",
+        "",
+    ):
+        broken = folder / "broken.csv"
+        broken.write_text(bad)
+        done = subprocess.run([program, broken, folder / "no.csv"], capture_output=True, text=True, check=False)
+        assert done.returncode == 2
+        assert str(broken) in done.stderr
+    for version in (2, 3):
+        life = compile_twin(
+            instrument,
+            folder / f"life{version}",
+            (*SANITIZED, f"-DTWIN_FMI={version}"),
+            main=str(HERE / "life.c"),
+            names=("fmi.c", "fmi2.inc", "fmi3.inc"),
+        )
+        done = subprocess.run([life], capture_output=True, text=True, check=False)
+        assert (done.returncode, done.stderr) == (0, "")
