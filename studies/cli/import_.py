@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from studies.importing.mapping import ImportMap
+    from studies.importing.mapping import LoadedMap
 
     Columns = Mapping[str, NDArray[np.float64]]
 
@@ -117,7 +117,7 @@ def _import(raw: tuple[str, ...], path: str, out: str) -> Result:
     )
 
 
-def _import_table(raw: tuple[str, ...], import_map: "ImportMap", out: str) -> Result:
+def _import_table(raw: tuple[str, ...], import_map: "LoadedMap", out: str) -> Result:
     """Convert a table of settled readings."""
     from studies.errors import InputError
     from studies.files.writing import write_text

@@ -10,7 +10,7 @@ import numpy as np
 from compensation.decimation import average_groups
 from studies.errors import InputError
 from studies.importing.clock import drop_repeated, read_times, seconds_between
-from studies.importing.mapping import TABLE_TARGETS, ColumnMap, FileMap, ImportMap
+from studies.importing.mapping import TABLE_TARGETS, ColumnMap, FileMap, LoadedMap
 from studies.importing.raw import RawTable, read_parts, read_raw
 from studies.record import Record, check_plausible
 
@@ -44,7 +44,7 @@ class ClockedFile:
         return USUAL_GAP * float(np.median(np.diff(self.time))) if len(self.time) > 1 else 0.0
 
 
-def import_records(paths: Sequence[str], import_map: ImportMap) -> dict[str, Record]:
+def import_records(paths: Sequence[str], import_map: LoadedMap) -> dict[str, Record]:
     """Read raw files, convert and join them into one record, or one for each axis ("" where there is only one).
 
     The comments of the record's header list every change; nothing is extrapolated, and nothing interpolated across gaps.
@@ -88,7 +88,7 @@ def import_records(paths: Sequence[str], import_map: ImportMap) -> dict[str, Rec
     }
 
 
-def import_table(path: str, import_map: ImportMap) -> "tuple[dict[str, Array], tuple[str, ...]]":
+def import_table(path: str, import_map: LoadedMap) -> "tuple[dict[str, Array], tuple[str, ...]]":
     """Read settled readings: temperature (°C) and frequency (Hz) in the order of the file, and what was changed.
 
     Rows that lack one of the two are left out.
@@ -109,7 +109,7 @@ def import_table(path: str, import_map: ImportMap) -> "tuple[dict[str, Array], t
     return {name: columns[name][whole] for name in TABLE_TARGETS}, tuple(" ".join(note.split()) for note in notes)
 
 
-def share_out(paths: Sequence[str], import_map: ImportMap) -> list[Sequence[str]]:
+def share_out(paths: Sequence[str], import_map: LoadedMap) -> list[Sequence[str]]:
     """Return the raw files of each [[file]] of the map: one, `parts` that continue one another, or all of a single one."""
     files = import_map.files
     counts = [file.parts or (len(paths) if len(files) == 1 else 1) for file in files]
@@ -234,7 +234,7 @@ def _bin_means(t: "Array", v: "Array", grid: "Array") -> "Array":
     return average_groups(v[inside], which[inside], len(grid))
 
 
-def _lay_grid(base: ClockedFile, import_map: ImportMap) -> "Array":
+def _lay_grid(base: ClockedFile, import_map: LoadedMap) -> "Array":
     """Return the times of the record by the first file's clock: its own, or a regular grid over its range."""
     if import_map.step is None:
         return base.time

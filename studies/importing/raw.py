@@ -147,7 +147,7 @@ def read_raw(path: str | Path, file: "FileMap") -> RawTable:
     data = read_filled(path)
     decimal = file.decimal
     if Path(path).suffix.lower() in EXCEL:
-        lines = read_sheet(path, file.sheet)
+        lines = read_sheet(path, file.sheet or None)
         names, rows = _head(path, lines, file), lines[file.data_line - 1 : file.last_line]
         width = len(names) + 1
         if any(any(row[width - 1 :]) for row in rows):

@@ -145,4 +145,3 @@ def split_nominal(text: str) -> tuple[str, float | None]:
 
 
 TARGETS = tuple(name for name in COLUMNS if name != "time_s")
-SETTINGS = ("clock_Hz", "periods", "gate_s", "nominal_Hz")
