@@ -67,7 +67,7 @@ def twin(
         if not compiled:
             sentences.append(
                 Sentence(
-                    "The FMU has no binary, because no C compiler for 64-bit Linux was found: the importing tool must compile its"
+                    "The FMU has no binary, because no C compiler for 64-bit Linux was found or it failed: the importing tool must compile its"
                     " sources. Install gcc or set CC, and run this command again for a binary.",
                     "warning",
                 )

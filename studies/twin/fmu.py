@@ -14,7 +14,7 @@ from xml.sax.saxutils import quoteattr
 
 from studies.files.writing import written_whole
 from studies.twin.plan import input_starts, symbol
-from studies.twin.source import CORE, FMI, exposed, outputs_of, sources
+from studies.twin.source import CORE, FMI, exposed, one_line, outputs_of, sources
 
 if TYPE_CHECKING:
     from studies.twin.plan import Plan
@@ -85,8 +85,9 @@ def describe(plan: "Plan", version: Version, name: str, token: str) -> str:
     rows = list(_variables(plan))
     units = dict.fromkeys(unit for *_, unit, _ in rows)
     outputs = [ref for ref, _, causality, *_ in rows if causality == "output"]
-    about = f"{plan.instrument.name}: heat path, frequency, zero-rate output and 1/Q; the gyro settles at the temperature it has at the start"
-    common = f'fmiVersion="{version}" modelName={quoteattr(plan.instrument.name)} description={quoteattr(about)}'
+    title = one_line(plan.instrument.name)
+    about = f"{title}: heat path, frequency, zero-rate output and 1/Q; the gyro settles at the temperature it has at the start"
+    common = f'fmiVersion="{version}" modelName={quoteattr(title)} description={quoteattr(about)}'
     common += ' generationTool="hrg"'
     able = 'canHandleVariableCommunicationStepSize="true"'
     bases = [

@@ -11,9 +11,8 @@ from numpy.typing import NDArray
 from shell.constants import zero_Celsius
 from studies.errors import InputError
 from studies.instrument.imperfect import is_imperfect
-from studies.instrument.tables.loop import Loop
 from studies.instrument.units import unit_of
-from studies.simulation.heat_path import SENSOR, build_network, slowest_lag, with_sensor
+from studies.simulation.heat_path import SENSOR, behind_housing, build_network, slowest_lag, with_sensor
 from studies.simulation.response import observed_rows
 from thermal.network import assemble
 from thermal.resonator import describe_resonator
@@ -54,7 +53,6 @@ class EffectRow:
     target: str
     shape: int
     weights: int
-    count: int
 
 
 @dataclass(frozen=True)
@@ -125,12 +123,7 @@ def plan_twin(instrument: "Instrument", boundary: "Boundary" = "chamber", theory
         drive_power=1.0,
     )
     network = assemble(describe_resonator(unit))
-    if boundary == "housing":
-        from studies.simulation.heat_path import behind_housing
-
-        network = behind_housing(network)
-    else:
-        network = with_sensor(network, 1.0)
+    network = behind_housing(network) if boundary == "housing" else with_sensor(network, 1.0)
     parameters = dict(_card_numbers(instrument))
     parameters["thermal.conductivity_W_per_m_K"] = path.conductivity
     splines = {"law": _spline(law._spline), **_splines(instrument, law)}
@@ -170,8 +163,8 @@ EFFECTS = (
 def _card_numbers(instrument: "Instrument") -> Iterator[tuple[str, float]]:
     """Yield the numbers of the tables that act, by their dotted keys."""
     for table in TABLES:
-        keys = (instrument.loop or Loop()) if table == "loop" else getattr(instrument, table)
-        if table == "loop" and instrument.loop is None:
+        keys = getattr(instrument, table)
+        if keys is None:
             continue
         for name in keys.__struct_fields__:
             value, key = getattr(keys, name), f"{table}.{name}"
@@ -226,28 +219,26 @@ def _place_effects(instrument: "Instrument", parameters: dict[str, float]) -> It
         for name, value in zip(names, [*shape, *weights], strict=True):
             parameters[name] = float(value)
         target = "temperature" if effect.thermal else one.response
-        yield EffectRow(one.name, target, first, first + len(shape), len(weights))
+        yield EffectRow(one.name, target, first, first + len(shape))
 
 
 def _constants(instrument: "Instrument", law: "FrequencyLaw", boundary: "Boundary") -> dict[str, float]:
     """Numbers that are no keys of the card: the solver's, and those of imperfection and electrodes."""
-    from shell.electrodes import soften_at_gap
     from studies.splitting import mean_shift, reference_split
 
     T0 = instrument.reference_temperature
     keys = instrument.part("electrodes").keys if instrument.part("electrodes").are_charged else None
     split, shift, own, per_volt = 0j, 0.0, 0.0, 0.0
+    at = np.array([T0])
     if is_imperfect(instrument):
         found = reference_split(instrument).split
         split = complex(found.frequency * found.wave)
-        at = np.array([T0])
         shift = float(np.ravel(mean_shift(instrument, at))[0])
     if keys is not None:
         shift = float(reference_split(instrument).imperfection.shift)
         own = float(np.ravel(mean_shift(instrument, at))[0]) - shift
         commanded = mean_shift(instrument, at, np.array([keys.voltage_V**2 + 1.0]))
         per_volt = float(np.ravel(commanded)[0]) - shift - own
-        per_volt /= float(soften_at_gap(1.0, 1.0))
     lag = slowest_lag(build_network(instrument, boundary=boundary), T0) if instrument.effects else 1.0
     return {
         "REFERENCE": T0,

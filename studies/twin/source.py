@@ -69,7 +69,7 @@ def card_header(plan: "Plan") -> str:
         "LEAST_LAG": LEAST_LAG,
     }
     lines = ["/* One card's sizes and numbers; card.c has its tables. */", "#ifndef CARD_H", "#define CARD_H", ""]
-    lines += [f"#define TWIN_NAME {_text(_comment(card.name))}", '#define TWIN_TOKEN "@TOKEN@"']
+    lines += [f"#define TWIN_NAME {_text(one_line(card.name))}", '#define TWIN_TOKEN "@TOKEN@"']
     lines += [f"#define TWIN_BOUNDARY {_text(plan.boundary + '_temperature_degC')}"]
     lines += [f"#define TWIN_INPUT_STARTS {{{', '.join(_number(v) for v in input_starts(plan).values())}}}"]
     lines += [f"#define TWIN_{name} {value}" for name, value in switches.items()]
@@ -102,14 +102,14 @@ def card_body(plan: "Plan") -> str:
 
     power = network.power(0.0)
     effects = [
-        f"{{E_{one.name.replace('-', '_')}, {TARGETS.index(one.target)}, {MEMORY * k}, {one.shape}, {one.weights}, {one.count}}}"
+        f"{{E_{one.name.replace('-', '_')}, {TARGETS.index(one.target)}, {MEMORY * k}, {one.shape}, {one.weights}}}"
         for k, one in enumerate(plan.effects)
     ]
     nowhere = "{0, 0, 0, 0}"
     splines = {**dict.fromkeys(("law", "heat_capacity", "loss", "wave_0", "wave_1")), **plan.splines}
     digits = [DIGITS.get(name, COMMAND_DIGITS) for name in outputs]
     parts = [
-        f"/* Numbers of the card {_comment(plan.instrument.name)}, in the units of its keys, SI elsewhere. */",
+        f"/* Numbers of the card {one_line(plan.instrument.name)}, in the units of its keys, SI elsewhere. */",
         '#include "twin.h"',
         "",
         _table(
@@ -132,7 +132,7 @@ def card_body(plan: "Plan") -> str:
         _table("double", "twin_power_shares", "TWIN_NODES", [_number(v) for v in power]),
         _table("double", "twin_rows", "5][TWIN_NODES", [_braced([_number(v) for v in row]) for row in plan.rows]),
         _table("double", "twin_uneven", "4", [_number(v) for v in plan.uneven]),
-        _table("TwinEffect", "twin_effects", "TWIN_EFFECTS", effects or ["{E_none, 0, 0, 0, 0, 0}"]),
+        _table("TwinEffect", "twin_effects", "TWIN_EFFECTS", effects or ["{E_none, 0, 0, 0, 0}"]),
         _table("char *const", "twin_columns", "TWIN_OUTPUTS", [_text(name) for name in outputs]),
         _table("int", "twin_digits", "TWIN_OUTPUTS", [str(n) for n in digits]),
         *(_coefficients(name, one) for name, one in splines.items() if one is not None),
@@ -146,7 +146,7 @@ def card_body(plan: "Plan") -> str:
 def exposed(plan: "Plan", key: str) -> str:
     """Return the name of a parameter that may be changed; "" of one that is no key of the card, or does not act."""
     value = plan.parameters[key]
-    idle = key == "loss.inverse_q" or key.startswith("loss.") if "loss" in plan.splines else False
+    idle = "loss" in plan.splines and key.startswith("loss.")
     return "" if key.startswith(".") or value != value or idle else key
 
 
@@ -188,5 +188,7 @@ def _text(words: str) -> str:
     )
 
 
-def _comment(words: str) -> str:
+def one_line(words: str) -> str:
+    """Return a card's name fit for a comment of C and for XML: one line, no characters that are not shown."""
+    words = "".join(c if c.isprintable() else " " for c in words)
     return " ".join(words.split()).replace("*/", "* /").replace("/*", "/ *")

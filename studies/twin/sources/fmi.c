@@ -126,11 +126,13 @@ static int save(void *c, void **state) {
 }
 
 static int restore(void *c, const void *state) {
-    Instance *one = c, kept = *one;
+    Instance *one = c;
+    void *environment = one->environment, (*log)(void) = one->log;
+    char *name = one->name;
     memcpy(one, state, sizeof *one);
-    one->environment = kept.environment;
-    one->log = kept.log;
-    one->name = kept.name;
+    one->environment = environment;
+    one->log = log;
+    one->name = name;
     return OK;
 }
 

@@ -21,7 +21,7 @@ enum { FLICKER_TIMES = 18 };
 
 typedef struct { int one, other, parameter; double factor; } TwinLink; /* conductance or exchange area = p * factor */
 typedef struct { int parameter; double factor; } TwinCapacity;         /* p * factor; of shell and stem over T besides */
-typedef struct { int kind, target, memory, shape, weights, count; } TwinEffect; /* memory; places in p; weights in use */
+typedef struct { int kind, target, memory, shape, weights; } TwinEffect; /* places in the memory and, of shape and weights, in p */
 typedef struct { double first, step; int count; const double *coefficients; } TwinSpline; /* 4 rows, highest power first */
 
 /* deg/s, V, V, V, deg; a command that is not given does not act, and the azimuth is the card's. */

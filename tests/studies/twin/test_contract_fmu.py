@@ -2,6 +2,8 @@
 
 import json
 import zipfile
+from dataclasses import replace
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -124,7 +126,7 @@ def test_contract_failure_keeps_the_old_file(tmp_path, monkeypatch):
 
 
 def test_contract_bad_input(tmp_path, capsys):
-    """Neither output; a part of the card that cannot be carried; a name that would end a C text."""
+    """Neither output; a part of the card that cannot be carried."""
     assert main(["twin", "free-dome"]) == 2
     assert "--fmu" in capsys.readouterr().err
     turning = tmp_path / "turning.toml"
@@ -134,3 +136,14 @@ def test_contract_bad_input(tmp_path, capsys):
     assert "turning.toml [loop]" in error
     assert "force-rebalance" in error
     assert not (tmp_path / "c").exists()
+
+
+@needs_compiler
+def test_contract_strange_names(tmp_path):
+    """A card's name can hold what would end a text of C, a comment or an attribute; the FMU compiles and its description is XML."""
+    path = tmp_path / "twin.fmu"
+    strange = replace(load_card("free-dome"), name='a"\\ */ ??/ %s <b> é \x07\n#define x')
+    assert fmus.write_fmu(plan_twin(strange), path, "2.0")
+    with zipfile.ZipFile(path) as archive:
+        root = ElementTree.fromstring(archive.read("modelDescription.xml"))
+    assert "%s <b> é" in root.get("modelName")

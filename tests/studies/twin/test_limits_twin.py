@@ -142,6 +142,19 @@ def test_limits_everything_at_once(folder):
         assert {name: error for name, error in worst(found, expected).items() if error > 1e-9} == {}, control
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("cells", [1, 24, 60])
+def test_limits_imperfect_card(cells, folder):
+    """Imperfection, charged electrodes at a commanded voltage, a mount, the parts of a loss budget; few cells of the shell and many."""
+    instrument = load_card(HERE.parents[1] / "golden" / "inputs" / "busy.toml").with_values({"thermal.cells": cells})
+    profile = write_profile(
+        folder / "volts.csv", {key: RAMPS[key] for key in ("time_s", "chamber_temperature_degC", "electrode_bias_V")}
+    )
+    found = run_twin(compile_twin(instrument, folder / "busy"), profile, 10.0)
+    expected = simulated(instrument, profile, 10.0)
+    assert {name: error for name, error in worst(found, expected).items() if error > 1e-9} == {}
+
+
 def test_limits_imposed_housing(folder):
     """The housing itself imposed, without the lag of its sensor: as a record of straight lines drives the simulation."""
     instrument = load_card("hrg-30mm").with_table("noise", {"housing_lag_s": 0.0})
