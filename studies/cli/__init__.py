@@ -74,6 +74,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "study export": ("studies.cli.study:export", "Export the results as CSV, with a file of units."),
     "compare": ("studies.cli.compare:compare", "Compare designs: differences between cards and their effects."),
     "cards": ("studies.cli.cards:cards", "List the built-in instrument cards, or the uncertain values of a card."),
+    "keys": ("studies.cli.keys:keys", "List the keys of a card, map, model or limits file: units, defaults, bounds."),
     "card new": ("studies.cli.new:card", "Write a card template."),
     "study new": ("studies.cli.new:study", "Write a study template."),
     "materials": ("studies.cli.cards:materials", "List the materials and their published laws."),
@@ -189,7 +190,7 @@ CHAPTERS = {
     "Simulate and import": ("simulate", "twin", "thermal", "import"),
     "Calibrate, diagnose and accept": ("calibrate", "diagnose", "effects", "acceptance"),
     "Compensate": ("fit", "compensate", "temperature"),
-    "Library and setup": ("cards", "card", "materials", "reproduce", "doctor"),
+    "Library and setup": ("cards", "card", "keys", "materials", "reproduce", "doctor"),
 }
 GROUPS = {
     "card": "Write your own card.",

@@ -46,7 +46,7 @@ def import_(
     First 'hrg import RAW --draft MAP.toml', then read and correct the map, then 'hrg import RAW --map MAP.toml --out RUN.csv'.
     Several raw files, such as those of two loggers, are joined by their clocks on the times of the first. The header of the
     record lists every change; --report shows each column over time. Columns that name an axis give one record per axis:
-    RUN_x.csv, RUN_y.csv … All keys of a map: python -m pydoc studies.importing.mapping.
+    RUN_x.csv, RUN_y.csv … All keys of a map: hrg keys map.
 
     Parameters
     ----------

@@ -174,7 +174,7 @@ class FileMap(Keys, frozen=True, kw_only=True):
 class ImportMap(Keys, frozen=True, kw_only=True):
     """A whole map."""
 
-    schema: Annotated[str, says("of the file")] = SCHEMA
+    schema: Annotated[str, says("what the file is")] = SCHEMA
     instrument: Annotated[str, says("goes into the record's header")] = ""
     source: Annotated[str, says("goes into the record's header")] = ""
     step: Annotated[float, number("regular time grid; without it the times of the first file", above=0.0)] | None = (

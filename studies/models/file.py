@@ -69,7 +69,7 @@ class ModelSource(msgspec.Struct, frozen=True):
 class ModelKeys(Keys, frozen=True, kw_only=True):
     """A fitted compensation."""
 
-    schema: Annotated[str, says("of the file")] = SCHEMA
+    schema: Annotated[str, says("what the file is")] = SCHEMA
     kind: Annotated[str, says("frequency, bias, scale or cross-damping", example="bias")]
     compensates: Annotated[str, says("the column of a record that gets a compensated copy", example="bias_deg_per_h")]
     made_by: Annotated[str, says("the command that fitted it")] = ""

@@ -91,7 +91,7 @@ class _Reader:
         for kind in kinds:
             if (found := self._read_as(kind, raw, path)) is not UNFIT:
                 return found
-        raise self._refused(path, f"must be {_spell_wanted(kinds, path)}, not {_short(raw)}.")
+        raise self._refused(path, f"must be {spell_wanted(kinds, path)}, not {_short(raw)}.")
 
     def _read_table(self, tables: list[inspect.StructType], raw: Mapping[str, Any], path: Path) -> Any:
         table = tables[0]
@@ -158,18 +158,16 @@ class _Reader:
     def _read_number(self, kind: inspect.FloatType | inspect.IntType, raw: Any, path: Path) -> Any:
         if isinstance(raw, bool) or not isinstance(raw, int | float):
             return UNFIT
-        if isinstance(kind, inspect.IntType):
-            if raw != raw or raw in (float("inf"), -float("inf")) or raw != int(raw):
-                return UNFIT
-            found: float = int(raw)
-        elif not is_sound(raw):
+        if not is_sound(raw) and (isinstance(raw, float) or kind.le is None):  # a seed may be larger
             return UNFIT
-        else:
-            found = float(raw)
+        if isinstance(kind, inspect.IntType) and raw != int(raw):
+            return UNFIT
+        found = int(raw) if isinstance(kind, inspect.IntType) else float(raw)
         for bound, words in BOUNDS.items():
             end = getattr(kind, bound)
             if end is not None and not getattr(operator, bound)(found, end):
-                raise self._refused(path, f"must be {words} {end:g}, not {found:g}.")
+                shown = f"{found:g}" if is_sound(found) else _short(found)
+                raise self._refused(path, f"must be {words} {end:g}, not {shown}.")
         return found
 
     def _refused(self, path: Path, what: str) -> InputError:
@@ -199,7 +197,7 @@ def spell_place(where: str, path: Path) -> str:
     return f"{spell_table(where, path[:last])}: {key}" if key else where
 
 
-def _spell_wanted(kinds: Any, path: Path) -> str:
+def spell_wanted(kinds: Any, path: Path = ()) -> str:
     """Return what a place may hold, in words."""
     words = []
     for one in kinds:

@@ -502,7 +502,7 @@ def test_names_and_units_on_two_lines_of_a_table(tmp_path):
     [
         ("bias_deg_per_h", "1e19", "is not a possible reading"),
         ("frequency_Hz", "-3", "is not a possible reading"),
-        ("inverse_q", "12", "-0.001 to 1 can"),
+        ("inverse_q", "12", "allowed: -0.001 to 1"),
     ],
 )
 def test_what_the_reader_refuses_is_not_imported(tmp_path, header, value, part):
