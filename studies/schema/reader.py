@@ -158,11 +158,11 @@ class _Reader:
     def _read_number(self, kind: inspect.FloatType | inspect.IntType, raw: Any, path: Path) -> Any:
         if isinstance(raw, bool) or not isinstance(raw, int | float):
             return UNFIT
-        if not is_sound(raw) and (isinstance(raw, float) or kind.le is None):  # a seed may be larger
+        whole = isinstance(kind, inspect.IntType)
+        large = whole and isinstance(raw, int) and kind.le is not None  # a seed, whose own bound decides
+        if not (large or is_sound(raw)) or (whole and raw != int(raw)):
             return UNFIT
-        if isinstance(kind, inspect.IntType) and raw != int(raw):
-            return UNFIT
-        found = int(raw) if isinstance(kind, inspect.IntType) else float(raw)
+        found = int(raw) if whole else float(raw)
         for bound, words in BOUNDS.items():
             end = getattr(kind, bound)
             if end is not None and not getattr(operator, bound)(found, end):
