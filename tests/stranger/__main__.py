@@ -10,7 +10,7 @@ from pathlib import Path
 
 from tests.stranger.aliens import ALIENS
 from tests.stranger.campaign import make_campaign
-from tests.stranger.effects import EFFECTS
+from tests.stranger.effects import JUDGED
 from tests.stranger.ideal import ideal_ratios
 from tests.stranger.noise import FAMILIES
 from tests.stranger.truth import Truth
@@ -21,7 +21,7 @@ ALIEN_SNRS = (3.0, 6.0, 12.0)
 
 def plan(count: int) -> list[tuple[str, str | None, float | None]]:
     """Of twelve campaigns: seven effects, two nulls, two aliens, one pair; names and SNR go round in step."""
-    effects, nulls, aliens = cycle(EFFECTS), cycle(FAMILIES), cycle(ALIENS)
+    effects, nulls, aliens = cycle(JUDGED), cycle(FAMILIES), cycle(ALIENS)
     out: list[tuple[str, str | None, float | None]] = []
     for i, turn in zip(range(count), cycle("eenepeaeenea"), strict=False):
         level = i // 12 + i  # moves against the turn, so that every name meets every SNR

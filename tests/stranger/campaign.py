@@ -9,7 +9,7 @@ import numpy as np
 
 from tests.stranger.aliens import ALIENS
 from tests.stranger.baseline import COLUMN, Fitted, Rows, fit_all, orthonormal, rms
-from tests.stranger.effects import EFFECTS, Effect, Shape
+from tests.stranger.effects import EFFECTS, JUDGED, Effect, Shape
 from tests.stranger.files import write_campaign
 from tests.stranger.network import Network, draw_network, housing_of, integrate
 from tests.stranger.noise import FAMILIES, draw_noise
@@ -169,8 +169,8 @@ def _names(rng: np.random.Generator, kind: str, effect: str | None) -> list[str]
     if kind == "null":
         return []
     if kind == "pair":
-        return effect.split("+") if effect else [str(n) for n in rng.choice(list(EFFECTS), 2, replace=False)]
-    return [effect or str(rng.choice(list(ALIENS if kind == "alien" else EFFECTS)))]
+        return effect.split("+") if effect else [str(n) for n in rng.choice(list(JUDGED), 2, replace=False)]
+    return [effect or str(rng.choice(list(ALIENS if kind == "alien" else JUDGED)))]
 
 
 def _protocol(rng: np.random.Generator, names: list[str], needs: set[str], count: int) -> str:

@@ -1,4 +1,4 @@
-"""The twenty known effects, each by a formula of its own, as shapes of unit size on the grid of the runs.
+"""The known effects, each by a formula of its own, as shapes of unit size on the grid of the runs.
 
 `target` says where a shape enters: the shell's `temperature` (K), `frequency` (Hz), `bias` (deg/h), `inverse_q`,
 the gyro's `clock` (relative) or the `reading` of the housing (K).
@@ -256,3 +256,28 @@ def mounting_stress(runs: list[Run], rng: Rng) -> Shape:
         strain = r.housing - r.mode
         out.append(knee * np.tanh((strain - part * lag(strain, tau)) / knee))
     return out
+
+
+JUDGED = tuple(EFFECTS)
+"""Effects that a seed of mixed campaigns draws from; those below came later and leave its campaigns as they were."""
+
+
+@effect("thermometer-lag", "reading")
+def thermometer_lag(runs: list[Run], rng: Rng) -> Shape:
+    """A sensor behind the housing by a short lag, in some with a slower part of its own: glue beside a bead."""
+    tau, share = rng.uniform(40, 120), rng.uniform(0, 0.2)
+    return [(1 - share) * lag(r.housing, tau) + share * lag(r.housing, 3 * tau) - r.housing for r in runs]
+
+
+@effect("clock-offset", "reading")
+def clock_offset(runs: list[Run], rng: Rng) -> Shape:
+    """The thermometer of one run is logged by a clock of its own, a minute or two off."""
+    late, offset = int(rng.integers(0, len(runs))), rng.uniform(30, 120) * rng.choice([-1.0, 1.0])
+    return [np.interp(r.time - (r.index == late) * offset, r.time, r.housing) - r.housing for r in runs]
+
+
+@effect("rate-frequency", "frequency")
+def rate_frequency(runs: list[Run], rng: Rng) -> Shape:
+    """A gradient across the shell, dT/dt behind a lag of seconds, shifts its frequency: dynamic temperature coefficient."""
+    tau = rng.uniform(5, 40)
+    return [60 * np.gradient(lag(r.mode, tau), STEP_S) for r in runs]

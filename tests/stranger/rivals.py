@@ -3,7 +3,7 @@
 import numpy as np
 
 from tests.stranger.baseline import Fitted, Rows, orthonormal
-from tests.stranger.effects import EFFECTS, Rng
+from tests.stranger.effects import EFFECTS, JUDGED, Rng
 from tests.stranger.network import lag
 from tests.stranger.protocol import Run
 
@@ -51,13 +51,15 @@ def nearest(
     """What every other effect that this campaign could show leaves of the structure."""
     columns = {key for run in runs for key, v in run.drive.items() if np.ptp(v) > 0}
     left: dict[str, np.ndarray] = {}
+    later = np.random.default_rng(len(structure))
     for other, effect in EFFECTS.items():
         drives = {n for n in effect.needs if n not in ("returns", "starts", "reference")}
         if other == name or other in barred or not drives <= columns:
             continue
         for target in effect.targets:
             if shadow(target, runs[0].time, response, slope, 1000.0) is not None:
-                cast = [effect.draw(runs, rng) for _ in range(DRAWS if other != "hysteresis" else 3)]
+                random = rng if other in JUDGED else later
+                cast = [effect.draw(runs, random) for _ in range(DRAWS if other != "hysteresis" else 3)]
                 cast = [[shadow(target, part, response, slope, runs[0].main_s) for part in shape] for shape in cast]
                 left[other] = matched(structure, [fit.project(rows.at(c)) for c in cast])
     return left

@@ -1,0 +1,85 @@
+"""One batch of campaigns for a whole session: each is drawn and answered once, whoever of the test processes comes first."""
+
+import fcntl
+import json
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+from unittest.mock import patch
+
+from studies.diagnosis.campaign import load_campaign
+from studies.diagnosis.investigate import investigate
+from studies.diagnosis.verdict import Verdict
+from studies.record import read_record
+from tests.stranger.aliens import ALIENS
+from tests.stranger.baseline import COLUMN
+from tests.stranger.campaign import make_campaign
+from tests.stranger.effects import EFFECTS
+from tests.stranger.noise import FAMILIES
+
+PAIRS = ("hysteresis+amplitude-frequency", "jump+leak", "rate-bias+periodic", "second-lag+quadrature-leakage")
+CASES: tuple[tuple[str, str, float | None], ...] = (
+    *(("effect", name, 5.0) for name in EFFECTS),
+    *(("null", name, None) for name in FAMILIES),
+    *(("alien", name, 6.0) for name in ALIENS),
+    *(("pair", name, 6.0) for name in PAIRS),
+)
+"""Kind, what is hidden, SNR; every effect of the library, every noise, every cause outside the library."""
+FIRST_SEED = 5000
+STEPS = 300
+"""Steps of the grid, of all runs: the engine's own 800 take two to three times as long."""
+Line = dict[str, Any]
+
+
+def truth_of(place: int, folder: Path) -> tuple[Line, list[str], set[str]]:
+    """Draw a campaign of two runs; return its truth in the form that marks read, its files and the responses that matter."""
+    kind, name, snr = CASES[place]
+    truth = make_campaign(FIRST_SEED + place, kind, name, snr, runs=2, folder=folder)
+    line = {
+        "kind": kind,
+        "hidden": [sorted(h.right_names) for h in truth.hidden] if kind != "alien" else [],
+        "snr": snr or 0.0,
+        "verdicts": truth.verdicts,
+        "tolerated": truth.tolerated,
+    }
+    asked = {"frequency_Hz", *(COLUMN[h.response] for h in truth.hidden)} if truth.hidden else set(COLUMN.values())
+    return line, [str(folder / file) for file in truth.files], asked
+
+
+def diagnose(files: list[str], asked: set[str]) -> Verdict:
+    """Ask for the frequency and the responses in which something is hidden, without a score of held-out rows."""
+    with patch("studies.diagnosis.campaign.MOST_BINS", STEPS):
+        campaign = load_campaign([read_record(file) for file in files])
+    campaign = replace(campaign, responses=tuple(one for one in campaign.responses if one in asked))
+    return investigate(campaign, score_held_out=False, advise=False).verdict
+
+
+def answer(place: int, folder: Path) -> Line:
+    """Return truth and verdict of one campaign, from the file where another process has left it."""
+    kind, name, _ = CASES[place]
+    folder = folder / f"{kind}-{name}"
+    folder.mkdir(parents=True, exist_ok=True)
+    kept = folder / "answer.json"
+    with (folder / "lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        if not kept.exists():
+            line, files, asked = truth_of(place, folder)
+            found = diagnose(files, asked).as_dict()
+            kept.write_text(
+                json.dumps({"case": f"{kind}:{name}", "card": False, "truth": line, **found}, default=float)
+            )
+    return json.loads(kept.read_text())
+
+
+def stub(line: Line, state: str, *names: str) -> Line:
+    """Return the answer of an engine that does not look: the same verdict and names, whatever is hidden."""
+    cause = {"effect": names[0], "equivalent": list(names[1:]), "probability": 0.99} if names else None
+    return line | {"verdict": state, "causes": [cause] if cause else [], "responses": {}}
+
+
+STUBS: dict[str, Callable[[Line], Line]] = {
+    "always adequate": lambda line: stub(line, "adequate"),
+    "always the first effect": lambda line: stub(line, "explained", next(iter(EFFECTS))),
+    "one of all effects": lambda line: stub(line, "not-identifiable", *EFFECTS),
+}
