@@ -9,6 +9,7 @@ from studies.cli import main
 from studies.record import Record, write_record
 from tests.generator.device import build
 
+pytestmark = pytest.mark.usefixtures("coarse_grid")
 VERDICTS = ("unexplained", "not-identifiable", "explained", "adequate")
 
 

@@ -1,14 +1,11 @@
-"""Engines that do not look fail the hide-and-find tests: "always adequate", "always the first effect", "one of all effects"."""
+"""Engines that do not look fail the tests of tables: "always adequate", "always the first effect", "one of all effects"."""
 
 from dataclasses import replace
-from types import SimpleNamespace
 
 import pytest
 
 from studies.diagnosis.verdict import Cause, ResponseResult, Verdict
 from studies.effects import library
-from tests.generator.hidden import EFFECTS
-from tests.studies.diagnosis import test_planted_effects as runs
 from tests.studies.diagnosis import test_planted_tables as tables
 
 NAMES = tuple(library())
@@ -26,41 +23,6 @@ STUBS = {
     "always the first effect": lambda response: answer("explained", NAMES[:1], response),
     "one of all effects": lambda response: answer("not-identifiable", NAMES, response),
 }
-
-
-def blind(stub):
-    """An engine of runs that sees no more of a campaign than which response is asked for besides the frequency."""
-
-    def investigate(campaign, *_, **__):
-        response = next((one for one in campaign.responses if one != "frequency_Hz"), "frequency_Hz")
-        verdict = STUBS[stub](response)
-        return SimpleNamespace(
-            verdict=replace(
-                verdict, responses=dict.fromkeys(campaign.responses, next(iter(verdict.responses.values())))
-            )
-        )
-
-    return investigate
-
-
-@pytest.mark.parametrize("stub", STUBS)
-def test_hidden_effects_are_not_found_by_a_stub(stub, monkeypatch):
-    monkeypatch.setattr(runs, "investigate", blind(stub))
-    asked = [key for key in sorted(EFFECTS) if key.split("@")[0] != NAMES[0]][::4]
-    assert len(asked) > 4
-    for key in asked:
-        with pytest.raises(AssertionError):
-            runs.test_hidden_effect_is_named(key)
-    for test in (runs.test_two_effects_are_both_found, runs.test_inseparable_pair_is_answered_as_a_set):
-        with pytest.raises(AssertionError):
-            test()
-
-
-@pytest.mark.parametrize("stub", ["always the first effect", "one of all effects"])
-def test_a_null_campaign_is_not_passed_by_a_stub_that_names(stub, monkeypatch):
-    monkeypatch.setattr(runs, "investigate", blind(stub))
-    with pytest.raises(AssertionError):
-        runs.test_null_campaigns_are_adequate("white")
 
 
 @pytest.mark.parametrize("stub", STUBS)
