@@ -79,7 +79,7 @@ def places(tmp_path_factory):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("command", "typo"), zip(COMMANDS, itertools.cycle(TYPOS), strict=False))
+@pytest.mark.parametrize(("command", "typo"), list(zip(COMMANDS, itertools.cycle(TYPOS), strict=False)))
 def test_a_typo_is_named_by_every_command_that_loads_the_card(places, capsys, command, typo):
     """Every command reads the whole card with one reader: each is tried with one typo, and every typo by a command or two."""
     content, words = TYPOS[typo]
