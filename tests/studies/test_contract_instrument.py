@@ -63,6 +63,7 @@ COMMANDS = {
     "electrodes": ["electrodes", "CARD"],
     "scan": ["scan", "CARD", "RUN"],
     "trim": ["trim", "CARD", "--split", "0.1", "--axis", "10"],
+    "twin": ["twin", "CARD", "--c", "OUT"],
 }
 
 
