@@ -15,12 +15,15 @@ from math import pi, sqrt
 
 import numpy as np
 from scipy.optimize import linprog
+from scipy.special import chndtrix
 
 from shell.errors import ShellError
 from shell.quadrature import Array
 
 BALANCED = (1, 2, 3)  # harmonics of the mass that must not grow
 SURE = 2.0  # standard errors of the gain that a round leaves room for
+FAR = 100.0  # errors from 0, from which the size of a wave is normal
+ONE_SIDED = 1.645  # standard errors that 95 of 100 stay below
 DIRECTIONS = 24  # sides of the polygon that stands for a circle
 
 
@@ -103,8 +106,13 @@ class ExpectedSplit(SplitWave):
 
     @property
     def most(self) -> float:
-        """The split that is not exceeded in 95 of 100 cases, Hz."""
-        return self.frequency * float(np.hypot(abs(self.wave) + 1.2 * self.error, 1.9 * self.error))
+        """The split that is not exceeded in 95 of 100 cases, Hz: both parts of the wave have the error, so |wave|²/error² is
+        a non-central χ² of two degrees of freedom.
+        """
+        size = abs(self.wave) / self.error if self.error > 0 else np.inf
+        if size > FAR:
+            return self.frequency * (abs(self.wave) + ONE_SIDED * self.error)
+        return self.frequency * self.error * sqrt(float(chndtrix(0.95, 2, size**2)))
 
 
 @dataclass(frozen=True)

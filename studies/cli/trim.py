@@ -38,6 +38,8 @@ STATES = (
     Column("slow_axis_deg", "slow axis", "°", ".2f"),
 )
 
+LIMIT = "Upper limit: a split is the length of a vector, both of whose parts have the standard error; 95 of 100 are shorter than it."
+
 
 @answers("hrg.trim/1")
 def trim(
@@ -195,7 +197,7 @@ def _parts(planned: "CardPlan", payload: dict[str, Any]) -> "list[Chapter]":
         ]),
         Chapter("Position of the cuts", [Figure(lambda: polar(plan, cuts),
             "Rim over azimuth. Curves bulge where the slower mode has its antinodes (dashed); black bars: the cuts of the table, by mass.")]),
-        Chapter("Expected result", [Table("Splits before and after the cuts", states, STATES)]),
+        Chapter("Expected result", [Table("Splits before and after the cuts", states, STATES, LIMIT)]),
     ]  # fmt: skip
 
 

@@ -3,14 +3,14 @@
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 from scipy.special import erf
 
 from compensation.noise import white_rms
 from studies.diagnosis import held_out
-from studies.diagnosis.baseline import first_stretches
+from studies.diagnosis.baseline import Reading, first_stretches
 from studies.diagnosis.campaign import Campaign
 from studies.diagnosis.causes import name_causes, vote
 from studies.diagnosis.checks import FEWEST_BINS
@@ -36,6 +36,8 @@ SURE_DELAY, LEAST_DELAY = 3.0, 0.5
 """Standard deviations, and part of what is expected of it beforehand, from which on a delay is said."""
 WORSE = 3.0
 """Held-out over training residual from which on the other runs are said not to determine a run."""
+FEWEST_LAGS = 3.0
+"""Time constants that the records must cover before they confirm a baseline whose lag is free."""
 NARROW_RANGE = 1.0
 """Kelvin below which a temperature does not vary."""
 Progress = Callable[[str], None]
@@ -136,6 +138,11 @@ def investigate(
         else _too_little("too few values")
         for column in campaign.responses
     }
+    if brief := _too_brief(campaign, inquiries):
+        results = {
+            column: replace(one, verdict="not-identifiable", remark=brief) if one.verdict == "adequate" else one
+            for column, one in results.items()
+        }
     for column, reason in campaign.skipped.items():
         results[column] = _too_little(reason)
     verdict = overall([result.verdict for result in results.values()])
@@ -179,6 +186,21 @@ def _doubt_turn_on(
         f" {campaign.turn_on:.2g} °/h from turn-on to turn-on; each run was therefore given its own offset."
     )
     return replace(free, notes=(*free.notes, note)), without
+
+
+def _too_brief(campaign: Campaign, inquiries: Mapping[str, Inquiry]) -> str:
+    """Return why nothing can be confirmed by records in which the resonator hardly follows the housing; else nothing."""
+    lags = [one.final.baseline for column, one in inquiries.items() if RESPONSES[column].thermometer]
+    if not lags:
+        return ""
+    reading = cast("Reading", lags[0])
+    span = sum(float(np.ptp(run.time)) for run in campaign.runs)
+    if reading.from_card:
+        change = float(np.ptp(np.concatenate([view.seen.resonator for view in reading.views()])))
+        return f"too short to judge: the resonator's temperature changes by {change:.2g} K only" if change < NARROW_RANGE else ""
+    if span >= FEWEST_LAGS * reading.tau:
+        return ""
+    return f"too short to judge: {span:.0f} s, and the resonator may follow the housing with {reading.tau:.0f} s or more"
 
 
 def _too_little(reason: str) -> ResponseResult:

@@ -19,7 +19,7 @@ from studies.calibration.observed import SETTLED, read_settled
 from studies.diagnosis.constants import CONSTANTS
 from studies.diagnosis.table_forms import Candidate, best_by_words, rms, span_alike, weigh_forms
 from studies.diagnosis.table_noise import TableBaseline, make_scale
-from studies.diagnosis.table_words import MORE, next_table, table_sentences
+from studies.diagnosis.table_words import MORE, bends_beyond_a_cubic, next_table, table_sentences
 from studies.diagnosis.verdict import NINETY, Cause, Interval, ResponseResult, Shift, Verdict, doubted, weigh
 from studies.effects import library
 from studies.effects.states import FloatArray
@@ -256,21 +256,29 @@ def _study(
     forms = [(c.words, c.ssq, c.loo, 2.0 * (c.log_evidence - nothing)) for c in best_by_words(every)]
     if not ranked or ranked[0].log_evidence + prior < nothing:
         white = scale.white()
+        short = 2.0 * (ranked[0].log_evidence - nothing) if ranked else 0.0
         wanders = base_rms > WANDERING * white
+        # noise that has a shape beyond rounding is not called noise
+        shaped = short > UNNAMED and base_rms > WANDERING * rounding and bends_beyond_a_cubic(T, f, rounding)
         values = doubted(wrong_values(shifts))
-        state = "not-identifiable" if wanders else "explained" if values else "adequate"
+        state = "not-identifiable" if wanders or shaped else "explained" if values else "adequate"
         if wanders:
             sentences.append(
                 f"The rows drift: the residual is {base_rms:.3g} Hz rms, but neighbouring rows agree to {white:.2g} Hz. One table"
                 " cannot distinguish a drift between the rows from a slow effect of temperature."
             )
-        elif ranked and (short := 2.0 * (ranked[0].log_evidence - nothing)) > UNNAMED:
+        elif short > UNNAMED:
+            times = f"{base_rms / rounding:.0f} times what rounding leaves" if shaped else "treated as noise"
+            cause = "no cause reaches the evidence needed" if shaped else "no cause is named"
             sentences.append(
-                f"The remaining residual of {base_rms:.3g} Hz rms is treated as noise: the best candidate, {ranked[0].words}, has an evidence of"
-                f" {short:.1f}, below the {-2.0 * prior:.0f} needed to name it."
+                f"The remaining residual of {base_rms:.3g} Hz rms is {times}; {cause}: the best candidate, {ranked[0].words}, has"
+                f" {short:.1f} of {-2.0 * prior:.0f}."
             )
-        result = ResponseResult(state, base_rms, (base_rms, lone), None, "structure" if wanders else "none")
-        return answer(state, values, result, next_table(T) if wanders else None, forms=forms)
+        left_over = "structure" if wanders or shaped else "none"
+        result = ResponseResult(
+            state, base_rms, (base_rms, lone), None, left_over, left_over_evidence=max(short, 0.0) if shaped else 0.0
+        )
+        return answer(state, values, result, next_table(T) if wanders or shaped else None, forms=forms)
     winner = ranked[0]
     members, probability = weigh([c.effect.name for c in ranked], [c.log_evidence + prior for c in ranked], nothing)
     # in a steady state a scale error of the thermometer and a curvature of the frequency are the same data

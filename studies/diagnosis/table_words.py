@@ -6,6 +6,8 @@ from scipy.special import fdtrc
 from compensation.decimation import average_groups
 from studies.effects.states import FloatArray
 
+DOUBTFUL = 0.05
+"""p of the fourth order below which a cubic is said not to be sufficient."""
 TURN = 0.1
 """Part of the covered range that a table must go back for its order to show a direction."""
 MORE = "Measure at five temperatures or more, from below and from above."
@@ -36,17 +38,13 @@ def table_sentences(T: FloatArray, f: FloatArray, rounding: float) -> list[str]:
                 f"The local slope falls to {local[lowest]:.1f} ppm/°C near {middle:.0f} °C and rises again to {local[-1]:.1f} ppm/°C."
             )
     if 7 <= T.size and t.size >= 7:
-        cubic, quartic = (float(np.sum((f - np.polyval(np.polyfit(T, f, p), T)) ** 2)) for p in (3, 4))
-        freedom = T.size - 5
-        ratio_f = (cubic - quartic) / max(quartic / freedom, rounding**2)
-        chance = float(fdtrc(1, freedom, max(ratio_f, 0.0)))
-        said = "a cubic is not sufficient" if chance < 0.05 else "a cubic is sufficient"
+        cubic, quartic, ratio, chance = compare_cubic(T, f, rounding)
+        said = "a cubic is not sufficient" if chance < DOUBTFUL else "a cubic is sufficient"
         if cubic < T.size * rounding**2:
             out.append("A cubic fits within the rounding of the readings; a cubic is sufficient.")
         else:
             out.append(
-                f"Cubic against quartic: {cubic:.3g} and {quartic:.3g} Hz², F(1, {freedom}) = {max(ratio_f, 0.0):.3g}, "
-                f"p = {chance:.2g}; {said}."
+                f"Cubic against quartic: {cubic:.3g} and {quartic:.3g} Hz², F(1, {T.size - 5}) = {ratio:.3g}, p = {chance:.2g}; {said}."
             )
     both = _turns(T)
     out.append(
@@ -59,6 +57,22 @@ def table_sentences(T: FloatArray, f: FloatArray, rounding: float) -> list[str]:
         )
     )
     return out
+
+
+def compare_cubic(T: FloatArray, f: FloatArray, rounding: float) -> tuple[float, float, float, float]:
+    """Return the sums of squares (Hz²) of a cubic and a quartic through seven readings or more, F of the fourth order and its p."""
+    cubic, quartic = (float(np.sum((f - np.polyval(np.polyfit(T, f, p), T)) ** 2)) for p in (3, 4))
+    freedom = T.size - 5
+    ratio = max((cubic - quartic) / max(quartic / freedom, rounding**2), 0.0)
+    return cubic, quartic, ratio, float(fdtrc(1, freedom, ratio))
+
+
+def bends_beyond_a_cubic(T: FloatArray, f: FloatArray, rounding: float) -> bool:
+    """Whether the readings ask for a fourth order beyond their rounding."""
+    if np.unique(T).size < 7:
+        return False
+    cubic, _, _, chance = compare_cubic(T, f, rounding)
+    return cubic >= T.size * rounding**2 and chance < DOUBTFUL
 
 
 def _merged(T: FloatArray, f: FloatArray) -> tuple[FloatArray, FloatArray]:

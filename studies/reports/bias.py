@@ -7,6 +7,7 @@ import numpy as np
 
 from compensation.bias import SELECTED_BY_THE_PAPER, TERMS
 from compensation.noise import FLAT
+from studies.models.file import widen
 from studies.models.kinds.bias import OUTPUTS
 from studies.reports import style
 from studies.reports.digits import plain, raised, to_error
@@ -37,10 +38,6 @@ PATH_NOTE = (
     " selection finds terms in pure noise. The guarded selection estimates the correlation time of the noise and divides the"
     " significance level among the candidates. A term can enter only after the lower-order terms that it contains. BIC is comparable"
     " only within one selection."
-)
-WHERE_READ = (
-    "N is the value at τ = 1 s of the line that falls as 1/√τ, K the value at τ = 3 s of the line that rises as √τ, and B the flat"
-    f" part divided by {FLAT:.3f}. All three are fitted to the whole curve."
 )
 NO_TERMS = (
     "These data support no term: a constant describes the bias just as well. Compensation brings no improvement; the saved model only"
@@ -178,9 +175,9 @@ def coefficients_table(judged: "Judged", output: str) -> Table:
         )
     unit = fit.variable.unit
     per, words = (60.0, "K/min") if unit == "°C" else (1.0, f"{unit}/s")
-    (low, high), (slow, fast) = fit.state_range, (plain(per * end) for end in fit.rate_range)
+    (low, high), (slow, fast) = widen(*fit.state_range), (plain(per * end) for end in widen(*fit.rate_range))
     note = (
-        f"Valid from {plain(low, 8)} to {plain(high, 8)} {unit} and from {slow} to {fast} {words}. Autocorrelation of the noise:"
+        f"Valid from {plain(low, 8)} to {plain(high, 8)} {unit} and from {slow} to {fast} {words}. Whiteness of the residual:"
         f" θ = {fit.theta:.3f} (1: white, 0: random walk)."
     )
     if judged.method == "guarded" and fit.theta < 0.99:
@@ -229,7 +226,16 @@ def stability_parts(study: "BiasStudy") -> list[Part]:
         return []
     caption = "Overlapping Allan deviation with its 68.3 % band; dashed: fitted N, B, K."
     figure = Figure(lambda: _draw_allan(study), caption, "Allan deviation before and after compensation.")
-    return [figure, noise_table(study), Sentence(WHERE_READ, "note", "page")]
+    return [figure, noise_table(study), Sentence(_where_read(study.output), "note", "page")]
+
+
+def _where_read(output: str) -> str:
+    """Say where on the curve N, B and K are: in °/√h and °/h/√h the time is in hours."""
+    unit = "h" if output == "bias_deg_per_h" else "s"
+    return (
+        f"N is the value at τ = 1 {unit} of the line that falls as 1/√τ, K the value at τ = 3 {unit} of the line that rises as √τ, and B"
+        f" the flat part divided by {FLAT:.3f}. All three are fitted to the whole curve."
+    )
 
 
 def noise_table(study: "BiasStudy") -> Table:

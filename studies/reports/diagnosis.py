@@ -20,6 +20,7 @@ WORDS = {
     "not-identifiable": "Not identifiable: these data cannot distinguish between the possible causes.",
     "unexplained": "Unexplained: no known effect explains the structure in the residual.",
 }
+UNDECIDED = "Not decided: these data neither confirm the simulation nor name a cause."
 CAUSES = (
     Column("cause", "cause"),
     Column("or", "or equally"),
@@ -69,6 +70,8 @@ def headline(verdict: Verdict) -> str:
 
 def _sentence(verdict: Verdict) -> str:
     removes = "the named causes remove" if len(verdict.causes) > 1 else "the named cause removes"
+    if verdict.verdict == "not-identifiable" and not verdict.causes:
+        return UNDECIDED
     return WORDS[verdict.verdict].format(removes)
 
 

@@ -6,6 +6,7 @@ import numpy as np
 
 from compensation.errors import CompensationError
 from compensation.frequency import misreading_degC
+from studies.models.file import widen
 from studies.reports import style
 from studies.reports.digits import raised
 from studies.results import Column, Facts, Figure, Part, Table, rows_of
@@ -49,11 +50,12 @@ def coefficients_table(study: "FrequencyStudy") -> Table:
     ]
     columns = [
         Column("name", "Coefficient"),
-        Column("value", "Value", digits=8),
-        Column("error", "Standard error", digits=3),
+        Column("value", "Value", error="error"),
         Column("unit", "Unit"),
     ]
-    return Table(f"Coefficients about T0 = {study.fit.reference_temperature_degC:g} °C", rows, columns)
+    low, high = widen(*study.fit.temperature_range_degC)
+    note = f"With standard errors; a saved model has all digits and is valid from {low:.4g} to {high:.4g} °C."
+    return Table(f"Coefficients about T0 = {study.fit.reference_temperature_degC:g} °C", rows, columns, note)
 
 
 def inverse_table(study: "FrequencyStudy") -> Table:
@@ -174,7 +176,7 @@ def _extrapolation(study: "FrequencyStudy", other: "FrequencyFit") -> Figure:
     pairs = ((study.fit, other, names, style.VERMILION), (other, study.fit, names[::-1], style.BLUE))
 
     def differ(T: float) -> str:
-        return _between(np.sort(np.abs([misreading_degC(one, two, T) for one, two, *_ in pairs])))
+        return _most(np.abs([misreading_degC(one, two, T) for one, two, *_ in pairs]))
 
     def draw() -> "Drawing":
         T = np.linspace(low - BEYOND, high + BEYOND, 200)
@@ -191,18 +193,17 @@ def _extrapolation(study: "FrequencyStudy", other: "FrequencyFit") -> Figure:
             return made
 
     caption = (
-        f"Temperature read with the wrong one of the two polynomials. Outside the measured range they differ by {differ(low - BEYOND)}"
-        f" at {low - BEYOND:.3g} °C and by {differ(high + BEYOND)} at {high + BEYOND:.3g} °C: do not extrapolate either."
+        f"Temperature read with the wrong one of the two polynomials. Outside the measured range they differ by up to {differ(low - BEYOND)}"
+        f" at {low - BEYOND:.3g} °C and up to {differ(high + BEYOND)} at {high + BEYOND:.3g} °C: do not extrapolate either."
     )
     return Figure(draw, caption, "Difference of two fits: small inside the measured range, large outside.")
 
 
-def _between(ends: "NDArray[np.float64]") -> str:
+def _most(ends: "NDArray[np.float64]") -> str:
     """Write the difference of two readings; a curve that turns has none beyond its turning point."""
     if not np.isfinite(ends).all():
         return "more than the range" if not np.isfinite(ends).any() else f"{np.nanmin(ends):.1f} °C or more"
-    low, high = (f"{end:.1f}" for end in ends)
-    return f"{low} °C" if low == high else f"{low} to {high} °C"
+    return f"{ends.max():.2g} °C"
 
 
 def _fits(study: "FrequencyStudy") -> "list[tuple[FrequencyFit, str, str]]":

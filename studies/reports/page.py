@@ -113,7 +113,8 @@ def render_page(title: str, lead: str, chapters: Sequence[Chapter], sources: Seq
 
 def typeset(text: str) -> str:
     """Return text with a minus sign before numbers that carry a unit or begin a range, and a space before per cent."""
-    unit = r"°|ppm|mHz|Hz|mK|K\b|µ|%|s\b|h\b|to -?\d|…|±"
+    unit = r"°|ppm|mHz|Hz|mK|K\b|µ|%|dB|s\b|h\b|standard|to -?\d|…|±"
+    text = re.sub(r"(?<=\de)([-−+]?)0+(?=\d)", r"\1", text)
     text = re.sub(rf"(?<![\w.)\]])-(?=\d[\d.]*(?:e[-+]?\d+)? ?(?:{unit}))", "−", text)
     return re.sub(r"(?<=\d)%", " %", re.sub(r"(?<=\de)-(?=\d)", "−", text))
 
@@ -135,6 +136,7 @@ def _cell(text: str) -> "Markup":
 
     text = str(text)
     if re.match(r"[-+±<> ]*[.\d]", text):
+        text = re.sub(r"(?<=\de)([-−+]?)0+(?=\d)", r"\1", text)
         text = re.sub(r"(?<![\w.)\]-])-(?=\.?\d)|(?<=\de)-(?=\d)", "−", text)
     return Markup(escape(re.sub(r"(?<=\d)%", " %", text)))
 

@@ -2,6 +2,7 @@
 
 import ctypes
 import json
+import re
 import shutil
 import subprocess
 
@@ -244,6 +245,22 @@ def test_a_rate_output_is_fitted_in_its_own_unit(tmp_path, capsys):
     assert main(["compensate", model, str(tmp_path / "run.csv"), "--out", str(out), "--json"]) == 0
     after = read_record(out)["compensated_measured_rate_deg_per_s"]
     assert np.flatnonzero(np.isnan(after)).tolist() == list(range(100, 110))
+
+
+def test_the_page_says_where_its_coefficients_are_read_and_the_range_that_is_enforced(calibrated):
+    """In °/√h and °/h/√h the line of N is read at one hour, that of K at three; the saved model refuses what lies outside its range."""
+    from tests.golden.answers import _Text
+
+    reader = _Text()
+    reader.feed((calibrated / "page.html").read_text(encoding="utf-8"))
+    page = " ".join(reader.lines)
+    assert "N is the value at τ = 1 h" in page
+    assert "K the value at τ = 3 h" in page
+    said = re.search(r"Valid from ([\d.]+) to ([\d.]+) Hz", page)
+    assert said is not None
+    assert [float(end) for end in said.groups()] == pytest.approx(
+        read_model(calibrated / "m.toml").range_of("frequency_Hz"), rel=1e-6
+    )
 
 
 def test_the_page_is_whole_and_escapes_names(calibrated, tmp_path):

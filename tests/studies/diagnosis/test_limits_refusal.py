@@ -66,3 +66,18 @@ def test_a_curve_of_the_frequency_is_no_curve_of_the_bias():
     assert verdict.responses["bias_deg_per_h"].verdict == "adequate", verdict.causes
     assert "curvature" in {name for cause in verdict.causes for name in cause.names}
     assert {cause.response for cause in verdict.causes} == {"frequency_Hz"}
+
+
+def test_a_record_shorter_than_the_lag_that_it_may_have_confirms_nothing():
+    """Six minutes after a step of the chamber once were adequate in every response."""
+    time = np.arange(0.0, 370.0, 10.0)
+    rng = np.random.default_rng(5)
+    columns = {
+        "time_s": time,
+        "housing_temperature_degC": 25.0 - 17.0 * (1.0 - np.exp(-time / 250.0)),
+        "frequency_Hz": 4434.0 - 3e-8 * time**2 + rng.normal(0.0, 7e-4, time.size),
+        "bias_deg_per_h": 2.3 + rng.normal(0.0, 0.3, time.size),
+    }
+    verdict = investigate(load_campaign([Record(columns)]), advise=False).verdict
+    assert verdict.verdict == "not-identifiable"
+    assert all("too short to judge" in one.remark for one in verdict.responses.values())
