@@ -12,6 +12,7 @@ from shell.constants import zero_Celsius
 from studies.errors import InputError
 from studies.record import Record, place_in_time
 from studies.simulation.drive import COLUMN, Drive, drive_by_record
+from studies.simulation.holes import bridge_holes
 
 Array = NDArray[np.float64]
 Rows = NDArray[np.intp]
@@ -82,8 +83,8 @@ class ObservedRun:
     responses : mapping
         Blocks of every response that was measured, the housing among them where it has an outer drive.
     kinks : mapping
-        Rows of the measured housing's profile before which its chamber jumped, and how far (K) the housing may have been from the
-        straight line midway between them.
+        Rows of the measured housing's profile before which its chamber jumped or a hole is, and how far (K) the housing may have been
+        from the straight line midway between them.
     """
 
     record: Record
@@ -164,6 +165,10 @@ def _observe(record: Record, start: float, named: Sequence[str], turning: bool) 
         raise InputError(f"{record.path}: {len(time)} rows are too few; a run needs at least {LEAST_ROWS}.")
     centre = time + 0.5 * float(np.median(np.diff(record["time_s"]))) if turning else time
     inner = replace(drive_by_record(record, time=np.minimum(centre, record["time_s"][-1])), start=start)
+    holes: dict[int, float] = {}
+    if inner.boundary == "housing":
+        profile, holes = bridge_holes(inner.profile)
+        inner = replace(inner, profile=profile)
     outer = None
     if inner.boundary == "housing" and COLUMN["chamber"] in record and np.isfinite(record[COLUMN["chamber"]]).sum() > 1:
         outer = replace(drive_by_record(record, "chamber", time=time), start=start)
@@ -171,7 +176,7 @@ def _observe(record: Record, start: float, named: Sequence[str], turning: bool) 
     responses = {name: blocks for name in wanted if (blocks := _block(time, columns[name], most_blocks)) is not None}
     if not any(name in responses for name in named):
         raise InputError(f"{record.path}: none of {', '.join(named)} has values; there is nothing to calibrate with.")
-    return ObservedRun(record, inner, outer, responses, {} if outer is None else _find_kinks(inner, outer))
+    return ObservedRun(record, inner, outer, responses, holes if outer is None else _find_kinks(inner, outer) | holes)
 
 
 def _find_kinks(inner: Drive, outer: Drive) -> dict[int, float]:

@@ -21,7 +21,8 @@ from studies.diagnosis.verdict import NINETY, Shift
 from studies.effects.states import FloatArray, States, average
 from studies.law import law_of, moved_law
 from studies.simulation.drive import Boundary, Drive
-from studies.simulation.prediction import Prediction, Variations, predict
+from studies.simulation.holes import bridge_holes
+from studies.simulation.prediction import INITIAL, KINK, Prediction, Variations, predict
 from thermal.errors import ThermalError
 from thermal.profile import Profile
 
@@ -90,7 +91,8 @@ class Simulated:
     z : tuple of float
         Where they are.
     initial : tuple of mapping
-        Departure of base and resonator at the start of every run, K.
+        What is free of every run: departure of base and resonator at the start of its record, and of the housing in every hole
+        before the run, K.
     """
 
     from_card: ClassVar[bool] = True
@@ -134,8 +136,7 @@ class Simulated:
         """The instrument and its neighbours; built once for every point, whatever the run."""
         key = ("varied", self.values, self.z)
         if key not in self.memory:
-            names = (*(v.name for v in self.values), *(f"initial.{lump}" for lump in LUMPS))
-            self.memory[key] = Variations(self.instrument, self.law, names)
+            self.memory[key] = Variations(self.instrument, self.law, tuple(v.name for v in self.values))
         return cast("Variations", self.memory[key])
 
     @cached_property
@@ -144,6 +145,26 @@ class Simulated:
         from studies.simulation.heat_path import slowest_lag
 
         return slowest_lag(self.varied.network(self.boundary), self.instrument.reference_temperature)
+
+    @cached_property
+    def profiles(self) -> tuple[tuple[Profile, dict[int, float]], ...]:
+        """What drives each run from the start of its record on, and what may have departed in the holes before it.
+
+        The heat path remembers what was before a hole: each run goes through its record anew, with holes of its own. A chamber in a
+        hole is what it was told to be; the run then begins in equilibrium, but for its departures.
+        """
+        found: list[tuple[Profile, dict[int, float]]] = []
+        for k, s in enumerate(self.states):
+            before = [o for o in self.states[:k] if o.record == s.record >= 0 and self.boundary == "housing"]
+            parts = [*before, s]
+            whole = Profile(np.concatenate([o.time for o in parts]), np.concatenate([o.housing for o in parts]))
+            found.append(bridge_holes(whole) if before else (whole, {}))
+        return tuple(found)
+
+    def free(self, k: int) -> dict[str, float]:
+        """Return what is free of run `k`, with its prior standard deviation (K)."""
+        starts = {f"initial.{lump}": START for lump in LUMPS}
+        return starts | {f"{KINK}{row}": size for row, size in self.profiles[k][1].items()}
 
     def drive(self, k: int) -> tuple[Drive, FloatArray]:
         """What run `k` is driven with, and the times of its predictions."""
@@ -155,8 +176,10 @@ class Simulated:
             for name in ("amplitude_squared", "voltage_squared", "quadrature", "pattern_angle")
             if (values := getattr(s, name)) is not None
         }
-        profile = Profile(s.time, s.housing)
-        return Drive(time, self.boundary, profile, self.initial[k], commands, 0.0, float(s.campaign_time[0])), time
+        initial = {name.removeprefix(INITIAL): v for name, v in self.initial[k].items() if name.startswith(INITIAL)}
+        kinks = {int(name.removeprefix(KINK)): v for name, v in self.initial[k].items() if name.startswith(KINK)}
+        start = float(s.campaign_time[0])
+        return Drive(time, self.boundary, self.profiles[k][0], initial, commands, start=start, kinks=kinks), time
 
     def predicted(self, k: int) -> tuple[Prediction, FloatArray]:
         """Prediction of run `k` with its derivatives, and its times; computed once for every point.
@@ -165,18 +188,19 @@ class Simulated:
         """
         run = self.states[k]  # kept beside its points: no other run gets its id
         points: dict[object, Point] = self.memory.setdefault(("run", id(run), self.values), (run, {}))[1]
-        initial = tuple(self.initial[k].get(lump, 0.0) for lump in LUMPS)
-        key = (self.z, initial)
+        initial = {name: self.initial[k].get(name, 0.0) for name in self.free(k)}
+        key = (self.z, tuple(initial.values()))
         if key not in points:
             drive, time = self.drive(k)
             here = {v.name: at(v, z) for v, z in zip(self.values, self.z, strict=True)}
-            here |= {f"initial.{lump}": value for lump, value in zip(LUMPS, initial, strict=True)}
+            here |= initial
+            varied = self.varied.with_names([*(v.name for v in self.values), *initial])
             known = [point for point in points.values() if point.solved]
-            found = predict(self.instrument, drive, () if known else self.varied, self.law)
+            found = predict(self.instrument, drive, () if known else varied, self.law)
             misses = [point.missed(here, found, self.response.column) for point in known]
             solved = not known or min(misses) > STRAIGHT * self.noise
             if known and solved:
-                found = predict(self.instrument, drive, self.varied, self.law)
+                found = predict(self.instrument, drive, varied, self.law)
             elif known:
                 found = replace(found, derivatives=known[int(np.argmin(misses))].found.derivatives)
             points[key] = Point(here, found, time, solved)
@@ -185,8 +209,7 @@ class Simulated:
     @cached_property
     def known(self) -> Tangent:
         """The linearisation, computed once."""
-        runs = len(self.states)
-        own = ("initial.base", "initial.resonator")
+        owned = [(k, name, sd) for k in range(len(self.states)) for name, sd in self.free(k).items()]
         shift, columns, views = [], [], []
         steps = np.array([slope_of(v, z) for v, z in zip(self.values, self.z, strict=True)])
         reference = self.card.reference_temperature
@@ -209,19 +232,20 @@ class Simulated:
                 return average(finely(found.derivatives[name][column]), self.group)  # type: ignore[attr-defined, operator]
 
             of_values = np.stack([slope(v.name) for v in self.values], axis=1) * steps
-            starts = np.zeros((seen.time.size, 2 * runs))
-            for n, name in enumerate(own):
-                starts[:, n * runs + k] = slope(name)
+            starts = np.zeros((seen.time.size, len(owned)))
+            for n, (run, name, _) in enumerate(owned):
+                if run == k:
+                    starts[:, n] = slope(name)
             predicted = average(finely(found.columns[column]), self.group)
             centre = of_values @ np.array(self.z)
-            begin = sum(self.initial[k].get(name.removeprefix("initial."), 0.0) * slope(name) for name in own)
+            begin = starts @ np.array([self.initial[run].get(name, 0.0) for run, name, _ in owned])
             shift.append(centre + begin - predicted)
             columns.append(np.concatenate([of_values, starts], axis=1))
         names = (
             *(v.name for v in self.values),
-            *(f"{name}@{k}" for name in own for k in range(runs)),
+            *(f"{name}@{k}" for k, name, _ in owned),
         )
-        prior = np.array([1.0] * len(self.values) + [START] * (2 * runs))
+        prior = np.array([1.0] * len(self.values) + [sd for _, _, sd in owned])
         return Tangent(shift, columns, prior, names, remembering(views))
 
     def tangent(self) -> Tangent:
@@ -247,7 +271,7 @@ class Simulated:
                 new = old + part * float(np.clip(values[value.name] - old, -BOLDEST, BOLDEST))
                 z.append(to_z(value, float(np.clip(at(value, new), value.low, value.high))))
             initial = tuple(
-                {lump: (1.0 - part) * own.get(lump, 0.0) + part * values[f"initial.{lump}@{k}"] for lump in LUMPS}
+                {name: (1.0 - part) * own.get(name, 0.0) + part * values[f"{name}@{k}"] for name in self.free(k)}
                 for k, own in enumerate(self.initial)
             )
             if self.bend(z, initial) < STRAIGHT * self.noise:  # a straight line is as good there
@@ -274,9 +298,9 @@ class Simulated:
         rises = [v.sd / v.value if v.logarithmic else 0.0 for v in self.values]
         missed = [0.5 * s * (new - old) ** 2 for s, new, old in zip(rises, z, self.z, strict=True)]
         missed += [
-            0.5 * WARMER * (new[lump] - old.get(lump, 0.0)) ** 2
-            for lump in LUMPS
+            0.5 * WARMER * (value - old.get(name, 0.0)) ** 2
             for new, old in zip(initial, self.initial, strict=True)
+            for name, value in new.items()
         ]
         return float(np.linalg.norm(reach * missed))
 

@@ -1,0 +1,83 @@
+"""A hole in a record, in which its housing turned back: what comes after it follows from what the housing may have done.
+
+The record is the card's own prediction without noise, of which 20 minutes about the turn are left out; a straight line over them leaves
+more than 0.1 Hz afterwards. With the card's values held, only departures in the hole, within their stated spread, can explain it;
+after one linear step 5 % of it are left at most.
+"""
+
+import numpy as np
+import pytest
+
+from studies.calibration.observed import observe
+from studies.calibration.priors import Priors, gather_priors
+from studies.calibration.problem import CardProblem, wide_law
+from studies.diagnosis.campaign import load_campaign
+from studies.diagnosis.simulated import simulate_baseline
+from studies.instrument.card import load_card
+from studies.record import Record
+from studies.simulation.chamber import load_profile
+from studies.simulation.holes import PARTS, bridge_holes
+from studies.simulation.virtual_gyro import simulate_run
+from thermal.profile import Profile
+
+BEGIN, END = 2800.0, 4000.0
+
+
+@pytest.fixture(scope="module")
+def card():
+    return load_card("hrg-30mm")
+
+
+@pytest.fixture(scope="module")
+def record(card):
+    profile = load_profile("soak 20 30min then ramp 20 45 1.0 then ramp 45 20 1.0 then soak 20 1h")
+    whole = simulate_run(card, profile, 0.1, 1, noise=False).record
+    keep = (whole["time_s"] < BEGIN) | (whole["time_s"] > END)
+    names = ("time_s", "housing_temperature_degC", "frequency_Hz")
+    return Record({name: whole[name][keep] for name in names}, path="hole.csv")
+
+
+def left_by(columns, residual, noise):
+    """What is left of a residual by columns of unit prior, in noise of so much."""
+    rows = np.vstack([columns / noise, np.eye(columns.shape[1])])
+    x = np.linalg.lstsq(rows, np.append(residual / noise, np.zeros(columns.shape[1])), rcond=None)[0]
+    return float(np.sqrt(np.mean((residual - columns @ x) ** 2)))
+
+
+def test_a_calibration_follows_what_comes_after_a_hole(card, record):
+    runs = observe([record])
+    problem = CardProblem(card, gather_priors(card), runs, wide_law(card, runs))
+    known = CardProblem(card, Priors((), np.eye(0)), runs, problem.law)  # the values are the card's: they may not help
+    state = known.evaluate(np.zeros(known.count))
+    residual, columns = state.residual["frequency_Hz"], state.slope["frequency_Hz"]
+    assert np.sqrt(np.mean(residual**2)) > 0.1
+    assert left_by(columns, residual, 1e-3) < 0.005
+
+
+def test_a_diagnosis_follows_what_comes_after_a_hole(card, record):
+    campaign = load_campaign([record])
+    baseline = simulate_baseline(campaign, card, 1e-3)
+    tangent = baseline.tangent()
+    after = [k for k, run in enumerate(campaign.runs) if run.time[0] > BEGIN]
+    assert len(campaign.runs) == 2
+    assert after == [1]
+    own = [place for place, name in enumerate(tangent.names) if "@" in name]
+    columns = tangent.columns[1][:, own] * tangent.prior[own]
+    measured = campaign.runs[1].responses["frequency_Hz"]
+    residual = measured + tangent.shift[1]
+    known = np.isfinite(residual)
+    assert np.sqrt(np.mean(residual[known] ** 2)) > 0.1
+    assert left_by(columns[known], residual[known], 1e-3) < 0.005
+
+
+def test_a_straight_line_over_a_hole_stays_where_it_is():
+    time = np.concatenate([np.arange(0.0, 1000.0, 10.0), np.arange(1900.0, 3000.0, 10.0)])
+    profile = Profile(time, 293.15 + 0.01 * time)
+    bridged, departures = bridge_holes(profile)
+    assert len(bridged.time) == len(time) + PARTS - 1
+    np.testing.assert_allclose(bridged.value, 293.15 + 0.01 * bridged.time, rtol=1e-13)
+    rows = sorted(departures)
+    assert len(rows) == PARTS
+    assert bridged.time[rows[0] - 1] == 990.0
+    assert bridged.time[rows[-1]] == 1900.0
+    assert bridge_holes(Profile(time[:100], time[:100] + 300.0))[1] == {}
