@@ -7,11 +7,7 @@ import pytest
 for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):
     os.environ.setdefault(name, "1")
 
-WORSE_SINCE_ONE_NOISE = (
-    "[ageing f, jump b, hysteresis i]",
-    "[hysteresis f, ageing b, jump i]",
-    "test_the_thermometer_of_a_crystal_is_slower_than_the_crystal",
-)
+WORSE_SINCE_ONE_NOISE = ("test_the_thermometer_of_a_crystal_is_slower_than_the_crystal",)
 
 
 def pytest_collection_modifyitems(items):

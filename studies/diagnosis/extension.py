@@ -16,7 +16,7 @@ from studies.diagnosis.investigate import Diagnosis
 from studies.diagnosis.model import Fit, fit
 from studies.diagnosis.scan import build_bank, scan
 from studies.diagnosis.search import refine
-from studies.diagnosis.terms import used
+from studies.diagnosis.terms import Term, used
 from studies.diagnosis.verdict import Interval
 from studies.effects import Effect, Parameter, find_effect
 from studies.effects.states import FloatArray
@@ -29,6 +29,8 @@ if TYPE_CHECKING:
 
 WIDER = 3.0
 """Of what a diagnosis knows of an effect, the prior with which a calibration finds it anew beside all other values."""
+SURE = 3.0
+"""Log evidence, twenty to one, by which fewer members of a family must be likelier than all of them."""
 
 
 def extend(
@@ -74,9 +76,10 @@ def _is_in_the_baseline(entry: dict[str, Any]) -> bool:
 
 
 def prune(model: Fit) -> Fit:
-    """Return the model with families cut down to the members that pay: the others would add their uncertainty to predictions.
+    """Return the model with families cut down to the members that pay, where the records tell so: the others are uncertain for nothing.
 
-    What forms may miss is no part of a card: it is left out first.
+    A form that is likelier by less than `SURE` is a guess, and a card that takes it at its word predicts other times and temperatures
+    too surely: then the family stays whole, if it holds that form. What forms may miss is no part of a card: it is left out first.
     """
     terms = [replace(term, about=(), named=False) for term in model.terms]
     if terms:
@@ -99,9 +102,16 @@ def prune(model: Fit) -> Fit:
                 fewer = tried
         if fewer is not model:
             fewer = refine(fewer, index)
-        plainest = _definite(model, index)
-        model = max((plainest, fewer), key=lambda f: f.log_evidence)
+        best = max((_definite(model, index), fewer), key=lambda f: f.log_evidence)
+        sure = best.log_evidence > model.log_evidence + SURE
+        model = best if sure or not _holds(model.terms[index], best.terms[index]) else model
     return model
+
+
+def _holds(family: Term, form: Term) -> bool:
+    """Whether a form is of a family as it was fitted: what is not fitted of their shapes is the same."""
+    pairs = zip(family.effect.shape, family.shape, form.shape, strict=True)
+    return all(one == other for parameter, one, other in pairs if not parameter.moves(one))
 
 
 def _definite(model: Fit, index: int) -> Fit:
