@@ -21,6 +21,7 @@ from studies.calibration.problem import JUMP, SHIFT, CardProblem, State, wide_la
 from studies.calibration.remarks import warn
 from studies.calibration.settled import SettledComparison, compare_settled
 from studies.errors import InputError
+from studies.instrument.display import display_name
 from studies.plausible import check_card_frequency, check_one_gyro
 from studies.record import Record, drop_repeats
 from studies.shown import Shown
@@ -123,7 +124,9 @@ class Calibration(Shown):
             return "the fit did not converge. Keep more values fixed (--exact), or leave out the run that differs most"
         if all(one.told_by == "prior" for one in self.estimates):
             return "the data determine none of the card's values"
-        far = [one.parameter for one in self.estimates if abs(one.shift_sd) > EXCLUDED]
+        far = [
+            f"{display_name(one.parameter)} ({one.parameter})" for one in self.estimates if abs(one.shift_sd) > EXCLUDED
+        ]
         if far:
             return (
                 f"{', '.join(far)} would have to move by more than {EXCLUDED:g} of the card's standard deviations. Give the value that"

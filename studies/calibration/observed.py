@@ -23,6 +23,14 @@ HOUSING = "housing_temperature_degC"
 SETTLED = "settled_frequency_Hz"
 """Frequencies of steady-state tables."""
 UNITS = {"frequency_Hz": "Hz", "bias_deg_per_h": "°/h", "inverse_q": "1", QUADRATURE: "V", HOUSING: "K", SETTLED: "Hz"}
+WORDS = {
+    "frequency_Hz": "frequency",
+    "bias_deg_per_h": "zero-rate output",
+    "inverse_q": "1/Q",
+    QUADRATURE: "quadrature control",
+    HOUSING: "housing temperature",
+    SETTLED: "settled frequency",
+}
 MOST_ROWS = 2000  # of a run that are predicted
 MOST_BLOCKS = 240  # of a run that are compared
 PERIOD = 90.0  # ° of azimuth, of what a turning wave of n = 2 meets

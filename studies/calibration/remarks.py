@@ -11,8 +11,9 @@ from studies.calibration.estimates import SILENT, TOLD, Estimate
 from studies.calibration.fit import CardFit, stated_noise
 from studies.calibration.ladder import Rung, noise_rms, usual_mean
 from studies.calibration.misreading import bias_in_seconds
-from studies.calibration.observed import UNITS
+from studies.calibration.observed import UNITS, WORDS
 from studies.calibration.problem import CardProblem
+from studies.instrument.display import display_name
 from studies.simulation.virtual_gyro import idle_effects
 
 TURNED_ON = 2.0  # runs whose offsets are so much larger than the card states
@@ -39,17 +40,17 @@ def warn(found: CardFit, estimates: Sequence[Estimate], ladder: Mapping[str, Run
         usual = usual_mean(found, name)
         if len(rows[name].times) > 1 and rung.offset > max(CONTRADICTION * usual, TURNED_ON * stated):
             warnings.append(
-                f"the runs disagree in {name}: after the calibration their means lie {rung.offset:.3g} {UNITS[name]}"
+                f"the runs disagree in the {WORDS[name]}: after the calibration their means lie {rung.offset:.3g} {UNITS[name]}"
                 f" (rms) from the model, but the noise within a run explains only {usual:.2g}"
-                + (f" and the card states {stated:.3g} from turn-on to turn-on" if stated else "")
+                + (f" and the card states {stated:.3g} from run to run" if stated else "")
                 + (". Are they of one device?" if stated else ". Are they of one device and one turn-on?")
             )
     for name, count in found.outliers.items():
         if count:
             warnings.append(
-                f"{count} {'block' if count == 1 else 'blocks'} of {name} {'is an outlier and was' if count == 1 else 'are outliers and were'} given less weight."
+                f"{count} {'block' if count == 1 else 'blocks'} of the {WORDS[name]} {'is an outlier and was' if count == 1 else 'are outliers and were'} given less weight."
             )
-    stayed = [one.parameter for one in estimates if one.width >= SILENT]
+    stayed = [display_name(one.parameter) for one in estimates if one.width >= SILENT]
     told = sum(rows[name].count for name in rows)
     if len(estimates) > told:
         warnings.append(
@@ -63,7 +64,7 @@ def _moved(estimates: Sequence[Estimate]) -> list[str]:
     """Name the values that the data move by more than two of their prior standard deviations, the furthest first."""
     far = sorted((one for one in estimates if abs(one.shift_sd) > FAR), key=lambda one: -abs(one.shift_sd))
     return [
-        f"{one.parameter} moved by {one.shift_sd:+.1f} of the card's standard deviations, to {one.value:.4g}"
+        f"{display_name(one.parameter)} ({one.parameter}) moved by {one.shift_sd:+.1f} of the card's standard deviations, to {one.value:.4g}"
         f" ({one.low:.4g} … {one.high:.4g}): the card is wrong in this value, or in another with the same effect."
         for one in far
     ]
@@ -77,7 +78,7 @@ def _misfit(found: CardFit, ladder: Mapping[str, Rung]) -> list[str]:
         usual = noise_rms(found, name, replace(slow, white=found.noise[name].white, offset=0.0))
         if rung.calibrated > MISFIT * usual:
             said.append(
-                f"poor fit in {name}: residual {rung.calibrated:.2g} {UNITS[name]} (rms), noise {usual:.2g}. The calibrated values"
+                f"poor fit in the {WORDS[name]}: residual {rung.calibrated:.2g} {UNITS[name]} (rms), noise {usual:.2g}. The calibrated values"
                 f" absorb part of this misfit; hrg diagnose --card looks for the missing effect."
             )
     return said

@@ -42,7 +42,7 @@ def cards(card: str = "") -> Result:
         Column("name", "name"),
         Column("shape", "shape"),
         Column("material", "material"),
-        Column("note", "what is printed, what is illustrative"),
+        Column("note", "what is published, what is illustrative"),
     ]
     return Result({"schema": "hrg.cards/1", "cards": entries}, "Cards", LEAD, [Table("Cards", entries, columns)])
 
@@ -52,6 +52,7 @@ def _show_values(card: str) -> Result:
 
     from shell.inertia import weigh
     from studies.instrument.card import load_card
+    from studies.instrument.display import display_name
 
     instrument = load_card(card)
     values, stated = instrument.uncertain, instrument.stated
@@ -73,6 +74,7 @@ def _show_values(card: str) -> Result:
     }
     rows = [row | {"from": "card" if row["stated"] else "default"} for row in entries]
     columns = [
+        Column("name", "quantity", spell=display_name),
         Column("key", "key"),
         Column("value", "value", form=".4g"),
         Column("sd", "±", form=".2g"),
@@ -91,7 +93,7 @@ def _show_values(card: str) -> Result:
             Facts([
                 ("Mass", f"{1e3 * mass.mass:.5g} g", f"{1e9 * mass.volume:.5g} mm³"),
                 ("Centre of mass", f"z = {1e3 * mass.center:.5g} mm", ""),
-                ("Moments of inertia", f"{1e9 * mass.axial:.5g} g mm² (axis)", f"{1e9 * mass.transverse:.5g} g mm² (across)"),
+                ("Moments of inertia", f"{1e9 * mass.axial:.5g} g mm² about the axis", f"{1e9 * mass.transverse:.5g} g mm² about a diameter"),
             ]),
             *(Table(f"[{table}]", found, columns) for table, found in tables.items()),
         ],

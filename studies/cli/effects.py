@@ -68,7 +68,11 @@ DRIVES = {
 
 
 def _words(effect: "Effect") -> tuple[str, ...]:
-    return ("temperature of the resonator",) if effect.thermal else effect.responses
+    from studies.diagnosis.response import RESPONSES
+
+    return (
+        ("temperature of the resonator",) if effect.thermal else tuple(RESPONSES[one].word for one in effect.responses)
+    )
 
 
 def parameters(effect: "Effect") -> list[dict[str, str]]:
@@ -88,7 +92,7 @@ def parameters(effect: "Effect") -> list[dict[str, str]]:
         kind = "coefficient" if many == 1 else f"coefficient, or a list of {many}"
         bounds = "0 and above" if effect.positive and name == names[0] else "any"
         bounds = bounds.replace("and above", f"to {coefficient.most:g}") if coefficient.most < float("inf") else bounds
-        rows.append({"name": name, "kind": kind, "bounds": bounds, "meaning": "size; the unit is that of the name"})
+        rows.append({"name": name, "kind": kind, "bounds": bounds, "meaning": "size, in the unit that the key names"})
     return rows
 
 

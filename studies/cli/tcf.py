@@ -52,6 +52,7 @@ def tcf(
     """
     from studies.errors import InputError
     from studies.instrument.card import load_card
+    from studies.instrument.display import display_name
     from studies.law import check_slope_known, law_of
 
     if harmonic > MOST_HARMONIC and theory != "rayleigh":
@@ -101,7 +102,12 @@ def tcf(
             Table(
                 "Uncertainty of the law: change of the slope by one standard deviation (ppm/°C)",
                 uncertain,
-                [Column("coefficient", "coefficient"), Column("sd", "standard deviation", form=".2g"), *at],
+                [
+                    Column("coefficient", "quantity", spell=display_name),
+                    Column("coefficient", "key"),
+                    Column("sd", "standard deviation", form=".2g"),
+                    *at,
+                ],
             ),
             Table(
                 "Measured slope between neighbouring points",

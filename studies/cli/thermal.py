@@ -43,6 +43,7 @@ def thermal(card: str, profile: str, *, rows: int = 13) -> Result:
     from shell.constants import zero_Celsius
     from studies.errors import InputError
     from studies.instrument.card import load_card
+    from studies.instrument.display import name_constant
     from studies.simulation.chamber import check_profile, load_profile
     from studies.simulation.heat_path import build_network, build_shell_and_stem
     from thermal.balance import check_energy
@@ -98,9 +99,9 @@ def thermal(card: str, profile: str, *, rows: int = 13) -> Result:
                 + [Column(f"tau.{k}", name, "s", ".0f") for k, name in enumerate(("slowest", "second", "third"))],
             ),
             Table(
-                "What decides the slowest time constant",
+                "Sensitivity of the slowest time constant τ to each constant p",
                 decisive,
-                [Column("constant", "constant"), Column("effect", "relative change per relative change", form="+.3f")],
+                [Column("constant", "constant", spell=name_constant), Column("effect", "d ln τ / d ln p", form="+.3f")],
             ),
             Figure(lambda: _curves(transient, chamber, np.array([*picks, mean, rim]), names), "Temperatures in time."),
             Table(

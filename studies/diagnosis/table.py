@@ -23,6 +23,7 @@ from studies.diagnosis.table_words import MORE, bends_beyond_a_cubic, next_table
 from studies.diagnosis.verdict import NINETY, Cause, Interval, ResponseResult, Shift, Verdict, doubted, weigh
 from studies.effects import library
 from studies.effects.states import FloatArray
+from studies.instrument.display import display_name
 from studies.shown import Shown
 
 if TYPE_CHECKING:
@@ -172,7 +173,9 @@ def study_calibrated_table(found: "Calibration") -> TableDiagnosis:
     shifts = tuple(Shift(m.parameter, m.card, m.value, m.low, m.high, m.shift_sd) for m in moved)
     said = list(compared.sentences)
     if shifts:
-        most = ", ".join(f"{one.parameter} ({one.shift_sd:+.2f} standard deviations)" for one in shifts[:2])
+        most = ", ".join(
+            f"{display_name(one.parameter)} ({one.shift_sd:+.2f} standard deviations)" for one in shifts[:2]
+        )
         said.append(f"The calibration changes most: {most}.")
     said.append(
         f"Residual with the card as given: {rms(shipped):.3f} Hz rms; calibrated: {rms(left):.3f} Hz; rounding alone would give {rounding:.4f} Hz."

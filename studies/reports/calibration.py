@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from shell.constants import zero_Celsius
-from studies.calibration.observed import HOUSING, QUADRATURE, SETTLED
+from studies.calibration.observed import HOUSING, QUADRATURE, SETTLED, WORDS
+from studies.instrument.display import display_name
 from studies.reports import style
 from studies.reports.digits import plain
 from studies.results import Chapter, Column, Facts, Figure, Sentence, Table
@@ -16,14 +17,7 @@ if TYPE_CHECKING:
 
     from studies.calibration.calibrate import Calibration
 
-NAMES = {
-    "frequency_Hz": "Frequency",
-    "bias_deg_per_h": "Zero-rate output",
-    "inverse_q": "1/Q",
-    QUADRATURE: "Quadrature control",
-    HOUSING: "Housing temperature",
-    SETTLED: "Settled frequency",
-}
+NAMES = {name: word[0].upper() + word[1:] for name, word in WORDS.items()}
 SHOWN = {
     "frequency_Hz": ("mHz", 1e3),
     "bias_deg_per_h": ("°/h", 1.0),
@@ -36,16 +30,17 @@ SHOWN = {
 TOLD = {"data": "data", "prior": "prior", "both": "data and prior"}
 RESPONSE = (Column("response", "response"), Column("unit", "unit"))
 VALUES = (
-    Column("parameter", "value"),
+    Column("parameter", "quantity", spell=display_name),
     Column("unit", "unit"),
     Column("card", "card", digits=5),
     Column("value", "calibrated", within=("low", "high")),
     Column("value", "90 % interval", interval=("low", "high"), digits=0),
-    Column("interval", "interval from"),
+    Column("interval", "type of interval"),
     Column("shift_sd", "shift", "sd", "+.2f"),
     Column("width", "width", form=".3f"),
     Column("told", "determined by"),
 )
+KEY = Column("parameter", "key of the card")
 RESIDUALS = (
     *RESPONSE,
     *(Column(key, heading, digits=3) for key, heading in (("as_shipped", "as given"), ("calibrated", "calibrated"), ("noise", "noise"))),
@@ -114,14 +109,14 @@ def calibration_parts(found: "Calibration", payload: Mapping[str, Any]) -> list[
             Table("Held-out run", _predicted(payload), PREDICTED, _held_out_note(payload)),
         ]),
         Chapter("Values", [
-            Table(title, rows, VALUES, WIDTHS, "page", sortable=True),
+            Table(title, rows, (*VALUES, KEY), WIDTHS, "page", sortable=True),
             Table(title, touched, VALUES, WIDTHS + unchanged, "terminal"),
-            *(Sentence(f"The data determine only a combination of {', '.join(group)}.") for group in found.groups),
+            *(Sentence(f"The data determine only a combination of {', '.join(map(display_name, group))}.") for group in found.groups),
             Figure(lambda: _draw_shifts(found), "Shifts of the values that the data determine at least in part, with 90 % intervals; shaded: 90 % of the prior."),
         ]),
         Chapter("Residuals over time, and noise", [
             Figure(lambda: residual_figure(found), "Measured minus predicted after the calibration; block averages, one colour for each run."),
-            Table("Noise levels", levels, LEVELS, "White: Allan deviation at 1 s. Flicker: flat part of the Allan deviation. Walk: standard deviation of the change in 1 h. Offset: from turn-on to turn-on.", "page"),
+            Table("Noise levels", levels, LEVELS, "White: Allan deviation at 1 s. Flicker: flat part of the Allan deviation. Walk: standard deviation of the change in 1 h. Offset: standard deviation from run to run.", "page"),
         ]),
     ]  # fmt: skip
 
@@ -175,7 +170,7 @@ def _draw_shifts(found: "Calibration") -> "Drawing":
         shifts, widths = [one.shift_sd for one in told], [1.645 * one.width for one in told]
         axis.errorbar(shifts, place, xerr=widths, fmt="o", markersize=4, capsize=2, color=style.BLUE)
         axis.axvline(0.0, color=style.BLACK, linewidth=0.8)
-        axis.set_yticks(place, [one.parameter for one in told], fontsize=8)
+        axis.set_yticks(place, [display_name(one.parameter) for one in told], fontsize=8)
         axis.set_xlabel("shift from the card (prior standard deviations)")
         return made
 

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 from studies.diagnosis.response import RESPONSES
 from studies.diagnosis.verdict import Cause, Verdict
+from studies.instrument.display import display_name
 from studies.instrument.units import split_unit, unit_of
 from studies.reports import diagnosis_pictures as pictures
 from studies.reports.digits import plain
@@ -89,7 +90,7 @@ def name_cause(cause: Cause) -> str:
 
 def spell_parameter(name: str) -> tuple[str, float]:
     """Return a parameter's name with its unit in brackets, and what its value is multiplied by: rates are in K/min."""
-    words, unit = (name, unit_of(name)) if "." in name else split_unit(name)
+    words, unit = (display_name(name), unit_of(name)) if "." in name else split_unit(name)
     factor = 1.0
     if unit.endswith(("/(K/s)", "/(K²/s)")):
         unit, factor = unit.replace("/(K/s)", " per K/min").replace("/(K²/s)", " per K²/min"), 1.0 / 60.0

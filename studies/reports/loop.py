@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from studies.instrument.display import display_name
 from studies.reports import style
 from studies.reports.digits import plain, to_error
 from studies.results import Chapter, Column, Facts, Figure, Sentence, Table
@@ -74,7 +75,7 @@ def loop_parts(study: "LoopStudy", payload: dict[str, Any], run: "Record | None"
                 "± one standard deviation, from the card's uncertain values. Total: including split and axis angles, which several sources share."),
             Figure(lambda: _around(study), "Bias by source over the azimuth of the standing wave; removing an error removes its curve."),
             Table("Sensitivity of the bias to the card's values", moving, [
-                Column("key", "key of the card"), Column("value", "value", error="sd"), Column("slope", "slope", "°/h per unit of the key", digits=3),
+                Column("key", "quantity", spell=display_name), Column("key", "key of the card"), Column("value", "value", error="sd"), Column("slope", "slope", "°/h per unit of the key", digits=3),
                 Column("effect", "1 σ effect", "°/h", digits=3),
             ], "Largest first.", "page"),
         ]),
@@ -137,7 +138,7 @@ def _largest(slopes: "tuple[BiasSlope, ...]", sd: float) -> list[Sentence]:
     first, share = slopes[0], (slopes[0].effect / sd) ** 2 if sd > 0 else 0.0
     return [
         Sentence(
-            f"Largest contribution to the uncertainty of the bias: {first.key}. Its standard deviation of {first.sd:.3g} contributes"
+            f"Largest contribution to the uncertainty of the bias: {display_name(first.key)} ({first.key}). Its standard deviation of {first.sd:.3g} contributes"
             f" {first.effect:.3g} °/h, {100 * share:.0f} % of the variance. A constant bias can be calibrated out; drift of these"
             " values with age or temperature changes the bias in proportion to the slopes."
         )

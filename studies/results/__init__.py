@@ -42,6 +42,8 @@ class Column:
         Keys of the ends of its interval: the value is written to the second digit of the width.
     scale : float
         What the row has times this is shown, for example 1e6 for ppm.
+    spell : callable
+        What makes a text of the row a name for people, such as `display_name` for a key of a card.
     """
 
     key: str
@@ -53,6 +55,7 @@ class Column:
     interval: tuple[str, str] | None = None
     within: tuple[str, str] | None = None
     scale: float = 1.0
+    spell: Callable[[str], str] = str
 
     @property
     def title(self) -> str:
@@ -80,7 +83,7 @@ class Column:
 
     def _number(self, value: object) -> str:
         if value is None or isinstance(value, str):
-            return value or ""
+            return self.spell(value) if value else ""
         if isinstance(value, list | tuple):
             return ", ".join(map(str, value))
         if not isinstance(value, float | int) or isinstance(value, bool):
@@ -184,7 +187,7 @@ class Result:
     title, lead : str
         Of the page: a name, and one sentence of what it shows.
     parts : Sequence[Chapter | Part]
-        What people read, in reading order; parts before the first chapter stand under "In short".
+        What people read, in reading order; parts before the first chapter stand under "Results".
     status : int
         The exit status, where it is not 0.
     printed : str
@@ -203,4 +206,4 @@ class Result:
     def chapters(self) -> list[Chapter]:
         """The parts by chapter."""
         loose = [part for part in self.parts if not isinstance(part, Chapter)]
-        return [*([Chapter("In short", loose)] if loose else []), *(p for p in self.parts if isinstance(p, Chapter))]
+        return [*([Chapter("Results", loose)] if loose else []), *(p for p in self.parts if isinstance(p, Chapter))]

@@ -48,5 +48,5 @@ def test_a_heat_path_of_another_form_is_fitted_as_well_as_it_can_be_and_the_misf
         if "initial" in name
     ]
     assert np.abs(away).max() < 0.3
-    (said,) = [one for one in found.warnings if "poor fit in frequency_Hz" in one]
+    (said,) = [one for one in found.warnings if "poor fit in the frequency" in one]
     assert "hrg diagnose" in said

@@ -35,7 +35,7 @@ def test_what_a_card_states_of_its_turn_ons_is_no_contradiction():
     assert not [warning for warning in found.warnings if "contradict" in warning]
     assert found.instrument.noise.bias_turn_on_deg_per_h == pytest.approx(np.std(offsets, ddof=1), rel=0.3)
     far = calibrate(card, [runs[0], _run(8.0, random)], profile=False)
-    assert [warning for warning in far.warnings if "the card states 0.5 from turn-on to turn-on" in warning]
+    assert [warning for warning in far.warnings if "the card states 0.5 from run to run" in warning]
 
 
 def _diagnose(levels, stated):

@@ -1,0 +1,80 @@
+"""Names that people read for a card's keys: "temperature slope of the shear modulus".
+
+The key itself stays in JSON, in cards, and beside the name where the reader edits a card.
+"""
+
+from studies.instrument.units import split_unit
+
+WHOLE = {
+    "bias.offset_deg_per_h": "bias offset",
+    "bias.pattern_angle_deg": "azimuth of the standing wave",
+    "loss.inverse_q": "1/Q at the reference temperature",
+    "loss.slope_per_K": "relative temperature slope of 1/Q",
+    "loss.curvature_per_K2": "relative temperature curvature of 1/Q",
+    "loss.pressure_Pa": "gas pressure in the housing",
+    "noise.housing_lag_s": "lag of the housing sensor",
+    "noise.bias_turn_on_deg_per_h": "run-to-run offset of the bias",
+    "thermal.film_emissivity": "emissivity of the film",
+    "thermal.base_heat_capacity_J_per_K": "heat capacity of the base",
+    "thermal.housing_heat_capacity_J_per_K": "heat capacity of the housing",
+    "thermal.chamber_conductance_W_per_K": "conductance chamber to housing",
+    "thermal.mount_conductance_W_per_K": "conductance housing to base",
+    "thermal.mount_exchange_cm2": "radiative exchange housing to base",
+    "thermal.conductivity_W_per_m_K": "thermal conductivity of the shell",
+    "thermal.heat_capacity_J_per_kg_K": "specific heat of the shell",
+    "loop.frequency_split_mHz": "frequency split",
+    "loop.frequency_axis_deg": "axis of the frequency split",
+    "loop.misalignment_mrad": "misalignment of drives and pick-offs",
+    "mount.expansion_per_K": "expansion of the mount",
+}
+"""By the dotted key, for names that the words of the key do not make."""
+
+WORDS = {"pickoff": "pick-off", "youngs": "Young's", "poisson": "Poisson's", "q": "Q", "adc": "ADC", "dac": "DAC"}
+POLYNOMIAL = {
+    "k1": "f", "k2": "f²", "k3": "f³", "k4": "ḟ", "k5": "ḟ²", "k6": "ḟ³", "k7": "f ḟ", "k8": "f² ḟ", "k9": "f ḟ²",
+}  # fmt: skip
+ERRORS = {
+    "gain_ratio": "gain mismatch",
+    "phase": "phase error",
+    "phase_difference": "phase difference",
+    "skew": "axis skew",
+}
+ORDERS = {"slope": "temperature slope of {}", "curvature": "temperature curvature of {}", "value": "{}"}
+PROPERTIES = {
+    "youngs_modulus": "Young's modulus",
+    "shear_modulus": "the shear modulus",
+    "poisson_ratio": "Poisson's ratio",
+    "density": "the density",
+    "expansion": "the thermal expansion",
+}
+NODES = {"conductance": "conductance", "exchange": "radiative exchange", "capacity": "heat capacity"}
+
+
+def display_name(key: str) -> str:
+    """Return what people call a dotted key of a card; without a name of its own, the words of the key without its unit."""
+    words = [word for word in key.split(".") if not word.isdigit()]
+    plain = split_unit(words[-1])[0]
+    if name := WHOLE.get(".".join(words)):
+        return name
+    if len(words) > 1 and words[-2] in PROPERTIES:
+        order = plain.removeprefix("log_")
+        return ORDERS.get(order, order + " of {}").format(PROPERTIES[words[-2]]).removeprefix("the ")
+    if words[0] == "bias" and plain in POLYNOMIAL:
+        return f"bias coefficient {plain} ({POLYNOMIAL[plain]})"
+    side, _, error = plain.partition("_")
+    if words[0] == "loop" and error in ERRORS:
+        return f"{WORDS.get(side, side)} {ERRORS[error]}"
+    parts = [WORDS.get(word, word) for word in plain.split("_")]
+    places = [str(int(word) + 1) for word in key.split(".") if word.isdigit()]
+    of = [" ".join([words[-2].replace("_", " "), *places])] if places else []
+    return " ".join(of + parts)
+
+
+def name_constant(name: str) -> str:
+    """Return what people call a constant of the heat path: "conductance housing-base" is "conductance housing to base"."""
+    kind, _, where = name.partition(" ")
+    return (
+        f"{NODES.get(kind, kind)} {' to '.join(where.split('-'))}"
+        if "-" in where
+        else f"{NODES.get(kind, kind)} of the {where}"
+    )
