@@ -187,7 +187,7 @@ def invert(curve: Callable[[Array], Array], span: tuple[float, float], frequency
         raise CompensationError(
             f"the frequency runs from {np.nanmin(frequency):.8g} to {np.nanmax(frequency):.8g} Hz and lies outside {low:.8g}"
             f" to {high:.8g} Hz ({span[0]:.1f} to {span[1]:.1f} °C), over which the curve was fitted, in"
-            f" {np.mean(outside):.1%} of the readings; calibrate over that range."
+            f" {100 * np.mean(outside):.1f} % of the readings; calibrate over that range."
         )
 
     def excess(T: Array, f: Array) -> Array:

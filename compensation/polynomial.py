@@ -123,7 +123,7 @@ def fit_polynomial(
     if distinct <= order or x.size <= order + 1:
         raise CompensationError(
             f"order {order} needs at least {order + 1} different values of '{name}' and {order + 2} rows, "
-            f"not {distinct} and {x.size} (values within {APART:.0%} of their span count as one); lower the order or measure more."
+            f"not {distinct} and {x.size} (values within {100 * APART:.0f} % of their span count as one); lower the order or measure more."
         )
     # A centre and span with few bits make the scaled variable exact for tabulated values.
     half_span = float(2.0 ** np.ceil(np.log2(np.ptp(x) / 2)))

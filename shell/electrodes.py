@@ -262,9 +262,10 @@ def trim_voltages(electrodes: Electrodes, wave: complex, limit: float) -> Trim:
         bounds=[(0.0, 1.0)] * len(waves),
     )
     if sought.status != 0:
+        hertz = electrodes.pair.mode.frequency
         raise ShellError(
-            f"{limit:g} V on these electrodes null splits up to {1e6 * reach(electrodes, limit):.3g} ppm in any direction; "
-            f"{1e6 * abs(wave):.3g} ppm is beyond: take more voltage, a smaller gap, or mass."
+            f"{limit:g} V on these electrodes null a split of at most {hertz * reach(electrodes, limit):.3g} Hz in any direction, "
+            f"not {hertz * abs(wave):.4g} Hz: raise the voltage, narrow the gap, or trim by mass first."
         )
     squares = np.maximum(np.asarray(sought.x), 0.0) * limit**2
     return Trim(tuple(np.sqrt(squares).tolist()), complex(waves @ squares + wave), float(means @ squares))

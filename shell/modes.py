@@ -181,7 +181,7 @@ def solve_modes(
         errors = [error + rest.error(one.along) for one, error in zip(solutions, errors, strict=True)]
     if max(errors) > tolerance:
         warnings.warn(
-            f"the frequency is known to {max(errors):.2g}, {max(errors) / tolerance:.2g} times the tolerance asked for.",
+            f"the tolerance of {tolerance:g} was not reached: relative error {max(errors):.2g}.",
             TheoryRangeWarning,
             stacklevel=2,
         )
@@ -264,7 +264,7 @@ def _rayleigh(resonator: Resonator, elastic: Elastic | VaryingElastic, n: int, c
         )
     if resonator.support != "free" or n < 2 or count != 1 or not isinstance(elastic, Elastic):
         raise ShellError(
-            "Rayleigh's closed form is one mode for each n >= 2 of a free shell of one material: use theory solid or shell."
+            "Rayleigh's closed form is one mode for each n >= 2 of a free shell of one material: use --harmonic 2 or more with --count 1, or --theory solid or shell."
         )
     h = thicknesses.pop()
     f = float(

@@ -64,7 +64,9 @@ class SplitReading(SplitWave):
             The split is smaller than twice its error: there is nothing that could be cut safely.
         """
         if not split > 0 or not error > 0:
-            raise ShellError("a split and its reading error are positive numbers of Hz.")
+            raise ShellError(
+                f"a split of {split:g} Hz with a reading error of {error:g} Hz: both must be positive (--split, --reading-error)."
+            )
         if split < 2 * error:
             raise ShellError(
                 f"the split of n = {harmonic}, {1e3 * split:.3g} mHz, cannot be distinguished from its reading error of {1e3 * error:.3g} mHz: "
@@ -243,11 +245,10 @@ def _least_mass(
         bounds=most,
     )
     if found.x is None:
-        room = 1e9 * float(capacity.sum())
-        need = 1e9 * size
+        room, need = 1e6 * float(capacity.sum()), 1e6 * size
         raise ShellError(
-            f"the cuts would go beyond the wall: about {need:.3g} µg are to be taken off around the antinodes, and the sites "
-            f"({count} of them, {room:.3g} µg in all, at most {1e9 * float(capacity.max()):.3g} µg each) cannot hold this and the balance. "
-            "Allow longer, wider or more cuts."
+            f"the cuts would go beyond the wall: about {need:.3g} mg must come off around the antinodes, but the {count} sites "
+            f"give {room:.3g} mg in all, at most {1e9 * float(capacity.max()):.3g} µg each, and the balance must be kept. "
+            "Allow longer, wider or more cuts. Is the split in Hz?"
         )
     return np.asarray(np.maximum(found.x[:count], 0.0) * size)

@@ -31,7 +31,7 @@ def naming(place: str | Path) -> Iterator[None]:
 
 
 def nearest(word: str, known: Iterable[str]) -> str:
-    """Return "; did you mean 'x'?" for the known word nearest to `word`, or the list of known words."""
-    known = sorted(known)
+    """Return "; did you mean 'x'?" for the known word nearest to `word`, or the list of known words, those with `word` in them first."""
+    known = sorted(known, key=lambda one: (word.lower() not in one.lower(), one))
     close = difflib.get_close_matches(word, known, n=1, cutoff=0.5)
-    return f"; did you mean '{close[0]}'?" if close else f"; known: {', '.join(known)}"
+    return f"; did you mean '{close[0]}'?" if close else f"; known: {', '.join(known)}."

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from studies.record import Record
 
 Array = NDArray[np.float64]
+ANOTHER = 0.2  # relative: no tolerance of one design makes so much
 ALIKE = 0.03  # relative: what trimming, temperature and small errors of dimensions make of a frequency
 SPREADS = 6.0  # standard deviations of the card's own frequency
 ONE_GYRO, STEEPEST = 5e-3, 3e-4  # relative, and 1/K: what one gyro does from run to run, and over temperature at most
@@ -39,10 +40,13 @@ def check_card_frequency(instrument: "Instrument", frequency: Array, path: str) 
     if away <= SPREADS * spread:
         return
     T = instrument.reference_temperature - zero_Celsius
+    ask = (
+        "is this a record of that gyro? If it is, give a dimension an uncertainty that covers the difference: [resonator]"
+        f" thickness_mm = {{ value = …, relative_sd = {np.ceil(50 * away) / 100:g} }}."
+    )
     raise InputError(
         f"{path}: frequency_Hz is near {read:.5g} Hz, but the card {instrument.name} rings at {own:.5g} Hz at {T:g} °C,"
-        f" known to {100 * spread:.2g} %: is this a record of that gyro? If it is, say so in the card, with a dimension"
-        f" that is as uncertain: [resonator] thickness_mm = {{ value = …, relative_sd = {np.ceil(50 * away) / 100:g} }}."
+        f" known to {100 * spread:.2g} %: {ask if away < ANOTHER else 'this is not a record of that gyro; check the card and the file.'}"
     )
 
 

@@ -37,6 +37,7 @@ COLUMNS = {
     "quadrature_V": "quadrature-control effort",
     "pattern_angle_deg": "azimuth of the standing wave",
 }
+FAR = 0.7  # of ln f from the median of a table: a factor of two
 COMPENSATED = "compensated_"
 RESONATOR = "resonator_temperature_degC"
 LIMITS = {
@@ -135,7 +136,7 @@ def read_record(path: str | Path) -> Record:
     import numpy as np
 
     if "time_s" not in (names := read_header(path)) and "temperature_degC" in names:
-        raise InputError(f"{path}: a steady-state table (no time_s) where a record in time is needed.")
+        raise InputError(f"{path}: this is a steady-state table (no time_s), but a record in time is needed.")
     table = read_columns(path, COLUMNS, required=("time_s",), prefixes=(COMPENSATED,))
     time = table.values["time_s"]
     if np.isnan(time).any():
@@ -165,6 +166,13 @@ def read_frequency_table(path: str | Path) -> Columns:
     if (table.values["frequency_Hz"] <= 0).any():
         line = table.line(int(np.flatnonzero(table.values["frequency_Hz"] <= 0)[0]))
         raise InputError(f"{path}, line {line}: frequency_Hz must be positive.")
+    usual = float(np.median(f := table.values["frequency_Hz"]))
+    away = np.flatnonzero(np.abs(np.log(f / usual)) > FAR)
+    if away.size:
+        line, value = table.line(int(away[0])), f[away[0]]
+        raise InputError(
+            f"{path}, line {line}: frequency_Hz = {value:g} is far from the others (median {usual:.6g} Hz); correct or remove the line."
+        )
     return table
 
 

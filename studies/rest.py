@@ -68,8 +68,11 @@ def choose_column(records: "Sequence[Record]", candidates: Sequence[str], purpos
     for name in candidates:
         if all(name in record for record in records):
             return name
-    path = next((r.path for r in records if not any(name in r for name in candidates)), records[0].path)
-    raise InputError(f"{path}: {purpose} needs the same one of {', '.join(candidates)} in every record.")
+    names = " or ".join(candidates)
+    for record in records:
+        if not any(name in record for name in candidates):
+            raise InputError(f"{record.path}: it has no column {names}, which {purpose} needs in every record.")
+    raise InputError(f"{records[0].path}: {purpose} needs the same column in every record: {names}.")
 
 
 def gather_rest(records: "Sequence[Record]", outputs: "dict[str, float]") -> RestData:

@@ -98,7 +98,7 @@ def settled_table(soaks: Sequence[Soak], where: str, advice: str = "") -> tuple[
     if np.count_nonzero(np.diff(np.sort(T)) > 0.5) < 1:
         raise InputError(
             f"{where}: found {len(soaks) or 'no'} settled {'part' if len(soaks) == 1 else 'parts'}; a fit over temperature needs at least two"
-            f" temperatures 0.5 °C apart. {advice[:1].upper()}{advice[1:]}{'S' if not advice else 's'}oak longer, raise --left, or lower --time-constant."
+            f" temperatures 0.5 °C apart. {advice or 'Hold each temperature longer.'} Raising --left accepts parts that are less settled."
         )
     return T, f, float(np.sqrt(12.0) * max(s.error_Hz for s in soaks))
 
@@ -113,7 +113,7 @@ def advise_hold(records: Sequence[Record], time_constant: float, tolerance: floa
     whole = [(one, rows[: -one.reach]) for one, rows in holds if _is_whole(one.time, rows, one.reach)]
     if not whole:
         longest = max((float(np.ptp(one.time[rows])) for one, rows in holds), default=0.0)
-        return f"no temperature is held for longer than {longest / 60:.0f} min; " if holds else ""
+        return f"Hold each temperature longer: none is held for more than {longest / 60:.0f} min." if holds else ""
     moving = [(one, rows) for one, rows in whole if one.left[rows[-2 * one.reach :]].min() > tolerance]
     if not moving:
         return ""
@@ -121,14 +121,14 @@ def advise_hold(records: Sequence[Record], time_constant: float, tolerance: floa
     found = [_settling(one, rows, tolerance) for one, rows in moving if np.ptp(one.time[rows]) > 0.9 * longest]
     speed, own, needed = max(found, key=lambda one: one[2])  # the temperature that settles most slowly
     moves = (
-        f"the frequency still drifts by {speed * HOUR:.2g} Hz/h at the end of the longest hold that has not settled,"
+        f"The frequency still drifts by {speed * HOUR:.2g} Hz/h at the end of the longest hold that has not settled,"
         f" {longest / HOUR:.1f} h"
     )
     if not np.isfinite(own):
-        return f"{moves}; "
+        return f"{moves}: hold each temperature longer."
     return (
         f"{moves}; with the time constant of {own / 60:.0f} min that it shows, hold each temperature"
-        f" {np.ceil(10 * needed / HOUR) / 10:.1f} h; or "
+        f" {np.ceil(10 * needed / HOUR) / 10:.1f} h."
     )
 
 

@@ -149,7 +149,8 @@ def tooth_sites(pairs: Mapping[int, Pair], teeth: Teeth) -> Sites:
     """One site on every tooth."""
     if not (4 <= teeth.count <= MOST_TEETH and 0 < teeth.limit < np.inf and np.isfinite(teeth.azimuth)):
         raise InputError(
-            f"the number of teeth must be 4 to {MOST_TEETH}, and the largest mass to remove from each must be positive."
+            f"--teeth {teeth.count}, --tooth-limit-ug {1e9 * teeth.limit:g}: there must be 4 to {MOST_TEETH} teeth, and the largest mass"
+            " to remove from each must be positive."
         )
     around = (teeth.azimuth + 2 * pi * np.arange(teeth.count) / teeth.count) % (2 * pi)
     along = np.ones(teeth.count)
@@ -205,17 +206,18 @@ def plan_for_card(
         The sites cannot take off what is needed, or what the cuts do is not known well enough.
     """
     if not 0 < goal < np.inf:
-        raise InputError("the goal must be a positive split in Hz.")
+        raise InputError(f"--goal {goal:g}: must be a positive split in Hz.")
     if gain == 0 or not np.isfinite(gain):
         raise InputError(
-            "the gain is the measured change of the split over the predicted one, a number of either sign, not 0."
+            f"--gain {gain:g}: measured over predicted change of the split, a number of either sign, not 0."
         )
     if not (0 <= removal_error < 1 and 0 <= gain_error < 1):
         raise InputError("the relative standard errors of the cuts must lie between 0 and 1 (0.02 is 2 %).")
     if not all(np.isfinite((split, axis)).all() and 0 <= error < np.inf for _, split, axis, error in measured):
         raise InputError("splits and axes must be finite, and the reading error must not be negative.")
     if not all(0 <= x <= 1 for x in heights):
-        raise InputError("positions along the meridian must lie between 0 and 1 (rim).")
+        wrong = next(x for x in heights if not 0 <= x <= 1)
+        raise InputError(f"--position {wrong:g}: must lie between 0 and 1 (rim).")
     pairs = {}
     for n, *_ in measured:
         if n in pairs:

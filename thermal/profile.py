@@ -131,10 +131,13 @@ def parse_profile(words: str) -> Profile:
             raise ThermalError(f"'{kind}' is not a kind of profile. {_forms()}")
         names, build = FORMS[kind]
         if len(arguments) != len(names):
+            durations = " (durations without a blank: 5h, 30min, 90s)" if {"DURATION", "HOLD"} & set(names) else ""
             raise ThermalError(
-                f"'{' '.join(sentence)}' has {len(arguments)} values, but the form is '{kind} {' '.join(names)}'."
+                f"'{' '.join(sentence)}' has {len(arguments)} values after '{kind}', not {len(names)}; write"
+                f" '{kind} {' '.join(names)}'{durations}."
             )
-        piece = build(*[_read(name, text) for name, text in zip(names, arguments, strict=True)])
+        given = " ".join(sentence)
+        piece = build(*[_read(name, text, given) for name, text in zip(names, arguments, strict=True)])
         offset = points[-1][0] if points else 0.0
         for time, temperature in piece:
             _append(points, offset + time, temperature)
@@ -208,7 +211,7 @@ def _forms() -> str:
     return f"A profile is one of: {forms}; joined by 'then'. Example: step 20 -10 5h."
 
 
-def _read(name: str, text: str) -> float:
+def _read(name: str, text: str, sentence: str) -> float:
     unit = 1.0
     number = text
     if name in ("DURATION", "HOLD"):
@@ -220,9 +223,10 @@ def _read(name: str, text: str) -> float:
         value = math.nan
     if not math.isfinite(value):
         what = "a duration such as 5h, 30min or 90s" if name in ("DURATION", "HOLD") else "a number"
-        raise ThermalError(f"'{text}' stands where the profile needs {what} ({name}).")
+        raise ThermalError(f"'{sentence}': {name} must be {what}, not '{text}'.")
     if name in TEMPERATURES and value <= -zero_Celsius:
-        raise ThermalError(f"{text} °C is below absolute zero.")
+        raise ThermalError(f"'{sentence}': {text} °C is below absolute zero; temperatures are in °C.")
     if name not in TEMPERATURES and value <= 0:
-        raise ThermalError(f"{name} must be positive, not {text}.")
+        spelled = {"RATE": " (K/min)", "STEP": " (K)", "COUNT": ""}.get(name, " (5h, 30min or 90s)")
+        raise ThermalError(f"'{sentence}': {name}{spelled} must be positive, not {text}.")
     return value

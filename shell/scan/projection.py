@@ -13,6 +13,7 @@ FINE = 8001  # samples of the meridian; between them the distance is exact to (s
 CELLS = 300  # cells of the table of nearest samples along the longer side
 COARSE = 10  # samples per entry of the table
 CHUNK = 500_000  # points at a time
+FEWEST = 20  # points of a face
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,6 +86,8 @@ def check_unit(points: Array, resonator: Resonator, name: str) -> None:
     nominal = max(2 * float(line.r.max()), float(np.ptp(line.z)))
     low, high = np.percentile(points[:: max(1, len(points) // 20000)], [0.5, 99.5], axis=0)
     measured = float((high - low).max())
+    if len(points) < FEWEST:
+        raise ShellError(f"{name}: {len(points)} points are too few to fit a face; at least {FEWEST} are needed.")
     if not 0.45 * nominal < measured < 2.2 * nominal:
         ratio = measured / nominal
         guess = {
@@ -99,5 +102,5 @@ def check_unit(points: Array, resonator: Resonator, name: str) -> None:
         hint = f" ({guess[power]}?)" if power in guess else ""
         raise ShellError(
             f"{name}: the points span {1e3 * measured:.4g} mm, the resonator of the card {1e3 * nominal:.4g} mm{hint}; "
-            "state the unit of the file, or use the card of this resonator."
+            "state the unit of the file (--unit), or use the card of this resonator."
         )

@@ -79,6 +79,7 @@ def compensate(
     added: list[str] = []
     parts: list[Table | Sentence | Figure] = []
     if run is not None and out is not None:
+        models.emit_c(loaded)  # a formula that lacks a key is refused before a long record is read
         say(f"reading {run}")
         record = read_record(run)
         result = models.compensate(loaded, record, extrapolate=extrapolate)

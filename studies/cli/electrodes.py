@@ -16,6 +16,9 @@ if TYPE_CHECKING:
     from studies.results import Part
 
 
+NO_SPLIT = 1e-12  # relative: rounding of a pair without a split
+
+
 @answers("hrg.electrodes/1")
 def electrodes(
     card: str,
@@ -78,7 +81,7 @@ def electrodes(
         else:
             wave = whole.split.wave
         factor, most = charged.pull_in, reach(charged, limit)
-        asked = split is not None or 0 < abs(wave) <= most  # the card's own split only where it can be nulled
+        asked = split is not None or NO_SPLIT < abs(wave) <= most  # the card's own split only where it can be nulled
         trim = trim_voltages(charged, wave, limit) if asked else None
     payload: dict[str, Any] = {
         "schema": "hrg.electrodes/1",
@@ -122,12 +125,12 @@ def _parts(payload: "dict[str, Any]", split: float, keys: "ElectrodeKeys") -> "l
         ("sensitivity to all voltages", payload["per_volt_ppm"], "ppm/V"),
         ("sensitivity to temperature, by the gap", payload["per_kelvin_ppm"], "ppm/K"),
         ("pull-in safety factor of the voltages", "unlimited" if isinf(factor) else factor, ""),
-        (f"largest split that {limit:g} V null on any axis", 1e3 * payload["reach_Hz"], "mHz"),
+        (f"largest split nulled by up to {limit:g} V, any axis", 1e3 * payload["reach_Hz"], "mHz"),
     )
     rows = [{"quantity": name, "value": value, "unit": unit} for name, value, unit in quantities]
     columns = [Column("quantity", "quantity"), Column("value", "value"), Column("unit", "unit")]
     parts: list[Part] = [Table(f"{payload['card']}, n = {payload['harmonic']}, {where}", rows, columns)]
-    if trim is None and split > 0:
+    if trim is None and split > payload["reach_Hz"]:
         parts.append(
             Sentence(f"{limit:g} V cannot null the card's split of {1e3 * split:.4g} mHz; see hrg trim.", "warning")
         )
@@ -138,13 +141,18 @@ def _parts(payload: "dict[str, Any]", split: float, keys: "ElectrodeKeys") -> "l
             for k, v in enumerate(trim["voltages_V"])
             if v > 0
         ]
-        note = f"They soften the pair by {abs(trim['shift_ppm']):.3g} ppm. Voltages add in squares: trim_V of the card."
+        note = f"They lower the frequency of the pair by {abs(trim['shift_ppm']):.3g} ppm. Squares of voltages add; in a card these are trim_V."
         columns = [
             Column("electrode", "electrode"),
             Column("azimuth", "azimuth", "°", ".2f"),
             Column("voltage", "voltage", "V", ".3f"),
         ]
         parts.append(
-            Table(f"Trim voltages that null {1e3 * split:.4g} mHz, besides the card's own", voltages, columns, note)
+            Table(
+                f"Trim voltages for a split of {1e3 * split:.4g} mHz, in addition to the card's own voltages",
+                voltages,
+                columns,
+                note,
+            )
         )
     return parts

@@ -84,8 +84,9 @@ def fit_cross_damping(
     carrier = frequency if frequency is not None else _median(records, "frequency_Hz", "--frequency")
     quality = quality if quality is not None else _quality(records)
     if not (0 < carrier < 1e9 and 1 < quality < 1e12):
+        wrong = f"--quality {quality:g}" if 0 < carrier < 1e9 else f"--frequency {carrier:g}"
         raise InputError(
-            f"{carrier:g} Hz with Q = {quality:g} is not a resonator; correct --frequency and --quality, or the columns of the record."
+            f"{wrong}: {carrier:g} Hz with Q = {quality:g} is not a resonator; correct the option or the columns of the record."
         )
     if not abs(calibration_temperature) <= 1000:
         raise InputError(

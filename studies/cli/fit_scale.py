@@ -65,7 +65,7 @@ def fit_scale(
     from studies.reports.bell import SOURCES, draw_steps, steps_table
     from studies.scale import study_scale
 
-    if not data:
+    if len(data) < 3:
         raise InputError(
             "name three records (CSV): several rates, at rest over temperature, one rate over temperature; a fourth at rest and then"
             " at one rate is optional."

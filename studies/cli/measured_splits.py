@@ -9,11 +9,14 @@ def pair_splits(
 
     from studies.errors import InputError
 
-    if not split or not len(split) == len(axis) == len(harmonic):
-        raise InputError(
-            f"{len(split)} splits, {len(axis)} axes and {len(harmonic)} harmonics were given; give one --axis (degrees) and one "
-            "--harmonic for each --split (Hz)."
-        )
+    if not split:
+        raise InputError("--split is missing: give the measured splits (Hz), each with its --axis (degrees).")
+    for option, given in (("--axis", axis), ("--harmonic", harmonic)):
+        if len(given) != len(split):
+            found = "is missing" if not given else f"has {len(given)} values"
+            raise InputError(
+                f"{option} {found}: give one for each --split, of which there {'is 1' if len(split) == 1 else f'are {len(split)}'}."
+            )
     if min(harmonic) < 1:
         raise InputError(f"--harmonic {min(harmonic)}: split modes have n = 1 or higher.")
     return [(n, s, radians(a), error) for n, s, a in zip(harmonic, split, axis, strict=True)]
@@ -35,7 +38,9 @@ def read_scan(path: str, harmonic: tuple[int, ...]) -> list[tuple[int, float, fl
         if content["schema"] != "hrg.scan/1":
             raise refused
         entries = {entry["harmonic"]: entry for entry in content["splits"]}
-    except (ValueError, KeyError, TypeError, RecursionError):
+    except ValueError as error:
+        raise InputError(f"{path}: damaged JSON ({error}); write it again with hrg scan --json.") from None
+    except (KeyError, TypeError, RecursionError):
         raise refused from None
     found = []
     for n in harmonic:

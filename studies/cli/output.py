@@ -10,6 +10,7 @@ from typing import Annotated, Any
 
 from cyclopts import Parameter
 
+from studies.errors import InputError
 from studies.files.paths import guarded
 from studies.results.terminal import print_result
 from studies.results.terminal import print_table as print_table
@@ -32,6 +33,8 @@ def answers(schema: str) -> Callable[[Callable[..., Any]], Callable[..., int]]:
         @functools.wraps(command)
         def run(*arguments: Any, json: bool = False, **options: Any) -> int:
             report = None if prints else options.pop("report", None)
+            if report is not None and not report.lower().endswith((".html", ".htm")):
+                raise InputError(f"--report {report}: a report is an HTML page; give a name that ends in .html.")
             with guarded({**own.bind(*arguments, **options).arguments, **({} if prints else {"report": report})}):
                 if prints:
                     return _let_print(command(*arguments, **options), json)

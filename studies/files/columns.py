@@ -160,6 +160,11 @@ def _check_names(
     for name in names:
         if counts[name] > 1:
             raise InputError(f"{where}: the column '{name}' appears twice; remove one.")
+        if name == "time_s" and name not in known:
+            raise InputError(
+                f"{where}: this is a record (it has time_s), but a table of settled points is needed ({', '.join(required)});"
+                " 'hrg fit frequency' makes one from a record."
+            )
         if name not in known and not any(name.startswith(prefix) for prefix in prefixes):
             raise InputError(f"{where}: unknown column '{name}'{nearest(name, known)}{IMPORT}")
     for name in required:

@@ -107,6 +107,10 @@ def read_table(name: str, raw: Any, place: CardPlace) -> ReadTable:
     given = raw or {}
     own = [known_keys(describe(entry.keys), given) for entry in entries]
     for key in given:
+        if key in card_tables() and not any(key in keys for keys in own):
+            raise InputError(
+                f"{place.where}: unknown key '{key}'; the table of that name begins with a line of its own: [{key}]."
+            )
         if not any(key in keys for keys in own) and len(entries) > 1:
             raise InputError(f"{place.where}: unknown key '{key}'{nearest(key, [k for keys in own for k in keys])}")
     read: dict[str, Any] = {}

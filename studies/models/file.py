@@ -14,6 +14,7 @@ import msgspec
 
 from studies.errors import InputError
 from studies.files.writing import write_text
+from studies.instrument.units import unit_of
 from studies.schema.keys import Keys, number, says
 from studies.schema.reader import read_file, read_keys
 from studies.schema.spelling import spell_value
@@ -185,9 +186,10 @@ class Model:
         outside = (values < low) | (values > high)
         if not extrapolate and np.any(outside):
             lowest, highest = np.nanmin(values), np.nanmax(values)
+            unit = f" {unit_of(variable)}".removesuffix(" 1")
             raise InputError(
-                f"{variable} runs from {lowest:.8g} to {highest:.8g}, outside {low:.8g} to {high:.8g} that the "
-                f"model was fitted to ({np.mean(outside):.1%} of the rows); calibrate over that range, or add "
+                f"{variable} runs from {lowest:.8g} to {highest:.8g}, outside {low:.8g} to {high:.8g}{unit} that the "
+                f"model was fitted to ({100 * np.mean(outside):.1f} % of the rows); calibrate over that range, or add "
                 "--extrapolate."
             )
 
@@ -251,6 +253,10 @@ def read_model(path: str | Path) -> Model:
     InputError
         Not such a file: the message names the key and the mend.
     """
+    from studies.instrument.card import shipped_cards
+
+    if not Path(path).exists() and str(path) in shipped_cards():
+        raise InputError(f"{path}: this is a card, not a model; give the file that 'hrg fit … --save' wrote.")
     keys = read_file(path, ModelKeys, SCHEMA)
     parts = tuple(one.part for one in keys.part)
     return Model(keys.kind, keys.compensates, parts, keys.settings, keys.validity, keys.source, keys.made_by, str(path))

@@ -68,15 +68,19 @@ def facts(study: "BiasStudy", method: Method) -> Facts:
     (before, after), held = judged.training, judged.held_out
     left_out = ("unknown", "needs two runs of a kind")
     if held is not None:
-        left_out = f"{held.gain:.2f}×", f"{held.before:.3g} → {held.after:.3g} {unit}"
-    count = f"of {len(TERMS)} candidates; the paper keeps {len(SELECTED_BY_THE_PAPER)}"
+        left_out = _times(held.gain), f"{held.before:.3g} → {held.after:.3g} {unit}"
+    count = f"of {len(TERMS)} candidates; the HRG paper selects {len(SELECTED_BY_THE_PAPER)}"
     return Facts(
         [
-            ("Improvement, fitted data", f"{judged.training_gain:.2f}×", f"{before:.3g} → {after:.3g} {unit}"),
+            ("Improvement, fitted data", _times(judged.training_gain), f"{before:.3g} → {after:.3g} {unit}"),
             ("Improvement, held-out data", *left_out),
             ("Terms", str(len(judged.fit.terms)), count),
         ]
     )
+
+
+def _times(gain: float) -> str:
+    return "none" if f"{gain:.2f}" == "1.00" else f"{gain:.2f}×"
 
 
 def verdict(study: "BiasStudy", method: Method) -> str:
@@ -131,7 +135,7 @@ def path_table(judged: "Judged", where: Where = "everywhere") -> Table:
     rows = [
         {
             "step": str(k),
-            "action": f"{'add' if step.added else 'remove'} {_symbol(step.term, symbol)}" if k else "start",
+            "action": f"{'add' if step.added else 'remove'} {_symbol(step.term, symbol)}" if k else "initial",
             "F": None if math.isnan(step.F) else step.F,
             "p": "" if math.isnan(step.p_value) else _probability(step.p_value),
             "bic": step.criterion,
@@ -204,7 +208,7 @@ def gain_table(study: "BiasStudy") -> Table:
         if held is not None:
             data = f"held-out {'runs' if held.by_runs else 'blocks'}"
             figures = {"before": held.before, "after": held.after, "gain": held.gain, "inside": held.coverage}
-            rows.append(row | {"terms": "selected again", "data": data} | figures)
+            rows.append(row | {"terms": "reselected without them", "data": data} | figures)
     columns = [
         Column("selection", "Selection"),
         Column("terms", "Terms"),

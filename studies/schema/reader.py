@@ -36,11 +36,12 @@ def read_toml(path: str | FilePath, schema: str | None = None) -> dict[str, Any]
         No such file, not UTF-8, a syntax error (with its line), or another schema.
     """
     try:
-        content = tomllib.loads(read_bytes(path, MOST_BYTES).decode("utf-8-sig"))
+        text = read_bytes(path, MOST_BYTES).decode("utf-8-sig")
+        content = tomllib.loads(text)
     except UnicodeDecodeError:
         raise InputError(f"{path}: not UTF-8 text; save the file as UTF-8.") from None
     except ValueError as error:  # a TOMLDecodeError, or a number of more digits than Python converts
-        raise InputError(f"{path}: not valid TOML: {str(error).partition(';')[0]}.") from None
+        raise InputError(f"{path}{_spell_syntax(text, str(error).partition(';')[0])}") from None
     except RecursionError:
         raise InputError(f"{path}: not valid TOML: nested too deeply.") from None
     for key, text in _texts(content):
@@ -50,9 +51,26 @@ def read_toml(path: str | FilePath, schema: str | None = None) -> dict[str, Any]
             )
     if schema is not None:
         found = content.get("schema")
+        if not text.strip():
+            raise InputError(f"{path}: the file is empty.")
+        if found is None:
+            raise InputError(f'{path}: the line schema = "{schema}" is missing; add it at the top.')
         if found != schema:
             raise InputError(f'{path}: schema must be "{schema}", not {found!r}; add or correct that line.')
     return content
+
+
+def _spell_syntax(text: str, error: str) -> str:
+    """Return the line of a syntax error, and what is wrong there."""
+    found = re.search(r"\(at line (\d+), column \d+\)$", error)
+    lines = text.splitlines()
+    number = int(found.group(1)) if found else 0
+    line = lines[number - 1] if 0 < number <= len(lines) else ""
+    if re.search(r"=\s*[-+]?\d+,\d", line):
+        return f", line {number}: write a decimal point, not a comma: {line.strip():.60}"
+    if found and "=" not in line and line.count(",") > 0:
+        return f": not a TOML file; its line {number} looks like a table (CSV). Give a TOML file here."
+    return f": not valid TOML: {error}."
 
 
 def read_keys(raw: Any, keys: type[T], where: str, numbers: Numbers | None = None) -> T:

@@ -171,9 +171,11 @@ def rows_of(profile: Profile, rate: float) -> Array:
         raise InputError("the time between rows must be positive and finite.")
     count = int(np.floor((profile.end - profile.start) * rate * (1 + 1e-12))) + 1
     if count > MOST_ROWS:
-        raise InputError(f"rows every {1 / rate:g} s make {count} rows, more than {MOST_ROWS}; take longer rows.")
+        raise InputError(
+            f"rows every {1 / rate:g} s make {count / 1e6:,.0f} million rows, more than the {MOST_ROWS / 1e6:.0f} million allowed; raise --row."
+        )
     if count < 2:
-        raise InputError(f"rows every {1 / rate:g} s make a single row of this profile; take shorter rows.")
+        raise InputError(f"rows every {1 / rate:g} s make a single row of this profile; lower --row.")
     return np.minimum(profile.start + np.arange(count) / rate, profile.end)
 
 

@@ -118,6 +118,11 @@ def require_range(instrument: "Instrument", use: RangeUse, rate: ArrayLike, coup
         return
     where, held = f"{instrument.path} [loop]", np.degrees(float(np.max(np.abs(rate))))
     across, quadrature, drive = (float(np.max(x)) for x in (use.across, use.quadrature, use.drive))
+    if loop.mode == "force-rebalance" and held > loop.rate_range_deg_per_s:
+        raise InputError(
+            f"{where}: the rate of {held:.4g} °/s (--rate) is beyond rate_range_deg_per_s = {loop.rate_range_deg_per_s:g}; apply a"
+            " lower rate, or raise the range."
+        )
     if drive > 1:
         raise InputError(
             f"{where}: holding the amplitude takes {drive:.3g} times the largest drive, drive_headroom ="

@@ -142,7 +142,9 @@ def test_the_page_shows_margins_drift_noise_start_and_run(card, tmp_path, capsys
     assert ">Simulated run<" in text
     found = json.loads(capsys.readouterr().out)
     assert f"{found['noise'][-1]['deg_per_rt_h']:.3g} °/√h" in text
-    assert "uncertainty of the bias: loop.pickoff_phase_deg." in text  # 0.5° on the quadrature of 5 mHz
+    assert (
+        "uncertainty of the bias: pick-off phase error (loop.pickoff_phase_deg)." in text
+    )  # 0.5° on the quadrature of 5 mHz
 
 
 @pytest.mark.parametrize("lines", ["", 'mode = "whole-angle"\n'], ids=["force-rebalance", "no self-precession"])

@@ -162,7 +162,7 @@ def test_trim_refuses_what_it_should_not_cut(tmp_path, capsys):
         capsys, "trim", "free-dome", "--split", "1e-4", "--axis", "3"
     )
     assert "beyond the wall" in failing(capsys, "trim", "free-dome", "--split", "500", "--axis", "3")
-    assert "1 splits, 0 axes" in failing(capsys, "trim", "free-dome", "--split", "0.1")
+    assert "--axis is missing: give one for each --split" in failing(capsys, "trim", "free-dome", "--split", "0.1")
     assert "write k:µg@degrees" in failing(
         capsys, "trim", "free-dome", "--split", "0.1", "--axis", "3", "--unbalance", "4:3@2"
     )

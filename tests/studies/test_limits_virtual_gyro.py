@@ -277,9 +277,9 @@ def test_unusable_runs_are_refused(card, law, tmp_path):
         run(card, law, "step 20 -80 1h")
     with pytest.raises(InputError, match="time between rows must be positive"):
         run(card, law, rate=0.0)
-    with pytest.raises(InputError, match="take longer rows"):
+    with pytest.raises(InputError, match="raise --row"):
         run(card, law, rate=1e6)
-    with pytest.raises(InputError, match="take shorter rows"):
+    with pytest.raises(InputError, match="lower --row"):
         run(card, law, rate=1e-6)
     with pytest.raises(InputError, match="there is no such file"):
         load_profile(str(tmp_path / "absent.csv"))
