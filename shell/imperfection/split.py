@@ -8,6 +8,8 @@ import numpy as np
 from shell.imperfection.imperfect import Imperfection
 from shell.imperfection.pair import Pair
 
+ROUNDING = 1e-14  # relative; below it a split has no axis
+
 
 @dataclass(frozen=True)
 class Split:
@@ -38,7 +40,9 @@ class Split:
 
     @property
     def fast_axis(self) -> float:
-        """Azimuth of an antinode of the faster mode, rad, in 0 ... π/n; 0 where there is no split."""
+        """Azimuth of an antinode of the faster mode, rad, in 0 ... π/n; 0 where the split is rounding only."""
+        if abs(self.wave) < ROUNDING:
+            return 0.0
         return float(np.angle(self.wave) / (2 * self.harmonic) % (pi / self.harmonic))
 
     @property

@@ -56,21 +56,23 @@ def answer(name: str) -> tuple[dict[str, Any], str]:
     return rounded(found, (*LOOSE, *case.get("loose", ()))), "\n".join(reader.lines) + "\n"
 
 
-def differences(was: Any, now: Any, place: str = "") -> list[str]:
-    """Where two answers differ; numbers may by two units of the last of `DIGITS` digits, and by `NOTHING` from 0."""
+def differences(was: Any, now: Any, within: float = 2e-5, place: str = "") -> list[str]:
+    """Where two answers differ; numbers may by `within` (two units of the last of `DIGITS` digits), and by `NOTHING` from 0."""
     if isinstance(was, dict) and isinstance(now, dict):
         gone = [
             f"{place}.{key}: only in {'the file' if key in was else 'the answer'}" for key in was.keys() ^ now.keys()
         ]
         return gone + [
-            one for key in was.keys() & now.keys() for one in differences(was[key], now[key], f"{place}.{key}")
+            one for key in was.keys() & now.keys() for one in differences(was[key], now[key], within, f"{place}.{key}")
         ]
     if isinstance(was, list) and isinstance(now, list) and len(was) == len(now):
         return [
-            one for k, (a, b) in enumerate(zip(was, now, strict=True)) for one in differences(a, b, f"{place}[{k}]")
+            one
+            for k, (a, b) in enumerate(zip(was, now, strict=True))
+            for one in differences(a, b, within, f"{place}[{k}]")
         ]
     if isinstance(was, float | int) and isinstance(now, float | int) and not isinstance(was, bool):
-        return [] if abs(was - now) <= 2e-5 * max(abs(was), abs(now)) + NOTHING else [f"{place}: {was} -> {now}"]
+        return [] if abs(was - now) <= within * max(abs(was), abs(now)) + NOTHING else [f"{place}: {was} -> {now}"]
     return [] if was == now else [f"{place}: {was!r} -> {now!r}"]
 
 
