@@ -197,10 +197,16 @@ def _too_brief(campaign: Campaign, inquiries: Mapping[str, Inquiry]) -> str:
     span = sum(float(np.ptp(run.time)) for run in campaign.runs)
     if reading.from_card:
         change = float(np.ptp(np.concatenate([view.seen.resonator for view in reading.views()])))
-        return f"too short to judge: the resonator's temperature changes by {change:.2g} K only" if change < NARROW_RANGE else ""
+        return (
+            f"too short to judge: the resonator's temperature changes by {change:.2g} K only"
+            if change < NARROW_RANGE
+            else ""
+        )
     if span >= FEWEST_LAGS * reading.tau:
         return ""
-    return f"too short to judge: {span:.0f} s, and the resonator may follow the housing with {reading.tau:.0f} s or more"
+    return (
+        f"too short to judge: {span:.0f} s, and the resonator may follow the housing with {reading.tau:.0f} s or more"
+    )
 
 
 def _too_little(reason: str) -> ResponseResult:
