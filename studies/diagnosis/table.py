@@ -290,7 +290,7 @@ def _study(
     noise = max(rms(winner.residual), rounding)
     size = float(np.ptp(base.made_by(winner.columns, noise)))
     spread = NINETY * float(np.sqrt(winner.ssq / max(T.size - 3 - winner.columns.shape[1], 1)))
-    cause = Cause(
+    named = Cause(
         winner.effect.name,
         "frequency_Hz",
         probability,
@@ -301,7 +301,7 @@ def _study(
     )
     if found is not None:
         shifts = _beside(found, base, winner, noise, shifts)
-    causes = sorted((cause, *wrong_values(shifts)), key=lambda one: -one.evidence)
+    causes = sorted((named, *wrong_values(shifts)), key=lambda one: -one.evidence)
     state = "not-identifiable" if len(names) > 1 else "explained"
     if len(names) > 1:
         sentences.append(f"The table cannot distinguish between {', '.join(names)}.")
