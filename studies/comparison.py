@@ -26,6 +26,8 @@ class Figure:
     unit: str
     value: float
     uncertainty: float
+    of: str = ""
+    """What it is a quantity of, where designs differ in that."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -81,7 +83,13 @@ def _figures(instrument: "Instrument") -> Iterator[Figure]:
     drive, share = lowest[DRIVE], float(law.uncertainty(np.array([T0]))[0])
     for n, mode in lowest.items():
         yield Figure(f"frequency, n = {n}", "Hz", mode.frequency, share * mode.frequency)
-    yield Figure("nearest other mode", "Hz", nearest.frequency - drive.frequency, nothing)
+    yield Figure(
+        "nearest other mode",
+        "Hz",
+        nearest.frequency - drive.frequency,
+        nothing,
+        f"n = {nearest.harmonic}, index {nearest.index}",
+    )
     yield Figure("Bryan factor", "1", drive.bryan_factor, nothing)
     yield Figure("modal mass", "g", 1e3 * drive.modal_mass, nothing)
     mean = float(np.mean([h for _, h in instrument.resonator.thickness]))

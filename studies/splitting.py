@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from shell.electrodes import soften_at_gap
 from shell.imperfection import CoupledHarmonics, Pair, Split, find_split
 from shell.modes import solve_modes
-from studies.errors import naming
+from studies.errors import InputError, naming
 
 if TYPE_CHECKING:
     from shell.elastic import Elastic
@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from studies.instrument.tables.imperfection import CardImperfection
 
 Array = NDArray[np.float64]
+PLACES = 65  # along the meridian, where waves are held against the wall
 
 
 @dataclass(frozen=True)
@@ -87,11 +88,29 @@ class SplitPair:
     @property
     def _fields(self) -> "Imperfection | None":
         card: CardImperfection = self.instrument.part("imperfection")
+        if card.fields is not None:
+            _check_wall(self.instrument, card.fields)
         return card.fields
 
     @property
     def _nothing(self) -> Split:
         return Split(self.mode.harmonic, self.mode.frequency, 0.0, 0j)
+
+
+def _check_wall(instrument: "Instrument", fields: "Imperfection") -> None:
+    """Refuse waves of the wall that would go through it."""
+    position, wall = zip(*instrument.resonator.thickness, strict=True)
+    at = np.linspace(0.0, 1.0, PLACES)
+    faces = [face for face in fields.faces() if face is not None]
+    orders = {m for face in faces for m in face.orders if m > 0}
+    deep = sum((np.abs(sum(face.wave(m, at) for face in faces)) for m in orders), np.zeros_like(at))
+    wall_there = np.interp(at, position, wall)
+    worst = int(np.argmax(deep / wall_there))
+    if deep[worst] >= wall_there[worst]:
+        raise InputError(
+            f"{instrument.path} [imperfection]: the wall's waves have {1e6 * deep[worst]:.4g} µm where the wall has"
+            f" {1e6 * wall_there[worst]:.4g} µm; their amplitudes must be smaller than the wall."
+        )
 
 
 @lru_cache(maxsize=8)

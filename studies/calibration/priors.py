@@ -103,7 +103,7 @@ def to_standard(value: "UncertainValue", number: float) -> float:
 def gather_priors(instrument: "Instrument", exact: Sequence[str] = ()) -> Priors:
     """Return the priors of an instrument's uncertain values but for those that are to be taken as exact."""
     correlation = instrument.correlation
-    idle = _idle(instrument)
+    idle = idle_values(instrument)
     values = tuple(value for value in instrument.uncertain if value.name not in exact and value.name not in idle)
     R = np.eye(len(values))
     for i, one in enumerate(values):
@@ -124,8 +124,8 @@ def gather_priors(instrument: "Instrument", exact: Sequence[str] = ()) -> Priors
     return Priors(values, np.linalg.cholesky(R), wave)
 
 
-def _idle(instrument: "Instrument") -> set[str]:
-    """Values that say nothing in this card: the parts of a loss budget that it does not use, or what stands for them."""
+def idle_values(instrument: "Instrument") -> set[str]:
+    """Return the values that say nothing in this card: the parts of a loss budget that it does not use, or what stands for them."""
     parts = instrument.part("loss", "loss_parts")
     whole = {f"loss.{key}" for key in instrument.loss.__struct_fields__}
     return {

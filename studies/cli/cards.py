@@ -8,6 +8,8 @@ from studies.results import Column, Facts, Result, Table
 if TYPE_CHECKING:
     from shell.materials import Material, Prior
 
+WIDE = 0.3
+"""Standard deviation of a logarithm from which on a factor is shown."""
 LEAD = "The instrument cards that ship with the package."
 
 
@@ -47,10 +49,21 @@ def cards(card: str = "") -> Result:
     return Result({"schema": "hrg.cards/1", "cards": entries}, "Cards", LEAD, [Table("Cards", entries, columns)])
 
 
+def _spread(row: dict[str, Any]) -> str:
+    """One standard deviation; a factor where the logarithm is normal and wide."""
+    from math import exp
+
+    from studies.reports.digits import plain
+
+    share = row["sd"] / row["value"] if row["logarithmic"] else 0.0
+    return f"×/÷ {exp(share):.2g}" if share >= WIDE else plain(row["sd"], 2)
+
+
 def _show_values(card: str) -> Result:
     from dataclasses import asdict
 
     from shell.inertia import weigh
+    from studies.calibration.priors import idle_values
     from studies.instrument.card import load_card
     from studies.instrument.display import display_name
 
@@ -72,12 +85,17 @@ def _show_values(card: str) -> Result:
         "correlations": [[*pair, correlation] for pair, correlation in instrument.correlation.items()],
         "mass_properties": asdict(mass),
     }
-    rows = [row | {"from": "card" if row["stated"] else "default"} for row in entries]
+    idle = idle_values(instrument)
+    rows = [
+        row | {"from": "card" if row["stated"] else "default", "spread": _spread(row)}
+        for row in entries
+        if row["name"] not in idle
+    ]
     columns = [
         Column("name", "quantity", spell=display_name),
         Column("key", "key"),
         Column("value", "value", form=".4g"),
-        Column("sd", "±", form=".2g"),
+        Column("spread", "±"),
         Column("from", "from"),
         Column("interval", "90 % interval", interval=("interval.0", "interval.1")),
     ]
@@ -144,13 +162,14 @@ def _law_tables(law: "Material") -> list[Table]:
             "property": key,
             "unit": PROPERTIES[key],
             "form": prop.form,
-            "numbers": ", ".join(f"{k} = {v}" for k, v in prop.numbers.items()),
-            "uncertainty": ", ".join(f"{k} ± {v:g}" for k, v in prop.uncertainty.items()),
+            "numbers": ", ".join(
+                _with_error(k, v, prop.uncertainty.get(k, 0.0), PROPERTIES[key]) for k, v in prop.numbers.items()
+            ),
             "source": prop.source,
         }
         for key, prop in law.properties.items()
     ]
-    columns = [Column(key, key) for key in ("property", "unit", "form", "numbers", "uncertainty", "source")]
+    columns = [Column(key, key) for key in ("property", "unit", "form", "numbers", "source")]
     prior = law.prior
     coefficients = [
         {
@@ -172,6 +191,17 @@ def _law_tables(law: "Material") -> list[Table]:
         Table(f"{law.name}, law '{law.law}'", properties, columns, law.note),
         Table(f"Uncertainty of law '{law.law}'", coefficients, open_ones, note),
     ]
+
+
+def _with_error(name: str, value: Any, error: float, unit: str) -> str:
+    """A number of a law with its standard deviation; moduli in GPa."""
+    from studies.reports.digits import plain, to_error
+
+    if not isinstance(value, float | int):
+        return f"{name} = {value}"
+    scale, words = (1e-9, " GPa") if unit == "Pa" and abs(value) > 1e6 else (1.0, "")
+    number, spread = to_error(scale * value, scale * error)
+    return f"{name} = " + (f"{number} ± {spread}" if error > 0 else plain(value * scale, 6)) + words
 
 
 def _correlated(prior: "Prior", k: int) -> list[int]:

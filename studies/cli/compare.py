@@ -52,6 +52,8 @@ def compare(*card: str) -> Result:
                 Column("name", "quantity"), Column("unit", "unit"),
                 *(Column(f"values.{k}", name, error=f"uncertainties.{k}") for k, name in enumerate(names)),
             ], note),
+            *(Sentence(f"{row[0].name.capitalize()}: {'; '.join(f'{name}: {one.of}' for name, one in zip(names, row, strict=True))}.")
+                for row in found.figures if row[0].of),
             Table("Where the cards differ", keys, [
                 Column("key", "key"), *(Column(f"values.{k}", name) for k, name in enumerate(names)),
             ]),

@@ -15,6 +15,9 @@ if TYPE_CHECKING:
     from studies.instrument.tables.electrodes import ElectrodeKeys
     from studies.results import Part
 
+NOTHING = 1e-9
+"""Part of the softening below which a split is rounding."""
+
 
 NO_SPLIT = 1e-12  # relative: rounding of a pair without a split
 
@@ -80,6 +83,7 @@ def electrodes(
             wave = complex(-split / mode.frequency * np.exp(2j * harmonic * np.deg2rad(axis)))
         else:
             wave = whole.split.wave
+            wave = wave if abs(wave) > NOTHING * abs(own.shift) else 0j
         factor, most = charged.pull_in, reach(charged, limit)
         asked = split is not None or NO_SPLIT < abs(wave) <= most  # the card's own split only where it can be nulled
         trim = trim_voltages(charged, wave, limit) if asked else None
@@ -113,6 +117,12 @@ def electrodes(
     )
 
 
+def _split(payload: "dict[str, Any]") -> "tuple[float | str, str]":
+    """The split by the card's voltages, where it is more than rounding."""
+    softened = 1e-6 * abs(payload["softening_ppm"]) * payload["frequency_Hz"]
+    return (1e3 * payload["split_Hz"], "mHz") if payload["split_Hz"] > NOTHING * softened else ("none", "")
+
+
 def _parts(payload: "dict[str, Any]", split: float, keys: "ElectrodeKeys") -> "list[Part]":
     """What people read; `split` in Hz is the one to be nulled."""
     from math import isinf
@@ -121,7 +131,7 @@ def _parts(payload: "dict[str, Any]", split: float, keys: "ElectrodeKeys") -> "l
     where = f"{payload['frequency_Hz']:.3f} Hz at {payload['temperature_degC']:g} °C"
     quantities = (
         ("softening by the card's voltages", payload["softening_ppm"], "ppm"),
-        ("split by the card's voltages", 1e3 * payload["split_Hz"], "mHz"),
+        ("split by the card's voltages", *_split(payload)),
         ("sensitivity to all voltages", payload["per_volt_ppm"], "ppm/V"),
         ("sensitivity to temperature, by the gap", payload["per_kelvin_ppm"], "ppm/K"),
         ("pull-in safety factor of the voltages", "unlimited" if isinf(factor) else factor, ""),

@@ -61,6 +61,11 @@ def fit_thermal(*data: str, card: str | None = None, lags: int | None = None, co
     told.done()
     for warning in found.warnings:
         say(f"warning: {warning}")
+    if all(e.value is None for e in found.estimates.values()):
+        raise InputError(
+            f"{data[0]}: the records determine none of the thermal constants. Record steps or ramps of 10 K or more that last"
+            " at least five times the resonator's time constant."
+        )
     rms, white = float(found.residual.std()), found.noise.innovation
     estimates = {
         name: {"value": e.value, "low": e.low, "high": e.high, "determined": e.value is not None}
@@ -120,7 +125,11 @@ def _write(row: Payload) -> dict[str, str]:
 
 
 def _combine(parts: dict[str, float]) -> str:
-    return " ".join(f"{share:+.2f} × {_name(key)[0].lower()}" for key, share in parts.items())
+    return " ".join(f"{share:+.2f} × {_lower(_name(key)[0])}" for key, share in parts.items())
+
+
+def _lower(text: str) -> str:
+    return text[:1].lower() + text[1:]
 
 
 def _draw(found: "Identification") -> "Drawing":

@@ -15,6 +15,7 @@ from studies.results import Chapter, Column, Facts, Figure, Result, Sentence, Ta
 
 if TYPE_CHECKING:
     from shell.damping.budget import Budget, LossPart
+    from studies.instrument.card import Instrument
     from studies.loss.account import DampingAround, StatedLoss
     from studies.loss.model import LossModel
 
@@ -91,7 +92,19 @@ def loss(
         payload,
         f"Loss budget of {instrument.name}",
         f"1/Q of the mode n = {harmonic} at {model.frequency:.1f} Hz as a sum of parts, each computed from the mode ({theory} theory).",
-        _parts(payload, model, budget, stated, at),
+        [*_parts(payload, model, budget, stated, at), Chapter("In a simulation", [Sentence(_simulated(instrument))])],
+    )
+
+
+def _simulated(instrument: "Instrument") -> str:
+    """Say whether a simulation takes 1/Q from this budget or from the card's own number."""
+    if instrument.part("loss", "loss_parts").given:
+        return "Simulations take 1/Q from this budget."
+    own = instrument.loss.inverse_q
+    given = "the card's" if "inverse_q" in instrument.content.get("loss", {}) else "the default of"
+    return (
+        f"Simulations do not use this budget: they take {given} [loss] inverse_q = {own:.3g} (Q = {1 / own:.3g}). State a part of the"
+        " loss in the card, such as loss.surface_layer_pm, to simulate with the budget."
     )
 
 
@@ -186,7 +199,7 @@ def _parts(
     damped = [] if around is None else rows_of({"T": degrees, **around})
     T = Column("T", "T", "°C", ".1f")
     words = [f"Attack first: {budget.first.name}. {_sentence(budget.first.advice)}"]
-    words += [f"Least known: {budget.least_known.name}. Its uncertainty moves the sum most."]
+    words += [f"Largest share of the uncertainty of the total: {budget.least_known.name}."]
     if stated is not None:
         words += [f"{stated.verdict}"] if stated.verdict else []
     return [

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from cyclopts import Parameter
 
 from studies.cli.output import answers
-from studies.results import Blocks, Column, Result, Table, Where
+from studies.results import Blocks, Column, Result, Sentence, Table, Where
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -30,11 +30,13 @@ THEORIES = {
     "shell": "Naghdi shell theory",
     "rayleigh": "Rayleigh's closed form",
 }
+FAR = 0.1
+"""Relative difference of the first order from all orders from which on a split is doubted."""
 COLUMNS = (
     Column("harmonic", "n"),
     Column("index", "index"),
     Column("label", "kind"),
-    Column("frequency_Hz", "f", "Hz", ".4f"),
+    Column("shown_Hz", "f", "Hz"),
     Column("bryan_factor", "Bryan factor", form=".5f"),
     Column("relative_error_estimate", "solver error, relative", form=".0e"),
     Column("material_uncertainty_Hz", "material uncertainty", "Hz", ".2g"),
@@ -141,8 +143,9 @@ def modes(
         f"Modes of {instrument.name}",
         f"Natural frequencies and Bryan factors at {T - zero_Celsius:g} °C, {THEORIES[theory]}.",
         [
-            Table(name, entries, COLUMNS, _note(theory, share)),
+            Table(name, [row | {"shown_Hz": _to_error(row)} for row in entries], COLUMNS, _note(theory, share)),
             *special,
+            *_all_orders(entries),
             *_detail_tables(entries if detailed else [], "everywhere" if sensitivities else "page"),
             Blocks(lambda: _view(instrument, sorted(set(harmonic)), T)),
         ],
@@ -157,9 +160,18 @@ def _view(instrument: "Instrument", harmonics: list[int], T: float) -> "Sequence
     return view_blocks([show_mode(instrument, n, temperature=T) for n in harmonics])
 
 
+def _to_error(row: "dict[str, Any]") -> str:
+    """The frequency to the second digit of its solver error, at most four decimals."""
+    from math import floor, log10
+
+    error = row["relative_error_estimate"] * row["frequency_Hz"]
+    last = min(4, max(0, 1 - floor(log10(error)))) if error > 0 else 4
+    return f"{row['frequency_Hz']:.{last}f}"
+
+
 def _note(theory: str, share: float) -> str:
     if theory == "rayleigh":
-        return "Rayleigh's closed form ignores the free edge: on a hemisphere it lies several per cent too high."
+        return "Rayleigh's closed form ignores the free edge: on a hemisphere it lies about 10 % too high. Its error is not estimated more closely."
     spread = (
         "from the published values of the material, one standard deviation"
         if share
@@ -229,6 +241,17 @@ def _split_table(modes: "list[dict[str, Any]]") -> Table:
     ]
     rows = [row for row in modes if "split" in row]
     return Table("Pairs with imperfections and electrodes", rows, columns, "Slow axis: an antinode of the slower mode.")
+
+
+def _all_orders(modes: "list[dict[str, Any]]") -> list[Sentence]:
+    """Warn where imperfections are too large for the first order."""
+    found = []
+    for row in modes:
+        one, every = (row.get("split", {}).get(key, 0.0) for key in ("split_Hz", "every_order_split_Hz"))
+        if abs(one - every) > FAR * max(one, every):
+            found.append(f"n = {row['harmonic']} ({one:.3g} and {every:.3g} Hz)")
+    words = "to first order and of all orders the splits differ by more than 10 %"
+    return [Sentence(f"The imperfections are large: {words} for {', '.join(found)}.", "warning")] if found else []
 
 
 def _detail_tables(modes: "list[dict[str, Any]]", where: Where) -> list[Table]:

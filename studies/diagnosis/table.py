@@ -272,9 +272,9 @@ def _study(
             )
         elif short > UNNAMED:
             times = f"{base_rms / rounding:.0f} times what rounding leaves" if shaped else "treated as noise"
-            cause = "no cause reaches the evidence needed" if shaped else "no cause is named"
+            ending = "no cause reaches the evidence needed" if shaped else "no cause is named"
             sentences.append(
-                f"The remaining residual of {base_rms:.3g} Hz rms is {times}; {cause}: the best candidate, {ranked[0].words}, has"
+                f"The remaining residual of {base_rms:.3g} Hz rms is {times}; {ending}: the best candidate, {ranked[0].words}, has"
                 f" {short:.1f} of {-2.0 * prior:.0f}."
             )
         left_over = "structure" if wanders or shaped else "none"

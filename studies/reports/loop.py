@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from studies.instrument.display import display_name
+from studies.instrument.units import unit_of
 from studies.reports import style
 from studies.reports.digits import plain, to_error
 from studies.results import Chapter, Column, Facts, Figure, Sentence, Table
@@ -113,7 +114,10 @@ def _ranges(study: "LoopStudy", payload: dict[str, Any]) -> list[dict[str, Any]]
     rows = [(turning, force, "rate"), ("quadrature", f"stiffness, {keys.quadrature_range_Hz:g} Hz" if stiff else force, "quadrature"),
             *([] if stiff else [(f"{turning} and quadrature", force, "across")]),
             ("amplitude", f"drive, {keys.drive_headroom:g} times the steady-state drive", "drive")]  # fmt: skip
-    return [{"loop": loop, "actuator": actuator, "use": use[key]} for loop, actuator, key in rows]
+    return [
+        {"loop": loop, "actuator": actuator, "use": use[key] if use[key] > 1e-5 else "< 0.001"}
+        for loop, actuator, key in rows
+    ]
 
 
 def _facts(study: "LoopStudy", payload: dict[str, Any]) -> list[tuple[str, str, str]]:
@@ -138,11 +142,16 @@ def _largest(slopes: "tuple[BiasSlope, ...]", sd: float) -> list[Sentence]:
     first, share = slopes[0], (slopes[0].effect / sd) ** 2 if sd > 0 else 0.0
     return [
         Sentence(
-            f"Largest contribution to the uncertainty of the bias: {display_name(first.key)} ({first.key}). Its standard deviation of {first.sd:.3g} contributes"
+            f"Largest contribution to the uncertainty of the bias: {display_name(first.key)} ({first.key}). Its standard deviation of {first.sd:.3g}{_unit(first.key)} contributes"
             f" {first.effect:.3g} °/h, {100 * share:.0f} % of the variance. A constant bias can be calibrated out; drift of these"
             " values with age or temperature changes the bias in proportion to the slopes."
         )
     ]
+
+
+def _unit(key: str) -> str:
+    unit = unit_of(key)
+    return "" if unit == "1" else unit if unit == "°" else f" {unit}"
 
 
 def _around(study: "LoopStudy") -> "Drawing":

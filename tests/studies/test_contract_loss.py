@@ -85,6 +85,15 @@ def test_schema_is_kept(capsys, tmp_path):
     assert list(found["stated"]) == ["inverse_q", "explained", "explained_low", "explained_high"]
 
 
+def test_it_is_said_which_q_a_simulation_takes(capsys, tmp_path):
+    """A budget of 2e7 once stood beside a simulation of 1e7 without a word."""
+    path = tmp_path / "card.toml"
+    path.write_text(tomli_w.dumps(DOME), encoding="utf-8")
+    assert "they take the default of [loss] inverse_q = 1e-07 (Q = 1e+07)" in _run(capsys, str(path))[1]
+    path.write_text(tomli_w.dumps(DOME | {"loss": {"film": [GOLD]}}), encoding="utf-8")
+    assert "Simulations take 1/Q from this budget." in _run(capsys, str(path))[1]
+
+
 def test_uncertain_parts_are_values_of_the_card():
     card = build_instrument(DOME | {"loss": {"pressure_Pa": 1e-3, "film": [GOLD], "activated": [PEAK]}})
     found = {one.name: (one.value, one.sd, one.unit) for one in card.uncertain}
@@ -122,6 +131,7 @@ def test_what_no_source_states_is_left_out_and_said():
         ({"film": [GOLD | {"thicknes_nm": 1.0}]}, "unknown key 'thicknes_nm'"),
         ({"activated": [PEAK | {"energy_eV": 0.0}]}, "energy_eV must be"),
         ({"unbalance_mg": 1.0}, "on a stem"),
+        ({"inverse_q": 1e7}, "inverse_q = 1e+07 must lie between 0 and 0.1: it is 1/Q, not Q."),
         ({"presure_Pa": 1.0}, "unknown key 'presure_Pa'; did you mean 'pressure_Pa'?"),
     ],
 )

@@ -2,6 +2,7 @@
 
 import json
 import pickle
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -166,6 +167,25 @@ def test_a_map_beside_the_card_is_read(tmp_path):
 def test_wrong_tables_are_refused(tmp_path, table, words):
     with pytest.raises(InputError, match=words):
         loaded(tmp_path, table)
+
+
+def test_waves_through_the_wall_are_refused_and_large_ones_are_doubted(tmp_path, capsys):
+    with pytest.raises(InputError, match="1000 µm where the wall has 900 µm"):
+        _ = split_of(loaded(tmp_path, WALL.replace("0.3, sd = 0.1", "1000.0, sd = 0.1"))).split
+    loaded(tmp_path, WALL.replace("0.3, sd = 0.1", "800.0, sd = 0.1"))
+    assert main(["modes", str(tmp_path / "card.toml")]) == 0
+    assert "differ by more than 10 % for n = 2" in capsys.readouterr().out
+    loaded(tmp_path, WALL)
+    assert main(["modes", str(tmp_path / "card.toml")]) == 0
+    assert "differ by" not in capsys.readouterr().out
+
+
+def test_even_voltages_make_no_split_and_rounding_is_not_trimmed(tmp_path, capsys):
+    loaded(tmp_path, "[electrodes]\ngap_um = 100.0\ncount = 16\nvoltage_V = 100.0\n")
+    assert main(["electrodes", str(tmp_path / "card.toml")]) == 0
+    out = capsys.readouterr().out
+    assert re.search(r"split by the card's voltages *│ *none", out)
+    assert "Trim voltages" not in out
 
 
 def test_a_voltage_beyond_pull_in_names_its_table(tmp_path):

@@ -23,6 +23,10 @@ class Loss(Keys, frozen=True, kw_only=True):
     curvature_per_K2: Annotated[float, number(sd=4e-5)] = 0.0
     note: str = ""
 
+    def __post_init__(self) -> None:
+        if not self.inverse_q < 0.1:
+            raise ValueError(f"inverse_q = {self.inverse_q:g} must lie between 0 and 0.1: it is 1/Q, not Q.")
+
     def at(self, excess: NDArray[np.float64]) -> NDArray[np.float64]:
         """1/Q at temperatures above the reference (K)."""
         return np.asarray(self.inverse_q * (1 + excess * (self.slope_per_K + self.curvature_per_K2 * excess)))
