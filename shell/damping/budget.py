@@ -213,7 +213,7 @@ def bulk_cause(coefficient: float, exponent: float, relative_sd: float, source: 
         lambda v, T: np.array([bulk_loss(coefficient, exponent, omega / (2 * np.pi)) for omega in v.omega(T)]),
         relative_sd,
         source,
-        "another glass or alloy, and its annealing",
+        "choose another glass or alloy; anneal it",
     )
 
 
@@ -224,7 +224,7 @@ def surface_cause(depth: float, relative_sd: float, source: str) -> LossCause:
         lambda v, T: np.full(len(T), surface_loss(depth, v.surfaces, v.strain_energy)),
         relative_sd,
         source,
-        "polish and etch the faces; cracks of the grinding reach deeper than its roughness",
+        "polish and etch the faces; subsurface grinding damage reaches deeper than the roughness",
     )
 
 

@@ -5,6 +5,7 @@ Exit status: 0 done, 1 a fault of the program, 2 unusable input or arguments, 3 
 """
 
 import os
+import re
 import sys
 import warnings
 from collections.abc import Sequence
@@ -81,7 +82,16 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "effects": ("studies.cli.effects:effects", "List the physical effects for diagnosis and cards."),
     "doctor": ("studies.cli.doctor:doctor", "Check the environment for missing programs and packages."),
 }
-EPILOGUE = "Every command that computes takes --json and --report FILE.html. --debug shows the traceback of an error."
+EPILOGUE = "With --json a command prints one JSON object; --report FILE.html, where it is listed, writes a page; --debug shows the traceback of an error."
+
+
+def spell_default(value: object) -> str | None:
+    """Return a default as it is typed on a command line; None for what is off or empty unless given."""
+    if value is None or value is False or value in ("", ()):
+        return None
+    if isinstance(value, tuple):
+        return " ".join(f"{one:g}" if isinstance(one, float) else str(one) for one in value)
+    return re.sub(r"e([-+])0+", r"e\1", f"{value:g}") if isinstance(value, float) else str(value)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -127,7 +137,7 @@ def _command_line(words: Sequence[str]) -> "App":
         exit_on_error=False,
         print_error=False,
         suppress_keyboard_interrupt=False,
-        default_parameter=Parameter(negative="", validator=refuse_unsound),
+        default_parameter=Parameter(negative="", validator=refuse_unsound, show_default=spell_default),
     )
     app.register_install_completion_command(help="Install completion for the shell in use (bash, zsh or fish).")
     groups: dict[str, App] = {}

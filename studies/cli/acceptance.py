@@ -53,7 +53,7 @@ def acceptance(card: str, *runs: str, limits: str | None = None, output: str = "
     runs : str
         The records (CSV).
     limits : str
-        Limits (TOML, schema hrg.limits/1): a table [limits] with the names of the quantities.
+        Limits (TOML, schema hrg.limits/1): a table [limits] with keys such as bias_deg_per_h; hrg keys limits lists them.
     output : str
         Column with the zero-rate output to judge, such as compensated_bias_deg_per_h.
     """
@@ -179,11 +179,11 @@ def _drift(found: "Acceptance") -> list[Figure | Sentence]:
     if allan is None or noise is None:
         return []
     first = next((k for k, kind in enumerate(allan.noise) if kind != "phase"), 0)
-    reach = f" from {plain(float(allan.tau[first]))} s on; angle noise dominates below" if first else ""
+    reach = f" from {plain(float(allan.tau[first]))} s on (angle noise dominates below)" if first else ""
     words = (
         f"Angle random walk {noise.N / 60:.3g} °/√h, bias instability {allan.bias_instability[0]:.3g} °/h (minimum of the Allan"
-        f" deviation over 0.664), rate random walk {noise.K * 60:.3g} °/h/√h. Misfit {noise.misfit:.2g}: near 1 where these three"
-        f" kinds of noise explain the curve{reach}."
+        f" deviation over 0.664), rate random walk {noise.K * 60:.3g} °/h/√h. Misfit {noise.misfit:.2g}{reach}; a value"
+        " near 1 means that these three kinds of noise explain the curve."
     )
 
     def draw() -> "Drawing":

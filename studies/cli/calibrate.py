@@ -42,7 +42,7 @@ def calibrate(card: str, *data: str, save: str | None = None, hold_out: int = 0,
         Write the calibrated card: most probable values with their posterior widths. Not saved, with exit status 2, if the fit
         did not converge, determined no value, or moved one by more than 6 of the card's standard deviations.
     hold_out : int
-        Number of the record, from 1, to predict by a second calibration without it; by default the last of several.
+        Number of the record, from 1, to predict by a second calibration without it; 0: the last, if there are several.
     exact : str
         A value to keep fixed, such as thermal.film_emissivity; may be given more than once.
     """

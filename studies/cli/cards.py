@@ -15,7 +15,7 @@ LEAD = "The instrument cards that ship with the package."
 
 @answers("hrg.cards/1; hrg.card-values/1 for one card")
 def cards(card: str = "") -> Result:
-    """List the instrument cards that ship with the package, or what one card weighs and its uncertain values.
+    """List the instrument cards that ship with the package, or show the mass properties and uncertain values of one.
 
     A number of a card may carry its uncertainty: { value = 0.0118, relative_sd = 0.3 }, { value = ..., sd = ... }, or
     { value = ..., low = ..., high = ... } with hard bounds; sd = 0 makes it exact. Other numbers have the uncertainty
@@ -135,12 +135,12 @@ def materials(name: str = "") -> Result:
         raise InputError(f"unknown material '{name}'{nearest(name, table)}")
     laws = [law for key, laws in table.items() if name in ("", key) for law in laws.values()]
     entries = [_describe(law) for law in laws]
-    rows = [row | {"lacks": ", ".join(row["lacks"]) or "nothing"} for row in entries]
+    rows = [row | {"lacks": ", ".join(one.replace("_", " ") for one in row["lacks"]) or "—"} for row in entries]
     columns = [
         Column("name", "name"),
         Column("law", "law"),
         Column("range_degC", "range", "°C", "g", interval=("range_degC.0", "range_degC.1")),
-        Column("lacks", "lacks"),
+        Column("lacks", "not stated"),
         Column("source", "source"),
     ]
     return Result(

@@ -36,15 +36,15 @@ def derive(
     """Derive the frequency of the inextensional spherical shell, HRG paper equations (1)-(15).
 
     Prints the chain of equations for any harmonic n, from the displacements to the frequency, and its
-    closed forms for one harmonic and one polar range. With --dynamics, instead, how the standing wave moves: amplitude,
-    quadrature, precession and phase from the two-dimensional oscillator.
+    closed forms for one harmonic and one polar range. With --dynamics, it derives the motion of the standing wave instead:
+    amplitude, quadrature, precession and phase of the two-dimensional oscillator.
 
     Parameters
     ----------
     dynamics : bool
         Derive the averaged dynamics of the vibration (Lynch's form; the CVG paper's equations 7 to 25), its transfer functions and poles, and its optimal filters (35, 36).
     bell : bool
-        Derive the theory of the bell (BVG paper, equations 1 to 22), beside what is printed, and hold its frequency against the
+        Derive the theory of the bell (BVG paper, equations 1 to 22), beside the published equations, and compare its frequency with the
         solver on the card bvg-bell; about 20 seconds.
     latex : bool
         Print a LaTeX fragment (amsmath) instead.

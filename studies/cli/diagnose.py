@@ -41,7 +41,7 @@ def diagnose(
     chamber : str
         Limits of the chamber, such as "rate 3 range -40 85" (K/min, °C), for --plan and for the suggested next run.
     draws : int
-        With --plan: four times the number of cases of each effect at each SNR (1, 0.3, 0.1).
+        With --plan: random draws, 4 to 2000; each effect is tried in a quarter as many cases at each SNR (1, 0.3, 0.1).
     seed : int
         Seed of the draws.
     device : list[str]

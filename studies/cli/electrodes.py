@@ -45,7 +45,7 @@ def electrodes(
     axis : float
         Azimuth in degrees of an antinode of its slower mode.
     limit : float
-        Largest trim voltage.
+        Largest trim voltage in V.
     temperature : float
         Temperature in °C; the card's reference temperature unless given.
     """

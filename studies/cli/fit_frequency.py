@@ -50,7 +50,7 @@ def fit_frequency(
         Slowest time constant of the gyro in s, used to judge whether a record has settled; hrg fit thermal measures it. If the
         records show a longer one, that one is used.
     left : float
-        Largest remaining temperature change, in K, that counts as settled.
+        A soak counts as settled when the temperature is within this of its final value, in K.
     order : int
         Order of the polynomial; the paper uses 3.
     reference_temperature : float

@@ -60,8 +60,8 @@ def fit_ringdown(
 ) -> Result:
     """Fit frequencies, Q and the axes of elasticity and damping to ring-downs, with 90 % intervals.
 
-    A file holds one decay: time_s and pickoff_cos_V (and pickoff_sin_V) as raw samples, amplitude_cos_V with phase_cos_deg
-    (and the same with sin) from a lock-in amplifier, or power_dBm. The drive, the release transient and the noise floor are
+    A file holds one decay: time_s and pickoff_cos_V (and pickoff_sin_V) as raw samples; from a lock-in amplifier
+    amplitude_cos_V with phase_cos_deg, or in_phase_cos_V with out_of_phase_cos_V (and the same with sin); or power_dB or power_dBm. The drive, the release transient and the noise floor are
     found and left out. Several files are several decays of one resonator; with '# pressure_Pa:' comments, 1/Q is fitted
     against pressure.
 

@@ -40,7 +40,7 @@ def loss(
     theory: Literal["solid", "shell"] = "solid",
     anchor: bool = False,
 ) -> Result:
-    """Show Q over temperature, where its loss comes from, and which part to attack first.
+    """Show Q over temperature, its loss contributions, and which of them to reduce first.
 
     Heat through the wall, loss of the bulk and of the surface follow from geometry and material; films, gas, activated losses,
     imbalance and what the mount takes are keys of the card's table [loss] and of [[loss.film]] and [[loss.activated]].
@@ -60,7 +60,7 @@ def loss(
     theory : str
         solid (three-dimensional) or shell (Naghdi).
     anchor : bool
-        Compute what a stem sends into the body that it stands on (a second or two).
+        Compute the anchor loss of a stem (a second or two).
     """
     import numpy as np
 
@@ -198,7 +198,7 @@ def _parts(
     values = [Column(f"inverse_q.{k}", f"1/Q at {degrees[k]:.0f} °C", "1e-9", ".3g", scale=1e9) for k in picked]
     damped = [] if around is None else rows_of({"T": degrees, **around})
     T = Column("T", "T", "°C", ".1f")
-    words = [f"Attack first: {budget.first.name}. {_sentence(budget.first.advice)}"]
+    words = [f"Reduce first: {budget.first.name}. {_sentence(budget.first.advice)}"]
     words += [f"Largest share of the uncertainty of the total: {budget.least_known.name}."]
     if stated is not None:
         words += [f"{stated.verdict}"] if stated.verdict else []
@@ -211,8 +211,8 @@ def _parts(
         Chapter(f"Parts at {degrees[at]:g} °C", [
             Table("Share and gain", rows, [
                 name, Column("share", "share", "%", ".3g"), *values, interval, Column(f"slope_per_K.{at}", "slope", "%/°C", "+.2f", scale=100.0),
-                Column("half", "Q with half of it", digits=3), Column("without", "Q without it", digits=3),
-            ], "Largest first; all but 1/Q at the temperature above."),
+                Column("half", "Q if halved", digits=3), Column("without", "Q without it", digits=3),
+            ], "Largest first; all columns but 1/Q at the temperature above."),
             Table("Remedies and sources", rows, [
                 name, Column("relative_sd", "standard uncertainty", "%", ".0f", scale=100.0), Column("advice", "remedy"), Column("source", "source"),
             ]),
@@ -235,7 +235,10 @@ def _parts(
                 Column("largest_drift_deg_per_h", "largest drift", "°/h"),
             ], "Axis: azimuth of the pattern with the largest damping. The drift goes as sin 2n of the angle from it."),
         ]),
-        Chapter("Not included", [Sentence(_sentence(f"not included: {words}")) for words in model.left_out]),
+        Chapter("Not included", [
+            *(Sentence(_sentence(words), where="page") for words in model.left_out),
+            *(Sentence(_sentence(f"not included: {words}"), where="terminal") for words in model.left_out),
+        ]),
     ]  # fmt: skip
 
 

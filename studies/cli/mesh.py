@@ -42,7 +42,7 @@ def mesh(
     spacing_mm : float
         Longest element along the meridian; a sixth of the radius unless given.
     complete : bool
-        Nodes in the middle of faces and elements too: 27 and 18 a piece instead of 20 and 15.
+        Add nodes at the centres of faces and elements: 27 and 18 for each element instead of 20 and 15.
     temperature : float
         Temperature in °C; the card's reference temperature unless given.
     """

@@ -40,7 +40,7 @@ COLUMNS = (
     Column("bryan_factor", "Bryan factor", form=".5f"),
     Column("relative_error_estimate", "solver error, relative", form=".0e"),
     Column("material_uncertainty_Hz", "material uncertainty", "Hz", ".2g"),
-    Column("frequency_per_thickness_Hz_per_um", "per wall thickness", "Hz/µm", "+.3g"),
+    Column("frequency_per_thickness_Hz_per_um", "df/dh", "Hz/µm", "+.3g"),
 )
 
 
@@ -74,7 +74,7 @@ def modes(
     tolerance : float
         Relative error that the frequency may have against its own theory.
     sensitivities : bool
-        Show how each frequency follows E, nu, rho, thickness and radius, and where its energy is.
+        Show how each frequency follows E, ν, ρ, thickness and radius, and where its energy is.
     spin : float
         Rate of rotation about the axis in °/s: frequencies of the two travelling waves, with second-order effects.
     amplitude : float
@@ -134,7 +134,7 @@ def modes(
             }
         entries.append(entry | {key: known[id(m)] for key, known in more.items() if id(m) in known})
     head = {"card": instrument.name, "temperature_degC": T - zero_Celsius, "theory": theory}
-    name = f"{instrument.name} at {T - zero_Celsius:g} °C, {theory}"
+    name = f"{instrument.name} at {T - zero_Celsius:g} °C, {THEORIES[theory]}"
     special = [
         make(entries) for make in (_split_table, spin_table, amplitude_table, mount_table, films_table, crystal_table)
     ]

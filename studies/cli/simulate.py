@@ -28,11 +28,11 @@ def simulate(
 ) -> Result:
     """Run a virtual gyro through a chamber profile, or drive it as a record was driven, and write the record.
 
-    A card with [loop] in mode whole-angle has a wave that turns: with the applied rate, its self-precession, and what damping
-    and electronics make of it; a record or profile with pattern_angle_deg says where it stands instead.
+    With [loop] in mode whole-angle, the wave precesses with the applied rate, the self-precession, and the drift by damping and
+    electronics; a column pattern_angle_deg of the record or profile prescribes its azimuth instead.
 
-    The card's optional tables [thermal], [loss], [bias], [loop], [noise] and [[effect]] say what the gyro is like; all have
-    defaults (studies/instrument/tables).
+    The gyro is described by the card's optional tables [thermal], [loss], [bias], [loop], [noise] and [[effect]]; all keys have
+    defaults (hrg keys card).
 
     Parameters
     ----------
@@ -58,7 +58,7 @@ def simulate(
     boundary : str
         Column of a record that is imposed: chamber or housing.
     spread : bool
-        Say how well the card knows the run: what its uncertain values leave of every column, without noise.
+        Show the standard deviation of every column, without noise, that follows from the uncertainties of the card.
     """
     import numpy as np
 

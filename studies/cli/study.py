@@ -39,7 +39,7 @@ def run(
         standard_deviation), triangular or log-uniform. [[quantity]]: name = bryan-factor, compensation-residual, frequency,
         mode-separation, python, q, split, tcf or thermal-time-constants, with harmonic, index, theory, temperature_degC, label and its own keys.
         [[requirement]]: column with within (of target), or low, high. [[search]]: kind = worst-case with column,
-        inversion with vary and targets, or tolerance with share (the tolerances with which that share of designs meets the requirements). Example and details: python -m pydoc studies.sweeps.spec.
+        inversion with vary and targets, or tolerance with share (the tolerances with which that share of designs meets the requirements). Example: hrg study new spec.toml.
     out : str
         Folder for the results; required except with --dry-run. Run again with the same folder to resume.
     workers : int

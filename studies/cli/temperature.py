@@ -82,7 +82,7 @@ def temperature(model: str, run: str, /, *, out: str | None = None) -> Result:
         said.append(f"{facts['rows_without_frequency']} rows have no frequency and stay empty.")
     return Result(
         payload,
-        "The resonator as its own thermometer",
+        "Resonator temperature from its frequency",
         f"The resonator's temperature in {run}, read from its frequency with {model}.",
         [
             Facts(cells),

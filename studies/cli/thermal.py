@@ -22,9 +22,9 @@ if TYPE_CHECKING:
 
 @answers("hrg.thermal/1")
 def thermal(card: str, profile: str, *, rows: int = 13) -> Result:
-    """Show time constants, what decides them, and the temperatures of housing, base, stem and shell in time.
+    """Show time constants, their sensitivities, and the temperatures of housing, base, stem and shell in time.
 
-    The heat path is the card's table [thermal] with its defaults (studies/instrument/tables/thermal.py).
+    The heat path is the card's table [thermal] with its defaults (hrg keys card).
 
     Parameters
     ----------

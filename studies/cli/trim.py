@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from studies.trim import CardPlan
 
 MANY = Parameter(consume_multiple=True)
+KINDS = {"mass": "unstrained mass", "edge": "off the rim", "inner": "off the inner face", "outer": "off the outer face"}
 CUTS = (
     Column("number", "cut"),
     Column("azimuth_deg", "azimuth", "°", ".2f"),
@@ -182,17 +183,17 @@ def _parts(planned: "CardPlan", payload: dict[str, Any]) -> "list[Chapter]":
     axes = ", ".join(f"n = {one['harmonic']} at {one['slow_axis_deg']:.1f}°" for one in payload["before"])
     limit = f"below {plain(1e3 * max(one['most_Hz'] for one in first['after']))} mHz"
     goal = f"goal {plain(1e3 * plan.goal)} mHz" + ("" if plan.is_enough else ": another round is needed")
-    kinds = ", ".join(f"{kind} {value:+.2f}" for kind, value in payload["other_cuts"].items()).replace("-", "−")
+    kinds = ", ".join(f"{KINDS[kind]} {value:+.2f}" for kind, value in payload["other_cuts"].items()).replace("-", "−")
     return [
         Chapter("Cuts", [
             Facts([
                 ("Measured split", ", ".join(f"{plain(1e3 * one['split_Hz'], 4)} mHz" for one in payload["before"]), f"slow axis of {axes}"),
-                ("Mass to remove", f"{first['mass_ug']:.3g} µg", f"{len(cuts)} cuts, {100 * first['share']:.0f} % of the split"),
+                ("Mass to remove", f"{first['mass_ug']:.3g} µg", f"{len(cuts)} cuts, {100 * first['share']:.0f} % of the split" + ("; the rest guards against overshoot" if first["share"] < 1 else "")),
                 ("Expected split", limit, f"95 % limit; {goal}"),
             ]),
             Table("Cuts of this round", cuts, CUTS, f"Total {first['mass_ug']:.4g} µg."),
             *map(Sentence, payload["measure"]),
-            Sentence(f"Cut type of this plan: {payload['cut']}. Effect of the same mass at the rim by cut type, relative to this one: {kinds}."
+            Sentence(f"Type of cut in this plan: {KINDS[payload['cut']]}. Effect of the same mass at the rim by type of cut, relative to this one: {kinds}."
                 " Negative: the split changes in the opposite direction.", "note", "page"),
         ]),
         Chapter("Position of the cuts", [Figure(lambda: polar(plan, cuts),

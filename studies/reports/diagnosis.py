@@ -138,9 +138,13 @@ def response_table(verdict: Verdict) -> Table:
             "explained_share": one.explained_share,
             "left": one.left_over + (f" in {one.left_over_input}" if one.left_over_input else ""),
         })  # fmt: skip
-    note = (
-        "Rms residuals. Baseline and with causes: on rows left out of the fit. Noise: what no model removes, with its white part for"
-        " each row and its coloured part within a run. Explained: share of the structure that the causes remove."
+    judged = any(row["baseline"] is not None for row in rows)
+    note = "Rms residuals." + (" Baseline and with causes: on rows left out of the fit." if judged else "")
+    note += " Noise: what no model removes, with its white part for each row and its coloured part within a run."
+    note += (
+        " Explained: share of the structure that the causes remove."
+        if any(row["explained_share"] is not None for row in rows)
+        else ""
     )
     return Table("Responses", rows, RESULTS, note)
 

@@ -67,7 +67,7 @@ def loop_parts(study: "LoopStudy", payload: dict[str, Any], run: "Record | None"
     start = f"Start from rest with {headroom:g} times the steady-state drive: phase locked after {study.start.locked:.3g} s, amplitude within 1 % after {study.start.ready:.4g} s."
     return [
         Chapter("In short", [
-            Sentence(f"Loops of {payload['card']}: {describe(payload)}", where="terminal"),
+            Sentence(f"Loops of {payload['card']}. {describe(payload)}", where="terminal"),
             Facts(_facts(study, payload), "page"),
             *_largest(slopes, study.sources[-1].sd),
         ]),

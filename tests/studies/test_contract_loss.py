@@ -66,7 +66,7 @@ def test_every_key_of_the_card_makes_its_part(capsys, tmp_path):
     assert json.loads(out)["left_out"] == []
     status, out, _ = _run(capsys, str(path))
     assert status == 0
-    assert "Attack first: film gold" in out
+    assert "Reduce first: film gold" in out
 
 
 def test_schema_is_kept(capsys, tmp_path):
@@ -216,7 +216,7 @@ def test_the_page_says_what_to_attack_first_and_what_each_part_is_worth(capsys, 
     assert "Loss budget of &lt;dome&gt;" in text
     for chapter in ("In short", "Parts at 20 °C", "Over temperature", "Along the meridian", "Around the axis"):
         assert f">{chapter}<" in text
-    assert "Attack first: film gold." in text
+    assert "Reduce first: film gold." in text
     at = found["temperature_degC"].index(20.0)
     assert f"Q would be {found['attack_first']['q_without'][at]:.2e} without it".replace("e+0", "e") in text
     assert found["left_out"][0][1:] in text

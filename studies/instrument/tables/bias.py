@@ -2,7 +2,7 @@
 
 [bias]                             # every key may be left out
 offset_deg_per_h = 0.0             # ± 10
-damping_anisotropy = 0.01          # Δ(1/τ) over the mean 1/τ = π f/Q; known to a factor of e unless stated
+damping_anisotropy = 0.01          # Δ(1/τ) over the mean 1/τ = π f/Q; relative ± 100 % unless stated
 damping_axis_deg = 0.0             # θ_τ; ± 13: anywhere within half of its period of 45°
 pattern_angle_deg = 22.5           # θ of the standing wave: commanded, exact
 k1_deg_per_h_per_Hz, k2_…_per_Hz2, k3_…_per_Hz3          # ± 1, 0.1, 0.01; HRG paper eqs. (21), (22), with f the

@@ -1,7 +1,7 @@
 """`[loss]`: 1/Q of the drive mode over temperature.
 
 [loss]                             # every key may be left out
-inverse_q = 1e-7                   # at the reference temperature; known to a factor of e unless stated
+inverse_q = 1e-7                   # at the reference temperature; relative ± 100 % unless stated
 slope_per_K = 4e-3                 # relative; ± 4e-3
 curvature_per_K2 = 0.0             # relative; ± 4e-5
 """

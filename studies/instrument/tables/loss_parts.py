@@ -7,7 +7,7 @@
     bulk_coefficient = 7.6e-12          # of the material's own loss c f^b, f in Hz; of the loss table unless given
     bulk_exponent = 0.77
     surface_layer_pm = 5.2              # depth times loss of the damaged surface; of the loss table unless given
-    surface_anisotropy = 0.01           # wave 2n around of the surface's loss; × e
+    surface_anisotropy = 0.01           # wave 2n around of the surface's loss; relative ± 100 %
     surface_anisotropy_angle_deg = 0.0  # azimuth of its crest; ± 13
     anchor_inverse_q = 1e-9             # what leaves through the mount
     unbalance_mg = 0.1                  # first harmonic Σ m exp(iθ) of the rim's mass, on a stem; ± 50 %. Masses of
@@ -18,12 +18,12 @@
     [[loss.film]]                       # conducting films; a film of the table (gold, chromium, …) or with its own numbers
     material = "gold"
     thickness_nm = 100.0                # ± 10 %
-    loss = 1e-4                         # its own loss angle; × e; no source states that of an evaporated metal
+    loss = 1e-4                         # its own loss angle; relative ± 100 %; no source states that of an evaporated metal
     face = "both"                       # inner | outer | both
     from_position = 0.0                 # of the meridian, 0 … 1
     to_position = 1.0
     coverage = 1.0                      # covered share, of a pattern
-    anisotropy = 0.01                   # relative amplitude of the wave 2n of its thickness around (4θ for n = 2); × e
+    anisotropy = 0.01                   # relative amplitude of the wave 2n of its thickness around (4θ for n = 2); relative ± 100 %
     anisotropy_angle_deg = 10.0         # azimuth of its crest; ± 13
     youngs_modulus_GPa, poisson_ratio, expansion_per_K, conductivity_W_per_m_K, heat_capacity_J_per_kg_K, density_kg_m3
 

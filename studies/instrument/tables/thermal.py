@@ -1,12 +1,12 @@
 """`[thermal]`: constants of the heat path from the chamber to the shell.
 
     [thermal]                               # every key may be left out
-    film_emissivity = 0.03                  # effective, of each face of the shell; bare metal film 0.03, silica 0.8; × e
+    film_emissivity = 0.03                  # effective, of each face of the shell; bare metal film 0.03, silica 0.8; relative ± 100 %
     base_heat_capacity_J_per_K = 25.0       # base with electrodes: about 34 g of silica; ± 50 %
     housing_heat_capacity_J_per_K = 70.0    # about 150 g of steel; ± 50 %
     chamber_conductance_W_per_K = 0.1       # moving air, 10 W/(m² K) on 100 cm²; ± 50 %
     mount_conductance_W_per_K = 0.0118      # base to housing; identified, see below; ± 50 %
-    mount_exchange_cm2 = 10.0               # base to housing, area x effective emissivity; × e
+    mount_exchange_cm2 = 10.0               # base to housing, area x effective emissivity; relative ± 100 %
     drive_power_mW = 0.0                    # heat of the vibration, spread over the shell
     radiation = true                        # false: linearised at the reference temperature
     cells = 24                              # of the shell's meridian; 1 makes it a lump
