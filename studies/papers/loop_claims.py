@@ -1,4 +1,4 @@
-"""What published gyros and papers claim of their loops, put to the loop twin: met, met on a condition, or not met.
+"""What published gyros and papers claim of their loops, put to the loop twin: met, met conditionally, or not met.
 
 Drift and mean rate of a free wave are closed forms. The published figures are of gyros whose electronics are not published, so
 the twin says what they ask of the electronics.
@@ -26,7 +26,7 @@ RESOLVED_Hz = 3.2e-4
 # Title of a paper on a micro-shell in whole-angle mode.
 NONLINEARITY = 0.79e-6
 
-Verdict = Literal["met", "met on a condition", "not met"]
+Verdict = Literal["met", "met conditionally", "not met"]
 
 
 @dataclass(frozen=True)
@@ -109,9 +109,9 @@ def _stability() -> Claim:
     return Claim(
         f"a bias stability of {STABILITY_deg_per_h:g} °/h under force rebalance with a split of {1e3 * SPLIT_Hz:g} mHz, Q > 2e6",
         "Micromachines 2021, 266",
-        f"only if the loop phase is stable to {1e6 * phase:.1f} µrad, or to 0.1 mrad with the wave within {60 * within:.1f}′ of a"
+        f"only if the loop phase is stable to {1e6 * phase:.1f} µrad, or to 0.1 mrad with the wave within {within:.2f}° of a"
         f" principal axis; a phase error causes {slope / 1e3:.0f} °/h per mrad at the worst azimuth",
-        "met on a condition",
+        "met conditionally",
     )
 
 
@@ -146,5 +146,5 @@ def _nonlinearity() -> Claim:
         "title of a paper on a micro-shell",
         f"at Q = 1e6 and 1 % damping anisotropy only above {np.degrees(rate):.1f} °/s, where √(Ω² − Ω_d²) is closer to Ω than that;"
         " below this rate the drift must be compensated over the azimuth",
-        "met on a condition",
+        "met conditionally",
     )

@@ -20,7 +20,7 @@ def claims_chapter(found: "LoopClaims") -> Chapter:
     text = (
         f"A damping anisotropy of 1 % at Q = 1e7 causes a drift of {drift:.3f} °/h in the simulation ({drift_closed:.3f} in closed form)."
         f" At the earth rate of 15.041 °/h a free wave indicates {mean:.3f} °/h on average ({mean_closed:.3f} in closed form). Below"
-        " the drift rate the wave locks and indicates nothing."
+        " the drift rate the wave is locked and shows no rate."
     )
     rows = [[claim.verdict, f"{claim.claim} ({claim.source})", claim.twin] for claim in found.claims]
     return Chapter(

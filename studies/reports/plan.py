@@ -27,11 +27,11 @@ SENSORS = (Column("sensor", "sensor"), Column("count", "sets"), Column("pairs", 
 def headline(outlook: Outlook) -> str:
     """Return what the campaign can identify, in a few sentences."""
     effects = list(outlook.close.confusion)
-    parts = [
-        f"{_sure(outlook, plan)} of {len(effects)} at SNR {plan.snr:g}" + (f" ({_sizes(plan)})" if plan.sizes else "")
-        for plan in outlook.plans
-    ]
+    parts = [f"{_sure(outlook, plan)} of {len(effects)} at SNR {plan.snr:g}" for plan in outlook.plans]
+    first = outlook.plans[0]
     text = f"Effects identified in at least 90 % of cases: {', '.join(parts)}."
+    if first.sizes:
+        text += f" SNR {first.snr:g} is {_sizes(first)}."
     never = [key for key in effects if outlook.smallest(key) is None]
     if never:
         text += f" Not even at SNR {outlook.plans[0].snr:g}: {', '.join(map(shown_key, never))}."

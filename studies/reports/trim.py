@@ -43,6 +43,7 @@ def polar(plan: "TrimPlan", cuts: "Sequence[dict[str, Any]]") -> "Drawing":
                     ax.text(azimuth, 1.44, str(number), ha="center", va="center", fontsize=8)
             ax.set_ylim(0, 1.55)
             ax.set_yticks([])
+            ax.tick_params(labelsize=8, pad=1)  # so that 0° of one and 180° of the other stand apart
             ax.set_title(title, fontsize=10)
             ax.legend(loc="lower center", bbox_to_anchor=(0.5, -0.28), fontsize=8)
         return made

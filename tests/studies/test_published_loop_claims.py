@@ -13,9 +13,9 @@ def test_drift_mean_rate_and_verdicts():
     assert [claim.verdict for claim in found.claims] == [
         "met",
         "not met",
-        "met on a condition",
+        "met conditionally",
         "met",
-        "met on a condition",
+        "met conditionally",
     ]
     # ε π Δf/(n k) = 0.065 deg/h at 60 mHz: 0.93 µrad
     assert "stable to 0.9 µrad" in found.claims[2].twin

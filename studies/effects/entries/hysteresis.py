@@ -65,7 +65,12 @@ EFFECT = Effect(
     shape=(
         Parameter("half_width_K", 0.02, 40.0, "half width of the loop in temperature", of_range=WIDEST),
         Parameter(
-            "initial_memory", -1.0, KEPT, "where each run starts in its band; 2: where the last ended", False, True
+            "initial_memory",
+            -1.0,
+            KEPT,
+            "where each run starts in its band, -1 to 1; 2: where the last run ended",
+            False,
+            True,
         ),
         Parameter("from_degC", -273.0, 500.0, "lower end of the envelope", False, True),
         Parameter("to_degC", -273.0, 500.0, "upper end of the envelope", False, True),
