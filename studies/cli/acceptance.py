@@ -97,6 +97,7 @@ def acceptance(card: str, *runs: str, limits: str | None = None, output: str = "
     rows = [
         {
             **line,
+            **_nothing(line),
             "words": one.quantity.words,
             "shown_unit": one.quantity.unit.replace("deg", "°"),
             "shown_limit": "" if one.limit is None else f"{'≤' if one.quantity.upper else '≥'} {plain(one.limit, 6)}",
@@ -153,6 +154,15 @@ def _line(line: "JudgedQuantity") -> dict[str, Any]:
     }
 
 
+def _nothing(line: dict[str, Any]) -> dict[str, Any]:
+    """What stands for a value of 0 at the end of its interval."""
+    from studies.reports.digits import plain
+
+    if line["value"] != 0 or not line["high"]:
+        return {}
+    return {"value": f"not detected (< {plain(line['high'], 2)})", "low": None, "high": None}
+
+
 def _facts(found: "Acceptance") -> list[tuple[str, str, str]]:
     judged = {kind: [one.quantity.words for one in found.lines if one.limit is not None and one.verdict == kind]
               for kind in ("pass", "fail", "undecided", "missing")}  # fmt: skip
@@ -181,9 +191,8 @@ def _drift(found: "Acceptance") -> list[Figure | Sentence]:
     first = next((k for k, kind in enumerate(allan.noise) if kind != "phase"), 0)
     reach = f" from {plain(float(allan.tau[first]))} s on (angle noise dominates below)" if first else ""
     words = (
-        f"Angle random walk {noise.N / 60:.3g} °/√h, bias instability {allan.bias_instability[0]:.3g} °/h (minimum of the Allan"
-        f" deviation over 0.664), rate random walk {noise.K * 60:.3g} °/h/√h. Misfit {noise.misfit:.2g}{reach}; a value"
-        " near 1 means that these three kinds of noise explain the curve."
+        f"Misfit {noise.misfit:.2g}{reach}; a value near 1 means that angle random walk, bias instability (minimum of the Allan"
+        " deviation over 0.664) and rate random walk explain the curve."
     )
 
     def draw() -> "Drawing":

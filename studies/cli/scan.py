@@ -29,6 +29,7 @@ SPLITS = (
     Column("every_order.split_Hz", "split, all orders", "mHz", scale=1e3),
     Column("every_order.slow_axis_deg", "slow axis, all orders", "°", ".2f"),
 )
+NAMES = {"wall": "wall", "offset": "middle surface", "inner": "inner face", "outer": "outer face"}
 HARMONICS = (
     Column("order", "harmonic"),
     Column("amplitude_um.value", "amplitude", "µm", ".3f"),
@@ -140,29 +141,38 @@ def _parts(found: "Scan", payload: dict[str, Any]) -> "list[Chapter]":
     from studies.reports import scan as pictures
 
     faces, splits = payload["faces"], payload["splits"]
-    quantity = "wall" if len(faces) == 2 else next(iter(faces))
+    shown = ("wall", "offset") if len(faces) == 2 else tuple(faces)
     rim = max(w.position for w in found.waves)
-    waves = [
-        w | {"crest": w["azimuth_deg"] if w["order"] else None}
-        for w in payload["waves"]
-        if w["quantity"] == quantity and w["position"] == rim
-    ]
+    waves: dict[str, list[dict[str, Any]]] = {}
+    for w in payload["waves"]:
+        if w["quantity"] in shown and w["position"] == rim:
+            waves.setdefault(w["quantity"], []).append(w | {"crest": w["azimuth_deg"] if w["order"] else None})
     note = "First order: from harmonic 2n alone. All orders: with products of harmonics. Slow axis: an antinode of the slower mode."
     if any(one["slow_axis_deg"] is None for one in splits):
-        note += " No slow axis: the split is not significant."
+        note += " <: 95 % limit of a split that is not significant and has no axis."
     only = "Only one face was measured; the other is assumed perfect." if len(faces) == 1 else ""
     return [
         Chapter("In short", [Facts(_facts(payload), "page"), *([Sentence(only, "warning")] if only else []),
-            Table("Frequency splits from the measured faces", splits, SPLITS, note)]),
+            Table("Frequency splits from the measured faces", list(map(_significant, splits)), SPLITS, note)]),
         Chapter("Maps", [Figure(lambda: pictures.maps(found), "Fitted deviations over azimuth and meridian.")]),
         Chapter("Circumferential harmonics", [
             Figure(lambda: pictures.harmonics(found), "Amplitudes at the rim with 90 % intervals; harmonic 2n splits the modes n."),
-            Table(f"Circumferential harmonics of the {quantity} at position {rim:.3f}", waves, HARMONICS),
+            *(Table(f"Circumferential harmonics of the {name} at position {rim:.3f}", waves[key], HARMONICS) for key, name in NAMES.items() if key in waves),
         ]),
         Chapter("Roundness", [Table("Roundness of circles", payload["roundness"], ROUNDNESS,
             "From harmonic 2 upwards; harmonic 1 is the eccentricity of the circle.", "page")]),
         Chapter("Faces", [Table("Faces as read", [{"face": name} | face for name, face in faces.items()], FACES)]),
     ]  # fmt: skip
+
+
+def _significant(split: dict[str, Any]) -> dict[str, Any]:
+    """A split that is not significant as its limit, without an axis."""
+    from studies.reports.digits import plain
+
+    if split["slow_axis_deg"] is not None:
+        return split
+    limit = f"< {plain(1e3 * split['split_Hz']['high'])}"
+    return split | {"split_Hz": {"value": limit, "low": None, "high": None}, "every_order": {}}
 
 
 def _facts(payload: dict[str, Any]) -> "list[tuple[str, str, str]]":

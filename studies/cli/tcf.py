@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from shell.law import FrequencyLaw
 
 MOST_HARMONIC = 50  # a law of a higher one takes minutes
-PARTS = {"E": "E", "nu": "μ", "rho": "ρ", "h": "h", "r": "r", "base": "base"}
+PARTS = {"E": "E", "nu": "ν", "rho": "ρ", "h": "h", "r": "r", "base": "base"}
 CAPTION = "Slope of the frequency with its standard deviation (band), and its parts."
 LEAST = 0.005  # ppm/°C, that is shown
 
@@ -30,7 +30,7 @@ def tcf(
     theory: Literal["solid", "shell", "rayleigh"] = "solid",
     measured: str | None = None,
 ) -> Result:
-    """Show the frequency over temperature, its slope in ppm/°C, and the slope's parts from E, μ, ρ, h, r and a [mount].
+    """Show the frequency over temperature, its slope in ppm/°C, and the slope's parts from E, ν, ρ, h, r and a [mount].
 
     Parameters
     ----------

@@ -12,6 +12,8 @@ if TYPE_CHECKING:
     from studies.record import Record
 
 SOURCES = ("Wang X. et al., Sensors 2012, 12, 6434 (the HRG paper), eqs. (16)–(18), Table 2, figure 5.",)
+FAR = 3.0
+"""Uncertainties of the curve from which on a known temperature contradicts it."""
 NOTE = (
     "The curve was fitted to settled readings. The frequency shows the resonator's own temperature, weighted by the mode; the housing"
     " leads it while the temperature changes."
@@ -73,11 +75,15 @@ def temperature(model: str, run: str, /, *, out: str | None = None) -> Result:
         ("Highest", f"{high:.3f} °C", ""),
         ("Uncertainty of the curve", f"± {sd:.2g} K", "one standard deviation of the fitted f(T)"),
     ]
-    said = []
+    said, warned = [], []
     if true is not None:
         said.append(
             f"The record's own, simulated temperature differs by {facts['rms_difference_from_simulated_K']:.2g} K rms."
         )
+        if facts["rms_difference_from_simulated_K"] > FAR * sd:
+            warned.append(
+                f"That is {facts['rms_difference_from_simulated_K'] / sd:.0f} times the uncertainty of the curve: is the model of this gyro?"
+            )
     if facts["rows_without_frequency"]:
         said.append(f"{facts['rows_without_frequency']} rows have no frequency and stay empty.")
     return Result(
@@ -87,6 +93,7 @@ def temperature(model: str, run: str, /, *, out: str | None = None) -> Result:
         [
             Facts(cells),
             *(Sentence(one) for one in said),
+            *(Sentence(one, "warning") for one in warned),
             Figure(lambda: _figure(record, found), "Temperature of the resonator over time."),
             Sentence(NOTE, "note", "page"),
         ],

@@ -201,7 +201,7 @@ def _alternatives(diagnosis: "Diagnosis", response: str) -> Iterator[Part]:
             {"name": name, "evidence": 2.0 * (rival.score - place.without.score)}
             for name, rival in zip(place.names, place.rivals, strict=True)
         ]
-        columns = (Column("name", "effect"), Column("evidence", "evidence", form=".1f"))
+        columns = (Column("name", "effect"), Column("evidence", "evidence", "2 ln odds", ".1f"))
         yield Table(f"Alternatives to {place.names[0]}", rows, columns, where="page")  # fmt: skip
     left = inquiry.leftover
     if left.significant:

@@ -2,6 +2,7 @@
 
 from typing import TYPE_CHECKING
 
+from studies.diagnosis.constants import CONSTANTS
 from studies.reports.diagnosis import headline, next_step, reason
 from studies.reports.digits import plain, to_error
 from studies.reports.style import BLACK, ORANGE, VERMILION, figure
@@ -16,7 +17,12 @@ CANDIDATES = (
     Column("form", "candidate"),
     Column("sum_of_squares_Hz2", "sum of squares", "Hz²", digits=3),
     Column("leave_one_out_Hz", "leave-one-out", "Hz", digits=3),
-    Column("evidence", "evidence", digits=3),
+    Column("evidence", "evidence", "2 ln odds", digits=3),
+)
+
+EVIDENCE = (
+    "Evidence: twice the logarithm of how much likelier the readings are with the candidate than without it, averaged over its size."
+    f" {-2.0 * CONSTANTS['log_prior_effect']:.0f} names a cause."
 )
 
 
@@ -34,7 +40,7 @@ def table_parts(found: "TableDiagnosis") -> list[Chapter]:
             *map(Sentence, found.sentences),
             *next_step(verdict),
         ]),
-        Chapter("Candidates", [Table("Candidates added to the baseline", candidates, CANDIDATES, where="page")]),
+        Chapter("Candidates", [Table("Candidates added to the baseline", candidates, CANDIDATES, EVIDENCE, "page")]),
     ]  # fmt: skip
 
 

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from studies.diagnosis.planning.plan import Outlook, Plan, effect_of
+from studies.diagnosis.planning.plan import Outlook, Plan, effect_of, response_of
 from studies.diagnosis.planning.rehearsal import NOTHING
 from studies.diagnosis.response import RESPONSES
 from studies.reports.style import figure
@@ -69,6 +69,7 @@ def plan_table(outlook: Outlook) -> Table:
 
 def shown_key(key: str) -> str:
     """Return the name of a hidden effect, with the response that it is hidden in for people: "jump (bias)"."""
+    key = key if " (" in key else f"{key} ({response_of(key)})"
     for column, response in RESPONSES.items():
         key = key.replace(f"({column})", f"({response.word})")
     return key
@@ -116,7 +117,7 @@ def plan_parts(outlook: Outlook, profiles: Sequence[str]) -> list[Chapter]:
     method = (
         "A gyro without effects goes through the planned runs with nominal physics. Each effect is added"
         f" {close.cases} times at each SNR, with random shapes, in white noise and, in every second case, also in coloured noise."
-        f" The answers follow the rules of the diagnosis. {SNR_WORDS}"
+        " The answers follow the rules of the diagnosis."
     )
     note = f"Sets at SNR {close.snr:g}. A sensor costs no chamber time; the most useful is listed first."
     return [

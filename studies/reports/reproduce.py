@@ -234,7 +234,7 @@ def _physics(physics: "PhysicsComparison", study: "FrequencyStudy") -> list[Bloc
             physics.temperature, numbers, physics.slope_ppm, physics.uncertainty_ppm, _measured(study), strict=True
         )
     ]
-    columns = ["T (°C)", "E", "μ", "ρ", "h", "r", "Predicted", "Measured"]
+    columns = ["T (°C)", "E", "ν (μ in the paper)", "ρ", "h", "r", "Predicted", "Measured"]
     parts = Table(
         "Slope of ln f and its contributions (ppm/°C), equation (15)",
         columns,

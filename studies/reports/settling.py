@@ -138,7 +138,8 @@ def soak_sentence(study: "SettlingStudy") -> str:
     against = "opposite to" if largest.curvature * missing < 0 else "of the same sign as"
     return (
         f"An incomplete soak from room temperature reduces the slope by at most {abs(largest.slope):.2f} ppm/°C here, of"
-        f" the {abs(study.measured_slope - study.law_slope):.1f} ppm/°C between measurement and prediction."
+        f" the {abs(study.measured_slope - study.law_slope):.1f} ppm/°C between measurement and prediction at"
+        " 20 °C (both slopes of quadratics through ln f; elsewhere the measured slope is that of the cubic)."
         f" With a linear heat path it hardly changes the curvature (by up to"
         f" {max(abs(soak.curvature) for soak in linear):.4f} ppm/°C², from the curvature of the law itself). Radiation adds"
         f" {largest.curvature:+.4f} ppm/°C², {against} the difference of {missing:+.3f} ppm/°C² to be explained. With points taken"

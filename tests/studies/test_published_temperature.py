@@ -77,3 +77,12 @@ def test_a_curve_that_turns_round_is_not_inverted(tmp_path, capsys):
         (tmp_path / "r.csv").write_text("time_s,frequency_Hz\n0,4428\n1,4429\n")
         assert main(["temperature", str(tmp_path / "m.toml"), str(tmp_path / "r.csv"), "--json"]) == 2
     assert "turning point" in capsys.readouterr().err
+
+
+def test_a_model_of_another_gyro_is_doubted(model, tmp_path, capsys):
+    """The record's own temperature is 5 K off what the model reads, a hundred times the uncertainty of its curve."""
+    path = tmp_path / "r.csv"
+    rows = "".join(f"{10 * k},4432.07,25.0\n" for k in range(20))
+    path.write_text("time_s,frequency_Hz,resonator_temperature_degC\n" + rows)
+    assert main(["temperature", model, str(path), "--out", str(tmp_path / "o.csv")]) == 0
+    assert "times the uncertainty of the curve: is the model of this gyro?" in capsys.readouterr().out

@@ -79,10 +79,12 @@ class Plan:
         """What would part sets without a further run: each sensor with the pairs that it parts, the most useful first."""
         found: dict[str, set[str]] = {}
         for key, others in self.sets.items():
+            response = response_of(key)
             for other in (name for name, share in others.items() if share >= OFTEN):
                 pair = " / ".join(sorted((effect_of(key), other)))
                 for name in (effect_of(key), other):
-                    if sensor := library()[name].sensor:
+                    sensor = library()[name].sensor
+                    if sensor and (response == "frequency_Hz" or "reference_frequency_Hz" not in sensor):
                         found.setdefault(sensor, set()).add(pair)
         return {sensor: sorted(found[sensor]) for sensor in sorted(found, key=lambda s: (-len(found[s]), s))}
 
@@ -102,6 +104,11 @@ class Plan:
             "chamber_hours": self.hours,
             "sensors": self.sensors,
         }
+
+
+def response_of(key: str) -> str:
+    """Return the response that the effect of a key is hidden in."""
+    return key.split(" (")[1].rstrip(")") if " (" in key else library()[key].responses[0]
 
 
 def effect_of(key: str) -> str:

@@ -37,6 +37,12 @@ def test_a_reference_clock_parts_what_no_run_does(loud):
     assert len(next(iter(loud.sensors.values()))) == max(map(len, loud.sensors.values()))
 
 
+def test_a_reference_clock_parts_nothing_in_the_loss():
+    """Ageing of 1/Q and a leak were once told apart by a clock."""
+    plan = Plan(1.0, 4, {}, {"ageing (inverse_q)": {"leak": 0.5}, "ageing": {"clock-drift": 0.5}}, {}, {}, {}, {}, 1.0)
+    assert plan.sensors["a reference clock (reference_frequency_Hz)"] == ["ageing / clock-drift"]
+
+
 def test_a_plan_beyond_the_chamber_is_refused():
     chamber = parse_chamber("rate 3 range -40 85")
     require_reach(chamber, "ramp 20 -10 3")
