@@ -35,8 +35,10 @@ def read_toml(path: str | FilePath, schema: str | None = None) -> dict[str, Any]
     InputError
         No such file, not UTF-8, a syntax error (with its line), or another schema.
     """
+    data = read_bytes(path, MOST_BYTES)
+    text = ""
     try:
-        text = read_bytes(path, MOST_BYTES).decode("utf-8-sig")
+        text = data.decode("utf-8-sig")
         content = tomllib.loads(text)
     except UnicodeDecodeError:
         raise InputError(f"{path}: not UTF-8 text; save the file as UTF-8.") from None

@@ -172,7 +172,7 @@ def test_options_of_a_run_are_never_ignored(card, capsys, words, said):
 @pytest.mark.parametrize(
     ("lines", "words", "said"),
     [
-        ("", ["--rate", "300"], "the rate of 300 °/s takes 300 % of the force that rate_range_deg_per_s = 100 allows"),
+        ("", ["--rate", "300"], "the rate of 300 °/s (--rate) is beyond rate_range_deg_per_s = 100"),
         ("frequency_split_mHz = 5000.0\n", [], "nulls a split of 306"),
         (
             'quadrature_control = "stiffness"\nfrequency_split_mHz = 5000.0\n',
