@@ -52,11 +52,15 @@ def extend(
 
 
 def fit_modes(envelope: Envelope) -> DecayFit:
-    """Fit two modes where the second pays: one that is not excited, or not split, cannot be told from the first."""
+    """Fit two modes where the second pays: one that is not excited, or not split, cannot be told from the first.
+
+    Noise offers as many places for a second mode as there are rows; each costs the odds.
+    """
     one = fit_decay(envelope, modes=1)
     two = fit_decay(envelope, modes=2)
     left = examine(envelope.time, two.residual)
-    return two if one.cost - two.cost > PAYS * left.widening**2 and np.all(two.decay.rates.real < 0) else one
+    price = (PAYS + 2 * np.log(envelope.time.size)) * left.widening**2
+    return two if one.cost - two.cost > price and np.all(two.decay.rates.real < 0) else one
 
 
 def _without_lines(

@@ -92,7 +92,7 @@ def _show_values(card: str) -> Result:
         if row["name"] not in idle
     ]
     columns = [
-        Column("name", "quantity", spell=display_name),
+        Column("name", "quantity", spell=display_name, where="page"),
         Column("key", "key"),
         Column("value", "value", form=".4g"),
         Column("spread", "±"),

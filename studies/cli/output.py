@@ -33,7 +33,7 @@ def answers(schema: str) -> Callable[[Callable[..., Any]], Callable[..., int]]:
         @functools.wraps(command)
         def run(*arguments: Any, json: bool = False, **options: Any) -> int:
             report = None if prints else options.pop("report", None)
-            if report is not None and not report.lower().endswith((".html", ".htm")):
+            if report is not None and not report.lower().endswith((".html", ".htm", "/dev/null")):
                 raise InputError(f"--report {report}: a report is an HTML page; give a name that ends in .html.")
             with guarded({**own.bind(*arguments, **options).arguments, **({} if prints else {"report": report})}):
                 if prints:

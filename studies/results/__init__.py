@@ -56,6 +56,7 @@ class Column:
     within: tuple[str, str] | None = None
     scale: float = 1.0
     spell: Callable[[str], str] = str
+    where: Where = "everywhere"
 
     @property
     def title(self) -> str:
@@ -125,9 +126,10 @@ class Table:
     where: Where = "everywhere"
     sortable: bool = False
 
-    def cells(self) -> tuple[list[str], list[list[str]]]:
-        """Return headings and rows of text."""
-        written = [(column.title, [column.write(row) for row in self.rows]) for column in self.columns]
+    def cells(self, where: Where = "everywhere") -> tuple[list[str], list[list[str]]]:
+        """Return headings and rows of text, in the terminal or on the page."""
+        columns = [column for column in self.columns if "everywhere" in (column.where, where) or column.where == where]
+        written = [(column.title, [column.write(row) for row in self.rows]) for column in columns]
         shown = [(title, cells) for title, cells in written if any(cells)]
         return [title for title, _ in shown], [list(row) for row in zip(*(cells for _, cells in shown), strict=True)]
 

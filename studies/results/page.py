@@ -26,7 +26,7 @@ def _blocks(part: Part) -> Iterator[page.Block]:
         case _ if part.where == "terminal":
             return
         case Table() if part.rows:
-            headings, rows = part.cells()
+            headings, rows = part.cells("page")
             yield page.Table(part.title, headings, rows, part.note, part.sortable)
         case Facts():
             yield page.Facts(part.facts)

@@ -24,7 +24,7 @@ def print_result(result: Result) -> None:
 def _print(part: Part) -> None:
     match part:
         case Table() if part.rows and part.where != "page":
-            headings, rows = part.cells()
+            headings, rows = part.cells("terminal")
             print_table(part.title, headings, rows, part.note)
         case Facts() if part.where != "page":
             for label, value, remark in part.facts:

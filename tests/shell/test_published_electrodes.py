@@ -103,7 +103,7 @@ def test_trim_voltages_null_the_split_within_their_reach(pair):
         assert max(trim.voltages) <= limit * (1 + 1e-9)
         assert abs(sixteen.charged(trim.voltages).soften().wave + wanted) < 1e-6 * most
     longest = abs(sixteen.per_square_volt[1]).sum() * limit**2  # no direction reaches as far
-    with pytest.raises(ShellError, match="is beyond"):
+    with pytest.raises(ShellError, match=r"at most 0\.239 Hz in any direction"):
         trim_voltages(sixteen, longest, limit)
     assert 0.1 < most * f < 1.0  # Hz
 

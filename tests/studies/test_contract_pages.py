@@ -39,7 +39,7 @@ def test_chapters_far_down_and_long_tables_are_folded_but_the_answer_is_not():
 def test_cells_are_escaped_sortable_and_have_minus_signs():
     text = page(1, 2)
     assert "&lt;b&gt;" in text
-    assert "<td>−1.5e−03</td>" in text
+    assert "<td>−1.5e−3</td>" in text
     assert '<table aria-labelledby="table-1-2" class="sortable ">' in text
 
 

@@ -37,7 +37,12 @@ def test_calibrate_and_diagnose_ask(card, record):
         InputError, match="run.csv: frequency_Hz is near .* the card hrg-30mm rings at 4432.*" + QUESTION
     ):
         calibrate(card, [record])
-    with pytest.raises(InputError, match="run.csv: frequency_Hz is near .*" + QUESTION + "say so in the card"):
+    with pytest.raises(
+        InputError,
+        match="run.csv: frequency_Hz is near .*"
+        + QUESTION
+        + "give a dimension an uncertainty that covers the difference",
+    ):
         investigate(load_campaign([record]), card=card)
 
 

@@ -296,7 +296,7 @@ def test_electrodes_null_the_cards_split_and_say_how_far_they_reach(tmp_path, ca
     )
     assert split_of(mended).split.hertz < 1e-8
     assert main(["electrodes", str(tmp_path / "card.toml"), "--split", "50", "--axis", "3"]) == 2
-    assert "is beyond" in capsys.readouterr().err
+    assert "in any direction, not 50 Hz" in capsys.readouterr().err
     loaded(tmp_path)
     assert main(["electrodes", str(tmp_path / "card.toml")]) == 2
     assert "no table [electrodes]" in capsys.readouterr().err

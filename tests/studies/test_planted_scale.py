@@ -249,7 +249,7 @@ def test_settled_rows():
 @pytest.mark.parametrize(
     ("files", "words"),
     [
-        ([0, 1], "at one rate over temperature"),
+        ([0, 1], "one rate over temperature"),
         ([0, 1, 1], "both runs at rest"),
         ([], "three records"),
     ],

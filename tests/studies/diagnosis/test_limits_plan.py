@@ -120,7 +120,7 @@ def test_the_smallest_effect_is_named_at_every_larger_size_too():
     assert "Not even at SNR 1: ageing" in words
     assert "Not testable (no wall): leak" in words
     rows = {row[0]: row[1:4] for row in plan_table(outlook).cells()[1]}
-    assert rows["jump"] == ["100", "90", "20"]
+    assert rows["jump (frequency)"] == ["100", "90", "20"]
     parts = plan_parts(outlook, ["cycle 20 -15 40 0.5 30min 1"])
     page = render_result(Result({}, "Planned campaign", words, parts))
     assert "cycle 20 -15 40 0.5 30min 1" in page

@@ -100,8 +100,8 @@ def beside_card(folder, T, f, card=CARD):
     ("spoil", "said"),
     [
         (lambda f: 2.0 * f[13] - f, "26 standard deviations. If the temperatures are read with the opposite sign"),
-        (lambda f: 1.5 * f, "is this a record of that gyro"),
-        (lambda f: 8110.0 * (1.0 - 27e-6 * (WIDE - 20.0)), "is this a record of that gyro"),
+        (lambda f: 1.5 * f, "this is not a record of that gyro"),
+        (lambda f: 8110.0 * (1.0 - 27e-6 * (WIDE - 20.0)), "this is not a record of that gyro"),
         (lambda f: f[13] * (1.0 - 27e-6 * (WIDE - WIDE[13])), "This table is of another gyro"),
     ],
     ids=["slope negated", "frequencies x 1.5", "another gyro's", "another gyro's slope"],

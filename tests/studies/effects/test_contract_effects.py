@@ -212,7 +212,7 @@ def test_the_command_lists_every_effect_and_shows_one_in_full(capsys):
     assert {entry["name"] for entry in listed["effects"]} == set(library())
     assert main(["effects", "hysteresis"]) == 0
     said = " ".join(capsys.readouterr().out.split())
-    for part in ("half_width_K", "0.02 to 40", "loop_deg_per_h_per_K", "To isolate it", "Source", "frequency_Hz"):
+    for part in ("half_width_K", "0.02 to 40", "loop_deg_per_h_per_K", "To isolate it", "Source", "frequency"):
         assert part in said
     assert main(["effects", "histeresis"]) == 2
     assert "hysteresis" in capsys.readouterr().err
