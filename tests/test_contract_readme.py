@@ -74,7 +74,7 @@ def test_commands_of_the_first_hour_run_in_order(folder, monkeypatch, capsys):
         if words[:1] == ["calibrate"]:
             assert "79.2 ppm/°C. hrg-30mm predicts" in said
             assert "88.7 ± 6.3 ppm/°C" in said
-            (slope,) = [line for line in said.splitlines() if "shear_modulus.log_slope_per_K" in line]
+            (slope,) = [line for line in said.splitlines() if "│ temperature slope of the shear modulus" in line]
             assert slope.split("│")[-2].strip() == "data"
 
 
