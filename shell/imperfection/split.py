@@ -39,9 +39,14 @@ class Split:
         return self.frequency * abs(self.wave)
 
     @property
+    def resolved(self) -> bool:
+        """Whether the split is more than rounding."""
+        return abs(self.wave) >= ROUNDING
+
+    @property
     def fast_axis(self) -> float:
         """Azimuth of an antinode of the faster mode, rad, in 0 ... π/n; 0 where the split is rounding only."""
-        if abs(self.wave) < ROUNDING:
+        if not self.resolved:
             return 0.0
         return float(np.angle(self.wave) / (2 * self.harmonic) % (pi / self.harmonic))
 

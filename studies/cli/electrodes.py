@@ -15,12 +15,6 @@ if TYPE_CHECKING:
     from studies.instrument.tables.electrodes import ElectrodeKeys
     from studies.results import Part
 
-NOTHING = 1e-9
-"""Part of the softening below which a split is rounding."""
-
-
-NO_SPLIT = 1e-12  # relative: rounding of a pair without a split
-
 
 @answers("hrg.electrodes/1")
 def electrodes(
@@ -83,9 +77,10 @@ def electrodes(
             wave = complex(-split / mode.frequency * np.exp(2j * harmonic * np.deg2rad(axis)))
         else:
             wave = whole.split.wave
-            wave = wave if abs(wave) > NOTHING * abs(own.shift) else 0j
         factor, most = charged.pull_in, reach(charged, limit)
-        asked = split is not None or NO_SPLIT < abs(wave) <= most  # the card's own split only where it can be nulled
+        asked = split is not None or (
+            whole.split.resolved and abs(wave) <= most
+        )  # the card's own split only where it can be nulled
         trim = trim_voltages(charged, wave, limit) if asked else None
     payload: dict[str, Any] = {
         "schema": "hrg.electrodes/1",
@@ -113,25 +108,19 @@ def electrodes(
         payload,
         f"Electrodes of {instrument.name}",
         f"Effect of the electrodes on the pair n = {harmonic} at {mode.frequency:.3f} Hz and {T - zero_Celsius:g} °C.",
-        _parts(payload, abs(wave) * mode.frequency, keys),
+        _parts(payload, abs(wave) * mode.frequency, own.resolved, keys),
     )
 
 
-def _split(payload: "dict[str, Any]") -> "tuple[float | str, str]":
-    """The split by the card's voltages, where it is more than rounding."""
-    softened = 1e-6 * abs(payload["softening_ppm"]) * payload["frequency_Hz"]
-    return (1e3 * payload["split_Hz"], "mHz") if payload["split_Hz"] > NOTHING * softened else ("none", "")
-
-
-def _parts(payload: "dict[str, Any]", split: float, keys: "ElectrodeKeys") -> "list[Part]":
-    """What people read; `split` in Hz is the one to be nulled."""
+def _parts(payload: "dict[str, Any]", split: float, resolved: bool, keys: "ElectrodeKeys") -> "list[Part]":
+    """What people read; `split` in Hz is the one to be nulled; `resolved` says whether the voltages make one."""
     from math import isinf
 
     factor, limit, trim = payload["pull_in_factor"], payload["limit_V"], payload["trim"]
     where = f"{payload['frequency_Hz']:.3f} Hz at {payload['temperature_degC']:g} °C"
     quantities = (
         ("softening by the card's voltages", payload["softening_ppm"], "ppm"),
-        ("split by the card's voltages", *_split(payload)),
+        ("split by the card's voltages", *((1e3 * payload["split_Hz"], "mHz") if resolved else ("none", ""))),
         ("sensitivity to all voltages", payload["per_volt_ppm"], "ppm/V"),
         ("sensitivity to temperature, by the gap", payload["per_kelvin_ppm"], "ppm/K"),
         ("pull-in safety factor of the voltages", "unlimited" if isinf(factor) else factor, ""),

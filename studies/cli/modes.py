@@ -162,11 +162,9 @@ def _view(instrument: "Instrument", harmonics: list[int], T: float) -> "Sequence
 
 def _to_error(row: "dict[str, Any]") -> str:
     """The frequency to the second digit of its solver error, at most four decimals."""
-    from math import floor, log10
+    from studies.reports.digits import to_numerical_error
 
-    error = row["relative_error_estimate"] * row["frequency_Hz"]
-    last = min(4, max(0, 1 - floor(log10(error)))) if error > 0 else 4
-    return f"{row['frequency_Hz']:.{last}f}"
+    return to_numerical_error(row["frequency_Hz"], row["relative_error_estimate"] * row["frequency_Hz"], 4)
 
 
 def _note(theory: str, share: float) -> str:

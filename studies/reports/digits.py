@@ -32,6 +32,12 @@ def to_error(value: float, error: float) -> tuple[str, str]:
     return written, below
 
 
+def to_numerical_error(value: float, error: float, most: int = 12) -> str:
+    """Return a value to the second digit of its numerical error, with `most` decimals at the most."""
+    digits = min(most, max(0, 1 - math.floor(math.log10(error)))) if error > 0.0 else most
+    return f"{value:.{digits}f}"
+
+
 def to_interval(value: float, low: float, high: float) -> list[str]:
     """Return a value and the ends of its interval to the second digit of the interval's width."""
     width = high - low

@@ -4,6 +4,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from studies.reports.digits import to_numerical_error
+
 if TYPE_CHECKING:
     from studies.sweeps.quantity import Column
     from studies.sweeps.results import Results
@@ -25,8 +27,7 @@ def to_error(value: float | None, error: float | None) -> str:
     """Return a number to the second digit of its numerical error."""
     if value is None or error is None or not np.isfinite(value) or not 0 < error < np.inf:
         return number(value)
-    digits = int(np.clip(1 - np.floor(np.log10(error)), 0, 12))
-    return f"{value:.{digits}f}" if abs(value) < 1e9 else number(value)
+    return to_numerical_error(value, error) if abs(value) < 1e9 else number(value)
 
 
 def spread(deviation: float | None, mean: float | None) -> str:

@@ -44,6 +44,8 @@ class Column:
         What the row has times this is shown, for example 1e6 for ppm.
     spell : callable
         What makes a text of the row a name for people, such as `display_name` for a key of a card.
+    where : str
+        Whether it stands in the terminal, on the page, or on both.
     """
 
     key: str
@@ -128,7 +130,7 @@ class Table:
 
     def cells(self, where: Where = "everywhere") -> tuple[list[str], list[list[str]]]:
         """Return headings and rows of text, in the terminal or on the page."""
-        columns = [column for column in self.columns if "everywhere" in (column.where, where) or column.where == where]
+        columns = [column for column in self.columns if column.where in ("everywhere", where)]
         written = [(column.title, [column.write(row) for row in self.rows]) for column in columns]
         shown = [(title, cells) for title, cells in written if any(cells)]
         return [title for title, _ in shown], [list(row) for row in zip(*(cells for _, cells in shown), strict=True)]

@@ -110,9 +110,10 @@ def plan_twin(instrument: "Instrument", boundary: "Boundary" = "chamber", theory
     _refuse(instrument)
     law = law_of(instrument, theory=theory)
     path = instrument.heat_path
+    density = float(instrument.material.value("density", instrument.reference_temperature))
     unit = replace(
         path,
-        volumetric_capacity=float(instrument.material.value("density", instrument.reference_temperature)),
+        volumetric_capacity=density,
         conductivity=1.0,
         emissivity=1.0,
         base_capacity=1.0,
@@ -127,7 +128,6 @@ def plan_twin(instrument: "Instrument", boundary: "Boundary" = "chamber", theory
     parameters = dict(_card_numbers(instrument))
     parameters["thermal.conductivity_W_per_m_K"] = path.conductivity
     splines = {"law": _spline(law._spline), **_splines(instrument, law)}
-    density = float(instrument.material.value("density", instrument.reference_temperature))
     capacity = path.volumetric_capacity
     parameters["thermal.heat_capacity_J_per_kg_K"] = math.nan if callable(capacity) else capacity / density
     effects = tuple(_place_effects(instrument, parameters))
