@@ -1,4 +1,4 @@
-"""The engine's constants, all in `calibration.toml`, with the commit, the cases and the command that wrote them."""
+"""The engine's constants, all in `calibration.toml`, each with its reason."""
 
 import tomllib
 from pathlib import Path

@@ -1,6 +1,6 @@
 """How well planted splits are found in synthetic scans: python tests/benchmarks/bench_scan.py [CASES] [POINTS].
 
-Every case plants waves 1 ... 6 of both faces in three dimensions (tests/generator/scans.py), with 100 nm of noise, 2 % gaps, 0.1 %
+Every case plants waves 1 ... 6 of both faces in three dimensions (tests/shell/scans.py), with 100 nm of noise, 2 % gaps, 0.1 %
 outliers, a tilt of 0.5° and an offset of each face's frame; the split that is true is that of the planted waves themselves.
 """
 
@@ -18,9 +18,7 @@ from shell.scan.alignment import align
 from shell.scan.projection import Projector
 from shell.scan.survey import survey
 from studies.scan import polar_intervals
-
-sys.path.insert(0, "tests/generator")
-from scans import dome_points
+from tests.shell.scans import dome_points
 
 
 def field(waves):

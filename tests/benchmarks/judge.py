@@ -50,7 +50,7 @@ from tests.benchmarks.bench_calibration import PROFILES
 from tests.benchmarks.diagnosis.card_cases import CARDS, SEEN, ceiling, make_case, run
 from tests.benchmarks.diagnosis.marks import compare, read_lines
 from tests.benchmarks.history import commit
-from tests.generator.measured import DATA, bring_in
+from tests.measured import DATA, bring_in
 from tests.stranger.__main__ import make_one
 
 ASK = "import sys; from studies.cli import main; sys.exit(main(sys.argv[1:]))"

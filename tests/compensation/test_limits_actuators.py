@@ -12,7 +12,7 @@ from compensation.errors import CompensationError
 from compensation.rebalance import settle_rebalance, simulate_rebalance, use_of_range
 from compensation.wave import from_quality
 from compensation.whole_angle import simulate_whole_angle
-from tests.generator.carrier import simulate_carrier
+from tests.compensation.carrier import simulate_carrier
 
 DEG_PER_H = np.degrees(1.0) * 3600
 ERRORS = Electronics(Channels(0.01, 0.002, 0.003, 0.001, 0.01), Channels(-0.02, 0.001, 0.002, 0.0005, 0.02))

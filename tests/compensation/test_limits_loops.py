@@ -13,7 +13,7 @@ from compensation.rebalance import close_loops, settle_rebalance, simulate_rebal
 from compensation.start_up import fit_run_down, start_up
 from compensation.wave import from_quality
 from compensation.whole_angle import simulate_whole_angle
-from tests.generator.carrier import simulate_carrier
+from tests.compensation.carrier import simulate_carrier
 
 DEG_PER_H = np.degrees(1.0) * 3600
 EARTH = 15.041 / DEG_PER_H

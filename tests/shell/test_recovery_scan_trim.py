@@ -15,7 +15,7 @@ from shell.scan.survey import rigid_shapes, survey
 from shell.trimming import ExpectedSplit, SplitReading, plan_trim
 from studies.scan import polar_intervals
 from studies.trim import Teeth, rim_sites, tooth_sites
-from tests.generator.scans import dome_points
+from tests.shell.scans import dome_points
 
 SILICA = Elastic(72.7e9, 0.17, 2203.0)
 R, H = 15e-3, 0.9e-3

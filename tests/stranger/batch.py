@@ -18,7 +18,9 @@ from tests.stranger.campaign import make_campaign
 from tests.stranger.effects import EFFECTS
 from tests.stranger.noise import FAMILIES
 
-PAIRS = ("hysteresis+amplitude-frequency", "jump+leak", "rate-bias+periodic", "second-lag+quadrature-leakage")
+PAIRS = ("hysteresis+amplitude-frequency", "jump+leak", "rate-bias+periodic", "second-lag+quadrature-leakage",
+         "rate-frequency+radiation")  # fmt: skip
+"""The last one was once named as a bond with its joint, which imitates both at once."""
 CASES: tuple[tuple[str, str, float | None], ...] = (
     *(("effect", name, 5.0) for name in EFFECTS),
     *(("null", name, None) for name in FAMILIES),

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from studies.cli import main
-from tests.generator.scans import dome_points
+from tests.shell.scans import dome_points
 
 OUTER = [(4, 0.4e-6, 0.4, 4), (2, 3e-6, 0.3, 2), (3, 1e-6, 0.1, 3)]
 

@@ -10,7 +10,7 @@ import pytest
 
 from studies.cli import main
 from studies.record import read_record
-from tests.generator.measured import DATA, bring_in
+from tests.measured import DATA, bring_in
 
 
 def fit(run, capsys, *words):

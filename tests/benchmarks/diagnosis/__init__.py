@@ -1,1 +1,1 @@
-"""The diagnosis on the independent generator: cases, scores, baselines beside it, the plan's promise, and the page."""
+"""Campaigns with a card, marks of recorded answers, and what an ideal detector would see."""

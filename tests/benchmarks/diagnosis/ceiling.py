@@ -14,14 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import cholesky, solve_triangular
 
-from compensation.noise import gauss_markov
-from studies.diagnosis.campaign import load_campaign
-from studies.diagnosis.constants import CONSTANTS
-from studies.diagnosis.inquiry import begin, read_thermometer
 from studies.diagnosis.noise import KERNELS, SHARES
-from tests.generator.noises import TAUS
-
-PRICE = CONSTANTS["margin"] - CONSTANTS["log_prior_effect"]
 
 
 @dataclass(frozen=True)
@@ -30,28 +23,6 @@ class Ceiling:
 
     known: float
     wandering: float
-
-
-def ceilings(truth):
-    """Return the ceiling of every hidden effect, the others absent."""
-    return [ceiling_of(truth, *alone) for alone in truth.alone]
-
-
-def ceiling_of(truth, channel, clean, noisy):
-    """Return the ceiling of one effect, from the records with it alone."""
-    campaign = load_campaign(noisy)
-    plain = begin(campaign, "frequency_Hz", None)
-    if channel != "frequency_Hz":
-        plain = begin(campaign, channel, read_thermometer(campaign, plain))
-    sigma, level = truth.levels[channel]
-    rows, noise = [], []
-    for run, mask in zip(campaign.runs, plain.problem.present, strict=True):
-        silent = clean[run.record]
-        known = np.isfinite(run.row_responses[channel])
-        own = np.interp(run.row_time, silent["time_s"] - silent["time_s"][0], silent[channel])
-        rows.append(run.steps.means(np.where(known, own, np.nan)))
-        noise.append(sigma**2 * covariance(truth.family, level, run, mask, plain.problem.noise.rows))
-    return above(campaign, plain, rows, noise, sigma**2 / plain.problem.noise.rows)
 
 
 def above(campaign, plain, rows, noise, white):
@@ -90,15 +61,3 @@ def _divergence(target, columns, prior, noise, wander):
     size = np.maximum(np.linalg.norm(whole, axis=0), 1e-300)
     found = np.linalg.lstsq(whole / size, y, rcond=1e-12)[0]
     return total + float(np.sum((y - whole / size @ found) ** 2))
-
-
-def covariance(family, level, run, mask, rows):
-    """Covariance of the means of a run's rows over the steps of its grid, over the white variance of a row."""
-    time = run.time[mask]
-    step = float(run.time[1] - run.time[0])
-    out = np.eye(time.size) / rows
-    if family == "walk":
-        out += level**2 * np.minimum.outer(time, time) / float(np.ptp(run.row_time))
-    for tau in {"flicker": TAUS, "correlated": (1500.0,)}.get(family, ()):
-        out += level**2 * gauss_markov(time, step, tau)
-    return out

@@ -16,8 +16,6 @@ from typing import Any
 import numpy as np
 from scipy.stats import binomtest
 
-from tests.benchmarks.diagnosis.scoring import band
-
 REACH_SD = 4.24
 """Standard deviations from which on a detector that knows noise and form could name a cause: its log likelihood ratio is 9."""
 Line = dict[str, Any]
@@ -41,6 +39,14 @@ class Mark:
     @property
     def snr(self) -> float:
         return float(self.line["truth"]["snr"])
+
+
+def band(hits: int, total: int) -> tuple[float, float]:
+    """Return Wilson's 90 % band of a rate (Wilson, J. Am. Stat. Assoc. 22 (1927) 209)."""
+    p, z = hits / total, 1.645
+    centre = (p + z * z / (2 * total)) / (1 + z * z / total)
+    half = z * np.sqrt(p * (1 - p) / total + z * z / (4 * total**2)) / (1 + z * z / total)
+    return max(float(centre - half), 0.0), min(float(centre + half), 1.0)
 
 
 def read_lines(path: Path) -> list[Line]:

@@ -16,14 +16,6 @@ def check_first(verdict, hidden, widest=WIDEST):
     assert len(names_of(causes[0])) <= widest, (hidden, verdict.causes)
 
 
-def check_all(verdict, hidden, widest=WIDEST):
-    """Every hidden effect is in a small set of its own."""
-    found = [names_of(cause) for cause in verdict.causes if cause.kind == "physics"]
-    assert all(len(names) <= widest for names in found), verdict.causes
-    assert len(found) >= len(hidden), verdict.causes
-    assert all(any(name in names for names in found) for name in hidden), (hidden, verdict.causes)
-
-
 def check_clean(verdict):
     """Nothing is named where nothing is hidden."""
     assert verdict.verdict == "adequate", verdict

@@ -7,7 +7,7 @@ import pytest
 
 from studies.cli import main
 from studies.record import Record, write_record
-from tests.generator.device import build
+from tests.studies.diagnosis.bench import BACK, CYCLE, STAIRS, Bench
 
 pytestmark = pytest.mark.usefixtures("coarse_grid")
 VERDICTS = ("unexplained", "not-identifiable", "explained", "adequate")
@@ -16,11 +16,16 @@ VERDICTS = ("unexplained", "not-identifiable", "explained", "adequate")
 @pytest.fixture(scope="module")
 def campaign(tmp_path_factory):
     folder = tmp_path_factory.mktemp("campaign")
-    records, _ = build("three", "white", np.random.default_rng(11), ("rate-bias",), snr=3.0)
-    paths = []
-    for k, record in enumerate(records):
+    records, paths = [], []
+    for k, corners in enumerate((STAIRS, CYCLE, BACK)):
+        bench = Bench(corners, sampling=20.0, seed=11 + k)
+        x, noise = bench.gyro() - 20.0, bench.rng.standard_normal((2, bench.time.size))
+        bias = 0.5 * k + 0.02 * x - 1e-4 * x**2 + 60.0 * bench.rate + 0.1 * noise[0]
+        loss = 2e-7 * (1.0 + 1e-3 * x + 1e-5 * x**2 + 0.01 * noise[1])
+        columns = {"frequency_Hz": bench.frequency(0.01), "bias_deg_per_h": bias, "inverse_q": loss}
+        records.append(bench.record(k + 1, **columns))
         paths.append(str(folder / f"run{k + 1}.csv"))
-        write_record(record, paths[-1])
+        write_record(records[-1], paths[-1])
     return records, paths
 
 

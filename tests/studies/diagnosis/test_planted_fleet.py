@@ -11,7 +11,9 @@ from studies.diagnosis.fleet.records import read_fleet
 from studies.diagnosis.verdict import Interval
 from studies.errors import InputError
 from studies.record import Record, write_record
-from tests.generator.thermal_twin import STEP, follow
+from thermal.lag import lag
+
+STEP = 5.0  # s
 
 
 def stand(score, size=1.0, sd=0.05):
@@ -73,8 +75,8 @@ def device(number, rng, dip, jump):
     records = []
     for k, ends in enumerate(((-10.0, 40.0), (35.0, -5.0))):
         time = np.arange(0.0, 6 * 3600.0, STEP)
-        housing = follow(np.interp(time, [0, 3600, 9000, 14000, 2e4], [20, *ends, ends[0], 20]), 300.0)
-        x = follow(housing, tau) - 20.0
+        housing = lag(time, np.interp(time, [0, 3600, 9000, 14000, 2e4], [20, *ends, ends[0], 20]), 300.0)
+        x = lag(time, housing, tau) - 20.0
         z = (x + 20.0 - 12.0 - 0.3 * number) / 0.8
         frequency = 5000.0 + number + slope * x - 4e-4 * x**2 + dip * z / (1 + z**2)
         frequency += jump * (k == 1) * (time > 11000.0) + 2e-3 * rng.standard_normal(time.size)

@@ -1,6 +1,5 @@
-"""Campaigns of an unusual kind: gaps in a log, a bias alone, a voltage that swings, uneven stamps, a thermometer that lags."""
+"""Campaigns of an unusual kind: gaps in a log, a bias alone, a voltage that swings, uneven stamps, a second clock."""
 
-from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime, timedelta
 
 import numpy as np
@@ -11,58 +10,10 @@ from studies.diagnosis.held_out import Score, is_worse
 from studies.diagnosis.inquiry import begin
 from studies.diagnosis.investigate import investigate
 from studies.diagnosis.scan import build_bank, scan
-from studies.effects import find_effect
-from studies.record import Record
+from studies.effects import find_effect, library
+from tests.studies.diagnosis.bench import BACK, CYCLE, Bench
 
-LAG = 1200.0  # s
-
-
-@dataclass
-class Bench:
-    """A chamber between corners (h, °C), the gyro behind one lag, rows every so many seconds."""
-
-    corners: list
-    sampling: float = 60.0
-    seed: int = 1
-    jitter: float = 0.0
-    rng: np.random.Generator = field(init=False)
-
-    def __post_init__(self):
-        self.rng = np.random.default_rng(self.seed)
-        hours, self.levels = np.array(self.corners, dtype=float).T
-        self.fine = np.arange(0.0, 3600.0 * hours[-1] + 5.0, 5.0)
-        chamber = np.interp(self.fine, 3600.0 * hours, self.levels)
-        keep = np.exp(-5.0 / LAG)
-        gyro = chamber.copy()
-        for k in range(1, gyro.size):
-            gyro[k] = keep * gyro[k - 1] + (1.0 - keep) * 0.5 * (chamber[k] + chamber[k - 1])
-        self._chamber, self._gyro = chamber, gyro
-        even = np.arange(0.0, self.fine[-1], self.sampling)
-        self.time = np.sort(even + self.jitter * self.rng.uniform(-0.5, 0.5, even.size) * self.sampling)
-
-    @property
-    def chamber(self):
-        return np.interp(self.time, self.fine, self._chamber)
-
-    def gyro(self, late=0.0):
-        return np.interp(self.time - late, self.fine, self._gyro)
-
-    @property
-    def rate(self):
-        return (self.chamber - self.gyro()) / LAG
-
-    def frequency(self, noise, late=0.0):
-        x = self.gyro(late) - 20.0
-        return 5000.0 * (1.0 + 8e-5 * x + 4e-8 * x**2) + noise * self.rng.standard_normal(x.size)
-
-    def record(self, number=0, keep=slice(None), **columns):
-        table = {"time_s": self.time, "housing_temperature_degC": self.chamber} | columns
-        table = {name: values[keep] for name, values in table.items()}
-        return Record(table, path=f"run{number}.csv", sha256=f"{number}{self.seed}")
-
-
-CYCLE = [(0, 20), (0.5, 20), (2, 55), (3, 55), (5, -15), (6, -15), (7.5, 30), (8, 30)]
-BACK = [(0, 30), (0.5, 30), (2.5, -20), (4, -20), (6, 50), (7, 50), (8, 20)]
+FIRST_DAY = datetime(2026, 3, 1, tzinfo=UTC)
 
 
 def told(records):
@@ -160,17 +111,78 @@ def test_more_is_left_where_it_was_held_out_or_else_where_it_was_fitted(before, 
 
 
 @pytest.mark.slow
-def test_a_drift_of_the_frequency_is_no_reason_for_one_of_the_loss():
-    """A clock that drifts looks like a resonator that ages; the loss of a gyro that leaks is not its doing."""
+@pytest.mark.usefixtures("coarse_grid")
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_drift_of_the_frequency_is_no_reason_for_one_of_the_loss_and_damping_that_falls_is_no_leak(sign):
+    """A clock that drifts looks like a resonator that ages; the loss of a gyro that leaks is not its doing. A leak only adds gas."""
     records = []
     for k in range(3):
         bench = Bench([(0, 20), (1, 20), (2, -10 + 15 * k), (4, -10 + 15 * k), (6, 35), (8, 35)], seed=60 + k)
         day = 2.0 * k + bench.time / 86400.0
-        loss = 1.4e-7 * (1.0 + 0.02 * day) + 1e-10 * bench.rng.standard_normal(day.size)
-        record = bench.record(k, frequency_Hz=bench.frequency(0.002) + 0.01 * day, inverse_q=loss)
-        records.append(replace(record, start=datetime(2026, 3, 1, tzinfo=UTC) + timedelta(days=2 * k)))
-    causes = investigate(load_campaign(records), advise=False).verdict.causes
-    found = {cause.response: {cause.effect, *cause.equivalent} for cause in causes}
+        loss = 1.4e-7 * (1.0 + sign * 0.02 * day) + 1e-10 * bench.rng.standard_normal(day.size)
+        start = FIRST_DAY + timedelta(days=2 * k)
+        records.append(bench.record(k, start=start, frequency_Hz=bench.frequency(0.002) + 0.01 * day, inverse_q=loss))
+    found = {cause.response: cause.names for cause in told(records).causes}
     assert found.keys() == {"frequency_Hz", "inverse_q"}
     assert "clock-drift" in found["frequency_Hz"]
-    assert "leak" in found["inverse_q"]
+    assert ("leak" in found["inverse_q"]) is (sign > 0)
+
+
+def drifting(size, spread, reference=None):
+    """Runs two days apart whose frequency drifts by so much a day; the reference clock sees all of the drift, none, or is not there."""
+    records = []
+    for k, corners in enumerate([CYCLE, BACK, CYCLE]):
+        bench = Bench(corners, seed=40 + k)
+        day, quiet = 2.0 * k + bench.time / 86400.0, bench.frequency(spread)
+        columns = {"frequency_Hz": quiet + size * day}
+        if reference is not None:
+            noise = 0.02 * spread * bench.rng.standard_normal(day.size)
+            columns["reference_frequency_Hz"] = quiet + (size * day if reference else 0.0) + noise
+        records.append(bench.record(k, start=FIRST_DAY + timedelta(days=2 * k), **columns))
+    return records
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("coarse_grid")
+@pytest.mark.parametrize(("hidden", "seen"), [("clock-drift", False), ("ageing", True)])
+def test_a_reference_clock_tells_a_drifting_clock_from_ageing(hidden, seen):
+    verdict = told(drifting(0.01, 2e-3, seen))
+    (cause,) = verdict.causes
+    assert (cause.effect, cause.equivalent) == (hidden, ())
+    assert verdict.verdict == "explained"
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("coarse_grid")
+def test_a_reference_clock_finds_a_drift_that_the_record_hides():
+    """A drift that white noise of each row covers: without the reference nothing is named, with it the clock is."""
+    assert "clock-drift" in {cause.effect for cause in told(drifting(2e-5, 2e-3, False)).causes}
+    assert not told(drifting(2e-5, 2e-3)).causes
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("coarse_grid")
+def test_an_effect_without_its_file_is_not_explained_by_another():
+    records = []
+    for k, corners in enumerate([CYCLE, BACK]):
+        bench = Bench(corners, seed=90 + k)
+        voltage = 80.0 + 20.0 * (np.floor(bench.time / 4000.0) % 3)
+        frequency = bench.frequency(2e-3) - 4e-6 * voltage**2
+        records.append(bench.record(k, frequency_Hz=frequency, electrode_bias_V=voltage))
+    others = [effect for effect in library().values() if effect.name != "electrostatic-softening"]
+    verdict = investigate(load_campaign(records), effects=others, advise=False).verdict
+    assert verdict.verdict == "unexplained", verdict.causes
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("coarse_grid")
+def test_a_bias_that_wanders_is_no_line():
+    """Six knots a run: noise, or unexplained, but no periodic disturbance."""
+    for seed in (1, 2):
+        records = []
+        for k, corners in enumerate([CYCLE, BACK]):
+            bench = Bench(corners, seed=10 * seed + k)
+            wander = np.interp(bench.time, np.linspace(0, bench.time[-1], 7), np.cumsum(bench.rng.normal(0, 0.15, 7)))
+            bias = 0.8 * (bench.gyro() - 20.0) / 10.0 + wander + 0.05 * bench.rng.standard_normal(wander.size)
+            records.append(bench.record(k, frequency_Hz=bench.frequency(2e-3), bias_deg_per_h=bias))
+        assert not [c for c in told(records).causes if c.effect == "periodic" and c.probability > 0.5]

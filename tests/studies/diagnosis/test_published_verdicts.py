@@ -13,7 +13,7 @@ import pytest
 from studies.diagnosis.campaign import load_campaign
 from studies.diagnosis.investigate import investigate
 from studies.record import read_record
-from tests.generator.measured import DATA, bring_in
+from tests.measured import DATA, bring_in
 
 
 def diagnose(*records):
