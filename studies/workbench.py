@@ -1,6 +1,6 @@
 """The workbench from Python, by the names that the command line uses: cards, profiles and records by path, name or object."""
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,10 +16,12 @@ if TYPE_CHECKING:
     from studies.calibration.calibrate import Calibration
     from studies.comparison import Comparison
     from studies.diagnosis.investigate import Diagnosis
+    from studies.diagnosis.planning.chamber import Chamber
     from studies.diagnosis.table import TableDiagnosis
 
 Card = Instrument | str | Path
 Run = Record | str | Path
+Progress = Callable[[str], None]
 
 
 def simulate(card: Card, profile: str, *, row: float = 1.0, seed: int = 0, noise: bool = True) -> Record:
@@ -55,7 +57,9 @@ def compare(*cards: Card) -> "Comparison":
     return compare_designs([open_card(card) for card in _flat(cards)])
 
 
-def calibrate(card: Card, *data: Run, hold_out: int | None = None, exact: Sequence[str] = ()) -> "Calibration":
+def calibrate(
+    card: Card, *data: Run, hold_out: int | None = None, exact: Sequence[str] = (), progress: Progress | None = None
+) -> "Calibration":
     """Return the most probable values of a card, given data of one device: `hrg calibrate`.
 
     Parameters
@@ -66,6 +70,8 @@ def calibrate(card: Card, *data: Run, hold_out: int | None = None, exact: Sequen
         Number of the record, from 1, that a second calibration without it predicts; the last of several unless given.
     exact : names
         Values of the card that stay fixed.
+    progress : callable, optional
+        Is told in a few words what comes next.
 
     Raises
     ------
@@ -76,14 +82,15 @@ def calibrate(card: Card, *data: Run, hold_out: int | None = None, exact: Sequen
     from studies.calibration.observed import read_settled
 
     data = tuple(_flat(data))
-    tables = [one for one in data if _is_table(one)]
-    records = open_records([one for one in data if not _is_table(one)])
+    tables = [one for one in data if is_table(one)]
+    records = open_records([one for one in data if not is_table(one)])
     if not data:
         raise InputError("give at least one record or steady-state table to calibrate with.")
     if hold_out is not None and not 1 <= hold_out <= len(records):
         raise InputError(f"hold_out = {hold_out}: there are {len(records)} records, numbered from 1.")
     left = (hold_out or len(records)) - 1 if len(records) > 1 else None
-    return find_values(open_card(card), records, [read_settled(str(one)) for one in tables], left, exact)
+    settled = [read_settled(str(one)) for one in tables]
+    return find_values(open_card(card), records, settled, left, exact, progress=progress or (lambda _: None))
 
 
 def diagnose(*runs: Run, card: Card | None = None) -> "Diagnosis | TableDiagnosis":
@@ -100,26 +107,36 @@ def diagnose(*runs: Run, card: Card | None = None) -> "Diagnosis | TableDiagnosi
     InputError
         Records that cannot be used together.
     """
-    from studies.calibration.misreading import check_readings
-    from studies.diagnosis.campaign import load_campaign
-    from studies.diagnosis.investigate import investigate
     from studies.diagnosis.table import diagnose_table
 
     runs = tuple(_flat(runs))
     if not runs:
         raise InputError("give the records of one gyro, or a steady-state table.")
-    if any(_is_table(one) for one in runs):
+    instrument = None if card is None else open_card(card)
+    if any(is_table(one) for one in runs):
         if len(runs) > 1:
             raise InputError("a steady-state table is diagnosed alone; leave the other files out.")
-        return diagnose_table(str(runs[0]), None if card is None else open_card(card))
-    records = open_records(runs)
+        return diagnose_table(str(runs[0]), instrument)
+    return diagnose_records(open_records(runs), instrument)
+
+
+def diagnose_records(
+    records: Sequence[Record],
+    card: Instrument | None = None,
+    chamber: "Chamber | None" = None,
+    progress: Progress | None = None,
+) -> "Diagnosis":
+    """Return what a campaign shows and the simulation lacks; `chamber` limits the run that is suggested next."""
+    from studies.calibration.misreading import check_readings
+    from studies.diagnosis.campaign import load_campaign
+    from studies.diagnosis.investigate import investigate
+
     if card is None:
-        return investigate(load_campaign(records))
-    instrument = open_card(card)
-    campaign = load_campaign(records, instrument.reference_temperature - zero_Celsius)
-    check_readings(instrument, records)
-    instrument.material.check(np.concatenate([run.states.housing for run in campaign.runs]))
-    return investigate(campaign, card=instrument)
+        return investigate(load_campaign(records), progress=progress, chamber=chamber)
+    campaign = load_campaign(records, card.reference_temperature - zero_Celsius)
+    check_readings(card, records)
+    card.material.check(np.concatenate([run.states.housing for run in campaign.runs]))
+    return investigate(campaign, progress=progress, chamber=chamber, card=card)
 
 
 def _flat(given: Iterable[Any]) -> Iterator[Any]:
@@ -131,7 +148,7 @@ def _flat(given: Iterable[Any]) -> Iterator[Any]:
             yield one
 
 
-def _is_table(run: Run) -> bool:
+def is_table(run: Run) -> bool:
     """Return whether a path is that of a steady-state table (temperature_degC, no time_s)."""
     if isinstance(run, Record):
         return False

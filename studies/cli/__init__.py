@@ -162,13 +162,16 @@ def _command_line(words: Sequence[str]) -> "App":
 
 def _judge(error: Exception, words: Sequence[str]) -> tuple[str, int]:
     """Return the sentence that a user reads of an error, and the exit status."""
-    from cyclopts import CycloptsError, UnusedCliTokensError
+    from cyclopts import CycloptsError, UnknownCommandError, UnusedCliTokensError
 
-    from studies.errors import UNUSABLE_INPUT, MissingEnvironment
+    from studies.errors import UNUSABLE_INPUT, MissingEnvironment, nearest
 
     match error:
         case UnusedCliTokensError():
             return _say_unused(error.unused_tokens or [], words), 2
+        case UnknownCommandError():  # its own words would load every command
+            word = " ".join([*words[:1], *(error.unused_tokens or [])[:1]] if words[0] in GROUPS else words[:1])
+            return f"unknown command '{word}'{nearest(word, (*COMMANDS, *GROUPS))}", 2
         case CycloptsError():
             asked = " ".join(["hrg", *_command_words(words), "--help"])
             return f"{' '.join(str(error).split())} See '{asked}'.", 2

@@ -8,13 +8,23 @@ that it served), `warm_up_band_deg_per_h`, `report`.
 
 from typing import TYPE_CHECKING, Any
 
-from studies.cli.output import answers
+import numpy as np
+
+from studies.acceptance.judgement import Acceptance, JudgedQuantity, judge
+from studies.acceptance.limits import SCHEMA, Limits
+from studies.acceptance.measure import CONFIDENCE
+from studies.cli.output import answers, say
+from studies.errors import InputError
+from studies.instrument.card import load_card
+from studies.record import read_record
+from studies.reports import style
+from studies.reports.digits import plain
 from studies.results import Chapter, Column, Facts, Figure, Part, Result, Sentence, Table
+from studies.schema.reader import read_file
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure as Drawing
 
-    from studies.acceptance.judgement import Acceptance, JudgedQuantity
 
 VERDICTS = {"pass": "all limits met", "fail": "a limit is not met", "incomplete": "not all limits could be judged"}
 SECTION, QUANTITY = Column("section", "section"), Column("words", "quantity")
@@ -57,16 +67,6 @@ def acceptance(card: str, *runs: str, limits: str | None = None, output: str = "
     output : str
         Column with the zero-rate output to judge, such as compensated_bias_deg_per_h.
     """
-    from studies.acceptance.judgement import judge
-    from studies.acceptance.limits import SCHEMA, Limits
-    from studies.acceptance.measure import CONFIDENCE
-    from studies.cli.output import say
-    from studies.errors import InputError
-    from studies.instrument.card import load_card
-    from studies.record import read_record
-    from studies.reports.digits import plain
-    from studies.schema.reader import read_file
-
     instrument = load_card(card)
     if not runs:
         raise InputError("no record given; name at least one record (CSV) of the gyro.")
@@ -137,7 +137,7 @@ def acceptance(card: str, *runs: str, limits: str | None = None, output: str = "
     return Result(payload, f"Acceptance of {instrument.name}: {found.verdict}", lead, parts)
 
 
-def _line(line: "JudgedQuantity") -> dict[str, Any]:
+def _line(line: JudgedQuantity) -> dict[str, Any]:
     q, m = line.quantity, line.measured
     return {
         "key": q.key,
@@ -156,14 +156,12 @@ def _line(line: "JudgedQuantity") -> dict[str, Any]:
 
 def _nothing(line: dict[str, Any]) -> dict[str, Any]:
     """What stands for a value of 0 at the end of its interval."""
-    from studies.reports.digits import plain
-
     if line["value"] != 0 or not line["high"]:
         return {}
     return {"value": f"not detected (< {plain(line['high'], 2)})", "low": None, "high": None}
 
 
-def _facts(found: "Acceptance") -> list[tuple[str, str, str]]:
+def _facts(found: Acceptance) -> list[tuple[str, str, str]]:
     judged = {kind: [one.quantity.words for one in found.lines if one.limit is not None and one.verdict == kind]
               for kind in ("pass", "fail", "undecided", "missing")}  # fmt: skip
     limited = sum(map(len, judged.values()))
@@ -182,9 +180,7 @@ def _facts(found: "Acceptance") -> list[tuple[str, str, str]]:
     ]
 
 
-def _drift(found: "Acceptance") -> list[Figure | Sentence]:
-    from studies.reports.digits import plain
-
+def _drift(found: Acceptance) -> list[Figure | Sentence]:
     allan, noise = found.allan, found.noise
     if allan is None or noise is None:
         return []
@@ -196,10 +192,6 @@ def _drift(found: "Acceptance") -> list[Figure | Sentence]:
     )
 
     def draw() -> "Drawing":
-        import numpy as np
-
-        from studies.reports import style
-
         with style.figure(height=3.6) as (made, axes):
             axes.fill_between(allan.tau, allan.low, allan.high, color=style.SKY, alpha=0.3, label="95 % interval")
             axes.loglog(

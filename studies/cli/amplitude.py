@@ -1,22 +1,18 @@
 """What a large amplitude does to modes, for `hrg modes --amplitude`."""
 
-from typing import TYPE_CHECKING, Any
+from math import isfinite
+from typing import Any
 
+from shell.duffing import amplitude_shift
+from shell.modes import Mode
+from studies.errors import InputError
 from studies.results import Column, Table
-
-if TYPE_CHECKING:
-    from shell.modes import Mode
 
 MICROMETRE = 1e-6
 
 
-def describe_amplitude(found: "list[Mode]", amplitude: float) -> "dict[int, dict[str, Any]]":
+def describe_amplitude(found: list[Mode], amplitude: float) -> dict[int, dict[str, Any]]:
     """The shift of each mode in ppb by its largest displacement of `amplitude` µm, by the identity of the mode."""
-    from math import isfinite
-
-    from shell.duffing import amplitude_shift
-    from studies.errors import InputError
-
     if not (isfinite(amplitude) and amplitude > 0):
         raise InputError(f"--amplitude {amplitude:g}: it is a largest displacement in µm, above 0.")
     entries: dict[int, dict[str, Any]] = {}
@@ -39,7 +35,7 @@ def describe_amplitude(found: "list[Mode]", amplitude: float) -> "dict[int, dict
     return entries
 
 
-def amplitude_table(modes: "list[dict[str, Any]]") -> Table:
+def amplitude_table(modes: list[dict[str, Any]]) -> Table:
     """The table of modes with `amplitude`."""
     rows = [row for row in modes if "amplitude" in row]
     columns = [

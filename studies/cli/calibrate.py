@@ -12,13 +12,16 @@ parameters that the data ties together but cannot tell apart; `responses`: by na
 card as given, `sd` and `away_sd`; `converged`; `warnings`; `calibrated_card`: path of the saved card, or null where it was not asked for or is refused.
 """
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from studies.cli.output import answers
+from studies import workbench
+from studies.calibration.calibrate import Calibration
+from studies.calibration.observed import UNITS
+from studies.cli.output import answers, say
+from studies.errors import InputError
+from studies.instrument.card import load_card, save_card
+from studies.reports import calibration as parts
 from studies.results import Result
-
-if TYPE_CHECKING:
-    from studies.calibration.calibrate import Calibration
 
 VALUE = ("parameter", "unit", "card", "value", "low", "high", "shift_sd", "width", "told_by", "bound", "interval")
 
@@ -46,25 +49,14 @@ def calibrate(card: str, *data: str, save: str | None = None, hold_out: int = 0,
     exact : str
         A value to keep fixed, such as thermal.film_emissivity; may be given more than once.
     """
-    from studies.calibration.calibrate import calibrate as run
-    from studies.calibration.observed import read_settled
-    from studies.cli.output import say
-    from studies.errors import InputError
-    from studies.files.columns import read_header
-    from studies.instrument.card import load_card, save_card
-    from studies.record import read_record
-    from studies.reports import calibration as parts
-
     if not data:
         raise InputError("no data given; name at least one record (CSV) or steady-state table.")
     instrument = load_card(card)
-    settled = [path for path in data if "time_s" not in (names := read_header(path)) and "temperature_degC" in names]
-    records = [read_record(path) for path in data if path not in settled]
-    if not 0 <= hold_out <= len(records):
-        there = "is 1 record" if len(records) == 1 else f"are {len(records)} records"
+    records = sum(not workbench.is_table(path) for path in data)
+    if not 0 <= hold_out <= records:
+        there = "is 1 record" if records == 1 else f"are {records} records"
         raise InputError(f"--hold-out {hold_out}: there {there}, numbered from 1.")
-    left = (hold_out or len(records)) - 1 if len(records) > 1 else None
-    found = run(instrument, records, [read_settled(path) for path in settled], left, exact, progress=say)
+    found = workbench.calibrate(instrument, *data, hold_out=hold_out or None, exact=exact, progress=say)
     for warning in found.warnings:
         say(f"warning: {warning}")
     refused = save is not None and found.unsaved is not None
@@ -79,9 +71,7 @@ def calibrate(card: str, *data: str, save: str | None = None, hold_out: int = 0,
     return Result(payload, title, lead, parts.calibration_parts(found, payload), 2 if refused else 0)
 
 
-def _payload(found: "Calibration", data: list[str], save: str | None) -> dict[str, Any]:
-    from studies.calibration.observed import UNITS
-
+def _payload(found: Calibration, data: list[str], save: str | None) -> dict[str, Any]:
     held = found.held_out
 
     def pair(values: tuple[float, float] | None) -> dict[str, float] | None:

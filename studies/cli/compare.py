@@ -8,6 +8,9 @@ from math import isfinite
 from typing import Any
 
 from studies.cli.output import answers
+from studies.comparison import compare as compare_designs
+from studies.errors import InputError
+from studies.instrument.card import load_card
 from studies.results import Column, Result, Sentence, Table
 
 
@@ -20,10 +23,6 @@ def compare(*card: str) -> Result:
     card : str
         Two or more cards: paths, or names of those that ship (hrg cards).
     """
-    from studies.comparison import compare as compare_designs
-    from studies.errors import InputError
-    from studies.instrument.card import load_card
-
     if len(card) < 2:
         raise InputError("name two cards or more: hrg compare A.toml B.toml.")
     found = compare_designs([load_card(one) for one in card])

@@ -2,14 +2,23 @@
 
 from typing import TYPE_CHECKING, Any
 
-from studies.cli.output import answers
+import numpy as np
+
+from compensation.decimation import average_blocks
+from compensation.errors import CompensationError
+from studies import models
+from studies.cli.arguments import Array
+from studies.cli.output import answers, say
+from studies.errors import InputError
+from studies.files.writing import write_text
+from studies.instrument.units import unit_of
+from studies.record import COMPENSATED, RESONATOR, Record, read_record, write_record
+from studies.reports import style
 from studies.results import Column, Figure, Result, Sentence, Table
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure as Drawing
 
-    from studies.cli.arguments import Array
-    from studies.record import Record
 
 AVERAGE = 100.0  # s
 NOISE = 0.02  # relative: what the noise of a model's inputs may add to a record that has nothing to compensate
@@ -59,14 +68,6 @@ def compensate(
     emit : str
         Write the model as C99 source for firmware.
     """
-    import numpy as np
-
-    from studies import models
-    from studies.cli.output import say
-    from studies.errors import InputError
-    from studies.files.writing import write_text
-    from studies.record import COMPENSATED, RESONATOR, read_record, write_record
-
     loaded = models.read_model(model)
     if (run is None) != (out is None):
         raise InputError("a record and --out go together: hrg compensate MODEL RUN --out FILE.")
@@ -108,12 +109,8 @@ def compensate(
     return Result(payload, "Compensation of a record", f"{run or 'No record'}, compensated with {model}.", parts)
 
 
-def _judge(record: "Record", result: "Record", name: str) -> dict[str, Any]:
+def _judge(record: Record, result: Record, name: str) -> dict[str, Any]:
     """Return the stability of a column before and after, and how many of its rows stay empty."""
-    import numpy as np
-
-    from studies.record import COMPENSATED
-
     # A rate made from raw counts has no uncompensated column of its own in the record.
     after, before = result[name], record.columns.get(name.removeprefix(COMPENSATED))
     missing = np.isnan(after) if before is None else np.isnan(after) & ~np.isnan(before)
@@ -124,10 +121,7 @@ def _judge(record: "Record", result: "Record", name: str) -> dict[str, Any]:
     }
 
 
-def _show(record: "Record", result: "Record", columns: dict[str, dict[str, Any]]) -> list[Table | Sentence | Figure]:
-    from studies.cli.output import say
-    from studies.instrument.units import unit_of
-
+def _show(record: Record, result: Record, columns: dict[str, dict[str, Any]]) -> list[Table | Sentence | Figure]:
     rows = [{"name": name, "unit": unit_of(name).removeprefix("1") or ""} | one for name, one in columns.items()]
     note = f"Before, after: standard deviation of {AVERAGE:g} s averages."
     if any(one["rows_not_compensated"] for one in rows):
@@ -144,12 +138,8 @@ def _show(record: "Record", result: "Record", columns: dict[str, dict[str, Any]]
     return parts
 
 
-def _draw(record: "Record", result: "Record", name: str) -> "Drawing":
+def _draw(record: Record, result: Record, name: str) -> "Drawing":
     """Draw a column that was added, with what it compensates where the record has that."""
-    from studies.instrument.units import unit_of
-    from studies.record import COMPENSATED
-    from studies.reports import style
-
     rows = style.few_rows(len(record))
     hours = record["time_s"][rows] / 3600
     with style.figure(height=3.4) as (made, axes):
@@ -162,11 +152,8 @@ def _draw(record: "Record", result: "Record", name: str) -> "Drawing":
         return made
 
 
-def _stability(time: "Array", values: "Array") -> float | None:
+def _stability(time: Array, values: Array) -> float | None:
     """Return the standard deviation of block averages, missing values left out; None of too few rows."""
-    from compensation.decimation import average_blocks
-    from compensation.errors import CompensationError
-
     try:
         return float(average_blocks(time, {"output": values}, AVERAGE).columns["output"].std())
     except CompensationError:

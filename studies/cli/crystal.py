@@ -1,19 +1,16 @@
 """The pairs of a resonator cut from a cubic crystal, for `hrg modes`."""
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from shell.cubic import Cubic, solve_cubic
+from shell.modes import Mode
 from studies.results import Column, Table
 
-if TYPE_CHECKING:
-    from shell.cubic import Cubic
-    from shell.modes import Mode
 
-
-def crystal_pairs(found: "list[Mode]", crystal: "Cubic | None", tolerance: float) -> "dict[int, dict[str, Any]]":
+def crystal_pairs(found: list[Mode], crystal: Cubic | None, tolerance: float) -> dict[int, dict[str, Any]]:
     """Both modes of every lowest pair n >= 2 but multiples of 4, by the identity of the mode in the isotropic mean."""
     if crystal is None:
         return {}
-    from shell.cubic import solve_cubic
 
     entries: dict[int, dict[str, Any]] = {}
     for m in found:
@@ -31,7 +28,7 @@ def crystal_pairs(found: "list[Mode]", crystal: "Cubic | None", tolerance: float
     return entries
 
 
-def crystal_table(modes: "list[dict[str, Any]]") -> Table:
+def crystal_table(modes: list[dict[str, Any]]) -> Table:
     """The table of modes with `crystal`."""
     columns = [
         Column("harmonic", "n"),

@@ -10,13 +10,21 @@ With --dynamics: schema hrg.derive-dynamics/1, `equations` and, with --code, `co
 CVG paper on demodulated dynamics.
 """
 
-from typing import TYPE_CHECKING, Any, Literal
+import dataclasses
+import io
+from collections.abc import Callable, Iterable
+from contextlib import redirect_stdout
+from dataclasses import replace
+from math import radians
+from typing import Any, Literal
 
-from studies.cli.output import answers
+from shell.rayleigh import rayleigh_integrals
+from studies.cli.output import answers, say
+from studies.errors import InputError
+from studies.files.writing import write_text
+from studies.papers.bvg_theory import compare_bell_theory
 from studies.results import Chapter, Column, Part, Result, Sentence, Table
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable
+from studies.results.terminal import print_result
 
 MOST_HARMONIC = 100  # the closed forms of higher ones take minutes
 
@@ -63,13 +71,10 @@ def derive(
         same = derive.__wrapped__  # type: ignore[attr-defined]
         shape_of = {"harmonic": harmonic, "pole_angle_deg": pole_angle_deg, "rim_angle_deg": rim_angle_deg}
         return _into_file(out, same(dynamics=dynamics, bell=bell, latex=latex, code=code, **shape_of))
-    from math import radians
 
     from shell.derivation.chain import DerivedCase, steps
     from shell.derivation.design_code import emit_code
     from shell.derivation.emit import HRG_TITLE, emit_latex, emit_text
-    from shell.rayleigh import rayleigh_integrals
-    from studies.errors import InputError
 
     if latex and code is not None:
         raise InputError("--latex and --code each print in another form; choose one of them.")
@@ -111,14 +116,6 @@ def derive(
 
 def _into_file(out: str, result: Result) -> Result:
     """Write what a derivation prints to a file, whole or not at all; the terminal is then left alone."""
-    import io
-    from contextlib import redirect_stdout
-    from dataclasses import replace
-
-    from studies.cli.output import say
-    from studies.files.writing import write_text
-    from studies.results.terminal import print_result
-
     text = io.StringIO()
     with redirect_stdout(text):
         print_result(result)
@@ -142,12 +139,8 @@ def _derive_dynamics(latex: bool, code: Literal["python", "c"] | None) -> Result
 
 
 def _derive_bell(latex: bool) -> Result:
-    import dataclasses
-
     from shell.derivation.bell_chain import bell_steps
     from shell.derivation.emit import BELL_TITLE, emit_latex, emit_text, typeset, write_plainly
-    from studies.cli.output import say
-    from studies.papers.bvg_theory import compare_bell_theory
 
     say("deriving the bell's equations ...")
     steps = bell_steps()
@@ -185,7 +178,7 @@ def _chapters(equations: list[dict[str, Any]]) -> list[Chapter]:
 
 
 def _equations(
-    steps: "Iterable[Any]", typeset: "Callable[[Any], str]", write: "Callable[[Any], str]"
+    steps: Iterable[Any], typeset: Callable[[Any], str], write: Callable[[Any], str]
 ) -> list[dict[str, Any]]:
     return [
         {

@@ -1,14 +1,16 @@
 """`hrg diagnose`: what the simulation gets wrong, why, and what the repair is worth."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
+from studies import workbench
 from studies.cli.arguments import Seed
-from studies.cli.output import answers
+from studies.cli.output import answers, say
+from studies.cli.telling import Told
+from studies.diagnosis.planning.chamber import Chamber, parse_chamber
+from studies.errors import InputError
+from studies.instrument.card import load_card, save_card
+from studies.reports.diagnosis import headline
 from studies.results import Result
-
-if TYPE_CHECKING:
-    from studies.diagnosis.planning.chamber import Chamber
 
 
 @answers("hrg.diagnosis/1, with --plan hrg.plan/1, with --device hrg.fleet/1")
@@ -50,10 +52,6 @@ def diagnose(
     fleet : str
         The same as a file (TOML): a table [devices] with lines such as A = ["a1.csv", "a2.csv"], beside the records.
     """
-    from studies.diagnosis.planning.chamber import parse_chamber
-    from studies.errors import InputError
-    from studies.files.columns import read_header
-
     limits = None if chamber is None else parse_chamber(chamber)
     if plan:
         return _plan([*plan, *runs], card, limits, draws, seed)
@@ -65,7 +63,7 @@ def diagnose(
         raise InputError("no records given: hrg diagnose RUN.csv [RUN.csv ...].")
     if save is not None and card is None:
         raise InputError("--save writes an extended card, so it needs --card CARD to extend.")
-    tables = [path for path in runs if "time_s" not in (names := read_header(path)) and "temperature_degC" in names]
+    tables = [path for path in runs if workbench.is_table(path)]
     if not tables:
         return _campaign(runs, card, limits, save)
     if len(runs) > 1:
@@ -75,57 +73,35 @@ def diagnose(
     return _table(tables[0], card)
 
 
-def _plan(profiles: list[str], card: str | None, limits: "Chamber | None", draws: int, seed: int) -> Result:
+def _plan(profiles: list[str], card: str | None, limits: Chamber | None, draws: int, seed: int) -> Result:
     """Predict which effects a planned campaign can identify."""
-    from studies.cli.telling import Told
     from studies.diagnosis.planning.plan import plan_campaign
     from studies.reports import plan as parts
 
-    told = Told("plan")
-    cases = max(4, min(draws, 2000) // 4)
-    outlook = plan_campaign(profiles, seed=seed, cases=cases, card=card, chamber=limits, progress=told)
-    told.done()
-    title = "Planned campaign"
-    return Result(outlook.as_dict(), title, parts.headline(outlook), parts.plan_parts(outlook, profiles))
+    with Told("plan") as told:
+        cases = max(4, min(draws, 2000) // 4)
+        outlook = plan_campaign(profiles, seed=seed, cases=cases, card=card, chamber=limits, progress=told)
+    return Result(outlook.as_dict(), "Planned campaign", parts.headline(outlook), parts.plan_parts(outlook, profiles))
 
 
 def _table(path: str, card: str | None) -> Result:
     """Diagnose one steady-state table."""
     from studies.diagnosis.table import diagnose_table
-    from studies.reports import diagnosis_table as parts
-    from studies.reports.diagnosis import headline
+    from studies.reports.diagnosis_table import table_parts
 
     found = diagnose_table(path, card)
-    title = f"Diagnosis of {Path(path).name}"
-    return Result(found.as_dict(), title, headline(found.verdict), parts.table_parts(found))
+    return Result(found.as_dict(), f"Diagnosis of {Path(path).name}", headline(found.verdict), table_parts(found))
 
 
-def _campaign(runs: tuple[str, ...], card: str | None, limits: "Chamber | None", save: str | None) -> Result:
+def _campaign(runs: tuple[str, ...], card: str | None, limits: Chamber | None, save: str | None) -> Result:
     """Diagnose the records of one gyro."""
-    import numpy as np
-
-    from shell.constants import zero_Celsius
-    from studies.calibration.misreading import check_readings
-    from studies.cli.output import say
-    from studies.cli.telling import Told
-    from studies.diagnosis.campaign import load_campaign
     from studies.diagnosis.extension import extend
-    from studies.diagnosis.investigate import investigate
-    from studies.instrument.card import load_card, save_card
-    from studies.record import read_record
-    from studies.reports import diagnosis as parts
+    from studies.reports.diagnosis import diagnosis_parts
 
-    instrument = None if card is None else load_card(card)
-    reference = None if instrument is None else instrument.reference_temperature - zero_Celsius
-    records = [read_record(path) for path in runs]
-    campaign = load_campaign(records, reference)
-    if instrument is not None:
-        check_readings(instrument, records)
-        instrument.material.check(np.concatenate([np.empty(0), *(run.states.housing for run in campaign.runs)]))
-    told = Told("diagnosis")
-    found = investigate(campaign, progress=told, chamber=limits, card=instrument)
-    extended = None if save is None or instrument is None else extend(instrument, found, records, told)
-    told.done()
+    instrument, records = None if card is None else load_card(card), workbench.open_records(runs)
+    with Told("diagnosis") as told:
+        found = workbench.diagnose_records(records, instrument, limits, told)
+        extended = None if save is None or instrument is None else extend(instrument, found, records, told)
     refused = extended is not None and not extended.fit.converged
     if refused:
         say(f"{save} not saved: the calibration of the extended card did not converge.")
@@ -134,20 +110,17 @@ def _campaign(runs: tuple[str, ...], card: str | None, limits: "Chamber | None",
         save_card(extended.instrument, save)
         say(f"extended model: {save}")
     payload = {**found.verdict.as_dict(), "extended_model": save}
-    lead = parts.headline(found.verdict)
-    return Result(payload, "Diagnosis of a campaign", lead, parts.diagnosis_parts(found), 2 if refused else 0)
+    parts = diagnosis_parts(found)
+    return Result(payload, "Diagnosis of a campaign", headline(found.verdict), parts, 2 if refused else 0)
 
 
 def _fleet(devices: list[str], manifest: str | None, card: str | None) -> Result:
     """Diagnose devices of one design together."""
-    from studies.cli.telling import Told
     from studies.diagnosis.fleet.investigation import diagnose_fleet
     from studies.diagnosis.fleet.records import read_fleet
-    from studies.instrument.card import load_card
     from studies.reports import fleet as parts
 
-    told = Told("fleet")
-    design = None if card is None else load_card(card)
-    whole = diagnose_fleet(read_fleet(devices, manifest), design, progress=told)
-    told.done()
+    with Told("fleet") as told:
+        design = None if card is None else load_card(card)
+        whole = diagnose_fleet(read_fleet(devices, manifest), design, progress=told)
     return Result(whole.as_dict(), "Diagnosis of a fleet", parts.headline(whole), parts.fleet_parts(whole))

@@ -1,12 +1,11 @@
 """`hrg effects`: the library of effects that a simulation can leave out, and that a card can have."""
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from studies.cli.output import answers
+from studies.diagnosis.response import RESPONSES
+from studies.effects import Effect, find_effect, library
 from studies.results import Column, Result, Sentence, Table
-
-if TYPE_CHECKING:
-    from studies.effects import Effect
 
 
 @answers("hrg.effects/1")
@@ -18,8 +17,6 @@ def effects(name: str = "") -> Result:
     name : str
         Show one effect: parameters, units, bounds, drives, source, isolating experiment.
     """
-    from studies.effects import find_effect, library
-
     chosen = [find_effect(name)] if name else list(library().values())
     entries = [describe(effect) for effect in chosen]
     payload = {"schema": "hrg.effects/1", "effects": entries}
@@ -67,15 +64,13 @@ DRIVES = {
 }
 
 
-def _words(effect: "Effect") -> tuple[str, ...]:
-    from studies.diagnosis.response import RESPONSES
-
+def _words(effect: Effect) -> tuple[str, ...]:
     return (
         ("temperature of the resonator",) if effect.thermal else tuple(RESPONSES[one].word for one in effect.responses)
     )
 
 
-def parameters(effect: "Effect") -> list[dict[str, str]]:
+def parameters(effect: Effect) -> list[dict[str, str]]:
     """Return every key of the effect's table: its shape, and its coefficients for the first response."""
     rows = [
         {
@@ -96,7 +91,7 @@ def parameters(effect: "Effect") -> list[dict[str, str]]:
     return rows
 
 
-def describe(effect: "Effect") -> dict[str, Any]:
+def describe(effect: Effect) -> dict[str, Any]:
     """Return an effect as a plain object."""
     return {
         "name": effect.name,

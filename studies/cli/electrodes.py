@@ -6,14 +6,21 @@ by which all voltages could grow (null without voltages); `reach_Hz`, the split 
 a split was given: {voltages_V, left_Hz, shift_ppm}.
 """
 
-from typing import TYPE_CHECKING, Any
+import math
+from math import isinf
+from typing import Any
 
+import numpy as np
+
+from shell.constants import zero_Celsius
+from shell.electrodes import reach, trim_voltages
+from shell.modes import solve_modes
 from studies.cli.output import answers
-from studies.results import Column, Result, Sentence, Table
-
-if TYPE_CHECKING:
-    from studies.instrument.tables.electrodes import ElectrodeKeys
-    from studies.results import Part
+from studies.errors import InputError, naming
+from studies.instrument.card import load_card
+from studies.instrument.tables.electrodes import ElectrodeKeys
+from studies.results import Column, Part, Result, Sentence, Table
+from studies.splitting import SplitPair
 
 
 @answers("hrg.electrodes/1")
@@ -43,17 +50,6 @@ def electrodes(
     temperature : float
         Temperature in °C; the card's reference temperature unless given.
     """
-    import math
-
-    import numpy as np
-
-    from shell.constants import zero_Celsius
-    from shell.electrodes import reach, trim_voltages
-    from shell.modes import solve_modes
-    from studies.errors import InputError, naming
-    from studies.instrument.card import load_card
-    from studies.splitting import SplitPair
-
     if (split is None) != (axis is None):
         raise InputError("a split that is to be nulled needs both --split (Hz) and --axis (degrees).")
     if harmonic < 1:
@@ -112,10 +108,8 @@ def electrodes(
     )
 
 
-def _parts(payload: "dict[str, Any]", split: float, resolved: bool, keys: "ElectrodeKeys") -> "list[Part]":
+def _parts(payload: dict[str, Any], split: float, resolved: bool, keys: ElectrodeKeys) -> list[Part]:
     """What people read; `split` in Hz is the one to be nulled; `resolved` says whether the voltages make one."""
-    from math import isinf
-
     factor, limit, trim = payload["pull_in_factor"], payload["limit_V"], payload["trim"]
     where = f"{payload['frequency_Hz']:.3f} Hz at {payload['temperature_degC']:g} °C"
     quantities = (

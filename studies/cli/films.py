@@ -1,18 +1,15 @@
 """What the card's films do to frequencies, for `hrg modes`."""
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from shell.modes import Mode
+from studies.instrument.card import Instrument
+from studies.loss.films import film_shifts
 from studies.results import Column, Table
 
-if TYPE_CHECKING:
-    from shell.modes import Mode
-    from studies.instrument.card import Instrument
 
-
-def describe_films(found: "list[Mode]", instrument: "Instrument") -> "dict[int, list[dict[str, Any]]]":
+def describe_films(found: list[Mode], instrument: Instrument) -> dict[int, list[dict[str, Any]]]:
     """Every film and its shift in ppm, null where its numbers are not known, by the identity of the mode."""
-    from studies.loss.films import film_shifts
-
     shifts = {id(m): film_shifts(instrument, m) for m in found}
     return {
         mode: [
@@ -28,7 +25,7 @@ def describe_films(found: "list[Mode]", instrument: "Instrument") -> "dict[int, 
     }
 
 
-def films_table(modes: "list[dict[str, Any]]") -> Table:
+def films_table(modes: list[dict[str, Any]]) -> Table:
     """The table of modes with `films`, a row for each film."""
     rows = [
         {

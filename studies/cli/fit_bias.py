@@ -7,13 +7,17 @@ are counted; a temperature acts behind `lag_s` and a hysteresis loop of `play_ha
 unit·√s, B in unit, K in unit/√s; null for runs too short for it.
 """
 
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
-from studies.cli.output import answers
+from studies.bias import BiasStudy, Judged, Stability, study_bias
+from studies.cli.output import answers, say
+from studies.errors import InputError
+from studies.files.writing import write_text
+from studies.models import emit_c, write_model
+from studies.models.kinds.bias import name_term
+from studies.record import read_record
+from studies.reports import bias as parts
 from studies.results import Chapter, Result, Sentence
-
-if TYPE_CHECKING:
-    from studies.bias import BiasStudy, Judged, Stability
 
 
 @answers("hrg.fit-bias/1")
@@ -53,14 +57,6 @@ def fit_bias(
     emit : str
         Write the model as C99 source for firmware.
     """
-    from studies.bias import study_bias
-    from studies.cli.output import say
-    from studies.errors import InputError
-    from studies.files.writing import write_text
-    from studies.models import emit_c, write_model
-    from studies.record import read_record
-    from studies.reports import bias as parts
-
     if not data:
         raise InputError("name at least one record (CSV) of a gyro at rest while its temperature changes.")
     records = []
@@ -101,7 +97,7 @@ def fit_bias(
     )
 
 
-def _payload(study: "BiasStudy", method: str, data: tuple[str, ...]) -> dict[str, Any]:
+def _payload(study: BiasStudy, method: str, data: tuple[str, ...]) -> dict[str, Any]:
     return {
         "schema": "hrg.fit-bias/1",
         "data": data,
@@ -121,9 +117,7 @@ def _payload(study: "BiasStudy", method: str, data: tuple[str, ...]) -> dict[str
     }
 
 
-def _judged(judged: "Judged") -> dict[str, Any]:
-    from studies.models.kinds.bias import name_term
-
+def _judged(judged: Judged) -> dict[str, Any]:
     fit, held_out = judged.fit, judged.held_out
     steps = fit.selection.steps if fit.selection else ()
     return {
@@ -156,7 +150,7 @@ def _judged(judged: "Judged") -> dict[str, Any]:
     }
 
 
-def _spectrum(spectrum: "Stability") -> dict[str, Any]:
+def _spectrum(spectrum: Stability) -> dict[str, Any]:
     noise, allan = spectrum.noise, spectrum.allan
     return {
         "tau_s": allan.tau, "deviation": allan.deviation, "low": allan.low, "high": allan.high,

@@ -1,17 +1,28 @@
 """`hrg fit cross-damping`: the bias of a CVG from cross-damping over temperature."""
 
+import math
 from typing import TYPE_CHECKING, Any
 
-from studies.cli.output import answers
+import numpy as np
+
+from compensation.improvement import Change
+from shell.constants import zero_Celsius
+from studies.cli.output import answers, say
+from studies.cross_damping import CrossDampingStudy, study_cross_damping
+from studies.errors import InputError, naming
+from studies.models import source_of, write_model
+from studies.models.kinds.cross_damping import OUTPUTS, save_cross_damping
+from studies.plausible import records_of_one_gyro
+from studies.record import Record, read_record
+from studies.reports import style
+from studies.reports.cross_damping import SOURCES, draw_runs
+from studies.reports.digits import lowered, raised
+from studies.rest import RestData, gather_rest
 from studies.results import Chapter, Column, Facts, Figure, Result, Sentence, Table
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure as Drawing
 
-    from compensation.improvement import Change
-    from studies.cross_damping import CrossDampingStudy
-    from studies.record import Record
-    from studies.rest import RestData
 
 LABELS = {
     "training": "fitted, rows",
@@ -65,19 +76,6 @@ def fit_cross_damping(
     save : str
         Write the model (TOML) for hrg compensate.
     """
-    import math
-
-    from shell.constants import zero_Celsius
-    from studies.cli.output import say
-    from studies.cross_damping import study_cross_damping
-    from studies.errors import InputError, naming
-    from studies.models import source_of, write_model
-    from studies.models.kinds.cross_damping import OUTPUTS, save_cross_damping
-    from studies.plausible import records_of_one_gyro
-    from studies.record import read_record
-    from studies.reports.cross_damping import SOURCES, draw_runs
-    from studies.rest import gather_rest
-
     if not data:
         raise InputError("name at least one record (CSV) of a gyro at rest.")
     records = records_of_one_gyro([read_record(path) for path in data], say)
@@ -175,15 +173,13 @@ def fit_cross_damping(
     )
 
 
-def _left_out(data: "RestData") -> list[str]:
+def _left_out(data: RestData) -> list[str]:
     """Say which rows were left out or averaged before the fit."""
     said = [f"{data.left_out} rows with an empty cell or an outlier were left out."] if data.left_out else []
     return said + ([f"Long records were averaged over {data.block_s:g} s before the fit."] if data.block_s else [])
 
 
 def _coefficients(summary: dict[str, Any]) -> list[dict[str, Any]]:
-    from studies.reports.digits import lowered, raised
-
     values, errors = summary["coefficients"], summary["standard_errors"]
     units = ["", "per °C", *(f"per °C{raised(i)}" for i in range(2, len(values)))]
     return [
@@ -192,13 +188,8 @@ def _coefficients(summary: dict[str, Any]) -> list[dict[str, Any]]:
     ]
 
 
-def _draw_curve(study: "CrossDampingStudy") -> "Drawing":
+def _draw_curve(study: CrossDampingStudy) -> "Drawing":
     """Draw ζ₁₂(T) over its value at calibration, with its 90 % band."""
-    import numpy as np
-
-    from shell.constants import zero_Celsius
-    from studies.reports import style
-
     model = study.model
     T = np.linspace(model.lowest, model.highest, 200)
     powers = (T - model.calibration_temperature)[:, None] ** np.arange(len(model.coefficients))
@@ -216,15 +207,8 @@ def _draw_curve(study: "CrossDampingStudy") -> "Drawing":
         return made
 
 
-def _summarise(study: "CrossDampingStudy", data: "RestData") -> dict[str, Any]:
+def _summarise(study: CrossDampingStudy, data: RestData) -> dict[str, Any]:
     """Numbers of the fit; before, after and dynamic_part in the unit of the output column."""
-    import math
-
-    import numpy as np
-
-    from shell.constants import zero_Celsius
-    from studies.models.kinds.cross_damping import OUTPUTS
-
     unit, model = OUTPUTS[data.output], study.model
     return {
         "output": data.output,
@@ -246,22 +230,18 @@ def _summarise(study: "CrossDampingStudy", data: "RestData") -> dict[str, Any]:
     }
 
 
-def _change(change: "Change", unit: float) -> dict[str, float]:
+def _change(change: Change, unit: float) -> dict[str, float]:
     return {"before": change.before / unit, "after": change.after / unit, "improvement": change.ratio}
 
 
-def _quality(records: "list[Record]") -> float:
+def _quality(records: list[Record]) -> float:
     """Quality factor from the median 1/Q of the records."""
     loss = _median(records, "inverse_q", "--quality")
     return 1 / loss if loss else float("inf")
 
 
-def _median(records: "list[Record]", column: str, option: str) -> float:
+def _median(records: list[Record], column: str, option: str) -> float:
     """Median of a column over all records that have it."""
-    import numpy as np
-
-    from studies.errors import InputError
-
     values = np.concatenate([record[column] for record in records if column in record] or [np.empty(0)])
     if not np.any(np.isfinite(values)):
         raise InputError(f"the records have no {column}; give {option}.")

@@ -5,15 +5,21 @@ frequency_Hz, error_Hz, left_K, extrapolated_K}]` and `time_constant_s`. `left_K
 distance from the last reading to the settled state of a hold that was extrapolated along its exponential (0 otherwise).
 """
 
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
-from studies.cli.output import answers
+from studies.cli.arguments import Array
+from studies.cli.output import answers, say
+from studies.errors import naming
+from studies.files.columns import read_header
+from studies.models import ModelSource, write_model
+from studies.models.kinds.frequency import save_frequency
+from studies.papers.hrg import study_table
+from studies.plausible import records_of_one_gyro
+from studies.record import read_frequency_table, read_record, reading_resolution
+from studies.reports import frequency as parts
 from studies.results import Chapter, Column, Result, Sentence, Table
-
-if TYPE_CHECKING:
-    from studies.cli.arguments import Array
-    from studies.models import ModelSource
-    from studies.settled import Soak
+from studies.settled import Soak, advise_hold, find_soaks, settled_table
 
 SOAKS = (
     Column("record", "Record"),
@@ -60,13 +66,6 @@ def fit_frequency(
     save : str
         Write the model (TOML) for hrg compensate.
     """
-    from studies.cli.output import say
-    from studies.errors import naming
-    from studies.models import write_model
-    from studies.models.kinds.frequency import save_frequency
-    from studies.papers.hrg import study_table
-    from studies.reports import frequency as parts
-
     T, f, step, source, soaks = _read_points((table, *more), time_constant, left)
     with naming(table):
         study = study_table(T, f, order, reference_temperature, step if resolution is None else resolution)
@@ -111,17 +110,8 @@ def fit_frequency(
 
 def _read_points(
     paths: tuple[str, ...], time_constant: float, left: float
-) -> "tuple[Array, Array, float, ModelSource, tuple[Soak, ...]]":
+) -> tuple[Array, Array, float, ModelSource, tuple[Soak, ...]]:
     """Return temperatures (°C), frequencies (Hz), their resolution (Hz), their source, and the soaks where they are of records."""
-    from pathlib import Path
-
-    from studies.cli.output import say
-    from studies.files.columns import read_header
-    from studies.models import ModelSource
-    from studies.plausible import records_of_one_gyro
-    from studies.record import read_frequency_table, read_record, reading_resolution
-    from studies.settled import advise_hold, find_soaks, settled_table
-
     first = paths[0]
     soaks: tuple[Soak, ...] = ()
     if len(paths) == 1 and "time_s" not in read_header(first):
@@ -141,7 +131,7 @@ def _read_points(
     return T, f, step, ModelSource(Path(first).name, sha256, len(f)), soaks
 
 
-def _describe(soak: "Soak") -> dict[str, Any]:
+def _describe(soak: Soak) -> dict[str, Any]:
     return {
         "record": soak.path,
         "start_s": soak.start,

@@ -9,13 +9,19 @@ pressures), `saved`.
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from studies.cli.output import answers
+import numpy as np
+
+from studies.cli.output import answers, say
+from studies.errors import InputError
+from studies.instrument.card import load_card, save_card
+from studies.law import law_of
+from studies.reports import style
 from studies.results import Chapter, Column, Figure, Result, Sentence, Table
+from studies.ringdown import Decay, GasLaw, fit_gas, read_decay, with_decay
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure as Drawing
 
-    from studies.ringdown import Decay, GasLaw
 
 QUANTITIES = {
     "frequency_1_Hz": "frequency of the upper mode (Hz)",
@@ -78,12 +84,6 @@ def fit_ringdown(
     save : str
         Write the card with the split, its axis, 1/Q and the damping axis of the first decay.
     """
-    from studies.cli.output import say
-    from studies.errors import InputError
-    from studies.instrument.card import load_card, save_card
-    from studies.law import law_of
-    from studies.ringdown import fit_gas, read_decay, with_decay
-
     if not data:
         raise InputError("name at least one file (CSV) with a free decay.")
     if save is not None and card is None:
@@ -125,7 +125,7 @@ def fit_ringdown(
     )
 
 
-def _row(decay: "Decay") -> dict[str, Any]:
+def _row(decay: Decay) -> dict[str, Any]:
     q = decay.inverse_q
     estimates = decay.estimates
     return {
@@ -148,7 +148,7 @@ def _row(decay: "Decay") -> dict[str, Any]:
     }
 
 
-def _gas_row(gas: "GasLaw") -> dict[str, float]:
+def _gas_row(gas: GasLaw) -> dict[str, float]:
     return {
         "inverse_q0": gas.inverse_q0,
         "inverse_q0_sd": gas.inverse_q0_sd,
@@ -158,15 +158,11 @@ def _gas_row(gas: "GasLaw") -> dict[str, float]:
     }
 
 
-def _figure(decay: "Decay") -> Figure:
+def _figure(decay: Decay) -> Figure:
     return Figure(lambda: _draw(decay), f"{Path(decay.path).name}: record, fitted decay (orange), residual.")
 
 
-def _draw(decay: "Decay") -> "Drawing":
-    import numpy as np
-
-    from studies.reports import style
-
+def _draw(decay: Decay) -> "Drawing":
     with style.figure(2, 1, height=4.6, sharex=True) as (drawn, (top, bottom)):
         for time, values, fitted, residual in decay.curves():
             rows = style.few_rows(time.size)
@@ -179,11 +175,7 @@ def _draw(decay: "Decay") -> "Drawing":
     return drawn
 
 
-def _draw_pressure(decays: "list[Decay]", gas: "GasLaw | None") -> "Drawing":
-    import numpy as np
-
-    from studies.reports import style
-
+def _draw_pressure(decays: list[Decay], gas: GasLaw | None) -> "Drawing":
     assert gas is not None
     points = [
         (d.notes["pressure_Pa"], d.inverse_q) for d in decays if d.inverse_q is not None and "pressure_Pa" in d.notes

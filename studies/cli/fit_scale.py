@@ -1,13 +1,18 @@
 """`hrg fit scale`: bias and scale of a bell-shaped gyro, step by step."""
 
+import dataclasses
 import re
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from studies.cli.output import answers
+from studies.cli.output import answers, say
+from studies.errors import InputError
+from studies.models import source_of, write_model
+from studies.models.kinds.scale import save_scale
+from studies.record import read_record
+from studies.reports.bell import SOURCES, draw_steps, steps_table
+from studies.reports.digits import raised
 from studies.results import Chapter, Column, Facts, Figure, Result, Sentence, Table
-
-if TYPE_CHECKING:
-    from studies.scale import ScaleStudy
+from studies.scale import ScaleStudy, study_scale
 
 STEPS = {
     "rough": "null and scale (33)",
@@ -55,16 +60,6 @@ def fit_scale(
     save : str
         Write the model (TOML) for hrg compensate.
     """
-    import dataclasses
-
-    from studies.cli.output import say
-    from studies.errors import InputError
-    from studies.models import source_of, write_model
-    from studies.models.kinds.scale import save_scale
-    from studies.record import read_record
-    from studies.reports.bell import SOURCES, draw_steps, steps_table
-    from studies.scale import study_scale
-
     if len(data) < 3:
         raise InputError(
             "name three records (CSV): several rates, at rest over temperature, one rate over temperature; a fourth at rest and then"
@@ -124,7 +119,7 @@ def fit_scale(
     )
 
 
-def _facts(study: "ScaleStudy") -> Facts:
+def _facts(study: ScaleStudy) -> Facts:
     first, last = study.figures[0], next(f for f in study.figures if f.step == "temperature_compensated")
     error = f"{study.error_before:.4f} → {study.error_held_out:.4f} °/s"
     facts = [("Rate error, held-out data", error, "rms, rough → compensated, before the filter")]
@@ -139,7 +134,7 @@ def _facts(study: "ScaleStudy") -> Facts:
     return Facts(facts)
 
 
-def _remarks(study: "ScaleStudy") -> list[str]:
+def _remarks(study: ScaleStudy) -> list[str]:
     """Say how the records were used."""
     said = {
         f"{study.left_out} rows with an empty cell or an outlier were left out.": study.left_out,
@@ -151,7 +146,5 @@ def _remarks(study: "ScaleStudy") -> list[str]:
 
 def _spell_unit(unit: str) -> str:
     """Return a unit of a model file as people write it: °/s/°C² for deg/s/degC^2."""
-    from studies.reports.digits import raised
-
     spelled = unit.replace("deg/s per counts", "°/s per count").replace("deg", "°").removeprefix("1") or ""
     return re.sub(r"\^(\d+)", lambda power: raised(int(power[1])), re.sub("^/", "per ", spelled))

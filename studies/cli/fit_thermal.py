@@ -7,13 +7,20 @@ With --json one object, schema `hrg.fit-thermal/1`: `data`, `confidence`, `estim
 
 from typing import TYPE_CHECKING
 
-from studies.cli.output import answers
+from studies.calibration.lags.identification import Identification
+from studies.calibration.lags.records import fit_thermal_constants
+from studies.cli.output import answers, say
+from studies.cli.telling import Told
+from studies.errors import InputError
+from studies.instrument.card import load_card
+from studies.record import read_record
+from studies.reports import style
+from studies.reports.digits import to_interval
 from studies.results import Column, Figure, Payload, Result, Sentence, Table
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure as Drawing
 
-    from studies.calibration.lags.identification import Identification
 
 NAMES = {
     "radiated_share": ("Radiated share of the heat exchange at 20 °C", ""),
@@ -44,21 +51,13 @@ def fit_thermal(*data: str, card: str | None = None, lags: int | None = None, co
     confidence : float
         Confidence level of the intervals.
     """
-    from studies.calibration.lags.records import fit_thermal_constants
-    from studies.cli.output import say
-    from studies.cli.telling import Told
-    from studies.errors import InputError
-    from studies.instrument.card import load_card
-    from studies.record import read_record
-
     if not data:
         raise InputError("name at least one record (CSV) with a step, a ramp or a cycle of temperature.")
     if not 0 < confidence < 1:
         raise InputError(f"--confidence {confidence:g}: a confidence level lies between 0 and 1, such as 0.9.")
     records = [read_record(path) for path in data]
-    told = Told("lags")
-    found = fit_thermal_constants(records, load_card(card) if card else None, lags, confidence, told)
-    told.done()
+    with Told("lags") as told:
+        found = fit_thermal_constants(records, load_card(card) if card else None, lags, confidence, told)
     for warning in found.warnings:
         say(f"warning: {warning}")
     if all(e.value is None for e in found.estimates.values()):
@@ -116,8 +115,6 @@ def _name(key: str) -> tuple[str, str]:
 
 
 def _write(row: Payload) -> dict[str, str]:
-    from studies.reports.digits import to_interval
-
     if row["value"] is None:
         return {"shown": "not determined", "range": ""}
     value, low, high = to_interval(*(row[key] for key in ("value", "low", "high")))
@@ -132,9 +129,7 @@ def _lower(text: str) -> str:
     return text[:1].lower() + text[1:]
 
 
-def _draw(found: "Identification") -> "Drawing":
-    from studies.reports import style
-
+def _draw(found: Identification) -> "Drawing":
     with style.figure(height=2.8) as (made, axes):
         axes.plot(1e3 * found.residual, ".", markersize=2, color=style.BLUE)
         axes.set_xlabel(f"row ({found.row_step:g} s each)")

@@ -5,15 +5,18 @@ With --json one object, schema `hrg.fit-whole-angle/1`: `data`, `confidence`, `e
 """
 
 from math import degrees, pi
-from typing import TYPE_CHECKING
 
-from studies.cli.output import answers
+import numpy as np
+
+from compensation.wave_fit import WaveFit
+from compensation.wave_fit import fit_whole_angle as fit
+from studies.cli.output import answers, say
+from studies.errors import InputError, naming
+from studies.instrument.card import Instrument, load_card, save_card
+from studies.instrument.tables.loop import Loop
+from studies.law import law_of
+from studies.record import read_record
 from studies.results import Column, Result, Sentence, Table
-
-if TYPE_CHECKING:
-    from compensation.wave_fit import WaveFit
-    from studies.instrument.card import Instrument
-    from studies.instrument.tables.loop import Loop
 
 KEYS = {
     # estimate: key of the card, factor to its unit, name, unit
@@ -65,11 +68,6 @@ def fit_whole_angle(
     save : str
         Write the card with the estimates and their uncertainties.
     """
-    from studies.cli.output import say
-    from studies.errors import InputError
-    from studies.instrument.card import load_card, save_card
-    from studies.law import law_of
-
     if not 0 < confidence < 1:
         raise InputError(f"--confidence {confidence:g}: a confidence level lies between 0 and 1, such as 0.95.")
     instrument = load_card(card) if card else None
@@ -116,16 +114,9 @@ def fit_whole_angle(
 
 
 def _fit_record(
-    path: str, bryan_factor: float, volts_per_hertz: float | None, loop: "Loop | None", confidence: float
-) -> "tuple[WaveFit, float | None]":
+    path: str, bryan_factor: float, volts_per_hertz: float | None, loop: Loop | None, confidence: float
+) -> tuple[WaveFit, float | None]:
     """Fit what is in a record; also its mean frequency in Hz, where it has one."""
-    import numpy as np
-
-    from compensation.wave_fit import fit_whole_angle as fit
-    from studies.cli.output import say
-    from studies.errors import InputError, naming
-    from studies.record import read_record
-
     record = read_record(path)
     rate = record["measured_rate_deg_per_s"] if "measured_rate_deg_per_s" in record else record["bias_deg_per_h"] / 3600
     frequency = record.columns.get("frequency_Hz")
@@ -157,7 +148,7 @@ def _fit_record(
     return found, None if frequency is None else float(np.mean(frequency))
 
 
-def _with_estimates(instrument: "Instrument", estimates: dict[str, dict[str, float]]) -> "Instrument":
+def _with_estimates(instrument: Instrument, estimates: dict[str, dict[str, float]]) -> Instrument:
     """Return the card with the estimates and their uncertainties; an anisotropy below 0 is left out."""
     values = {
         key: {"value": e["value"], "sd": e["sd"]}
@@ -169,7 +160,7 @@ def _with_estimates(instrument: "Instrument", estimates: dict[str, dict[str, flo
     return instrument.with_values(values)
 
 
-def _in_card_units(found: "WaveFit", frequency: float | None) -> dict[str, dict[str, float]]:
+def _in_card_units(found: WaveFit, frequency: float | None) -> dict[str, dict[str, float]]:
     """Return the estimates by the keys of a card; anisotropy over 1/τ, and 1/Q, where drive effort and frequency are known."""
     estimates = {}
     for name, e in found.estimates.items():

@@ -5,22 +5,26 @@ With --json one object, schema `hrg.import/1`: `start` (of the clock, or null), 
 `mapped`, `left_over`.
 """
 
-from typing import TYPE_CHECKING, Annotated, Any
+import os
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Annotated, Any
 
+import numpy as np
 from cyclopts import Parameter
+from numpy.typing import NDArray
 
 from studies.cli.output import answers
+from studies.errors import InputError
+from studies.files.writing import write_text
+from studies.importing.draft import draft_map
+from studies.importing.join import import_records, import_table
+from studies.importing.mapping import LoadedMap, load_map
+from studies.record import write_record
+from studies.reports.columns import draw_columns, find_gaps
 from studies.results import Chapter, Column, Figure, Result, Sentence, Table, rows_of
 
-if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-
-    import numpy as np
-    from numpy.typing import NDArray
-
-    from studies.importing.mapping import LoadedMap
-
-    Columns = Mapping[str, NDArray[np.float64]]
+Columns = Mapping[str, NDArray[np.float64]]
 
 FIRST_ROWS = 5
 RANGES = (
@@ -59,8 +63,6 @@ def import_(
     draft : str
         Draft a map from the files instead; an existing file is not overwritten.
     """
-    from studies.errors import InputError
-
     if not raw:
         raise InputError("no raw file given: 'hrg import RAW --draft MAP.toml' drafts a map from it.")
     if draft is not None and map_ is None and out is None:
@@ -71,12 +73,6 @@ def import_(
 
 
 def _draft(raw: tuple[str, ...], path: str) -> Result:
-    import os
-
-    from studies.errors import InputError
-    from studies.files.writing import write_text
-    from studies.importing.draft import draft_map
-
     if os.path.exists(path):
         raise InputError(f"{path}: exists and is not overwritten; remove it or choose another name for the draft.")
     draft = draft_map(raw)
@@ -95,12 +91,6 @@ def _draft(raw: tuple[str, ...], path: str) -> Result:
 
 
 def _import(raw: tuple[str, ...], path: str, out: str) -> Result:
-    from pathlib import Path
-
-    from studies.importing.join import import_records
-    from studies.importing.mapping import load_map
-    from studies.record import write_record
-
     import_map = load_map(path)
     if import_map.is_table:
         return _import_table(raw, import_map, out)
@@ -117,12 +107,8 @@ def _import(raw: tuple[str, ...], path: str, out: str) -> Result:
     )
 
 
-def _import_table(raw: tuple[str, ...], import_map: "LoadedMap", out: str) -> Result:
+def _import_table(raw: tuple[str, ...], import_map: LoadedMap, out: str) -> Result:
     """Convert a table of settled readings."""
-    from studies.errors import InputError
-    from studies.files.writing import write_text
-    from studies.importing.join import import_table
-
     if len(raw) != 1:
         raise InputError(f"{import_map.path}: describes one table, but {len(raw)} raw files are given.")
     columns, notes = import_table(raw[0], import_map)
@@ -132,11 +118,7 @@ def _import_table(raw: tuple[str, ...], import_map: "LoadedMap", out: str) -> Re
     return _show({out: columns}, notes, None, {})
 
 
-def _show(records: "Mapping[str, Columns]", notes: "Sequence[str]", start: str | None, more: dict[str, Any]) -> Result:
-    import numpy as np
-
-    from studies.reports.columns import draw_columns
-
+def _show(records: Mapping[str, Columns], notes: Sequence[str], start: str | None, more: dict[str, Any]) -> Result:
     out, columns = next(iter(records.items()))
     payload = {
         "schema": "hrg.import/1",
@@ -166,12 +148,8 @@ def _show(records: "Mapping[str, Columns]", notes: "Sequence[str]", start: str |
     return Result(payload, "Import", lead, chapters)
 
 
-def _ranges(columns: "Columns") -> list[dict[str, Any]]:
+def _ranges(columns: Columns) -> list[dict[str, Any]]:
     """Range, usual step, missing values and, over time, gaps of each column."""
-    import numpy as np
-
-    from studies.reports.columns import find_gaps
-
     rows = []
     for name, values in columns.items():
         known = values[np.isfinite(values)]

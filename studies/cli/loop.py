@@ -9,15 +9,28 @@ force); `out` and `rows` of the run, or null. --state-space writes another objec
 `studies.simulation.state_space`).
 """
 
-from typing import TYPE_CHECKING, Any
+from math import degrees, log10
+from typing import Any
 
+import numpy as np
+
+from compensation.controllers import Loops
+from shell.constants import zero_Celsius
 from studies.cli.arguments import Seed
-from studies.cli.output import answers
+from studies.cli.output import answers, say
+from studies.errors import InputError
+from studies.instrument.card import load_card
+from studies.law import law_of
+from studies.loss.damping_law import damping_law, settled_loss
+from studies.record import Record, write_record
+from studies.reports.loop import describe, loop_parts
 from studies.results import Result
-
-if TYPE_CHECKING:
-    from studies.record import Record
-    from studies.simulation.loop_study import LoopStudy
+from studies.simulation.chamber import load_profile
+from studies.simulation.drive import MOST_ROWS
+from studies.simulation.loop import columns_of, require_loop, run_loops, without_loop
+from studies.simulation.loop_study import LoopStudy, study_loops
+from studies.simulation.state_space import write_state_space
+from studies.simulation.virtual_gyro import simulate_run
 
 
 @answers("hrg.loop/1")
@@ -66,19 +79,6 @@ def loop(
     noiseless : bool
         Run without noise.
     """
-    import numpy as np
-
-    from shell.constants import zero_Celsius
-    from studies.cli.output import say
-    from studies.errors import InputError
-    from studies.instrument.card import load_card
-    from studies.law import law_of
-    from studies.loss.damping_law import settled_loss
-    from studies.reports.loop import describe, loop_parts
-    from studies.simulation.loop import require_loop
-    from studies.simulation.loop_study import study_loops
-    from studies.simulation.state_space import write_state_space
-
     instrument = load_card(card)
     keys = require_loop(instrument)
     if both_ways and (keys.mode != "whole-angle" or keys.self_precession_deg_per_s == 0):
@@ -119,9 +119,6 @@ def loop(
 
 def _check_run(given: list[str], out: str | None, hours: float | None, row: float | None) -> None:
     """Refuse options of a run where none is written, and a run without an end."""
-    from studies.errors import InputError
-    from studies.simulation.drive import MOST_ROWS
-
     if given and out is None:
         named = ", ".join(f"--{name}" for name in given)
         raise InputError(f"{named}: only for a simulated run; add --out RUN.csv to write one, or leave it out.")
@@ -135,11 +132,7 @@ def _check_run(given: list[str], out: str | None, hours: float | None, row: floa
         raise InputError(f"--hours {hours:g} --row {row:g}: more than {MOST_ROWS} rows; increase --row.")
 
 
-def _describe(study: "LoopStudy") -> dict[str, Any]:
-    from math import degrees, log10
-
-    from compensation.controllers import Loops
-
+def _describe(study: LoopStudy) -> dict[str, Any]:
     return {
         "settled": study.settled,
         "bias": [{"source": s.name, "deg_per_h": s.bias, "sd_deg_per_h": s.sd} for s in study.sources],
@@ -164,7 +157,7 @@ def _describe(study: "LoopStudy") -> dict[str, Any]:
 
 
 def _run(
-    study: "LoopStudy",
+    study: LoopStudy,
     temperature: float,
     out: str,
     hours: float,
@@ -173,18 +166,8 @@ def _run(
     profile: str | None,
     both_ways: bool,
     seed: int | None,
-) -> "Record":
+) -> Record:
     """Run the wave through the loops and write the record."""
-    import numpy as np
-
-    from shell.constants import zero_Celsius
-    from studies.cli.output import say
-    from studies.loss.damping_law import damping_law
-    from studies.record import Record, write_record
-    from studies.simulation.chamber import load_profile
-    from studies.simulation.loop import columns_of, require_loop, run_loops, without_loop
-    from studies.simulation.virtual_gyro import simulate_run
-
     instrument, damping = study.instrument, None
     f, loss = np.array(study.frequency), np.array(study.inverse_q)
     if profile is not None:

@@ -7,17 +7,21 @@ where nothing varies around) with `inverse_q_split`, `damping_axis_deg`, `larges
 (null where the card states no 1/Q) with `inverse_q`, and the `explained` share of it with `explained_low`, `explained_high`.
 """
 
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
+import numpy as np
+
+from shell.constants import zero_Celsius
+from shell.damping.budget import Budget, LossPart
+from shell.damping.thermoelastic import trace_share
 from studies.cli.arguments import FromDegC, ToDegC, lay_temperatures
 from studies.cli.output import answers
+from studies.instrument.card import Instrument, load_card
+from studies.loss.account import DampingAround, StatedLoss, damping_around, stated_loss
+from studies.loss.model import LossModel, loss_model
+from studies.reports import loss as pictures
+from studies.reports.digits import plain
 from studies.results import Chapter, Column, Facts, Figure, Result, Sentence, Table, rows_of
-
-if TYPE_CHECKING:
-    from shell.damping.budget import Budget, LossPart
-    from studies.instrument.card import Instrument
-    from studies.loss.account import DampingAround, StatedLoss
-    from studies.loss.model import LossModel
 
 WALL = (
     "The cost of a surface treatment depends on its place: a damaged layer or a film dissipates in proportion to the energy, heat in"
@@ -62,12 +66,6 @@ def loss(
     anchor : bool
         Compute the anchor loss of a stem (a second or two).
     """
-    import numpy as np
-
-    from studies.instrument.card import load_card
-    from studies.loss.account import damping_around, stated_loss
-    from studies.loss.model import loss_model
-
     temperatures = lay_temperatures(from_degC, to_degC, step)
     instrument = load_card(card)
     T = instrument.material.check(temperatures)
@@ -96,7 +94,7 @@ def loss(
     )
 
 
-def _simulated(instrument: "Instrument") -> str:
+def _simulated(instrument: Instrument) -> str:
     """Say whether a simulation takes 1/Q from this budget or from the card's own number."""
     if instrument.part("loss", "loss_parts").given:
         return "Simulations take 1/Q from this budget."
@@ -108,9 +106,7 @@ def _simulated(instrument: "Instrument") -> str:
     )
 
 
-def _describe(model: "LossModel", budget: "Budget", theory: str) -> "dict[str, Any]":
-    from shell.constants import zero_Celsius
-
+def _describe(model: LossModel, budget: Budget, theory: str) -> dict[str, Any]:
     low, high = budget.interval
     return {
         "harmonic": model.harmonic,
@@ -132,7 +128,7 @@ def _describe(model: "LossModel", budget: "Budget", theory: str) -> "dict[str, A
     }
 
 
-def _part(part: "LossPart") -> "dict[str, Any]":
+def _part(part: LossPart) -> dict[str, Any]:
     low, high = part.interval
     return {
         "name": part.name,
@@ -145,9 +141,7 @@ def _part(part: "LossPart") -> "dict[str, Any]":
     }
 
 
-def _around(found: "DampingAround | None") -> "dict[str, Any] | None":
-    import numpy as np
-
+def _around(found: DampingAround | None) -> dict[str, Any] | None:
     if found is None:
         return None
     return {
@@ -158,14 +152,9 @@ def _around(found: "DampingAround | None") -> "dict[str, Any] | None":
 
 
 def _parts(
-    payload: "dict[str, Any]", model: "LossModel", budget: "Budget", stated: "StatedLoss | None", at: int
-) -> "list[Chapter]":
+    payload: dict[str, Any], model: LossModel, budget: Budget, stated: StatedLoss | None, at: int
+) -> list[Chapter]:
     """What people read: the answer, the parts, their course, where on the wall, around the axis, what is left out."""
-    import numpy as np
-
-    from shell.damping.thermoelastic import trace_share
-    from studies.reports import loss as pictures
-
     degrees, around = payload["temperature_degC"], payload["anisotropy"]
     low, high = budget.interval
     over = {
@@ -242,11 +231,7 @@ def _parts(
     ]  # fmt: skip
 
 
-def _facts(budget: "Budget", stated: "StatedLoss | None", at: int, degrees: float) -> "list[tuple[str, str, str]]":
-    import numpy as np
-
-    from studies.reports.digits import plain
-
+def _facts(budget: Budget, stated: StatedLoss | None, at: int, degrees: float) -> list[tuple[str, str, str]]:
     low, high = (float(end[at]) for end in budget.interval)
     without = float(budget.without(budget.first.name)[at])
     gain = f"Q would be {plain(without)} without it" if np.isfinite(without) else "no other part is known"

@@ -1,14 +1,19 @@
 """Measured splits and imbalance as options of `hrg trim`, or from a scan."""
 
+import cmath
+import re
+from json import loads
+from math import radians
+
+from studies.errors import InputError
+from studies.files.reading import read_bytes
+from studies.schema.reader import read_keys
+
 
 def pair_splits(
     split: tuple[float, ...], axis: tuple[float, ...], harmonic: tuple[int, ...], error: float
 ) -> list[tuple[int, float, float, float]]:
     """Return (harmonic, split in Hz, azimuth in rad, reading error in Hz) of the splits given as options."""
-    from math import radians
-
-    from studies.errors import InputError
-
     if not split:
         raise InputError("--split is missing: give the measured splits (Hz), each with its --axis (degrees).")
     for option, given in (("--axis", axis), ("--harmonic", harmonic)):
@@ -24,13 +29,6 @@ def pair_splits(
 
 def read_scan(path: str, harmonic: tuple[int, ...]) -> list[tuple[int, float, float, float]]:
     """Return the same of the splits of a scan."""
-    from json import loads
-    from math import radians
-
-    from studies.errors import InputError
-    from studies.files.reading import read_bytes
-    from studies.schema.reader import read_keys
-
     refused = InputError(f'{path}: is not output of hrg scan --json (schema "hrg.scan/1").')
     data = read_bytes(path)
     try:
@@ -62,12 +60,6 @@ def read_scan(path: str, harmonic: tuple[int, ...]) -> list[tuple[int, float, fl
 
 def read_unbalance(words: tuple[str, ...]) -> dict[int, complex]:
     """Return the mass imbalance (kg) by harmonic."""
-    import cmath
-    import re
-    from math import radians
-
-    from studies.errors import InputError
-
     found = {}
     for word in words:
         match = re.fullmatch(r"([123]):([0-9.]+(?:e-?[0-9]+)?)@(-?[0-9.]+)", word)

@@ -1,10 +1,19 @@
 """`hrg mesh`: the solid as a quadratic mesh for another finite-element program."""
 
-from typing import Annotated
+import os
+from pathlib import Path
+from typing import Annotated, cast
 
 from cyclopts import Parameter
 
+from shell.constants import zero_Celsius
+from shell.inertia import weigh
+from shell.volume import build_volume
+from shell.volume_files import VolumeKind, encode_volume
 from studies.cli.output import answers
+from studies.errors import InputError, naming
+from studies.files.writing import written_whole
+from studies.instrument.card import load_card
 from studies.results import Result, Sentence
 
 KINDS = (".vtu", ".msh", ".inp")
@@ -46,18 +55,6 @@ def mesh(
     temperature : float
         Temperature in °C; the card's reference temperature unless given.
     """
-    import os
-    from pathlib import Path
-    from typing import cast
-
-    from shell.constants import zero_Celsius
-    from shell.inertia import weigh
-    from shell.volume import build_volume
-    from shell.volume_files import VolumeKind, encode_volume
-    from studies.errors import InputError, naming
-    from studies.files.writing import written_whole
-    from studies.instrument.card import load_card
-
     kind = Path(out).suffix.lower()
     if kind not in KINDS:
         raise InputError(f"--out {out}: the ending must be one of {', '.join(KINDS)}.")

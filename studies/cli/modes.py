@@ -10,20 +10,32 @@ Where the card has films ([[loss.film]]), modes have `films`: `film`, `shift_ppm
 a crystal, the lowest pairs of n = 2, 3, 5, 6, 7, 9 … have `crystal`: `antinode_along_100_Hz`, `other_Hz`, `split_Hz`, `relative_split`.
 """
 
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from collections.abc import Sequence
+from dataclasses import asdict
+from math import degrees
+from typing import Annotated, Any, Literal
 
+import numpy as np
 from cyclopts import Parameter
 
+from shell.constants import zero_Celsius
+from shell.modes import Mode, solve_modes
+from shell.resonator import Resonator
+from studies.cli.amplitude import amplitude_table, describe_amplitude
+from studies.cli.crystal import crystal_pairs, crystal_table
+from studies.cli.films import describe_films, films_table
+from studies.cli.mount import describe_mount, mount_table
 from studies.cli.output import answers
+from studies.cli.spin import spin_pairs, spin_table
+from studies.errors import InputError, naming
+from studies.instrument.card import Instrument, load_card
+from studies.instrument.imperfect import is_imperfect
+from studies.law import law_of
+from studies.reports.digits import to_numerical_error
+from studies.reports.page import Block
+from studies.reports.scenes import show_mode
 from studies.results import Blocks, Column, Result, Sentence, Table, Where
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from shell.modes import Mode
-    from shell.resonator import Resonator
-    from studies.instrument.card import Instrument
-    from studies.reports.page import Block
+from studies.splitting import SplitPair
 
 THEORIES = {
     "solid": "three-dimensional elasticity",
@@ -80,18 +92,6 @@ def modes(
     amplitude : float
         Largest displacement in µm: shift of the frequency by geometric nonlinearity.
     """
-    from dataclasses import asdict
-
-    from shell.constants import zero_Celsius
-    from shell.modes import solve_modes
-    from studies.cli.amplitude import amplitude_table, describe_amplitude
-    from studies.cli.crystal import crystal_pairs, crystal_table
-    from studies.cli.films import describe_films, films_table
-    from studies.cli.mount import describe_mount, mount_table
-    from studies.cli.spin import spin_pairs, spin_table
-    from studies.errors import InputError, naming
-    from studies.instrument.card import load_card
-
     if count < 1:
         raise InputError(f"--count {count}: at least one mode must be asked for.")
     if min(harmonic) < 0:
@@ -152,18 +152,15 @@ def modes(
     )
 
 
-def _view(instrument: "Instrument", harmonics: list[int], T: float) -> "Sequence[Block]":
+def _view(instrument: Instrument, harmonics: list[int], T: float) -> Sequence[Block]:
     """The lowest modes, to be turned."""
     from studies.reports.mode_picture import view_blocks
-    from studies.reports.scenes import show_mode
 
     return view_blocks([show_mode(instrument, n, temperature=T) for n in harmonics])
 
 
-def _to_error(row: "dict[str, Any]") -> str:
+def _to_error(row: dict[str, Any]) -> str:
     """The frequency to the second digit of its solver error, at most four decimals."""
-    from studies.reports.digits import to_numerical_error
-
     return to_numerical_error(row["frequency_Hz"], row["relative_error_estimate"] * row["frequency_Hz"], 4)
 
 
@@ -178,15 +175,10 @@ def _note(theory: str, share: float) -> str:
     return f"Solver error: against the exact solution of the same theory. Material uncertainty: {spread}."
 
 
-def _find_splits(instrument: "Instrument", found: "list[Mode]", T: float) -> "dict[int, dict[str, Any]]":
+def _find_splits(instrument: Instrument, found: list[Mode], T: float) -> dict[int, dict[str, Any]]:
     """What the card's imperfection and electrodes make of each pair, by the identity of its mode."""
-    from math import degrees
-
-    from studies.instrument.imperfect import is_imperfect
-
     if not is_imperfect(instrument):
         return {}
-    from studies.splitting import SplitPair
 
     entries: dict[int, dict[str, Any]] = {}
     for m in found:
@@ -210,24 +202,20 @@ def _find_splits(instrument: "Instrument", found: "list[Mode]", T: float) -> "di
     return entries
 
 
-def _material_share(instrument: "Instrument", T: float) -> float:
-    import numpy as np
-
-    from studies.law import law_of
-
+def _material_share(instrument: Instrument, T: float) -> float:
     return float(law_of(instrument, T, T).uncertainty(np.array([T]))[0])
 
 
-def _mean_thickness(resonator: "Resonator") -> float:
+def _mean_thickness(resonator: Resonator) -> float:
     return float(sum(h for _, h in resonator.thickness) / len(resonator.thickness))
 
 
-def _per_micrometre(mode: "Mode", thickness: float) -> float:
+def _per_micrometre(mode: Mode, thickness: float) -> float:
     """Return df/dh in Hz/µm, for a wall that grows everywhere by the same part."""
     return float(mode.frequency * mode.sensitivities.thickness / thickness * 1e-6)
 
 
-def _split_table(modes: "list[dict[str, Any]]") -> Table:
+def _split_table(modes: list[dict[str, Any]]) -> Table:
     columns = [
         *COLUMNS[:2],
         Column("split.slow_Hz", "slow", "Hz", ".5f"),
@@ -241,7 +229,7 @@ def _split_table(modes: "list[dict[str, Any]]") -> Table:
     return Table("Pairs with imperfections and electrodes", rows, columns, "Slow axis: an antinode of the slower mode.")
 
 
-def _all_orders(modes: "list[dict[str, Any]]") -> list[Sentence]:
+def _all_orders(modes: list[dict[str, Any]]) -> list[Sentence]:
     """Warn where imperfections are too large for the first order."""
     found = []
     for row in modes:
@@ -252,7 +240,7 @@ def _all_orders(modes: "list[dict[str, Any]]") -> list[Sentence]:
     return [Sentence(f"The imperfections are large: {words} for {', '.join(found)}.", "warning")] if found else []
 
 
-def _detail_tables(modes: "list[dict[str, Any]]", where: Where) -> list[Table]:
+def _detail_tables(modes: list[dict[str, Any]], where: Where) -> list[Table]:
     names = {"E": "ln E", "nu": "ν", "rho": "ln ρ", "thickness": "ln h", "radius": "ln r"}
     slopes = [Column(f"sensitivities.{key}", name, form="+.4f") for key, name in names.items()]
     kinds = {"bending": "bending", "membrane": "membrane", "shear": "transverse shear", "root": "root", "stem": "stem"}

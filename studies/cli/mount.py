@@ -1,20 +1,17 @@
 """What a base that expands otherwise does to modes, for `hrg modes`."""
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from shell.law import check_mount
+from shell.modes import Mode
+from shell.prestress import Prestress
+from studies.errors import naming
+from studies.instrument.card import Instrument
 from studies.results import Column, Table
 
-if TYPE_CHECKING:
-    from shell.modes import Mode
-    from studies.instrument.card import Instrument
 
-
-def describe_mount(found: "list[Mode]", instrument: "Instrument", T: float) -> "dict[int, dict[str, Any]]":
+def describe_mount(found: list[Mode], instrument: Instrument, T: float) -> dict[int, dict[str, Any]]:
     """Shift and slope of each pair by the stress of [mount] at T (K), by the identity of the mode."""
-    from shell.law import check_mount
-    from shell.prestress import Prestress
-    from studies.errors import naming
-
     mount = instrument.part("mount")
     if mount is None:
         return {}
@@ -34,7 +31,7 @@ def describe_mount(found: "list[Mode]", instrument: "Instrument", T: float) -> "
     return entries
 
 
-def mount_table(modes: "list[dict[str, Any]]") -> Table:
+def mount_table(modes: list[dict[str, Any]]) -> Table:
     """The table of modes with `mount`."""
     rows = [row for row in modes if "mount" in row]
     columns = [

@@ -1,16 +1,22 @@
 """`hrg render`: a mode shape as picture, animation, interactive page or mesh."""
 
-from typing import TYPE_CHECKING, Annotated, Literal
+import os
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated, Literal
 
 from cyclopts import Parameter
 
+from shell.constants import zero_Celsius
+from shell.mesh import encode_animation, encode_mesh
+from shell.scene import EXAGGERATION
 from studies.cli.output import answers
+from studies.errors import InputError, MissingEnvironment
+from studies.files.writing import written_whole
+from studies.instrument.card import load_card
+from studies.reports.scenes import ModeScene, ShellTemperature, read_field, show_mode
 from studies.results import Blocks, Chapter, Column, Result, Sentence, Table
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from studies.reports.scenes import ModeScene, ShellTemperature
+from studies.results.page import render_result
 
 KINDS = (".png", ".webp", ".gif", ".html", ".glb", ".stl", ".ply")
 MOST = 4  # resonators in one picture
@@ -68,14 +74,7 @@ def render(
     swing_mm : float
         Displacement at the antinode in mesh files; unless given, .stl and .ply are undeformed and .glb swings visibly.
     """
-    import os
-    from pathlib import Path
-
-    from shell.constants import zero_Celsius
-    from studies.errors import InputError
-    from studies.files.writing import written_whole
     from studies.reports.mode_picture import view_blocks
-    from studies.reports.scenes import read_field
 
     kind = Path(out).suffix.lower()
     if kind not in KINDS:
@@ -119,19 +118,14 @@ def render(
 
 
 def _solve(
-    cards: "Sequence[str]",
-    harmonics: "Sequence[int]",
+    cards: Sequence[str],
+    harmonics: Sequence[int],
     index: int,
-    temperatures: "Sequence[float]",
+    temperatures: Sequence[float],
     theory: Literal["solid", "shell"],
     kind: str,
-) -> "list[ModeScene]":
+) -> list[ModeScene]:
     """Solve every mode that is to be shown: cards × temperatures × harmonics."""
-    from shell.constants import zero_Celsius
-    from studies.errors import InputError
-    from studies.instrument.card import load_card
-    from studies.reports.scenes import show_mode
-
     if not cards:
         raise InputError("a card is missing: give its path or the name of one that ships ('hrg cards').")
     if index < 0:
@@ -147,14 +141,13 @@ def _solve(
 
 
 def _picture(
-    shown: "Sequence[ModeScene]",
+    shown: Sequence[ModeScene],
     kind: str,
     colour: Literal["displacement", "energy", "temperature"],
-    field: "ShellTemperature | None",
+    field: ShellTemperature | None,
     view: Literal["oblique", "axis", "side"],
 ) -> bytes:
     from shell.render import NoOpenGL, render_animation, render_png
-    from studies.errors import MissingEnvironment
 
     scenes = [one.scene(colour, field) for one in shown]
     try:
@@ -165,10 +158,8 @@ def _picture(
         raise MissingEnvironment(f"{error} An .html page or a mesh needs none.") from None
 
 
-def _page(shown: "Sequence[ModeScene]") -> bytes:
-    from shell.constants import zero_Celsius
+def _page(shown: Sequence[ModeScene]) -> bytes:
     from studies.reports.mode_picture import view_blocks
-    from studies.results.page import render_result
 
     first = shown[0]
     rows = [
@@ -187,14 +178,12 @@ def _page(shown: "Sequence[ModeScene]") -> bytes:
 
 
 def _mesh(
-    one: "ModeScene",
+    one: ModeScene,
     kind: str,
     colour: Literal["displacement", "energy", "temperature"],
-    field: "ShellTemperature | None",
+    field: ShellTemperature | None,
     swing_mm: float | None,
 ) -> bytes:
-    from shell.mesh import encode_animation, encode_mesh
-    from shell.scene import EXAGGERATION
 
     colours = one.colours(colour, field)
     if kind == ".glb":

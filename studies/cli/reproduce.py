@@ -1,16 +1,18 @@
 """`hrg reproduce`: the papers' tables and figures from their data."""
 
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
 
-from studies.cli.output import Answer, answers
+import numpy as np
+from numpy.typing import NDArray
 
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    import numpy as np
-    from numpy.typing import NDArray
-
-    from studies.reports.reproduce import Reproduction
+from studies.cli.output import Answer, answers, dump_json, say
+from studies.diagnosis.table import diagnose_table
+from studies.files.writing import check_folder, write_text
+from studies.instrument.card import load_card
+from studies.papers import bias_twin, hrg
+from studies.papers.settling import study_settling
+from studies.reports.gyro_papers import reproduce_gyro_papers
+from studies.reports.reproduce import Reproduction, reproduce_page, summarise
 
 GYROS = 12
 
@@ -26,10 +28,7 @@ def reproduce(*, out: str = "report") -> Answer:
     out : str
         Folder for the files; created if it does not exist.
     """
-    from studies.cli.output import dump_json
-    from studies.files.writing import check_folder, write_text
     from studies.reports.mode_picture import mode_blocks
-    from studies.reports.reproduce import reproduce_page, summarise
 
     folder = check_folder(out)
     parts = _reproduce()
@@ -57,16 +56,8 @@ def reproduce(*, out: str = "report") -> Answer:
     print(f"report: {folder / 'report.html'}")
 
 
-def _reproduce() -> "Reproduction":
+def _reproduce() -> Reproduction:
     """Compute every part of the page, telling which one is under way."""
-    from studies.cli.output import say
-    from studies.diagnosis.table import diagnose_table
-    from studies.instrument.card import load_card
-    from studies.papers import bias_twin, hrg
-    from studies.papers.settling import study_settling
-    from studies.reports.gyro_papers import reproduce_gyro_papers
-    from studies.reports.reproduce import Reproduction
-
     say("1/5 modes over temperature and a first diagnosis of Table 1 ...")
     instrument = load_card(hrg.CARD)
     study = hrg.study_table(*hrg.printed_table1(), resolution=hrg.RESOLUTION)
@@ -82,6 +73,6 @@ def _reproduce() -> "Reproduction":
     return Reproduction(study, physics, diagnosis, settling, twins, chapters, summary)
 
 
-def _csv(columns: "Mapping[str, NDArray[np.float64]]") -> str:
+def _csv(columns: Mapping[str, NDArray[np.float64]]) -> str:
     rows = "\n".join(",".join(f"{float(x):.10g}" for x in row) for row in zip(*columns.values(), strict=True))
     return f"{','.join(columns)}\n{rows}\n"

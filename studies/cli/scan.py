@@ -7,16 +7,21 @@ the split is not significant), `shift_ppm`, and `every_order` {split_Hz, slow_ax
 the offset {quantity, order, position, amplitude_um {value, low, high}, azimuth_deg}; `roundness` {face, position, peak_to_valley_um, rms_um}.
 """
 
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from pathlib import Path
+from typing import Annotated, Any, Literal
 
+import numpy as np
 from cyclopts import Parameter
 
-from studies.cli.output import answers
+from shell.constants import zero_Celsius
+from studies.cli.output import answers, say
+from studies.errors import InputError, naming
+from studies.files.writing import write_text
+from studies.instrument.card import Instrument, load_card, save_card
+from studies.reports import scan as pictures
+from studies.reports.digits import plain, to_interval
 from studies.results import Chapter, Column, Facts, Figure, Result, Sentence, Table
-
-if TYPE_CHECKING:
-    from studies.instrument.card import Instrument
-    from studies.scan import Scan, ScanInterval
+from studies.scan import Scan, ScanInterval, scan_faces
 
 NONE = "none"
 SPLITS = (
@@ -101,12 +106,6 @@ def scan(
     save : str
         Write a card with the fitted faces as its imperfection; the tables are written beside it.
     """
-    from shell.constants import zero_Celsius
-    from studies.cli.output import say
-    from studies.errors import InputError, naming
-    from studies.instrument.card import load_card
-    from studies.scan import scan_faces
-
     files = {name: path for name, path in (("inner", inner), ("outer", outer)) if path != NONE}
     if not files:
         raise InputError("no face given: name the file of the inner face, of the outer face, or of both.")
@@ -136,10 +135,8 @@ def scan(
     )
 
 
-def _parts(found: "Scan", payload: dict[str, Any]) -> "list[Chapter]":
+def _parts(found: Scan, payload: dict[str, Any]) -> list[Chapter]:
     """What people read: splits, maps, harmonics, roundness, faces."""
-    from studies.reports import scan as pictures
-
     faces, splits = payload["faces"], payload["splits"]
     shown = ("wall", "offset") if len(faces) == 2 else tuple(faces)
     rim = max(w.position for w in found.waves)
@@ -167,17 +164,13 @@ def _parts(found: "Scan", payload: dict[str, Any]) -> "list[Chapter]":
 
 def _significant(split: dict[str, Any]) -> dict[str, Any]:
     """A split that is not significant as its limit, without an axis."""
-    from studies.reports.digits import plain
-
     if split["slow_axis_deg"] is not None:
         return split
     limit = f"< {plain(1e3 * split['split_Hz']['high'])}"
     return split | {"split_Hz": {"value": limit, "low": None, "high": None}, "every_order": {}}
 
 
-def _facts(payload: dict[str, Any]) -> "list[tuple[str, str, str]]":
-    from studies.reports.digits import to_interval
-
+def _facts(payload: dict[str, Any]) -> list[tuple[str, str, str]]:
     main = min(payload["splits"], key=lambda one: abs(one["harmonic"] - 2))
     split, low, high = to_interval(*(1e3 * main["split_Hz"][key] for key in ("value", "low", "high")))
     axis, noise = main["slow_axis_deg"], [1e3 * face["noise_um"] for face in payload["faces"].values()]
@@ -188,10 +181,8 @@ def _facts(payload: dict[str, Any]) -> "list[tuple[str, str, str]]":
     ]  # fmt: skip
 
 
-def _payload(found: "Scan", name: str, temperature: float, files: dict[str, str]) -> dict[str, Any]:
-    import numpy as np
-
-    def of(interval: "ScanInterval | None", factor: float) -> dict[str, float] | None:
+def _payload(found: Scan, name: str, temperature: float, files: dict[str, str]) -> dict[str, Any]:
+    def of(interval: ScanInterval | None, factor: float) -> dict[str, float] | None:
         if interval is None:
             return None
         return {key: factor * getattr(interval, key) for key in ("value", "low", "high")}
@@ -251,15 +242,8 @@ def _payload(found: "Scan", name: str, temperature: float, files: dict[str, str]
     }
 
 
-def _save(path: str, instrument: "Instrument", found: "Scan") -> None:
+def _save(path: str, instrument: Instrument, found: Scan) -> None:
     """Write the card with the faces as maps, and their tables first."""
-    from pathlib import Path
-
-    import numpy as np
-
-    from studies.files.writing import write_text
-    from studies.instrument.card import save_card
-
     target, maps = Path(path).resolve(), []
     for name in found.faces:
         x, theta, values = found.map_of(name, columns=72)
@@ -274,9 +258,7 @@ def _save(path: str, instrument: "Instrument", found: "Scan") -> None:
     save_card(instrument.with_table("imperfection", table), path)
 
 
-def _map_csv(found: "Scan") -> str:
-    import numpy as np
-
+def _map_csv(found: Scan) -> str:
     names = [*found.faces, *(("wall", "offset") if len(found.faces) == 2 else ())]
     maps = {name: found.map_of(name) for name in names}
     x, theta, _ = next(iter(maps.values()))

@@ -8,9 +8,16 @@ rms over the run, that the card's uncertainties leave), `warnings`.
 
 from typing import Literal
 
+import numpy as np
+
 from studies.cli.arguments import Seed
-from studies.cli.output import answers
+from studies.cli.output import answers, say
+from studies.errors import InputError
+from studies.instrument.card import load_card
+from studies.record import write_record
 from studies.results import Column, Figure, Result, Sentence, Table
+from studies.simulation.chamber import load_drive
+from studies.simulation.virtual_gyro import simulate_run
 
 
 @answers("hrg.simulate/1")
@@ -60,15 +67,6 @@ def simulate(
     spread : bool
         Show the standard deviation of every column, without noise, that follows from the uncertainties of the card.
     """
-    import numpy as np
-
-    from studies.cli.output import say
-    from studies.errors import InputError
-    from studies.instrument.card import load_card
-    from studies.record import write_record
-    from studies.simulation.chamber import load_drive
-    from studies.simulation.virtual_gyro import simulate_run
-
     if not 0 < row < np.inf:
         raise InputError(f"--row {row:g}: the time between rows must be positive (s).")
     instrument = load_card(card)

@@ -1,24 +1,20 @@
 """What spin about the axis does to pairs, for `hrg modes --spin`."""
 
-from typing import TYPE_CHECKING, Any
+from math import isfinite, pi, radians
+from typing import Any
 
+from shell.elastic import Elastic
+from shell.modes import Mode
+from shell.spin import spin_shift
+from studies.errors import InputError
 from studies.results import Column, Table
 
-if TYPE_CHECKING:
-    from shell.elastic import Elastic
-    from shell.modes import Mode
 
-
-def spin_pairs(found: "list[Mode]", elastic: "Elastic", rate: float) -> "dict[int, dict[str, Any]]":
+def spin_pairs(found: list[Mode], elastic: Elastic, rate: float) -> dict[int, dict[str, Any]]:
     """What a spin of `rate` °/s makes of each pair, in the frame of the resonator, by the identity of its mode.
 
     The two waves that run around have f + shift ± g Ω/2π, with g = n K of Bryan's factor K.
     """
-    from math import isfinite, pi, radians
-
-    from shell.spin import spin_shift
-    from studies.errors import InputError
-
     if not isfinite(rate):
         raise InputError(f"--spin {rate:g}: it is a rate in °/s.")
     omega = radians(rate)
@@ -45,7 +41,7 @@ def spin_pairs(found: "list[Mode]", elastic: "Elastic", rate: float) -> "dict[in
     return entries
 
 
-def spin_table(modes: "list[dict[str, Any]]") -> Table:
+def spin_table(modes: list[dict[str, Any]]) -> Table:
     """The table of modes with `spin`."""
     rows = [row for row in modes if "spin" in row]
     columns = [

@@ -1,12 +1,19 @@
 """`hrg study`: run, status, report and export of parametric studies."""
 
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
-from studies.cli.output import Answer, answers
-
-if TYPE_CHECKING:
-    from studies.sweeps.results import Results
-    from studies.sweeps.run import Effort
+from studies.cli.output import Answer, answers, print_table, say
+from studies.errors import InputError
+from studies.files.writing import write_text
+from studies.reports.sweep import summarise, sweep_page
+from studies.reports.sweep_analysis import describe_tolerances, tell_tolerance
+from studies.sweeps.export import export_results
+from studies.sweeps.opening import is_running
+from studies.sweeps.results import Results, open_results
+from studies.sweeps.run import Effort, check_functions, estimate_study, run_study
+from studies.sweeps.spec import read_study
+from studies.sweeps.validity import find_invalid
 
 SOLVERS = {"full": "each solved in full", "family": "interpolated between full solves"}
 
@@ -58,12 +65,6 @@ def run(
     quiet : bool
         Show no progress.
     """
-    from studies.cli.output import say
-    from studies.errors import InputError
-    from studies.sweeps.run import check_functions, estimate_study, run_study
-    from studies.sweeps.spec import read_study
-    from studies.sweeps.validity import find_invalid
-
     if workers is not None and workers < 1:
         raise InputError(f"--workers {workers}: must be at least 1.")
     if workers is not None and scheduler is not None:
@@ -102,10 +103,7 @@ def run(
     _print_tolerances(results)
 
 
-def _print_tolerances(results: "Results") -> None:
-    from studies.cli.output import print_table
-    from studies.reports.sweep_analysis import describe_tolerances, tell_tolerance
-
+def _print_tolerances(results: Results) -> None:
     for found in results.store.findings().values():
         if found.get("kind") == "tolerance" and "failed" not in found:
             heading = f"Tolerances with which {100 * found['share']:g} % of designs meet the requirements"
@@ -116,7 +114,7 @@ def _print_tolerances(results: "Results") -> None:
             print(f"No tolerances were found: {found['failed']}")
 
 
-def _failed(results: "Results") -> int:
+def _failed(results: Results) -> int:
     counts = results.store.counts()
     return sum(counts.values()) - counts.get("ok", 0)
 
@@ -130,10 +128,6 @@ def status(folder: str) -> Answer:
     folder : str
         Folder of the study (hrg study run --out).
     """
-    from studies.cli.output import print_table
-    from studies.sweeps.opening import is_running
-    from studies.sweeps.results import open_results
-
     results = open_results(folder)
     found = _status(results, folder, is_running(folder))
     yield found
@@ -156,13 +150,6 @@ def report(folder: str, *, out: str | None = None) -> Answer:
     out : str
         The page; default: report.html in the folder.
     """
-    from pathlib import Path
-
-    from studies.cli.output import say
-    from studies.files.writing import write_text
-    from studies.reports.sweep import summarise, sweep_page
-    from studies.sweeps.results import open_results
-
     results = open_results(folder)
     page = Path(out) if out else Path(folder) / "report.html"
     say("writing the page, with mode shapes if the study has modes ...")
@@ -183,11 +170,6 @@ def export(folder: str, *, out: str | None = None) -> Answer:
     out : str
         The CSV file; default: results.csv in the folder.
     """
-    from pathlib import Path
-
-    from studies.sweeps.export import export_results
-    from studies.sweeps.results import open_results
-
     results = open_results(folder)
     path = Path(out) if out else Path(folder) / "results.csv"
     units = export_results(results, path)
@@ -204,20 +186,18 @@ def export(folder: str, *, out: str | None = None) -> Answer:
     print(f"{_done(results)} cases: {path}; units: {units}")
 
 
-def _done(results: "Results") -> str:
+def _done(results: Results) -> str:
     return str(len(results)) if results.done == results.total else f"{results.done} of {results.total}"
 
 
-def _say_unfinished(results: "Results") -> None:
-    from studies.cli.output import say
-
+def _say_unfinished(results: Results) -> None:
     if results.done < results.total:
         say(
             f"note: the study is not finished: {results.done} of {results.total} cases are done. Run it again to resume."
         )
 
 
-def _status(results: "Results", folder: str, running: bool) -> dict[str, Any]:
+def _status(results: Results, folder: str, running: bool) -> dict[str, Any]:
     counts = results.store.counts()
     done = sum(counts.values())
     finished = done == results.total
@@ -236,15 +216,13 @@ def _status(results: "Results", folder: str, running: bool) -> dict[str, Any]:
     }
 
 
-def _print_reasons(results: "Results") -> None:
-    from studies.cli.output import print_table
-
+def _print_reasons(results: Results) -> None:
     reasons = results.store.reasons(8)
     if reasons:
         print_table("Failed cases", ["cases", "reason"], [[str(count), reason] for reason, count in reasons])
 
 
-def _estimate_words(estimate: "Effort") -> str:
+def _estimate_words(estimate: Effort) -> str:
     return (
         f"{estimate.cases} cases in {estimate.batches} batch{'es' * (estimate.batches != 1)}, {SOLVERS[estimate.solver]}"
         + (f" ({estimate.why_full})" if estimate.why_full else "")

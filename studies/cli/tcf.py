@@ -2,16 +2,24 @@
 
 from typing import TYPE_CHECKING, Any, Literal
 
+import numpy as np
+from numpy.typing import NDArray
+
+from shell.constants import zero_Celsius
+from shell.law import FrequencyLaw
 from studies.cli.arguments import FromDegC, ToDegC, lay_temperatures
 from studies.cli.output import answers
+from studies.errors import InputError
+from studies.instrument.card import load_card
+from studies.instrument.display import display_name
+from studies.law import check_slope_known, law_of
+from studies.papers import hrg
+from studies.record import read_frequency_table
+from studies.reports import style
 from studies.results import Column, Figure, Result, Table, rows_of
 
 if TYPE_CHECKING:
-    import numpy as np
     from matplotlib.figure import Figure as Drawing
-    from numpy.typing import NDArray
-
-    from shell.law import FrequencyLaw
 
 MOST_HARMONIC = 50  # a law of a higher one takes minutes
 PARTS = {"E": "E", "nu": "ν", "rho": "ρ", "h": "h", "r": "r", "base": "base"}
@@ -50,11 +58,6 @@ def tcf(
         A steady-state table (temperature_degC,frequency_Hz) whose local slopes stand beside; with the card hrg-30mm it is
         the HRG paper's Table 1 unless another is given.
     """
-    from studies.errors import InputError
-    from studies.instrument.card import load_card
-    from studies.instrument.display import display_name
-    from studies.law import check_slope_known, law_of
-
     if harmonic > MOST_HARMONIC and theory != "rayleigh":
         raise InputError(
             f"--harmonic {harmonic}: the law over temperature is solved up to n = {MOST_HARMONIC}; hrg modes goes higher."
@@ -118,12 +121,8 @@ def tcf(
     )
 
 
-def _curves(points: "list[dict[str, Any]]", parts: list[str], local: "list[dict[str, float]]") -> "Drawing":
+def _curves(points: list[dict[str, Any]], parts: list[str], local: list[dict[str, float]]) -> "Drawing":
     """The slope, its uncertainty and its parts over temperature."""
-    import numpy as np
-
-    from studies.reports import style
-
     T, slope, sd = (
         np.array([p[key] for p in points])
         for key in ("temperature_degC", "slope_ppm_per_degC", "uncertainty_ppm_per_degC")
@@ -142,9 +141,7 @@ def _curves(points: "list[dict[str, Any]]", parts: list[str], local: "list[dict[
         return made
 
 
-def _points(law: "FrequencyLaw", T: "NDArray[np.float64]") -> "list[dict[str, Any]]":
-    from shell.constants import zero_Celsius
-
+def _points(law: FrequencyLaw, T: NDArray[np.float64]) -> list[dict[str, Any]]:
     parts = law.parts(T)
     f, slope, spread = law.frequency(T), 1e6 * parts.total, 1e6 * law.slope_uncertainty(T)
     return [
@@ -159,7 +156,7 @@ def _points(law: "FrequencyLaw", T: "NDArray[np.float64]") -> "list[dict[str, An
     ]
 
 
-def _moves(law: "FrequencyLaw", T: "NDArray[np.float64]") -> "list[dict[str, Any]]":
+def _moves(law: FrequencyLaw, T: NDArray[np.float64]) -> list[dict[str, Any]]:
     """Return what one standard deviation of each open coefficient of the law moves the slope by."""
     slopes, prior = law.slope_derivatives(T), law.material.prior
     return [
@@ -169,11 +166,8 @@ def _moves(law: "FrequencyLaw", T: "NDArray[np.float64]") -> "list[dict[str, Any
     ]
 
 
-def _measured_slopes(card: str, path: str | None) -> "list[dict[str, float]]":
+def _measured_slopes(card: str, path: str | None) -> list[dict[str, float]]:
     """Return the slope between neighbouring points of a table; empty without one."""
-    from studies.papers import hrg
-    from studies.record import read_frequency_table
-
     if path is not None:
         table = read_frequency_table(path)
         T, f = table.values["temperature_degC"], table.values["frequency_Hz"]

@@ -25,7 +25,10 @@ class Told:
             print(f"{self.what}: {words} ({now - self.begin:.0f} s)", file=sys.stderr, flush=True)
             self.last = now
 
-    def done(self) -> None:
+    def __enter__(self) -> "Told":
+        return self
+
+    def __exit__(self, *_: object) -> None:
         """Clear the line."""
         if self.shown:
             print("\r\x1b[2K", end="", file=sys.stderr, flush=True)

@@ -2,14 +2,20 @@
 
 from typing import TYPE_CHECKING
 
-from studies.cli.output import answers
+import numpy as np
+
+from studies.cli.arguments import Array
+from studies.cli.output import answers, say
+from studies.errors import InputError, naming
+from studies.models import read_model
+from studies.models.kinds.frequency import find_temperature, temperature_error
+from studies.record import Record, read_record, write_record
+from studies.reports import style
 from studies.results import Facts, Figure, Result, Sentence
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure as Drawing
 
-    from studies.cli.arguments import Array
-    from studies.record import Record
 
 SOURCES = ("Wang X. et al., Sensors 2012, 12, 6434 (the HRG paper), eqs. (16)–(18), Table 2, figure 5.",)
 FAR = 3.0
@@ -36,14 +42,6 @@ def temperature(model: str, run: str, /, *, out: str | None = None) -> Result:
     out : str
         Where the record with the temperature goes.
     """
-    import numpy as np
-
-    from studies.cli.output import say
-    from studies.errors import InputError, naming
-    from studies.models import read_model
-    from studies.models.kinds.frequency import find_temperature, temperature_error
-    from studies.record import read_record, write_record
-
     loaded = read_model(model)
     if loaded.kind != "frequency":
         raise InputError(
@@ -101,9 +99,7 @@ def temperature(model: str, run: str, /, *, out: str | None = None) -> Result:
     )
 
 
-def _figure(record: "Record", found: "Array") -> "Drawing":
-    from studies.reports import style
-
+def _figure(record: Record, found: Array) -> "Drawing":
     rows = style.few_rows(len(record))
     hours = record["time_s"][rows] / 3600
     with style.figure(height=3.6) as (made, axes):

@@ -6,18 +6,31 @@ relative change per relative change of each constant; `energy_balance_error`, re
 `chamber_temperature_degC`, and `temperature_degC` of housing, base, stem, shell (its mean) and rim.
 """
 
+import re
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
+from shell.constants import zero_Celsius
+from studies.cli.arguments import Array
 from studies.cli.output import answers
+from studies.errors import InputError
+from studies.instrument.card import load_card
+from studies.instrument.display import name_constant
+from studies.reports import style
 from studies.results import Column, Figure, Result, Table, rows_of
+from studies.simulation.chamber import check_profile, load_profile
+from studies.simulation.heat_path import build_network, build_shell_and_stem
+from thermal.balance import check_energy
+from thermal.network import Network
+from thermal.profile import Profile
+from thermal.radiative import simulate
+from thermal.relaxation import find_relaxation, time_constant_sensitivities
+from thermal.resonator import shell_weights
+from thermal.transient import Transient
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure as Drawing
-
-    from studies.cli.arguments import Array
-    from thermal.network import Network
-    from thermal.profile import Profile
-    from thermal.transient import Transient
 
 
 @answers("hrg.thermal/1")
@@ -38,19 +51,6 @@ def thermal(card: str, profile: str, *, rows: int = 13) -> Result:
     rows : int
         Rows of the table, evenly spaced in time.
     """
-    import numpy as np
-
-    from shell.constants import zero_Celsius
-    from studies.errors import InputError
-    from studies.instrument.card import load_card
-    from studies.instrument.display import name_constant
-    from studies.simulation.chamber import check_profile, load_profile
-    from studies.simulation.heat_path import build_network, build_shell_and_stem
-    from thermal.balance import check_energy
-    from thermal.radiative import simulate
-    from thermal.relaxation import find_relaxation
-    from thermal.resonator import shell_weights
-
     if rows < 2:
         raise InputError(f"--rows {rows}: a table in time needs at least two rows.")
     instrument = load_card(card)
@@ -115,13 +115,8 @@ def thermal(card: str, profile: str, *, rows: int = 13) -> Result:
     )
 
 
-def _curves(transient: "Transient", chamber: "Profile", weights: "Array", names: list[str]) -> "Drawing":
+def _curves(transient: Transient, chamber: Profile, weights: Array, names: list[str]) -> "Drawing":
     """Chamber and nodes over the whole profile."""
-    import numpy as np
-
-    from shell.constants import zero_Celsius
-    from studies.reports import style
-
     time = np.linspace(chamber.start, chamber.end, 600)
     T = transient.observe(time, weights) - zero_Celsius
     with style.figure() as (made, axis):
@@ -135,12 +130,8 @@ def _curves(transient: "Transient", chamber: "Profile", weights: "Array", names:
         return made
 
 
-def _influence(network: "Network", T0: float) -> "dict[str, Any]":
+def _influence(network: Network, T0: float) -> dict[str, Any]:
     """Sensitivity of the slowest time constant, the shell's cells taken together, largest first."""
-    import re
-
-    from thermal.relaxation import time_constant_sensitivities
-
     found: dict[str, float] = {}
     for name, values in time_constant_sensitivities(network, T0).items():
         key = re.sub(r"shell-\d+", "shell", name)

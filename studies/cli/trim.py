@@ -8,17 +8,23 @@ does as another kind of cut over what it does as this one; `measure`, what to me
 one: the next is planned from what is measured after it.
 """
 
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from math import degrees
+from typing import Annotated, Any, Literal
 
+import numpy as np
 from cyclopts import Parameter
 
-from studies.cli.output import answers
+from shell.constants import zero_Celsius
+from shell.resonator import Resonator
+from shell.trimming import ExpectedSplit
+from studies.cli.measured_splits import pair_splits, read_scan, read_unbalance
+from studies.cli.output import answers, say
+from studies.errors import naming
+from studies.instrument.card import load_card
+from studies.reports.digits import plain, to_error
+from studies.reports.trim import polar
 from studies.results import Chapter, Column, Facts, Figure, Result, Sentence, Table
-
-if TYPE_CHECKING:
-    from shell.resonator import Resonator
-    from shell.trimming import ExpectedSplit
-    from studies.trim import CardPlan
+from studies.trim import SURE, CardPlan, Teeth, Tool, other_cuts, plan_for_card
 
 MANY = Parameter(consume_multiple=True)
 KINDS = {"mass": "unstrained mass", "edge": "off the rim", "inner": "off the inner face", "outer": "off the outer face"}
@@ -119,15 +125,6 @@ def trim(
     out : str
         Write the cuts as CSV, for the machine.
     """
-    import numpy as np
-
-    from shell.constants import zero_Celsius
-    from studies.cli.measured_splits import pair_splits, read_scan, read_unbalance
-    from studies.cli.output import say
-    from studies.errors import naming
-    from studies.instrument.card import load_card
-    from studies.trim import Teeth, Tool, other_cuts, plan_for_card
-
     measured = read_scan(scan, harmonic) if scan is not None else pair_splits(split, axis, harmonic, reading_error)
     instrument = load_card(card)
     T = instrument.reference_temperature if temperature is None else temperature + zero_Celsius
@@ -167,11 +164,8 @@ def trim(
     )
 
 
-def _parts(planned: "CardPlan", payload: dict[str, Any]) -> "list[Chapter]":
+def _parts(planned: CardPlan, payload: dict[str, Any]) -> list[Chapter]:
     """What people read: the cuts and what to measure, where they are, the splits expected."""
-    from studies.reports.digits import plain
-    from studies.reports.trim import polar
-
     first, plan = payload["rounds"][0], planned.plan
     in_order = sorted(first["cuts"], key=lambda one: (one["azimuth_deg"], one["position"]))
     cuts = [{"number": k, "done": "☐"} | one for k, one in enumerate(in_order, 1)]
@@ -202,10 +196,8 @@ def _parts(planned: "CardPlan", payload: dict[str, Any]) -> "list[Chapter]":
     ]  # fmt: skip
 
 
-def gains(planned: "CardPlan") -> list[dict[str, float]]:
+def gains(planned: CardPlan) -> list[dict[str, float]]:
     """The change by each planned groove over that by the shape derivative, with its 90 % interval."""
-    from studies.trim import SURE
-
     return [
         {
             "position": x,
@@ -219,9 +211,7 @@ def gains(planned: "CardPlan") -> list[dict[str, float]]:
     ]
 
 
-def _round(planned: "CardPlan", resonator: "Resonator") -> dict[str, Any]:
-    import numpy as np
-
+def _round(planned: CardPlan, resonator: Resonator) -> dict[str, Any]:
     one, cuts = planned.plan.round, planned.cuts
 
     return {
@@ -242,10 +232,8 @@ def _round(planned: "CardPlan", resonator: "Resonator") -> dict[str, Any]:
     }
 
 
-def measure_after(planned: "CardPlan") -> list[str]:
+def measure_after(planned: CardPlan) -> list[str]:
     """Return how certain the cuts are, what to measure after them, and how to use it."""
-    from studies.reports.digits import to_error
-
     plan, found = planned.plan, []
     for entry in gains(planned):
         value, error = entry["value"], (entry["high"] - entry["low"]) / 2
@@ -272,9 +260,7 @@ def measure_after(planned: "CardPlan") -> list[str]:
     return found
 
 
-def _state(state: "ExpectedSplit") -> dict[str, Any]:
-    from math import degrees
-
+def _state(state: ExpectedSplit) -> dict[str, Any]:
     return {
         "harmonic": state.harmonic,
         "frequency_Hz": state.frequency,

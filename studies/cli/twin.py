@@ -5,10 +5,17 @@ written, or null), `fmi` (the version, or null), `compiled` (whether the FMU hol
 or null), `inputs` and `parameters` (lists of `name`, `unit`, `start`), `outputs` (list of `name`, `unit`).
 """
 
+import os
 from typing import Literal
 
 from studies.cli.output import answers
+from studies.errors import InputError
+from studies.files.writing import check_folder, write_text
+from studies.instrument.card import load_card
 from studies.results import Column, Result, Sentence, Table
+from studies.twin.fmu import write_fmu
+from studies.twin.plan import input_starts, plan_twin, symbol
+from studies.twin.source import PROGRAM, exposed, outputs_of, sources
 
 
 @answers("hrg.twin/1")
@@ -42,15 +49,6 @@ def twin(
     theory : str
         Of the shell: solid (three-dimensional) or shell (Naghdi).
     """
-    import os
-
-    from studies.errors import InputError
-    from studies.files.writing import check_folder, write_text
-    from studies.instrument.card import load_card
-    from studies.twin.fmu import write_fmu
-    from studies.twin.plan import input_starts, plan_twin, symbol
-    from studies.twin.source import PROGRAM, exposed, outputs_of, sources
-
     if fmu is None and c is None:
         raise InputError("nothing to do: give --fmu FILE.fmu, --c FOLDER, or both.")
     plan = plan_twin(load_card(card), boundary, theory)

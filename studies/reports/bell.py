@@ -6,20 +6,20 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from compensation.bell import BellChain, apply_chain
+from compensation.bell_calibration import BellRun
+from compensation.stability import allan_deviation
 from shell.constants import zero_Celsius
 from studies import results
+from studies.papers.bvg import BellTwin, Claims
 from studies.reports import style
 from studies.reports.page import Block, Chapter, Picture, Table, Text, draw
-from studies.results import Column
+from studies.results import Column, Payload
 from studies.results.page import make_blocks
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure as Drawing
 
-    from compensation.bell import BellChain
-    from compensation.bell_calibration import BellRun
-    from studies.papers.bvg import BellTwin, Claims
-    from studies.results import Payload
 
 SOURCES = ("Su Z., Liu N., Li Q., Sensors 2015, 15, 23684–23705, doi:10.3390/s150923684: equations (1)–(36).",)
 NAMES = {
@@ -42,7 +42,7 @@ STEP_COLUMNS = (
 )
 
 
-def bell_chapters(twin: "BellTwin") -> list[Chapter]:
+def bell_chapters(twin: BellTwin) -> list[Chapter]:
     """Return the chapters of the twin for the page of `hrg reproduce`."""
     return [
         Chapter(
@@ -67,7 +67,7 @@ TWIN = (
 )
 
 
-def steps_table(steps: "Sequence[Payload]", title: str) -> results.Table:
+def steps_table(steps: Sequence[Payload], title: str) -> results.Table:
     """Return the figures of merit after every step; a column is left out where the records are too short for it."""
     rows = [{**step, "name": NAMES[step["step"]]} for step in steps]
     note = "σ: standard deviation over the temperature run."
@@ -76,7 +76,7 @@ def steps_table(steps: "Sequence[Payload]", title: str) -> results.Table:
     return results.Table(title, rows, STEP_COLUMNS, note)
 
 
-def claim_blocks(claims: "Claims") -> list[Block]:
+def claim_blocks(claims: Claims) -> list[Block]:
     """Return the printed results beside what the printed coefficients make of them."""
     short = dict(claims.averaging)
     rows = [
@@ -134,10 +134,8 @@ def claim_blocks(claims: "Claims") -> list[Block]:
     return [Table("Published claims", ["Claim", "Published", "Recomputed", "Verdict"], rows, note)]
 
 
-def draw_steps(chain: "BellChain", runs: "tuple[BellRun, BellRun, BellRun]") -> "Drawing":
+def draw_steps(chain: BellChain, runs: tuple[BellRun, BellRun, BellRun]) -> "Drawing":
     """Draw the error of the rate before and after: at rest and turning over temperature, and over the applied rate."""
-    from compensation.bell import apply_chain
-
     rates, rest, turning = runs
     with style.figure(1, 3, height=3.2) as (made, axes):
         for panel, run, x, label in (
@@ -165,11 +163,8 @@ def draw_steps(chain: "BellChain", runs: "tuple[BellRun, BellRun, BellRun]") -> 
         return made
 
 
-def draw_allan(chain: "BellChain", rest: "BellRun") -> Picture:
+def draw_allan(chain: BellChain, rest: BellRun) -> Picture:
     """Draw the Allan deviation at rest after the rough step, after the chain, and after the filter (figure 19)."""
-    from compensation.bell import apply_chain
-    from compensation.stability import allan_deviation
-
     result = apply_chain(chain, rest.time, rest.output, rest.temperature, extrapolate=True)
     step = float(rest.time[1] - rest.time[0])
     with style.figure(height=3.4) as (made, axes):

@@ -5,8 +5,10 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from compensation.bias import SELECTED_BY_THE_PAPER, TERMS
+from compensation.bias import SELECTED_BY_THE_PAPER, TERMS, Variable
+from compensation.memory import Memory
 from compensation.noise import FLAT
+from studies.bias import BiasStudy, Judged, Stability
 from studies.models.file import widen
 from studies.models.kinds.bias import OUTPUTS
 from studies.reports import style
@@ -16,9 +18,6 @@ from studies.results import Column, Facts, Figure, Part, Sentence, Table, Where
 if TYPE_CHECKING:
     from matplotlib.figure import Figure as Drawing
 
-    from compensation.bias import Variable
-    from compensation.memory import Memory
-    from studies.bias import BiasStudy, Judged, Stability
 
 SOURCES = (
     "Wang X. et al., Sensors 2012, 12, 6434 (the HRG paper), eqs. (19)–(22).",
@@ -62,7 +61,7 @@ COEFFICIENTS = (
 )
 
 
-def facts(study: "BiasStudy", method: Method) -> Facts:
+def facts(study: BiasStudy, method: Method) -> Facts:
     """Return the numbers that carry the answer."""
     judged, unit = study.by(method), _unit(study.output)
     (before, after), held = judged.training, judged.held_out
@@ -83,7 +82,7 @@ def _times(gain: float) -> str:
     return "none" if f"{gain:.2f}" == "1.00" else f"{gain:.2f}×"
 
 
-def verdict(study: "BiasStudy", method: Method) -> str:
+def verdict(study: BiasStudy, method: Method) -> str:
     """Say in one or two sentences what the model is worth."""
     judged = study.by(method)
     if not judged.fit.terms:
@@ -108,7 +107,7 @@ def verdict(study: "BiasStudy", method: Method) -> str:
     )
 
 
-def how_rows_were_made(study: "BiasStudy") -> str:
+def how_rows_were_made(study: BiasStudy) -> str:
     """Say how the rows of the fit were made."""
     run, variable = study.runs[0], study.runs[0].variable
     missing, spikes = sum(r.missing for r in study.runs), sum(r.spikes for r in study.runs)
@@ -121,14 +120,14 @@ def how_rows_were_made(study: "BiasStudy") -> str:
     )
 
 
-def memory_sentence(memory: "Memory") -> str:
+def memory_sentence(memory: Memory) -> str:
     """Say what stands between the thermometer and the bias, if anything does."""
     parts = [f"a lag of {memory.lag:g} s"] if memory.lag else []
     parts += [f"a hysteresis of half-width {memory.play:.2g} °C, as a tenth candidate"] if memory.play else []
     return f" The temperature acts through {' and '.join(parts)}." if parts else ""
 
 
-def path_table(judged: "Judged", where: Where = "everywhere") -> Table:
+def path_table(judged: Judged, where: Where = "everywhere") -> Table:
     """Return the steps of a selection: term, F, p, criterion, residual."""
     selection, symbol = judged.fit.selection, judged.fit.variable.symbol
     steps = () if selection is None else (selection.start, *selection.steps)
@@ -158,7 +157,7 @@ def path_table(judged: "Judged", where: Where = "everywhere") -> Table:
     return Table(f"Selection, {METHOD[judged.method]}", rows, STEP_COLUMNS, " ".join(notes), where)
 
 
-def coefficients_table(judged: "Judged", output: str) -> Table:
+def coefficients_table(judged: Judged, output: str) -> Table:
     """Return the coefficients with the naive error and the one that respects the autocorrelation."""
     fit, rows = judged.fit, []
     for name, value, error, naive in zip(
@@ -189,7 +188,7 @@ def coefficients_table(judged: "Judged", output: str) -> Table:
     return Table(f"Coefficients, {METHOD[judged.method]}", rows, COEFFICIENTS, note)
 
 
-def gain_table(study: "BiasStudy") -> Table:
+def gain_table(study: BiasStudy) -> Table:
     """Return bias stability before and after, on the fitted and on held-out data, for both selections."""
     rows = []
     for judged in study.judged:
@@ -224,7 +223,7 @@ def gain_table(study: "BiasStudy") -> Table:
     return Table("Bias stability", rows, columns, note)
 
 
-def stability_parts(study: "BiasStudy") -> list[Part]:
+def stability_parts(study: BiasStudy) -> list[Part]:
     """Return Allan deviation and noise coefficients before and after, where the longest run is long enough."""
     if study.before is None:
         return []
@@ -242,12 +241,12 @@ def _where_read(output: str) -> str:
     )
 
 
-def noise_table(study: "BiasStudy") -> Table:
+def noise_table(study: BiasStudy) -> Table:
     """Return N, B, K and the minimum of the Allan deviation before and after, on the longest run."""
     hours, unit = study.output == "bias_deg_per_h", _unit(study.output)
     n_scale, k_scale, n_unit, k_unit = (1 / 60, 60.0, "°/√h", "°/h/√h") if hours else (1.0, 1.0, "°/√s", "°/s/√s")
 
-    def row(label: str, spectrum: "Stability") -> dict[str, object]:
+    def row(label: str, spectrum: Stability) -> dict[str, object]:
         noise, (flat, low, high) = spectrum.noise, spectrum.allan.bias_instability
         return {
             "label": label,
@@ -274,7 +273,7 @@ def noise_table(study: "BiasStudy") -> Table:
     return Table("Noise coefficients", rows, columns, note)
 
 
-def runs_figure(study: "BiasStudy", method: Method) -> Figure:
+def runs_figure(study: BiasStudy, method: Method) -> Figure:
     """Return the averages before and after, and the model, three runs beside each other: like the paper's figure 6."""
     first = f" The first {MOST_RUNS} of {len(study.runs)} runs." if len(study.runs) > MOST_RUNS else ""
     caption = f"Averages of the output with the model (above) and residuals (below), as in the paper's figure 6.{first}"
@@ -283,7 +282,7 @@ def runs_figure(study: "BiasStudy", method: Method) -> Figure:
     )
 
 
-def _draw_runs(study: "BiasStudy", method: Method) -> "Drawing":
+def _draw_runs(study: BiasStudy, method: Method) -> "Drawing":
     unit = _unit(study.output)
     fit, shown = study.by(method).fit, study.runs[:MOST_RUNS]
     columns = min(len(shown), 3)
@@ -308,7 +307,7 @@ def _draw_runs(study: "BiasStudy", method: Method) -> "Drawing":
         return figure
 
 
-def _draw_allan(study: "BiasStudy") -> "Drawing":
+def _draw_allan(study: BiasStudy) -> "Drawing":
     with style.figure(height=3.8) as (figure, axes):
         for spectrum, colour, label in ((study.before, style.ORANGE, "before"), (study.after, style.BLUE, "after")):
             if spectrum is None:
@@ -339,7 +338,7 @@ def _measured(value: float, uncertainty: float) -> str:
     return " ± ".join(to_error(value, uncertainty)) if value > 0 else f"not detected (< {plain(2 * uncertainty, 1)})"
 
 
-def _coefficient_unit(output: str, term: str, variable: "Variable") -> tuple[float, str]:
+def _coefficient_unit(output: str, term: str, variable: Variable) -> tuple[float, str]:
     """Return the unit of a coefficient for people, and what its value is multiplied by: a rate of temperature is in K/min."""
     state, rate = TERMS.get(term, (1, 0)) if term != "constant" else (0, 0)
     over = "K" if variable.unit == "°C" else variable.unit

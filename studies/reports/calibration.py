@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from shell.constants import zero_Celsius
+from studies.calibration.calibrate import Calibration
 from studies.calibration.observed import HOUSING, QUADRATURE, SETTLED, WORDS
 from studies.instrument.display import display_name
 from studies.reports import style
@@ -15,7 +16,6 @@ from studies.results import Chapter, Column, Facts, Figure, Sentence, Table
 if TYPE_CHECKING:
     from matplotlib.figure import Figure as Drawing
 
-    from studies.calibration.calibrate import Calibration
 
 NAMES = {name: word[0].upper() + word[1:] for name, word in WORDS.items()}
 SHOWN = {
@@ -62,7 +62,7 @@ WIDTHS = (
 )
 
 
-def lead(found: "Calibration", data: Sequence[str]) -> str:
+def lead(found: Calibration, data: Sequence[str]) -> str:
     """Return what was calibrated, and how many of its values changed."""
     told = [one.told_by for one in found.estimates]
     moved = sum(abs(one.shift_sd) > 2 for one in found.estimates)
@@ -73,7 +73,7 @@ def lead(found: "Calibration", data: Sequence[str]) -> str:
     )
 
 
-def calibration_parts(found: "Calibration", payload: Mapping[str, Any]) -> list[Chapter]:
+def calibration_parts(found: Calibration, payload: Mapping[str, Any]) -> list[Chapter]:
     """Return what people read of a calibration, with the tables over rows of its payload."""
     responses = [_scaled(name, row) for name, row in payload["responses"].items()]
     facts = [
@@ -146,7 +146,7 @@ def _held_out_note(payload: Mapping[str, Any]) -> str:
     )
 
 
-def _draw_residuals(found: "Calibration") -> "Drawing":
+def _draw_residuals(found: Calibration) -> "Drawing":
     with style.figure(1, len(found.ladder), height=2.5, squeeze=False) as (made, axes):
         for axis, (name, rung) in zip(axes[0], found.ladder.items(), strict=True):
             unit, scale = SHOWN[name]
@@ -162,7 +162,7 @@ def _draw_residuals(found: "Calibration") -> "Drawing":
         return made
 
 
-def _draw_shifts(found: "Calibration") -> "Drawing":
+def _draw_shifts(found: Calibration) -> "Drawing":
     told = [one for one in found.estimates if one.told_by != "prior"][:30] or list(found.estimates)[:30]
     with style.figure(height=0.24 * len(told) + 0.9) as (made, axis):
         place = np.arange(len(told))[::-1]
@@ -175,7 +175,7 @@ def _draw_shifts(found: "Calibration") -> "Drawing":
         return made
 
 
-def residual_figure(found: "Calibration") -> "Drawing":
+def residual_figure(found: Calibration) -> "Drawing":
     """Draw measured minus predicted after the calibration, over time; of tables alone over temperature."""
     problem, state = found.fit.problem, found.fit.state
     names = [name for name in problem.responses if name != SETTLED]

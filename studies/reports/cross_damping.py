@@ -4,25 +4,24 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from compensation.cross_damping import CrossDampingModel, RestRun
 from compensation.decimation import average_blocks
 from compensation.improvement import AVERAGING
 from shell.constants import zero_Celsius
+from studies.papers import cvg_cross_damping as paper
+from studies.papers.cvg_cross_damping import CrossDampingTwin
 from studies.reports import style
 from studies.reports.page import Chapter, Table, Text, draw
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure as Drawing
 
-    from compensation.cross_damping import CrossDampingModel, RestRun
-    from studies.papers.cvg_cross_damping import CrossDampingTwin
 
 SOURCES = ("Apostolyuk V., Chikovani V., Temperature error model in Coriolis vibratory gyroscopes: eqs. (1)–(10).",)
 
 
-def twin_chapters(twin: "CrossDampingTwin") -> list[Chapter]:
+def twin_chapters(twin: CrossDampingTwin) -> list[Chapter]:
     """Return the chapter on figures 1 and 2 of the paper, from a virtual gyro, for the page of `hrg reproduce`."""
-    from studies.papers import cvg_cross_damping as paper
-
     unit = paper.DEG_PER_H
     low, middle, high = twin.spread
     told = (
@@ -49,7 +48,7 @@ def twin_chapters(twin: "CrossDampingTwin") -> list[Chapter]:
     return [chapter]
 
 
-def determinants_table(twin: "CrossDampingTwin") -> Table:
+def determinants_table(twin: CrossDampingTwin) -> Table:
     """Return what the improvement depends on: lag of the resonator and white noise."""
     rows = [
         [f"{lag:g}", *(f"{ratio:.1f}" for ratio in ratios)] for lag, ratios in zip(twin.lags, twin.table, strict=True)
@@ -62,7 +61,7 @@ def determinants_table(twin: "CrossDampingTwin") -> Table:
     return Table("Improvement factor by resonator lag and white noise", columns, rows, note)
 
 
-def draw_runs(runs: "tuple[RestRun, ...]", model: "CrossDampingModel", unit: float, name: str) -> "Drawing":
+def draw_runs(runs: tuple[RestRun, ...], model: CrossDampingModel, unit: float, name: str) -> "Drawing":
     """Draw runs one after the other (CVG cross-damping paper, figures 1 and 2); `unit` in rad/s, called `name`."""
     with style.figure(2, height=4.8, sharex=True, height_ratios=(1, 2)) as (made, (upper, lower)):
         begin = 0.0

@@ -1,18 +1,17 @@
 """Parts of a diagnosis: the verdict, its causes, sizes and gain, and the evidence after them."""
 
 from collections.abc import Iterator, Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from studies.diagnosis.investigate import Diagnosis
 from studies.diagnosis.response import RESPONSES
 from studies.diagnosis.verdict import Cause, Verdict
+from studies.effects import find_effect
 from studies.instrument.display import display_name
 from studies.instrument.units import split_unit, unit_of
 from studies.reports import diagnosis_pictures as pictures
 from studies.reports.digits import plain
 from studies.results import Chapter, Column, Facts, Figure, Part, Sentence, Table
-
-if TYPE_CHECKING:
-    from studies.diagnosis.investigate import Diagnosis
 
 NAMES = {column: response.word for column, response in RESPONSES.items()}
 WORDS = {
@@ -160,7 +159,7 @@ def next_step(verdict: Verdict) -> list[Sentence]:
     return [Sentence(f"Next experiment: {verdict.next_experiment}", "note")] if verdict.next_experiment else []
 
 
-def diagnosis_parts(diagnosis: "Diagnosis") -> list[Chapter]:
+def diagnosis_parts(diagnosis: Diagnosis) -> list[Chapter]:
     """Return what people read of the diagnosis of a campaign."""
     verdict = diagnosis.verdict
     files = ", ".join(dict.fromkeys(run.label for run in diagnosis.campaign.runs))
@@ -183,7 +182,7 @@ def diagnosis_parts(diagnosis: "Diagnosis") -> list[Chapter]:
     ]  # fmt: skip
 
 
-def _residual(diagnosis: "Diagnosis") -> Iterator[Part]:
+def _residual(diagnosis: Diagnosis) -> Iterator[Part]:
     main, run = _main_response(diagnosis.verdict), diagnosis.verdict.next_run
     if main is not None and main in diagnosis.inquiries:
         when = " before and after the named causes are added" if diagnosis.inquiries[main].final.terms else ""
@@ -192,7 +191,7 @@ def _residual(diagnosis: "Diagnosis") -> Iterator[Part]:
         yield Figure(lambda: pictures.next_run_picture(run), f"Suggested next run: {run.profile}.")
 
 
-def _alternatives(diagnosis: "Diagnosis", response: str) -> Iterator[Part]:
+def _alternatives(diagnosis: Diagnosis, response: str) -> Iterator[Part]:
     inquiry = diagnosis.inquiries[response]
     caption = f"Baseline residual of the {NAMES[response]} (averages over {diagnosis.campaign.step:.0f} s) against its inputs."
     yield Figure(lambda: pictures.residual_views(diagnosis, response), caption)
@@ -210,8 +209,6 @@ def _alternatives(diagnosis: "Diagnosis", response: str) -> Iterator[Part]:
 
 
 def _summary(cause: Cause) -> str:
-    from studies.effects import find_effect
-
     effect = find_effect(cause.effect)
     return f"{effect.summary}. To isolate it: {effect.isolate}. Source: {effect.source}."
 

@@ -6,6 +6,7 @@ import numpy as np
 
 from shell.constants import zero_Celsius
 from studies.diagnosis.held_out import residuals
+from studies.diagnosis.investigate import Diagnosis
 from studies.diagnosis.planning.next_run import NextRun
 from studies.diagnosis.response import RESPONSES
 from studies.diagnosis.verdict import ResponseResult
@@ -15,10 +16,8 @@ from studies.reports.style import BLACK, BLUE, ORANGE, VERMILION, figure
 if TYPE_CHECKING:
     from matplotlib.figure import Figure as Drawing
 
-    from studies.diagnosis.investigate import Diagnosis
 
-
-def ladder(diagnosis: "Diagnosis") -> "Drawing":
+def ladder(diagnosis: Diagnosis) -> "Drawing":
     """Draw what is left of every response: as shipped, calibrated, with the named physics, noise; on held-out rows."""
     columns = [c for c in diagnosis.verdict.responses if c in diagnosis.inquiries]
     with figure(1, len(columns), height=3.0, squeeze=False) as (canvas, axes):
@@ -59,7 +58,7 @@ def rungs(result: ResponseResult) -> list[tuple[str, float | None]]:
     ]
 
 
-def as_temperature(diagnosis: "Diagnosis", column: str, value: float) -> str | None:
+def as_temperature(diagnosis: Diagnosis, column: str, value: float) -> str | None:
     """Return the error of temperature that a residual of the frequency amounts to; None for the others."""
     if not RESPONSES[column].thermometer:
         return None
@@ -75,7 +74,7 @@ def as_temperature(diagnosis: "Diagnosis", column: str, value: float) -> str | N
     )
 
 
-def before_and_after(diagnosis: "Diagnosis", response: str) -> "Drawing":
+def before_and_after(diagnosis: Diagnosis, response: str) -> "Drawing":
     """Draw the residual over the campaign before and, if anything is named, after the extension; the noise as a band."""
     inquiry, unit = diagnosis.inquiries[response], RESPONSES[response]
     noise = (diagnosis.verdict.responses[response].noise or 0.0) * unit.scale
@@ -105,7 +104,7 @@ def _thinned(time: np.ndarray, values: np.ndarray, most: int = 500) -> tuple[np.
     return time[::step], values[::step]
 
 
-def residual_views(diagnosis: "Diagnosis", response: str) -> "Drawing":
+def residual_views(diagnosis: Diagnosis, response: str) -> "Drawing":
     """Draw the baseline's residual against temperature (heating and cooling), rate, frequency and the drives."""
     campaign, inquiry, unit = diagnosis.campaign, diagnosis.inquiries[response], RESPONSES[response]
     fit = inquiry.plain

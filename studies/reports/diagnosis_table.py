@@ -3,6 +3,7 @@
 from typing import TYPE_CHECKING
 
 from studies.diagnosis.constants import CONSTANTS
+from studies.diagnosis.table import TableDiagnosis
 from studies.reports.diagnosis import headline, next_step, reason
 from studies.reports.digits import plain, to_error
 from studies.reports.style import BLACK, ORANGE, VERMILION, figure
@@ -11,7 +12,6 @@ from studies.results import Chapter, Column, Facts, Figure, Sentence, Table
 if TYPE_CHECKING:
     from matplotlib.figure import Figure as Drawing
 
-    from studies.diagnosis.table import TableDiagnosis
 
 CANDIDATES = (
     Column("form", "candidate"),
@@ -26,7 +26,7 @@ EVIDENCE = (
 )
 
 
-def table_parts(found: "TableDiagnosis") -> list[Chapter]:
+def table_parts(found: TableDiagnosis) -> list[Chapter]:
     """Return what people read of a steady-state table: the answer, and the other candidates."""
     verdict = found.verdict
     candidates = [dict(zip([one.key for one in CANDIDATES], row, strict=True)) for row in found.candidates]
@@ -44,7 +44,7 @@ def table_parts(found: "TableDiagnosis") -> list[Chapter]:
     ]  # fmt: skip
 
 
-def law_facts(found: "TableDiagnosis") -> list[tuple[str, str, str]]:
+def law_facts(found: TableDiagnosis) -> list[tuple[str, str, str]]:
     """Return the residual of the law, or the measured level and slope beside those of the card, to the digits of its uncertainty."""
     compared = found.verdict.details.get("settled")
     if compared is None:
@@ -59,7 +59,7 @@ def law_facts(found: "TableDiagnosis") -> list[tuple[str, str, str]]:
     return facts
 
 
-def table_residuals(found: "TableDiagnosis") -> "Drawing":
+def table_residuals(found: TableDiagnosis) -> "Drawing":
     """Draw the residuals of the law, the baseline and the strongest candidate of a steady-state table."""
     given = ("card as given", "card calibrated") if found.from_card else ("default law", "baseline: curvature free")
     with figure(1, 1, height=3.2) as (canvas, axis):

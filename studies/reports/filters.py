@@ -1,13 +1,12 @@
 """Chapters on demodulated dynamics and optimal filters: the CVG filtering paper's figures 3 and 5–7."""
 
-from typing import TYPE_CHECKING
+import numpy as np
 
+from compensation.demodulated import ErrorMap, respond_to_oscillating_rate
+from compensation.sensitive_element import SensitiveElement, tune
+from studies.papers.cvg_filters import ZETA, Filtered, FilterStudy, K
 from studies.reports import style
 from studies.reports.page import Block, Chapter, Picture, Table, Text, draw
-
-if TYPE_CHECKING:
-    from compensation.demodulated import ErrorMap
-    from studies.papers.cvg_filters import Filtered, FilterStudy
 
 MOST_POINTS = 3000
 SOURCES = (
@@ -15,7 +14,7 @@ SOURCES = (
 )
 
 
-def filter_chapters(study: "FilterStudy", error_map: "ErrorMap") -> list[Chapter]:
+def filter_chapters(study: FilterStudy, error_map: ErrorMap) -> list[Chapter]:
     """Return the chapters for the responses (13), (14), figure 3, the Wiener filters with figure 5, and the Kalman filter with figures 6, 7."""
     wiener: list[Block] = [wiener_table(study), draw_filtered(study.figure5, FIGURE5, "Wiener filter")]
     kalman: list[Block] = [
@@ -43,12 +42,6 @@ APART, LIGHT = 1.02, 0.2
 
 def draw_responses() -> Picture:
     """Draw amplitude and phase (14) over the frequency of the rate, of both signs, for three gyros."""
-    import numpy as np
-
-    from compensation.demodulated import respond_to_oscillating_rate
-    from compensation.sensitive_element import SensitiveElement, tune
-    from studies.papers.cvg_filters import ZETA, K
-
     tuned = tune(K, ZETA)
     gyros = {
         f"matched modes, ζ = {ZETA:g}": tuned,
@@ -75,10 +68,8 @@ def draw_responses() -> Picture:
 FIGURE5 = "Square pulses through the full dynamics (1) with white noise (γ = 0.1, B = 3 Hz), filtered by eq. (35)."
 
 
-def draw_error_map(error_map: "ErrorMap") -> Picture:
+def draw_error_map(error_map: ErrorMap) -> Picture:
     """Draw figure 3, the integral error over the ratios of frequency and damping."""
-    import numpy as np
-
     with style.figure(height=3.8) as (made, axes):
         shades = axes.contourf(
             error_map.frequency_ratio,
@@ -98,9 +89,8 @@ def draw_error_map(error_map: "ErrorMap") -> Picture:
     return draw(made, caption, "A map of the error, least where both modes agree.")
 
 
-def map_sentence(error_map: "ErrorMap") -> str:
+def map_sentence(error_map: ErrorMap) -> str:
     """Say what the paper leaves open, and how far the error reaches in numbers."""
-    import numpy as np
 
     def at(ratio: float, damping: float) -> float:
         i = int(np.argmin(np.abs(error_map.damping_ratio - damping)))
@@ -115,7 +105,7 @@ def map_sentence(error_map: "ErrorMap") -> str:
     )
 
 
-def wiener_table(study: "FilterStudy") -> Table:
+def wiener_table(study: FilterStudy) -> Table:
     """Return error variances over the rate's variance, before and after the renormalisation."""
     rows = [
         [
@@ -136,7 +126,7 @@ def wiener_table(study: "FilterStudy") -> Table:
     return Table("Wiener filters for k = 500 Hz, ζ = 0.025, γ = 0.1, B = 3 Hz", columns, rows, note)
 
 
-def draw_filtered(case: "Filtered", caption: str, name: str) -> Picture:
+def draw_filtered(case: Filtered, caption: str, name: str) -> Picture:
     """Draw true rate, noisy output and estimate over time."""
     rows = slice(None, None, max(len(case.time) // MOST_POINTS, 1))
     with style.figure(height=3.4) as (made, axes):
@@ -154,7 +144,7 @@ def draw_filtered(case: "Filtered", caption: str, name: str) -> Picture:
     return draw(made, caption + numbers, "Square pulses, a noisy output and a filtered one.")
 
 
-def draw_kalman(study: "FilterStudy") -> Picture:
+def draw_kalman(study: FilterStudy) -> Picture:
     """Draw figure 6 (output and its estimate) above figure 7 (true rate, output, estimated rate)."""
     six, seven = study.figure6, study.figure7
     rows = slice(None, None, max(len(six.time) // MOST_POINTS, 1))
@@ -179,7 +169,7 @@ def draw_kalman(study: "FilterStudy") -> Picture:
     return draw(made, caption, "Output and rate with their estimates over time.")
 
 
-def step_table(study: "FilterStudy") -> Table:
+def step_table(study: FilterStudy) -> Table:
     """Return the error of the rate estimate for several sampling steps."""
     rows = [
         [f"{1e3 * step:g}", f"{noise:.4f}", f"{case.lag_error:.3f}", f"{case.output_error:.3f}"]
@@ -193,7 +183,7 @@ def step_table(study: "FilterStudy") -> Table:
     return Table("Rate estimate by sampling step", columns, rows, note)
 
 
-def kalman_sentence(study: "FilterStudy") -> str:
+def kalman_sentence(study: FilterStudy) -> str:
     """Say what the filter's own statistics say of the pulses."""
     low, high = study.nis_band
     inside = "inside" if low <= study.mean_nis <= high else "outside"

@@ -3,20 +3,18 @@
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from compensation.errors import CompensationError
-from compensation.frequency import misreading_degC
+from compensation.frequency import FrequencyFit, misreading_degC
 from studies.models.file import widen
+from studies.papers.hrg import FrequencyStudy
 from studies.reports import style
 from studies.reports.digits import raised
 from studies.results import Column, Facts, Figure, Part, Table, rows_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure as Drawing
-    from numpy.typing import NDArray
-
-    from compensation.frequency import FrequencyFit
-    from studies.papers.hrg import FrequencyStudy
 
 SOURCES = ("Wang X. et al., Sensors 2012, 12, 6434 (the HRG paper), eqs. (16)–(18), Table 2, figures 4 and 5.",)
 ORDERS = {1: "straight line", 2: "quadratic", 3: "cubic", 4: "quartic", 5: "quintic"}
@@ -28,7 +26,7 @@ def name_order(order: int) -> str:
     return ORDERS.get(order, f"polynomial of order {order}")
 
 
-def facts(study: "FrequencyStudy") -> Facts:
+def facts(study: FrequencyStudy) -> Facts:
     """Return the numbers that carry the answer."""
     fit = study.fit
     middle = float(np.mean(fit.temperature_range_degC))
@@ -42,7 +40,7 @@ def facts(study: "FrequencyStudy") -> Facts:
     )
 
 
-def coefficients_table(study: "FrequencyStudy") -> Table:
+def coefficients_table(study: FrequencyStudy) -> Table:
     """Return the polynomial's coefficients with their standard errors."""
     rows = [
         {"name": f"a{k}" if k else "f0", "value": c, "error": u, "unit": "Hz" + f"/°C{raised(k) * (k > 1)}" * (k > 0)}
@@ -58,7 +56,7 @@ def coefficients_table(study: "FrequencyStudy") -> Table:
     return Table(f"Coefficients about T0 = {study.fit.reference_temperature_degC:g} °C", rows, columns, note)
 
 
-def inverse_table(study: "FrequencyStudy") -> Table:
+def inverse_table(study: FrequencyStudy) -> Table:
     """Return the temperatures that the inverse of the fit gives."""
     rows = rows_of(
         {
@@ -79,7 +77,7 @@ def inverse_table(study: "FrequencyStudy") -> Table:
     return Table("Temperature from frequency", rows, columns, "Error: actual minus calculated temperature.")
 
 
-def order_table(study: "FrequencyStudy") -> Table:
+def order_table(study: FrequencyStudy) -> Table:
     """Return the fits of rising order and the F-test of each against the one before."""
     rows = [
         {
@@ -107,7 +105,7 @@ def order_table(study: "FrequencyStudy") -> Table:
     return Table("Polynomials of rising order", rows, columns, note)
 
 
-def order_sentence(study: "FrequencyStudy") -> str:
+def order_sentence(study: FrequencyStudy) -> str:
     """Say which order the data support."""
     asked, order = study.orders.recommended, study.fit.order
     if asked <= order:
@@ -120,12 +118,12 @@ def order_sentence(study: "FrequencyStudy") -> str:
     )
 
 
-def order_parts(study: "FrequencyStudy") -> list[Part]:
+def order_parts(study: FrequencyStudy) -> list[Part]:
     """Return what shows the order that the data support, and what that means outside the measured range."""
     return [order_table(study), *([_extrapolation(study, study.next_fit)] if study.next_fit else [])]
 
 
-def fit_figure(study: "FrequencyStudy") -> Figure:
+def fit_figure(study: FrequencyStudy) -> Figure:
     """Return the fitted curve over the measured points, with the residuals below (HRG paper, figure 4)."""
 
     def draw() -> "Drawing":
@@ -147,7 +145,7 @@ def fit_figure(study: "FrequencyStudy") -> Figure:
     return Figure(draw, "Measured frequency, fitted curve and residuals.", "Frequency and residuals over temperature.")
 
 
-def error_figure(study: "FrequencyStudy") -> Figure:
+def error_figure(study: FrequencyStudy) -> Figure:
     """Return the error of the calculated temperature (HRG paper, figure 5a)."""
 
     def draw() -> "Drawing":
@@ -169,7 +167,7 @@ def error_figure(study: "FrequencyStudy") -> Figure:
     )
 
 
-def _extrapolation(study: "FrequencyStudy", other: "FrequencyFit") -> Figure:
+def _extrapolation(study: FrequencyStudy, other: FrequencyFit) -> Figure:
     low, high = study.fit.temperature_range_degC
     names = name_order(study.fit.order), name_order(other.order)
     # Which of the two holds out there is not known, so each is read at the other's frequency.
@@ -199,14 +197,14 @@ def _extrapolation(study: "FrequencyStudy", other: "FrequencyFit") -> Figure:
     return Figure(draw, caption, "Difference of two fits: small inside the measured range, large outside.")
 
 
-def _most(ends: "NDArray[np.float64]") -> str:
+def _most(ends: NDArray[np.float64]) -> str:
     """Write the difference of two readings; a curve that turns has none beyond its turning point."""
     if not np.isfinite(ends).all():
         return "more than the range" if not np.isfinite(ends).any() else f"{np.nanmin(ends):.1f} °C or more"
     return f"{ends.max():.2g} °C"
 
 
-def _fits(study: "FrequencyStudy") -> "list[tuple[FrequencyFit, str, str]]":
+def _fits(study: FrequencyStudy) -> list[tuple[FrequencyFit, str, str]]:
     shown = [(study.fit, style.BLUE, "o")]
     if study.next_fit is not None:
         shown.append((study.next_fit, style.VERMILION, "s"))

@@ -1,22 +1,22 @@
 """The chapters on the two CVG papers and the BVG paper for the page of `hrg reproduce`, and their numbers."""
 
 import dataclasses
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from studies.papers.bvg import BellTwin, reproduce_bell
+from studies.papers.bvg_theory import compare_bell_theory, read_planted_rate
+from studies.papers.cvg_cross_damping import PRINTED_IMPROVEMENT, CrossDampingTwin, reproduce_cross_damping
+from studies.papers.cvg_filters import FilterStudy, study_error_map, study_filters
+from studies.papers.loop_claims import study_claims
 from studies.reports import bell, cross_damping, filters, loop_claims
 from studies.reports.bell_theory import theory_chapters
-
-if TYPE_CHECKING:
-    from studies.papers.bvg import BellTwin
-    from studies.papers.cvg_cross_damping import CrossDampingTwin
-    from studies.papers.cvg_filters import FilterStudy
-    from studies.reports.page import Chapter
+from studies.reports.page import Chapter
 
 SOURCES = (*cross_damping.SOURCES, *filters.SOURCES, *bell.SOURCES, *loop_claims.SOURCES)
 MAP_POINTS = 31
 
 
-def reproduce_gyro_papers(seeds: int = 20) -> "tuple[list[Chapter], dict[str, Any]]":
+def reproduce_gyro_papers(seeds: int = 20) -> tuple[list[Chapter], dict[str, Any]]:
     """Run the virtual gyros of the three papers; return their chapters and the numbers for summary.json.
 
     Parameters
@@ -24,12 +24,6 @@ def reproduce_gyro_papers(seeds: int = 20) -> "tuple[list[Chapter], dict[str, An
     seeds : int
         Virtual runs for the spread of the cross-damping improvement.
     """
-    from studies.papers.bvg import reproduce_bell
-    from studies.papers.bvg_theory import compare_bell_theory, read_planted_rate
-    from studies.papers.cvg_cross_damping import reproduce_cross_damping
-    from studies.papers.cvg_filters import study_error_map, study_filters
-    from studies.papers.loop_claims import study_claims
-
     damping, study, chain = reproduce_cross_damping(seeds), study_filters(), reproduce_bell()
     claims = study_claims()
     theory, reading = compare_bell_theory(), read_planted_rate()
@@ -50,9 +44,7 @@ def reproduce_gyro_papers(seeds: int = 20) -> "tuple[list[Chapter], dict[str, An
     return chapters, summary
 
 
-def _summarise_damping(twin: "CrossDampingTwin") -> dict[str, Any]:
-    from studies.papers.cvg_cross_damping import PRINTED_IMPROVEMENT
-
+def _summarise_damping(twin: CrossDampingTwin) -> dict[str, Any]:
     return {
         "improvement_printed": PRINTED_IMPROVEMENT,
         "improvement_training": twin.study.training.rows.ratio,
@@ -64,7 +56,7 @@ def _summarise_damping(twin: "CrossDampingTwin") -> dict[str, Any]:
     }
 
 
-def _summarise_filters(study: "FilterStudy") -> dict[str, Any]:
+def _summarise_filters(study: FilterStudy) -> dict[str, Any]:
     return {
         "wiener": [
             {
@@ -82,7 +74,7 @@ def _summarise_filters(study: "FilterStudy") -> dict[str, Any]:
     }
 
 
-def _summarise_bell(twin: "BellTwin") -> dict[str, Any]:
+def _summarise_bell(twin: BellTwin) -> dict[str, Any]:
     return {
         "claims": dataclasses.asdict(twin.claims),
         "fitted": [dataclasses.asdict(step) for step in twin.fitted],

@@ -1,5 +1,6 @@
 """Tables and pictures of a card's loops: bias over azimuth, noise, open loops, step responses, start-up, and a run."""
 
+from collections.abc import Mapping
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
@@ -7,18 +8,15 @@ import numpy as np
 
 from studies.instrument.display import display_name
 from studies.instrument.units import unit_of
+from studies.record import Record
 from studies.reports import style
 from studies.reports.digits import plain, to_error
 from studies.results import Chapter, Column, Facts, Figure, Sentence, Table
-from studies.simulation.loop_study import answer_steps, bias_around, bias_slopes, noise_over
+from studies.simulation.loop_study import BiasSlope, LoopStudy, answer_steps, bias_around, bias_slopes, noise_over
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-
     from matplotlib.figure import Figure as Drawing
 
-    from studies.record import Record
-    from studies.simulation.loop_study import BiasSlope, LoopStudy
 
 COLOURS = (style.BLUE, style.VERMILION, style.GREEN, style.PURPLE, style.ORANGE, style.SKY, style.YELLOW)
 LENGTHS = tuple(np.geomspace(0.01, 1e4, 25))
@@ -48,14 +46,14 @@ SMALLEST = 1e-4  # of the largest effect on the bias: smaller ones are not liste
 SOURCE = Column("name", "source")
 
 
-def describe(payload: "Mapping[str, Any]") -> str:
+def describe(payload: Mapping[str, Any]) -> str:
     """Return mode, temperature, frequency and damping in one line."""
     mode = {"force-rebalance": "Force-to-rebalance", "whole-angle": "Whole-angle"}[payload["mode"]]
     f, q = payload["frequency_Hz"], payload["quality_factor"]
     return f"{mode} mode at {payload['temperature_degC']:g} °C: {f:.2f} Hz, Q = {plain(q)}, decay time constant {plain(q / (np.pi * f))} s."
 
 
-def loop_parts(study: "LoopStudy", payload: dict[str, Any], run: "Record | None") -> list[Chapter]:
+def loop_parts(study: LoopStudy, payload: dict[str, Any], run: Record | None) -> list[Chapter]:
     """What people read: the answer, bias, noise, stability, start-up, the run."""
 
     def named(key: str) -> list[dict[str, Any]]:
@@ -105,7 +103,7 @@ def loop_parts(study: "LoopStudy", payload: dict[str, Any], run: "Record | None"
     ]  # fmt: skip
 
 
-def _ranges(study: "LoopStudy", payload: dict[str, Any]) -> list[dict[str, Any]]:
+def _ranges(study: LoopStudy, payload: dict[str, Any]) -> list[dict[str, Any]]:
     keys, use = study.instrument.loop, payload["range"]
     assert keys is not None
     stiff = keys.quadrature_control == "stiffness"
@@ -120,7 +118,7 @@ def _ranges(study: "LoopStudy", payload: dict[str, Any]) -> list[dict[str, Any]]
     ]
 
 
-def _facts(study: "LoopStudy", payload: dict[str, Any]) -> list[tuple[str, str, str]]:
+def _facts(study: LoopStudy, payload: dict[str, Any]) -> list[tuple[str, str, str]]:
     total, noise = study.sources[-1], payload["noise"]
     largest = max(study.sources[:-1], key=lambda one: one.sd).name
     single = [one for one in noise if one["source"] != "all"]
@@ -135,7 +133,7 @@ def _facts(study: "LoopStudy", payload: dict[str, Any]) -> list[tuple[str, str, 
     ]  # fmt: skip
 
 
-def _largest(slopes: "tuple[BiasSlope, ...]", sd: float) -> list[Sentence]:
+def _largest(slopes: tuple[BiasSlope, ...], sd: float) -> list[Sentence]:
     """What to improve first."""
     if not slopes or slopes[0].effect == 0:
         return []
@@ -154,7 +152,7 @@ def _unit(key: str) -> str:
     return "" if unit == "1" else unit if unit == "°" else f" {unit}"
 
 
-def _around(study: "LoopStudy") -> "Drawing":
+def _around(study: LoopStudy) -> "Drawing":
     """Return the bias of each source over the azimuth of the wave."""
     azimuth = np.linspace(0.0, np.pi / 2, 181)
     parts = bias_around(study, azimuth)
@@ -176,7 +174,7 @@ def _around(study: "LoopStudy") -> "Drawing":
         return made
 
 
-def _noise(study: "LoopStudy") -> "Drawing":
+def _noise(study: LoopStudy) -> "Drawing":
     """Return the noise of each source over the averaging time."""
     found = noise_over(study, LENGTHS)
     with style.figure(height=3.4) as (made, axis):
@@ -195,7 +193,7 @@ def _noise(study: "LoopStudy") -> "Drawing":
         return made
 
 
-def _bode(study: "LoopStudy") -> "Drawing":
+def _bode(study: LoopStudy) -> "Drawing":
     """Return gain and phase of the open loops over frequency."""
     half = study.loops.sampling / 2
     low = min(m.crossover for m in study.margins) / 30
@@ -231,7 +229,7 @@ def _bode(study: "LoopStudy") -> "Drawing":
         return made
 
 
-def _steps(study: "LoopStudy") -> "Drawing":
+def _steps(study: LoopStudy) -> "Drawing":
     """Return the command of each loop after a step."""
     with style.figure(height=3.0) as (made, axis):
         for k, (name, (time, answer)) in enumerate(answer_steps(study).items()):
@@ -244,7 +242,7 @@ def _steps(study: "LoopStudy") -> "Drawing":
         return made
 
 
-def _start(study: "LoopStudy") -> "Drawing":
+def _start(study: LoopStudy) -> "Drawing":
     """Return amplitude and phase error of a start from rest."""
     start = study.start
     last = max(int(np.searchsorted(start.time, 1.6 * start.ready)), 2) if np.isfinite(start.ready) else None
@@ -262,7 +260,7 @@ def _start(study: "LoopStudy") -> "Drawing":
         return made
 
 
-def _course(run: "Record") -> "Drawing":
+def _course(run: Record) -> "Drawing":
     """Return the columns of a run over time."""
     names = [name for name in COLUMNS if name in run]
     time = run["time_s"] / 3600

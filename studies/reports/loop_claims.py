@@ -1,11 +1,7 @@
 """The chapter on what is claimed of loops, and what the twin says."""
 
-from typing import TYPE_CHECKING
-
+from studies.papers.loop_claims import LoopClaims
 from studies.reports.page import Chapter, Table, Text
-
-if TYPE_CHECKING:
-    from studies.papers.loop_claims import LoopClaims
 
 SOURCES = (
     "Lynch D., Vibratory gyro analysis by the method of averaging, St. Petersburg 1995; IEEE Std 1431-2004, Annex B.",
@@ -14,7 +10,7 @@ SOURCES = (
 )
 
 
-def claims_chapter(found: "LoopClaims") -> Chapter:
+def claims_chapter(found: LoopClaims) -> Chapter:
     """Return the chapter."""
     (drift, drift_closed), (mean, mean_closed) = found.drift, found.mean_rate
     text = (

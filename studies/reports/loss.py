@@ -5,21 +5,21 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from shell.constants import zero_Celsius
+from shell.damping.budget import Budget, LossPart
+from studies.loss.account import StatedLoss
+from studies.loss.model import LossModel
 from studies.reports import style
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from shell.damping.budget import Budget, LossPart
-    from studies.loss.account import StatedLoss
-    from studies.loss.model import LossModel
 
 COLOURS = (style.BLUE, style.VERMILION, style.GREEN, style.ORANGE, style.PURPLE, style.SKY, style.YELLOW)
 DASHES = ("-", "--", ":")
 SMALLEST = 1e-6  # of the sum: smaller parts are in the tables, not in the pictures
 
 
-def bars(budget: "Budget", at: int) -> "Figure":
+def bars(budget: Budget, at: int) -> "Figure":
     """The parts at one temperature with their intervals, largest on top."""
     parts = _shown(budget, at)
     with style.figure(height=0.34 * len(parts) + 1.0) as (made, axis):
@@ -38,7 +38,7 @@ def bars(budget: "Budget", at: int) -> "Figure":
         return made
 
 
-def course(budget: "Budget", stated: "StatedLoss | None", reference: float) -> "Figure":
+def course(budget: Budget, stated: StatedLoss | None, reference: float) -> "Figure":
     """1/Q and its parts over temperature."""
     degrees, middle = budget.temperatures - zero_Celsius, len(budget.temperatures) // 2
     low, high = budget.interval
@@ -62,7 +62,7 @@ def course(budget: "Budget", stated: "StatedLoss | None", reference: float) -> "
         return made
 
 
-def along(model: "LossModel") -> "Figure":
+def along(model: LossModel) -> "Figure":
     """What the faces of the wall take part in, both together, over the meridian."""
     faces = model.vibration.faces
     with style.figure(height=3.0) as (made, axis):
@@ -88,5 +88,5 @@ def along(model: "LossModel") -> "Figure":
         return made
 
 
-def _shown(budget: "Budget", at: int) -> list["LossPart"]:
+def _shown(budget: Budget, at: int) -> list["LossPart"]:
     return [part for part in budget.parts if part.inverse_q[at] > SMALLEST * budget.inverse_q[at]]

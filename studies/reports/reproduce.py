@@ -2,14 +2,17 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from compensation.frequency import fit_frequency
 from shell.constants import zero_Celsius
+from studies.diagnosis.table import TableDiagnosis
 from studies.papers import hrg
-from studies.papers.settling import NETWORKS, ROOM_degC
+from studies.papers.bias_twin import TwinFit
+from studies.papers.hrg import FrequencyStudy, PhysicsComparison
+from studies.papers.settling import NETWORKS, ROOM_degC, SettlingStudy
 from studies.reports import gyro_papers, style
 from studies.reports.bias_twin import twin_chapters
 from studies.reports.diagnosis import headline
@@ -20,22 +23,16 @@ from studies.reports.settling import settling_chapter
 from studies.reports.theories import theories_chapter
 from studies.results.page import make_blocks
 
-if TYPE_CHECKING:
-    from studies.diagnosis.table import TableDiagnosis
-    from studies.papers.bias_twin import TwinFit
-    from studies.papers.hrg import FrequencyStudy, PhysicsComparison
-    from studies.papers.settling import SettlingStudy
-
 
 @dataclass(frozen=True)
 class Reproduction:
     """Everything that the page shows: the table, physics, its diagnosis, settling, bias twins, the other papers."""
 
-    study: "FrequencyStudy"
-    physics: "PhysicsComparison"
-    diagnosis: "TableDiagnosis"
-    settling: "SettlingStudy"
-    twins: "Sequence[tuple[TwinFit, ...]]"
+    study: FrequencyStudy
+    physics: PhysicsComparison
+    diagnosis: TableDiagnosis
+    settling: SettlingStudy
+    twins: Sequence[tuple[TwinFit, ...]]
     gyro_chapters: Sequence[Chapter]
     gyro_summary: dict[str, Any]
 
@@ -48,7 +45,7 @@ SOURCES = (
 )
 
 
-def reproduce_page(parts: "Reproduction", mode: Sequence[Block]) -> str:
+def reproduce_page(parts: Reproduction, mode: Sequence[Block]) -> str:
     """Return the whole page; `mode` shows the mode shape."""
     study, physics = parts.study, parts.physics
     lead = (
@@ -75,7 +72,7 @@ def reproduce_page(parts: "Reproduction", mode: Sequence[Block]) -> str:
     return render_page("Four gyro papers, reproduced", lead, chapters, (*SOURCES, *gyro_papers.SOURCES))
 
 
-def summarise(parts: "Reproduction") -> dict[str, Any]:
+def summarise(parts: Reproduction) -> dict[str, Any]:
     """Return the numbers of the page, schema `hrg.reproduce/1`."""
     study, physics = parts.study, parts.physics
     fit, better = study.fit, study.next_fit
@@ -120,7 +117,7 @@ def summarise(parts: "Reproduction") -> dict[str, Any]:
     }
 
 
-def _facts(parts: "Reproduction") -> Facts:
+def _facts(parts: Reproduction) -> Facts:
     study, physics = parts.study, parts.physics
     return Facts(
         [
@@ -148,7 +145,7 @@ def _facts(parts: "Reproduction") -> Facts:
     )
 
 
-def _short(parts: "Reproduction") -> list[Text]:
+def _short(parts: Reproduction) -> list[Text]:
     study, physics = parts.study, parts.physics
     better = study.next_fit
     assert better is not None
@@ -180,12 +177,12 @@ def _short(parts: "Reproduction") -> list[Text]:
     ]
 
 
-def _farthest(study: "FrequencyStudy") -> float:
+def _farthest(study: FrequencyStudy) -> float:
     """Return the largest distance of a calculated temperature of Table 2 from the printed one (°C)."""
     return float(np.max(np.abs(study.calculated_degC - hrg.printed_table2()[0])))
 
 
-def _table1(study: "FrequencyStudy") -> Table:
+def _table1(study: FrequencyStudy) -> Table:
     rows = [
         [f"{T:g}", f"{f:.2f}", f"{f - r:.3f}", f"{1e3 * r:+.1f}"]
         for T, f, r in zip(study.temperature_degC, study.frequency, study.fit.residuals, strict=True)
@@ -199,7 +196,7 @@ def _table1(study: "FrequencyStudy") -> Table:
     )
 
 
-def _table2(study: "FrequencyStudy") -> Table:
+def _table2(study: FrequencyStudy) -> Table:
     printed, printed_error = hrg.printed_table2()
     rows = [
         [f"{f:.2f}", f"{T:g}", f"{p:g}", f"{c:.4f}", f"{c - p:+.4f}", f"{pe:+g}", f"{e:+.4f}"]
@@ -225,7 +222,7 @@ def _table2(study: "FrequencyStudy") -> Table:
     return Table("Table 2, published and recomputed", columns, rows, "Error: actual minus calculated temperature.")
 
 
-def _physics(physics: "PhysicsComparison", study: "FrequencyStudy") -> list[Block]:
+def _physics(physics: PhysicsComparison, study: FrequencyStudy) -> list[Block]:
     slope = physics.parts
     numbers = 1e6 * np.stack([slope.E, slope.nu, slope.rho, slope.h, slope.r], axis=1)
     rows = [
@@ -259,11 +256,11 @@ def _physics(physics: "PhysicsComparison", study: "FrequencyStudy") -> list[Bloc
     ]
 
 
-def _measured(study: "FrequencyStudy") -> list[str]:
+def _measured(study: FrequencyStudy) -> list[str]:
     return [f"{s:.1f}" for s in study.local_slope_ppm] + [f"{float(study.fit.slope_ppm(20.0)):.1f}"]
 
 
-def _slope_figure(physics: "PhysicsComparison", study: "FrequencyStudy") -> Picture:
+def _slope_figure(physics: PhysicsComparison, study: FrequencyStudy) -> Picture:
     total, spread = physics.slope_ppm[:-1], physics.uncertainty_ppm[:-1]
     with style.figure(height=3.2) as (made, axes):
         axes.fill_between(
@@ -282,7 +279,7 @@ def _slope_figure(physics: "PhysicsComparison", study: "FrequencyStudy") -> Pict
     return draw(made, caption, "Predicted and measured slopes over temperature.")
 
 
-def _first_diagnosis(parts: "Reproduction") -> Chapter:
+def _first_diagnosis(parts: Reproduction) -> Chapter:
     """Return what `hrg diagnose` says of Table 1."""
     verdict = Text(headline(parts.diagnosis.verdict), "warning")
     blocks = make_blocks(*(part for chapter in table_parts(parts.diagnosis) for part in chapter.parts))
@@ -290,7 +287,7 @@ def _first_diagnosis(parts: "Reproduction") -> Chapter:
     return Chapter("Differences between measurement and physics: a first diagnosis", [verdict, *shown])
 
 
-def _step_inverse(settling: "SettlingStudy") -> Picture:
+def _step_inverse(settling: SettlingStudy) -> Picture:
     """Draw the temperature that a cubic calculates from the frequency of the virtual step to -10 °C (figure 5b)."""
     curve = next(c for c in settling.curves if c.target_degC < ROOM_degC and c.network == NETWORKS[0])
     true = curve.target_degC + curve.remaining * (ROOM_degC - curve.target_degC)

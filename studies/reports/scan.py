@@ -5,14 +5,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from studies.reports.style import BLUE, ORANGE, figure
+from studies.scan import Scan
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure as Drawing
 
-    from studies.scan import Scan
 
-
-def maps(scan: "Scan") -> "Drawing":
+def maps(scan: Scan) -> "Drawing":
     """Return maps of wall and middle surface, or of the one face."""
     names = ["wall", "offset"] if len(scan.faces) == 2 else list(scan.faces)
     with figure(len(names), 1, 2.5 * len(names), squeeze=False) as (made, axes):
@@ -30,7 +29,7 @@ def maps(scan: "Scan") -> "Drawing":
         return made
 
 
-def harmonics(scan: "Scan") -> "Drawing":
+def harmonics(scan: Scan) -> "Drawing":
     """Return the amplitudes of the harmonics at the rim."""
     quantity = "wall" if len(scan.faces) == 2 else next(iter(scan.faces))
     rim = max(w.position for w in scan.waves)

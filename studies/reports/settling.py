@@ -1,15 +1,10 @@
 """The chapter on Figure 3 of the HRG paper: how the resonator settles, and what incomplete soak does to Table 1."""
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
-from studies.papers.settling import FAST, NETWORKS, PROTOCOLS, SETTLED, POINTS_degC
+from studies.papers.settling import FAST, NETWORKS, PROTOCOLS, SETTLED, POINTS_degC, SettlingStudy
 from studies.reports import style
 from studies.reports.page import Chapter, Picture, Table, Text, draw
-
-if TYPE_CHECKING:
-    from studies.papers.settling import SettlingStudy
 
 COLOURS = {
     "radiative": (style.BLUE, "-"),
@@ -18,7 +13,7 @@ COLOURS = {
 }
 
 
-def settling_chapter(study: "SettlingStudy") -> Chapter:
+def settling_chapter(study: SettlingStudy) -> Chapter:
     """Return the chapter: Figure 3, the share of the step that is left, and the soak error of Table 1."""
     return Chapter(
         "Figure 3: settling of the resonator, and effect of the soak time on Table 1",
@@ -37,7 +32,7 @@ def settling_chapter(study: "SettlingStudy") -> Chapter:
     )
 
 
-def step_figure(study: "SettlingStudy") -> Picture:
+def step_figure(study: SettlingStudy) -> Picture:
     """Draw the frequency after the two steps (HRG paper, figure 3) and the share of the step that is left."""
     with style.figure(2, 2, height=5.2, sharex=True) as (made, axes):
         for column, target in enumerate(sorted({curve.target_degC for curve in study.curves})):
@@ -64,7 +59,7 @@ def step_figure(study: "SettlingStudy") -> Picture:
     )
 
 
-def step_table(study: "SettlingStudy") -> Table:
+def step_table(study: SettlingStudy) -> Table:
     """Return what is left of each step at the paper's two times."""
     rows = [
         [
@@ -89,7 +84,7 @@ def step_table(study: "SettlingStudy") -> Table:
     return Table("Settling after a chamber step", columns, rows, note)
 
 
-def soak_figure(study: "SettlingStudy") -> Picture:
+def soak_figure(study: SettlingStudy) -> Picture:
     """Draw the error that incomplete soak leaves in Table 1's frequencies."""
     with style.figure(height=3.0) as (made, axes):
         axes.axhline(0, color=style.BLACK, linewidth=0.8)
@@ -111,7 +106,7 @@ def soak_figure(study: "SettlingStudy") -> Picture:
     )
 
 
-def soak_table(study: "SettlingStudy") -> Table:
+def soak_table(study: SettlingStudy) -> Table:
     """Return what soak adds to slope and curvature, beside what is to be explained."""
     rows = [
         [f"soak {soak.hours:g} h, {soak.protocol}", soak.network, f"{soak.slope:+.3f}", f"{soak.curvature:+.4f}"]
@@ -127,7 +122,7 @@ def soak_table(study: "SettlingStudy") -> Table:
     return Table("Effect of an incomplete soak on Table 1", columns, rows, note)
 
 
-def soak_sentence(study: "SettlingStudy") -> str:
+def soak_sentence(study: SettlingStudy) -> str:
     """Say which sign and size soak can explain, and what it cannot."""
     from_room = [soak for soak in study.soaks if soak.protocol == PROTOCOLS[0]]
     upwards = [soak for soak in study.soaks if soak.protocol == PROTOCOLS[1]]

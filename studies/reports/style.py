@@ -5,11 +5,11 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-    from numpy.typing import NDArray
 
 # Okabe and Ito's set: distinguishable with every common kind of colour vision, and by lightness in print.
 BLACK, ORANGE, SKY, GREEN, YELLOW, BLUE, VERMILION, PURPLE = (
@@ -38,7 +38,7 @@ _STYLE = {
 MOST_POINTS = 4000  # of a line or a cloud; more only make the page heavy
 
 
-def few_rows(count: int) -> "NDArray[np.intp]":
+def few_rows(count: int) -> NDArray[np.intp]:
     """Return the rows that are drawn of so many: all, or as many as can be told apart, the first and the last among them."""
     return np.unique(np.linspace(0, count - 1, MOST_POINTS).astype(np.intp))
 

@@ -1,26 +1,26 @@
 """The page of a parametric study: what was asked, what came out, what matters, and where it comes from."""
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from studies.errors import UNUSABLE_INPUT, InputError
+from studies.papers.hrg import study_table
+from studies.reports import frequency
 from studies.reports import sweep_figures as figures
 from studies.reports.digits import plain
 from studies.reports.page import Block, Chapter, Facts, Table, Text, render_page
 from studies.reports.sweep_analysis import influence_chapters, search_chapters, tolerance_chapters
 from studies.reports.sweep_cells import main_columns, number, percent, spread, to_error, within
+from studies.results.page import make_blocks
+from studies.sweeps.definition import StudyParameter
 from studies.sweeps.design import nominal_design
 from studies.sweeps.parameters import TEMPERATURE, set_parameters
+from studies.sweeps.quantity import Column
+from studies.sweeps.results import Results
 from studies.sweeps.sensitivity import linear_shares, local_slopes, sobol_indices
-from studies.sweeps.tolerance import find_yield, resolve_limits
-
-if TYPE_CHECKING:
-    from studies.sweeps.definition import StudyParameter
-    from studies.sweeps.quantity import Column
-    from studies.sweeps.results import Results
-    from studies.sweeps.tolerance import Yield
+from studies.sweeps.tolerance import Yield, find_yield, resolve_limits
 
 MOST_ROWS = 300
 ENDS = 20  # designs shown from each end when there are more than MOST_ROWS
@@ -34,7 +34,7 @@ METHODS = {
 }
 
 
-def sweep_page(results: "Results") -> str:
+def sweep_page(results: Results) -> str:
     """Return the page of a study as HTML."""
     study = results.study
     done = len(results) if results.done == results.total else f"{results.done} of {results.total}"
@@ -55,7 +55,7 @@ def sweep_page(results: "Results") -> str:
     return render_page(f"Study: {study.name}", lead, chapters)
 
 
-def summarise(results: "Results") -> dict[str, Any]:
+def summarise(results: Results) -> dict[str, Any]:
     """Return the numbers behind the page (schema hrg.study-report/1)."""
     found: dict[str, Any] = {
         "schema": "hrg.study-report/1",
@@ -75,7 +75,7 @@ def summarise(results: "Results") -> dict[str, Any]:
     return found
 
 
-def _data(analyse: Any, results: "Results", column: str) -> Any:
+def _data(analyse: Any, results: Results, column: str) -> Any:
     try:
         found = analyse(results, column)
     except InputError:
@@ -83,7 +83,7 @@ def _data(analyse: Any, results: "Results", column: str) -> Any:
     return [vars(one) for one in found] if isinstance(found, list) else None if found is None else vars(found)
 
 
-def _numbers(results: "Results", column: "Column") -> dict[str, float | None]:
+def _numbers(results: Results, column: Column) -> dict[str, float | None]:
     y = results.column(column.name)
     y = y[np.isfinite(y)]
     place = [c.name for c in results.study.columns].index(column.name)
@@ -95,7 +95,7 @@ def _numbers(results: "Results", column: "Column") -> dict[str, float | None]:
     return {"nominal": nominal, **over_all, "error": error}
 
 
-def _yield(results: "Results") -> "Yield | None":
+def _yield(results: Results) -> Yield | None:
     """Return the yield under all requirements; None without any, and where the nominal design that they need is missing."""
     if not results.study.requirements or not len(results):
         return None
@@ -105,7 +105,7 @@ def _yield(results: "Results") -> "Yield | None":
         return None
 
 
-def _short(results: "Results") -> list[Block]:
+def _short(results: Results) -> list[Block]:
     facts = [("Designs", str(results.done), f"of {results.total}; {len(results.failed)} failed")]
     for column in main_columns(results)[:2]:
         n = _numbers(results, column)
@@ -122,7 +122,7 @@ def _short(results: "Results") -> list[Block]:
     return blocks
 
 
-def _asked(results: "Results") -> list[Block]:
+def _asked(results: Results) -> list[Block]:
     study = results.study
     sampling = study.sampling
     parameters = Table(
@@ -148,7 +148,7 @@ def _asked(results: "Results") -> list[Block]:
     return [parameters, Table("Quantities", ["Column", "Quantity", "Options"], rows), Text(f"{words}; {solver}.")]
 
 
-def _failures(results: "Results") -> list[Chapter]:
+def _failures(results: Results) -> list[Chapter]:
     if not results.failed.size:
         return []
     rows = [[str(count), reason] for reason, count in results.store.reasons()]
@@ -170,7 +170,7 @@ def _failures(results: "Results") -> list[Chapter]:
     ]
 
 
-def _statistics(results: "Results") -> Table:
+def _statistics(results: Results) -> Table:
     rows = []
     for column in results.study.columns:
         n = _numbers(results, column)
@@ -194,7 +194,7 @@ def _digits(n: Mapping[str, Any], key: str) -> str:
     return to_error(n[key], n["error"]) if known else within(n[key], n["deviation"])
 
 
-def _designs(results: "Results") -> Table:
+def _designs(results: Results) -> Table:
     columns = main_columns(results)
     places: Sequence[int] = range(len(results))
     note = "Click a heading to sort."
@@ -211,7 +211,7 @@ def _designs(results: "Results") -> Table:
     return Table("Designs", ["Case", *heads, *map(figures.column_label, columns)], rows, note, sortable=True)
 
 
-def _pictures(results: "Results") -> list[Block]:
+def _pictures(results: Results) -> list[Block]:
     if results.study.sampling.method == "one-at-a-time":
         return []  # the tornado says it better
     limits = _limits(results)
@@ -225,12 +225,8 @@ def _pictures(results: "Results") -> list[Block]:
     return blocks
 
 
-def _over_temperature(results: "Results") -> list[Block]:
+def _over_temperature(results: Results) -> list[Block]:
     """Return the HRG paper's Table 1, its cubic and Table 2 where only the temperature was varied."""
-    from studies.papers.hrg import study_table
-    from studies.reports import frequency
-    from studies.results.page import make_blocks
-
     study = results.study
     columns = [column for column in study.columns if column.stem.startswith("frequency")]
     if study.names != (TEMPERATURE,) or not columns or len(results) < 5 or results.failed.size:
@@ -244,7 +240,7 @@ def _over_temperature(results: "Results") -> list[Block]:
         return [Text(f"No cubic over temperature: {error}", "warning")]
 
 
-def _shapes(results: "Results") -> list[Chapter]:
+def _shapes(results: Results) -> list[Chapter]:
     from studies.reports.mode_picture import mode_blocks
 
     study = results.study
@@ -265,7 +261,7 @@ def _shapes(results: "Results") -> list[Chapter]:
     return [Chapter("Mode shapes", blocks)]
 
 
-def _provenance(results: "Results") -> list[Block]:
+def _provenance(results: Results) -> list[Block]:
     about, identity = results.about, results.about["identity"]
     rows: list[list[str]] = []
     environments: dict[str, list[str]] = {}
@@ -299,21 +295,21 @@ def _environment(found: Mapping[str, Any]) -> list[str]:
     ]
 
 
-def _limits(results: "Results") -> list[Any]:
+def _limits(results: Results) -> list[Any]:
     try:
         return [resolve_limits(results, requirement) for requirement in results.study.requirements]
     except InputError:
         return []
 
 
-def _range(parameter: "StudyParameter") -> str:
+def _range(parameter: StudyParameter) -> str:
     if parameter.values:
         words = ", ".join(number(value) for value in parameter.values[:8])
         return words + (f", … ({len(parameter.values)})" if len(parameter.values) > 8 else "")
     return f"{number(parameter.low)} … {number(parameter.high)}"
 
 
-def _distribution(parameter: "StudyParameter") -> str:
+def _distribution(parameter: StudyParameter) -> str:
     if parameter.values:
         return "values"
     if parameter.distribution == "normal":

@@ -1,23 +1,21 @@
 """Chapters on what a study means: which parameter matters, the yield, worst cases and designs by inversion."""
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from studies.errors import InputError
 from studies.reports import sweep_figures as figures
 from studies.reports.page import Block, Chapter, Table, Text
 from studies.reports.sweep_cells import main_columns, number, percent
+from studies.sweeps.definition import StudyParameter
+from studies.sweeps.quantity import Column
+from studies.sweeps.results import Results
 from studies.sweeps.search import name_search
 from studies.sweeps.sensitivity import linear_shares, local_slopes, sobol_indices
 from studies.sweeps.tolerance import find_reach, find_yield, resolve_limits
 
-if TYPE_CHECKING:
-    from studies.sweeps.definition import StudyParameter
-    from studies.sweeps.quantity import Column
-    from studies.sweeps.results import Results
 
-
-def influence_chapters(results: "Results") -> list[Chapter]:
+def influence_chapters(results: Results) -> list[Chapter]:
     """Return which parameter matters: Sobol indices, slopes or linear shares, whichever the design allows."""
     blocks: list[Block] = []
     method = results.study.sampling.method
@@ -34,7 +32,7 @@ def influence_chapters(results: "Results") -> list[Chapter]:
     return [Chapter("Influence of the parameters", blocks)] if blocks else []
 
 
-def _sobol(results: "Results", column: "Column") -> list[Block]:
+def _sobol(results: Results, column: Column) -> list[Block]:
     found = sobol_indices(results, column.name)
     if found.variance == 0:
         return [Text(f"{column.label} is the same for every design: no parameter influences it.", "note")]
@@ -53,7 +51,7 @@ def _sobol(results: "Results", column: "Column") -> list[Block]:
     return [table, figures.sobol_figure(found, column)]
 
 
-def _slopes(results: "Results", column: "Column") -> list[Block]:
+def _slopes(results: Results, column: Column) -> list[Block]:
     found = local_slopes(results, column.name)
     units = {p.name: p.unit for p in results.study.parameters}
     rows = []
@@ -70,7 +68,7 @@ def _slopes(results: "Results", column: "Column") -> list[Block]:
     ]
 
 
-def _shares(results: "Results", column: "Column") -> list[Block]:
+def _shares(results: Results, column: Column) -> list[Block]:
     found = linear_shares(results, column.name)
     if found is None:
         return []
@@ -95,7 +93,7 @@ def _slope_unit(column: str, parameter: str) -> str:
     return column if parameter == "1" else f"{column} per {parameter}"
 
 
-def tolerance_chapters(results: "Results") -> list[Chapter]:
+def tolerance_chapters(results: Results) -> list[Chapter]:
     """Return the yield under the requirements, and how far the tolerances may reach."""
     study = results.study
     if not study.requirements or not len(results):
@@ -128,25 +126,25 @@ def tolerance_chapters(results: "Results") -> list[Chapter]:
     return [Chapter("Tolerances", [*found, Table("Yield", heads, rows, note), Text(words, "note")])]
 
 
-def _yield_cells(results: "Results", requirements: Any) -> list[str]:
+def _yield_cells(results: Results, requirements: Any) -> list[str]:
     found = find_yield(results, requirements)
     between = "" if found.low is None else f"{percent(found.low)} … {percent(found.high)}"
     return [percent(found.share), between, str(found.unknown)]
 
 
-def _reach(parameter: "StudyParameter", part: float) -> str:
+def _reach(parameter: StudyParameter, part: float) -> str:
     nominal = float(parameter.nominal)
     low, high = (nominal + part * (end - nominal) for end in (parameter.low, parameter.high))
     return f"{figures.label(parameter.name, parameter.unit)} {low:.4g} … {high:.4g}"
 
 
-def search_chapters(results: "Results") -> list[Chapter]:
+def search_chapters(results: Results) -> list[Chapter]:
     """Return what the worst-case searches and inversions found."""
     blocks = _findings(results, "worst-case", "inversion")
     return [Chapter("Searches", blocks)] if blocks else []
 
 
-def _findings(results: "Results", *kinds: str) -> list[Block]:
+def _findings(results: Results, *kinds: str) -> list[Block]:
     findings = results.store.findings()
     blocks: list[Block] = []
     for search in (one for one in results.study.searches if one.kind in kinds):
@@ -162,7 +160,7 @@ def _findings(results: "Results", *kinds: str) -> list[Block]:
     return blocks
 
 
-def _worst_case(results: "Results", found: Mapping[str, Any]) -> list[Block]:
+def _worst_case(results: Results, found: Mapping[str, Any]) -> list[Block]:
     names = results.study.names
     rows = [
         [end, number(found[end]["value"]), *(number(found[end]["parameters"][name]) for name in names)]
@@ -173,7 +171,7 @@ def _worst_case(results: "Results", found: Mapping[str, Any]) -> list[Block]:
     return [Table(f"Worst cases of {found['column']} within the ranges", heads, rows, note)]
 
 
-def _inversion(results: "Results", found: Mapping[str, Any]) -> list[Block]:
+def _inversion(results: Results, found: Mapping[str, Any]) -> list[Block]:
     rows = [[column, number(wanted), number(found["values"][column])] for column, wanted in found["targets"].items()]
     design = ", ".join(f"{name} = {number(value)}" for name, value in found["parameters"].items())
     if found["reached"]:
@@ -186,7 +184,7 @@ def _inversion(results: "Results", found: Mapping[str, Any]) -> list[Block]:
     return [Table("Design by inversion", ["Column", "Target", "Found"], rows), Text(words, kind)]
 
 
-def _tolerances(results: "Results", found: Mapping[str, Any]) -> list[Block]:
+def _tolerances(results: Results, found: Mapping[str, Any]) -> list[Block]:
     rows = describe_tolerances(results, found)
     head = f"Tolerances with which {100 * found['share']:g} % of designs meet the requirements"
     note = (
@@ -196,7 +194,7 @@ def _tolerances(results: "Results", found: Mapping[str, Any]) -> list[Block]:
     return [Table(head, ["Parameter", "Specified", "Found"], rows, note)]
 
 
-def describe_tolerances(results: "Results", found: Mapping[str, Any]) -> list[list[str]]:
+def describe_tolerances(results: Results, found: Mapping[str, Any]) -> list[list[str]]:
     """Rows of parameter, the tolerance that was asked, and the one that was found."""
     asked = {p.name: p for p in results.study.parameters}
     rows = []

@@ -1,17 +1,15 @@
 """Cells of a study's tables: numbers as text, and the columns that a page is about."""
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from studies.reports.digits import to_numerical_error
-
-if TYPE_CHECKING:
-    from studies.sweeps.quantity import Column
-    from studies.sweeps.results import Results
+from studies.sweeps.quantity import Column
+from studies.sweeps.results import Results
 
 
-def main_columns(results: "Results") -> "list[Column]":
+def main_columns(results: Results) -> list[Column]:
     """Return the first column of every quantity: those that are drawn."""
     return [asked.columns[0] for asked in results.study.asked]
 

@@ -1,6 +1,6 @@
 """Figures of a study: how results are spread, how they follow the parameters, and which parameter matters."""
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -8,12 +8,10 @@ from studies.errors import InputError
 from studies.instrument.units import split_unit
 from studies.reports import style
 from studies.reports.page import Picture, draw
-
-if TYPE_CHECKING:
-    from studies.sweeps.quantity import Column
-    from studies.sweeps.results import Results
-    from studies.sweeps.sensitivity import LocalSlope, SobolIndices
-    from studies.sweeps.tolerance import RequirementLimits
+from studies.sweeps.quantity import Column
+from studies.sweeps.results import Results
+from studies.sweeps.sensitivity import LocalSlope, SobolIndices
+from studies.sweeps.tolerance import RequirementLimits
 
 COLOURS = (style.BLUE, style.VERMILION, style.GREEN, style.PURPLE, style.ORANGE, style.SKY)
 
@@ -25,12 +23,12 @@ def label(name: str, unit: str) -> str:
     return plain + ("" if unit == "1" else f" ({unit})")
 
 
-def column_label(column: "Column") -> str:
+def column_label(column: Column) -> str:
     """Return what a column is, with its unit in brackets."""
     return column.label + ("" if column.unit == "1" else f" ({column.unit})")
 
 
-def first_figure(results: "Results") -> Picture:
+def first_figure(results: Results) -> Picture:
     """Draw the first column against the parameters.
 
     Raises
@@ -45,7 +43,7 @@ def first_figure(results: "Results") -> Picture:
     return picture
 
 
-def spread_figure(results: "Results", column: "Column", limits: "list[RequirementLimits]") -> Picture:
+def spread_figure(results: Results, column: Column, limits: list[RequirementLimits]) -> Picture:
     """Draw the histogram of a column, with the nominal design and the limits asked for."""
     y = results.column(column.name)
     y = y[np.isfinite(y)]
@@ -69,7 +67,7 @@ def spread_figure(results: "Results", column: "Column", limits: "list[Requiremen
     return draw(made, f"Distribution of {column.label} over {len(y)} designs.", f"Histogram of {column.label}.")
 
 
-def response_figure(results: "Results", column: "Column") -> Picture | None:
+def response_figure(results: Results, column: Column) -> Picture | None:
     """Draw a column against the parameters: a map for a grid of two, else one panel for each of the first six."""
     numeric = [p for p in results.study.parameters if not isinstance(p.nominal, str)]
     if not numeric or not np.isfinite(results.column(column.name)).any():
@@ -102,7 +100,7 @@ def response_figure(results: "Results", column: "Column") -> Picture | None:
     return draw(made, words, f"{column.label} over each parameter.")
 
 
-def _map(results: "Results", column: "Column") -> Picture:
+def _map(results: Results, column: Column) -> Picture:
     one, other = results.study.parameters
     x, y = (np.unique(results.parameter(p.name).astype(float)) for p in (one, other))
     z = np.full((len(y), len(x)), np.nan)
@@ -123,7 +121,7 @@ def _map(results: "Results", column: "Column") -> Picture:
     return draw(made, caption, f"Map of {column.label} over two parameters.")
 
 
-def sobol_figure(indices: "SobolIndices", column: "Column") -> Picture:
+def sobol_figure(indices: SobolIndices, column: Column) -> Picture:
     """Draw first-order and total indices with their intervals."""
     at = np.arange(len(indices.parameters))
     with style.figure(height=1.2 + 0.45 * len(at)) as (made, axes):
@@ -141,7 +139,7 @@ def sobol_figure(indices: "SobolIndices", column: "Column") -> Picture:
     return draw(made, "Sobol indices with 95 % intervals.", "Bars of first-order and total indices for each parameter.")
 
 
-def tornado_figure(slopes: "list[LocalSlope]", column: "Column") -> Picture:
+def tornado_figure(slopes: list[LocalSlope], column: Column) -> Picture:
     """Draw what each parameter alone does to a column between the ends of its range."""
     ordered = sorted(slopes, key=lambda slope: abs(slope.swing))
     at = np.arange(len(ordered))
