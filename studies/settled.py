@@ -98,7 +98,7 @@ def settled_table(soaks: Sequence[Soak], where: str, advice: str = "") -> tuple[
     if np.count_nonzero(np.diff(np.sort(T)) > 0.5) < 1:
         raise InputError(
             f"{where}: found {len(soaks) or 'no'} settled {'part' if len(soaks) == 1 else 'parts'}; a fit over temperature needs at least two"
-            f" temperatures 0.5 °C apart. {advice or 'Hold each temperature longer.'} Raising --left accepts parts that are less settled."
+            f" temperatures 0.5 K apart. {advice or 'Hold each temperature longer.'} Raising --left accepts parts that are less settled."
         )
     return T, f, float(np.sqrt(12.0) * max(s.error_Hz for s in soaks))
 

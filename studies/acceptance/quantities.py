@@ -19,9 +19,9 @@ class TestedQuantity:
 
 
 WARM = "a record of the output from power-on, marked '# test: warm-up'"
-THERMAL = "a record at rest over a temperature range of 5 °C or more"
+THERMAL = "a record at rest over a temperature range of 5 K or more"
 RATES = "a record with rate_deg_per_s (three or more rates, both signs) and measured_rate_deg_per_s"
-REST = "a record of an hour or more at rest and at constant temperature (within 5 °C)"
+REST = "a record of an hour or more at rest and at constant temperature (within 5 K)"
 RUN_DOWN = "a record of vibration_amplitude_V with the drive off"
 SHAKEN = "a record of a swept or random rate with rate_deg_per_s and measured_rate_deg_per_s, evenly sampled"
 STORED = "a record of pattern_angle_deg of a whole-angle gyro with a gap while its power was off, marked '# test: angle-storage'"
@@ -62,7 +62,7 @@ QUANTITIES = (
         "12.11",
         "run-to-run bias repeatability, standard deviation",
         "deg/h",
-        "two or more records of an hour or more at rest and at constant temperature (within 5 °C)",
+        "two or more records of an hour or more at rest and at constant temperature (within 5 K)",
     ),
     TestedQuantity("angle_random_walk_deg_per_rt_h", "12.11", "angle random walk", "deg/√h", REST),
     TestedQuantity(

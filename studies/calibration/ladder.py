@@ -6,6 +6,7 @@ import numpy as np
 
 from compensation.noise import Noise
 from studies.calibration.fit import CardFit
+from studies.calibration.observed import SETTLED
 from studies.calibration.problem import CardProblem, State
 
 
@@ -13,7 +14,8 @@ from studies.calibration.problem import CardProblem, State
 class Rung:
     """Residuals of one response (its unit, rms of block averages): with the card as shipped, calibrated, and the noise.
 
-    The mean of a run's residual is left out of all three; `offset` is the rms of these means after the calibration.
+    The mean of a run's residual is left out of all three, that of a table is not: its level is a value of the card. `offset` is the
+    rms of the means after the calibration.
     """
 
     as_shipped: float
@@ -38,18 +40,20 @@ def build_ladder(found: CardFit) -> dict[str, Rung]:
 
 
 def spread_of(problem: CardProblem, state: State, name: str) -> float:
-    """Rms of what is left of a response about the mean of each run."""
+    """Rms of what is left of a response, of runs about the mean of each."""
+    if name == SETTLED:
+        return float(np.sqrt(np.mean(state.residual[name] ** 2)))
     parts = [state.residual[name][s] - state.residual[name][s].mean() for s in problem.rows[name].slices]
     return float(np.sqrt(np.mean(np.concatenate(parts) ** 2)))
 
 
 def noise_rms(found: CardFit, name: str, noise: Noise | None = None) -> float:
-    """Rms of the noise about the mean of each run, as the fitted levels have it, or others."""
+    """Rms of the noise, of runs about the mean of each, as the fitted levels have it, or others."""
     rows, total, count = found.problem.rows[name], 0.0, 0
     levels = found.noise[name] if noise is None else noise
     for run, t in enumerate(rows.times):
         S = rows.covariance(run, levels)
-        total += float(np.trace(S) - S.mean() * len(t))
+        total += float(np.trace(S) - (S.mean() * len(t) if name != SETTLED else 0.0))
         count += len(t)
     return float(np.sqrt(total / count))
 

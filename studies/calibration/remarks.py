@@ -50,13 +50,10 @@ def warn(found: CardFit, estimates: Sequence[Estimate], ladder: Mapping[str, Run
             warnings.append(
                 f"{count} {'block' if count == 1 else 'blocks'} of the {WORDS[name]} {'is an outlier and was' if count == 1 else 'are outliers and were'} given less weight."
             )
-    stayed = [display_name(one.parameter) for one in estimates if one.width >= SILENT]
+    stayed = sum(one.width >= SILENT for one in estimates)
     told = sum(rows[name].count for name in rows)
     if len(estimates) > told:
-        warnings.append(
-            f"{len(estimates)} uncertain values, but only {told} data; {len(stayed)} values stay at their prior:"
-            f" {', '.join(stayed)}."
-        )
+        warnings.append(f"{told} data cannot determine {len(estimates)} uncertain values: {stayed} stay at their prior.")
     return tuple(warnings)
 
 

@@ -5,7 +5,7 @@ Schema hrg.calibration/1:
 and `high` a 90 % interval, `shift_sd` the move in prior standard deviations, `width` posterior over prior standard deviation,
 `told_by` "data", "prior" or "both", `bound` "low", "high" or null, `interval` "normal" or "profile"; `inseparable`: groups of
 parameters that the data ties together but cannot tell apart; `responses`: by name `unit`, `as_shipped`, `calibrated`, `noise`
-(rms of block averages about the mean of each run), `run_offset` (rms of these means) and `outliers`; `held_out`: null, or
+(rms of block averages about the mean of each run; of tables, of the rows), `run_offset` (rms of the means) and `outliers`; `held_out`: null, or
 `record` and by response `chamber` and `housing` (`as_shipped`, `calibrated`, null where not measured) beside `noise` and `stated`
 (rms standard deviation that the calibrated values, the run's start and its turn-on leave from the chamber, or null);
 `settled`: for each steady-state table `temperature_degC`, `level_Hz` and `slope_ppm_per_degC` (or null), each `measured`, `predicted` by the

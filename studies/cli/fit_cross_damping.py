@@ -181,7 +181,7 @@ def _left_out(data: RestData) -> list[str]:
 
 def _coefficients(summary: dict[str, Any]) -> list[dict[str, Any]]:
     values, errors = summary["coefficients"], summary["standard_errors"]
-    units = ["", "per °C", *(f"per °C{raised(i)}" for i in range(2, len(values)))]
+    units = ["", "1/K", *(f"1/K{raised(i)}" for i in range(2, len(values)))]
     return [
         {"name": f"ζ{lowered(i)}", "value": value, "error": error, "unit": units[i], "ratio": value / values[0]}
         for i, (value, error) in enumerate(zip(values, errors, strict=True))

@@ -108,7 +108,7 @@ def simulate(
         f"Virtual run of {instrument.name}",
         f"A run through {profile}; the {summary['boundary']} is imposed.",
         [
-            Sentence(f"{out}: {rows} rows over {length:g} s; the resonator's temperature covers {span:.2f} °C."),
+            Sentence(f"{out}: {rows} rows over {length:g} s; the resonator's temperature varies by {span:.2f} K."),
             Sentence(
                 f"Frequency law: interpolation error {run.law.interpolation_error:.0e}, solver error"
                 f" {run.law.solver_error:.0e}, both relative."

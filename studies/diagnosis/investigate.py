@@ -288,7 +288,7 @@ def _result(
         (base.residual_rms, base.held_out_rms),
         None if extended is None else (extended.residual_rms, extended.held_out_rms),
         "structure" if left.significant else "none",
-        left.input if left.significant else "",
+        left.input if left.doubtful else "",
         2.0 * max(left.evidence, 0.0),
         share,
         "; ".join(remarks),
@@ -322,6 +322,11 @@ def _judge(
     temperature = np.concatenate([run.states.housing for run in campaign.runs])
     if np.ptp(temperature) < NARROW_RANGE:
         return "not-identifiable", [f"the temperature varies by {np.ptp(temperature):.2g} K only"]
+    if left.doubtful:
+        needed = 2.0 * (CONSTANTS["margin"] - CONSTANTS["log_prior_unknown"])
+        return "not-identifiable", [
+            f"something may be left ({left.input}): evidence {2.0 * left.evidence:.3g}, more than noise leaves, but structure needs {needed:g}"
+        ]
     return ("not-identifiable", apart) if apart else ("adequate", _turned_on(inquiry))
 
 

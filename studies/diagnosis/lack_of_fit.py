@@ -48,6 +48,11 @@ class Leftover:
         """Whether it is more than chance."""
         return self.evidence > CONSTANTS["margin"] - CONSTANTS["log_prior_unknown"]
 
+    @property
+    def doubtful(self) -> bool:
+        """Whether it is more than noise leaves, though perhaps too little to be called structure."""
+        return self.evidence > CONSTANTS["margin"]
+
 
 def _ends(states: States) -> FloatArray:
     """Temperature over the range of the campaign, about −1 … 1."""

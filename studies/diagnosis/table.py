@@ -144,7 +144,7 @@ def study_steady_table(
     slope = float(np.polyfit(T, f, 1)[0])
     said = [
         f"Residual with the curvature of the law ({law_name}): {law_rms:.3f} Hz rms, "
-        f"equivalent to a temperature error of {law_rms / max(abs(slope), 1e-12):.2f} °C.",
+        f"equivalent to a temperature error of {law_rms / max(abs(slope), 1e-12):.2f} K.",
         f"The measured curvature is {ratio:.1f} times the law's. With a free curvature the residual is {rms(left):.3f} Hz rms "
         f"({rms(lone):.3f} Hz leave-one-out); rounding alone would give {rounding:.4f} Hz.",
     ]
@@ -178,7 +178,7 @@ def study_calibrated_table(found: "Calibration") -> TableDiagnosis:
         )
         said.append(f"The calibration changes most: {most}.")
     said.append(
-        f"Residual with the card as given: {rms(shipped):.3f} Hz rms; calibrated: {rms(left):.3f} Hz; rounding alone would give {rounding:.4f} Hz."
+        f"Residual with the card as given, rms over the rows: {rms(shipped):.3f} Hz; calibrated: {rms(left):.3f} Hz; rounding alone would give {rounding:.4f} Hz."
     )
     fits = _Fits(T, f, rounding, max(table.scatter, rounding), shipped, left, lone, rms(shipped), ratio)
     return _study(base, fits, said, shifts, found)

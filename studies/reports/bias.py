@@ -123,7 +123,7 @@ def how_rows_were_made(study: BiasStudy) -> str:
 def memory_sentence(memory: Memory) -> str:
     """Say what stands between the thermometer and the bias, if anything does."""
     parts = [f"a lag of {memory.lag:g} s"] if memory.lag else []
-    parts += [f"a hysteresis of half-width {memory.play:.2g} °C, as a tenth candidate"] if memory.play else []
+    parts += [f"a hysteresis of half-width {memory.play:.2g} K, as a tenth candidate"] if memory.play else []
     return f" The temperature acts through {' and '.join(parts)}." if parts else ""
 
 

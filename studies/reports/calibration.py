@@ -35,7 +35,6 @@ VALUES = (
     Column("card", "card", digits=5),
     Column("value", "calibrated", within=("low", "high")),
     Column("value", "90 % interval", interval=("low", "high"), digits=0),
-    Column("interval", "type of interval"),
     Column("shift_sd", "shift", "sd", "+.2f"),
     Column("width", "width", form=".3f"),
     Column("told", "determined by"),
@@ -56,9 +55,11 @@ PREDICTED = (
 )
 LEVELS = (*RESPONSE, *(Column(key, key, digits=3) for key in ("white", "flicker", "walk", "offset")))
 OFFSETS = "Rms of block averages about the mean of each run; run offset: rms of these means after the calibration."
+DRIVEN = "The measured housing drives the other responses where there is one."
+ROWS = "Settled frequency: rms over the rows of the tables; its noise is their scatter about the calibrated card."
 WIDTHS = (
     "Shift: change in prior standard deviations. Width: posterior over prior standard deviation; the data determine a value up to 0.5,"
-    " from 0.95 it stays at its prior."
+    " from 0.95 it stays at its prior. Of a material's properties: deviation from its law, relative where it has no unit."
 )
 
 
@@ -89,14 +90,14 @@ def calibration_parts(found: Calibration, payload: Mapping[str, Any]) -> list[Ch
         for one in sorted(payload["values"], key=lambda one: float(one["width"]))
     ]  # fmt: skip
     touched = [one for one in rows if one["width"] <= 0.9995 or abs(one["shift_sd"]) >= 0.005]
-    rest = len(rows) - len(touched)
-    unchanged = f" The data do not depend on {rest} more value{'s' * (rest > 1)}." if rest else ""
-    driven = (
-        "" if set(found.ladder) == {SETTLED} else " The measured housing drives the other responses where there is one."
-    )
+    rest = [one for one in rows if one not in touched]
+    unchanged = f" The data do not depend on {len(rest)} more value{'s' * (len(rest) > 1)}." if rest else ""
+    runs = set(found.ladder) - {SETTLED}
+    notes = [*([OFFSETS, DRIVEN] if runs else []), *([ROWS] if SETTLED in found.ladder else [])]
     levels = [
         _scaled(name, {"white": n.white, "flicker": n.flicker, "walk": 60.0 * n.walk, "offset": n.offset})
         for name, n in found.fit.noise.items()
+        if name in runs
     ]
     title = "Values, best known first"
     return [
@@ -104,18 +105,19 @@ def calibration_parts(found: Calibration, payload: Mapping[str, Any]) -> list[Ch
             *(Sentence(" ".join(one.sentences)) for one in found.settled),
             Facts(facts, "page"),
             *(Sentence(warning, "warning", "page") for warning in found.warnings),
-            Table("Residuals", responses, RESIDUALS, OFFSETS + driven),
+            Table("Residuals", responses, RESIDUALS, " ".join(notes)),
             Figure(lambda: _draw_residuals(found), "Residuals with the card as given and calibrated; dashed: the noise."),
             Table("Held-out run", _predicted(payload), PREDICTED, _held_out_note(payload)),
         ]),
         Chapter("Values", [
-            Table(title, rows, (*VALUES, KEY), WIDTHS, "page", sortable=True),
+            Table(title, touched, (*VALUES, KEY), WIDTHS, "page", sortable=True),
             Table(title, touched, VALUES, WIDTHS + unchanged, "terminal"),
             *(Sentence(f"The data determine only a combination of {', '.join(map(display_name, group))}.") for group in found.groups),
             Figure(lambda: _draw_shifts(found), "Shifts of the values that the data determine at least in part, with 90 % intervals; shaded: 90 % of the prior."),
+            Table("Values that the data do not depend on", rest, (*VALUES[:3], KEY), "", "page", sortable=True),
         ]),
-        Chapter("Residuals over time, and noise", [
-            Figure(lambda: residual_figure(found), "Measured minus predicted after the calibration; block averages, one colour for each run."),
+        Chapter("Residuals over time, and noise" if runs else "Residuals over temperature", [
+            Figure(lambda: residual_figure(found), "Measured minus predicted after the calibration" + ("; block averages, one colour for each run." if runs else ".")),
             Table("Noise levels", levels, LEVELS, "White: Allan deviation at 1 s. Flicker: flat part of the Allan deviation. Walk: standard deviation of the change in 1 h. Offset: standard deviation from run to run.", "page"),
         ]),
     ]  # fmt: skip
@@ -125,6 +127,8 @@ def _scaled(name: str, row: Mapping[str, Any]) -> dict[str, Any]:
     """Return a row of numbers of a response in the unit that they are shown in."""
     unit, scale = SHOWN[name]
     numbers = {key: scale * value if isinstance(value, float) else value for key, value in row.items()}
+    if name == SETTLED:
+        numbers.pop("run_offset", None)
     return {**numbers, "response": NAMES[name], "unit": unit}
 
 

@@ -135,7 +135,8 @@ def response_table(verdict: Verdict) -> Table:
             "verdict": one.verdict,
             "gain": one.gain,
             "explained_share": one.explained_share,
-            "left": one.left_over + (f" in {one.left_over_input}" if one.left_over_input else ""),
+            "left": ("undecided" if one.left_over == "none" and one.left_over_input else one.left_over)
+            + (f" in {one.left_over_input}" if one.left_over_input else ""),
         })  # fmt: skip
     judged = any(row["baseline"] is not None for row in rows)
     note = "Rms residuals." + (" Baseline and with causes: on rows left out of the fit." if judged else "")

@@ -33,7 +33,7 @@ def facts(study: FrequencyStudy) -> Facts:
     return Facts(
         [
             (f"Slope at {middle:.3g} °C", f"{float(fit.slope_ppm(middle)):.2f} ppm/°C", "middle of the range"),
-            ("Largest temperature error", f"{np.abs(study.error_degC).max():.3f} °C", "temperature from frequency"),
+            ("Largest temperature error", f"{np.abs(study.error_degC).max():.3f} K", "temperature from frequency"),
             ("Leave-one-out error", f"{fit.leave_one_out_rms:.4f} Hz", "rms of points left out of the fit"),
             ("Order supported by the data", name_order(study.orders.recommended), "F-test at the 5 % level"),
         ]
@@ -71,7 +71,7 @@ def inverse_table(study: FrequencyStudy) -> Table:
         Column("frequency", "Frequency", "Hz", ".2f"),
         Column("actual", "Actual", "°C", "g"),
         Column("calculated", "Calculated", "°C", ".3f"),
-        Column("error", "Error", "°C", "+.3f"),
+        Column("error", "Error", "K", "+.3f"),
         Column("residual", "Fit residual", "Hz", "+.4f"),
     ]
     return Table("Temperature from frequency", rows, columns, "Error: actual minus calculated temperature.")
@@ -158,7 +158,7 @@ def error_figure(study: FrequencyStudy) -> Figure:
                     continue
                 axes.plot(study.temperature_degC, error, mark + "-", color=colour, label=name_order(fit.order))
             axes.set_xlabel("temperature (°C)")
-            axes.set_ylabel("actual − calculated (°C)")
+            axes.set_ylabel("actual − calculated (K)")
             axes.legend()
             return made
 
@@ -186,7 +186,7 @@ def _extrapolation(study: FrequencyStudy, other: FrequencyFit) -> Figure:
                     T, misreading_degC(one, two, T), color=colour, label=f"read by the {reader} if the {truth} is true"
                 )
             axes.set_xlabel("temperature (°C)")
-            axes.set_ylabel("reading error (°C)")
+            axes.set_ylabel("reading error (K)")
             axes.legend(fontsize=8)
             return made
 
@@ -200,8 +200,8 @@ def _extrapolation(study: FrequencyStudy, other: FrequencyFit) -> Figure:
 def _most(ends: NDArray[np.float64]) -> str:
     """Write the difference of two readings; a curve that turns has none beyond its turning point."""
     if not np.isfinite(ends).all():
-        return "more than the range" if not np.isfinite(ends).any() else f"{np.nanmin(ends):.1f} °C or more"
-    return f"{ends.max():.2g} °C"
+        return "more than the range" if not np.isfinite(ends).any() else f"{np.nanmin(ends):.1f} K or more"
+    return f"{ends.max():.2g} K"
 
 
 def _fits(study: FrequencyStudy) -> list[tuple[FrequencyFit, str, str]]:

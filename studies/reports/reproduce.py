@@ -133,7 +133,7 @@ def _facts(parts: Reproduction) -> Facts:
             ),
             (
                 "Temperature from frequency",
-                f"within {np.abs(study.error_degC).max():.3f} °C",
+                f"within {np.abs(study.error_degC).max():.3f} K",
                 "largest error in Table 2, as in the paper",
             ),
             (
@@ -155,8 +155,8 @@ def _short(parts: Reproduction) -> list[Text]:
     return [
         Text(
             "The two published coefficients of the cubic are reproduced to the last digit, and the temperatures of Table 2 to within"
-            f" {_farthest(study):.4f} °C. At −10 °C the columns of the paper disagree: it gives −10.058 °C but an error of 0.0578 °C"
-            f" (here {study.error_degC[1]:.4f} °C). The paper concludes that higher orders have little effect; this is not reproduced."
+            f" {_farthest(study):.4f} K. At −10 °C the columns of the paper disagree: it gives −10.058 °C but an error of 0.0578 K"
+            f" (here {study.error_degC[1]:.4f} K). The paper concludes that higher orders have little effect; this is not reproduced."
             f" The residual sum of squares is {better.sum_of_squares:.1e} Hz² for a quartic and"
             f" {study.fit.sum_of_squares:.2e} Hz² for the cubic, and the quartic predicts omitted points"
             f" {study.fit.leave_one_out_rms / better.leave_one_out_rms:.1f} times better."
@@ -178,7 +178,7 @@ def _short(parts: Reproduction) -> list[Text]:
 
 
 def _farthest(study: FrequencyStudy) -> float:
-    """Return the largest distance of a calculated temperature of Table 2 from the printed one (°C)."""
+    """Return the largest distance of a calculated temperature of Table 2 from the printed one (K)."""
     return float(np.max(np.abs(study.calculated_degC - hrg.printed_table2()[0])))
 
 
@@ -215,9 +215,9 @@ def _table2(study: FrequencyStudy) -> Table:
         "Actual (°C)",
         "Paper (°C)",
         "Here (°C)",
-        "Here − paper (°C)",
-        "Error in the paper (°C)",
-        "Error here (°C)",
+        "Here − paper (K)",
+        "Error in the paper (K)",
+        "Error here (K)",
     ]
     return Table("Table 2, published and recomputed", columns, rows, "Error: actual minus calculated temperature.")
 

@@ -70,11 +70,21 @@ def test_what_has_not_converged_is_no_card(tmp_path, monkeypatch, capsys):
     assert main(words) == 0
 
 
-def test_tables_are_for_people(capsys):
-    assert main(["calibrate", "hrg-30mm", "studies/papers/hrg_table1.csv"]) == 0
-    out = capsys.readouterr().out
+def test_tables_are_for_people(tmp_path, capsys):
+    """The residual is that of `hrg diagnose`: the level is a value of the card; a scatter of rows is no Allan deviation."""
+    page = tmp_path / "page.html"
+    assert main(["calibrate", "hrg-30mm", "studies/papers/hrg_table1.csv", "--report", str(page)]) == 0
+    out, err = capsys.readouterr()
     assert "Values, best known first" in out
     assert "Settled frequency" in out
+    assert "24 stay at their prior.\n" in err
+    text = page.read_text(encoding="utf-8")
+    assert "Allan" not in text
+    assert "block averages" not in text
+    assert "Values that the data do not depend on <small>(19 rows)" in text
+    assert main(["diagnose", "studies/papers/hrg_table1.csv", "--card", "hrg-30mm", "--json"]) == 0
+    left = json.loads(capsys.readouterr().out)["responses"]["frequency_Hz"]["shipped_rms"]
+    assert f"{1e3 * left:.0f} mHz as given" in text
 
 
 @pytest.mark.slow

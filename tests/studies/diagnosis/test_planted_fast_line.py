@@ -1,10 +1,12 @@
 """A line faster than the steps of the grid: resolved where a finer grid does, else said to be there; never taken for noise."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from studies.diagnosis.campaign import load_campaign
-from studies.diagnosis.investigate import investigate
+from studies.diagnosis.investigate import _judge, investigate
 from studies.record import Record
 
 ROWS, SAMPLING, LAG, NOISE = 2880, 5.0, 900.0, 4e-4  # rows a run, s, s, Hz
@@ -38,7 +40,14 @@ def amplitude(cause):
 def test_without_a_line_the_grid_is_the_usual_one():
     campaign = a_campaign(60.0, size=0.0)
     assert campaign.step == 35.0
-    assert investigate(campaign, advise=False).verdict.verdict == "adequate"
+    found = investigate(campaign, advise=False)
+    assert found.verdict.verdict == "adequate"
+    inquiry = found.inquiries["frequency_Hz"]
+    states = [
+        _judge(found.campaign, replace(inquiry, leftover=replace(inquiry.leftover, evidence=left)), (), None, False)[0]
+        for left in (3.9, 4.1, 11.9, 12.1)  # nothing is said to be adequate beside more than noise leaves
+    ]
+    assert states == ["adequate", "not-identifiable", "not-identifiable", "unexplained"]
 
 
 @pytest.mark.slow
