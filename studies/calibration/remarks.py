@@ -53,7 +53,9 @@ def warn(found: CardFit, estimates: Sequence[Estimate], ladder: Mapping[str, Run
     stayed = sum(one.width >= SILENT for one in estimates)
     told = sum(rows[name].count for name in rows)
     if len(estimates) > told:
-        warnings.append(f"{told} data cannot determine {len(estimates)} uncertain values: {stayed} stay at their prior.")
+        warnings.append(
+            f"{told} data cannot determine {len(estimates)} uncertain values: {stayed} stay at their prior."
+        )
     return tuple(warnings)
 
 
