@@ -146,14 +146,5 @@ def _remarks(study: ScaleStudy) -> list[str]:
 
 def _spell_unit(unit: str) -> str:
     """Return a unit of a model file as people write it: °/s/K² for deg/s/degC^2."""
-<<<<<<< HEAD
     spelled = unit.replace("deg/s per counts", "°/s per count").replace("/degC", "/K").replace("deg", "°").removeprefix("1") or ""
-=======
-    from studies.reports.digits import raised
-
-    spelled = (
-        unit.replace("deg/s per counts", "°/s per count").replace("/degC", "/K").replace("deg", "°").removeprefix("1")
-        or ""
-    )
->>>>>>> f11d21f (Formatting)
     return re.sub(r"\^(\d+)", lambda power: raised(int(power[1])), re.sub("^/", "per ", spelled))
