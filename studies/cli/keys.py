@@ -24,7 +24,7 @@ def keys(kind: str = "card", *, table: str = "") -> Result:
     Parameters
     ----------
     kind : str
-        card, map (of hrg import), model (of hrg fit and hrg compensate) or limits (of hrg acceptance).
+        card, study, map (of hrg import), model (of hrg fit and hrg compensate) or limits (of hrg acceptance).
     table : str
         Only the keys of this table and the tables in it, such as thermal or loss.film.
     """
@@ -53,9 +53,10 @@ def keys(kind: str = "card", *, table: str = "") -> Result:
 
 def _words(row: Mapping[str, Any]) -> dict[str, str]:
     """Return default and uncertainty as people read them."""
-    sd = f"± {row['sd']:g}" if row["sd"] else f"± {100 * row['relative_sd']:g} %" if row["relative_sd"] else ""
+    from studies.schema.reference import spell_uncertainty
+
     default = "required" if row["required"] else "" if row["default"] is None else str(row["default"])
-    return {"uncertainty": sd, "default_words": default}
+    return {"uncertainty": spell_uncertainty(row), "default_words": default}
 
 
 def _card() -> Iterator[dict[str, Any]]:
@@ -91,4 +92,11 @@ def _limits() -> Iterator[dict[str, Any]]:
     yield from list_keys(Limits)
 
 
-KINDS = {"card": _card, "map": _map, "model": _model, "limits": _limits}
+def _study() -> Iterator[dict[str, Any]]:
+    from studies.schema.reference import list_keys
+    from studies.sweeps.keys import StudyKeys
+
+    yield from list_keys(StudyKeys)
+
+
+KINDS = {"card": _card, "study": _study, "map": _map, "model": _model, "limits": _limits}

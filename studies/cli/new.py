@@ -1,7 +1,7 @@
 """`hrg card new` and `hrg study new`: files of one's own to start from."""
 
-from collections.abc import Iterator
-from typing import Annotated
+from collections.abc import Collection, Iterator
+from typing import Annotated, Any
 
 from cyclopts import Parameter
 
@@ -24,6 +24,7 @@ def card(path: str, *, like: str = "hrg-30mm", name: str | None = None) -> int:
     from studies.cli.output import say
     from studies.files.writing import write_text
     from studies.instrument.card import build_instrument, load_card, spell_card
+    from studies.schema.reference import write_form
 
     _refuse_existing(path)
     model = load_card(like)
@@ -31,17 +32,8 @@ def card(path: str, *, like: str = "hrg-30mm", name: str | None = None) -> int:
     own = replace(model, name=name or Path(path).stem, content={**model.content, **note})
     content, text = spell_card(own, path)
     build_instrument(content, path)
-    lines = [
-        text,
-        "# Optional entries. Remove the # of a line to set it; entries left out have their documented default.",
-    ]
-    headings: set[str] = set()
-    for block in _forms(set(content)):
-        heading = block[0].partition("]")[0] + "]"
-        again = heading in headings and not heading.startswith("[[")
-        headings.add(heading)
-        more = [f"more keys of {heading}", *block[1:]] if again else block  # a table may be opened once
-        lines += [f"# {line}".rstrip() for line in ("", *more)]
+    head = "# Optional entries. Remove the # of a line to set it; entries left out have their documented default."
+    lines = [text, head, *(f"# {line}".rstrip() for line in write_form(_other_tables(content)))]
     write_text(path, "\n".join(lines) + "\n")
     say(f"{path}: written as a copy of {like}. Edit it, then run: hrg modes {path}")
     return 0
@@ -71,6 +63,8 @@ def study(
     from studies.cli.output import say
     from studies.files.reading import find_shipped, read_bytes
     from studies.files.writing import write_text
+    from studies.schema.reference import write_form
+    from studies.sweeps.keys import StudyKeys
     from studies.sweeps.spec import shipped_specs
 
     _refuse_existing(path)
@@ -79,19 +73,10 @@ def study(
         stated = tomllib.loads(text)["card"]
         old, new = (tomli_w.dumps({"card": one}).rstrip("\n") for one in (stated, card_))
         text = text.replace(old, new)
-    write_text(path, "\n".join([text.rstrip("\n"), "", *_study_form()]) + "\n")
+    form = ["All entries of a study, by example:", *write_form([(StudyKeys, "")])]
+    write_text(path, "\n".join([text.rstrip("\n"), "", *(f"# {line}".rstrip() for line in form)]) + "\n")
     say(f"{path}: written as a copy of {like}. Edit it, then run: hrg study run {path} --dry-run")
     return 0
-
-
-def _study_form() -> list[str]:
-    """Return everything that a study may say, as comments, from the documentation of the spec."""
-    import studies.sweeps.spec
-
-    lines = (studies.sweeps.spec.__doc__ or "").splitlines()
-    first, last = (k for k, line in enumerate(lines) if line.startswith("```"))
-    form = ["All entries of a study, by example:", "", *lines[first + 3 : last]]
-    return [f"# {line}".rstrip() for line in form]
 
 
 def _refuse_existing(path: str) -> None:
@@ -103,20 +88,11 @@ def _refuse_existing(path: str) -> None:
         raise InputError(f"{path}: already exists and is not overwritten; remove it or choose another name.")
 
 
-def _forms(present: set[str]) -> Iterator[list[str]]:
-    """Yield the form of each table that the card lacks, from the documentation of the table."""
-    import importlib
-    import pkgutil
+def _other_tables(present: Collection[str]) -> Iterator[tuple[Any, str]]:
+    """Yield the keys and the heading of each table that a card may have and this one has not."""
+    from studies.instrument.registry import card_tables
 
-    from studies.instrument.registry import TABLES
-
-    for module in pkgutil.iter_modules(importlib.import_module(TABLES).__path__):
-        doc = importlib.import_module(f"{TABLES}.{module.name}").__doc__ or ""
-        lines = [line.strip() for line in doc.splitlines()]
-        start = next((k for k, line in enumerate(lines) if line.startswith("[")), len(lines))
-        prose = (
-            k for k in range(start, len(lines)) if not lines[k] and not "".join(lines[k + 1 : k + 2]).startswith("[")
-        )
-        block = lines[start : next(prose, len(lines))]
-        if block and block[0].partition("]")[0].strip("[").split(".")[0] not in {*present, "posterior"}:
-            yield block
+    for name, entries in card_tables().items():
+        for entry in entries if name not in (*present, "posterior") else ():
+            keys = entry.keys if entry.keys_of is None else entry.keys_of({"name": "second-lag"}, "")
+            yield keys, f"[{name}]" if entry.keys_of is None else f"[[{name}]]"

@@ -135,7 +135,7 @@ def status(folder: str) -> Answer:
         [key.replace("_", " "), _words(found[key])]
         for key in ("state", "cases", "done", "failed", "seconds_each", "runs")
     ]
-    print_table(results.study.name, ["item", "value"], rows, results.study.note.strip("-"))
+    print_table(results.study.name, ["item", "value"], rows, results.study.note)
     _print_reasons(results)
 
 

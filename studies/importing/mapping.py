@@ -34,7 +34,7 @@ class ColumnMap(Keys, frozen=True, kw_only=True):
         str, says("of the scaled reading: K, °C, °/s, mdps, ppm of 4432.07 Hz, ...; see hrg import --help", example="K")
     ] = msgspec.field(name="unit")
     scale: Annotated[float, number("reading × scale + offset is in the unit")] = 1.0
-    offset: float = 0.0
+    offset: Annotated[float, number("see scale")] = 0.0
     sign: Annotated[float, number("-1 turns the converted value's sign", least=-1, most=1)] = 1.0
     stated_resample: (
         Annotated[

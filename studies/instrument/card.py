@@ -19,7 +19,7 @@ from studies.files.writing import write_text
 from studies.instrument.dotted import replaced
 from studies.instrument.registry import CardPlace, ReadTable, card_tables, read_table
 from studies.instrument.uncertain import UncertainValue
-from studies.schema.keys import Keys, number
+from studies.schema.keys import Keys, Note, number, says
 from studies.schema.reader import read_keys, read_toml
 
 if TYPE_CHECKING:
@@ -40,10 +40,12 @@ SCHEMA = "hrg.card/1"
 class Head(Keys, frozen=True, kw_only=True):
     """The keys of a card outside its tables."""
 
-    schema: str
-    name: str
-    note: str = ""
-    reference_temperature_degC: Annotated[float, number(least=-200.0, most=200.0)] = 20.0
+    schema: Annotated[str, says("what the file is", example=SCHEMA)]
+    name: Annotated[str, says("of the instrument", example="free-dome")]
+    note: Note = ""
+    reference_temperature_degC: Annotated[
+        float, number("dimensions and given material values hold here", least=-200.0, most=200.0)
+    ] = 20.0
 
 
 @dataclass(frozen=True)

@@ -1,6 +1,7 @@
 """Units that the names of keys carry: `mount_conductance_W_per_K` is in W/K."""
 
 import re
+from functools import lru_cache
 
 SYMBOLS = {"um": "µm", "deg": "°", "degC": "°C", "day": "d", "rt": "√"}
 UNIT = re.compile(r"(10)?(per|rt|degC|deg|mrad|ppm|day|[GMkmun]?(?:Pa|Hz|W|J|V|eV|N|g|K|s)|[cmunp]?m|pF|h|1)([2-9])?")
@@ -24,6 +25,7 @@ def unit_of(name: str) -> str:
     return split_unit(words[-1])[1]
 
 
+@lru_cache(maxsize=1024)
 def split_unit(key: str) -> tuple[str, str]:
     """Split a key into its name and its unit ("1" where it carries none): `film_K_per_s` into ("film", "K/s")."""
     words = key.split("_")

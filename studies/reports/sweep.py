@@ -39,7 +39,7 @@ def sweep_page(results: Results) -> str:
     study = results.study
     done = len(results) if results.done == results.total else f"{results.done} of {results.total}"
     lead = f"{done} designs ({METHODS[study.sampling.method]}) based on the card {study.instrument.name}."
-    if study.note != "-":
+    if study.note:
         lead = f"{study.note} {lead}"
     chapters = [
         Chapter("In short", _short(results)),
@@ -133,7 +133,7 @@ def _asked(results: Results) -> list[Block]:
     rows = [
         [
             c.name,
-            one.quantity.summary,
+            one.__doc__ or "",
             ", ".join(f"{key} = {value}" for key, value in one.options.items() if value is not None),
         ]
         for one in study.asked

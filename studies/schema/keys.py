@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from functools import lru_cache
-from typing import Any
+from typing import Annotated, Any
 
 import msgspec
 from msgspec import inspect
@@ -50,6 +50,9 @@ def says(meaning: str, *, example: Any = None, least: int | None = None, most: i
     return msgspec.Meta(description=meaning, examples=examples, min_length=least, max_length=most)
 
 
+Note = Annotated[str, says("free text")]
+
+
 @lru_cache(maxsize=256)
 def describe(keys: Any) -> inspect.Type:
     """Return msgspec's description of a table's type."""
@@ -66,7 +69,7 @@ def plain(node: inspect.Type) -> inspect.Type:
 def options(node: inspect.Type) -> Sequence[inspect.Type]:
     """Return the types that a value may have."""
     node = plain(node)
-    return [plain(one) for one in node.types] if isinstance(node, inspect.UnionType) else [node]
+    return [one for part in node.types for one in options(part)] if isinstance(node, inspect.UnionType) else [node]
 
 
 def structs(node: inspect.Type, value: Any = None) -> list[inspect.StructType]:

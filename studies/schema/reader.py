@@ -46,10 +46,10 @@ def read_toml(path: str | FilePath, schema: str | None = None) -> dict[str, Any]
         raise InputError(f"{path}{_spell_syntax(text, str(error).partition(';')[0])}") from None
     except RecursionError:
         raise InputError(f"{path}: not valid TOML: nested too deeply.") from None
-    for key, text in _texts(content):
-        if text != printable(text):
+    for key, said in _texts(content):
+        if said != printable(said):
             raise InputError(
-                f"{path}: {printable(key)} holds a control character ({printable(text)!s:.60}); remove it."
+                f"{path}: {printable(key)} holds a control character ({printable(said)!s:.60}); remove it."
             )
     if schema is not None:
         found = content.get("schema")

@@ -6,12 +6,11 @@ from typing import TYPE_CHECKING, Any
 
 from shell.constants import zero_Celsius
 from studies.instrument.card import Instrument
+from studies.sweeps.quantity import OvertoneQuantity
 
 if TYPE_CHECKING:
     from shell.levels import Theory
     from shell.modes import Mode
-
-Options = Mapping[str, Any]
 
 
 @dataclass
@@ -22,17 +21,14 @@ class Case:
     ----------
     instrument : the card with this design's parameters.
     parameters : every parameter of the study by name, in the unit of its name.
-    remarks : warnings of the solver, kept beside the results.
     """
 
     instrument: Instrument
     parameters: Mapping[str, Any]
-    remarks: list[str] = field(default_factory=list)
     _solved: dict[tuple[int, str, float], "tuple[Mode, ...]"] = field(default_factory=dict, repr=False)
 
-    def temperature(self, options: Options) -> float:
-        """Return the temperature in K that a quantity asks for, the study's, or the card's reference."""
-        given = options.get("temperature_degC")
+    def temperature(self, given: float | None) -> float:
+        """Return the temperature in K that a quantity gives (°C), else the study's, or the card's reference."""
         if given is None:
             given = self.parameters.get("temperature_degC")
         return self.instrument.reference_temperature if given is None else float(given) + zero_Celsius
@@ -47,8 +43,7 @@ class Case:
             self._solved[key] = solve_modes(resonator, elastic, harmonic, count, theory)
         return self._solved[key]
 
-    def mode(self, options: "Options") -> "Mode":
-        """Return the mode that `harmonic`, `index`, `theory` and the temperature name."""
-        index = options.get("index", 0)
-        found = self.modes(options["harmonic"], index + 1, options["theory"], self.temperature(options))
-        return found[index]
+    def mode(self, asked: OvertoneQuantity) -> "Mode":
+        """Return the mode that a quantity names."""
+        at = self.temperature(asked.temperature_degC)
+        return self.modes(asked.harmonic, asked.index + 1, asked.theory, at)[asked.index]

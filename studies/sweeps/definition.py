@@ -7,15 +7,11 @@ from typing import Any
 from studies.instrument.card import Instrument
 from studies.instrument.units import unit_of
 from studies.sweeps.expressions import Derived
+from studies.sweeps.keys import Requirement, Sampling, Search
 from studies.sweeps.quantity import Column, Quantity
 
-FREE = (
-    "name",
-    "note",
-    "requirement",
-    "search",
-)  # keys that may change after the first run: no sampled result needs them
-MOST_CASES = 20_000_000
+FREE = ("name", "note", "requirement", "search")
+"""Keys that may change after the first run: no sampled result needs them."""
 
 
 @dataclass(frozen=True)
@@ -42,48 +38,6 @@ class StudyParameter:
 
 
 @dataclass(frozen=True)
-class Asked:
-    """A quantity with its options, and the columns that it fills."""
-
-    quantity: Quantity
-    options: Mapping[str, Any]
-    columns: tuple[Column, ...]
-
-
-@dataclass(frozen=True)
-class Sampling:
-    """How designs are drawn."""
-
-    method: str
-    cases: int
-    seed: int
-    batch: int | None
-    solver: str
-
-
-@dataclass(frozen=True)
-class Requirement:
-    """Limits of a column; a `within` alone is about the nominal design's value."""
-
-    column: str
-    low: float | None
-    high: float | None
-    target: float | None
-    within: float | None
-
-
-@dataclass(frozen=True)
-class Search:
-    """A worst case of a column over the box, an inversion to target values, or the tolerances that a share of designs keep."""
-
-    kind: str
-    column: str = ""
-    vary: tuple[str, ...] = ()
-    targets: Mapping[str, float] = field(default_factory=dict)
-    share: float = 0.0
-
-
-@dataclass(frozen=True)
 class Study:
     """A checked spec. `content` is the spec as data, `text` as its author wrote it, `folder` where it lies."""
 
@@ -93,7 +47,7 @@ class Study:
     sampling: Sampling
     parameters: tuple[StudyParameter, ...]
     derived: tuple[Derived, ...]
-    asked: tuple[Asked, ...]
+    asked: tuple[Quantity, ...]
     requirements: tuple[Requirement, ...]
     searches: tuple[Search, ...]
     content: Mapping[str, Any] = field(repr=False)
@@ -113,4 +67,4 @@ class Study:
     @property
     def functions(self) -> tuple[str, ...]:
         """User functions that the study asks for."""
-        return tuple(asked.options["function"] for asked in self.asked if asked.quantity.name == "python")
+        return tuple(asked.options["function"] for asked in self.asked if asked.name == "python")

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from studies.errors import InputError
-from studies.sweeps.definition import MOST_CASES
+from studies.sweeps.keys import MOST_CASES
 
 if TYPE_CHECKING:
     from studies.sweeps.definition import Study, StudyParameter

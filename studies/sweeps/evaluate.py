@@ -16,13 +16,12 @@ from studies.sweeps.case import Case
 from studies.sweeps.child import FunctionFailed, FunctionLost
 from studies.sweeps.design import coding
 from studies.sweeps.parameters import set_parameters
-from studies.sweeps.quantities import library
+from studies.sweeps.quantity import Number, Quantity
 
 if TYPE_CHECKING:
     from studies.sweeps.definition import Study
     from studies.sweeps.expressions import Derived
     from studies.sweeps.families import Families
-    from studies.sweeps.quantity import Number
 
 
 class Row(NamedTuple):
@@ -41,20 +40,19 @@ class WorkPlan:
 
     instrument: Instrument
     coding: tuple[tuple[str, tuple[str, ...]], ...]
-    asked: tuple[tuple[str, Mapping[str, Any], int], ...]
+    asked: "tuple[Quantity, ...]"
     families: "Families | None" = None
     derived: "tuple[Derived, ...]" = ()
 
     @classmethod
     def of(cls, study: "Study", families: "Families | None" = None) -> "WorkPlan":
         """Return the plan of a study."""
-        asked = tuple((one.quantity.name, one.options, len(one.columns)) for one in study.asked)
-        return cls(study.instrument, coding(study), asked, families, study.derived)
+        return cls(study.instrument, coding(study), study.asked, families, study.derived)
 
     @property
     def width(self) -> int:
         """The number of columns of results."""
-        return sum(width for _, _, width in self.asked)
+        return sum(len(one.columns) for one in self.asked)
 
 
 def evaluate_task(plan: WorkPlan, batches: Sequence[Batch]) -> list[Cases]:
@@ -111,11 +109,11 @@ def evaluate_case(plan: WorkPlan, parameters: Mapping[str, Any]) -> Row:
             case = Case(set_parameters(plan.instrument, parameters, plan.derived), parameters)
         except UNUSABLE_INPUT as error:
             return failed_row(plan, "failed", str(error))
-        for name, options, width in plan.asked:
+        for asked in plan.asked:
             try:
-                numbers, reason = _evaluate(name, options, width, case)
+                numbers, reason = _evaluate(asked, case)
             except FunctionLost as error:
-                return failed_row(plan, "lost", f"{name}: {error}; the next run tries again.")
+                return failed_row(plan, "lost", f"{asked.name}: {error}; the next run tries again.")
             values += (number.value for number in numbers)
             errors += (number.error for number in numbers)
             reasons += [reason] if reason else []
@@ -131,12 +129,10 @@ def failed_row(plan: WorkPlan, status: str, reason: str) -> Row:
     return Row(status, reason, nothing, nothing, 0.0)
 
 
-def _evaluate(name: str, options: Mapping[str, Any], width: int, case: Case) -> "tuple[Sequence[Number], str]":
-    from studies.sweeps.quantity import Number
-
-    nothing = (Number(math.nan),) * width
+def _evaluate(asked: Quantity, case: Case) -> tuple[Sequence[Number], str]:
+    nothing, name = (Number(math.nan),) * len(asked.columns), asked.name
     try:
-        numbers = library()[name].evaluate(case, options)
+        numbers = asked.evaluate(case)
     except (*UNUSABLE_INPUT, FunctionFailed) as error:
         return nothing, f"{name}: {error}"
     except FunctionLost:

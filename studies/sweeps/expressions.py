@@ -8,10 +8,10 @@ import ast
 import math
 import operator
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
 from studies.errors import InputError, nearest
+from studies.schema.keys import Keys, says
 
 LookUp = Callable[[str], Any]
 BINARY: dict[type[ast.operator], Callable[[float, float], float]] = {
@@ -26,18 +26,21 @@ LONGEST = 500  # characters
 MOST_POWER = 100.0
 
 
-@dataclass(frozen=True)
-class Derived:
-    """A key of the card that follows from others: its `name`, the `text` of the formula, and where it stands."""
+class Derived(Keys, frozen=True, kw_only=True):
+    """A key of the card that follows from others."""
 
-    name: str
-    text: str
-    where: str
+    name: Annotated[str, says("a key of the card", example="resonator.stem.end_mm")]
+    expression: Annotated[
+        str, says("numbers, names of parameters and keys, + - * / ** and brackets", example="4 - radius_mm")
+    ]
+
+    def __post_init__(self) -> None:
+        parse(self.expression)
 
     @property
     def names(self) -> tuple[str, ...]:
         """The names that the formula uses, in their order."""
-        return tuple(dict.fromkeys(_names(parse(self.text, self.where))))
+        return tuple(dict.fromkeys(_names(parse(self.expression))))
 
     def value(self, known: Mapping[str, Any]) -> float:
         """Return the value for known names.
@@ -47,25 +50,25 @@ class Derived:
         InputError
             The arithmetic fails or its result is no finite number.
         """
-        tree = parse(self.text, self.where)
+        where = f"{self.name} = '{self.expression}'"
         try:
-            found = _evaluate(tree, known)
+            found = _evaluate(parse(self.expression), known)
         except (ArithmeticError, ValueError) as error:
-            raise InputError(f"{self.where}: '{self.text}' cannot be computed ({error}).") from error
+            raise InputError(f"{where} cannot be computed ({error}).") from error
         if isinstance(found, complex) or not math.isfinite(found):
-            raise InputError(f"{self.where}: '{self.text}' is not a finite number.")
+            raise InputError(f"{where} is not a finite number.")
         return found
 
 
-def parse(text: str, where: str) -> ast.expr:
-    """Return the tree of a formula of numbers, names, + - * / ** and brackets; anything else is refused."""
+def parse(text: str) -> ast.expr:
+    """Return the tree of a formula of numbers, names, + - * / ** and brackets; ValueError says what else is there."""
     if len(text) > LONGEST:
-        raise InputError(f"{where}: the expression is longer than {LONGEST} characters.")
+        raise ValueError(f"the expression is longer than {LONGEST} characters.")
     try:
         tree = ast.parse(text, mode="eval").body
     except (SyntaxError, ValueError, RecursionError, MemoryError):
-        raise InputError(f"{where}: '{text}' is not a formula; write one such as \"radius_mm + 4\".") from None
-    _check(tree, text, where)
+        raise ValueError(f"'{text}' is not a formula; write one such as \"radius_mm + 4\".") from None
+    _check(tree, text)
     return tree
 
 
@@ -95,23 +98,23 @@ def _look_up(one: Derived, name: str, values: Mapping[str, Any], in_card: LookUp
                 continue
         else:
             raise InputError(
-                f"{one.where}: '{name}' is neither a parameter nor a key of the card{nearest(name, values)}"
+                f"{one.name} = '{one.expression}': '{name}' is neither a parameter nor a key of the card{nearest(name, values)}"
             )
     if isinstance(found, str) or found is None:
-        raise InputError(f"{one.where}: '{name}' has no usable number.")
+        raise InputError(f"{one.name} = '{one.expression}': '{name}' has no usable number.")
     return float(found)
 
 
-def _check(node: ast.expr, text: str, where: str) -> None:
+def _check(node: ast.expr, text: str) -> None:
     if isinstance(node, ast.BinOp) and type(node.op) in BINARY:
-        _check(node.left, text, where)
-        _check(node.right, text, where)
+        _check(node.left, text)
+        _check(node.right, text)
     elif isinstance(node, ast.UnaryOp) and type(node.op) in UNARY:
-        _check(node.operand, text, where)
+        _check(node.operand, text)
     elif _spell(node) is None and not (
         isinstance(node, ast.Constant) and isinstance(node.value, int | float) and not isinstance(node.value, bool)
     ):
-        raise InputError(f"{where}: '{text}' may contain only numbers, names of parameters, + - * / ** and brackets.")
+        raise ValueError(f"'{text}' may contain only numbers, names of parameters, + - * / ** and brackets.")
 
 
 def _spell(node: ast.expr) -> str | None:

@@ -5,7 +5,7 @@ temperature follow exactly. Its error is judged by full solves that it has not s
 more solves than half the designs, every design is solved in full. No result depends on the other designs of its batch.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
 from typing import TYPE_CHECKING, Any
@@ -20,11 +20,11 @@ from studies.errors import UNUSABLE_INPUT, InputError
 from studies.instrument.card import Instrument
 from studies.sweeps.parameters import TEMPERATURE, set_parameters
 from studies.sweeps.quantities.tcf import PARTS, STEEPEST
+from studies.sweeps.quantity import ModeQuantity, Quantity
 
 if TYPE_CHECKING:
     from shell.materials import Material
     from shell.resonator import Resonator
-    from studies.sweeps.case import Options
     from studies.sweeps.definition import Study, StudyParameter
     from studies.sweeps.design import Design
 
@@ -45,7 +45,7 @@ class Families:
     """The families of a study by (harmonic, index, theory), and what it takes to evaluate its designs with them."""
 
     instrument: Instrument
-    asked: tuple[tuple[str, "Options", int], ...]
+    asked: tuple[Quantity, ...]
     members: Mapping[tuple[int, int, str], Family]
 
     def evaluate(self, designs: Designs, count: int) -> tuple[Array, Array]:
@@ -56,13 +56,13 @@ class Families:
         ShellError, InputError
             One of the designs cannot be computed.
         """
-        found = [FAST[name](self, options, designs, count) for name, options, _ in self.asked]
+        found = [FAST[one.name](self, one, designs, count) for one in self.asked]
         values, errors = (np.concatenate([one[part] for one in found], axis=1) for part in (0, 1))
         return values, errors
 
-    def modes(self, options: "Options", designs: Designs, bodies: "_Bodies") -> tuple[Family, FamilyResult]:
+    def modes(self, asked: ModeQuantity, designs: Designs, bodies: "_Bodies") -> tuple[Family, FamilyResult]:
         """Return the family that a quantity asks for and what it gives."""
-        family = self.members[_key(options)]
+        family = self.members[_key(asked)]
         values = np.empty((len(bodies.T), len(family.axes)))
         for k, axis in enumerate(family.axes):
             values[:, k] = designs[axis.name]
@@ -93,7 +93,7 @@ def why_not(study: "Study") -> str:
         if not (follows or (name.startswith(DIMENSIONS) and not isinstance(parameter.nominal, str))):
             return f"families do not cover the parameter '{name}'"
     for asked in study.asked:
-        if asked.quantity.name not in FAST:
+        if asked.name not in FAST:
             return f"families do not give the quantity '{asked.columns[0].name}'"
         if asked.options["theory"] == "rayleigh":
             return "families need the theory solid or shell"
@@ -118,14 +118,14 @@ def build_families(study: "Study", design: "Design", most: int = MOST_SOLVES) ->
         named = {axis.name: float(value) for axis, value in zip(axes, values, strict=True)}
         return set_parameters(study.instrument, named).resonator
 
-    sloped = {_key(one.options) for one in study.asked if one.quantity.name == "tcf"}
+    sloped = {_key(one) for one in study.asked if one.name == "tcf"}
     members: dict[tuple[int, int, str], Family] = {}
     try:
         ends = _ends(study, design)
         nu = _describe(study.instrument, ends, len(ends[TEMPERATURE]), None).nu
         beyond = MARGIN * float(np.ptp(nu))
         for one in study.asked:
-            key = harmonic, index, theory = _key(one.options)
+            key = harmonic, index, theory = _key(one)
             if key not in members:
                 members[key] = build_family(
                     build,
@@ -140,8 +140,7 @@ def build_families(study: "Study", design: "Design", most: int = MOST_SOLVES) ->
                 )
     except UNUSABLE_INPUT as error:
         return str(error).rstrip(".")
-    asked = tuple((one.quantity.name, one.options, len(one.columns)) for one in study.asked)
-    return Families(study.instrument, asked, members)
+    return Families(study.instrument, study.asked, members)
 
 
 def choose_solver(study: "Study", design: "Design") -> "Families | None":
@@ -163,23 +162,23 @@ def choose_solver(study: "Study", design: "Design") -> "Families | None":
     return None
 
 
-def _frequency(families: Families, options: "Options", designs: Designs, count: int) -> tuple[Array, Array]:
-    bodies = _describe(families.instrument, designs, count, options["temperature_degC"])
-    family, found = families.modes(options, designs, bodies)
+def _frequency(families: Families, asked: ModeQuantity, designs: Designs, count: int) -> tuple[Array, Array]:
+    bodies = _describe(families.instrument, designs, count, asked.temperature_degC)
+    family, found = families.modes(asked, designs, bodies)
     error = found.frequency * (family.error.frequency + family.theory_error)
     return found.frequency[:, None], error[:, None]
 
 
-def _bryan_factor(families: Families, options: "Options", designs: Designs, count: int) -> tuple[Array, Array]:
-    bodies = _describe(families.instrument, designs, count, options["temperature_degC"])
-    family, found = families.modes(options, designs, bodies)
+def _bryan_factor(families: Families, asked: ModeQuantity, designs: Designs, count: int) -> tuple[Array, Array]:
+    bodies = _describe(families.instrument, designs, count, asked.temperature_degC)
+    family, found = families.modes(asked, designs, bodies)
     return found.bryan_factor[:, None], np.full((count, 1), family.error.bryan_factor + family.theory_error)
 
 
-def _tcf(families: Families, options: "Options", designs: Designs, count: int) -> tuple[Array, Array]:
+def _tcf(families: Families, asked: ModeQuantity, designs: Designs, count: int) -> tuple[Array, Array]:
     """Return the five parts of d ln f/dT (HRG paper eq. 15) and their sum."""
-    bodies = _describe(families.instrument, designs, count, options["temperature_degC"])
-    family, found = families.modes(options, designs, bodies)
+    bodies = _describe(families.instrument, designs, count, asked.temperature_degC)
+    family, found = families.modes(asked, designs, bodies)
     parts, scale = np.empty((count, 5)), np.empty((count, 2))
     for material, places in bodies.materials:
         T = bodies.T[places]
@@ -193,10 +192,15 @@ def _tcf(families: Families, options: "Options", designs: Designs, count: int) -
     return 1e6 * np.column_stack([parts.sum(axis=1), parts]), 1e6 * errors
 
 
-FAST = {"frequency": _frequency, "tcf": _tcf, "bryan-factor": _bryan_factor}
+FAST: Mapping[str, Callable[..., tuple[Array, Array]]] = {
+    "frequency": _frequency,
+    "tcf": _tcf,
+    "bryan-factor": _bryan_factor,
+}
 
 
-def _key(options: "Options") -> tuple[int, int, Any]:
+def _key(asked: Quantity) -> tuple[int, int, Any]:
+    options = asked.options
     return options["harmonic"], options.get("index", 0), options["theory"]
 
 

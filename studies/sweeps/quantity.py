@@ -1,13 +1,15 @@
-"""What a study can ask of a design: the form in which every file of `quantities/` describes its quantity."""
+"""Form of what a study can ask of a design: a class in a file of `quantities/` declares its keys, its columns and its value."""
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
 from math import nan
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple
 
-from studies.errors import InputError
-from studies.files.toml import TomlTable, check_number
-from studies.sweeps.case import Case, Options
+import msgspec
+
+from studies.schema.keys import Keys, number, says
+
+if TYPE_CHECKING:
+    from studies.sweeps.case import Case
 
 SUFFIXES = {"Hz": "_Hz", "ppm/°C": "_ppm_per_degC", "°C": "_degC", "s": "_s", "°": "_deg", "1": ""}
 
@@ -19,8 +21,7 @@ class Number(NamedTuple):
     error: float = nan
 
 
-@dataclass(frozen=True)
-class Column:
+class Column(NamedTuple):
     """One column of results: `stem` is its name without the unit's suffix, `label` what people read."""
 
     stem: str
@@ -33,75 +34,78 @@ class Column:
         return self.stem + SUFFIXES.get(self.unit, f"_{self.unit}")
 
 
-@dataclass(frozen=True)
-class Option:
-    """One key of a `[[quantity]]` table: what it means and how it is read and checked."""
+class Quantity(Keys, frozen=True, kw_only=True, tag_field="name"):
+    """A quantity that a study computes for every design; its fields are the keys of its `[[quantity]]` table."""
 
-    meaning: str
-    read: Callable[[TomlTable, str], Any]
+    label: Annotated[str, says("before the names of its columns, where a quantity is asked for twice")] = ""
 
+    def list_columns(self) -> Sequence[Column]:
+        """Return the columns that it fills, without its label."""
+        raise NotImplementedError
 
-@dataclass(frozen=True)
-class Quantity:
-    """A quantity that a study can compute for every design.
+    def evaluate(self, case: "Case") -> Sequence[Number]:
+        """Return one number for every column."""
+        raise NotImplementedError
 
-    Attributes
-    ----------
-    name : what a spec calls it.
-    summary : one sentence.
-    options : its keys in a spec.
-    columns : options -> the columns that it fills.
-    evaluate : (case, options) -> one Number for every column.
-    """
+    @property
+    def name(self) -> str:
+        """What a spec calls it."""
+        return str(self.__struct_config__.tag)
 
-    name: str
-    summary: str
-    options: Mapping[str, Option]
-    columns: Callable[[Options], Sequence[Column]]
-    evaluate: Callable[["Case", Options], Sequence[Number]]
+    @property
+    def columns(self) -> tuple[Column, ...]:
+        """The columns that it fills."""
+        found = tuple(self.list_columns())
+        if not self.label:
+            return found
+        return tuple(Column(f"{self.label}_{c.stem}", c.unit, f"{self.label}: {c.label}") for c in found)
 
-
-def whole(default: int, meaning: str, least: int = 0, most: int = 100) -> Option:
-    """Return an option that is a whole number."""
-
-    def read(section: TomlTable, key: str) -> int:
-        value = section.raw(key, default)
-        if isinstance(value, bool) or not isinstance(value, int) or not least <= value <= most:
-            raise InputError(f"{section.where}: {key} must be a whole number from {least} to {most}, not {value!r}.")
-        return value
-
-    return Option(meaning, read)
+    @property
+    def options(self) -> Mapping[str, Any]:
+        """Its keys by name, the label apart."""
+        return {key: value for key, value in msgspec.structs.asdict(self).items() if key != "label"}
 
 
-def number(default: float | None, meaning: str, **bounds: float) -> Option:
-    """Return an option that is a number; without a default it may be left out (None)."""
+class HarmonicQuantity(Quantity, frozen=True, kw_only=True):
+    """A quantity of one harmonic."""
 
-    def read(section: TomlTable, key: str) -> float | None:
-        if default is None and key not in section:
-            return None
-        return check_number(section.raw(key, default), f"{section.where}: {key}", **bounds)
+    harmonic: Annotated[int, number("circumferential harmonic n", least=0, most=100)] = 2
+    theory: Annotated[
+        Literal["solid", "shell", "rayleigh"],
+        says("solid (three-dimensional), shell (Naghdi) or rayleigh (closed form)"),
+    ] = "solid"
 
-    return Option(meaning, read)
+    def stem(self, what: str) -> str:
+        """Return such as frequency_n2."""
+        return f"{what}_n{self.harmonic}"
 
-
-def choice(choices: Sequence[str], meaning: str) -> Option:
-    """Return an option that is one of a few words, the first unless given."""
-    return Option(meaning, lambda section, key: section.text(key, choices[0], choices))
-
-
-HARMONIC = whole(2, "circumferential harmonic n")
-INDEX = whole(0, "0 for the lowest mode of the harmonic", most=20)
-THEORY = choice(("solid", "shell", "rayleigh"), "solid (three-dimensional), shell (Naghdi) or rayleigh (closed form)")
-TEMPERATURE = number(None, "temperature in °C; the parameter temperature_degC, else the card's reference, unless given")
+    @property
+    def words(self) -> str:
+        """Such as "n = 2"."""
+        return f"n = {self.harmonic}"
 
 
-def mode_stem(what: str, options: Options) -> str:
-    """Return such as frequency_n2, or frequency_n2_1 for a higher mode."""
-    index = options.get("index", 0)
-    return f"{what}_n{options['harmonic']}" + (f"_{index}" if index else "")
+Temperature = Annotated[
+    float, number("the parameter temperature_degC, else the card's reference, unless given", example=20.0)
+]
 
 
-def mode_words(options: Options) -> str:
-    """Return such as "n = 2", or "n = 2, mode 1" for a higher mode."""
-    index = options.get("index", 0)
-    return f"n = {options['harmonic']}" + (f", mode {index}" if index else "")
+class ModeQuantity(HarmonicQuantity, frozen=True, kw_only=True):
+    """A quantity of one harmonic at one temperature."""
+
+    temperature_degC: Temperature | None = None
+
+
+class OvertoneQuantity(ModeQuantity, frozen=True, kw_only=True):
+    """A quantity of one of the modes of a harmonic."""
+
+    index: Annotated[int, number("0 for the lowest mode of the harmonic", least=0, most=20)] = 0
+
+    def stem(self, what: str) -> str:
+        """Return such as frequency_n2, or frequency_n2_1 for a higher mode."""
+        return f"{what}_n{self.harmonic}" + (f"_{self.index}" if self.index else "")
+
+    @property
+    def words(self) -> str:
+        """Such as "n = 2", or "n = 2, mode 1" for a higher mode."""
+        return f"n = {self.harmonic}" + (f", mode {self.index}" if self.index else "")

@@ -5,7 +5,7 @@ resumed, it walks over what is already there.
 """
 
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from itertools import product
 from typing import TYPE_CHECKING, Any
 
@@ -15,11 +15,12 @@ from numpy.typing import NDArray
 from studies.sweeps.block import Batch, decode, each_design
 from studies.sweeps.design import draw, nominal_row
 from studies.sweeps.engine import BATCH_VECTORISED, compute
+from studies.sweeps.keys import Inversion, Requirement, Search, ToleranceSearch, WorstCase
 from studies.sweeps.progress import Silent
 from studies.sweeps.tolerance import place_limits
 
 if TYPE_CHECKING:
-    from studies.sweeps.definition import Requirement, Search, Study, StudyParameter
+    from studies.sweeps.definition import Study, StudyParameter
     from studies.sweeps.evaluate import WorkPlan
     from studies.sweeps.store import Store, Stored
     from studies.sweeps.workers import Workers
@@ -78,17 +79,18 @@ def run_searches(study: "Study", plan: "WorkPlan", workers: "Workers", store: "S
         store.keep_finding(name_search(search), {"kind": search.kind, **found})
 
 
-def name_search(search: "Search") -> str:
+def name_search(search: Search) -> str:
     """Return the name under which a search's outcome is kept."""
-    targets = ", ".join(f"{column} = {value:.10g}" for column, value in search.targets.items())
-    if search.kind == "tolerance":
+    if isinstance(search, ToleranceSearch):
         return f"tolerances of {', '.join(search.vary)} that {100 * search.share:g} % keep"
-    if search.kind == "inversion":
+    if isinstance(search, Inversion):
+        targets = ", ".join(f"{column} = {value:.10g}" for column, value in search.targets.items())
         return f"{targets} by {', '.join(search.vary)}"
+    assert isinstance(search, WorstCase)
     return f"extremes of {search.column}"
 
 
-def find_worst_case(explorer: Explorer, search: "Search") -> dict[str, Any]:
+def find_worst_case(explorer: Explorer, search: WorstCase) -> dict[str, Any]:
     """Find the extremes of a column over the box of all numeric parameters.
 
     From the best corner (or, with many parameters, the best of single excursions) a bounded quasi-Newton search goes on,
@@ -123,7 +125,7 @@ def find_worst_case(explorer: Explorer, search: "Search") -> dict[str, Any]:
     return found
 
 
-def invert(explorer: Explorer, search: "Search") -> dict[str, Any]:
+def invert(explorer: Explorer, search: Inversion) -> dict[str, Any]:
     """Find the parameters that give target values, by bounded least squares on relative deviations.
 
     The unit of each deviation is what the column changes over the box, so that Hz and ppm/°C weigh alike.
@@ -165,7 +167,7 @@ def invert(explorer: Explorer, search: "Search") -> dict[str, Any]:
     }
 
 
-def find_tolerance(explorer: Explorer, search: "Search") -> dict[str, Any]:
+def find_tolerance(explorer: Explorer, search: ToleranceSearch) -> dict[str, Any]:
     """Find by which factor the tolerances may be wider (or must be narrower) for a share of designs to meet the requirements.
 
     Every sampled design moves along its line through the nominal one. How far it then is on its way to its limit is taken to go
@@ -214,7 +216,7 @@ def find_tolerance(explorer: Explorer, search: "Search") -> dict[str, Any]:
     }
 
 
-def _ends_of(requirement: "Requirement", nominal: float) -> tuple[float, float]:
+def _ends_of(requirement: Requirement, nominal: float) -> tuple[float, float]:
     """The limits of a requirement; about the nominal value unless it has a target."""
     if requirement.within is not None:
         target = nominal if requirement.target is None else requirement.target
@@ -232,7 +234,11 @@ def _tolerance(parameter: "StudyParameter", factor: float) -> dict[str, Any]:
     return {"name": parameter.name, "low": ends[0], "high": ends[1]}
 
 
-SEARCHES = {"worst-case": find_worst_case, "inversion": invert, "tolerance": find_tolerance}
+SEARCHES: Mapping[str, Callable[..., dict[str, Any]]] = {
+    "worst-case": find_worst_case,
+    "inversion": invert,
+    "tolerance": find_tolerance,
+}
 
 
 def _starts(free: "Sequence[StudyParameter]") -> Array:

@@ -1,91 +1,20 @@
-"""Study specs, `schema = "hrg.study/1"`: what is varied, how it is sampled, what is computed.
+"""Study specs, read and checked against their card (`studies.sweeps.keys` declares the keys)."""
 
-```toml
-schema = "hrg.study/1"
-name = "thickness and radius tolerance"
-card = "hrg-30mm"                  # a shipped card, or the path of one beside this file
-
-[sampling]
-method = "sobol"                   # grid | list | latin-hypercube | sobol | sensitivity | one-at-a-time
-cases = 1024                       # not for grid, list and one-at-a-time; a power of two for sobol and sensitivity
-seed = 1
-# batch = 8                        # cases that are computed and kept together; 16384 with families
-# solver = "auto"                  # family: interpolated between full solves, with its error; full: every design by the solver
-
-[[parameter]]
-name = "resonator.thickness_mm"    # a key of the card; or temperature_degC; or user.NAME for a function of yours
-tolerance = 0.005                  # nominal ± tolerance; or low and high; or values = [...] for grid and list
-# nominal = 0.86                   # the card's value unless given
-# distribution = "uniform"         # uniform | normal (standard_deviation) | triangular | log-uniform
-# count = 11                       # points of a grid from low to high
-
-[[parameter]]
-name = "resonator.radius_mm"
-low = 14.99
-high = 15.01
-
-[[derived]]                        # a key that follows from others: numbers, names, + - * / ** and brackets
-name = "resonator.stem.end_mm"
-expression = "4 - radius_mm"
-
-[[quantity]]
-name = "frequency"                 # frequency, tcf, bryan-factor, mode-separation, compensation-residual, ...
-harmonic = 2
-theory = "solid"
-
-[[quantity]]
-name = "tcf"
-
-[[requirement]]                    # asked of the yield; may change without computing anew
-column = "frequency_n2_Hz"
-within = 0.5                       # of target, which is the nominal design's value unless given; or low and/or high
-
-[[search]]                         # optional, after the sampled cases
-kind = "worst-case"                # the extremes of a column over the box of all parameters
-column = "frequency_n2_Hz"
-
-[[search]]
-kind = "inversion"                 # the parameters that give wanted values
-vary = ["resonator.thickness_mm", "resonator.radius_mm"]
-targets = { frequency_n2_Hz = 4432.07, tcf_n2_ppm_per_degC = 79.5 }
-
-[[search]]
-kind = "tolerance"                 # how much wider or narrower all tolerances are with which a share of designs meets the requirements
-share = 0.95
-# vary = ["resonator.radius_mm"]   # these parameters alone; all unless given
-```
-
-`grid` takes every combination, `list` the rows of equally long `values`, `sensitivity` the design of Saltelli for Sobol
-indices (cases × (parameters + 2) designs), `one-at-a-time` five levels of each parameter about the nominal design.
-"""
-
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from studies.errors import InputError
-from studies.files.reading import find_shipped, list_shipped
-from studies.files.toml import TomlTable
-from studies.instrument.card import Instrument, load_card
-from studies.schema.reader import read_toml
-from studies.sweeps.definition import Study
-from studies.sweeps.tables import (
-    read_asked,
-    read_derived,
-    read_parameter,
-    read_requirement,
-    read_sampling,
-    read_search,
-    refuse_twins,
-    split_tables,
-)
-from studies.sweeps.validity import check_nominal, check_sample
+from msgspec.structs import replace
 
-SCHEMA = "hrg.study/1"
-KEYS = ("schema", "name", "note", "card", "sampling", "parameter", "derived", "quantity", "requirement", "search")
-PARAMETER_KEYS = (
-    "name", "low", "high", "tolerance", "values", "count", "distribution", "standard_deviation", "nominal",
-)  # fmt: skip
+from studies.errors import InputError, nearest
+from studies.files.reading import find_shipped, list_shipped
+from studies.instrument.card import Instrument, load_card
+from studies.schema.reader import read_keys, read_toml
+from studies.sweeps.definition import Study, StudyParameter
+from studies.sweeps.keys import SCHEMA, Inversion, ParameterKeys, Search, StudyKeys, ToleranceSearch, WorstCase
+from studies.sweeps.parameters import find_nominal
+from studies.sweeps.quantity import Quantity
+from studies.sweeps.validity import check_nominal, check_sample
 
 
 def read_study(source: str | Path | Mapping[str, Any], card: str | None = None) -> Study:
@@ -102,9 +31,7 @@ def read_study(source: str | Path | Mapping[str, Any], card: str | None = None) 
         An unknown key, parameter or quantity (the nearest is named), a value of the wrong type or out of range.
     """
     if isinstance(source, Mapping):
-        content, where, folder, text = dict(source), "study", Path(), ""
-        if content.setdefault("schema", SCHEMA) != SCHEMA:
-            raise InputError(f'study: schema must be "{SCHEMA}", not {content["schema"]!r}.')
+        content, where, folder, text = {"schema": SCHEMA, **source}, "study", Path(), ""
     else:
         path = find_shipped(source, shipped_specs(), "study")
         content, folder = read_toml(path, SCHEMA), path.parent
@@ -113,8 +40,7 @@ def read_study(source: str | Path | Mapping[str, Any], card: str | None = None) 
     if card is not None:
         content["card"] = card
         text = f"# computed with --card {card} instead of the card below\n{text}"
-    top = TomlTable(content, where, KEYS)
-    named = top.text("card")
+    named = read_keys(content, StudyKeys, where).card
     beside = folder / named
     instrument = load_card(beside if card is None and named.endswith(".toml") else named)
     return check_study(content, instrument, where, str(folder.resolve()), text)
@@ -122,45 +48,44 @@ def read_study(source: str | Path | Mapping[str, Any], card: str | None = None) 
 
 def check_study(content: Mapping[str, Any], instrument: Instrument, where: str, folder: str, text: str) -> Study:
     """Make a study from its content and its instrument, as read from a spec or from a store."""
-    top = TomlTable(content, where, KEYS)
-    sampling = read_sampling(top)
+    keys = read_keys(content, StudyKeys, where)
+
+    def numbered(table: str, members: Sequence[Any]) -> list[tuple[str, Any]]:
+        return [(f"{where} [[{table}]] number {place}", one) for place, one in enumerate(members, 1)]
+
     parameters = tuple(
-        read_parameter(part, instrument, sampling.method) for part in top.sections("parameter", PARAMETER_KEYS)
+        _resolve(place, one, instrument, keys.sampling.method) for place, one in numbered("parameter", keys.parameter)
     )
-    refuse_twins([parameter.name for parameter in parameters], f"{where} [[parameter]]: the name")
-    derived = tuple(
-        read_derived(part, instrument, [parameter.name for parameter in parameters])
-        for part in top.sections("derived", ("name", "expression"))
-    )
-    refuse_twins([one.name for one in derived], f"{where} [[derived]]: the name")
-    asked = tuple(read_asked(part, folder) for part in split_tables(top, "quantity"))
-    if not asked:
+    names = [parameter.name for parameter in parameters]
+    _refuse_twins(names, f"{where} [[parameter]]: the name")
+    for place, derived in numbered("derived", keys.derived):
+        if derived.name in names:
+            raise InputError(f"{place}: '{derived.name}' is a parameter too; it cannot be both.")
+        find_nominal(instrument, derived.name, place)
+    _refuse_twins([one.name for one in keys.derived], f"{where} [[derived]]: the name")
+    if not keys.quantity:
         raise InputError(f"{where}: a study needs at least one [[quantity]].")
-    columns = [column.name for one in asked for column in one.columns]
-    refuse_twins(columns, f"{where} [[quantity]]: give one of them another label; the column")
-    searches = tuple(
-        read_search(part, columns, parameters)
-        for part in top.sections("search", ("kind", "column", "vary", "targets", "share"))
-    )
+    columns = [column.name for one in keys.quantity for column in one.columns]
+    _refuse_twins(columns, f"{where} [[quantity]]: give one of them another label; the column")
+    for place, requirement in numbered("requirement", keys.requirement):
+        _check_known(place, "column", [requirement.column], columns)
+    numeric = [parameter.name for parameter in parameters if not isinstance(parameter.nominal, str)]
     study = Study(
-        name=top.text("name", Path(where).stem),
-        note=top.text("note", "-"),
+        name=keys.name or Path(where).stem,
+        note=keys.note,
         instrument=instrument,
-        sampling=sampling,
+        sampling=keys.sampling,
         parameters=parameters,
-        derived=derived,
-        asked=asked,
-        requirements=tuple(
-            read_requirement(part, columns)
-            for part in top.sections("requirement", ("column", "low", "high", "target", "within"))
-        ),
-        searches=searches,
+        derived=keys.derived,
+        asked=tuple(_beside(one, folder) for one in keys.quantity),
+        requirements=keys.requirement,
+        searches=tuple(_check_search(place, one, columns, numeric) for place, one in numbered("search", keys.search)),
         content=content,
         text=text,
         folder=folder,
     )
     check_nominal(study, where)
-    if any(search.kind == "tolerance" for search in searches):
+    if any(isinstance(search, ToleranceSearch) for search in study.searches):
         check_sample(study, where)
     return study
 
@@ -168,3 +93,97 @@ def check_study(content: Mapping[str, Any], instrument: Instrument, where: str, 
 def shipped_specs() -> dict[str, Path]:
     """Return name -> path of the specs that ship with the package."""
     return list_shipped(Path(__file__).parent / "templates")
+
+
+def _resolve(place: str, keys: ParameterKeys, instrument: Instrument, method: str) -> StudyParameter:
+    """Return a parameter with its nominal value and its ends, from the card where the spec leaves them open."""
+    where = f"{place} '{keys.name}'"
+    found = find_nominal(instrument, keys.name, place)
+    if keys.values is not None:
+        return _list_values(where, keys, keys.values, found, method)
+    if method == "list":
+        raise InputError(f"{where}: method = 'list' needs values = [...] for every parameter.")
+    if method != "grid" and keys.count is not None:
+        raise InputError(f"{where}: count is only for method = 'grid'.")
+    if method == "grid" and keys.count is None:
+        raise InputError(f"{where}: the key 'count' is missing; add it, or values = [...].")
+    if isinstance(found, str):
+        raise InputError(f"{where} is text in the card; give values = [...] and method = 'grid' or 'list'.")
+    middle = found if keys.nominal is None else float(keys.nominal)
+    if middle is None:
+        if keys.low is None or keys.high is None:
+            raise InputError(f"{where}: the card leaves it open, so nominal, or low and high, must be given.")
+        middle = (keys.low + keys.high) / 2
+    low, high = _find_ends(where, keys, middle)
+    if keys.distribution == "log-uniform" and low <= 0:
+        raise InputError(f"{where}: a log-uniform parameter must be positive, not from {low:g}.")
+    deviation = keys.standard_deviation
+    bounded = deviation is None or any(one is not None for one in (keys.low, keys.high, keys.tolerance))
+    return StudyParameter(keys.name, middle, low, high, keys.distribution, deviation, (), keys.count, bounded)
+
+
+def _find_ends(where: str, keys: ParameterKeys, middle: float) -> tuple[float, float]:
+    """Return the ends of a parameter; a normal one without ends is shown over three standard deviations."""
+    if keys.tolerance is not None:
+        return middle - keys.tolerance, middle + keys.tolerance
+    low, high = keys.low, keys.high
+    if keys.standard_deviation is not None and low is None and high is None:
+        return middle - 3 * keys.standard_deviation, middle + 3 * keys.standard_deviation
+    if low is None or high is None:
+        raise InputError(f"{where}: give tolerance, or low and high.")
+    if not low < high:
+        raise InputError(f"{where}: low must be below high, not {low:g} and {high:g}.")
+    if not low <= middle <= high:
+        raise InputError(
+            f"{where}: the nominal value {middle:g} lies outside {low:g} to {high:g}; correct one of them."
+        )
+    return low, high
+
+
+def _list_values(
+    where: str, keys: ParameterKeys, values: tuple[Any, ...], found: float | str | None, method: str
+) -> StudyParameter:
+    if method not in ("grid", "list"):
+        raise InputError(f"{where}: values are only for method = 'grid' or 'list'; for '{method}' give low and high.")
+    kind = str if isinstance(values[0], str) else float
+    if keys.nominal is not None and not isinstance(keys.nominal, kind):
+        raise InputError(f"{where}: nominal must be of the kind of values, not {keys.nominal!r}.")
+    if kind is str:
+        texts = keys.nominal or (found if isinstance(found, str) else values[0])
+        return StudyParameter(keys.name, texts, 0.0, float(len(values) - 1), values=values)
+    if method == "grid":
+        _refuse_twins([f"{value:.17g}" for value in values], f"{where}: the value")
+    stated = found if keys.nominal is None else keys.nominal
+    nominal = stated if isinstance(stated, float) else values[len(values) // 2]
+    return StudyParameter(keys.name, nominal, min(values), max(values), values=values)
+
+
+def _beside(asked: Quantity, folder: str) -> Quantity:
+    """Return a quantity whose function, where it has one in a file, is found from anywhere."""
+    function = asked.options.get("function", "")
+    file = function.rpartition(":")[0].endswith(".py")
+    return replace(asked, function=str(Path(folder) / function)) if file else asked
+
+
+def _check_search(where: str, search: Search, columns: Sequence[str], numeric: Sequence[str]) -> Search:
+    """Return a search whose columns and parameters are there; one for tolerances that names none varies all."""
+    if isinstance(search, WorstCase):
+        _check_known(where, "column", [search.column], columns)
+    if isinstance(search, Inversion):
+        _check_known(where, "targets", list(search.targets), columns)
+    if isinstance(search, Inversion | ToleranceSearch):
+        _check_known(where, "vary", search.vary, numeric)
+    return replace(search, vary=tuple(numeric)) if isinstance(search, ToleranceSearch) and not search.vary else search
+
+
+def _check_known(where: str, key: str, names: Sequence[str], known: Sequence[str]) -> None:
+    for name in names:
+        if name not in known:
+            raise InputError(f"{where}: {key}: '{name}' is unknown{nearest(name, known)}")
+
+
+def _refuse_twins(names: Sequence[str], what: str) -> None:
+    """Raise InputError when a name stands there twice."""
+    twice = [name for place, name in enumerate(names) if name in names[:place]]
+    if twice:
+        raise InputError(f"{what} '{twice[0]}' is given twice.")

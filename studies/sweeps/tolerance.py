@@ -7,12 +7,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from studies.errors import InputError
+from studies.sweeps.keys import DRAWN
 
 if TYPE_CHECKING:
-    from studies.sweeps.definition import Requirement
+    from studies.sweeps.keys import Requirement
     from studies.sweeps.results import Results
-
-RANDOM = ("latin-hypercube", "sobol", "sensitivity")
 
 
 @dataclass(frozen=True)
@@ -82,7 +81,7 @@ def find_yield(results: "Results", requirements: "tuple[Requirement, ...]") -> Y
     rows = _sample_rows(results)
     good, unknown = good[rows], unknown[rows]
     n, passed, open_ = len(good), int(good.sum()), int(unknown.sum())
-    if results.study.sampling.method not in RANDOM or n == 0:
+    if results.study.sampling.method not in DRAWN or n == 0:
         return Yield(limits, n, passed, open_, None, None)
     low = binomtest(passed, n).proportion_ci(0.95, "wilson").low
     high = binomtest(passed + open_, n).proportion_ci(0.95, "wilson").high

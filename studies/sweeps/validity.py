@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from studies.sweeps.definition import Study, StudyParameter
 
 MOST_CORNERS = 6  # parameters up to which all corners of the box are looked at
-DRAWN = ("latin-hypercube", "sobol")
+SAMPLES = ("latin-hypercube", "sobol")
 
 
 def check_nominal(study: "Study", where: str) -> None:
@@ -89,7 +89,7 @@ def _corners(study: "Study") -> Iterator[Mapping[str, Any]]:
 
 def check_sample(study: "Study", where: str) -> None:
     """Raise when a study gives a search for tolerances no sample or nothing to keep."""
-    if study.sampling.method not in DRAWN:
+    if study.sampling.method not in SAMPLES:
         raise InputError(
             f"{where}: a search for tolerances needs designs that are drawn: method = 'latin-hypercube' or 'sobol', not"
             f" '{study.sampling.method}'."

@@ -19,9 +19,10 @@ from studies.instrument.registry import card_tables
 from studies.models.file import ModelKeys
 from studies.schema.keys import describe, number_in, options, structs
 from studies.schema.reader import read_keys
+from studies.sweeps.keys import StudyKeys
 
 CARD = {f"{entry.table}.{entry.name}": entry.keys for es in card_tables().values() for entry in es if entry.keys}
-KINDS = {"limits": Limits, "map": ImportMap, "model": ModelKeys, **CARD}
+KINDS = {"limits": Limits, "study": StudyKeys, "map": ImportMap, "model": ModelKeys, **CARD}
 JUNK = st.one_of(
     st.none(), st.booleans(), st.integers(-(10**20), 10**20), st.floats(), st.text(max_size=5),
     st.lists(st.integers(), max_size=3), st.dictionaries(st.text(max_size=3), st.integers(), max_size=2),
@@ -117,14 +118,13 @@ def test_a_wrong_value_and_a_typo_name_the_key(kind):
     run()
 
 
-@pytest.mark.parametrize("kind", ["card", "map", "model", "limits"])
+@pytest.mark.parametrize("kind", ["card", "study", "map", "model", "limits"])
 def test_the_reference_has_every_key_with_its_unit_and_default(kind, capsys):
     assert main(["keys", kind, "--json"]) == 0
     rows = json.loads(capsys.readouterr().out)["keys"]
     assert len({(row["table"], row["key"], row.get("only")) for row in rows}) == len(rows)
-    if kind != "card":
-        assert all(row["meaning"] for row in rows if row["key"] != "offset")
-    else:
+    assert all(row["meaning"] for row in rows)
+    if kind == "card":
         found = {(row["table"], row["key"]): row for row in rows}
         assert found["[thermal]", "base_heat_capacity_J_per_K"]["unit"] == "J/K"
         assert found["[thermal]", "film_emissivity"]["bounds"] == "at least 0, at most 1"

@@ -47,6 +47,17 @@ def test_the_lines_of_the_forms_can_be_set(tmp_path):
     assert tried > 15
 
 
+@pytest.mark.parametrize("words", [["card", "new"], ["study", "new"]])
+def test_every_commented_line_is_toml(tmp_path, words):
+    """All forms uncommented, each table as a document of its own, parse; the lines come from the declarations."""
+    path = tmp_path / "mine.toml"
+    assert main([*words, str(path)]) == 0
+    lines = [line[2:] for line in path.read_text(encoding="utf-8").splitlines() if line.startswith("# ") or line == "#"]
+    first = next(k for k, line in enumerate(lines) if line.startswith(("[", "schema")))
+    for block in "\n".join(lines[first:]).split("\n\n"):
+        assert tomllib.loads(block)
+
+
 @pytest.mark.parametrize("like", sorted(shipped_specs()))
 def test_a_new_study_is_valid_with_another_card(tmp_path, like):
     assert main(["study", "new", str(tmp_path / "s.toml"), "--like", like, "--card", "free-dome"]) == 0

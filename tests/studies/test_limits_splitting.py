@@ -20,7 +20,7 @@ from studies.simulation.loop import wave_of
 from studies.simulation.prediction import predict
 from studies.splitting import SplitPair, mean_shift
 from studies.sweeps.case import Case
-from studies.sweeps.quantities import find_quantity
+from studies.sweeps.quantities.split import Split
 from thermal.profile import Profile
 
 CARD = """
@@ -130,14 +130,13 @@ def test_modes_tell_the_split_only_where_there_is_one(tmp_path, capsys):
 
 def test_studies_vary_a_wave_and_ask_for_the_split(tmp_path):
     instrument = loaded(tmp_path, WALL)
-    quantity = find_quantity("split", "here")
-    options = {"harmonic": 2, "theory": "shell", "order": "first", "temperature_degC": None}
+    quantity = Split(theory="shell")
     found = [
-        quantity.evaluate(Case(instrument.with_values({"imperfection.wave.0.amplitude_um": a}), {}), options)[0].value
+        quantity.evaluate(Case(instrument.with_values({"imperfection.wave.0.amplitude_um": a}), {}))[0].value
         for a in (0.3, 0.6)
     ]
     assert found[1] == pytest.approx(2 * found[0], rel=1e-9)
-    assert [column.name for column in quantity.columns(options)] == ["split_n2_Hz", "slow_axis_n2_deg"]
+    assert [column.name for column in quantity.columns] == ["split_n2_Hz", "slow_axis_n2_deg"]
 
 
 def test_a_map_beside_the_card_is_read(tmp_path):

@@ -1,11 +1,21 @@
 """Records of a fleet, from the words of a command or from a manifest."""
 
-import tomllib
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from pathlib import Path
+from typing import Annotated
 
 from studies.errors import InputError
 from studies.record import Record, read_record
+from studies.schema.keys import Keys, says
+from studies.schema.reader import read_keys, read_toml
+
+
+class Manifest(Keys, frozen=True, kw_only=True):
+    """The devices of a fleet."""
+
+    devices: Annotated[
+        dict[str, Annotated[tuple[str, ...], says("records", least=1)]], says('lines such as A = ["a1.csv", "a2.csv"]')
+    ]
 
 
 def read_fleet(devices: Sequence[str] = (), manifest: str | None = None) -> dict[str, list[Record]]:
@@ -23,25 +33,12 @@ def read_fleet(devices: Sequence[str] = (), manifest: str | None = None) -> dict
             raise InputError(f"--device {words}: give a unique name and its records, as in A=a1.csv,a2.csv.")
         paths[name] = files.split(",")
     if manifest is not None:
-        paths |= _read_manifest(manifest, set(paths))
+        paths |= _read_manifest(manifest, paths)
     return {name: [read_record(path) for path in own] for name, own in paths.items()}
 
 
-def _read_manifest(manifest: str, known: set[str]) -> dict[str, list[str]]:
-    try:
-        content = tomllib.loads(Path(manifest).read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        raise InputError(f"{manifest}: not a readable list of devices: {error}.") from None
-    table = content.get("devices")
-    if set(content) != {"devices"} or not isinstance(table, dict):
-        raise InputError(
-            f'{manifest}: the file needs one table [devices], with lines such as A = ["a1.csv", "a2.csv"].'
-        )
-    out = {}
-    for name, files in table.items():
-        if not (isinstance(files, list) and files and all(isinstance(one, str) for one in files)) or name in known:
-            raise InputError(
-                f'{manifest}: {name} needs a list of records, each named once, such as ["a1.csv", "a2.csv"].'
-            )
-        out[name] = [str(Path(manifest).parent / one) for one in files]
-    return out
+def _read_manifest(manifest: str, known: Collection[str]) -> dict[str, list[str]]:
+    devices = read_keys(read_toml(manifest), Manifest, manifest).devices
+    if twice := sorted(set(devices) & set(known)):
+        raise InputError(f"{manifest} [devices]: {twice[0]} is given by --device too; name each device once.")
+    return {name: [str(Path(manifest).parent / one) for one in files] for name, files in devices.items()}

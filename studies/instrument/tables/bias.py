@@ -1,14 +1,4 @@
-"""`[bias]`: the zero-rate output of the gyro.
-
-[bias]                             # every key may be left out
-offset_deg_per_h = 0.0             # ± 10
-damping_anisotropy = 0.01          # Δ(1/τ) over the mean 1/τ = π f/Q; relative ± 100 % unless stated
-damping_axis_deg = 0.0             # θ_τ; ± 13: anywhere within half of its period of 45°
-pattern_angle_deg = 22.5           # θ of the standing wave: commanded, exact
-k1_deg_per_h_per_Hz, k2_…_per_Hz2, k3_…_per_Hz3          # ± 1, 0.1, 0.01; HRG paper eqs. (21), (22), with f the
-k4_deg_per_h_s_per_Hz, k5_…_s2_per_Hz2, k6_…_s3_per_Hz3  # change of frequency from the reference temperature and
-k7_deg_per_h_s_per_Hz2, k8_…_s_per_Hz3, k9_…_s2_per_Hz3  # its rate; all 0 unless given, k4 to k9 then exact
-"""
+"""`[bias]`: the zero-rate output of the gyro (HRG paper eqs. 21, 22)."""
 
 from typing import Annotated
 
@@ -17,7 +7,7 @@ from numpy.typing import NDArray
 
 from compensation.wave import feign_rate, see_across
 from studies.instrument.registry import CardTable
-from studies.schema.keys import Keys, number
+from studies.schema.keys import Keys, Note, number
 
 Array = NDArray[np.float64]
 DEG_PER_H = np.degrees(1.0) * 3600.0  # of 1 rad/s
@@ -38,20 +28,22 @@ TERMS = {
 class Bias(Keys, frozen=True, kw_only=True):
     """Zero-rate output: offset, damping anisotropy, and the paper's polynomial in f and its rate."""
 
-    offset_deg_per_h: Annotated[float, number(sd=10.0)] = 0.0
-    damping_anisotropy: Annotated[float, number(least=0.0, relative_sd=1.0)] = 0.01
-    damping_axis_deg: Annotated[float, number(sd=13.0)] = 0.0
-    pattern_angle_deg: float = 22.5
-    k1_deg_per_h_per_Hz: Annotated[float, number(sd=1.0)] = 0.0
-    k2_deg_per_h_per_Hz2: Annotated[float, number(sd=0.1)] = 0.0
-    k3_deg_per_h_per_Hz3: Annotated[float, number(sd=0.01)] = 0.0
-    k4_deg_per_h_s_per_Hz: float = 0.0
-    k5_deg_per_h_s2_per_Hz2: float = 0.0
-    k6_deg_per_h_s3_per_Hz3: float = 0.0
-    k7_deg_per_h_s_per_Hz2: float = 0.0
-    k8_deg_per_h_s_per_Hz3: float = 0.0
-    k9_deg_per_h_s2_per_Hz3: float = 0.0
-    note: str = ""
+    offset_deg_per_h: Annotated[float, number("at the reference temperature", sd=10.0)] = 0.0
+    damping_anisotropy: Annotated[float, number("Δ(1/τ) over the mean 1/τ = π f/Q", least=0.0, relative_sd=1.0)] = 0.01
+    damping_axis_deg: Annotated[float, number("θ_τ; ± 13 is anywhere within half of its period of 45°", sd=13.0)] = 0.0
+    pattern_angle_deg: Annotated[float, number("θ of the standing wave, as commanded")] = 22.5
+    k1_deg_per_h_per_Hz: Annotated[
+        float, number("of f, the change of frequency from the reference temperature", sd=1.0)
+    ] = 0.0
+    k2_deg_per_h_per_Hz2: Annotated[float, number("of f²", sd=0.1)] = 0.0
+    k3_deg_per_h_per_Hz3: Annotated[float, number("of f³", sd=0.01)] = 0.0
+    k4_deg_per_h_s_per_Hz: Annotated[float, number("of ḟ, its rate")] = 0.0
+    k5_deg_per_h_s2_per_Hz2: Annotated[float, number("of ḟ²")] = 0.0
+    k6_deg_per_h_s3_per_Hz3: Annotated[float, number("of ḟ³")] = 0.0
+    k7_deg_per_h_s_per_Hz2: Annotated[float, number("of f ḟ")] = 0.0
+    k8_deg_per_h_s_per_Hz3: Annotated[float, number("of f² ḟ")] = 0.0
+    k9_deg_per_h_s2_per_Hz3: Annotated[float, number("of f ḟ²")] = 0.0
+    note: Note = ""
 
     @property
     def terms(self) -> dict[tuple[int, int], float]:

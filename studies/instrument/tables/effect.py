@@ -1,12 +1,7 @@
 """`[[effect]]`: what extends the model of a card beyond its other tables, by the names of the library of effects.
 
-[[effect]]
-name = "second-lag"                # `hrg effects` lists names, parameters and bounds
-response = "frequency_Hz"          # of those that the effect acts on; the first of them unless given
-second_time_constant_s = 20000.0   # every parameter of its shape, within its bounds
-weight = 0.2                       # and at least one of its coefficients; a list where the effect is a family
-
-Parameters are exact unless the card states their uncertainty.
+An entry has every parameter of the effect's shape, within its bounds, and at least one of its coefficients, a list where the effect is
+a family. Parameters are exact unless the card states their uncertainty.
 """
 
 from collections.abc import Mapping
@@ -18,7 +13,7 @@ import numpy as np
 
 from studies.errors import InputError
 from studies.instrument.registry import CardPlace, CardTable
-from studies.schema.keys import Keys, number
+from studies.schema.keys import Keys, number, says
 
 if TYPE_CHECKING:
     from studies.effects import Effect
@@ -50,7 +45,10 @@ def keys_of(raw: Mapping[str, Any], where: str) -> Any:
 
 def _declare(effect: "Effect", response: str) -> Any:
     """Declare the parameters of the effect's shape with their bounds, and its coefficients for one response."""
-    fields: list[Any] = [("name", str), ("response", Literal[effect.responses], effect.responses[0])]
+    fields: list[Any] = [
+        ("name", Annotated[str, says("hrg effects lists names, parameters and bounds", example=effect.name)]),
+        ("response", Literal[effect.responses], effect.responses[0]),
+    ]
     for shape in effect.shape:
         kind = Annotated[float, number(least=shape.low, most=shape.high)]
         fields.append((shape.name, kind, shape.low) if shape.steady else (shape.name, kind))

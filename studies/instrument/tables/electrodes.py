@@ -1,21 +1,4 @@
-"""`[electrodes]`: electrodes over a face of the shell, their gap and voltages.
-
-[electrodes]
-face = "inner"                       # or outer
-gap_um = 100.0                       # known to ± 5 % unless stated
-count = 16                           # equal electrodes around, the first one centred at azimuth_deg
-coverage = 0.8                       # share of the circle
-azimuth_deg = 0.0
-first = 0.6                          # they lie between these positions of the meridian (1: rim)
-last = 1.0
-voltage_V = 100.0                    # of all; 0: none
-trim_V = [0.0, 30.0]                 # added in squares: what each electrode has besides, in order, 0 where the list ends
-gap_expansion_per_K = 0.0            # (1/g) dg/dT
-[[electrodes.gap_wave]]              # waves of the gap around, relative to it
-order = 1
-amplitude_percent = 2.0
-azimuth_deg = 10.0
-"""
+"""`[electrodes]`: electrodes over a face of the shell, their gap and voltages."""
 
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Literal
@@ -23,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import numpy as np
 
 from studies.instrument.registry import CardPlace, CardTable
-from studies.schema.keys import Keys, number
+from studies.schema.keys import Keys, Note, number, says
 
 if TYPE_CHECKING:
     from shell.electrodes import Electrodes
@@ -33,26 +16,29 @@ if TYPE_CHECKING:
 class GapWave(Keys, frozen=True, kw_only=True):
     """A wave of the gap around."""
 
-    order: Annotated[int, number(least=1, most=40)]
-    amplitude_percent: Annotated[float, number(above=-100.0, below=100.0)]
-    azimuth_deg: float = 0.0
+    order: Annotated[int, number("crests around", least=1, most=40)]
+    amplitude_percent: Annotated[float, number("of the gap", above=-100.0, below=100.0, example=2.0)]
+    azimuth_deg: Annotated[float, number("of a crest")] = 0.0
 
 
 class ElectrodeKeys(Keys, frozen=True, kw_only=True):
     """Equal electrodes around a face."""
 
-    face: Literal["inner", "outer"] = "inner"
-    gap_um: Annotated[float, number(above=0.0, relative_sd=0.05)] = 100.0
-    count: Annotated[int, number(least=1, most=256)] = 16
-    coverage: Annotated[float, number(above=0.0, most=1.0)] = 0.8
-    azimuth_deg: float = 0.0
-    first: Annotated[float, number(least=0.0, below=1.0)] = 0.6
-    last: Annotated[float, number(above=0.0, most=1.0)] = 1.0
-    voltage_V: float = 0.0
-    trim_V: tuple[float, ...] = ()
-    gap_expansion_per_K: float = 0.0
+    face: Annotated[Literal["inner", "outer"], says("of the shell")] = "inner"
+    gap_um: Annotated[float, number("at the reference temperature", above=0.0, relative_sd=0.05)] = 100.0
+    count: Annotated[int, number("equal electrodes around", least=1, most=256)] = 16
+    coverage: Annotated[float, number("share of the circle", above=0.0, most=1.0)] = 0.8
+    azimuth_deg: Annotated[float, number("of the middle of the first one")] = 0.0
+    first: Annotated[float, number("they begin at this position of the meridian", least=0.0, below=1.0)] = 0.6
+    last: Annotated[float, number("and end at this one; 1: rim", above=0.0, most=1.0)] = 1.0
+    voltage_V: Annotated[float, number("of all; 0: none")] = 0.0
+    trim_V: Annotated[
+        tuple[float, ...],
+        says("added in squares: what each has besides, in order; 0 where the list ends", example=[0.0, 30.0]),
+    ] = ()
+    gap_expansion_per_K: Annotated[float, number("(1/g) dg/dT")] = 0.0
     gap_wave: tuple[GapWave, ...] = ()
-    note: str = ""
+    note: Note = ""
 
     def __post_init__(self) -> None:
         if not self.first < self.last:

@@ -1,26 +1,4 @@
-"""`[imperfection]`: how the resonator differs from the body of revolution of `[resonator]`.
-
-[[imperfection.wave]]                # waves around, as many as wanted
-of = "wall"                          # wall | outer | inner | offset (of the middle surface) | rim (its edge) | density | modulus
-order = 4                            # crests around
-amplitude_um = 0.3                   # of lengths; density and modulus have amplitude_ppm
-azimuth_deg = 31.0                   # of a crest
-power = 0.0                          # grows as position to this power, 0 where the meridian starts and 1 at the rim
-[imperfection.wall]                  # the low waves of the wall by their parts, Σ c_m cos mθ + s_m sin mθ, beside those: for studies
-cosine_4_um = 0.0                    # cosine_1_um ... sine_4_um
-[[imperfection.mass]]                # small masses, negative where material was taken away
-mass_ug = 5.0
-azimuth_deg = 31.0
-position = 1.0                       # 0 ... 1 of the meridian
-height = 0.0                         # -1 inner face, 0 middle, 1 outer face
-[[imperfection.map]]                 # measured departures over position and azimuth (hrg scan reads the same tables)
-of = "outer"                         # wall | outer | inner | offset
-file = "outer.csv"                   # in µm, beside the card
-[imperfection.split]                 # a split as it was measured at the reference temperature, whatever causes it, beside all that
-harmonic = 2
-split_Hz = 0.12
-slow_axis_deg = 31.0                 # azimuth of an antinode of the slower mode
-"""
+"""`[imperfection]`: how the resonator differs from the body of revolution of `[resonator]`."""
 
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Annotated, Any, Literal
@@ -30,7 +8,7 @@ from numpy.typing import NDArray
 
 from studies.errors import InputError
 from studies.instrument.registry import CardPlace, CardTable
-from studies.schema.keys import Keys, number
+from studies.schema.keys import Keys, Note, number, says
 
 if TYPE_CHECKING:
     from shell.imperfection import Field, Imperfection
@@ -42,12 +20,18 @@ SHARES = {"density": "density", "modulus": "modulus"}
 class WaveKeys(Keys, frozen=True, kw_only=True):
     """A wave around of a length or of a property of the material."""
 
-    of: Literal["wall", "outer", "inner", "offset", "rim", "density", "modulus"] = "wall"
-    order: Annotated[int, number(least=0, most=40)]
-    amplitude_um: float | None = None
-    amplitude_ppm: float | None = None
-    azimuth_deg: float = 0.0
-    power: Annotated[float, number(least=0.0, most=40.0)] = 0.0
+    of: Annotated[
+        Literal["wall", "outer", "inner", "offset", "rim", "density", "modulus"],
+        says("offset: of the middle surface; rim: of its edge"),
+    ] = "wall"
+    order: Annotated[int, number("crests around", least=0, most=40, example=4)]
+    amplitude_um: Annotated[float, number("of lengths", example=0.3)] | None = None
+    amplitude_ppm: Annotated[float, number("of density and modulus", example=100.0)] | None = None
+    azimuth_deg: Annotated[float, number("of a crest")] = 0.0
+    power: Annotated[
+        float,
+        number("grows as position to this power, 0 where the meridian starts and 1 at the rim", least=0.0, most=40.0),
+    ] = 0.0
 
     def __post_init__(self) -> None:
         right, wrong = ("amplitude_um", "amplitude_ppm") if self.of in LENGTHS else ("amplitude_ppm", "amplitude_um")
@@ -60,38 +44,45 @@ class WaveKeys(Keys, frozen=True, kw_only=True):
 class MassKeys(Keys, frozen=True, kw_only=True):
     """A small mass on the shell."""
 
-    mass_ug: float
-    azimuth_deg: float
-    position: Annotated[float, number(least=0.0, most=1.0)] = 1.0
-    height: Annotated[float, number(least=-1.0, most=1.0)] = 0.0
+    mass_ug: Annotated[float, number("negative where material was taken away", example=5.0)]
+    azimuth_deg: Annotated[float, number("where it sits", example=31.0)]
+    position: Annotated[float, number("0 ... 1 of the meridian", least=0.0, most=1.0)] = 1.0
+    height: Annotated[float, number("-1 inner face, 0 middle, 1 outer face", least=-1.0, most=1.0)] = 0.0
 
 
 class MapKeys(Keys, frozen=True, kw_only=True):
     """A table of measured departures."""
 
-    of: Literal["wall", "outer", "inner", "offset"]
-    file: str
+    of: Annotated[Literal["wall", "outer", "inner", "offset"], says("what departs; offset: the middle surface")]
+    file: Annotated[
+        str, says("µm over position and azimuth, beside the card (hrg scan reads the same tables)", example="outer.csv")
+    ]
 
 
 class SplitKeys(Keys, frozen=True, kw_only=True):
     """A measured split of one harmonic."""
 
-    harmonic: Annotated[int, number(least=1, most=12)] = 2
-    split_Hz: Annotated[float, number(least=0.0)]
-    slow_axis_deg: float
+    harmonic: Annotated[int, number("waves around", least=1, most=12)] = 2
+    split_Hz: Annotated[
+        float, number("at the reference temperature, whatever causes it, beside all that", least=0.0, example=0.12)
+    ]
+    slow_axis_deg: Annotated[float, number("azimuth of an antinode of the slower mode", example=31.0)]
+
+
+WavePart = Annotated[float, number("of the wall, Σ c cos mθ + s sin mθ, beside the waves: for studies")]
 
 
 class WallKeys(Keys, frozen=True, kw_only=True):
     """Parts of the wall's waves 1 to 4, even along the meridian."""
 
-    cosine_1_um: float = 0.0
-    sine_1_um: float = 0.0
-    cosine_2_um: float = 0.0
-    sine_2_um: float = 0.0
-    cosine_3_um: float = 0.0
-    sine_3_um: float = 0.0
-    cosine_4_um: float = 0.0
-    sine_4_um: float = 0.0
+    cosine_1_um: WavePart = 0.0
+    sine_1_um: WavePart = 0.0
+    cosine_2_um: WavePart = 0.0
+    sine_2_um: WavePart = 0.0
+    cosine_3_um: WavePart = 0.0
+    sine_3_um: WavePart = 0.0
+    cosine_4_um: WavePart = 0.0
+    sine_4_um: WavePart = 0.0
 
     def __post_init__(self) -> None:
         for name in self.__struct_fields__:
@@ -113,7 +104,7 @@ class ImperfectionKeys(Keys, frozen=True, kw_only=True):
     mass: tuple[MassKeys, ...] = ()
     map: tuple[MapKeys, ...] = ()
     split: SplitKeys | None = None
-    note: str = ""
+    note: Note = ""
 
 
 @dataclass(frozen=True)

@@ -1,10 +1,4 @@
-"""`[loss]`: 1/Q of the drive mode over temperature.
-
-[loss]                             # every key may be left out
-inverse_q = 1e-7                   # at the reference temperature; relative ± 100 % unless stated
-slope_per_K = 4e-3                 # relative; ± 4e-3
-curvature_per_K2 = 0.0             # relative; ± 4e-5
-"""
+"""`[loss]`: 1/Q of the drive mode over temperature."""
 
 from typing import Annotated
 
@@ -12,16 +6,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from studies.instrument.registry import CardTable
-from studies.schema.keys import Keys, number
+from studies.schema.keys import Keys, Note, number
 
 
 class Loss(Keys, frozen=True, kw_only=True):
     """1/Q = q₀ (1 + a x + b x²), x = T − T_ref (K)."""
 
-    inverse_q: Annotated[float, number(above=0.0, relative_sd=1.0)] = 1e-7
-    slope_per_K: Annotated[float, number(sd=4e-3)] = 4e-3
-    curvature_per_K2: Annotated[float, number(sd=4e-5)] = 0.0
-    note: str = ""
+    inverse_q: Annotated[float, number("at the reference temperature", above=0.0, relative_sd=1.0)] = 1e-7
+    slope_per_K: Annotated[float, number("relative", sd=4e-3)] = 4e-3
+    curvature_per_K2: Annotated[float, number("relative", sd=4e-5)] = 0.0
+    note: Note = ""
 
     def __post_init__(self) -> None:
         if not self.inverse_q < 0.1:

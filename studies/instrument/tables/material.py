@@ -1,17 +1,5 @@
 """`[material]`: an entry of the material table, or given values.
 
-    [material]
-    name = "fused-silica"       # an entry of the material table
-    law = "default"             # which published temperature law
-    file = "mine.toml"          # a user's own material table, beside the card
-    youngs_modulus_GPa, poisson_ratio, density_kg_m3   # given values at the reference temperature
-
-    [material.crystal]          # of a cubic crystal with [001] along the axis; density_kg_m3 stands above
-    C11_GPa, C12_GPa, C44_GPa   # `hrg modes` solves its pairs; everything else takes the isotropic mean (Voigt)
-
-    [material.deviation.shear_modulus]                 # of the law, by property; for poisson_ratio and expansion: value,
-    log_value, log_slope_per_K, log_curvature_per_K2   # slope_per_K, curvature_per_K2
-
 Given values rescale the law of a table's name; with any other name they are constant. A deviation is 0 unless given, and as
 uncertain as the material table says ("hrg materials NAME").
 """
@@ -22,7 +10,7 @@ import msgspec
 
 from studies.errors import InputError, naming
 from studies.instrument.registry import CardPlace, CardTable
-from studies.schema.keys import Keys, number
+from studies.schema.keys import Keys, Note, number, says
 
 if TYPE_CHECKING:
     from shell.cubic import Cubic
@@ -38,20 +26,27 @@ GIVEN = {
 }
 
 
+ByValue = Annotated[
+    float, number("a of a + b x + ½ c x², which is added to the property or, as log_value, to its logarithm")
+]
+BySlope = Annotated[float, number("b of it; x = T − T_ref")]
+ByCurvature = Annotated[float, number("c of it")]
+
+
 class PropertyFactor(Keys, frozen=True, kw_only=True):
     """The property times exp(a + b x + ½ c x²), x = T − T_ref (K)."""
 
-    log_value: float = 0.0
-    log_slope_per_K: float = 0.0
-    log_curvature_per_K2: float = 0.0
+    log_value: ByValue = 0.0
+    log_slope_per_K: BySlope = 0.0
+    log_curvature_per_K2: ByCurvature = 0.0
 
 
 class Difference(Keys, frozen=True, kw_only=True):
     """The property plus a + b x + ½ c x²."""
 
-    value: float = 0.0
-    slope_per_K: float = 0.0
-    curvature_per_K2: float = 0.0
+    value: ByValue = 0.0
+    slope_per_K: BySlope = 0.0
+    curvature_per_K2: ByCurvature = 0.0
 
 
 class Deviation(Keys, frozen=True, kw_only=True):
@@ -79,23 +74,30 @@ class Deviation(Keys, frozen=True, kw_only=True):
 class Crystal(Keys, frozen=True, kw_only=True):
     """Elastic constants of a cubic crystal."""
 
-    C11_GPa: Annotated[float, number(above=0.0)]
-    C12_GPa: float
-    C44_GPa: Annotated[float, number(above=0.0)]
+    C11_GPa: Annotated[
+        float, number("of a cubic crystal with [001] along the axis; density_kg_m3 stands above", above=0.0)
+    ]
+    C12_GPa: Annotated[float, number("likewise")]
+    C44_GPa: Annotated[float, number("likewise", above=0.0)]
 
 
 class MaterialKeys(Keys, frozen=True, kw_only=True):
     """The keys of `[material]`."""
 
-    name: str
-    law: str = "default"
-    file: str | None = None
-    youngs_modulus_GPa: Annotated[float, number(above=0.0)] | None = None
-    poisson_ratio: Annotated[float, number(above=-1.0, below=0.5)] | None = None
-    density_kg_m3: Annotated[float, number(above=0.0)] | None = None
+    name: Annotated[str, says("of the material table, or of one's own with given values", example="fused-silica")]
+    law: Annotated[str, says("which published temperature law")] = "default"
+    file: Annotated[str, says("a user's own material table, beside the card", example="mine.toml")] | None = None
+    youngs_modulus_GPa: (
+        Annotated[
+            float, number("at the reference temperature; rescales the law of a table's name", above=0.0, example=72.6)
+        ]
+        | None
+    ) = None
+    poisson_ratio: Annotated[float, number("likewise", above=-1.0, below=0.5, example=0.17)] | None = None
+    density_kg_m3: Annotated[float, number("likewise", above=0.0, example=2200.0)] | None = None
     crystal: Crystal | None = None
     deviation: Deviation | None = None
-    note: str = ""
+    note: Note = ""
 
     @property
     def cubic(self) -> "Cubic | None":

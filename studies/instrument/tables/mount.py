@@ -1,15 +1,10 @@
-"""`[mount]`: what the support holds on to, where it expands otherwise than the resonator.
-
-[mount]
-expansion_per_K = 5.1e-6             # of the base that a stem ends in, or that a rim or face is joined to; known to ± 10 % unless stated
-joined_at_degC = 20.0                # where the joint is free of stress; the reference temperature unless given
-"""
+"""`[mount]`: what the support holds on to, where it expands otherwise than the resonator."""
 
 from typing import TYPE_CHECKING, Annotated
 
 from shell.constants import zero_Celsius
 from studies.instrument.registry import CardPlace, CardTable
-from studies.schema.keys import Keys, number
+from studies.schema.keys import Keys, Note, number
 
 if TYPE_CHECKING:
     from shell.mount import Mount
@@ -20,9 +15,32 @@ FASTEST = 1e-3  # 1/K
 class MountKeys(Keys, frozen=True, kw_only=True):
     """Expansion of the base, and the temperature of the joint."""
 
-    expansion_per_K: Annotated[float, number(least=-FASTEST, most=FASTEST, relative_sd=0.1)] | None = None
-    joined_at_degC: Annotated[float, number(least=-273.15, most=1500.0)] | None = None
-    note: str = ""
+    expansion_per_K: (
+        Annotated[
+            float,
+            number(
+                "of the base that a stem ends in, or that a rim or face is joined to",
+                least=-FASTEST,
+                most=FASTEST,
+                relative_sd=0.1,
+                example=5.1e-06,
+            ),
+        ]
+        | None
+    ) = None
+    joined_at_degC: (
+        Annotated[
+            float,
+            number(
+                "where the joint is free of stress; the reference temperature unless given",
+                least=-273.15,
+                most=1500.0,
+                example=20.0,
+            ),
+        ]
+        | None
+    ) = None
+    note: Note = ""
 
     def __post_init__(self) -> None:
         if self.expansion_per_K is None and (self.joined_at_degC is not None or self.note):

@@ -1,25 +1,22 @@
 """`[posterior]`: how the uncertainties of a calibrated card go together; written by `hrg calibrate --save`.
 
-[posterior]
-names = ["thermal.mount_conductance_W_per_K", "thermal.base_heat_capacity_J_per_K"]   # keys of the card with an uncertainty
-correlation = [[1.0, 0.9], [0.9, 1.0]]                                                # of their normal coordinates
-interval = [[0.0101, 0.0123], [0.24, 0.31]]                                           # 90 %, in the unit of each key
-
 A value's own sd and the correlations hold together near the most probable card: they are what a prediction's spread follows from.
 Where the likelihood is bent the interval is not symmetric about the value, and may be many times as wide as that sd.
 """
 
+from typing import Annotated
+
 from studies.instrument.registry import CardTable
-from studies.schema.keys import Keys
+from studies.schema.keys import Keys, Note, says
 
 
 class Correlations(Keys, frozen=True, kw_only=True):
     """Correlations of uncertain values."""
 
-    names: tuple[str, ...] = ()
-    correlation: tuple[tuple[float, ...], ...] = ()
-    interval: tuple[tuple[float, float], ...] = ()
-    note: str = ""
+    names: Annotated[tuple[str, ...], says("keys of the card with an uncertainty")] = ()
+    correlation: Annotated[tuple[tuple[float, ...], ...], says("of their normal coordinates")] = ()
+    interval: Annotated[tuple[tuple[float, float], ...], says("90 %, in the unit of each key")] = ()
+    note: Note = ""
 
     def __post_init__(self) -> None:
         count = len(self.names)

@@ -8,7 +8,7 @@ import msgspec
 
 from studies.errors import InputError, naming
 from studies.instrument.registry import CardPlace, CardTable
-from studies.schema.keys import Keys, number
+from studies.schema.keys import Keys, number, says
 
 if TYPE_CHECKING:
     from shell.resonator import Resonator, Stem, Support
@@ -26,10 +26,10 @@ Point = tuple[float, float]
 class StemKeys(Keys, frozen=True, kw_only=True):
     """`[resonator.stem]`: a solid cylinder on the axis, clamped at `end_mm`; with side "both" at [inner, outer]."""
 
-    radius_mm: Length
-    end_mm: float | Point
-    side: Literal["inner", "outer", "both"] = "inner"
-    fillet_mm: NotNegative = 0.0
+    radius_mm: Annotated[Length, says("of the solid cylinder")]
+    end_mm: Annotated[float | Point, says("height of its clamped end; with side both: [inner, outer]")]
+    side: Annotated[Literal["inner", "outer", "both"], says("of the shell")] = "inner"
+    fillet_mm: Annotated[NotNegative, says("root radius, 0 for a sharp corner")] = 0.0
 
     def __post_init__(self) -> None:
         if isinstance(self.end_mm, tuple) != (self.side == "both"):
@@ -47,7 +47,10 @@ class StemKeys(Keys, frozen=True, kw_only=True):
 class Shape(Keys, frozen=True, kw_only=True, tag_field="shape"):
     """What every shape has: a number, or [position, value] pairs that are joined linearly from 0 (start) to 1 (rim)."""
 
-    thickness_mm: Thickness
+    thickness_mm: Annotated[
+        Thickness,
+        says("a number, or [position, value] pairs, linear between; 0 where the meridian starts, 1 at the rim"),
+    ]
 
     def __post_init__(self) -> None:
         places = [s for s, _ in self.thickness_mm] if isinstance(self.thickness_mm, list) else []
@@ -74,7 +77,7 @@ class Shape(Keys, frozen=True, kw_only=True, tag_field="shape"):
 class Stemmed(Shape, frozen=True, kw_only=True):
     """A dome that may stand on a stem."""
 
-    support: Literal["free", "clamped-pole", "clamped-rim", "stem"] = "free"
+    support: Annotated[Literal["free", "clamped-pole", "clamped-rim", "stem"], says("what holds it")] = "free"
     stem: StemKeys | None = None
 
     def __post_init__(self) -> None:
@@ -91,9 +94,11 @@ class Stemmed(Shape, frozen=True, kw_only=True):
 class Hemisphere(Stemmed, frozen=True, kw_only=True, tag="hemisphere"):
     """A dome of `radius_mm` from the polar angle `pole_angle_deg` (above 0 the pole is open) to `rim_angle_deg`."""
 
-    radius_mm: Length
-    rim_angle_deg: Annotated[float, number(above=0.0, most=180.0)] = 90.0
-    pole_angle_deg: Annotated[float, number(least=0.0, below=180.0)] = 0.0
+    radius_mm: Annotated[Length, says("of the middle surface")]
+    rim_angle_deg: Annotated[float, number("polar angle where the meridian ends", above=0.0, most=180.0)] = 90.0
+    pole_angle_deg: Annotated[
+        float, number("polar angle where it starts; above 0 the pole is open", least=0.0, below=180.0)
+    ] = 0.0
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -120,10 +125,10 @@ class Hemisphere(Stemmed, frozen=True, kw_only=True, tag="hemisphere"):
 class Cylinder(Shape, frozen=True, kw_only=True, tag="cylinder"):
     """A cup (without `bottom_thickness_mm` an open tube) whose lower face is clamped within `clamp_radius_mm`."""
 
-    radius_mm: Length
-    height_mm: Length
-    bottom_thickness_mm: Length | None = None
-    clamp_radius_mm: NotNegative = 0.0
+    radius_mm: Annotated[Length, says("of the middle surface of the wall")]
+    height_mm: Annotated[Length, says("total, from the lower face of the bottom to the rim")]
+    bottom_thickness_mm: Annotated[Length, says("without it an open tube")] | None = None
+    clamp_radius_mm: Annotated[NotNegative, says("the lower face is clamped within it; 0: free")] = 0.0
 
     def build(self) -> "Resonator":
         """Return the resonator in SI units."""
@@ -141,10 +146,10 @@ class Cylinder(Shape, frozen=True, kw_only=True, tag="cylinder"):
 class Bell(Stemmed, frozen=True, kw_only=True, tag="bell"):
     """Hemisphere, cylinder and hyperbola (BVG paper, eq. 1)."""
 
-    radius_mm: Length
-    cylinder_height_mm: NotNegative
-    hyperbola_height_mm: NotNegative
-    mouth_radius_mm: Length
+    radius_mm: Annotated[Length, says("of the middle surface")]
+    cylinder_height_mm: Annotated[NotNegative, says("below the dome")]
+    hyperbola_height_mm: Annotated[NotNegative, says("below the cylinder")]
+    mouth_radius_mm: Annotated[Length, says("at the rim")]
 
     def build(self) -> "Resonator":
         """Return the resonator in SI units."""
@@ -163,23 +168,23 @@ class Bell(Stemmed, frozen=True, kw_only=True, tag="bell"):
 class LineKeys(Keys, frozen=True, kw_only=True, tag_field="kind", tag="line"):
     """A straight piece of a meridian, [r, z] to [r, z]."""
 
-    from_mm: Point
-    to_mm: Point
+    from_mm: Annotated[Point, says("[r, z]")]
+    to_mm: Annotated[Point, says("[r, z]")]
 
 
 class ArcKeys(Keys, frozen=True, kw_only=True, tag_field="kind", tag="arc"):
     """A circular piece of a meridian about `center_mm`."""
 
-    from_mm: Point
-    to_mm: Point
-    center_mm: Point
+    from_mm: Annotated[Point, says("[r, z]")]
+    to_mm: Annotated[Point, says("[r, z]")]
+    center_mm: Annotated[Point, says("[r, z]")]
 
 
 class Meridian(Shape, frozen=True, kw_only=True, tag="meridian"):
     """A middle surface of lines and arcs in order; the support holds the first point or the last."""
 
     segment: Annotated[list[LineKeys | ArcKeys], msgspec.Meta(min_length=1)]
-    support: Literal["free", "clamped-pole", "clamped-rim"] = "free"
+    support: Annotated[Literal["free", "clamped-pole", "clamped-rim"], says("of the first point or the last")] = "free"
 
     def build(self) -> "Resonator":
         """Return the resonator in SI units."""

@@ -1,19 +1,5 @@
 """`[thermal]`: constants of the heat path from the chamber to the shell.
 
-    [thermal]                               # every key may be left out
-    film_emissivity = 0.03                  # effective, of each face of the shell; bare metal film 0.03, silica 0.8; relative ± 100 %
-    base_heat_capacity_J_per_K = 25.0       # base with electrodes: about 34 g of silica; ± 50 %
-    housing_heat_capacity_J_per_K = 70.0    # about 150 g of steel; ± 50 %
-    chamber_conductance_W_per_K = 0.1       # moving air, 10 W/(m² K) on 100 cm²; ± 50 %
-    mount_conductance_W_per_K = 0.0118      # base to housing; identified, see below; ± 50 %
-    mount_exchange_cm2 = 10.0               # base to housing, area x effective emissivity; relative ± 100 %
-    drive_power_mW = 0.0                    # heat of the vibration, spread over the shell
-    radiation = true                        # false: linearised at the reference temperature
-    cells = 24                              # of the shell's meridian; 1 makes it a lump
-    stem_radius_mm, stem_length_mm          # of the card's stem; without one a sixth of the radius, and the radius
-    conductivity_W_per_m_K, heat_capacity_J_per_kg_K   # of the material table unless given; ± 30 %, ± 10 %
-    note = "..."                            # free text
-
 Shell and stem follow from geometry and material. The mount's conductance is identified from the settling in the HRG
 paper's Figure 3 (`studies.papers.settling`); capacities and the chamber's air are assumptions, and so are all the
 uncertainties: what is known before a thermal record has been seen.
@@ -22,7 +8,7 @@ uncertainties: what is known before a thermal record has been seen.
 from typing import Annotated
 
 from studies.instrument.registry import CardTable
-from studies.schema.keys import Keys, number
+from studies.schema.keys import Keys, Note, number, says
 
 IDENTIFIED_MOUNT = 0.0118  # W/K, for the card hrg-30mm; see studies.papers.settling
 Length = Annotated[float, number(above=0.0)]
@@ -31,20 +17,43 @@ Length = Annotated[float, number(above=0.0)]
 class Thermal(Keys, frozen=True, kw_only=True):
     """Constants of the heat path; what is None follows from geometry and material."""
 
-    film_emissivity: Annotated[float, number(least=0.0, most=1.0, relative_sd=1.0)] = 0.03
-    base_heat_capacity_J_per_K: Annotated[float, number(above=0.0, relative_sd=0.5)] = 25.0
-    housing_heat_capacity_J_per_K: Annotated[float, number(above=0.0, relative_sd=0.5)] = 70.0
-    chamber_conductance_W_per_K: Annotated[float, number(above=0.0, relative_sd=0.5)] = 0.1
-    mount_conductance_W_per_K: Annotated[float, number(above=0.0, relative_sd=0.5)] = IDENTIFIED_MOUNT
-    mount_exchange_cm2: Annotated[float, number(least=0.0, relative_sd=1.0)] = 10.0
-    drive_power_mW: Annotated[float, number(least=0.0)] = 0.0
-    radiation: bool = True
-    cells: Annotated[float, number(least=1.0, most=400.0)] = 24
-    stem_radius_mm: Length | None = None
-    stem_length_mm: Length | None = None
-    conductivity_W_per_m_K: Annotated[float, number(above=0.0, relative_sd=0.3)] | None = None
-    heat_capacity_J_per_kg_K: Annotated[float, number(above=0.0, relative_sd=0.1)] | None = None
-    note: str = ""
+    film_emissivity: Annotated[
+        float,
+        number(
+            "effective, of each face of the shell; bare metal film 0.03, silica 0.8",
+            least=0.0,
+            most=1.0,
+            relative_sd=1.0,
+        ),
+    ] = 0.03
+    base_heat_capacity_J_per_K: Annotated[
+        float, number("base with electrodes: about 34 g of silica", above=0.0, relative_sd=0.5)
+    ] = 25.0
+    housing_heat_capacity_J_per_K: Annotated[float, number("about 150 g of steel", above=0.0, relative_sd=0.5)] = 70.0
+    chamber_conductance_W_per_K: Annotated[
+        float, number("moving air, 10 W/(m² K) on 100 cm²", above=0.0, relative_sd=0.5)
+    ] = 0.1
+    mount_conductance_W_per_K: Annotated[
+        float,
+        number("base to housing; identified from the settling of the HRG paper's Figure 3", above=0.0, relative_sd=0.5),
+    ] = IDENTIFIED_MOUNT
+    mount_exchange_cm2: Annotated[
+        float, number("base to housing, area × effective emissivity", least=0.0, relative_sd=1.0)
+    ] = 10.0
+    drive_power_mW: Annotated[float, number("heat of the vibration, spread over the shell", least=0.0)] = 0.0
+    radiation: Annotated[bool, says("false: linearised at the reference temperature")] = True
+    cells: Annotated[float, number("of the shell's meridian; 1 makes it a lump", least=1.0, most=400.0)] = 24
+    stem_radius_mm: (
+        Annotated[Length, says("of the card's stem; without one a sixth of the radius", example=2.5)] | None
+    ) = None
+    stem_length_mm: Annotated[Length, says("of the card's stem; without one the radius", example=10.0)] | None = None
+    conductivity_W_per_m_K: (
+        Annotated[float, number("of the material table unless given", above=0.0, relative_sd=0.3, example=1.38)] | None
+    ) = None
+    heat_capacity_J_per_kg_K: (
+        Annotated[float, number("of the material table unless given", above=0.0, relative_sd=0.1, example=740.0)] | None
+    ) = None
+    note: Note = ""
 
     def __post_init__(self) -> None:
         if self.cells != int(self.cells):

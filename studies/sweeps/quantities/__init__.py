@@ -4,22 +4,14 @@ import importlib
 import pkgutil
 from functools import cache
 
-from studies.errors import InputError, nearest
 from studies.sweeps.quantity import Quantity
 
 
 @cache
-def library() -> dict[str, Quantity]:
+def library() -> dict[str, type[Quantity]]:
     """Return every quantity of this folder by name."""
-    found: dict[str, Quantity] = {}
+    found: dict[str, type[Quantity]] = {}
     for module in pkgutil.iter_modules(__path__):
-        quantity = importlib.import_module(f"{__name__}.{module.name}").QUANTITY
-        found[quantity.name] = quantity
+        quantity: type[Quantity] = importlib.import_module(f"{__name__}.{module.name}").QUANTITY
+        found[str(quantity.__struct_config__.tag)] = quantity
     return found
-
-
-def find_quantity(name: str, where: str) -> Quantity:
-    """Return the quantity called `name`; InputError names the nearest when there is none."""
-    if name not in library():
-        raise InputError(f"{where}: there is no quantity '{name}'{nearest(name, library())}")
-    return library()[name]

@@ -1,31 +1,19 @@
 """The Bryan (precession) factor of a mode: pattern rotation over rotation of the case."""
 
-from studies.sweeps.case import Case, Options
-from studies.sweeps.quantity import (
-    HARMONIC,
-    INDEX,
-    TEMPERATURE,
-    THEORY,
-    Column,
-    Number,
-    Quantity,
-    mode_stem,
-    mode_words,
-)
+from studies.sweeps.case import Case
+from studies.sweeps.quantity import Column, Number, OvertoneQuantity
 
 
-def _columns(options: Options) -> tuple[Column, ...]:
-    return (Column(mode_stem("bryan_factor", options), "1", f"Bryan factor, {mode_words(options)}"),)
+class BryanFactor(OvertoneQuantity, frozen=True, kw_only=True, tag="bryan-factor"):
+    """Precession of the standing wave per angle of rotation."""
+
+    def list_columns(self) -> tuple[Column, ...]:
+        """Return the column of the factor."""
+        return (Column(self.stem("bryan_factor"), "1", f"Bryan factor, {self.words}"),)
+
+    def evaluate(self, case: Case) -> tuple[Number, ...]:
+        """Return the factor."""
+        return (Number(case.mode(self).bryan_factor),)
 
 
-def _evaluate(case: Case, options: Options) -> tuple[Number, ...]:
-    return (Number(case.mode(options).bryan_factor),)
-
-
-QUANTITY = Quantity(
-    "bryan-factor",
-    "Precession of the standing wave per angle of rotation.",
-    {"harmonic": HARMONIC, "index": INDEX, "theory": THEORY, "temperature_degC": TEMPERATURE},
-    _columns,
-    _evaluate,
-)
+QUANTITY = BryanFactor

@@ -1,32 +1,20 @@
 """The frequency of a mode in Hz, with the solver's error estimate."""
 
-from studies.sweeps.case import Case, Options
-from studies.sweeps.quantity import (
-    HARMONIC,
-    INDEX,
-    TEMPERATURE,
-    THEORY,
-    Column,
-    Number,
-    Quantity,
-    mode_stem,
-    mode_words,
-)
+from studies.sweeps.case import Case
+from studies.sweeps.quantity import Column, Number, OvertoneQuantity
 
 
-def _columns(options: Options) -> tuple[Column, ...]:
-    return (Column(mode_stem("frequency", options), "Hz", f"frequency, {mode_words(options)}"),)
+class Frequency(OvertoneQuantity, frozen=True, kw_only=True, tag="frequency"):
+    """Frequency of a mode; without the stress of a [mount], which is in `tcf`."""
+
+    def list_columns(self) -> tuple[Column, ...]:
+        """Return the column of the frequency."""
+        return (Column(self.stem("frequency"), "Hz", f"frequency, {self.words}"),)
+
+    def evaluate(self, case: Case) -> tuple[Number, ...]:
+        """Return the frequency."""
+        mode = case.mode(self)
+        return (Number(mode.frequency, mode.frequency * mode.relative_error_estimate),)
 
 
-def _evaluate(case: Case, options: Options) -> tuple[Number, ...]:
-    mode = case.mode(options)
-    return (Number(mode.frequency, mode.frequency * mode.relative_error_estimate),)
-
-
-QUANTITY = Quantity(
-    "frequency",
-    "Frequency of a mode; without the stress of a [mount], which is in `tcf`.",
-    {"harmonic": HARMONIC, "index": INDEX, "theory": THEORY, "temperature_degC": TEMPERATURE},
-    _columns,
-    _evaluate,
-)
+QUANTITY = Frequency

@@ -4,40 +4,35 @@ It is named by module path, `function = "package.module:name"` or `"file.py:name
 (instrument, parameters) and returns one finite number. It runs only where the study was started with --allow-python.
 """
 
-from studies.errors import InputError
-from studies.files.toml import TomlTable
-from studies.sweeps.case import Case, Options
-from studies.sweeps.quantity import Column, Number, Option, Quantity, number
+from typing import Annotated
+
+from studies.schema.keys import number, says
+from studies.sweeps.case import Case
+from studies.sweeps.quantity import Column, Number, Quantity
 
 
-def _text(default: str | None, meaning: str) -> Option:
-    def read(section: TomlTable, key: str) -> str:
-        return section.text(key, default)
+class Python(Quantity, frozen=True, kw_only=True, tag="python"):
+    """A user's own function (instrument, parameters) -> number; needs --allow-python."""
 
-    return Option(meaning, read)
+    function: Annotated[str, says('"package.module:name" or "file.py:name" beside the spec', example="mine.py:area")]
+    unit: Annotated[str, says("of what it returns")] = "1"
+    time_limit_s: Annotated[float, number("that one design may take", above=0.0)] = 30.0
+
+    def __post_init__(self) -> None:
+        module, colon, name = self.function.rpartition(":")
+        if not (colon and module and name.isidentifier()):
+            raise ValueError(f'function = \'{self.function}\' must be "package.module:name" or "file.py:name".')
+
+    def list_columns(self) -> tuple[Column, ...]:
+        """Return the column of what it returns."""
+        name = self.function.rpartition(":")[2]
+        return (Column(name, self.unit, name.replace("_", " ")),)
+
+    def evaluate(self, case: Case) -> tuple[Number, ...]:
+        """Return what it returns."""
+        from studies.sweeps.child import ask
+
+        return (Number(ask(self.function, self.time_limit_s, case)),)
 
 
-def _columns(options: Options) -> tuple[Column, ...]:
-    module, colon, name = options["function"].rpartition(":")
-    if not (colon and module and name.isidentifier()):
-        raise InputError(f'function = \'{options["function"]}\' must be "package.module:name" or "file.py:name".')
-    return (Column(name, options["unit"], name.replace("_", " ")),)
-
-
-def _evaluate(case: Case, options: Options) -> tuple[Number, ...]:
-    from studies.sweeps.child import ask
-
-    return (Number(ask(options["function"], options["time_limit_s"], case)),)
-
-
-QUANTITY = Quantity(
-    "python",
-    "A user's own function (instrument, parameters) -> number; needs --allow-python.",
-    {
-        "function": _text(None, '"package.module:name" or "file.py:name" beside the spec'),
-        "unit": _text("1", "unit of what it returns"),
-        "time_limit_s": number(30.0, "seconds that one design may take", above=0.0),
-    },
-    _columns,
-    _evaluate,
-)
+QUANTITY = Python

@@ -1,33 +1,37 @@
 """The split of a pair in Hz, by the imperfection and the electrodes of the card, and the azimuth of its slower mode."""
 
 import math
+from typing import Annotated, Literal
 
-from studies.sweeps.case import Case, Options
-from studies.sweeps.quantity import HARMONIC, TEMPERATURE, Column, Number, Quantity, choice, mode_stem, mode_words
-
-THEORY = choice(("solid", "shell"), "solid (three-dimensional) or shell (Naghdi)")
-ORDER = choice(("first", "every"), "first order in the imperfection, or every order with the harmonics coupled")
-
-
-def _columns(options: Options) -> tuple[Column, ...]:
-    return (
-        Column(mode_stem("split", options), "Hz", f"split, {mode_words(options)}"),
-        Column(mode_stem("slow_axis", options), "°", f"azimuth of the slower mode, {mode_words(options)}"),
-    )
+from studies.schema.keys import says
+from studies.sweeps.case import Case
+from studies.sweeps.quantity import Column, ModeQuantity, Number
 
 
-def _evaluate(case: Case, options: Options) -> tuple[Number, ...]:
-    from studies.splitting import SplitPair
+class Split(ModeQuantity, frozen=True, kw_only=True, tag="split"):
+    """Frequency split of a pair and the azimuth of its slower mode."""
 
-    whole = SplitPair(case.instrument, case.mode(options), case.temperature(options))
-    split = whole.of_every_order() if options["order"] == "every" else whole.split
-    return Number(split.hertz), Number(math.degrees(split.slow_axis))
+    theory: Annotated[Literal["solid", "shell"], says("solid (three-dimensional) or shell (Naghdi)")] = "solid"
+    order: Annotated[
+        Literal["first", "every"],
+        says("first order in the imperfection, or every order with the harmonics coupled"),
+    ] = "first"
+
+    def list_columns(self) -> tuple[Column, ...]:
+        """Return the columns of split and azimuth."""
+        return (
+            Column(self.stem("split"), "Hz", f"split, {self.words}"),
+            Column(self.stem("slow_axis"), "°", f"azimuth of the slower mode, {self.words}"),
+        )
+
+    def evaluate(self, case: Case) -> tuple[Number, ...]:
+        """Return both."""
+        from studies.splitting import SplitPair
+
+        T = case.temperature(self.temperature_degC)
+        whole = SplitPair(case.instrument, case.modes(self.harmonic, 1, self.theory, T)[0], T)
+        split = whole.of_every_order() if self.order == "every" else whole.split
+        return Number(split.hertz), Number(math.degrees(split.slow_axis))
 
 
-QUANTITY = Quantity(
-    "split",
-    "Frequency split of a pair and the azimuth of its slower mode.",
-    {"harmonic": HARMONIC, "theory": THEORY, "order": ORDER, "temperature_degC": TEMPERATURE},
-    _columns,
-    _evaluate,
-)
+QUANTITY = Split

@@ -1,36 +1,34 @@
 """The temperature coefficient of frequency, d ln f/dT, and its parts from E, ν, ρ, h and r (HRG paper eq. 15)."""
 
 from studies.law import check_slope_known, law_of
-from studies.sweeps.case import Case, Options
-from studies.sweeps.quantity import HARMONIC, TEMPERATURE, THEORY, Column, Number, Quantity, mode_stem
+from studies.sweeps.case import Case
+from studies.sweeps.quantity import Column, ModeQuantity, Number
 
 PARTS = ("E", "nu", "rho", "h", "r")
 STEEPEST = 10.0  # error of a solve's slopes of ln f, by ν or ln h, over its error of f; 2 to 3 were seen
 
 
-def _columns(options: Options) -> tuple[Column, ...]:
-    stem, n = mode_stem("tcf", options), options["harmonic"]
-    parts = [Column(f"{stem}_{part}", "ppm/°C", f"TCF, n = {n}, part of {part}") for part in PARTS]
-    return (Column(stem, "ppm/°C", f"TCF, n = {n}"), *parts)
+class TemperatureCoefficient(ModeQuantity, frozen=True, kw_only=True, tag="tcf"):
+    """Relative slope of the frequency over temperature and its five parts."""
+
+    def list_columns(self) -> tuple[Column, ...]:
+        """Return the columns of the sum and of its parts."""
+        stem, words = self.stem("tcf"), f"TCF, {self.words}"
+        parts = [Column(f"{stem}_{part}", "ppm/°C", f"{words}, part of {part}") for part in PARTS]
+        return (Column(stem, "ppm/°C", words), *parts)
+
+    def evaluate(self, case: Case) -> tuple[Number, ...]:
+        """Return the sum and its parts."""
+        check_slope_known(case.instrument)
+        T = case.temperature(self.temperature_degC)
+        law = law_of(case.instrument, T, T, self.theory, self.harmonic)
+        found, level = law.parts(T), STEEPEST * law.solver_error
+        of_nu = level * abs(float(law.material.slope("poisson_ratio", T)))
+        of_h = level * abs(float(law.material.value("expansion", T)))
+        # the parts of h and r add up to −alpha whatever the slope by h
+        values = (found.total, *(getattr(found, part) for part in PARTS))
+        errors = (of_nu, 0.0, of_nu, 0.0, of_h, of_h)
+        return tuple(Number(1e6 * float(value), 1e6 * error) for value, error in zip(values, errors, strict=True))
 
 
-def _evaluate(case: Case, options: Options) -> tuple[Number, ...]:
-    check_slope_known(case.instrument)
-    T = case.temperature(options)
-    law = law_of(case.instrument, T, T, options["theory"], options["harmonic"])
-    found, level = law.parts(T), STEEPEST * law.solver_error
-    of_nu = level * abs(float(law.material.slope("poisson_ratio", T)))
-    of_h = level * abs(float(law.material.value("expansion", T)))
-    # the parts of h and r add up to −alpha whatever the slope by h
-    values = (found.total, *(getattr(found, part) for part in PARTS))
-    errors = (of_nu, 0.0, of_nu, 0.0, of_h, of_h)
-    return tuple(Number(1e6 * float(value), 1e6 * error) for value, error in zip(values, errors, strict=True))
-
-
-QUANTITY = Quantity(
-    "tcf",
-    "Relative slope of the frequency over temperature and its five parts.",
-    {"harmonic": HARMONIC, "theory": THEORY, "temperature_degC": TEMPERATURE},
-    _columns,
-    _evaluate,
-)
+QUANTITY = TemperatureCoefficient

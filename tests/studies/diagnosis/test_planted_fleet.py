@@ -119,7 +119,7 @@ def test_a_manifest_names_devices_beside_it(tmp_path):
     manifest.write_text('[devices]\nA = ["a.csv"]\nB = ["a.csv", "a.csv"]\n')
     assert {name: len(own) for name, own in read_fleet([], str(manifest)).items()} == {"A": 1, "B": 2}
     manifest.write_text('[devices]\nA = "a.csv"\n')
-    with pytest.raises(InputError, match="A needs a list of records"):
+    with pytest.raises(InputError, match="A must be a list of 1 or more texts"):
         read_fleet([], str(manifest))
     with pytest.raises(InputError, match="give a unique name"):
         read_fleet(["a.csv"])

@@ -6,8 +6,9 @@ from pathlib import Path
 import pytest
 
 from studies.cli import study as cli
-from studies.files.toml import TomlTable
 from studies.instrument.card import load_card
+from studies.schema.reader import read_keys
+from studies.schema.reference import list_keys
 from studies.sweeps.case import Case
 from studies.sweeps.quantities import library
 from studies.sweeps.quantity import SUFFIXES
@@ -15,9 +16,8 @@ from studies.sweeps.quantity import SUFFIXES
 COMPUTED = sorted(name for name in library() if name != "python")
 
 
-def options_of(name, **given):
-    section = TomlTable(given, "test", tuple(library()[name].options))
-    return {key: option.read(section, key) for key, option in library()[name].options.items()}
+def asked(name, **given):
+    return read_keys({"name": name, **given}, library()[name], "test")
 
 
 @pytest.fixture(scope="module")
@@ -27,10 +27,9 @@ def case():
 
 @pytest.mark.parametrize("name", COMPUTED)
 def test_values_fill_the_columns_and_are_finite(name, case):
-    quantity = library()[name]
-    given = {"theory": "shell"} if "theory" in quantity.options else {}
-    options = options_of(name, **given)
-    columns, numbers = quantity.columns(options), quantity.evaluate(case, options)
+    given = {"theory": "shell"} if "theory" in library()[name].__struct_fields__ else {}
+    quantity = asked(name, **given)
+    columns, numbers = quantity.columns, quantity.evaluate(case)
     assert len(columns) == len(numbers) == len({column.name for column in columns})
     assert all(math.isfinite(number.value) for number in numbers)
     assert all(not number.error < 0 for number in numbers)
@@ -40,15 +39,15 @@ def test_values_fill_the_columns_and_are_finite(name, case):
 @pytest.mark.parametrize("name", sorted(library()))
 def test_quantity_is_described_and_documented(name):
     quantity = library()[name]
-    assert quantity.summary.endswith(".")
-    assert all(option.meaning for option in quantity.options.values())
+    assert quantity.__doc__.endswith(".")
+    assert all(row["meaning"] for row in list_keys(quantity))
     assert name in (cli.run.__doc__ or ""), "add it to the help of hrg study run"
     file = Path(__file__).parents[3] / "studies" / "sweeps" / "quantities" / f"{name.replace('-', '_')}.py"
     assert file.is_file()
 
 
 def test_tcf_parts_add_up(case):
-    numbers = library()["tcf"].evaluate(case, options_of("tcf", theory="shell"))
+    numbers = asked("tcf", theory="shell").evaluate(case)
     assert numbers[0].value == pytest.approx(sum(number.value for number in numbers[1:]), abs=1e-9)
 
 
@@ -56,10 +55,9 @@ def test_quantities_of_one_case_share_their_solves(case):
     from shell import modes
 
     case = Case(load_card("hrg-30mm"), {})
-    options = options_of("frequency", theory="shell")
-    library()["frequency"].evaluate(case, options)
+    asked("frequency", theory="shell").evaluate(case)
     solve, modes.solve_modes = modes.solve_modes, None  # a second solve would now fail
     try:
-        library()["bryan-factor"].evaluate(case, options_of("bryan-factor", theory="shell"))
+        asked("bryan-factor", theory="shell").evaluate(case)
     finally:
         modes.solve_modes = solve
