@@ -1,7 +1,6 @@
 """`hrg derive --dynamics` speaks as promised, and the C that it prints computes what the Python does."""
 
 import ctypes
-import json
 import shutil
 import subprocess
 
@@ -14,18 +13,6 @@ from studies.cli import main
 def speak(capsys, *words):
     status = main(["derive", "--dynamics", *words])
     return status, capsys.readouterr()
-
-
-def test_schema_is_kept(capsys):
-    status, said = speak(capsys, "--json", "--code", "c")
-    payload = json.loads(said.out)
-    assert status == 0
-    assert list(payload) == ["schema", "equations", "code"]
-    assert payload["schema"] == "hrg.derive-dynamics/1"
-    assert [step["number"] for step in payload["equations"] if step["number"]] == [
-        "7", "3", "8", "9", "10-12", "13", "14", "15", "16", "17", "18, 19", "20-22", "23, 24", "25", "35", "36",
-    ]  # fmt: skip
-    assert all(list(step) == ["number", "title", "latex", "plain"] for step in payload["equations"])
 
 
 def test_options_of_the_shell_are_refused(capsys):

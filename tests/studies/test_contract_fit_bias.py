@@ -211,25 +211,6 @@ def test_json_is_one_object_with_both_methods(calibrated, capsys):
     assert payload["allan"]["before"]["N"] == pytest.approx(0.4 * np.sqrt(5.0), rel=0.05)
 
 
-def test_golden_keys_of_the_schema(calibrated, capsys):
-    """The keys that scripts rely on; regenerate by reading `_payload` when the schema's number changes."""
-    assert main(["fit", "bias", str(calibrated / "run0.csv"), "--json"]) == 0
-    payload = json.loads(capsys.readouterr().out)
-    top = {
-        "schema", "data", "output", "over", "lag_s", "play_half_width_degC", "method", "rows", "missing", "spikes",
-        "rate_lag_s", "methods", "allan",
-    }  # fmt: skip
-    assert set(payload) == top
-    judged = payload["methods"]["guarded"]
-    assert set(judged) == {
-        "reference", "terms", "coefficients", "standard_errors", "naive_standard_errors", "theta", "path",
-        "training", "held_out",
-    }  # fmt: skip
-    assert set(judged["path"][0]) == {"added", "term", "F", "p_value", "bic"}
-    assert set(judged["training"]) == {"before", "after", "gain"}
-    assert set(payload["allan"]) == {"step_s", "before", "after"}
-
-
 def test_a_rate_output_is_fitted_in_its_own_unit(tmp_path, capsys):
     def spoil(columns):
         columns["measured_rate_deg_per_s"] = columns.pop("bias_deg_per_h") / 3600

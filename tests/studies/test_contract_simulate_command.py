@@ -5,40 +5,6 @@ import json
 import pytest
 
 from studies.cli import main
-from studies.record import read_record
-
-
-def test_simulate_writes_a_record_and_one_json_object(tmp_path, capsys):
-    out = tmp_path / "run.csv"
-    assert (
-        main(
-            [
-                "simulate",
-                "hrg-30mm",
-                "step 20 -10 1h",
-                "--out",
-                str(out),
-                "--theory",
-                "shell",
-                "--row",
-                "10",
-                "--json",
-            ]
-        )
-        == 0
-    )
-    answer = json.loads(capsys.readouterr().out)
-    assert answer["schema"] == "hrg.simulate/1"
-    assert list(answer) == [
-        "schema", "card", "out", "rows", "columns", "rate_Hz", "boundary", "seed", "frequency_Hz", "solver_relative_error",
-        "interpolation_relative_error", "spread", "warnings",
-    ]  # fmt: skip
-    assert answer["spread"] is None
-    assert answer["rows"] == 361
-    assert answer["interpolation_relative_error"] < 1e-7
-    record = read_record(out)
-    assert len(record) == 361
-    assert record.source == "simulated, rate 0.1 Hz, seed 0"
 
 
 def test_thermal_prints_time_constants_and_temperatures(capsys):

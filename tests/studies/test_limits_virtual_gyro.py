@@ -241,32 +241,6 @@ def test_every_shipped_shape_has_a_heat_path(card):
     assert turned.volume[0] == pytest.approx(card.heat_path.cells.volume[-1], rel=1e-3)
 
 
-@pytest.mark.parametrize(
-    ("table", "content", "words"),
-    [
-        ("thermal", {"film_emisivity": 0.1}, "unknown key 'film_emisivity'; did you mean 'film_emissivity'"),
-        ("thermal", {"film_emissivity": 2.0}, "film_emissivity must be at most 1"),
-        ("thermal", {"base_heat_capacity_J_per_K": -1.0}, "must be above 0"),
-        ("thermal", {"radiation": "yes"}, "radiation must be true or false"),
-        ("noise", {"frequency_white": 1.0}, "unknown key 'frequency_white'"),
-        ("noise", {"housing_lag_s": -1.0}, "housing_lag_s must be at least 0"),
-        ("bias", {"k1": 1.0}, "unknown key 'k1'"),
-        ("loss", {"inverse_q": 0.0}, "inverse_q must be above 0"),
-        ("loss", {"slope_per_K": 0.2}, "1/Q becomes negative"),
-        (
-            "effect",
-            [{"name": "second-leg", "weight": 0.1}],
-            "no effect is called 'second-leg'; did you mean 'second-lag'",
-        ),
-        ("effect", [{"name": "second-lag", "weight": 0.1}], "the key 'second_time_constant_s' is missing"),
-        ("effect", [{"name": "second-lag", "weight": "much"}], "weight must be a finite number"),
-    ],
-)
-def test_unusable_tables_are_refused_by_key(card, law, table, content, words):
-    with pytest.raises(InputError, match=words):
-        run(card.with_table(table, content), law)
-
-
 def test_a_material_without_heat_capacity_is_asked_for_by_its_key():
     with pytest.raises(InputError, match="of 3j53; add the key 'heat_capacity_J_per_kg_K'"):
         build_network(load_card("bvg-bell").with_table("thermal", {}))

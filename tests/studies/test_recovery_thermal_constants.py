@@ -4,63 +4,20 @@ The records are synthetic: a housing with a lag of its own, a resonator behind i
 about 20 °C, white noise, a random walk or a wander of the frequency, noise of the housing sensor.
 """
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
-
 import numpy as np
 import pytest
 from scipy.constants import Stefan_Boltzmann
-from scipy.optimize import brentq
 from scipy.signal import lfilter
-from scipy.stats import f as fisher
 
 from studies.calibration.lags.followers import Constant, make_lags
 from studies.calibration.lags.housing_run import HousingRun, even_rows, row_step
-from studies.calibration.lags.identification import FrequencyPolynomial, Identification, identify, identify_lags
-from studies.calibration.lags.least_squares import solve
+from studies.calibration.lags.identification import FrequencyPolynomial, identify, identify_lags
 from studies.calibration.lags.wander import estimate_wander
 from thermal.errors import ThermalError
 from thermal.lag import lag
-from thermal.network import Boundary, Conductor, Network, Node, Radiator, assemble
+from thermal.network import Boundary, Conductor, Node, Radiator, assemble
 from thermal.profile import Profile, parse_profile
 from thermal.radiative import integrate
-from thermal.steady import find_steady_state
-from thermal.sweeping import sweep
-from thermal.transient import propagate
-
-
-@dataclass(frozen=True)
-class NetworkFollower:
-    """The resonator as a node of a network whose one boundary is the housing.
-
-    Attributes
-    ----------
-    constants : the constants that `build` takes
-    build : callable from the constants by name to the network; its boundary must be called "housing"
-    node : the node whose temperature the frequency sees
-    node_count : number of nodes of the network
-    """
-
-    constants: tuple[Constant, ...]
-    build: Callable[[Mapping[str, float]], Network]
-    node: str
-    node_count: int
-
-    @property
-    def states(self) -> int:
-        """One for each node."""
-        return self.node_count
-
-    def follow(
-        self, constants: Mapping[str, float], departure: np.ndarray, time: np.ndarray, housing_temperature: np.ndarray
-    ) -> np.ndarray:
-        """Propagate a linear network, sweep one with radiation."""
-        network = self.build(constants)
-        held = {"housing": Profile(time, housing_temperature)}
-        first = find_steady_state(network, {"housing": float(housing_temperature[0])}, float(time[0]))
-        solver = propagate if network.is_linear else sweep
-        return solver(network, held, first[: network.count] + departure).node(self.node, time)
-
 
 ROOM = 293.15
 SLOPE, CURVATURE = 0.3716, -9.7e-4
@@ -161,57 +118,6 @@ def test_lags_in_series_and_their_radiated_share_are_found():
         assert estimate.value == pytest.approx(truth, rel=0.02)
 
 
-def radiating(constants):
-    return assemble(
-        [
-            Boundary("housing"),
-            Node("shell", constants.get("capacity", 2.0)),
-            Conductor("housing", "shell", constants["conductance"]),
-            Radiator("housing", "shell", constants["exchange"]),
-        ]
-    )
-
-
-CONDUCTANCE = Constant("conductance", 1e-3, 1e-5, 1e-1)
-EXCHANGE = Constant("exchange", 5e-5, 1e-6, 1e-2)
-
-
-def radiative_record(rng):
-    """Temperatures from the implicit integrator, which the identification does not use."""
-    t, T_h = housing("step 20 -40 4h then step -40 60 4h", 120.0)
-    network = radiating({"conductance": 8e-4, "exchange": 1.2e-4})
-    start = [T_h[0] + 2.0]
-    T_r = integrate(network, {"housing": Profile(t, T_h)}, start, relative_tolerance=1e-9).node("shell", t)
-    return record(rng, t, T_h, T_r, walk=1e-4, sensor=0.0)
-
-
-@pytest.mark.slow
-def test_radiation_and_conduction_are_told_apart_by_a_cold_and_a_hot_step():
-    follower = NetworkFollower((CONDUCTANCE, EXCHANGE), radiating, "shell", 1)
-    scores = []
-    for seed in range(2):
-        fit = identify([radiative_record(np.random.default_rng(seed))], follower, FREE_LAW)
-        for name, truth in (("conductance", 8e-4), ("exchange", 1.2e-4)):
-            estimate = fit.estimates[name]
-            scores.append(np.log(estimate.value / truth) / estimate.standard_error)
-        assert fit.departures[0][0] == pytest.approx(2.0, abs=0.05)
-    assert np.abs(scores).max() < 3.5
-    assert np.sqrt(np.mean(np.square(scores))) < 2.0
-
-
-@pytest.mark.slow
-def test_a_common_factor_of_capacity_and_links_is_named_as_undetermined():
-    follower = NetworkFollower((CONDUCTANCE, EXCHANGE, Constant("capacity", 2.0, 0.1, 50.0)), radiating, "shell", 1)
-    fit = identify([radiative_record(np.random.default_rng(1))], follower, FREE_LAW)
-    assert len(fit.undetermined) == 1
-    assert set(fit.undetermined[0].parts) == {"conductance", "exchange", "capacity"}
-    assert [abs(share) for share in fit.undetermined[0].parts.values()] == pytest.approx([3**-0.5] * 3, rel=1e-3)
-    for name in ("conductance", "exchange", "capacity"):
-        assert fit.estimates[name].value is None
-        assert fit.estimates[name].high == np.inf
-    assert fit.estimates["slope"].value == pytest.approx(SLOPE, rel=1e-3)
-
-
 def test_a_relaxation_tells_the_time_constant_and_not_the_law():
     rng = np.random.default_rng(2)
     fit = identify_lags([one_lag(rng, "soak 20 5h", departure=5.0, sensor=0.0)], FREE_LAW, make=make_lags)
@@ -275,50 +181,6 @@ def test_rows_hold_a_whole_number_of_samples_and_know_their_mean_time():
     fit = identify([sparse], make_lags(1000.0), FREE_LAW)
     assert covers(fit.estimates["time_constant_1"], 1800.0)
     assert fit.residual.std() < 4e-3
-
-
-def profile_interval(result: Identification, name: str) -> tuple[float, float]:
-    """Interval of a constant from the profile of the fit: where refitting all others costs too much.
-
-    The whitened sum of squares may grow by the quantile of F(1, N − p) (Bates & Watts, Nonlinear Regression
-    Analysis, 1988, ch. 6). Unlike the intervals of `Identification.estimates` it needs no straight parabola, and an
-    end is 0 or infinite where the record never objects.
-    """
-    solution, problem = result.solution, result.problem
-    k = problem.names.index(name)
-    allowed = float(fisher.ppf(result.confidence, 1, problem.rows - problem.count))
-    best, error = solution.parameters[k], float(np.sqrt(solution.covariance[k, k]))
-    reference = solve(problem, solution.parameters, solution.noise, {k: best}).cost
-
-    def growth(distance: float) -> float:
-        fixed = solve(problem, solution.parameters, solution.noise, {k: best + distance * error})
-        return fixed.cost - reference - allowed
-
-    ends = []
-    for sign in (-1.0, 1.0):
-        reach = 2.0 * sign
-        while growth(reach) < 0 and abs(reach) < 16.0:
-            reach *= 2
-        ends.append(best + error * brentq(growth, 0.0, reach, xtol=1e-2) if growth(reach) > 0 else sign * np.inf)
-    low, high = np.exp(ends) if problem.is_logarithmic(k) else ends
-    return float(low), float(high)
-
-
-def test_the_profile_of_a_well_determined_constant_is_the_parabola_of_its_standard_error():
-    fit = identify([one_lag(np.random.default_rng(8))], make_lags(1000.0), FREE_LAW)
-    estimate = fit.estimates["time_constant_1"]
-    assert profile_interval(fit, "time_constant_1") == pytest.approx((estimate.low, estimate.high), rel=2e-4)
-
-
-def test_the_profile_of_an_open_constant_has_an_open_end():
-    """A lag far shorter than the rows: any still shorter one explains the record as well."""
-    t, T_h = housing(STEPS, 60.0)
-    run = record(np.random.default_rng(9), t, T_h, lag(t, T_h, 12.0), white=2.0)
-    fit = identify([run], make_lags(100.0, shortest=1e-3), FrequencyPolynomial(ROOM, SLOPE, CURVATURE))
-    assert fit.estimates["time_constant_1"].value is None
-    low, high = profile_interval(fit, "time_constant_1")
-    assert low < 3.0
-    assert 12.0 < high < 300.0
 
 
 def test_the_noise_of_a_wandering_level_is_recovered():
