@@ -7,7 +7,6 @@ import numpy as np
 
 from shell.blocks import Mesh, Solid, Tie, constrain, find_boundary, mesh_solid, number_functions
 from shell.cells import at_gauss_points, tabulate_cells
-from shell.constraints import Index, Rows
 from shell.corner import find_kinks, lay_clamped_edge, lay_clamped_face, lay_corner
 from shell.errors import ShellError, mm
 from shell.kernel import Orders, Section, shell_table
@@ -16,6 +15,7 @@ from shell.levels import Level, Theory
 from shell.quadrature import Array, at_gauss, gauss, legendre, nodal
 from shell.resonator import Resonator
 from shell.root import lay_root
+from shell.sparse import Index, Rows
 from shell.system import Group, ShellGroup, ShellPart, SolidGroup, SolidPart, System
 
 SMALL = 0.5  # length over radius of a small element

@@ -7,12 +7,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shell.cells import in_order
-from shell.constraints import Index, Rows
 from shell.errors import ShellError
 from shell.kernel import Orders
 from shell.patches import Part, Patch
 from shell.quadrature import Array, interpolate_hierarchic, legendre, lobatto
 from shell.resonator import MeridianPoints
+from shell.sparse import Index, Rows
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,10 +13,10 @@ from functools import cache
 
 import numpy as np
 
-from shell.constraints import Index
 from shell.errors import FoldedCells
 from shell.kernel import energy_weights
 from shell.quadrature import Array, Basis, gauss, hierarchic, nodal
+from shell.sparse import Index
 
 R, Z, ZERO = range(3)  # the gradients φ_r, φ_z, φ_0
 

@@ -8,8 +8,7 @@ import numpy as np
 from shell.blocks import Solid
 from shell.errors import ShellError
 from shell.layout import SMOOTH_JOINT
-from shell.patches import Cell, Part, Patch, Path, narrowed, rings, shrinking, straight, whole
-from shell.quadrature import Array
+from shell.patches import Cell, Patch, along, box, narrowed, rings, shrinking, straight, whole
 from shell.resonator import MeridianPoints, Resonator
 
 Spot = tuple[float, float]
@@ -77,9 +76,9 @@ def lay_clamped_face(resonator: Resonator, ring_count: int) -> tuple[Solid, floa
     width = min(COLLAR * h, 0.6 * c)
     cells = rings(shrinking(ring_count))
     patches = [
-        _box((c, low), (c + width, low + h), cells),
-        _box((c, low), (c - width, low + h), cells),
-        _box((0.0, low), (c - width, low + h), whole()),
+        box((c, low), (c + width, low + h), cells),
+        box((c, low), (c - width, low + h), cells),
+        box((0.0, low), (c - width, low + h), whole()),
     ]
     margin = 1e-9 * resonator.length
     held = lambda r, z: abs(z - low) < margin and r <= c + margin  # noqa: E731
@@ -154,30 +153,20 @@ def _strip(
     """The shell from s to `end`, from the face η = near to η = far (the other face if not given)."""
     far = -near if far is None else far
 
-    def side(eta: float) -> Path:
-        def path(x: Array) -> tuple[Array, Array]:
-            points = resonator.at(np.ravel(s + (end - s) * x), segment)
-            zeta = eta * points.thickness / 2
-            return (points.r + zeta * points.normal_r).reshape(np.shape(x)), (
-                points.z + zeta * points.normal_z
-            ).reshape(np.shape(x))
-
-        return path
-
     start, stop = resonator.at([s], segment), resonator.at([end], segment)
     return Patch(
         straight(_face(start, near), _face(start, far)),
         straight(_face(stop, near), _face(stop, far)),
-        side(near),
-        side(far),
+        along(resonator.surface(near, segment), s, end),
+        along(resonator.surface(far, segment), s, end),
         cells,
         "corner",
     )
 
 
 def _face(points: MeridianPoints, eta: float) -> Spot:
-    zeta = eta * points.thickness[0] / 2
-    return float(points.r[0] + zeta * points.normal_r[0]), float(points.z[0] + zeta * points.normal_z[0])
+    r, z = points.at_heights([eta])
+    return float(r[0, 0]), float(z[0, 0])
 
 
 def _along_face(points: MeridianPoints, eta: float) -> Spot:
@@ -199,15 +188,3 @@ def _cross(one: Spot, along_one: Spot, two: Spot, along_two: Spot) -> Spot:
     det = along_one[0] * along_two[1] - along_one[1] * along_two[0]
     x = ((two[0] - one[0]) * along_two[1] - (two[1] - one[1]) * along_two[0]) / det
     return one[0] + x * along_one[0], one[1] + x * along_one[1]
-
-
-def _box(corner: Spot, opposite: Spot, cells: tuple[Cell, ...], part: Part = "root") -> Patch:
-    (r0, z0), (r1, z1) = corner, opposite
-    return Patch(
-        straight((r0, z0), (r1, z0)),
-        straight((r0, z1), (r1, z1)),
-        straight((r0, z0), (r0, z1)),
-        straight((r1, z0), (r1, z1)),
-        cells,
-        part,
-    )

@@ -25,6 +25,7 @@ from shell.errors import ShellError
 from shell.modes import solve_modes
 from shell.quadrature import Array
 from shell.resonator import Resonator
+from shell.sparse import assemble_elements
 from shell.system import ShellGroup, System
 
 REACH = 8  # harmonics above n that take part
@@ -159,10 +160,7 @@ def _isotropic(system: System, crystal: Cubic) -> tuple[Array, Array]:
     C12, C44, rho = ([np.full(shape, v) for shape in shapes] for v in (crystal.C12, crystal.C44, crystal.rho))
     elements, mass = system.operators(C12, C44, rho, True)
     size = system.constraint.shape[1]
-    K = np.zeros((size, size))
-    for own, members in zip(elements, system.pattern.unknowns, strict=True):
-        K[np.ix_(members, members)] += own
-    return K, mass @ np.eye(size)
+    return assemble_elements(system.pattern.unknowns, elements, size).toarray(), mass @ np.eye(size)
 
 
 def _strains(system: System) -> tuple[Array, Array, Array, Array]:

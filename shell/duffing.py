@@ -17,8 +17,6 @@ import warnings
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import csc_matrix
-from scipy.sparse.linalg import splu
 
 from shell.errors import ShellError
 from shell.finite import QuadraticForce, solved_as_solid
@@ -26,6 +24,7 @@ from shell.modes import Mode, TheoryRangeWarning
 from shell.prestress import is_uniform, neighbour, settle
 from shell.quadrature import Array
 from shell.solution import Solution, total
+from shell.sparse import assemble_elements, factor_symmetric
 
 NEAR = 0.01  # of twice the frequency, by which it is moved to see whether another mode lies near
 SETTLED = 0.1  # share of the coefficient that this may change
@@ -99,13 +98,9 @@ def _inertia(z: Solution, force: Array, driven: float) -> tuple[float, float]:
     system, constants = z.system, z.constants
     lam, G, rho = (list(kind) for kind in zip(*((*c.lame, c.rho) for c in constants), strict=True))
     elements, inertia = system.operators(lam, G, rho, is_uniform(constants))
-    members = system.pattern.unknowns
-    entries = np.concatenate([own.ravel() for own in elements])
-    rows = np.concatenate([np.repeat(u, len(u)) for u in members])
-    columns = np.concatenate([np.tile(u, len(u)) for u in members])
     M = inertia.matrix()
-    A = csc_matrix((entries, (rows, columns)), shape=M.shape) - driven * M.tocsc()
-    factor = splu(A, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.01, options={"SymmetricMode": True})
+    K = assemble_elements(system.pattern.unknowns, elements, system.pattern.size)
+    solve = factor_symmetric(K - driven * M, 0.01)
     heavy = M @ z.vector
-    z_d, other = factor.solve(force), factor.solve(heavy)
+    z_d, other = solve(force), solve(heavy)
     return float(heavy @ z_d), float(other @ (M @ z_d))

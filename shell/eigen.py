@@ -15,9 +15,9 @@ from scipy.linalg import blas, lapack
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import reverse_cuthill_mckee
 
-from shell.constraints import Index
 from shell.errors import ShellError
 from shell.quadrature import Array
+from shell.sparse import Index
 
 TOO_THIN = "the stiffness lost its last digit in double precision: the shell is too thin (h/R far below 1e-6)."
 BLOCK = 3  # vectors a step; modes that coincide (torsion and axial, mirror images) need two

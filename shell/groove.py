@@ -18,15 +18,14 @@ from typing import Literal, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csc_matrix
-from scipy.sparse.linalg import splu
 
-from shell.constraints import Index
 from shell.errors import ShellError, mm
 from shell.imperfection import Pair
 from shell.imperfection.pair import WAVE
 from shell.imperfection.place import cut
 from shell.quadrature import Array, gauss
 from shell.resonator import Resonator
+from shell.sparse import Index, assemble_elements, factor_symmetric
 
 Face: TypeAlias = Literal["edge", "inner", "outer"]
 REACH = {"edge": 16.0, "inner": 4.0, "outer": 4.0}  # wall thicknesses of the piece along the meridian
@@ -105,12 +104,7 @@ def solve_groove(pair: Pair, groove: Groove) -> GrooveSplit:
     for kind in (0, 1):
         free = nodes.free(kind)
         load = (turn.T @ loads[kind])[free]
-        answer = splu(
-            csc_matrix(K[free][:, free]),
-            permc_spec="MMD_AT_PLUS_A",
-            diag_pivot_thresh=0.0,
-            options={"SymmetricMode": True},
-        ).solve(load)
+        answer = factor_symmetric(K[free][:, free])(load)
         E.append(2 * float(load @ answer))  # the other half of the piece
     norm = 2 * np.pi * pair.scale
     error = RELIEF_ERROR * (E[0] + E[1]) / norm
@@ -206,9 +200,7 @@ class _Nodes:
         ]
         self.gone = grid.gone.ravel()
         place = resonator.at(knots[0])
-        zeta = knots[2] * place.thickness[:, None] / 2
-        rho = place.r[:, None] + zeta * place.normal_r[:, None]
-        z = place.z[:, None] + zeta * place.normal_z[:, None]
+        rho, z = place.at_heights(knots[2])
         theta = knots[1][None, :, None]
         x = np.broadcast_to(rho[:, None], shape) * np.cos(theta), np.broadcast_to(rho[:, None], shape) * np.sin(theta)
         self.points = np.stack([*x, np.broadcast_to(z[:, None], shape)], axis=-1).reshape(-1, 3)
@@ -268,8 +260,7 @@ class _Nodes:
         left = (np.einsum("ij,epjm->epim", D, B) * volume[:, :, None, None]).reshape(size, 27 * 6, 81)
         K = np.matmul(np.swapaxes(B.reshape(size, 27 * 6, 81), 1, 2), left)
         unknowns = (3 * self.elements[~self.gone][:, :, None] + np.arange(3)).reshape(size, 81)
-        rows, columns = np.repeat(unknowns, 81, axis=1).ravel(), np.tile(unknowns, (1, 81)).ravel()
-        return csc_matrix((K.ravel(), (rows, columns)), shape=(3 * len(self.points),) * 2)
+        return assemble_elements(unknowns, K, 3 * len(self.points))
 
 
 def _loads(pair: Pair, grid: _Grid, nodes: _Nodes, lam: float, G: float, rho: float) -> tuple[Array, Array, float]:

@@ -60,6 +60,5 @@ def _gauss_points(resonator: Resonator, group: Group, level: Level) -> tuple[Arr
     chain, found = group.place.chain, []
     for (one, two), segment in zip(pairwise(chain.breaks), chain.segments, strict=True):
         at = resonator.at((one + two) / 2 + (two - one) / 2 * xi, segment)
-        zeta = np.multiply.outer(at.thickness / 2, eta)
-        found.append((at.r[:, None] + zeta * at.normal_r[:, None], at.z[:, None] + zeta * at.normal_z[:, None]))
+        found.append(at.at_heights(eta))
     return np.array([r for r, _ in found]), np.array([z for _, z in found])

@@ -19,7 +19,7 @@ from shell.fitted import fit_profile
 from shell.levels import Theory
 from shell.refinement import refine
 from shell.resonator import Resonator
-from shell.sampling import ShapePatch, sample_shape
+from shell.section import ShapePatch, draw_section, sample_shape
 from shell.solution import AlongMeridian, EnergyFractions, Solution, total
 
 if TYPE_CHECKING:
@@ -103,8 +103,6 @@ class Mode:
         ShellError
             Rayleigh's closed form has no shape.
         """
-        from shell.section import draw_section
-
         return draw_section(self.shape(33), self.harmonic, f"n = {self.harmonic}, {self.frequency:.3f} Hz")
 
     def __repr__(self) -> str:

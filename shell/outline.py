@@ -141,10 +141,8 @@ class _Sides:
     def _shell_side(self, number: int, chain: Chain, element: int, xi: Array, eta: Array) -> Outline:
         one = Chain(chain.breaks[element : element + 2], (chain.segments[element],), chain.ends)
         place = self.resonator.at(sum(one.breaks) / 2 + (one.breaks[1] - one.breaks[0]) / 2 * xi, one.segments[0])
-        zeta = np.multiply.outer(place.thickness / 2, eta)
-        r = (place.r[:, None] + zeta * place.normal_r[:, None]).ravel()
-        z = (place.z[:, None] + zeta * place.normal_z[:, None]).ravel()
-        position = np.broadcast_to(place.position[:, None], zeta.shape).ravel()
+        r, z = (one.ravel() for one in place.at_heights(eta))
+        position = np.repeat(place.position, len(eta))
         if self.solution is None:
             return _bare(r, z, position)
         level = self.system.level

@@ -105,6 +105,20 @@ def straight(start: tuple[float, float], end: tuple[float, float]) -> Path:
     return path
 
 
+def along(curve: Path, first: float, last: float) -> Path:
+    """The part of a curve between two of its parameters."""
+    return lambda x: curve(first + (last - first) * x)
+
+
+def box(
+    corner: tuple[float, float], opposite: tuple[float, float], cells: tuple[Cell, ...], part: Part = "root"
+) -> Patch:
+    """A rectangle."""
+    (r0, z0), (r1, z1) = corner, opposite
+    bottom, top = straight((r0, z0), (r1, z0)), straight((r0, z1), (r1, z1))
+    return Patch(bottom, top, straight((r0, z0), (r0, z1)), straight((r1, z0), (r1, z1)), cells, part)
+
+
 def circular(center: tuple[float, float], radius: float, first: float, last: float) -> Path:
     """A circular side, center + radius (cos ψ, sin ψ) for ψ from `first` to `last`."""
 

@@ -4,6 +4,7 @@ The pole of a dome is at z = +R. Along the chain the tangent is t = (t_r, t_z) a
 points outwards on a dome; the curvature κ of the meridian is positive where n points away from its centre.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import hypot
@@ -82,6 +83,11 @@ class MeridianPoints:
         """Axial component of the unit normal."""
         return self.tangent_r
 
+    def at_heights(self, eta: ArrayLike) -> tuple[Array, Array]:
+        """R and z at heights η (-1 inner face, 1 outer face), (points, heights)."""
+        zeta = np.multiply.outer(self.thickness / 2, np.asarray(eta))
+        return self.r[:, None] + zeta * self.normal_r[:, None], self.z[:, None] + zeta * self.normal_z[:, None]
+
 
 @dataclass(frozen=True)
 class Resonator:
@@ -147,6 +153,15 @@ class Resonator:
             for name, values in joined.items():
                 values[which == k] = getattr(piece, name)
         return MeridianPoints(**joined)
+
+    def surface(self, eta: float, segment: int | None = None) -> Callable[[Array], tuple[Array, Array]]:
+        """R and z of the surface at a height η (-1 inner face, 1 outer face) as functions of the arc length (m)."""
+
+        def at(s: Array) -> tuple[Array, Array]:
+            r, z = self.at(np.ravel(s), segment).at_heights([eta])
+            return r.reshape(np.shape(s)), z.reshape(np.shape(s))
+
+        return at
 
     def sample(self, count: int) -> MeridianPoints:
         """The middle surface at `count` equally spaced arc lengths, both ends included."""

@@ -22,7 +22,7 @@ import numpy as np
 
 from shell.blocks import Solid
 from shell.errors import ShellError, mm
-from shell.patches import Cell, Patch, Path, Planar, circular, layers, rings, shrinking, straight, whole
+from shell.patches import Cell, Patch, Path, Planar, along, circular, layers, rings, shrinking, straight, whole
 from shell.quadrature import Array
 from shell.resonator import Resonator, Stem
 
@@ -108,7 +108,7 @@ def _find_frame(resonator: Resonator) -> Frame:
     above = []
     for contact in contacts:
         far = 0.0 if len(contacts) == 2 else -float(contact.face)
-        surface = _offset(resonator, far)
+        surface = resonator.surface(far, 0)
         above.append((far, tuple(_at_radius(surface, r, widest) for r in radii[1:])))
     # two fillets end at different places of a thin shell; where they nearly do not, one slanting cut serves both
     slant = SLANT * h if stem.fillet else np.inf
@@ -123,7 +123,7 @@ def _cuts(
     """Beside a thin shell the wedge under the fillet is long: its cells grow away from the shell."""
     if not stem.fillet:
         return ()
-    far_face, near = _offset(resonator, far), min(corners)
+    far_face, near = resonator.surface(far, 0), min(corners)
     count = 0
     for contact, corner in zip(contacts, corners, strict=True):
         height = _distance(contact.on_dome, _point(far_face, corner))
@@ -154,27 +154,27 @@ def _touch(resonator: Resonator, stem: Stem, face: int, end: float) -> Contact:
 def _half_root(resonator: Resonator, stem: Stem, frame: Frame, which: int, ring_count: int, n: int) -> list[Patch]:
     """The patches between one face of the dome and `far` (η of the opposite face, or 0: the middle surface)."""
     contact, (far, arcs), own = frame.contacts[which], frame.above[which], frame.corners[which]
-    near_face, far_face = _offset(resonator, contact.face), _offset(resonator, far)
+    near_face, far_face = resonator.surface(contact.face, 0), resonator.surface(far, 0)
     radii, collar = frame.radii, frame.collar
     over = _point(far_face, arcs[0])  # X; `arcs` are those of X and of the points further in
     corner = _point(far_face, own)  # O
     base = _base(resonator, contact, radii)
     foot, under = _point(base.path, base.arcs[0]), _point(base.path, base.arcs[1])  # T1, X1
     steps = _steps(stem.fillet, min(hypot(foot[0] - under[0], 0.0), _distance(contact.on_dome, corner)), ring_count)
-    cross, roof = straight(contact.on_dome, corner), _along(far_face, own, arcs[0])
+    cross, roof = straight(contact.on_dome, corner), along(far_face, own, arcs[0])
     ends = [collar] if own == frame.widest else [frame.widest, collar]
     patches: list[Patch] = []
     begin, near = cross, contact.s
     for end in ends:
         section = straight(_point(near_face, end), _point(far_face, end))
-        sides = _along(near_face, near, end), _along(far_face, near if patches else own, end)
+        sides = along(near_face, near, end), along(far_face, near if patches else own, end)
         patches.append(Patch(begin, section, *sides, whole() if patches else rings(steps), "root"))
         begin, near = section, end
     for (a_out, s_out), (a_in, s_in) in pairwise(zip(base.arcs[1:], arcs, strict=True)):
         left, right = (straight(_point(base.path, a), _point(far_face, s)) for a, s in ((a_in, s_in), (a_out, s_out)))
-        floor = _along(base.path, a_in, a_out)
-        patches.append(Patch(floor, _along(far_face, s_in, s_out), left, right, whole(), "root"))
-    floor, wall = _along(base.path, *base.arcs[:2]), straight(under, over)
+        floor = along(base.path, a_in, a_out)
+        patches.append(Patch(floor, along(far_face, s_in, s_out), left, right, whole(), "root"))
+    floor, wall = along(base.path, *base.arcs[:2]), straight(under, over)
     if stem.fillet:
         cuts = [(s - own) / (arcs[0] - own) for s in frame.cuts if s < own]
         patches += _fillet(contact, stem.fillet, cross, roof, floor, wall, over, steps, (1.0, *cuts[::-1]))
@@ -196,7 +196,7 @@ def _base(resonator: Resonator, contact: Contact, radii: tuple[float, ...]) -> B
     level = contact.on_stem[1]
     if contact.face < 0:
         return Base(lambda r: (r, np.full_like(r, level)), radii)
-    face = _offset(resonator, contact.face)
+    face = resonator.surface(contact.face, 0)
     arcs = tuple(_at_radius(face, r, (1 + 1e-6) * contact.s) for r in radii)
     rise = level - _point(face, arcs[0])[1]
 
@@ -296,18 +296,6 @@ def _steps(fillet: float, reach: float, ring_count: int) -> tuple[float, ...]:
     return shrinking(max(0, ceil(log(reach / (2 * fillet)) / -log(FILLET_SHRINK))) + 1, FILLET_SHRINK)
 
 
-def _offset(resonator: Resonator, eta: float) -> Callable[[Array], Planar]:
-    """The surface at η h/2 from the middle surface, as a function of its arc length."""
-
-    def surface(s: Array) -> Planar:
-        shape = np.shape(s)
-        points = resonator.at(np.ravel(s), 0)
-        zeta = eta * points.thickness / 2
-        return (points.r + zeta * points.normal_r).reshape(shape), (points.z + zeta * points.normal_z).reshape(shape)
-
-    return surface
-
-
 def _at_radius(surface: Callable[[Array], Planar], r: float, s_most: float) -> float:
     """Arc length at which a surface is r away from the axis."""
     if r == 0:
@@ -336,10 +324,6 @@ def _face(resonator: Resonator, face: int, s: Array) -> tuple[Planar, Planar]:
     t_z = stretch * there.tangent_z + rise * there.normal_z
     scale = face / np.hypot(t_r, t_z)
     return (there.r + zeta * there.normal_r, there.z + zeta * there.normal_z), (-scale * t_z, scale * t_r)
-
-
-def _along(surface: Callable[[Array], Planar], first: float, last: float) -> Path:
-    return lambda x: surface(first + (last - first) * x)
 
 
 def _point(surface: Callable[[Array], Planar], s: float) -> Spot:

@@ -1,19 +1,73 @@
-"""A mode on its cross-section as a plain drawing, where no three-dimensional picture can or need be made."""
+"""The shape of a mode on the cross-section: sampled, and as a plain drawing where no three-dimensional picture is needed."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from shell.cells import in_order
+from shell.quadrature import Array, hierarchic, legendre, nodal
+from shell.resonator import Resonator
+from shell.solution import Solution
+from shell.system import ShellGroup, SolidGroup
+
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-    from shell.sampling import ShapePatch
 
 SWING = 0.12  # of the largest extent, that the largest displacement is drawn as
 
 
-def draw_section(patches: "Sequence[ShapePatch]", harmonic: int, title: str) -> "Figure":
+@dataclass(frozen=True, eq=False)
+class ShapePatch:
+    """A curved grid (i, j) of the cross-section: r, z in m, amplitudes of u_r, u_z (cos nθ) and u_theta (sin nθ)."""
+
+    r: Array
+    z: Array
+    u_r: Array
+    u_theta: Array
+    u_z: Array
+
+
+def sample_shape(resonator: Resonator, solution: Solution, points: int) -> tuple[ShapePatch, ...]:
+    """The whole section as grids of `points` by `points`, one for each element."""
+    x = np.linspace(-1, 1, points)
+    found: list[ShapePatch] = []
+    for group, q in zip(solution.system.groups, solution.unknowns, strict=True):
+        if isinstance(group, ShellGroup):
+            found += _shell_patches(resonator, group, solution.system.level.through, q, x)
+        else:
+            found += _solid_patches(group, q, x)
+    return tuple(found)
+
+
+def _shell_patches(
+    resonator: Resonator, group: ShellGroup, orders: tuple[int, int, int], q: Array, x: Array
+) -> list[ShapePatch]:
+    along = nodal(group.table.along.shape[2] - 1, x).values
+    through = [legendre(order, x).values for order in orders]
+    splits = np.cumsum([order + 1 for order in orders])[:2]
+    chain, found = group.place.chain, []
+    for (one, two), segment, unknowns in zip(pairwise(chain.breaks), chain.segments, q, strict=True):
+        at = resonator.at((one + two) / 2 + (two - one) / 2 * x, segment)
+        amplitudes = along @ unknowns.reshape(along.shape[1], -1)
+        u, v, w = (a @ modes.T for a, modes in zip(np.split(amplitudes, splits, axis=1), through, strict=True))
+        t_r, t_z = at.tangent_r[:, None], at.tangent_z[:, None]
+        found.append(ShapePatch(*at.at_heights(x), t_r * u - t_z * w, v, t_z * u + t_r * w))
+    return found
+
+
+def _solid_patches(group: SolidGroup, q: Array, x: Array) -> list[ShapePatch]:
+    degree = group.place.mesh.grid.shape[2] - 1
+    place, move = nodal(degree, x).values, hierarchic(degree, x).values
+    r, z = np.einsum("ia,geab,jb->geij", place, group.place.mesh.grid, place)
+    i, j = in_order(degree)
+    u = np.einsum("xk,yk,ekc->cexy", move[:, i], move[:, j], q.reshape(len(q), -1, 3))
+    return [ShapePatch(*fields) for fields in zip(r, z, *u, strict=True)]
+
+
+def draw_section(patches: Sequence[ShapePatch], harmonic: int, title: str) -> "Figure":
     """Return the meridian section at rest and at full swing, (r, z) in mm; `patches` as `Mode.shape` gives them.
 
     Right of the axis the azimuth θ = 0, where u_r and u_z are largest; left of it θ = 180°, where cos nθ is (−1)ⁿ.

@@ -177,7 +177,7 @@ class Solution:
             return 0.0
         coupling = 0.0
         for group, c, d in zip(self.system.groups, self.constants, self.displacement, strict=True):
-            coupling += float(np.sum(c.rho * _integrate(_radial(group, d) * d[:, :, 1], group)))
+            coupling += float(np.sum(c.rho * _integrate(radial(group, d) * d[:, :, 1], group)))
         return -2 * coupling / (self.system.n * total(self.kinetic))
 
     @cached_property
@@ -250,7 +250,7 @@ def _integrate(at_points: Array, group: Group) -> Array:
     return np.asarray(np.add.reduce(at_points * group.table.volume, axis=-1))
 
 
-def _radial(group: Group, displacement: Array) -> Array:
+def radial(group: Group, displacement: Array) -> Array:
     """Displacement away from the axis, (elements, stations, points)."""
     if not isinstance(group, ShellGroup):
         return displacement[:, :, 0]
@@ -274,16 +274,14 @@ def _plane_energies(c: Constants, s: Array, theta: Array, twist: Array) -> tuple
     return np.asarray(lam * (s + theta) ** 2 + 2 * G * (s**2 + theta**2)), np.asarray(G * twist**2)
 
 
-def surface_energies(solution: Solution, number: int, film: Elastic | None = None) -> tuple[Array, Array]:
+def surface_energies(solution: Solution, number: int) -> tuple[Array, Array]:
     """Change of (elastic - ω² kinetic) as the faces of one shell group move outwards by h/2, (elements, stations, 2) each.
 
     The energies at the faces (Hadamard's formula), inner and outer: first of what varies as cos nθ, then as sin nθ. Of a
     solid the faces are free of traction, so their strain energy is that of plane stress; Naghdi's transverse shear does
-    not vanish there and counts. A film of another material on the faces follows their strains, if one is given.
+    not vanish there and counts.
     """
     system, group, c = solution.system, solution.system.groups[number], solution.constants[number]
-    if film:
-        c = find_constants(group.table.position, film, True)
     assert isinstance(group, ShellGroup)
     faces = np.array([-1.0, 1.0])
     u, v, w = (legendre(order, faces) for order in system.level.through)
@@ -293,7 +291,7 @@ def surface_energies(solution: Solution, number: int, film: Elastic | None = Non
     e, d = table.strains(q), table.displacements(q)
     at_stations = Constants(c.E[..., None], c.nu[..., None], c.rho[..., None], True)
     cosine, sine = _plane_energies(at_stations, e[:, :, 0], e[:, :, 1], e[:, :, 3])
-    if table.plane_stress and not film:
+    if table.plane_stress:
         transverse = c.lame[1][..., None] * table.transverse_shear
         cosine, sine = cosine + transverse * e[:, :, 4] ** 2, sine + transverse * e[:, :, 5] ** 2
     heavy = solution.eigenvalue * c.rho[..., None]

@@ -23,7 +23,7 @@ from shell.finite import solved_as_solid
 from shell.modes import Mode
 from shell.prestress import mean_answer, neighbour
 from shell.quadrature import Array, gauss
-from shell.solution import Solution, total
+from shell.solution import Solution, radial, total
 from shell.system import Group, ShellGroup, System
 
 STEPS = 60  # of the iterations for rigid motions and for the other modes
@@ -62,14 +62,9 @@ def spin_shift(mode: Mode, elastic: Elastic) -> SpinShift:
         raise ShellError("the second-order effect of spin is computed for the lowest mode of a harmonic from 2 up.")
     system, mass, eigenvalue = solution.system, total(solution.kinetic), solution.eigenvalue
     rest = neighbour(mode, 0)
-    pull = [
-        -group.table.loads(
-            np.zeros((*_shape(group), 6, _points(group))), elastic.rho * _radially(group, _radii(group, system))
-        )
-        for group in rest.groups
-    ]
+    pull = [_pull(group, elastic.rho * _radially(group, _radii(group, system))) for group in rest.groups]
     stiffening = 4 * float(mean_answer(mode)[0].vector @ rest.gather(pull)) / mass
-    around = [_radial_and_around(group, d) for group, d in zip(system.groups, solution.displacement, strict=True)]
+    around = [(radial(group, d), d[:, :, 1]) for group, d in zip(system.groups, solution.displacement, strict=True)]
     softening = sum(
         float(np.sum(elastic.rho * (r**2 + t**2) * group.table.volume))
         for group, (r, t) in zip(system.groups, around, strict=True)
@@ -78,7 +73,7 @@ def spin_shift(mode: Mode, elastic: Elastic) -> SpinShift:
     for group, (r, t) in zip(system.groups, around, strict=True):
         force = _radially(group, elastic.rho * t)
         force[:, :, 1] = elastic.rho * r
-        forces.append(-group.table.loads(np.zeros((*_shape(group), 6, _points(group))), force))
+        forces.append(_pull(group, force))
     load = system.gather(forces)
     g = float(solution.vector @ load) / mass
     others = _response(system, elastic, solution, load, mass)
@@ -106,12 +101,10 @@ def _response(system: System, elastic: Elastic, solution: Solution, load: Array,
     raise ShellError("the next mode lies so near that its share in the effect of spin does not converge.")
 
 
-def _shape(group: Group) -> tuple[int, int]:
-    return group.table.volume.shape[0], group.table.volume.shape[1]
-
-
-def _points(group: Group) -> int:
-    return int(group.table.volume.shape[2])
+def _pull(group: Group, force: Array) -> Array:
+    """Loads of forces per volume on the functions of a group."""
+    elements, stations, points = group.table.volume.shape
+    return -group.table.loads(np.zeros((elements, stations, 6, points)), force)
 
 
 def _radii(group: Group, system: System) -> Array:
@@ -132,11 +125,3 @@ def _radially(group: Group, amount: Array) -> Array:
     else:
         field[:, :, 0] = amount
     return field
-
-
-def _radial_and_around(group: Group, d: Array) -> tuple[Array, Array]:
-    """Displacements along r and θ at the points."""
-    if isinstance(group, ShellGroup):
-        section = group.place.section
-        return section.tangent_r[..., None] * d[:, :, 0] - section.tangent_z[..., None] * d[:, :, 2], d[:, :, 1]
-    return d[:, :, 0], d[:, :, 1]

@@ -21,7 +21,6 @@ from numpy.typing import NDArray
 from shell.assembly import sections
 from shell.blocks import open_edges
 from shell.cells import CellTable, Reference, at_gauss_points, cell_stiffness, in_order, tabulate_cells
-from shell.constraints import Index
 from shell.eigen import Factor, Pattern, find_pattern
 from shell.elastic import Elastic, VaryingElastic
 from shell.kernel import StrainTable, pair_stiffness, shell_table, station_stiffness
@@ -30,6 +29,7 @@ from shell.levels import Level
 from shell.quadrature import Array, at_gauss, gauss, hierarchic, legendre, values_to_hierarchic
 from shell.resonator import Resonator
 from shell.solution import Constants, Solution, find_constants, total
+from shell.sparse import Index
 from shell.system import ShellGroup, SolidGroup, System
 
 ALONG = 2  # degrees added along the shell

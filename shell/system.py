@@ -10,7 +10,6 @@ from scipy.sparse import block_diag, coo_array, csr_matrix
 
 from shell.blocks import Mesh, Support
 from shell.cells import CellTable, cell_mass, cell_stiffness
-from shell.constraints import Index
 from shell.eigen import Pattern, find_pattern
 from shell.kernel import (
     Section,
@@ -23,6 +22,7 @@ from shell.kernel import (
 from shell.layout import Chain
 from shell.levels import Level
 from shell.quadrature import Array
+from shell.sparse import Index
 
 Pair: TypeAlias = tuple[Array, Array]
 PORTION = 16  # elements integrated at a time

@@ -144,9 +144,7 @@ def _divide_chain(resonator: Resonator, chain: Chain, layers: int, spacing: floa
     for start, stop, segment in zip(chain.breaks[:-1], chain.breaks[1:], chain.segments, strict=True):
         count = int(np.ceil((stop - start) / spacing - 1e-9))
         place = resonator.at(np.linspace(start, stop, 2 * count + 1), segment)
-        zeta = np.multiply.outer(place.thickness / 2, eta)
-        r = place.r[:, None] + zeta * place.normal_r[:, None]
-        grids.append(np.array([r, place.z[:, None] + zeta * place.normal_z[:, None]]))
+        grids.append(np.array(place.at_heights(eta)))
     return grids
 
 

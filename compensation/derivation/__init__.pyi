@@ -1,12 +1,11 @@
 from .averaging import amplitude_rates, ellipse_rates
-from .chain import Step, steps
+from .chain import steps
 from .demodulated import amplitude_equations, measured_rate
 from .design_code import emit_code
 from .filters import derive_wiener_filter
 from .transfer_functions import poles, responses
 
 __all__ = [
-    "Step",
     "amplitude_equations",
     "amplitude_rates",
     "derive_wiener_filter",

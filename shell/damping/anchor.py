@@ -1,20 +1,25 @@
 """Anchor loss: what a mode sends down its stem into the body that the stem stands on."""
 
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
 from shell.assembly import assemble, lay_resonator
 from shell.blocks import mesh_solid
-from shell.damping.base import lay_half_space
-from shell.damping.radiation import Radiating, RadiatingBody, assemble_waves, radiating_mode
+from shell.damping.radiation import Layer, Radiating, RadiatingBody, assemble_waves, radiating_mode
 from shell.elastic import Elastic, VaryingElastic
 from shell.errors import ShellError
 from shell.modes import Mode
+from shell.patches import Patch, box, whole
 from shell.quadrature import Array, legendre
 from shell.resonator import Resonator
 from shell.solution import Solution, total
 from shell.system import ShellGroup, SolidGroup, System
+
+GROWTH = 3.0  # of the cells away from the stem
+PER_WAVE = 3  # cells over a shear wavelength
+LAYER = 3  # cells across the absorbing layer
 
 
 def anchor_loss(mode: Mode, elastic: Elastic | VaryingElastic, base: Elastic | None = None) -> Radiating:
@@ -166,3 +171,35 @@ def _rim(resonator: Resonator, system: System) -> list[Array]:
     rim = resonator.at([resonator.length], len(resonator.segments) - 1)
     t_r, t_z = float(rim.tangent_r[0]), float(rim.tangent_z[0])
     return [t_r * along - t_z * normal, turned, t_z * along + t_r * normal]
+
+
+def lay_half_space(radii: list[float], surface: float, below: bool, wavelength: float) -> tuple[list[Patch], Layer]:
+    """Cells of a half-space whose surface carries a stem.
+
+    Parameters
+    ----------
+    radii : where the cells of the stem's end meet, from 0 to its radius, m.
+    surface : height of the surface, m.
+    below : whether the half-space fills z < surface.
+    wavelength : of shear waves in it at the mode's frequency, m.
+    """
+    radius, step = radii[-1], radii[-1] - radii[-2]
+    start, width = max(4 * radius, 0.5 * wavelength), wavelength
+    columns = [*radii, *_grow(radius, step, start, wavelength), *(start + width * np.arange(1, LAYER + 1) / LAYER)]
+    rows = [0.0, *_grow(0.0, step, start, wavelength), *(start + width * np.arange(1, LAYER + 1) / LAYER)]
+    sign = -1.0 if below else 1.0
+    patches = []
+    for r_in, r_out in pairwise(columns):
+        for near, far in pairwise(rows):
+            low, high = sorted((surface + sign * near, surface + sign * far))
+            patches.append(box((r_in, low), (r_out, high), whole(), "base"))
+    return patches, Layer(start, width, surface, below, wavelength)
+
+
+def _grow(first: float, step: float, last: float, wavelength: float) -> list[float]:
+    """Places from `first` (left out) to `last`, in steps that grow up to a part of the wavelength."""
+    at = [first]
+    while at[-1] + 1.5 * step < last:
+        at.append(at[-1] + step)
+        step = min(GROWTH * step, wavelength / PER_WAVE)
+    return [*at[1:], last]

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from shell.damping.budget import Budget
 from shell.damping.faces import FreeFaces
-from shell.damping.film import LossyFilm
+from shell.damping.film import Film
 from shell.errors import ShellError
 from shell.quadrature import Array
 
@@ -56,7 +56,7 @@ def damping_wave(budget: Budget, ripples: Sequence[Ripple], harmonic: int) -> Co
     return total
 
 
-def film_weight(film: LossyFilm, faces: tuple[FreeFaces, ...]) -> float:
+def film_weight(film: Film, faces: tuple[FreeFaces, ...]) -> float:
     """κ of a film's own loss: its normal strains against its twist."""
     lam, G = film.E * film.nu / (1 - film.nu**2), film.E / (2 * (1 + film.nu))
     return _weight(

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from shell.damping.anelastic import activated_loss, bulk_loss, surface_loss
 from shell.damping.faces import FreeFaces, free_surfaces, shell_faces
-from shell.damping.film import LossyFilm, check_film, film_internal_loss, film_thermoelastic_loss
+from shell.damping.film import Film, check_film, film_internal_loss, film_thermoelastic_loss
 from shell.damping.gas import Gas, gas_loss, mean_free_path
 from shell.damping.heat import Heat
 from shell.damping.thermoelastic import heat_flow
@@ -229,7 +229,7 @@ def surface_cause(depth: float, relative_sd: float, source: str) -> LossCause:
 
 
 def film_causes(
-    name: str, film: LossyFilm, heat: HeatLaw | None, relative: tuple[float, float], source: str
+    name: str, film: Film, heat: HeatLaw | None, relative: tuple[float, float], source: str
 ) -> list[LossCause]:
     """A film's own loss, and the heat between it and the wall where both materials' heat is known.
 

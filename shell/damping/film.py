@@ -1,6 +1,10 @@
-"""Loss in a thin film on the faces: its own, and the heat that flows between film and wall.
+"""A thin film on the faces, a coating or electrodes: what it does to a frequency, its own loss, and the heat between it and the wall.
 
-The film follows the strain of the face. Its own loss counts with its energy,
+The film follows the strain of the face. Its stiffness in plane stress and its mass move the frequency, to first order in t/h, by
+
+    δω²/ω² = ∫ t [σ_f : ε - ω² ρ_f u²] dA / ω² ∫ ρ u² dV;
+
+a film of the wall's own material is a thicker wall (Hadamard's formula). Its own loss counts with its energy,
 
     1/Q = φ t ∫ σ_f : ε dA / ∫ σ : ε dV,
 
@@ -16,16 +20,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from shell.damping.faces import FreeFaces
+from shell.damping.faces import FreeFaces, shell_faces
 from shell.damping.heat import Heat
 from shell.errors import ShellError, mm
+from shell.modes import Mode
 from shell.quadrature import Array
+from shell.solution import total
 
 THICKEST = 0.05  # film over wall up to which it follows the face and leaves the mode as it is
 
 
 @dataclass(frozen=True)
-class LossyFilm:
+class Film:
     """A film on the faces of the shell.
 
     Attributes
@@ -37,16 +43,18 @@ class LossyFilm:
     faces : the faces that carry it.
     span : part of the meridian that carries it, 0 ... 1 of the arc length.
     coverage : covered share of that part (a pattern finer than the mode's wavelength).
+    rho : density, kg/m³, for its effect on a frequency.
     """
 
     thickness: float
     E: float
     nu: float
-    loss: float
+    loss: float = 0.0
     heat: Heat | None = None
     faces: tuple[str, ...] = ("inner", "outer")
     span: tuple[float, float] = (0.0, 1.0)
     coverage: float = 1.0
+    rho: float = 0.0
 
     def __post_init__(self) -> None:
         if not (self.thickness >= 0 and self.loss >= 0):
@@ -67,7 +75,7 @@ class LossyFilm:
         return np.asarray(self.coverage * there * (face.kind in self.faces))
 
 
-def check_film(film: LossyFilm, wall: float) -> None:
+def check_film(film: Film, wall: float) -> None:
     """Refuse a film that is not thin against the thinnest wall (m)."""
     if film.thickness >= wall:
         raise ShellError(
@@ -80,14 +88,32 @@ def check_film(film: LossyFilm, wall: float) -> None:
         )
 
 
-def film_energy(film: LossyFilm, face: FreeFaces) -> Array:
+def film_energy(film: Film, face: FreeFaces) -> Array:
     """σ_f : ε of the film per volume of film, plane stress, at the points of a face (J/m³)."""
     s, theta, twist = face.strain[0], face.strain[1], face.strain[3]
     lam, G = film.E * film.nu / (1 - film.nu**2), film.E / (2 * (1 + film.nu))
     return np.asarray(lam * (s + theta) ** 2 + G * (2 * s**2 + 2 * theta**2 + twist**2))
 
 
-def film_internal_loss(film: LossyFilm, faces: tuple[FreeFaces, ...], strain_energy: float) -> float:
+def film_shift(mode: Mode, film: Film) -> float:
+    """Relative change of a mode's frequency by a film's stiffness and mass; stem and root stay bare.
+
+    Raises
+    ------
+    ShellError
+        A film that is too thick for the first order, or a mode without a shape.
+    """
+    if mode.solution is None or mode.resonator is None:
+        raise ShellError("Rayleigh's closed form carries no energies: use theory solid or shell.")
+    check_film(film, min(value for _, value in mode.resonator.thickness))
+    eigenvalue, changed = mode.solution.eigenvalue, 0.0
+    for face in shell_faces(mode.solution):
+        heavy = eigenvalue * film.rho * np.sum(face.moved**2, axis=0)
+        changed += face.integrate(film.carries(face) * (film_energy(film, face) - heavy))
+    return film.thickness * changed / (2 * eigenvalue * total(mode.solution.kinetic))
+
+
+def film_internal_loss(film: Film, faces: tuple[FreeFaces, ...], strain_energy: float) -> float:
     """1/Q of the film's own loss.
 
     Parameters
@@ -101,7 +127,7 @@ def film_internal_loss(film: LossyFilm, faces: tuple[FreeFaces, ...], strain_ene
 
 
 def film_thermoelastic_loss(
-    film: LossyFilm, faces: tuple[FreeFaces, ...], strain_energy: float, wall: Heat, temperature: float, omega: float
+    film: Film, faces: tuple[FreeFaces, ...], strain_energy: float, wall: Heat, temperature: float, omega: float
 ) -> float:
     """1/Q of the heat that flows between film and wall (formula above), at a temperature (K) and ω (rad/s)."""
     if film.heat is None or film.thickness == 0:
@@ -123,7 +149,7 @@ def exchange(thickness: float, film: Heat, wall: Heat, omega: float) -> float:
     return float(np.real(a * b / (a + b)))
 
 
-def thickness_power(film: LossyFilm, wall: Heat, omega: float) -> float:
+def thickness_power(film: Film, wall: Heat, omega: float) -> float:
     """Power of the thickness with which the heat's loss grows: 2 of a thin film, whose heat meets no resistance within."""
     if film.heat is None:
         raise ShellError("a film without heat constants has no thermoelastic loss.")

@@ -14,14 +14,14 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_matrix, csc_matrix
-from scipy.sparse.linalg import splu
+from scipy.sparse import csc_matrix
 
 from shell.cells import at_gauss_points, cell_mass, cell_stiffness
 from shell.elastic import Elastic
 from shell.errors import ShellError
 from shell.kernel import lame
 from shell.quadrature import Array
+from shell.sparse import assemble_elements, factor_symmetric
 from shell.system import ShellGroup, SolidGroup, System
 
 Complex = NDArray[np.complex128]
@@ -74,12 +74,7 @@ class RadiatingBody:
 
     def factor(self, shift: complex) -> Callable[[Complex], Complex]:
         """The solution of (K - shift M) x = b as a function of b."""
-        return splu(
-            csc_matrix(self.stiffness - shift * self.mass),
-            permc_spec="MMD_AT_PLUS_A",
-            diag_pivot_thresh=1e-3,
-            options={"SymmetricMode": True},
-        ).solve
+        return factor_symmetric(self.stiffness - shift * self.mass, 1e-3)
 
     def judge(self, v: Complex, eigenvalue: complex) -> Radiating:
         """Frequency and loss of an eigenvector."""
@@ -133,7 +128,7 @@ def assemble_waves(system: System, materials: Sequence[Elastic], bases: Sequence
     total: list[csc_matrix] = [csc_matrix((size, size), dtype=complex) for _ in range(3)]
     for group, base in zip(system.groups, bases, strict=True):
         for k, elements in enumerate(_matrices(group, materials, base, layer, system.n)):
-            total[k] = total[k] + _spread(group.unknowns, elements, size)
+            total[k] = total[k] + assemble_elements(group.unknowns, elements, size)
     return RadiatingBody(*(csc_matrix(P.T @ one @ P) for one in total))
 
 
@@ -179,9 +174,3 @@ def _products(group: SolidGroup, base: Mask, layer: Layer) -> Complex:
     moved = gradients[:, 2] * radius[..., None]
     np.matmul(np.swapaxes(moved, 1, 2), moved * volume[..., None], out=found[:, 9])
     return np.asarray(found.reshape(cells, 10, functions**2), dtype=complex)
-
-
-def _spread(unknowns: NDArray[np.intp], elements: Complex, size: int) -> csc_matrix:
-    rows = np.repeat(unknowns, unknowns.shape[1], axis=1).ravel()
-    columns = np.tile(unknowns, (1, unknowns.shape[1])).ravel()
-    return coo_matrix((elements.ravel(), (rows, columns)), shape=(size, size)).tocsc()

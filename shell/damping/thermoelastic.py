@@ -18,8 +18,7 @@ of a shell κ_φ + κ_θ = 0, and a bare dome warms only near its free edge.
 import numpy as np
 from scipy.special import spherical_jn
 
-from shell.damping.conduction import conduct_in_cells
-from shell.damping.heat import mean_stress
+from shell.damping.heat import conduct_in_cells, mean_stress
 from shell.quadrature import Array, legendre
 from shell.solution import Solution, total
 from shell.system import ShellGroup

@@ -1,4 +1,4 @@
-from .chain import DerivedCase, Step, steps
+from .chain import DerivedCase, steps
 from .design_code import emit_code
 from .frequency import (
     bending_integral,
@@ -13,7 +13,6 @@ from .strains import derive_deformation, layer_strains
 
 __all__ = [
     "DerivedCase",
-    "Step",
     "bending_integral",
     "derive_deformation",
     "emit_code",

@@ -1,13 +1,19 @@
-"""The derivation as one numbered chain of equations, ready to be printed."""
+"""The derivation as one numbered chain of equations.
 
-from collections.abc import Iterable
+A row is a step: its number in the HRG paper (empty where the paper has none), its title, the left sides (names parted by spaces,
+or expressions) and the right sides; 0 says that the left sides vanish.
+"""
+
 from dataclasses import dataclass
+from typing import Any, TypeAlias
 
 import sympy as sp
 
 from shell.derivation import coriolis, displacements, energies, frequency, inextensional, strains, temperature
 from shell.derivation.displacements import U, V, W
 from shell.derivation.symbols import n, omega, phi, phi_2, t
+
+Row: TypeAlias = tuple[str, str, Any, Any]
 
 
 @dataclass(frozen=True)
@@ -53,169 +59,90 @@ class DerivedCase:
         return frequency.log_derivatives().phi_2.subs(values)
 
 
-@dataclass(frozen=True)
-class Step:
-    """One step of the derivation: its number in the HRG paper (empty where the paper has none) and its equations."""
-
-    number: str
-    title: str
-    equations: tuple[sp.Eq, ...]
-
-
-def steps(case: DerivedCase) -> list[Step]:
+def steps(case: DerivedCase) -> list[Row]:
     """Return the whole chain, HRG paper eqs. (1)–(15), for any n, with the numbers of one case before (15)."""
     return [*_elasticity(), *_mode(), *_frequency(), *_numbers(case), *_temperature()]
 
 
-def _elasticity() -> list[Step]:
-    strain, deformation = energies.STRAIN, energies.DEFORMATION
+def _elasticity() -> list[Row]:
+    shape, strain, deformation = displacements.harmonic_displacement(), energies.STRAIN, energies.DEFORMATION
     layer = strains.thin_layer_strains(deformation)
-    in_plane = ("e_phi", "e_theta", "gamma_phitheta")
     surface = strains.corrected_deformation(displacements.general_displacement())
-    shift = strains.rigid_motions()["shift along z"]
+    defect = strains.printed_twist_defect(), strains.printed_deformation(strains.rigid_motions()["shift along z"]).tau
+    in_plane = ((one.e_phi, one.e_theta, one.gamma_phitheta) for one in (strain, layer))
+    twist = "has ∂w/∂φ for ∂w/∂θ in the twist: its error, and the twist it finds in a shell only shifted along its axis"
     return [
-        Step("1", "Displacements of harmonic n", name_expressions("u v w", *displacements.harmonic_displacement())),
-        Step(
-            "2",
-            "Kinetic energy",
-            name_expressions("K", displacements.kinetic_energy(displacements.harmonic_displacement())),
-        ),
-        Step("3", "Strain energy per volume", name_expressions("S_V", energies.full_energy_density())),
-        Step(
-            "4",
-            "the same of a thin shell, normals staying normal",
-            name_expressions("S_V", energies.thin_energy_density()),
-        ),
-        Step("5", "Hooke's law", pair_up(energies.hooke().items())),
-        Step(
-            "6",
-            "Strains at height z, much smaller than r",
-            pair_up((getattr(strain, name), getattr(layer, name)) for name in in_plane),
-        ),
-        Step("7", "Strain energy per area", name_expressions("S_A", energies.surface_energy_density())),
-        Step(
+        ("1", "Displacements of harmonic n", "u v w", shape),
+        ("2", "Kinetic energy", "K", displacements.kinetic_energy(shape)),
+        ("3", "Strain energy per volume", "S_V", energies.full_energy_density()),
+        ("4", "the same of a thin shell, normals staying normal", "S_V", energies.thin_energy_density()),
+        ("5", "Hooke's law", energies.hooke().keys(), energies.hooke().values()),
+        ("6", "Strains at height z, much smaller than r", next(in_plane), next(in_plane)),
+        ("7", "Strain energy per area", "S_A", energies.surface_energy_density()),
+        (
             "8",
             "Strains, curvature changes and twist of the middle surface, from the Kirchhoff hypothesis",
-            pair_up(zip(deformation, surface, strict=True)),
+            deformation,
+            surface,
         ),
-        Step(
-            "8 as printed",
-            "has ∂w/∂φ for ∂w/∂θ in the twist: its error, and the twist it finds in a shell only shifted along its axis",
-            name_expressions("Δτ τ_shift", strains.printed_twist_defect(), strains.printed_deformation(shift).tau),
-        ),
+        ("8 as printed", twist, "Δτ τ_shift", defect),
     ]
 
 
-def _mode() -> list[Step]:
+def _mode() -> list[Row]:
     unknown = [function(phi) for function in (U, V, W)]
     bending = [part.subs(t, 0) for part in inextensional.mode_deformation()[3:]]
+    at_pole = "Powers of φ at the pole: M is infinite there for n > 1, so M = 0 and U = V"
     return [
-        Step("9", "No stretching, for harmonic n", set_to_zero(inextensional.inextensional_conditions())),
-        Step("", "The first condition removes W", set_to_zero(inextensional.eliminate_normal_displacement())),
-        Step(
-            "",
-            "Their sum, in P = U + V, and their difference, in M = U - V",
-            set_to_zero(inextensional.decoupled_equations()),
-        ),
-        Step("", "Variables separated", name_expressions("(lnP)′ (lnM)′", *inextensional.separated_rates())),
-        Step("", "Integrated in T = tan(φ/2)", name_expressions("lnP lnM", *inextensional.integrate_separated())),
-        Step(
-            "",
-            "General solution, each with a factor of its own",
-            name_expressions("P M", *inextensional.general_solution()),
-        ),
-        Step(
-            "",
-            "Powers of φ at the pole: M is infinite there for n > 1, so M = 0 and U = V",
-            name_expressions("p_P p_M", *inextensional.pole_exponents()),
-        ),
-        Step(
-            "10",
-            "The mode that does not stretch",
-            pair_up(zip(unknown, inextensional.inextensional_mode(), strict=True)),
-        ),
-        Step("11", "Its displacements", name_expressions("u v w", *inextensional.inextensional_displacement())),
-        Step("", "Its curvature changes and twist", pair_up(zip(energies.DEFORMATION[3:], bending, strict=True))),
+        ("9", "No stretching, for harmonic n", inextensional.inextensional_conditions(), 0),
+        ("", "The first condition removes W", inextensional.eliminate_normal_displacement(), 0),
+        ("", "Their sum, in P = U + V, and their difference, in M = U - V", inextensional.decoupled_equations(), 0),
+        ("", "Variables separated", "(lnP)′ (lnM)′", inextensional.separated_rates()),
+        ("", "Integrated in T = tan(φ/2)", "lnP lnM", inextensional.integrate_separated()),
+        ("", "General solution, each with a factor of its own", "P M", inextensional.general_solution()),
+        ("", at_pole, "p_P p_M", inextensional.pole_exponents()),
+        ("10", "The mode that does not stretch", unknown, inextensional.inextensional_mode()),
+        ("11", "Its displacements", "u v w", inextensional.inextensional_displacement()),
+        ("", "Its curvature changes and twist", energies.DEFORMATION[3:], bending),
     ]
 
 
-def _frequency() -> list[Step]:
-    return [
-        Step(
-            "12",
-            "Greatest kinetic and potential energy, and their integrals",
-            name_expressions("K_max U_max", frequency.maximum_kinetic_energy(), frequency.maximum_potential_energy())
-            + name_expressions("I J", *frequency.integral_definitions()),
-        ),
-        Step("13", "Frequency, where both energies are equal", pair_up([(omega**2, frequency.omega_squared())])),
-        Step(
-            "",
-            "Derivatives of ln f for design",
-            name_expressions("∂lnf/∂lnE ∂lnf/∂ν ∂lnf/∂lnρ ∂lnf/∂lnh ∂lnf/∂lnr ∂lnf/∂φ₂", *frequency.log_derivatives()),
-        ),
-        Step(
-            "",
-            "Two patterns on a shell turning with Ω, per unit of φ and ρh: mass M and Coriolis coupling 2ΩB; "
-            "the standing wave lags by K of the angle turned",
-            name_expressions("M B K", *coriolis.pattern_coefficients(), coriolis.precession_rate()),
-        ),
-    ]
-
-
-def _temperature() -> list[Step]:
-    return [
-        Step("15", "Frequency over temperature", name_expressions("f", temperature.frequency_over_temperature())),
-        Step(
-            "",
-            "Its slope d ln f/dT by parts, from E, ν, ρ, h and r",
-            name_expressions("TCF_E TCF_ν TCF_ρ TCF_h TCF_r", *temperature.temperature_parts()),
-        ),
-        Step(
-            "",
-            "their sum in free isotropic expansion α, E = 2 G (1 + ν)",
-            name_expressions("TCF", temperature.free_expansion()),
-        ),
-    ]
-
-
-def _numbers(case: DerivedCase) -> list[Step]:
-    number, names = "14" if case.harmonic == 2 else "", f"I_{case.harmonic} J_{case.harmonic} K_{case.harmonic}"
-    values = (case.bending, case.mass, case.precession)
-    closed = (
-        []
-        if case.mass.has(sp.Float)
-        else [Step("", "Its integrals and Bryan factor in closed form", name_expressions(names, *values))]
+def _frequency() -> list[Row]:
+    greatest = frequency.maximum_kinetic_energy(), frequency.maximum_potential_energy()
+    by_logarithm = "∂lnf/∂lnE ∂lnf/∂ν ∂lnf/∂lnρ ∂lnf/∂lnh ∂lnf/∂lnr ∂lnf/∂φ₂"
+    turning = (
+        "Two patterns on a shell turning with Ω, per unit of φ and ρh: mass M and Coriolis coupling 2ΩB; "
+        "the standing wave lags by K of the angle turned"
     )
     return [
-        Step(
-            number,
-            f"Frequency in Hz for n = {case.harmonic}",
-            name_expressions("f", frequency.frequency(case.harmonic)),
+        (
+            "12",
+            "Greatest kinetic and potential energy, and their integrals",
+            "K_max U_max I J",
+            (*greatest, *frequency.integral_definitions()),
         ),
-        *closed,
-        Step(
-            "",
-            "Its integrals and Bryan factor as numbers",
-            name_expressions(names, *(sp.N(value, 17) for value in values)),
-        ),
-        Step(
-            "",
-            "Derivative of ln f by the rim angle (1/rad)",
-            name_expressions("∂lnf/∂φ₂", sp.N(case.rim_derivative, 17)),
-        ),
+        ("13", "Frequency, where both energies are equal", omega**2, frequency.omega_squared()),
+        ("", "Derivatives of ln f for design", by_logarithm, frequency.log_derivatives()),
+        ("", turning, "M B K", (*coriolis.pattern_coefficients(), coriolis.precession_rate())),
     ]
 
 
-def name_expressions(names: str, *expressions: sp.Expr) -> tuple[sp.Eq, ...]:
-    """Return equations of names, parted by spaces, with expressions."""
-    return pair_up(zip((sp.Symbol(name) for name in names.split()), expressions, strict=True))
+def _temperature() -> list[Row]:
+    parts = "TCF_E TCF_ν TCF_ρ TCF_h TCF_r"
+    return [
+        ("15", "Frequency over temperature", "f", temperature.frequency_over_temperature()),
+        ("", "Its slope d ln f/dT by parts, from E, ν, ρ, h and r", parts, temperature.temperature_parts()),
+        ("", "their sum in free isotropic expansion α, E = 2 G (1 + ν)", "TCF", temperature.free_expansion()),
+    ]
 
 
-def set_to_zero(expressions: Iterable[sp.Expr]) -> tuple[sp.Eq, ...]:
-    """Return equations that say that expressions vanish."""
-    return pair_up((expression, sp.S.Zero) for expression in expressions)
-
-
-def pair_up(pairs: Iterable[tuple[sp.Expr, sp.Expr]]) -> tuple[sp.Eq, ...]:
-    """Return equations of left with right sides, not worked out."""
-    return tuple(sp.Eq(left, right, evaluate=False) for left, right in pairs)
+def _numbers(case: DerivedCase) -> list[Row]:
+    number, names = "14" if case.harmonic == 2 else "", f"I_{case.harmonic} J_{case.harmonic} K_{case.harmonic}"
+    values = (case.bending, case.mass, case.precession)
+    closed = [("", "Its integrals and Bryan factor in closed form", names, values)]
+    return [
+        (number, f"Frequency in Hz for n = {case.harmonic}", "f", frequency.frequency(case.harmonic)),
+        *([] if case.mass.has(sp.Float) else closed),
+        ("", "Its integrals and Bryan factor as numbers", names, [sp.N(value, 17) for value in values]),
+        ("", "Derivative of ln f by the rim angle (1/rad)", "∂lnf/∂φ₂", sp.N(case.rim_derivative, 17)),
+    ]

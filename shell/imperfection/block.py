@@ -4,22 +4,20 @@ Inside a solid part (i) nothing but the shell's edges (I) pulls, so that x_i = W
 and the shell feels A_II + A_Ii W. What an imperfection does inside a solid part is felt through the same W.
 """
 
-from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import pi
 
 import numpy as np
-from numpy.typing import NDArray
-from scipy.sparse import coo_matrix, csc_matrix, csr_matrix, eye
+from scipy.sparse import csc_matrix, csr_matrix, eye
 from scipy.sparse.linalg import splu
 
-from shell.constraints import Index
 from shell.imperfection.place import cut
 from shell.imperfection.substructure import Substructures
 from shell.quadrature import Array
 from shell.resonator import Resonator
 from shell.solution import Constants
+from shell.sparse import Index, assemble_elements
 from shell.system import ShellGroup, System
 
 
@@ -112,7 +110,8 @@ def condense(system: System, constants: tuple[Constants, ...], value: float, pai
         inside, edge = np.setdiff1d(solid, shell), np.intersect1d(solid, shell)
         shared = np.searchsorted(shell, edge)
         of_solid = [(n, A) for n, A, mine in zip(numbers, matrices, of_shell, strict=True) if not mine]
-        core = _assemble(of_solid, system.pattern.size)
+        members, cells = zip(*of_solid, strict=True)
+        core = csr_matrix(assemble_elements(members, cells, system.pattern.size))
         coupling = core[inside][:, edge].toarray()
         lifted = -splu(csc_matrix(core[inside][:, inside])).solve(coupling)
         felt = core[edge][:, edge].toarray() + coupling.T @ lifted
@@ -134,16 +133,6 @@ def _lift(system: System, edge: Index, inside: Index, lifted: Array) -> Array:
     free[edge, np.arange(len(edge))] = 1.0
     free[inside] = lifted
     return free
-
-
-def _assemble(elements: Iterable[tuple[NDArray[np.intp], Array]], size: int) -> csr_matrix:
-    rows, columns, values = [], [], []
-    for numbers, matrix in elements:
-        rows.append(np.repeat(numbers, len(numbers)))
-        columns.append(np.tile(numbers, len(numbers)))
-        values.append(matrix.ravel())
-    place = (np.concatenate(rows), np.concatenate(columns))
-    return coo_matrix((np.concatenate(values), place), shape=(size, size)).tocsr()
 
 
 def _plain(group: ShellGroup, constraint: csr_matrix) -> csr_matrix:

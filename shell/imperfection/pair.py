@@ -175,8 +175,7 @@ class Pair:
 
     def radius(self, position: float, height: float) -> float:
         """Distance from the axis of a place of the wall, m."""
-        place = self.resonator.at([position * self.resonator.length])
-        return float((place.r + height * place.thickness / 2 * place.normal_r)[0])
+        return float(self.resonator.at([position * self.resonator.length]).at_heights([height])[0])
 
     def _material(self, edge: CrossSection) -> Constants:
         c = self.solution.constants[edge.group]

@@ -12,9 +12,9 @@ from copy import copy
 
 import numpy as np
 
-from shell.constraints import Index
 from shell.eigen import find_pattern
 from shell.quadrature import Array
+from shell.sparse import Index
 
 
 class Substructures:

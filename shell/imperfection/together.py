@@ -10,13 +10,13 @@ from itertools import pairwise
 import numpy as np
 from scipy.sparse import block_diag, csr_matrix
 
-from shell.constraints import Index
 from shell.imperfection.block import Block
 from shell.imperfection.substructure import Substructures, stack
 from shell.kernel import station_mass
 from shell.quadrature import Array
 from shell.resonator import Resonator
 from shell.solution import Constants
+from shell.sparse import Index
 from shell.system import ShellGroup
 
 WORKSPACE = 1 << 19  # numbers that a solve uses and frees again

@@ -12,11 +12,10 @@ CVG paper on demodulated dynamics.
 
 import dataclasses
 import io
-from collections.abc import Callable, Iterable
 from contextlib import redirect_stdout
 from dataclasses import replace
 from math import radians
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 from shell.rayleigh import rayleigh_integrals
 from studies.cli.output import answers, say
@@ -26,6 +25,14 @@ from studies.papers.bvg_theory import compare_bell_theory
 from studies.results import Chapter, Column, Part, Result, Sentence, Table
 from studies.results.terminal import print_result
 
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from studies.derivation import Step
+
+HRG_TITLE = "Rayleigh's inextensional shell, HRG paper equations (1)-(15)"
+BELL_TITLE = "The bell's theory, BVG paper equations (1)-(22)"
+DYNAMICS_TITLE = "Averaged dynamics of a Coriolis vibratory gyro"
 MOST_HARMONIC = 100  # the closed forms of higher ones take minutes
 
 
@@ -74,7 +81,7 @@ def derive(
 
     from shell.derivation.chain import DerivedCase, steps
     from shell.derivation.design_code import emit_code
-    from shell.derivation.emit import HRG_TITLE, emit_latex, emit_text
+    from studies.derivation import read_chain
 
     if latex and code is not None:
         raise InputError("--latex and --code each print in another form; choose one of them.")
@@ -105,11 +112,18 @@ def derive(
                 f"from {pole_angle_deg:g} to {rim_angle_deg:g} degrees the closed forms of harmonic {harmonic} cancel"
                 " to nothing; take a wider cap."
             )
-    payload = _payload(case, pole_angle_deg, rim_angle_deg)
-    text = emit_text(steps(case)) if code is None and not latex else emit_latex(steps(case), HRG_TITLE)
-    if code is not None:
-        text = emit_code(case, code)
-        payload["code"] = {"language": code, "text": text}
+    payload: dict[str, Any] = {
+        "schema": "hrg.derive/1",
+        "harmonic": case.harmonic,
+        "pole_angle_deg": pole_angle_deg,
+        "rim_angle_deg": rim_angle_deg,
+        "I": {"closed_form": str(case.bending), "value": float(case.bending.evalf(20))},
+        "J": {"closed_form": str(case.mass), "value": float(case.mass.evalf(20))},
+        "bryan_factor": {"closed_form": str(case.precession), "value": float(case.precession.evalf(20))},
+        "d_ln_f_d_rim_angle_per_rad": float(case.rim_derivative.evalf(20)),
+    }
+    emitted = emit_code(case, code) if code else None
+    text = _write(payload, read_chain(steps(case)), HRG_TITLE, latex, code, emitted)
     lead = f"HRG paper, equations (1) to (15), closed forms for n = {harmonic} from {pole_angle_deg:g}° to {rim_angle_deg:g}°."
     return Result(payload, "Frequency of the inextensional shell", lead, _chapters(payload["equations"]), printed=text)
 
@@ -125,30 +139,28 @@ def _into_file(out: str, result: Result) -> Result:
 
 
 def _derive_dynamics(latex: bool, code: Literal["python", "c"] | None) -> Result:
-    from compensation.derivation import chain
+    from compensation.derivation.chain import steps
     from compensation.derivation.design_code import emit_code
+    from studies.derivation import read_chain
 
-    equations = _equations(chain.steps(), chain.typeset, chain.write_plainly)
-    payload: dict[str, Any] = {"schema": "hrg.derive-dynamics/1", "equations": equations}
-    text = chain.emit_text() if code is None and not latex else chain.emit_latex()
-    if code is not None:
-        text = emit_code(code)
-        payload["code"] = {"language": code, "text": text}
+    payload: dict[str, Any] = {"schema": "hrg.derive-dynamics/1"}
+    emitted = emit_code(code) if code else None
+    text = _write(payload, read_chain(steps()), DYNAMICS_TITLE, latex, code, emitted)
     lead = "Averaged equations of amplitude, quadrature, precession and phase of the standing wave."
-    return Result(payload, "Dynamics of the standing wave", lead, _chapters(equations), printed=text)
+    return Result(payload, "Dynamics of the standing wave", lead, _chapters(payload["equations"]), printed=text)
 
 
 def _derive_bell(latex: bool) -> Result:
-    from shell.derivation.bell_chain import bell_steps
-    from shell.derivation.emit import BELL_TITLE, emit_latex, emit_text, typeset, write_plainly
+    from shell.derivation.bell_chain import bell_steps, shorten
+    from studies.derivation import read_chain
 
     say("deriving the bell's equations ...")
-    steps = bell_steps()
-    equations = _equations(steps, typeset, write_plainly)
-    payload = {"schema": "hrg.derive-bell/1", "equations": equations, "numbers": None}
+    payload: dict[str, Any] = {"schema": "hrg.derive-bell/1"}
+    text = _write(payload, read_chain(bell_steps(), shorten), BELL_TITLE, latex)
+    payload["numbers"] = None
     title, lead = "Theory of the bell", "BVG paper, equations (1) to (22), beside what is printed."
     if latex:
-        return Result(payload, title, lead, _chapters(equations), printed=emit_latex(steps, BELL_TITLE))
+        return Result(payload, title, lead, _chapters(payload["equations"]), printed=text)
     theory = compare_bell_theory()
     numbers = [dataclasses.asdict(row) for row in (*theory.rows, theory.free, theory.solid)]
     columns = [
@@ -159,9 +171,9 @@ def _derive_bell(latex: bool) -> Result:
     ]
     table = Table(f"Equations (21), (22) with these patterns, and the solver: card {theory.card}", numbers, columns)
     parts: list[Chapter | Part] = [
-        Sentence(emit_text(steps), "source", "terminal"),
+        Sentence(text, "source", "terminal"),
         Chapter("Against the solver", [table]),
-        *_chapters(equations),
+        *_chapters(payload["equations"]),
     ]
     return Result(payload | {"numbers": dataclasses.asdict(theory)}, title, lead, parts)
 
@@ -177,32 +189,27 @@ def _chapters(equations: list[dict[str, Any]]) -> list[Chapter]:
     ]
 
 
-def _equations(
-    steps: Iterable[Any], typeset: Callable[[Any], str], write: Callable[[Any], str]
-) -> list[dict[str, Any]]:
-    return [
+def _write(
+    payload: dict[str, Any],
+    steps: "Sequence[Step]",
+    title: str,
+    latex: bool,
+    code: str | None = None,
+    emitted: str | None = None,
+) -> str:
+    """Put the equations of a derivation, and its code, into the payload; return what is printed of them."""
+    from studies.derivation import emit_latex, emit_text, typeset, write_plainly
+
+    payload["equations"] = [
         {
             "number": step.number or None,
             "title": step.title,
             "latex": [typeset(equation) for equation in step.equations],
-            "plain": [write(equation) for equation in step.equations],
+            "plain": [write_plainly(equation) for equation in step.equations],
         }
         for step in steps
     ]
-
-
-def _payload(case: Any, pole_angle_deg: float, rim_angle_deg: float) -> dict[str, Any]:
-    from shell.derivation.chain import steps
-    from shell.derivation.emit import typeset, write_plainly
-
-    return {
-        "schema": "hrg.derive/1",
-        "harmonic": case.harmonic,
-        "pole_angle_deg": pole_angle_deg,
-        "rim_angle_deg": rim_angle_deg,
-        "I": {"closed_form": str(case.bending), "value": float(case.bending.evalf(20))},
-        "J": {"closed_form": str(case.mass), "value": float(case.mass.evalf(20))},
-        "bryan_factor": {"closed_form": str(case.precession), "value": float(case.precession.evalf(20))},
-        "d_ln_f_d_rim_angle_per_rad": float(case.rim_derivative.evalf(20)),
-        "equations": _equations(steps(case), typeset, write_plainly),
-    }
+    if emitted is not None:
+        payload["code"] = {"language": code, "text": emitted}
+        return emitted
+    return emit_latex(steps, title) if latex else emit_text(steps)

@@ -3,20 +3,16 @@
 import math
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
-from functools import partial
 from typing import TYPE_CHECKING, Any
-
-import numpy as np
 
 from studies.errors import InputError, naming
 
 if TYPE_CHECKING:
     from shell.damping.anisotropy import Ripple
     from shell.damping.budget import LossCause, Vibration
-    from shell.damping.film import LossyFilm
+    from shell.damping.film import Film
     from shell.damping.heat import Heat
     from shell.modes import Mode
-    from shell.quadrature import Array
     from studies.instrument.card import Instrument
     from studies.instrument.tables.loss_parts import FilmKeys
 
@@ -24,6 +20,7 @@ ELASTIC = ("youngs_modulus_GPa", "poisson_ratio", "density_kg_m3")
 LOSSY = ("youngs_modulus_GPa", "poisson_ratio", "loss")
 THERMAL = ("expansion_per_K", "conductivity_W_per_m_K")
 CAPACITY = ("heat_capacity_J_per_kg_K", "density_kg_m3")
+ALL = (*LOSSY, *THERMAL, *CAPACITY)
 
 
 @dataclass(frozen=True)
@@ -52,21 +49,13 @@ def film_shifts(instrument: "Instrument", mode: "Mode") -> tuple[FilmShift, ...]
     ShellError
         A film is too thick for that.
     """
-    films = instrument.part("loss", "loss_parts").film
-    if not films:
-        return ()
-    from shell.elastic import Elastic
-    from shell.film import Film, film_shift
+    from shell.damping.film import film_shift
 
     found = []
-    for keys in films:
-        numbers = film_numbers(keys, ELASTIC)
-        missing = tuple(name for name, value in numbers.items() if value is None)
-        relative = None
-        if not missing:
-            E, nu, rho = numbers.values()
-            film = Film(Elastic(1e9 * E, nu, rho), partial(_thickness, keys), keys.face)
-            relative = film_shift(mode, film)
+    for keys in instrument.part("loss", "loss_parts").film:
+        numbers = film_numbers(keys, ALL)
+        missing = tuple(name for name in ELASTIC if numbers[name] is None)
+        relative = None if missing else film_shift(mode, _build_film(keys, numbers))
         found.append(FilmShift(keys.material, relative, missing))
     return tuple(found)
 
@@ -92,7 +81,7 @@ def film_losses(
     from shell.damping.sources import film_names, known_film
 
     known = known_film(keys.material)
-    numbers = film_numbers(keys, (*LOSSY, *THERMAL, *CAPACITY))
+    numbers = film_numbers(keys, ALL)
     missing = [key for key in LOSSY if numbers[key] is None]
     if missing:
         listed = "" if known else f" (films of the table: {', '.join(film_names())})"
@@ -101,7 +90,7 @@ def film_losses(
         )
     with naming(where):
         relative = (spread.get(f"{name}.thickness_nm", 0.0), spread.get(f"{name}.loss", 0.0))
-        film = _build_film(keys, numbers, known.get("heat_capacity_J_per_m3_K"))
+        film = _build_film(keys, numbers)
         check_film(film, vibration.thinnest)
         causes = film_causes(keys.material, film, heat, relative, str(known.get("source", "given in the card")))
         if keys.anisotropy is None:
@@ -115,29 +104,25 @@ def film_losses(
         return causes, waves
 
 
-def _build_film(keys: "FilmKeys", numbers: Mapping[str, Any], capacity: float | None) -> "LossyFilm":
-    """`capacity` per volume (J/(m³ K)) counts where the card or the table has none per mass."""
-    from shell.damping.film import LossyFilm
+def _build_film(keys: "FilmKeys", numbers: Mapping[str, Any]) -> "Film":
+    """The film; its capacity per volume (J/(m³ K)) in the table counts where there is none per mass."""
+    from shell.damping.film import Film
     from shell.damping.heat import Heat
+    from shell.damping.sources import known_film
 
-    heat = None
+    heat, capacity = None, known_film(keys.material).get("heat_capacity_J_per_m3_K")
     if all(numbers[key] is not None for key in CAPACITY):
         capacity = numbers["density_kg_m3"] * numbers["heat_capacity_J_per_kg_K"]
     if capacity is not None and all(numbers[key] is not None for key in THERMAL):
         heat = Heat(numbers["expansion_per_K"], capacity, numbers["conductivity_W_per_m_K"])
-    return LossyFilm(
+    return Film(
         1e-9 * keys.thickness_nm,
         1e9 * numbers["youngs_modulus_GPa"],
         numbers["poisson_ratio"],
-        numbers["loss"],
+        numbers["loss"] or 0.0,
         heat,
         ("inner", "outer") if keys.face == "both" else (keys.face,),
         (keys.from_position, keys.to_position),
         keys.coverage,
+        numbers["density_kg_m3"] or 0.0,
     )
-
-
-def _thickness(keys: "FilmKeys", position: "Array") -> "Array":
-    """Mean thickness, m, where a pattern covers a share of the film's part of the meridian."""
-    covered = (position >= keys.from_position) & (position <= keys.to_position)
-    return np.asarray(1e-9 * keys.thickness_nm * keys.coverage * covered)

@@ -4,8 +4,7 @@ import mpmath
 import numpy as np
 
 from shell.assembly import sections
-from shell.damping.conduction import conduct_in_cells, solve_heat
-from shell.damping.heat import mean_stress
+from shell.damping.heat import conduct_in_cells, mean_stress, solve_heat
 from shell.kernel import shell_table
 from shell.layout import Chain
 from shell.quadrature import gauss, hierarchic, legendre, nodal

@@ -19,7 +19,7 @@ from shell.damping.budget import (
     surface_cause,
     thermoelastic_cause,
 )
-from shell.damping.film import LossyFilm, exchange
+from shell.damping.film import Film, exchange
 from shell.damping.gas import GASES, R, free_molecular_loss
 from shell.damping.heat import Heat
 from shell.damping.thermoelastic import heat_flow, trace_share
@@ -112,7 +112,7 @@ def test_surface_and_film_on_a_thin_bent_wall() -> None:
     """In bending ∫ energy dA over both faces is 6/h of that in the volume; a film of the wall's own elasticity follows it."""
     h = 0.1e-3
     vibration = _vibration(_tube(h, 10e-3), constant_material("metal", METAL.E, METAL.nu, METAL.rho))
-    film = LossyFilm(50e-9, METAL.E, METAL.nu, 1e-3)
+    film = Film(50e-9, METAL.E, METAL.nu, 1e-3)
     budget = loss_budget(
         vibration, [surface_cause(1e-12, 0.0, ""), *film_causes("own", film, None, (0.0, 0.0), "")], 293.15
     )
@@ -125,7 +125,7 @@ def test_film_on_one_face_or_half_covered(dome: Mode) -> None:
     vibration = _vibration(dome)
 
     def loss(**changes: object) -> float:
-        film = LossyFilm(100e-9, 78e9, 0.44, 1e-4, **changes)  # type: ignore[arg-type]
+        film = Film(100e-9, 78e9, 0.44, 1e-4, **changes)  # type: ignore[arg-type]
         return float(loss_budget(vibration, film_causes("gold", film, None, (0.0, 0.0), ""), 293.15).inverse_q[0])
 
     both = loss()
@@ -230,11 +230,11 @@ def test_budget_over_temperature_follows_the_direct_form(dome: Mode) -> None:
 
 def test_bad_input_is_said(dome: Mode) -> None:
     vibration = _vibration(dome)
-    thick = LossyFilm(1e-3, 78e9, 0.44, 1e-4)
+    thick = Film(1e-3, 78e9, 0.44, 1e-4)
     with pytest.raises(ShellError, match="thicker than the wall"):
         loss_budget(vibration, film_causes("gold", thick, None, (0, 0), ""), 293.15)
     with pytest.raises(ShellError, match="5 % of the wall"):
-        loss_budget(vibration, film_causes("gold", LossyFilm(0.1e-3, 78e9, 0.44, 1e-4), None, (0, 0), ""), 293.15)
+        loss_budget(vibration, film_causes("gold", Film(0.1e-3, 78e9, 0.44, 1e-4), None, (0, 0), ""), 293.15)
     with pytest.raises(ShellError, match="pressure must be 0 or positive"):
         gas_cause(vibration, GASES["air"], -1.0, 0.1)
     with pytest.raises(ShellError, match="at least one cause"):
@@ -242,7 +242,7 @@ def test_bad_input_is_said(dome: Mode) -> None:
     with pytest.raises(ShellError, match="height"):
         activated_cause(-1.0, 0.5, 300.0, 0.1, "")
     with pytest.raises(ShellError, match="a share 0"):
-        LossyFilm(1e-7, 78e9, 0.44, 1e-4, coverage=1.2)
+        Film(1e-7, 78e9, 0.44, 1e-4, coverage=1.2)
     (closed,) = solve_modes(
         hemisphere(radius=15e-3, thickness=0.9e-3), Elastic(72.7e9, 0.17, 2203.0), theory="rayleigh"
     )

@@ -8,7 +8,7 @@ import pytest
 from shell.curves import Line
 from shell.damping.anisotropy import Ripple, damping_wave, describe_wave, film_weight, surface_weight
 from shell.damping.budget import Vibration, film_causes, loss_budget
-from shell.damping.film import LossyFilm, film_energy, thickness_power
+from shell.damping.film import Film, film_energy, thickness_power
 from shell.damping.heat import Heat
 from shell.elastic import Elastic
 from shell.errors import ShellError
@@ -18,7 +18,7 @@ from shell.modes import Mode, solve_modes
 from shell.resonator import Resonator
 
 GLASS = Elastic(72.7e9, 0.17, 2203.0)
-GOLD = LossyFilm(100e-9, 78e9, 0.44, 1e-4)
+GOLD = Film(100e-9, 78e9, 0.44, 1e-4)
 WALL, INSIDE = Heat(5.1e-7, 2203 * 740.0, 1.38), Heat(14.2e-6, 19300 * 129.0, 320.0)
 
 
@@ -79,7 +79,7 @@ def test_two_ripples_add_as_vectors() -> None:
 
 
 def test_heat_of_a_thin_film_goes_as_its_square() -> None:
-    film = LossyFilm(10e-9, 78e9, 0.44, 1e-4, INSIDE)
+    film = Film(10e-9, 78e9, 0.44, 1e-4, INSIDE)
     assert thickness_power(film, WALL, 2 * pi * 4400) == pytest.approx(2.0, abs=1e-2)
 
 

@@ -1,12 +1,32 @@
-"""Which raw unknowns are free and which follow others: poles, clamps, edges that solids share with shells."""
+"""Sparse matrices: sums of element matrices and their factors, and which raw unknowns are free and which follow others."""
+
+from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csr_matrix
+from scipy.sparse import csc_matrix, csr_matrix
 
 from shell.quadrature import Array
 
 Index = NDArray[np.intp]
+
+
+def assemble_elements(
+    unknowns: Sequence[Index] | Index, elements: Sequence[NDArray[Any]] | NDArray[Any], size: int
+) -> csc_matrix:
+    """The sum of element matrices, each on its unknowns, (size, size)."""
+    rows = np.concatenate([np.repeat(own, len(own)) for own in unknowns])
+    columns = np.concatenate([np.tile(own, len(own)) for own in unknowns])
+    return csc_matrix((np.concatenate([np.ravel(one) for one in elements]), (rows, columns)), shape=(size, size))
+
+
+def factor_symmetric(matrix: csc_matrix, pivoting: float = 0.0) -> Callable[[NDArray[Any]], NDArray[Any]]:
+    """The solution of A x = b as a function of b; an indefinite A needs some `pivoting`, up to 1."""
+    from scipy.sparse.linalg import splu
+
+    options = {"SymmetricMode": True}
+    return splu(csc_matrix(matrix), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=pivoting, options=options).solve
 
 
 class Rows:
