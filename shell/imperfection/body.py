@@ -115,6 +115,6 @@ def _masses(together: Together, flaw: Imperfection, theta: Array) -> Iterator[tu
         yield place, np.array([m.azimuth for m in here]), np.array([m.mass for m in here])
     for line in flaw.lines:
         at = together.resonator.at([line.position * together.resonator.length])
-        radius = float(at.at_heights([line.height])[0])
+        radius = float(at.at_heights([line.height])[0].item())
         density = values_around(line.per_length, line.per_length.orders, np.array([line.position]), theta)[0][0]
         yield (line.position, line.height), theta, density * radius * 2 * pi / theta.size

@@ -175,7 +175,7 @@ class Pair:
 
     def radius(self, position: float, height: float) -> float:
         """Distance from the axis of a place of the wall, m."""
-        return float(self.resonator.at([position * self.resonator.length]).at_heights([height])[0])
+        return float(self.resonator.at([position * self.resonator.length]).at_heights([height])[0].item())
 
     def _material(self, edge: CrossSection) -> Constants:
         c = self.solution.constants[edge.group]
