@@ -4,7 +4,7 @@ import importlib
 import pkgutil
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -98,10 +98,23 @@ def read_table(name: str, raw: Any, place: CardPlace) -> ReadTable:
         A key is unknown, missing, of the wrong type or out of its bounds.
     """
     entries = card_tables()[name]
+    if raw is not None:
+        return _read_given(name, raw, place)
+    if any(entry.required for entry in entries):
+        raise InputError(f"{place.where}: the table is missing; add it.")
+    return _read_absent(name, place.reference_temperature)
+
+
+@lru_cache(maxsize=256)
+def _read_absent(name: str, reference_temperature: float) -> ReadTable:
+    """Return the defaults of a table, which are the same for every card of one reference temperature."""
+    return _read_given(name, None, CardPlace(f"[{name}]", Path(), reference_temperature))
+
+
+def _read_given(name: str, raw: Any, place: CardPlace) -> ReadTable:
+    entries = card_tables()[name]
     if entries[0].keys_of is not None:
         return _read_array(entries[0], raw, place)
-    if raw is None and any(entry.required for entry in entries):
-        raise InputError(f"{place.where}: the table is missing; add it.")
     if not isinstance(raw, Mapping | None):
         raise InputError(f"{place.where}: {name} must be a table ([{name}]), not {raw!r:.60}.")
     given = raw or {}

@@ -5,6 +5,7 @@ indices (cases × (parameters + 2) designs), `one-at-a-time` five levels of each
 `hrg keys study` lists the keys; `hrg study new` writes a spec to start from.
 """
 
+from math import inf
 from typing import TYPE_CHECKING, Annotated, Literal, Union
 
 import msgspec
@@ -136,6 +137,13 @@ class Requirement(Keys, frozen=True, kw_only=True):
             raise ValueError("give within (and target), or low and/or high.")
         if (self.within is None and self.target is not None) or (self.within is not None and ends):
             raise ValueError("give either target and within, or low and/or high.")
+
+    def limits(self, nominal: float) -> tuple[float, float]:
+        """Return the lowest and the highest value, infinite where an end is open; `nominal`: the nominal design's value."""
+        if self.within is None:
+            return -inf if self.low is None else self.low, inf if self.high is None else self.high
+        target = nominal if self.target is None else self.target
+        return target - self.within, target + self.within
 
 
 class Search(Keys, frozen=True, kw_only=True, tag_field="kind"):

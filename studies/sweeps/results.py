@@ -122,18 +122,32 @@ class Results(Shown):
             there = {row: remarks[k] for row, k in enumerate(places.tolist()) if k in remarks} if remarks else {}
             yield Chunk(decode(coding(self.study), found[:d].T), found[d : d + w].T, found[d + w :].T, there)
 
-    def table(self) -> "pd.DataFrame":
-        """Return one row a case: parameters, results, numerical errors, status, remark; `attrs["units"]` by column."""
+    def frames(self) -> "Iterator[pd.DataFrame]":
+        """Give one row a case, some thousand at a time: parameters, results, numerical errors, status, remark."""
         import pandas as pd
 
-        columns: dict[str, Any] = {name: self.parameter(name) for name in self.study.names}
-        for column, judged in zip(self.study.columns, self.judged, strict=True):
-            columns[column.name] = self.column(column.name)
-            if judged:
-                columns[f"{column.name}_error"] = self.error(column.name)
-        status = np.full(len(self), "ok", dtype=object)
-        status[self.failed] = "failed"
-        table = pd.DataFrame({**columns, "status": status, "remark": self.remarks})
+        for chunk in self.chunks():
+            columns: dict[str, Any] = dict(chunk.parameters)
+            for k, (column, judged) in enumerate(zip(self.study.columns, self.judged, strict=True)):
+                columns[column.name] = chunk.values[:, k]
+                if judged:
+                    columns[f"{column.name}_error"] = chunk.errors[:, k]
+            status, remark = ["ok"] * len(chunk.values), [""] * len(chunk.values)
+            for row, (found, text) in chunk.remarks.items():
+                status[row], remark[row] = "ok" if found == "ok" else "failed", text
+            yield pd.DataFrame({**columns, "status": status, "remark": remark})
+
+    @property
+    def header(self) -> list[str]:
+        """The columns of the table."""
+        return [*self.units, "status", "remark"]
+
+    def table(self) -> "pd.DataFrame":
+        """Return all cases as one table; `attrs["units"]` by column."""
+        import pandas as pd
+
+        frames = list(self.frames()) or [pd.DataFrame(columns=self.header)]
+        table = pd.concat(frames, ignore_index=True)
         table.attrs = {"study": self.study.name, "units": self.units}
         return table
 

@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from studies.sweeps.block import Batch, decode, each_design
 from studies.sweeps.design import draw, nominal_row
 from studies.sweeps.engine import BATCH_VECTORISED, compute
-from studies.sweeps.keys import Inversion, Requirement, Search, ToleranceSearch, WorstCase
-from studies.sweeps.progress import Silent
+from studies.sweeps.keys import Inversion, Search, ToleranceSearch, WorstCase
+from studies.sweeps.progress import Progress
 from studies.sweeps.tolerance import place_limits
 
 if TYPE_CHECKING:
@@ -49,7 +49,7 @@ class Explorer:
             rows, size = np.array(list(lacking.values())), BATCH_VECTORISED if self.plan.families else 1
             parts = np.split(rows, range(size, len(rows), size))
             batches = deque(Batch(np.full(len(part), -1), part) for part in parts)
-            compute(self.plan, batches, self.workers, self.store, Silent())
+            compute(self.plan, batches, self.workers, self.store, Progress())
         found = [self.store.find(design) for design in designs]
         return [case for case in found if case is not None]
 
@@ -180,7 +180,7 @@ def find_tolerance(explorer: Explorer, search: ToleranceSearch) -> dict[str, Any
     varied = np.array([p.name in search.vary for p in study.parameters])
     columns = [requirement.column for requirement in study.requirements]
     middle = explorer.values(nominal[None], columns)[0]
-    limits = [_ends_of(one, value) for one, value in zip(study.requirements, middle, strict=True)]
+    limits = [one.limits(float(value)) for one, value in zip(study.requirements, middle, strict=True)]
     for column, value, (low, high) in zip(columns, middle, limits, strict=True):
         if not low <= value <= high:
             raise SearchFailed(f"the nominal design itself has {column} = {value:g}, beyond its limits")
@@ -214,15 +214,6 @@ def find_tolerance(explorer: Explorer, search: ToleranceSearch) -> dict[str, Any
         },
         "tolerances": [_tolerance(p, factor) for p in study.parameters if p.name in search.vary],
     }
-
-
-def _ends_of(requirement: Requirement, nominal: float) -> tuple[float, float]:
-    """The limits of a requirement; about the nominal value unless it has a target."""
-    if requirement.within is not None:
-        target = nominal if requirement.target is None else requirement.target
-        return target - requirement.within, target + requirement.within
-    low = -np.inf if requirement.low is None else requirement.low
-    return low, np.inf if requirement.high is None else requirement.high
 
 
 def _tolerance(parameter: "StudyParameter", factor: float) -> dict[str, Any]:

@@ -60,16 +60,11 @@ class Reach:
 
 def resolve_limits(results: "Results", requirement: "Requirement") -> RequirementLimits:
     """Return the limits of a requirement; without a target they lie about the nominal design's value."""
-    if requirement.within is None:
-        low = -np.inf if requirement.low is None else requirement.low
-        return RequirementLimits(requirement.column, low, np.inf if requirement.high is None else requirement.high)
-    target = requirement.target
-    if target is None:
-        place = [column.name for column in results.study.columns].index(requirement.column)
-        target = results.nominal.values[place] if results.nominal is not None else np.nan
-    if not np.isfinite(target):
+    place = [column.name for column in results.study.columns].index(requirement.column)
+    low, high = requirement.limits(float(results.nominal.values[place]) if results.nominal is not None else np.nan)
+    if np.isnan(low):
         raise InputError(f"the nominal design has no {requirement.column}; give the requirement a target.")
-    return RequirementLimits(requirement.column, target - requirement.within, target + requirement.within)
+    return RequirementLimits(requirement.column, low, high)
 
 
 def find_yield(results: "Results", requirements: "tuple[Requirement, ...]") -> Yield:

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from shell.constants import zero_Celsius
 from studies.errors import UNUSABLE_INPUT, InputError
+from studies.sweeps.design import nominal_design
 from studies.sweeps.parameters import TEMPERATURE, set_parameters
 
 if TYPE_CHECKING:
@@ -23,8 +24,7 @@ def check_nominal(study: "Study", where: str) -> None:
     InputError
         A nominal design or a temperature that the card, the material's law or the chosen theory does not allow.
     """
-    nominal = {parameter.name: parameter.nominal for parameter in study.parameters}
-    problem = _problem(study, nominal)
+    problem = _problem(study, nominal_design(study))
     if problem:
         raise InputError(f"{where}: {problem}")
     _check_temperatures(study, where)
@@ -32,7 +32,7 @@ def check_nominal(study: "Study", where: str) -> None:
 
 def find_invalid(study: "Study") -> list[str]:
     """Return what is wrong with designs at the ends of each parameter and at the corners of the box; they fail as cases."""
-    nominal = {parameter.name: parameter.nominal for parameter in study.parameters}
+    nominal = nominal_design(study)
     ends = ({**nominal, parameter.name: value} for parameter in study.parameters for value in _extremes(parameter))
     problems = (_problem(study, {**nominal, **design}) for design in chain(ends, _corners(study)))
     return list(dict.fromkeys(problem for problem in problems if problem))
