@@ -62,7 +62,7 @@ def compensate(model: Model, record: Record, *, extrapolate: bool = False) -> Re
         raise InputError(f"{where}{error}") from error
     for name, values in columns.items():
         if isinf(values).any():
-            raise InputError(f"{model.path or 'model'}: its coefficients make '{name}' infinite; correct them.")
+            raise InputError(f"{model.where}: its coefficients make '{name}' infinite; correct them.")
         if not name.startswith(COMPENSATED) and name != RESONATOR:
             raise ValueError(f"{model.kind} writes '{name}', which is no {COMPENSATED}… column")
         if name in record:
@@ -77,5 +77,5 @@ def emit_c(model: Model) -> str:
 
 def _module(model: Model) -> Any:
     if model.kind not in model_kinds():
-        raise InputError(f"{model.path or 'model'}: unknown kind '{model.kind}'{nearest(model.kind, model_kinds())}")
+        raise InputError(f"{model.where}: unknown kind '{model.kind}'{nearest(model.kind, model_kinds())}")
     return import_module(f"{kinds.__name__}.{model.kind.replace('-', '_')}")

@@ -5,8 +5,7 @@ bit. The text is laid out here, not by tomli-w, for the comments: how well each 
 """
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Collection, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -23,6 +22,8 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
+    from studies.record import Record
+
 SCHEMA = "hrg.model/1"
 WIDENED = 0.05  # of a fitted range, on each side
 Setting = float | str | tuple[float, ...]
@@ -36,15 +37,15 @@ class Coefficient(Keys, frozen=True, kw_only=True):
     unit: Annotated[str, says("of the value", example="deg/h")]
 
 
-class PartKeys(Keys, frozen=True, kw_only=True):
-    """One set of coefficients that was fitted together."""
+class ModelPart(Keys, frozen=True, kw_only=True):
+    """One set of coefficients that was fitted together, with their covariance (k, k), or none ()."""
 
     name: Annotated[str, says("by which the kind knows it", example="bias")]
     coefficients: Annotated[tuple[Coefficient, ...], says("one or more", least=1)]
     covariance: Annotated[tuple[tuple[float, ...], ...], says("of the coefficients in this order; [] unknown")] = ()
 
     def __post_init__(self) -> None:
-        names = [one.name for one in self.coefficients]
+        names = self.names
         if len(set(names)) < len(names):
             raise ValueError("two coefficients have the same name; rename one.")
         if len(self.covariance) not in (0, len(names)) or any(len(row) != len(names) for row in self.covariance):
@@ -52,11 +53,30 @@ class PartKeys(Keys, frozen=True, kw_only=True):
         if any(row[k] < 0 for k, row in enumerate(self.covariance)):
             raise ValueError("covariance has a negative variance on its diagonal.")
 
+    def __getitem__(self, name: str) -> float:
+        return self.values[self.names.index(name)]
+
     @property
-    def part(self) -> "ModelPart":
-        """The part, column by column."""
-        names, values, units = zip(*((one.name, one.value, one.unit) for one in self.coefficients), strict=True)
-        return ModelPart(self.name, names, values, units, self.covariance)
+    def names(self) -> tuple[str, ...]:
+        """Names of the terms."""
+        return tuple(one.name for one in self.coefficients)
+
+    @property
+    def values(self) -> tuple[float, ...]:
+        """Values of the coefficients."""
+        return tuple(one.value for one in self.coefficients)
+
+    @property
+    def units(self) -> tuple[str, ...]:
+        """Units of the values."""
+        return tuple(one.unit for one in self.coefficients)
+
+    @property
+    def standard_errors(self) -> tuple[float, ...]:
+        """Square roots of the covariance's diagonal; NaN where it is unknown."""
+        if not self.covariance:
+            return (math.nan,) * len(self.coefficients)
+        return tuple(math.sqrt(row[k]) for k, row in enumerate(self.covariance))
 
 
 class ModelSource(msgspec.Struct, frozen=True):
@@ -68,7 +88,7 @@ class ModelSource(msgspec.Struct, frozen=True):
 
 
 class ModelKeys(Keys, frozen=True, kw_only=True):
-    """A fitted compensation."""
+    """A fitted compensation: what it applies to, where it holds, its coefficients, where they come from."""
 
     schema: Annotated[str, says("what the file is")] = SCHEMA
     kind: Annotated[str, says("frequency, bias, scale or cross-damping", example="bias")]
@@ -80,8 +100,12 @@ class ModelKeys(Keys, frozen=True, kw_only=True):
     validity: Annotated[
         dict[str, tuple[float, float]], says("lowest and highest value of each variable that the fit has seen")
     ] = msgspec.field(default_factory=dict)
-    part: Annotated[tuple[PartKeys, ...], says("what was fitted together; one or more", least=1)]
-    source: Annotated[tuple[ModelSource, ...], says("the records that it was fitted to")] = ()
+    parts: Annotated[tuple[ModelPart, ...], says("what was fitted together; one or more", least=1)] = msgspec.field(
+        name="part"
+    )
+    sources: Annotated[tuple[ModelSource, ...], says("the records that it was fitted to")] = msgspec.field(
+        name="source", default=()
+    )
 
     def __post_init__(self) -> None:
         for key, (low, high) in self.validity.items():
@@ -89,39 +113,18 @@ class ModelKeys(Keys, frozen=True, kw_only=True):
                 raise ValueError(f"[validity] {key}: the lowest value {low:g} must be below the highest {high:g}.")
 
 
-@dataclass(frozen=True)
-class ModelPart:
-    """Coefficients that were fitted together: names, values, units (k,) and covariance (k, k), or none ()."""
+class Model(ModelKeys, frozen=True, kw_only=True):
+    """A model and the file that it came from."""
 
-    name: str
-    names: tuple[str, ...]
-    values: tuple[float, ...]
-    units: tuple[str, ...]
-    covariance: tuple[tuple[float, ...], ...] = ()
+    path: str = ""
 
-    def __getitem__(self, name: str) -> float:
-        return self.values[self.names.index(name)]
+    def __post_init__(self) -> None:
+        """Allow what only a file is refused for: a fit that has seen one value has a range without length."""
 
     @property
-    def standard_errors(self) -> tuple[float, ...]:
-        """Square roots of the covariance's diagonal; NaN where it is unknown."""
-        if not self.covariance:
-            return (math.nan,) * len(self.values)
-        return tuple(math.sqrt(row[k]) for k, row in enumerate(self.covariance))
-
-
-@dataclass(frozen=True)
-class Model:
-    """A fitted compensation: what it applies to, where it holds, its coefficients, where they come from."""
-
-    kind: str
-    compensates: str
-    parts: tuple[ModelPart, ...]
-    settings: Mapping[str, Setting] = field(default_factory=dict)
-    validity: Mapping[str, tuple[float, float]] = field(default_factory=dict)
-    sources: tuple[ModelSource, ...] = ()
-    made_by: str = ""
-    path: str = ""
+    def where(self) -> str:
+        """The file, for messages."""
+        return self.path or "model"
 
     def part(self, name: str) -> ModelPart:
         """Return the part of that name.
@@ -134,14 +137,14 @@ class Model:
         for part in self.parts:
             if part.name == name:
                 return part
-        raise InputError(f"{self.path or 'model'}: a model of kind '{self.kind}' needs a [[part]] named '{name}'.")
+        raise InputError(f"{self.where}: a model of kind '{self.kind}' needs a [[part]] named '{name}'.")
 
     @property
     def temperature_column(self) -> str:
         """The column that the setting of this name calls the temperature."""
         column = self.settings.get("temperature_column")
         if not isinstance(column, str):
-            raise InputError(f"{self.path or 'model'} [settings]: the key 'temperature_column' must name a column.")
+            raise InputError(f"{self.where} [settings]: the key 'temperature_column' must name a column.")
         return column
 
     def number(self, key: str, *, above: float | None = None, least: float | None = None) -> float:
@@ -152,11 +155,36 @@ class Model:
         InputError
             The setting is missing or something else.
         """
-        where = f"{self.path or 'model'} [settings]"
+        where = f"{self.where} [settings]"
         if key not in self.settings:
             raise InputError(f"{where}: the key '{key}' is missing; add it.")
         kind: Any = Annotated[float, number(above=above, least=least)]
         return float(read_keys(self.settings[key], kind, f"{where}: {key}"))
+
+    def check_inputs(self, record: "Record", *columns: str, outputs: Collection[str]) -> None:
+        """Refuse a column that this kind cannot compensate, and a record that lacks a column that it needs.
+
+        Raises
+        ------
+        InputError
+            `compensates` is none of the outputs, or a column is missing.
+        """
+        self.check_output(outputs)
+        for name in (self.compensates, *columns):
+            if name not in record:
+                raise InputError(f"the column '{name}' is missing; this {self.kind} model needs it.")
+
+    def check_output(self, outputs: Collection[str]) -> None:
+        """Refuse a column that this kind cannot compensate; InputError names those that it can."""
+        if self.compensates not in outputs:
+            raise InputError(f"{self.where}: a {self.kind} model compensates {' or '.join(outputs)}.")
+
+    def check_names(self, part: ModelPart, prefix: str) -> None:
+        """Refuse coefficients of a polynomial that are not prefix0, prefix1, … in this order; InputError says so."""
+        expected = tuple(f"{prefix}{k}" for k in range(len(part.coefficients)))
+        if part.names != expected:
+            names = ", ".join(expected)
+            raise InputError(f"{self.where} [[part]] {part.name}: the coefficients must be {names}, in this order.")
 
     def range_of(self, variable: str) -> tuple[float, float]:
         """Return the lowest and highest value of a variable that the fit has seen.
@@ -167,7 +195,7 @@ class Model:
             The model does not say.
         """
         if variable not in self.validity:
-            raise InputError(f"{self.path or 'model'} [validity]: the range of '{variable}' is missing; add it.")
+            raise InputError(f"{self.where} [validity]: the range of '{variable}' is missing; add it.")
         return self.validity[variable]
 
     def check_range(self, variable: str, values: "NDArray[np.float64]", extrapolate: bool) -> None:
@@ -207,8 +235,14 @@ def make_part(
     covariance: "NDArray[np.float64] | None" = None,
 ) -> ModelPart:
     """Build a part from arrays."""
-    rows = () if covariance is None else tuple(tuple(float(v) for v in row) for row in covariance)
-    return ModelPart(name, tuple(names), tuple(float(v) for v in values), tuple(units), rows)
+    import numpy as np
+
+    columns = zip(names, map(float, values), units, strict=True)
+    return ModelPart(
+        name=name,
+        coefficients=tuple(Coefficient(name=one, value=value, unit=unit) for one, value, unit in columns),
+        covariance=() if covariance is None else tuple(map(tuple, np.asarray(covariance, dtype=float).tolist())),
+    )
 
 
 def write_model(model: Model, path: str | Path) -> None:
@@ -257,6 +291,4 @@ def read_model(path: str | Path) -> Model:
 
     if not Path(path).exists() and str(path) in shipped_cards():
         raise InputError(f"{path}: this is a card, not a model; give the file that 'hrg fit … --save' wrote.")
-    keys = read_file(path, ModelKeys, SCHEMA)
-    parts = tuple(one.part for one in keys.part)
-    return Model(keys.kind, keys.compensates, parts, keys.settings, keys.validity, keys.source, keys.made_by, str(path))
+    return Model(**msgspec.structs.asdict(read_file(path, ModelKeys, SCHEMA)), path=str(path))

@@ -5,10 +5,10 @@ import json
 import shutil
 import subprocess
 import tomllib
-from dataclasses import replace
 
 import numpy as np
 import pytest
+from msgspec.structs import replace
 
 from compensation.frequency import fit_frequency
 from studies.cli import main
@@ -156,7 +156,8 @@ def test_an_unknown_kind_and_a_wrong_covariance_are_refused(model, tmp_path):
 
 def test_coefficients_that_overflow_are_refused(model):
     part = model.parts[0]
-    broken = replace(model, parts=(replace(part, values=(part.values[0], *[1e308] * (len(part.values) - 1))),))
+    first, *others = part.coefficients
+    broken = replace(model, parts=(replace(part, coefficients=(first, *(replace(c, value=1e308) for c in others))),))
     record = Record(
         {
             "time_s": np.arange(3.0),

@@ -11,10 +11,10 @@ ten seconds; when a block is complete its mean and the slope of the line through
 which holds until the next block is complete.
 """
 
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
+from msgspec.structs import replace
 from numpy.typing import NDArray
 
 from compensation.bias import FREQUENCY, PLAY, TEMPERATURE, TERMS, Variable, term_columns
@@ -24,7 +24,7 @@ from compensation.memory import NO_MEMORY, Memory, follow_lag, follow_play
 from compensation.samples import check_time
 from studies.errors import InputError, nearest
 from studies.models.bias_c import CausalBias, write_c
-from studies.models.file import Model, ModelSource, make_part, widen
+from studies.models.file import Model, ModelSource, Setting, make_part, widen
 from studies.record import COMPENSATED, Record
 
 if TYPE_CHECKING:
@@ -43,7 +43,7 @@ def save_bias(
     """Return a fitted bias model; `run` tells how the rate was taken, `output` the column fitted, `column` over which."""
     units = [OUTPUTS[output], *(unit_of_term(OUTPUTS[output], name, fit.variable) for name in fit.terms)]
     names = [name_term(name, fit.variable) for name in fit.terms]
-    settings: dict[str, float | str] = {
+    settings: dict[str, Setting] = {
         "variable": column,
         _reference_key(column): fit.reference,
         "rate_window_s": run.window,
@@ -65,9 +65,7 @@ def save_bias(
 def compensate(model: Model, record: Record, *, extrapolate: bool) -> dict[str, Array]:
     """Take the predicted bias out of the output; rows farther than a window from any reading stay NaN."""
     column, output = variable_column(model), model.compensates
-    for name in (column, output):
-        if name not in record:
-            raise InputError(f"the column '{name}' is missing; this bias model needs it.")
+    model.check_inputs(record, column, outputs=OUTPUTS)
     predict = _predict_causally if model.number("rate_lag_s", least=0) > 0 else _predict_centred
     bias = predict(model, record["time_s"], record[column], extrapolate)
     return {f"{COMPENSATED}{output}": record[output] - bias}
@@ -159,7 +157,7 @@ def variable_column(model: Model) -> str:
     """Return the column that the bias is a function of; the frequency where an older file does not say."""
     column = model.settings.get("variable", "frequency_Hz")
     if not isinstance(column, str):
-        raise InputError(f"{model.path or 'model'} [settings]: the key 'variable' must name a column.")
+        raise InputError(f"{model.where} [settings]: the key 'variable' must name a column.")
     return column
 
 
@@ -184,9 +182,8 @@ def memory_of(model: Model) -> Memory:
 def read_terms(model: Model) -> tuple[tuple[str, ...], Array]:
     """Return the terms in the names of `compensation.bias`, and all coefficients, the constant first."""
     part, variable = model.part("bias"), _variable(variable_column(model))
-    where = model.path or "model"
-    if model.compensates not in OUTPUTS:
-        raise InputError(f"{where}: compensates = '{model.compensates}'{nearest(model.compensates, OUTPUTS)}")
+    where = model.where
+    model.check_output(OUTPUTS)
     if part.names[0] != "constant":
         raise InputError(f"{where}: the first coefficient must be 'constant', not '{part.names[0]}'.")
     known = {name_term(name, variable): name for name in (*TERMS, PLAY)}

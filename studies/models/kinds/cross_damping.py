@@ -52,10 +52,8 @@ def load_cross_damping(model: Model) -> "CrossDampingModel":
     """Return the fit that a model file holds."""
     from compensation.cross_damping import CrossDampingModel
 
-    part, column = _part(model), model.temperature_column
-    if column not in model.validity:
-        raise InputError(f"{model.path or 'model'} [validity]: the range of '{column}' is missing; add it.")
-    low, high = model.range_of(column)
+    part = _part(model)
+    low, high = model.range_of(model.temperature_column)
     return CrossDampingModel(
         coefficients=np.array(part.values),
         covariance=np.array(part.covariance) if part.covariance else np.full((len(part.values),) * 2, np.nan),
@@ -72,11 +70,7 @@ def load_cross_damping(model: Model) -> "CrossDampingModel":
 def compensate(model: Model, record: Record, *, extrapolate: bool) -> dict[str, NDArray[np.float64]]:
     """Subtract the predicted cross-damping error; rows without temperature or output stay empty."""
     output, column = model.compensates, model.temperature_column
-    if output not in OUTPUTS:
-        raise InputError(f"{model.path or 'model'}: a cross-damping model compensates {' or '.join(OUTPUTS)}.")
-    for name in (output, column):
-        if name not in record:
-            raise InputError(f"the column '{name}' is missing; this cross-damping model needs it.")
+    model.check_inputs(record, column, outputs=OUTPUTS)
     temperature = record[column]
     model.check_range(column, temperature, extrapolate)
     known = np.isfinite(temperature)
@@ -92,10 +86,8 @@ def compensate(model: Model, record: Record, *, extrapolate: bool) -> dict[str, 
 
 def emit_c(model: Model) -> str:
     """Return `hrg_cross_damping_step(&state, T, dt)`, the error to subtract, in C99, with a table to test it."""
-    part = _part(model)
-    unit = OUTPUTS.get(model.compensates)
-    if unit is None:
-        raise InputError(f"{model.path or 'model'}: a cross-damping model compensates {' or '.join(OUTPUTS)}.")
+    model.check_output(OUTPUTS)
+    part, unit = _part(model), OUTPUTS[model.compensates]
     pole = 2 * math.pi * model.number("frequency_Hz", above=0) * model.number("relative_damping", above=0)
     gain = 2 * (2 * math.pi * model.number("frequency_Hz", above=0)) / model.number("g2", above=0) / unit
     return f"""{head(model)}
@@ -143,9 +135,5 @@ def _test_rows(model: Model) -> list[tuple[float, ...]]:
 
 def _part(model: Model) -> ModelPart:
     part = model.part("cross-damping")
-    expected = tuple(f"zeta_{i}" for i in range(len(part.values)))
-    if part.names != expected:
-        raise InputError(
-            f"{model.path or 'model'} [[part]] cross-damping: the coefficients must be {', '.join(expected)}, in this order."
-        )
+    model.check_names(part, "zeta_")
     return part

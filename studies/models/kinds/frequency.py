@@ -47,8 +47,7 @@ def compensate(model: Model, record: Record, *, extrapolate: bool) -> dict[str, 
     the other outputs can be compensated, and to extrapolate is to leave the rows empty that lie outside. The curve is a settled one: while a housing's or chamber's temperature moves, the
     resonator lags behind it and the difference stays in the result.
     """
-    if model.compensates != "frequency_Hz":
-        raise InputError(f"{model.path or 'model'}: a frequency model compensates frequency_Hz.")
+    model.check_output(("frequency_Hz",))
     column = next((name for name in TEMPERATURES if name in record and np.isfinite(record[name]).any()), None)
     if column is None:
         return {RESONATOR: find_temperature(model, record["frequency_Hz"], record.path or "record", spare=extrapolate)}
@@ -90,7 +89,7 @@ def find_temperature(model: Model, frequency: Array, path: str = "record", *, sp
     check_model_frequency(frequency, float(low), float(high), path, model.path or "the model")
     if spare:
         frequency = np.where((frequency >= low) & (frequency <= high), frequency, np.nan)
-    with naming(f"{path} with {model.path or 'model'}"):
+    with naming(f"{path} with {model.where}"):
         return invert(partial(evaluate, model), model.range_of(VARIABLE), frequency)
 
 

@@ -71,18 +71,20 @@ def load_scale(model: Model) -> "BellChain":
     from compensation.bell import BellChain
 
     rough, column = model.part("rough"), model.temperature_column
-    for name in (column, RATE):
-        if name not in model.validity:
-            raise InputError(f"{model.path or 'model'} [validity]: the range of '{name}' is missing; add it.")
+    for name in ("null", "scale"):
+        if name not in rough.names:
+            raise InputError(f"{model.where} [[part]] rough: the coefficient '{name}' is missing.")
+    if rough["scale"] == 0:
+        raise InputError(f"{model.where}: [[part]] rough: scale is 0, so the output has no effect; correct it.")
     low, high = (value + zero_Celsius for value in model.range_of(column))
     slow, fast = (value * DEG for value in model.range_of(RATE))
     taps = model.settings.get("fir_taps", ())
     if isinstance(taps, str | float):
-        raise InputError(f"{model.path or 'model'} [settings]: fir_taps must be a list of numbers, [] for no filter.")
+        raise InputError(f"{model.where} [settings]: fir_taps must be a list of numbers, [] for no filter.")
     errors = np.array(rough.covariance) if rough.covariance else np.zeros((2, 2))
     return BellChain(
-        null=_coefficient(model, rough, "null"),
-        scale=_rough_scale(model, rough) * DEG,
+        null=rough["null"],
+        scale=rough["scale"] * DEG,
         rough_covariance=np.diag([1.0, DEG]) @ errors @ np.diag([1.0, DEG]),
         bias=_load_curve(model, "bias", 1.0, 0.0, zero_Celsius, (low, high)),
         scale_over_rate=_load_curve(model, "scale_over_rate", 1.0, 1.0, 0.0, (slow, fast)),
@@ -97,11 +99,7 @@ def compensate(model: Model, record: Record, *, extrapolate: bool) -> dict[str, 
     from compensation.bell import apply_chain
 
     output, column = model.compensates, model.temperature_column
-    if output not in RAW:
-        raise InputError(f"{model.path or 'model'}: a scale model compensates {' or '.join(RAW)}.")
-    for name in (output, column):
-        if name not in record:
-            raise InputError(f"the column '{name}' is missing; this scale model needs it.")
+    model.check_inputs(record, column, outputs=RAW)
     complete = np.isfinite(record[output]) & np.isfinite(record[column])
     chain = load_scale(model)
     if len(chain.taps) and not np.all(complete):
@@ -186,21 +184,7 @@ def _load_curve(
     from compensation.bell import PolynomialCurve
 
     part = model.part(name)
-    if part.names != tuple(f"c{i}" for i in range(len(part.values))):
-        raise InputError(f"{model.path or 'model'} [[part]] {name}: the coefficients must be c0, c1, …, in this order.")
+    model.check_names(part, "c")
     size = DEG ** (y - x * np.arange(len(part.values)))
     covariance = np.array(part.covariance) if part.covariance else np.zeros((len(part.values),) * 2)
     return PolynomialCurve(size * np.array(part.values), size[:, None] * covariance * size, reference, *limits)
-
-
-def _rough_scale(model: Model, rough: ModelPart) -> float:
-    scale = _coefficient(model, rough, "scale")
-    if scale == 0:
-        raise InputError(f"{model.path}: [[part]] rough: scale is 0, so the output has no effect; correct it.")
-    return scale
-
-
-def _coefficient(model: Model, part: ModelPart, name: str) -> float:
-    if name not in part.names:
-        raise InputError(f"{model.path or 'model'} [[part]] {part.name}: the coefficient '{name}' is missing.")
-    return part[name]
