@@ -1,18 +1,21 @@
 """A first map for raw files: notation, time, columns and units guessed from names and cells, and every guess marked."""
 
 import re
+import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from studies.errors import InputError
 from studies.importing.look import Look, as_number, is_stamp, look_at
-from studies.importing.mapping import SCHEMA, TABLE_TARGETS, FileMap, load_map
+from studies.importing.mapping import SCHEMA, TABLE_TARGETS, FileMap, ImportMap
 from studies.importing.meaning import Meaning, find_meanings, find_unit
 from studies.importing.offset import estimate_offset
 from studies.importing.stated import find_nominal, find_period
 from studies.importing.timing import TIME_WORDS, find_time
 from studies.importing.units import units_of
+from studies.schema.reader import read_keys
+from studies.schema.spelling import spell_value
 
 if TYPE_CHECKING:
     from studies.importing.join import ClockedFile
@@ -82,20 +85,16 @@ def _continues(paths: Sequence[str]) -> bool:
 
     draft = [line.replace("= 0.0    # CHECK", "= 1.0    # CHECK") for line in _draft_file(paths[0], ())[0]]
     try:
-        (file,) = _load_text("\n".join([f'schema = "{SCHEMA}"', *draft]))
+        file = _load_text(draft)
         return file.sample_period is None and bool(read_series(paths, file))
     except InputError:
         return False
 
 
-def _load_text(text: str) -> tuple[FileMap, ...]:
-    import tempfile
-    from pathlib import Path
-
-    with tempfile.TemporaryDirectory() as folder:
-        file = Path(folder) / "map.toml"
-        file.write_text(text, encoding="utf-8")
-        return load_map(file).files
+def _load_text(lines: Sequence[str]) -> FileMap:
+    """Return the one file that a draft describes."""
+    text = "\n".join([f'schema = "{SCHEMA}"', *lines])
+    return read_keys(tomllib.loads(text), ImportMap, "draft").files[0]
 
 
 def _find_offsets(paths: Sequence[str], files: list[list[str]]) -> list[str]:
@@ -106,9 +105,7 @@ def _find_offsets(paths: Sequence[str], files: list[list[str]]) -> list[str]:
     from studies.importing.join import read_series, shift_between
 
     try:
-        drafts = ["\n".join([f'schema = "{SCHEMA}"', *_draft_file(path, ())[0]]) for path in paths]
-        maps = [file for draft in drafts for file in _load_text(draft)]
-        series = [read_series([path], one) for path, one in zip(paths, maps, strict=True)]
+        series = [read_series([path], _load_text(_draft_file(path, ())[0])) for path in paths]
         shifts = [shift_between(series[0], other) for other in series]
     except InputError:  # the draft is not complete yet: nothing can be compared
         return []
@@ -175,7 +172,7 @@ def _describe_notation(path: str, look: Look) -> list[str]:
     lines = ["[[file]]", f"# {_comment(path)}"]
     if not look.excel:
         lines += [
-            f"separator = {_quote(look.separator)}",
+            f"separator = {spell_value(look.separator)}",
             f'decimal = "{look.decimal}"',
             f'encoding = "{look.encoding}"',
         ]
@@ -200,12 +197,10 @@ def _draft_file(path: str, taken: Sequence[str]) -> tuple[list[str], list[str], 
     lines = _describe_notation(path, look)
     markers = _find_markers(names, cells, time, look.decimal)
     if markers:
-        lines.append(
-            f"missing = [{', '.join(_quote(marker) for marker in markers)}]    # CHECK: these cells mean 'no value'"
-        )
+        lines.append(f"missing = {spell_value(markers)}    # CHECK: these cells mean 'no value'")
     if time:
-        lines.append(f"time = {_quote(time[0]) if len(time) == 1 else '[' + ', '.join(map(_quote, time)) + ']'}")
-        lines.append(f"time_format = {_quote(form)}{f'    # CHECK: {unsure}' if unsure else ''}")
+        lines.append(f"time = {spell_value(time[0] if len(time) == 1 else time)}")
+        lines.append(f"time_format = {spell_value(form)}{f'    # CHECK: {unsure}' if unsure else ''}")
     else:
         stated = "the lines above the table say so" if period else unsure
         lines.append(f"sample_period_s = {period or 0.0!r}    # CHECK: {stated}")
@@ -249,7 +244,7 @@ def _draft_column(
     unit = stated or next(iter(units))
     remark = remark or ("" if stated else "    # CHECK: the name states no unit")
     middle = sorted(numbers)[len(numbers) // 2]
-    lines = [f"from = {_quote(name)}", f'to = "{target}"']
+    lines = [f"from = {spell_value(name)}", f'to = "{target}"']
     if target.endswith("_degC") and unit == "degC" and 200 < middle < 500:
         unit, remark = "K", "    # CHECK: the values look like kelvin"
     lines.append(f'unit = "{unit}"{remark}')
@@ -271,10 +266,10 @@ def _draft_unknown(name: str, numbers: Sequence[float]) -> list[str]:
     """Leave a form to fill for a column without a meaning."""
     span = f"{min(numbers):.6g} to {max(numbers):.6g}; " if numbers else ""
     return [
-        f"# no meaning found for the column {_quote(name)}",
+        f"# no meaning found for the column {spell_value(name)}",
         f"# {span}if it belongs to the record:",
         "# [[file.column]]",
-        f"# from = {_quote(name)}",
+        f"# from = {spell_value(name)}",
         '# to = "..."',
         '# unit = "..."',
     ]
@@ -296,18 +291,6 @@ def _find_markers(names: Sequence[str], cells: Mapping[str, list[str]], time: Se
         if name not in time and 0 < 2 * len(words) < len(cells[name]):
             markers += [word for word in dict.fromkeys(words) if word not in markers]
     return markers[:20]
-
-
-def _quote(text: str) -> str:
-    """Return a TOML basic string."""
-    escaped = text.replace("\\", "\\\\").replace('"', '\\"')
-    return (
-        '"'
-        + "".join(
-            c if c.isprintable() else f"\\u{ord(c):04x}" if ord(c) < 65536 else f"\\U{ord(c):08x}" for c in escaped
-        )
-        + '"'
-    )
 
 
 def _comment(text: str) -> str:

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from studies.errors import InputError
 from studies.importing.mapping import SEPARATORS
-from studies.importing.raw import EXCEL, decode, read_filled, read_sheet
+from studies.importing.raw import EXCEL, decode, name_columns, read_filled, read_sheet
 
 SEEN = 2000  # lines that are looked at
 
@@ -28,10 +28,7 @@ class Look:
     @property
     def names(self) -> list[str]:
         """The columns' names, their places where a name is missing; a repeated one gets its place."""
-        cells = self.rows[self.data if self.header is None else self.header]
-        given = [""] * len(cells) if self.header is None else [" ".join(cell.split()) for cell in cells]
-        names = [name or f"column {k}" for k, name in enumerate(given, 1)]
-        return [f"{name} #{k}" if name in names[: k - 1] else name for k, name in enumerate(names, 1)]
+        return name_columns([""] * len(self.rows[self.data]) if self.header is None else self.rows[self.header])
 
     @property
     def units(self) -> list[str]:

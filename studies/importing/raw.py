@@ -240,23 +240,28 @@ def _split_lines(path: str | Path, text: str, file: "FileMap") -> list[list[str]
 
 
 def _head(path: str | Path, lines: Sequence[Sequence[str]], file: "FileMap") -> list[str]:
-    """Return the column names of the header line; a repeated name gets its number, a nameless column its place."""
+    """Return the column names of the header line."""
     if len(lines) < file.header_line:
         raise InputError(f"{path}: has {len(lines)} lines, but header_line is {file.header_line} in the map.")
-    names: list[str] = []
     if file.header_line == 0:
         width = len(lines[file.data_line - 1]) if len(lines) >= file.data_line else 0
         if not width:
             raise InputError(f"{path}: there are no rows from line {file.data_line} on (data_line in the map).")
         return [f"column {place}" for place in range(1, width + 1)]
-    cells = [" ".join(cell.split()) for cell in lines[file.header_line - 1]]
-    while cells and not cells[-1]:
+    cells = list(lines[file.header_line - 1])
+    while cells and not cells[-1].strip():
         cells.pop()
-    for place, name in enumerate(cells, 1):
-        wanted = name or f"column {place}"
-        names.append(f"{wanted} #{place}" if wanted in [*names, OVERFLOW] else wanted)
-    if not names:
+    if not cells:
         raise InputError(f"{path}, line {file.header_line}: the header line is empty; set header_line in the map.")
+    return name_columns(cells)
+
+
+def name_columns(cells: Sequence[str]) -> list[str]:
+    """Return the names of columns from the cells of a header; a repeated name gets its number, a nameless column its place."""
+    names: list[str] = []
+    for place, cell in enumerate(cells, 1):
+        wanted = " ".join(cell.split()) or f"column {place}"
+        names.append(f"{wanted} #{place}" if wanted in [*names, OVERFLOW] else wanted)
     return names
 
 
