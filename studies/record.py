@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING
 from studies.errors import InputError, nearest
 from studies.files.columns import Columns, read_columns, read_header
 from studies.files.writing import written_whole
+from studies.results import Drawing
 
 if TYPE_CHECKING:
     import numpy as np
-    from matplotlib.figure import Figure
     from numpy.typing import NDArray
     from pandas import DataFrame
 
@@ -92,7 +92,7 @@ class Record:
         frame.attrs = {"instrument": self.instrument, "source": self.source, "path": self.path}
         return frame
 
-    def plot(self) -> "Figure":
+    def plot(self) -> Drawing:
         """Draw every column over time."""
         from studies.reports.columns import draw_columns
 

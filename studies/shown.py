@@ -3,8 +3,9 @@
 from importlib import import_module
 from typing import TYPE_CHECKING, ClassVar
 
+from studies.results import Drawing
+
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
     from pandas import DataFrame
 
 
@@ -23,12 +24,12 @@ class Shown:
         """Return what the result holds as a table."""
         raise NotImplementedError
 
-    def plot(self) -> "Figure":
+    def plot(self) -> Drawing:
         """Return the picture of the result (matplotlib)."""
         module, _, name = self.drawn_by.partition(":")
         if not module:
             raise NotImplementedError
-        figure: Figure = getattr(import_module(module), name)(
+        figure: Drawing = getattr(import_module(module), name)(
             self
         ).figure  # of a picture of a page; a figure's is itself
         return figure

@@ -6,7 +6,7 @@ Schema hrg.acceptance/1: `card`, `verdict` ("pass", "fail", "incomplete": a limi
 that it served), `warm_up_band_deg_per_h`, `report`.
 """
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -19,12 +19,8 @@ from studies.instrument.card import load_card
 from studies.record import read_record
 from studies.reports import style
 from studies.reports.digits import plain
-from studies.results import Chapter, Column, Facts, Figure, Part, Result, Sentence, Table
+from studies.results import Chapter, Column, Drawing, Facts, Figure, Part, Result, Sentence, Table
 from studies.schema.reader import read_file
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure as Drawing
-
 
 VERDICTS = {"pass": "all limits met", "fail": "a limit is not met", "incomplete": "not all limits could be judged"}
 SECTION, QUANTITY = Column("section", "section"), Column("words", "quantity")
@@ -191,17 +187,14 @@ def _drift(found: Acceptance) -> list[Figure | Sentence]:
         " deviation over 0.664) and rate random walk explain the curve."
     )
 
-    def draw() -> "Drawing":
-        with style.figure(height=3.6) as (made, axes):
+    def draw() -> Drawing:
+        with style.figure(height=3.6, x="averaging time τ (s)", y="Allan deviation (°/h)") as (made, axes):
             axes.fill_between(allan.tau, allan.low, allan.high, color=style.SKY, alpha=0.3, label="95 % interval")
             axes.loglog(
                 allan.tau, allan.deviation, "o-", color=style.BLUE, markersize=3, label="overlapping Allan deviation"
             )
             tau = np.geomspace(allan.tau[first], allan.tau[-1], 100)
             axes.loglog(tau, noise.deviation(tau), "--", color=style.VERMILION, label="fit N, B, K")
-            axes.set_xlabel("averaging time τ (s)")
-            axes.set_ylabel("Allan deviation (°/h)")
-            axes.legend()
             return made  # fmt: skip
 
     caption = "Allan deviation of the longest drift record."

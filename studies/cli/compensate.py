@@ -1,6 +1,6 @@
 """`hrg compensate`: apply a saved model to a record, or turn it into C for firmware."""
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -14,11 +14,7 @@ from studies.files.writing import write_text
 from studies.instrument.units import unit_of
 from studies.record import COMPENSATED, RESONATOR, Record, read_record, write_record
 from studies.reports import style
-from studies.results import Column, Figure, Result, Sentence, Table
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure as Drawing
-
+from studies.results import Column, Drawing, Figure, Result, Sentence, Table
 
 AVERAGE = 100.0  # s
 NOISE = 0.02  # relative: what the noise of a model's inputs may add to a record that has nothing to compensate
@@ -138,17 +134,14 @@ def _show(record: Record, result: Record, columns: dict[str, dict[str, Any]]) ->
     return parts
 
 
-def _draw(record: Record, result: Record, name: str) -> "Drawing":
+def _draw(record: Record, result: Record, name: str) -> Drawing:
     """Draw a column that was added, with what it compensates where the record has that."""
     rows = style.few_rows(len(record))
     hours = record["time_s"][rows] / 3600
-    with style.figure(height=3.4) as (made, axes):
+    with style.figure(height=3.4, x="time (h)", y=unit_of(name)) as (made, axes):
         if before := name.removeprefix(COMPENSATED) in record:
             axes.plot(hours, record[name.removeprefix(COMPENSATED)][rows], color=style.ORANGE, label="before")
         axes.plot(hours, result[name][rows], color=style.BLUE, label="after" if before else name)
-        axes.set_xlabel("time (h)")
-        axes.set_ylabel(unit_of(name))
-        axes.legend()
         return made
 
 

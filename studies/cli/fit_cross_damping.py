@@ -1,7 +1,7 @@
 """`hrg fit cross-damping`: the bias of a CVG from cross-damping over temperature."""
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -18,11 +18,7 @@ from studies.reports import style
 from studies.reports.cross_damping import SOURCES, draw_runs
 from studies.reports.digits import lowered, raised
 from studies.rest import RestData, gather_rest
-from studies.results import Chapter, Column, Facts, Figure, Result, Sentence, Table
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure as Drawing
-
+from studies.results import Chapter, Column, Drawing, Facts, Figure, Result, Sentence, Table
 
 LABELS = {
     "training": "fitted, rows",
@@ -188,7 +184,7 @@ def _coefficients(summary: dict[str, Any]) -> list[dict[str, Any]]:
     ]
 
 
-def _draw_curve(study: CrossDampingStudy) -> "Drawing":
+def _draw_curve(study: CrossDampingStudy) -> Drawing:
     """Draw ζ₁₂(T) over its value at calibration, with its 90 % band."""
     model = study.model
     T = np.linspace(model.lowest, model.highest, 200)
@@ -196,14 +192,11 @@ def _draw_curve(study: CrossDampingStudy) -> "Drawing":
     size = model.coefficients[0]
     spread = 1.645 * np.sqrt(np.einsum("ni,ij,nj->n", powers, model.covariance, powers)) / abs(size)
     middle = powers @ model.coefficients / size
-    with style.figure(height=3.0) as (made, axes):
+    with style.figure(height=3.0, x="temperature (°C)", y="ζ₁₂ / ζ₀") as (made, axes):
         axes.fill_between(
             T - zero_Celsius, middle - spread, middle + spread, color=style.SKY, alpha=0.4, label="90 % band"
         )
         axes.plot(T - zero_Celsius, middle, color=style.BLUE, label="fitted")
-        axes.set_xlabel("temperature (°C)")
-        axes.set_ylabel("ζ₁₂ / ζ₀")
-        axes.legend()
         return made
 
 

@@ -7,7 +7,7 @@ pressures), `saved`.
 """
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -16,12 +16,8 @@ from studies.errors import InputError
 from studies.instrument.card import load_card, save_card
 from studies.law import law_of
 from studies.reports import style
-from studies.results import Chapter, Column, Figure, Result, Sentence, Table
+from studies.results import Chapter, Column, Drawing, Figure, Result, Sentence, Table
 from studies.ringdown import Decay, GasLaw, fit_gas, read_decay, with_decay
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure as Drawing
-
 
 QUANTITIES = {
     "frequency_1_Hz": "frequency of the upper mode (Hz)",
@@ -162,30 +158,28 @@ def _figure(decay: Decay) -> Figure:
     return Figure(lambda: _draw(decay), f"{Path(decay.path).name}: record, fitted decay (orange), residual.")
 
 
-def _draw(decay: Decay) -> "Drawing":
-    with style.figure(2, 1, height=4.6, sharex=True) as (drawn, (top, bottom)):
+def _draw(decay: Decay) -> Drawing:
+    with style.figure(2, 1, height=4.6, sharex=True, x="time (s)", y=("level (dB)", "residual")) as (
+        drawn,
+        (top, bottom),
+    ):
         for time, values, fitted, residual in decay.curves():
             rows = style.few_rows(time.size)
             top.plot(time[rows], values[rows], ".", markersize=1.5)
             top.plot(time[rows], fitted[rows], color=style.ORANGE, linewidth=1)
             bottom.plot(time[rows], np.real(residual[rows]), ".", markersize=1.5)
-        top.set_ylabel("level (dB)")
-        bottom.set_ylabel("residual")
-        bottom.set_xlabel("time (s)")
     return drawn
 
 
-def _draw_pressure(decays: list[Decay], gas: GasLaw | None) -> "Drawing":
+def _draw_pressure(decays: list[Decay], gas: GasLaw | None) -> Drawing:
     assert gas is not None
     points = [
         (d.notes["pressure_Pa"], d.inverse_q) for d in decays if d.inverse_q is not None and "pressure_Pa" in d.notes
     ]
     p = np.array([pressure for pressure, _ in points])
     y = np.array([(q.value, q.value - q.low, q.high - q.value) for _, q in points])
-    with style.figure() as (drawn, axes):
+    with style.figure(x="pressure (Pa)", y="1/Q") as (drawn, axes):
         axes.errorbar(p, y[:, 0], y[:, 1:].T, fmt="o", color=style.BLUE, markersize=4)
         grid = np.geomspace(max(p[p > 0].min() / 2, 1e-12), p.max() * 1.5, 200)
         axes.loglog(grid, gas.inverse_q0 + gas.slope * grid, color=style.ORANGE)
-        axes.set_xlabel("pressure (Pa)")
-        axes.set_ylabel("1/Q")
     return drawn

@@ -5,8 +5,6 @@ With --json one object, schema `hrg.fit-thermal/1`: `data`, `confidence`, `estim
 `initial_departure_K` per run, `residual_rms_Hz`, `row_step_s` of the averaged rows, `warnings`.
 """
 
-from typing import TYPE_CHECKING
-
 from studies.calibration.lags.identification import Identification
 from studies.calibration.lags.records import fit_thermal_constants
 from studies.cli.output import answers, say
@@ -16,11 +14,7 @@ from studies.instrument.card import load_card
 from studies.record import read_record
 from studies.reports import style
 from studies.reports.digits import to_interval
-from studies.results import Column, Figure, Payload, Result, Sentence, Table
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure as Drawing
-
+from studies.results import Column, Drawing, Figure, Payload, Result, Sentence, Table
 
 NAMES = {
     "radiated_share": ("Radiated share of the heat exchange at 20 °C", ""),
@@ -129,9 +123,7 @@ def _lower(text: str) -> str:
     return text[:1].lower() + text[1:]
 
 
-def _draw(found: Identification) -> "Drawing":
-    with style.figure(height=2.8) as (made, axes):
+def _draw(found: Identification) -> Drawing:
+    with style.figure(height=2.8, x=f"row ({found.row_step:g} s each)", y="residual (mHz)") as (made, axes):
         axes.plot(1e3 * found.residual, ".", markersize=2, color=style.BLUE)
-        axes.set_xlabel(f"row ({found.row_step:g} s each)")
-        axes.set_ylabel("residual (mHz)")
         return made

@@ -1,6 +1,6 @@
 """`hrg tcf`: frequency against temperature and its parts."""
 
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,10 +16,7 @@ from studies.law import check_slope_known, law_of
 from studies.papers import hrg
 from studies.record import read_frequency_table
 from studies.reports import style
-from studies.results import Column, Figure, Result, Table, rows_of
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure as Drawing
+from studies.results import Column, Drawing, Figure, Result, Table, rows_of
 
 MOST_HARMONIC = 50  # a law of a higher one takes minutes
 PARTS = {"E": "E", "nu": "ν", "rho": "ρ", "h": "h", "r": "r", "base": "base"}
@@ -121,13 +118,13 @@ def tcf(
     )
 
 
-def _curves(points: list[dict[str, Any]], parts: list[str], local: list[dict[str, float]]) -> "Drawing":
+def _curves(points: list[dict[str, Any]], parts: list[str], local: list[dict[str, float]]) -> Drawing:
     """The slope, its uncertainty and its parts over temperature."""
     T, slope, sd = (
         np.array([p[key] for p in points])
         for key in ("temperature_degC", "slope_ppm_per_degC", "uncertainty_ppm_per_degC")
     )
-    with style.figure(height=4.0) as (made, axis):
+    with style.figure(height=4.0, x="temperature (°C)", y="ppm/°C") as (made, axis):
         axis.fill_between(T, slope - sd, slope + sd, color=style.BLACK, alpha=0.12, linewidth=0)
         axis.plot(T, slope, color=style.BLACK, linewidth=2.2, label="slope")
         colours = (style.BLUE, style.VERMILION, style.GREEN, style.ORANGE, style.PURPLE, style.SKY)
@@ -135,8 +132,6 @@ def _curves(points: list[dict[str, Any]], parts: list[str], local: list[dict[str
             axis.plot(T, [p["parts_ppm_per_degC"][name] for p in points], "--", color=colour, label=PARTS[name])
         if local:
             axis.plot(*zip(*(one.values() for one in local), strict=True), "k.", label="measured")
-        axis.set_xlabel("temperature (°C)")
-        axis.set_ylabel("ppm/°C")
         axis.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
         return made
 

@@ -1,7 +1,5 @@
 """`hrg temperature`: the resonator's temperature from its own frequency."""
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from studies.cli.arguments import Array
@@ -11,11 +9,7 @@ from studies.models import read_model
 from studies.models.kinds.frequency import find_temperature, temperature_error
 from studies.record import Record, read_record, write_record
 from studies.reports import style
-from studies.results import Facts, Figure, Result, Sentence
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure as Drawing
-
+from studies.results import Drawing, Facts, Figure, Result, Sentence
 
 SOURCES = ("Wang X. et al., Sensors 2012, 12, 6434 (the HRG paper), eqs. (16)–(18), Table 2, figure 5.",)
 FAR = 3.0
@@ -99,15 +93,12 @@ def temperature(model: str, run: str, /, *, out: str | None = None) -> Result:
     )
 
 
-def _figure(record: Record, found: Array) -> "Drawing":
+def _figure(record: Record, found: Array) -> Drawing:
     rows = style.few_rows(len(record))
     hours = record["time_s"][rows] / 3600
-    with style.figure(height=3.6) as (made, axes):
+    with style.figure(height=3.6, x="time (h)", y="temperature (°C)") as (made, axes):
         for label, colour in (("housing", style.ORANGE), ("chamber", style.GREEN)):
             if f"{label}_temperature_degC" in record:
                 axes.plot(hours, record[f"{label}_temperature_degC"][rows], color=colour, linewidth=0.9, label=label)
         axes.plot(hours, found[rows], color=style.BLUE, label="resonator, from its frequency")
-        axes.set_xlabel("time (h)")
-        axes.set_ylabel("temperature (°C)")
-        axes.legend()
         return made

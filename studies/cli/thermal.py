@@ -7,7 +7,7 @@ relative change per relative change of each constant; `energy_balance_error`, re
 """
 
 import re
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -18,7 +18,7 @@ from studies.errors import InputError
 from studies.instrument.card import load_card
 from studies.instrument.display import name_constant
 from studies.reports import style
-from studies.results import Column, Figure, Result, Table, rows_of
+from studies.results import Column, Drawing, Figure, Result, Table, rows_of
 from studies.simulation.chamber import check_profile, load_profile
 from studies.simulation.heat_path import build_network, build_shell_and_stem
 from thermal.balance import check_energy
@@ -28,9 +28,6 @@ from thermal.radiative import simulate
 from thermal.relaxation import find_relaxation, time_constant_sensitivities
 from thermal.resonator import shell_weights
 from thermal.transient import Transient
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure as Drawing
 
 
 @answers("hrg.thermal/1")
@@ -115,18 +112,15 @@ def thermal(card: str, profile: str, *, rows: int = 13) -> Result:
     )
 
 
-def _curves(transient: Transient, chamber: Profile, weights: Array, names: list[str]) -> "Drawing":
+def _curves(transient: Transient, chamber: Profile, weights: Array, names: list[str]) -> Drawing:
     """Chamber and nodes over the whole profile."""
     time = np.linspace(chamber.start, chamber.end, 600)
     T = transient.observe(time, weights) - zero_Celsius
-    with style.figure() as (made, axis):
+    with style.figure(x="time (h)", y="temperature (°C)") as (made, axis):
         axis.plot(time / 3600, chamber.at(time) - zero_Celsius, color=style.BLACK, linestyle=":", label="chamber")
         colours = (style.ORANGE, style.GREEN, style.SKY, style.BLUE, style.VERMILION)
         for k, (name, colour) in enumerate(zip(names, colours, strict=True)):
             axis.plot(time / 3600, T[:, k], color=colour, label=name)
-        axis.set_xlabel("time (h)")
-        axis.set_ylabel("temperature (°C)")
-        axis.legend()
         return made
 
 

@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import asdict, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,12 +13,8 @@ from studies import results
 from studies.papers.bvg import BellTwin, Claims
 from studies.reports import style
 from studies.reports.page import Block, Chapter, Picture, Table, Text, draw
-from studies.results import Column, Payload
+from studies.results import Column, Drawing, Payload
 from studies.results.page import make_blocks
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure as Drawing
-
 
 SOURCES = ("Su Z., Liu N., Li Q., Sensors 2015, 15, 23684–23705, doi:10.3390/s150923684: equations (1)–(36).",)
 NAMES = {
@@ -134,7 +129,7 @@ def claim_blocks(claims: Claims) -> list[Block]:
     return [Table("Published claims", ["Claim", "Published", "Recomputed", "Verdict"], rows, note)]
 
 
-def draw_steps(chain: BellChain, runs: tuple[BellRun, BellRun, BellRun]) -> "Drawing":
+def draw_steps(chain: BellChain, runs: tuple[BellRun, BellRun, BellRun]) -> Drawing:
     """Draw the error of the rate before and after: at rest and turning over temperature, and over the applied rate."""
     rates, rest, turning = runs
     with style.figure(1, 3, height=3.2) as (made, axes):
@@ -167,7 +162,7 @@ def draw_allan(chain: BellChain, rest: BellRun) -> Picture:
     """Draw the Allan deviation at rest after the rough step, after the chain, and after the filter (figure 19)."""
     result = apply_chain(chain, rest.time, rest.output, rest.temperature, extrapolate=True)
     step = float(rest.time[1] - rest.time[0])
-    with style.figure(height=3.4) as (made, axes):
+    with style.figure(height=3.4, x="averaging time τ (s)", y="Allan deviation (°/h)") as (made, axes):
         for values, colour, name in (
             (result.rough, style.ORANGE, "rough"),
             (result.temperature_compensated, style.BLUE, "compensated"),
@@ -177,9 +172,6 @@ def draw_allan(chain: BellChain, rest: BellRun) -> Picture:
             axes.loglog(allan.tau, allan.deviation, color=colour, label=name)
             axes.fill_between(allan.tau, allan.low, allan.high, color=colour, alpha=0.2)
         axes.axvline(step * len(chain.taps), color=style.BLACK, linewidth=0.8, linestyle=":")
-        axes.set_xlabel("averaging time τ (s)")
-        axes.set_ylabel("Allan deviation (°/h)")
-        axes.legend()
     caption = (
         "Allan deviation at rest during the temperature ramp, with its 68 % band. The dotted line marks the filter length; at longer"
         " averaging times filtering changes nothing, so it cannot reduce a random walk read there. The run was used for the fit, which"

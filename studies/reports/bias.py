@@ -1,7 +1,7 @@
 """Parts of the page of a bias calibration: selection of terms, coefficients with both errors, improvement, Allan deviation."""
 
 import math
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import numpy as np
 
@@ -13,11 +13,7 @@ from studies.models.file import widen
 from studies.models.kinds.bias import OUTPUTS
 from studies.reports import style
 from studies.reports.digits import plain, raised, to_error
-from studies.results import Column, Facts, Figure, Part, Sentence, Table, Where
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure as Drawing
-
+from studies.results import Column, Drawing, Facts, Figure, Part, Sentence, Table, Where
 
 SOURCES = (
     "Wang X. et al., Sensors 2012, 12, 6434 (the HRG paper), eqs. (19)–(22).",
@@ -282,7 +278,7 @@ def runs_figure(study: BiasStudy, method: Method) -> Figure:
     )
 
 
-def _draw_runs(study: BiasStudy, method: Method) -> "Drawing":
+def _draw_runs(study: BiasStudy, method: Method) -> Drawing:
     unit = _unit(study.output)
     fit, shown = study.by(method).fit, study.runs[:MOST_RUNS]
     columns = min(len(shown), 3)
@@ -303,12 +299,14 @@ def _draw_runs(study: BiasStudy, method: Method) -> "Drawing":
                 below.set_ylabel(f"compensated ({unit})")
         for empty in axes[-2:, len(shown) - (rows - 1) * columns :].flat:
             empty.set_axis_off()
-        axes[0, 0].legend()
         return figure
 
 
-def _draw_allan(study: BiasStudy) -> "Drawing":
-    with style.figure(height=3.8) as (figure, axes):
+def _draw_allan(study: BiasStudy) -> Drawing:
+    with style.figure(height=3.8, x="averaging time τ (s)", y=f"Allan deviation ({_unit(study.output)})") as (
+        figure,
+        axes,
+    ):
         for spectrum, colour, label in ((study.before, style.ORANGE, "before"), (study.after, style.BLUE, "after")):
             if spectrum is None:
                 continue
@@ -316,9 +314,6 @@ def _draw_allan(study: BiasStudy) -> "Drawing":
             axes.fill_between(allan.tau, allan.low, allan.high, color=colour, alpha=0.25, linewidth=0)
             axes.loglog(allan.tau, allan.deviation, color=colour, label=label)
             axes.loglog(allan.tau, spectrum.noise.deviation(allan.tau), "--", color=colour, linewidth=1)
-        axes.set_xlabel("averaging time τ (s)")
-        axes.set_ylabel(f"Allan deviation ({_unit(study.output)})")
-        axes.legend()
         return figure
 
 

@@ -43,7 +43,7 @@ def trace_figure(twins: Twins) -> Picture:
     fit = ranked[len(ranked) // 2]
     time, bias, left = fit.trace
     hours = time / 3600
-    with style.figure(2, height=4.4, sharex=True) as (figure, (upper, lower)):
+    with style.figure(2, height=4.4, sharex=True, x="time (h)") as (figure, (upper, lower)):
         upper.plot(hours, bias, color=style.BLUE, linewidth=0.8, label="output")
         upper.plot(hours, bias - left, color=style.VERMILION, label="model, eq. (22)")
         lower.plot(hours, left, color=style.BLUE, linewidth=0.8, label="compensated")
@@ -51,8 +51,6 @@ def trace_figure(twins: Twins) -> Picture:
         lower.set_ylim(middle - 0.6 * span, middle + 0.6 * span)
         for axes in (upper, lower):
             axes.set_ylabel("bias (°/h)")
-            axes.legend(fontsize=8)
-        lower.set_xlabel("time (h)")
     before, after = fit.training
     caption = (
         f"Figure 6 for the virtual gyro with the median improvement, cooled from 25 to −20 °C: (a) output and model, (b) compensated"
@@ -105,7 +103,10 @@ def terms_table(twins: Twins) -> Table:
 def twin_figure(twins: Twins) -> Picture:
     """Draw every gyro's improvement, held out against training."""
     paper = _fits(twins, "paper", 1)
-    with style.figure(height=3.6) as (figure, axes):
+    with style.figure(height=3.6, x="improvement factor, training run", y="improvement factor, held-out run") as (
+        figure,
+        axes,
+    ):
         training = [fit.training_gain for fit in paper]
         axes.loglog(
             training, [fit.cooling.gain for fit in paper], "o", color=style.BLUE, markersize=5, label="new cooling run"
@@ -120,9 +121,6 @@ def twin_figure(twins: Twins) -> Picture:
             PAPER_BEFORE / PAPER_AFTER, color=style.ORANGE, linestyle="--", label="paper: 5.15 on its training run"
         )
         axes.set_xlim(0.9, ends[1])
-        axes.set_xlabel("improvement factor, training run")
-        axes.set_ylabel("improvement factor, held-out run")
-        axes.legend()
         caption = "Each marker is one virtual gyro, fitted to one cooling run as in the paper. Below the dotted line compensation makes the bias worse."
         return draw(figure, caption, "Improvement on held-out runs against improvement on the training run.")
 

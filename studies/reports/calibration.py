@@ -1,7 +1,7 @@
 """Parts of a calibration's answer: residuals from the card as given to the noise, values, and the figures of its page."""
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -11,11 +11,7 @@ from studies.calibration.observed import HOUSING, QUADRATURE, SETTLED, WORDS
 from studies.instrument.display import display_name
 from studies.reports import style
 from studies.reports.digits import plain
-from studies.results import Chapter, Column, Facts, Figure, Sentence, Table
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure as Drawing
-
+from studies.results import Chapter, Column, Drawing, Facts, Figure, Sentence, Table
 
 NAMES = {name: word[0].upper() + word[1:] for name, word in WORDS.items()}
 SHOWN = {
@@ -150,7 +146,7 @@ def _held_out_note(payload: Mapping[str, Any]) -> str:
     )
 
 
-def _draw_residuals(found: Calibration) -> "Drawing":
+def _draw_residuals(found: Calibration) -> Drawing:
     with style.figure(1, len(found.ladder), height=2.5, squeeze=False) as (made, axes):
         for axis, (name, rung) in zip(axes[0], found.ladder.items(), strict=True):
             unit, scale = SHOWN[name]
@@ -166,20 +162,22 @@ def _draw_residuals(found: Calibration) -> "Drawing":
         return made
 
 
-def _draw_shifts(found: Calibration) -> "Drawing":
+def _draw_shifts(found: Calibration) -> Drawing:
     told = [one for one in found.estimates if one.told_by != "prior"][:30] or list(found.estimates)[:30]
-    with style.figure(height=0.24 * len(told) + 0.9) as (made, axis):
+    with style.figure(height=0.24 * len(told) + 0.9, x="shift from the card (prior standard deviations)") as (
+        made,
+        axis,
+    ):
         place = np.arange(len(told))[::-1]
         axis.axvspan(-1.645, 1.645, color=style.SKY, alpha=0.18)
         shifts, widths = [one.shift_sd for one in told], [1.645 * one.width for one in told]
         axis.errorbar(shifts, place, xerr=widths, fmt="o", markersize=4, capsize=2, color=style.BLUE)
         axis.axvline(0.0, color=style.BLACK, linewidth=0.8)
         axis.set_yticks(place, [display_name(one.parameter) for one in told], fontsize=8)
-        axis.set_xlabel("shift from the card (prior standard deviations)")
         return made
 
 
-def residual_figure(found: Calibration) -> "Drawing":
+def residual_figure(found: Calibration) -> Drawing:
     """Draw measured minus predicted after the calibration, over time; of tables alone over temperature."""
     problem, state = found.fit.problem, found.fit.state
     names = [name for name in problem.responses if name != SETTLED]

@@ -1,15 +1,12 @@
 """Pictures of records: every column over time, with its gaps."""
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from studies.reports import style
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+from studies.results import Drawing
 
 Array = NDArray[np.float64]
 Columns = Mapping[str, Array]
@@ -18,7 +15,7 @@ LONG = 10.0  # usual steps between two values that make a gap, whatever the rows
 SKIPPED = 1.5  # the same where rows between them are empty
 
 
-def draw_columns(columns: Columns) -> "Figure":
+def draw_columns(columns: Columns) -> Drawing:
     """Return a figure with every column over time, or over the first column of a table of settled readings."""
     names = list(columns)
     timed = names[0] == "time_s"
@@ -39,7 +36,7 @@ def draw_columns(columns: Columns) -> "Figure":
             axis.plot(*drawn, mark, color=style.BLUE, linewidth=0.9)
             axis.set_title(name.replace("$", r"\$"), fontsize=9, loc="left")
         axes[-1, 0].set_xlabel(label.replace("$", r"\$"))
-        made: Figure = figure
+        made: Drawing = figure
     return made
 
 

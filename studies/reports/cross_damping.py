@@ -1,7 +1,5 @@
 """Runs before and after compensation of cross-damping, and the chapter on the CVG paper's figures 1 and 2 for `hrg reproduce`."""
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from compensation.cross_damping import CrossDampingModel, RestRun
@@ -12,10 +10,7 @@ from studies.papers import cvg_cross_damping as paper
 from studies.papers.cvg_cross_damping import CrossDampingTwin
 from studies.reports import style
 from studies.reports.page import Chapter, Table, Text, draw
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure as Drawing
-
+from studies.results import Drawing
 
 SOURCES = ("Apostolyuk V., Chikovani V., Temperature error model in Coriolis vibratory gyroscopes: eqs. (1)–(10).",)
 
@@ -61,9 +56,16 @@ def determinants_table(twin: CrossDampingTwin) -> Table:
     return Table("Improvement factor by resonator lag and white noise", columns, rows, note)
 
 
-def draw_runs(runs: tuple[RestRun, ...], model: CrossDampingModel, unit: float, name: str) -> "Drawing":
+def draw_runs(runs: tuple[RestRun, ...], model: CrossDampingModel, unit: float, name: str) -> Drawing:
     """Draw runs one after the other (CVG cross-damping paper, figures 1 and 2); `unit` in rad/s, called `name`."""
-    with style.figure(2, height=4.8, sharex=True, height_ratios=(1, 2)) as (made, (upper, lower)):
+    with style.figure(
+        2,
+        height=4.8,
+        sharex=True,
+        height_ratios=(1, 2),
+        x="time (h)",
+        y=("temperature (°C)", f"zero-rate output ({name})"),
+    ) as (made, (upper, lower)):
         begin = 0.0
         for i, run in enumerate(runs):
             after = model.compensate(run.time, run.rate, run.temperature, extrapolate=True)
@@ -79,8 +81,4 @@ def draw_runs(runs: tuple[RestRun, ...], model: CrossDampingModel, unit: float, 
             ):
                 lower.plot(hours, means[when] / unit, color=colour, linewidth=0.9, label=None if i else label)
         lower.axhline(0, color=style.BLACK, linewidth=0.8)
-        upper.set_ylabel("temperature (°C)")
-        lower.set_ylabel(f"zero-rate output ({name})")
-        lower.set_xlabel("time (h)")
-        lower.legend()
         return made

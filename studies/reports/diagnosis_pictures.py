@@ -1,7 +1,5 @@
 """Pictures of a diagnosis: the ladder of the residual, the residual in time and against its inputs, the next run."""
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from shell.constants import zero_Celsius
@@ -12,12 +10,10 @@ from studies.diagnosis.response import RESPONSES
 from studies.diagnosis.verdict import ResponseResult
 from studies.reports.digits import plain
 from studies.reports.style import BLACK, BLUE, ORANGE, VERMILION, figure
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure as Drawing
+from studies.results import Drawing
 
 
-def ladder(diagnosis: Diagnosis) -> "Drawing":
+def ladder(diagnosis: Diagnosis) -> Drawing:
     """Draw what is left of every response: as shipped, calibrated, with the named physics, noise; on held-out rows."""
     columns = [c for c in diagnosis.verdict.responses if c in diagnosis.inquiries]
     with figure(1, len(columns), height=3.0, squeeze=False) as (canvas, axes):
@@ -74,7 +70,7 @@ def as_temperature(diagnosis: Diagnosis, column: str, value: float) -> str | Non
     )
 
 
-def before_and_after(diagnosis: Diagnosis, response: str) -> "Drawing":
+def before_and_after(diagnosis: Diagnosis, response: str) -> Drawing:
     """Draw the residual over the campaign before and, if anything is named, after the extension; the noise as a band."""
     inquiry, unit = diagnosis.inquiries[response], RESPONSES[response]
     noise = (diagnosis.verdict.responses[response].noise or 0.0) * unit.scale
@@ -104,7 +100,7 @@ def _thinned(time: np.ndarray, values: np.ndarray, most: int = 500) -> tuple[np.
     return time[::step], values[::step]
 
 
-def residual_views(diagnosis: Diagnosis, response: str) -> "Drawing":
+def residual_views(diagnosis: Diagnosis, response: str) -> Drawing:
     """Draw the baseline's residual against temperature (heating and cooling), rate, frequency and the drives."""
     campaign, inquiry, unit = diagnosis.campaign, diagnosis.inquiries[response], RESPONSES[response]
     fit = inquiry.plain
@@ -144,7 +140,7 @@ def residual_views(diagnosis: Diagnosis, response: str) -> "Drawing":
         return canvas
 
 
-def next_run_picture(run: NextRun) -> "Drawing":
+def next_run_picture(run: NextRun) -> Drawing:
     """Draw the suggested run: the chamber's temperature, and the drives that step."""
     rows = 1 + len(run.drives)
     heights = [2.0] + [0.7] * len(run.drives)

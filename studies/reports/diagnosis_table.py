@@ -1,17 +1,11 @@
 """Parts of a diagnosed steady-state table: the answer, what each model leaves, and the candidates."""
 
-from typing import TYPE_CHECKING
-
 from studies.diagnosis.constants import CONSTANTS
 from studies.diagnosis.table import TableDiagnosis
 from studies.reports.diagnosis import headline, next_step, reason
 from studies.reports.digits import plain, to_error
 from studies.reports.style import BLACK, ORANGE, VERMILION, figure
-from studies.results import Chapter, Column, Facts, Figure, Sentence, Table
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure as Drawing
-
+from studies.results import Chapter, Column, Drawing, Facts, Figure, Sentence, Table
 
 CANDIDATES = (
     Column("form", "candidate"),
@@ -59,15 +53,12 @@ def law_facts(found: TableDiagnosis) -> list[tuple[str, str, str]]:
     return facts
 
 
-def table_residuals(found: TableDiagnosis) -> "Drawing":
+def table_residuals(found: TableDiagnosis) -> Drawing:
     """Draw the residuals of the law, the baseline and the strongest candidate of a steady-state table."""
     given = ("card as given", "card calibrated") if found.from_card else ("default law", "baseline: curvature free")
-    with figure(1, 1, height=3.2) as (canvas, axis):
+    with figure(1, 1, height=3.2, x="temperature (°C)", y="measured − model (Hz)") as (canvas, axis):
         # lines in the order of the rows, so that a loop shows as one
         axis.plot(found.temperature, found.law_residual, "o-", color=VERMILION, label=given[0])
         axis.plot(found.temperature, found.baseline_residual, "s-", color=ORANGE, label=given[1])
         axis.plot(found.temperature, found.extended_residual, "^-", color=BLACK, label="with the strongest candidate")
-        axis.set_xlabel("temperature (°C)")
-        axis.set_ylabel("measured − model (Hz)")
-        axis.legend()
         return canvas

@@ -49,16 +49,18 @@ def draw_responses() -> Picture:
         f"matched modes, ζ = {LIGHT * ZETA:g}": tune(K, LIGHT * ZETA),
     }
     frequency = np.linspace(-60.0, 60.0, 1201)
-    with style.figure(2, height=4.6, sharex=True) as (made, (upper, lower)):
+    with style.figure(
+        2,
+        height=4.6,
+        sharex=True,
+        x="frequency of the rate λ/2π (Hz)",
+        y=("A(λ) / A(0) of the matched gyro", "phase (°)"),
+    ) as (made, (upper, lower)):
         for name, gyro in gyros.items():
             amplitude, phase = respond_to_oscillating_rate(gyro, 2 * np.pi * frequency)
             still, _ = respond_to_oscillating_rate(tuned, 0.0)
             upper.semilogy(frequency, amplitude / still, label=name)
             lower.plot(frequency, np.degrees(np.unwrap(phase)))
-        upper.set_ylabel("A(λ) / A(0) of the matched gyro")
-        upper.legend(fontsize=8)
-        lower.set_ylabel("phase (°)")
-        lower.set_xlabel("frequency of the rate λ/2π (Hz)")
     caption = (
         "Amplitude and phase (14) of the secondary mode per unit rate, k = 500 Hz, the same excitation for all gyros."
     )
@@ -70,7 +72,7 @@ FIGURE5 = "Square pulses through the full dynamics (1) with white noise (γ = 0.
 
 def draw_error_map(error_map: ErrorMap) -> Picture:
     """Draw figure 3, the integral error over the ratios of frequency and damping."""
-    with style.figure(height=3.8) as (made, axes):
+    with style.figure(height=3.8, x="δk = k₂/k₁", y="δζ = ζ₂/ζ₁") as (made, axes):
         shades = axes.contourf(
             error_map.frequency_ratio,
             error_map.damping_ratio,
@@ -82,8 +84,6 @@ def draw_error_map(error_map: ErrorMap) -> Picture:
         bar = made.colorbar(shades, ax=axes)
         bar.set_label("log₁₀ (J / ∫A² dt)")
         axes.plot([1.0], [1.0], "+", color="white", markersize=10)
-        axes.set_xlabel("δk = k₂/k₁")
-        axes.set_ylabel("δζ = ζ₂/ζ₁")
         axes.grid(visible=False)
     caption = "Integral error (26) of the simplified transfer function (24) relative to the full equations (1)."
     return draw(made, caption, "A map of the error, least where both modes agree.")
@@ -129,12 +129,10 @@ def wiener_table(study: FilterStudy) -> Table:
 def draw_filtered(case: Filtered, caption: str, name: str) -> Picture:
     """Draw true rate, noisy output and estimate over time."""
     rows = slice(None, None, max(len(case.time) // MOST_POINTS, 1))
-    with style.figure(height=3.4) as (made, axes):
+    with style.figure(height=3.4, x="time (s)", y="rate (rad/s)") as (made, axes):
         axes.plot(case.time[rows], case.noisy[rows], color="#b8bec6", linewidth=0.6, label="noisy output")
         axes.plot(case.time[rows], case.rate[rows], "--", color=style.BLACK, linewidth=1.0, label="true rate")
         axes.plot(case.time[rows], case.estimate[rows], color=style.BLUE, label=name)
-        axes.set_xlabel("time (s)")
-        axes.set_ylabel("rate (rad/s)")
         axes.legend(ncols=3, loc="upper right")
     numbers = (
         f" Noise {case.noise_before:.3f} → {case.noise_after:.3f} rad/s (factor {case.noise_before / case.noise_after:.1f});"
@@ -148,7 +146,7 @@ def draw_kalman(study: FilterStudy) -> Picture:
     """Draw figure 6 (output and its estimate) above figure 7 (true rate, output, estimated rate)."""
     six, seven = study.figure6, study.figure7
     rows = slice(None, None, max(len(six.time) // MOST_POINTS, 1))
-    with style.figure(2, height=5.4, sharex=True) as (made, (upper, lower)):
+    with style.figure(2, height=5.4, sharex=True, x="time (s)") as (made, (upper, lower)):
         upper.plot(six.time[rows], six.noisy[rows], color="#b8bec6", linewidth=0.6, label="noisy output")
         upper.plot(six.time[rows], six.output[rows], ":", color=style.BLACK, label="output without noise")
         upper.plot(six.time[rows], six.estimate[rows], color=style.BLUE, label="estimate of the output")
@@ -159,7 +157,6 @@ def draw_kalman(study: FilterStudy) -> Picture:
             axes.set_ylabel("rate (rad/s)")
             axes.legend(ncols=3, loc="upper right", fontsize=8)
             axes.set_ylim(-0.5, 1.75)
-        lower.set_xlabel("time (s)")
     output_noise, rate_noise = study.settled_noise[-1]
     caption = (
         f"Kalman filter with the paper's Q and R, sampled every {1e3 * (six.time[1] - six.time[0]):g} ms: output noise"

@@ -6,11 +6,10 @@ from studies.diagnosis.fleet.outcome import Fleet, Share, Value
 from studies.reports.diagnosis import NAMES, cause_table, remarks, response_table
 from studies.reports.digits import plain
 from studies.reports.style import BLUE, VERMILION, figure
-from studies.results import Chapter, Column, Figure, Part, Sentence, Table
+from studies.results import Chapter, Column, Drawing, Figure, Part, Sentence, Table
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure as Drawing
 
 ACROSS, MOST = 3, 6
 KINDS = {"all": "all devices", "all but": "all but {0}", "alone": "{0} alone", "own": "each device its own"}
@@ -123,7 +122,7 @@ def _on_page(*tables: Table) -> list[Table]:
     return [Table(one.title, one.rows, one.columns, one.note, "page") for one in tables]
 
 
-def _draw_values(fleet: Fleet) -> "Drawing":
+def _draw_values(fleet: Fleet) -> Drawing:
     drawn, devices = _ordered(fleet)[:MOST], list(fleet.devices)
     rows = -(-len(drawn) // ACROSS)
     with figure(rows, ACROSS, height=2.4 * rows, squeeze=False) as (canvas, axes):

@@ -1,7 +1,5 @@
 """Parts of any page about a steady-state table: fit, inverse, order, and extrapolation."""
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -11,10 +9,7 @@ from studies.models.file import widen
 from studies.papers.hrg import FrequencyStudy
 from studies.reports import style
 from studies.reports.digits import raised
-from studies.results import Column, Facts, Figure, Part, Table, rows_of
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure as Drawing
+from studies.results import Column, Drawing, Facts, Figure, Part, Table, rows_of
 
 SOURCES = ("Wang X. et al., Sensors 2012, 12, 6434 (the HRG paper), eqs. (16)–(18), Table 2, figures 4 and 5.",)
 ORDERS = {1: "straight line", 2: "quadratic", 3: "cubic", 4: "quartic", 5: "quintic"}
@@ -126,20 +121,22 @@ def order_parts(study: FrequencyStudy) -> list[Part]:
 def fit_figure(study: FrequencyStudy) -> Figure:
     """Return the fitted curve over the measured points, with the residuals below (HRG paper, figure 4)."""
 
-    def draw() -> "Drawing":
+    def draw() -> Drawing:
         T = np.linspace(*study.fit.temperature_range_degC, 200)
-        with style.figure(2, height=4.6, sharex=True, height_ratios=(3, 1.2)) as (made, (upper, lower)):
+        with style.figure(
+            2,
+            height=4.6,
+            sharex=True,
+            height_ratios=(3, 1.2),
+            x="temperature (°C)",
+            y=("frequency (Hz)", "residual (mHz)"),
+        ) as (made, (upper, lower)):
             upper.plot(T, study.fit.frequency(T), color=style.BLUE, label=name_order(study.fit.order))
             upper.plot(study.temperature_degC, study.frequency, "o", color=style.BLACK, label="measured")
-            upper.set_ylabel("frequency (Hz)")
             upper.ticklabel_format(axis="y", useOffset=False)
-            upper.legend()
             lower.axhline(0, color=style.BLACK, linewidth=0.8)
             for fit, colour, mark in _fits(study):
                 lower.plot(study.temperature_degC, 1e3 * fit.residuals, mark, color=colour, label=name_order(fit.order))
-            lower.set_ylabel("residual (mHz)")
-            lower.set_xlabel("temperature (°C)")
-            lower.legend(fontsize=8)
             return made
 
     return Figure(draw, "Measured frequency, fitted curve and residuals.", "Frequency and residuals over temperature.")
@@ -148,8 +145,8 @@ def fit_figure(study: FrequencyStudy) -> Figure:
 def error_figure(study: FrequencyStudy) -> Figure:
     """Return the error of the calculated temperature (HRG paper, figure 5a)."""
 
-    def draw() -> "Drawing":
-        with style.figure(height=2.8) as (made, axes):
+    def draw() -> Drawing:
+        with style.figure(height=2.8, x="temperature (°C)", y="actual − calculated (K)") as (made, axes):
             axes.axhline(0, color=style.BLACK, linewidth=0.8)
             for fit, colour, mark in _fits(study):
                 try:
@@ -157,9 +154,6 @@ def error_figure(study: FrequencyStudy) -> Figure:
                 except CompensationError:
                     continue
                 axes.plot(study.temperature_degC, error, mark + "-", color=colour, label=name_order(fit.order))
-            axes.set_xlabel("temperature (°C)")
-            axes.set_ylabel("actual − calculated (K)")
-            axes.legend()
             return made
 
     return Figure(
@@ -176,18 +170,15 @@ def _extrapolation(study: FrequencyStudy, other: FrequencyFit) -> Figure:
     def differ(T: float) -> str:
         return _most(np.abs([misreading_degC(one, two, T) for one, two, *_ in pairs]))
 
-    def draw() -> "Drawing":
+    def draw() -> Drawing:
         T = np.linspace(low - BEYOND, high + BEYOND, 200)
-        with style.figure(height=2.8) as (made, axes):
+        with style.figure(height=2.8, x="temperature (°C)", y="reading error (K)") as (made, axes):
             axes.axvspan(low, high, color=style.SKY, alpha=0.18, label="measured range")
             axes.axhline(0, color=style.BLACK, linewidth=0.8)
             for one, two, (reader, truth), colour in pairs:
                 axes.plot(
                     T, misreading_degC(one, two, T), color=colour, label=f"read by the {reader} if the {truth} is true"
                 )
-            axes.set_xlabel("temperature (°C)")
-            axes.set_ylabel("reading error (K)")
-            axes.legend(fontsize=8)
             return made
 
     caption = (

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import asdict
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -11,12 +11,8 @@ from studies.instrument.units import unit_of
 from studies.record import Record
 from studies.reports import style
 from studies.reports.digits import plain, to_error
-from studies.results import Chapter, Column, Facts, Figure, Sentence, Table
+from studies.results import Chapter, Column, Drawing, Facts, Figure, Sentence, Table
 from studies.simulation.loop_study import BiasSlope, LoopStudy, answer_steps, bias_around, bias_slopes, noise_over
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure as Drawing
-
 
 COLOURS = (style.BLUE, style.VERMILION, style.GREEN, style.PURPLE, style.ORANGE, style.SKY, style.YELLOW)
 LENGTHS = tuple(np.geomspace(0.01, 1e4, 25))
@@ -152,11 +148,11 @@ def _unit(key: str) -> str:
     return "" if unit == "1" else unit if unit == "°" else f" {unit}"
 
 
-def _around(study: LoopStudy) -> "Drawing":
+def _around(study: LoopStudy) -> Drawing:
     """Return the bias of each source over the azimuth of the wave."""
     azimuth = np.linspace(0.0, np.pi / 2, 181)
     parts = bias_around(study, azimuth)
-    with style.figure(height=3.4) as (made, axis):
+    with style.figure(height=3.4, x="azimuth of the wave (°)", y="bias (°/h)") as (made, axis):
         for k, (name, values) in enumerate(parts.items()):
             strong = name == "all"
             axis.plot(
@@ -168,16 +164,14 @@ def _around(study: LoopStudy) -> "Drawing":
             )
         at = np.degrees(study.angle % (np.pi / 2))
         axis.axvline(at, color=style.BLACK, linestyle=":", linewidth=1.0, label="azimuth of the card")
-        axis.set_xlabel("azimuth of the wave (°)")
-        axis.set_ylabel("bias (°/h)")
         axis.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), fontsize=9)
         return made
 
 
-def _noise(study: LoopStudy) -> "Drawing":
+def _noise(study: LoopStudy) -> Drawing:
     """Return the noise of each source over the averaging time."""
     found = noise_over(study, LENGTHS)
-    with style.figure(height=3.4) as (made, axis):
+    with style.figure(height=3.4, x="averaging time (s)", y="standard deviation (°/h)") as (made, axis):
         for k, (name, values) in enumerate(found.items()):
             strong = name == "all"
             axis.loglog(
@@ -187,13 +181,10 @@ def _noise(study: LoopStudy) -> "Drawing":
                 linewidth=2.2 if strong else 1.4,
                 label=NAMES[name],
             )
-        axis.set_xlabel("averaging time (s)")
-        axis.set_ylabel("standard deviation (°/h)")
-        axis.legend(fontsize=9)
         return made
 
 
-def _bode(study: LoopStudy) -> "Drawing":
+def _bode(study: LoopStudy) -> Drawing:
     """Return gain and phase of the open loops over frequency."""
     half = study.loops.sampling / 2
     low = min(m.crossover for m in study.margins) / 30
@@ -206,7 +197,10 @@ def _bode(study: LoopStudy) -> "Drawing":
             drawn[key] = m.loop
         else:
             drawn[near] += f", {m.loop}"
-    with style.figure(2, 1, height=4.6, sharex=True) as (made, (upper, lower)):
+    with style.figure(2, 1, height=4.6, sharex=True, x="frequency (Hz)", y=("loop gain", "phase (°)")) as (
+        made,
+        (upper, lower),
+    ):
         for k, words in enumerate(drawn.values()):
             name = words.split(", ")[0]
             margin = next(m for m in study.margins if m.loop == name)
@@ -222,27 +216,20 @@ def _bode(study: LoopStudy) -> "Drawing":
         lower.axhline(-180, color=style.BLACK, linewidth=0.8)
         lower.set_ylim(-300, -60)
         lower.set_yticks([-270, -180, -90])
-        upper.set_ylabel("loop gain")
-        lower.set_ylabel("phase (°)")
-        lower.set_xlabel("frequency (Hz)")
-        upper.legend(fontsize=9)
         return made
 
 
-def _steps(study: LoopStudy) -> "Drawing":
+def _steps(study: LoopStudy) -> Drawing:
     """Return the command of each loop after a step."""
-    with style.figure(height=3.0) as (made, axis):
+    with style.figure(height=3.0, x="time after the step (s)", y="command / final value") as (made, axis):
         for k, (name, (time, answer)) in enumerate(answer_steps(study).items()):
             dash = ("-", "-", "--", ":")[k % 4]
             axis.semilogx(time[1:], answer[1:], dash, color=COLOURS[k], label=name)
         axis.axhline(1.0, color=style.BLACK, linewidth=0.8)
-        axis.set_xlabel("time after the step (s)")
-        axis.set_ylabel("command / final value")
-        axis.legend(fontsize=9)
         return made
 
 
-def _start(study: LoopStudy) -> "Drawing":
+def _start(study: LoopStudy) -> Drawing:
     """Return amplitude and phase error of a start from rest."""
     start = study.start
     last = max(int(np.searchsorted(start.time, 1.6 * start.ready)), 2) if np.isfinite(start.ready) else None
@@ -260,7 +247,7 @@ def _start(study: LoopStudy) -> "Drawing":
         return made
 
 
-def _course(run: Record) -> "Drawing":
+def _course(run: Record) -> Drawing:
     """Return the columns of a run over time."""
     names = [name for name in COLUMNS if name in run]
     time = run["time_s"] / 3600

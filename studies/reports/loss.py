@@ -1,7 +1,5 @@
 """Pictures of a loss budget: its parts, their course over temperature, and what the wall takes part in."""
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from shell.constants import zero_Celsius
@@ -9,20 +7,17 @@ from shell.damping.budget import Budget, LossPart
 from studies.loss.account import StatedLoss
 from studies.loss.model import LossModel
 from studies.reports import style
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
+from studies.results import Drawing
 
 COLOURS = (style.BLUE, style.VERMILION, style.GREEN, style.ORANGE, style.PURPLE, style.SKY, style.YELLOW)
 DASHES = ("-", "--", ":")
 SMALLEST = 1e-6  # of the sum: smaller parts are in the tables, not in the pictures
 
 
-def bars(budget: Budget, at: int) -> "Figure":
+def bars(budget: Budget, at: int) -> Drawing:
     """The parts at one temperature with their intervals, largest on top."""
     parts = _shown(budget, at)
-    with style.figure(height=0.34 * len(parts) + 1.0) as (made, axis):
+    with style.figure(height=0.34 * len(parts) + 1.0, x="1/Q (1e−9)") as (made, axis):
         place = np.arange(len(parts))[::-1]
         values = 1e9 * np.array([part.inverse_q[at] for part in parts])
         low, high = (1e9 * np.array([part.interval[end][at] for part in parts]) for end in (0, 1))
@@ -34,15 +29,14 @@ def bars(budget: Budget, at: int) -> "Figure":
             place, [f"{part.name}, {100 * part.inverse_q[at] / budget.inverse_q[at]:.3g} %" for part in parts]
         )
         axis.set_xlim(left=0.0)
-        axis.set_xlabel("1/Q (1e−9)")
         return made
 
 
-def course(budget: Budget, stated: StatedLoss | None, reference: float) -> "Figure":
+def course(budget: Budget, stated: StatedLoss | None, reference: float) -> Drawing:
     """1/Q and its parts over temperature."""
     degrees, middle = budget.temperatures - zero_Celsius, len(budget.temperatures) // 2
     low, high = budget.interval
-    with style.figure(height=4.0) as (made, axis):
+    with style.figure(height=4.0, x="temperature (°C)", y="1/Q") as (made, axis):
         axis.fill_between(degrees, low, high, color=style.BLACK, alpha=0.12, linewidth=0)
         axis.plot(degrees, budget.inverse_q, color=style.BLACK, linewidth=2.2, label="sum, with its 90 % interval")
         for k, part in enumerate(_shown(budget, middle)):
@@ -56,16 +50,16 @@ def course(budget: Budget, stated: StatedLoss | None, reference: float) -> "Figu
         if stated is not None:
             axis.plot(reference - zero_Celsius, stated.inverse_q, "k*", markersize=11, label="stated in the card")
         axis.set_yscale("log")
-        axis.set_xlabel("temperature (°C)")
-        axis.set_ylabel("1/Q")
         axis.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), fontsize=9)
         return made
 
 
-def along(model: LossModel) -> "Figure":
+def along(model: LossModel) -> Drawing:
     """What the faces of the wall take part in, both together, over the meridian."""
     faces = model.vibration.faces
-    with style.figure(height=3.0) as (made, axis):
+    with style.figure(
+        height=3.0, x="position on the meridian, 0 where it starts, 1 where it ends", y="per area, over its mean"
+    ) as (made, axis):
         for words, field, colour, dash in (
             ("energy", "energy", style.BLUE, "-"),
             ("area strain", "stretch", style.VERMILION, "--"),
@@ -81,10 +75,7 @@ def along(model: LossModel) -> "Figure":
             axis.plot(
                 faces[0].position[order], np.asarray(density)[order] / (mean or 1.0), dash, color=colour, label=words
             )
-        axis.set_xlabel("position on the meridian, 0 where it starts, 1 where it ends")
-        axis.set_ylabel("per area, over its mean")
         axis.set_ylim(bottom=0.0)
-        axis.legend()
         return made
 
 

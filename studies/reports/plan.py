@@ -1,7 +1,6 @@
 """Parts of a plan: which effects a campaign can identify, how small they may be, and what would be named instead."""
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -9,10 +8,7 @@ from studies.diagnosis.planning.plan import Outlook, Plan, effect_of, response_o
 from studies.diagnosis.planning.rehearsal import NOTHING
 from studies.diagnosis.response import RESPONSES
 from studies.reports.style import figure
-from studies.results import Chapter, Column, Facts, Figure, Sentence, Table
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure as Drawing
+from studies.results import Chapter, Column, Drawing, Facts, Figure, Sentence, Table
 
 SEEN = 0.02
 """Share below which an answer is not listed."""
@@ -136,7 +132,7 @@ def plan_parts(outlook: Outlook, profiles: Sequence[str]) -> list[Chapter]:
     ]  # fmt: skip
 
 
-def _draw_shares(outlook: Outlook) -> "Drawing":
+def _draw_shares(outlook: Outlook) -> Drawing:
     """How often each effect is named at each SNR, under white and with slow noise."""
     keys = _ranked(outlook)
     columns = [(plan, noise) for plan in outlook.plans for noise in plan.by_noise]
@@ -144,14 +140,14 @@ def _draw_shares(outlook: Outlook) -> "Drawing":
     return _map(shares, keys, [f"SNR {plan.snr:g}\n{NOISE.get(noise, noise)} noise" for plan, noise in columns])
 
 
-def _draw_confusion(plan: Plan) -> "Drawing":
+def _draw_confusion(plan: Plan) -> Drawing:
     keys = sorted(plan.confusion)
     said = {name for shares in plan.confusion.values() for name in shares} | {effect_of(key) for key in keys}
     names = [*sorted(said - {NOTHING}), NOTHING]
     return _map([[plan.confusion[key].get(name, 0.0) for name in names] for key in keys], keys, names, 55.0)
 
 
-def _map(table: list[list[float]], keys: list[str], columns: Sequence[str], turn: float = 0.0) -> "Drawing":
+def _map(table: list[list[float]], keys: list[str], columns: Sequence[str], turn: float = 0.0) -> Drawing:
     shares = np.array(table)
     with figure(height=0.25 * len(keys) + (1.8 if turn else 0.8)) as (made, axes):
         axes.imshow(shares, cmap="Blues", vmin=0.0, vmax=1.0, aspect="auto")

@@ -262,7 +262,7 @@ def _measured(study: FrequencyStudy) -> list[str]:
 
 def _slope_figure(physics: PhysicsComparison, study: FrequencyStudy) -> Picture:
     total, spread = physics.slope_ppm[:-1], physics.uncertainty_ppm[:-1]
-    with style.figure(height=3.2) as (made, axes):
+    with style.figure(height=3.2, x="temperature (°C)", y="slope of ln f (ppm/°C)") as (made, axes):
         axes.fill_between(
             study.local_degC, total - spread, total + spread, color=style.SKY, alpha=0.3, label="± 1 standard deviation"
         )
@@ -270,9 +270,6 @@ def _slope_figure(physics: PhysicsComparison, study: FrequencyStudy) -> Picture:
         axes.plot(
             study.local_degC, study.local_slope_ppm, "o", color=style.BLACK, label="measured, neighbouring points"
         )
-        axes.set_xlabel("temperature (°C)")
-        axes.set_ylabel("slope of ln f (ppm/°C)")
-        axes.legend()
     caption = (
         "The predicted slope has the right magnitude. The measured slope falls faster and rises again above 25 °C."
     )
@@ -296,7 +293,7 @@ def _step_inverse(settling: SettlingStudy) -> Picture:
     fit = fit_frequency(true[points], curve.frequency[points])
     calculated = fit.temperature(curve.frequency[inside])
     hours = curve.time[inside] / 3600
-    with style.figure(2, height=4.2, sharex=True, height_ratios=(3, 1.2)) as (made, (upper, lower)):
+    with style.figure(2, height=4.2, sharex=True, height_ratios=(3, 1.2), x="time (h)") as (made, (upper, lower)):
         upper.plot(hours, calculated, color=style.BLUE, label="calculated from the frequency")
         upper.set_ylabel("temperature (°C)")
         other = upper.twinx()
@@ -309,7 +306,6 @@ def _step_inverse(settling: SettlingStudy) -> Picture:
         lower.axhline(0, color=style.BLACK, linewidth=0.8)
         lower.plot(hours, 1e3 * (calculated - true[inside]), color=style.BLUE)
         lower.set_ylabel("error (mK)")
-        lower.set_xlabel("time (h)")
     caption = (
         "A virtual step from 20 to −10 °C (the paper does not publish its record): the temperature calculated from the frequency"
         " with a cubic fitted to nine points, and its error relative to the effective temperature of the mode."

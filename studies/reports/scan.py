@@ -1,17 +1,13 @@
 """Pictures of a scan: unwrapped maps and circumferential harmonics."""
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from studies.reports.style import BLUE, ORANGE, figure
+from studies.results import Drawing
 from studies.scan import Scan
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure as Drawing
 
-
-def maps(scan: Scan) -> "Drawing":
+def maps(scan: Scan) -> Drawing:
     """Return maps of wall and middle surface, or of the one face."""
     names = ["wall", "offset"] if len(scan.faces) == 2 else list(scan.faces)
     with figure(len(names), 1, 2.5 * len(names), squeeze=False) as (made, axes):
@@ -29,7 +25,7 @@ def maps(scan: Scan) -> "Drawing":
         return made
 
 
-def harmonics(scan: Scan) -> "Drawing":
+def harmonics(scan: Scan) -> Drawing:
     """Return the amplitudes of the harmonics at the rim."""
     quantity = "wall" if len(scan.faces) == 2 else next(iter(scan.faces))
     rim = max(w.position for w in scan.waves)
@@ -49,5 +45,4 @@ def harmonics(scan: Scan) -> "Drawing":
             ax.bar(order + shift, value, 0.28, color=colour, label="middle surface" if q == "offset" else q)
             ax.errorbar(order + shift, value, np.maximum(spread.T, 0), fmt="none", ecolor="black", capsize=2)
         ax.set(xlabel="circumferential harmonic", ylabel="amplitude at the rim (µm)", yscale="log")
-        ax.legend()
         return made

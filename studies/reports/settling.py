@@ -51,7 +51,6 @@ def step_figure(study: SettlingStudy) -> Picture:
             lower.set_xlabel("time (10³ s)")
         axes[0][0].set_ylabel("frequency (Hz)")
         axes[1][0].set_ylabel("remaining step (%)")
-        axes[0][0].legend(fontsize=8)
     return draw(
         made,
         "The virtual gyro after the temperature steps of figure 3; dotted lines: 9 000 s and 15 000 s.",
@@ -86,7 +85,7 @@ def step_table(study: SettlingStudy) -> Table:
 
 def soak_figure(study: SettlingStudy) -> Picture:
     """Draw the error that incomplete soak leaves in Table 1's frequencies."""
-    with style.figure(height=3.0) as (made, axes):
+    with style.figure(height=3.0, x="chamber temperature (°C)", y="reading − settled (mHz)") as (made, axes):
         axes.axhline(0, color=style.BLACK, linewidth=0.8)
         hours = sorted({soak.hours for soak in study.soaks})
         for soak in (s for s in study.soaks if s.protocol == PROTOCOLS[0]):
@@ -96,8 +95,6 @@ def soak_figure(study: SettlingStudy) -> Picture:
             axes.plot(
                 POINTS_degC, 1e3 * soak.error, line + "o", color=colour, alpha=strength, markersize=3, label=label
             )
-        axes.set_xlabel("chamber temperature (°C)")
-        axes.set_ylabel("reading − settled (mHz)")
         axes.legend(fontsize=7, ncols=2)
     return draw(
         made,

@@ -1,27 +1,18 @@
 """How figures look: colours that survive print and colour blindness, a light grid, SI units in the labels."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+from studies.results import Drawing
 
 # Okabe and Ito's set: distinguishable with every common kind of colour vision, and by lightness in print.
 BLACK, ORANGE, SKY, GREEN, YELLOW, BLUE, VERMILION, PURPLE = (
-    "#000000",
-    "#E69F00",
-    "#56B4E9",
-    "#009E73",
-    "#F0E442",
-    "#0072B2",
-    "#D55E00",
-    "#CC79A7",
-)
+    "#000000", "#E69F00", "#56B4E9", "#009E73", "#F0E442", "#0072B2", "#D55E00", "#CC79A7",
+)  # fmt: skip
 _STYLE = {
     "font.size": 10,
     "axes.grid": True,
@@ -31,6 +22,7 @@ _STYLE = {
     "axes.spines.right": False,
     "axes.axisbelow": True,
     "legend.frameon": False,
+    "legend.fontsize": 9,
     "lines.linewidth": 1.6,
 }
 
@@ -44,12 +36,25 @@ def few_rows(count: int) -> NDArray[np.intp]:
 
 
 @contextmanager
-def figure(rows: int = 1, columns: int = 1, height: float = 3.4, **options: Any) -> "Iterator[tuple[Figure, Any]]":
-    """Give a figure and its axes in the house style; it belongs to no window and is forgotten afterwards."""
+def figure(
+    rows: int = 1, columns: int = 1, height: float = 3.4, x: str = "", y: str | Sequence[str] = "", **options: Any
+) -> Iterator[tuple[Drawing, Any]]:
+    """Give a figure and its axes in the house style; it belongs to no window and is forgotten afterwards.
+
+    `x` stands below the last row, `y` beside every row or one for each; what has named lines gets a legend.
+    """
     import matplotlib as mpl
     from matplotlib.figure import Figure
 
     with mpl.rc_context(_STYLE):
         made = Figure(figsize=(7.4, height), layout="constrained")
-        axes: Axes | Any = made.subplots(rows, columns, **options)
+        axes = made.subplots(rows, columns, **options)
+        grid = np.reshape(axes, (rows, columns))
+        for axis in grid[-1]:
+            axis.set_xlabel(x)
+        for axis, label in zip(grid[:, 0], [y] * rows if isinstance(y, str) else y, strict=True):
+            axis.set_ylabel(label)
         yield made, axes
+        for axis in made.axes:
+            if axis.get_legend() is None and axis.get_legend_handles_labels()[0]:
+                axis.legend()

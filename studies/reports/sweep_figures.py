@@ -47,7 +47,7 @@ def spread_figure(results: Results, column: Column, limits: list[RequirementLimi
     """Draw the histogram of a column, with the nominal design and the limits asked for."""
     y = results.column(column.name)
     y = y[np.isfinite(y)]
-    with style.figure(height=2.6) as (made, axes):
+    with style.figure(height=2.6, x=column_label(column), y="designs") as (made, axes):
         axes.hist(y, bins=min(60, max(5, int(np.sqrt(len(y))))), color=style.SKY, edgecolor="white", linewidth=0.4)
         if results.nominal is not None:
             place = [c.name for c in results.study.columns].index(column.name)
@@ -59,8 +59,6 @@ def spread_figure(results: Results, column: Column, limits: list[RequirementLimi
                 axes.axvline(end, color=style.VERMILION, linestyle="--", label=f"required: {end:.8g}")
             else:
                 axes.plot([], [], color=style.VERMILION, linestyle="--", label=f"required: {end:.8g}, outside the plot")
-        axes.set_xlabel(column_label(column))
-        axes.set_ylabel("designs")
         axes.ticklabel_format(axis="x", useOffset=False)
         if axes.get_legend_handles_labels()[0]:
             axes.legend(fontsize=8, loc="lower left", bbox_to_anchor=(0, 1), ncols=3)
@@ -109,13 +107,11 @@ def _map(results: Results, column: Column) -> Picture:
     z[rows, places] = results.column(column.name)
     steps_x, steps_y = (max(1, len(axis) // 200) for axis in (x, y))
     x, y, z = x[::steps_x], y[::steps_y], z[::steps_y, ::steps_x]
-    with style.figure(height=4.0) as (made, axes):
+    with style.figure(height=4.0, x=label(one.name, one.unit), y=label(other.name, other.unit)) as (made, axes):
         picture: Any = axes.pcolormesh(x, y, z, cmap="cividis", shading="nearest", rasterized=True)
         if min(z.shape) > 1 and np.isfinite(z).all() and np.ptp(z) > 0:
             lines = axes.contour(x, y, z, colors="white", linewidths=0.8)
             axes.clabel(lines, fontsize=8, fmt="%.6g")
-        axes.set_xlabel(label(one.name, one.unit))
-        axes.set_ylabel(label(other.name, other.unit))
         made.colorbar(picture, label=column_label(column), format="%.6g")
     caption = f"Map of {column.label}; failed designs are left blank."
     return draw(made, caption, f"Map of {column.label} over two parameters.")
@@ -124,7 +120,7 @@ def _map(results: Results, column: Column) -> Picture:
 def sobol_figure(indices: SobolIndices, column: Column) -> Picture:
     """Draw first-order and total indices with their intervals."""
     at = np.arange(len(indices.parameters))
-    with style.figure(height=1.2 + 0.45 * len(at)) as (made, axes):
+    with style.figure(height=1.2 + 0.45 * len(at), x=f"share of the variance of {column.label}") as (made, axes):
         for shift, name, colour, values, low, high in (
             (-0.18, "alone (first order)", style.BLUE, indices.first, indices.first_low, indices.first_high),
             (0.18, "with all interactions (total)", style.ORANGE, indices.total, indices.total_low, indices.total_high),
@@ -134,7 +130,6 @@ def sobol_figure(indices: SobolIndices, column: Column) -> Picture:
             axes.errorbar(values, at + shift, xerr=reach, fmt="none", color=style.BLACK, linewidth=1, capsize=2)
         axes.set_yticks(at, [label(name, "1") for name in indices.parameters])
         axes.invert_yaxis()
-        axes.set_xlabel(f"share of the variance of {column.label}")
         axes.legend(fontsize=8, loc="lower right")
     return draw(made, "Sobol indices with 95 % intervals.", "Bars of first-order and total indices for each parameter.")
 

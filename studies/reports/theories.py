@@ -56,7 +56,7 @@ def theories_chapter() -> Chapter:
 
 def _closing_figure(rows: list[theories.TheoryComparison], limit: float) -> Picture:
     ratio = np.array([r.ratio for r in rows])
-    with style.figure(height=2.9) as (made, axes):
+    with style.figure(height=2.9, x="h/R", y="relative difference (%)") as (made, axes):
         axes.loglog(ratio, [100 * r.excess for r in rows], "o-", color=style.BLUE, label="Rayleigh above solid")
         axes.loglog(
             ratio,
@@ -66,9 +66,6 @@ def _closing_figure(rows: list[theories.TheoryComparison], limit: float) -> Pict
             label="shell against solid",
         )
         axes.loglog(ratio, 100 * limit * np.sqrt(ratio), ":", color=style.BLACK, label=f"{limit:.2f} √(h/R)")
-        axes.set_xlabel("h/R")
-        axes.set_ylabel("relative difference (%)")
-        axes.legend()
     return draw(
         made,
         "The excess of Rayleigh's form falls as √(h/R); shell theory is within 0.1 % of the solid model everywhere.",

@@ -1,19 +1,17 @@
 """Picture of a trimming plan: cuts and splits over azimuth."""
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from shell.trimming import TrimPlan
 from studies.reports.digits import plain
 from studies.reports.style import BLUE, GREEN, VERMILION, figure
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure as Drawing
+from studies.results import Drawing
 
 
-def polar(plan: TrimPlan, cuts: Sequence[dict[str, Any]]) -> "Drawing":
+def polar(plan: TrimPlan, cuts: Sequence[dict[str, Any]]) -> Drawing:
     """Return the cuts as bars on the rim, and the splits as curves around it, before and as expected after the cuts."""
     theta = np.linspace(0, 2 * np.pi, 721)
     with figure(1, 2, 4.2, subplot_kw={"projection": "polar"}) as (made, axes):

@@ -13,11 +13,12 @@ from typing import TYPE_CHECKING, Any, Literal
 from studies.reports.digits import plain, short_exponent, to_error, to_interval
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure as Drawing
-
     from studies.reports.page import Block
 
 Payload = Mapping[str, Any]
+Key = str | Callable[[Any], Any]
+Drawing = Any
+"""A matplotlib figure, by a name that does not load matplotlib."""
 Where = Literal["everywhere", "page", "terminal"]
 
 
@@ -27,8 +28,9 @@ class Column:
 
     Attributes
     ----------
-    key : str
-        Where a row has it: a key, or keys and places in a list joined by dots ("split.slow_Hz"); what a row lacks leaves the cell empty.
+    key : str or callable
+        Where a row has it: a key or an attribute, or several and places in a list joined by dots ("split.slow_Hz"), or what makes it
+        of the row; what a row lacks leaves the cell empty.
     heading, unit : str
         What people read above it.
     form : str
@@ -48,7 +50,7 @@ class Column:
         Whether it stands in the terminal, on the page, or on both.
     """
 
-    key: str
+    key: Key
     heading: str
     unit: str = ""
     form: str = ""
@@ -65,7 +67,7 @@ class Column:
         """Heading and unit."""
         return f"{self.heading} ({self.unit})" if self.unit else self.heading
 
-    def write(self, row: Payload) -> str:
+    def write(self, row: Any) -> str:
         """Return the cell of a row: here a number becomes text."""
         ends = self.within or (self.interval if not self.digits else None)
         if ends is not None and all(isinstance(find(row, key), float | int) for key in (self.key, *ends)):
@@ -100,14 +102,17 @@ class Column:
         return short_exponent(text)
 
 
-def find(row: Payload, key: str) -> Any:
-    """Return what a row has under keys, or places in a list, joined by dots; None where it has none."""
-    value: Any = row
-    for step in key.split("."):
-        if isinstance(value, Mapping):
-            value = value.get(step)
-        elif value is not None:
-            value = value[int(step)]
+def find(row: Any, key: Key) -> Any:
+    """Return what a row has under a key; None where it has none."""
+    value = row
+    if callable(key):
+        value = key(row)
+    else:
+        for step in key.split("."):
+            if isinstance(value, Mapping):
+                value = value.get(step)
+            elif value is not None:
+                value = value[int(step)] if step.isdigit() else getattr(value, step)
     return value.item() if hasattr(value, "item") else value
 
 
@@ -119,10 +124,10 @@ def rows_of(columns: Mapping[str, Iterable[Any]]) -> list[dict[str, Any]]:
 
 @dataclass(frozen=True)
 class Table:
-    """Rows of the payload as people see them; without rows it is not shown, and neither is a column of which no row has anything."""
+    """Rows, of the payload or of any objects, as people see them; without rows it is not shown, and neither is a column of which no row has anything."""
 
     title: str
-    rows: Sequence[Payload]
+    rows: Sequence[Any]
     columns: Sequence[Column]
     note: str = ""
     where: Where = "everywhere"
@@ -157,7 +162,7 @@ class Sentence:
 class Figure:
     """A picture of the page, drawn only when the page is written; `alt` stands for it where it cannot be seen."""
 
-    draw: "Callable[[], Drawing]"
+    draw: Callable[[], Drawing]
     caption: str
     alt: str = ""
 
