@@ -29,10 +29,7 @@ class Shown:
         module, _, name = self.drawn_by.partition(":")
         if not module:
             raise NotImplementedError
-        figure: Drawing = getattr(import_module(module), name)(
-            self
-        ).figure  # of a picture of a page; a figure's is itself
-        return figure
+        return getattr(import_module(module), name)(self)
 
     def _repr_html_(self) -> str:
         from html import escape

@@ -108,8 +108,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if clash:
             return _complain(clash, 3)
         status = _command_line(words)(words)
-    except KeyboardInterrupt:
-        return _complain("interrupted.", 130)
+    except KeyboardInterrupt as stop:
+        return _complain(str(stop) or "interrupted.", 130)
     except BrokenPipeError:
         sys.stderr.close()
         return 0

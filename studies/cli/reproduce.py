@@ -1,24 +1,27 @@
 """`hrg reproduce`: the papers' tables and figures from their data."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from studies.cli.output import Answer, answers, dump_json, say
+from studies.cli.output import answers, dump_json, say
 from studies.diagnosis.table import diagnose_table
 from studies.files.writing import check_folder, write_text
 from studies.instrument.card import load_card
 from studies.papers import bias_twin, hrg
 from studies.papers.settling import study_settling
 from studies.reports.gyro_papers import reproduce_gyro_papers
-from studies.reports.reproduce import Reproduction, reproduce_page, summarise
+from studies.reports.reproduce import Reproduction, reproduce_result
+from studies.results import Result
+from studies.results.page import render_result
 
 GYROS = 12
 
 
-@answers("hrg.reproduce/1")
-def reproduce(*, out: str = "report") -> Answer:
+@answers("hrg.reproduce/1", page=False)
+def reproduce(*, out: str = "report") -> Result:
     """Recompute the tables and figures of the papers and compare them with first-principles predictions.
 
     Writes report.html, summary.json, table1.csv and table2.csv.
@@ -28,13 +31,10 @@ def reproduce(*, out: str = "report") -> Answer:
     out : str
         Folder for the files; created if it does not exist.
     """
-    from studies.reports.mode_picture import mode_blocks
-
     folder = check_folder(out)
     parts = _reproduce()
-    study, summary = parts.study, summarise(parts)
+    study, result = parts.study, reproduce_result(parts)
     T, f = study.temperature_degC, study.frequency
-    page = reproduce_page(parts, mode_blocks(parts.physics.instrument))
     columns = {"temperature_degC": T, "frequency_Hz": f, "cubic_Hz": study.fit.frequency(T)}
     write_text(folder / "table1.csv", _csv(columns))
     columns = {
@@ -44,16 +44,15 @@ def reproduce(*, out: str = "report") -> Answer:
         "error_degC": study.error_degC,
     }
     write_text(folder / "table2.csv", _csv(columns))
-    write_text(folder / "summary.json", dump_json(summary))
-    write_text(folder / "report.html", page)
-    yield summary
-    sensitivity = summary["sensitivity_ppm_per_degC"]
-    print(
+    write_text(folder / "summary.json", dump_json(result.payload))
+    write_text(folder / "report.html", render_result(result))
+    sensitivity = result.payload["sensitivity_ppm_per_degC"]
+    told = (
         f"slope at 20 °C: measured {sensitivity['measured']:.1f}, predicted {sensitivity['simulated']:.1f}"
         f" ± {sensitivity['uncertainty']:.1f} ppm/°C; largest temperature error in Table 2"
-        f" {max(abs(study.error_degC)):.3f} °C."
+        f" {max(abs(study.error_degC)):.3f} °C.\nreport: {folder / 'report.html'}\n"
     )
-    print(f"report: {folder / 'report.html'}")
+    return replace(result, printed=told)
 
 
 def _reproduce() -> Reproduction:

@@ -3,19 +3,16 @@
 from pathlib import Path
 from typing import Any
 
-from studies.cli.output import Answer, answers, print_table, say
+from studies.cli.output import answers, say
 from studies.errors import InputError
-from studies.files.writing import write_text
-from studies.reports.sweep import summarise, sweep_page
-from studies.reports.sweep_analysis import describe_tolerances, tell_tolerance
-from studies.sweeps.export import export_results
-from studies.sweeps.opening import is_running
+from studies.results import Column, Result, Sentence, Table
 from studies.sweeps.results import Results, open_results
 from studies.sweeps.run import Effort, check_functions, estimate_study, run_study
 from studies.sweeps.spec import read_study
 from studies.sweeps.validity import find_invalid
 
 SOLVERS = {"full": "each solved in full", "family": "interpolated between full solves"}
+STATUS = ("state", "cases", "done", "failed", "seconds_each", "runs")
 
 
 @answers("hrg.study-status/1, with --dry-run hrg.study-estimate/1")
@@ -30,7 +27,7 @@ def run(
     retry_failed: bool = False,
     dry_run: bool = False,
     quiet: bool = False,
-) -> Answer:
+) -> Result:
     """Run or resume a parametric study. Finished cases are kept and never computed again.
 
     Exit status 4: the study is finished but some cases failed; the results give the reasons.
@@ -65,23 +62,23 @@ def run(
     quiet : bool
         Show no progress.
     """
+    from studies.reports.sweep_analysis import tolerance_table
+
     if workers is not None and workers < 1:
         raise InputError(f"--workers {workers}: must be at least 1.")
     if workers is not None and scheduler is not None:
         raise InputError("--workers and --scheduler cannot be combined: give one of them.")
-    if dry_run:
-        study = read_study(spec, card)
-        check_functions(study, allow_python)
-        for problem in find_invalid(study):
-            say(f"note: {problem} Such designs fail; the others are computed.")
-        estimate = estimate_study(study, workers)
-        yield {"schema": "hrg.study-estimate/1", **vars(estimate)}
-        print(_estimate_words(estimate))
-        return 0
-    if out is None:
+    if out is None and not dry_run:
         raise InputError("--out is missing: name the folder for the study.")
-    for problem in find_invalid(read_study(spec, card)):
+    study = read_study(spec, card)
+    if dry_run:
+        check_functions(study, allow_python)
+    for problem in find_invalid(study):
         say(f"note: {problem} Such designs fail; the others are computed.")
+    if out is None or dry_run:
+        estimate = estimate_study(study, workers)
+        payload = {"schema": "hrg.study-estimate/1", **vars(estimate)}
+        return Result(payload, f"Estimate of {study.name}", "", [Sentence(_estimate_words(estimate))])
     try:
         results = run_study(
             spec,
@@ -94,33 +91,23 @@ def run(
             show_progress=not quiet,
         )
     except KeyboardInterrupt:
-        say(f"hrg: interrupted; finished cases are kept in {out}. Run the same command again to resume.")
-        return 130
-    failed = _failed(results)
-    yield _status(results, out, running=False), 4 if failed else 0
-    print(f"{results.total} cases computed, {failed} failed. Next: hrg study report {out}, hrg study export {out}.")
-    _print_reasons(results)
-    _print_tolerances(results)
-
-
-def _print_tolerances(results: Results) -> None:
-    for found in results.store.findings().values():
-        if found.get("kind") == "tolerance" and "failed" not in found:
-            heading = f"Tolerances with which {100 * found['share']:g} % of designs meet the requirements"
-            print_table(
-                heading, ["parameter", "specified", "found"], describe_tolerances(results, found), tell_tolerance(found)
-            )
-        elif found.get("kind") == "tolerance":
-            print(f"No tolerances were found: {found['failed']}")
-
-
-def _failed(results: Results) -> int:
-    counts = results.store.counts()
-    return sum(counts.values()) - counts.get("ok", 0)
+        raise KeyboardInterrupt(
+            f"interrupted; finished cases are kept in {out}. Run the same command again to resume."
+        ) from None
+    found = _status(results, out, running=False)
+    failed = found["failed"]
+    done = f"{results.total} cases computed, {failed} failed. Next: hrg study report {out}, hrg study export {out}."
+    searches = [one for one in results.store.findings().values() if one.get("kind") == "tolerance"]
+    tolerances = [
+        Sentence(f"No tolerances were found: {one['failed']}") if "failed" in one else tolerance_table(results, one)
+        for one in searches
+    ]
+    parts = [Sentence(done), _reasons(results), *tolerances]
+    return Result(found, f"Study {study.name}", "What was computed.", parts, 4 if failed else 0)
 
 
 @answers("hrg.study-status/1")
-def status(folder: str) -> Answer:
+def status(folder: str) -> Result:
     """Show the progress of a study and the failed cases with their reasons, also while it runs.
 
     Parameters
@@ -128,19 +115,18 @@ def status(folder: str) -> Answer:
     folder : str
         Folder of the study (hrg study run --out).
     """
+    from studies.sweeps.opening import is_running
+
     results = open_results(folder)
     found = _status(results, folder, is_running(folder))
-    yield found
-    rows = [
-        [key.replace("_", " "), _words(found[key])]
-        for key in ("state", "cases", "done", "failed", "seconds_each", "runs")
-    ]
-    print_table(results.study.name, ["item", "value"], rows, results.study.note)
-    _print_reasons(results)
+    rows = [{"item": key.replace("_", " "), "value": found[key]} for key in STATUS]
+    columns = (Column("item", "item"), Column("value", "value", digits=3))
+    table = Table(results.study.name, rows, columns, results.study.note)
+    return Result(found, f"Study {results.study.name}", "Its progress.", [table, _reasons(results)])
 
 
-@answers("hrg.study-report/1")
-def report(folder: str, *, out: str | None = None) -> Answer:
+@answers("hrg.study-report/1", page=False)
+def report(folder: str, *, out: str | None = None) -> Result:
     """Write a self-contained HTML page: definition, results, figures, sensitivities, yield and provenance.
 
     Parameters
@@ -150,17 +136,24 @@ def report(folder: str, *, out: str | None = None) -> Answer:
     out : str
         The page; default: report.html in the folder.
     """
+    from dataclasses import replace
+
+    from studies.files.writing import write_text
+    from studies.reports.sweep import study_result
+    from studies.results.page import render_result
+
     results = open_results(folder)
     page = Path(out) if out else Path(folder) / "report.html"
     say("writing the page, with mode shapes if the study has modes ...")
-    write_text(page, sweep_page(results))
-    yield {**summarise(results), "report": str(page)}
+    found = study_result(results)
+    write_text(page, render_result(found))
     _say_unfinished(results)
-    print(f"report on {_done(results)} cases: {page}")
+    told = f"report on {_done(results)} cases: {page}\n"
+    return replace(found, payload={**found.payload, "report": str(page)}, printed=told)
 
 
-@answers("hrg.study-export/1")
-def export(folder: str, *, out: str | None = None) -> Answer:
+@answers("hrg.study-export/1", page=False)
+def export(folder: str, *, out: str | None = None) -> Result:
     """Write the results as CSV, and the unit of every column to a JSON file.
 
     Parameters
@@ -170,6 +163,8 @@ def export(folder: str, *, out: str | None = None) -> Answer:
     out : str
         The CSV file; default: results.csv in the folder.
     """
+    from studies.sweeps.export import export_results
+
     results = open_results(folder)
     path = Path(out) if out else Path(folder) / "results.csv"
     units = export_results(results, path)
@@ -180,10 +175,10 @@ def export(folder: str, *, out: str | None = None) -> Answer:
         "rows": len(results),
         "done": results.done,
         "cases": results.total,
+        "columns": results.units,
     }
-    yield {**payload, "columns": results.units}
     _say_unfinished(results)
-    print(f"{_done(results)} cases: {path}; units: {units}")
+    return Result(payload, "Export", "", [Sentence(f"{_done(results)} cases: {path}; units: {units}")])
 
 
 def _done(results: Results) -> str:
@@ -216,10 +211,9 @@ def _status(results: Results, folder: str, running: bool) -> dict[str, Any]:
     }
 
 
-def _print_reasons(results: Results) -> None:
-    reasons = results.store.reasons(8)
-    if reasons:
-        print_table("Failed cases", ["cases", "reason"], [[str(count), reason] for reason, count in reasons])
+def _reasons(results: Results) -> Table:
+    rows = [{"cases": count, "reason": reason} for reason, count in results.store.reasons(8)]
+    return Table("Failed cases", rows, (Column("cases", "cases"), Column("reason", "reason")))
 
 
 def _estimate_words(estimate: Effort) -> str:
@@ -236,7 +230,3 @@ def _duration(seconds: float) -> str:
     if seconds < 120:
         return f"{seconds:.3g} s"
     return f"{seconds / 60:.3g} min" if seconds < 7200 else f"{seconds / 3600:.3g} h"
-
-
-def _words(value: object) -> str:
-    return f"{value:.3g}" if isinstance(value, float) else str(value)

@@ -9,12 +9,9 @@ from compensation.bell import BellChain, apply_chain
 from compensation.bell_calibration import BellRun
 from compensation.stability import allan_deviation
 from shell.constants import zero_Celsius
-from studies import results
 from studies.papers.bvg import BellTwin, Claims
 from studies.reports import style
-from studies.reports.page import Block, Chapter, Picture, Table, Text, draw
-from studies.results import Column, Drawing, Payload
-from studies.results.page import make_blocks
+from studies.results import Chapter, Column, Drawing, Figure, Payload, Sentence, Table
 
 SOURCES = ("Su Z., Liu N., Li Q., Sensors 2015, 15, 23684–23705, doi:10.3390/s150923684: equations (1)–(36).",)
 NAMES = {
@@ -25,6 +22,11 @@ NAMES = {
     "filtered": "FIR filter",
 }
 ERRORS = "Rate error after the first step (rough) and after all steps (compensated), before the filter."
+ALLAN = (
+    "Allan deviation at rest during the temperature ramp, with its 68 % band. The dotted line marks the filter length; at longer"
+    " averaging times filtering changes nothing, so it cannot reduce a random walk read there. The run was used for the fit, which"
+    " lowers the curve at the longest times."
+)
 DEG = float(np.pi / 180)
 STEP_COLUMNS = (
     Column("name", "After"),
@@ -39,20 +41,16 @@ STEP_COLUMNS = (
 
 def bell_chapters(twin: BellTwin) -> list[Chapter]:
     """Return the chapters of the twin for the page of `hrg reproduce`."""
+    steps, claims = Figure(lambda: draw_steps(twin.chain, twin.runs), ERRORS), _claims_table(twin.claims)
+    allan = Figure(
+        lambda: _draw_allan(twin.chain, twin.runs[1]), ALLAN, "Allan deviation over averaging time, three curves."
+    )
+    held_out = steps_table([asdict(step) for step in twin.held_out], "Held-out runs")
+    fitted = steps_table([asdict(step) for step in twin.fitted], "Fitted runs")
+    title = "BVG equations (32)–(36): the compensation chain on a virtual gyro"
     return [
-        Chapter(
-            "BVG equations (32)–(36): the compensation chain on a virtual gyro",
-            [
-                Text(TWIN),
-                *make_blocks(
-                    steps_table([asdict(step) for step in twin.held_out], "Held-out runs"),
-                    steps_table([asdict(step) for step in twin.fitted], "Fitted runs"),
-                ),
-                draw(draw_steps(twin.chain, twin.runs), ERRORS, "Rate error before and after compensation."),
-                draw_allan(twin.chain, twin.runs[1]),
-            ],
-        ),
-        Chapter("BVG: check of the published claims", claim_blocks(twin.claims)),
+        Chapter(title, [Sentence(TWIN), held_out, fitted, steps, allan]),
+        Chapter("BVG: check of the published claims", [claims]),
     ]
 
 
@@ -62,71 +60,41 @@ TWIN = (
 )
 
 
-def steps_table(steps: Sequence[Payload], title: str) -> results.Table:
+def steps_table(steps: Sequence[Payload], title: str) -> Table:
     """Return the figures of merit after every step; a column is left out where the records are too short for it."""
     rows = [{**step, "name": NAMES[step["step"]]} for step in steps]
     note = "σ: standard deviation over the temperature run."
     if any(step["bias_instability"] is not None for step in steps):
         note += " Bias instability: minimum of the Allan deviation over 0.664. A filter lowers the random walk at 1 s, not at 100 s."
-    return results.Table(title, rows, STEP_COLUMNS, note)
+    return Table(title, rows, STEP_COLUMNS, note)
 
 
-def claim_blocks(claims: Claims) -> list[Block]:
+def _claims_table(claims: Claims) -> Table:
     """Return the printed results beside what the printed coefficients make of them."""
-    short = dict(claims.averaging)
+    short, (bias, printed_bias), (scale, printed_scale) = (
+        dict(claims.averaging),
+        claims.bias_deviation,
+        claims.scale_deviation,
+    )
     rows = [
-        [
-            "σ removed by (34) at rest",
-            f"{claims.bias_deviation[1]:.4f} °/s",
-            f"{claims.bias_deviation[0]:.4f} °/s",
-            "agrees",
-        ],
-        [
-            "σ removed by (36) at 300 °/s",
-            f"{claims.scale_deviation[1]:.4f} °/s",
-            f"{claims.scale_deviation[0]:.4f} °/s",
-            "agrees within 12 %",
-        ],
-        [
-            "Nonlinearity before (35)",
-            "0.2 %",
-            f"{100 * claims.curvature_nonlinearity:.2f} %",
-            "the quadratic term explains 0.7 of it",
-        ],
-        ["−361.4 °/s after (35)", "−360 °/s (applied)", f"{claims.mapped[0]:.1f} °/s", "disagrees by 0.8 %"],
-        ["… and after (36) at 25 °C", "−360 °/s (applied)", f"{claims.mapped[1]:.1f} °/s", "disagrees by 1.1 %"],
-        [
-            "Factor (36) at 25 °C, where (35) was fitted",
-            "1, if both are correct",
-            f"{claims.mapped[1] / claims.mapped[0]:.4f}",
-            "disagrees by 0.3 %",
-        ],
-        [
-            "σ of 2.78 °/√h at 10 Hz",
-            "0.0619 °/s in total",
-            f"{claims.noise_deviation:.4f} °/s",
-            "cannot both be white noise",
-        ],
-        [
-            "Random walk after the filter, read at 1 s",
-            "3.98 times lower",
-            f"{short[1.0]:.2f} times lower",
-            f"a cut-off of {claims.cutoff_for_printed:.2f} Hz would be needed",
-        ],
-        [
-            "Random walk after the filter, read at 100 s",
-            "3.98 times lower",
-            f"{short[100.0]:.3f} times lower",
-            "impossible with a filter of 5 s",
-        ],
-        ["Cut-off of the filter", "200 Hz", "below 5 Hz", "impossible with a sampling interval of 0.1 s"],
-        ["Rough scale", "0.0242 in (33), 0.00242 in the text", "0.0242 used", "misprint"],
-    ]
+        ("σ removed by (34) at rest", f"{printed_bias:.4f} °/s", f"{bias:.4f} °/s", "agrees"),
+        ("σ removed by (36) at 300 °/s", f"{printed_scale:.4f} °/s", f"{scale:.4f} °/s", "agrees within 12 %"),
+        ("Nonlinearity before (35)", "0.2 %", f"{100 * claims.curvature_nonlinearity:.2f} %", "the quadratic term explains 0.7 of it"),
+        ("−361.4 °/s after (35)", "−360 °/s (applied)", f"{claims.mapped[0]:.1f} °/s", "disagrees by 0.8 %"),
+        ("… and after (36) at 25 °C", "−360 °/s (applied)", f"{claims.mapped[1]:.1f} °/s", "disagrees by 1.1 %"),
+        ("Factor (36) at 25 °C, where (35) was fitted", "1, if both are correct", f"{claims.mapped[1] / claims.mapped[0]:.4f}", "disagrees by 0.3 %"),
+        ("σ of 2.78 °/√h at 10 Hz", "0.0619 °/s in total", f"{claims.noise_deviation:.4f} °/s", "cannot both be white noise"),
+        ("Random walk after the filter, read at 1 s", "3.98 times lower", f"{short[1.0]:.2f} times lower", f"a cut-off of {claims.cutoff_for_printed:.2f} Hz would be needed"),
+        ("Random walk after the filter, read at 100 s", "3.98 times lower", f"{short[100.0]:.3f} times lower", "impossible with a filter of 5 s"),
+        ("Cut-off of the filter", "200 Hz", "below 5 Hz", "impossible with a sampling interval of 0.1 s"),
+        ("Rough scale", "0.0242 in (33), 0.00242 in the text", "0.0242 used", "misprint"),
+    ]  # fmt: skip
     note = (
         "Recomputed from the published coefficients over −45 … 55 °C and ±360 °/s; filter of order 50, cut-off 1 Hz. The bias instability"
         " of 20.5 → 4.67 °/h depends on the length and temperature ramp of an unpublished record and cannot be checked."
     )
-    return [Table("Published claims", ["Claim", "Published", "Recomputed", "Verdict"], rows, note)]
+    headings = ("Claim", "Published", "Recomputed", "Verdict")
+    return Table("Published claims", rows, [Column(f"{k}", heading) for k, heading in enumerate(headings)], note)
 
 
 def draw_steps(chain: BellChain, runs: tuple[BellRun, BellRun, BellRun]) -> Drawing:
@@ -158,7 +126,7 @@ def draw_steps(chain: BellChain, runs: tuple[BellRun, BellRun, BellRun]) -> Draw
         return made
 
 
-def draw_allan(chain: BellChain, rest: BellRun) -> Picture:
+def _draw_allan(chain: BellChain, rest: BellRun) -> Drawing:
     """Draw the Allan deviation at rest after the rough step, after the chain, and after the filter (figure 19)."""
     result = apply_chain(chain, rest.time, rest.output, rest.temperature, extrapolate=True)
     step = float(rest.time[1] - rest.time[0])
@@ -172,9 +140,4 @@ def draw_allan(chain: BellChain, rest: BellRun) -> Picture:
             axes.loglog(allan.tau, allan.deviation, color=colour, label=name)
             axes.fill_between(allan.tau, allan.low, allan.high, color=colour, alpha=0.2)
         axes.axvline(step * len(chain.taps), color=style.BLACK, linewidth=0.8, linestyle=":")
-    caption = (
-        "Allan deviation at rest during the temperature ramp, with its 68 % band. The dotted line marks the filter length; at longer"
-        " averaging times filtering changes nothing, so it cannot reduce a random walk read there. The run was used for the fit, which"
-        " lowers the curve at the longest times."
-    )
-    return draw(made, caption, "Allan deviation over averaging time, three curves.")
+        return made

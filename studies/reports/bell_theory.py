@@ -1,7 +1,7 @@
 """Chapters on the BVG paper's theory, equations (1)–(22), and on its reading of the rate, (23)–(30), for `hrg reproduce`."""
 
 from studies.papers.bvg_theory import BellTheory, LoopReading
-from studies.reports.page import Chapter, Table, Text
+from studies.results import Chapter, Column, Sentence, Table
 
 EQUATIONS = (
     ("(1)–(3)", "meridian, domain, principal radii", "correct; in (3) roots and a minus sign are missing: ρ₁ of the hyperbola is negative"),
@@ -54,89 +54,78 @@ COEFFICIENTS = (
 )  # fmt: skip
 
 
+PATTERNS = (
+    Column("name", "Pattern"),
+    Column(lambda row: _hertz(row.frequency), "Frequency"),
+    Column("precession_factor", "Precession factor", form=".4f"),
+    Column(lambda row: 0 if row.membrane_share < 1e-9 else row.membrane_share, "Membrane energy", "%", ".3g", scale=100.0),
+)  # fmt: skip
+PATTERNS_NOTE = (
+    "First three rows: (21), (22) with m₀, b and c₀ computed for the assumed pattern. Stretching the wall is of order (R/h)² stiffer"
+    " than bending it."
+)
+SYMBOLS_NOTE = (
+    "U: along the meridian, V: circumferential, W: normal, with the parity of (16) corrected; ε, κ, γ: the strains (5), (6) of the"
+    " pattern. Our copy of the paper lacks fraction bars, most minus signs and derivative marks: a blank between two terms"
+    " is a missing sign, and … marks illegible parts."
+)
+CHECKED = (Column("0", "Equation"), Column("1", "Content"), Column("2", "Result of the check"))
+CORRECTED = (
+    Column("0", ""),
+    Column("1", "Printed, as far as legible"),
+    Column("2", "Corrected (U, V, W as in (19))"),
+    Column("3", "Difference"),
+)
+
+
 def theory_chapters(theory: BellTheory, reading: LoopReading) -> list[Chapter]:
     """Return the two chapters."""
     printed, solid = theory.rows[0], theory.solid
     excess = 100 * (theory.rows[-1].frequency / solid.frequency - 1)
-    rows = [
-        [row.name, _hertz(row.frequency), f"{row.precession_factor:.4f}", _share(row.membrane_share)]
-        for row in (*theory.rows, theory.free, theory.solid)
-    ]
-    patterns = Table(
-        f"Card '{theory.card}', n = 2",
-        ["Pattern", "Frequency", "Precession factor", "Membrane energy"],
-        rows,
-        "First three rows: (21), (22) with m₀, b and c₀ computed for the assumed pattern. Stretching the wall is of order (R/h)² stiffer"
-        " than bending it.",
+    told = (
+        f"The paper states that the pattern (19) does not stretch the wall. It does: with this pattern (22) gives {_hertz(printed.frequency)},"
+        f" {printed.frequency / solid.frequency:.0f} times the {_hertz(solid.frequency)} of the solid model. The pattern"
+        f" that satisfies (17), (18) along the meridian is {excess:.0f} % above the solid model, because it ignores the free"
+        " edge, as Rayleigh's form does on a dome. The command hrg derive --bell derives every equation."
     )
-    loop = Table(
-        "Rate recovered from a simulation of (23) with a coupling c₁",
-        ["Quantity", "Value"],
-        [
-            ["applied rate", f"{reading.planted:.6g} rad/s"],
-            ["error of the mean rate in open loop, (25)", _error(reading.open_loop, reading.planted)],
-            ["error of the mean rate in force rebalance, (26)", _error(reading.rebalance, reading.planted)],
-            [
-                "error of the mean rate from the driven axis in open loop, second form of (24)",
-                _error(reading.second_form, reading.planted),
-            ],
-            [
-                "error of the mean rate from the charges of the elements, (27)–(29)",
-                _error(reading.from_charges, reading.planted),
-            ],
-            [
-                "amplifier voltage of elements 3 and 7 per µm of rim displacement (assumed: PZT-5A, 6 × 3 mm, 1 nF)",
-                f"{reading.volts_per_um:.3g} V",
-            ],
-            ["part of the charge in (27) as printed", f"{100 * reading.printed_share:.0f} %"],
-            ["error of Ω = K A_q with K = 1/(4 k m₀ ω P), (30)", f"{1e6 * reading.scale_error:+.2g} ppm"],
-            [
-                "part of the time in which ṗ is below a tenth of its amplitude and (24) fails",
-                f"{100 * reading.singular_share:.0f} %",
-            ],
-        ],
-    )
+    mean = "error of the mean rate"
+    loop = {
+        "applied rate": f"{reading.planted:.6g} rad/s",
+        f"{mean} in open loop, (25)": _error(reading.open_loop, reading.planted),
+        f"{mean} in force rebalance, (26)": _error(reading.rebalance, reading.planted),
+        f"{mean} from the driven axis in open loop, second form of (24)": _error(reading.second_form, reading.planted),
+        f"{mean} from the charges of the elements, (27)–(29)": _error(reading.from_charges, reading.planted),
+        "amplifier voltage of elements 3 and 7 per µm of rim displacement (assumed: PZT-5A, 6 × 3 mm, 1 nF)": f"{reading.volts_per_um:.3g} V",
+        "part of the charge in (27) as printed": f"{100 * reading.printed_share:.0f} %",
+        "error of Ω = K A_q with K = 1/(4 k m₀ ω P), (30)": f"{1e6 * reading.scale_error:+.2g} ppm",
+        "part of the time in which ṗ is below a tenth of its amplitude and (24) fails": f"{100 * reading.singular_share:.0f} %",
+    }
+    rows = [*theory.rows, theory.free, theory.solid]
     return [
         Chapter(
             "BVG equations (1)–(22): theory of the bell-shaped resonator",
             [
-                Text(
-                    f"The paper states that the pattern (19) does not stretch the wall. It does: with this pattern (22) gives {_hertz(printed.frequency)},"
-                    f" {printed.frequency / solid.frequency:.0f} times the {_hertz(solid.frequency)} of the solid model. The pattern"
-                    f" that satisfies (17), (18) along the meridian is {excess:.0f} % above the solid model, because it ignores the free"
-                    " edge, as Rayleigh's form does on a dome. The command hrg derive --bell derives every equation."
-                ),
-                patterns,
-                Table(
-                    "Coefficients of (20), printed and corrected",
-                    [
-                        "",
-                        "Printed, as far as legible",
-                        "Corrected (U, V, W as in (19))",
-                        "Difference",
-                    ],
-                    [list(row) for row in COEFFICIENTS],
-                    "U: along the meridian, V: circumferential, W: normal, with the parity of (16) corrected; ε, κ, γ: the strains (5), (6) of the"
-                    " pattern. Our copy of the paper lacks fraction bars, most minus signs and derivative marks: a blank between two terms"
-                    " is a missing sign, and … marks illegible parts.",
-                ),
-                Table(
-                    "Equation by equation",
-                    ["Equation", "Content", "Result of the check"],
-                    [list(row) for row in EQUATIONS],
-                ),
+                Sentence(told),
+                Table(f"Card '{theory.card}', n = 2", rows, PATTERNS, PATTERNS_NOTE),
+                Table("Coefficients of (20), printed and corrected", COEFFICIENTS, CORRECTED, SYMBOLS_NOTE),
+                Table("Equation by equation", EQUATIONS, CHECKED),
             ],
         ),
-        Chapter("BVG equations (23)–(30): rate from the control loop", [loop]),
+        Chapter(
+            "BVG equations (23)–(30): rate from the control loop",
+            [
+                Table(
+                    "Rate recovered from a simulation of (23) with a coupling c₁",
+                    list(loop.items()),
+                    (Column("0", "Quantity"), Column("1", "Value")),
+                )
+            ],
+        ),
     ]
 
 
 def _hertz(value: float) -> str:
     return f"{value / 1e3:.4g} kHz"
-
-
-def _share(value: float) -> str:
-    return "0" if value < 1e-9 else f"{100 * value:.3g} %"
 
 
 def _error(read: float, planted: float) -> str:

@@ -8,7 +8,7 @@ from compensation.bias import SELECTED_BY_THE_PAPER, TERMS
 from studies.papers.bias_twin import METHODS, PAPER_AFTER, PAPER_BEFORE, TwinFit, spread
 from studies.reports import style
 from studies.reports.bias import METHOD, SYMBOLS
-from studies.reports.page import Chapter, Picture, Table, Text, draw
+from studies.results import Chapter, Column, Drawing, Figure, Part, Sentence, Table
 
 Twins = Sequence[tuple[TwinFit, ...]]
 
@@ -29,100 +29,95 @@ def twin_chapters(twins: Twins) -> list[Chapter]:
         f" compensation. Models fitted to three runs (cooling and warming), with terms selected for autocorrelated noise, make"
         f" {mended or 'none'} of the {len(twins)} gyros worse."
     )
-    return [
-        Chapter(
-            "Figure 6: compensated bias on held-out runs",
-            [Text(told), trace_figure(twins), twin_table(twins), twin_figure(twins), terms_table(twins)],
-        )
-    ]
+    caption = "Each marker is one virtual gyro, fitted to one cooling run as in the paper. Below the dotted line compensation makes the bias worse."
+    scatter = Figure(
+        lambda: _draw_gains(twins), caption, "Improvement on held-out runs against improvement on the training run."
+    )
+    parts: list[Part] = [Sentence(told), _trace_figure(twins), twin_table(twins), scatter, terms_table(twins)]
+    return [Chapter("Figure 6: compensated bias on held-out runs", parts)]
 
 
-def trace_figure(twins: Twins) -> Picture:
-    """Draw figure 6 (a) and (b) of the virtual gyro whose improvement on its run is the median one."""
+def _trace_figure(twins: Twins) -> Figure:
+    """Return figure 6 (a) and (b) of the virtual gyro whose improvement on its run is the median one."""
     ranked = sorted(_fits(twins, "paper", 1), key=lambda fit: fit.training_gain)
     fit = ranked[len(ranked) // 2]
-    time, bias, left = fit.trace
-    hours = time / 3600
-    with style.figure(2, height=4.4, sharex=True, x="time (h)") as (figure, (upper, lower)):
-        upper.plot(hours, bias, color=style.BLUE, linewidth=0.8, label="output")
-        upper.plot(hours, bias - left, color=style.VERMILION, label="model, eq. (22)")
-        lower.plot(hours, left, color=style.BLUE, linewidth=0.8, label="compensated")
-        middle, span = float(np.mean(left)), float(np.ptp(bias)) or 1.0  # the scale of (a)
-        lower.set_ylim(middle - 0.6 * span, middle + 0.6 * span)
-        for axes in (upper, lower):
-            axes.set_ylabel("bias (°/h)")
     before, after = fit.training
     caption = (
         f"Figure 6 for the virtual gyro with the median improvement, cooled from 25 to −20 °C: (a) output and model, (b) compensated"
         f" output. Bias {before:.3g} → {after:.3g} °/h, a factor of {fit.training_gain:.2f}; in the paper {PAPER_BEFORE} → {PAPER_AFTER} °/h."
     )
-    return draw(figure, caption, "Bias over time with the model, and the compensated bias below it.")
+    return Figure(
+        lambda: _draw_trace(fit), caption, "Bias over time with the model, and the compensated bias below it."
+    )
+
+
+def _draw_trace(fit: TwinFit) -> Drawing:
+    time, bias, left = fit.trace
+    hours = time / 3600
+    with style.figure(2, height=4.4, x="time (h)", y="bias (°/h)", sharex=True) as (made, (upper, lower)):
+        upper.plot(hours, bias, color=style.BLUE, linewidth=0.8, label="output")
+        upper.plot(hours, bias - left, color=style.VERMILION, label="model, eq. (22)")
+        lower.plot(hours, left, color=style.BLUE, linewidth=0.8, label="compensated")
+        middle, span = float(np.mean(left)), float(np.ptp(bias)) or 1.0  # the scale of (a)
+        lower.set_ylim(middle - 0.6 * span, middle + 0.6 * span)
+        return made
+
+
+IMPROVEMENT = (
+    Column("selection", "Selection"),
+    Column("fitted", "Fitted to"),
+    Column("training", "On the training run"),
+    Column("cooling", "Held out: new cooling run"),
+    Column("warming", "Held out: warming run"),
+)
 
 
 def twin_table(twins: Twins) -> Table:
     """Return the table paper / ours on the training run / ours held out: median and 90 % range over the gyros."""
-    rows = [["the paper's gyro", "1 cooling", f"{PAPER_BEFORE / PAPER_AFTER:.2f}", "not given", "not given"]]
+    printed = {"training": f"{PAPER_BEFORE / PAPER_AFTER:.2f}", "cooling": "not given", "warming": "not given"}
+    rows = [{"selection": "the paper's gyro", "fitted": "1 cooling"} | printed]
     for method in METHODS:
         for runs, label in ((1, "1 cooling"), (3, "cooling, warming, cooling")):
             fits = _fits(twins, method, runs)
-            cells = [
-                _words(gains)
-                for gains in (
-                    [fit.training_gain for fit in fits],
-                    [fit.cooling.gain for fit in fits],
-                    [fit.warming.gain for fit in fits],
-                )
-            ]
-            rows.append([f"virtual gyros, {METHOD[method]}", label, *cells])
-    columns = ["Selection", "Fitted to", "On the training run", "Held out: new cooling run", "Held out: warming run"]
-    note = (
-        "Factor by which the standard deviation of 100 s averages falls: median (5 % … 95 % range of the gyros; number that got"
-        " worse)."
-    )
-    return Table("Improvement of the bias stability", columns, rows, note)
+            gains = {
+                "training": _words([fit.training_gain for fit in fits]),
+                "cooling": _words([fit.cooling.gain for fit in fits]),
+                "warming": _words([fit.warming.gain for fit in fits]),
+            }
+            rows.append({"selection": f"virtual gyros, {METHOD[method]}", "fitted": label} | gains)
+    note = "Factor by which the standard deviation of 100 s averages falls: median (5 % … 95 % range of the gyros; number that got worse)."
+    return Table("Improvement of the bias stability", rows, IMPROVEMENT, note)
 
 
 def terms_table(twins: Twins) -> Table:
     """Return how often each term was selected from one cooling run."""
     rows = []
     for number, name in enumerate(TERMS, 1):
-        shares = [np.mean([name in fit.terms for fit in _fits(twins, method, 1)]) for method in METHODS]
+        counts = {method: sum(name in fit.terms for fit in _fits(twins, method, 1)) for method in METHODS}
         printed = "yes" if name in SELECTED_BY_THE_PAPER else "no"
-        rows.append(
-            [
-                f"k{number}",
-                SYMBOLS[name],
-                printed,
-                *(f"{round(share * len(twins))} of {len(twins)}" for share in shares),
-            ]
-        )
-    columns = ["", "Term", "In eq. (22)", *(f"Virtual gyros, {METHOD[method]}" for method in METHODS)]
-    return Table("How often a term is selected from one cooling run", columns, rows)
+        words = {method: f"{count} of {len(twins)}" for method, count in counts.items()}
+        rows.append({"number": f"k{number}", "term": SYMBOLS[name], "printed": printed} | words)
+    columns = [Column("number", ""), Column("term", "Term"), Column("printed", "In eq. (22)")]
+    columns += [Column(method, f"Virtual gyros, {METHOD[method]}") for method in METHODS]
+    return Table("How often a term is selected from one cooling run", rows, columns)
 
 
-def twin_figure(twins: Twins) -> Picture:
+def _draw_gains(twins: Twins) -> Drawing:
     """Draw every gyro's improvement, held out against training."""
     paper = _fits(twins, "paper", 1)
-    with style.figure(height=3.6, x="improvement factor, training run", y="improvement factor, held-out run") as (
-        figure,
-        axes,
-    ):
-        training = [fit.training_gain for fit in paper]
-        axes.loglog(
-            training, [fit.cooling.gain for fit in paper], "o", color=style.BLUE, markersize=5, label="new cooling run"
-        )
-        axes.loglog(
-            training, [fit.warming.gain for fit in paper], "x", color=style.VERMILION, markersize=6, label="warming run"
-        )
+    training = [fit.training_gain for fit in paper]
+    cooling, warming = ([fit.cooling.gain for fit in paper], [fit.warming.gain for fit in paper])
+    labels = ("improvement factor, training run", "improvement factor, held-out run")
+    with style.figure(height=3.6, x=labels[0], y=labels[1]) as (made, axes):
+        axes.loglog(training, cooling, "o", color=style.BLUE, markersize=5, label="new cooling run")
+        axes.loglog(training, warming, "x", color=style.VERMILION, markersize=6, label="warming run")
         ends = [0.1, 1.2 * max(training)]
         axes.plot(ends, ends, color=style.BLACK, linewidth=0.8)
         axes.axhline(1.0, color=style.BLACK, linewidth=0.8, linestyle=":")
-        axes.axvline(
-            PAPER_BEFORE / PAPER_AFTER, color=style.ORANGE, linestyle="--", label="paper: 5.15 on its training run"
-        )
+        printed = PAPER_BEFORE / PAPER_AFTER
+        axes.axvline(printed, color=style.ORANGE, linestyle="--", label=f"paper: {printed:.2f} on its training run")
         axes.set_xlim(0.9, ends[1])
-        caption = "Each marker is one virtual gyro, fitted to one cooling run as in the paper. Below the dotted line compensation makes the bias worse."
-        return draw(figure, caption, "Improvement on held-out runs against improvement on the training run.")
+        return made
 
 
 def _fits(twins: Twins, method: str, runs: int) -> list[TwinFit]:

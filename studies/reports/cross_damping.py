@@ -9,8 +9,7 @@ from shell.constants import zero_Celsius
 from studies.papers import cvg_cross_damping as paper
 from studies.papers.cvg_cross_damping import CrossDampingTwin
 from studies.reports import style
-from studies.reports.page import Chapter, Table, Text, draw
-from studies.results import Drawing
+from studies.results import Chapter, Column, Drawing, Figure, Part, Sentence, Table
 
 SOURCES = ("Apostolyuk V., Chikovani V., Temperature error model in Coriolis vibratory gyroscopes: eqs. (1)–(10).",)
 
@@ -32,28 +31,23 @@ def twin_chapters(twin: CrossDampingTwin) -> list[Chapter]:
         f" {paper.count_bias_of_printed_values():.0f} rad/s at {paper.FREQUENCY:g} Hz. The filter (9) itself changes the"
         f" correction by at most {twin.study.memory / unit:.2g} °/h: its time constant is less than a second, while the temperature changes over minutes."
     )
-    drawn = draw_runs((*twin.study.runs, twin.second), twin.study.model, unit, "°/h")
-    picture = draw(
-        drawn, "Temperature, and zero-rate output before and after compensation, 100 s averages.", "Runs over time."
-    )
-    chapter = Chapter(
-        "CVG figures 1 and 2: cross-damping compensation",
-        [Text(told), picture, determinants_table(twin), Text(shape, "note")],
-    )
-    return [chapter]
+    caption = "Temperature, and zero-rate output before and after compensation, 100 s averages."
+    runs = (*twin.study.runs, twin.second)
+    picture = Figure(lambda: draw_runs(runs, twin.study.model, unit, "°/h"), caption, "Runs over time.")
+    parts: list[Part] = [Sentence(told), picture, _determinants_table(twin), Sentence(shape, "note")]
+    return [Chapter("CVG figures 1 and 2: cross-damping compensation", parts)]
 
 
-def determinants_table(twin: CrossDampingTwin) -> Table:
+def _determinants_table(twin: CrossDampingTwin) -> Table:
     """Return what the improvement depends on: lag of the resonator and white noise."""
-    rows = [
-        [f"{lag:g}", *(f"{ratio:.1f}" for ratio in ratios)] for lag, ratios in zip(twin.lags, twin.table, strict=True)
-    ]
-    columns = ["Lag (s)", *(f"{noise:g} °/√h" for noise in twin.noises)]
+    rows = [(lag, *ratios) for lag, ratios in zip(twin.lags, twin.table, strict=True)]
+    noises = [Column(f"{k}", f"{noise:g} °/√h", form=".1f") for k, noise in enumerate(twin.noises, 1)]
     note = (
         "Median over noise seeds, on held-out runs. Without a lag, the random walk of the bias sets the limit; with a lag, the"
         " temperature difference between sensor and resonator."
     )
-    return Table("Improvement factor by resonator lag and white noise", columns, rows, note)
+    columns = [Column("0", "Lag", "s", "g"), *noises]
+    return Table("Improvement factor by resonator lag and white noise", rows, columns, note)
 
 
 def draw_runs(runs: tuple[RestRun, ...], model: CrossDampingModel, unit: float, name: str) -> Drawing:

@@ -6,7 +6,7 @@ from compensation.demodulated import ErrorMap, respond_to_oscillating_rate
 from compensation.sensitive_element import SensitiveElement, tune
 from studies.papers.cvg_filters import ZETA, Filtered, FilterStudy, K
 from studies.reports import style
-from studies.reports.page import Block, Chapter, Picture, Table, Text, draw
+from studies.results import Chapter, Column, Drawing, Figure, Sentence, Table
 
 MOST_POINTS = 3000
 SOURCES = (
@@ -14,23 +14,69 @@ SOURCES = (
 )
 
 
+WIENER = (
+    Column("name", "Noise"),
+    Column(lambda case: case.optimum.error / case.rate_variance, "Error, optimum", form=".4f"),
+    Column(lambda case: case.renormalised.error / case.rate_variance, "Error, as printed", form=".4f"),
+    Column(lambda case: case.renormalised.distortion / case.rate_variance, "Distortion part", form=".4f"),
+    Column(lambda case: case.renormalised.noise / case.rate_variance, "Noise part", form=".4f"),
+    Column("optimum.filter.steady_gain.real", "G(0) of the optimum", form=".4f"),
+)
+WIENER_NOTE = (
+    "Error variance divided by the variance of the rate. The printed filters are the optimum scaled to G(0) W(0) = 1, which removes"
+    " the error for a constant rate but increases the mean square error."
+)
+STEPS = (
+    Column("0.0", "Step", "ms", "g", scale=1e3),
+    Column("1.1", "Noise of the estimate", "rad/s", ".4f"),
+    Column("0.1.lag_error", "Lag error", "rad/s", ".3f"),
+    Column("0.1.output_error", "Lag error of the output", "rad/s", ".3f"),
+)
+STEPS_NOTE = (
+    "Noise: standard deviation of the settled filter, from its Riccati equation. Lag errors: rms for pulses of 0.25 s."
+    " The paper gives Q per step but not the step."
+)
+
+
 def filter_chapters(study: FilterStudy, error_map: ErrorMap) -> list[Chapter]:
     """Return the chapters for the responses (13), (14), figure 3, the Wiener filters with figure 5, and the Kalman filter with figures 6, 7."""
-    wiener: list[Block] = [wiener_table(study), draw_filtered(study.figure5, FIGURE5, "Wiener filter")]
-    kalman: list[Block] = [
-        draw_kalman(study),
-        step_table(study),
-        Text(kalman_sentence(study)),
-    ]
+    responses = (
+        "Amplitude and phase (14) of the secondary mode per unit rate, k = 500 Hz, the same excitation for all gyros."
+    )
+    simplified = "Integral error (26) of the simplified transfer function (24) relative to the full equations (1)."
+    five, six, (output_noise, rate_noise) = study.figure5, study.figure6, study.settled_noise[-1]
+    pulses = (
+        "Square pulses through the full dynamics (1) with white noise (γ = 0.1, B = 3 Hz), filtered by eq. (35)."
+        f" Noise {five.noise_before:.3f} → {five.noise_after:.3f} rad/s (factor {five.noise_before / five.noise_after:.1f});"
+        f" error relative to the true rate {five.error_before:.3f} → {five.error_after:.3f} rad/s, of which {five.lag_error:.3f}"
+        " from the lag of the filter."
+    )
+    kalman = (
+        f"Kalman filter with the paper's Q and R, sampled every {1e3 * (six.time[1] - six.time[0]):g} ms: output noise"
+        f" {six.noise_before:.4f} → {output_noise:.4f} rad/s once settled (factor {six.noise_before / output_noise:.0f}); noise of the"
+        f" rate estimate {rate_noise:.4f} rad/s."
+    )
+    cases = "Wiener filters for k = 500 Hz, ζ = 0.025, γ = 0.1, B = 3 Hz"
+    steps = list(zip(study.by_step, study.settled_noise, strict=True))
     return [
-        Chapter("CVG equations (13), (14): response to an oscillating rate", [draw_responses(), Text(RESPONSES)]),
-        Chapter(
-            "CVG figure 3: accuracy of the simplified dynamics",
-            [draw_error_map(error_map), Text(map_sentence(error_map))],
-        ),
-        Chapter("CVG equations (35), (36), figure 5: Wiener filter", wiener),
-        Chapter("CVG equations (37)–(41), figures 6 and 7: Kalman filter", kalman),
-    ]
+        Chapter("CVG equations (13), (14): response to an oscillating rate", [
+            Figure(draw_responses, responses, "Amplitude and phase over the frequency of the rate."),
+            Sentence(RESPONSES),
+        ]),
+        Chapter("CVG figure 3: accuracy of the simplified dynamics", [
+            Figure(lambda: draw_error_map(error_map), simplified, "A map of the error, least where both modes agree."),
+            Sentence(map_sentence(error_map)),
+        ]),
+        Chapter("CVG equations (35), (36), figure 5: Wiener filter", [
+            Table(cases, study.wiener, WIENER, WIENER_NOTE),
+            Figure(lambda: draw_filtered(five), pulses, "Square pulses, a noisy output and a filtered one."),
+        ]),
+        Chapter("CVG equations (37)–(41), figures 6 and 7: Kalman filter", [
+            Figure(lambda: draw_kalman(study), kalman, "Output and rate with their estimates over time."),
+            Table("Rate estimate by sampling step", steps, STEPS, STEPS_NOTE),
+            Sentence(kalman_sentence(study)),
+        ]),
+    ]  # fmt: skip
 
 
 RESPONSES = (
@@ -40,7 +86,7 @@ RESPONSES = (
 APART, LIGHT = 1.02, 0.2
 
 
-def draw_responses() -> Picture:
+def draw_responses() -> Drawing:
     """Draw amplitude and phase (14) over the frequency of the rate, of both signs, for three gyros."""
     tuned = tune(K, ZETA)
     gyros = {
@@ -61,16 +107,10 @@ def draw_responses() -> Picture:
             still, _ = respond_to_oscillating_rate(tuned, 0.0)
             upper.semilogy(frequency, amplitude / still, label=name)
             lower.plot(frequency, np.degrees(np.unwrap(phase)))
-    caption = (
-        "Amplitude and phase (14) of the secondary mode per unit rate, k = 500 Hz, the same excitation for all gyros."
-    )
-    return draw(made, caption, "Amplitude and phase over the frequency of the rate.")
+        return made
 
 
-FIGURE5 = "Square pulses through the full dynamics (1) with white noise (γ = 0.1, B = 3 Hz), filtered by eq. (35)."
-
-
-def draw_error_map(error_map: ErrorMap) -> Picture:
+def draw_error_map(error_map: ErrorMap) -> Drawing:
     """Draw figure 3, the integral error over the ratios of frequency and damping."""
     with style.figure(height=3.8, x="δk = k₂/k₁", y="δζ = ζ₂/ζ₁") as (made, axes):
         shades = axes.contourf(
@@ -85,8 +125,7 @@ def draw_error_map(error_map: ErrorMap) -> Picture:
         bar.set_label("log₁₀ (J / ∫A² dt)")
         axes.plot([1.0], [1.0], "+", color="white", markersize=10)
         axes.grid(visible=False)
-    caption = "Integral error (26) of the simplified transfer function (24) relative to the full equations (1)."
-    return draw(made, caption, "A map of the error, least where both modes agree.")
+        return made
 
 
 def map_sentence(error_map: ErrorMap) -> str:
@@ -105,44 +144,18 @@ def map_sentence(error_map: ErrorMap) -> str:
     )
 
 
-def wiener_table(study: FilterStudy) -> Table:
-    """Return error variances over the rate's variance, before and after the renormalisation."""
-    rows = [
-        [
-            case.name,
-            f"{case.optimum.error / case.rate_variance:.4f}",
-            f"{case.renormalised.error / case.rate_variance:.4f}",
-            f"{case.renormalised.distortion / case.rate_variance:.4f}",
-            f"{case.renormalised.noise / case.rate_variance:.4f}",
-            f"{case.optimum.filter.steady_gain.real:.4f}",
-        ]
-        for case in study.wiener
-    ]
-    columns = ["Noise", "Error, optimum", "Error, as printed", "Distortion part", "Noise part", "G(0) of the optimum"]
-    note = (
-        "Error variance divided by the variance of the rate. The printed filters are the optimum scaled to G(0) W(0) = 1, which removes"
-        " the error for a constant rate but increases the mean square error."
-    )
-    return Table("Wiener filters for k = 500 Hz, ζ = 0.025, γ = 0.1, B = 3 Hz", columns, rows, note)
-
-
-def draw_filtered(case: Filtered, caption: str, name: str) -> Picture:
+def draw_filtered(case: Filtered) -> Drawing:
     """Draw true rate, noisy output and estimate over time."""
     rows = slice(None, None, max(len(case.time) // MOST_POINTS, 1))
     with style.figure(height=3.4, x="time (s)", y="rate (rad/s)") as (made, axes):
         axes.plot(case.time[rows], case.noisy[rows], color="#b8bec6", linewidth=0.6, label="noisy output")
         axes.plot(case.time[rows], case.rate[rows], "--", color=style.BLACK, linewidth=1.0, label="true rate")
-        axes.plot(case.time[rows], case.estimate[rows], color=style.BLUE, label=name)
+        axes.plot(case.time[rows], case.estimate[rows], color=style.BLUE, label="Wiener filter")
         axes.legend(ncols=3, loc="upper right")
-    numbers = (
-        f" Noise {case.noise_before:.3f} → {case.noise_after:.3f} rad/s (factor {case.noise_before / case.noise_after:.1f});"
-        f" error relative to the true rate {case.error_before:.3f} → {case.error_after:.3f} rad/s, of which {case.lag_error:.3f}"
-        " from the lag of the filter."
-    )
-    return draw(made, caption + numbers, "Square pulses, a noisy output and a filtered one.")
+        return made
 
 
-def draw_kalman(study: FilterStudy) -> Picture:
+def draw_kalman(study: FilterStudy) -> Drawing:
     """Draw figure 6 (output and its estimate) above figure 7 (true rate, output, estimated rate)."""
     six, seven = study.figure6, study.figure7
     rows = slice(None, None, max(len(six.time) // MOST_POINTS, 1))
@@ -157,27 +170,7 @@ def draw_kalman(study: FilterStudy) -> Picture:
             axes.set_ylabel("rate (rad/s)")
             axes.legend(ncols=3, loc="upper right", fontsize=8)
             axes.set_ylim(-0.5, 1.75)
-    output_noise, rate_noise = study.settled_noise[-1]
-    caption = (
-        f"Kalman filter with the paper's Q and R, sampled every {1e3 * (six.time[1] - six.time[0]):g} ms: output noise"
-        f" {six.noise_before:.4f} → {output_noise:.4f} rad/s once settled (factor {six.noise_before / output_noise:.0f}); noise of the"
-        f" rate estimate {rate_noise:.4f} rad/s."
-    )
-    return draw(made, caption, "Output and rate with their estimates over time.")
-
-
-def step_table(study: FilterStudy) -> Table:
-    """Return the error of the rate estimate for several sampling steps."""
-    rows = [
-        [f"{1e3 * step:g}", f"{noise:.4f}", f"{case.lag_error:.3f}", f"{case.output_error:.3f}"]
-        for (step, case), (_, noise) in zip(study.by_step, study.settled_noise, strict=True)
-    ]
-    columns = ["Step (ms)", "Noise of the estimate (rad/s)", "Lag error (rad/s)", "Lag error of the output (rad/s)"]
-    note = (
-        "Noise: standard deviation of the settled filter, from its Riccati equation. Lag errors: rms for pulses of 0.25 s."
-        " The paper gives Q per step but not the step."
-    )
-    return Table("Rate estimate by sampling step", columns, rows, note)
+        return made
 
 
 def kalman_sentence(study: FilterStudy) -> str:

@@ -10,7 +10,7 @@ from studies.papers.cvg_filters import FilterStudy, study_error_map, study_filte
 from studies.papers.loop_claims import study_claims
 from studies.reports import bell, cross_damping, filters, loop_claims
 from studies.reports.bell_theory import theory_chapters
-from studies.reports.page import Chapter
+from studies.results import Chapter
 
 SOURCES = (*cross_damping.SOURCES, *filters.SOURCES, *bell.SOURCES, *loop_claims.SOURCES)
 MAP_POINTS = 31

@@ -13,15 +13,14 @@ from studies.papers import hrg
 from studies.papers.bias_twin import TwinFit
 from studies.papers.hrg import FrequencyStudy, PhysicsComparison
 from studies.papers.settling import NETWORKS, ROOM_degC, SettlingStudy
-from studies.reports import gyro_papers, style
+from studies.reports import gyro_papers, mode_picture, style
 from studies.reports.bias_twin import twin_chapters
 from studies.reports.diagnosis import headline
 from studies.reports.diagnosis_table import table_parts
 from studies.reports.frequency import coefficients_table, error_figure, fit_figure, order_parts, order_sentence
-from studies.reports.page import Block, Chapter, Facts, Picture, Table, Text, draw, render_page
 from studies.reports.settling import settling_chapter
 from studies.reports.theories import theories_chapter
-from studies.results.page import make_blocks
+from studies.results import Blocks, Chapter, Column, Drawing, Facts, Figure, Part, Result, Sentence, Table, rows_of
 
 
 @dataclass(frozen=True)
@@ -45,34 +44,66 @@ SOURCES = (
 )
 
 
-def reproduce_page(parts: Reproduction, mode: Sequence[Block]) -> str:
-    """Return the whole page; `mode` shows the mode shape."""
+TABLE1 = (
+    Column("temperature", "T", "°C", "g"),
+    Column("frequency", "Measured", "Hz", ".2f"),
+    Column("cubic", "Cubic", "Hz", ".3f"),
+    Column("residual", "Residual", "mHz", "+.1f", scale=1e3),
+)
+TABLE2 = (
+    Column("frequency", "f", "Hz", ".2f"),
+    Column("actual", "Actual", "°C", "g"),
+    Column("printed", "Paper", "°C", "g"),
+    Column("calculated", "Here", "°C", ".4f"),
+    Column(lambda row: row["calculated"] - row["printed"], "Here − paper", "K", "+.4f"),
+    Column("printed_error", "Error in the paper", "K", "+g"),
+    Column("error", "Error here", "K", "+.4f"),
+)
+NAMES = {"E": "E", "nu": "ν (μ in the paper)", "rho": "ρ", "h": "h", "r": "r"}
+SLOPES = (
+    Column("T", "T", "°C", ".0f"),
+    *(Column(key, name, form="+.2f", scale=1e6) for key, name in NAMES.items()),
+    Column("predicted", "Predicted"),
+    Column("measured", "Measured", form=".1f"),
+)
+SLOPES_NOTE = (
+    "Measured: from neighbouring points of Table 1 (± 0.09 from rounding); at 20 °C, the slope of the cubic. The uncertainty is one"
+    " standard deviation of the prior on the law: its published values, and a curvature that no source determines."
+)
+LAWS = (Column("0", "Law"), Column("1", "Slope", "ppm/°C", ".1f"), Column("2", "Uncertainty", form=".1f"))
+LAWS_NOTE = "The laws differ by more than any stated uncertainty: most of the spread comes from the literature, not from the solver."
+LEAD = (
+    "Tables 1 and 2 and figures 3 to 6 of the HRG paper, recomputed from its measured data and from virtual gyros and compared"
+    " with first-principles predictions; then the two CVG papers and the BVG paper."
+)
+
+
+def reproduce_result(parts: Reproduction) -> Result:
+    """Return the numbers and the whole page."""
     study, physics = parts.study, parts.physics
-    lead = (
-        "Tables 1 and 2 and figures 3 to 6 of the HRG paper, recomputed from its measured data and from virtual gyros and compared"
-        " with first-principles predictions; then the two CVG papers and the BVG paper."
-    )
-    figure_4 = "Table 1 and figure 4: frequency over temperature"
+    shapes = Blocks(lambda: mode_picture.mode_blocks(physics.instrument))
     chapters = [
         Chapter("In short", [_facts(parts), *_short(parts)]),
         _first_diagnosis(parts),
-        Chapter(figure_4, [_table1(study), *make_blocks(coefficients_table(study), fit_figure(study))]),
         Chapter(
-            "Table 2 and figure 5(a): temperature from frequency", [_table2(study), *make_blocks(error_figure(study))]
+            "Table 1 and figure 4: frequency over temperature",
+            [_table1(study), coefficients_table(study), fit_figure(study)],
         ),
-        Chapter("Order of the polynomial", [Text(order_sentence(study)), *make_blocks(*order_parts(study))]),
+        Chapter("Table 2 and figure 5(a): temperature from frequency", [_table2(study), error_figure(study)]),
+        Chapter("Order of the polynomial", [Sentence(order_sentence(study)), *order_parts(study)]),
         Chapter("First-principles prediction", _physics(physics, study)),
-        Chapter("Mode shape", list(mode)),
+        Chapter("Mode shape", [shapes]),
         theories_chapter(),
         settling_chapter(parts.settling),
         Chapter("Figure 5(b): temperature from frequency during a step", [_step_inverse(parts.settling)]),
         *twin_chapters(parts.twins),
         *parts.gyro_chapters,
     ]
-    return render_page("Four gyro papers, reproduced", lead, chapters, (*SOURCES, *gyro_papers.SOURCES))
+    sources = (*SOURCES, *gyro_papers.SOURCES)
+    return Result(_summarise(parts), "Four gyro papers, reproduced", LEAD, chapters, sources=sources)
 
 
-def summarise(parts: Reproduction) -> dict[str, Any]:
+def _summarise(parts: Reproduction) -> dict[str, Any]:
     """Return the numbers of the page, schema `hrg.reproduce/1`."""
     study, physics = parts.study, parts.physics
     fit, better = study.fit, study.next_fit
@@ -145,7 +176,7 @@ def _facts(parts: Reproduction) -> Facts:
     )
 
 
-def _short(parts: Reproduction) -> list[Text]:
+def _short(parts: Reproduction) -> list[Part]:
     study, physics = parts.study, parts.physics
     better = study.next_fit
     assert better is not None
@@ -153,7 +184,7 @@ def _short(parts: Reproduction) -> list[Text]:
     away_curvature = abs(physics.curvature_measured - physics.curvature_law) / physics.curvature_uncertainty
     slopes = [value for _, value, _ in physics.laws]
     return [
-        Text(
+        Sentence(
             "The two published coefficients of the cubic are reproduced to the last digit, and the temperatures of Table 2 to within"
             f" {_farthest(study):.4f} K. At −10 °C the columns of the paper disagree: it gives −10.058 °C but an error of 0.0578 K"
             f" (here {study.error_degC[1]:.4f} K). The paper concludes that higher orders have little effect; this is not reproduced."
@@ -161,7 +192,7 @@ def _short(parts: Reproduction) -> list[Text]:
             f" {study.fit.sum_of_squares:.2e} Hz² for the cubic, and the quartic predicts omitted points"
             f" {study.fit.leave_one_out_rms / better.leave_one_out_rms:.1f} times better."
         ),
-        Text(
+        Sentence(
             f"Physics predicts the magnitude of the slope: at 20 °C the prediction is {abs(away):.1f} standard deviations"
             f" {'above' if away > 0 else 'below'} the measurement, and the published laws of fused silica range from"
             f" {min(slopes):.0f} to {max(slopes):.0f} ppm/°C. Physics does not determine the curvature. The measured curvature is"
@@ -183,109 +214,84 @@ def _farthest(study: FrequencyStudy) -> float:
 
 
 def _table1(study: FrequencyStudy) -> Table:
-    rows = [
-        [f"{T:g}", f"{f:.2f}", f"{f - r:.3f}", f"{1e3 * r:+.1f}"]
-        for T, f, r in zip(study.temperature_degC, study.frequency, study.fit.residuals, strict=True)
-    ]
+    fit = study.fit
     note = (
-        f"Largest residual {1e3 * np.abs(study.fit.residuals).max():.1f} mHz = {100 * study.fit.largest_residual_of_span:.2f} % of the"
+        f"Largest residual {1e3 * np.abs(fit.residuals).max():.1f} mHz = {100 * fit.largest_residual_of_span:.2f} % of the"
         " span; the paper gives 0.12 %."
     )
-    return Table(
-        "Table 1 and the fitted cubic", ["T (°C)", "Measured (Hz)", "Cubic (Hz)", "Residual (mHz)"], rows, note
-    )
+    columns = {
+        "temperature": study.temperature_degC,
+        "frequency": study.frequency,
+        "cubic": study.frequency - fit.residuals,
+        "residual": fit.residuals,
+    }
+    return Table("Table 1 and the fitted cubic", rows_of(columns), TABLE1, note)
 
 
 def _table2(study: FrequencyStudy) -> Table:
     printed, printed_error = hrg.printed_table2()
-    rows = [
-        [f"{f:.2f}", f"{T:g}", f"{p:g}", f"{c:.4f}", f"{c - p:+.4f}", f"{pe:+g}", f"{e:+.4f}"]
-        for f, T, p, c, pe, e in zip(
-            study.frequency,
-            study.temperature_degC,
-            printed,
-            study.calculated_degC,
-            printed_error,
-            study.error_degC,
-            strict=True,
-        )
-    ]
-    columns = [
-        "f (Hz)",
-        "Actual (°C)",
-        "Paper (°C)",
-        "Here (°C)",
-        "Here − paper (K)",
-        "Error in the paper (K)",
-        "Error here (K)",
-    ]
-    return Table("Table 2, published and recomputed", columns, rows, "Error: actual minus calculated temperature.")
+    columns = {
+        "frequency": study.frequency,
+        "actual": study.temperature_degC,
+        "printed": printed,
+        "calculated": study.calculated_degC,
+        "printed_error": printed_error,
+        "error": study.error_degC,
+    }
+    note = "Error: actual minus calculated temperature."
+    return Table("Table 2, published and recomputed", rows_of(columns), TABLE2, note)
 
 
-def _physics(physics: PhysicsComparison, study: FrequencyStudy) -> list[Block]:
-    slope = physics.parts
-    numbers = 1e6 * np.stack([slope.E, slope.nu, slope.rho, slope.h, slope.r], axis=1)
-    rows = [
-        [f"{T - zero_Celsius:.0f}", *(f"{part:+.2f}" for part in parts), f"{total:.2f} ± {sd:.1f}", measured]
-        for T, parts, total, sd, measured in zip(
-            physics.temperature, numbers, physics.slope_ppm, physics.uncertainty_ppm, _measured(study), strict=True
-        )
-    ]
-    columns = ["T (°C)", "E", "ν (μ in the paper)", "ρ", "h", "r", "Predicted", "Measured"]
-    parts = Table(
-        "Slope of ln f and its contributions (ppm/°C), equation (15)",
-        columns,
-        rows,
-        "Measured: from neighbouring points of Table 1 (± 0.09 from rounding); at 20 °C, the slope of the cubic. The uncertainty is one"
-        " standard deviation of the prior on the law: its published values, and a curvature that no source determines.",
+def _physics(physics: PhysicsComparison, study: FrequencyStudy) -> list[Part]:
+    predicted = zip(physics.slope_ppm, physics.uncertainty_ppm, strict=True)
+    columns = {
+        "T": physics.temperature - zero_Celsius,
+        **{key: getattr(physics.parts, key) for key in NAMES},
+        "predicted": [f"{total:.2f} ± {sd:.1f}" for total, sd in predicted],
+        "measured": [*study.local_slope_ppm, float(study.fit.slope_ppm(20.0))],
+    }
+    unknown = (
+        f"The paper does not give the geometry of its resonator. The card '{physics.instrument.name}' represents it."
     )
-    laws = Table(
-        "Slope at 20 °C by published law of fused silica",
-        ["Law", "Slope (ppm/°C)", "Uncertainty"],
-        [[name, f"{value:.1f}", f"{u:.1f}"] for name, value, u in physics.laws],
-        "The laws differ by more than any stated uncertainty: most of the spread comes from the literature, not from the solver.",
-    )
-    return [
-        Text(
-            f"The paper does not give the geometry of its resonator. The card '{physics.instrument.name}' represents it."
-            f" {physics.instrument.note}"
-        ),
-        parts,
-        _slope_figure(physics, study),
-        laws,
-    ]
-
-
-def _measured(study: FrequencyStudy) -> list[str]:
-    return [f"{s:.1f}" for s in study.local_slope_ppm] + [f"{float(study.fit.slope_ppm(20.0)):.1f}"]
-
-
-def _slope_figure(physics: PhysicsComparison, study: FrequencyStudy) -> Picture:
-    total, spread = physics.slope_ppm[:-1], physics.uncertainty_ppm[:-1]
-    with style.figure(height=3.2, x="temperature (°C)", y="slope of ln f (ppm/°C)") as (made, axes):
-        axes.fill_between(
-            study.local_degC, total - spread, total + spread, color=style.SKY, alpha=0.3, label="± 1 standard deviation"
-        )
-        axes.plot(study.local_degC, total, color=style.BLUE, label="predicted, default law")
-        axes.plot(
-            study.local_degC, study.local_slope_ppm, "o", color=style.BLACK, label="measured, neighbouring points"
-        )
+    title = "Slope of ln f and its contributions (ppm/°C), equation (15)"
     caption = (
         "The predicted slope has the right magnitude. The measured slope falls faster and rises again above 25 °C."
     )
-    return draw(made, caption, "Predicted and measured slopes over temperature.")
+    return [
+        Sentence(f"{unknown} {physics.instrument.note}"),
+        Table(title, rows_of(columns), SLOPES, SLOPES_NOTE),
+        Figure(lambda: _draw_slopes(physics, study), caption, "Predicted and measured slopes over temperature."),
+        Table("Slope at 20 °C by published law of fused silica", physics.laws, LAWS, LAWS_NOTE),
+    ]
+
+
+def _draw_slopes(physics: PhysicsComparison, study: FrequencyStudy) -> Drawing:
+    T, total, spread = study.local_degC, physics.slope_ppm[:-1], physics.uncertainty_ppm[:-1]
+    with style.figure(height=3.2, x="temperature (°C)", y="slope of ln f (ppm/°C)") as (made, axes):
+        axes.fill_between(T, total - spread, total + spread, color=style.SKY, alpha=0.3, label="± 1 standard deviation")
+        axes.plot(T, total, color=style.BLUE, label="predicted, default law")
+        axes.plot(T, study.local_slope_ppm, "o", color=style.BLACK, label="measured, neighbouring points")
+        return made
 
 
 def _first_diagnosis(parts: Reproduction) -> Chapter:
     """Return what `hrg diagnose` says of Table 1."""
-    verdict = Text(headline(parts.diagnosis.verdict), "warning")
-    blocks = make_blocks(*(part for chapter in table_parts(parts.diagnosis) for part in chapter.parts))
-    shown = [block for block in blocks if not isinstance(block, Facts)]
+    shown = [part for chapter in table_parts(parts.diagnosis) for part in chapter.parts if not isinstance(part, Facts)]
+    verdict = Sentence(headline(parts.diagnosis.verdict), "warning")
     return Chapter("Differences between measurement and physics: a first diagnosis", [verdict, *shown])
 
 
-def _step_inverse(settling: SettlingStudy) -> Picture:
-    """Draw the temperature that a cubic calculates from the frequency of the virtual step to -10 °C (figure 5b)."""
+def _step_inverse(settling: SettlingStudy) -> Figure:
+    """Return the temperature that a cubic calculates from the frequency of the virtual step to -10 °C (figure 5b)."""
+    caption = (
+        "A virtual step from 20 to −10 °C (the paper does not publish its record): the temperature calculated from the frequency"
+        " with a cubic fitted to nine points, and its error relative to the effective temperature of the mode."
+    )
+    alt = "Temperature and frequency fall together; the error stays far below a millikelvin."
+    return Figure(lambda: _draw_step(settling), caption, alt)
+
+
+def _draw_step(settling: SettlingStudy) -> Drawing:
     curve = next(c for c in settling.curves if c.target_degC < ROOM_degC and c.network == NETWORKS[0])
     true = curve.target_degC + curve.remaining * (ROOM_degC - curve.target_degC)
     points = np.linspace(0, len(true) - 1, 9).astype(int)
@@ -293,21 +299,15 @@ def _step_inverse(settling: SettlingStudy) -> Picture:
     fit = fit_frequency(true[points], curve.frequency[points])
     calculated = fit.temperature(curve.frequency[inside])
     hours = curve.time[inside] / 3600
-    with style.figure(2, height=4.2, sharex=True, height_ratios=(3, 1.2), x="time (h)") as (made, (upper, lower)):
+    labels, heights = ("temperature (°C)", "error (mK)"), (3, 1.2)
+    with style.figure(2, 1, 4.2, "time (h)", labels, sharex=True, height_ratios=heights) as (made, (upper, lower)):
         upper.plot(hours, calculated, color=style.BLUE, label="calculated from the frequency")
-        upper.set_ylabel("temperature (°C)")
+        upper.plot([], [], "--", color=style.VERMILION, label="frequency")
         other = upper.twinx()
-        other.plot(hours, curve.frequency[inside], "--", color=style.VERMILION, label="frequency")
+        other.plot(hours, curve.frequency[inside], "--", color=style.VERMILION)
         other.set_ylabel("frequency (Hz)")
         other.ticklabel_format(axis="y", useOffset=False)
         other.grid(visible=False)
-        handles = [*upper.get_lines(), *other.get_lines()]
-        upper.legend(handles, [line.get_label() for line in handles])
         lower.axhline(0, color=style.BLACK, linewidth=0.8)
         lower.plot(hours, 1e3 * (calculated - true[inside]), color=style.BLUE)
-        lower.set_ylabel("error (mK)")
-    caption = (
-        "A virtual step from 20 to −10 °C (the paper does not publish its record): the temperature calculated from the frequency"
-        " with a cubic fitted to nine points, and its error relative to the effective temperature of the mode."
-    )
-    return draw(made, caption, "Temperature and frequency fall together; the error stays far below a millikelvin.")
+        return made

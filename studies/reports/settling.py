@@ -4,13 +4,37 @@ import numpy as np
 
 from studies.papers.settling import FAST, NETWORKS, PROTOCOLS, SETTLED, POINTS_degC, SettlingStudy
 from studies.reports import style
-from studies.reports.page import Chapter, Picture, Table, Text, draw
+from studies.results import Chapter, Column, Drawing, Figure, Sentence, Table
 
 COLOURS = {
     "radiative": (style.BLUE, "-"),
     "linear": (style.ORANGE, "--"),
     "shell and stem alone": (style.GREEN, ":"),
 }
+NO_HEAT_PATH = (
+    "The paper gives no heat path. Shell and stem follow from geometry and material. One constant, the conductance between base and"
+    " housing, is identified from the statement that a step is 95 % complete after 9 000 s. The model then predicts that less than"
+    " 1 % remains after 15 000 s, as the paper states."
+)
+STEPS = (
+    Column(lambda curve: f"20 → {curve.target_degC:g} °C", "Step"),
+    Column("network", "Heat path"),
+    Column(lambda curve: curve.left_at(FAST), "Remaining at 9 000 s", "%", ".2f", scale=100.0),
+    Column(lambda curve: curve.left_at(SETTLED), "Remaining at 15 000 s", "%", ".2f", scale=100.0),
+    Column(lambda curve: curve.time_to(0.05), "95 % complete", "s", ".0f"),
+    Column(lambda curve: curve.time_to(0.01), "99 % complete", "s", ".0f"),
+)
+IDENTIFIED = "The mount conductance is identified from the mean of the two radiative steps at 9 000 s; all other values are predictions."
+SOAKS = (
+    Column("soak", "Soak"),
+    Column("network", "Heat path"),
+    Column("slope", "Slope at 20 °C", "ppm/°C", "+.3f"),
+    Column("curvature", "Curvature", "ppm/°C²", "+.4f"),
+)
+QUADRATIC = (
+    "From a quadratic fitted to the logarithms of the seven frequencies. From room: each point starts at room temperature; upwards:"
+    " each point starts at the one before."
+)
 
 
 def settling_chapter(study: SettlingStudy) -> Chapter:
@@ -18,28 +42,34 @@ def settling_chapter(study: SettlingStudy) -> Chapter:
     return Chapter(
         "Figure 3: settling of the resonator, and effect of the soak time on Table 1",
         [
-            Text(
-                "The paper gives no heat path. Shell and stem follow from geometry and material. One constant, the"
-                " conductance between base and housing, is identified from the statement that a step is 95 % complete after"
-                " 9 000 s. The model then predicts that less than 1 % remains after 15 000 s, as the paper states."
+            Sentence(NO_HEAT_PATH),
+            Figure(
+                lambda: _draw_steps(study),
+                "The virtual gyro after the temperature steps of figure 3; dotted lines: 9 000 s and 15 000 s.",
+                "Frequency and remaining part of the step over time, for a step to −10 and a step to 40 degrees.",
             ),
-            step_figure(study),
-            step_table(study),
-            soak_figure(study),
-            soak_table(study),
-            Text(soak_sentence(study), "note"),
+            Table("Settling after a chamber step", study.curves, STEPS, IDENTIFIED),
+            Figure(
+                lambda: _draw_soaks(study),
+                "Frequency error of the seven points after a soak of 4 to 5 h from room temperature.",
+                "Frequency error of the seven points for three soak times in two networks.",
+            ),
+            _soak_table(study),
+            Sentence(soak_sentence(study), "note"),
         ],
     )
 
 
-def step_figure(study: SettlingStudy) -> Picture:
+def _draw_steps(study: SettlingStudy) -> Drawing:
     """Draw the frequency after the two steps (HRG paper, figure 3) and the share of the step that is left."""
-    with style.figure(2, 2, height=5.2, sharex=True) as (made, axes):
+    labels = ("frequency (Hz)", "remaining step (%)")
+    with style.figure(2, 2, height=5.2, x="time (10³ s)", y=labels, sharex=True) as (made, axes):
         for column, target in enumerate(sorted({curve.target_degC for curve in study.curves})):
             upper, lower = axes[0][column], axes[1][column]
             for curve in (c for c in study.curves if c.target_degC == target):
                 colour, line = COLOURS[curve.network]
-                upper.plot(curve.time / 1e3, curve.frequency, line, color=colour, label=curve.network)
+                label = None if column else curve.network
+                upper.plot(curve.time / 1e3, curve.frequency, line, color=colour, label=label)
                 left = np.maximum(curve.remaining, 1e-6)
                 lower.semilogy(curve.time / 1e3, 100 * left, line, color=colour)
             for time in (FAST, SETTLED):
@@ -48,42 +78,10 @@ def step_figure(study: SettlingStudy) -> Picture:
             upper.set_title(f"20 → {target:g} °C", fontsize=10)
             upper.ticklabel_format(axis="y", useOffset=False)
             lower.set_ylim(0.05, 120)
-            lower.set_xlabel("time (10³ s)")
-        axes[0][0].set_ylabel("frequency (Hz)")
-        axes[1][0].set_ylabel("remaining step (%)")
-    return draw(
-        made,
-        "The virtual gyro after the temperature steps of figure 3; dotted lines: 9 000 s and 15 000 s.",
-        "Frequency and remaining part of the step over time, for a step to −10 and a step to 40 degrees.",
-    )
+        return made
 
 
-def step_table(study: SettlingStudy) -> Table:
-    """Return what is left of each step at the paper's two times."""
-    rows = [
-        [
-            f"20 → {curve.target_degC:g} °C",
-            curve.network,
-            f"{100 * curve.left_at(FAST):.2f}",
-            f"{100 * curve.left_at(SETTLED):.2f}",
-            f"{curve.time_to(0.05):.0f}",
-            f"{curve.time_to(0.01):.0f}",
-        ]
-        for curve in study.curves
-    ]
-    columns = [
-        "Step",
-        "Heat path",
-        "Remaining at 9 000 s (%)",
-        "Remaining at 15 000 s (%)",
-        "95 % complete (s)",
-        "99 % complete (s)",
-    ]
-    note = "The mount conductance is identified from the mean of the two radiative steps at 9 000 s; all other values are predictions."
-    return Table("Settling after a chamber step", columns, rows, note)
-
-
-def soak_figure(study: SettlingStudy) -> Picture:
+def _draw_soaks(study: SettlingStudy) -> Drawing:
     """Draw the error that incomplete soak leaves in Table 1's frequencies."""
     with style.figure(height=3.0, x="chamber temperature (°C)", y="reading − settled (mHz)") as (made, axes):
         axes.axhline(0, color=style.BLACK, linewidth=0.8)
@@ -96,27 +94,15 @@ def soak_figure(study: SettlingStudy) -> Picture:
                 POINTS_degC, 1e3 * soak.error, line + "o", color=colour, alpha=strength, markersize=3, label=label
             )
         axes.legend(fontsize=7, ncols=2)
-    return draw(
-        made,
-        "Frequency error of the seven points after a soak of 4 to 5 h from room temperature.",
-        "Frequency error of the seven points for three soak times in two networks.",
-    )
+        return made
 
 
-def soak_table(study: SettlingStudy) -> Table:
+def _soak_table(study: SettlingStudy) -> Table:
     """Return what soak adds to slope and curvature, beside what is to be explained."""
-    rows = [
-        [f"soak {soak.hours:g} h, {soak.protocol}", soak.network, f"{soak.slope:+.3f}", f"{soak.curvature:+.4f}"]
-        for soak in study.soaks
-    ]
+    rows = [{**vars(soak), "soak": f"soak {soak.hours:g} h, {soak.protocol}"} for soak in study.soaks]
     slope, curvature = study.measured_slope - study.law_slope, study.measured_curvature - study.law_curvature
-    rows.append(["measured minus predicted", "", f"{slope:+.3f}", f"{curvature:+.4f}"])
-    columns = ["Soak", "Heat path", "Slope at 20 °C (ppm/°C)", "Curvature (ppm/°C²)"]
-    note = (
-        "From a quadratic fitted to the logarithms of the seven frequencies. From room: each point starts at room temperature;"
-        " upwards: each point starts at the one before."
-    )
-    return Table("Effect of an incomplete soak on Table 1", columns, rows, note)
+    rows.append({"soak": "measured minus predicted", "slope": slope, "curvature": curvature})
+    return Table("Effect of an incomplete soak on Table 1", rows, SOAKS, QUADRATIC)
 
 
 def soak_sentence(study: SettlingStudy) -> str:

@@ -1,23 +1,22 @@
 """The page of a parametric study: what was asked, what came out, what matters, and where it comes from."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from studies.errors import UNUSABLE_INPUT, InputError
 from studies.papers.hrg import study_table
 from studies.reports import frequency
 from studies.reports import sweep_figures as figures
-from studies.reports.digits import plain
-from studies.reports.page import Block, Chapter, Facts, Table, Text, render_page
-from studies.reports.sweep_analysis import influence_chapters, search_chapters, tolerance_chapters
-from studies.reports.sweep_cells import main_columns, number, percent, spread, to_error, within
-from studies.results.page import make_blocks
+from studies.reports.digits import plain, to_numerical_error
+from studies.reports.sweep_analysis import influence_parts, main_columns, number, search_parts, tolerance_parts
+from studies.results import Blocks, Chapter, Column, Facts, Part, Result, Sentence, Table
 from studies.sweeps.definition import StudyParameter
 from studies.sweeps.design import nominal_design
 from studies.sweeps.parameters import TEMPERATURE, set_parameters
-from studies.sweeps.quantity import Column
+from studies.sweeps.quantity import Column as Output
 from studies.sweeps.results import Results
 from studies.sweeps.sensitivity import linear_shares, local_slopes, sobol_indices
 from studies.sweeps.tolerance import Yield, find_yield, resolve_limits
@@ -32,31 +31,54 @@ METHODS = {
     "sensitivity": "the Saltelli design for Sobol indices",
     "one-at-a-time": "one parameter at a time about the nominal design",
 }
+STATISTICS = (
+    Column("label", "Quantity"),
+    Column("unit", "Unit"),
+    Column("nominal", "Nominal"),
+    Column("mean", "Mean"),
+    Column("deviation", "Standard deviation"),
+    Column("least", "Minimum"),
+    Column("greatest", "Maximum"),
+    Column("error", "Numerical error"),
+)
+NUMERICAL = "The numerical error is the largest error estimate of the solver over all designs, relative to the exact solution of its theory."
+RUNS = (
+    Column("run", "Run"),
+    Column("started_utc", "Started"),
+    Column("finished_utc", "Ended"),
+    Column(lambda run: run["outcome"] or "killed", "Outcome"),
+    Column(lambda run: run["provenance"].get("commit", "none")[:12], "Commit"),
+    Column(lambda run: run["provenance"].get("lock_sha256", "none")[:12], "Lock file"),
+)
 
 
-def sweep_page(results: Results) -> str:
-    """Return the page of a study as HTML."""
+def study_result(results: Results) -> Result:
+    """Return what a study found: its numbers (schema hrg.study-report/1) and the parts of its page."""
     study = results.study
     done = len(results) if results.done == results.total else f"{results.done} of {results.total}"
     lead = f"{done} designs ({METHODS[study.sampling.method]}) based on the card {study.instrument.name}."
     if study.note:
         lead = f"{study.note} {lead}"
-    chapters = [
-        Chapter("In short", _short(results)),
-        Chapter("Definition", _asked(results)),
-        *_failures(results),
-        Chapter("Results", [_statistics(results), *_over_temperature(results), *_pictures(results), _designs(results)]),
-        *influence_chapters(results),
-        *tolerance_chapters(results),
-        *search_chapters(results),
-        *_shapes(results),
-        Chapter("Provenance", _provenance(results)),
-    ]
-    return render_page(f"Study: {study.name}", lead, chapters)
+    shown = [_statistics(results), *_over_temperature(results), *_pictures(results), _designs(results)]
+    return Result(
+        _summarise(results),
+        f"Study: {study.name}",
+        lead,
+        [
+            Chapter("In short", _short(results)),
+            Chapter("Definition", _asked(results)),
+            Chapter("Failed cases", _failures(results)),
+            Chapter("Results", shown),
+            Chapter("Influence of the parameters", influence_parts(results)),
+            Chapter("Tolerances", tolerance_parts(results)),
+            Chapter("Searches", search_parts(results, "worst-case", "inversion")),
+            Chapter("Mode shapes", _shapes(results)),
+            Chapter("Provenance", _provenance(results)),
+        ],
+    )
 
 
-def summarise(results: Results) -> dict[str, Any]:
-    """Return the numbers behind the page (schema hrg.study-report/1)."""
+def _summarise(results: Results) -> dict[str, Any]:
     found: dict[str, Any] = {
         "schema": "hrg.study-report/1",
         "study": results.study.name,
@@ -83,7 +105,7 @@ def _data(analyse: Any, results: Results, column: str) -> Any:
     return [vars(one) for one in found] if isinstance(found, list) else None if found is None else vars(found)
 
 
-def _numbers(results: Results, column: Column) -> dict[str, float | None]:
+def _numbers(results: Results, column: Output) -> dict[str, float]:
     y = results.column(column.name)
     y = y[np.isfinite(y)]
     place = [c.name for c in results.study.columns].index(column.name)
@@ -105,93 +127,102 @@ def _yield(results: Results) -> Yield | None:
         return None
 
 
-def _short(results: Results) -> list[Block]:
+def _short(results: Results) -> list[Part]:
     facts = [("Designs", str(results.done), f"of {results.total}; {len(results.failed)} failed")]
     for column in main_columns(results)[:2]:
         n = _numbers(results, column)
         unit = "" if column.unit == "1" else f" {column.unit}"
-        least, greatest, nominal = (within(n[key], n["deviation"]) for key in ("least", "greatest", "nominal"))
+        least, greatest, nominal = (_to(n[key], n["deviation"] / 3) for key in ("least", "greatest", "nominal"))
         facts.append((column.label, f"{least} … {greatest}{unit}", f"nominal {nominal}{unit}"))
     found = _yield(results)
     if found is not None:
-        words = "of the designs" if found.low is None else f"95 % interval {percent(found.low)} … {percent(found.high)}"
-        facts.append(("Meet all requirements", percent(found.share), words))
-    blocks: list[Block] = [Facts(facts)]
-    if results.done < results.total:
-        blocks.append(Text("The study is not finished. Run it again to resume, then write this page again.", "warning"))
-    return blocks
+        low, high = found.low, found.high
+        words = "of the designs" if low is None or high is None else f"95 % interval {_percent(low)} … {_percent(high)}"
+        facts.append(("Meet all requirements", _percent(found.share), words))
+    unfinished = "The study is not finished. Run it again to resume, then write this page again."
+    return [Facts(facts), *([Sentence(unfinished, "warning")] if results.done < results.total else [])]
 
 
-def _asked(results: Results) -> list[Block]:
-    study = results.study
-    sampling = study.sampling
-    parameters = Table(
-        "Parameters",
-        ["Parameter", "Nominal", "Range", "Distribution"],
-        [[figures.label(p.name, p.unit), number(p.nominal), _range(p), _distribution(p)] for p in study.parameters],
+def _percent(share: float) -> str:
+    return f"{100 * share:.2f} %"
+
+
+def _to(value: float, error: float) -> str:
+    """Return a number to the second digit of an error, six digits of it without one, nothing for nothing."""
+    if np.isnan(value):
+        return ""
+    return to_numerical_error(value, error) if 0 < error < np.inf and abs(value) < 1e9 else f"{value:.6g}"
+
+
+def _asked(results: Results) -> list[Part]:
+    study, sampling = results.study, results.study.sampling
+    parameters = (
+        Column(lambda p: figures.label(p.name, p.unit), "Parameter"),
+        Column("nominal", "Nominal", form=".8g"),
+        Column(_range, "Range"),
+        Column(_distribution, "Distribution"),
     )
-    rows = [
-        [
-            c.name,
-            one.__doc__ or "",
-            ", ".join(f"{key} = {value}" for key, value in one.options.items() if value is not None),
-        ]
-        for one in study.asked
-        for c in one.columns[:1]
-    ]
+    quantities = (
+        Column("columns.0.name", "Column"),
+        Column("__doc__", "Quantity"),
+        Column(lambda one: ", ".join(f"{k} = {v}" for k, v in one.options.items() if v is not None), "Options"),
+    )
     words = f"Sampling: {METHODS[sampling.method]}"
     words += f", seed {sampling.seed}" if sampling.method in ("latin-hypercube", "sobol", "sensitivity") else ""
     full = results.about["identity"]["solver"] == "full"
     solver = (
         "every design solved in full" if full else "interpolated between full solves, with a stated interpolation error"
     )
-    return [parameters, Table("Quantities", ["Column", "Quantity", "Options"], rows), Text(f"{words}; {solver}.")]
+    return [
+        Table("Parameters", study.parameters, parameters),
+        Table("Quantities", study.asked, quantities),
+        Sentence(f"{words}; {solver}."),
+    ]
 
 
-def _failures(results: Results) -> list[Chapter]:
+def _failures(results: Results) -> list[Part]:
     if not results.failed.size:
         return []
-    rows = [[str(count), reason] for reason, count in results.store.reasons()]
-    examples = [
-        [*map(number, results.design(place).values()), results.remark(place)]
-        for place in results.failed[:MOST_ROWS].tolist()
-    ]
-    words = "These designs have no result and are excluded from all figures on this page."
-    heads = [figures.label(p.name, p.unit) for p in results.study.parameters]
+    reasons = [{"cases": count, "reason": reason} for reason, count in results.store.reasons()]
     return [
-        Chapter(
-            "Failed cases",
-            [
-                Text(words, "warning"),
-                Table("Reasons", ["Cases", "Reason"], rows),
-                Table("Failed designs", [*heads, "Reason"], examples, sortable=True),
-            ],
-        )
+        Sentence("These designs have no result and are excluded from all figures on this page.", "warning"),
+        Table("Reasons", reasons, (Column("cases", "Cases"), Column("reason", "Reason"))),
+        Table(
+            "Failed designs",
+            results.failed[:MOST_ROWS].tolist(),
+            (*_design_columns(results), Column(results.remark, "Reason")),
+            sortable=True,
+        ),
     ]
+
+
+def _design_columns(results: Results) -> list[Column]:
+    return [
+        Column(_at(results.parameter(p.name)), figures.label(p.name, p.unit), form=".8g")
+        for p in results.study.parameters
+    ]
+
+
+def _at(values: NDArray[Any]) -> Callable[[int], Any]:
+    """Return what shows the value of a design, whose place is the row."""
+    return lambda place: values[place]
 
 
 def _statistics(results: Results) -> Table:
-    rows = []
+    rows: list[dict[str, Any]] = []
     for column in results.study.columns:
         n = _numbers(results, column)
+        deviation, mean, error = n["deviation"], n["mean"], n["error"]
+        to = error if np.isfinite(error) else deviation / 3
         rows.append(
-            [
-                column.label,
-                column.unit,
-                *(_digits(n, key) for key in ("nominal", "mean")),
-                spread(n["deviation"], n["mean"]),
-                *(_digits(n, key) for key in ("least", "greatest")),
-            ]
+            {"label": column.label, "unit": column.unit}
+            | {key: _to(n[key], to) for key in ("nominal", "mean", "least", "greatest")}
+            | {
+                "deviation": "" if np.isnan(deviation) else plain(deviation) if deviation > 1e-12 * abs(mean) else "0",
+                "error": plain(error, 2) if np.isfinite(error) else "",
+            }
         )
-        rows[-1].append(plain(n["error"], 2) if n["error"] is not None and np.isfinite(n["error"]) else "")
-    heads = ["Quantity", "Unit", "Nominal", "Mean", "Standard deviation", "Minimum", "Maximum", "Numerical error"]
-    note = "The numerical error is the largest error estimate of the solver over all designs, relative to the exact solution of its theory."
-    return Table("All designs with a result", heads, rows, note)
-
-
-def _digits(n: Mapping[str, Any], key: str) -> str:
-    known = n["error"] is not None and np.isfinite(n["error"])
-    return to_error(n[key], n["error"]) if known else within(n[key], n["deviation"])
+    return Table("All designs with a result", rows, STATISTICS, NUMERICAL)
 
 
 def _designs(results: Results) -> Table:
@@ -203,29 +234,28 @@ def _designs(results: Results) -> Table:
         order = order[np.isfinite(results.column(columns[0].name)[order])]
         places = [*order[:ENDS].tolist(), *order[-ENDS:].tolist()]
         note += f" Of {len(results)} designs, the {ENDS} with the lowest and the {ENDS} with the highest {columns[0].label} are shown; hrg study export writes all."
-    rows = []
-    for place in places:
-        numbers = (results.column(column.name)[place] for column in columns)
-        rows.append([str(place), *map(number, results.design(place).values()), *map(number, numbers)])
-    heads = [figures.label(p.name, p.unit) for p in results.study.parameters]
-    return Table("Designs", ["Case", *heads, *map(figures.column_label, columns)], rows, note, sortable=True)
+    shown = [Column(_at(results.column(c.name)), figures.column_label(c), form=".8g") for c in columns]
+    case = Column(lambda place: place, "Case")
+    return Table("Designs", places, (case, *_design_columns(results), *shown), note, sortable=True)
 
 
-def _pictures(results: Results) -> list[Block]:
+def _pictures(results: Results) -> list[Part]:
     if results.study.sampling.method == "one-at-a-time":
         return []  # the tornado says it better
-    limits = _limits(results)
-    blocks: list[Block] = []
+    try:
+        limits = [resolve_limits(results, requirement) for requirement in results.study.requirements]
+    except InputError:
+        limits = []
+    parts: list[Part] = []
     for column in main_columns(results):
         y = results.column(column.name)
         if np.isfinite(y).sum() >= 20 and np.nanmax(y) > np.nanmin(y):
-            blocks.append(figures.spread_figure(results, column, limits))
-        response = figures.response_figure(results, column)
-        blocks += [response] if response else []
-    return blocks
+            parts.append(figures.spread_figure(results, column, limits))
+        parts += figures.response_figures(results, column)
+    return parts
 
 
-def _over_temperature(results: Results) -> list[Block]:
+def _over_temperature(results: Results) -> list[Part]:
     """Return the HRG paper's Table 1, its cubic and Table 2 where only the temperature was varied."""
     study = results.study
     columns = [column for column in study.columns if column.stem.startswith("frequency")]
@@ -235,13 +265,13 @@ def _over_temperature(results: Results) -> list[Block]:
     try:
         fit = study_table(T, f)
         tables = frequency.coefficients_table(fit), frequency.inverse_table(fit)
-        return list(make_blocks(*tables, frequency.fit_figure(fit), frequency.order_table(fit)))
+        return [*tables, frequency.fit_figure(fit), frequency.order_table(fit)]
     except UNUSABLE_INPUT as error:
-        return [Text(f"No cubic over temperature: {error}", "warning")]
+        return [Sentence(f"No cubic over temperature: {error}", "warning")]
 
 
-def _shapes(results: Results) -> list[Chapter]:
-    from studies.reports.mode_picture import mode_blocks
+def _shapes(results: Results) -> list[Part]:
+    from studies.reports import mode_picture
 
     study = results.study
     modal = [one for one in study.asked if "harmonic" in one.options]
@@ -253,53 +283,42 @@ def _shapes(results: Results) -> list[Chapter]:
     if np.isfinite(y).any() and any(name.startswith("resonator.") for name in study.names):
         designs[f"Minimum {column.label}"] = results.design(int(np.nanargmin(y)))
         designs[f"Maximum {column.label}"] = results.design(int(np.nanargmax(y)))
-    blocks: list[Block] = []
+    parts: list[Part] = []
     for title, design in designs.items():
         words = ", ".join(f"{name} = {number(value)}" for name, value in design.items())
-        blocks.append(Text(f"{title}: {words or 'as in the card'}."))
-        blocks += mode_blocks(set_parameters(study.instrument, design, study.derived), (n,))
-    return [Chapter("Mode shapes", blocks)]
+        instrument = set_parameters(study.instrument, design, study.derived)
+        parts.append(Sentence(f"{title}: {words or 'as in the card'}."))
+        parts.append(Blocks(lambda shown=instrument: mode_picture.mode_blocks(shown, (n,))))  # type: ignore[misc]
+    return parts
 
 
-def _provenance(results: Results) -> list[Block]:
+def _provenance(results: Results) -> list[Part]:
     about, identity = results.about, results.about["identity"]
-    rows: list[list[str]] = []
+    runs = [{**run, "run": count} for count, run in enumerate(results.store.runs(), 1)]
     environments: dict[str, list[str]] = {}
-    for count, run in enumerate(results.store.runs(), 1):
-        commit, versions, lock, machine = _environment(run["provenance"])
-        ended, outcome = run["finished_utc"] or "", run["outcome"] or "killed"
-        rows.append([str(count), run["started_utc"], ended, outcome, commit[:12], lock])
-        environments.setdefault(f"{versions}; {machine}", []).append(str(count))
-    facts = [
-        ["study created", about["created_utc"]],
-        ["physics version", identity["physics_version"]],
-        ["hash of card, material, quantities and physics", identity["base"]],
-        ["hash of the designs", identity["design"]],
-        ["seed", str(results.study.sampling.seed)],
-        ["card", results.study.instrument.path],
-        *([f"user function {name}", source] for name, source in identity["functions"].items()),
-    ]
-    heads = ["Run", "Started", "Ended", "Outcome", "Commit", "Lock file"]
-    blocks: list[Block] = [Table("Identity", ["Item", "Value"], facts), Table("Runs", heads, rows)]
-    blocks += [Text(f"Run {', '.join(runs)}: {versions}.") for versions, runs in environments.items()]
-    return [*blocks, Text(about["spec_text"], "source")] if about["spec_text"] else blocks
-
-
-def _environment(found: Mapping[str, Any]) -> list[str]:
-    versions = ", ".join(f"{name} {text}" for name, text in found["packages"].items())
+    for run in runs:
+        environments.setdefault(_environment(run["provenance"]), []).append(str(run["run"]))
+    facts = {
+        "study created": about["created_utc"],
+        "physics version": identity["physics_version"],
+        "hash of card, material, quantities and physics": identity["base"],
+        "hash of the designs": identity["design"],
+        "seed": str(results.study.sampling.seed),
+        "card": results.study.instrument.path,
+        **{f"user function {name}": source for name, source in identity["functions"].items()},
+    }
+    items = [{"item": item, "value": value} for item, value in facts.items()]
     return [
-        found.get("commit", "none"),
-        f"Python {found['python']}, {versions}",
-        found.get("lock_sha256", "none")[:12],
-        found["platform"],
+        Table("Identity", items, (Column("item", "Item"), Column("value", "Value"))),
+        Table("Runs", runs, RUNS),
+        *(Sentence(f"Run {', '.join(counts)}: {words}.") for words, counts in environments.items()),
+        *([Sentence(about["spec_text"], "source")] if about["spec_text"] else []),
     ]
 
 
-def _limits(results: Results) -> list[Any]:
-    try:
-        return [resolve_limits(results, requirement) for requirement in results.study.requirements]
-    except InputError:
-        return []
+def _environment(found: Mapping[str, Any]) -> str:
+    versions = ", ".join(f"{name} {text}" for name, text in found["packages"].items())
+    return f"Python {found['python']}, {versions}; {found['platform']}"
 
 
 def _range(parameter: StudyParameter) -> str:

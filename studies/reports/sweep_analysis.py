@@ -1,99 +1,118 @@
 """Chapters on what a study means: which parameter matters, the yield, worst cases and designs by inversion."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
+
+import numpy as np
 
 from studies.errors import InputError
 from studies.reports import sweep_figures as figures
-from studies.reports.page import Block, Chapter, Table, Text
-from studies.reports.sweep_cells import main_columns, number, percent
+from studies.results import Column, Part, Sentence, Table
 from studies.sweeps.definition import StudyParameter
-from studies.sweeps.quantity import Column
+from studies.sweeps.quantity import Column as Output
 from studies.sweeps.results import Results
 from studies.sweeps.search import name_search
 from studies.sweeps.sensitivity import linear_shares, local_slopes, sobol_indices
 from studies.sweeps.tolerance import find_reach, find_yield, resolve_limits
 
+PARAMETER, SLOPE, UNIT = Column("parameter", "Parameter"), Column("slope", "Slope", form=".6g"), Column("unit", "Unit")
+EITHER_SIDE = Column("half_width", "±", form=".2g")
+SOBOL = (
+    PARAMETER,
+    Column("first", "First order", form=".4f"),
+    Column("first", "95 % interval", form=".4f", interval=("first_low", "first_high")),
+    Column("total", "Total", form=".4f"),
+    Column("total", "95 % interval", form=".4f", interval=("total_low", "total_high")),
+)
+SHARES = (PARAMETER, SLOPE, EITHER_SIDE, UNIT, Column("share", "Share of variance", "%", ".2f", scale=100.0))
+YIELD = (
+    Column("requirement", "Requirement"),
+    Column("from", "From", form=".8g"),
+    Column("to", "To", form=".8g"),
+    Column("share", "Designs that meet it", "%", ".2f", scale=100.0),
+    Column("share", "95 % interval", "%", ".2f", scale=100.0, interval=("low", "high")),
+    Column("unknown", "Without a result"),
+)
+INVERSION = (Column("column", "Column"), Column("target", "Target", form=".8g"), Column("found", "Found", form=".8g"))
+TOLERANCES = (Column("label", "Parameter"), Column("asked", "Specified"), Column("found", "Found"))
 
-def influence_chapters(results: Results) -> list[Chapter]:
+
+def main_columns(results: Results) -> list[Output]:
+    """Return the first column of every quantity: those that are drawn."""
+    return [asked.columns[0] for asked in results.study.asked]
+
+
+def number(value: Any) -> str:
+    """Return eight digits of a number, text as it is, nothing for nothing and for no end."""
+    if isinstance(value, str):
+        return value
+    return "" if value is None or not np.isfinite(value) else f"{value:.8g}"
+
+
+def influence_parts(results: Results) -> list[Part]:
     """Return which parameter matters: Sobol indices, slopes or linear shares, whichever the design allows."""
-    blocks: list[Block] = []
-    method = results.study.sampling.method
-    for column in main_columns(results):
+    show = {"sensitivity": _sobol, "one-at-a-time": _slopes, "latin-hypercube": _shares, "sobol": _shares}
+    parts: list[Part] = []
+    for column in main_columns(results) if results.study.sampling.method in show else ():
         try:
-            if method == "sensitivity":
-                blocks += _sobol(results, column)
-            elif method == "one-at-a-time":
-                blocks += _slopes(results, column)
-            elif method in ("latin-hypercube", "sobol"):
-                blocks += _shares(results, column)
+            parts += show[results.study.sampling.method](results, column)
         except InputError as error:
-            blocks.append(Text(str(error), "warning"))
-    return [Chapter("Influence of the parameters", blocks)] if blocks else []
+            parts.append(Sentence(str(error), "warning"))
+    return parts
 
 
-def _sobol(results: Results, column: Column) -> list[Block]:
+def _sobol(results: Results, column: Output) -> list[Part]:
     found = sobol_indices(results, column.name)
     if found.variance == 0:
-        return [Text(f"{column.label} is the same for every design: no parameter influences it.", "note")]
-    rows = []
-    for k, name in enumerate(found.parameters):
-        first = [f"{found.first[k]:.4f}", f"{found.first_low[k]:.4f} … {found.first_high[k]:.4f}"]
-        rows.append([name, *first, f"{found.total[k]:.4f}", f"{found.total_low[k]:.4f} … {found.total_high[k]:.4f}"])
-    heads = ["Parameter", "First order", "95 % interval", "Total", "95 % interval"]
-    table = Table(
-        f"Sobol indices of {column.label}",
-        heads,
-        rows,
-        "A parameter whose total interval includes zero has no significant influence.",
-        True,
-    )
+        return [Sentence(f"{column.label} is the same for every design: no parameter influences it.", "note")]
+    names = ("first", "first_low", "first_high", "total", "total_low", "total_high")
+    rows = [
+        {"parameter": parameter} | {name: float(getattr(found, name)[k]) for name in names}
+        for k, parameter in enumerate(found.parameters)
+    ]
+    note = "A parameter whose total interval includes zero has no significant influence."
+    table = Table(f"Sobol indices of {column.label}", rows, SOBOL, note, sortable=True)
     return [table, figures.sobol_figure(found, column)]
 
 
-def _slopes(results: Results, column: Column) -> list[Block]:
+def _slopes(results: Results, column: Output) -> list[Part]:
     found = local_slopes(results, column.name)
-    units = {p.name: p.unit for p in results.study.parameters}
-    rows = []
-    for slope in found:
-        unit = _slope_unit(column.unit, units[slope.parameter])
-        rows.append([slope.parameter, f"{slope.slope:.6g}", f"{slope.uncertainty:.2g}", unit, f"{slope.swing:.6g}"])
-    heads = ["Parameter", "Slope", "±", "Unit", f"Change over the range ({column.unit})"]
+    units = _slope_units(results, column)
+    columns = (
+        PARAMETER,
+        SLOPE,
+        Column("uncertainty", "±", form=".2g"),
+        Column(lambda slope: units[slope.parameter], "Unit"),
+        Column("swing", "Change over the range", column.unit, ".6g"),
+    )
     note = (
         "± includes curvature beyond the outer levels and the solver error; a slope smaller than ± is not significant."
     )
-    return [
-        Table(f"Slopes of {column.label} at the nominal design", heads, rows, note, True),
-        figures.tornado_figure(found, column),
-    ]
+    table = Table(f"Slopes of {column.label} at the nominal design", found, columns, note, sortable=True)
+    return [table, figures.tornado_figure(found, column)]
 
 
-def _shares(results: Results, column: Column) -> list[Block]:
+def _shares(results: Results, column: Output) -> list[Part]:
     found = linear_shares(results, column.name)
     if found is None:
         return []
-    units = {p.name: p.unit for p in results.study.parameters}
+    units = _slope_units(results, column)
     rows = [
-        [name, f"{slope:.6g}", f"{half:.2g}", _slope_unit(column.unit, units[name]), percent(share)]
+        {"parameter": name, "slope": slope, "half_width": half, "unit": units[name], "share": share}
         for name, slope, half, share in zip(found.parameters, found.slope, found.half_width, found.share, strict=True)
     ]
-    note = f"A linear model explains {percent(found.r_squared)} of the variance. ± is half of the 95 % interval; a slope smaller than ± is not significant."
-    return [
-        Table(
-            f"Linear influence on {column.label}",
-            ["Parameter", "Slope", "±", "Unit", "Share of variance"],
-            rows,
-            note,
-            True,
-        )
-    ]
+    note = (
+        f"A linear model explains {100 * found.r_squared:.2f} % of the variance. ± is half of the 95 % interval; a slope"
+        " smaller than ± is not significant."
+    )
+    return [Table(f"Linear influence on {column.label}", rows, SHARES, note, sortable=True)]
 
 
-def _slope_unit(column: str, parameter: str) -> str:
-    return column if parameter == "1" else f"{column} per {parameter}"
+def _slope_units(results: Results, column: Output) -> dict[str, str]:
+    return {p.name: column.unit if p.unit == "1" else f"{column.unit} per {p.unit}" for p in results.study.parameters}
 
 
-def tolerance_chapters(results: Results) -> list[Chapter]:
+def tolerance_parts(results: Results) -> list[Part]:
     """Return the yield under the requirements, and how far the tolerances may reach."""
     study = results.study
     if not study.requirements or not len(results):
@@ -102,17 +121,15 @@ def tolerance_chapters(results: Results) -> list[Chapter]:
         rows = []
         for requirement in study.requirements:
             limits = resolve_limits(results, requirement)
-            rows.append(
-                [limits.column, number(limits.low), number(limits.high), *_yield_cells(results, (requirement,))]
-            )
-        rows.append(["all requirements", "", "", *_yield_cells(results, study.requirements)])
+            ends = {"from": _end(limits.low), "to": _end(limits.high)}
+            rows.append({"requirement": limits.column} | ends | _yield_row(results, (requirement,)))
+        rows.append({"requirement": "all requirements"} | _yield_row(results, study.requirements))
         reach = find_reach(results, study.requirements)
     except InputError as error:
-        return [Chapter("Tolerances", [Text(str(error), "warning")])]
+        return [Sentence(str(error), "warning")]
     note = (
         "For the interval, a design without a result counts as failed at the lower end and as passed at the upper end."
     )
-    heads = ["Requirement", "From", "To", "Designs that meet it", "95 % interval", "Without a result"]
     if reach.part is None:
         words = "No sampled design fails: the tolerances can be wider than the ranges of the study."
     else:
@@ -122,14 +139,16 @@ def tolerance_chapters(results: Results) -> list[Chapter]:
             + ", ".join(_reach(p, reach.part) for p in study.parameters if not isinstance(p.nominal, str))
             + ". This is based on the sampled designs only; confirm it with a worst-case search."
         )
-    found = _findings(results, "tolerance")
-    return [Chapter("Tolerances", [*found, Table("Yield", heads, rows, note), Text(words, "note")])]
+    return [*search_parts(results, "tolerance"), Table("Yield", rows, YIELD, note), Sentence(words, "note")]
 
 
-def _yield_cells(results: Results, requirements: Any) -> list[str]:
+def _end(value: float) -> float | None:
+    return value if np.isfinite(value) else None
+
+
+def _yield_row(results: Results, requirements: Any) -> dict[str, Any]:
     found = find_yield(results, requirements)
-    between = "" if found.low is None else f"{percent(found.low)} … {percent(found.high)}"
-    return [percent(found.share), between, str(found.unknown)]
+    return {"share": found.share, "low": found.low, "high": found.high, "unknown": found.unknown}
 
 
 def _reach(parameter: StudyParameter, part: float) -> str:
@@ -138,41 +157,39 @@ def _reach(parameter: StudyParameter, part: float) -> str:
     return f"{figures.label(parameter.name, parameter.unit)} {low:.4g} … {high:.4g}"
 
 
-def search_chapters(results: Results) -> list[Chapter]:
-    """Return what the worst-case searches and inversions found."""
-    blocks = _findings(results, "worst-case", "inversion")
-    return [Chapter("Searches", blocks)] if blocks else []
-
-
-def _findings(results: Results, *kinds: str) -> list[Block]:
+def search_parts(results: Results, *kinds: str) -> list[Part]:
+    """Return what the searches of these kinds found."""
     findings = results.store.findings()
-    blocks: list[Block] = []
+    parts: list[Part] = []
     for search in (one for one in results.study.searches if one.kind in kinds):
-        found = findings.get(name_search(search))
+        name = name_search(search)
+        found = findings.get(name)
         if found is None:
-            blocks.append(
-                Text(f"The search for {name_search(search)} has not been run yet: run the study again.", "warning")
-            )
+            parts.append(Sentence(f"The search for {name} has not been run yet: run the study again.", "warning"))
         elif "failed" in found:
-            blocks.append(Text(f"The search for {name_search(search)} failed: {found['failed']}", "warning"))
+            parts.append(Sentence(f"The search for {name} failed: {found['failed']}", "warning"))
         else:
-            blocks += SEARCHES[search.kind](results, found)
-    return blocks
+            parts += SEARCHES[search.kind](results, found)
+    return parts
 
 
-def _worst_case(results: Results, found: Mapping[str, Any]) -> list[Block]:
-    names = results.study.names
-    rows = [
-        [end, number(found[end]["value"]), *(number(found[end]["parameters"][name]) for name in names)]
-        for end in ("least", "greatest")
-    ]
-    heads = ["", found["column"], *(figures.label(p.name, p.unit) for p in results.study.parameters)]
+def _worst_case(results: Results, found: Mapping[str, Any]) -> list[Part]:
+    rows = [{"end": end} | found[end] for end in ("least", "greatest")]
+    columns = (
+        Column("end", ""),
+        Column("value", found["column"], form=".8g"),
+        *(Column(_parameter(p.name), figures.label(p.name, p.unit), form=".8g") for p in results.study.parameters),
+    )
     note = "Bounded quasi-Newton search from the worst corner of the box; text parameters keep their nominal value."
-    return [Table(f"Worst cases of {found['column']} within the ranges", heads, rows, note)]
+    return [Table(f"Worst cases of {found['column']} within the ranges", rows, columns, note)]
 
 
-def _inversion(results: Results, found: Mapping[str, Any]) -> list[Block]:
-    rows = [[column, number(wanted), number(found["values"][column])] for column, wanted in found["targets"].items()]
+def _parameter(name: str) -> Callable[[Mapping[str, Any]], Any]:
+    return lambda row: row["parameters"][name]
+
+
+def _inversion(results: Results, found: Mapping[str, Any]) -> list[Part]:
+    rows = [{"column": c, "target": wanted, "found": found["values"][c]} for c, wanted in found["targets"].items()]
     design = ", ".join(f"{name} = {number(value)}" for name, value in found["parameters"].items())
     if found["reached"]:
         words, kind = f"The targets are met by {design}.", "note"
@@ -181,40 +198,32 @@ def _inversion(results: Results, found: Mapping[str, Any]) -> list[Block]:
         words, kind = f"No design within the ranges meets the targets. The closest is {design}.{limits}", "warning"
     if found["condition"] and found["condition"] > 1e3:
         words += f" The targets barely separate the parameters (condition number {found['condition']:.1e})."
-    return [Table("Design by inversion", ["Column", "Target", "Found"], rows), Text(words, kind)]
+    return [Table("Design by inversion", rows, INVERSION), Sentence(words, kind)]
 
 
-def _tolerances(results: Results, found: Mapping[str, Any]) -> list[Block]:
-    rows = describe_tolerances(results, found)
-    head = f"Tolerances with which {100 * found['share']:g} % of designs meet the requirements"
-    note = (
-        f"{tell_tolerance(found)} Each of the {found['cases']} sampled designs is scaled along its line through the nominal design;"
-        " the interval is the 90 % interval of the quantile for this number of samples."
-    )
-    return [Table(head, ["Parameter", "Specified", "Found"], rows, note)]
-
-
-def describe_tolerances(results: Results, found: Mapping[str, Any]) -> list[list[str]]:
-    """Rows of parameter, the tolerance that was asked, and the one that was found."""
+def tolerance_table(results: Results, found: Mapping[str, Any]) -> Table:
+    """Return the tolerances that were asked for, and those that were found."""
     asked = {p.name: p for p in results.study.parameters}
     rows = []
     for one in found["tolerances"]:
         p = asked[one["name"]]
         label = figures.label(p.name, p.unit)
         if p.standard_deviation is not None:
-            rows.append([label, f"σ = {number(p.standard_deviation)}", f"σ = {one['standard_deviation']:.4g}"])
+            ends = f"σ = {number(p.standard_deviation)}", f"σ = {one['standard_deviation']:.4g}"
         else:
-            rows.append([label, f"{number(p.low)} … {number(p.high)}", f"{one['low']:.6g} … {one['high']:.6g}"])
-    return rows
-
-
-def tell_tolerance(found: Mapping[str, Any]) -> str:
-    """Say by which factor tolerances may be wider, in a sentence."""
-    low, high = found["low"], found["high"]
-    return (
-        f"{100 * found['share']:g} % of designs meet the requirements if the tolerances are {found['factor']:.3g} times those of"
-        f" the study ({low:.3g} … {high:.3g})."
+            ends = f"{number(p.low)} … {number(p.high)}", f"{one['low']:.6g} … {one['high']:.6g}"
+        rows.append({"label": label, "asked": ends[0], "found": ends[1]})
+    share = f"{100 * found['share']:g} %"
+    note = (
+        f"{share} of designs meet the requirements if the tolerances are {found['factor']:.3g} times those of the study"
+        f" ({found['low']:.3g} … {found['high']:.3g}). Each of the {found['cases']} sampled designs is scaled along its line through the"
+        " nominal design; the interval is the 90 % interval of the quantile for this number of samples."
     )
+    return Table(f"Tolerances with which {share} of designs meet the requirements", rows, TOLERANCES, note)
+
+
+def _tolerances(results: Results, found: Mapping[str, Any]) -> list[Part]:
+    return [tolerance_table(results, found)]
 
 
 SEARCHES = {"worst-case": _worst_case, "inversion": _inversion, "tolerance": _tolerances}

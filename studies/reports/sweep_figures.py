@@ -7,7 +7,8 @@ import numpy as np
 from studies.errors import InputError
 from studies.instrument.units import split_unit
 from studies.reports import style
-from studies.reports.page import Picture, draw
+from studies.results import Drawing, Figure
+from studies.sweeps.definition import StudyParameter
 from studies.sweeps.quantity import Column
 from studies.sweeps.results import Results
 from studies.sweeps.sensitivity import LocalSlope, SobolIndices
@@ -28,7 +29,7 @@ def column_label(column: Column) -> str:
     return column.label + ("" if column.unit == "1" else f" ({column.unit})")
 
 
-def first_figure(results: Results) -> Picture:
+def first_figure(results: Results) -> Drawing:
     """Draw the first column against the parameters.
 
     Raises
@@ -37,14 +38,55 @@ def first_figure(results: Results) -> Picture:
         No design has a value.
     """
     column = results.study.columns[0]
-    picture = response_figure(results, column)
-    if picture is None:
+    if not _is_drawable(results, column):
         raise InputError(f"no design of the study '{results.study.name}' has a value of '{column.name}'.")
-    return picture
+    return _draw_response(results, column)
 
 
-def spread_figure(results: Results, column: Column, limits: list[RequirementLimits]) -> Picture:
-    """Draw the histogram of a column, with the nominal design and the limits asked for."""
+def spread_figure(results: Results, column: Column, limits: list[RequirementLimits]) -> Figure:
+    """Return the histogram of a column, with the nominal design and the limits asked for."""
+    count = int(np.isfinite(results.column(column.name)).sum())
+    words = f"Distribution of {column.label} over {count} designs."
+    return Figure(lambda: _draw_spread(results, column, limits), words, f"Histogram of {column.label}.")
+
+
+def response_figures(results: Results, column: Column) -> list[Figure]:
+    """Return a column against the parameters, where there is a number to draw it over."""
+    if not _is_drawable(results, column):
+        return []
+    mapped = _is_map(results)
+    words = f"Map of {column.label}; failed designs are left blank." if mapped else f"{column.label} by parameter."
+    alt = f"Map of {column.label} over two parameters." if mapped else f"{column.label} over each parameter."
+    return [Figure(lambda: _draw_response(results, column), words, alt)]
+
+
+def sobol_figure(indices: SobolIndices, column: Column) -> Figure:
+    """Return first-order and total indices with their intervals."""
+    alt = "Bars of first-order and total indices for each parameter."
+    return Figure(lambda: _draw_sobol(indices, column), "Sobol indices with 95 % intervals.", alt)
+
+
+def tornado_figure(slopes: list[LocalSlope], column: Column) -> Figure:
+    """Return what each parameter alone does to a column between the ends of its range."""
+    caption = "Change from the nominal design at the ends of each parameter's range."
+    alt = "Tornado diagram: bars to both sides of the nominal design."
+    return Figure(lambda: _draw_tornado(slopes, column), caption, alt)
+
+
+def _numeric(results: Results) -> list[StudyParameter]:
+    return [p for p in results.study.parameters if not isinstance(p.nominal, str)]
+
+
+def _is_drawable(results: Results, column: Column) -> bool:
+    return bool(_numeric(results)) and bool(np.isfinite(results.column(column.name)).any())
+
+
+def _is_map(results: Results) -> bool:
+    """Return whether a study is a grid of two numbers."""
+    return results.study.sampling.method == "grid" and len(_numeric(results)) == 2 == len(results.study.parameters)
+
+
+def _draw_spread(results: Results, column: Column, limits: list[RequirementLimits]) -> Drawing:
     y = results.column(column.name)
     y = y[np.isfinite(y)]
     with style.figure(height=2.6, x=column_label(column), y="designs") as (made, axes):
@@ -62,16 +104,14 @@ def spread_figure(results: Results, column: Column, limits: list[RequirementLimi
         axes.ticklabel_format(axis="x", useOffset=False)
         if axes.get_legend_handles_labels()[0]:
             axes.legend(fontsize=8, loc="lower left", bbox_to_anchor=(0, 1), ncols=3)
-    return draw(made, f"Distribution of {column.label} over {len(y)} designs.", f"Histogram of {column.label}.")
+    return made
 
 
-def response_figure(results: Results, column: Column) -> Picture | None:
+def _draw_response(results: Results, column: Column) -> Drawing:
     """Draw a column against the parameters: a map for a grid of two, else one panel for each of the first six."""
-    numeric = [p for p in results.study.parameters if not isinstance(p.nominal, str)]
-    if not numeric or not np.isfinite(results.column(column.name)).any():
-        return None
-    if results.study.sampling.method == "grid" and len(numeric) == 2 == len(results.study.parameters):
-        return _map(results, column)
+    if _is_map(results):
+        return _draw_map(results, column)
+    numeric = _numeric(results)
     shown = numeric[:6]
     columns = min(len(shown), 3)
     rows = -(-len(shown) // columns)
@@ -94,11 +134,10 @@ def response_figure(results: Results, column: Column) -> Picture | None:
             panel.set_visible(False)
         for panel in axes[:, 0]:
             panel.set_ylabel(column_label(column), fontsize=9)
-    words = f"{column.label} by parameter."
-    return draw(made, words, f"{column.label} over each parameter.")
+    return made
 
 
-def _map(results: Results, column: Column) -> Picture:
+def _draw_map(results: Results, column: Column) -> Drawing:
     one, other = results.study.parameters
     x, y = (np.unique(results.parameter(p.name).astype(float)) for p in (one, other))
     z = np.full((len(y), len(x)), np.nan)
@@ -113,12 +152,10 @@ def _map(results: Results, column: Column) -> Picture:
             lines = axes.contour(x, y, z, colors="white", linewidths=0.8)
             axes.clabel(lines, fontsize=8, fmt="%.6g")
         made.colorbar(picture, label=column_label(column), format="%.6g")
-    caption = f"Map of {column.label}; failed designs are left blank."
-    return draw(made, caption, f"Map of {column.label} over two parameters.")
+    return made
 
 
-def sobol_figure(indices: SobolIndices, column: Column) -> Picture:
-    """Draw first-order and total indices with their intervals."""
+def _draw_sobol(indices: SobolIndices, column: Column) -> Drawing:
     at = np.arange(len(indices.parameters))
     with style.figure(height=1.2 + 0.45 * len(at), x=f"share of the variance of {column.label}") as (made, axes):
         for shift, name, colour, values, low, high in (
@@ -130,22 +167,16 @@ def sobol_figure(indices: SobolIndices, column: Column) -> Picture:
             axes.errorbar(values, at + shift, xerr=reach, fmt="none", color=style.BLACK, linewidth=1, capsize=2)
         axes.set_yticks(at, [label(name, "1") for name in indices.parameters])
         axes.invert_yaxis()
-        axes.legend(fontsize=8, loc="lower right")
-    return draw(made, "Sobol indices with 95 % intervals.", "Bars of first-order and total indices for each parameter.")
+    return made
 
 
-def tornado_figure(slopes: list[LocalSlope], column: Column) -> Picture:
-    """Draw what each parameter alone does to a column between the ends of its range."""
+def _draw_tornado(slopes: list[LocalSlope], column: Column) -> Drawing:
     ordered = sorted(slopes, key=lambda slope: abs(slope.swing))
     at = np.arange(len(ordered))
-    with style.figure(height=1.2 + 0.4 * len(at)) as (made, axes):
+    with style.figure(height=1.2 + 0.4 * len(at), x=f"change of {column_label(column)}") as (made, axes):
         for end, colour, words in (("at_low", style.SKY, "lower end"), ("at_high", style.BLUE, "upper end")):
             change = [getattr(slope, end) - slope.nominal for slope in ordered]
             axes.barh(at, change, 0.6, color=colour, label=words)
         axes.axvline(0, color=style.BLACK, linewidth=0.8)
         axes.set_yticks(at, [label(slope.parameter, "1") for slope in ordered])
-        unit = "" if column.unit == "1" else f" ({column.unit})"
-        axes.set_xlabel(f"change of {column.label}{unit}")
-        axes.legend(fontsize=8, loc="lower right")
-    caption = "Change from the nominal design at the ends of each parameter's range."
-    return draw(made, caption, "Tornado diagram: bars to both sides of the nominal design.")
+    return made

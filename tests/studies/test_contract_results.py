@@ -2,6 +2,7 @@
 
 import inspect
 import json
+from fractions import Fraction
 from importlib import import_module
 
 import pytest
@@ -12,15 +13,13 @@ from studies.results import Blocks, Chapter, Column, Facts, Figure, Result, Sent
 from studies.results.page import render_result
 from studies.results.terminal import print_result
 
-OLD = {
-    # commands that still print for themselves and have no page, and why
-    "study run": "hrg study report makes its page",
-    "study status": "hrg study report makes its page",
-    "study report": "writes a page",
+WITHOUT_REPORT = {
+    # commands that have no --report, and why
+    "study report": "writes a page of its own",
+    "reproduce": "writes a page of its own",
     "study export": "computes nothing",
     "card new": "computes nothing",
     "study new": "computes nothing",
-    "reproduce": "writes a page",
 }
 ROW = {"a": 1.23456789, "sd": 0.0234, "low": 1e-7, "high": 3.0e6, "in": {"list": [1.0, -0.0004]}, "n": 2, "name": "x"}
 
@@ -38,10 +37,16 @@ ROW = {"a": 1.23456789, "sd": 0.0234, "low": 1e-7, "high": 3.0e6, "in": {"list":
         (Column("name", "name"), "x"),
         (Column("gone.deeper", "none"), ""),
         (Column("a", "a", error="gone"), "1.235"),
+        (Column(lambda row: row["a"] + row["n"], "a function"), "3.235"),
     ],
 )
 def test_a_number_becomes_text_in_one_place(column, text):
     assert column.write(ROW) == text
+
+
+def test_a_row_may_be_any_object():
+    assert Column("denominator", "a").write(Fraction(3, 4)) == "4"
+    assert Column("1.denominator", "a").write((0, Fraction(3, 4))) == "4"
 
 
 def answer(drawn):
@@ -108,7 +113,7 @@ def test_a_figure_is_embedded():
     assert "data:image/svg+xml;base64" in render_result(Result({}, "T", "l", [Figure(draw, "A line.")]))
 
 
-@pytest.mark.parametrize("name", sorted(set(COMMANDS) - set(OLD)))
+@pytest.mark.parametrize("name", sorted(set(COMMANDS) - set(WITHOUT_REPORT)))
 def test_every_command_that_computes_writes_a_page(name):
     module, function = COMMANDS[name][0].split(":")
     assert "report" in inspect.signature(getattr(import_module(module), function)).parameters

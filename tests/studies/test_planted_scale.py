@@ -19,6 +19,7 @@ from studies.papers.bvg import DEG, examine_claims, read_printed_chain, reduce_w
 from studies.record import read_record
 from studies.reports.bell import bell_chapters
 from studies.rest import drop_spikes
+from studies.results.page import make_blocks
 from studies.scale import settled_rows
 
 STRIDE = 20
@@ -185,7 +186,7 @@ def test_paper_twin():
     assert steady.at_rest == pytest.approx(twin.claims.noise_deviation, rel=0.05)
     assert steady.random_walk_1s / filtered.random_walk_1s == pytest.approx(dict(twin.claims.averaging)[1.0], rel=0.02)
     assert steady.random_walk_100s / filtered.random_walk_100s == pytest.approx(1.0, abs=0.01)
-    assert [len(chapter.blocks) for chapter in bell_chapters(twin)] == [5, 1]
+    assert [len(make_blocks(*chapter.parts)) for chapter in bell_chapters(twin)] == [5, 1]
 
 
 def test_filter_reduces_the_allan_deviation_as_predicted():

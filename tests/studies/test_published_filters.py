@@ -61,7 +61,8 @@ def test_error_map_is_darkest_in_the_middle():
 
 def test_chapters_can_be_drawn(study):
     from studies.reports.filters import filter_chapters
+    from studies.results.page import make_blocks
 
     chapters = filter_chapters(study, study_error_map(5))
-    assert [len(chapter.blocks) for chapter in chapters] == [2, 2, 2, 3]
+    assert [len(make_blocks(*chapter.parts)) for chapter in chapters] == [2, 2, 2, 3]
     assert cvg_filters.KALMAN_STEP == study.by_step[-1][0]

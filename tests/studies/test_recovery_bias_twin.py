@@ -51,10 +51,10 @@ def test_without_any_temperature_effect_the_guarded_method_gains_nothing_held_ou
 
 def test_the_table_holds_paper_training_and_held_out(twins):
     table = twin_table(twins)
-    assert table.rows[0][2] == "5.15"
+    assert table.rows[0]["training"] == "5.15"
     assert len(table.rows) == 5
     assert len(terms_table(twins).rows) == 9
-    assert twin_chapters(twins)[0].blocks
+    assert twin_chapters(twins)[0].parts
 
 
 def test_spread_counts_those_made_worse():

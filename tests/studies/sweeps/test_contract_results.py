@@ -12,7 +12,8 @@ from dataclasses import replace
 import pytest
 
 from studies.errors import InputError, MissingEnvironment
-from studies.reports.sweep import sweep_page
+from studies.reports.sweep import study_result
+from studies.results.page import render_result
 from studies.sweeps.progress import Lines
 from studies.sweeps.run import run_study
 from tests.studies.sweeps.processes import environment, rows_of, spec_of, words_of
@@ -59,7 +60,7 @@ def test_two_workers_give_the_same_bits(results):
 def test_page_is_self_contained_and_escapes(results, monkeypatch):
     monkeypatch.setattr("studies.reports.mode_picture.mode_blocks", lambda *_: [])  # pictures have their own tests
     hostile = replace(results, study=replace(results.study, name="<script>alert(1)</script>"))
-    page = sweep_page(hostile)
+    page = render_result(study_result(hostile))
     assert "<script>alert" not in page
     assert "https://" not in page.split("<footer")[0]
     for part in ("Influence of the parameters", "Tolerances", "Provenance", "sortable", "resonator.thickness_mm"):
@@ -73,7 +74,7 @@ def test_page_of_a_study_of_which_nothing_is_computed_yet(results, monkeypatch):
     monkeypatch.setattr("studies.reports.mode_picture.mode_blocks", lambda *_: [])
     empty = memory_store()
     empty.describe(results.store.about() | {"cases": 8})
-    page = sweep_page(Results(results.study, empty))
+    page = render_result(study_result(Results(results.study, empty)))
     assert "not finished" in page
     assert len(Results(results.study, empty).table()) == 0
 
@@ -83,7 +84,7 @@ def test_template_over_temperature_gives_table_1_and_2_for_any_card(tmp_path, mo
     found = run_study("frequency-over-temperature", tmp_path / "out", card="cvg-25mm", workers=1)
     assert found.study.instrument.name == "cvg-25mm"
     assert found.parameter("temperature_degC").tolist() == [-20, -10, 0, 10, 20, 30, 40]
-    page = sweep_page(found)
+    page = render_result(study_result(found))
     assert "Temperature from frequency" in page
     assert "Coefficients about T0" in page
     found.close()
