@@ -1,6 +1,6 @@
 """Arguments that several commands share."""
 
-from typing import Annotated
+from typing import Annotated, Literal
 
 import numpy as np
 from cyclopts import Parameter
@@ -12,10 +12,20 @@ from studies.errors import InputError
 
 Array = NDArray[np.float64]
 
-Seed = Annotated[int, Parameter(validator=Number(gte=0))]
-"""Of random draws: a whole number from 0 up."""
-FromDegC = Annotated[float, Parameter(name="--from")]
-ToDegC = Annotated[float, Parameter(name="--to")]
+CARD = "Path of a card, or the name of one that ships (hrg cards)."
+REFERENCE = "Temperature in °C; the card's reference temperature unless given."
+Card = Annotated[str, Parameter(help=CARD)]
+Temperature = Annotated[float | None, Parameter(help=REFERENCE, show_default=False)]
+Theory = Annotated[Literal["solid", "shell"], Parameter(help="solid (three-dimensional) or shell (Naghdi).")]
+Harmonic = Annotated[int, Parameter(help="Circumferential harmonic n.")]
+Seed = Annotated[int, Parameter(help="Seed of the random numbers.", validator=Number(gte=0))]
+FromDegC = Annotated[float, Parameter(name="--from", help="Lowest temperature in °C.")]
+ToDegC = Annotated[float, Parameter(name="--to", help="Highest temperature in °C.")]
+Step = Annotated[float, Parameter(help="Step in °C.")]
+Confidence = Annotated[float, Parameter(help="Confidence level of the intervals.")]
+SaveModel = Annotated[str | None, Parameter(help="Write the model (TOML) for hrg compensate.")]
+EmitC = Annotated[str | None, Parameter(help="Write the model as C99 source for firmware.")]
+Folder = Annotated[str, Parameter(help="Folder of the study (hrg study run --out).")]
 MOST_TEMPERATURES = 10_000
 
 

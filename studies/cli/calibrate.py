@@ -17,6 +17,7 @@ from typing import Any
 from studies import workbench
 from studies.calibration.calibrate import Calibration
 from studies.calibration.observed import UNITS
+from studies.cli.arguments import Card
 from studies.cli.output import answers, say
 from studies.errors import InputError
 from studies.instrument.card import load_card, save_card
@@ -27,7 +28,9 @@ VALUE = ("parameter", "unit", "card", "value", "low", "high", "shift_sd", "width
 
 
 @answers("hrg.calibration/1")
-def calibrate(card: str, *data: str, save: str | None = None, hold_out: int = 0, exact: tuple[str, ...] = ()) -> Result:
+def calibrate(
+    card: Card, *data: str, save: str | None = None, hold_out: int = 0, exact: tuple[str, ...] = ()
+) -> Result:
     """Find the most probable values of a card, given its uncertainties and records of the device.
 
     Every uncertain value of the card may change within its prior: { value = …, relative_sd = … } in the card, or the documented
@@ -37,8 +40,6 @@ def calibrate(card: str, *data: str, save: str | None = None, hold_out: int = 0,
 
     Parameters
     ----------
-    card : str
-        Path of a card, or the name of one that ships (hrg cards).
     data : str
         Records (CSV) of one device, and steady-state tables (temperature_degC,frequency_Hz).
     save : str

@@ -7,7 +7,7 @@ import numpy as np
 from compensation.decimation import average_blocks
 from compensation.errors import CompensationError
 from studies import models
-from studies.cli.arguments import Array
+from studies.cli.arguments import Array, EmitC
 from studies.cli.output import answers, say
 from studies.errors import InputError
 from studies.files.writing import write_text
@@ -43,7 +43,7 @@ def compensate(
     *,
     out: str | None = None,
     extrapolate: bool = False,
-    emit: str | None = None,
+    emit: EmitC = None,
 ) -> Result:
     """Apply a model saved by one of the hrg fit commands: write the record with compensated_… columns added.
 
@@ -61,8 +61,6 @@ def compensate(
         Write the record with the added columns.
     extrapolate : bool
         Apply the model outside its fitted range too; in a record without a thermometer, leave those rows empty.
-    emit : str
-        Write the model as C99 source for firmware.
     """
     loaded = models.read_model(model)
     if (run is None) != (out is None):

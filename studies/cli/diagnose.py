@@ -44,8 +44,6 @@ def diagnose(
         Limits of the chamber, such as "rate 3 range -40 85" (K/min, °C), for --plan and for the suggested next run.
     draws : int
         With --plan: random draws, 4 to 2000; each effect is tried in a quarter as many cases at each SNR (1, 0.3, 0.1).
-    seed : int
-        Seed of the draws.
     device : list[str]
         A device of a fleet and its records, such as A=a1.csv,a2.csv; repeat it for each device of the same design. Shows what the
         devices have in common and which one differs.

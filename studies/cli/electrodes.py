@@ -15,6 +15,7 @@ import numpy as np
 from shell.constants import zero_Celsius
 from shell.electrodes import reach, trim_voltages
 from shell.modes import solve_modes
+from studies.cli.arguments import Temperature
 from studies.cli.output import answers
 from studies.errors import InputError, naming
 from studies.instrument.card import load_card
@@ -31,7 +32,7 @@ def electrodes(
     split: float | None = None,
     axis: float | None = None,
     limit: float = 100.0,
-    temperature: float | None = None,
+    temperature: Temperature = None,
 ) -> Result:
     """Show what the card's table [electrodes] does to a pair: softening, split, coefficients, pull-in, trim voltages.
 
@@ -47,8 +48,6 @@ def electrodes(
         Azimuth in degrees of an antinode of its slower mode.
     limit : float
         Largest trim voltage in V.
-    temperature : float
-        Temperature in °C; the card's reference temperature unless given.
     """
     if (split is None) != (axis is None):
         raise InputError("a split that is to be nulled needs both --split (Hz) and --axis (degrees).")

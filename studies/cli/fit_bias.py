@@ -10,6 +10,7 @@ unit·√s, B in unit, K in unit/√s; null for runs too short for it.
 from typing import Any, Literal
 
 from studies.bias import BiasStudy, Judged, Stability, study_bias
+from studies.cli.arguments import EmitC, SaveModel
 from studies.cli.output import answers, say
 from studies.errors import InputError
 from studies.files.writing import write_text
@@ -28,8 +29,8 @@ def fit_bias(
     window: float | None = None,
     causal: bool = False,
     over: Literal["auto", "frequency", "temperature"] = "auto",
-    save: str | None = None,
-    emit: str | None = None,
+    save: SaveModel = None,
+    emit: EmitC = None,
 ) -> Result:
     """Fit the bias over the change of frequency and its rate, with stepwise selection (HRG paper, equations 19 to 22).
 
@@ -52,10 +53,6 @@ def fit_bias(
         Take the rate from past samples only, as firmware must; it then lags by half the window.
     over : str
         Variable of the fit; auto is the frequency if every record has it, else a temperature.
-    save : str
-        Write the model (TOML) for hrg compensate.
-    emit : str
-        Write the model as C99 source for firmware.
     """
     if not data:
         raise InputError("name at least one record (CSV) of a gyro at rest while its temperature changes.")

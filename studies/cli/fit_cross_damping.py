@@ -7,6 +7,7 @@ import numpy as np
 
 from compensation.improvement import Change
 from shell.constants import zero_Celsius
+from studies.cli.arguments import SaveModel
 from studies.cli.output import answers, say
 from studies.cross_damping import CrossDampingStudy, study_cross_damping
 from studies.errors import InputError, naming
@@ -50,7 +51,7 @@ def fit_cross_damping(
     quality: float | None = None,
     order: int = 3,
     calibration_temperature: float = 20.0,
-    save: str | None = None,
+    save: SaveModel = None,
 ) -> Result:
     """Fit the cross-damping of a cylindrical gyro over temperature (CVG cross-damping paper, equations 9 and 10).
 
@@ -69,8 +70,6 @@ def fit_cross_damping(
         Highest power of the temperature; the paper uses 3.
     calibration_temperature : float
         Temperature in °C about which the polynomial is expanded.
-    save : str
-        Write the model (TOML) for hrg compensate.
     """
     if not data:
         raise InputError("name at least one record (CSV) of a gyro at rest.")

@@ -8,7 +8,7 @@ distance from the last reading to the settled state of a hold that was extrapola
 from pathlib import Path
 from typing import Any
 
-from studies.cli.arguments import Array
+from studies.cli.arguments import Array, SaveModel
 from studies.cli.output import answers, say
 from studies.errors import naming
 from studies.files.columns import read_header
@@ -39,7 +39,7 @@ def fit_frequency(
     order: int = 3,
     reference_temperature: float = 0.0,
     resolution: float | None = None,
-    save: str | None = None,
+    save: SaveModel = None,
     time_constant: float = 3000.0,
     left: float = 0.05,
 ) -> Result:
@@ -63,8 +63,6 @@ def fit_frequency(
         Temperature T0 in °C about which the polynomial is expanded.
     resolution : float
         Resolution of the frequency readings in Hz; by default the last digit in the file.
-    save : str
-        Write the model (TOML) for hrg compensate.
     """
     T, f, step, source, soaks = _read_points((table, *more), time_constant, left)
     with naming(table):

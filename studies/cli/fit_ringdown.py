@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from studies.cli.arguments import Harmonic
 from studies.cli.output import answers, say
 from studies.errors import InputError
 from studies.instrument.card import load_card, save_card
@@ -58,7 +59,7 @@ GAS = (
 
 @answers("hrg.fit-ringdown/1")
 def fit_ringdown(
-    *data: str, card: str | None = None, frequency: float | None = None, harmonic: int = 2, save: str | None = None
+    *data: str, card: str | None = None, frequency: float | None = None, harmonic: Harmonic = 2, save: str | None = None
 ) -> Result:
     """Fit frequencies, Q and the axes of elasticity and damping to ring-downs, with 90 % intervals.
 
@@ -75,8 +76,6 @@ def fit_ringdown(
         The resonator's card: an aliased frequency is recognised by it, and --save writes it with the values found.
     frequency : float
         Carrier or reference frequency in Hz, in place of the file's comment.
-    harmonic : int
-        Circumferential harmonic n.
     save : str
         Write the card with the split, its axis, 1/Q and the damping axis of the first decay.
     """

@@ -4,6 +4,7 @@ import dataclasses
 import re
 from typing import Any
 
+from studies.cli.arguments import SaveModel
 from studies.cli.output import answers, say
 from studies.errors import InputError
 from studies.models import source_of, write_model
@@ -38,7 +39,7 @@ def fit_scale(
     cutoff: float = 1.0,
     order: int = 50,
     no_filter: bool = False,
-    save: str | None = None,
+    save: SaveModel = None,
 ) -> Result:
     """Fit null, bias over temperature, and scale over rate and over temperature (BVG paper, equations 32 to 36).
 
@@ -57,8 +58,6 @@ def fit_scale(
         Order of the FIR filter; the paper uses 50.
     no_filter : bool
         Omit the FIR filter; the record may then have gaps.
-    save : str
-        Write the model (TOML) for hrg compensate.
     """
     if len(data) < 3:
         raise InputError(

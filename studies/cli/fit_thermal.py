@@ -7,6 +7,7 @@ With --json one object, schema `hrg.fit-thermal/1`: `data`, `confidence`, `estim
 
 from studies.calibration.lags.identification import Identification
 from studies.calibration.lags.records import fit_thermal_constants
+from studies.cli.arguments import Confidence
 from studies.cli.output import answers, say
 from studies.cli.telling import Told
 from studies.errors import InputError
@@ -27,7 +28,7 @@ COLOURED = 3.0  # residual over its white part, above which the chain of lags is
 
 
 @answers("hrg.fit-thermal/1")
-def fit_thermal(*data: str, card: str | None = None, lags: int | None = None, confidence: float = 0.9) -> Result:
+def fit_thermal(*data: str, card: str | None = None, lags: int | None = None, confidence: Confidence = 0.9) -> Result:
     """Find the time constants with which the resonator follows its housing, with intervals, and what the records leave open.
 
     The records need time_s, frequency_Hz and housing_temperature_degC (or chamber_temperature_degC). The model is a series of
@@ -42,8 +43,6 @@ def fit_thermal(*data: str, card: str | None = None, lags: int | None = None, co
         A card whose law gives the curvature of frequency over temperature; without it the curvature is fitted.
     lags : int
         Number of lags; by default as many as the records support.
-    confidence : float
-        Confidence level of the intervals.
     """
     if not data:
         raise InputError("name at least one record (CSV) with a step, a ramp or a cycle of temperature.")

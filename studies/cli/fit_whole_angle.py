@@ -10,6 +10,7 @@ import numpy as np
 
 from compensation.wave_fit import WaveFit
 from compensation.wave_fit import fit_whole_angle as fit
+from studies.cli.arguments import Confidence
 from studies.cli.output import answers, say
 from studies.errors import InputError, naming
 from studies.instrument.card import Instrument, load_card, save_card
@@ -43,7 +44,7 @@ def fit_whole_angle(
     card: str | None = None,
     bryan_factor: float | None = None,
     quadrature_volts_per_hertz: float | None = None,
-    confidence: float = 0.95,
+    confidence: Confidence = 0.95,
     save: str | None = None,
 ) -> Result:
     """Find damping and frequency splits with their axes, gain ratio and phase error in a whole-angle run, with intervals.
@@ -63,8 +64,6 @@ def fit_whole_angle(
         Bryan factor, used instead of the card's.
     quadrature_volts_per_hertz : float
         Scale of quadrature_V; without it and without a card, that column is not used.
-    confidence : float
-        Confidence level of the intervals.
     save : str
         Write the card with the estimates and their uncertainties.
     """

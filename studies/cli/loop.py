@@ -16,7 +16,7 @@ import numpy as np
 
 from compensation.controllers import Loops
 from shell.constants import zero_Celsius
-from studies.cli.arguments import Seed
+from studies.cli.arguments import Card, Seed, Temperature
 from studies.cli.output import answers, say
 from studies.errors import InputError
 from studies.instrument.card import load_card
@@ -35,9 +35,9 @@ from studies.simulation.virtual_gyro import simulate_run
 
 @answers("hrg.loop/1")
 def loop(
-    card: str,
+    card: Card,
     *,
-    temperature: float | None = None,
+    temperature: Temperature = None,
     rate: float = 0.0,
     out: str | None = None,
     state_space: str | None = None,
@@ -56,10 +56,6 @@ def loop(
 
     Parameters
     ----------
-    card : str
-        Path of a card, or the name of one that ships (hrg cards).
-    temperature : float
-        In °C; the card's reference temperature unless given.
     rate : float
         Applied rate in °/s, within the range of the actuators.
     out : str
@@ -74,8 +70,6 @@ def loop(
         Chamber profile of the run, as for hrg simulate; frequency and loss follow the temperature.
     both_ways : bool
         Reverse the self-precession halfway through the run (whole-angle cards only).
-    seed : int
-        Seed of the noise of the run.
     noiseless : bool
         Run without noise.
     """

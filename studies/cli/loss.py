@@ -7,14 +7,14 @@ where nothing varies around) with `inverse_q_split`, `damping_axis_deg`, `larges
 (null where the card states no 1/Q) with `inverse_q`, and the `explained` share of it with `explained_low`, `explained_high`.
 """
 
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
 from shell.constants import zero_Celsius
 from shell.damping.budget import Budget, LossPart
 from shell.damping.thermoelastic import trace_share
-from studies.cli.arguments import FromDegC, ToDegC, lay_temperatures
+from studies.cli.arguments import Card, FromDegC, Harmonic, Step, Theory, ToDegC, lay_temperatures
 from studies.cli.output import answers
 from studies.instrument.card import Instrument, load_card
 from studies.loss.account import DampingAround, StatedLoss, damping_around, stated_loss
@@ -35,13 +35,13 @@ SQUEEZE = (
 
 @answers("hrg.loss/1")
 def loss(
-    card: str,
+    card: Card,
     *,
     from_degC: FromDegC = -20.0,
     to_degC: ToDegC = 40.0,
-    step: float = 10.0,
-    harmonic: int = 2,
-    theory: Literal["solid", "shell"] = "solid",
+    step: Step = 10.0,
+    harmonic: Harmonic = 2,
+    theory: Theory = "solid",
     anchor: bool = False,
 ) -> Result:
     """Show Q over temperature, its loss contributions, and which of them to reduce first.
@@ -51,18 +51,6 @@ def loss(
 
     Parameters
     ----------
-    card : str
-        Path of a card, or the name of one that ships (hrg cards).
-    from_degC : float
-        Lowest temperature in °C.
-    to_degC : float
-        Highest temperature in °C.
-    step : float
-        Step in °C.
-    harmonic : int
-        Circumferential harmonic n.
-    theory : str
-        solid (three-dimensional) or shell (Naghdi).
     anchor : bool
         Compute the anchor loss of a stem (a second or two).
     """

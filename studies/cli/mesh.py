@@ -10,6 +10,7 @@ from shell.constants import zero_Celsius
 from shell.inertia import weigh
 from shell.volume import build_volume
 from shell.volume_files import VolumeKind, encode_volume
+from studies.cli.arguments import Card, Temperature
 from studies.cli.output import answers
 from studies.errors import InputError, naming
 from studies.files.writing import written_whole
@@ -21,14 +22,14 @@ KINDS = (".vtu", ".msh", ".inp")
 
 @answers("hrg.mesh/1")
 def mesh(
-    card: str,
+    card: Card,
     *,
     out: str,
     layers: int = 2,
     around: int = 48,
     spacing_mm: Annotated[float | None, Parameter(show_default=False)] = None,
     complete: bool = False,
-    temperature: Annotated[float | None, Parameter(show_default=False)] = None,
+    temperature: Temperature = None,
 ) -> Result:
     """Mesh the solid for a finite-element program: shell, roots, fillets, corners and stem, node on node.
 
@@ -40,8 +41,6 @@ def mesh(
 
     Parameters
     ----------
-    card : str
-        Path of a card, or the name of one that ships (hrg cards).
     out : str
         File to write.
     layers : int
@@ -52,8 +51,6 @@ def mesh(
         Longest element along the meridian; a sixth of the radius unless given.
     complete : bool
         Add nodes at the centres of faces and elements: 27 and 18 for each element instead of 20 and 15.
-    temperature : float
-        Temperature in °C; the card's reference temperature unless given.
     """
     kind = Path(out).suffix.lower()
     if kind not in KINDS:

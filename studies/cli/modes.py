@@ -22,6 +22,7 @@ from shell.constants import zero_Celsius
 from shell.modes import Mode, solve_modes
 from shell.resonator import Resonator
 from studies.cli.amplitude import amplitude_table, describe_amplitude
+from studies.cli.arguments import Card, Temperature
 from studies.cli.crystal import crystal_pairs, crystal_table
 from studies.cli.films import describe_films, films_table
 from studies.cli.mount import describe_mount, mount_table
@@ -58,11 +59,11 @@ COLUMNS = (
 
 @answers("hrg.modes/1")
 def modes(
-    card: str,
+    card: Card,
     *,
     harmonic: Annotated[tuple[int, ...], Parameter(consume_multiple=True)] = (2,),
     count: int = 1,
-    temperature: float | None = None,
+    temperature: Temperature = None,
     theory: Literal["solid", "shell", "rayleigh"] = "solid",
     tolerance: float = 1e-5,
     sensitivities: bool = False,
@@ -73,14 +74,10 @@ def modes(
 
     Parameters
     ----------
-    card : str
-        Path of a card, or the name of one that ships (hrg cards).
     harmonic : tuple[int, ...]
         One or more circumferential harmonics n, for example --harmonic 0 1 2 3.
     count : int
         Number of modes of each harmonic.
-    temperature : float
-        Temperature of the resonator in °C; the card's reference temperature unless given.
     theory : str
         solid (three-dimensional), shell (Naghdi) or rayleigh (closed form, hemisphere of constant thickness).
     tolerance : float

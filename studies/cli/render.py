@@ -10,6 +10,7 @@ from cyclopts import Parameter
 from shell.constants import zero_Celsius
 from shell.mesh import encode_animation, encode_mesh
 from shell.scene import EXAGGERATION
+from studies.cli.arguments import Theory
 from studies.cli.output import answers
 from studies.errors import InputError, MissingEnvironment
 from studies.files.writing import written_whole
@@ -36,7 +37,7 @@ def render(
     harmonic: Annotated[tuple[int, ...], Parameter(consume_multiple=True, show_default=False)] = (2,),
     index: int = 0,
     temperature: Annotated[tuple[float, ...], Parameter(consume_multiple=True, show_default=False)] = (),
-    theory: Literal["solid", "shell"] = "solid",
+    theory: Theory = "solid",
     colour: Literal["displacement", "energy", "temperature"] = "displacement",
     field: str | None = None,
     view: Literal["oblique", "axis", "side"] = "oblique",
@@ -63,8 +64,6 @@ def render(
         0 for the lowest mode of its harmonic.
     temperature : tuple[float, ...]
         Temperature of the resonator in °C; the card's reference temperature unless given.
-    theory : str
-        solid (three-dimensional) or shell (Naghdi).
     colour : str
         What the colour shows: displacement, strain-energy density, or a temperature field.
     field : str

@@ -14,6 +14,7 @@ import numpy as np
 from cyclopts import Parameter
 
 from shell.constants import zero_Celsius
+from studies.cli.arguments import Card, Temperature, Theory
 from studies.cli.output import answers, say
 from studies.errors import InputError, naming
 from studies.files.writing import write_text
@@ -61,7 +62,7 @@ ROUNDNESS = (
 
 @answers("hrg.scan/1")
 def scan(
-    card: str,
+    card: Card,
     inner: str,
     outer: str = NONE,
     *,
@@ -69,8 +70,8 @@ def scan(
     frames: Literal["own", "common"] = "own",
     harmonic: Annotated[tuple[int, ...], Parameter(consume_multiple=True)] = (1, 2, 3, 4),
     highest: int = 12,
-    temperature: float | None = None,
-    theory: Literal["solid", "shell"] = "solid",
+    temperature: Temperature = None,
+    theory: Theory = "solid",
     map_file: Annotated[str | None, Parameter(name="--map")] = None,
     save: str | None = None,
 ) -> Result:
@@ -83,8 +84,6 @@ def scan(
 
     Parameters
     ----------
-    card : str
-        Path of a card, or the name of one that ships (hrg cards).
     inner : str
         Points of the inner face; none if only the outer face was measured.
     outer : str
@@ -97,10 +96,6 @@ def scan(
         Harmonics n of the splits.
     highest : int
         Highest circumferential harmonic of the fit, at least twice the highest n.
-    temperature : float
-        Temperature in °C; the card's reference temperature unless given.
-    theory : str
-        solid (three-dimensional) or shell (Naghdi).
     map_file : str
         Write a CSV file: position, azimuth, and deviations of faces, wall and middle surface.
     save : str

@@ -10,7 +10,7 @@ from typing import Literal
 
 import numpy as np
 
-from studies.cli.arguments import Seed
+from studies.cli.arguments import Card, Seed, Theory
 from studies.cli.output import answers, say
 from studies.errors import InputError
 from studies.instrument.card import load_card
@@ -22,14 +22,14 @@ from studies.simulation.virtual_gyro import simulate_run
 
 @answers("hrg.simulate/1")
 def simulate(
-    card: str,
+    card: Card,
     profile: str,
     *,
     out: str,
     row: float = 1.0,
     seed: Seed = 0,
     noiseless: bool = False,
-    theory: Literal["solid", "shell"] = "solid",
+    theory: Theory = "solid",
     boundary: Literal["chamber", "housing"] | None = None,
     spread: bool = False,
 ) -> Result:
@@ -43,8 +43,6 @@ def simulate(
 
     Parameters
     ----------
-    card : str
-        Path of a card, or the name of one that ships (hrg cards).
     profile : str
         A CSV file (time_s,chamber_temperature_degC, linear between its rows; drive_amplitude_V, electrode_bias_V,
         quadrature_V or pattern_angle_deg beside them command the drives, rate_deg_per_s is applied), or words in quotes with temperatures in °C,
@@ -56,12 +54,8 @@ def simulate(
         The record to write.
     row : float
         Time between rows in s; a record has its own rows.
-    seed : int
-        Seed of the noise.
     noiseless : bool
         Leave out noise, sensor lag and rounding.
-    theory : str
-        Of the shell: solid (three-dimensional) or shell (Naghdi).
     boundary : str
         Column of a record that is imposed: chamber or housing.
     spread : bool

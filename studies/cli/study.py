@@ -3,6 +3,7 @@
 from pathlib import Path
 from typing import Any
 
+from studies.cli.arguments import Folder
 from studies.cli.output import answers, say
 from studies.errors import InputError
 from studies.results import Column, Result, Sentence, Table
@@ -107,14 +108,8 @@ def run(
 
 
 @answers("hrg.study-status/1")
-def status(folder: str) -> Result:
-    """Show the progress of a study and the failed cases with their reasons, also while it runs.
-
-    Parameters
-    ----------
-    folder : str
-        Folder of the study (hrg study run --out).
-    """
+def status(folder: Folder) -> Result:
+    """Show the progress of a study and the failed cases with their reasons, also while it runs."""
     from studies.sweeps.opening import is_running
 
     results = open_results(folder)
@@ -126,13 +121,11 @@ def status(folder: str) -> Result:
 
 
 @answers("hrg.study-report/1", page=False)
-def report(folder: str, *, out: str | None = None) -> Result:
+def report(folder: Folder, *, out: str | None = None) -> Result:
     """Write a self-contained HTML page: definition, results, figures, sensitivities, yield and provenance.
 
     Parameters
     ----------
-    folder : str
-        Folder of the study (hrg study run --out).
     out : str
         The page; default: report.html in the folder.
     """
@@ -153,13 +146,11 @@ def report(folder: str, *, out: str | None = None) -> Result:
 
 
 @answers("hrg.study-export/1", page=False)
-def export(folder: str, *, out: str | None = None) -> Result:
+def export(folder: Folder, *, out: str | None = None) -> Result:
     """Write the results as CSV, and the unit of every column to a JSON file.
 
     Parameters
     ----------
-    folder : str
-        Folder of the study (hrg study run --out).
     out : str
         The CSV file; default: results.csv in the folder.
     """

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from shell.constants import zero_Celsius
 from shell.law import FrequencyLaw
-from studies.cli.arguments import FromDegC, ToDegC, lay_temperatures
+from studies.cli.arguments import Card, FromDegC, Harmonic, Step, ToDegC, lay_temperatures
 from studies.cli.output import answers
 from studies.errors import InputError
 from studies.instrument.card import load_card
@@ -26,12 +26,12 @@ LEAST = 0.005  # ppm/°C, that is shown
 
 @answers("hrg.tcf/1")
 def tcf(
-    card: str,
+    card: Card,
     *,
     from_degC: FromDegC = -20.0,
     to_degC: ToDegC = 40.0,
-    step: float = 10.0,
-    harmonic: int = 2,
+    step: Step = 10.0,
+    harmonic: Harmonic = 2,
     theory: Literal["solid", "shell", "rayleigh"] = "solid",
     measured: str | None = None,
 ) -> Result:
@@ -39,16 +39,6 @@ def tcf(
 
     Parameters
     ----------
-    card : str
-        Path of a card, or the name of one that ships (hrg cards).
-    from_degC : float
-        Lowest temperature in °C.
-    to_degC : float
-        Highest temperature in °C.
-    step : float
-        Step in °C.
-    harmonic : int
-        Circumferential harmonic n.
     theory : str
         solid (three-dimensional), shell (Naghdi) or rayleigh (closed form).
     measured : str

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from shell.constants import zero_Celsius
-from studies.cli.arguments import Array
+from studies.cli.arguments import Array, Card
 from studies.cli.output import answers
 from studies.errors import InputError
 from studies.instrument.card import load_card
@@ -31,15 +31,13 @@ from thermal.transient import Transient
 
 
 @answers("hrg.thermal/1")
-def thermal(card: str, profile: str, *, rows: int = 13) -> Result:
+def thermal(card: Card, profile: str, *, rows: int = 13) -> Result:
     """Show time constants, their sensitivities, and the temperatures of housing, base, stem and shell in time.
 
     The heat path is the card's table [thermal] with its defaults (hrg keys card).
 
     Parameters
     ----------
-    card : str
-        Path of a card, or the name of one that ships (hrg cards).
     profile : str
         A CSV file (time_s,chamber_temperature_degC, linear between its rows), or words in quotes with temperatures in °C,
         durations as 5h, 30min or 90s, and rates in K/min: "soak T DURATION", "step FROM TO DURATION",

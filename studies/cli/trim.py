@@ -17,6 +17,7 @@ from cyclopts import Parameter
 from shell.constants import zero_Celsius
 from shell.resonator import Resonator
 from shell.trimming import ExpectedSplit
+from studies.cli.arguments import Card, Temperature
 from studies.cli.measured_splits import pair_splits, read_scan, read_unbalance
 from studies.cli.output import answers, say
 from studies.errors import naming
@@ -50,7 +51,7 @@ LIMIT = "Upper limit: a split is the length of a vector, both of whose parts hav
 
 @answers("hrg.trim/1")
 def trim(
-    card: str,
+    card: Card,
     *,
     split: Annotated[tuple[float, ...], MANY] = (),
     axis: Annotated[tuple[float, ...], MANY] = (),
@@ -70,7 +71,7 @@ def trim(
     removal_error: float = 0.02,
     gain_error: float = 0.03,
     gain: float = 1.0,
-    temperature: float | None = None,
+    temperature: Temperature = None,
     out: str | None = None,
 ) -> Result:
     """Plan the cuts that null measured splits with the least mass, preserve the balance, and do not overshoot.
@@ -82,8 +83,6 @@ def trim(
 
     Parameters
     ----------
-    card : str
-        Path of a card, or the name of one that ships (hrg cards).
     split : tuple[float, ...]
         Measured splits in Hz, one for each --harmonic.
     axis : tuple[float, ...]
@@ -120,8 +119,6 @@ def trim(
         Relative standard error common to all cuts.
     gain : float
         Measured over predicted change of the split in the last round; negative if the split changed in the opposite direction.
-    temperature : float
-        Temperature in °C; the card's reference temperature unless given.
     out : str
         Write the cuts as CSV, for the machine.
     """

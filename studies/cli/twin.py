@@ -8,6 +8,7 @@ or null), `inputs` and `parameters` (lists of `name`, `unit`, `start`), `outputs
 import os
 from typing import Literal
 
+from studies.cli.arguments import Card, Theory
 from studies.cli.output import answers
 from studies.errors import InputError
 from studies.files.writing import check_folder, write_text
@@ -20,13 +21,13 @@ from studies.twin.source import PROGRAM, exposed, outputs_of, sources
 
 @answers("hrg.twin/1")
 def twin(
-    card: str,
+    card: Card,
     *,
     fmu: str | None = None,
     c: str | None = None,
     fmi: Literal["2.0", "3.0"] = "3.0",
     boundary: Literal["chamber", "housing"] = "chamber",
-    theory: Literal["solid", "shell"] = "solid",
+    theory: Theory = "solid",
 ) -> Result:
     """Write the virtual gyro of a card as an FMU for co-simulation, or as C11.
 
@@ -36,8 +37,6 @@ def twin(
 
     Parameters
     ----------
-    card : str
-        Path of a card, or the name of one that ships (hrg cards).
     fmu : str
         The FMU to write, with its sources; it holds a binary for 64-bit Linux if a C compiler is found (the variable CC, cc or gcc).
     c : str
@@ -46,8 +45,6 @@ def twin(
         Version of the FMU.
     boundary : str
         Temperature that is an input: that of the chamber, or of the housing itself.
-    theory : str
-        Of the shell: solid (three-dimensional) or shell (Naghdi).
     """
     if fmu is None and c is None:
         raise InputError("nothing to do: give --fmu FILE.fmu, --c FOLDER, or both.")
