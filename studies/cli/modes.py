@@ -12,7 +12,6 @@ a crystal, the lowest pairs of n = 2, 3, 5, 6, 7, 9 … have `crystal`: `antinod
 
 from collections.abc import Sequence
 from dataclasses import asdict
-from math import degrees
 from typing import Annotated, Any, Literal
 
 import numpy as np
@@ -21,22 +20,16 @@ from cyclopts import Parameter
 from shell.constants import zero_Celsius
 from shell.modes import Mode, solve_modes
 from shell.resonator import Resonator
-from studies.cli.amplitude import amplitude_table, describe_amplitude
 from studies.cli.arguments import Card, Temperature
-from studies.cli.crystal import crystal_pairs, crystal_table
-from studies.cli.films import describe_films, films_table
-from studies.cli.mount import describe_mount, mount_table
+from studies.cli.mode_effects import MODE, Asked, describe_effects, effect_tables
 from studies.cli.output import answers
-from studies.cli.spin import spin_pairs, spin_table
 from studies.errors import InputError, naming
 from studies.instrument.card import Instrument, load_card
-from studies.instrument.imperfect import is_imperfect
 from studies.law import law_of
 from studies.reports.digits import to_numerical_error
 from studies.reports.page import Block
 from studies.reports.scenes import show_mode
 from studies.results import Blocks, Column, Result, Sentence, Table, Where
-from studies.splitting import SplitPair
 
 THEORIES = {
     "solid": "three-dimensional elasticity",
@@ -46,8 +39,7 @@ THEORIES = {
 FAR = 0.1
 """Relative difference of the first order from all orders from which on a split is doubted."""
 COLUMNS = (
-    Column("harmonic", "n"),
-    Column("index", "index"),
+    *MODE,
     Column("label", "kind"),
     Column("shown_Hz", "f", "Hz"),
     Column("bryan_factor", "Bryan factor", form=".5f"),
@@ -101,18 +93,11 @@ def modes(
     with naming(instrument.path):
         resonator, elastic = instrument.at(T)
         found = [m for n in harmonic for m in solve_modes(resonator, elastic, n, count, theory, tolerance)]
-        more: dict[str, dict[int, Any]] = {
-            # key of a mode in the JSON: what of it is known, by the identity of the mode
-            "split": _find_splits(instrument, found, T) if detailed else {},
-            "spin": {} if spin is None else spin_pairs(found, elastic, spin),
-            "amplitude": {} if amplitude is None else describe_amplitude(found, amplitude),
-            "mount": describe_mount(found, instrument, T),
-            "films": describe_films(found, instrument) if detailed else {},
-            "crystal": crystal_pairs(found, instrument.keys("material").cubic, tolerance),
-        }
+        asked = Asked(instrument, T, elastic, tolerance, spin, amplitude)
+        more = describe_effects(found, asked)
     share, mean = _material_share(instrument, T), _mean_thickness(resonator)
     entries = []
-    for m in found:
+    for m, effects in zip(found, more, strict=True):
         entry = {
             "harmonic": m.harmonic,
             "index": m.index,
@@ -129,19 +114,16 @@ def modes(
                 "sensitivities": asdict(m.sensitivities),
                 "energy_fractions": asdict(m.energy_fractions),
             }
-        entries.append(entry | {key: known[id(m)] for key, known in more.items() if id(m) in known})
+        entries.append(entry | effects)
     head = {"card": instrument.name, "temperature_degC": T - zero_Celsius, "theory": theory}
     name = f"{instrument.name} at {T - zero_Celsius:g} °C, {THEORIES[theory]}"
-    special = [
-        make(entries) for make in (_split_table, spin_table, amplitude_table, mount_table, films_table, crystal_table)
-    ]
     return Result(
         {"schema": "hrg.modes/1", **head, "modes": entries},
         f"Modes of {instrument.name}",
         f"Natural frequencies and Bryan factors at {T - zero_Celsius:g} °C, {THEORIES[theory]}.",
         [
             Table(name, [row | {"shown_Hz": _to_error(row)} for row in entries], COLUMNS, _note(theory, share)),
-            *special,
+            *effect_tables(entries, asked),
             *_all_orders(entries),
             *_detail_tables(entries if detailed else [], "everywhere" if sensitivities else "page"),
             Blocks(lambda: _view(instrument, sorted(set(harmonic)), T)),
@@ -172,33 +154,6 @@ def _note(theory: str, share: float) -> str:
     return f"Solver error: against the exact solution of the same theory. Material uncertainty: {spread}."
 
 
-def _find_splits(instrument: Instrument, found: list[Mode], T: float) -> dict[int, dict[str, Any]]:
-    """What the card's imperfection and electrodes make of each pair, by the identity of its mode."""
-    if not is_imperfect(instrument):
-        return {}
-
-    entries: dict[int, dict[str, Any]] = {}
-    for m in found:
-        if m.harmonic < 1:
-            continue
-        whole = SplitPair(instrument, m, T)
-        slow, fast = whole.split.frequencies
-        parts = {"imperfection": whole.imperfection, "measured": whole.measured, "electrodes": whole.electrodes}
-        entries[id(m)] = {
-            "split_Hz": whole.split.hertz,
-            "slow_Hz": slow,
-            "fast_Hz": fast,
-            "slow_axis_deg": degrees(whole.split.slow_axis),
-            "shift_ppm": 1e6 * whole.split.shift,
-            "every_order_split_Hz": whole.of_every_order().hertz,
-            "parts": {
-                name: {"split_Hz": p.hertz, "slow_axis_deg": degrees(p.slow_axis), "shift_ppm": 1e6 * p.shift}
-                for name, p in parts.items()
-            },
-        }
-    return entries
-
-
 def _material_share(instrument: Instrument, T: float) -> float:
     return float(law_of(instrument, T, T).uncertainty(np.array([T]))[0])
 
@@ -210,20 +165,6 @@ def _mean_thickness(resonator: Resonator) -> float:
 def _per_micrometre(mode: Mode, thickness: float) -> float:
     """Return df/dh in Hz/µm, for a wall that grows everywhere by the same part."""
     return float(mode.frequency * mode.sensitivities.thickness / thickness * 1e-6)
-
-
-def _split_table(modes: list[dict[str, Any]]) -> Table:
-    columns = [
-        *COLUMNS[:2],
-        Column("split.slow_Hz", "slow", "Hz", ".5f"),
-        Column("split.fast_Hz", "fast", "Hz", ".5f"),
-        Column("split.split_Hz", "split", "Hz", ".5f"),
-        Column("split.every_order_split_Hz", "split, all orders", "Hz", ".5f"),
-        Column("split.slow_axis_deg", "slow axis", "°", ".2f"),
-        Column("split.shift_ppm", "shift", "ppm", "+.3f"),
-    ]
-    rows = [row for row in modes if "split" in row]
-    return Table("Pairs with imperfections and electrodes", rows, columns, "Slow axis: an antinode of the slower mode.")
 
 
 def _all_orders(modes: list[dict[str, Any]]) -> list[Sentence]:
@@ -245,6 +186,6 @@ def _detail_tables(modes: list[dict[str, Any]], where: Where) -> list[Table]:
     mass = Column("modal_mass_kg", "modal mass", "g", ".4f", scale=1e3)
     note = "ν at constant E; ln r scales every length but the thickness. Modal mass for a largest displacement of 1."
     return [
-        Table("Derivatives of ln f", modes, [*COLUMNS[:2], *slopes, mass], note, where),
-        Table("Strain energy (%)", modes, [*COLUMNS[:2], *shares], "Root: the solid cap, fillet or corner.", where),
+        Table("Derivatives of ln f", modes, [*MODE, *slopes, mass], note, where),
+        Table("Strain energy (%)", modes, [*MODE, *shares], "Root: the solid cap, fillet or corner.", where),
     ]

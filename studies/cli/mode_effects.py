@@ -1,0 +1,254 @@
+"""What else `hrg modes` shows of a mode: imperfections, spin, amplitude, a mount, films, a crystal.
+
+Each function returns what is under its key of a mode in the JSON, or None where it does not apply; `TABLES` shows the keys.
+"""
+
+from dataclasses import dataclass
+from math import degrees, isfinite, pi, radians
+from typing import Any
+
+from shell.elastic import Elastic
+from shell.modes import Mode
+from studies.errors import InputError, naming
+from studies.instrument.card import Instrument
+from studies.instrument.imperfect import is_imperfect
+from studies.results import Column, Table
+
+MICROMETRE = 1e-6
+Entry = dict[str, Any]
+
+
+@dataclass(frozen=True, eq=False)
+class Asked:
+    """The card at T (K), and what was asked of its modes: rate of spin (°/s), amplitude (µm)."""
+
+    instrument: Instrument
+    T: float
+    elastic: Elastic
+    tolerance: float
+    spin: float | None
+    amplitude: float | None
+
+    def __post_init__(self) -> None:
+        if self.spin is not None and not isfinite(self.spin):
+            raise InputError(f"--spin {self.spin:g}: it is a rate in °/s.")
+        if self.amplitude is not None and not (isfinite(self.amplitude) and self.amplitude > 0):
+            raise InputError(f"--amplitude {self.amplitude:g}: it is a largest displacement in µm, above 0.")
+
+
+def describe_effects(found: list[Mode], asked: Asked) -> list[dict[str, Any]]:
+    """Return what applies to each mode, by its key."""
+    entries = [
+        {key: entry for key, describe in EFFECTS.items() if (entry := describe(mode, asked)) is not None}
+        for mode in found
+    ]
+    for key, wanted, which in (
+        ("spin", asked.spin, "effect of spin is computed for the lowest mode of a harmonic from 2 up"),
+        ("amplitude", asked.amplitude, "effect of the amplitude is computed for harmonics from 2 up"),
+    ):
+        if wanted is not None and not any(key in entry for entry in entries):
+            raise InputError(f"--{key}: the {which}, in the solid theory; none of these modes is one.")
+    return entries
+
+
+def _split(m: Mode, asked: Asked) -> Entry | None:
+    """What the card's imperfection and electrodes make of a pair."""
+    if m.theory == "rayleigh" or m.harmonic < 1 or not is_imperfect(asked.instrument):
+        return None
+    from studies.splitting import SplitPair
+
+    whole = SplitPair(asked.instrument, m, asked.T)
+    slow, fast = whole.split.frequencies
+    parts = {"imperfection": whole.imperfection, "measured": whole.measured, "electrodes": whole.electrodes}
+    return {
+        "split_Hz": whole.split.hertz,
+        "slow_Hz": slow,
+        "fast_Hz": fast,
+        "slow_axis_deg": degrees(whole.split.slow_axis),
+        "shift_ppm": 1e6 * whole.split.shift,
+        "every_order_split_Hz": whole.of_every_order().hertz,
+        "parts": {
+            name: {"split_Hz": p.hertz, "slow_axis_deg": degrees(p.slow_axis), "shift_ppm": 1e6 * p.shift}
+            for name, p in parts.items()
+        },
+    }
+
+
+def _spin(m: Mode, asked: Asked) -> Entry | None:
+    """What a spin makes of a pair, in the frame of the resonator: two waves with f + shift ± g Ω/2π, g = n K of Bryan's factor K."""
+    if asked.spin is None or m.theory != "solid" or m.harmonic < 2 or m.index:
+        return None
+    from shell.spin import spin_shift
+
+    shift, omega = spin_shift(m, asked.elastic), radians(asked.spin)
+    mean = m.frequency * (1 + shift.total * omega**2)
+    apart = m.harmonic * abs(m.bryan_factor * omega) / (2 * pi)
+    return {
+        "rate_deg_per_s": asked.spin,
+        "shift_ppm": 1e6 * shift.total * omega**2,
+        "stress_ppm": 1e6 * shift.stress * omega**2,
+        "centrifugal_ppm": 1e6 * shift.centrifugal * omega**2,
+        "coriolis_ppm": 1e6 * shift.coriolis * omega**2,
+        "lower_wave_Hz": mean - apart,
+        "upper_wave_Hz": mean + apart,
+    }
+
+
+def _amplitude(m: Mode, asked: Asked) -> Entry | None:
+    """The shift in ppb by the largest displacement that was asked."""
+    if asked.amplitude is None or m.theory != "solid" or m.harmonic < 2:
+        return None
+    from shell.duffing import amplitude_shift
+
+    shift, square = amplitude_shift(m), (asked.amplitude * MICROMETRE) ** 2
+    return {
+        "amplitude_um": asked.amplitude,
+        "shift_ppb": 1e9 * shift.total * square,
+        "static_ppb": 1e9 * shift.static * square,
+        "inertial_ppb": 1e9 * shift.inertial * square,
+        "shift_Hz_per_um2": shift.total * m.frequency * MICROMETRE**2,
+    }
+
+
+def _mount(m: Mode, asked: Asked) -> Entry | None:
+    """Shift and slope of a pair by the stress of [mount]."""
+    instrument, mount = asked.instrument, asked.instrument.part("mount")
+    if mount is None or m.theory != "solid" or not m.harmonic:
+        return None
+    from shell.law import check_mount
+    from shell.prestress import Prestress
+
+    with naming(f"{instrument.path} [mount]"):
+        strain, slope = (float(x(instrument.material, asked.T)) for x in (mount.strain, mount.strain_slope))
+        check_mount(instrument.resonator, m.theory, m.harmonic)
+        s = Prestress(m).by_base
+    return {
+        "strain_ppm": 1e6 * strain,
+        "shift_ppm": 1e6 * s * strain + 0.0,  # no -0
+        "slope_ppm_per_degC": 1e6 * s * slope,
+        "per_strain": s,
+    }
+
+
+def _films(m: Mode, asked: Asked) -> list[Entry] | None:
+    """Every film and its shift in ppm, null where its numbers are not known."""
+    if m.theory == "rayleigh":
+        return None
+    from studies.loss.films import film_shifts
+
+    return [
+        {
+            "film": one.material,
+            "shift_ppm": None if one.relative is None else 1e6 * one.relative,
+            "missing": one.missing,
+        }
+        for one in film_shifts(asked.instrument, m)
+    ] or None
+
+
+def _crystal(m: Mode, asked: Asked) -> Entry | None:
+    """Both modes of a lowest pair n >= 2 but multiples of 4."""
+    crystal = asked.instrument.keys("material").cubic
+    if crystal is None or m.theory != "solid" or m.harmonic < 2 or m.harmonic % 4 == 0 or m.index:
+        return None
+    from shell.cubic import solve_cubic
+
+    assert m.resonator is not None
+    pair = solve_cubic(m.resonator, crystal, m.harmonic, asked.tolerance)
+    return {
+        "antinode_along_100_Hz": pair.along_100,
+        "other_Hz": pair.along_110,
+        "split_Hz": abs(pair.along_110 - pair.along_100),
+        "relative_split": pair.relative_split,
+        "relative_error_estimate": pair.relative_error_estimate,
+    }
+
+
+EFFECTS = {
+    "split": _split,
+    "spin": _spin,
+    "amplitude": _amplitude,
+    "mount": _mount,
+    "films": _films,
+    "crystal": _crystal,
+}
+
+MODE = (Column("harmonic", "n"), Column("index", "index"))
+SPLIT = (
+    *MODE,
+    Column("split.slow_Hz", "slow", "Hz", ".5f"),
+    Column("split.fast_Hz", "fast", "Hz", ".5f"),
+    Column("split.split_Hz", "split", "Hz", ".5f"),
+    Column("split.every_order_split_Hz", "split, all orders", "Hz", ".5f"),
+    Column("split.slow_axis_deg", "slow axis", "°", ".2f"),
+    Column("split.shift_ppm", "shift", "ppm", "+.3f"),
+)
+SPIN = (
+    MODE[0],
+    Column("spin.lower_wave_Hz", "lower wave", "Hz", ".5f"),
+    Column("spin.upper_wave_Hz", "upper wave", "Hz", ".5f"),
+    Column("spin.shift_ppm", "shift of the mean", "ppm", "+.3g"),
+    Column("spin.stress_ppm", "by stress", "ppm", "+.3g"),
+    Column("spin.centrifugal_ppm", "centrifugal", "ppm", "+.3g"),
+    Column("spin.coriolis_ppm", "Coriolis", "ppm", "+.3g"),
+)
+AMPLITUDE = (
+    *MODE,
+    Column("amplitude.shift_ppb", "shift", "ppb", "+.4g"),
+    Column("amplitude.static_ppb", "static", "ppb", "+.4g"),
+    Column("amplitude.inertial_ppb", "inertial", "ppb", "+.4g"),
+    Column("amplitude.shift_Hz_per_um2", "coefficient", "Hz/µm²", "+.4g"),
+)
+MOUNT = (
+    *MODE,
+    Column("mount.per_strain", "per strain", form="+.4g"),
+    Column("mount.shift_ppm", "shift", "ppm", "+.4g"),
+    Column("mount.slope_ppm_per_degC", "slope", "ppm/°C", "+.3g"),
+)
+FILMS = (*MODE, Column("film", "film"), Column("shift_ppm", "shift", "ppm", "+.4g"))
+CRYSTAL = (
+    MODE[0],
+    Column("crystal.antinode_along_100_Hz", "antinode along [100]", "Hz", ".4f"),
+    Column("crystal.other_Hz", "other mode", "Hz", ".4f"),
+    Column("crystal.split_Hz", "split", "Hz", ".4f"),
+    Column("crystal.relative_error_estimate", "solver error, relative", form=".0e"),
+)
+ROTATION = (
+    "In the frame of the resonator. Bryan's effect separates the two waves; their mean shifts with the square of the rate,"
+    " by the stress of rotation, centrifugal softening and Coriolis forces."
+)
+NONLINEAR = (
+    "Standing wave; the shift is proportional to the square of the largest displacement. Geometric nonlinearity only: the static"
+    " part stiffens, the inertia of the motion at twice the frequency softens. Third-order elastic constants, which may matter as much in thick shells,"
+    " and electrostatic springs are not included."
+)
+MISMATCH = (
+    "The base has expanded {:.4g} ppm more than the resonator since they were joined. First order in the resulting stress"
+    " and deformation. The frequencies above do not include it; those of hrg tcf and of simulations do."
+)
+BARE = "By stiffness and mass, to first order in the thickness. The frequencies above are those of the bare wall."
+VOIGT = "[001] along the axis. The table above and every other command use the isotropic (Voigt) mean of the elastic constants."
+
+
+def effect_tables(modes: list[dict[str, Any]], asked: Asked) -> list[Table]:
+    """Return the tables of what applies to the modes."""
+
+    def those(key: str) -> list[dict[str, Any]]:
+        return [row for row in modes if key in row]
+
+    strain = next((row["mount"]["strain_ppm"] for row in those("mount")), 0.0)
+    films = [{**row, **film, "shift_ppm": _known_shift(film)} for row in those("films") for film in row["films"]]
+    antinode = "Slow axis: an antinode of the slower mode."
+    return [
+        Table("Pairs with imperfections and electrodes", those("split"), SPLIT, antinode),
+        Table(f"Effects of rotation at {asked.spin or 0.0:g} °/s", those("spin"), SPIN, ROTATION),
+        Table(f"Effect of an amplitude of {asked.amplitude or 0.0:g} µm", those("amplitude"), AMPLITUDE, NONLINEAR),
+        Table("Thermal mismatch with the base", those("mount"), MOUNT, MISMATCH.format(strain)),
+        Table("Effect of the films", films, FILMS, BARE),
+        Table("Pairs of the anisotropic crystal", those("crystal"), CRYSTAL, VOIGT),
+    ]
+
+
+def _known_shift(film: Entry) -> float | str:
+    shift: float | None = film["shift_ppm"]
+    return f"unknown without {' and '.join(film['missing'])}" if shift is None else shift
