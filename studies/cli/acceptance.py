@@ -36,10 +36,9 @@ MEASURED = (
 MISSING = (QUANTITY, SECTION, Column("limited", "has a limit"), Column("needs", "needs"))
 RECORDS = (
     Column("path", "file"),
-    Column("test", "test"),
-    Column("hours", "duration", "h", digits=3),
-    Column("rows", "rows"),
-    Column("sha256", "SHA-256, first digits"),
+    Column(lambda record: np.ptp(record["time_s"]) / 3600, "duration", "h", digits=3),
+    Column(len, "rows"),
+    Column(lambda record: record.sha256[:12], "SHA-256, first digits"),
 )
 
 
@@ -104,16 +103,7 @@ def acceptance(card: str, *runs: str, limits: str | None = None, output: str = "
     missing = [row for row in rows if row["needs"]]
     missing += [{**one, "words": one["test"], "limited": "no"} for one in elsewhere]
     missing.sort(key=lambda row: float(row["section"].split("–")[0].split(".")[1]))
-    files = [
-        {
-            "path": record.path,
-            "test": found.used[record.path],
-            "hours": (record["time_s"][-1] - record["time_s"][0]) / 3600,
-            "rows": len(record),
-            "sha256": record.sha256[:12],
-        }
-        for record in records
-    ]
+    used = Column(lambda record: found.used[record.path], "test")
     note = (
         "A limit is judged only if the whole interval lies on one side of it. An upper limit applies to the magnitude."
     )
@@ -124,7 +114,7 @@ def acceptance(card: str, *runs: str, limits: str | None = None, output: str = "
         Chapter("Quantities", [Table("Measured, in the order of IEEE Std 1431", [row for row in rows if not row["needs"]], MEASURED, note)]),
         Chapter("Drift (12.11)", _drift(found)),
         Chapter("Not judged", [Table("Missing quantities and tests", missing, MISSING)]),
-        Chapter("Records", [Table("Files read", files, RECORDS, where="page")]),
+        Chapter("Records", [Table("Files read", records, (RECORDS[0], used, *RECORDS[1:]), where="page")]),
     ]  # fmt: skip
     lead = (
         f"{len(records)} record{'s' * (len(records) != 1)} of {instrument.name}, judged in the order of section 12 of IEEE"

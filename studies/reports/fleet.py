@@ -1,5 +1,6 @@
 """Parts of a fleet's diagnosis: what devices of one design have in common, and which of them differs."""
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from studies.diagnosis.fleet.outcome import Fleet, Share, Value
@@ -19,21 +20,6 @@ METHOD = (
     " lies more than three standard deviations from the prediction of the other devices, including their scatter. With two devices,"
     " values alone cannot show which one differs."
 )
-SHARES = (
-    Column("cause", "cause"),
-    Column("response", "response"),
-    Column("devices", "devices"),
-    Column("probability", "probability", form=".2f"),
-    Column("evidence", "evidence", digits=3),
-    Column("sizes", "size in each device"),
-    Column("coefficient", "coefficient"),
-)
-DEVICES = (
-    Column("device", "device"),
-    Column("verdict", "verdict"),
-    Column("causes", "causes"),
-    Column("differs", "differs from the others"),
-)
 
 
 def headline(fleet: Fleet) -> str:
@@ -50,35 +36,31 @@ def _names(share: Share) -> str:
     return " or ".join([share.effect, *share.equivalent])
 
 
+SHARES = (
+    Column(_names, "cause"),
+    Column(lambda one: NAMES[one.response], "response"),
+    Column(lambda one: KINDS[one.kind].format(one.odd), "devices"),
+    Column("probability", "probability", form=".2f"),
+    Column("evidence", "evidence", digits=3),
+    Column(lambda one: ", ".join(f"{name} {plain(size.value)}" for name, size in one.sizes.items()), "size in each device"),
+    Column("coefficient", "coefficient"),
+)  # fmt: skip
+
+
 def share_table(fleet: Fleet) -> Table:
     """Return the causes over the fleet."""
-    rows = [
-        {
-            "cause": _names(one),
-            "response": NAMES[one.response],
-            "devices": KINDS[one.kind].format(one.odd),
-            "probability": one.probability,
-            "evidence": one.evidence,
-            "sizes": ", ".join(f"{device} {plain(size.value)}" for device, size in one.sizes.items()),
-            "coefficient": one.coefficient or "",
-        }
-        for one in fleet.shares
-    ]
-    return Table("Causes", rows, SHARES, "Size: value of the coefficient named in the last column.")
+    return Table("Causes", fleet.shares, SHARES, "Size: value of the coefficient named in the last column.")
 
 
 def device_table(fleet: Fleet) -> Table:
     """Return one row a device: its verdict, its causes, and how it differs."""
-    rows = [
-        {
-            "device": name,
-            "verdict": one.verdict.verdict,
-            "causes": ", ".join(" or ".join(cause.names) for cause in one.verdict.causes),
-            "differs": "; ".join(fleet.reasons[name]),
-        }
-        for name, one in fleet.devices.items()
-    ]
-    return Table("Devices", rows, DEVICES)
+    columns = (
+        Column("0", "device"),
+        Column("1.verdict.verdict", "verdict"),
+        Column(lambda row: ", ".join(" or ".join(cause.names) for cause in row[1].verdict.causes), "causes"),
+        Column(lambda row: "; ".join(fleet.reasons[row[0]]), "differs from the others"),
+    )
+    return Table("Devices", list(fleet.devices.items()), columns)
 
 
 def _ordered(fleet: Fleet) -> list[Value]:
@@ -87,20 +69,21 @@ def _ordered(fleet: Fleet) -> list[Value]:
 
 def value_table(fleet: Fleet) -> Table:
     """Return the values of every device, those first in which a device differs."""
-    rows = [
-        {
-            "value": value.name,
-            "of": {d: plain(own.value) + (" !" if d in value.odd else "") for d, own in value.of.items()},
-            "common": value.common,
-            "scatter": value.scatter,
-        }
-        for value in _ordered(fleet)
-    ]
-    each = [(f"of.{device}", device) for device in fleet.devices]
-    columns = (Column("value", "value"), *(Column(key, heading) for key, heading in each))
-    ends = (Column("common", "mean", digits=3), Column("scatter", "scatter", digits=3))
+    columns = (
+        Column("name", "value"),
+        *(Column(_of(device), device) for device in fleet.devices),
+        Column("common", "mean", digits=3),
+        Column("scatter", "scatter", digits=3),
+    )
     note = "!: far from the prediction of the other devices; left out of mean and scatter."
-    return Table("Values of the devices", rows, (*columns, *ends), note)
+    return Table("Values of the devices", _ordered(fleet), columns, note)
+
+
+def _of(device: str) -> Callable[[Value], str]:
+    def write(value: Value) -> str:
+        return plain(value.of[device].value) + " !" * (device in value.odd) if device in value.of else ""
+
+    return write
 
 
 def fleet_parts(fleet: Fleet) -> list[Chapter]:

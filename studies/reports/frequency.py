@@ -74,25 +74,15 @@ def inverse_table(study: FrequencyStudy) -> Table:
 
 def order_table(study: FrequencyStudy) -> Table:
     """Return the fits of rising order and the F-test of each against the one before."""
-    rows = [
-        {
-            "order": name_order(fit.order),
-            "free": fit.degrees_of_freedom,
-            "squares": fit.sum_of_squares,
-            "chi": fit.chi_squared,
-            "left_out": fit.leave_one_out_rms,
-            **({} if test is None else {"F": test.statistic, "p": test.p_value}),
-        }
-        for fit, test in zip(study.orders.fits, [None, *study.orders.against_next], strict=False)
-    ]
+    rows = list(zip(study.orders.fits, [None, *study.orders.against_next], strict=False))
     columns = [
-        Column("order", "Order"),
-        Column("free", "Degrees of freedom"),
-        Column("squares", "Sum of squares", "Hz²", ".3e"),
-        Column("chi", "χ²", form=".3g"),
-        Column("left_out", "Leave-one-out error", "Hz", ".4f"),
-        Column("F", "F", form=".3g"),
-        Column("p", "p", form=".2g"),
+        Column(lambda row: name_order(row[0].order), "Order"),
+        Column("0.degrees_of_freedom", "Degrees of freedom"),
+        Column("0.sum_of_squares", "Sum of squares", "Hz²", ".3e"),
+        Column("0.chi_squared", "χ²", form=".3g"),
+        Column("0.leave_one_out_rms", "Leave-one-out error", "Hz", ".4f"),
+        Column("1.statistic", "F", form=".3g"),
+        Column("1.p_value", "p", form=".2g"),
     ]
     note = (
         "χ² assumes that rounding to the last digit is the only noise. F and p test each order against the one below."
