@@ -8,7 +8,7 @@ import numpy as np
 from compensation.bias import SELECTED_BY_THE_PAPER, TERMS, Variable
 from compensation.memory import Memory
 from compensation.noise import FLAT
-from studies.bias import BiasStudy, Judged, Stability
+from studies.bias import BiasStudy, Judged
 from studies.models.file import widen
 from studies.models.kinds.bias import OUTPUTS
 from studies.reports import style
@@ -186,32 +186,23 @@ def coefficients_table(judged: Judged, output: str) -> Table:
 
 def gain_table(study: BiasStudy) -> Table:
     """Return bias stability before and after, on the fitted and on held-out data, for both selections."""
-    rows = []
+    unit, rows = _unit(study.output), []
     for judged in study.judged:
-        terms = ", ".join(_symbol(name, judged.fit.variable.symbol) for name in judged.fit.terms) or "none"
         (before, after), held = judged.training, judged.held_out
-        row: dict[str, object] = {"selection": METHOD[judged.method]}
-        fitted = {
-            "terms": terms,
-            "data": "fitted",
-            "before": before,
-            "after": after,
-            "gain": judged.training_gain,
-            "inside": 1.0,
-        }
-        rows.append(row | fitted)
+        terms = ", ".join(_symbol(name, judged.fit.variable.symbol) for name in judged.fit.terms) or "none"
+        rows.append((METHOD[judged.method], terms, "fitted", before, after, judged.training_gain, 1.0))
         if held is not None:
             data = f"held-out {'runs' if held.by_runs else 'blocks'}"
-            figures = {"before": held.before, "after": held.after, "gain": held.gain, "inside": held.coverage}
-            rows.append(row | {"terms": "reselected without them", "data": data} | figures)
+            reselected = (METHOD[judged.method], "reselected without them", data)
+            rows.append((*reselected, held.before, held.after, held.gain, held.coverage))
     columns = [
-        Column("selection", "Selection"),
-        Column("terms", "Terms"),
-        Column("data", "Data"),
-        Column("before", "Before", _unit(study.output)),
-        Column("after", "After", _unit(study.output)),
-        Column("gain", "Improvement", form=".2f"),
-        Column("inside", "Rows in range", "%", ".0f", scale=100.0),
+        Column("0", "Selection"),
+        Column("1", "Terms"),
+        Column("2", "Data"),
+        Column("3", "Before", unit),
+        Column("4", "After", unit),
+        Column("5", "Improvement", form=".2f"),
+        Column("6", "Rows in range", "%", ".0f", scale=100.0),
     ]
     note = "Standard deviation of 100 s averages about the mean of each run or block."
     if study.no_held_out:
@@ -242,30 +233,19 @@ def noise_table(study: BiasStudy) -> Table:
     hours, unit = study.output == "bias_deg_per_h", _unit(study.output)
     n_scale, k_scale, n_unit, k_unit = (1 / 60, 60.0, "°/√h", "°/h/√h") if hours else (1.0, 1.0, "°/√s", "°/s/√s")
 
-    def row(label: str, spectrum: Stability) -> dict[str, object]:
-        noise, (flat, low, high) = spectrum.noise, spectrum.allan.bias_instability
-        return {
-            "label": label,
-            "N": _measured(noise.N * n_scale, noise.N_uncertainty * n_scale),
-            "B": _measured(noise.B, noise.B_uncertainty),
-            "K": _measured(noise.K * k_scale, noise.K_uncertainty * k_scale),
-            "flat": f"{flat:.3g} ({low:.3g} … {high:.3g})",
-            "misfit": noise.misfit,
-        }
-
     columns = [
-        Column("label", "Output"),
-        Column("N", "N", n_unit),
-        Column("B", "B", unit),
-        Column("K", "K", k_unit),
-        Column("flat", f"Minimum over {FLAT:.3f}", unit),
-        Column("misfit", "Misfit", form=".1f"),
-    ]
+        Column("0", "Output"),
+        Column(lambda row: _measured(row[1].noise.N * n_scale, row[1].noise.N_uncertainty * n_scale), "N", n_unit),
+        Column(lambda row: _measured(row[1].noise.B, row[1].noise.B_uncertainty), "B", unit),
+        Column(lambda row: _measured(row[1].noise.K * k_scale, row[1].noise.K_uncertainty * k_scale), "K", k_unit),
+        Column(lambda row: "{:.3g} ({:.3g} … {:.3g})".format(*row[1].allan.bias_instability), f"Minimum over {FLAT:.3f}", unit),
+        Column("1.noise.misfit", "Misfit", form=".1f"),
+    ]  # fmt: skip
     note = (
         f"Longest run, samples of {study.allan_step:g} s. A misfit well above 1 shows more than white noise, flicker noise and random"
         " walk, such as drift with temperature; the errors are increased accordingly."
     )
-    rows = [row(label, s) for label, s in (("before", study.before), ("after", study.after)) if s is not None]
+    rows = [row for row in (("before", study.before), ("after", study.after)) if row[1] is not None]
     return Table("Noise coefficients", rows, columns, note)
 
 
