@@ -27,9 +27,9 @@ from studies.errors import InputError, naming
 from studies.instrument.card import Instrument, load_card
 from studies.law import law_of
 from studies.reports.digits import to_numerical_error
-from studies.reports.page import Block
 from studies.reports.scenes import show_mode
 from studies.results import Blocks, Column, Result, Sentence, Table, Where
+from studies.results.page import Block
 
 THEORIES = {
     "solid": "three-dimensional elasticity",

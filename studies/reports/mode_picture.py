@@ -5,7 +5,8 @@ from math import degrees
 from typing import TYPE_CHECKING
 
 from shell.constants import zero_Celsius
-from studies.reports.page import Block, Text
+from studies.results import Sentence
+from studies.results.page import Block
 
 if TYPE_CHECKING:
     from studies.instrument.card import Instrument
@@ -45,7 +46,7 @@ def view_blocks(shown: "Sequence[ModeScene]") -> list[Block]:
         png = render_png(first.scene())
     except NoOpenGL as error:
         png = None
-        blocks.append(Text(f"The still picture of the mode is missing: {error}", "warning"))
+        blocks.append(Sentence(f"The still picture of the mode is missing: {error}", "warning"))
     lobes = 2 * first.mode.harmonic
     alt = f"The resonator with its rim bent into {lobes} lobes, nodes between them."
     splits = [None if one.split is None else Drawn(one.split, one.imperfection, one.exaggeration) for one in shown]

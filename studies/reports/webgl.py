@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from studies.reports.page import Embedded
+from studies.results.page import Embedded
 
 if TYPE_CHECKING:
     from shell.imperfection import Imperfection, Split

@@ -8,12 +8,9 @@ column is added in one place.
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from math import isfinite
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 from studies.reports.digits import plain, short_exponent, to_error, to_interval
-
-if TYPE_CHECKING:
-    from studies.reports.page import Block
 
 Payload = Mapping[str, Any]
 Key = str | Callable[[Any], Any]
@@ -169,9 +166,9 @@ class Figure:
 
 @dataclass(frozen=True)
 class Blocks:
-    """Ready blocks of the page, such as a view of modes to turn; made only when the page is written."""
+    """Ready blocks of the page (`studies.results.page`), such as a view of modes to turn; made only when the page is written."""
 
-    make: "Callable[[], Sequence[Block]]"
+    make: Callable[[], Sequence[Any]]
 
 
 Part = Table | Facts | Sentence | Figure | Blocks

@@ -1,34 +1,227 @@
-"""Results as a page: one self-contained HTML file."""
+"""Results as a page: text, tables and figures in one self-contained HTML file.
 
+All text is escaped; figures are embedded, so the page works without a network. What would make a page long is folded:
+tables of many rows, and the chapters that begin below `OPEN_HEIGHT`. On paper everything is unfolded, but no table has more
+than `PAPER_ROWS` rows. On a phone a table that is too wide is stacked, every row a few lines of heading and value.
+"""
+
+import base64
+import datetime
+import platform
+import re
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from importlib.metadata import version
+from importlib.resources import files
+from io import BytesIO
+from typing import TYPE_CHECKING
 
-from studies.reports import page
-from studies.results import Blocks, Facts, Figure, Part, Result, Sentence, Table
+from studies.results import Blocks, Chapter, Drawing, Facts, Figure, Part, Result, Sentence, Table
+
+if TYPE_CHECKING:
+    from markupsafe import Markup
+
+PACKAGES = ("numpy", "scipy", "sympy", "pandas", "pyvista", "trimesh")
+OPEN_HEIGHT = 4600  # px: chapters that would end below, on a screen 1280 px wide or on a phone, are folded
+LONG_TABLE = 15  # rows; longer tables are folded, except in the first chapter, which is the answer
+LONG_ANSWER = 40  # rows of a table in the first chapter
+PAPER_ROWS = 40  # of a table; the others are on the screen only
+CONTENTS_FROM = 4  # chapters
+PHONE = 364.0  # px for a table on a phone
+
+
+@dataclass(frozen=True)
+class Cells:
+    """A table of cells that are already text; `columns` carry quantity and unit; `sortable` by a click on a heading."""
+
+    caption: str
+    columns: Sequence[str]
+    rows: Sequence[Sequence[str]]
+    note: str = ""
+    sortable: bool = False
+
+
+@dataclass(frozen=True)
+class Picture:
+    """An embedded picture with its caption and the words that stand for it where it cannot be seen."""
+
+    data_uri: str
+    caption: str
+    alt: str
+    height: float = 400.0  # px, roughly
+
+
+@dataclass(frozen=True)
+class Embedded:
+    """Trusted HTML made by the workbench itself (never a user's text), such as an interactive view."""
+
+    html: str
+    caption: str = ""
+
+
+Block = Sentence | Cells | Picture | Facts | Embedded
+KINDS = {"text": Sentence, "cells": Cells, "picture": Picture, "facts": Facts, "embedded": Embedded}
 
 
 def render_result(result: Result) -> str:
     """Return the page as HTML text."""
-    chapters = [page.Chapter(chapter.title, make_blocks(*chapter.parts)) for chapter in result.chapters]
-    return page.render_page(result.title, result.lead, [one for one in chapters if one.blocks], result.sources)
+    return render_page(result.title, result.lead, result.chapters, result.sources)
 
 
-def make_blocks(*parts: Part) -> Sequence[page.Block]:
-    """Return parts as blocks of a page."""
+def make_blocks(*parts: Part | Block) -> list[Block]:
+    """Return what parts are on a page: tables as text, figures drawn."""
     return [block for part in parts for block in _blocks(part)]
 
 
-def _blocks(part: Part) -> Iterator[page.Block]:
+def _blocks(part: Part | Block) -> Iterator[Block]:
     match part:
         case Figure():
-            yield page.draw(part.draw(), part.caption, part.alt or part.caption)
+            yield draw(part.draw(), part.caption, part.alt or part.caption)
         case Blocks():
             yield from part.make()
-        case _ if part.where == "terminal":
-            return
-        case Table() if part.rows:
-            headings, rows = part.cells("page")
-            yield page.Table(part.title, headings, rows, part.note, part.sortable)
-        case Facts():
-            yield page.Facts(part.facts)
-        case Sentence():
-            yield page.Text(part.text, part.kind)
+        case Table():
+            if part.rows and part.where != "terminal":
+                yield Cells(part.title, *part.cells("page"), part.note, part.sortable)
+        case Sentence() | Facts():
+            if part.where != "terminal":
+                yield part
+        case _:
+            yield part
+
+
+def render_page(title: str, lead: str, chapters: Sequence[Chapter], sources: Sequence[str] = ()) -> str:
+    """Return the page as HTML text; chapters without anything to show are left out."""
+    from jinja2 import Environment, StrictUndefined
+
+    template = (files("studies.reports") / "templates" / "page.html").read_text(encoding="utf-8")
+    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
+    environment.filters.update(typeset=typeset, prose=_prose, cell=_cell)
+    environment.tests.update(kind=_is_kind, stacked=_stacked)
+    made = [(chapter.title, make_blocks(*chapter.parts)) for chapter in chapters]
+    made = [(heading, blocks) for heading, blocks in made if blocks]
+    folded = _folded([blocks for _, blocks in made])
+    return environment.from_string(template).render(
+        title=title,
+        lead=lead,
+        chapters=[(heading, blocks, fold) for (heading, blocks), fold in zip(made, folded, strict=True)],
+        contents=len(made) >= CONTENTS_FROM,
+        long_table=LONG_TABLE,
+        long_answer=LONG_ANSWER,
+        paper_rows=PAPER_ROWS,
+        sources=sources,
+        provenance=_provenance(),
+    )
+
+
+def _is_kind(block: Block, name: str) -> bool:
+    return isinstance(block, KINDS[name])
+
+
+def typeset(text: str) -> str:
+    """Return text with a minus sign before numbers that carry a unit or begin a range, and a space before per cent."""
+    unit = r"°|ppm|mHz|Hz|mK|K\b|µ|%|dB|s\b|h\b|standard|to -?\d|…|±"
+    text = re.sub(r"(?<=\de)([-−+]?)0+(?=\d)", r"\1", text)
+    text = re.sub(rf"(?<![\w.)\]])-(?=\d[\d.]*(?:e[-+]?\d+)? ?(?:{unit}))", "−", text)
+    return re.sub(r"(?<=\d)%", " %", re.sub(r"(?<=\de)-(?=\d)", "−", text))
+
+
+def _prose(text: str) -> "Markup":
+    """Return a paragraph, escaped, with words between backticks as code."""
+    from markupsafe import Markup, escape
+
+    parts = str(text).split("`")
+    if len(parts) % 2 == 0:  # an odd backtick is a character like others
+        parts = [str(text)]
+    pieces = [f"<code>{escape(part)}</code>" if k % 2 else escape(typeset(part)) for k, part in enumerate(parts)]
+    return Markup("".join(pieces))
+
+
+def _cell(text: str) -> "Markup":
+    """Return a cell, escaped, with minus signs, also in exponents, where it begins as a number."""
+    from markupsafe import Markup, escape
+
+    text = str(text)
+    if re.match(r"[-+±<> ]*[.\d]", text):
+        text = re.sub(r"(?<=\de)([-−+]?)0+(?=\d)", r"\1", text)
+        text = re.sub(r"(?<![\w.)\]-])-(?=\.?\d)|(?<=\de)-(?=\d)", "−", text)
+    return Markup(escape(re.sub(r"(?<=\d)%", " %", text)))
+
+
+def _stacked(table: Cells) -> bool:
+    """Return whether a table is too wide for a phone: the longest pieces that no line break divides, side by side."""
+
+    def least(text: str) -> int:
+        whole = re.match(r"[-+±<> ]*[.\d]", text) or len(text) <= 12
+        return len(text) if whole else max(map(len, re.split(r"[\s-]+", text)))
+
+    columns = [
+        max([least(str(row[k])) for row in table.rows] + [max(map(len, str(head).split()), default=0)])
+        for k, head in enumerate(table.columns)
+    ]
+    return sum(10.0 + 7.4 * width for width in columns) > PHONE
+
+
+def _folded(chapters: Sequence[Sequence[Block]]) -> list[bool]:
+    """Return which chapters are folded: from the first on that would end below `OPEN_HEIGHT`, never the first two."""
+    reached, phone = 260.0 + 26 * len(chapters), 420.0 + 26 * len(chapters)
+    folded: list[bool] = []
+    for k, chapter in enumerate(chapters):
+        reached += 80 + sum(_height(block, k == 0) for block in chapter)
+        phone += 80 + sum(_height_on_a_phone(block, k == 0) for block in chapter)
+        folded.append((k > 1 and max(reached, phone) > OPEN_HEIGHT) or any(folded))
+    return folded
+
+
+def _height_on_a_phone(block: "Block", answer: bool) -> float:
+    """Return about how many pixels a block is high at a width of 390 px."""
+    if isinstance(block, Sentence):
+        return 25 * (1 + len(block.text) / 40) + 12
+    if isinstance(block, Cells):
+        if len(block.rows) > (LONG_ANSWER if answer else LONG_TABLE):
+            return 60
+        cells = len(block.columns) * (sum(map(len, block.columns)) / max(1, len(block.columns)) + 3)
+        if _stacked(block):
+            lines = sum(1 + (sum(len(str(cell)) for cell in row) + cells) / 46 for row in block.rows)
+        else:
+            lines = sum(1 + max((len(str(cell)) for cell in row), default=0) // 25 for row in block.rows) + 2.0
+        return 70 + 24 * lines + len(block.note) / 2
+    if isinstance(block, Picture):
+        return 0.51 * block.height + 45 + 0.6 * len(block.caption)
+    return 100.0 * len(block.facts) if isinstance(block, Facts) else 450
+
+
+def _height(block: "Block", answer: bool) -> float:
+    """Return about how many pixels a block is high at a width of 1280 px."""
+    if isinstance(block, Sentence):
+        lines = len(block.text.splitlines()) if block.kind == "source" else 1 + len(block.text) / 95
+        return 25 * lines + 25
+    if isinstance(block, Cells):
+        if len(block.rows) > (LONG_ANSWER if answer else LONG_TABLE):
+            return 60
+        share = 110 / max(1, len(block.columns))
+        lines = sum(1 + max((len(str(cell)) // max(28.0, share) for cell in row), default=0) for row in block.rows)
+        return 100 + 33 * lines + len(block.note) / 4
+    if isinstance(block, Picture):
+        return block.height + 70
+    return 110.0 * (1 + len(block.facts) // 5) if isinstance(block, Facts) else 700
+
+
+def draw(figure: Drawing, caption: str, alt: str) -> Picture:
+    """Embed a matplotlib figure as SVG."""
+    import matplotlib as mpl
+
+    buffer = BytesIO()
+    with mpl.rc_context({"svg.hashsalt": caption}):
+        figure.savefig(buffer, format="svg", bbox_inches="tight", metadata={"Date": None})
+    height = 96 * float(figure.get_figheight())
+    return Picture(_data_uri("image/svg+xml", buffer.getvalue()), caption, alt, height)
+
+
+def _data_uri(kind: str, data: bytes) -> str:
+    return f"data:{kind};base64,{base64.b64encode(data).decode()}"
+
+
+def _provenance() -> str:
+    packages = ", ".join(f"{name} {version(name)}" for name in PACKAGES)
+    made = datetime.datetime.now(datetime.UTC).strftime("%Y-%m-%d %H:%M UTC")
+    return f"hrg-workbench {version('hrg-workbench')}, Python {platform.python_version()}, {packages}; made {made}."

@@ -14,8 +14,9 @@ from PIL import Image
 
 from shell.modes import solve_modes
 from studies.instrument.card import load_card
-from studies.reports.page import Chapter, Text, render_page
 from studies.reports.webgl import view_modes
+from studies.results import Chapter, Sentence
+from studies.results.page import render_page
 
 BROWSER = next(
     (found for name in ("chromium", "chromium-browser", "google-chrome", "chrome") if (found := shutil.which(name))),
@@ -89,7 +90,7 @@ def page(tmp_path_factory):
     buffer = io.BytesIO()
     Image.new("RGB", (8, 8), "gray").save(buffer, "PNG")
     view = view_modes(instrument.resonator, modes, "free-dome", buffer.getvalue(), "a dome with four lobes", "caption")
-    text = render_page("Modes", "lead", [Chapter("Mode shapes", [Text("before"), view])])
+    text = render_page("Modes", "lead", [Chapter("Mode shapes", [Sentence("before"), view])])
     path = tmp_path_factory.mktemp("browser") / "page.html"
     path.write_text(text.replace("</body>", VISIT + "</body>"))
     assert not re.findall(r"""(?:src|href)\s*=\s*["']?(?!data:)(?:https?:)?//""", text)

@@ -4,14 +4,15 @@ import re
 
 from studies.reports.diagnosis import spell_parameter
 from studies.reports.digits import plain, to_error, to_interval
-from studies.reports.page import Chapter, Table, Text, render_page, typeset
+from studies.results import Chapter, Sentence
+from studies.results.page import Cells, render_page, typeset
 
 
 def page(chapters, rows):
-    table = Table("Readings", ["Name", "Value"], [["<b>", "-1.5e-03"]] * rows, sortable=True)
-    long = Text("word " * 1500)
+    table = Cells("Readings", ["Name", "Value"], [["<b>", "-1.5e-03"]] * rows, sortable=True)
+    long = Sentence("word " * 1500)
     return render_page(
-        "A page", "lead", [Chapter(f"Chapter {k}", [Text("short"), table, long]) for k in range(chapters)]
+        "A page", "lead", [Chapter(f"Chapter {k}", [Sentence("short"), table, long]) for k in range(chapters)]
     )
 
 
@@ -71,9 +72,9 @@ def test_parameters_have_units_that_people_use():
 
 
 def test_wide_tables_are_stacked_on_a_phone_and_long_ones_end_on_paper():
-    wide = Table("T", [f"Quantity {k}" for k in range(9)], [["1234.5678"] * 9] * 50)
-    narrow = Table("T", ["Name", "Value"], [["f", "1"]])
-    text = render_page("A page", "lead", [Chapter("One", [wide, narrow, Text("run `step 20 -10 5h`")])])
+    wide = Cells("T", [f"Quantity {k}" for k in range(9)], [["1234.5678"] * 9] * 50)
+    narrow = Cells("T", ["Name", "Value"], [["f", "1"]])
+    text = render_page("A page", "lead", [Chapter("One", [wide, narrow, Sentence("run `step 20 -10 5h`")])])
     assert text.count('class="stack paged"') == 1
     assert text.count('data-head="Quantity 8"') == 50
     assert 'class="remark onpaper">40 of 50 rows' in text

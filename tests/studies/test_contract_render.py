@@ -12,8 +12,9 @@ from studies.cli import main
 from studies.errors import InputError
 from studies.instrument.card import load_card
 from studies.reports.mode_picture import mode_blocks
-from studies.reports.page import Embedded, Text
 from studies.reports.scenes import read_field, show_mode
+from studies.results import Sentence
+from studies.results.page import Embedded
 
 
 def hrg_render(*words):
@@ -65,7 +66,7 @@ def test_without_opengl_the_page_is_interactive_still_and_says_what_is_missing(t
     assert "webgl2" in text
     assert "apt install libegl1" in text
     blocks = mode_blocks(load_card("free-dome"))
-    assert [type(block) for block in blocks] == [Embedded, Text]
+    assert [type(block) for block in blocks] == [Embedded, Sentence]
 
 
 def test_a_mesh_for_slicers_is_the_undeformed_solid_in_mm(tmp_path, capsys):

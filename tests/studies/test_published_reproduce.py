@@ -11,7 +11,8 @@ from studies.cli import main
 from studies.instrument.card import load_card
 from studies.papers import hrg
 from studies.reports.mode_picture import mode_blocks
-from studies.reports.page import Chapter, render_page
+from studies.results import Chapter
+from studies.results.page import render_page
 
 pytestmark = pytest.mark.slow
 
