@@ -10,16 +10,14 @@ from studies.errors import UNUSABLE_INPUT, InputError
 from studies.papers.hrg import study_table
 from studies.reports import frequency
 from studies.reports import sweep_figures as figures
-from studies.reports.digits import plain, to_numerical_error
 from studies.reports.sweep_analysis import influence_parts, main_columns, number, search_parts, tolerance_parts
+from studies.reports.sweep_numbers import numbers_of, statistics_table, summarise, to_digits, yield_of
 from studies.results import Blocks, Chapter, Column, Facts, Part, Result, Sentence, Table
 from studies.sweeps.definition import StudyParameter
 from studies.sweeps.design import nominal_design
 from studies.sweeps.parameters import TEMPERATURE, set_parameters
-from studies.sweeps.quantity import Column as Output
 from studies.sweeps.results import Results
-from studies.sweeps.sensitivity import linear_shares, local_slopes, sobol_indices
-from studies.sweeps.tolerance import Yield, find_yield, resolve_limits
+from studies.sweeps.tolerance import resolve_limits
 
 MOST_ROWS = 300
 ENDS = 20  # designs shown from each end when there are more than MOST_ROWS
@@ -31,17 +29,6 @@ METHODS = {
     "sensitivity": "the Saltelli design for Sobol indices",
     "one-at-a-time": "one parameter at a time about the nominal design",
 }
-STATISTICS = (
-    Column("label", "Quantity"),
-    Column("unit", "Unit"),
-    Column("nominal", "Nominal"),
-    Column("mean", "Mean"),
-    Column("deviation", "Standard deviation"),
-    Column("least", "Minimum"),
-    Column("greatest", "Maximum"),
-    Column("error", "Numerical error"),
-)
-NUMERICAL = "The numerical error is the largest error estimate of the solver over all designs, relative to the exact solution of its theory."
 RUNS = (
     Column("run", "Run"),
     Column("started_utc", "Started"),
@@ -59,9 +46,9 @@ def study_result(results: Results) -> Result:
     lead = f"{done} designs ({METHODS[study.sampling.method]}) based on the card {study.instrument.name}."
     if study.note:
         lead = f"{study.note} {lead}"
-    shown = [_statistics(results), *_over_temperature(results), *_pictures(results), _designs(results)]
+    shown = [statistics_table(results), *_over_temperature(results), *_pictures(results), _designs(results)]
     return Result(
-        _summarise(results),
+        summarise(results),
         f"Study: {study.name}",
         lead,
         [
@@ -78,63 +65,14 @@ def study_result(results: Results) -> Result:
     )
 
 
-def _summarise(results: Results) -> dict[str, Any]:
-    found: dict[str, Any] = {
-        "schema": "hrg.study-report/1",
-        "study": results.study.name,
-        "cases": len(results),
-        "done": results.done,
-        "total": results.total,
-        "failed": len(results.failed),
-        "columns": {c.name: {"unit": c.unit, **_numbers(results, c)} for c in results.study.columns},
-        "searches": results.store.findings(),
-    }
-    for key, analyse in (("sobol", sobol_indices), ("slopes", local_slopes), ("linear", linear_shares)):
-        found[key] = {c.name: _data(analyse, results, c.name) for c in results.study.columns}
-    whole = _yield(results)
-    if whole is not None:
-        found["yield"] = {k: v for k, v in vars(whole).items() if k != "limits"} | {"share": whole.share}
-    return found
-
-
-def _data(analyse: Any, results: Results, column: str) -> Any:
-    try:
-        found = analyse(results, column)
-    except InputError:
-        return None
-    return [vars(one) for one in found] if isinstance(found, list) else None if found is None else vars(found)
-
-
-def _numbers(results: Results, column: Output) -> dict[str, float]:
-    y = results.column(column.name)
-    y = y[np.isfinite(y)]
-    place = [c.name for c in results.study.columns].index(column.name)
-    nominal = results.nominal.values[place] if results.nominal is not None else np.nan
-    errors = results.error(column.name)
-    error = float(np.nanmax(errors)) if np.isfinite(errors).any() else np.nan
-    numbers: dict[str, Any] = {"mean": np.mean, "deviation": np.std, "least": np.min, "greatest": np.max}
-    over_all = {name: float(function(y)) if y.size else np.nan for name, function in numbers.items()}
-    return {"nominal": nominal, **over_all, "error": error}
-
-
-def _yield(results: Results) -> Yield | None:
-    """Return the yield under all requirements; None without any, and where the nominal design that they need is missing."""
-    if not results.study.requirements or not len(results):
-        return None
-    try:
-        return find_yield(results, results.study.requirements)
-    except InputError:  # the chapter on tolerances says why
-        return None
-
-
 def _short(results: Results) -> list[Part]:
     facts = [("Designs", str(results.done), f"of {results.total}; {len(results.failed)} failed")]
     for column in main_columns(results)[:2]:
-        n = _numbers(results, column)
+        n = numbers_of(results, column)
         unit = "" if column.unit == "1" else f" {column.unit}"
-        least, greatest, nominal = (_to(n[key], n["deviation"] / 3) for key in ("least", "greatest", "nominal"))
+        least, greatest, nominal = (to_digits(n[key], n["deviation"] / 3) for key in ("least", "greatest", "nominal"))
         facts.append((column.label, f"{least} … {greatest}{unit}", f"nominal {nominal}{unit}"))
-    found = _yield(results)
+    found = yield_of(results)
     if found is not None:
         low, high = found.low, found.high
         words = "of the designs" if low is None or high is None else f"95 % interval {_percent(low)} … {_percent(high)}"
@@ -145,13 +83,6 @@ def _short(results: Results) -> list[Part]:
 
 def _percent(share: float) -> str:
     return f"{100 * share:.2f} %"
-
-
-def _to(value: float, error: float) -> str:
-    """Return a number to the second digit of an error, six digits of it without one, nothing for nothing."""
-    if np.isnan(value):
-        return ""
-    return to_numerical_error(value, error) if 0 < error < np.inf and abs(value) < 1e9 else f"{value:.6g}"
 
 
 def _asked(results: Results) -> list[Part]:
@@ -206,23 +137,6 @@ def _design_columns(results: Results) -> list[Column]:
 def _at(values: NDArray[Any]) -> Callable[[int], Any]:
     """Return what shows the value of a design, whose place is the row."""
     return lambda place: values[place]
-
-
-def _statistics(results: Results) -> Table:
-    rows: list[dict[str, Any]] = []
-    for column in results.study.columns:
-        n = _numbers(results, column)
-        deviation, mean, error = n["deviation"], n["mean"], n["error"]
-        to = error if np.isfinite(error) else deviation / 3
-        rows.append(
-            {"label": column.label, "unit": column.unit}
-            | {key: _to(n[key], to) for key in ("nominal", "mean", "least", "greatest")}
-            | {
-                "deviation": "" if np.isnan(deviation) else plain(deviation) if deviation > 1e-12 * abs(mean) else "0",
-                "error": plain(error, 2) if np.isfinite(error) else "",
-            }
-        )
-    return Table("All designs with a result", rows, STATISTICS, NUMERICAL)
 
 
 def _designs(results: Results) -> Table:
