@@ -1,10 +1,14 @@
 """`hrg keys`: the keys of the files that people write, from their declaration."""
 
 from collections.abc import Iterator, Mapping
+from importlib import import_module
 from typing import Any
 
 from studies.cli.output import answers
+from studies.errors import InputError, nearest
+from studies.instrument.registry import card_tables
 from studies.results import Column, Result, Table
+from studies.schema.reference import list_keys, spell_uncertainty
 
 COLUMNS = (
     Column("key", "key"),
@@ -28,13 +32,11 @@ def keys(kind: str = "card", *, table: str = "") -> Result:
     table : str
         Only the keys of this table and the tables in it, such as thermal or loss.film.
     """
-    from studies.errors import InputError, nearest
-
     if kind not in KINDS:
         raise InputError(f"there are no keys of '{kind}'{nearest(kind, KINDS)}")
-    rows = [row for row in KINDS[kind]() if not table or f"{row['table'].strip('[]')}.".startswith(f"{table}.")]
+    rows = [row for row in _keys_of(kind) if not table or f"{row['table'].strip('[]')}.".startswith(f"{table}.")]
     if not rows:
-        names = {row["table"].strip("[]") for row in KINDS[kind]()} - {""}
+        names = {row["table"].strip("[]") for row in _keys_of(kind)} - {""}
         raise InputError(f"a {kind} has no table '{table}'{nearest(table, names)}")
     headings = list(dict.fromkeys((row["table"], row.get("only", "")) for row in rows))
     tables = [
@@ -53,50 +55,24 @@ def keys(kind: str = "card", *, table: str = "") -> Result:
 
 def _words(row: Mapping[str, Any]) -> dict[str, str]:
     """Return default and uncertainty as people read them."""
-    from studies.schema.reference import spell_uncertainty
-
     default = "required" if row["required"] else "" if row["default"] is None else str(row["default"])
     return {"uncertainty": spell_uncertainty(row), "default_words": default}
 
 
-def _card() -> Iterator[dict[str, Any]]:
-    from studies.instrument.card import Head
-    from studies.instrument.registry import card_tables
-    from studies.schema.reference import list_keys
+KINDS = {
+    # what people write: the class that declares its keys
+    "card": "studies.instrument.card:Head",
+    "study": "studies.sweeps.keys:StudyKeys",
+    "map": "studies.importing.mapping:ImportMap",
+    "model": "studies.models.file:ModelKeys",
+    "limits": "studies.acceptance.limits:Limits",
+}
 
-    yield from list_keys(Head)
-    for name, entries in card_tables().items():
+
+def _keys_of(kind: str) -> Iterator[dict[str, Any]]:
+    module, name = KINDS[kind].split(":")
+    yield from list_keys(getattr(import_module(module), name))
+    for table, entries in card_tables().items() if kind == "card" else ():
         for entry in entries:
             if entry.keys is not None:  # those of an [[effect]] depend on its name: hrg effects NAME
-                yield from list_keys(entry.keys, f"[{name}]")
-
-
-def _map() -> Iterator[dict[str, Any]]:
-    from studies.importing.mapping import ImportMap
-    from studies.schema.reference import list_keys
-
-    yield from list_keys(ImportMap)
-
-
-def _model() -> Iterator[dict[str, Any]]:
-    from studies.models.file import ModelKeys
-    from studies.schema.reference import list_keys
-
-    yield from list_keys(ModelKeys)
-
-
-def _limits() -> Iterator[dict[str, Any]]:
-    from studies.acceptance.limits import Limits
-    from studies.schema.reference import list_keys
-
-    yield from list_keys(Limits)
-
-
-def _study() -> Iterator[dict[str, Any]]:
-    from studies.schema.reference import list_keys
-    from studies.sweeps.keys import StudyKeys
-
-    yield from list_keys(StudyKeys)
-
-
-KINDS = {"card": _card, "study": _study, "map": _map, "model": _model, "limits": _limits}
+                yield from list_keys(entry.keys, f"[{table}]")

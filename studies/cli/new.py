@@ -1,9 +1,24 @@
 """`hrg card new` and `hrg study new`: files of one's own to start from."""
 
+import os
+import tomllib
 from collections.abc import Collection, Iterator
+from dataclasses import replace
+from pathlib import Path
 from typing import Annotated, Any
 
+import tomli_w
 from cyclopts import Parameter
+
+from studies.cli.output import say
+from studies.errors import InputError
+from studies.files.reading import find_shipped, read_bytes
+from studies.files.writing import write_text
+from studies.instrument.card import build_instrument, load_card, spell_card
+from studies.instrument.registry import card_tables
+from studies.schema.reference import write_form
+from studies.sweeps.keys import StudyKeys
+from studies.sweeps.spec import shipped_specs
 
 
 def card(path: str, *, like: str = "hrg-30mm", name: str | None = None) -> int:
@@ -18,14 +33,6 @@ def card(path: str, *, like: str = "hrg-30mm", name: str | None = None) -> int:
     name : str
         Name of the instrument; default: the name of the file.
     """
-    from dataclasses import replace
-    from pathlib import Path
-
-    from studies.cli.output import say
-    from studies.files.writing import write_text
-    from studies.instrument.card import build_instrument, load_card, spell_card
-    from studies.schema.reference import write_form
-
     _refuse_existing(path)
     model = load_card(like)
     note = {"note": "State here which values are measured, published or assumed."}
@@ -56,17 +63,6 @@ def study(
     card_ : str
         The card to study: a built-in one, or a path relative to the spec.
     """
-    import tomllib
-
-    import tomli_w
-
-    from studies.cli.output import say
-    from studies.files.reading import find_shipped, read_bytes
-    from studies.files.writing import write_text
-    from studies.schema.reference import write_form
-    from studies.sweeps.keys import StudyKeys
-    from studies.sweeps.spec import shipped_specs
-
     _refuse_existing(path)
     text = read_bytes(find_shipped(like, shipped_specs(), "study")).decode("utf-8-sig")
     if card_ is not None:
@@ -80,18 +76,12 @@ def study(
 
 
 def _refuse_existing(path: str) -> None:
-    import os
-
-    from studies.errors import InputError
-
     if os.path.lexists(path):
         raise InputError(f"{path}: already exists and is not overwritten; remove it or choose another name.")
 
 
 def _other_tables(present: Collection[str]) -> Iterator[tuple[Any, str]]:
     """Yield the keys and the heading of each table that a card may have and this one has not."""
-    from studies.instrument.registry import card_tables
-
     for name, entries in card_tables().items():
         for entry in entries if name not in (*present, "posterior") else ():
             keys = entry.keys if entry.keys_of is None else entry.keys_of({"name": "second-lag"}, "")
