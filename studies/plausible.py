@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from shell.constants import zero_Celsius
 from studies.errors import InputError
+from studies.law import check_slope_known
 
 if TYPE_CHECKING:
     from studies.instrument.card import Instrument
@@ -16,6 +17,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 ANOTHER = 0.2  # relative: no tolerance of one design makes so much
 ALIKE = 0.03  # relative: what trimming, temperature and small errors of dimensions make of a frequency
+AT_REST = 1e-5  # relative: frequencies that vary by less need no temperature law
 SPREADS = 6.0  # standard deviations of the card's own frequency
 ONE_GYRO, STEEPEST = 5e-3, 3e-4  # relative, and 1/K: what one gyro does from run to run, and over temperature at most
 SAME_GYRO = 0.01  # relative: one gyro over temperature, beyond the range of its model
@@ -32,6 +34,8 @@ def check_card_frequency(instrument: "Instrument", frequency: Array, path: str) 
     known = frequency[np.isfinite(frequency)]
     if not known.size:
         return
+    if np.ptp(known) > AT_REST * np.median(known):
+        check_slope_known(instrument)
     read, own = float(np.median(known)), _frequency(instrument)
     away = abs(float(np.log(max(read, 1e-9) / own)))
     if away <= ALIKE:

@@ -164,7 +164,7 @@ def read_decay(
     import numpy as np
 
     from compensation.ringdown.analysis import analyse_decay
-    from compensation.ringdown.envelope import from_lock_in, mix_down
+    from compensation.ringdown.envelope import even_rows, from_lock_in, mix_down
     from compensation.ringdown.trace import analyse_trace
 
     table, notes = _read(path)
@@ -186,7 +186,7 @@ def read_decay(
         if raw:
             envelope = mix_down(time, np.array(raw), reference)
             if expected is not None:
-                _refuse_alias(path, envelope.carrier, 1 / float(np.median(np.diff(time))), expected)
+                _refuse_alias(path, envelope.carrier, 1 / even_rows(time)[0], expected)
         else:
             envelope = from_lock_in(time, np.array(_pairs(path, columns)), reference or 0.0)
         return Decay(str(path), notes, phased=analyse_decay(envelope, harmonic=harmonic), envelope=envelope)

@@ -165,6 +165,7 @@ def _judge(error: Exception, words: Sequence[str]) -> tuple[str, int]:
     from cyclopts import CycloptsError, UnknownCommandError, UnusedCliTokensError
 
     from studies.errors import UNUSABLE_INPUT, MissingEnvironment, nearest
+    from studies.files.lines import point_out
 
     match error:
         case UnusedCliTokensError():
@@ -176,7 +177,7 @@ def _judge(error: Exception, words: Sequence[str]) -> tuple[str, int]:
             asked = " ".join(["hrg", *_command_words(words), "--help"])
             return f"{' '.join(str(error).split())} See '{asked}'.", 2
         case _ if isinstance(error, UNUSABLE_INPUT):
-            return str(error), 2
+            return point_out(str(error)), 2
         case MissingEnvironment():
             return str(error), 3
         case OSError() | MemoryError() | UnicodeError():

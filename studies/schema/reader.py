@@ -70,7 +70,7 @@ def _spell_syntax(text: str, error: str) -> str:
     line = lines[number - 1] if 0 < number <= len(lines) else ""
     if re.search(r"=\s*[-+]?\d+,\d", line):
         return f", line {number}: write a decimal point, not a comma: {line.strip():.60}"
-    if found and "=" not in line and line.count(",") > 0:
+    if found and "=" not in "".join(lines[:number]) and line.count(",") > 0:
         return f": not a TOML file; its line {number} looks like a table (CSV). Give a TOML file here."
     return f": not valid TOML: {error}."
 

@@ -62,3 +62,27 @@ def test_comparison_and_modes_leave_open_what_is_not_known(card, capsys):
     assert slope["values"][1] > 0
     assert main(["modes", str(card), "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["modes"][0]["material_uncertainty_Hz"] is None
+
+
+@pytest.mark.parametrize("words", [["calibrate", "CARD", "TABLE"], ["diagnose", "TABLE", "--card", "CARD"]])
+def test_readings_over_temperature_are_not_compared_with_a_slope_of_0(card, capsys, words):
+    named = {"CARD": str(card), "TABLE": "studies/papers/hrg_table1.csv"}
+    assert main([named.get(word, word) for word in words]) == 2
+    said = capsys.readouterr().err
+    assert "the slope of the frequency is not known" in said
+    assert f"({card}:7)" in said  # the line of [material]
+
+
+@pytest.mark.parametrize(
+    ("more", "line"),
+    [
+        ("radius = 1\n", 12),
+        ("[[effect]]\nname = 'hysteresis'\n[[effect]]\nname = 'nothing'\n", 15),
+        ("[loop]\n# range\nadc_step_uV = 'x'\n", 14),
+        ("[resonator.stem]\nradius_mm = 2.5\nend_mm = -5.0\nside = 'inside'\n", 15),
+    ],
+)
+def test_a_wrong_key_is_shown_with_its_line(card, capsys, more, line):
+    card.write_text(CARD + more)
+    assert main(["cards", str(card)]) == 2
+    assert capsys.readouterr().err.endswith(f" ({card}:{line})\n")
