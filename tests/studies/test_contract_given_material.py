@@ -77,7 +77,7 @@ def test_readings_over_temperature_are_not_compared_with_a_slope_of_0(card, caps
     ("more", "line"),
     [
         ("radius = 1\n", 12),
-        ("[[effect]]\nname = 'hysteresis'\n[[effect]]\nname = 'nothing'\n", 15),
+        ("[[imperfection.mass]]\nmass_ug = 5.0\nazimuth_deg = 0.0\n[[imperfection.mass]]\nmass = 5.0\n", 16),
         ("[loop]\n# range\nadc_step_uV = 'x'\n", 14),
         ("[resonator.stem]\nradius_mm = 2.5\nend_mm = -5.0\nside = 'inside'\n", 15),
     ],
