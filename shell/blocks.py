@@ -10,7 +10,7 @@ from shell.cells import in_order
 from shell.errors import ShellError
 from shell.kernel import Orders
 from shell.patches import Part, Patch
-from shell.quadrature import Array, interpolate_hierarchic, legendre, lobatto
+from shell.quadrature import Array, interpolate_hierarchic, legendre, lobatto, nodal
 from shell.resonator import MeridianPoints
 from shell.sparse import Index, Rows
 
@@ -53,6 +53,11 @@ class Mesh:
     points: Array
     pairs: Index
     parts: tuple[Part, ...]
+
+    def place(self, xi: Array, eta: Array, cells: slice | list[int] = slice(None)) -> Array:
+        """R and z at ξ and η of some cells, (2, cells, ξ, η)."""
+        along, across = (nodal(self.grid.shape[2] - 1, x).values for x in (xi, eta))
+        return np.asarray(along @ self.grid[:, cells] @ across.T)
 
 
 SIDES = ((0, 1), (2, 3), (0, 2), (1, 3))

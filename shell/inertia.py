@@ -8,7 +8,7 @@ import numpy as np
 
 from shell.assembly import build_system
 from shell.levels import LEVELS, Level
-from shell.quadrature import Array, gauss, nodal
+from shell.quadrature import Array, gauss
 from shell.resonator import Resonator
 from shell.system import Group, SolidPart
 
@@ -53,8 +53,8 @@ def weigh(resonator: Resonator, density: float) -> MassProperties:
 def _gauss_points(resonator: Resonator, group: Group, level: Level) -> tuple[Array, Array]:
     """Coordinates r and z (elements, stations, points) of the quadrature points of one group."""
     if isinstance(group.place, SolidPart):
-        values = nodal(level.block, gauss(level.block + 2)[0]).values
-        r, z = np.einsum("ia,gcab,jb->gcij", values, group.place.mesh.grid, values)
+        points = gauss(level.block + 2)[0]
+        r, z = group.place.mesh.place(points, points)
         return r, z
     xi, eta = gauss(level.along + 2)[0], gauss(max(level.through) + 2)[0]
     chain, found = group.place.chain, []

@@ -108,16 +108,8 @@ def shell_table(
     along : polynomials along the meridian at the stations.
     """
     points, weights = eta
-    h, slope, ds = (_tall(a) for a in (section.thickness, section.thickness_slope, section.ds))
-    t_r, kappa, n_r = _tall(section.tangent_r), _tall(section.curvature), _tall(-section.tangent_z)
-    zeta = h * points[:, None, None] / 2
-    A, rho = 1 + kappa * zeta, _tall(section.r) + n_r * zeta
-    counts = [basis.values.shape[1] for basis in through]
-    value, d_eta, d_xi = _jets(through, counts)
-    u, v, w = value
-    u_zeta, v_zeta, w_zeta = (2 / h * d for d in d_eta)
-    drift = slope / h * points[:, None, None]
-    u_s, v_s, w_s = (f / ds - drift * g for f, g in zip(d_xi, d_eta, strict=True))
+    t_r, kappa, n_r, A, rho = _frame(section, points)
+    (u, v, w), (u_s, v_s, w_s), (u_zeta, v_zeta, w_zeta) = _jets(section, through, points)
     strain = np.stack(
         np.broadcast_arrays(
             (u_s + kappa * w) / A,
@@ -129,9 +121,11 @@ def shell_table(
         ),
         axis=2,
     )
-    volume = (ds * A * rho * h / 2)[..., 0, 0] * section.weight[..., None] * weights
-    displacement = np.broadcast_to(np.stack([f[:, 0] for f in value]), (*section.r.shape, 3, len(points), sum(counts)))
-    naghdi = counts[2] == 1
+    share = section.ds * section.thickness / 2 * section.weight
+    volume = (A * rho)[..., 0, 0] * share[..., None] * weights
+    moved = np.stack([f[:, 0] for f in (u, v, w)])
+    displacement = np.broadcast_to(moved, (*section.r.shape, *moved.shape))
+    naghdi = through[2].values.shape[1] == 1
     return StrainTable(
         strain,
         displacement,
@@ -150,18 +144,12 @@ def shell_gradients(section: Section, n: int, through: tuple[Basis, Basis, Basis
 
     (u_s + κ w)/A, v_s/A, (w_s - κ u)/A;  -(n u + t_r v)/ρ, (n v + t_r u + n_r w)/ρ, -(n w + n_r v)/ρ;  u_ζ, v_ζ, w_ζ.
     """
-    points, _ = eta
-    h, slope, ds = (_tall(a) for a in (section.thickness, section.thickness_slope, section.ds))
-    t_r, kappa, n_r = _tall(section.tangent_r), _tall(section.curvature), _tall(-section.tangent_z)
-    zeta = h * points[:, None, None] / 2
-    A, rho = 1 + kappa * zeta, _tall(section.r) + n_r * zeta
-    (u, v, w), d_eta, d_xi = _jets(through, [basis.values.shape[1] for basis in through])
-    drift = slope / h * points[:, None, None]
-    u_s, v_s, w_s = (f / ds - drift * g for f, g in zip(d_xi, d_eta, strict=True))
+    t_r, kappa, n_r, A, rho = _frame(section, eta[0])
+    (u, v, w), (u_s, v_s, w_s), by_zeta = _jets(section, through, eta[0])
     rows = (
         ((u_s + kappa * w) / A, v_s / A, (w_s - kappa * u) / A),
         (-(n * u + t_r * v) / rho, (n * v + t_r * u + n_r * w) / rho, -(n * w + n_r * v) / rho),
-        tuple(2 / h * d for d in d_eta),
+        by_zeta,
     )
     flat = np.stack(np.broadcast_arrays(*(one for row in rows for one in row)), axis=2)
     return np.asarray(flat.reshape(*flat.shape[:2], 3, 3, *flat.shape[3:]))
@@ -238,22 +226,29 @@ def _tall(per_station: Array) -> NDArray[np.float64]:
     return per_station[..., None, None, None]
 
 
-def _jets(bases: tuple[Basis, Basis, Basis], counts: list[int]) -> tuple[list[Array], list[Array], list[Array]]:
-    """The three displacements, their η- and their ξ-derivatives as rows (point, jet, amplitude)."""
-    total, start = sum(counts), 0
-    value: list[Array] = []
-    d_eta: list[Array] = []
-    d_xi: list[Array] = []
-    for basis, count in zip(bases, counts, strict=True):
-        rows = [np.zeros((len(basis.values), 2, total)) for _ in range(3)]
-        columns = slice(start, start + count)
-        rows[0][:, 0, columns] = basis.values
-        rows[1][:, 0, columns] = basis.slopes
-        rows[2][:, 1, columns] = basis.values
-        for target, row in zip((value, d_eta, d_xi), rows, strict=True):
-            target.append(row)
-        start += count
-    return value, d_eta, d_xi
+def _frame(section: Section, points: Array) -> tuple[Array, Array, Array, Array, Array]:
+    """t_r, κ, n_r of the middle surface, and A = 1 + κ ζ and ρ = r + ζ n_r at heights η."""
+    t_r, kappa, n_r = _tall(section.tangent_r), _tall(section.curvature), _tall(-section.tangent_z)
+    zeta = _tall(section.thickness) * points[:, None, None] / 2
+    return t_r, kappa, n_r, 1 + kappa * zeta, _tall(section.r) + n_r * zeta
+
+
+def _jets(
+    section: Section, through: tuple[Basis, Basis, Basis], points: Array
+) -> tuple[list[Array], list[Array], list[Array]]:
+    """The three displacements, their s- and their ζ-derivatives as rows (point, jet, amplitude)."""
+    h, slope, ds = (_tall(a) for a in (section.thickness, section.thickness_slope, section.ds))
+    total, start = sum(basis.values.shape[1] for basis in through), 0
+    drift = slope / h * points[:, None, None]
+    found: tuple[list[Array], list[Array], list[Array]] = ([], [], [])
+    for basis in through:
+        value, d_eta, d_xi = (np.zeros((len(basis.values), 2, total)) for _ in range(3))
+        columns = slice(start, start := start + basis.values.shape[1])
+        value[:, 0, columns] = d_xi[:, 1, columns] = basis.values
+        d_eta[:, 0, columns] = basis.slopes
+        for kind, one in zip(found, (value, d_xi / ds - drift * d_eta, 2 / h * d_eta), strict=True):
+            kind.append(one)
+    return found
 
 
 def _unravel(integrals: Array, functions: int) -> Array:

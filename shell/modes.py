@@ -143,7 +143,7 @@ def solve_modes(
     """The lowest modes of one circumferential harmonic, without rigid motions.
 
     The polynomial orders rise until what the next functions of every element would still change lies within `tolerance`;
-    that is the error estimate (see shell.surplus), to which thin shells add what double precision loses (shell.rounding).
+    that is the error estimate (see shell.surplus), to which thin shells add what double precision loses (shell.refinement).
 
     Parameters
     ----------

@@ -161,7 +161,7 @@ class _Sides:
         fixed = np.array([-1.0 if side in (0, 2) else 1.0])
         xi, eta = (run, fixed) if side < 2 else (fixed, run)
         degree, grid = self.system.level.block, mesh.grid[:, [cell]]
-        r, z = _place(grid, nodal(degree, xi).values, nodal(degree, eta).values).reshape(2, -1)
+        r, z = mesh.place(xi, eta, [cell]).reshape(2, -1)
         where = self.system.groups[number].table.position[cell, 0]
         if self.solution is None:
             return _bare(r, z, np.full(r.shape, where))
@@ -185,10 +185,6 @@ def _fields(solution: Solution, table: StrainTable | CellTable, number: int, ele
 
 def _points(length: float, spacing: float) -> Array:
     return np.linspace(-1.0, 1.0, 1 + int(np.clip(np.ceil(length / spacing), 2, MOST_POINTS)))
-
-
-def _place(grid: Array, along: Array, across: Array) -> Array:
-    return np.asarray(np.einsum("ia,gcab,jb->gcij", along, grid, across))
 
 
 def _bare(r: Array, z: Array, position: Array) -> Outline:

@@ -60,8 +60,8 @@ def _shell_patches(
 
 def _solid_patches(group: SolidGroup, q: Array, x: Array) -> list[ShapePatch]:
     degree = group.place.mesh.grid.shape[2] - 1
-    place, move = nodal(degree, x).values, hierarchic(degree, x).values
-    r, z = np.einsum("ia,geab,jb->geij", place, group.place.mesh.grid, place)
+    move = hierarchic(degree, x).values
+    r, z = group.place.mesh.place(x, x)
     i, j = in_order(degree)
     u = np.einsum("xk,yk,ekc->cexy", move[:, i], move[:, j], q.reshape(len(q), -1, 3))
     return [ShapePatch(*fields) for fields in zip(r, z, *u, strict=True)]

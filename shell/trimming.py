@@ -29,7 +29,7 @@ DIRECTIONS = 24  # sides of the polygon that stands for a circle
 
 @dataclass(frozen=True)
 class SplitWave:
-    """A split of one harmonic as a vector.
+    """A split of one harmonic as a vector, measured or expected: its most probable wave, and its error.
 
     harmonic : n. frequency : f, Hz. wave : (f_fast - f_slow)/f exp(2 i n α_fast). error : standard error of either part of it.
     """
@@ -39,23 +39,8 @@ class SplitWave:
     wave: complex
     error: float
 
-    @property
-    def hertz(self) -> float:
-        """The split, Hz."""
-        return abs(self.wave) * self.frequency
-
-    @property
-    def slow_axis(self) -> float:
-        """Azimuth of an antinode of the slower mode, rad, in 0 ... π/n."""
-        return float(np.angle(-self.wave) / (2 * self.harmonic) % (pi / self.harmonic))
-
-
-@dataclass(frozen=True)
-class SplitReading(SplitWave):
-    """A measured split."""
-
     @classmethod
-    def of(cls, harmonic: int, frequency: float, split: float, slow_axis: float, error: float) -> "SplitReading":
+    def of(cls, harmonic: int, frequency: float, split: float, slow_axis: float, error: float) -> "SplitWave":
         """From a split and its standard error in Hz and the azimuth of the slower mode's antinode, rad.
 
         Raises
@@ -75,6 +60,26 @@ class SplitReading(SplitWave):
         return cls(
             harmonic, frequency, complex(-split / frequency * np.exp(2j * harmonic * slow_axis)), error / frequency
         )
+
+    @property
+    def hertz(self) -> float:
+        """The split, Hz."""
+        return abs(self.wave) * self.frequency
+
+    @property
+    def slow_axis(self) -> float:
+        """Azimuth of an antinode of the slower mode, rad, in 0 ... π/n."""
+        return float(np.angle(-self.wave) / (2 * self.harmonic) % (pi / self.harmonic))
+
+    @property
+    def most(self) -> float:
+        """The split that is not exceeded in 95 of 100 cases, Hz: both parts of the wave have the error, so |wave|²/error² is
+        a non-central χ² of two degrees of freedom.
+        """
+        size = abs(self.wave) / self.error if self.error > 0 else np.inf
+        if size > FAR:
+            return self.frequency * (abs(self.wave) + ONE_SIDED * self.error)
+        return self.frequency * self.error * sqrt(float(chndtrix(0.95, 2, size**2)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,27 +108,12 @@ class Cut:
 
 
 @dataclass(frozen=True)
-class ExpectedSplit(SplitWave):
-    """A split as it is expected: most probable wave, and its error."""
-
-    @property
-    def most(self) -> float:
-        """The split that is not exceeded in 95 of 100 cases, Hz: both parts of the wave have the error, so |wave|²/error² is
-        a non-central χ² of two degrees of freedom.
-        """
-        size = abs(self.wave) / self.error if self.error > 0 else np.inf
-        if size > FAR:
-            return self.frequency * (abs(self.wave) + ONE_SIDED * self.error)
-        return self.frequency * self.error * sqrt(float(chndtrix(0.95, 2, size**2)))
-
-
-@dataclass(frozen=True)
 class Round:
     """Cuts that are made without a measurement between them, the share of the splits that they take, and what is left."""
 
     cuts: tuple[Cut, ...]
     share: float
-    after: tuple[ExpectedSplit, ...]
+    after: tuple[SplitWave, ...]
     unbalance: Mapping[int, complex]
 
     @property
@@ -136,7 +126,7 @@ class Round:
 class TrimPlan:
     """One round of cuts. The next is planned from what is measured after it."""
 
-    before: tuple[ExpectedSplit, ...]
+    before: tuple[SplitWave, ...]
     round: Round
     goal: float
 
@@ -147,7 +137,7 @@ class TrimPlan:
 
 
 def plan_trim(
-    readings: Sequence[SplitReading],
+    readings: Sequence[SplitWave],
     sites: Sites,
     *,
     goal: float,
@@ -174,7 +164,7 @@ def plan_trim(
     if not goal > 0:
         raise ShellError("the goal is a positive split in Hz.")
     known = dict(unbalance or {})
-    before = tuple(ExpectedSplit(r.harmonic, r.frequency, r.wave, r.error) for r in readings)
+    before = tuple(readings)
     share = _share(before, goal, removal_error, gain_error)
     masses = _least_mass(before, sites, share, sites.capacity, known)
     after = []
@@ -183,7 +173,7 @@ def plan_trim(
         total = complex(moves.sum())
         # what is left before it is measured: the reading, the error of each cut and that of all
         spread = state.error**2 + removal_error**2 * float((abs(moves) ** 2).sum()) / 2 + (gain_error * abs(total)) ** 2
-        after.append(ExpectedSplit(state.harmonic, state.frequency, state.wave + total, sqrt(spread)))
+        after.append(SplitWave(state.harmonic, state.frequency, state.wave + total, sqrt(spread)))
     known = {k: u - complex(masses @ np.exp(1j * k * sites.azimuth)) for k, u in known.items()}
     cuts = tuple(
         Cut(float(a), float(p), float(m))
@@ -193,7 +183,7 @@ def plan_trim(
     return TrimPlan(before, Round(cuts, share, tuple(after), known), goal)
 
 
-def _share(states: Sequence[ExpectedSplit], goal: float, removal_error: float, gain_error: float) -> float:
+def _share(states: Sequence[SplitWave], goal: float, removal_error: float, gain_error: float) -> float:
     """The largest share that leaves no split on the far side of 0 by more than the goal, `SURE` errors of the gain allowed for."""
     spread = SURE * sqrt(gain_error**2 + removal_error**2 / 4)
     shares = [(s.hertz + goal / 2) / (s.hertz * (1 + spread)) for s in states if s.hertz > goal / 2]
@@ -201,7 +191,7 @@ def _share(states: Sequence[ExpectedSplit], goal: float, removal_error: float, g
 
 
 def _least_mass(
-    states: Sequence[ExpectedSplit], sites: Sites, share: float, capacity: Array, unbalance: Mapping[int, complex]
+    states: Sequence[SplitWave], sites: Sites, share: float, capacity: Array, unbalance: Mapping[int, complex]
 ) -> Array:
     count = len(sites.azimuth)
     rows: list[Array] = []

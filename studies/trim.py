@@ -16,7 +16,7 @@ from shell.errors import ShellError
 from shell.groove import Groove, GrooveSplit, solve_groove
 from shell.imperfection import Pair
 from shell.modes import solve_modes
-from shell.trimming import Sites, SplitReading, TrimPlan, plan_trim
+from shell.trimming import Sites, SplitWave, TrimPlan, plan_trim
 from studies.errors import InputError
 
 if TYPE_CHECKING:
@@ -223,7 +223,7 @@ def plan_for_card(
         if n in pairs:
             raise InputError(f"the split of n = {n} is given twice.")
         pairs[n] = Pair(solve_modes(resonator, elastic, n)[0])
-    readings = [SplitReading.of(n, pairs[n].mode.frequency, split, axis, error) for n, split, axis, error in measured]
+    readings = [SplitWave.of(n, pairs[n].mode.frequency, split, axis, error) for n, split, axis, error in measured]
     largest = max(readings, key=lambda reading: reading.hertz)
     sites = (
         tooth_sites(pairs, teeth)

@@ -1,30 +1,12 @@
-"""Loss inside the material: of its bulk, of its damaged surface, and of processes that heat activates."""
+"""Loss inside the material by processes that heat activates."""
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from shell.damping.faces import FreeFaces
 from shell.errors import ShellError
 from shell.quadrature import Array
 
 BOLTZMANN = 8.617333262e-5  # eV/K
-
-
-def bulk_loss(coefficient: float, exponent: float, frequency: float) -> float:
-    """φ = c f^b (f in Hz): loss of the material's volume (Penn et al., Phys. Lett. A 352 (2006) 3, gr-qc/0507097)."""
-    return float(coefficient * frequency**exponent)
-
-
-def surface_loss(depth: float, surfaces: tuple[FreeFaces, ...], strain_energy: float) -> float:
-    """1/Q = (d φ_s) ∫ σ : ε dA / ∫ σ : ε dV, energy of the mode at its surfaces, which a ratio S/V misses threefold in bending.
-
-    Parameters
-    ----------
-    depth : product of the damaged layer's depth and loss, m.
-    surfaces : of `free_surfaces`.
-    strain_energy : ∫ σ : ε dV / π of the mode, J.
-    """
-    return depth * sum(surface.integrate(surface.energy) for surface in surfaces) / strain_energy
 
 
 def activated_loss(height: float, energy: float, peak: float, temperature: ArrayLike) -> Array:

@@ -2,80 +2,22 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from shell.damping.anelastic import activated_loss, bulk_loss, surface_loss
-from shell.damping.faces import FreeFaces, free_surfaces, shell_faces
+from shell.damping.anelastic import activated_loss
+from shell.damping.faces import Vibration
 from shell.damping.film import Film, check_film, film_internal_loss, film_thermoelastic_loss
 from shell.damping.gas import Gas, gas_loss, mean_free_path
 from shell.damping.heat import Heat
 from shell.damping.thermoelastic import heat_flow
 from shell.errors import ShellError
-from shell.materials import Material
-from shell.modes import Mode
 from shell.quadrature import Array
-from shell.resonator import Resonator
-from shell.solution import Solution, total
 
 NORMAL_90 = 1.6448536269514722  # a 90 % interval is ± this many standard deviations
 STEP = 0.5  # K, for slopes over temperature
 FREE = 10.0  # free path over the radius beyond which molecules count as free
-
-
-@dataclass(frozen=True, eq=False)
-class Vibration:
-    """A solved mode with its material, for the causes of loss to work on.
-
-    reference : temperature (K) at which it was solved. Over temperature its shape stays and ω follows √(E/ρ).
-    """
-
-    solution: Solution
-    resonator: Resonator
-    material: Material
-    reference: float
-
-    @classmethod
-    def of(cls, mode: Mode, material: Material, reference: float) -> "Vibration":
-        """From a mode of theory solid or shell."""
-        if mode.solution is None or mode.resonator is None:
-            raise ShellError("Rayleigh's closed form carries no energies: a loss budget needs theory solid or shell.")
-        return cls(mode.solution, mode.resonator, material, reference)
-
-    @cached_property
-    def faces(self) -> tuple[FreeFaces, FreeFaces]:
-        """Inner and outer face."""
-        return shell_faces(self.solution)
-
-    @cached_property
-    def surfaces(self) -> tuple[FreeFaces, ...]:
-        """All free surfaces."""
-        return free_surfaces(self.solution, self.resonator)
-
-    @cached_property
-    def strain_energy(self) -> float:
-        """∫ σ : ε dV / π, J."""
-        return total(self.solution.elastic)
-
-    @cached_property
-    def kinetic(self) -> float:
-        """∫ ρ |u|² dV / π, kg m²."""
-        return total(self.solution.kinetic)
-
-    @property
-    def thinnest(self) -> float:
-        """Least thickness of the wall, m."""
-        return min(value for _, value in self.resonator.thickness)
-
-    def omega(self, temperature: ArrayLike) -> Array:
-        """ω (rad/s) at temperatures (K)."""
-        now, then = (
-            self.material.value("youngs_modulus", T) / self.material.value("density", T)
-            for T in (np.asarray(temperature, dtype=float), np.asarray(self.reference))
-        )
-        return np.asarray(np.sqrt(self.solution.eigenvalue * now / then))
 
 
 HeatLaw = Callable[[float], Heat]
@@ -207,10 +149,10 @@ def thermoelastic_cause(
 
 
 def bulk_cause(coefficient: float, exponent: float, relative_sd: float, source: str) -> LossCause:
-    """Loss of the material's volume, c f^b."""
+    """Loss of the material's volume, φ = c f^b, f in Hz (Penn et al., Phys. Lett. A 352 (2006) 3, gr-qc/0507097)."""
     return LossCause(
         "bulk",
-        lambda v, T: np.array([bulk_loss(coefficient, exponent, omega / (2 * np.pi)) for omega in v.omega(T)]),
+        lambda v, T: coefficient * (v.omega(T) / (2 * np.pi)) ** exponent,
         relative_sd,
         source,
         "choose another glass or alloy; anneal it",
@@ -218,10 +160,17 @@ def bulk_cause(coefficient: float, exponent: float, relative_sd: float, source: 
 
 
 def surface_cause(depth: float, relative_sd: float, source: str) -> LossCause:
-    """Loss of the damaged surface, of depth times loss (m)."""
+    """Loss of the damaged surface, of depth times loss (m): 1/Q = (d φ_s) ∫ σ : ε dA / ∫ σ : ε dV.
+
+    The energy is that of the mode at its surfaces, which a ratio S/V misses threefold in bending.
+    """
+
+    def inverse_q(v: Vibration, T: Array) -> Array:
+        return np.full(len(T), depth * sum(face.integrate(face.energy) for face in v.surfaces) / v.strain_energy)
+
     return LossCause(
         "surface",
-        lambda v, T: np.full(len(T), surface_loss(depth, v.surfaces, v.strain_energy)),
+        inverse_q,
         relative_sd,
         source,
         "polish and etch the faces; subsurface grinding damage reaches deeper than the roughness",
@@ -238,7 +187,7 @@ def film_causes(
 
     def internal(v: Vibration, T: Array) -> Array:
         check_film(film, v.thinnest)
-        return np.full(len(T), film_internal_loss(film, v.faces, v.strain_energy))
+        return np.full(len(T), film_internal_loss(film, v))
 
     found = [
         LossCause(
@@ -253,12 +202,7 @@ def film_causes(
 
         def thermoelastic(v: Vibration, T: Array) -> Array:
             check_film(film, v.thinnest)
-            return np.array(
-                [
-                    film_thermoelastic_loss(film, v.faces, v.strain_energy, heat(float(t)), float(t), float(omega))
-                    for t, omega in zip(T, v.omega(T), strict=True)
-                ]
-            )
+            return np.array([film_thermoelastic_loss(film, v, heat(float(t)), float(t)) for t in T])
 
         sd = float(np.hypot(relative[0], 0.2))  # films differ from the bulk whose constants they are given
         found.append(
@@ -280,21 +224,7 @@ def gas_cause(
     model_sd = 0.1 if flight > FREE * vibration.resonator.size else 0.5
 
     def inverse_q(v: Vibration, T: Array) -> Array:
-        return np.array(
-            [
-                gas_loss(
-                    v.faces,
-                    v.kinetic,
-                    v.solution.system.n,
-                    gas,
-                    pressure * t / v.reference,
-                    float(t),
-                    float(omega),
-                    accommodation,
-                )
-                for t, omega in zip(T, v.omega(T), strict=True)
-            ]
-        )
+        return np.array([gas_loss(v, gas, pressure * t / v.reference, float(t), accommodation) for t in T])
 
     return LossCause(
         "gas",

@@ -1,20 +1,25 @@
-"""What a mode does at the free surfaces of its body: strains, stresses and motion at the faces, the edges and the root.
+"""A mode with its material, and what it does at the free surfaces of its body: strains, stresses and motion at the faces, the edges and the root.
 
 Areas are per π around the axis, as the solver's volumes are (`table.volume`), so that ratios to its energies need no factor.
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from shell.assembly import sections
 from shell.blocks import surface_sides
 from shell.cells import CellTable, Reference, tabulate_cells
+from shell.errors import ShellError
 from shell.kernel import StrainTable, shell_table
+from shell.materials import Material
+from shell.modes import Mode
 from shell.quadrature import Array, Basis, gauss, legendre, nodal
 from shell.resonator import Resonator
-from shell.solution import Constants, Solution
+from shell.solution import Constants, Solution, total
 from shell.system import ShellGroup, SolidGroup
 
 Kind = Literal["inner", "outer", "edge", "root"]
@@ -53,6 +58,59 @@ class FreeFaces:
     def integrate(self, density: Array) -> float:
         """∫ density dA / π."""
         return float(np.sum(density * self.area))
+
+
+@dataclass(frozen=True, eq=False)
+class Vibration:
+    """A solved mode with its material, for the causes of loss to work on.
+
+    reference : temperature (K) at which it was solved. Over temperature its shape stays and ω follows √(E/ρ).
+    """
+
+    solution: Solution
+    resonator: Resonator
+    material: Material
+    reference: float
+
+    @classmethod
+    def of(cls, mode: Mode, material: Material, reference: float) -> "Vibration":
+        """From a mode of theory solid or shell."""
+        if mode.solution is None or mode.resonator is None:
+            raise ShellError("Rayleigh's closed form carries no energies: a loss budget needs theory solid or shell.")
+        return cls(mode.solution, mode.resonator, material, reference)
+
+    @cached_property
+    def faces(self) -> tuple[FreeFaces, FreeFaces]:
+        """Inner and outer face."""
+        return shell_faces(self.solution)
+
+    @cached_property
+    def surfaces(self) -> tuple[FreeFaces, ...]:
+        """All free surfaces."""
+        return free_surfaces(self.solution, self.resonator)
+
+    @cached_property
+    def strain_energy(self) -> float:
+        """∫ σ : ε dV / π, J."""
+        return total(self.solution.elastic)
+
+    @cached_property
+    def kinetic(self) -> float:
+        """∫ ρ |u|² dV / π, kg m²."""
+        return total(self.solution.kinetic)
+
+    @property
+    def thinnest(self) -> float:
+        """Least thickness of the wall, m."""
+        return min(value for _, value in self.resonator.thickness)
+
+    def omega(self, temperature: ArrayLike) -> Array:
+        """ω (rad/s) at temperatures (K)."""
+        now, then = (
+            self.material.value("youngs_modulus", T) / self.material.value("density", T)
+            for T in (np.asarray(temperature, dtype=float), np.asarray(self.reference))
+        )
+        return np.asarray(np.sqrt(self.solution.eigenvalue * now / then))
 
 
 def shell_faces(solution: Solution) -> tuple[FreeFaces, FreeFaces]:

@@ -20,7 +20,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from shell.damping.faces import FreeFaces, shell_faces
+from shell.damping.faces import FreeFaces, Vibration, shell_faces
 from shell.damping.heat import Heat
 from shell.errors import ShellError, mm
 from shell.modes import Mode
@@ -113,32 +113,22 @@ def film_shift(mode: Mode, film: Film) -> float:
     return film.thickness * changed / (2 * eigenvalue * total(mode.solution.kinetic))
 
 
-def film_internal_loss(film: Film, faces: tuple[FreeFaces, ...], strain_energy: float) -> float:
-    """1/Q of the film's own loss.
-
-    Parameters
-    ----------
-    film : thickness, modulus, loss.
-    faces : of `shell_faces`.
-    strain_energy : ∫ σ : ε dV / π of the mode, J.
-    """
-    energy = sum(face.integrate(film.carries(face) * film_energy(film, face)) for face in faces)
-    return film.loss * film.thickness * energy / strain_energy
+def film_internal_loss(film: Film, vibration: Vibration) -> float:
+    """1/Q of the film's own loss."""
+    energy = sum(face.integrate(film.carries(face) * film_energy(film, face)) for face in vibration.faces)
+    return film.loss * film.thickness * energy / vibration.strain_energy
 
 
-def film_thermoelastic_loss(
-    film: Film, faces: tuple[FreeFaces, ...], strain_energy: float, wall: Heat, temperature: float, omega: float
-) -> float:
-    """1/Q of the heat that flows between film and wall (formula above), at a temperature (K) and ω (rad/s)."""
+def film_thermoelastic_loss(film: Film, vibration: Vibration, wall: Heat, temperature: float) -> float:
+    """1/Q of the heat that flows between film and wall (formula above), at a temperature (K)."""
     if film.heat is None or film.thickness == 0:
         return 0.0
-    inside = film.heat
+    inside, omega, gap = film.heat, float(vibration.omega(temperature)), 0.0
     own = inside.expansion * film.E / (1 - film.nu) / inside.capacity
-    gap = 0.0
-    for face in faces:
+    for face in vibration.faces:
         beneath = wall.expansion * face.E / (1 - face.nu) / wall.capacity
         gap += face.integrate(film.carries(face) * ((own - beneath) * face.stretch) ** 2)
-    return temperature * gap * exchange(film.thickness, inside, wall, omega) / (omega * strain_energy)
+    return temperature * gap * exchange(film.thickness, inside, wall, omega) / (omega * vibration.strain_energy)
 
 
 def exchange(thickness: float, film: Heat, wall: Heat, omega: float) -> float:

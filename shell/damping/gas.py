@@ -21,7 +21,7 @@ from math import pi, sqrt
 import numpy as np
 from numpy.typing import ArrayLike
 
-from shell.damping.faces import FreeFaces
+from shell.damping.faces import Vibration
 from shell.errors import ShellError
 from shell.quadrature import Array
 
@@ -56,53 +56,31 @@ GASES = {
 }
 
 
-def gas_loss(
-    faces: tuple[FreeFaces, ...],
-    kinetic: float,
-    harmonic: int,
-    gas: Gas,
-    pressure: float,
-    temperature: float,
-    omega: float,
-    accommodation: float = 1.0,
-) -> float:
-    """1/Q to a gas at a pressure (Pa) and temperature (K).
-
-    Parameters
-    ----------
-    faces : of `shell_faces`.
-    kinetic : ∫ ρ |u|² dV / π of the mode, kg m².
-    harmonic : n, for the flow that the waves drive in a viscous gas.
-    accommodation : share of molecules that leave the wall diffusely, 0 ... 1.
-    """
+def gas_loss(vibration: Vibration, gas: Gas, pressure: float, temperature: float, accommodation: float = 1.0) -> float:
+    """1/Q to a gas at a pressure (Pa) and temperature (K); `accommodation` is the share of molecules that leave the wall diffusely."""
     if not pressure >= 0:
         raise ShellError(f"the gas pressure must be 0 or positive, not {pressure:g} Pa.")
     if not 0 <= accommodation <= 1:
         raise ShellError(f"the accommodation is a share 0 ... 1, not {accommodation:g}.")
     if pressure == 0:
         return 0.0
-    free = free_molecular_loss(faces, kinetic, gas, pressure, temperature, omega, accommodation)
-    viscous = viscous_loss(faces, kinetic, harmonic, gas, pressure, temperature, omega)
+    free = free_molecular_loss(vibration, gas, pressure, temperature, accommodation)
+    viscous = viscous_loss(vibration, gas, pressure, temperature)
     return free * viscous / float(np.hypot(free, viscous))
 
 
 def free_molecular_loss(
-    faces: tuple[FreeFaces, ...],
-    kinetic: float,
-    gas: Gas,
-    pressure: float,
-    temperature: float,
-    omega: float,
-    accommodation: float,
+    vibration: Vibration, gas: Gas, pressure: float, temperature: float, accommodation: float
 ) -> float:
     """1/Q to molecules that hit the faces one by one."""
     normal = (1 - accommodation) * 2 * sqrt(2 / pi) + accommodation * (sqrt(2 / pi) + 0.5 * sqrt(pi / 2))
     along = accommodation / sqrt(2 * pi)
     hit = sum(
         face.integrate(normal * face.moved[2] ** 2 + along * (face.moved[0] ** 2 + face.moved[1] ** 2))
-        for face in faces
+        for face in vibration.faces
     )
-    return float(free_impedance(pressure, gas.molar_mass, temperature)) * hit / (omega * kinetic)
+    impedance = float(free_impedance(pressure, gas.molar_mass, temperature))
+    return impedance * hit / (float(vibration.omega(temperature)) * vibration.kinetic)
 
 
 def free_impedance(pressure: ArrayLike, molar_mass: float, temperature: ArrayLike) -> Array:
@@ -115,23 +93,16 @@ def free_impedance(pressure: ArrayLike, molar_mass: float, temperature: ArrayLik
     return np.asarray(np.asarray(pressure) * np.sqrt(molar_mass / (R * np.asarray(temperature, dtype=float))))
 
 
-def viscous_loss(
-    faces: tuple[FreeFaces, ...],
-    kinetic: float,
-    harmonic: int,
-    gas: Gas,
-    pressure: float,
-    temperature: float,
-    omega: float,
-) -> float:
+def viscous_loss(vibration: Vibration, gas: Gas, pressure: float, temperature: float) -> float:
     """1/Q to the viscous layer on the faces; the waves' own flow runs around as fast as the wall moves along its normal."""
+    omega = float(vibration.omega(temperature))
     density = pressure * gas.molar_mass / (R * temperature)
     resistance = sqrt(density * gas.viscosity_at(temperature) * omega / 2)
     slip = 0.0
-    for face in faces:
-        flow = (1.0 if face.kind == "outer" else -1.0) * (harmonic > 0) * face.moved[2]
+    for face in vibration.faces:
+        flow = (1.0 if face.kind == "outer" else -1.0) * (vibration.solution.system.n > 0) * face.moved[2]
         slip += face.integrate(face.moved[0] ** 2 + (face.moved[1] - flow) ** 2)
-    return resistance * slip / (omega * kinetic)
+    return resistance * slip / (omega * vibration.kinetic)
 
 
 def mean_free_path(gas: Gas, pressure: float, temperature: float) -> float:

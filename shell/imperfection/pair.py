@@ -122,19 +122,9 @@ class Pair:
 
     def rim(self) -> Density:
         """Per metre that the edge of the rim stands out along the meridian: the energies of the edge, free of traction."""
-        self._require_free_rim()
-        eta, weights = gauss(max(self.solution.system.level.through) + 2)
-        edge = cut(self.resonator, self.solution.system, 1.0, eta)
-        e, d = edge.strains(self.solution.unknowns), edge.displacements(self.solution.unknowns)
-        c, q = self._material(edge), edge.table.volume[0, 0] * weights
-        lam, G = (field[0, 0] for field in c.lame)
-        sheared = G * energy_weights(edge.table.transverse_shear)[:, None] * e * e
-        cosine = lam * e[:3].sum(axis=0) ** 2 + sheared[WAVE].sum(axis=0)
-        sine = sheared[~WAVE].sum(axis=0)
-        heavy = self.solution.eigenvalue * c.rho[0, 0]
-        one = q @ (cosine - heavy * (d[0] ** 2 + d[2] ** 2)) / self.scale
-        two = q @ (sine - heavy * d[1] ** 2) / self.scale
-        return Density(np.ones(1), np.array([one + two]), np.array([one - two]) / 2)
+        edge, area = self._edge()
+        mean, wave = self._of_material(edge, 2 * np.pi * float(self._material(edge).rho[0, 0]) * area)
+        return Density(np.ones(1), np.array([mean]), np.array([wave]) / 2)
 
     def mass(self, position: float = 1.0, height: float = 0.0) -> tuple[float, float]:
         """Per kilogram of a point mass there: the mean shift, and z for the azimuth 0; at θ it is z exp(2 i n θ).
@@ -156,11 +146,16 @@ class Pair:
 
     def edging(self) -> tuple[float, float]:
         """Like `mass` for a kilogram of material on the edge of the rim, over the whole wall."""
-        self._require_free_rim()
+        edge, area = self._edge()
+        return self._of_material(edge, area / area.sum())
+
+    def _edge(self) -> tuple[CrossSection, Array]:
+        """The edge of the rim, and the areas per radian that its heights stand for."""
+        if self.resonator.support == "clamped-rim" or self.resonator.ends_on_axis:
+            raise ShellError("the meridian has no free rim whose edge could stand out.")
         eta, weights = gauss(max(self.solution.system.level.through) + 2)
         edge = cut(self.resonator, self.solution.system, 1.0, eta)
-        area = edge.table.volume[0, 0] * weights
-        return self._of_material(edge, area / area.sum())
+        return edge, edge.table.volume[0, 0] * weights
 
     def _of_material(self, here: CrossSection, share: Array) -> tuple[float, float]:
         e, d = here.strains(self.solution.unknowns), here.displacements(self.solution.unknowns)
@@ -181,10 +176,6 @@ class Pair:
         c = self.solution.constants[edge.group]
         here = (slice(edge.element, edge.element + 1), slice(-1, None))
         return Constants(c.E[here], c.nu[here], c.rho[here], c.plane_stress)
-
-    def _require_free_rim(self) -> None:
-        if self.resonator.support == "clamped-rim" or self.resonator.ends_on_axis:
-            raise ShellError("the meridian has no free rim whose edge could stand out.")
 
 
 def _columns(position: Array, volume: Array, cosine: Array, sine: Array) -> Array:

@@ -108,21 +108,17 @@ class Face:
         density : what the wave does at stations (shell.imperfection.pair).
         order : m > 0.
         """
-        found, covariance = self._combine(density.wave @ self.waves.along(density.position), order)
-        if self.turns is None or self.motion is None:
-            return found, covariance
-        parts = np.array(
-            [[z.real, z.imag] for z in (complex(density.wave @ turn) for turn in self.turns(density.position, order))]
-        )
-        return found, covariance + self.motion.tilt_error**2 * parts.T @ parts
+        return self._weigh(density.position, density.wave, order)
 
     def at(self, position: float, order: int) -> tuple[complex, Array]:
         """c_m at a position and the covariance of its parts, m; the axis of a dome is as uncertain as its edge leaves it."""
-        where = np.array([position])
-        found, covariance = self._combine(self.waves.along(where)[0], order)
+        return self._weigh(np.array([position]), np.ones(1), order)
+
+    def _weigh(self, position: Array, weight: Array, order: int) -> tuple[complex, Array]:
+        found, covariance = self._combine(weight @ self.waves.along(position), order)
         if self.turns is None or self.motion is None:
             return found, covariance
-        parts = np.array([[z.real, z.imag] for z in (complex(turn[0]) for turn in self.turns(where, order))])
+        parts = np.array([[z.real, z.imag] for z in (complex(weight @ turn) for turn in self.turns(position, order))])
         return found, covariance + self.motion.tilt_error**2 * parts.T @ parts
 
     def centred(self, rigid: Array) -> "Face":

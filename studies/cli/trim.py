@@ -16,7 +16,7 @@ from cyclopts import Parameter
 
 from shell.constants import zero_Celsius
 from shell.resonator import Resonator
-from shell.trimming import ExpectedSplit
+from shell.trimming import SplitWave
 from studies.cli.arguments import Card, Temperature
 from studies.cli.measured_splits import pair_splits, read_scan, read_unbalance
 from studies.cli.output import answers, say
@@ -257,7 +257,7 @@ def measure_after(planned: CardPlan) -> list[str]:
     return found
 
 
-def _state(state: ExpectedSplit) -> dict[str, Any]:
+def _state(state: SplitWave) -> dict[str, Any]:
     return {
         "harmonic": state.harmonic,
         "frequency_Hz": state.frequency,

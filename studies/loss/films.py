@@ -9,7 +9,8 @@ from studies.errors import InputError, naming
 
 if TYPE_CHECKING:
     from shell.damping.anisotropy import Ripple
-    from shell.damping.budget import LossCause, Vibration
+    from shell.damping.budget import LossCause
+    from shell.damping.faces import Vibration
     from shell.damping.film import Film
     from shell.damping.heat import Heat
     from shell.modes import Mode

@@ -15,7 +15,8 @@ if TYPE_CHECKING:
 
     from shell.damping.anchor import Unbalance
     from shell.damping.anisotropy import Complex, Ripple
-    from shell.damping.budget import Budget, LossCause, Vibration
+    from shell.damping.budget import Budget, LossCause
+    from shell.damping.faces import Vibration
     from shell.damping.heat import Heat
     from shell.elastic import Elastic
     from shell.levels import Theory
@@ -77,7 +78,7 @@ def loss_model(
     InputError, ShellError
         Unusable parts in the card; the mode cannot be solved.
     """
-    from shell.damping.budget import Vibration
+    from shell.damping.faces import Vibration
 
     T0, material = instrument.reference_temperature, instrument.material
     mode = _solve(instrument.resonator, material.elastic(T0), harmonic, theory)

@@ -16,7 +16,7 @@ from shell.imperfection import CoupledHarmonics, Imperfection, Pair, PointMass, 
 from shell.inertia import weigh
 from shell.meridian import hemisphere
 from shell.modes import solve_modes
-from shell.trimming import SplitReading, plan_trim
+from shell.trimming import SplitWave, plan_trim
 from studies.trim import rim_sites
 
 RHO = 2203.0
@@ -44,7 +44,7 @@ def simulate(seed, coupled, pair, mass, rounds=3, goal=5e-4):
             break
         axis = float(np.angle(-z) / 4)
         sites = rim_sites(pair.resonator, {2: pair}, RHO, axis)
-        plan = plan_trim([SplitReading.of(2, f, abs(z) * f, axis, 1e-4)], sites, goal=goal)
+        plan = plan_trim([SplitWave.of(2, f, abs(z) * f, axis, 1e-4)], sites, goal=goal)
         for cut in plan.round.cuts:
             removed = cut.mass * all_gain * (1 + 0.02 * rng.standard_normal())
             gone.append(PointMass(-removed, cut.azimuth, cut.position))

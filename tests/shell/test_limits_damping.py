@@ -11,7 +11,6 @@ from shell.curves import Line
 from shell.damping.anelastic import BOLTZMANN, activated_loss
 from shell.damping.budget import (
     Budget,
-    Vibration,
     activated_cause,
     film_causes,
     gas_cause,
@@ -19,6 +18,7 @@ from shell.damping.budget import (
     surface_cause,
     thermoelastic_cause,
 )
+from shell.damping.faces import Vibration
 from shell.damping.film import Film, exchange
 from shell.damping.gas import GASES, R, free_molecular_loss
 from shell.damping.heat import Heat
@@ -180,7 +180,7 @@ def test_resistance_of_free_molecules_by_quadrature(dome: Mode) -> None:
             for face in vibration.faces
         )
         expected = p / speed * hit / (omega * vibration.kinetic)
-        found = free_molecular_loss(vibration.faces, vibration.kinetic, gas, p, T, omega, accommodation)
+        found = free_molecular_loss(vibration, gas, p, T, accommodation)
         assert found == pytest.approx(expected, rel=1e-6)
 
 

@@ -7,7 +7,8 @@ import pytest
 
 from shell.curves import Line
 from shell.damping.anisotropy import Ripple, damping_wave, describe_wave, film_weight, surface_weight
-from shell.damping.budget import Vibration, film_causes, loss_budget
+from shell.damping.budget import film_causes, loss_budget
+from shell.damping.faces import Vibration
 from shell.damping.film import Film, film_energy, thickness_power
 from shell.damping.heat import Heat
 from shell.elastic import Elastic

@@ -4,7 +4,8 @@ from math import pi, sqrt
 
 import pytest
 
-from shell.damping.budget import Vibration, bulk_cause, loss_budget, surface_cause
+from shell.damping.budget import bulk_cause, loss_budget, surface_cause
+from shell.damping.faces import Vibration
 from shell.damping.gas import GASES, R, free_molecular_loss
 from shell.damping.thermoelastic import trace_share
 from shell.elastic import Elastic
@@ -60,7 +61,7 @@ def test_christians_formula_for_a_wall_in_normal_motion() -> None:
     (mode,) = solve_modes(hemisphere(radius=15e-3, thickness=h), SILICA)
     vibration = Vibration.of(mode, find_material("fused-silica"), 293.15)
     gas, omega = GASES["nitrogen"], 2 * pi * mode.frequency
-    found = free_molecular_loss(vibration.faces, vibration.kinetic, gas, 1e-2, 293.15, omega, 0.0)
+    found = free_molecular_loss(vibration, gas, 1e-2, 293.15, 0.0)
     normal = sum(face.integrate(face.moved[2] ** 2) for face in vibration.faces)
     every = sum(face.integrate((face.moved**2).sum(axis=0)) for face in vibration.faces)
     christian = 4 * sqrt(2 / pi) * 1e-2 * sqrt(gas.molar_mass / (R * 293.15)) / (2203.0 * h * omega)

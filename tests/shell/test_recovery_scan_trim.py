@@ -12,7 +12,7 @@ from shell.modes import solve_modes
 from shell.scan.alignment import align
 from shell.scan.projection import Projector
 from shell.scan.survey import rigid_shapes, survey
-from shell.trimming import ExpectedSplit, SplitReading, plan_trim
+from shell.trimming import SplitWave, plan_trim
 from studies.scan import polar_intervals
 from studies.trim import Teeth, rim_sites, tooth_sites
 from tests.shell.scans import dome_points
@@ -98,7 +98,7 @@ def test_distances_from_a_cylinder_and_a_dome_are_exact():
 
 def test_four_cuts_null_n_2_and_leave_the_balance(pair):
     f = pair.mode.frequency
-    plan = plan_trim([SplitReading.of(2, f, 0.3, 0.4, 1e-4)], rim_sites(DOME, {2: pair}, 2203.0, 0.4), goal=5e-4)
+    plan = plan_trim([SplitWave.of(2, f, 0.3, 0.4, 1e-4)], rim_sites(DOME, {2: pair}, 2203.0, 0.4), goal=5e-4)
     first = plan.round
     flaw = Imperfection(masses=tuple(PointMass(-c.mass, c.azimuth) for c in first.cuts))
     assert find_split(pair, flaw).wave * f == pytest.approx(first.share * 0.3 * np.exp(4j * 0.4), rel=1e-9)
@@ -113,11 +113,11 @@ def test_known_unbalance_is_used_and_never_raised(pair):
     # what four antinodes take off wave 1 they take off wave 3 mirrored
     f, u = pair.mode.frequency, {1: 20e-9 * np.exp(0.7j), 3: 22e-9 * np.exp(1j * (4 * 0.4 - 0.6))}
     sites = rim_sites(DOME, {2: pair}, 2203.0, 0.4)
-    plan = plan_trim([SplitReading.of(2, f, 0.3, 0.4, 1e-4)], sites, goal=5e-4, unbalance=u)
+    plan = plan_trim([SplitWave.of(2, f, 0.3, 0.4, 1e-4)], sites, goal=5e-4, unbalance=u)
     for k in u:
         assert abs(plan.round.unbalance[k]) <= abs(u[k]) * (1 + 1e-6)
     assert abs(plan.round.unbalance[1]) < 0.3 * abs(u[1])  # the antinodes on its heavy side give more
-    even = plan_trim([SplitReading.of(2, f, 0.3, 0.4, 1e-4)], sites, goal=5e-4)
+    even = plan_trim([SplitWave.of(2, f, 0.3, 0.4, 1e-4)], sites, goal=5e-4)
     assert plan.round.mass == pytest.approx(even.round.mass, rel=1e-6)
 
 
@@ -125,8 +125,8 @@ def test_two_harmonics_and_teeth(pair):
     (three,) = solve_modes(DOME, SILICA, 3)
     pairs = {2: pair, 3: Pair(three)}
     readings = [
-        SplitReading.of(2, pair.mode.frequency, 0.2, 0.4, 1e-4),
-        SplitReading.of(3, three.frequency, 0.5, 0.1, 1e-4),
+        SplitWave.of(2, pair.mode.frequency, 0.2, 0.4, 1e-4),
+        SplitWave.of(3, three.frequency, 0.5, 0.1, 1e-4),
     ]
     plan = plan_trim(readings, tooth_sites(pairs, Teeth(36, 0.05, 200e-9)), goal=5e-4)
     first = plan.round
@@ -151,7 +151,7 @@ def test_planted_splits_end_below_half_a_millihertz_in_three_rounds(pair):
                 break
             slow = float(np.angle(-seen) / 4)
             plan = plan_trim(
-                [SplitReading.of(2, f, abs(seen) * f, slow, 1e-4)], rim_sites(DOME, {2: pair}, 2203.0, slow), goal=5e-4
+                [SplitWave.of(2, f, abs(seen) * f, slow, 1e-4)], rim_sites(DOME, {2: pair}, 2203.0, slow), goal=5e-4
             )
             for cut in plan.round.cuts:
                 gone.append(PointMass(-cut.mass * (1 + 0.02 * rng.standard_normal()), cut.azimuth))
@@ -163,5 +163,5 @@ def test_the_upper_limit_of_a_split_holds_95_of_100_of_its_vectors(errors):
     """At many errors the limit was short: 1.2 of them hold 88 of 100."""
     rng = np.random.default_rng(2)
     drawn = abs(errors + rng.normal(size=(2, 100_000)).T @ [1.0, 1.0j])
-    share = np.mean(drawn < ExpectedSplit(2, 1.0, complex(errors), 1.0).most)
+    share = np.mean(drawn < SplitWave(2, 1.0, complex(errors), 1.0).most)
     assert share == pytest.approx(0.95, abs=0.003)
