@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 
 THEORIES = ("solid", "shell", "rayleigh")
 MOST_HARMONIC = 100  # waves shorter than any wall is thin; beyond, the meshes outgrow memory
+SMALL = 5e-4  # relative change of the thickness over h/R, of the difference that gives the slope of ln f
 THICKEST_SHELL = 0.1  # h/R up to which shell theory has been held against the solid
 
 
@@ -201,9 +202,8 @@ def solve_modes(
 
 def _by_thickness(resonator: Resonator, solution: Solution, theory: Theory) -> float:
     """D ln f / d ln h of the whole profile: change of the Rayleigh quotient with the shape kept (it is stationary)."""
-    step = (
-        2e-3 * min(value for _, value in resonator.thickness) / resonator.size
-    )  # its cube over (h/R)² is what is neglected
+    # what is neglected goes as (step R/h)², 2.5 SMALL² of the slope; a smaller one leaves the digits of thin shells in rounding
+    step = SMALL * min(value for _, value in resonator.thickness) / resonator.size
     found: dict[float, float] = {0.0: solution.eigenvalue}
     for change in (-step, step):
         system = lay_system(resonator.thickened(1 + change), solution.system.n, theory, solution.system.level)
