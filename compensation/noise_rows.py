@@ -17,7 +17,8 @@ from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import cho_factor, cho_solve, solve_triangular
+from scipy.linalg import solve_triangular
+from scipy.linalg.lapack import dpotri
 from scipy.optimize import minimize
 
 from compensation.errors import CompensationError
@@ -92,36 +93,74 @@ class NoiseRows:
 
     def whiten(self, columns: Array, noise: Noise) -> Array:
         """Return stacked columns, (M,) or (M, p), in which this noise is white of variance 1: L⁻¹ of Σ = L Lᵀ."""
-        return self._whiten(columns, noise)[0]
+        return self.whitener(noise)(columns)
 
-    def _whiten(self, columns: Array, noise: Noise) -> tuple[Array, float]:
-        """Whitened columns and ln|Σ|."""
+    def whitener(self, noise: Noise) -> "Whitener":
+        """Factor the covariance of every distinct set of rows once."""
+        own = [(np.asarray(np.linalg.cholesky(self.covariance(runs[0], noise))), runs) for _, _, runs in self._groups]
+        return Whitener(self.slices, tuple(own))
+
+    def kept(self, masks: Sequence[NDArray[np.bool_]]) -> "NoiseRows":
+        """Return the rows that a mask of each run keeps; a run without any is left out."""
+        parts = [k for k, mask in enumerate(masks) if mask.any()]
+        own = [tuple(one[k][masks[k]] for k in parts) for one in (self.times, self.spans, self.stretch)]
+        return NoiseRows(own[0], own[1], own[2])
+
+    def deviance(
+        self, target: Array, columns: Array, precision: Array, noise: Noise, mean: Array | None = None
+    ) -> tuple[float, dict[str, float]]:
+        """Return −2 ln L (see the module) of residuals (M,) beside columns (M, p) of prior precision and mean (p,), and its slopes.
+
+        The slope by the logarithm of a level θ, with C Cᵀ = (Λ + XᵀΣ⁻¹X)⁻¹, what is left e, and U = Σ⁻¹ [X C, e], is
+        Σ_ij (Σ⁻¹ − U Uᵀ)_ij θ ∂Σ_ij/∂θ.
+        """
+        whitener = self.whitener(noise)
+        white, total = whitener(np.column_stack([columns, target])), whitener.log_determinant
+        X, r = white[:, :-1], white[:, -1]
+        about = np.zeros(X.shape[1]) if mean is None else mean
+        A = X.T @ X
+        root = np.linalg.cholesky(A + np.diag(precision + 1e-12 * (1 + A.diagonal())))
+        beside = solve_triangular(root, X.T, lower=True).T
+        found = solve_triangular(root, solve_triangular(root, X.T @ r + precision * about, lower=True), lower=True, trans="T")  # fmt: skip
+        rest = r - X @ found
+        total += float(rest @ rest + (found - about) @ (precision * (found - about)))
+        total += 2 * float(np.log(np.diag(root)).sum())
+        both, slopes = np.column_stack([beside, rest]), dict.fromkeys(KINDS, 0.0)
+        for (L, runs), (F, W, _) in zip(whitener.roots, self._groups, strict=True):
+            inverse = np.tril(dpotri(L, lower=1)[0])
+            S = len(runs) * (inverse + np.tril(inverse, -1).T)
+            for run in runs:
+                U = solve_triangular(L, both[self.slices[run]], lower=True, trans="T", check_finite=False)
+                S -= U @ U.T
+            slopes["white"] += 2 * noise.white**2 * float(S.diagonal() @ (self.stretch[runs[0]] / self.spans[runs[0]]))
+            for kind, level, own in (("flicker", noise.flicker, F), ("walk", noise.walk, W)):
+                slopes[kind] += 2 * level**2 * float(np.vdot(S, own)) if level else 0.0
+            slopes["offset"] += 2 * noise.offset**2 * float(S.sum()) if noise.offset else 0.0
+        return total, slopes
+
+
+@dataclass(frozen=True)
+class Whitener:
+    """Roots L of the covariance of rows, with the runs that each is of."""
+
+    slices: tuple[slice, ...]
+    roots: tuple[tuple[Array, tuple[int, ...]], ...]
+
+    def __call__(self, columns: Array) -> Array:
+        """Return stacked columns, (M,) or (M, p), whitened."""
         matrix = columns.reshape(len(columns), -1)
-        white, log_determinant = np.empty_like(matrix), 0.0
-        p = matrix.shape[1]
-        for _, _, runs in self._groups:
-            L = np.linalg.cholesky(self.covariance(runs[0], noise))
+        white, p = np.empty_like(matrix), matrix.shape[1]
+        for L, runs in self.roots:
             side_by_side = np.hstack([matrix[self.slices[run]] for run in runs])
             solved = solve_triangular(L, side_by_side, lower=True, check_finite=False)
             for k, run in enumerate(runs):
                 white[self.slices[run]] = solved[:, k * p : (k + 1) * p]
-            log_determinant += 2 * len(runs) * float(np.log(np.diag(L)).sum())
-        return white.reshape(columns.shape), log_determinant
+        return white.reshape(columns.shape)
 
-    def deviance(
-        self, target: Array, columns: Array, precision: Array, noise: Noise, mean: Array | None = None
-    ) -> float:
-        """Return −2 ln L (see the module) of residuals (M,) beside columns (M, p) of prior precision and mean (p,)."""
-        white, total = self._whiten(np.column_stack([columns, target]), noise)
-        X, r = white[:, :-1], white[:, -1]
-        total += float(r @ r)
-        if X.shape[1]:
-            about = np.zeros(X.shape[1]) if mean is None else mean
-            A, b = X.T @ X, X.T @ r + precision * about
-            factor = cho_factor(A + np.diag(precision + 1e-12 * (1 + A.diagonal())), lower=True)
-            total += float(about @ (precision * about)) + 2 * float(np.log(np.diag(factor[0])).sum())
-            total -= float(b @ cho_solve(factor, b))
-        return total
+    @property
+    def log_determinant(self) -> float:
+        """ln|Σ| of all rows."""
+        return sum(2 * len(runs) * float(np.log(np.diag(L)).sum()) for L, runs in self.roots)
 
 
 def estimate_noise(
@@ -182,14 +221,19 @@ def estimate_noise(
 
     said = {kind: getattr(stated, kind) for kind in free if stated is not None and getattr(stated, kind) > 0}
 
-    def surprise(kind: str, x: Array, ratio: float) -> float:
-        if kind not in said:
-            return (ratio - USUAL) / SPREAD
-        return float(np.log(getattr(levels(x), kind) / said[kind])) / STATED_SPREAD
-
-    def objective(x: Array) -> float:
-        prior = sum(surprise(kind, x, float(ratio)) ** 2 for kind, ratio in zip(free, x[1:], strict=True))
-        return rows.deviance(rest, X, lam, levels(x), -free_part) + prior
+    def objective(x: Array) -> tuple[float, Array]:
+        noise = levels(x)
+        total, by_level = rows.deviance(rest, X, lam, noise, -free_part)
+        slopes = np.array([sum(by_level.values()), *(by_level[kind] for kind in free)])
+        for k, kind in enumerate(free, 1):
+            if kind in said:
+                surprise, spread = float(np.log(getattr(noise, kind) / said[kind])) / STATED_SPREAD, STATED_SPREAD
+                slopes[0] += 2 * surprise / spread
+            else:
+                surprise, spread = (float(x[k]) - USUAL) / SPREAD, SPREAD
+            total += surprise**2
+            slopes[k] += 2 * surprise / spread
+        return total, slopes
 
     first = np.array([-0.3, *[USUAL] * len(free)])
     if near is not None and near.white > 0:
@@ -198,5 +242,5 @@ def estimate_noise(
         first = np.log([white / spread, *slow])
         first[1:] = np.clip(first[1:], LEAST, MOST)
     bounds = [(-12.0, 12.0), *[(LEAST, MOST)] * len(free)]
-    found = minimize(objective, first, method="L-BFGS-B", bounds=bounds, options={"ftol": 1e-9, "eps": 1e-4})
+    found = minimize(objective, first, jac=True, method="L-BFGS-B", bounds=bounds, options={"ftol": 1e-9})
     return levels(found.x)

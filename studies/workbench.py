@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from studies.diagnosis.investigate import Diagnosis
     from studies.diagnosis.planning.chamber import Chamber
     from studies.diagnosis.table import TableDiagnosis
+    from studies.inference.diagnosis import Inference
 
 Card = Instrument | str | Path
 Run = Record | str | Path
@@ -93,7 +94,7 @@ def calibrate(
     return find_values(open_card(card), records, settled, left, exact, progress=progress or (lambda _: None))
 
 
-def diagnose(*runs: Run, card: Card | None = None) -> "Diagnosis | TableDiagnosis":
+def diagnose(*runs: Run, card: Card | None = None) -> "Diagnosis | Inference | TableDiagnosis":
     """Return what a campaign shows and the simulation lacks, with its causes: `hrg diagnose`; `.verdict` is the outcome.
 
     Parameters
@@ -125,18 +126,19 @@ def diagnose_records(
     card: Instrument | None = None,
     chamber: "Chamber | None" = None,
     progress: Progress | None = None,
-) -> "Diagnosis":
+) -> "Diagnosis | Inference":
     """Return what a campaign shows and the simulation lacks; `chamber` limits the run that is suggested next."""
     from studies.calibration.misreading import check_readings
     from studies.diagnosis.campaign import load_campaign
     from studies.diagnosis.investigate import investigate
+    from studies.inference.diagnosis import infer
 
     if card is None:
         return investigate(load_campaign(records), progress=progress, chamber=chamber)
     campaign = load_campaign(records, card.reference_temperature - zero_Celsius)
     check_readings(card, records)
     card.material.check(np.concatenate([run.states.housing for run in campaign.runs]))
-    return investigate(campaign, progress=progress, chamber=chamber, card=card)
+    return infer(card, records, progress or (lambda words: None), campaign.said)
 
 
 def _flat(given: Iterable[Any]) -> Iterator[Any]:

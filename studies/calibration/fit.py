@@ -7,7 +7,7 @@ model cannot follow all responses at once, and the noise of each is judged given
 out by more than 5 standard deviations are given the variance that they show: one outlier moves nothing.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import astuple, dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -95,7 +95,9 @@ def fit(problem: CardProblem, start: Array | None = None, progress: Progress = l
         least = min(least, left)
         if size > SETTLED_NOISE:
             found = (
-                _estimate(problem, rows, state, noise, waited > PATIENCE) if straight else _left(problem, rows, state)
+                _estimate(problem, rows, state, noise, waited > PATIENCE)
+                if straight
+                else residual_noise(problem, rows, state)
             )
             noise = found if waited <= PATIENCE else {name: _larger(noise[name], found[name]) for name in found}
         if straight:
@@ -137,7 +139,7 @@ def objective(problem: CardProblem, state: State, noise: Mapping[str, Noise], ro
     return total + sum(float(np.sum(rows[n].whiten(state.residual[n], noise[n]) ** 2)) for n in problem.responses)
 
 
-def _left(problem: CardProblem, rows: Mapping[str, NoiseRows], state: State) -> dict[str, Noise]:
+def residual_noise(problem: CardProblem, rows: Mapping[str, NoiseRows], state: State) -> dict[str, Noise]:
     """Noise that the residuals would be as they are: far from the values, a straight line promises what no step keeps."""
     return {n: _levels(problem, rows[n], n, state.residual[n]) for n in problem.responses}
 
@@ -145,25 +147,48 @@ def _left(problem: CardProblem, rows: Mapping[str, NoiseRows], state: State) -> 
 def _estimate(
     problem: CardProblem, rows: Mapping[str, NoiseRows], state: State, noise: Mapping[str, Noise], given: bool
 ) -> dict[str, Noise]:
-    """Noise of highest marginal likelihood, each response's by itself or `given` the others'.
+    """Noise of highest marginal likelihood, each response's by itself or `given` the others'."""
+    target = {name: state.residual[name] + state.slope[name] @ state.point for name in problem.responses}
+    if given:
+        return estimate_levels(problem, rows, target, state.slope, noise, problem.responses)
+    alone = (
+        estimate_levels(problem, rows, target, state.slope, {name: noise[name]}, [name]) for name in problem.responses
+    )
+    return {name: level for one in alone for name, level in one.items()}
 
-    What the others say of the values is then their prior for this one: it may not bend for itself what they hold. What the model
-    cannot follow is left to the slow noise (the discrepancy of Kennedy & O'Hagan 2001, J. R. Stat. Soc. B 63, 425).
+
+def estimate_levels(
+    problem: CardProblem,
+    rows: Mapping[str, NoiseRows],
+    target: Mapping[str, Array],
+    slopes: Mapping[str, Array],
+    noise: Mapping[str, Noise],
+    names: Sequence[str],
+) -> dict[str, Noise]:
+    """Return the noise of highest marginal likelihood of some responses, each given the others'.
+
+    What the others say of the unknowns, of unit prior, is then their prior for this one: it may not bend for itself what they
+    hold. What the model cannot follow is left to the slow noise (the discrepancy of Kennedy & O'Hagan 2001, J. R. Stat. Soc. B
+    63, 425).
+
+    Parameters
+    ----------
+    target, slopes : response -> (M,) and (M, p), about the prior mean of the unknowns
+    names : responses whose noise is estimated
     """
     found = dict(noise)
-    for name in problem.responses:
-        others = [np.column_stack([np.eye(problem.count), -state.point])]
-        for other in problem.responses:
-            if given and other != name:
-                both = np.column_stack([state.slope[other], state.residual[other]])
-                others.append(rows[other].whiten(both, found[other]))
-        triangle = np.linalg.qr(np.vstack(others)).R[: problem.count]
+    for name in names:
+        count = slopes[name].shape[1]
+        told = [other for other in problem.responses if other != name and other in found]
+        white = [rows[n].whiten(np.column_stack([slopes[n], target[n]]), found[n]) for n in told]
+        triangle = np.linalg.qr(np.vstack([np.eye(count, count + 1), *white])).R[:count]
         R, move = triangle[:, :-1], solve_triangular(triangle[:, :-1], triangle[:, -1])
-        residual, J = state.residual[name], state.slope[name]
+        J = slopes[name]
         # Rotated coordinates of unit prior are of unit prior again; those that the rows do not see are left out.
         U, S, _ = np.linalg.svd(solve_triangular(R, J.T, trans="T").T, full_matrices=False)
-        seen = S > UNSEEN * float(np.median(np.abs(np.diff(residual))))
-        found[name] = _levels(problem, rows[name], name, residual - J @ move, U[:, seen] * S[seen], found[name])
+        left = target[name] - J @ move
+        seen = S > UNSEEN * float(np.median(np.abs(np.diff(left - U @ (U.T @ left)))))
+        found[name] = _levels(problem, rows[name], name, left, U[:, seen] * S[seen], found.get(name))
     return found
 
 

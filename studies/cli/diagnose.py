@@ -93,13 +93,14 @@ def _table(path: str, card: str | None) -> Result:
 
 def _campaign(runs: tuple[str, ...], card: str | None, limits: Chamber | None, save: str | None) -> Result:
     """Diagnose the records of one gyro."""
-    from studies.diagnosis.extension import extend
+    from studies.inference.diagnosis import Inference
+    from studies.inference.extension import extend
     from studies.reports.diagnosis import diagnosis_parts
 
     instrument, records = None if card is None else load_card(card), workbench.open_records(runs)
     with Told("diagnosis") as told:
         found = workbench.diagnose_records(records, instrument, limits, told)
-        extended = None if save is None or instrument is None else extend(instrument, found, records, told)
+        extended = extend(found, records, told) if save is not None and isinstance(found, Inference) else None
     refused = extended is not None and not extended.fit.converged
     if refused:
         say(f"{save} not saved: the calibration of the extended card did not converge.")

@@ -13,7 +13,7 @@ from studies.diagnosis.lack_of_fit import left_over
 from studies.diagnosis.model import Fit, exact_forms, fit
 from studies.diagnosis.response import RESPONSES
 from studies.diagnosis.search import Hypothesis, Place
-from studies.diagnosis.verdict import NINETY, Cause, Interval, temper_of, weigh
+from studies.diagnosis.verdict import NINETY, Cause, Interval, same_cause, temper_of, weigh
 from studies.effects import Effect, find_effect
 from studies.effects.states import FloatArray
 
@@ -98,7 +98,7 @@ def name_causes(campaign: Campaign, inquiries: Mapping[str, Inquiry]) -> tuple[C
     causes.sort(key=lambda cause: -cause.evidence)
     kept: list[Cause] = []
     for cause in causes:
-        if not any(_same(cause, other) for other in kept):
+        if not any(same_cause(cause, other) for other in kept):
             kept.append(cause)
     return tuple(kept)
 
@@ -222,31 +222,3 @@ def peak_of(model: Fit, index: int) -> float:
     places = model.columns_of(index)
     change = model.linear.columns[:, places] @ model.solved.coefficients[places]
     return float(np.ptp(change)) if change.size else 0.0
-
-
-def _same(one: Cause, two: Cause) -> bool:
-    """The same effect in two responses is one cause when its place agrees; two members of one set are one answer.
-
-    An equal that does not act on both tells of a choice that the other response does not have: then each is named.
-    """
-    if one.response == two.response:
-        return one.effect in two.equivalent and two.effect in one.equivalent
-    if not all(_acts(name, own.response) for name in (*one.names, *two.names) for own in (one, two)):
-        return False
-    shared = [name for name in (one.effect, two.effect) if name in one.names and name in two.names]
-    return any(_agree(one.shapes.get(name, {}), two.shapes.get(name, {})) for name in shared)
-
-
-def _acts(name: str, response: str) -> bool:
-    effect = find_effect(name)
-    return effect.thermal or response in effect.responses
-
-
-def _agree(one: Mapping[str, Interval], two: Mapping[str, Interval]) -> bool:
-    for name in ("time_s", "temperature_degC", "period_s", "run"):
-        if name in one and name in two:
-            a, b = one[name], two[name]
-            slack = 300.0 if name == "time_s" else 0.05 * abs(b.value) + 0.5
-            if not (a.low - slack <= b.value <= a.high + slack or b.low - slack <= a.value <= b.high + slack):
-                return False
-    return True

@@ -154,16 +154,16 @@ def entry_of(model: Fit, index: int, column: str) -> dict[str, Any]:
     numbers: dict[str, Any] = {p.name: float(value) for p, value in zip(term.effect.shape, term.shape, strict=True)}
     if term.effect.sees_heat:  # the fit knew the temperature with it; a simulation has to solve for it
         numbers[term.effect.shape[0].name] = float(np.clip(values[0], 0.0, 1.0))
-    numbers |= {key: _shortest(value) for key, value in term.effect.numbers(values, column).items() if np.any(value)}
+    numbers |= {key: shortest(value) for key, value in term.effect.numbers(values, column).items() if np.any(value)}
     shapes = {parameter.name: parameter for parameter in term.effect.shape}
     for key, known in parameters_of(model, index).items():
-        sd = _spread_of_shape(shapes[key], known) if key in shapes else WIDER * known.sd
+        sd = spread_of_shape(shapes[key], known) if key in shapes else WIDER * known.sd
         if sd > 0 and isinstance(numbers.get(key), float):
             numbers[key] = {"value": numbers[key], "sd": float(sd)}
     return {"name": term.name, "response": column, **numbers}
 
 
-def _spread_of_shape(parameter: Parameter, known: Interval) -> float:
+def spread_of_shape(parameter: Parameter, known: Interval) -> float:
     """Return the prior's standard deviation of a shape parameter: at most that of a value which is even between its bounds."""
     interval, bounds, scale = np.array([known.low, known.high]), np.array([parameter.low, parameter.high]), 1.0
     if parameter.logarithmic and parameter.low > 0:
@@ -171,7 +171,7 @@ def _spread_of_shape(parameter: Parameter, known: Interval) -> float:
     return scale * min(WIDER * Interval(known.value, *interval).sd, float(np.ptp(bounds)) / float(np.sqrt(12.0)))
 
 
-def _shortest(value: float | list[float]) -> float | list[float]:
+def shortest(value: float | list[float]) -> float | list[float]:
     """Return a list without the zeros at its end, and a number for one alone: that can be uncertain."""
     if isinstance(value, float):
         return value

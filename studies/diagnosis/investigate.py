@@ -9,6 +9,7 @@ import numpy as np
 from scipy.special import erf
 
 from compensation.noise import white_rms
+from shell.constants import zero_Celsius
 from studies.diagnosis import held_out
 from studies.diagnosis.baseline import Reading, first_stretches
 from studies.diagnosis.campaign import Campaign
@@ -21,6 +22,7 @@ from studies.diagnosis.model import Fit
 from studies.diagnosis.planning.advice import suggest_next
 from studies.diagnosis.planning.chamber import Chamber
 from studies.diagnosis.response import RESPONSES
+from studies.diagnosis.seen import SeenResponse
 from studies.diagnosis.simulated import FAR, Simulated, shifts_of, simulate_baseline
 from studies.diagnosis.stated import as_shipped, with_loss_carried, without_rate_terms
 from studies.diagnosis.verdict import Cause, Interval, ResponseResult, Shift, Verdict, doubted, overall
@@ -64,6 +66,47 @@ class Diagnosis(Shown):
     def to_frame(self) -> "DataFrame":
         """Return one row a response."""
         return self.verdict.to_frame()
+
+    @property
+    def labels(self) -> list[str]:
+        """Names of the records."""
+        return list(dict.fromkeys(run.label for run in self.campaign.runs))
+
+    @property
+    def shown_responses(self) -> list[str]:
+        """Responses that were fitted."""
+        return [name for name in self.verdict.responses if name in self.inquiries]
+
+    def seen(self, response: str) -> SeenResponse:
+        """Return what pages show of a response."""
+        campaign, inquiry = self.campaign, self.inquiries[response]
+        problem, views, left = inquiry.plain.problem, inquiry.plain.tangent.views, inquiry.leftover
+        inputs = {
+            "resonator temperature (°C)": problem.stack([v.seen.resonator - zero_Celsius for v in views]),
+            "rate (K/min)": 60.0 * problem.stack([v.seen.rate for v in views]),
+        }
+        if "frequency_Hz" in campaign.responses:
+            inputs["frequency (Hz)"] = problem.stack([run.responses["frequency_Hz"] for run in campaign.runs])
+        for label, drive in (("amplitude (V)", "amplitude_squared"), ("electrode voltage (V)", "voltage_squared")):
+            if all(getattr(v.coarse, drive) is not None for v in views):
+                inputs[label] = np.sqrt(problem.stack([getattr(v.coarse, drive) for v in views]))
+        steep = np.concatenate([np.abs(view.steep) for view in inquiry.final.tangent.views])
+        return SeenResponse(
+            time=tuple(run.row_time for run in campaign.runs),
+            plain=tuple(held_out.residuals(inquiry.plain, campaign)),
+            final=tuple(held_out.residuals(inquiry.final, campaign)),
+            named=bool(inquiry.final.terms),
+            step=campaign.step,
+            rest=inquiry.plain.residual,
+            run=np.concatenate([np.full(int(mask.sum()), k) for k, mask in enumerate(problem.present)]),
+            inputs=inputs,
+            slope=float(np.median(steep)) if steep.size else 0.0,
+            alternatives=tuple(
+                tuple((name, 2.0 * (rival.score - place.without.score)) for name, rival in zip(place.names, place.rivals, strict=True))
+                for place in inquiry.selection.places
+            ),
+            left=(left.input, 2.0 * left.evidence) if left.significant else None,
+        )  # fmt: skip
 
 
 def investigate(

@@ -263,12 +263,16 @@ def share(plain: Fit, model: Fit, fullest: Fit) -> float:
 
 
 def fitful(model: Fit) -> tuple[str, float]:
+    """Return the log evidence of oscillations that come and go in what a model leaves."""
+    return "time: an intermittent oscillation", intermittent(innovations(model))
+
+
+def intermittent(runs: Sequence[FloatArray]) -> float:
     """Return the log evidence of oscillations that come, go or wander: noise has the same spectrum all the time.
 
     Short periodograms of the innovations over their mean in each run are of one exponential law in noise, with about one
     mean at all frequencies; against it a mixture of two, a small part of the cells with more power.
     """
-    runs = innovations(model)
     best = 0.0
     for length in CELLS:
         cells = []
@@ -285,7 +289,7 @@ def fitful(model: Fit) -> tuple[str, float]:
                 weak = max((1.0 - part * strong) / (1.0 - part), 0.3)
                 mixed = (1 - part) / weak * np.exp(-power / weak) + part / strong * np.exp(-power / strong)
                 best = max(best, float(np.sum(np.log(mixed + 1e-300) + power)))
-    return "time: an intermittent oscillation", best - 3.0
+    return best - 3.0
 
 
 CELLS = (8, 16, 32, 64, 128)
@@ -310,12 +314,18 @@ def innovations(model: Fit) -> list[FloatArray]:
 
 
 def sharp(model: Fit) -> tuple[str, float]:
-    """Return the log evidence of brief events: a few innovations that are too large for noise.
+    """Return the log evidence of brief events in what a model leaves."""
+    # the tails of a mean over rows are lighter than theirs
+    heaviest = min(model.problem.noise.tails + 0.5 * (model.problem.noise.rows - 1.0), 1e3)
+    return "time: brief events", brief_events(np.concatenate(innovations(model)), heaviest)
+
+
+def brief_events(rows: FloatArray, heaviest: float) -> float:
+    """Return the log evidence of brief events: a few innovations that are too large for noise of tails no heavier than Student's t.
 
     A mixture of two normal laws about 0, by expectation and maximisation, against the likeliest of Student's laws, for the
     tails of noise may be heavy; as many numbers more as the BIC counts.
     """
-    rows = np.concatenate(innovations(model))
     square = rows**2 / max(float(np.mean(rows**2)), 1e-300)
     best = -np.inf
     for part in (0.02, 0.1, 0.3):
@@ -328,10 +338,8 @@ def sharp(model: Fit) -> tuple[str, float]:
             narrow = max(float((1.0 - belongs) @ square / max(np.sum(1.0 - belongs), 1e-9)), 1e-3)
             wide = max(float(belongs @ square / max(belongs.sum(), 1e-9)), narrow)
         best = max(best, float(np.sum(np.log(total))))
-    # the tails of a mean over rows are lighter than theirs
-    heaviest = min(model.problem.noise.tails + 0.5 * (model.problem.noise.rows - 1.0), 1e3)
     best -= max(student_log(square, freedom) for freedom in (heaviest, 2.0 * heaviest, 1e3))
-    return "time: brief events", best - float(np.log(rows.size))
+    return best - float(np.log(rows.size))
 
 
 def _normal(square: FloatArray, variance: float) -> FloatArray:

@@ -252,3 +252,31 @@ def weigh(
     inside = sum(w for w, name in zip(weight, names, strict=True) if name in members)
     probability = float(inside / (weight.sum() * (1.0 + strange) + chance))
     return tuple(members), probability
+
+
+def same_cause(one: Cause, two: Cause) -> bool:
+    """Return whether two entries are one cause: the same effect in two responses is one when its place agrees; two members of one set are one answer.
+
+    An equal that does not act on both tells of a choice that the other response does not have: then each is named.
+    """
+    if one.response == two.response:
+        return one.effect in two.equivalent and two.effect in one.equivalent
+    if not all(_acts(name, own.response) for name in (*one.names, *two.names) for own in (one, two)):
+        return False
+    shared = [name for name in (one.effect, two.effect) if name in one.names and name in two.names]
+    return any(_agree(one.shapes.get(name, {}), two.shapes.get(name, {})) for name in shared)
+
+
+def _acts(name: str, response: str) -> bool:
+    effect = find_effect(name)
+    return effect.thermal or response in effect.responses
+
+
+def _agree(one: Mapping[str, Interval], two: Mapping[str, Interval]) -> bool:
+    for name in ("time_s", "temperature_degC", "period_s", "run"):
+        if name in one and name in two:
+            a, b = one[name], two[name]
+            slack = 300.0 if name == "time_s" else 0.05 * abs(b.value) + 0.5
+            if not (a.low - slack <= b.value <= a.high + slack or b.low - slack <= a.value <= b.high + slack):
+                return False
+    return True

@@ -1,9 +1,8 @@
 """Parts of a diagnosis: the verdict, its causes, sizes and gain, and the evidence after them."""
 
 from collections.abc import Iterator, Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from studies.diagnosis.investigate import Diagnosis
 from studies.diagnosis.response import RESPONSES
 from studies.diagnosis.verdict import Cause, Verdict
 from studies.effects import find_effect
@@ -12,6 +11,10 @@ from studies.instrument.units import split_unit, unit_of
 from studies.reports import diagnosis_pictures as pictures
 from studies.reports.digits import plain
 from studies.results import Chapter, Column, Facts, Figure, Part, Sentence, Table
+
+if TYPE_CHECKING:
+    from studies.diagnosis.investigate import Diagnosis
+    from studies.inference.diagnosis import Inference
 
 NAMES = {column: response.word for column, response in RESPONSES.items()}
 WORDS = {
@@ -160,16 +163,16 @@ def next_step(verdict: Verdict) -> list[Sentence]:
     return [Sentence(f"Next experiment: {verdict.next_experiment}", "note")] if verdict.next_experiment else []
 
 
-def diagnosis_parts(diagnosis: Diagnosis) -> list[Chapter]:
+def diagnosis_parts(diagnosis: "Diagnosis | Inference") -> list[Chapter]:
     """Return what people read of the diagnosis of a campaign."""
     verdict = diagnosis.verdict
-    files = ", ".join(dict.fromkeys(run.label for run in diagnosis.campaign.runs))
+    files = ", ".join(diagnosis.labels)
     physics = [cause for cause in verdict.causes if cause.kind == "physics"]
     return [
         Chapter("The answer", [
             Sentence(headline(verdict), where="terminal"),
             Facts(_facts(verdict), "page"),
-            *([Figure(lambda: pictures.ladder(diagnosis), "Rms residual of each response; for the frequency also as a temperature error. Calibrated and with causes: on held-out rows where these can be predicted, else on the rows of the fit.")] if diagnosis.inquiries else []),
+            *([Figure(lambda: pictures.ladder(diagnosis), "Rms residual of each response; for the frequency also as a temperature error. Calibrated and with causes: on held-out rows where these can be predicted, else on the rows of the fit.")] if diagnosis.shown_responses else []),
             *next_step(verdict),
             Sentence(f"Files read: {files}.", where="page"),
         ]),
@@ -178,34 +181,30 @@ def diagnosis_parts(diagnosis: Diagnosis) -> list[Chapter]:
             cause_table(verdict), response_table(verdict), *remarks(verdict),
             *(Sentence(f"{cause.effect}: {_summary(cause)}", where="page") for cause in physics),
         ]),
-        *(Chapter(f"Residual of the {NAMES[name]}", list(_alternatives(diagnosis, name))) for name in diagnosis.inquiries),
+        *(Chapter(f"Residual of the {NAMES[name]}", list(_alternatives(diagnosis, name))) for name in diagnosis.shown_responses),
         Chapter("Method", [Sentence(METHOD, where="page")]),
     ]  # fmt: skip
 
 
-def _residual(diagnosis: Diagnosis) -> Iterator[Part]:
+def _residual(diagnosis: "Diagnosis | Inference") -> Iterator[Part]:
     main, run = _main_response(diagnosis.verdict), diagnosis.verdict.next_run
-    if main is not None and main in diagnosis.inquiries:
-        when = " before and after the named causes are added" if diagnosis.inquiries[main].final.terms else ""
+    if main is not None and main in diagnosis.shown_responses:
+        when = " before and after the named causes are added" if diagnosis.seen(main).named else ""
         yield Figure(lambda: pictures.before_and_after(diagnosis, main), f"Residual of the {NAMES[main]}{when}.")
     if run is not None:
         yield Figure(lambda: pictures.next_run_picture(run), f"Suggested next run: {run.profile}.")
 
 
-def _alternatives(diagnosis: Diagnosis, response: str) -> Iterator[Part]:
-    inquiry = diagnosis.inquiries[response]
-    caption = f"Baseline residual of the {NAMES[response]} (averages over {diagnosis.campaign.step:.0f} s) against its inputs."
+def _alternatives(diagnosis: "Diagnosis | Inference", response: str) -> Iterator[Part]:
+    seen = diagnosis.seen(response)
+    caption = f"Baseline residual of the {NAMES[response]} (averages over {seen.step:.0f} s) against its inputs."
     yield Figure(lambda: pictures.residual_views(diagnosis, response), caption)
-    for place in inquiry.selection.places:
-        rows = [
-            {"name": name, "evidence": 2.0 * (rival.score - place.without.score)}
-            for name, rival in zip(place.names, place.rivals, strict=True)
-        ]
+    for rivals in seen.alternatives:
+        rows = [{"name": name, "evidence": evidence} for name, evidence in rivals]
         columns = (Column("name", "effect"), Column("evidence", "evidence", "2 ln odds", ".1f"))
-        yield Table(f"Alternatives to {place.names[0]}", rows, columns, where="page")  # fmt: skip
-    left = inquiry.leftover
-    if left.significant:
-        words = f"Lack of fit: strongest against {left.input}, evidence {2.0 * left.evidence:.0f}."
+        yield Table(f"Alternatives to {rivals[0][0]}", rows, columns, where="page")
+    if seen.left is not None:
+        words = f"Lack of fit: strongest against {seen.left[0]}, evidence {seen.left[1]:.0f}."
         yield Sentence(words, where="page")
 
 

@@ -1,10 +1,9 @@
 """Pictures of a diagnosis: the ladder of the residual, the residual in time and against its inputs, the next run."""
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
-from shell.constants import zero_Celsius
-from studies.diagnosis.held_out import residuals
-from studies.diagnosis.investigate import Diagnosis
 from studies.diagnosis.planning.next_run import NextRun
 from studies.diagnosis.response import RESPONSES
 from studies.diagnosis.verdict import ResponseResult
@@ -12,10 +11,14 @@ from studies.reports.digits import plain
 from studies.reports.style import BLACK, BLUE, ORANGE, VERMILION, figure
 from studies.results import Drawing
 
+if TYPE_CHECKING:
+    from studies.diagnosis.investigate import Diagnosis
+    from studies.inference.diagnosis import Inference
 
-def ladder(diagnosis: Diagnosis) -> Drawing:
+
+def ladder(diagnosis: "Diagnosis | Inference") -> Drawing:
     """Draw what is left of every response: as shipped, calibrated, with the named physics, noise; on held-out rows."""
-    columns = [c for c in diagnosis.verdict.responses if c in diagnosis.inquiries]
+    columns = diagnosis.shown_responses
     with figure(1, len(columns), height=3.0, squeeze=False) as (canvas, axes):
         for axis, column in zip(axes[0], columns, strict=True):
             response, result = RESPONSES[column], diagnosis.verdict.responses[column]
@@ -54,13 +57,11 @@ def rungs(result: ResponseResult) -> list[tuple[str, float | None]]:
     ]
 
 
-def as_temperature(diagnosis: Diagnosis, column: str, value: float) -> str | None:
+def as_temperature(diagnosis: "Diagnosis | Inference", column: str, value: float) -> str | None:
     """Return the error of temperature that a residual of the frequency amounts to; None for the others."""
     if not RESPONSES[column].thermometer:
         return None
-    inquiry = diagnosis.inquiries[column]
-    steep = np.concatenate([np.abs(view.steep) for view in inquiry.final.tangent.views])
-    slope = float(np.median(steep)) if steep.size else 0.0
+    slope = diagnosis.seen(column).slope
     return (
         None
         if not slope
@@ -70,22 +71,21 @@ def as_temperature(diagnosis: Diagnosis, column: str, value: float) -> str | Non
     )
 
 
-def before_and_after(diagnosis: Diagnosis, response: str) -> Drawing:
+def before_and_after(diagnosis: "Diagnosis | Inference", response: str) -> Drawing:
     """Draw the residual over the campaign before and, if anything is named, after the extension; the noise as a band."""
-    inquiry, unit = diagnosis.inquiries[response], RESPONSES[response]
+    seen, unit = diagnosis.seen(response), RESPONSES[response]
     noise = (diagnosis.verdict.responses[response].noise or 0.0) * unit.scale
-    strips = [(inquiry.plain, "calibrated simulation", VERMILION)]
-    if inquiry.final.terms:
-        strips = [(inquiry.plain, "calibrated simulation", VERMILION)]
-        strips.append((inquiry.final, "with the named causes", BLUE))
+    strips = [(seen.plain, "calibrated simulation", VERMILION)]
+    if seen.named:
+        strips.append((seen.final, "with the named causes", BLUE))
     with figure(len(strips), 1, height=2.0 * len(strips), sharex=True, sharey=True, squeeze=False) as (canvas, grid):
         axes = grid[:, 0]
-        for axis, (model, title, colour) in zip(axes, strips, strict=True):
+        for axis, (residuals, title, colour) in zip(axes, strips, strict=True):
             begin = 0.0
-            for run, rest in zip(diagnosis.campaign.runs, residuals(model, diagnosis.campaign), strict=True):
-                time, values = _thinned(run.row_time, rest * unit.scale)
+            for rows, rest in zip(seen.time, residuals, strict=True):
+                time, values = _thinned(rows, rest * unit.scale)
                 axis.plot((begin + time - time[0]) / 3600.0, values, color=colour, linewidth=0.6)
-                begin += float(run.row_time[-1] - run.row_time[0])
+                begin += float(rows[-1] - rows[0])
                 axis.axvline(begin / 3600.0, color="#b0b6bd", linewidth=0.8)
             axis.axhspan(-2 * noise, 2 * noise, color=ORANGE, alpha=0.25, label="noise, ±2 rms")
             axis.set_title(title, loc="left", fontsize=10)
@@ -100,23 +100,11 @@ def _thinned(time: np.ndarray, values: np.ndarray, most: int = 500) -> tuple[np.
     return time[::step], values[::step]
 
 
-def residual_views(diagnosis: Diagnosis, response: str) -> Drawing:
+def residual_views(diagnosis: "Diagnosis | Inference", response: str) -> Drawing:
     """Draw the baseline's residual against temperature (heating and cooling), rate, frequency and the drives."""
-    campaign, inquiry, unit = diagnosis.campaign, diagnosis.inquiries[response], RESPONSES[response]
-    fit = inquiry.plain
-    problem, views = fit.problem, fit.tangent.views
-    rest = fit.residual * unit.scale
-    inputs: dict[str, np.ndarray] = {
-        "resonator temperature (°C)": problem.stack([v.seen.resonator - zero_Celsius for v in views]),
-        "rate (K/min)": 60.0 * problem.stack([v.seen.rate for v in views]),
-    }
-    if "frequency_Hz" in campaign.responses:
-        inputs["frequency (Hz)"] = problem.stack([run.responses["frequency_Hz"] for run in campaign.runs])
-    for label, drive in (("amplitude (V)", "amplitude_squared"), ("electrode voltage (V)", "voltage_squared")):
-        if all(getattr(v.coarse, drive) is not None for v in views):
-            inputs[label] = np.sqrt(problem.stack([getattr(v.coarse, drive) for v in views]))
+    seen, unit = diagnosis.seen(response), RESPONSES[response]
+    inputs, rest, runs = seen.inputs, seen.rest * unit.scale, seen.run
     heating = inputs["rate (K/min)"] > 0
-    runs = np.concatenate([np.full(int(mask.sum()), k) for k, mask in enumerate(problem.present)])
     columns = 2
     rows = (len(inputs) + 2) // columns
     with figure(rows, columns, height=2.5 * rows, sharey=True) as (canvas, axes):

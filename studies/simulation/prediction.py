@@ -58,6 +58,9 @@ class Prediction:
         The housing itself.
     law : FrequencyLaw
     network : Network
+    temperatures : Temperatures
+        What the gyro reads its columns at.
+    damping : DampingLaw or None
     """
 
     drive: Drive
@@ -66,6 +69,8 @@ class Prediction:
     housing: Array
     law: "FrequencyLaw"
     network: Network
+    temperatures: Temperatures
+    damping: DampingLaw | None
 
 
 def predict(
@@ -131,7 +136,8 @@ def predict(
         )
         step = np.ptp([side.distance for side in varied.sides(name)])
         slopes[name] = {COLUMN["housing"]: read} | {column: (above[column] - below[column]) / step for column in above}
-    return Prediction(drive, columns, slopes, found.value[:, 0], law, varied.network(drive.boundary))
+    network = varied.network(drive.boundary)
+    return Prediction(drive, columns, slopes, found.value[:, 0], law, network, found, varied.damping)
 
 
 def law_for(

@@ -82,6 +82,7 @@ def read_out(
     found: Temperatures,
     tau: float,
     damping: "DampingLaw | None" = None,
+    more_loss: float = 0.0,
 ) -> dict[str, Array]:
     """Columns of the record, without noise: °C, Hz, deg/h, 1; of a card with loops also what their quadrature control says.
 
@@ -91,6 +92,8 @@ def read_out(
         Slowest time constant (s) of the resonator behind its housing, for the effects.
     damping : DampingLaw, optional
         1/Q and its anisotropy from the parts in the card; else `[loss]`'s polynomial and `[bias]`'s anisotropy.
+    more_loss : float
+        Added to 1/Q, as an effect on it would be.
 
     Raises
     ------
@@ -109,7 +112,7 @@ def read_out(
     softened = thermal * (1 + mean_shift(instrument, warmed, drive.commands.get("voltage_squared")))
     frequency = softened + changes.get("frequency_Hz", 0.0)
     own = instrument.loss.at(warmed - reference) if damping is None else damping.inverse_q(warmed)
-    inverse_q = own + changes.get("inverse_q", 0.0)
+    inverse_q = own + changes.get("inverse_q", 0.0) + more_loss
     wave = None if damping is None or damping.wave is None else damping.wave(warmed)
     change = thermal - float(law.frequency(reference))
     slope, angle = (

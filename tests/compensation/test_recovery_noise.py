@@ -1,5 +1,7 @@
 """Levels of noise come back from draws by restricted likelihood, with and without a prior."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -32,7 +34,6 @@ def test_levels_are_recovered_from_drawn_noise():
     assert max(n.walk for n in quiet) < 5e-4
 
 
-@pytest.mark.slow
 def test_what_is_stated_of_the_noise_helps_where_rows_say_little_and_yields_where_they_say_much():
     """Two short runs with a trend of each that is free: they hardly tell a walk from flicker."""
     generator = np.random.default_rng(8)
@@ -77,11 +78,26 @@ def test_a_prior_narrows_and_its_absence_is_restricted_likelihood():
     noise = Noise(1.1 * np.sqrt(96.0))
     V = 1.21 * np.eye(50) + X @ X.T / 4.0
     exact = np.linalg.slogdet(V)[1] + r @ np.linalg.solve(V, r)
-    given = rows.deviance(r, X, np.full(2, 4.0), noise)
+    given, _ = rows.deviance(r, X, np.full(2, 4.0), noise)
     assert given - 2 * np.log(4.0) == pytest.approx(exact, rel=1e-9)
     rss = float(np.linalg.lstsq(X, r, rcond=None)[1][0])
     restricted = 100 * np.log(1.1) + np.linalg.slogdet(X.T @ X / 1.21)[1] + rss / 1.21
-    assert rows.deviance(r, X, np.zeros(2), noise) == pytest.approx(restricted, rel=1e-9)
+    assert rows.deviance(r, X, np.zeros(2), noise)[0] == pytest.approx(restricted, rel=1e-9)
+
+
+def test_slopes_of_the_likelihood_are_its_differences():
+    generator = np.random.default_rng(4)
+    rows = NoiseRows.of([EVEN[:60], EVEN[:60], np.sort(generator.uniform(0.0, 3000.0, 50))])
+    r, X = generator.standard_normal(170), generator.standard_normal((170, 3))
+    noise, prior = Noise(3.0, 0.4, 0.02, 0.3), (np.full(3, 0.7), np.full(3, 0.3))
+
+    def at(level: str, e: float) -> float:
+        moved = replace(noise, **{level: getattr(noise, level) * np.exp(e)})
+        return rows.deviance(r, X, prior[0], moved, prior[1])[0]
+
+    _, slopes = rows.deviance(r, X, prior[0], noise, prior[1])
+    for level, slope in slopes.items():
+        assert slope == pytest.approx((at(level, 1e-4) - at(level, -1e-4)) / 2e-4, rel=1e-6, abs=1e-6)
 
 
 def test_the_unit_of_the_signal_does_not_matter():

@@ -1,0 +1,267 @@
+"""Diagnosis of a campaign against a card: calibrate, search for effects beside all values and responses at once, judge.
+
+The card is calibrated without effects first. Where effects are found its values are linearised anew at the most probable point of all
+unknowns together, and the search begins again there: values that had gone far to do what an effect does come back.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shell.constants import zero_Celsius
+from studies.calibration.fit import CardFit, fit, residual_noise
+from studies.calibration.observed import RESPONSES, observe
+from studies.calibration.priors import gather_priors
+from studies.calibration.problem import CardProblem, wide_law
+from studies.diagnosis.constants import CONSTANTS
+from studies.diagnosis.seen import SeenResponse
+from studies.inference.held_out import Kept, Model, Rows
+from studies.inference.lack_of_fit import Leftover, generic_bank, look
+from studies.inference.model import Background, Linear
+from studies.inference.search import Hypothesis, Outcome, Search
+from studies.inference.signatures import Signatures
+from studies.record import Record
+from studies.shown import Shown
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
+
+    from studies.diagnosis.verdict import Verdict
+    from studies.instrument.card import Instrument
+
+Array = NDArray[np.float64]
+Report = Callable[[str], None]
+AGAIN = 2
+"""Most linearisations after the first."""
+SAME = 0.3
+"""Prior standard deviations by which values may move in a linearisation that is taken as it is."""
+FAR = 2.0
+"""The same, beyond which the columns of all effects are computed anew."""
+
+
+@dataclass(frozen=True, repr=False)
+class Inference(Shown):
+    """What a card and records say together.
+
+    Attributes
+    ----------
+    card : as shipped
+    shipped, plain : rows of every response with the card as shipped and calibrated
+    search : Search, in the linearisation where it ended
+    outcome : Outcome
+    left : response -> Leftover
+    held_out : response -> (without effects, with them)
+    """
+
+    card: "Instrument"
+    fit: CardFit
+    search: Search
+    outcome: Outcome
+    left: Mapping[str, Leftover]
+    shipped: Mapping[str, Rows]
+    plain: Mapping[str, Rows]
+    rows: Mapping[str, Rows]
+    held_out: Mapping[str, tuple[float | None, float | None]]
+    unknown: tuple[float, ...]
+    notes: tuple[str, ...] = ()
+
+    drawn_by = "studies.reports.diagnosis_pictures:ladder"
+
+    def __repr__(self) -> str:
+        return f"Diagnosis({self.verdict})"
+
+    def to_frame(self) -> "DataFrame":
+        """Return one row a response."""
+        return self.verdict.to_frame()
+
+    @property
+    def final(self) -> Hypothesis:
+        """The model with the named effects."""
+        return self.outcome.final
+
+    @cached_property
+    def verdict(self) -> "Verdict":
+        """The outcome of the contract."""
+        from studies.inference.verdict import judge
+
+        return judge(self)
+
+    @property
+    def labels(self) -> list[str]:
+        """Names of the records."""
+        return [run.record.path or f"run {k}" for k, run in enumerate(self.search.linear.problem.runs, 1)]
+
+    @property
+    def shown_responses(self) -> list[str]:
+        """Responses that were fitted."""
+        return list(self.search.linear.responses)
+
+    def seen(self, response: str) -> SeenResponse:
+        """Return what pages show of a response."""
+        problem, left = self.search.linear.problem, self.left[response]
+        members = [k for k, part in enumerate(problem.parts) if response in part.responses]
+        blocks = [problem.runs[problem.parts[k].run].responses[response] for k in members]
+        paths = [self.search.signatures.paths[k] for k in members]
+
+        def onto(values: Sequence[Array]) -> Array:
+            at = zip(blocks, paths, values, strict=True)
+            return np.concatenate([np.interp(b.time - p.time[0], p.states.time, own) for b, p, own in at])
+
+        inputs = {
+            "resonator temperature (°C)": onto([p.states.resonator - zero_Celsius for p in paths]),
+            "rate (K/min)": onto([60.0 * p.states.rate for p in paths]),
+            "frequency (Hz)": onto([np.interp(p.states.time, p.time, p.prediction.columns["frequency_Hz"]) for p in paths]),
+        }  # fmt: skip
+        for label, drive in (("amplitude (V)", "amplitude_squared"), ("electrode voltage (V)", "voltage_squared")):
+            own = [getattr(p.states, drive) for p in paths]
+            if all(values is not None for values in own):
+                inputs[label] = np.sqrt(onto(own))
+        plain, final = self.plain[response], self.rows[response]
+        rest = [
+            np.interp(b.time - b.time[0], t - t[0], own)
+            for b, t, own in zip(blocks, plain.time, plain.residual, strict=True)
+        ]
+        slope = np.concatenate([np.abs(p.by_temperature["frequency_Hz"]) for p in paths])
+        return SeenResponse(
+            time=plain.time,
+            plain=plain.residual,
+            final=final.residual,
+            named=any(response in term.columns for term in self.final.terms),
+            step=float(np.median(np.concatenate([b.span for b in blocks]))),
+            rest=np.concatenate(rest),
+            run=np.concatenate([np.full(len(b.time), k) for k, b in enumerate(blocks)]),
+            inputs=inputs,
+            slope=float(np.median(slope)) if response == "frequency_Hz" else 0.0,
+            alternatives=tuple(
+                tuple((h.terms[-1].effect.name, 2.0 * (h.score - base.score)) for h in rivals)
+                for term, rivals, base in zip(self.final.terms, self.outcome.rivals, self.outcome.without, strict=True)
+                if term.response == response
+            ),
+            left=(left.input, 2.0 * left.evidence) if left.significant else None,
+        )  # fmt: skip
+
+    @cached_property
+    def background(self) -> Background:
+        """The final model, solved."""
+        return Background(self.search.linear, self.final.terms, self.final.noise)
+
+    @cached_property
+    def model(self) -> Model:
+        """The final model on the records' rows."""
+        return Model(self.search.linear, self.search.signatures, self.final.terms, self.final.noise)
+
+    @cached_property
+    def numbers(self) -> Kept:
+        """Its most probable numbers."""
+        return self.model.kept(self.background.posterior[0])
+
+
+def build_problem(card: "Instrument", records: Sequence[Record]) -> CardProblem:
+    """Return the problem of a card's values and the starts of runs, driven by the measured temperature."""
+    runs = tuple(
+        replace(run, outer=None, responses={name: own for name, own in run.responses.items() if name in RESPONSES})
+        for run in observe(records)
+    )
+    return CardProblem(card, gather_priors(card), runs, wide_law(card, runs))
+
+
+def infer(
+    card: "Instrument", records: Sequence[Record], progress: Report = lambda _: None, notes: Sequence[str] = ()
+) -> Inference:
+    """Find what records say of a card and of effects that it lacks; `notes` are what reading them had to say."""
+    problem = build_problem(card, records)
+    progress("calibration without effects")
+    found = fit(problem, progress=progress)
+    search, outcome = _from(problem, found, progress)
+    values = len(problem.priors.values)
+    if np.abs(problem.priors.standard(found.point[:values])).max(initial=0.0) > FAR:
+        # values may have gone far to do what an effect does: look from the card as shipped too
+        progress("again from the card's own values")
+        state = problem.evaluate(np.zeros(problem.count))
+        noise = residual_noise(problem, problem.rows, state)
+        there = _from(problem, replace(found, state=state, noise=noise, rows=problem.rows), progress)
+        search, outcome = max((there, (search, outcome)), key=_on_all_rows)
+    plain = Model(Linear.of(found), Signatures.at(problem, found.point), (), outcome.plain.noise)
+    shipped = plain.residuals(Kept(np.zeros(problem.count), ()))
+    calibrated = plain.residuals(Kept(found.point, ()))
+    bank = generic_bank(search)
+    progress("rows that the fit has not seen")
+    outcome, held, rows = _confirmed(search, outcome, plain)
+    progress("lack of fit")
+    left = look(search, bank, outcome.plain, outcome.final, rows)
+    unknown = []
+    for base in outcome.without:
+        seen = search.scan(base, bank)
+        best = max((one.gain for one in seen), default=-np.inf)
+        unknown.append(base.score + best + CONSTANTS["log_prior_unknown"] - outcome.final.score)
+    return Inference(card, found, search, outcome, left, shipped, calibrated, rows, held, tuple(unknown), tuple(notes))
+
+
+def _on_all_rows(found: tuple[Search, Outcome]) -> float:
+    """Log posterior of a final model, no row taken for an outlier."""
+    search, final = found[0], found[1].final
+    linear = replace(search.linear, rows=search.linear.problem.rows)
+    return Background(linear, final.terms, final.noise).evidence + sum(term.price for term in final.terms)
+
+
+def _from(problem: CardProblem, start: CardFit, progress: Report) -> tuple[Search, Outcome]:
+    """Search with the values linearised at a start, and again where they are most probable beside the effects."""
+    progress("all effects in all shapes")
+    point = start.point
+    search = Search(Linear.of(start), Signatures.at(problem, point), start.noise, progress=progress)
+    outcome = search.run()
+    for _ in range(AGAIN):
+        model = Model(search.linear, search.signatures, outcome.final.terms, outcome.final.noise)
+        moved = model.kept(model.mean()).point
+        if np.abs(moved - point).max() < SAME:
+            break
+        progress("linearised anew beside the effects")
+        bank = search.bank if np.abs(moved - start.point).max() < FAR else None
+        point, linear = moved, Linear.of(replace(start, state=problem.evaluate(moved)))
+        again = Search(linear, Signatures.at(problem, point), outcome.plain.noise, bank, progress)
+        found = again.run(outcome.final)
+        if found.final.score < outcome.final.score:  # the step went too far
+            break
+        search, outcome = again, found
+    return search, outcome
+
+
+def _confirmed(
+    search: Search, outcome: Outcome, plain: Model
+) -> tuple[Outcome, dict[str, tuple[float | None, float | None]], dict[str, Rows]]:
+    """Leave out causes whose model predicts unseen rows no better than the card alone, the weakest first."""
+    events = any(term.effect.event for term in outcome.final.terms)
+    by_record = len(search.linear.problem.runs) > 1 and not events
+    before = plain.held_out(by_record)
+    while True:
+        final = outcome.final
+        model = Model(search.linear, search.signatures, final.terms, final.noise)
+        after = model.held_out(by_record) if final.terms else before
+        weak = [k for k, term in enumerate(final.terms) if _worse(before[term.response], after[term.response])]
+        if not weak:
+            rows = model.residuals(model.kept(model.mean()) if final.terms else Kept(plain.mean(), ()))
+            return outcome, {name: (before[name], after[name]) for name in before}, rows
+        gone = min(weak, key=lambda k: final.score - outcome.without[k].score)
+        outcome = _left_out(search, outcome, gone)
+
+
+def _left_out(search: Search, outcome: Outcome, gone: int) -> Outcome:
+    terms = tuple(term for k, term in enumerate(outcome.final.terms) if k != gone)
+    final = search.settle(terms, outcome.final.noise) if terms else outcome.plain
+    without, rivals = [], []
+    for k in range(len(outcome.final.terms)):
+        if k != gone:
+            others = tuple(t for j, t in enumerate(outcome.final.terms) if j not in (k, gone))
+            base = search.settle(others, outcome.final.noise) if others else outcome.plain
+            drop = outcome.without[k].score - base.score
+            without.append(base)
+            rivals.append(tuple(replace(h, evidence=h.evidence - drop) for h in outcome.rivals[k]))
+    return Outcome(outcome.plain, final, tuple(rivals), tuple(without))
+
+
+def _worse(before: float | None, after: float | None) -> bool:
+    return before is not None and after is not None and after >= before

@@ -1,0 +1,93 @@
+"""The extended model: the card with the named effects as `[[effect]]` tables, calibrated against the records by the one simulation."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from studies.diagnosis.extension import SURE, WIDER, shortest, spread_of_shape
+from studies.inference.diagnosis import Inference
+from studies.inference.model import Background, Term
+from studies.inference.verdict import parameters_of
+from studies.record import Record
+
+if TYPE_CHECKING:
+    from studies.calibration.calibrate import Calibration
+
+Array = NDArray[np.float64]
+
+
+def extend(
+    found: Inference, records: Sequence[Record], progress: Callable[[str], None] = lambda words: None
+) -> "Calibration":
+    """Calibrate the card with the named effects: its instrument predicts what was diagnosed."""
+    from studies.calibration.calibrate import calibrate
+
+    progress("calibrating the extended card")
+    background = found.background
+    for k in range(len(background.terms)):
+        background = definite(found, background, k)
+    named = [entry_of(found, background, k) for k, term in enumerate(background.terms) if not term.effect.once]
+    card = found.card.with_table("effect", [*found.card.content.get("effect", []), *named])
+    return calibrate(card, without_events(found, records), profile=False, progress=progress, keep=False)
+
+
+def definite(found: Inference, background: Background, k: int) -> Background:
+    """Return the model with a family cut down to its definite curve, where that is likelier by `SURE`; else the family stays whole."""
+    term = background.terms[k]
+    if len(term.members) == 1:
+        return background
+    others = replace(background, terms=(*background.terms[:k], *background.terms[k + 1 :]))
+    one = replace(
+        term,
+        columns={name: own[:, :1] for name, own in term.columns.items()},
+        members=term.members[:1],
+        unit=term.unit[:1],
+    )
+    whole, single = others.with_term(term), others.with_term(found.search.polish(others, one))
+    kept = single[0] if single[1] > whole[1] + SURE else term
+    return replace(background, terms=(*background.terms[:k], kept, *background.terms[k + 1 :]))
+
+
+def entry_of(found: Inference, background: Background, k: int) -> dict[str, Any]:
+    """Return the `[[effect]]` table of a term, without the coefficients that are 0; numbers are as uncertain as a prior."""
+    term = background.terms[k]
+    effect = term.effect
+    values = np.zeros(effect.spread.size)
+    values[list(term.members)] = background.coefficients(k)[0]
+    values = np.minimum(values, np.concatenate([np.full(len(own.spread), own.most) for own in effect.coefficients]))
+    numbers: dict[str, Any] = {p.name: float(value) for p, value in zip(effect.shape, term.shape, strict=True)}
+    if effect.sees_heat:  # the fit knew the temperature with it; a simulation has to solve for it
+        numbers[effect.shape[0].name] = float(np.clip(values[0], 0.0, 1.0))
+    numbers |= {key: shortest(value) for key, value in effect.numbers(values, term.response).items() if np.any(value)}
+    shapes = {parameter.name: parameter for parameter in effect.shape}
+    for key, known in parameters_of(background, found.search.signatures, k).items():
+        sd = spread_of_shape(shapes[key], known) if key in shapes else WIDER * known.sd
+        if sd > 0 and isinstance(numbers.get(key), float):
+            numbers[key] = {"value": numbers[key], "sd": float(sd)}
+    return {"name": effect.name, "response": term.response, **numbers}
+
+
+def without_events(found: Inference, records: Sequence[Record]) -> list[Record]:
+    """Return the records as they would be had what happens once happened before them all: a jump that stays is there from the start."""
+    problem, out = found.search.linear.problem, list(records)
+    for k, part in enumerate(problem.parts):
+        columns: dict[str, Array] = {}
+        record, time = records[part.run], problem.runs[part.run].inner.time
+        for term, values in zip(found.final.terms, found.numbers.coefficients, strict=True):
+            if not term.effect.once:
+                continue
+            for name, change in found.model.change(term, values, k).items():
+                own = columns.setdefault(name, np.array(record[name], dtype=float))
+                own += _last(found, term, values, name) - np.interp(record["time_s"], time, change)
+        out[part.run] = record.with_columns(columns) if columns else record
+    return out
+
+
+def _last(found: Inference, term: Term, values: Array, name: str) -> float:
+    """What an event leaves behind it at the end of the campaign."""
+    parts = found.search.linear.problem.parts
+    ends = [found.model.change(term, values, k)[name][-1] for k, part in enumerate(parts) if name in part.responses]
+    return 0.0 if term.effect.thermal else float(ends[-1])

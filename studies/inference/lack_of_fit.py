@@ -1,0 +1,103 @@
+"""Lack of fit: what no named effect explains, seen by generic forms of every input, by what is sharp in time and by fast lines."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from compensation.lines import Line
+from studies.diagnosis.campaign import fast_line
+from studies.diagnosis.constants import CONSTANTS
+from studies.diagnosis.lack_of_fit import BUMP, STEP, brief_events, generic_forms, intermittent
+from studies.diagnosis.noise import tails_of
+from studies.inference.held_out import Rows
+from studies.inference.model import Background, Term
+from studies.inference.search import Hypothesis, Search, Shapes
+
+Array = NDArray[np.float64]
+ENOUGH = CONSTANTS["margin"] - CONSTANTS["log_prior_unknown"]
+"""Log evidence from which on structure is no chance."""
+
+
+@dataclass(frozen=True)
+class Leftover:
+    """What is left of one response: in which input, with how much log evidence, and the part of the structure that is explained."""
+
+    input: str
+    evidence: float
+    share: float
+    line: Line | None = None
+
+    @property
+    def significant(self) -> bool:
+        """Whether it is more than chance."""
+        return self.evidence > ENOUGH
+
+
+def generic_bank(search: Search) -> list[Shapes]:
+    """Return the columns of the generic forms."""
+    signatures = search.signatures
+    forms = [*generic_forms(signatures.span, [path.states for path in signatures.paths]), BUMP, STEP]
+    return search.shapes_of(signatures.applicable({form.name: form for form in forms}))
+
+
+def look(
+    search: Search, bank: Sequence[Shapes], plain: Hypothesis, final: Hypothesis, rows: Mapping[str, Rows]
+) -> dict[str, Leftover]:
+    """Return what a model leaves of every response.
+
+    Parameters
+    ----------
+    plain, final : the models without effects and with the named ones
+    rows : response -> what the final model leaves on the rows of the records
+    """
+    seen = search.scan(final, bank, less=())
+    own = Background(search.linear, final.terms, final.noise)
+    before = Background(search.linear, plain.terms, final.noise)
+    found = {}
+    for name in search.linear.responses:
+        best = max((one for one in seen if one.term.response == name), key=lambda one: one.gain)
+        word, smooth = best.term.effect.name, best.gain
+        evidence, line = smooth, None
+        white = search.linear.rows[name].whiten(own.residual(name), final.noise[name])
+        brief = brief_events(white, tails_of(white / max(float(np.std(white)), 1e-300)))
+        if brief > evidence:
+            word, evidence = "time: brief events", brief
+        fitful = intermittent([white[place] for place in search.linear.rows[name].slices])
+        if fitful > evidence:
+            word, evidence = "time: an intermittent oscillation", fitful
+        fast = _line(search, name, rows.get(name))
+        if fast is not None and fast.evidence > evidence:
+            word = f"time: a line of {fast.period:.3g} s, too fast for steps of {_step(search, name):.3g} s"
+            evidence, line = fast.evidence, fast
+        named = [term for term in final.terms if term.response == name or term.effect.thermal]
+        share = _share(search, name, before, own, best.term) if named else 0.0
+        if evidence > smooth and named:
+            gained = max(final.score - plain.score, 0.0)
+            share = min(share, gained / max(gained + evidence, 1e-9))
+        found[name] = Leftover(word, float(evidence), share, line)
+    return found
+
+
+def _share(search: Search, name: str, before: Background, own: Background, generic: Term) -> float:
+    """Part of the structure that the named effects explain, in independent rows of the noise."""
+    term, _ = own.with_term(generic)
+    fullest = replace(own, terms=(*own.terms, term))
+    rows, noise = search.linear.rows[name], own.noise[name]
+    left = [float(np.sum(rows.whiten(one.residual(name), noise) ** 2)) for one in (before, own, fullest)]
+    total = max(left[0] - left[2], 1e-9)
+    return float(np.clip(1.0 - (left[1] - left[2]) / total, 0.0, 1.0)) if left[0] > left[1] else 0.0
+
+
+def _step(search: Search, name: str) -> float:
+    times = search.linear.rows[name].times
+    return float(np.median(np.concatenate([np.diff(t) for t in times if len(t) > 1])))
+
+
+def _line(search: Search, name: str, rows: Rows | None) -> Line | None:
+    if rows is None:
+        return None
+    sampling = float(np.median(np.concatenate([np.diff(t) for t in rows.time])))
+    series = list(zip(rows.time, rows.residual, strict=True))
+    return fast_line(series, sampling, _step(search, name), rows.rms)

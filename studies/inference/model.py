@@ -1,0 +1,234 @@
+"""The linear-Gaussian model of all responses of a campaign: y = J u + Σ X_k c_k + noise, every unknown with a normal prior.
+
+J are the derivatives of the calibrated card by its values and by the starts of the runs, u of unit prior; X_k the columns of an effect,
+its coefficients of standard deviation scale · spread · size. With rows whitened by the noise of each response,
+
+    −2 ln L = ln|Σ| + ln|A| + |r|² − bᵀA⁻¹b,   A = 1 + XᵀX,  b = Xᵀr,
+
+and what one more effect adds to it follows from its own small Gram matrix beside the columns that are there.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import solve_triangular
+from scipy.special import logsumexp
+
+from compensation.noise import Noise
+from compensation.noise_rows import NoiseRows, Whitener
+from studies.calibration.fit import CardFit, estimate_levels
+from studies.calibration.problem import CardProblem
+from studies.effects import Effect
+
+Array = NDArray[np.float64]
+SCALES = 10.0 ** np.arange(-4.0, 0.51, 0.5)
+"""Sizes of an effect over that of strong cases, every one as likely."""
+PRICE = -4.0
+"""Log prior of one effect of some thirty against nothing."""
+
+
+@dataclass(frozen=True)
+class Term:
+    """An effect of one shape with its columns.
+
+    Attributes
+    ----------
+    effect, response, shape
+    columns : response -> (M, k), of the members that are fitted
+    members : which columns of the effect these are
+    unit : array (k,), prior standard deviations in a strong case
+    scale : of SCALES
+    price : log prior of the effect and of the choice of shape and scale
+    """
+
+    effect: Effect
+    response: str
+    shape: tuple[float, ...]
+    columns: Mapping[str, Array]
+    members: tuple[int, ...]
+    unit: Array
+    scale: float = 1.0
+    price: float = PRICE
+
+    @property
+    def key(self) -> tuple[str, str]:
+        """Name and response."""
+        return self.effect.name, self.response
+
+    @property
+    def spread(self) -> Array:
+        """Prior standard deviations of its coefficients."""
+        return self.scale * self.unit
+
+
+@dataclass(frozen=True)
+class Linear:
+    """The rows of a calibration linearised at a point.
+
+    Attributes
+    ----------
+    problem : CardProblem
+    rows : response -> NoiseRows
+    target : response -> (M,), what the card leaves, about u = 0
+    slope : response -> (M, p)
+    """
+
+    problem: CardProblem
+    rows: Mapping[str, NoiseRows]
+    target: Mapping[str, Array]
+    slope: Mapping[str, Array]
+
+    @classmethod
+    def of(cls, fit: CardFit) -> "Linear":
+        """Linearise at the most probable point."""
+        state = fit.state
+        target = {n: state.residual[n] + state.slope[n] @ state.point for n in fit.problem.responses}
+        return cls(fit.problem, fit.rows, target, state.slope)
+
+    @property
+    def responses(self) -> tuple[str, ...]:
+        """Names of the responses."""
+        return self.problem.responses
+
+    @property
+    def count(self) -> int:
+        """Number of the card's coordinates, starts included."""
+        return self.problem.count
+
+    def columns(self, terms: Sequence[Term], name: str) -> Array:
+        """Return J and the columns of terms in units of their priors for one response."""
+        parts = [self.slope[name]]
+        for term in terms:
+            own = term.columns.get(name)
+            parts.append(np.zeros((len(self.target[name]), len(term.unit))) if own is None else own * term.spread)
+        return np.hstack(parts)
+
+    def whitened(
+        self,
+        terms: Sequence[Term],
+        noise: Mapping[str, Noise],
+        keep: Mapping[str, Sequence[NDArray[np.bool_]]] | None = None,
+    ) -> tuple[dict[str, Array], dict[str, Array], float]:
+        """Return columns and target by response in rows of white noise of variance 1, and ln|Σ|; of the responses and rows to keep alone."""
+        X, r, total = {}, {}, 0.0
+        for name in self.responses if keep is None else keep:
+            both = np.column_stack([self.columns(terms, name), self.target[name]])
+            rows = self.rows[name]
+            if keep is not None:
+                both = both[np.concatenate(keep[name])]
+                rows = rows.kept(keep[name])
+            whitener = rows.whitener(noise[name])
+            white = whitener(both)
+            X[name], r[name], total = white[:, :-1], white[:, -1], total + whitener.log_determinant
+        return X, r, total
+
+
+@dataclass(frozen=True)
+class Background:
+    """A model at given noise, beside which one more effect is weighed."""
+
+    linear: Linear
+    terms: tuple[Term, ...]
+    noise: Mapping[str, Noise]
+
+    @cached_property
+    def _solved(self) -> tuple[dict[str, Array], dict[str, Array], float, Array]:
+        """Rows of the orthonormal base and what it leaves, by response; log likelihood; triangle R of [X; 1]."""
+        X, r, determinant = self.linear.whitened(self.terms, self.noise)
+        p = next(iter(X.values())).shape[1]
+        Q, R = np.linalg.qr(np.vstack([*X.values(), np.eye(p)]))
+        target = np.concatenate([*r.values(), np.zeros(p)])
+        rest = target - Q @ (Q.T @ target)
+        evidence = -0.5 * (determinant + 2 * np.log(np.abs(np.diag(R))).sum() + rest @ rest)
+        base, left, at = {}, {}, 0
+        for name, rows in X.items():
+            base[name], left[name] = Q[at : at + len(rows)], rest[at : at + len(rows)]
+            at += len(rows)
+        return base, left, float(evidence), R
+
+    @cached_property
+    def _whiteners(self) -> dict[str, Whitener]:
+        return {name: self.linear.rows[name].whitener(level) for name, level in self.noise.items()}
+
+    @property
+    def evidence(self) -> float:
+        """Log marginal likelihood, all linear unknowns integrated out."""
+        return self._solved[2]
+
+    def gains(self, columns: Mapping[str, Array], units: Array, positive: Array) -> Array:
+        """Return what effects add to the evidence at each of SCALES, (S, H).
+
+        Parameters
+        ----------
+        columns : response -> (M, H, k)
+        units : array (H, k)
+        positive : array (H,), those that cannot go against their first column; of the wrong sign they add nothing: −∞
+        """
+        base, left, _, _ = self._solved
+        H, k = units.shape
+        gram, moment = np.zeros((H, k, k)), np.zeros((H, k))
+        beside = np.zeros((next(iter(base.values())).shape[1], H * k))
+        for name, own in columns.items():
+            white = self._whiteners[name](own.reshape(len(own), H * k))
+            moment += (white.T @ left[name]).reshape(H, k)
+            beside += base[name].T @ white
+            stacked = white.reshape(len(own), H, k).transpose(1, 2, 0)
+            gram += stacked @ stacked.transpose(0, 2, 1)
+        shared = beside.reshape(-1, H, k).transpose(1, 2, 0)
+        gram -= shared @ shared.transpose(0, 2, 1)
+        gram, moment = gram * units[:, :, None] * units[:, None, :], moment * units
+        values, ways = np.linalg.eigh(gram)
+        along = np.einsum("hij,hi->hj", ways, moment)
+        values = np.maximum(values, 0.0)
+        size = (SCALES**2)[:, None, None]
+        gain = -0.5 * np.log1p(size * values).sum(-1) + 0.5 * (size * along**2 / (1 + size * values)).sum(-1)
+        best = SCALES[np.argmax(gain, axis=0)][:, None] ** 2
+        coefficient = np.einsum("hij,hj->hi", ways, best * along / (1 + best * values))
+        against = positive & (coefficient[:, 0] < 0)
+        gain[:, against] = -np.inf
+        return np.asarray(gain)
+
+    def with_term(self, term: Term) -> tuple[Term, float]:
+        """Return a term at its likeliest scale, and the log evidence that it adds, its scales averaged."""
+        gain = self.gains(
+            {n: X[:, None, :] for n, X in term.columns.items()}, term.unit[None], np.array([term.effect.positive])
+        )[:, 0]
+        total = float(logsumexp(gain) - np.log(len(gain)))
+        return replace(term, scale=float(SCALES[int(np.argmax(gain))])), total
+
+    @cached_property
+    def posterior(self) -> tuple[Array, Array]:
+        """Mean and covariance of all coordinates: the card's and starts, then coefficients in units of their priors."""
+        X, r, _ = self.linear.whitened(self.terms, self.noise)
+        return solve_posterior(np.vstack(list(X.values())), np.concatenate(list(r.values())))
+
+    def coefficients(self, k: int) -> tuple[Array, Array]:
+        """Return mean and covariance of the coefficients of one term, in its own units."""
+        begin = self.linear.count + sum(len(term.unit) for term in self.terms[:k])
+        own = slice(begin, begin + len(self.terms[k].unit))
+        mean, covariance = self.posterior
+        spread = self.terms[k].spread
+        return mean[own] * spread, covariance[own, own] * np.outer(spread, spread)
+
+    def residual(self, name: str) -> Array:
+        """Return what the most probable model leaves of a response."""
+        return np.asarray(self.linear.target[name] - self.linear.columns(self.terms, name) @ self.posterior[0])
+
+
+def solve_posterior(X: Array, r: Array) -> tuple[Array, Array]:
+    """Return mean and covariance of unknowns of unit prior from whitened rows."""
+    p = X.shape[1]
+    R = np.linalg.qr(np.column_stack([np.vstack([X, np.eye(p)]), np.append(r, np.zeros(p))])).R[:p]
+    root = solve_triangular(R[:, :p], np.eye(p))
+    return root @ R[:, p], root @ root.T
+
+
+def estimate_noise_of(
+    linear: Linear, terms: Sequence[Term], noise: Mapping[str, Noise], names: Sequence[str] = ()
+) -> dict[str, Noise]:
+    """Return the levels of highest marginal likelihood of each response (or those named), given what the others say."""
+    slopes = {name: linear.columns(terms, name) for name in linear.responses}
+    return estimate_levels(linear.problem, linear.rows, linear.target, slopes, noise, names or linear.responses)

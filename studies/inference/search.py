@@ -1,0 +1,298 @@
+"""Search over effects: the model of all responses grows by the effect that adds most evidence, as long as that pays its price.
+
+Every effect is looked at in all shapes of its grid at once; the nearest contenders are refitted, each with shape, size and noise of its
+own. Log posteriors are those of `model`, with the prior of an effect, the mean over its shapes and the mean over its sizes.
+"""
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import minimize_scalar
+from scipy.special import logsumexp
+
+from compensation.noise import Noise, white_rms
+from studies.effects import Effect, Parameter
+from studies.inference.model import PRICE, Background, Linear, Term, estimate_noise_of
+from studies.inference.signatures import Signatures
+
+Array = NDArray[np.float64]
+MOST_SHAPES = 400
+"""Of an effect, of many more shapes evenly chosen ones."""
+FEW, LEADING, WIDTH = 40, 0.4, 4
+"""Of effects with more shapes than FEW only the leading columns are scanned: those with a prior of at least this part of the widest."""
+LESS = (0.1, 0.01)
+"""Of the slow noise of a response: what an effect has been taken for until it is named."""
+MOST_TERMS, CONTENDERS = 4, 5
+MARGIN, FURTHER = 4.0, 0.06
+"""Log posterior that a cause must bring, and part of what is explained already that a further one must bring besides."""
+NEAR = 0.35, 15.0
+"""Part of the best scan, less so much, down to which contenders are refitted."""
+HOPELESS = -3.0
+Report = Callable[[str], None]
+
+
+@dataclass(frozen=True)
+class Shapes:
+    """All shapes of an effect with the same members: the columns that are scanned."""
+
+    effect: Effect
+    response: str
+    shapes: tuple[tuple[float, ...], ...]
+    members: tuple[int, ...]
+    columns: Mapping[str, Array]
+    """response -> (M, H, k)"""
+    count: int
+    """Shapes of the whole grid."""
+
+
+@dataclass(frozen=True)
+class Seen:
+    """What a scan sees of one effect: log evidence over all shapes, the best of them, its scale, and the noise beside it."""
+
+    gain: float
+    best: float
+    term: Term
+    noise: Mapping[str, Noise]
+
+
+@dataclass(frozen=True)
+class Hypothesis:
+    """A model with its noise; `score` is its log posterior up to a constant."""
+
+    terms: tuple[Term, ...]
+    noise: Mapping[str, Noise]
+    evidence: float
+
+    @property
+    def score(self) -> float:
+        """Log evidence and the prices of the terms."""
+        return self.evidence + sum(term.price for term in self.terms)
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """The model without effects, the best one, and for each of its terms the rivals that could stand there, best first."""
+
+    plain: Hypothesis
+    final: Hypothesis
+    rivals: tuple[tuple[Hypothesis, ...], ...]
+    without: tuple[Hypothesis, ...]
+
+
+class Search:
+    """The search in one linearised campaign."""
+
+    def __init__(
+        self,
+        linear: Linear,
+        signatures: Signatures,
+        noise: Mapping[str, Noise],
+        bank: Sequence[Shapes] | None = None,
+        progress: Report = lambda _: None,
+    ) -> None:
+        self.linear, self.signatures, self.noise, self.progress = linear, signatures, noise, progress
+        self.bank = self.shapes_of(signatures.applicable()) if bank is None else bank
+
+    def shapes_of(self, effects: Iterable[tuple[Effect, str]]) -> list[Shapes]:
+        """Return the columns of all shapes of some effects."""
+        found = []
+        for effect, response in effects:
+            grid = [tuple(shape) for shape in effect.grid(self.signatures.span, response)]
+            chosen = grid
+            if len(grid) > MOST_SHAPES:
+                chosen = [grid[k] for k in np.linspace(0, len(grid) - 1, MOST_SHAPES).astype(int)]
+            groups: dict[tuple[int, ...], list[tuple[tuple[float, ...], dict[str, Array]]]] = {}
+            first = _leading(effect, len(grid))
+            for shape in chosen:
+                columns = self.signatures.columns(effect, shape, response)
+                there = np.any([np.any(own != 0, axis=0) for own in columns.values()], axis=0)
+                members = tuple(k for k in first if there[k])
+                if members:
+                    kept = {name: own[:, members] for name, own in columns.items()}
+                    groups.setdefault(members, []).append((shape, kept))
+            for members, own in groups.items():
+                stacked = {name: np.stack([columns[name] for _, columns in own], axis=1) for name in own[0][1]}
+                found.append(Shapes(effect, response, tuple(shape for shape, _ in own), members, stacked, len(grid)))
+        return found
+
+    def unit(self, effect: Effect, response: str, members: Sequence[int]) -> Array:
+        """Prior standard deviations of members in a strong case."""
+        return np.asarray(effect.spread[list(members)] * self.signatures.size(effect, response))
+
+    def term(self, effect: Effect, response: str, shape: tuple[float, ...], price: float = PRICE) -> Term:
+        """Return a term with all members of the effect that have a prior."""
+        members = tuple(int(k) for k in np.flatnonzero(effect.spread > 0))
+        columns = {name: own[:, members] for name, own in self.signatures.columns(effect, shape, response).items()}
+        return Term(effect, response, shape, columns, members, self.unit(effect, response, members), 1.0, price)
+
+    def scan(self, now: Hypothesis, bank: Sequence[Shapes] | None = None, less: Sequence[float] = LESS) -> list[Seen]:
+        """Return what every effect adds to a model, the strongest first, with its noise and with less slow noise of a response."""
+        bank = self.bank if bank is None else bank
+        taken = {term.key for term in now.terms}
+        open_ = [own for own in bank if (own.effect.name, own.response) not in taken]
+        plain = Background(self.linear, now.terms, now.noise)
+        found: dict[tuple[str, str], dict[tuple[float, ...], tuple[float, Shapes, int, Mapping[str, Noise]]]] = {}
+        for name, noise in [("", now.noise), *self._quieter(now, less)]:
+            beside = plain if not name else Background(self.linear, now.terms, noise)
+            behind = beside.evidence - plain.evidence
+            for own in open_:
+                if name and name != own.response:
+                    continue
+                units = np.broadcast_to(
+                    self.unit(own.effect, own.response, own.members), (len(own.shapes), len(own.members))
+                )
+                positive = np.full(len(own.shapes), own.effect.positive)
+                gain = logsumexp(beside.gains(own.columns, units, positive), axis=0) - np.log(10) + behind
+                best = found.setdefault((own.effect.name, own.response), {})
+                for k, shape in enumerate(own.shapes):
+                    if np.isfinite(gain[k]) and (shape not in best or gain[k] > best[shape][0]):
+                        best[shape] = (float(gain[k]), own, k, noise)
+        out = []
+        for shapes in found.values():
+            if not shapes:
+                continue
+            gains = np.array([value[0] for value in shapes.values()])
+            top, own, k, noise = max(shapes.values(), key=lambda value: value[0])
+            # chosen shapes stand for the whole grid
+            total = float(logsumexp(gains) - np.log(min(own.count, MOST_SHAPES)))
+            term = self.term(own.effect, own.response, own.shapes[k], PRICE + min(total - top, 0.0))
+            out.append(Seen(total, top, term, noise))
+        return sorted(out, key=lambda seen: -seen.gain)
+
+    def settle(self, terms: tuple[Term, ...], noise: Mapping[str, Noise], names: Sequence[str] = ()) -> Hypothesis:
+        """Return the model with noise of its own and the last term at its likeliest scale."""
+        noise = estimate_noise_of(self.linear, terms, noise, names)
+        if not terms:
+            return Hypothesis((), noise, Background(self.linear, (), noise).evidence)
+        beside = Background(self.linear, terms[:-1], noise)
+        last, gain = beside.with_term(terms[-1])
+        return Hypothesis((*terms[:-1], last), noise, beside.evidence + gain)
+
+    def polish(self, beside: Background, term: Term) -> Term:
+        """Move the free parameters of a shape, one after another, to where the evidence is largest between the next shapes of the grid."""
+        effect = term.effect
+        if effect.near is not None:
+            shapes = [tuple(shape) for shape in effect.near(self.signatures.span, term.response, term.shape)]
+            tried = [self._moved(term, shape) for shape in shapes[:: max(1, len(shapes) // 60)]]
+            return max([term, *tried], key=lambda one: beside.with_term(one)[1])
+        grid = np.array(list(effect.grid(self.signatures.span, term.response)))
+        best = beside.with_term(term)[1]
+        for k, parameter in enumerate(effect.shape):
+            if not parameter.moves(term.shape[k]):
+                continue
+            low, high = self._between(grid[:, k], term.shape[k], parameter)
+            if high <= low:
+                continue
+            logarithmic = parameter.logarithmic and low > 0
+            start = term
+
+            def at(x: float, k: int = k, logarithmic: bool = logarithmic, start: Term = start) -> Term:
+                value = float(np.exp(x)) if logarithmic else float(x)
+                return self._moved(start, (*start.shape[:k], value, *start.shape[k + 1 :]))
+
+            ends = (np.log(low), np.log(high)) if logarithmic else (low, high)
+            lowest = minimize_scalar(
+                lambda x, at=at: -beside.with_term(at(x))[1], bounds=ends, method="bounded", options={"maxiter": 10}
+            )
+            if -lowest.fun > best:
+                best, term = float(-lowest.fun), at(lowest.x)
+        return term
+
+    def _moved(self, term: Term, shape: tuple[float, ...]) -> Term:
+        return replace(self.term(term.effect, term.response, shape, term.price), scale=term.scale)
+
+    def _between(self, grid: Array, at: float, parameter: Parameter) -> tuple[float, float]:
+        """Return the neighbours of a value in a grid, within the bounds of its parameter."""
+        span, near = self.signatures.span, 1e-9 * max(abs(at), 1.0)
+        values = np.unique(grid)
+        below, above = values[values < at - near], values[values > at + near]
+        step = 1.6 if parameter.logarithmic else 1.0
+        low = below[-1] if below.size else (at / step if parameter.logarithmic else at - step)
+        high = above[0] if above.size else (at * step if parameter.logarithmic else at + step)
+        ends = parameter.high, parameter.of_run * span.longest_run, parameter.of_range * span.temperature_range
+        return float(max(low, parameter.low)), float(min(high, *ends))
+
+    def contenders(self, now: Hypothesis) -> list[Hypothesis]:
+        """Return the models with one effect more, best first: each with shape, noise and size of its own where it is near enough."""
+        seen = self.scan(now)[:CONTENDERS]
+        tried: list[tuple[float, Term, Mapping[str, Noise]]] = []
+        plain = Background(self.linear, now.terms, now.noise)
+        for one in seen:
+            beside = plain if one.noise is now.noise else Background(self.linear, now.terms, one.noise)
+            if _near(one.gain, seen[0].gain):
+                term = self.polish(beside, one.term)
+                tried.append((beside.with_term(term)[1] + beside.evidence - plain.evidence, term, one.noise))
+        best = max((gain for gain, _, _ in tried), default=0.0)
+        found = []
+        for gain, term, noise in tried:
+            if _near(gain, best):
+                acts = self.linear.responses if term.effect.thermal else (term.response,)
+                found.append(self.settle((*now.terms, term), noise, acts))
+        return sorted(found, key=lambda h: -h.score)
+
+    def run(self, before: Hypothesis | None = None) -> Outcome:
+        """Grow the model from nothing, or from what was found in another linearisation."""
+        estimated = estimate_noise_of(self.linear, (), self.noise)
+        plain = now = Hypothesis((), estimated, Background(self.linear, (), estimated).evidence)
+        if before is not None:
+            for term in before.terms:
+                beside = Background(self.linear, now.terms, before.noise)
+                now = self.settle((*now.terms, self.polish(beside, self._moved(term, term.shape))), before.noise)
+            now = self._without_idle(now, plain)
+        beside_nothing: list[Hypothesis] = []
+        for _ in range(MOST_TERMS - len(now.terms)):
+            tried = self.contenders(now)
+            beside_nothing = tried if not now.terms else beside_nothing
+            if not tried or tried[0].score - now.score < _needed(plain, now):
+                break
+            self.progress(f"{tried[0].terms[-1].effect.name} explains {tried[0].score - now.score:.0f} of log evidence")
+            now = self._without_idle(self.settle(tried[0].terms, tried[0].noise), plain)
+        rivals, without = [], []
+        for k, term in enumerate(now.terms):
+            others = (*now.terms[:k], *now.terms[k + 1 :])
+            base = self.settle(others, now.noise) if others else plain
+            own = beside_nothing if not others and beside_nothing else self.contenders(base)
+            same = replace(now, terms=(*others, term))
+            known = [h for h in own if h.terms[-1].key != term.key]
+            rivals.append(tuple(sorted([same, *known], key=lambda h: -h.score)))
+            without.append(base)
+        return Outcome(plain, now, tuple(rivals), tuple(without))
+
+    def _quieter(self, now: Hypothesis, parts: Sequence[float]) -> list[tuple[str, dict[str, Noise]]]:
+        """Return noises with less that is slow in one response, and no more white noise than neighbouring rows scatter."""
+        found = []
+        for name, own in now.noise.items():
+            rows = self.linear.rows[name]
+            rest = Background(self.linear, now.terms, now.noise).residual(name)
+            white = min(own.white, white_rms(*(rest[place] for place in rows.slices)) * rows.span**0.5 or own.white)
+            for part in parts:
+                less = replace(own, white=white, flicker=own.flicker * max(part, 0.1), walk=own.walk * part)
+                found.append((name, {**now.noise, name: less}))
+        return found
+
+    def _without_idle(self, now: Hypothesis, plain: Hypothesis) -> Hypothesis:
+        """Leave out terms that do not pay beside the others."""
+        for k in range(len(now.terms)):
+            others = (*now.terms[:k], *now.terms[k + 1 :])
+            fewer = self.settle(others, now.noise) if others else plain
+            if now.score - fewer.score < _needed(plain, fewer):
+                return self._without_idle(fewer, plain)
+        return now
+
+
+def _near(gain: float, best: float) -> bool:
+    part, less = NEAR
+    return gain > max(part * best - less, HOPELESS)
+
+
+def _needed(plain: Hypothesis, now: Hypothesis) -> float:
+    return MARGIN + FURTHER * max(now.score - plain.score, 0.0)
+
+
+def _leading(effect: Effect, shapes: int) -> list[int]:
+    spread = effect.spread
+    least = 0.0 if shapes <= FEW else LEADING * float(spread.max())
+    first = [int(k) for k in np.argsort(-spread, kind="stable") if spread[k] > 0 and spread[k] >= least]
+    return first if shapes <= FEW else first[: max(WIDTH, int(np.sum(spread == spread.max())))]

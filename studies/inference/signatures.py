@@ -1,0 +1,192 @@
+"""Signatures of effects in the rows of a calibration: what each adds to every response, driven by the card's own simulation.
+
+An effect on a response adds its columns there. One on the resonator's temperature, dT, changes every response by
+∂y/∂T dT + ∂y/∂Ṫ dṪ, the slopes by differences of the read-out at the temperatures that the card predicts.
+"""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shell.constants import zero_Celsius
+from studies.calibration.problem import CardProblem
+from studies.effects import Effect, Span, library
+from studies.effects.states import States, remembered
+from studies.simulation.drive import Drive
+from studies.simulation.heat_path import slowest_lag
+from studies.simulation.prediction import Prediction, predict
+from studies.simulation.response import Temperatures, read_out
+
+if TYPE_CHECKING:
+    from shell.law import FrequencyLaw
+    from studies.instrument.card import Instrument
+
+Array = NDArray[np.float64]
+WARMER, FASTER, LOSSIER = 0.01, 1e-6, 0.01
+"""Steps of temperature (K), of its rate (K/s) and of 1/Q (relative) for the slopes of the read-out."""
+VARIES = 1e-3
+"""Relative change from which on a drive varies."""
+
+
+@dataclass(frozen=True)
+class Path:
+    """One run as the card predicts it: its states on an even grid, and how responses follow the resonator's temperature.
+
+    `by_temperature` and `by_rate`: response -> slope at the predicted rows, per K and per K/s; `by_loss`: of the bias by 1/Q, through the
+    anisotropy of damping.
+    """
+
+    time: Array
+    states: States
+    prediction: Prediction
+    by_temperature: Mapping[str, Array]
+    by_rate: Mapping[str, Array]
+    by_loss: Array
+
+    def onto_rows(self, values: Array) -> Array:
+        """Return columns of the even grid at the predicted rows."""
+        if self.time.shape == self.states.time.shape and np.allclose(self.time, self.states.time, rtol=0.0, atol=1e-6):
+            return values
+        return np.stack([np.interp(self.time, self.states.time, column) for column in values.T], axis=1)
+
+    def changes(self, effect: Effect, own: Array, response: str) -> dict[str, Array]:
+        """Return what the columns of an effect on the even grid make of every response at the predicted rows."""
+        here = self.onto_rows(own)
+        if effect.thermal:
+            faster = self.onto_rows(np.gradient(own, self.states.step, axis=0))
+            return {
+                name: by_T[:, None] * here + self.by_rate[name][:, None] * faster
+                for name, by_T in self.by_temperature.items()
+            }
+        if response == "inverse_q":
+            return {response: here, "bias_deg_per_h": self.by_loss[:, None] * here}
+        return {response: here}
+
+
+def trace(instrument: "Instrument", law: "FrequencyLaw", drive: Drive, run: int) -> Path:
+    """Return the path of one run through the states of a card."""
+    found = predict(instrument, drive, (), law)
+    time = drive.time - drive.time[0]
+    even = np.linspace(0.0, time[-1], int(np.ceil(time[-1] / np.median(np.diff(time)))) + 1)
+    standing = {"pattern_angle": np.full(len(time), np.radians(instrument.bias.pattern_angle_deg))}
+    commands = {name: np.interp(even, time, values) for name, values in (standing | dict(drive.commands)).items()}
+    at, tau = found.temperatures, slowest_lag(found.network, instrument.reference_temperature)
+
+    def read(warmer: float, faster: float) -> dict[str, Array]:
+        value, rate = at.value.copy(), at.rate.copy()
+        value[:, 1] += warmer
+        rate[:, 1] += faster
+        return read_out(instrument, law, drive, Temperatures(value, rate), tau, found.damping)
+
+    (below, above), (slower, faster) = (
+        [read(sign * step * (kind == 0), sign * step * (kind == 1)) for sign in (-1, 1)]
+        for kind, step in enumerate((WARMER, FASTER))
+    )
+    states = States(
+        run=run,
+        time=even,
+        campaign_time=even + drive.start,
+        housing=np.interp(even, time, found.housing),
+        resonator=np.interp(even, time, found.columns["resonator_temperature_degC"]) + zero_Celsius,
+        tau=tau,
+        reference=instrument.reference_temperature,
+        **commands,
+    )
+    more = LOSSIER * float(np.median(found.columns["inverse_q"]))
+    less, lossier = (read_out(instrument, law, drive, at, tau, found.damping, sign * more) for sign in (-1, 1))
+    return Path(
+        time,
+        states,
+        found,
+        {name: (above[name] - below[name]) / (2 * WARMER) for name in above},
+        {name: (faster[name] - slower[name]) / (2 * FASTER) for name in faster},
+        (lossier["bias_deg_per_h"] - less["bias_deg_per_h"]) / (2 * more),
+    )
+
+
+@dataclass(frozen=True)
+class Signatures:
+    """Paths of all runs of a calibration at one point."""
+
+    problem: CardProblem
+    paths: tuple[Path, ...]
+
+    @classmethod
+    def at(cls, problem: CardProblem, point: Array) -> "Signatures":
+        """Trace all runs with the values of a point."""
+        instrument = problem.instrument_at(point)
+        law = problem.law_at(instrument)
+        drives = [problem.drive_at(point, k) for k in range(len(problem.parts))]
+        paths = [trace(instrument, law, drive, part.run) for drive, part in zip(drives, problem.parts, strict=True)]
+        past = remembered([path.states for path in paths])
+        return cls(
+            problem,
+            tuple(
+                replace(path, states=replace(path.states, before=turns))
+                for path, turns in zip(paths, past, strict=True)
+            ),
+        )
+
+    @cached_property
+    def span(self) -> Span:
+        """What the campaign covers."""
+        states = [path.states for path in self.paths]
+        housing = np.concatenate([s.housing for s in states])
+        low, high = np.percentile(housing, (0.5, 99.5))
+        first = [self.problem.runs[part.run].responses[part.responses[0]].time for part in self.problem.parts]
+        begins, ends = [s.campaign_time[0] for s in states], [s.campaign_time[-1] for s in states]
+        angles = np.concatenate([np.zeros(1) if s.pattern_angle is None else s.pattern_angle for s in states])
+        return Span(
+            temperature_low=float(low),
+            temperature_high=float(high),
+            longest_run=max(float(np.ptp(s.time)) for s in states),
+            campaign_length=float(max(ends) - min(begins)),
+            step=max(float(np.median(np.diff(t))) for t in first),
+            tau=max(s.tau for s in states),
+            runs=len(states),
+            bins=tuple(first),
+            turns=bool(np.ptp(angles) > VARIES),
+            timed=True,
+        )
+
+    def size(self, effect: Effect, response: str) -> float:
+        """Return how large the first coefficient is in strong cases, K or the unit of the response."""
+        if effect.thermal or response == "bias_deg_per_h":
+            return effect.sizes[response]
+        parts = [self.problem.runs[part.run].responses[response].value for part in self.problem.members(response)]
+        return effect.sizes[response] * abs(float(np.median(np.concatenate(parts))))
+
+    def applicable(self, effects: "Mapping[str, Effect] | None" = None) -> Iterator[tuple[Effect, str]]:
+        """Yield the effects that can act here, with the response where each counts: drives that vary, shapes that fit."""
+        for effect in (library() if effects is None else effects).values():
+            if not all(self._varies(name) for name in effect.needs):
+                continue
+            for response in effect.sizes:
+                there = response in self.problem.responses
+                if there and not (effect.thermal and response != "frequency_Hz"):
+                    yield effect, response
+
+    def _varies(self, drive: str) -> bool:
+        parts = [getattr(path.states, drive) for path in self.paths]
+        if any(part is None for part in parts):
+            return False
+        values = np.concatenate(parts)
+        return bool(np.ptp(values) > VARIES * max(float(np.abs(values).max()), 1e-12))
+
+    def columns(self, effect: Effect, shape: tuple[float, ...], response: str) -> dict[str, Array]:
+        """Return what the members of an effect make of each response, stacked over its rows."""
+        found: dict[str, list[Array]] = {name: [] for name in self.problem.responses}
+        acting = set()
+        for part, path in zip(self.problem.parts, self.paths, strict=True):
+            changes = path.changes(effect, np.asarray(effect.columns(path.states, shape, response)), response)
+            for name in part.responses:
+                own = changes.get(name)
+                acting |= set() if own is None else {name}
+                blocks = self.problem.runs[part.run].responses[name]
+                zero = np.zeros((len(blocks.value), effect.spread.size))
+                found[name].append(zero if own is None else blocks.average(own))
+        return {name: np.concatenate(parts) for name, parts in found.items() if name in acting}

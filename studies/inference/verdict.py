@@ -1,0 +1,263 @@
+"""From an inference to the verdict of the contract: causes with their equals and numbers, values that moved, and each response."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import erf
+
+from compensation.noise import Noise, white_rms
+from studies.calibration.estimates import SILENT
+from studies.calibration.fit import stated_noise
+from studies.calibration.ladder import noise_rms
+from studies.calibration.priors import from_standard
+from studies.diagnosis.constants import CONSTANTS
+from studies.diagnosis.response import RESPONSES
+from studies.diagnosis.verdict import (
+    NINETY,
+    Cause,
+    Interval,
+    ResponseResult,
+    Shift,
+    Verdict,
+    doubted,
+    overall,
+    same_cause,
+    weigh,
+)
+from studies.effects import find_effect
+from studies.inference.diagnosis import Inference
+from studies.inference.model import Background, Term
+from studies.inference.signatures import Signatures
+
+Array = NDArray[np.float64]
+FAR = 2.0
+"""Prior standard deviations beyond which a value of the card is wrong."""
+NARROW_RANGE = 1.0
+"""Kelvin below which a temperature does not vary."""
+STEP, WORTH = 0.03, 0.5
+"""Of a shape parameter (of its logarithm): first step to see its curvature, and fall of the evidence that a step should cost."""
+
+
+def judge(found: Inference) -> Verdict:
+    """Return the verdict."""
+    shifts = find_shifts(found)
+    physics = _merged([_cause(found, k) for k in range(len(found.final.terms))])
+    causes = tuple(sorted((*wrong_values(shifts), *physics), key=lambda cause: -cause.evidence))
+    results = {name: _result(found, name, causes) for name in found.search.linear.responses}
+    verdict = overall([result.verdict for result in results.values()])
+    named = tuple(cause for cause in doubted(causes) if cause.probability >= CONSTANTS["member"])
+    return Verdict(verdict, named, results, next_step(named, results), found.notes, calibration=tuple(shifts))
+
+
+def find_shifts(found: Inference) -> list[Shift]:
+    """Return the values of the card that the data determine or have moved, with 90 % intervals."""
+    priors, (mean, C) = found.search.linear.problem.priors, found.background.posterior
+    count = len(priors.values)
+    z, cov = priors.standard(mean[:count]), priors.root @ C[:count, :count] @ priors.root.T
+    at, out = priors.at(mean[:count]), []
+    for value, own, sd in zip(priors.values, z, np.sqrt(np.diag(cov)), strict=True):
+        low, high = (from_standard(value, own + side * NINETY * sd) for side in (-1.0, 1.0))
+        if sd < SILENT or abs(own) > FAR:
+            out.append(Shift(value.name, value.value, at[value.name], min(low, high), max(low, high), float(own)))
+    return out
+
+
+def wrong_values(shifts: Sequence[Shift]) -> list[Cause]:
+    """Return the card's values that the data move by more than two of their standard deviations."""
+    return [
+        Cause(
+            shift.parameter,
+            "frequency_Hz",
+            float(erf(abs(shift.shift_sd) / np.sqrt(2.0))),
+            (),
+            {shift.parameter: Interval(shift.value, shift.low, shift.high)},
+            shift.shift_sd**2,
+            kind="value",
+        )
+        for shift in shifts
+        if abs(shift.shift_sd) > FAR
+    ]
+
+
+def _merged(causes: Sequence[Cause]) -> list[Cause]:
+    """Return one entry a physical cause, under the response where its evidence is largest."""
+    kept: list[Cause] = []
+    for cause in sorted(causes, key=lambda one: -one.evidence):
+        if not any(same_cause(cause, other) for other in kept):
+            kept.append(cause)
+    return kept
+
+
+def _cause(found: Inference, k: int) -> Cause:
+    """Return one term as a cause, with the effects that these data cannot tell from it."""
+    outcome, term = found.outcome, found.final.terms[k]
+    best: dict[str, float] = {}
+    for rival in outcome.rivals[k]:
+        name = rival.terms[-1].effect.name
+        best[name] = max(best.get(name, -np.inf), rival.score)
+    members, probability = weigh(list(best), list(best.values()), outcome.without[k].score, found.unknown[k])
+    left = found.left[term.response]
+    if left.significant and 0.0 < left.share < CONSTANTS["believed"]:
+        probability *= left.share  # whatever made the larger rest may have made this too
+    exact = term.effect.equivalents.get(term.response, ())
+    names = list(dict.fromkeys([term.effect.name, *members, *exact]))
+    numbers = parameters_of(found.background, found.search.signatures, k)
+    own = next(iter([columns for name, columns in term.columns.items() if name == term.response]))
+    change = own @ found.background.coefficients(k)[0]
+    shapes = {rival.terms[-1].effect.name: _shape_of(rival.terms[-1]) for rival in reversed(outcome.rivals[k])}
+    return Cause(
+        term.effect.name,
+        term.response,
+        probability,
+        tuple(sorted(names[1:])),
+        numbers,
+        2.0 * max(found.final.score - outcome.without[k].score, 0.0),
+        peak=float(np.ptp(change)),
+        shapes=shapes | {term.effect.name: numbers},
+    )
+
+
+def _shape_of(term: Term) -> dict[str, Interval]:
+    return {p.name: Interval.about(v, 0.0) for p, v in zip(term.effect.shape, term.shape, strict=True)}
+
+
+def parameters_of(background: Background, signatures: Signatures, k: int) -> dict[str, Interval]:
+    """Return shape and definite coefficients of a term with 90 % intervals.
+
+    What is not known of the shape is part of what is not known of the coefficients: Σ = Σ_c + Σ_s (∂c/∂s)² σ_s².
+    """
+    term, out = background.terms[k], {}
+    mean, C = background.coefficients(k)
+    variance = np.diag(C).copy()
+    for place, parameter in enumerate(term.effect.shape):
+        value, sd = term.shape[place], 0.0
+        if parameter.moves(value):
+            sd, slope = _shape_spread(background, signatures, k, place)
+            variance = variance + (slope * sd) ** 2
+        if parameter.logarithmic and sd > 0:
+            half = NINETY * sd
+            out[parameter.name] = Interval(value, value * float(np.exp(-half)), value * float(np.exp(half)))
+        else:
+            out[parameter.name] = Interval.about(value, sd)
+    begin = 0
+    names = term.effect.coefficient_names(term.response)
+    for name, coefficient in zip(names, term.effect.coefficients, strict=True):
+        at = term.members.index(begin) if begin in term.members else -1
+        if at >= 0 and any(own[:, at].any() for own in term.columns.values()):  # what no row shows is left out
+            out[name] = Interval.about(float(mean[at]), float(np.sqrt(variance[at])))
+        begin += len(coefficient.spread)
+    return out
+
+
+def _shape_spread(background: Background, signatures: Signatures, k: int, place: int) -> tuple[float, Array]:
+    """Return the standard deviation of a shape parameter (of its logarithm where it has one) and how coefficients go with it."""
+    term = background.terms[k]
+    parameter, value = term.effect.shape[place], term.shape[place]
+    step = STEP if parameter.logarithmic else max(0.01 * abs(value), 0.05)
+
+    def moved(by: float) -> Background:
+        there = value * float(np.exp(by)) if parameter.logarithmic else value + by
+        shape = (*term.shape[:place], there, *term.shape[place + 1 :])
+        columns = signatures.columns(term.effect, shape, term.response)
+        own = replace(term, shape=shape, columns={n: X[:, term.members] for n, X in columns.items()})
+        return replace(background, terms=(*background.terms[:k], own, *background.terms[k + 1 :]))
+
+    for _ in range(6):
+        below, above = moved(-step), moved(step)
+        fall = background.evidence - 0.5 * (below.evidence + above.evidence)
+        if 0.1 * WORTH < fall < 10 * WORTH:
+            break
+        step *= float(np.clip(np.sqrt(WORTH / max(fall, 1e-6)), 0.02, 5.0))
+    sd = step / float(np.sqrt(2.0 * fall)) if fall > 0 else 10.0 * step
+    slope = (above.coefficients(k)[0] - below.coefficients(k)[0]) / (2.0 * step)
+    return sd, slope
+
+
+def _result(found: Inference, name: str, causes: Sequence[Cause]) -> ResponseResult:
+    left, plain, rows = found.left[name], found.plain[name], found.rows[name]
+    before, after = found.held_out[name]
+    terms = [term for term in found.final.terms if term.response == name]
+    mine = [cause for cause in causes if cause.response == name and cause.kind == "physics"]
+    values = any(cause.kind == "value" and cause.response == name for cause in causes)
+    share = (left.share if left.significant else 1.0) if terms else None
+    slow = _slow(found, name)
+    verdict, remark = _judge(found, name, bool(terms), mine, values, slow, share)
+    noise = min(value for value in (rows.rms, after if terms else before) if value is not None)
+    white = white_rms(*rows.residual)
+    return ResponseResult(
+        verdict,
+        noise,
+        (plain.rms, before),
+        (rows.rms, after) if terms else None,
+        "structure" if left.significant else "none",
+        left.input if left.significant else "",
+        2.0 * max(left.evidence, 0.0),
+        share,
+        remark,
+        white=white,
+        wander=float(np.sqrt(max(rows.rms**2 - white**2, 0.0))),
+        shipped=found.shipped[name].rms,
+        run_shifts=_run_shifts(found, name),
+    )
+
+
+def _judge(
+    found: Inference, name: str, terms: bool, mine: Sequence[Cause], values: bool, slow: float, share: float | None
+) -> tuple[str, str]:
+    left = found.left[name]
+    clean = share is None or share >= CONSTANTS["share_explained"]
+    patched = bool(mine) and max(cause.probability for cause in mine) < CONSTANTS["believed"]
+    if left.significant and (share is None or not clean or patched):
+        return "unexplained", ""
+    if slow > CONSTANTS["wander_usual"]:
+        return "not-identifiable", (
+            f"the slow part of the residual is {slow:.2g} times what the card states of its noise: these records cannot distinguish"
+            " slow noise from a cause that acts slowly"
+        )
+    if terms:
+        return ("not-identifiable" if any(cause.equivalent for cause in mine) else "explained"), ""
+    if values:
+        return "explained", ""
+    resonator = np.concatenate([path.states.resonator for path in found.search.signatures.paths])
+    if np.ptp(resonator) < NARROW_RANGE:
+        return (
+            "not-identifiable",
+            f"too short to judge: the resonator's temperature changes by {np.ptp(resonator):.2g} K only",
+        )
+    return "adequate", ""
+
+
+def _slow(found: Inference, name: str) -> float:
+    """What is left of a response over the scatter of neighbouring rows and what the card states of slow noise."""
+    stated = stated_noise(found.card.noise, name) or Noise(0.0)
+    slow = noise_rms(found.fit, name, replace(stated, white=0.0, offset=0.0))
+    rows = found.rows[name]
+    return rows.rms / max(float(np.hypot(white_rms(*rows.residual), slow)), 1e-300)
+
+
+def _run_shifts(found: Inference, name: str) -> tuple[float, ...]:
+    """Mean of what is left of each run, about their mean."""
+    level = found.search.linear.rows[name]
+    rest = found.background.residual(name)
+    means = np.array([rest[own].mean() for own in level.slices])
+    return tuple(float(value) for value in means - means.mean())
+
+
+def next_step(causes: Sequence[Cause], results: Mapping[str, ResponseResult]) -> str | None:
+    """Return what to measure next: what would separate a set, or see again what nobody explains."""
+    for cause in causes:
+        if cause.equivalent:
+            sensors = sorted({find_effect(name).sensor for name in cause.names} - {""})
+            more = f" Alternatively, without a run: {'; or '.join(sensors)}." if sensors else ""
+            others = ", ".join(cause.equivalent)
+            return f"To distinguish {cause.effect} from {others}: {find_effect(cause.effect).isolate}.{more}"
+    for name, result in results.items():
+        if result.verdict == "unexplained":
+            word = RESPONSES[name].word
+            return (
+                f"The {word} has structure in {result.left_over_input} that no known effect explains: repeat a run unchanged to see"
+                " whether it recurs, then vary that input alone."
+            )
+    return None
