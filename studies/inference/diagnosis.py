@@ -4,7 +4,7 @@ The card is calibrated without effects first. Where effects are found its values
 unknowns together, and the search begins again there: values that had gone far to do what an effect does come back.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -20,10 +20,12 @@ from studies.calibration.problem import CardProblem, wide_law
 from studies.diagnosis.constants import CONSTANTS
 from studies.diagnosis.seen import SeenResponse
 from studies.inference.held_out import Kept, Model, Rows
-from studies.inference.lack_of_fit import Leftover, generic_bank, look
+from studies.inference.inferred import Inferred
+from studies.inference.lack_of_fit import generic_bank, look
 from studies.inference.model import Background, Linear
-from studies.inference.search import Hypothesis, Outcome, Search
+from studies.inference.search import Outcome, Search
 from studies.inference.signatures import Signatures
+from studies.inference.verdict import judge
 from studies.record import Record
 from studies.shown import Shown
 
@@ -44,30 +46,8 @@ FAR = 2.0
 
 
 @dataclass(frozen=True, repr=False)
-class Inference(Shown):
-    """What a card and records say together.
-
-    Attributes
-    ----------
-    card : as shipped
-    shipped, plain : rows of every response with the card as shipped and calibrated
-    search : Search, in the linearisation where it ended
-    outcome : Outcome
-    left : response -> Leftover
-    held_out : response -> (without effects, with them)
-    """
-
-    card: "Instrument"
-    fit: CardFit
-    search: Search
-    outcome: Outcome
-    left: Mapping[str, Leftover]
-    shipped: Mapping[str, Rows]
-    plain: Mapping[str, Rows]
-    rows: Mapping[str, Rows]
-    held_out: Mapping[str, tuple[float | None, float | None]]
-    unknown: tuple[float, ...]
-    notes: tuple[str, ...] = ()
+class Inference(Inferred, Shown):
+    """What a card and records say together, with its verdict."""
 
     drawn_by = "studies.reports.diagnosis_pictures:ladder"
 
@@ -78,16 +58,9 @@ class Inference(Shown):
         """Return one row a response."""
         return self.verdict.to_frame()
 
-    @property
-    def final(self) -> Hypothesis:
-        """The model with the named effects."""
-        return self.outcome.final
-
     @cached_property
     def verdict(self) -> "Verdict":
         """The outcome of the contract."""
-        from studies.inference.verdict import judge
-
         return judge(self)
 
     @property
@@ -143,21 +116,6 @@ class Inference(Shown):
             ),
             left=(left.input, 2.0 * left.evidence) if left.significant else None,
         )  # fmt: skip
-
-    @cached_property
-    def background(self) -> Background:
-        """The final model, solved."""
-        return Background(self.search.linear, self.final.terms, self.final.noise)
-
-    @cached_property
-    def model(self) -> Model:
-        """The final model on the records' rows."""
-        return Model(self.search.linear, self.search.signatures, self.final.terms, self.final.noise)
-
-    @cached_property
-    def numbers(self) -> Kept:
-        """Its most probable numbers."""
-        return self.model.kept(self.background.posterior[0])
 
 
 def build_problem(card: "Instrument", records: Sequence[Record]) -> CardProblem:

@@ -27,7 +27,7 @@ from studies.diagnosis.verdict import (
     weigh,
 )
 from studies.effects import find_effect
-from studies.inference.diagnosis import Inference
+from studies.inference.inferred import Inferred
 from studies.inference.model import Background, Term
 from studies.inference.signatures import Signatures
 
@@ -40,7 +40,7 @@ STEP, WORTH = 0.03, 0.5
 """Of a shape parameter (of its logarithm): first step to see its curvature, and fall of the evidence that a step should cost."""
 
 
-def judge(found: Inference) -> Verdict:
+def judge(found: Inferred) -> Verdict:
     """Return the verdict."""
     shifts = find_shifts(found)
     physics = _merged([_cause(found, k) for k in range(len(found.final.terms))])
@@ -51,7 +51,7 @@ def judge(found: Inference) -> Verdict:
     return Verdict(verdict, named, results, next_step(named, results), found.notes, calibration=tuple(shifts))
 
 
-def find_shifts(found: Inference) -> list[Shift]:
+def find_shifts(found: Inferred) -> list[Shift]:
     """Return the values of the card that the data determine or have moved, with 90 % intervals."""
     priors, (mean, C) = found.search.linear.problem.priors, found.background.posterior
     count = len(priors.values)
@@ -90,7 +90,7 @@ def _merged(causes: Sequence[Cause]) -> list[Cause]:
     return kept
 
 
-def _cause(found: Inference, k: int) -> Cause:
+def _cause(found: Inferred, k: int) -> Cause:
     """Return one term as a cause, with the effects that these data cannot tell from it."""
     outcome, term = found.outcome, found.final.terms[k]
     best: dict[str, float] = {}
@@ -175,7 +175,7 @@ def _shape_spread(background: Background, signatures: Signatures, k: int, place:
     return sd, slope
 
 
-def _result(found: Inference, name: str, causes: Sequence[Cause]) -> ResponseResult:
+def _result(found: Inferred, name: str, causes: Sequence[Cause]) -> ResponseResult:
     left, plain, rows = found.left[name], found.plain[name], found.rows[name]
     before, after = found.held_out[name]
     terms = [term for term in found.final.terms if term.response == name]
@@ -204,7 +204,7 @@ def _result(found: Inference, name: str, causes: Sequence[Cause]) -> ResponseRes
 
 
 def _judge(
-    found: Inference, name: str, terms: bool, mine: Sequence[Cause], values: bool, slow: float, share: float | None
+    found: Inferred, name: str, terms: bool, mine: Sequence[Cause], values: bool, slow: float, share: float | None
 ) -> tuple[str, str]:
     left = found.left[name]
     clean = share is None or share >= CONSTANTS["share_explained"]
@@ -229,7 +229,7 @@ def _judge(
     return "adequate", ""
 
 
-def _slow(found: Inference, name: str) -> float:
+def _slow(found: Inferred, name: str) -> float:
     """What is left of a response over the scatter of neighbouring rows and what the card states of slow noise."""
     stated = stated_noise(found.card.noise, name) or Noise(0.0)
     slow = noise_rms(found.fit, name, replace(stated, white=0.0, offset=0.0))
@@ -237,7 +237,7 @@ def _slow(found: Inference, name: str) -> float:
     return rows.rms / max(float(np.hypot(white_rms(*rows.residual), slow)), 1e-300)
 
 
-def _run_shifts(found: Inference, name: str) -> tuple[float, ...]:
+def _run_shifts(found: Inferred, name: str) -> tuple[float, ...]:
     """Mean of what is left of each run, about their mean."""
     level = found.search.linear.rows[name]
     rest = found.background.residual(name)

@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING, Any
 
 from shell.constants import zero_Celsius
 from studies.instrument.card import Instrument
-from studies.sweeps.quantity import OvertoneQuantity
 
 if TYPE_CHECKING:
     from shell.levels import Theory
@@ -42,8 +41,3 @@ class Case:
             resonator, elastic = self.instrument.at(temperature)
             self._solved[key] = solve_modes(resonator, elastic, harmonic, count, theory)
         return self._solved[key]
-
-    def mode(self, asked: OvertoneQuantity) -> "Mode":
-        """Return the mode that a quantity names."""
-        at = self.temperature(asked.temperature_degC)
-        return self.modes(asked.harmonic, asked.index + 1, asked.theory, at)[asked.index]

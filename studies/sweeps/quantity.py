@@ -9,6 +9,7 @@ import msgspec
 from studies.schema.keys import Keys, number, says
 
 if TYPE_CHECKING:
+    from shell.modes import Mode
     from studies.sweeps.case import Case
 
 SUFFIXES = {"Hz": "_Hz", "ppm/°C": "_ppm_per_degC", "°C": "_degC", "s": "_s", "°": "_deg", "1": ""}
@@ -109,3 +110,8 @@ class OvertoneQuantity(ModeQuantity, frozen=True, kw_only=True):
     def words(self) -> str:
         """Such as "n = 2", or "n = 2, mode 1" for a higher mode."""
         return f"n = {self.harmonic}" + (f", mode {self.index}" if self.index else "")
+
+    def mode(self, case: "Case") -> "Mode":
+        """Return the mode of a design."""
+        at = case.temperature(self.temperature_degC)
+        return case.modes(self.harmonic, self.index + 1, self.theory, at)[self.index]

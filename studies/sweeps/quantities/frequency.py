@@ -13,7 +13,7 @@ class Frequency(OvertoneQuantity, frozen=True, kw_only=True, tag="frequency"):
 
     def evaluate(self, case: Case) -> tuple[Number, ...]:
         """Return the frequency."""
-        mode = case.mode(self)
+        mode = self.mode(case)
         return (Number(mode.frequency, mode.frequency * mode.relative_error_estimate),)
 
 

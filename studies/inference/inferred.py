@@ -1,0 +1,62 @@
+"""What a card and records say together, before it is judged."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+from studies.calibration.fit import CardFit
+from studies.inference.held_out import Kept, Model, Rows
+from studies.inference.lack_of_fit import Leftover
+from studies.inference.model import Background
+from studies.inference.search import Hypothesis, Outcome, Search
+
+if TYPE_CHECKING:
+    from studies.instrument.card import Instrument
+
+
+@dataclass(frozen=True, repr=False)
+class Inferred:
+    """What a card and records say together.
+
+    Attributes
+    ----------
+    card : as shipped
+    shipped, plain : rows of every response with the card as shipped and calibrated
+    search : Search, in the linearisation where it ended
+    outcome : Outcome
+    left : response -> Leftover
+    held_out : response -> (without effects, with them)
+    """
+
+    card: "Instrument"
+    fit: CardFit
+    search: Search
+    outcome: Outcome
+    left: Mapping[str, Leftover]
+    shipped: Mapping[str, Rows]
+    plain: Mapping[str, Rows]
+    rows: Mapping[str, Rows]
+    held_out: Mapping[str, tuple[float | None, float | None]]
+    unknown: tuple[float, ...]
+    notes: tuple[str, ...] = ()
+
+    @property
+    def final(self) -> Hypothesis:
+        """The model with the named effects."""
+        return self.outcome.final
+
+    @cached_property
+    def background(self) -> Background:
+        """The final model, solved."""
+        return Background(self.search.linear, self.final.terms, self.final.noise)
+
+    @cached_property
+    def model(self) -> Model:
+        """The final model on the records' rows."""
+        return Model(self.search.linear, self.search.signatures, self.final.terms, self.final.noise)
+
+    @cached_property
+    def numbers(self) -> Kept:
+        """Its most probable numbers."""
+        return self.model.kept(self.background.posterior[0])
