@@ -18,6 +18,7 @@ from studies.diagnosis.checks import FEWEST_BINS
 from studies.diagnosis.constants import CONSTANTS
 from studies.diagnosis.held_out import Score, score_both
 from studies.diagnosis.inquiry import Inquiry, Thermometer, again, begin, inquire, read_thermometer
+from studies.diagnosis.lack_of_fit import doubt_of
 from studies.diagnosis.model import Fit
 from studies.diagnosis.planning.advice import suggest_next
 from studies.diagnosis.planning.chamber import Chamber
@@ -366,10 +367,7 @@ def _judge(
     if np.ptp(temperature) < NARROW_RANGE:
         return "not-identifiable", [f"the temperature varies by {np.ptp(temperature):.2g} K only"]
     if left.doubtful:
-        needed = 2.0 * (CONSTANTS["margin"] - CONSTANTS["log_prior_unknown"])
-        return "not-identifiable", [
-            f"something may be left ({left.input}): evidence {2.0 * left.evidence:.3g}, more than noise leaves, but structure needs {needed:g}"
-        ]
+        return "not-identifiable", [doubt_of(left.input, left.evidence)]
     return ("not-identifiable", apart) if apart else ("adequate", _turned_on(inquiry))
 
 

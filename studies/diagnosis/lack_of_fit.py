@@ -54,6 +54,12 @@ class Leftover:
         return self.evidence > CONSTANTS["margin"]
 
 
+def doubt_of(input_: str, evidence: float) -> str:
+    """Return the sentence on structure that is more than noise leaves and less than it takes to name it."""
+    needed = 2.0 * (CONSTANTS["margin"] - CONSTANTS["log_prior_unknown"])
+    return f"something may be left ({input_}): evidence {2.0 * evidence:.3g}, more than noise leaves, but structure needs {needed:g}"
+
+
 def _ends(states: States) -> FloatArray:
     """Temperature over the range of the campaign, about −1 … 1."""
     return np.asarray(states.excess / 30.0)

@@ -34,6 +34,11 @@ class Leftover:
         """Whether it is more than chance."""
         return self.evidence > ENOUGH
 
+    @property
+    def doubtful(self) -> bool:
+        """Whether it is more than noise leaves, though perhaps too little to be called structure."""
+        return self.evidence > CONSTANTS["margin"]
+
 
 def generic_bank(search: Search) -> list[Shapes]:
     """Return the columns of the generic forms."""

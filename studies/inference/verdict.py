@@ -13,6 +13,7 @@ from studies.calibration.fit import stated_noise
 from studies.calibration.ladder import noise_rms
 from studies.calibration.priors import from_standard
 from studies.diagnosis.constants import CONSTANTS
+from studies.diagnosis.lack_of_fit import doubt_of
 from studies.diagnosis.response import RESPONSES
 from studies.diagnosis.verdict import (
     NINETY,
@@ -192,7 +193,7 @@ def _result(found: Inferred, name: str, causes: Sequence[Cause]) -> ResponseResu
         (plain.rms, before),
         (rows.rms, after) if terms else None,
         "structure" if left.significant else "none",
-        left.input if left.significant else "",
+        left.input if left.doubtful else "",
         2.0 * max(left.evidence, 0.0),
         share,
         remark,
@@ -226,7 +227,7 @@ def _judge(
             "not-identifiable",
             f"too short to judge: the resonator's temperature changes by {np.ptp(resonator):.2g} K only",
         )
-    return "adequate", ""
+    return ("not-identifiable", doubt_of(left.input, left.evidence)) if left.doubtful else ("adequate", "")
 
 
 def _slow(found: Inferred, name: str) -> float:
