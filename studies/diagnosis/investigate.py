@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import TYPE_CHECKING, cast
+from typing import TYPE_CHECKING, ClassVar, cast
 
 import numpy as np
 from scipy.special import erf
@@ -56,6 +56,7 @@ class Diagnosis(Shown):
     """A verdict with the fits behind it, for pages and extended models."""
 
     drawn_by = "studies.reports.diagnosis_pictures:ladder"
+    with_card: ClassVar[bool] = False
 
     verdict: Verdict
     campaign: Campaign

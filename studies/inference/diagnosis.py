@@ -7,7 +7,7 @@ unknowns together, and the search begins again there: values that had gone far t
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -50,6 +50,7 @@ class Inference(Inferred, Shown):
     """What a card and records say together, with its verdict."""
 
     drawn_by = "studies.reports.diagnosis_pictures:ladder"
+    with_card: ClassVar[bool] = True
 
     def __repr__(self) -> str:
         return f"Diagnosis({self.verdict})"

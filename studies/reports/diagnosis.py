@@ -49,9 +49,16 @@ RESULTS = (
     Column("explained_share", "explained", "%", ".1f", scale=100.0),
     Column("left", "lack of fit"),
 )
-METHOD = (
+WITH_CARD = (
+    "Frequency, bias and 1/Q are fitted together: the card's uncertain values within their tolerances, the start of each run, what"
+    " happened in gaps, and the effects in the library, each with a prior on its size, beside the noise of each response. "
+)
+WITHOUT_CARD = (
     "The baseline is calibrated first. Without a card it is the frequency through one thermal lag with free f0, slope and curvature,"
-    " the bias as a cubic in the frequency change with an offset for each run, and 1/Q as a quadratic in temperature. Each effect in"
+    " the bias as a cubic in the frequency change with an offset for each run, and 1/Q as a quadratic in temperature. "
+)
+METHOD = (
+    "Each effect in"
     " the library is a family of curves with a prior on its size. Models with no, one or several effects are compared by their"
     " marginal likelihood in white and coloured noise. Effects that fit equally well are named as a set; the other responses help"
     " to decide between them. Smooth generic functions of time, temperature, rate, history and drives detect structure that no"
@@ -182,7 +189,7 @@ def diagnosis_parts(diagnosis: "Diagnosis | Inference") -> list[Chapter]:
             *(Sentence(f"{cause.effect}: {_summary(cause)}", where="page") for cause in physics),
         ]),
         *(Chapter(f"Residual of the {NAMES[name]}", list(_alternatives(diagnosis, name))) for name in diagnosis.shown_responses),
-        Chapter("Method", [Sentence(METHOD, where="page")]),
+        Chapter("Method", [Sentence((WITH_CARD if diagnosis.with_card else WITHOUT_CARD) + METHOD, where="page")]),
     ]  # fmt: skip
 
 
