@@ -75,6 +75,7 @@ def test_heavy_packages_are_imported_where_they_are_needed():
             assert not {i.split(".")[0] for i in imports(path, top_only=True)} & lazy, name
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("words", "spared"),
     [

@@ -153,6 +153,7 @@ def test_amplitude_and_phase_are_those_of_the_complex_response():
     )
 
 
+@pytest.mark.slow
 def test_amplitude_response_is_that_of_the_integrated_carrier():
     """A rate that oscillates at λ: the secondary, through every cycle, has two side bands, A(λ) above and A(−λ) below the carrier."""
     side = 60.0

@@ -33,6 +33,7 @@ def test_the_allan_variance_of_draws_is_that_of_the_levels(kind, rate):
     assert np.all(error / found.mean(axis=0) < 0.1)
 
 
+@pytest.mark.slow
 def test_draws_have_the_covariance_of_the_levels():
     """Whitened by it, 20 000 runs of 30 rows have the unit matrix: eigenvalues of a sample's are within (1 ± √(30/20 000))²."""
     noise, times = Noise(2.0, 0.5, 0.05, 0.7), 20.0 * np.arange(30)

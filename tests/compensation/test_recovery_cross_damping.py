@@ -58,6 +58,7 @@ def test_constant_cross_damping_looks_like_a_rate():
     assert damped == pytest.approx(turned, rel=1e-4)
 
 
+@pytest.mark.slow
 def test_integrated_motion_with_varying_cross_damping_follows_the_slow_model():
     """Equations (2), carrier resolved and demodulated, against (9): 0.23 ζ in the amplitude, 2.6 ζ² in phase."""
     errors, in_phase = [], []
@@ -100,6 +101,7 @@ def test_noise_free_record_gives_the_planted_coefficients():
     assert np.max(np.abs(model.compensate(time, rate, temperature))) < 1e-9 * np.max(np.abs(rate))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("walk", [0.0, 0.05])
 def test_intervals_cover(walk):
     """95 % intervals hold the planted coefficient in 95 % of 200 records, within 4 sigma, also when the bias wanders."""

@@ -34,6 +34,7 @@ def test_levels_are_recovered_from_drawn_noise():
     assert max(n.walk for n in quiet) < 5e-4
 
 
+@pytest.mark.slow
 def test_what_is_stated_of_the_noise_helps_where_rows_say_little_and_yields_where_they_say_much():
     """Two short runs with a trend of each that is free: they hardly tell a walk from flicker."""
     generator = np.random.default_rng(8)

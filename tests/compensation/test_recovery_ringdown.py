@@ -122,6 +122,7 @@ def test_one_channel_tells_two_modes_but_no_axes():
     assert "frequency_axis_deg" not in found.estimates
 
 
+@pytest.mark.slow
 def test_an_isotropic_resonator_has_no_axis_and_says_so():
     gyro, squares = Gyro(CARRIER, CARRIER, 1e7, 1e7, 0.3, 0.3), 0.0
     for seed in range(16):

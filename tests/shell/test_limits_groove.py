@@ -33,6 +33,7 @@ def test_a_real_groove_lies_in_the_interval(pair, row):
     assert abs(four * found.wave - true) < 1.645 * four * found.error
 
 
+@pytest.mark.slow
 def test_a_shallow_wide_cut_is_the_shape_derivative(pair):
     """Hadamard's formula is exact as depth over width goes to 0: the relieved share falls in proportion."""
     shares = []

@@ -7,7 +7,7 @@ import pytest
 
 from shell.assembly import solid_group
 from shell.blocks import Solid, mesh_solid
-from shell.damping.base import lay_half_space
+from shell.damping.anchor import lay_half_space
 from shell.damping.radiation import assemble_waves, radiating_mode
 from shell.elastic import Elastic
 from shell.levels import LEVELS

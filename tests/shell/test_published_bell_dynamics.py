@@ -87,6 +87,7 @@ def test_printed_slow_acceleration_lacks_a_term_around():
     assert bell.inertial_forces()[2].coeff(bell.moving(2).diff(t, 2)) == rho * h
 
 
+@pytest.mark.slow
 def test_parts_of_the_temperature_coefficient_add_up_to_its_derivative():
     whole = sp.log(frequency_over_temperature()).diff(temperature)
     assert sp.simplify(whole - temperature_parts().total) == 0

@@ -57,6 +57,7 @@ def test_frame_noise_and_outliers_are_found(projector):
     assert abs(face.at(1.0, 2)[0]) == pytest.approx(2e-6, rel=0.02)
 
 
+@pytest.mark.slow
 def test_no_first_wave_is_seen_where_none_is(projector):
     """Tilt, shift, gaps and waves 2 and 3 but no wave 1: its 90 % interval holds 0, and those of the others their amplitudes."""
     held = {1: 0, 2: 0, 3: 0}
@@ -137,7 +138,7 @@ def test_two_harmonics_and_teeth(pair):
 
 
 def test_planted_splits_end_below_half_a_millihertz_in_three_rounds(pair):
-    """Three seeds of tests/benchmarks/bench_trim.py: cuts with 2 % of error, readings with 0.1 mHz, coupled harmonics as nature."""
+    """Three seeds: cuts with 2 % of error, readings with 0.1 mHz, coupled harmonics as nature."""
     coupled, f = CoupledHarmonics(pair.mode, SILICA), pair.mode.frequency
     for seed, planted in ((0, 0.02), (1, 0.2), (2, 1.0)):
         rng = np.random.default_rng(seed)

@@ -15,7 +15,7 @@ OPEN = ("thermal.", "noise.", "material.deviation.shear_modulus")
 
 
 def _run(times, levels, random):
-    """A run that begins at rest: rows of a minute, 5 mK and 1 mHz."""
+    """A run that begins at rest: rows of two minutes, 5 mK and 1 mHz."""
     t = np.arange(0.0, 4 * 3600.0 + 1.0, STEP_S)
     chamber = np.interp(t, times, levels)
     housing = housing_of(NETWORK, chamber)
@@ -26,7 +26,7 @@ def _run(times, levels, random):
         "housing_temperature_degC": housing + 5e-3 * random.standard_normal(t.size),
         "frequency_Hz": 4432.07 * (1 + 82e-6 * x - 6e-8 * x**2) + 1e-3 * random.standard_normal(t.size),
     }
-    return Record({name: column[::6] for name, column in columns.items()})
+    return Record({name: column[::12] for name, column in columns.items()})
 
 
 @pytest.mark.slow

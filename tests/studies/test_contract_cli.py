@@ -178,6 +178,7 @@ def test_what_a_file_says_cannot_act_on_the_terminal(tmp_path, capsys):
         assert "\x1b" not in said
 
 
+@pytest.mark.slow
 def test_doctor_looks_for_the_package_of_the_cluster_and_not_for_a_program(capsys, monkeypatch):
     pytest.importorskip("distributed", reason="the extra 'cluster' (dask[distributed]) is not installed")
     monkeypatch.setenv("PATH", "")

@@ -37,9 +37,8 @@ def test_every_name_is_there_and_listed(package):
     assert set(module.__all__) <= set(dir(module))
 
 
-@pytest.mark.parametrize("package", PACKAGES)
-def test_a_package_alone_imports_nothing_heavy(package):
-    code = f"import {package}, sys; print([m for m in ('numpy', 'scipy', 'sympy', 'pyvista', 'matplotlib') if m in sys.modules])"
+def test_packages_import_nothing_heavy():
+    code = f"import {', '.join(PACKAGES)}, sys; print([m for m in ('numpy', 'scipy', 'sympy', 'pyvista', 'matplotlib') if m in sys.modules])"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"
 
@@ -67,6 +66,7 @@ def test_records_show_themselves_shortly_and_as_tables_and_pictures():
     assert "<table" in record._repr_html_()
 
 
+@pytest.mark.slow
 def test_results_show_themselves_shortly_and_as_tables(tmp_path):
     table = str(Path(studies.papers.__file__).parent / "hrg_table1.csv")
     comparison = studies.compare(["free-dome", "hrg-30mm"])

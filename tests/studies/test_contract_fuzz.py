@@ -428,6 +428,7 @@ def test_a_long_profile_in_words_is_no_file_name():
     assert load_drive(words).end == pytest.approx(60 * 3600)
 
 
+@pytest.mark.slow
 def test_text_of_files_is_escaped_in_pages(tmp_path, capsys, monkeypatch):
     """A hostile card's and record's texts stand as text in every page that is made from them."""
     monkeypatch.setattr("shell.render._run_child", lambda *_: None)  # no pictures: they hold no text

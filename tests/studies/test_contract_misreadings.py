@@ -70,6 +70,7 @@ def test_a_bias_in_degrees_per_second_is_named(card, record):
     assert "the column is probably in °/s; multiply it by 3600" in said
 
 
+@pytest.mark.slow
 def test_a_record_given_twice_counts_once_and_holds_nothing_out(card, record):
     known = [value.name for value in card.uncertain if not value.name.startswith("loss.")]
     again = dataclasses.replace(record, path="copy.csv")

@@ -89,6 +89,7 @@ def test_a_scan_can_be_trimmed(faces, tmp_path, capsys):
     assert plan["before"][0]["split_Hz"] == pytest.approx(json.loads(text)["splits"][0]["split_Hz"]["value"])
 
 
+@pytest.mark.slow
 def test_scan_refuses_what_it_cannot_use(faces, tmp_path, capsys):
     points = np.loadtxt(faces["outer"])
     wrong = tmp_path / "wrong.asc"
@@ -147,6 +148,7 @@ def test_a_measured_gain_turns_the_cuts_to_the_other_antinodes(capsys):
     assert sorted(round(c["azimuth_deg"]) for c in only["cuts"]) == [76, 166, 256, 346]
 
 
+@pytest.mark.slow
 def test_the_depth_of_a_cut_of_the_edge_removes_its_mass_through_the_wall(capsys):
     words = ["trim", "free-dome", "--split", "1", "--axis", "31", "--cut", "edge", "--width-mm", "4", "--json"]
     assert main(words) == 0
@@ -157,6 +159,7 @@ def test_the_depth_of_a_cut_of_the_edge_removes_its_mass_through_the_wall(capsys
     assert 0.8 < gain["low"] < gain["value"] < gain["high"] < 1
 
 
+@pytest.mark.slow
 def test_trim_refuses_what_it_should_not_cut(tmp_path, capsys):
     assert "measure more accurately before cutting" in failing(
         capsys, "trim", "free-dome", "--split", "1e-4", "--axis", "3"

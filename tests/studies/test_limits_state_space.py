@@ -72,6 +72,7 @@ def test_limits_closed_loops(study):
     assert gain == pytest.approx(1.0, abs=0.01)
 
 
+@pytest.mark.slow
 def test_contract_files(tmp_path, capsys):
     """JSON and .mat hold the same; another ending is refused before anything is written."""
     for name in ("loops.json", "loops.mat"):

@@ -170,14 +170,6 @@ def test_the_record_keeps_the_contract_and_is_read_back(card, law, tmp_path):
     assert read["frequency_Hz"] * 100 == pytest.approx(np.round(read["frequency_Hz"] * 100), abs=1e-6)
 
 
-def test_a_profile_from_a_file_is_the_profile_from_words(card, law, tmp_path):
-    path = tmp_path / "chamber.csv"
-    path.write_text("time_s,chamber_temperature_degC\n0,20\n1200,40\n4800,40\n", encoding="utf-8")
-    file = run(card, law, str(path), noise=False).record
-    words = run(card, law, "ramp 20 40 1 then soak 40 1h", noise=False).record
-    assert file["resonator_temperature_degC"] == pytest.approx(words["resonator_temperature_degC"], abs=1e-6)
-
-
 def test_a_measured_profile_of_many_rows_is_the_same_as_its_corners(card, law, tmp_path):
     t = np.arange(0.0, 4801.0, 5.0)
     T = np.interp(t, [0.0, 1200.0, 4800.0], [20.0, 40.0, 40.0])

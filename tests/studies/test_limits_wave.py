@@ -17,6 +17,7 @@ def priors():
     return gather_priors(load_card("hrg-30mm"))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("x", "sd"), [(-0.9, 0.05), (0.3, 0.1)])
 def test_length_and_axis_are_what_draws_that_agree_with_the_data_say(priors, x, sd):
     """Of 4 million draws of ln A and θ, those are weighed with the data's likelihood of one component; a cosine may be negative."""

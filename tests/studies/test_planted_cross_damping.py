@@ -100,6 +100,7 @@ def test_emitted_c_agrees_with_python(record, tmp_path):
     np.testing.assert_allclose(emitted, applied, atol=1e-9)
 
 
+@pytest.mark.slow
 def test_a_gain_that_fast_rows_hide_shows_in_their_means():
     """100 000 rows at 0.1 s: the white noise of a row is 17 times the drift; "1.00 times" was all that was said, after two minutes."""
     generator = np.random.default_rng(3)

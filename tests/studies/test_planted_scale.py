@@ -18,7 +18,6 @@ from studies.models.kinds.scale import load_scale
 from studies.papers.bvg import DEG, examine_claims, read_printed_chain, reduce_white, reproduce_bell, simulate_runs
 from studies.record import read_record
 from studies.reports.bell import bell_chapters
-from studies.rest import drop_spikes
 from studies.results.page import make_blocks
 from studies.scale import settled_rows
 
@@ -77,6 +76,7 @@ def test_saved_model_is_the_fitted_chain_and_compensates(records, tmp_path):
         compensate(model, data.with_columns({"housing_temperature_degC": data["housing_temperature_degC"] + 20}))
 
 
+@pytest.mark.slow
 def test_the_records_of_the_fit_are_compensated(tmp_path, capsys):
     """At 100 Hz a fit is of block averages: neither their narrower range nor an outlier refuses the rows they are made of."""
     records, model = [], tmp_path / "model.toml"
@@ -173,6 +173,7 @@ def test_printed_claims():
     assert dict(claims.averaging)[100.0] == pytest.approx(1.0, abs=0.002)
 
 
+@pytest.mark.slow
 def test_paper_twin():
     """Each step does what it can on runs not seen, and the filter leaves the random walk at long times alone."""
     twin = reproduce_bell(seed=1)
@@ -203,15 +204,7 @@ def test_filter_reduces_the_allan_deviation_as_predicted():
         assert before.deviation[k] / after.deviation[k] == pytest.approx(reduce_white(taps, rows), rel=0.03)
 
 
-def test_smooth_columns_have_no_spikes():
-    """Neither a ramp that was rounded nor its rounding noise is an outlier; a wrong reading is."""
-    ramp = np.round(np.linspace(-45, 55, 1000), 3)
-    keep = np.ones(1000, dtype=bool)
-    assert np.all(drop_spikes(keep, ramp + 273.15 - 273.15, np.full(1000, 3.0)))
-    ramp[[5, 700]] += [3.0, -1.0]
-    assert np.flatnonzero(~drop_spikes(keep, ramp)).tolist() == [5, 700]
-
-
+@pytest.mark.slow
 def test_long_runs_are_averaged_for_the_fit(monkeypatch):
     """Block averages give the same chain as the rows, and no block mixes two applied rates."""
     from studies import scale

@@ -19,6 +19,7 @@ def fit(run, capsys, *words):
     return json.loads(capsys.readouterr().out)
 
 
+@pytest.mark.slow
 def test_a_gyro_of_three_axes_in_a_chamber(tmp_path, capsys):
     """The clock counts µs without saying so; one file makes three records; axis y gains more than tenfold on unseen blocks.
 
@@ -37,6 +38,7 @@ def test_a_gyro_of_three_axes_in_a_chamber(tmp_path, capsys):
     assert fit(tmp_path / "run_x.csv", capsys)["methods"]["guarded"]["training"]["gain"] < 5
 
 
+@pytest.mark.slow
 def test_a_gyro_in_bursts_with_raw_temperatures(tmp_path, capsys):
     """Of 1 770 °/h in x a law in temperature leaves about 20 (burst means: 19); magnetometers in [T] are no temperatures."""
     scale = ("scale = 1.0 ", "scale = 0.00390625 "), ("offset = 0.0 ", "offset = -231.0 ")

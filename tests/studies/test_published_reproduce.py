@@ -69,12 +69,6 @@ def test_page_is_self_contained_and_shows_the_mode(folder):
     assert "data:image/png;base64" in text or render.REMEDY in text
 
 
-def test_tables_hold_the_printed_data(folder):
-    rows = (folder / "table1.csv").read_text().splitlines()
-    assert rows[0].startswith("temperature_degC,frequency_Hz")
-    assert len(rows) == 8
-
-
 def test_without_opengl_the_blocks_say_how_to_get_the_picture(monkeypatch):
     """VTK ends its process with a segmentation fault there; the child that does so is simulated."""
     monkeypatch.setattr(render.subprocess, "run", lambda job, **options: subprocess.CompletedProcess(job, -11))

@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from studies.papers.bias_twin import COOLING, METHODS, draw_tables, run_gyro, spread, study_twin
-from studies.reports.bias_twin import terms_table, twin_chapters, twin_table
+from studies.papers.bias_twin import COOLING, METHODS, draw_tables, run_gyro, study_twin
 
 
 @pytest.fixture(scope="module")
@@ -12,11 +11,13 @@ def twins():
     return [study_twin(seed) for seed in range(8)]
 
 
+@pytest.mark.slow
 def test_every_gyro_is_fitted_by_both_methods_to_one_run_and_to_three(twins):
     for fits in twins:
         assert [(fit.method, fit.runs) for fit in fits] == [(m, n) for m in METHODS for n in (1, 3)]
 
 
+@pytest.mark.slow
 def test_the_training_run_flatters_and_a_warming_run_is_worse(twins):
     one = [fits[0] for fits in twins]
     training, cooling, warming = (
@@ -36,6 +37,7 @@ def test_a_twin_is_the_same_for_the_same_seed():
     assert study_twin(3) == study_twin(3)
 
 
+@pytest.mark.slow
 def test_without_any_temperature_effect_the_guarded_method_gains_nothing_held_out():
     from compensation.bias_selection import fit_bias, score_runs
 
@@ -47,15 +49,3 @@ def test_without_any_temperature_effect_the_guarded_method_gains_nothing_held_ou
         gains.append(score_runs(fit_bias([first]), [second], extrapolate=True).gain)
     assert np.mean(np.array(gains) != 1.0) <= 0.15  # at most three of twenty, at a stated rate of 5 %
     assert np.mean(gains) < 1.01
-
-
-def test_the_table_holds_paper_training_and_held_out(twins):
-    table = twin_table(twins)
-    assert table.rows[0]["training"] == "5.15"
-    assert len(table.rows) == 5
-    assert len(terms_table(twins).rows) == 9
-    assert twin_chapters(twins)[0].parts
-
-
-def test_spread_counts_those_made_worse():
-    assert spread([0.5, 2.0, 3.0, 4.0]).worse == 0.25

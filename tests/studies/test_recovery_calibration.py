@@ -108,6 +108,7 @@ def test_the_device_is_where_the_calibration_expects_it(found, device, card):
             assert abs(size) < 4.5 * one.width * unit, one.parameter
 
 
+@pytest.mark.slow
 def test_what_the_data_does_not_say_stays_at_its_prior(found):
     told = {one.parameter: one for one in found.estimates}
     axis = told["bias.damping_axis_deg"]
@@ -133,6 +134,7 @@ def test_the_saved_card_predicts_the_runs_and_an_unseen_one_from_their_chambers(
     assert all(widths[one.parameter] == pytest.approx(one.sd, rel=1e-6) for one in found.estimates)
 
 
+@pytest.mark.slow
 def test_a_run_that_was_held_out_is_predicted(found):
     held = found.held_out
     assert held is not None
@@ -178,6 +180,7 @@ def test_where_nothing_is_wrong_the_card_stays_and_an_unseen_bias_is_as_it_was(c
     assert not found.warnings
 
 
+@pytest.mark.slow
 def test_the_baseline_is_the_linear_problem_about_the_calibrated_values(found):
     base = found.baseline("frequency_Hz")
     problem = found.fit.problem
@@ -219,18 +222,23 @@ def law_only(device, records, **changed):
     return calibrate(device, bare, exact=fixed, profile=False)
 
 
+@pytest.fixture(scope="module")
+def clean(device, records):
+    return law_only(device, records)
+
+
 @pytest.mark.slow
-def test_runs_that_contradict_each_other_are_named(device, records):
+def test_runs_that_contradict_each_other_are_named(device, records, clean):
     away = law_only(device, records, frequency_Hz=records[0]["frequency_Hz"] + 0.5)
     assert any("the runs disagree in the frequency" in warning for warning in away.warnings)
-    assert not law_only(device, records).warnings
+    assert not clean.warnings
 
 
 @pytest.mark.slow
-def test_outliers_do_not_move_the_values(device, records):
+def test_outliers_do_not_move_the_values(device, records, clean):
     spoilt = records[0]["frequency_Hz"].copy()
     spoilt[np.random.default_rng(1).choice(len(spoilt), 6, replace=False)] += 0.5
-    wrong, clean = law_only(device, records, frequency_Hz=spoilt), law_only(device, records)
+    wrong = law_only(device, records, frequency_Hz=spoilt)
     for one, other in zip(wrong.estimates, clean.estimates, strict=True):
         assert abs(one.shift_sd - other.shift_sd) < other.width + 1e-6, one.parameter
 

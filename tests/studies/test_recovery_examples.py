@@ -45,6 +45,7 @@ def test_design_by_formula_is_far_off_and_by_solver_is_not(tmp_path):
     assert 1.11 < solver / formula < 1.14
 
 
+@pytest.mark.slow
 def test_the_tolerance_study(tmp_path):
     text = run_example("tolerance_study", tmp_path)
     assert "64 designs, 0 failed" in text
@@ -55,6 +56,7 @@ def test_the_tolerance_study(tmp_path):
     assert "within limits" in text
 
 
+@pytest.mark.slow
 def test_the_chamber_run_settles_as_the_paper_describes(tmp_path):
     """HRG paper, figure 3: fast until about 9000 s, settled at about 15 000 s."""
     text = run_example("chamber_run", tmp_path)
@@ -63,6 +65,7 @@ def test_the_chamber_run_settles_as_the_paper_describes(tmp_path):
     assert 9000 < 60 * settled < 17000
 
 
+@pytest.mark.slow
 def test_the_compensation_leaves_only_the_lag(tmp_path):
     before, after = numbers(
         r"changes by ([\d.]+) Hz, compensated by ([\d.]+) Hz", run_example("compensate_run", tmp_path)

@@ -81,6 +81,7 @@ def test_two_temperatures_are_no_polynomial(tmp_path, capsys):
     assert main(["fit", "frequency", str(path), "--order", "2"]) == 2
 
 
+@pytest.mark.slow
 def test_what_is_advised_settles(tmp_path, capsys):
     card, path = load_card("hrg-30mm"), str(tmp_path / "run.csv")
     record = simulate_run(card, load_profile("staircase -20 40 20 3h"), 1 / 30, 3).record

@@ -69,6 +69,7 @@ def test_ninety_percent_intervals_cover_about_nine_in_ten(noise):
     assert 0.5 < np.sqrt(np.mean((relative / stated) ** 2)) < 1.4
 
 
+@pytest.mark.slow
 def test_the_number_of_lags_is_what_the_record_supports():
     rng = np.random.default_rng(5)
     t, T_h = housing(STEPS, 30.0)
@@ -118,6 +119,7 @@ def test_lags_in_series_and_their_radiated_share_are_found():
         assert estimate.value == pytest.approx(truth, rel=0.02)
 
 
+@pytest.mark.slow
 def test_a_relaxation_tells_the_time_constant_and_not_the_law():
     rng = np.random.default_rng(2)
     fit = identify_lags([one_lag(rng, "soak 20 5h", departure=5.0, sensor=0.0)], FREE_LAW, make=make_lags)
@@ -170,6 +172,7 @@ def test_a_fast_record_is_averaged_first():
     assert covers(fit.estimates["time_constant_1"], 1800.0)
 
 
+@pytest.mark.slow
 def test_rows_hold_a_whole_number_of_samples_and_know_their_mean_time():
     run = one_lag(np.random.default_rng(12), step=10.0)
     assert row_step([run], 2000) == 20.0

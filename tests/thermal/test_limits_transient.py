@@ -156,6 +156,7 @@ def test_scan_is_the_same_with_even_and_uneven_rows():
     assert scan(decay, forced, np.array([1.0, -1.0])) == pytest.approx(np.array(states), rel=1e-12, abs=1e-14)
 
 
+@pytest.mark.slow
 def test_sums_of_nodes_are_observed_in_blocks_of_rows():
     network = assemble(LINEAR)
     transient = propagate(network, CHAMBER)
@@ -174,6 +175,7 @@ def test_simulate_chooses_the_exact_way_where_there_is_one():
     assert np.array_equal(simulate(radiative, measured).at(t), sweep(radiative, measured).at(t))
 
 
+@pytest.mark.slow
 def test_sweeps_tend_to_the_integrated_radiation_with_the_fourth_power_of_the_rows(monkeypatch):
     monkeypatch.setattr(sweeping, "LONGEST_ROW", 1e4)
     parts = [part for part in RADIATIVE if part != LINEAR[3]]
@@ -190,6 +192,7 @@ def test_sweeps_tend_to_the_integrated_radiation_with_the_fourth_power_of_the_ro
     assert errors[2] < 1e-5
 
 
+@pytest.mark.slow
 def test_many_cycles_with_long_ramps_are_simulated_as_exactly_as_few():
     network = assemble(RADIATIVE)
     few = parse_profile("cycle 20 -20 60 1 1h 2")

@@ -44,6 +44,7 @@ def test_a_value_of_a_card_is_never_less_known_than_stated(sigma):
     assert abs(solved.coefficients[1]) < 0.5
 
 
+@pytest.mark.slow
 def test_no_run_is_held_out_of_a_line_with_a_phase_of_its_own():
     rng, records = np.random.default_rng(3), []
     t = np.arange(0.0, 6 * 3600.0, 30.0)

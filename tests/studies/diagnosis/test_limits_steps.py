@@ -1,6 +1,7 @@
 """Limits: a step of the grid stands for its mean only, and rows that a bend or an uneven clock hid are left out."""
 
 import numpy as np
+import pytest
 
 from studies.diagnosis.campaign import load_campaign
 from studies.diagnosis.held_out import residuals
@@ -65,6 +66,7 @@ def test_outlying_rows_hide_neither_behind_a_bend_nor_behind_an_uneven_clock():
     assert cleaned.said[0].startswith("3 outlying")
 
 
+@pytest.mark.slow
 def test_outlying_rows_beside_each_other_are_left_out_and_the_baseline_goes_on_from_where_it_was():
     """Three rows within four stand out together and are counted; five rows are an event, not outliers."""
     rng = np.random.default_rng(12)

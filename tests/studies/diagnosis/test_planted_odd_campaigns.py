@@ -20,6 +20,7 @@ def told(records):
     return investigate(load_campaign(records), advise=False).verdict
 
 
+@pytest.mark.slow
 def test_a_gap_in_a_log_is_no_turn_on():
     """Half an hour is missing of each of two records: their stretches share an offset, and nothing is named."""
     records = []
@@ -69,6 +70,7 @@ def test_a_bias_alone_with_a_term_in_the_rate_finds_its_lag():
     assert verdict.responses["bias_deg_per_h"].noise == pytest.approx(0.05, rel=0.05)
 
 
+@pytest.mark.slow
 def test_a_bias_that_is_a_cubic_of_the_temperature_has_no_cause():
     """The frequency is bent, so that a cubic of it is another curve: the difference is a tenth of the noise here."""
     records = []
@@ -91,6 +93,7 @@ def test_a_delay_is_said():
     assert "12 s earlier" in result.remark
 
 
+@pytest.mark.slow
 def test_uneven_stamps_on_a_ramp_are_no_noise():
     bench = Bench(CYCLE, seed=13, jitter=0.8)
     result = told([bench.record(frequency_Hz=bench.frequency(1e-3))]).responses["frequency_Hz"]

@@ -58,6 +58,7 @@ def test_the_same_readings_without_a_loop_are_adequate_and_the_law_is_named():
     assert "not sufficient" not in text
 
 
+@pytest.mark.slow
 def test_neighbouring_rows_that_wander_together_name_nothing_and_are_not_adequate():
     """A random walk over 200 rows of a sweep; taken for independent it was an activity dip or a curvature in six of ten."""
     T = np.linspace(-40.0, 80.0, 200)

@@ -51,6 +51,7 @@ def test_noise_of_the_third_axis_is_split_into_white_and_wander(chamber):
     assert found["wander"] > 0.5 * found["white"]
 
 
+@pytest.mark.slow
 def test_bursts_whose_range_a_law_explains_get_no_name(tmp_path):
     scale = ("scale = 1.0 ", "scale = 0.00390625 "), ("offset = 0.0 ", "offset = -231.0 ")
     bring_in("pan_bursts.csv", tmp_path, *scale)
@@ -80,6 +81,7 @@ def test_a_resistor_that_relaxes_from_run_to_run_ages():
     assert found["gain"] > 1.5
 
 
+@pytest.mark.slow
 def test_a_voltmeter_in_an_air_bath_gets_no_false_name():
     """Known: one lag leaves 0.33 ppm, two 0.19, of averages over many rows."""
     verdict = diagnose(DATA / "voltmeter_sweep.csv")

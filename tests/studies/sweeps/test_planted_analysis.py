@@ -166,6 +166,7 @@ def test_worst_case_and_inversion(tmp_path, functions):
     assert impossible["at_limit"] == ["user.x"]
 
 
+@pytest.mark.slow
 def test_tolerances_that_a_share_keeps(tmp_path, functions):
     """The size of two independent normal parts is distributed as Rayleigh's law: 95 % lie below σ √(2 ln 20)."""
     functions.write_text("def size(i, p):\n    return 2 * (p['user.x'] ** 2 + p['user.y'] ** 2) ** 0.5\n")

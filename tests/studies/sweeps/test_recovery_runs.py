@@ -147,6 +147,7 @@ def test_failures_keep_their_reason_and_do_not_stop_the_rest(tmp_path, functions
     assert "one is not welcome" in (tmp_path / "out" / "report.html").read_text()
 
 
+@pytest.mark.slow
 def test_a_function_that_was_killed_is_tried_again_and_its_case_is_lost_and_not_failed(
     tmp_path, functions, monkeypatch
 ):

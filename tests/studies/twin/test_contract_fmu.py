@@ -114,6 +114,7 @@ def test_contract_without_compiler(tmp_path, monkeypatch, capsys):
     assert {"modelDescription.xml", "sources/fmi.c", "sources/card.c", "sources/buildDescription.xml"} <= set(names)
 
 
+@pytest.mark.slow
 def test_contract_failure_keeps_the_old_file(tmp_path, monkeypatch):
     path = tmp_path / "twin.fmu"
     path.write_text("old")
@@ -138,6 +139,7 @@ def test_contract_bad_input(tmp_path, capsys):
     assert not (tmp_path / "c").exists()
 
 
+@pytest.mark.slow
 @needs_compiler
 def test_contract_strange_names(tmp_path):
     """A card's name can hold what would end a text of C, a comment or an attribute; the FMU compiles and its description is XML."""

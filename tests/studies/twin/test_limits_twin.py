@@ -155,6 +155,7 @@ def test_limits_imperfect_card(cells, folder):
     assert {name: error for name, error in worst(found, expected).items() if error > 1e-9} == {}
 
 
+@pytest.mark.slow
 def test_limits_imposed_housing(folder):
     """The housing itself imposed, without the lag of its sensor: as a record of straight lines drives the simulation."""
     instrument = load_card("hrg-30mm").with_table("noise", {"housing_lag_s": 0.0})
@@ -166,6 +167,7 @@ def test_limits_imposed_housing(folder):
     assert {name: error for name, error in worst(found, expected).items() if error > 1e-9} == {}
 
 
+@pytest.mark.slow
 def test_contract_record_of_the_program(folder, capsys):
     """Columns, order and digits of `hrg simulate --noiseless`, which reads what the twin writes."""
     card = folder / "card.toml"
@@ -185,6 +187,7 @@ def test_contract_record_of_the_program(folder, capsys):
         )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "noise",
     [Noise(white=1.0), Noise(flicker=1.0), Noise(walk=1.0), Noise(0.3, 0.5, 0.02)],
@@ -206,6 +209,7 @@ def test_limits_allan_variance_of_the_draws(noise, folder):
         assert scatter < 0.2 * each.mean()
 
 
+@pytest.mark.slow
 def test_limits_draws_are_normal_and_seeded(folder):
     """Moments of 262 144 white draws within 5 standard errors; the same seed gives the same run, another one does not."""
     program = compile_twin(load_card("free-dome"), folder / "draws", main=str(HERE / "draw.c"))
