@@ -14,7 +14,7 @@ from studies.record import Record
 from studies.simulation.chamber import check_profile
 from studies.simulation.drive import COLUMN, COMMANDS, RATE, Drive, drive_by_profile, rows_of
 from studies.simulation.loop import find_range_use, require_range, require_stable_loops, wave_of
-from studies.simulation.noise import bias_noise, draw_noise, frequency_noise, quantise
+from studies.simulation.noise import bias_noise, frequency_noise, quantise
 from studies.simulation.prediction import Prediction, law_for, predict
 from thermal.profile import Profile
 from thermal.sweeping import LONGEST_ROW
@@ -168,8 +168,8 @@ def _observe(
     count = len(true["frequency_Hz"])
     housing = true["housing_temperature_degC"]
     scatter = Noise(levels.housing_white_K).draw(count, rate, generator)
-    frequency = true["frequency_Hz"] + draw_noise(frequency_noise(levels), count, rate, generator)
-    wander = draw_noise(bias_noise(levels), count, rate, generator)
+    frequency = true["frequency_Hz"] + frequency_noise(levels).draw(count, rate, generator)
+    wander = bias_noise(levels).draw(count, rate, generator)
     bias = true["bias_deg_per_h"] + wander
     loss = true["inverse_q"] * (1 + Noise(levels.inverse_q_white).draw(count, rate, generator))
     read = {
