@@ -128,7 +128,7 @@ def diagnose_records(
     progress: Progress | None = None,
 ) -> "Diagnosis | Inference":
     """Return what a campaign shows and the simulation lacks; `chamber` limits the run that is suggested next."""
-    from studies.calibration.misreading import check_readings
+    from studies.calibration.misreading import bias_of_opposite_sign, check_readings
     from studies.diagnosis.campaign import load_campaign
     from studies.diagnosis.investigate import investigate
     from studies.inference.diagnosis import infer
@@ -138,7 +138,9 @@ def diagnose_records(
     campaign = load_campaign(records, card.reference_temperature - zero_Celsius)
     check_readings(card, records)
     card.material.check(np.concatenate([run.states.housing for run in campaign.runs]))
-    return infer(card, records, progress or (lambda words: None), campaign.said)
+    turned = [bias_of_opposite_sign(card, record) for record in records]
+    notes = (*campaign.said, *(said for said in turned if said is not None))
+    return infer(card, records, progress or (lambda words: None), notes)
 
 
 def _flat(given: Iterable[Any]) -> Iterator[Any]:

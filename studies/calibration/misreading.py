@@ -1,4 +1,4 @@
-"""Readings that are not what their column says: temperatures in °F or with the opposite sign, a bias in °/s."""
+"""Readings that are not what their column says: temperatures in °F or with the opposite sign, a bias in °/s or of the opposite sign."""
 
 from typing import TYPE_CHECKING
 
@@ -35,14 +35,16 @@ LIKE = 10.0
 
 
 def check_readings(instrument: "Instrument", records: "Sequence[Record]", law: "FrequencyLaw | None" = None) -> None:
-    """Refuse records whose frequency follows the temperatures only if these are read otherwise.
+    """Refuse records whose frequency follows the temperatures only if these are read otherwise, and a bias in °/s.
 
     Raises
     ------
     InputError
-        The card leaves most of the frequency's changes, and little of them with the temperatures in °F or with the opposite sign.
+        The card leaves most of the frequency's changes, and little of them with the temperatures in °F or with the opposite sign;
+        or a bias scatters 3600 times less than the card states.
     """
     for record in records:
+        _check_unit(instrument, record)
         names = [name for name in COLUMN.values() if name in record]
         if FREQUENCY not in record or not names:
             continue
@@ -64,26 +66,44 @@ def check_readings(instrument: "Instrument", records: "Sequence[Record]", law: "
                 )
 
 
-def bias_in_seconds(instrument: "Instrument", record: "Record") -> str | None:
-    """Return a sentence where a bias scatters 3600 times less than the card states, as one in °/s does; else None."""
-    if BIAS not in record or len(record) < ROWS // 10:
+def bias_of_opposite_sign(instrument: "Instrument", record: "Record", law: "FrequencyLaw | None" = None) -> str | None:
+    """Return a sentence where a bias follows what the card predicts with the opposite sign; else None."""
+    if BIAS not in record:
         return None
-    stated = bias_noise(instrument.noise).white / np.sqrt(float(np.median(np.diff(record["time_s"]))))
-    scatter = white_rms(record[BIAS])
-    if stated <= 0 or not stated / LIKE < SECONDS * scatter < stated * LIKE:
+    law = law or law_of(instrument)
+    white = white_rms(record[BIAS][np.isfinite(record[BIAS])])
+    turned = record.with_columns({BIAS: -record[BIAS]})
+    changes, left, rest = (
+        float(np.sqrt(max(rms**2 - white**2, 0.0)))
+        for rms in (np.nanstd(record[BIAS]), _left(instrument, record, law, BIAS), _left(instrument, turned, law, BIAS))
+    )
+    if not white < changes or not rest < min(FOLLOWED * changes, left / 3):
         return None
     return (
-        f"{record.path}: {BIAS} scatters by {scatter:.2g} °/h from row to row, {stated / scatter:.0f} times less than the card states:"
-        " the column is probably in °/s; multiply it by 3600."
+        f"{record.path}: {BIAS} follows the card's prediction with the opposite sign: {rest:.2g} °/h of its {changes:.2g} °/h (rms, white noise left out) then"
+        " remain. Check the sign of the output."
     )
 
 
-def _left(instrument: "Instrument", record: "Record", law: "FrequencyLaw") -> float:
-    """Rms of measured minus predicted frequency about its mean, with the card as given; infinite where it cannot be predicted."""
+def _check_unit(instrument: "Instrument", record: "Record") -> None:
+    """Refuse a bias that scatters 3600 times less than the card states, as one in °/s does."""
+    if BIAS not in record or len(record) < ROWS // 10:
+        return
+    stated = bias_noise(instrument.noise).white / np.sqrt(float(np.median(np.diff(record["time_s"]))))
+    scatter = white_rms(record[BIAS])
+    if stated > 0 and stated / LIKE < SECONDS * scatter < stated * LIKE:
+        raise InputError(
+            f"{record.path}: {BIAS} scatters by {scatter:.2g} °/h from row to row, {stated / scatter:.0f} times less than the card states:"
+            " the column is probably in °/s. Multiply it by 3600; if the gyro is as quiet as this, lower [noise] bias_white_deg_per_rt_h."
+        )
+
+
+def _left(instrument: "Instrument", record: "Record", law: "FrequencyLaw", response: str = FREQUENCY) -> float:
+    """Rms of measured minus predicted about its mean, with the card as given; infinite where it cannot be predicted."""
     time = record["time_s"]
     places = np.unique(np.linspace(0, len(time) - 1, min(ROWS, len(time))).astype(int))
     try:
         found = predict(instrument, drive_by_record(record, time=time[places]), (), law)
     except (ShellError, ThermalError):
         return np.inf
-    return float(np.nanstd(record[FREQUENCY][places] - found.columns[FREQUENCY]))
+    return float(np.nanstd(record[response][places] - found.columns[response]))

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from studies.calibration.calibrate import calibrate
-from studies.calibration.misreading import bias_in_seconds, check_readings
+from studies.calibration.misreading import bias_of_opposite_sign, check_readings
 from studies.calibration.observed import observe, read_settled
 from studies.diagnosis.campaign import load_campaign
 from studies.errors import InputError
@@ -62,12 +62,21 @@ def test_a_right_record_and_one_of_a_card_somewhat_off_are_not_questioned(card, 
     check_readings(card, [flat])
 
 
-def test_a_bias_in_degrees_per_second_is_named(card, record):
-    assert bias_in_seconds(card, record) is None
-    said = bias_in_seconds(card, spoilt(record, bias_deg_per_h=lambda b: b / 3600.0))
+def test_a_bias_in_degrees_per_second_is_refused_before_the_fit(card, record):
+    """The fit once left the range of the law and said only that."""
+    with pytest.raises(InputError, match=r"run\.csv: bias_deg_per_h scatters .* probably in °/s\. Multiply it by 3600"):
+        calibrate(card, [spoilt(record, bias_deg_per_h=lambda b: b / 3600.0)])
+
+
+def test_a_bias_of_the_opposite_sign_is_told(card):
+    own = card.with_table("bias", {"k1_deg_per_h_per_Hz": 0.2, "k4_deg_per_h_s_per_Hz": 300.0})
+    made = simulate_run(own, load_profile("cycle 20 -15 40 0.5 30min 1"), 1 / 60, 1).record
+    assert bias_of_opposite_sign(own, made) is None
+    said = bias_of_opposite_sign(own, spoilt(made, bias_deg_per_h=lambda b: -b))
     assert said is not None
-    assert "run.csv" in said
-    assert "the column is probably in °/s; multiply it by 3600" in said
+    assert "bias_deg_per_h follows the card's prediction with the opposite sign" in said
+    quiet = spoilt(made, bias_deg_per_h=lambda b: np.random.default_rng(1).standard_normal(b.size))
+    assert bias_of_opposite_sign(own, quiet) is None
 
 
 @pytest.mark.slow
