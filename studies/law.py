@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 from math import inf
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 if TYPE_CHECKING:
     from shell.law import FrequencyLaw
@@ -23,6 +23,8 @@ def law_of(
     from shell.law import build_law, check_mount
     from studies.errors import naming
 
+    if instrument.polynomial is not None:
+        return cast("FrequencyLaw", instrument.polynomial.between(lowest, highest))
     T0, material, mount = instrument.reference_temperature, instrument.material, instrument.part("mount")
     if mount is not None:
         with naming(f"{instrument.path} [mount]"):
@@ -40,7 +42,7 @@ def law_of(
 
 def unknown_slope(instrument: "Instrument") -> str:
     """Say why the slope of the frequency is not known, and which keys would tell it; empty where it is known."""
-    missing = instrument.material.constant
+    missing = () if instrument.polynomial is not None else instrument.material.constant
     named = {"youngs_modulus": "Young's modulus", "expansion": "expansion"}
     keys = {name: f"[material.deviation.{name}] {key} (1/K)" for name, key in SLOPE_KEYS.items()}
     if not missing:
@@ -65,6 +67,8 @@ def moved_law(law: "FrequencyLaw", instrument: "Instrument") -> "FrequencyLaw":
     """Return the law of an instrument whose material or mount has moved; solved anew where Poisson's ratio has left the law's."""
     from shell.errors import ShellError
 
+    if instrument.polynomial is not None:
+        return law_of(instrument, law.lowest, law.highest)
     try:
         return replace(law.with_material(instrument.material), mount=instrument.part("mount"))
     except ShellError:

@@ -88,8 +88,12 @@ class CardProblem:
         between these two rows is free too: it has a kink there, and a straight line between its rows is not it.
         """
         away = [start_spread(run, self.instrument, self.law) for run in self.runs]
+        absent = ("base", "stem") if self.instrument.polynomial is not None else ()
         found = [
-            (k, f"initial.{lump}", away[part.run]) for k, part in enumerate(self.parts) for lump in part.drive.departing
+            (k, f"initial.{lump}", away[part.run])
+            for k, part in enumerate(self.parts)
+            for lump in part.drive.departing
+            if lump not in absent
         ]
         for k, part in enumerate(self.parts):
             if part.drive.boundary == "housing":
@@ -201,7 +205,7 @@ class CardProblem:
     def _settled_slopes(self, table: SettledTable, varied: Variations, scale: Array) -> Array:
         columns = np.zeros((len(table.frequency), len(self.priors.values)))
         for k, name in enumerate(self.priors.names):
-            if name.startswith(("material.", "mount.", "resonator.")):
+            if name.startswith(("material.", "mount.", "resonator.", "law.")):
                 below, above = varied.sides(name)
                 high, low = (side.law.frequency(table.temperature, extrapolate=True) for side in (above, below))
                 columns[:, k] = (high - low) / (above.distance - below.distance)

@@ -1,6 +1,6 @@
 """Cards: the description of one instrument, `schema = "hrg.card/1"`, parsed whole when it is loaded.
 
-A card names the resonator's geometry at the reference temperature and its material; the optional tables `[thermal]`,
+A card names the resonator's geometry at the reference temperature and its material, or a polynomial law; the optional tables `[thermal]`,
 `[bias]`, `[loss]`, `[noise]` and `[[effect]]` say more, and every file of `studies.instrument.tables` adds one.
 """
 
@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from shell.resonator import Resonator
     from studies.instrument.tables.bias import Bias
     from studies.instrument.tables.effect import EffectEntry
+    from studies.instrument.tables.law import PolynomialLaw
     from studies.instrument.tables.loop import Loop
     from studies.instrument.tables.loss import Loss
     from studies.instrument.tables.noise import NoiseKeys
@@ -35,6 +36,8 @@ if TYPE_CHECKING:
     from thermal.resonator import HeatPath
 
 SCHEMA = "hrg.card/1"
+OF_GEOMETRY = ("resonator", "material", "thermal", "mount", "imperfection", "electrodes", "loop")
+"""Tables that a card without geometry cannot have."""
 
 
 class Head(Keys, frozen=True, kw_only=True):
@@ -83,13 +86,19 @@ class Instrument:
     @property
     def resonator(self) -> "Resonator":
         """The resonator at the reference temperature, SI units."""
-        found: Resonator = self.part("resonator")
+        found: Resonator = self._of_geometry("resonator")
         return found
 
     @property
     def material(self) -> "Material":
         """The material over temperature, SI units."""
-        found: Material = self.part("material")
+        found: Material = self._of_geometry("material")
+        return found
+
+    @property
+    def polynomial(self) -> "PolynomialLaw | None":
+        """The law of a gyro without geometry; None where the card has one."""
+        found: PolynomialLaw | None = self.part("law")
         return found
 
     @property
@@ -147,6 +156,8 @@ class Instrument:
         from studies.instrument.material_values import uncertain_of_heat, uncertain_of_law
 
         tables = [value for table in self.tables.values() for value in table.uncertain]
+        if self.polynomial is not None:
+            return tuple(tables)
         law = uncertain_of_law(self.material, self.stated)
         return (*tables, *law, *uncertain_of_heat(self.material, self.thermal, self.reference_temperature))
 
@@ -155,6 +166,8 @@ class Instrument:
         """Correlation of pairs of uncertain values, by the law's prior or as the card states; of other pairs, none."""
         from studies.instrument.material_values import correlations_of_law
 
+        if self.polynomial is not None:
+            return self.part("posterior").pairs  # type: ignore[no-any-return]
         by_law = correlations_of_law(self.material, {one.name for one in self.uncertain} - self.stated)
         return {**by_law, **self.part("posterior").pairs}
 
@@ -162,6 +175,13 @@ class Instrument:
     def stated(self) -> frozenset[str]:
         """Names of the numbers whose uncertainty the card itself states, exact ones among them."""
         return frozenset[str]().union(*(table.stated for table in self.tables.values()))
+
+    def _of_geometry(self, table: str) -> Any:
+        if self.polynomial is not None:
+            raise InputError(
+                f"{self.path}: this needs a card with [resonator] and [material]; this one has a polynomial ([law]) instead."
+            )
+        return self.part(table)
 
     def at(self, temperature: float) -> "tuple[Resonator, Elastic]":
         """Return the resonator, grown by its expansion, and its elastic constants at a uniform temperature (K)."""
@@ -243,7 +263,7 @@ def spell_card(instrument: Instrument, path: str | Path) -> tuple[dict[str, Any]
         own = (Path(instrument.path).parent / table["file"]).resolve()
         return {**table, "file": os.path.relpath(own, Path(path).resolve().parent)}
 
-    if "file" in content["material"]:
+    if "file" in content.get("material", {}):
         content["material"] = moved(content["material"])
     maps = content.get("imperfection", {}).get("map", [])
     if maps:
@@ -259,10 +279,17 @@ def shipped_cards() -> dict[str, Path]:
 def _reread(instrument: Instrument, content: Mapping[str, Any], changed: set[str]) -> Instrument:
     folder = Path(instrument.path).parent
     tables = dict(instrument.tables)
+    without = OF_GEOMETRY if "law" in content else ()
+    for name in without:
+        if name in content:
+            raise InputError(f"{instrument.path} [{name}]: a card has either [law] or [{name}]; leave one of them out.")
     for name in card_tables():
-        if name in changed:
+        if name in ("resonator", "material") and name in without:
+            tables[name] = ReadTable({name: None}, {name: None}, (), frozenset())
+        elif name in changed:
             place = CardPlace(f"{instrument.path} [{name}]", folder, instrument.reference_temperature)
-            tables[name] = read_table(name, content.get(name), place)
+            read = read_table(name, content.get(name), place)
+            tables[name] = replace(read, uncertain=()) if name in without else read
     unknown = changed - set(tables)
     if unknown:
         raise InputError(f"{instrument.path}: unknown table '{min(unknown)}'{nearest(min(unknown), tables)}")

@@ -8,6 +8,13 @@ from studies.instrument.units import split_unit
 WHOLE = {
     "bias.offset_deg_per_h": "bias offset",
     "bias.pattern_angle_deg": "azimuth of the standing wave",
+    "law.f0_Hz": "frequency at the reference temperature",
+    "law.a1_per_K": "relative temperature slope of the frequency",
+    "law.a2_per_K2": "quadratic term of the frequency",
+    "law.a3_per_K3": "cubic term of the frequency",
+    "law.lag_s": "lag of the resonator behind its housing",
+    "law.chamber_lag_s": "lag of the housing behind its chamber",
+    "law.delay_s": "delay of the resonator behind the housing sensor",
     "loss.inverse_q": "1/Q at the reference temperature",
     "loss.slope_per_K": "relative temperature slope of 1/Q",
     "loss.curvature_per_K2": "relative temperature curvature of 1/Q",

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from studies.errors import naming
+from thermal.meridian import cell_names
 from thermal.network import Boundary, Conductor, Network, Node, Part, assemble, linearise
 from thermal.relaxation import find_relaxation
 from thermal.resonator import describe_resonator, describe_shell_and_stem
@@ -30,6 +31,9 @@ def build_network(instrument: "Instrument", radiation: bool | None = None, bound
         False linearises at the reference temperature; what the card says when absent.
     boundary : "chamber" or "housing"
     """
+    if instrument.polynomial is not None:
+        network = one_lag(instrument.polynomial.lag, instrument.polynomial.chamber_lag)
+        return behind_housing(network) if boundary == "housing" else network
     with naming(f"{instrument.path} [thermal]"):
         network = assemble(describe_resonator(instrument.heat_path))
     if boundary == "housing":
@@ -45,6 +49,13 @@ def behind_housing(network: Network) -> Network:
     parts += [link for link in network.conductors if "chamber" not in (link.one, link.other)]
     parts += network.radiators
     return assemble(parts)
+
+
+def one_lag(lag: float, chamber_lag: float) -> Network:
+    """Return a resonator that takes no heat behind a housing behind a chamber, by two time constants (s)."""
+    (cell,) = cell_names(1)
+    parts: list[Part] = [Boundary("chamber"), Node("housing", 1.0), Conductor("chamber", "housing", 1.0 / chamber_lag)]
+    return assemble([*parts, Node(cell, SENSOR_SHARE), Conductor("housing", cell, SENSOR_SHARE / lag)])
 
 
 def with_sensor(network: Network, time_constant: float) -> Network:

@@ -38,6 +38,8 @@ SHIFT, JUMP, KINK = "shift", "jump.", "kink."
 SHIFT_STEP = 0.02  # s
 OF_WALL = ("thermal.conductivity_W_per_m_K", "thermal.heat_capacity_J_per_kg_K")
 """Values of the heat path that the loss of a wall takes as well."""
+HEATED = ("thermal", "material", "resonator", "law")
+"""Tables whose values the temperatures may depend on."""
 LAG = "noise.housing_lag_s"
 GAP = 3.0  # usual distances of rows, across which nothing is known of a curve
 
@@ -321,7 +323,7 @@ class Variations:
             return no_change(network, {drive.boundary: drive.kink_shape(int(name.removeprefix(KINK)))})
         if name == LAG and drive.boundary == "housing":
             return no_change(network, {"housing": Profile(drive.imposed.time, _slope_of_reading(drive.imposed))})
-        if name.partition(".")[0] not in ("thermal", "material", "resonator"):
+        if name.partition(".")[0] not in HEATED:
             return None
         below, above = self.sides(name)
         step, T0 = above.distance - below.distance, self._here.instrument.reference_temperature
@@ -338,14 +340,14 @@ class Variations:
         sides = []
         for distance in ends:
             moved, law = here.instrument.with_values({name: value + distance}), here.law
-            if table in ("material", "mount"):
+            if table in ("material", "mount", "law"):
                 law = moved_law(law, moved)
             elif table == "resonator":
                 law = law_of(moved, law.lowest, law.highest, law.theory)
             damping = here.damping
             if damping is not None and (table in ("loss", "material", "resonator") or name in OF_WALL):
                 damping = damping_law(moved, law.lowest, law.highest)
-            same = table not in ("thermal", "material", "resonator")
+            same = table not in HEATED
             known = (here.networks, here.lags) if same else ({}, {})
             sides.append(Side(distance, moved, law, damping, *known))
         return sides[0], sides[1]

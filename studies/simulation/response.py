@@ -47,13 +47,16 @@ class Temperatures:
 
 def observed_rows(instrument: "Instrument", law: "FrequencyLaw", nodes: tuple[str, ...]) -> Array:
     """Sums over the nodes that make `Temperatures` and what the housing's sensor reads, (7, nodes); empty where they are no nodes."""
-    elastic = cell_weights(instrument, law)
-    shares = (law.along.kinetic, law.along.nu, law.prestress.shares, law.prestress.held)
     rows = np.zeros((7, len(nodes)))
-    cells = [nodes.index(name) for name in cell_names(len(elastic))]
     if "housing" in nodes:
         rows[0, nodes.index("housing")] = 1.0
         rows[6, nodes.index(SENSOR if instrument.noise.housing_lag_s > 0 else "housing")] = 1.0
+    if instrument.polynomial is not None:
+        rows[1, [nodes.index(name) for name in cell_names(1)]] = 1.0
+        return rows
+    elastic = cell_weights(instrument, law)
+    shares = (law.along.kinetic, law.along.nu, law.prestress.shares, law.prestress.held)
+    cells = [nodes.index(name) for name in cell_names(len(elastic))]
     rows[1, cells] = elastic
     for row, share in zip(rows[2:6], shares, strict=True):
         found = to_cells(instrument, law, share)
@@ -102,6 +105,8 @@ def read_out(
     """
     reference = instrument.reference_temperature
     housing, resonator, *uneven = found.value.T
+    if instrument.polynomial is not None:
+        resonator = resonator - instrument.polynomial.delay * found.rate[:, 1]
     changes = _apply_effects(instrument, drive, housing, resonator, found.rate[:, 1], tau)
     warmed, rate = resonator, found.rate[:, 1]
     if "resonator_temperature" in changes:

@@ -1,0 +1,166 @@
+"""The card of a gyro of which only records are known: a polynomial law behind one lag, every value wide.
+
+    f = f₀ (1 + a₁ x + a₂ x²),   x = T_r − T_ref;   bias = offset + a cubic in f − f₀;   1/Q = q₀ (1 + b₁ x + b₂ x²)
+
+Most probable values are those of a fit by least squares at the lag that leaves least; of the widths no record sees an end.
+"""
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import minimize_scalar
+
+from compensation.noise import white_rms
+from shell.constants import zero_Celsius
+from studies.calibration.observed import ObservedRun, observe
+from studies.record import Record
+from thermal.lag import lag
+
+if TYPE_CHECKING:
+    from studies.instrument.card import Instrument
+
+Array = NDArray[np.float64]
+LAGS = np.geomspace(30.0, 3e4, 10)
+"""Lags, s, among which one is looked for."""
+OF_RUN = 0.5
+"""Part of the longest run up to which a response that is no thermometer shows a lag."""
+WIDE, BENT = 10.0, 3.0
+"""Standard deviations of level and slope, and of each bend, over the covered range, in parts of what the response varies by."""
+LAG_WIDTH = 1.0
+"""Standard deviation of the logarithm of the lag."""
+PER_KELVIN = 1e-4
+"""Relative slope of a frequency that nobody measured, which then stands for the temperature: 1 Hz for 1 K at 10 kHz."""
+POWERS = {"frequency_Hz": 2, "inverse_q": 2, "bias_deg_per_h": 3}
+
+
+def polynomial_card(records: Sequence[Record], name: str = "") -> "Instrument":
+    """Return the card of a gyro with these records.
+
+    Raises
+    ------
+    InputError
+        Records without a drive or a response, or too short.
+    """
+    from studies.instrument.card import SCHEMA, build_instrument
+
+    runs = observe(records)
+    housing = np.concatenate([run.inner.profile.value for run in runs])
+    reference = float(np.round(0.5 * (housing.min() + housing.max()) - zero_Celsius, 1))
+    x0, reach = reference + zero_Celsius, max(0.5 * float(np.ptp(housing)), 1e-2)
+    by_chamber = runs[0].inner.boundary == "chamber"
+    thermometers = [column for column in POWERS if any(column in run.responses for run in runs)]
+    thermometer = thermometers[0]
+    tau = _likeliest_lag(runs, thermometer, x0)
+    law: dict[str, Any] = {
+        "f0_Hz": _exact(1.0 / PER_KELVIN),
+        "a1_per_K": _exact(PER_KELVIN),
+        "a2_per_K2": _exact(0.0),
+        "a3_per_K3": _exact(0.0),
+        "lag_s": {"value": tau, "sd": LAG_WIDTH * tau},
+        "delay_s": {"value": 0.0, "sd": 10.0},
+    }
+    if by_chamber:
+        law["chamber_lag_s"] = _exact(1.0)
+    content: dict[str, Any] = {
+        "schema": SCHEMA,
+        "name": name or next((record.instrument for record in records if record.instrument), "") or "gyro",
+        "reference_temperature_degC": reference,
+        "law": law,
+        "bias": {"damping_anisotropy": _exact(0.0), "damping_axis_deg": _exact(0.0)},
+        "noise": {"housing_lag_s": _exact(0.0), "frequency_flicker_Hz": 0.0, "frequency_walk_Hz": 0.0,
+                  "bias_flicker_deg_per_h": 0.0, "bias_walk_deg_per_h_per_rt_h": 0.0},
+    }  # fmt: skip
+    slope = 1.0
+    for column in thermometers:
+        level, own, spread = _levels(runs, column, tau, x0)
+        if column == "frequency_Hz":
+            slope = max(abs(own[0]), 0.1 * spread / reach)
+            law["f0_Hz"] = {"value": level, "sd": WIDE * spread + 1e-4 * level}
+            law["a1_per_K"] = {"value": own[0] / level, "sd": min(WIDE * spread / reach / level, 5e-3)}
+            law["a2_per_K2"] = {"value": own[1] / level, "sd": BENT * spread / reach**2 / level}
+            content["noise"]["frequency_white_Hz"] = _white(runs, column)
+        elif column == "inverse_q":
+            content["loss"] = {
+                "inverse_q": {"value": level, "sd": WIDE * spread},
+                "slope_per_K": {"value": own[0] / level, "sd": WIDE * spread / reach / level},
+                "curvature_per_K2": {"value": own[1] / level, "sd": BENT * spread / reach**2 / level},
+            }
+            content["noise"]["inverse_q_white"] = _white(runs, column) / level
+        else:
+            changes = slope * reach
+            content["bias"] |= {
+                "offset_deg_per_h": {"value": level, "sd": WIDE * spread},
+                "k1_deg_per_h_per_Hz": {"value": own[0] / slope, "sd": WIDE * spread / changes},
+                "k2_deg_per_h_per_Hz2": {"value": 0.0, "sd": BENT * spread / changes**2},
+                "k3_deg_per_h_per_Hz3": {"value": 0.0, "sd": BENT * spread / changes**3},
+            }
+            content["noise"] |= {
+                "bias_white_deg_per_rt_h": _white(runs, column) / 60.0,
+                "bias_turn_on_deg_per_h": WIDE * spread if len(runs) > 1 else 0.0,
+            }
+    return build_instrument(content, "the records")
+
+
+def _exact(value: float) -> dict[str, float]:
+    return {"value": value, "sd": 0.0}
+
+
+def _followed(runs: Sequence[ObservedRun], column: str, tau: float, x0: float) -> tuple[Array, Array, Array]:
+    """Return the column's blocks, the lagged temperature above a reference, and what an initial state of each run adds to it."""
+    value, excess, starts = [], [], []
+    members = [run for run in runs if column in run.responses]
+    for k, run in enumerate(members):
+        blocks, t = run.responses[column], run.inner.time
+        follows = lag(t, run.inner.profile.at(t), tau) - x0
+        own = np.zeros((len(blocks.value), len(members)))
+        own[:, k] = blocks.average(np.exp(-(t - t[0]) / tau))
+        value.append(blocks.value)
+        excess.append(blocks.average(follows))
+        starts.append(own)
+    return np.concatenate(value), np.concatenate(excess), np.concatenate(starts)
+
+
+def _fit(runs: Sequence[ObservedRun], column: str, tau: float, x0: float) -> tuple[Array, Array]:
+    """Return the coefficients of a polynomial with starts (and offsets, of a bias) of each run, and what it leaves."""
+    y, x, starts = _followed(runs, column, tau, x0)
+    columns = [np.ones_like(x), *(x**power for power in range(1, POWERS[column] + 1)), *starts.T]
+    if column == "bias_deg_per_h":
+        columns += list((starts[:, 1:] > 0).astype(float).T)
+    X = np.stack(columns, axis=1)
+    size = np.linalg.norm(X, axis=0)
+    size[size == 0] = 1.0
+    found = np.linalg.lstsq(X / size, y, rcond=1e-10)[0] / size
+    return found, y - X @ found
+
+
+def _likeliest_lag(runs: Sequence[ObservedRun], column: str, x0: float) -> float:
+    longest = max(float(np.ptp(run.inner.time)) for run in runs)
+    most = 1e5 if column == "frequency_Hz" else max(OF_RUN * longest, float(LAGS[1]))
+
+    def left(logarithm: float) -> float:
+        return float(np.log(np.sum(_fit(runs, column, float(np.exp(logarithm)), x0)[1] ** 2) + 1e-300))
+
+    grid = np.log(LAGS[LAGS <= most])
+    best = int(np.argmin([left(one) for one in grid]))
+    ends = grid[max(best - 1, 0)], grid[min(best + 1, len(grid) - 1)]
+    return float(np.exp(minimize_scalar(left, bounds=ends, method="bounded", options={"maxiter": 15}).x))
+
+
+def _levels(runs: Sequence[ObservedRun], column: str, tau: float, x0: float) -> tuple[float, Array, float]:
+    """Return a column's level and coefficients about the reference, and the rms that it varies by about its mean."""
+    own, _ = _fit(runs, column, tau, x0)
+    y = np.concatenate([run.responses[column].value for run in runs if column in run.responses])
+    spread = max(float(np.std(y)), 1e-12 * abs(float(np.median(y))), 1e-300)
+    level = float(own[0])
+    if column != "bias_deg_per_h" and not 0.5 * np.median(y) < level < 2.0 * np.median(y):
+        level = float(np.median(y))
+    return level, own[1:], spread
+
+
+def _white(runs: Sequence[ObservedRun], column: str) -> float:
+    """White noise of a column, as an Allan deviation at 1 s."""
+    blocks = [run.responses[column] for run in runs if column in run.responses]
+    span = float(np.median(np.concatenate([one.span for one in blocks])))
+    return float(white_rms(*(one.value for one in blocks)) * np.sqrt(span))

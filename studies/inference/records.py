@@ -1,0 +1,140 @@
+"""Records of one gyro made ready for a diagnosis: checked, each once, with the columns that can be used and why others cannot."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from compensation.spikes import find_spikes
+from studies.calibration.observed import LEAST_ROWS, RESPONSES
+from studies.diagnosis.checks import FEWEST_BINS, check_device, check_units
+from studies.errors import InputError
+from studies.record import Record, drop_repeats, place_in_time
+from studies.rest import LEAST_SPIKE
+from studies.simulation.drive import COMMAND_COLUMNS, RATE
+
+Array = NDArray[np.float64]
+HOUSING, CHAMBER, RESONATOR = "housing_temperature_degC", "chamber_temperature_degC", "resonator_temperature_degC"
+REFERENCE = "reference_frequency_Hz"
+
+
+@dataclass(frozen=True)
+class Campaign:
+    """Records that a diagnosis can use.
+
+    Attributes
+    ----------
+    records : each once, with bias and driving temperature under their usual names
+    numbers : their places among those that were given, from 1
+    skipped : response -> why it is not judged
+    notes : sentences
+    timed : whether every record states its start
+    """
+
+    records: tuple[Record, ...]
+    numbers: tuple[int, ...]
+    skipped: dict[str, str] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
+    timed: bool = False
+
+
+def make_ready(given: Sequence[Record]) -> Campaign:
+    """Check several records of one gyro and keep what can be used.
+
+    Raises
+    ------
+    InputError
+        If the records disagree about the gyro, lack a temperature or a response, or use another unit.
+    """
+    if not given:
+        raise InputError("no records given; a diagnosis needs at least one.")
+    kept, repeated = drop_repeats(given)
+    notes = list(repeated)
+    source = _temperature_source(kept)
+    tables = [_columns(record, source) for record in kept]
+    check_units(kept, tables)
+    check_device(kept, tables)
+    outliers = sum(_remove_outliers(table) for table in tables)
+    skipped = _unusable(kept, tables)
+    if all(name in skipped or not any(name in table for table in tables) for name in RESPONSES) and not skipped:
+        raise InputError(f"{kept[0].path or 'record'}: a diagnosis needs frequency_Hz, bias_deg_per_h or inverse_q.")
+    _, timed = place_in_time(kept)
+    if not timed and len(kept) > 1:
+        notes.append("not every record states its start; the records are treated as consecutive, with unknown gaps.")
+    for name in COMMAND_COLUMNS:
+        there = [name in record and np.isfinite(record[name]).all() for record in kept]
+        if any(there) and not all(there) and name != RATE:
+            notes.append(f"{name} is not in every record and was left out.")
+            tables = [{key: own for key, own in table.items() if key != name} for table in tables]
+    if outliers:
+        one = outliers == 1
+        notes.insert(0, "1 outlying value was left out." if one else f"{outliers} outlying values were left out.")
+    out = []
+    for record, table in zip(kept, tables, strict=True):
+        columns = {key: own for key, own in table.items() if key != "temperature" and key not in skipped}
+        place = CHAMBER if source == CHAMBER else HOUSING
+        out.append(replace(record, columns=columns | {place: table["temperature"]}))
+    numbers = [1 + next(k for k, one in enumerate(given) if one is record) for record in kept]
+    long = [any(name in own and np.isfinite(own[name]).sum() >= LEAST_ROWS for name in RESPONSES) for own in out]
+    if not any(long):
+        skipped |= {name: "too few rows in every run" for name in RESPONSES if any(name in own for own in out)}
+    notes += [
+        f"{own.path}: too few rows; it is left out."
+        for own, enough in zip(out, long, strict=True)
+        if not enough and any(long)
+    ]
+    chosen = [k for k, enough in enumerate(long) if enough]
+    return Campaign(tuple(out[k] for k in chosen), tuple(numbers[k] for k in chosen), skipped, tuple(notes), timed)
+
+
+def _temperature_source(records: Sequence[Record]) -> str:
+    for name in (HOUSING, CHAMBER, RESONATOR):
+        if all(name in record and np.isfinite(record[name]).sum() > 1 for record in records):
+            return name
+    lacking = next((r for r in records if not any(n in r for n in (HOUSING, CHAMBER, RESONATOR))), records[0])
+    raise InputError(
+        f"{lacking.path or 'record'}: a diagnosis needs {HOUSING} or {CHAMBER}, the same one in every record."
+    )
+
+
+def _columns(record: Record, source: str) -> dict[str, Array]:
+    names = ("time_s", *RESPONSES, *COMMAND_COLUMNS, REFERENCE, *((CHAMBER,) if source == HOUSING else ()))
+    table = {name: np.array(record[name], dtype=float) for name in names if name in record}
+    table["temperature"] = np.array(record[source], dtype=float)
+    if "bias_deg_per_h" not in table and "measured_rate_deg_per_s" in record:
+        applied = record.columns.get(RATE, 0.0)
+        table["bias_deg_per_h"] = np.asarray(3600.0 * (record["measured_rate_deg_per_s"] - applied))
+    return table
+
+
+def _remove_outliers(table: dict[str, Array]) -> int:
+    """Set outlying rows of every measured column to NaN and return how many there were."""
+    count = 0
+    for name in ("temperature", *RESPONSES, REFERENCE):
+        if name in table:
+            outlying = find_spikes(table[name], LEAST_SPIKE if name == "temperature" else 0.0)
+            table[name][outlying] = np.nan
+            count += int(outlying.sum())
+    return count
+
+
+def _unusable(records: Sequence[Record], tables: Sequence[dict[str, Array]]) -> dict[str, str]:
+    """Return response -> why it cannot be judged."""
+    skipped = {}
+    spans = [np.ptp(own) for t in tables if (own := t["temperature"][np.isfinite(t["temperature"])]).size]
+    if not spans:
+        raise InputError(f"{records[0].path or 'record'}: the driving temperature has no values.")
+    for name in RESPONSES:
+        parts = [table[name][np.isfinite(table[name])] for table in tables if name in table]
+        values = np.concatenate(parts or [np.empty(0)])
+        if values.size == 0:
+            if any(name in record.columns for record in records):
+                skipped[name] = "every value is missing"
+        elif values.size < FEWEST_BINS:
+            skipped[name] = f"only {values.size} values"
+        elif np.ptp(values) == 0.0:
+            skipped[name] = "constant"
+        elif max(spans) == 0.0:
+            skipped[name] = "the temperature never changes (is the sensor stuck?)"
+    return skipped

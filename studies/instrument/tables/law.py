@@ -1,0 +1,124 @@
+"""`[law]`: a gyro without geometry, its frequency a polynomial of the temperature that follows the housing through one lag.
+
+    f = f₀ (1 + a₁ x + a₂ x² + a₃ x³),   x = T − T_ref,   T(t) = T_r(t − delay),   lag dT_r/dt = T_housing − T_r
+
+It stands in place of `[resonator]`, `[material]` and `[thermal]`.
+"""
+
+from dataclasses import dataclass, replace
+from typing import Annotated
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from shell.errors import ShellError
+from studies.instrument.registry import CardPlace, CardTable
+from studies.schema.keys import Keys, Note, number
+
+Array = NDArray[np.float64]
+LEAST = 1e-3
+"""Of f over f₀: a polynomial is no law down to 0."""
+
+
+class LawKeys(Keys, frozen=True, kw_only=True):
+    """Coefficients at the card's reference temperature, and time constants."""
+
+    f0_Hz: Annotated[float, number("at the reference temperature", above=0.0, relative_sd=1e-3, example=4432.07)] | None = None  # fmt: skip
+    a1_per_K: Annotated[float, number("of x", least=-1e-2, most=1e-2, sd=2e-5)] = 8e-5
+    a2_per_K2: Annotated[float, number("of x²", sd=2e-7)] = 0.0
+    a3_per_K3: Annotated[float, number("of x³", sd=2e-9)] = 0.0
+    lag_s: Annotated[float, number("of the resonator behind its housing", above=0.0, relative_sd=1.0)] = 1500.0
+    chamber_lag_s: Annotated[float, number("of the housing behind its chamber", above=0.0, relative_sd=1.0)] = 600.0
+    delay_s: Annotated[float, number("of the resonator beside its lag, less that of the housing's sensor", sd=10.0)] = (
+        0.0
+    )
+    note: Note = ""
+
+    def __post_init__(self) -> None:
+        given = tuple(getattr(self, key) for key in self.__struct_fields__)
+        if self.f0_Hz is None and given != self.__struct_defaults__:
+            raise ValueError("f0_Hz, the frequency at the reference temperature, is missing; add it.")
+
+
+@dataclass(frozen=True)
+class PolynomialLaw:
+    """Frequency law of `[law]`, with what a simulation asks of `shell.law.FrequencyLaw`.
+
+    Attributes
+    ----------
+    f0 : float, Hz
+    coefficients : of x, x², x³, 1/Kⁿ
+    reference_temperature, lowest, highest : float, K
+    lag, chamber_lag, delay : float, s
+    """
+
+    f0: float
+    coefficients: tuple[float, float, float]
+    reference_temperature: float
+    lag: float
+    chamber_lag: float
+    delay: float = 0.0
+    lowest: float = 0.0
+    highest: float = np.inf
+    bryan_factor: float = 0.2774
+    """Of a thin hemisphere."""
+
+    def frequency(self, temperature: ArrayLike, *, extrapolate: bool = False) -> Array:
+        """Frequency (Hz) at temperatures (K)."""
+        return np.asarray(np.exp(self.logarithm(temperature, extrapolate=extrapolate)))
+
+    def logarithm(self, temperature: ArrayLike, *, extrapolate: bool = False) -> Array:
+        """Return ln f, f in Hz.
+
+        Raises
+        ------
+        ShellError
+            A temperature at which the polynomial has no positive frequency.
+        """
+        x = np.asarray(temperature, dtype=float) - self.reference_temperature
+        a1, a2, a3 = self.coefficients
+        change = x * (a1 + x * (a2 + x * a3))
+        if not (change > LEAST - 1.0).all():
+            raise ShellError(f"the polynomial of the frequency is negative {np.ptp(x):.0f} K from its reference.")
+        return np.asarray(np.log(self.f0) + np.log1p(change))
+
+    def slope(self, temperature: ArrayLike, *, extrapolate: bool = False) -> Array:
+        """Return d ln f/dT, 1/K."""
+        x = np.asarray(temperature, dtype=float) - self.reference_temperature
+        a1, a2, a3 = self.coefficients
+        return np.asarray((a1 + x * (2 * a2 + x * 3 * a3)) * self.f0 / self.frequency(temperature))
+
+    def uneven_slopes(self, temperature: float) -> Array:
+        """What an uneven temperature does: nothing, for the resonator has one."""
+        return np.zeros(4)
+
+    def uncertainty(self, temperature: ArrayLike) -> Array:
+        """Standard deviation of ln f by a material's prior: it has none."""
+        return np.zeros_like(np.asarray(temperature, dtype=float))
+
+    @property
+    def solver_error(self) -> float:
+        """Relative error of a solver: nothing is solved."""
+        return 0.0
+
+    @property
+    def interpolation_error(self) -> float:
+        """Relative error between knots: there are none."""
+        return 0.0
+
+    def between(self, lowest: float, highest: float) -> "PolynomialLaw":
+        """Return the law between two temperatures (K)."""
+        return replace(self, lowest=max(lowest, 0.0), highest=highest)
+
+
+def build(keys: LawKeys, place: CardPlace) -> PolynomialLaw | None:
+    """The law in SI units; None where the card has a geometry."""
+    if keys.f0_Hz is None:
+        return None
+    coefficients = (keys.a1_per_K, keys.a2_per_K2, keys.a3_per_K3)
+    return PolynomialLaw(
+        keys.f0_Hz, coefficients, place.reference_temperature, keys.lag_s, keys.chamber_lag_s, keys.delay_s
+    )
+
+
+TABLE = CardTable("law", LawKeys, build=build, optional=True)

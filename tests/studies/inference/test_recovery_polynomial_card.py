@@ -1,0 +1,58 @@
+"""A card of a polynomial law: simulated, made from records alone, calibrated, written and read."""
+
+import numpy as np
+import pytest
+
+from studies.calibration.calibrate import calibrate
+from studies.errors import InputError
+from studies.inference.polynomial_card import polynomial_card
+from studies.instrument.card import build_instrument, load_card, save_card
+from studies.simulation.chamber import load_profile
+from studies.simulation.virtual_gyro import simulate_run
+from thermal.lag import lag
+
+TRUE = {
+    "schema": "hrg.card/1",
+    "name": "truth",
+    "law": {"f0_Hz": 4432.07, "a1_per_K": 8.1e-5, "a2_per_K2": -7e-8, "lag_s": 2000.0, "delay_s": 5.0},
+    "bias": {"damping_anisotropy": 0.0, "k1_deg_per_h_per_Hz": 0.4, "k3_deg_per_h_per_Hz3": 0.003},
+    "noise": {"housing_lag_s": 0.0},
+}  # fmt: skip
+
+
+def test_limits_one_lag_behind_the_housing() -> None:
+    card = build_instrument(TRUE)
+    run = simulate_run(card, load_profile("step 20 -10 4h"), 0.1, noise=False)
+    t, housing, resonator = (
+        run.record[name] for name in ("time_s", "housing_temperature_degC", "resonator_temperature_degC")
+    )
+    follows = lag(t, housing, 2000.0)
+    assert np.abs(resonator - follows + 5.0 * np.gradient(follows, t)).max() < 2e-3
+    x = resonator - 20.0
+    assert run.record["frequency_Hz"] == pytest.approx(
+        4432.07 * (1 + 8.1e-5 * x - 7e-8 * x**2), abs=3e-7
+    )  # six digits of a temperature
+
+
+def test_recovery_of_the_law_from_records_alone(tmp_path) -> None:
+    card = build_instrument(TRUE)
+    words = ("step 20 -10 4h", "step -10 50 4h")
+    records = [simulate_run(card, load_profile(w), 0.1, k).record for k, w in enumerate(words)]
+    found = calibrate(polynomial_card(records), records, profile=False, keep=False)
+    save_card(found.instrument, tmp_path / "found.toml")
+    again = load_card(tmp_path / "found.toml")
+    T = np.linspace(265.0, 320.0, 7)
+    away = again.polynomial.frequency(T) - card.polynomial.frequency(T)
+    assert np.abs(away).max() < 2e-3
+    for key, true in (("lag_s", 2000.0), ("chamber_lag_s", 600.0)):
+        value = next(one for one in again.uncertain if one.name == f"law.{key}")
+        assert abs(value.value - true) < 4 * value.sd + 1e-3 * true
+
+
+def test_contract_a_card_has_one_law() -> None:
+    with pytest.raises(InputError, match=r"either \[law\] or \[thermal\]"):
+        build_instrument({**TRUE, "thermal": {"cells": 1}})
+    with pytest.raises(InputError, match="f0_Hz"):
+        build_instrument({**TRUE, "law": {"lag_s": 100.0}})
+    with pytest.raises(InputError, match="needs a card with"):
+        _ = build_instrument(TRUE).resonator
