@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from studies.calibration.calibrate import Calibration
     from studies.comparison import Comparison
     from studies.diagnosis.investigate import Diagnosis
-    from studies.diagnosis.planning.chamber import Chamber
+    from studies.planning.chamber import Chamber
     from studies.diagnosis.table import TableDiagnosis
     from studies.inference.diagnosis import Inference
 

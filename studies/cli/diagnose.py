@@ -3,25 +3,25 @@
 from pathlib import Path
 
 from studies import workbench
-from studies.cli.arguments import Seed
 from studies.cli.output import answers, say
 from studies.cli.telling import Told
-from studies.diagnosis.planning.chamber import Chamber, parse_chamber
+from studies.planning.chamber import Chamber, parse_chamber
 from studies.errors import InputError
 from studies.instrument.card import load_card, save_card
 from studies.reports.diagnosis import headline
 from studies.results import Result
 
+PLANNED = "hrg-30mm"
+"""Card of a plan without --card."""
 
-@answers("hrg.diagnosis/1, with --plan hrg.plan/1, with --device hrg.fleet/1")
+
+@answers("hrg.diagnosis/1, with --plan hrg.plan/2, with --device hrg.fleet/1")
 def diagnose(
     *runs: str,
     card: str | None = None,
     save: str | None = None,
     plan: list[str] | None = None,
     chamber: str | None = None,
-    draws: int = 100,
-    seed: Seed = 0,
     device: list[str] | None = None,
     fleet: str | None = None,
 ) -> Result:
@@ -39,11 +39,9 @@ def diagnose(
         Save the extended model as a card (TOML); needs --card. Not saved, with exit status 2, if its calibration does not converge.
     plan : list[str]
         Chamber profiles of a planned campaign, as text or as files, one for each run: predict which effects the campaign can
-        identify. Further profiles may follow without --plan.
+        identify with the gyro of --card, and how small they may be. Further profiles may follow without --plan.
     chamber : str
         Limits of the chamber, such as "rate 3 range -40 85" (K/min, °C), for --plan and for the suggested next run.
-    draws : int
-        With --plan: random draws, 4 to 2000; each effect is tried in a quarter as many cases at each SNR (1, 0.3, 0.1).
     device : list[str]
         A device of a fleet and its records, such as A=a1.csv,a2.csv; repeat it for each device of the same design. Shows what the
         devices have in common and which one differs.
@@ -52,7 +50,7 @@ def diagnose(
     """
     limits = None if chamber is None else parse_chamber(chamber)
     if plan:
-        return _plan([*plan, *runs], card, limits, draws, seed)
+        return _plan([*plan, *runs], card, limits)
     if device or fleet is not None:
         if runs or save is not None:
             raise InputError("with --device or --fleet, give no other records and no --save.")
@@ -71,15 +69,16 @@ def diagnose(
     return _table(tables[0], card)
 
 
-def _plan(profiles: list[str], card: str | None, limits: Chamber | None, draws: int, seed: int) -> Result:
+def _plan(profiles: list[str], card: str | None, limits: Chamber | None) -> Result:
     """Predict which effects a planned campaign can identify."""
-    from studies.diagnosis.planning.plan import plan_campaign
+    from studies.planning.plan import plan_campaign
     from studies.reports import plan as parts
 
+    if card is None:
+        say(f"no --card given: planning with the card {PLANNED}.")
     with Told("plan") as told:
-        cases = max(4, min(draws, 2000) // 4)
-        outlook = plan_campaign(profiles, seed=seed, cases=cases, card=card, chamber=limits, progress=told)
-    return Result(outlook.as_dict(), "Planned campaign", parts.headline(outlook), parts.plan_parts(outlook, profiles))
+        plan = plan_campaign(load_card(card or PLANNED), profiles, limits, told)
+    return Result(plan.as_dict(), "Planned campaign", parts.headline(plan), parts.plan_parts(plan, profiles))
 
 
 def _table(path: str, card: str | None) -> Result:

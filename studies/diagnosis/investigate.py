@@ -21,7 +21,7 @@ from studies.diagnosis.inquiry import Inquiry, Thermometer, again, begin, inquir
 from studies.diagnosis.lack_of_fit import doubt_of
 from studies.diagnosis.model import Fit
 from studies.diagnosis.planning.advice import suggest_next
-from studies.diagnosis.planning.chamber import Chamber
+from studies.planning.chamber import Chamber
 from studies.diagnosis.response import RESPONSES
 from studies.diagnosis.seen import SeenResponse
 from studies.diagnosis.simulated import FAR, Simulated, shifts_of, simulate_baseline

@@ -167,22 +167,10 @@ class Background:
         units : array (H, k)
         positive : array (H,), those that cannot go against their first column; of the wrong sign they add nothing: −∞
         """
-        base, left, _, _ = self._solved
-        H, k = units.shape
-        gram, moment = np.zeros((H, k, k)), np.zeros((H, k))
-        beside = np.zeros((next(iter(base.values())).shape[1], H * k))
-        for name, own in columns.items():
-            white = self._whiteners[name](own.reshape(len(own), H * k))
-            moment += (white.T @ left[name]).reshape(H, k)
-            beside += base[name].T @ white
-            stacked = white.reshape(len(own), H, k).transpose(1, 2, 0)
-            gram += stacked @ stacked.transpose(0, 2, 1)
-        shared = beside.reshape(-1, H, k).transpose(1, 2, 0)
-        gram -= shared @ shared.transpose(0, 2, 1)
-        gram, moment = gram * units[:, :, None] * units[:, None, :], moment * units
-        values, ways = np.linalg.eigh(gram)
-        along = np.einsum("hij,hi->hj", ways, moment)
-        values = np.maximum(values, 0.0)
+        values, ways, along = self.against(
+            columns, units, {name: rest[:, None] for name, rest in self._solved[1].items()}
+        )
+        along = along[:, :, 0]
         size = (SCALES**2)[:, None, None]
         gain = -0.5 * np.log1p(size * values).sum(-1) + 0.5 * (size * along**2 / (1 + size * values)).sum(-1)
         best = SCALES[np.argmax(gain, axis=0)][:, None] ** 2
@@ -190,6 +178,42 @@ class Background:
         against = positive & (coefficient[:, 0] < 0)
         gain[:, against] = -np.inf
         return np.asarray(gain)
+
+    def against(
+        self, columns: Mapping[str, Array], units: Array, left: Mapping[str, Array]
+    ) -> tuple[Array, Array, Array]:
+        """Return eigenvalues (H, k) and eigenvectors (H, k, k) of the Gram matrices of effects beside this model, and the moments along these of B residuals (H, k, B).
+
+        Parameters
+        ----------
+        columns, units : as in `gains`
+        left : response -> (M, B), whitened rows that this model leaves
+        """
+        base, (H, k) = self._solved[0], units.shape
+        gram, moment = np.zeros((H, k, k)), np.zeros((H, k, next(iter(left.values())).shape[1]))
+        beside = np.zeros((next(iter(base.values())).shape[1], H * k))
+        for name, own in columns.items():
+            white = self._whiteners[name](own.reshape(len(own), H * k))
+            moment += (white.T @ left[name]).reshape(moment.shape)
+            beside += base[name].T @ white
+            stacked = white.reshape(len(own), H, k).transpose(1, 2, 0)
+            gram += stacked @ stacked.transpose(0, 2, 1)
+        shared = beside.reshape(-1, H, k).transpose(1, 2, 0)
+        gram -= shared @ shared.transpose(0, 2, 1)
+        values, ways = np.linalg.eigh(gram * units[:, :, None] * units[:, None, :])
+        along = ways.transpose(0, 2, 1) @ (moment * units[:, :, None])
+        return np.maximum(values, 0.0), ways, along
+
+    def left_of(self, signals: Mapping[str, Array]) -> tuple[dict[str, Array], Array, dict[str, Array]]:
+        """Return what this model cannot absorb of signals, response -> (M, B): whitened rows, their energy (B,), and the rows themselves."""
+        base, _, _, R = self._solved
+        white = {name: self._whiteners[name](own) for name, own in signals.items()}
+        taken = sum(base[name].T @ own for name, own in white.items())
+        energy = sum((own**2).sum(axis=0) for own in white.values()) - (taken**2).sum(axis=0)
+        absorbed = solve_triangular(R, taken)
+        rows = {n: own - self.linear.columns(self.terms, n) @ absorbed for n, own in signals.items()}
+        left = {name: white.get(name, 0.0) - base[name] @ taken for name in base}
+        return left, np.maximum(energy, 0.0), rows
 
     def with_term(self, term: Term) -> tuple[Term, float]:
         """Return a term at its likeliest scale, and the log evidence that it adds, its scales averaged."""

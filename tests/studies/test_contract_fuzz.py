@@ -412,7 +412,7 @@ def test_broken_meshes_are_one_sentence(tmp_path, ending, capfd):
         "loop hrg-30mm-loops --out run.csv --seed -1",
         "loop hrg-30mm-loops --out run.csv --hours inf",
         "loop hrg-30mm-loops --out run.csv --hours 1e9",
-        "diagnose --plan soak_20_2h --seed -1",
+        "diagnose --plan soak_20_2h --card nobody",
     ],
 )
 def test_impossible_arguments_are_refused(words, capsys, monkeypatch, tmp_path):

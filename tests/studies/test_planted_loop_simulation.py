@@ -72,12 +72,11 @@ def test_a_hole_in_a_schedule_is_refused(tmp_path, capsys):
 
 
 def test_a_planned_run_moves_the_commanded_drives(tmp_path):
-    from studies.diagnosis.planning.plan import imagine
+    from studies.planning.plan import simulate_plan
 
     path = tmp_path / "schedule.csv"
     path.write_text(SCHEDULE)
-    (commanded,) = (run.states for run in imagine([str(path)], np.random.default_rng(0)).runs)
-    (plain,) = (run.states for run in imagine(["soak 20 30min"], np.random.default_rng(0)).runs)
-    assert plain.voltage_squared is None
-    assert commanded.voltage_squared.max() == pytest.approx(1e4)
-    assert np.degrees(commanded.pattern_angle.min()) == pytest.approx(11.25)
+    commanded, plain = simulate_plan(load_card("free-dome"), [str(path), "soak 20 30min"])
+    assert "electrode_bias_V" not in plain
+    assert commanded["electrode_bias_V"].max() == pytest.approx(100.0)
+    assert commanded["pattern_angle_deg"].min() == pytest.approx(11.25)

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 from studies.diagnosis.campaign import Campaign, longest_resolved
 from studies.diagnosis.model import Fit
-from studies.diagnosis.planning.chamber import Chamber
+from studies.planning.chamber import Chamber
 from studies.diagnosis.planning.next_run import (
     NOTHING,
     SMALLEST,

@@ -22,7 +22,7 @@ from studies.diagnosis.campaign import Campaign
 from studies.diagnosis.constants import CONSTANTS
 from studies.diagnosis.model import Fit
 from studies.diagnosis.noise import KERNELS, SHARES
-from studies.diagnosis.planning.chamber import Chamber
+from studies.planning.chamber import Chamber
 from studies.diagnosis.planning.programme import Programme, Steps, candidates
 from studies.diagnosis.scan import applicable, scan
 from studies.diagnosis.search import Place

@@ -7,7 +7,7 @@ import numpy as np
 
 from shell.constants import zero_Celsius
 from studies.diagnosis.campaign import Campaign
-from studies.diagnosis.planning.chamber import Chamber, limited
+from studies.planning.chamber import Chamber, limited
 from studies.effects.states import FloatArray, States, lag
 
 HOUSING_LAG = 600.0

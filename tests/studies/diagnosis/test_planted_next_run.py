@@ -7,7 +7,7 @@ from studies.diagnosis.campaign import load_campaign
 from studies.diagnosis.inquiry import begin
 from studies.diagnosis.investigate import investigate
 from studies.diagnosis.model import fit
-from studies.diagnosis.planning.chamber import limited, parse_chamber
+from studies.planning.chamber import limited, parse_chamber
 from studies.diagnosis.planning.next_run import against, covariance_of_noise
 from studies.diagnosis.planning.next_run import follow as continue_model
 from studies.diagnosis.planning.programme import candidates, words_of
