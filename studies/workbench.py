@@ -16,9 +16,9 @@ if TYPE_CHECKING:
     from studies.calibration.calibrate import Calibration
     from studies.comparison import Comparison
     from studies.diagnosis.investigate import Diagnosis
-    from studies.planning.chamber import Chamber
     from studies.diagnosis.table import TableDiagnosis
     from studies.inference.diagnosis import Inference
+    from studies.planning.chamber import Chamber
 
 Card = Instrument | str | Path
 Run = Record | str | Path

@@ -5,9 +5,9 @@ from pathlib import Path
 from studies import workbench
 from studies.cli.output import answers, say
 from studies.cli.telling import Told
-from studies.planning.chamber import Chamber, parse_chamber
 from studies.errors import InputError
 from studies.instrument.card import load_card, save_card
+from studies.planning.chamber import Chamber, parse_chamber
 from studies.reports.diagnosis import headline
 from studies.results import Result
 

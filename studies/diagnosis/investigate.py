@@ -21,13 +21,13 @@ from studies.diagnosis.inquiry import Inquiry, Thermometer, again, begin, inquir
 from studies.diagnosis.lack_of_fit import doubt_of
 from studies.diagnosis.model import Fit
 from studies.diagnosis.planning.advice import suggest_next
-from studies.planning.chamber import Chamber
 from studies.diagnosis.response import RESPONSES
 from studies.diagnosis.seen import SeenResponse
 from studies.diagnosis.simulated import FAR, Simulated, shifts_of, simulate_baseline
 from studies.diagnosis.stated import as_shipped, with_loss_carried, without_rate_terms
 from studies.diagnosis.verdict import Cause, Interval, ResponseResult, Shift, Verdict, doubted, overall
 from studies.effects import Effect
+from studies.planning.chamber import Chamber
 from studies.plausible import check_card_frequency
 from studies.shown import Shown
 

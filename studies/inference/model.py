@@ -208,8 +208,9 @@ class Background:
         """Return what this model cannot absorb of signals, response -> (M, B): whitened rows, their energy (B,), and the rows themselves."""
         base, _, _, R = self._solved
         white = {name: self._whiteners[name](own) for name, own in signals.items()}
-        taken = sum(base[name].T @ own for name, own in white.items())
-        energy = sum((own**2).sum(axis=0) for own in white.values()) - (taken**2).sum(axis=0)
+        names = list(white)
+        taken = np.vstack([base[name] for name in names]).T @ np.vstack([white[name] for name in names])
+        energy = np.sum([(own**2).sum(axis=0) for own in white.values()], axis=0) - (taken**2).sum(axis=0)
         absorbed = solve_triangular(R, taken)
         rows = {n: own - self.linear.columns(self.terms, n) @ absorbed for n, own in signals.items()}
         left = {name: white.get(name, 0.0) - base[name] @ taken for name in base}

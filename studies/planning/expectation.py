@@ -11,6 +11,7 @@ against nothing as N(S_h, Σ w² λ a² α²), w = s²/(1 + s² λ). (The expect
 it is detected, that another effect is named or cannot be told from it, are normal integrals. Of all others the worst one counts.
 """
 
+import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -108,11 +109,11 @@ class Expectation:
         self.hidden = tuple(hidden)
         counts = [one.cases for one in hidden]
         edges = np.cumsum([0, *counts])
-        self.places = [slice(int(a), int(b)) for a, b in zip(edges[:-1], edges[1:], strict=True)]
+        self.places = [slice(int(a), int(b)) for a, b in itertools.pairwise(edges)]
         signals = {name: np.zeros((len(target), edges[-1])) for name, target in search.linear.target.items()}
         for one, place in zip(hidden, self.places, strict=True):
-            for name, own in one.signal.items():
-                signals[name][:, place] = own
+            for name, columns in one.signal.items():
+                signals[name][:, place] = columns
         left, self.energy, self.left = beside.left_of(signals)
         self.signals = signals
         self._explained: dict[Key, list[tuple[Array, ...]]] = {}

@@ -5,7 +5,6 @@ from typing import TYPE_CHECKING
 
 from studies.diagnosis.campaign import Campaign, longest_resolved
 from studies.diagnosis.model import Fit
-from studies.planning.chamber import Chamber
 from studies.diagnosis.planning.next_run import (
     NOTHING,
     SMALLEST,
@@ -19,6 +18,7 @@ from studies.diagnosis.planning.programme import candidates, programme_for
 from studies.diagnosis.response import RESPONSES
 from studies.diagnosis.verdict import Cause, Verdict
 from studies.effects import find_effect
+from studies.planning.chamber import Chamber
 
 if TYPE_CHECKING:
     from studies.diagnosis.inquiry import Inquiry

@@ -22,13 +22,13 @@ from studies.diagnosis.campaign import Campaign
 from studies.diagnosis.constants import CONSTANTS
 from studies.diagnosis.model import Fit
 from studies.diagnosis.noise import KERNELS, SHARES
-from studies.planning.chamber import Chamber
 from studies.diagnosis.planning.programme import Programme, Steps, candidates
 from studies.diagnosis.scan import applicable, scan
 from studies.diagnosis.search import Place
 from studies.diagnosis.terms import Term, term_columns, used
 from studies.effects import library
 from studies.effects.states import FloatArray, States, average
+from studies.planning.chamber import Chamber
 
 NOTHING = "nothing"
 MOST_RIVALS = 3

@@ -7,8 +7,8 @@ import numpy as np
 
 from shell.constants import zero_Celsius
 from studies.diagnosis.campaign import Campaign
-from studies.planning.chamber import Chamber, limited
 from studies.effects.states import FloatArray, States, lag
+from studies.planning.chamber import Chamber, limited
 
 HOUSING_LAG = 600.0
 """The housing behind the chamber's air, s, where the housing is measured."""

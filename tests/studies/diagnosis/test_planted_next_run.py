@@ -7,13 +7,13 @@ from studies.diagnosis.campaign import load_campaign
 from studies.diagnosis.inquiry import begin
 from studies.diagnosis.investigate import investigate
 from studies.diagnosis.model import fit
-from studies.planning.chamber import limited, parse_chamber
 from studies.diagnosis.planning.next_run import against, covariance_of_noise
 from studies.diagnosis.planning.next_run import follow as continue_model
 from studies.diagnosis.planning.programme import candidates, words_of
 from studies.diagnosis.terms import Term
 from studies.effects import find_effect
 from studies.errors import InputError
+from studies.planning.chamber import limited, parse_chamber
 from studies.record import Record
 from tests.studies.diagnosis.bench import LAG, STAIRS, Bench
 from thermal.lag import lag
