@@ -17,8 +17,8 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.linalg import expm
 
 from compensation.controllers import Loops
 from compensation.electronics import Electronics
@@ -110,7 +110,7 @@ class ClosedLoop:
         newest = np.vstack([command, sent])  # c_n, c_{n−1}, …
         first, second = newest[4 * (late + 1) : 4 * (late + 2)], newest[4 * late : 4 * (late + 1)]
         whole, early = _held_maps(A, T), _held_maps(A, T - rest)
-        before = expm(A * (T - rest)) @ _held_maps(A, rest)[1]
+        before = scipy.linalg.expm(A * (T - rest)) @ _held_maps(A, rest)[1]
         wave = whole[0] @ part("wave") + whole[1] @ part("forcing") + whole[2] @ part("forcing_slope")
         wave += before @ drive @ first + early[1] @ drive @ second
         F = np.zeros((N, N))
@@ -283,5 +283,5 @@ def _held_maps(A: Real, time: float) -> tuple[Real, Real, Real]:
     block = np.zeros((3 * n, 3 * n))
     block[:n, :n] = A
     block[:n, n : 2 * n] = block[n : 2 * n, 2 * n :] = np.eye(n)
-    E = expm(block * time)
+    E = scipy.linalg.expm(block * time)
     return E[:n, :n], E[:n, n : 2 * n], E[:n, 2 * n :]

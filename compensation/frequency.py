@@ -11,7 +11,6 @@ from itertools import pairwise
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.optimize import elementwise
 
 from compensation.errors import CompensationError
 from compensation.polynomial import PolynomialFit, count_apart, fit_polynomial
@@ -190,12 +189,14 @@ def invert(curve: Callable[[Array], Array], span: tuple[float, float], frequency
             f" {100 * np.mean(outside):.1f} % of the readings; calibrate over that range."
         )
 
+    from scipy.optimize.elementwise import find_root
+
     def excess(T: Array, f: Array) -> Array:
         return curve(T) - f
 
     found = np.full(frequency.shape, np.nan)
     if np.any(known):
-        found[known] = elementwise.find_root(excess, span, args=(frequency[known],)).x
+        found[known] = find_root(excess, span, args=(frequency[known],)).x
     return found
 
 
@@ -292,8 +293,10 @@ def misreading_degC(one: FrequencyFit, other: FrequencyFit, temperature_degC: Ar
     T = np.asarray(temperature_degC, dtype=np.float64)
     reach = np.ptp(one.temperature_range_degC)
 
+    from scipy.optimize.elementwise import find_root
+
     def excess(read: Array, f: Array) -> Array:
         return one.frequency(read, extrapolate=True) - f
 
-    found = elementwise.find_root(excess, (T - reach, T + reach), args=(other.frequency(T, extrapolate=True),))
+    found = find_root(excess, (T - reach, T + reach), args=(other.frequency(T, extrapolate=True),))
     return np.asarray(np.where(found.success, found.x, np.nan) - T)

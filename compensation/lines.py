@@ -4,10 +4,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.fft import next_fast_len, rfft
-from scipy.ndimage import median_filter, uniform_filter1d
-from scipy.special import gammaincc, gammaln
 
 from compensation.noise import white_rms
 from compensation.spikes import find_step
@@ -58,7 +56,7 @@ def find_line(
     """
     rows = [(time[known], values[known]) for time, values in series if (known := np.isfinite(values)).sum() > AROUND]
     longest = round(max((time[-1] - time[0] for time, _ in rows), default=0.0) / sampling) + 1
-    count = next_fast_len(2 * longest, real=True)
+    count = scipy.fft.next_fast_len(2 * longest, real=True)
     frequency = np.arange(count // 2 + 1) / (count * sampling)
     slow = max(1.0 / slowest, CYCLES / (longest * sampling))
     looked_at = (frequency > slow) & (frequency < 1.0 / (FASTEST * sampling))
@@ -66,8 +64,8 @@ def find_line(
     for time, values in rows:
         fast = _fast(time, values, sampling, slowest)
         window = np.hanning(fast.size)
-        amplitude = np.abs(rfft(fast * window, count)) * 2.0 / window.sum()
-        level = median_filter(amplitude**2, AROUND, mode="nearest") / np.log(2.0)
+        amplitude = np.abs(scipy.fft.rfft(fast * window, count)) * 2.0 / window.sum()
+        level = scipy.ndimage.median_filter(amplitude**2, AROUND, mode="nearest") / np.log(2.0)
         real = looked_at & (level > 0.0) & (amplitude > 2.0 * _of_rounding(values))
         ratio[real] += LEVEL * np.log1p(amplitude[real] ** 2 / level[real] / LEVEL)
         size[real] = np.maximum(size[real], amplitude[real] / np.sqrt(2.0))
@@ -78,16 +76,18 @@ def find_line(
 
 def _improbable(ratio: Array, order: int) -> Array:
     """Return minus the log of the probability that a gamma law exceeds a number; far out by its leading term."""
-    far = ratio - (order - 1) * np.log(np.maximum(ratio, 1.0)) + gammaln(order)
+    far = ratio - (order - 1) * np.log(np.maximum(ratio, 1.0)) + scipy.special.gammaln(order)
     near = np.minimum(ratio, FAR + 3.0 * order)
-    return np.asarray(np.where(ratio > near, far, -np.log(gammaincc(order, near))))
+    return np.asarray(np.where(ratio > near, far, -np.log(scipy.special.gammaincc(order, near))))
 
 
 def _fast(time: Array, values: Array, sampling: float, slowest: float) -> Array:
     """Return what readings do within twice the slowest period, on an even grid; a bend or a hop is clipped."""
     table = np.interp(np.arange(time[0], time[-1] + 0.5 * sampling, sampling), time, values)
     width = max(3, round(slowest / sampling))
-    fast = table - uniform_filter1d(uniform_filter1d(table, width, mode="nearest"), width, mode="nearest")
+    fast = table - scipy.ndimage.uniform_filter1d(
+        scipy.ndimage.uniform_filter1d(table, width, mode="nearest"), width, mode="nearest"
+    )
     most = TALLEST * 1.4826 * float(np.median(np.abs(fast)))
     return np.asarray(np.clip(fast, -most, most))
 

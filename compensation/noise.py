@@ -17,8 +17,8 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike, NDArray
-from scipy.fft import irfft, rfft
 
 Array = NDArray[np.float64]
 FLAT = math.sqrt(2 * math.log(2) / math.pi)
@@ -155,10 +155,10 @@ def _draw_flicker(count: int, span: float, generator: np.random.Generator) -> Ar
         r[1 : seen + 1] += g * g * np.exp(-one * lag[:seen])
     r[0] = variance_of_mean(x).sum()
     length = 2 * count
-    power = rfft(np.concatenate([r, r[-2:0:-1]])).real
+    power = scipy.fft.rfft(np.concatenate([r, r[-2:0:-1]])).real
     amplitude = np.sqrt(power * length / 2.0) * (generator.standard_normal((2, power.size)).T @ [1.0, 1j])
     amplitude[[0, -1]] = np.sqrt(2.0) * amplitude[[0, -1]].real  # the mean and the alternating part are real
-    return np.ascontiguousarray(irfft(amplitude, length)[:count])
+    return np.ascontiguousarray(scipy.fft.irfft(amplitude, length)[:count])
 
 
 def _draw_walk(count: int, generator: np.random.Generator) -> Array:

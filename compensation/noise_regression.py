@@ -19,9 +19,8 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import linalg, optimize
-from scipy.linalg import lapack
 
 from compensation.noise import Noise
 from compensation.regression import LinearFit, fit_linear
@@ -65,7 +64,7 @@ def whiten(Z: Array, theta: float, runs: Runs) -> Array:
         return Z
     columns = Z.reshape(len(Z), -1)
     parts = [np.diff(columns[run], axis=0, prepend=np.zeros((1, columns.shape[1]))) for run in runs]
-    solved = [lapack.dtbtrs(_factor(theta, len(part)), part, uplo="L")[0] for part in parts]
+    solved = [scipy.linalg.lapack.dtbtrs(_factor(theta, len(part)), part, uplo="L")[0] for part in parts]
     return np.concatenate(solved).reshape(Z.shape)
 
 
@@ -75,14 +74,14 @@ def _factor(theta: float, rows: int) -> Array:
     bands = np.empty((2, rows))
     bands[0], bands[1] = 1.0 + theta**2, -theta
     bands[0, 0] = (1.0 + theta**2) / 2.0
-    return np.asarray(linalg.cholesky_banded(bands, lower=True))
+    return np.asarray(scipy.linalg.cholesky_banded(bands, lower=True))
 
 
 def restricted_deviance(X: Array, y: Array, theta: float, runs: Runs) -> float:
     """Return −2 ln L = (m − k) ln RSS + ln det XᵀX + ln det Σ of the whitened rows; columns of X should be of length one."""
     # The triangle R of [X, y]: its last corner is the root of RSS, the rest the determinant.
     both = np.column_stack([whiten(X, theta, runs), whiten(y, theta, runs)])
-    R = np.maximum(np.abs(np.diag(linalg.qr(both, mode="r", check_finite=False)[0])), 1e-300)
+    R = np.maximum(np.abs(np.diag(scipy.linalg.qr(both, mode="r", check_finite=False)[0])), 1e-300)
     total = 2 * (y.size - X.shape[1]) * np.log(R[-1]) + 2 * np.sum(np.log(R[:-1]))
     if theta != 1.0:
         total += 2 * sum(float(np.sum(np.log(_factor(theta, run.stop - run.start)[0]))) for run in runs)
@@ -106,7 +105,7 @@ def estimate_theta(X: Array, y: Array, runs: Runs, caution: float = 0.0) -> floa
     best = int(np.argmin(values))
     theta, least = grid[best], values[best]
     if 0 < best < grid.size - 1:
-        found = optimize.minimize_scalar(
+        found = scipy.optimize.minimize_scalar(
             deviance, bounds=(grid[best + 1], grid[best - 1]), method="bounded", options={"xatol": 1e-4}
         )
         theta, least = found.x, found.fun
@@ -117,7 +116,7 @@ def estimate_theta(X: Array, y: Array, runs: Runs, caution: float = 0.0) -> floa
             return float(grid[-1])
         if edge > best:
             upper = theta if edge == best + 1 else grid[edge - 1]
-            return float(optimize.brentq(lambda t: deviance(t) - least - caution, grid[edge], upper, xtol=1e-4))
+            return float(scipy.optimize.brentq(lambda t: deviance(t) - least - caution, grid[edge], upper, xtol=1e-4))
     return float(theta)
 
 

@@ -16,10 +16,8 @@ from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.linalg import solve_triangular
-from scipy.linalg.lapack import dpotri
-from scipy.optimize import minimize
 
 from compensation.errors import CompensationError
 from compensation.noise import SLOW_TIMES, Noise, flicker, random_walk
@@ -120,17 +118,17 @@ class NoiseRows:
         about = np.zeros(X.shape[1]) if mean is None else mean
         A = X.T @ X
         root = np.linalg.cholesky(A + np.diag(precision + 1e-12 * (1 + A.diagonal())))
-        beside = solve_triangular(root, X.T, lower=True).T
-        found = solve_triangular(root, solve_triangular(root, X.T @ r + precision * about, lower=True), lower=True, trans="T")  # fmt: skip
+        beside = scipy.linalg.solve_triangular(root, X.T, lower=True).T
+        found = scipy.linalg.solve_triangular(root, scipy.linalg.solve_triangular(root, X.T @ r + precision * about, lower=True), lower=True, trans="T")  # fmt: skip
         rest = r - X @ found
         total += float(rest @ rest + (found - about) @ (precision * (found - about)))
         total += 2 * float(np.log(np.diag(root)).sum())
         both, slopes = np.column_stack([beside, rest]), dict.fromkeys(KINDS, 0.0)
         for (L, runs), (F, W, _) in zip(whitener.roots, self._groups, strict=True):
-            inverse = np.tril(dpotri(L, lower=1)[0])
+            inverse = np.tril(scipy.linalg.lapack.dpotri(L, lower=1)[0])
             S = len(runs) * (inverse + np.tril(inverse, -1).T)
             for run in runs:
-                U = solve_triangular(L, both[self.slices[run]], lower=True, trans="T", check_finite=False)
+                U = scipy.linalg.solve_triangular(L, both[self.slices[run]], lower=True, trans="T", check_finite=False)
                 S -= U @ U.T
             slopes["white"] += 2 * noise.white**2 * float(S.diagonal() @ (self.stretch[runs[0]] / self.spans[runs[0]]))
             for kind, level, own in (("flicker", noise.flicker, F), ("walk", noise.walk, W)):
@@ -152,7 +150,7 @@ class Whitener:
         white, p = np.empty_like(matrix), matrix.shape[1]
         for L, runs in self.roots:
             side_by_side = np.hstack([matrix[self.slices[run]] for run in runs])
-            solved = solve_triangular(L, side_by_side, lower=True, check_finite=False)
+            solved = scipy.linalg.solve_triangular(L, side_by_side, lower=True, check_finite=False)
             for k, run in enumerate(runs):
                 white[self.slices[run]] = solved[:, k * p : (k + 1) * p]
         return white.reshape(columns.shape)
@@ -242,5 +240,7 @@ def estimate_noise(
         first = np.log([white / spread, *slow])
         first[1:] = np.clip(first[1:], LEAST, MOST)
     bounds = [(-12.0, 12.0), *[(LEAST, MOST)] * len(free)]
-    found = minimize(objective, first, jac=True, method="L-BFGS-B", bounds=bounds, options={"ftol": 1e-9})
+    found = scipy.optimize.minimize(
+        objective, first, jac=True, method="L-BFGS-B", bounds=bounds, options={"ftol": 1e-9}
+    )
     return levels(found.x)

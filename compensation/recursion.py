@@ -3,8 +3,8 @@
 from typing import Any
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike, NDArray
-from scipy.linalg import lapack
 
 
 def recur(pole: complex, forced: ArrayLike) -> NDArray[Any]:
@@ -14,5 +14,5 @@ def recur(pole: complex, forced: ArrayLike) -> NDArray[Any]:
     columns = forced.astype(complex if is_complex else float).reshape(len(forced), -1)
     band = np.ones((2, len(columns)), order="F", dtype=columns.dtype)
     band[1] = -pole
-    solve = lapack.ztbtrs if is_complex else lapack.dtbtrs
+    solve = scipy.linalg.lapack.ztbtrs if is_complex else scipy.linalg.lapack.dtbtrs
     return np.asarray(solve(band, columns, uplo="L", diag="U")[0]).reshape(forced.shape)

@@ -11,8 +11,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike, NDArray
-from scipy import linalg, special
 
 from compensation.errors import CompensationError
 
@@ -167,7 +167,7 @@ def fit_linear(
     if constant:
         T[0, 1:] = -shift / scale[1:]
     design = np.column_stack([np.ones(m), X]) if constant else X
-    root = T[:, order] @ linalg.solve_triangular(R, np.eye(R.shape[0]))
+    root = T[:, order] @ scipy.linalg.solve_triangular(R, np.eye(R.shape[0]))
     coefficients, residuals = _solve(Q, R, root, design, y)
     return LinearFit(
         names=labels,
@@ -203,7 +203,7 @@ def compare_nested(small: LinearFit, large: LinearFit) -> FTest:
     left = large.sum_of_squares / large.degrees_of_freedom
     # Rounded readings can lie on a curve exactly; then any reduction is infinitely significant.
     statistic = max(reduction, 0.0) / left if left else math.inf if reduction > 0 else 0.0
-    p_value = float(special.fdtrc(extra, large.degrees_of_freedom, statistic))
+    p_value = float(scipy.special.fdtrc(extra, large.degrees_of_freedom, statistic))
     return FTest(statistic, extra, large.degrees_of_freedom, p_value)
 
 
@@ -227,11 +227,11 @@ def _check(X: ArrayLike, y: ArrayLike, names: Sequence[str]) -> tuple[Array, Arr
 
 def _factor(Z: Array, names: Sequence[str], tolerance: float) -> tuple[Array, Array, NDArray[np.intp]]:
     """Pivoted QR of unit columns; a pivot of rounding size names the column that others make up."""
-    Q, R, order = linalg.qr(Z, mode="economic", pivoting=True)
+    Q, R, order = scipy.linalg.qr(Z, mode="economic", pivoting=True)
     small = np.flatnonzero(np.abs(np.diag(R)) < tolerance)
     if small.size:
         rank = int(small[0])
-        share = linalg.solve_triangular(R[:rank, :rank], R[:rank, rank])
+        share = scipy.linalg.solve_triangular(R[:rank, :rank], R[:rank, rank])
         others = [f"'{names[order[j]]}'" for j in range(rank) if abs(share[j]) > 1e-6]
         raise CompensationError(
             f"column '{names[order[rank]]}' is a linear combination of {', '.join(others)}: "

@@ -1,8 +1,8 @@
 """Spikes: readings that their neighbours contradict."""
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.ndimage import median_filter
 
 Array = NDArray[np.float64]
 REACH = 3
@@ -35,7 +35,7 @@ def find_spikes(values: Array, least: float = 0.0, step: float = 0.0) -> NDArray
     known = values[rows]
     marked[rows] = _stand_out(known, 0.5 * step)
     if least:
-        smooth = median_filter(known, NEIGHBOURS, mode="mirror")
+        smooth = scipy.ndimage.median_filter(known, NEIGHBOURS, mode="mirror")
         marked[rows] &= np.abs(known - smooth) > least * np.ptp(smooth)
     return marked
 
@@ -57,7 +57,7 @@ def find_spike_groups(rests: Array, step: float = 0.0) -> NDArray[np.bool_]:
     marked, rows = np.zeros(len(rests), dtype=bool), np.flatnonzero(np.isfinite(rests))
     if len(rows) < LEVEL:
         return marked
-    distance = np.abs(rests[rows] - median_filter(rests[rows], LEVEL, mode="mirror"))
+    distance = np.abs(rests[rows] - scipy.ndimage.median_filter(rests[rows], LEVEL, mode="mirror"))
     far = np.flatnonzero(distance > SPIKE * max(1.4826 * float(np.median(distance)), 0.5 * step))
     groups = np.split(far, np.flatnonzero(np.diff(far) > 2) + 1) if far.size else []
     for own in groups:

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike, NDArray
-from scipy import optimize, special
 
 from compensation.errors import CompensationError
 from compensation.noise import FLAT, Noise
@@ -131,8 +131,8 @@ def allan_deviation(
         deviation=deviation,
         degrees_of_freedom=edf,
         noise=noise,
-        low=deviation * np.sqrt(edf / special.chdtri(edf, tail)),
-        high=deviation * np.sqrt(edf / special.chdtri(edf, 1 - tail)),
+        low=deviation * np.sqrt(edf / scipy.special.chdtri(edf, tail)),
+        high=deviation * np.sqrt(edf / scipy.special.chdtri(edf, 1 - tail)),
         confidence=confidence,
     )
 
@@ -168,7 +168,7 @@ def fit_noise(allan: AllanDeviation) -> NoiseCoefficients:
     for _ in range(50):
         weight = np.sqrt(allan.degrees_of_freedom / 2) / fitted
         size = np.linalg.norm(A * weight[:, None], axis=0)
-        new = optimize.nnls(A * weight[:, None] / size, variance * weight)[0] / size
+        new = scipy.optimize.nnls(A * weight[:, None] / size, variance * weight)[0] / size
         settled = np.allclose(new, c, rtol=1e-9, atol=0.0)
         c, fitted = new, A @ new
         if settled:

@@ -11,8 +11,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import linalg, special
 
 from compensation.errors import CompensationError
 
@@ -114,7 +114,7 @@ class _Search:
     ) -> None:
         Z = np.column_stack([forced, candidates, y])
         self.lengths = np.linalg.norm(candidates, axis=0)
-        self.R: Array = np.asarray(linalg.qr(Z, mode="r")[0][: Z.shape[1]], dtype=np.float64)
+        self.R: Array = np.asarray(scipy.linalg.qr(Z, mode="r")[0][: Z.shape[1]], dtype=np.float64)
         self.rows, self.forced = forced.shape
         self.names = names
         self.parents = parents
@@ -171,7 +171,7 @@ class _Search:
         without, within = self.sum_of_squares(small), self.sum_of_squares(large)
         freedom = self.rows - self.forced - len(large)
         F = max(without - within, 0.0) / max(within / freedom, 1e-300)
-        return F, float(special.fdtrc(1, freedom, F))
+        return F, float(scipy.special.fdtrc(1, freedom, F))
 
     def _own_part(self, chosen: Sequence[str], name: str) -> float:
         k = self.names.index(name)
@@ -180,5 +180,5 @@ class _Search:
 
     def _residual(self, chosen: Sequence[str], target: Array) -> Array:
         index = [*range(self.forced), *(self.forced + self.names.index(name) for name in chosen)]
-        Q = linalg.qr(self.R[:, index], mode="economic")[0]
+        Q = scipy.linalg.qr(self.R[:, index], mode="economic")[0]
         return np.asarray(target - Q @ (Q.T @ target))

@@ -18,8 +18,8 @@ tells them apart; they are taken as given.
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike, NDArray
-from scipy import special
 
 from compensation.errors import CompensationError
 from compensation.noise_regression import fit_coloured
@@ -105,7 +105,7 @@ def fit_whole_angle(
         )
     turn_rate = np.diff(theta)
     both_ways = np.ptp(_smooth(turn_rate)) > LEAST_CONTRAST * np.max(np.abs(_smooth(turn_rate)))
-    z = float(special.ndtri(0.5 + confidence / 2))
+    z = float(scipy.special.ndtri(0.5 + confidence / 2))
     undetermined: list[str] = []
     estimates: dict[str, tuple[float, float]] = {}
     # Of the rows' means, all but the last: where the wave is at both ends of the row.

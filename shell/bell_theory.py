@@ -17,7 +17,7 @@ from math import pi, sqrt
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
-from scipy.integrate import solve_ivp
+import scipy
 
 from shell.elastic import Elastic
 from shell.errors import ShellError
@@ -177,7 +177,9 @@ def inextensional_functions(resonator: Resonator, pieces: Sequence[Piece]) -> li
             return np.concatenate([-here.curvature * w, (N * u + v * here.normal_z) / here.r])
 
         stops = np.append(piece.points.arc_length, piece.end)
-        path = solve_ivp(rate, (start, piece.end), state, method="DOP853", t_eval=stops, rtol=1e-12, atol=1e-30)
+        path = scipy.integrate.solve_ivp(
+            rate, (start, piece.end), state, method="DOP853", t_eval=stops, rtol=1e-12, atol=1e-30
+        )
         u, v = path.y[:, :-1]
         shapes.append(Amplitudes(u, v, _unstretched_normal(piece.points, u, v)))
         start, state = piece.end, path.y[:, -1]

@@ -10,10 +10,8 @@ from functools import lru_cache
 from typing import Protocol
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.linalg import blas, lapack
-from scipy.sparse import csr_matrix
-from scipy.sparse.csgraph import reverse_cuthill_mckee
 
 from shell.errors import ShellError
 from shell.quadrature import Array
@@ -95,9 +93,11 @@ def _in_a_narrow_band(elements: list[Index], size: int) -> Index:
     _, bundle = np.unique(marks, return_inverse=True)
     known = [np.unique(bundle[members]) for members in elements]
     owner = np.repeat(np.arange(len(known)), [len(k) for k in known])
-    shares = csr_matrix((np.ones(len(owner)), (owner, np.concatenate(known))))
+    shares = scipy.sparse.csr_matrix((np.ones(len(owner)), (owner, np.concatenate(known))))
     rank = np.empty(shares.shape[1], dtype=np.intp)
-    rank[reverse_cuthill_mckee((shares.T @ shares).tocsr(), symmetric_mode=True)] = np.arange(shares.shape[1])
+    rank[scipy.sparse.csgraph.reverse_cuthill_mckee((shares.T @ shares).tocsr(), symmetric_mode=True)] = np.arange(
+        shares.shape[1]
+    )
     place = np.empty(size, dtype=np.intp)
     place[np.argsort(rank[bundle], kind="stable")] = np.arange(size)
     return place
@@ -116,7 +116,7 @@ class Factor:
             L = _cholesky(K[:own, :own])
             W = np.zeros((own, len(K) - own))
             if W.size:
-                W = blas.dtrsm(1.0, L, K[own:, :own].T, lower=1)
+                W = scipy.linalg.blas.dtrsm(1.0, L, K[own:, :own].T, lower=1)
             if len(source):
                 flat[target] += (K[own:, own:] - W.T @ W).ravel()[source]
             self.own.append(L)
@@ -127,22 +127,22 @@ class Factor:
         """K⁻¹ load for several columns."""
         p = self.pattern
         if p.is_whole:
-            return np.asarray(lapack.dpotrs(self.own[0], load, lower=1)[0])
+            return np.asarray(scipy.linalg.lapack.dpotrs(self.own[0], load, lower=1)[0])
         x = np.empty_like(load)
         right = load[p.shared]
         half = []
         for L, W, members, own, where in zip(self.own, self.coupling, p.unknowns, p.own, p.skeleton, strict=True):
-            y = blas.dtrsm(1.0, L, load[members[:own]], lower=1) if own else load[:0]
+            y = scipy.linalg.blas.dtrsm(1.0, L, load[members[:own]], lower=1) if own else load[:0]
             right[where] -= W.T @ y
             half.append(y)
         if len(p.shared):
-            right = lapack.dpbtrs(self.band, right, lower=1)[0]
+            right = scipy.linalg.lapack.dpbtrs(self.band, right, lower=1)[0]
             x[p.shared] = right
         for y, L, W, members, own, where in zip(
             half, self.own, self.coupling, p.unknowns, p.own, p.skeleton, strict=True
         ):
             if own:
-                x[members[:own]] = blas.dtrsm(1.0, L, y - W @ right[where], lower=1, trans_a=1)
+                x[members[:own]] = scipy.linalg.blas.dtrsm(1.0, L, y - W @ right[where], lower=1, trans_a=1)
         return x
 
 
@@ -246,14 +246,14 @@ def _undone(theta: Array, residual: Array, count: int) -> Array:
 
 def _set_apart(x: Array) -> tuple[Array, Array]:
     """An orthonormal basis of the columns, and their coefficients in it."""
-    reflectors, tau, _, _ = lapack.dgeqrf(x)
+    reflectors, tau, _, _ = scipy.linalg.lapack.dgeqrf(x)
     right = reflectors[: x.shape[1]] * _upper(x.shape[1])
-    return np.asarray(lapack.dorgqr(reflectors, tau)[0]), right
+    return np.asarray(scipy.linalg.lapack.dorgqr(reflectors, tau)[0]), right
 
 
 def _eigenpairs(matrix: Array) -> tuple[Array, Array]:
     """Eigenvalues, rising, and eigenvectors of a small symmetric matrix."""
-    values, vectors, fault = lapack.dsyevd(matrix)
+    values, vectors, fault = scipy.linalg.lapack.dsyevd(matrix)
     if fault:
         raise ShellError("the eigenvalues of the subspace did not converge.")
     return np.asarray(values), np.asarray(vectors)
@@ -279,14 +279,14 @@ def _random(size: int, width: int) -> Array:
 def _cholesky(matrix: Array) -> Array:
     if not matrix.size:
         return matrix
-    factor, fault = lapack.dpotrf(matrix.T, lower=1, clean=0)
+    factor, fault = scipy.linalg.lapack.dpotrf(matrix.T, lower=1, clean=0)
     return np.asarray(_definite(factor, fault))
 
 
 def _cholesky_band(band: Array) -> Array:
     if not band.size:
         return band
-    factor, fault = lapack.dpbtrf(band, lower=1, overwrite_ab=1)
+    factor, fault = scipy.linalg.lapack.dpbtrf(band, lower=1, overwrite_ab=1)
     return np.asarray(_definite(factor, fault))
 
 

@@ -16,8 +16,8 @@ from functools import cache
 from typing import Literal, TypeAlias
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.sparse import csc_matrix
 
 from shell.errors import ShellError, mm
 from shell.imperfection import Pair
@@ -225,12 +225,12 @@ class _Nodes:
         return np.flatnonzero(free)
 
     @property
-    def turn(self) -> csc_matrix:
+    def turn(self) -> "scipy.sparse.csc_matrix":
         """Cartesian components from those along the radius, circle and axis."""
         c, s, one = np.cos(self.theta), np.sin(self.theta), np.ones_like(self.theta)
         k = 3 * np.arange(len(c))
         rows, columns = np.concatenate([k, k, k + 1, k + 1, k + 2]), np.concatenate([k, k + 1, k, k + 1, k + 2])
-        return csc_matrix((np.concatenate([c, -s, s, c, one]), (rows, columns)))
+        return scipy.sparse.csc_matrix((np.concatenate([c, -s, s, c, one]), (rows, columns)))
 
     def strains(self, which: Index) -> tuple[Array, Array]:
         """Strain (elements, points, 6, 81) of elements in x, y, z and volumes (elements, points)."""
@@ -251,7 +251,7 @@ class _Nodes:
                 B[:, :, row, :, two] += g[:, :, one]
         return B.reshape(len(X), 27, 6, 81), volume
 
-    def stiffness(self, lam: float, G: float) -> csc_matrix:
+    def stiffness(self, lam: float, G: float) -> "scipy.sparse.csc_matrix":
         """Of what is left."""
         D = np.diag([2 * G] * 3 + [G] * 3)
         D[:3, :3] += lam

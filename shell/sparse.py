@@ -4,8 +4,8 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.sparse import csc_matrix, csr_matrix
 
 from shell.quadrature import Array
 
@@ -14,19 +14,25 @@ Index = NDArray[np.intp]
 
 def assemble_elements(
     unknowns: Sequence[Index] | Index, elements: Sequence[NDArray[Any]] | NDArray[Any], size: int
-) -> csc_matrix:
+) -> "scipy.sparse.csc_matrix":
     """The sum of element matrices, each on its unknowns, (size, size)."""
     rows = np.concatenate([np.repeat(own, len(own)) for own in unknowns])
     columns = np.concatenate([np.tile(own, len(own)) for own in unknowns])
-    return csc_matrix((np.concatenate([np.ravel(one) for one in elements]), (rows, columns)), shape=(size, size))
+    return scipy.sparse.csc_matrix(
+        (np.concatenate([np.ravel(one) for one in elements]), (rows, columns)), shape=(size, size)
+    )
 
 
-def factor_symmetric(matrix: csc_matrix, pivoting: float = 0.0) -> Callable[[NDArray[Any]], NDArray[Any]]:
+def factor_symmetric(
+    matrix: "scipy.sparse.csc_matrix", pivoting: float = 0.0
+) -> Callable[[NDArray[Any]], NDArray[Any]]:
     """The solution of A x = b as a function of b; an indefinite A needs some `pivoting`, up to 1."""
     from scipy.sparse.linalg import splu
 
     options = {"SymmetricMode": True}
-    return splu(csc_matrix(matrix), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=pivoting, options=options).solve
+    return splu(
+        scipy.sparse.csc_matrix(matrix), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=pivoting, options=options
+    ).solve
 
 
 class Rows:
@@ -56,7 +62,7 @@ class Rows:
         self._masters += more._masters
         self._factors += more._factors
 
-    def matrix(self, size: int) -> csr_matrix:
+    def matrix(self, size: int) -> "scipy.sparse.csr_matrix":
         """The sparse matrix from free to raw unknowns; an unknown without a row is free."""
         is_free = np.ones(size, dtype=bool)
         is_free[np.concatenate([np.zeros(0, dtype=np.intp), *self._held])] = False
@@ -65,4 +71,4 @@ class Rows:
         rows = np.concatenate([free, *self._followers])
         columns = column[np.concatenate([free, *self._masters])]
         values = np.concatenate([np.ones(len(free)), *self._factors])
-        return csr_matrix((values, (rows, columns)), shape=(size, len(free)))
+        return scipy.sparse.csr_matrix((values, (rows, columns)), shape=(size, len(free)))

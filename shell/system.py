@@ -6,7 +6,7 @@ from functools import cached_property
 from typing import TypeAlias
 
 import numpy as np
-from scipy.sparse import block_diag, coo_array, csr_matrix
+import scipy
 
 from shell.blocks import Mesh, Support
 from shell.cells import CellTable, cell_mass, cell_stiffness
@@ -151,7 +151,7 @@ class System:
     """
 
     groups: tuple[Group, ...]
-    constraint: csr_matrix
+    constraint: "scipy.sparse.csr_matrix"
     rigid_motions: int
     n: int
     level: Level
@@ -244,7 +244,7 @@ class System:
         return K, Inertia(self._choice, starts, tuple(M))
 
     @cached_property
-    def _choice(self) -> csr_matrix:
+    def _choice(self) -> "scipy.sparse.csr_matrix":
         """From the free unknowns to those of all elements."""
         return self.constraint[np.concatenate([group.unknowns.ravel() for group in self.groups])]
 
@@ -319,7 +319,7 @@ class Inertia:
     blocks : m of the elements of every group, (elements, functions, functions), the same for each component of a solid.
     """
 
-    choice: csr_matrix
+    choice: "scipy.sparse.csr_matrix"
     starts: Index
     blocks: tuple[Array, ...]
 
@@ -330,7 +330,7 @@ class Inertia:
             rows[:] = (block @ rows.reshape(*block.shape[:2], -1)).reshape(rows.shape)
         return np.asarray(self.choice.T @ local)
 
-    def matrix(self) -> csr_matrix:
+    def matrix(self) -> "scipy.sparse.csr_matrix":
         """M as a sparse matrix."""
         per_group = np.diff([0, *self.starts, self.choice.shape[0]])
         blocks = [
@@ -339,4 +339,8 @@ class Inertia:
             for one in block
         ]
         first, *others = blocks
-        return csr_matrix(self.choice.T @ block_diag([coo_array(first), *others], format="csr") @ self.choice)
+        return scipy.sparse.csr_matrix(
+            self.choice.T
+            @ scipy.sparse.block_diag([scipy.sparse.coo_array(first), *others], format="csr")
+            @ self.choice
+        )

@@ -14,8 +14,7 @@ from dataclasses import dataclass
 from math import pi, sqrt
 
 import numpy as np
-from scipy.optimize import linprog
-from scipy.special import chndtrix
+import scipy
 
 from shell.errors import ShellError
 from shell.quadrature import Array
@@ -79,7 +78,7 @@ class SplitWave:
         size = abs(self.wave) / self.error if self.error > 0 else np.inf
         if size > FAR:
             return self.frequency * (abs(self.wave) + ONE_SIDED * self.error)
-        return self.frequency * self.error * sqrt(float(chndtrix(0.95, 2, size**2)))
+        return self.frequency * self.error * sqrt(float(scipy.special.chndtrix(0.95, 2, size**2)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -226,7 +225,7 @@ def _least_mass(
     most = [(0.0, max(float(c), 0.0) / size) for c in capacity]
     most += [(0.0, abs(unbalance.get(k, 0.0)) / size) for k in BALANCED]
     cost = np.concatenate([np.ones(count), np.full(len(BALANCED), 0.05)])
-    found = linprog(
+    found = scipy.optimize.linprog(
         cost,
         A_eq=padded,
         b_eq=np.array(wanted) / size,

@@ -12,10 +12,8 @@ from math import pi
 from typing import Any
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
-from scipy.spatial import cKDTree
 
 from shell.assembly import build_system
 from shell.blocks import Mesh, Support
@@ -165,10 +163,10 @@ def _join(grids: list[Array], held: list[NDArray[np.bool_]]) -> Pieces:
     """Number the points that coincide once, and cut every grid into 3 x 3 nodes."""
     points = np.concatenate([grid.reshape(2, -1) for grid in grids], axis=1)
     shortest = min(min(np.hypot(*np.diff(grid, axis=axis)).min() for axis in (1, 2)) for grid in grids)
-    pairs = cKDTree(points.T).query_pairs(1e-3 * shortest, output_type="ndarray")
+    pairs = scipy.spatial.cKDTree(points.T).query_pairs(1e-3 * shortest, output_type="ndarray")
     size = points.shape[1]
-    links = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(size, size))
-    count, numbers = connected_components(links, directed=False)
+    links = scipy.sparse.coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(size, size))
+    count, numbers = scipy.sparse.csgraph.connected_components(links, directed=False)
     first = np.zeros(count, dtype=np.intp)
     first[numbers[::-1]] = np.arange(size)[::-1]
     marks = np.zeros(count, dtype=bool)

@@ -13,8 +13,8 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.optimize import minimize_scalar
 
 from compensation.decimation import average_blocks
 from compensation.errors import CompensationError
@@ -315,7 +315,7 @@ def _time_constant(t: Array, f: Array, least: float = 0.0) -> float:
 
     length = float(np.ptp(t))
     low, high = np.log(length / 30), np.log(3 * length)
-    best = minimize_scalar(lambda x: miss(x)[0], bounds=(low, high), method="bounded").x
+    best = scipy.optimize.minimize_scalar(lambda x: miss(x)[0], bounds=(low, high), method="bounded").x
     scatter = np.sqrt(miss(best)[0] / max(len(t) - 3, 1))
     if min(best - low, high - best) < 0.01 or abs(miss(best)[1]) < max(STANDS_OUT * scatter, least):
         return np.inf

@@ -4,7 +4,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import roots_legendre
 
 from thermal.network import Array, Network
 from thermal.profile import Profile
@@ -51,7 +50,7 @@ def check_energy(network: Network, boundaries: Mapping[str, Profile], transient:
 
 
 def _enthalpy(network: Network, i: int, first: float, last: float) -> float:
-    x, w = roots_legendre(POINTS)
+    x, w = np.polynomial.legendre.leggauss(POINTS)
     T = first + (last - first) * (x + 1) / 2
     capacity = np.array([network.nodes[i].capacity_at(float(value)) for value in T])
     return float((last - first) / 2 * (w @ capacity))
@@ -59,6 +58,6 @@ def _enthalpy(network: Network, i: int, first: float, last: float) -> float:
 
 def _graded_gauss(start: float, end: float) -> tuple[Array, Array]:
     edges = start + (end - start) * np.concatenate([[0.0], 2.0 ** np.arange(1 - PIECES, 1)])
-    x, w = roots_legendre(POINTS)
+    x, w = np.polynomial.legendre.leggauss(POINTS)
     half = np.diff(edges)[:, None] / 2
     return (edges[:-1, None] + half * (x + 1)).ravel(), (half * w).ravel()

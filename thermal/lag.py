@@ -1,8 +1,8 @@
 """First-order lags, exact for drives that are linear between their rows."""
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike
-from scipy.linalg import lapack
 
 from thermal.errors import ThermalError
 from thermal.network import Array
@@ -44,5 +44,5 @@ def scan(decay: Array, forced: Array, start: Array) -> Array:
     band = np.ones((2, len(states)), order="F")
     for m in range(len(start)):
         band[1, :-1] = -decay[:, m]
-        states[:, m] = lapack.dtbtrs(band, states[:, m : m + 1], uplo="L", diag="U")[0][:, 0]
+        states[:, m] = scipy.linalg.lapack.dtbtrs(band, states[:, m : m + 1], uplo="L", diag="U")[0][:, 0]
     return states

@@ -11,14 +11,12 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.special import roots_legendre
 
 from thermal.errors import ThermalError
 from thermal.network import Array, Conductor, Node, Part, Radiator
 
 Along = Callable[[Array], Array]
 Capacity = float | Callable[[float], float]
-GAUSS = roots_legendre(12)
 
 
 @dataclass(frozen=True)
@@ -172,7 +170,7 @@ def scale(value: Capacity, factor: float) -> Capacity:
 
 
 def _integrate(function: Along, start: Array, end: Array) -> Array:
-    x, w = GAUSS
+    x, w = np.polynomial.legendre.leggauss(12)
     half = (end - start)[:, None] / 2
     s = start[:, None] + half * (x + 1)
     integral: Array = (half * w * np.broadcast_to(function(s), s.shape)).sum(axis=1)

@@ -14,9 +14,8 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.sparse import csr_array
-from scipy.sparse.csgraph import connected_components
 
 from thermal.constants import Stefan_Boltzmann
 from thermal.errors import ThermalError
@@ -263,7 +262,7 @@ def _check_paths(network: Network) -> None:
             raise ThermalError(f"node '{node.name}' is isolated; join it by a conductor or a radiator.")
     if not network.boundaries:
         raise ThermalError("the network has no boundary; give at least one Boundary, such as the chamber.")
-    _, group = connected_components(csr_array(links), directed=False)
+    _, group = scipy.sparse.csgraph.connected_components(scipy.sparse.csr_array(links), directed=False)
     reached = set(group[network.count :])
     lost = [node.name for node, part in zip(network.nodes, group, strict=False) if part not in reached]
     if lost:

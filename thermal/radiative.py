@@ -5,8 +5,8 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike
-from scipy.integrate import OdeSolution, solve_ivp
 
 from thermal.errors import ThermalError
 from thermal.forcing import boundary_forcing, find_corners, initial_state
@@ -70,7 +70,7 @@ def integrate(
             matrix: Array = -slope / network.capacities(T)[:, None]
             return matrix
 
-        solution = solve_ivp(
+        solution = scipy.integrate.solve_ivp(
             rate,
             (start, end),
             T,
@@ -87,7 +87,7 @@ def integrate(
         dense: Any = solution.sol
         times.append(dense.ts[1:])
         pieces.extend(dense.interpolants)
-    whole = OdeSolution(np.concatenate(times), pieces)
+    whole = scipy.integrate.OdeSolution(np.concatenate(times), pieces)
 
     def evaluate(time: Array) -> Array:
         temperature: Array = np.asarray(whole(time)).T

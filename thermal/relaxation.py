@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import eigh
+import scipy
 
 from thermal.network import Array, Network, linearise
 
@@ -38,7 +38,7 @@ def find_relaxation(network: Network, temperature: float) -> Relaxation:
     n = linear.count
     L = linear.conduction
     capacity = linear.capacities(np.full(n, temperature))
-    rates, shapes = eigh(L[:n, :n], np.diag(capacity))
+    rates, shapes = scipy.linalg.eigh(L[:n, :n], np.diag(capacity))
     return Relaxation(
         nodes=tuple(node.name for node in network.nodes),
         temperature=temperature,

@@ -3,8 +3,8 @@
 from collections.abc import Callable
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike
-from scipy.optimize import brentq
 
 from thermal.errors import ThermalError
 from thermal.network import Array, Network
@@ -48,4 +48,4 @@ def identify_conductance(remaining: Callable[[float], float], observed: float) -
             f"no conductance leaves {observed:.3g} of the step at that time; "
             f"the rest of the network alone leaves {high + observed:.3g}."
         )
-    return float(10 ** brentq(excess, *DECADES, xtol=1e-12, rtol=1e-12))
+    return float(10 ** scipy.optimize.brentq(excess, *DECADES, xtol=1e-12, rtol=1e-12))

@@ -9,8 +9,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.optimize import least_squares
 
 from compensation.errors import CompensationError
 from compensation.ringdown.envelope import Envelope
@@ -153,7 +153,7 @@ def _fit_from(envelope: Envelope, time: Real, names: tuple[str, ...], guess: Dec
         def residuals(point: Real, weight: Real = weight) -> Real:
             return _flatten((model(point) - z) / weight[:, None])
 
-        solved = least_squares(
+        solved = scipy.optimize.least_squares(
             residuals, point, method="lm", x_scale="jac", xtol=1e-12, ftol=1e-12, gtol=1e-12, max_nfev=12 * point.size
         )
         point = np.asarray(solved.x)

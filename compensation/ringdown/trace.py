@@ -9,9 +9,8 @@ these weights, so the late record counts for what it tells; it ends where a < 3 
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike, NDArray
-from scipy import stats
-from scipy.optimize import minimize
 
 from compensation.errors import CompensationError
 
@@ -109,7 +108,7 @@ def analyse_trace(time: ArrayLike, amplitude: ArrayLike, *, confidence: float = 
         raise CompensationError(
             f"nothing decays in this trace (1/τ = {-slope:.3g} ± {sd:.2g} 1/s); record a free ring-down, longer."
         )
-    reach = float(stats.norm.isf((1 - confidence) / 2)) * sd
+    reach = float(scipy.stats.norm.isf((1 - confidence) / 2)) * sd
     said = []
     if first:
         said.append(f"The first {t[first] - t[0]:.4g} s are no free decay (drive or release) and are left out.")
@@ -182,7 +181,7 @@ def _fit_scatter(line: Real, L: Real) -> tuple[float, float]:
         return float(np.sum(np.log(variance) + squares / variance))
 
     start = np.log([np.median(squares) + 1e-12, np.exp(float(line.min())) + 1e-300])
-    solved = minimize(cost, start, method="Nelder-Mead", bounds=[(-40, 5), (top - 40, top)])
+    solved = scipy.optimize.minimize(cost, start, method="Nelder-Mead", bounds=[(-40, 5), (top - 40, top)])
     return float(np.exp(solved.x[0])), float(np.exp(solved.x[1]))
 
 

@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import stats
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -46,7 +46,7 @@ def examine(time: Real, residual: Complex) -> Leftover:
         count = rows // size
         means = scaled[:, : count * size].reshape(channels, count, size).mean(axis=2)
         ratio = size * float(np.mean(np.abs(means) ** 2))
-        if ratio > stats.chi2.isf(RARE, 2 * channels * count) / (2 * channels * count):
+        if ratio > scipy.stats.chi2.isf(RARE, 2 * channels * count) / (2 * channels * count):
             widest = max(widest, ratio)
         size *= 2
     count = min(BLOCKS, rows // 4)
@@ -56,7 +56,7 @@ def examine(time: Real, residual: Complex) -> Leftover:
     for first in (1, 2, 4, 8):
         if first <= count // 4:
             rest = float(np.mean(energy[first:]))
-            bound = stats.f.isf(RARE / 4, 2 * channels * first, 2 * channels * (count - first))
+            bound = scipy.stats.f.isf(RARE / 4, 2 * channels * first, 2 * channels * (count - first))
             early |= float(np.mean(energy[:first])) > max(bound, 1.0) * max(rest, 1e-300)
     line, amplitude = _find_line(time, scaled, np.sqrt(variance))
     return Leftover(float(np.sqrt(widest)), bool(early), line, amplitude)
@@ -73,8 +73,8 @@ def _find_line(time: Real, scaled: Complex, sd: Real) -> tuple[float | None, flo
     power = np.sum(np.abs(np.fft.fft(even * np.hanning(even.shape[1]), axis=1)) ** 2, axis=0)
     at = int(np.argmax(power))
     near = np.take(power, np.arange(at - 40, at + 41), mode="wrap")
-    level = float(np.median(near)) / stats.chi2.median(2 * scaled.shape[0]) * 2
-    if power[at] < level * stats.chi2.isf(RARE / power.size, 2 * scaled.shape[0]) / 2:
+    level = float(np.median(near)) / scipy.stats.chi2.median(2 * scaled.shape[0]) * 2
+    if power[at] < level * scipy.stats.chi2.isf(RARE / power.size, 2 * scaled.shape[0]) / 2:
         return None, 0.0
     frequency = float(np.fft.fftfreq(power.size, step)[at])
     tone = np.exp(-2j * np.pi * frequency * (time - time[0]))

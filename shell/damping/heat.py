@@ -10,8 +10,7 @@ With t = tr σ and x = ω C/k, the part of θ in quadrature with t is what makes
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import csc_matrix
-from scipy.sparse.linalg import splu
+import scipy
 
 from shell.blocks import number_functions
 from shell.errors import ShellError
@@ -79,5 +78,5 @@ def solve_heat(
     matrix = assemble_elements(numbers, stiffness + 1j * x * mass, size)
     right = np.zeros(size)
     np.add.at(right, numbers.ravel(), load.ravel())
-    theta = splu(csc_matrix(matrix[:, free][free])).solve(1j * x * right[free])
+    theta = scipy.sparse.linalg.splu(scipy.sparse.csc_matrix(matrix[:, free][free])).solve(1j * x * right[free])
     return float(np.imag(right[free] @ theta))

@@ -13,8 +13,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.sparse import csc_matrix
 
 from shell.cells import at_gauss_points, cell_mass, cell_stiffness
 from shell.elastic import Elastic
@@ -68,9 +68,9 @@ class Radiating:
 class RadiatingBody:
     """Complex stiffness and mass of body and base on free unknowns, and the body's part of the mass."""
 
-    stiffness: csc_matrix
-    mass: csc_matrix
-    body: csc_matrix
+    stiffness: "scipy.sparse.csc_matrix"
+    mass: "scipy.sparse.csc_matrix"
+    body: "scipy.sparse.csc_matrix"
 
     def factor(self, shift: complex) -> Callable[[Complex], Complex]:
         """The solution of (K - shift M) x = b as a function of b."""
@@ -125,11 +125,11 @@ def assemble_waves(system: System, materials: Sequence[Elastic], bases: Sequence
     layer : where waves are absorbed.
     """
     P, size = system.constraint.astype(complex), system.constraint.shape[0]
-    total: list[csc_matrix] = [csc_matrix((size, size), dtype=complex) for _ in range(3)]
+    total: list[scipy.sparse.csc_matrix] = [scipy.sparse.csc_matrix((size, size), dtype=complex) for _ in range(3)]
     for group, base in zip(system.groups, bases, strict=True):
         for k, elements in enumerate(_matrices(group, materials, base, layer, system.n)):
             total[k] = total[k] + assemble_elements(group.unknowns, elements, size)
-    return RadiatingBody(*(csc_matrix(P.T @ one @ P) for one in total))
+    return RadiatingBody(*(scipy.sparse.csc_matrix(P.T @ one @ P) for one in total))
 
 
 def _matrices(

@@ -16,7 +16,7 @@ of a shell κ_φ + κ_θ = 0, and a bare dome warms only near its free edge.
 """
 
 import numpy as np
-from scipy.special import spherical_jn
+import scipy
 
 from shell.damping.heat import conduct_in_cells, mean_stress
 from shell.quadrature import Array, legendre
@@ -74,7 +74,10 @@ def _wall(degree: int, h: float, x: float) -> Array:
     count = int(max(60, 30 * h * np.sqrt(x / 2)))
     j = np.arange(1, min(count, 40_000) + 1)
     parts = np.array(
-        [np.sqrt(2) * np.cos((j - l) * np.pi / 2) * spherical_jn(l, j * np.pi / 2) for l in range(degree + 1)]
+        [
+            np.sqrt(2) * np.cos((j - l) * np.pi / 2) * scipy.special.spherical_jn(l, j * np.pi / 2)
+            for l in range(degree + 1)
+        ]
     )
     d = (j * np.pi / h) ** 2
     return np.asarray((parts * (x * d / (x**2 + d**2))) @ parts.T)

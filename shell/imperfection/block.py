@@ -9,8 +9,7 @@ from functools import cached_property
 from math import pi
 
 import numpy as np
-from scipy.sparse import csc_matrix, csr_matrix, eye
-from scipy.sparse.linalg import splu
+import scipy
 
 from shell.imperfection.place import cut
 from shell.imperfection.substructure import Substructures
@@ -51,7 +50,7 @@ class Block:
         return len(self.shell)
 
     @cached_property
-    def spreads(self) -> dict[int, csr_matrix]:
+    def spreads(self) -> "dict[int, scipy.sparse.csr_matrix]":
         """From the unknowns to those of the elements of every chain of shell, in the plain basis."""
         return {
             number: _plain(group, self.system.constraint)[:, self.shell]
@@ -111,9 +110,9 @@ def condense(system: System, constants: tuple[Constants, ...], value: float, pai
         shared = np.searchsorted(shell, edge)
         of_solid = [(n, A) for n, A, mine in zip(numbers, matrices, of_shell, strict=True) if not mine]
         members, cells = zip(*of_solid, strict=True)
-        core = csr_matrix(assemble_elements(members, cells, system.pattern.size))
+        core = scipy.sparse.csr_matrix(assemble_elements(members, cells, system.pattern.size))
         coupling = core[inside][:, edge].toarray()
-        lifted = -splu(csc_matrix(core[inside][:, inside])).solve(coupling)
+        lifted = -scipy.sparse.linalg.splu(scipy.sparse.csc_matrix(core[inside][:, inside])).solve(coupling)
         felt = core[edge][:, edge].toarray() + coupling.T @ lifted
         elements.append((shared, around * (felt + felt.T) / 2))
         moved = _lift(system, edge, inside, lifted)
@@ -135,7 +134,7 @@ def _lift(system: System, edge: Index, inside: Index, lifted: Array) -> Array:
     return free
 
 
-def _plain(group: ShellGroup, constraint: csr_matrix) -> csr_matrix:
+def _plain(group: ShellGroup, constraint: "scipy.sparse.csr_matrix") -> "scipy.sparse.csr_matrix":
     """Rows of the constraint for the unknowns of a chain's elements, its small elements out of their differences."""
     rows = constraint[group.unknowns.ravel()]
     elements, size = group.unknowns.shape
@@ -145,6 +144,6 @@ def _plain(group: ShellGroup, constraint: csr_matrix) -> csr_matrix:
         others = np.delete(np.arange(functions), node)
         to = (element * size + others[:, None] * amplitudes + np.arange(amplitudes)).ravel()
         of = np.tile(element * size + node * amplitudes + np.arange(amplitudes), len(others))
-        more = csr_matrix((np.ones(len(to)), (to, of)), shape=(elements * size,) * 2)
-        rows = (eye(elements * size, format="csr") + more) @ rows
+        more = scipy.sparse.csr_matrix((np.ones(len(to)), (to, of)), shape=(elements * size,) * 2)
+        rows = (scipy.sparse.eye(elements * size, format="csr") + more) @ rows
     return rows

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from math import pi, sqrt
 
 import numpy as np
-from scipy.linalg import eigh
+import scipy
 
 from shell.errors import ShellError
 from shell.imperfection.field import Field, values_around
@@ -63,7 +63,7 @@ def split_ring(
     v, w = shapes(theta)
     M = v.T @ (weight[:, None] * v) + w.T @ (weight[:, None] * w)
     stiffness = np.concatenate([[0.0], pi * k**2 * (k**2 - 1.0) ** 2])
-    values, vectors = eigh(np.diag(stiffness), M)
+    values, vectors = scipy.linalg.eigh(np.diag(stiffness), M)
     first = 2 * n - 1  # three rigid motions, then the pairs 2, 3, ...
     slow, fast = np.sqrt(values[first : first + 2])
     perfect = n * (n**2 - 1) / sqrt(n**2 + 1)

@@ -8,7 +8,7 @@ from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
-from scipy.sparse import block_diag, csr_matrix
+import scipy
 
 from shell.imperfection.block import Block
 from shell.imperfection.substructure import Substructures, stack
@@ -39,15 +39,15 @@ class Together:
         self.rows = tuple(slice(int(a), int(b)) for a, b in pairwise(ends))
         self.groups = blocks[0].system.groups
         np.empty(WORKSPACE)  # freed at once, so that the process keeps the memory of each solve for the next
-        self._places: dict[tuple[float, float], tuple[csr_matrix, csr_matrix]] = {}
+        self._places: dict[tuple[float, float], tuple[scipy.sparse.csr_matrix, scipy.sparse.csr_matrix]] = {}
 
     @cached_property
-    def spreads(self) -> dict[int, tuple[csr_matrix, csr_matrix]]:
+    def spreads(self) -> "dict[int, tuple[scipy.sparse.csr_matrix, scipy.sparse.csr_matrix]]":
         """From the unknowns to those of the elements of every chain of shell, in the plain basis, and the transpose."""
         found = {}
         for number in self.blocks[0].spreads:
-            whole = csr_matrix(block_diag([block.spreads[number] for block in self.blocks]))
-            found[number] = whole, csr_matrix(whole.T)
+            whole = scipy.sparse.csr_matrix(scipy.sparse.block_diag([block.spreads[number] for block in self.blocks]))
+            found[number] = whole, scipy.sparse.csr_matrix(whole.T)
         return found
 
     def plain(self, number: int, X: Array) -> Array:
@@ -63,14 +63,14 @@ class Together:
         rows = loads.transpose(4, 1, 2, 0, 3, 5).reshape(-1, 2 * vectors)
         return np.asarray(self.spreads[number][1] @ rows).reshape(self.size, vectors, 2)
 
-    def moves(self, position: float, height: float) -> tuple[csr_matrix, csr_matrix]:
+    def moves(self, position: float, height: float) -> "tuple[scipy.sparse.csr_matrix, scipy.sparse.csr_matrix]":
         """Displacements u, v, w of a place in every harmonic per unit of every unknown, (3 harmonics, size), and the transpose."""
         if (position, height) not in self._places:
             if len(self._places) >= PLACES:
                 self._places.clear()
             rows = [block.moves(self.resonator, position, height) for block in self.blocks]
-            whole = csr_matrix(block_diag([csr_matrix(one) for one in rows]))
-            self._places[position, height] = whole, csr_matrix(whole.T)
+            whole = scipy.sparse.csr_matrix(scipy.sparse.block_diag([scipy.sparse.csr_matrix(one) for one in rows]))
+            self._places[position, height] = whole, scipy.sparse.csr_matrix(whole.T)
         return self._places[position, height]
 
     def answer(self, loads: Array) -> Array:

@@ -9,9 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import linprog
-from scipy.spatial.transform import Rotation
-from scipy.stats import median_abs_deviation
+import scipy
 
 from shell.curves import Arc
 from shell.errors import ShellError
@@ -95,7 +93,7 @@ def _descend(samples: list[tuple[Array, int]], projector: Projector, start: Rigi
             rows.append(np.concatenate([n, turn[:, :2]], axis=1))
             residual.append(off)
         A, d = np.concatenate(rows), np.concatenate(residual)
-        spread = float(median_abs_deviation(d, scale="normal")) + 1e-12
+        spread = float(scipy.stats.median_abs_deviation(d, scale="normal")) + 1e-12
         far = abs(d - np.median(d)) / spread
         # weights that fall with the distance find the place; equal ones do not let the form of the face push it aside
         weight = 1 / np.maximum(1.0, far / 2) if count < SETTLED else np.where(far < 6, 1.0, 0.0)
@@ -105,7 +103,7 @@ def _descend(samples: list[tuple[Array, int]], projector: Projector, start: Rigi
         kept = values > UNTOLD * values[0]
         step = -(turned[kept].T / values[kept]) @ (turned[kept] @ ((A * weight[:, None]).T @ d))
         told = np.sum(turned[kept] ** 2, axis=0)[:5] > 0.5
-        spin = Rotation.from_rotvec([step[3] / size, step[4] / size, 0.0]).as_matrix()
+        spin = scipy.spatial.transform.Rotation.from_rotvec([step[3] / size, step[4] / size, 0.0]).as_matrix()
         rotation, offset = spin @ rotation, spin @ offset + step[:3]
         left = spread
         if count > SETTLED and np.abs(step[:5]).max() < 1e-9 * size:
@@ -153,14 +151,14 @@ def _turn(one: Array, other: Array) -> Array:
     sine, cosine = float(np.linalg.norm(axis)), float(one @ other)
     if sine < 1e-12:
         return np.eye(3) if cosine > 0 else np.diag([1.0, -1.0, -1.0])
-    return np.asarray(Rotation.from_rotvec(axis / sine * np.arctan2(sine, cosine)).as_matrix())
+    return np.asarray(scipy.spatial.transform.Rotation.from_rotvec(axis / sine * np.arctan2(sine, cosine)).as_matrix())
 
 
 def _check(samples: list[tuple[Array, int]], projector: Projector, motion: RigidMotion, names: Sequence[str]) -> None:
     for (points, side), name in zip(samples, names, strict=True):
         _, off = _normals(motion.apply(points), side, projector)
         h, middle = float(np.median(projector.line.thickness)), float(np.median(off))
-        spread = float(median_abs_deviation(off, scale="normal"))
+        spread = float(scipy.stats.median_abs_deviation(off, scale="normal"))
         if abs(middle + side * h) < 0.3 * h and spread < LOOSE * h:
             here, there = ("outer", "inner") if side > 0 else ("inner", "outer")
             raise ShellError(
@@ -187,11 +185,11 @@ def _upright(clouds: Sequence[tuple[Array, int]], projector: Projector, motion: 
         if len(s) < SECTORS // 2 or s.max() < REACHED:
             return RigidMotion(motion.rotation, motion.offset, motion.told, GIVEN)
         A = np.column_stack([np.ones(len(s)), np.cos(theta), np.sin(theta)])
-        found = linprog([1.0, 0.0, 0.0], A_ub=-A, b_ub=-s, bounds=[(None, None)] * 3)
+        found = scipy.optimize.linprog([1.0, 0.0, 0.0], A_ub=-A, b_ub=-s, bounds=[(None, None)] * 3)
         if found.x is None:
             return RigidMotion(motion.rotation, motion.offset, motion.told, GIVEN)
         tilt = found.x[1:] * resonator.length / resonator.size
-        spin = Rotation.from_rotvec([tilt[1], -tilt[0], 0.0]).as_matrix()
+        spin = scipy.spatial.transform.Rotation.from_rotvec([tilt[1], -tilt[0], 0.0]).as_matrix()
         center = _center(resonator)
         # how far the sectors end below the edge: points are so far apart there, SECTORS times closer over the whole circle
         apart = float(np.median(A @ found.x - s)) * resonator.length / resonator.size / SECTORS
@@ -206,7 +204,7 @@ def _edge(clouds: Sequence[tuple[Array, int]], projector: Projector, motion: Rig
     for points, side in clouds:
         at = projector.place(motion.apply(points[:: max(1, len(points) // EDGE_SAMPLE)]))
         off = at.height - side * at.thickness / 2
-        scatter = float(median_abs_deviation(off, scale="normal"))
+        scatter = float(scipy.stats.median_abs_deviation(off, scale="normal"))
         near = abs(off - np.median(off)) < 10 * scatter + 1e-9
         x, angle = at.position[near], at.azimuth[near] % (2 * np.pi)
         sector = np.minimum((angle / (2 * np.pi) * SECTORS).astype(np.intp), SECTORS - 1)

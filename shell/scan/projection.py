@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial import cKDTree
+import scipy
 
 from shell.errors import ShellError
 from shell.quadrature import Array
@@ -39,7 +39,7 @@ class Projector:
         self.shape = tuple(int(k) for k in np.ceil((high - self.low) / self.cell)) + np.array([1, 1])
         i, j = (axis.ravel() for axis in np.meshgrid(*(np.arange(k) for k in self.shape), indexing="ij"))
         centers = self.low + (np.stack([i, j], axis=1) + 0.5) * self.cell
-        tree = cKDTree(np.stack([line.r, line.z], axis=1)[::COARSE])
+        tree = scipy.spatial.cKDTree(np.stack([line.r, line.z], axis=1)[::COARSE])
         nearest = COARSE * tree.query(centers, distance_upper_bound=reach)[1]
         # far from the curve none is found, and any will do
         self.nearest = np.where(nearest < FINE, nearest, 0).reshape(self.shape)

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import median_abs_deviation
+import scipy
 
 from shell.quadrature import Array, legendre
 
@@ -59,7 +59,7 @@ class WaveBasis:
             ridge = 1e-9 * np.trace(normal) / len(normal)
             flat = np.linalg.solve(normal + ridge * np.eye(len(normal)), design.T @ value[good])
             left = value - self.evaluate(flat, position, theta)
-            scatter = float(median_abs_deviation(left, scale="normal"))
+            scatter = float(scipy.stats.median_abs_deviation(left, scale="normal"))
             limit = OUTLIER * max(scatter, 1e-10)
             good = abs(left - np.median(left)) <= limit
         return flat, limit

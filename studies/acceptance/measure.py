@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import special
 
 from compensation.decimation import average_blocks
 from compensation.linearity import measure_linearity, same_rate
@@ -57,19 +57,19 @@ def measure_drift(records: "Sequence[Record]", output: str) -> tuple[Found, Alla
     paths = tuple(record.path for record in records)
     values = np.array([value for value, _ in means])
     if len(records) == 1:
-        z = float(special.ndtri(0.5 + CONFIDENCE / 2))
+        z = float(scipy.special.ndtri(0.5 + CONFIDENCE / 2))
         value, sd = means[0]
         found["bias_deg_per_h"] = Measured(value, value - z * sd, value + z * sd, paths)
     else:
         spread = float(values.std(ddof=1))
-        reach = float(special.stdtrit(len(values) - 1, 0.5 + CONFIDENCE / 2)) * spread / math.sqrt(len(values))
+        reach = float(scipy.special.stdtrit(len(values) - 1, 0.5 + CONFIDENCE / 2)) * spread / math.sqrt(len(values))
         mean = float(values.mean())
         found["bias_deg_per_h"] = Measured(mean, mean - reach, mean + reach, paths)
         low, high = _deviation_interval(spread, len(values) - 1)
         found["bias_repeatability_deg_per_h"] = Measured(spread, low, high, paths)
     longest = max(records, key=lambda record: record["time_s"][-1] - record["time_s"][0])
     allan, noise = _stability(longest, output)
-    z = float(special.ndtri(0.5 + CONFIDENCE / 2))
+    z = float(scipy.special.ndtri(0.5 + CONFIDENCE / 2))
     for key, value, sd in (
         ("angle_random_walk_deg_per_rt_h", noise.N / 60, noise.N_uncertainty / 60),
         ("rate_random_walk_deg_per_h_per_rt_h", noise.K * 60, noise.K_uncertainty * 60),
@@ -98,7 +98,7 @@ def _stability(record: "Record", output: str) -> tuple[AllanDeviation, NoiseCoef
 
 def _deviation_interval(deviation: float, free: int) -> tuple[float, float]:
     """Return the χ² interval of a standard deviation with its degrees of freedom."""
-    ends = [float(special.chdtri(free, 0.5 - side * CONFIDENCE / 2)) for side in (1, -1)]
+    ends = [float(scipy.special.chdtri(free, 0.5 - side * CONFIDENCE / 2)) for side in (1, -1)]
     return deviation * math.sqrt(free / ends[0]), deviation * math.sqrt(free / ends[1])
 
 
@@ -144,7 +144,7 @@ def measure_temperature(records: "Sequence[Record]", output: str) -> Found:
         with naming(", ".join(paths)):
             fit = fit_coloured(X, y, names, runs)
         b, sd = fit.regression.coefficients, np.sqrt(np.diag(fit.regression.covariance))
-        reach = float(special.stdtrit(max(len(y) - X.shape[1], 1), 0.5 + CONFIDENCE / 2))
+        reach = float(scipy.special.stdtrit(max(len(y) - X.shape[1], 1), 0.5 + CONFIDENCE / 2))
         for key, place in (
             ("bias_temperature_slope_deg_per_h_per_K", -2),
             ("bias_temperature_rate_deg_per_h_s_per_K", -1),
@@ -186,10 +186,10 @@ def measure_scale(record: "Record") -> Found:
     with naming(record.path):
         line = measure_linearity(rates, means)
         fit = fit_linear(rates[:, None], means, ["rate"])
-    reach = float(special.stdtrit(fit.degrees_of_freedom, 0.5 + CONFIDENCE / 2)) * float(fit.standard_errors[1])
+    reach = float(scipy.special.stdtrit(fit.degrees_of_freedom, 0.5 + CONFIDENCE / 2)) * float(fit.standard_errors[1])
     error = float(fit.coefficients[1]) - 1
     found = {"scale_factor_error_ppm": Measured(error * 1e6, (error - reach) * 1e6, (error + reach) * 1e6, source)}
-    z = float(special.ndtri(0.5 + CONFIDENCE / 2))
+    z = float(scipy.special.ndtri(0.5 + CONFIDENCE / 2))
     width = z * float(np.max(errors)) / full
     departure = line.nonlinearity
     found["scale_factor_nonlinearity_ppm"] = Measured(
@@ -280,5 +280,5 @@ def measure_seal(records: "Sequence[Record]") -> Found:
         X, names = np.column_stack([X, T - T.mean()]), ["year", "temperature"]
     fit = fit_linear(X, loss, names)
     value = float(fit.coefficients[1])
-    reach = float(special.stdtrit(fit.degrees_of_freedom, 0.5 + CONFIDENCE / 2)) * float(fit.standard_errors[1])
+    reach = float(scipy.special.stdtrit(fit.degrees_of_freedom, 0.5 + CONFIDENCE / 2)) * float(fit.standard_errors[1])
     return {"inverse_q_trend_per_year": Measured(value, value - reach, value + reach, tuple(sources))}

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy import special
+import scipy
 
 from compensation.regression import fit_linear
 from studies.acceptance.measure import CONFIDENCE, YEAR, Found, Measured
@@ -47,7 +47,7 @@ def measure_transfer(record: "Record") -> Found:
     gain, phase = np.abs(H), np.unwrap(np.angle(H))
     error = np.sqrt((1 - squared) / (2 * squared * SEGMENTS))
     start = float(np.median(gain[:3]))
-    z = float(special.ndtri(0.5 + CONFIDENCE / 2))
+    z = float(scipy.special.ndtri(0.5 + CONFIDENCE / 2))
 
     def falls(curve: np.ndarray) -> float | None:
         below = np.flatnonzero(curve < HALF * start)
@@ -73,7 +73,9 @@ def measure_transfer(record: "Record") -> Found:
     low = f <= (value or f[-1]) / 2
     if low.sum() >= 3:
         fit = fit_linear(2 * np.pi * f[low][:, None], -phase[low], ["delay"])
-        reach = float(special.stdtrit(fit.degrees_of_freedom, 0.5 + CONFIDENCE / 2)) * float(fit.standard_errors[1])
+        reach = float(scipy.special.stdtrit(fit.degrees_of_freedom, 0.5 + CONFIDENCE / 2)) * float(
+            fit.standard_errors[1]
+        )
         delay = float(fit.coefficients[1])
         found["delay_ms"] = Measured(1e3 * delay, 1e3 * (delay - reach), 1e3 * (delay + reach), source)
     return found
@@ -101,7 +103,7 @@ def measure_storage(record: "Record") -> Found:
         sides.append((float(fit.coefficients[0]), float(np.sqrt(row @ fit.covariance @ row))))
     (before, one), (after, two) = sides
     error = (after - before + 45.0) % 90.0 - 45.0
-    reach = float(special.ndtri(0.5 + CONFIDENCE / 2)) * math.hypot(one, two)
+    reach = float(scipy.special.ndtri(0.5 + CONFIDENCE / 2)) * math.hypot(one, two)
     return {"angle_storage_error_deg": Measured(error, error - reach, error + reach, (record.path,))}
 
 
@@ -116,7 +118,7 @@ def measure_life(records: "Sequence[Record]", output: str) -> Found:
     bias = np.array([float(np.nanmean(record[output])) for record in dated])
     fit = fit_linear(((at - at.mean()) / YEAR)[:, None], bias, ["year"])
     value = float(fit.coefficients[1])
-    reach = float(special.stdtrit(fit.degrees_of_freedom, 0.5 + CONFIDENCE / 2)) * float(fit.standard_errors[1])
+    reach = float(scipy.special.stdtrit(fit.degrees_of_freedom, 0.5 + CONFIDENCE / 2)) * float(fit.standard_errors[1])
     return {
         "bias_trend_deg_per_h_per_year": Measured(value, value - reach, value + reach, tuple(r.path for r in dated))
     }

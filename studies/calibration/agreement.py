@@ -9,8 +9,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from scipy.linalg import block_diag, null_space
-from scipy.special import chdtri
+import scipy
 
 from studies.calibration.estimates import Estimate
 from studies.calibration.fit import CardFit, objective, whitened
@@ -29,7 +28,8 @@ def keep_agreeing(found: CardFit) -> CardFit:
     for k, name in enumerate(priors.names):
         tables.setdefault(name.split(".", maxsplit=1)[0], []).append(k)
     costs = {
-        name: float(z[own] @ np.linalg.solve(C[np.ix_(own, own)], z[own])) / float(chdtri(len(own), 1 - AGREEING))
+        name: float(z[own] @ np.linalg.solve(C[np.ix_(own, own)], z[own]))
+        / float(scipy.special.chdtri(len(own), 1 - AGREEING))
         for name, own in tables.items()
     }
     agreeing = sorted((name for name in tables if costs[name] < 1.0), key=lambda name: costs[name])
@@ -39,7 +39,7 @@ def keep_agreeing(found: CardFit) -> CardFit:
         risen = objective(problem, kept.state, found.noise, found.rows) - objective(
             problem, found.state, found.noise, found.rows
         )
-        if risen < chdtri(len(held), 1 - AGREEING):
+        if risen < scipy.special.chdtri(len(held), 1 - AGREEING):
             return kept
         agreeing.pop()
     return found
@@ -48,8 +48,8 @@ def keep_agreeing(found: CardFit) -> CardFit:
 def _hold(found: CardFit, held: Sequence[int]) -> CardFit:
     """Solve for the coordinates u whose values `held` are the card's, in the noise of the fit."""
     problem = found.problem
-    root = block_diag(problem.priors.root, np.eye(problem.count - len(problem.priors.values)))
-    ways = null_space(root[list(held)])
+    root = scipy.linalg.block_diag(problem.priors.root, np.eye(problem.count - len(problem.priors.values)))
+    ways = scipy.linalg.null_space(root[list(held)])
     state = found.state
     for _ in range(STEPS):
         J, r = whitened(problem, state, found.noise, found.rows)

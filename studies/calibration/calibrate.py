@@ -5,8 +5,8 @@ from dataclasses import asdict, dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.linalg import block_diag
 
 from shell.errors import ShellError
 from studies.calibration.agreement import keep_agreeing, put_back
@@ -328,7 +328,7 @@ def predict_held_out(
             np.concatenate([at, np.zeros(outer.count - count)]) for at in (np.zeros(count), values)
         )
         before, after = outer.evaluate(as_shipped, slopes=False), outer.evaluate(calibrated)
-        C = block_diag(without.covariance[:count, :count], _usual_starts(whole, outer))
+        C = scipy.linalg.block_diag(without.covariance[:count, :count], _usual_starts(whole, outer))
         spread = {name: np.mean(np.sum(J @ C * J, axis=1)) for name, J in after.slope.items()}
         stated = {name: float(np.sqrt(spread[name] + whole.noise[name].offset ** 2)) for name in responses}
         by_chamber = {name: (_rms(before.residual[name]), _rms(after.residual[name])) for name in responses}

@@ -12,8 +12,8 @@ from dataclasses import astuple, dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.linalg import solve_triangular
 
 from compensation.errors import CompensationError
 from compensation.noise import Noise
@@ -182,10 +182,10 @@ def estimate_levels(
         told = [other for other in problem.responses if other != name and other in found]
         white = [rows[n].whiten(np.column_stack([slopes[n], target[n]]), found[n]) for n in told]
         triangle = np.linalg.qr(np.vstack([np.eye(count, count + 1), *white])).R[:count]
-        R, move = triangle[:, :-1], solve_triangular(triangle[:, :-1], triangle[:, -1])
+        R, move = triangle[:, :-1], scipy.linalg.solve_triangular(triangle[:, :-1], triangle[:, -1])
         J = slopes[name]
         # Rotated coordinates of unit prior are of unit prior again; those that the rows do not see are left out.
-        U, S, _ = np.linalg.svd(solve_triangular(R, J.T, trans="T").T, full_matrices=False)
+        U, S, _ = np.linalg.svd(scipy.linalg.solve_triangular(R, J.T, trans="T").T, full_matrices=False)
         left = target[name] - J @ move
         seen = S > UNSEEN * float(np.median(np.abs(np.diff(left - U @ (U.T @ left)))))
         found[name] = _levels(problem, rows[name], name, left, U[:, seen] * S[seen], found.get(name))
@@ -293,7 +293,7 @@ class _Linear:
         missed = reached - (self.residual - self.slopes @ (move + bent))
         count = len(move)
         R = np.linalg.qr(np.vstack([self.triangle, np.sqrt(damping) * np.eye(count)])).R
-        way = solve_triangular(R, solve_triangular(R, self.slopes.T @ missed, trans="T"))
+        way = scipy.linalg.solve_triangular(R, scipy.linalg.solve_triangular(R, self.slopes.T @ missed, trans="T"))
         return np.clip(way, self.low - move, self.high - move)
 
     def _damped(self, damping: float) -> Array:

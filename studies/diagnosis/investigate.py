@@ -6,7 +6,7 @@ from functools import partial
 from typing import TYPE_CHECKING, ClassVar, cast
 
 import numpy as np
-from scipy.special import erf
+import scipy
 
 from compensation.noise import white_rms
 from shell.constants import zero_Celsius
@@ -272,7 +272,7 @@ def wrong_values(shifts: Sequence[Shift]) -> list[Cause]:
         Cause(
             shift.parameter,
             "frequency_Hz",
-            float(erf(abs(shift.shift_sd) / np.sqrt(2.0))),
+            float(scipy.special.erf(abs(shift.shift_sd) / np.sqrt(2.0))),
             (),
             {shift.parameter: Interval(shift.value, min(shift.low, shift.high), max(shift.low, shift.high))},
             shift.shift_sd**2,

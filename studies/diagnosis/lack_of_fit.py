@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.linalg import solve_triangular
+import scipy
 
 from compensation.lines import Line
 from studies.diagnosis.campaign import Campaign, fast_line
@@ -315,7 +315,9 @@ def innovations(model: Fit) -> list[FloatArray]:
         rows = slice(begin, begin := begin + vectors.shape[0])
         covariance = (vectors * (1.0 + SHARES[solved.share] * basis.eigenvalues[rows])) @ vectors.T
         root = np.linalg.cholesky(covariance)
-        out.append(np.asarray(solve_triangular(root, model.residual[rows], lower=True)) / np.sqrt(solved.variance))
+        out.append(
+            np.asarray(scipy.linalg.solve_triangular(root, model.residual[rows], lower=True)) / np.sqrt(solved.variance)
+        )
     return out
 
 

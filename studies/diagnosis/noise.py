@@ -13,7 +13,7 @@ from threading import Lock
 from typing import NamedTuple
 
 import numpy as np
-from scipy.special import gammaln
+import scipy
 
 from compensation.noise import SLOW_TIMES, Noise, gauss_markov
 from studies.diagnosis.constants import CONSTANTS
@@ -46,7 +46,11 @@ def student_log(square: FloatArray, freedom: float) -> float:
     scale = max(float(np.mean(square)), 1e-300)
     for _ in range(30):
         scale = float(np.mean((freedom + 1.0) * square / (freedom + square / scale)))
-    norm = gammaln((freedom + 1.0) / 2.0) - gammaln(freedom / 2.0) - 0.5 * np.log(np.pi * freedom * scale)
+    norm = (
+        scipy.special.gammaln((freedom + 1.0) / 2.0)
+        - scipy.special.gammaln(freedom / 2.0)
+        - 0.5 * np.log(np.pi * freedom * scale)
+    )
     return float(square.size * norm - (freedom + 1.0) / 2.0 * np.log1p(square / (freedom * scale)).sum())
 
 

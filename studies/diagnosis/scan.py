@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from scipy.special import logsumexp
+import scipy
 
 from studies.diagnosis.evidence import SCALES
 from studies.diagnosis.model import Fit
@@ -162,7 +162,7 @@ def scan(model: Fit, bank: Bank, models: int = 5, like: Fit | None = None) -> li
         best = own[int(np.argmax(gain[own]))]
         if not np.isfinite(gain[best]):
             continue  # of the wrong sign in every shape
-        total = float(logsumexp(gain[own]) - np.log(own.size))
+        total = float(scipy.special.logsumexp(gain[own]) - np.log(own.size))
         out.append(Seen(bank.terms[best], total, float(gain[best]), own.size, _other_hill(bank, gain, own, int(best))))
     return sorted(out, key=lambda seen: -seen.gain)
 
@@ -248,5 +248,7 @@ def _gains(model: Fit, bank: Bank, kind: int, share: int) -> FloatArray:
             # what it does along its first column
             first = (vectors[:, 0] * values[0] * along / (1.0 + values[0])).sum(axis=-1)
             wrong = np.array([bank.terms[k].effect.positive for k in group.terms[place]]) & (first < 0.0)
-            out[group.terms[place]] = np.where(wrong, -np.inf, logsumexp(gains, axis=0) - np.log(SCALES.size))
+            out[group.terms[place]] = np.where(
+                wrong, -np.inf, scipy.special.logsumexp(gains, axis=0) - np.log(SCALES.size)
+            )
     return out

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.special import logsumexp
+import scipy
 
 from studies.diagnosis.table_noise import Scale, TableBaseline
 from studies.effects import Effect
@@ -51,7 +51,7 @@ def weigh_forms(
         value = scale.log_evidence(columns) - float(np.log(len(shapes)))
         out.append(Candidate(effect, tuple(shape), columns, value, float(residual @ residual), rms(lone), residual))
     if len(out) > 1 and effect.shape:  # one form at many places: the mean over them
-        total = float(logsumexp([c.log_evidence for c in out]))
+        total = float(scipy.special.logsumexp([c.log_evidence for c in out]))
         best = max(out, key=lambda c: c.log_evidence)
         out = [c if c is not best else replace(best, log_evidence=total) for c in out]
     return out

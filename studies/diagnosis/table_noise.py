@@ -3,8 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import solve_triangular
-from scipy.special import logsumexp
+import scipy
 
 from studies.effects.states import FloatArray
 
@@ -80,7 +79,7 @@ class Scale:
     def log_evidence(self, columns: FloatArray) -> float:
         """Log of the mean likelihood of the readings over noise and size."""
         values = self._likelihoods(columns)
-        return float(logsumexp(values) - np.log(values.size))
+        return float(scipy.special.logsumexp(values) - np.log(values.size))
 
     def white(self) -> float:
         """The white part of the noise, Hz, where nothing is there but noise."""
@@ -96,7 +95,7 @@ class Scale:
         sizes = self.sizes if columns.shape[1] else np.zeros(1)
         found = []
         for _, factor, logarithm in self.frames:
-            white = solve_triangular(factor, np.column_stack([y, own]), lower=True)
+            white = scipy.linalg.solve_triangular(factor, np.column_stack([y, own]), lower=True)
             z = white[:, 0]
             along, strength, _ = np.linalg.svd(white[:, 1:], full_matrices=False)
             grown = (sizes[:, None] * strength) ** 2

@@ -1,7 +1,7 @@
 """What a steady-state table says in words: its own shape, how it was approached, what to measure next."""
 
 import numpy as np
-from scipy.special import fdtrc
+import scipy
 
 from compensation.decimation import average_groups
 from studies.effects.states import FloatArray
@@ -64,7 +64,7 @@ def compare_cubic(T: FloatArray, f: FloatArray, rounding: float) -> tuple[float,
     cubic, quartic = (float(np.sum((f - np.polyval(np.polyfit(T, f, p), T)) ** 2)) for p in (3, 4))
     freedom = T.size - 5
     ratio = max((cubic - quartic) / max(quartic / freedom, rounding**2), 0.0)
-    return cubic, quartic, ratio, float(fdtrc(1, freedom, ratio))
+    return cubic, quartic, ratio, float(scipy.special.fdtrc(1, freedom, ratio))
 
 
 def bends_beyond_a_cubic(T: FloatArray, f: FloatArray, rounding: float) -> bool:

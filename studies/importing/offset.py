@@ -14,10 +14,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.interpolate import CubicSpline
-from scipy.ndimage import gaussian_filter1d
-from scipy.optimize import minimize_scalar
 
 Array = NDArray[np.float64]
 MOST_ROWS = 4000
@@ -67,7 +65,7 @@ def _search(t1: Array, y1: Array, t2: Array, y2: Array, reach: float, step: floa
     inside = (t1 >= t2[0] + reach) & (t1 <= t2[-1] - reach)
     if np.count_nonzero(inside) < 20:
         return None
-    t, y, second = t1[inside], y1[inside] - y1[inside].mean(), CubicSpline(t2, y2)
+    t, y, second = t1[inside], y1[inside] - y1[inside].mean(), scipy.interpolate.CubicSpline(t2, y2)
 
     def left(d: float) -> Array:
         x = np.asarray(second(t - d))
@@ -85,7 +83,7 @@ def _search(t1: Array, y1: Array, t2: Array, y2: Array, reach: float, step: floa
     best = int(np.argmin(values))
     if best in (0, len(grid) - 1):
         return None
-    found = minimize_scalar(
+    found = scipy.optimize.minimize_scalar(
         misfit, bounds=(grid[best - 1], grid[best + 1]), method="bounded", options={"xatol": step / 1e4}
     )
     d = float(found.x)
@@ -116,4 +114,4 @@ def _known(t: Array, y: Array) -> tuple[Array, Array]:
 def _smooth(t: Array, y: Array, step: float) -> tuple[Array, Array]:
     """Put a series on a regular grid and smooth it there."""
     grid = np.arange(t[0], t[-1] + step / 2, step)
-    return grid, np.asarray(gaussian_filter1d(np.interp(grid, t, y), SMOOTHED, mode="nearest"))
+    return grid, np.asarray(scipy.ndimage.gaussian_filter1d(np.interp(grid, t, y), SMOOTHED, mode="nearest"))

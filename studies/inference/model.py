@@ -13,9 +13,8 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.linalg import solve_triangular
-from scipy.special import logsumexp
 
 from compensation.noise import Noise
 from compensation.noise_rows import NoiseRows, Whitener
@@ -221,7 +220,7 @@ class Background:
         gain = self.gains(
             {n: X[:, None, :] for n, X in term.columns.items()}, term.unit[None], np.array([term.effect.positive])
         )[:, 0]
-        total = float(logsumexp(gain) - np.log(len(gain)))
+        total = float(scipy.special.logsumexp(gain) - np.log(len(gain)))
         return replace(term, scale=float(SCALES[int(np.argmax(gain))])), total
 
     @cached_property
@@ -247,7 +246,7 @@ def solve_posterior(X: Array, r: Array) -> tuple[Array, Array]:
     """Return mean and covariance of unknowns of unit prior from whitened rows."""
     p = X.shape[1]
     R = np.linalg.qr(np.column_stack([np.vstack([X, np.eye(p)]), np.append(r, np.zeros(p))])).R[:p]
-    root = solve_triangular(R[:, :p], np.eye(p))
+    root = scipy.linalg.solve_triangular(R[:, :p], np.eye(p))
     return root @ R[:, p], root @ root.T
 
 

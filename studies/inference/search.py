@@ -8,9 +8,8 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.optimize import minimize_scalar
-from scipy.special import logsumexp
 
 from compensation.noise import Noise, white_rms
 from studies.effects import Effect, Parameter
@@ -144,7 +143,7 @@ class Search:
                     self.unit(own.effect, own.response, own.members), (len(own.shapes), len(own.members))
                 )
                 positive = np.full(len(own.shapes), own.effect.positive)
-                gain = logsumexp(beside.gains(own.columns, units, positive), axis=0) - np.log(10) + behind
+                gain = scipy.special.logsumexp(beside.gains(own.columns, units, positive), axis=0) - np.log(10) + behind
                 best = found.setdefault((own.effect.name, own.response), {})
                 for k, shape in enumerate(own.shapes):
                     if np.isfinite(gain[k]) and (shape not in best or gain[k] > best[shape][0]):
@@ -156,7 +155,7 @@ class Search:
             gains = np.array([value[0] for value in shapes.values()])
             top, own, k, noise = max(shapes.values(), key=lambda value: value[0])
             # chosen shapes stand for the whole grid
-            total = float(logsumexp(gains) - np.log(min(own.count, MOST_SHAPES)))
+            total = float(scipy.special.logsumexp(gains) - np.log(min(own.count, MOST_SHAPES)))
             term = self.term(own.effect, own.response, own.shapes[k], PRICE + min(total - top, 0.0))
             out.append(Seen(total, top, term, noise))
         return sorted(out, key=lambda seen: -seen.gain)
@@ -193,7 +192,7 @@ class Search:
                 return self._moved(start, (*start.shape[:k], value, *start.shape[k + 1 :]))
 
             ends = (np.log(low), np.log(high)) if logarithmic else (low, high)
-            lowest = minimize_scalar(
+            lowest = scipy.optimize.minimize_scalar(
                 lambda x, at=at: -beside.with_term(at(x))[1], bounds=ends, method="bounded", options={"maxiter": 10}
             )
             if -lowest.fun > best:

@@ -4,8 +4,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.special import erf
 
 from compensation.noise import Noise, white_rms
 from studies.calibration.estimates import SILENT
@@ -71,7 +71,7 @@ def wrong_values(shifts: Sequence[Shift]) -> list[Cause]:
         Cause(
             shift.parameter,
             "frequency_Hz",
-            float(erf(abs(shift.shift_sd) / np.sqrt(2.0))),
+            float(scipy.special.erf(abs(shift.shift_sd) / np.sqrt(2.0))),
             (),
             {shift.parameter: Interval(shift.value, shift.low, shift.high)},
             shift.shift_sd**2,

@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from scipy.special import stdtrit
+import scipy
 
 from studies.calibration.lags.followers import Follower, make_series
 from studies.calibration.lags.housing_run import HousingRun, even_rows, row_step
@@ -221,7 +221,7 @@ def _refuse_constant(problem: LagProblem, solution: LagSolution, noise: Wander) 
 
 
 def _estimates(problem: LagProblem, solution: LagSolution, confidence: float) -> dict[str, LagEstimate]:
-    quantile = float(stdtrit(problem.rows - problem.count, (1 + confidence) / 2))
+    quantile = float(scipy.special.stdtrit(problem.rows - problem.count, (1 + confidence) / 2))
     errors = np.sqrt(np.diag(solution.covariance))
     scales = problem.scales(solution.parameters)
     estimates = {}

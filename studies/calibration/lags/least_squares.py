@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.optimize import least_squares
 
 from compensation.noise_regression import Runs, runs_between
 from studies.calibration.lags.followers import Follower
@@ -198,7 +198,7 @@ def solve(problem: LagProblem, start: Array, noise: Wander, fixed: dict[int, flo
         return J
 
     inside = np.clip(parameters[free], low[free] + 1e-9, high[free] - 1e-9)
-    result = least_squares(
+    result = scipy.optimize.least_squares(
         residuals, inside, slopes, bounds=(low[free], high[free]), x_scale="jac", xtol=1e-7, ftol=1e-9, max_nfev=60
     )
     if not np.isfinite(result.cost):

@@ -8,8 +8,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import linalg, optimize
 
 from compensation.noise_regression import Runs
 from compensation.recursion import recur
@@ -58,7 +58,7 @@ def estimate_wander(X: Array, y: Array, runs: Runs) -> Wander:
         return _deviance(X, y, _of_logits(memory, share), runs)
 
     def at_memory(memory: float) -> tuple[float, float]:
-        found = optimize.minimize_scalar(
+        found = scipy.optimize.minimize_scalar(
             lambda share: criterion(memory, share), bounds=ENDS, method="bounded", options={"xatol": 0.1}
         )
         return float(found.fun), float(found.x)
@@ -67,7 +67,7 @@ def estimate_wander(X: Array, y: Array, runs: Runs) -> Wander:
         return criterion(float(logits[0]), float(logits[1]))
 
     best = min(
-        (optimize.minimize(both, np.array(start), method="L-BFGS-B", bounds=[ENDS, ENDS]) for start in STARTS),
+        (scipy.optimize.minimize(both, np.array(start), method="L-BFGS-B", bounds=[ENDS, ENDS]) for start in STARTS),
         key=lambda result: float(result.fun),
     )
     memory = _farthest(lambda memory: at_memory(memory)[0], float(best.x[0]), ENDS[1], float(best.fun) + SLOWER)
@@ -89,7 +89,7 @@ def _farthest(criterion: Callable[[float], float], start: float, end: float, all
 
 
 def _diagonal(columns: Array) -> Array:
-    return np.asarray(np.abs(np.diag(linalg.qr(columns, mode="r", check_finite=False)[0])))
+    return np.asarray(np.abs(np.diag(scipy.linalg.qr(columns, mode="r", check_finite=False)[0])))
 
 
 def _of_logits(memory: float, share: float) -> Wander:

@@ -3,7 +3,7 @@
 from functools import lru_cache
 
 import numpy as np
-from scipy.special import diric
+import scipy
 
 from studies.effects.effect import Coefficient, Effect, Parameter, Shape, Span
 from studies.effects.states import FloatArray, States
@@ -29,7 +29,7 @@ def columns(states: States, shape: Shape, response: str) -> FloatArray:
 def _of_means(period: float, step: float, rows: int) -> FloatArray:
     """Return the amplitudes of means over the `rows` readings of a step, of a line and its harmonics."""
     apart = 2.0 * np.pi * step / (rows * period)  # phase from one reading to the next
-    return np.asarray(diric(np.arange(1, 4) * apart, rows), dtype=float)
+    return np.asarray(scipy.special.diric(np.arange(1, 4) * apart, rows), dtype=float)
 
 
 def grid(span: Span, response: str) -> list[tuple[float, ...]]:
