@@ -210,7 +210,7 @@ class Background:
         names = list(white)
         taken = np.vstack([base[name] for name in names]).T @ np.vstack([white[name] for name in names])
         energy = np.sum([(own**2).sum(axis=0) for own in white.values()], axis=0) - (taken**2).sum(axis=0)
-        absorbed = solve_triangular(R, taken)
+        absorbed = scipy.linalg.solve_triangular(R, taken)
         rows = {n: own - self.linear.columns(self.terms, n) @ absorbed for n, own in signals.items()}
         left = {name: white.get(name, 0.0) - base[name] @ taken for name in base}
         return left, np.maximum(energy, 0.0), rows

@@ -9,8 +9,8 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.optimize import minimize_scalar
 
 from compensation.noise import white_rms
 from shell.constants import zero_Celsius
@@ -145,7 +145,7 @@ def _likeliest_lag(runs: Sequence[ObservedRun], column: str, x0: float) -> float
     grid = np.log(LAGS[LAGS <= most])
     best = int(np.argmin([left(one) for one in grid]))
     ends = grid[max(best - 1, 0)], grid[min(best + 1, len(grid) - 1)]
-    return float(np.exp(minimize_scalar(left, bounds=ends, method="bounded", options={"maxiter": 15}).x))
+    return float(np.exp(scipy.optimize.minimize_scalar(left, bounds=ends, method="bounded", options={"maxiter": 15}).x))
 
 
 def _levels(runs: Sequence[ObservedRun], column: str, tau: float, x0: float) -> tuple[float, Array, float]:

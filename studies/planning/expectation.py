@@ -16,8 +16,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.special import ndtr
 
 from studies.diagnosis.constants import CONSTANTS
 from studies.diagnosis.verdict import temper_of
@@ -159,7 +159,9 @@ class Expectation:
         energy = size[:, None] ** 2 * self.energy[place]
         seen = [(score[:, place], variance[:, place]) for score, _, variance in scores.values()]
         best = np.max([score for score, _ in seen], axis=0)
-        detected = np.max([ndtr((score - MARGIN) / np.sqrt(variance + 0.25)) for score, variance in seen], axis=0)
+        detected = np.max(
+            [scipy.special.ndtr((score - MARGIN) / np.sqrt(variance + 0.25)) for score, variance in seen], axis=0
+        )
         near = np.vectorize(temper_of)(best) * -np.log(CONSTANTS["member"])
         ahead: dict[str, Array] = {}
         level: dict[str, Array] = {}
@@ -168,8 +170,8 @@ class Expectation:
                 continue
             spread = np.sqrt(np.maximum(energy - explained[:, place], 0.0) + 1.0)
             lead = (score[:, place] - own) / spread
-            ahead[name] = np.maximum(ahead.get(name, 0.0), ndtr(lead - near / spread))
-            level[name] = np.maximum(level.get(name, 0.0), ndtr(lead + near / spread))
+            ahead[name] = np.maximum(ahead.get(name, 0.0), scipy.special.ndtr(lead - near / spread))
+            level[name] = np.maximum(level.get(name, 0.0), scipy.special.ndtr(lead + near / spread))
         wrong = np.max(list(ahead.values()), axis=0, initial=0.0)
         named = detected * (1.0 - wrong)
         exact = one.effect.equivalents.get(one.response, ())
