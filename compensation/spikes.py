@@ -9,6 +9,8 @@ REACH = 3
 NEIGHBOURS = 2 * REACH + 1
 SPIKE, ALONE = 6.0, 4.0
 FEW, LEVEL = 3, 25
+STUCK = 20
+"""Readings in a row that are alike, where those beside them mostly differ, make a sensor that is stuck."""
 
 
 def find_spikes(values: Array, least: float = 0.0, step: float = 0.0) -> NDArray[np.bool_]:
@@ -44,6 +46,36 @@ def find_step(readings: Array) -> float:
     """Return the smallest difference of readings (m,): what they were rounded to, if they were; 0 where all are alike."""
     apart = np.diff(np.unique(readings[np.isfinite(readings)]))
     return float(apart.min()) if apart.size else 0.0
+
+
+def find_stuck(values: Array) -> NDArray[np.bool_]:
+    """Mark readings (m,) of a sensor that is stuck: `STUCK` or more alike, of whose neighbours on either side at least half differ.
+
+    A settled column of coarse readings is no stuck sensor: beside its runs of one value there are others.
+    """
+    marked, rows = np.zeros(len(values), dtype=bool), np.flatnonzero(np.isfinite(values))
+    if len(rows) < 3 * STUCK:
+        return marked
+    moves = np.concatenate([[0], np.cumsum(np.diff(values[rows]) != 0)])  # number of changes up to each reading
+    starts = np.flatnonzero(np.diff(moves, prepend=-1))
+    ends = np.append(starts[1:], len(rows))
+    long = ends - starts >= STUCK
+    for begin, end in zip(starts[long].tolist(), ends[long].tolist(), strict=True):
+        before, after = max(begin - STUCK, 0), min(end - 1 + STUCK, len(rows) - 1)
+        changes = (moves[begin] - moves[before], moves[after] - moves[end - 1])
+        if all(2 * n >= STUCK for n in changes):
+            marked[rows[begin:end]] = True
+    return marked
+
+
+def find_dropouts(values: Array) -> NDArray[np.bool_]:
+    """Mark readings (m,) of exactly 0 that lie farther from the range of the others than half that range."""
+    others = values[np.isfinite(values) & (values != 0)]
+    if not others.size or others.size == np.count_nonzero(np.isfinite(values)):
+        return np.zeros(len(values), dtype=bool)
+    low, high = np.percentile(others, [1, 99])
+    room = 0.5 * (high - low)
+    return np.asarray((values == 0) & bool(low - room > 0 or high + room < 0))
 
 
 def find_spike_groups(rests: Array, step: float = 0.0) -> NDArray[np.bool_]:

@@ -21,17 +21,16 @@ from compensation.bias_selection import (
     score_held_out,
     score_path,
 )
-from compensation.decimation import average_blocks
 from compensation.errors import CompensationError
 from compensation.memory import NO_MEMORY, Memory
-from compensation.spikes import find_spikes
-from compensation.stability import AllanDeviation, NoiseCoefficients, allan_deviation, fit_noise
+from compensation.stability import allan_deviation, fit_noise
 from studies.errors import InputError, naming
 from studies.models import Model, compensate, source_of
 from studies.models.kinds.bias import OUTPUTS, save_bias
 from studies.plausible import records_of_one_gyro
 from studies.record import COMPENSATED, Record
 from studies.rest import LARGEST_REST, TEMPERATURES, choose_column
+from studies.stability import Stability, unbroken
 
 Over = Literal["auto", "frequency", "temperature"]
 Array = NDArray[np.float64]
@@ -60,14 +59,6 @@ class Judged:
     def training_gain(self) -> float:
         """Improvement on the data that were fitted."""
         return self.training[0] / self.training[1]
-
-
-@dataclass(frozen=True)
-class Stability:
-    """Allan deviation of an output with the noise coefficients read off it."""
-
-    allan: AllanDeviation
-    noise: NoiseCoefficients
 
 
 @dataclass(frozen=True)
@@ -248,25 +239,6 @@ def find_state(records: Sequence[Record], over: Over = "auto") -> str:
                 f"{where}: frequency_Hz around {typical:g} cannot be a resonator's; is it in kHz? Multiply it by 1000."
             )
     return "frequency_Hz"
-
-
-def unbroken(time: Array, columns: dict[str, Array]) -> tuple[float, dict[str, Array]]:
-    """Return an equally spaced series for Allan deviations and its step (s).
-
-    The samples themselves where they are regular, complete and free of spikes; else averages of ten samples, over the
-    longest stretch without a gap.
-    """
-    steps = np.diff(time)
-    step = float(np.median(steps))
-    regular = bool(np.all(np.abs(steps - step) < 0.01 * step))
-    if regular and all(np.all(np.isfinite(y)) and not np.any(find_spikes(y)) for y in columns.values()):
-        return step, columns
-    blocks = average_blocks(time, columns, 10 * step)
-    breaks = np.flatnonzero(np.abs(np.diff(blocks.time) - blocks.width) > 0.5 * blocks.width) + 1
-    ends = np.concatenate([[0], breaks, [blocks.time.size]])
-    longest = int(np.argmax(np.diff(ends)))
-    stretch = slice(int(ends[longest]), int(ends[longest + 1]))
-    return blocks.width, {name: y[stretch] for name, y in blocks.columns.items()}
 
 
 def _score_path(runs: Sequence[BiasRun], fit: BiasFit) -> tuple[float, ...]:

@@ -108,7 +108,7 @@ def advise_hold(records: Sequence[Record], time_constant: float, tolerance: floa
 
     What is left to settle decays with the record's own time constant τ, so that it takes τ ln(left/tolerance) more.
     """
-    holds = [(one, rows) for one in _judge(records, time_constant, tolerance) for rows in _holds(one.seen.drive)]
+    holds = [(one, rows) for one in _judge(records, time_constant, tolerance) for rows in find_holds(one.seen.drive)]
     # Slopes near the end of a hold know of what comes after it.
     whole = [(one, rows[: -one.reach]) for one, rows in holds if _is_whole(one.time, rows, one.reach)]
     if not whole:
@@ -203,7 +203,7 @@ def _shown(seen: Sequence[_Seen], tolerance: float) -> float:
     """
     found = []
     for one in seen:
-        for rows in (rows[:-REACH] for rows in _holds(one.drive) if _is_whole(one.time, rows, REACH)):
+        for rows in (rows[:-REACH] for rows in find_holds(one.drive) if _is_whole(one.time, rows, REACH)):
             half = rows[len(rows) // 2 :]
             tau = _time_constant(one.time[half], one.frequency[half], tolerance * one.slope)
             if tau < np.ptp(one.time[half]):
@@ -238,7 +238,7 @@ def _soaks_of(one: _Judged, tolerance: float) -> list[Soak]:
 def _extrapolated(one: _Judged, soaks: Sequence[Soak], tolerance: float) -> list[Soak]:
     """Return the states that holds without a settled part would settle at, where their error is within the tolerance."""
     found = []
-    for rows in (rows[: -one.reach] for rows in _holds(one.seen.drive)):
+    for rows in (rows[: -one.reach] for rows in find_holds(one.seen.drive)):
         t = one.time[rows]
         settled = any(soak.start < t[-1] and soak.end > t[0] for soak in soaks) if len(rows) else True
         if settled or not _is_whole(one.time, rows, one.reach):
@@ -291,7 +291,7 @@ def _is_whole(time: Array, rows: NDArray[np.intp], reach: int) -> bool:
     return len(rows) > 3 * reach and float(np.ptp(time[rows])) >= LEAST
 
 
-def _holds(drive: Array) -> list[NDArray[np.intp]]:
+def find_holds(drive: Array) -> list[NDArray[np.intp]]:
     """Rows of the stretches in which a temperature stays within `HELD`."""
     ends, low, high = [0], np.inf, -np.inf
     for k, T in enumerate(drive):

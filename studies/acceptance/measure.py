@@ -14,10 +14,11 @@ from compensation.decimation import average_blocks
 from compensation.linearity import measure_linearity, same_rate
 from compensation.noise_regression import fit_coloured
 from compensation.regression import fit_linear
-from compensation.stability import AllanDeviation, NoiseCoefficients, allan_deviation, fit_noise
+from compensation.stability import AllanDeviation, NoiseCoefficients
 from compensation.start_up import fit_run_down
 from studies.acceptance.runs import temperature_column
 from studies.errors import InputError, naming
+from studies.stability import read_stability
 
 if TYPE_CHECKING:
     from studies.record import Record
@@ -86,14 +87,8 @@ def _stability(record: "Record", output: str) -> tuple[AllanDeviation, NoiseCoef
     with naming(record.path):
         if width > step or not np.isfinite(y).all() or np.ptp(np.diff(time)) > 1e-3 * step:
             y = average_blocks(time, {"output": y}, width).columns["output"]
-        allan = allan_deviation(y, width, confidence=CONFIDENCE)
-        # Noise of the angle falls as 1/τ and is no random walk: N, B and K are read where it no longer rules.
-        angle = sum(1 for _ in itertools.takewhile(lambda kind: kind == "phase", allan.noise))
-        if angle:
-            factor = round(allan.tau[min(angle, len(allan.tau) - 1)] / width)
-            later = y[: len(y) // factor * factor].reshape(-1, factor).mean(axis=1)
-            return allan, fit_noise(allan_deviation(later, width * factor, confidence=CONFIDENCE))
-        return allan, fit_noise(allan)
+        found = read_stability(y, width, CONFIDENCE)
+        return found.allan, found.noise
 
 
 def _deviation_interval(deviation: float, free: int) -> tuple[float, float]:

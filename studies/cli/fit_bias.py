@@ -9,7 +9,7 @@ unit·√s, B in unit, K in unit/√s; null for runs too short for it.
 
 from typing import Any, Literal
 
-from studies.bias import BiasStudy, Judged, Stability, study_bias
+from studies.bias import BiasStudy, Judged, study_bias
 from studies.cli.arguments import EmitC, SaveModel
 from studies.cli.output import answers, say
 from studies.errors import InputError
@@ -19,6 +19,7 @@ from studies.models.kinds.bias import name_term
 from studies.record import read_record
 from studies.reports import bias as parts
 from studies.results import Chapter, Result, Sentence
+from studies.stability import Stability
 
 
 @answers("hrg.fit-bias/1")

@@ -21,10 +21,10 @@ def draw_columns(columns: Columns) -> Drawing:
     timed = names[0] == "time_s"
     x, label = (columns["time_s"] / 3600, "Time (h)") if timed else (columns[names[0]], names[0])
     shown = names[1:]
-    rows = style.few_rows(len(x))
     mark = "-" if timed and len(x) >= FEW else "."
     with style.figure(len(shown), height=1.9 * len(shown) + 0.6, squeeze=False, sharex=True) as (figure, axes):
         for axis, name in zip(axes[:, 0], shown, strict=True):
+            rows = style.outline_rows(columns[name])
             drawn = x[rows], columns[name][rows]
             if timed:
                 gaps = find_gaps(columns["time_s"], columns[name]) / 3600

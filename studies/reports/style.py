@@ -35,6 +35,18 @@ def few_rows(count: int) -> NDArray[np.intp]:
     return np.unique(np.linspace(0, count - 1, MOST_POINTS).astype(np.intp))
 
 
+def outline_rows(values: NDArray[np.float64]) -> NDArray[np.intp]:
+    """Return the rows of a column that are drawn: all, or the least and the largest of as many parts as can be told apart."""
+    if len(values) <= MOST_POINTS:
+        return np.arange(len(values))
+    part = np.arange(len(values)) * (MOST_POINTS // 2) // len(values)
+    order = np.lexsort((values, part))  # missing values last
+    known = np.bincount(part, np.isfinite(values)).astype(np.intp)
+    first = np.concatenate([[0], np.cumsum(np.bincount(part))[:-1]])
+    ends = np.concatenate([first, first + np.maximum(known, 1) - 1, first + known - 1 + (known < np.bincount(part))])
+    return np.unique(np.concatenate([[0, len(values) - 1], order[ends]]))
+
+
 @contextmanager
 def figure(
     rows: int = 1, columns: int = 1, height: float = 3.4, x: str = "", y: str | Sequence[str] = "", **options: Any

@@ -1,6 +1,6 @@
 """Results as a page: text, tables and figures in one self-contained HTML file.
 
-All text is escaped; figures are embedded, so the page works without a network. What would make a page long is folded:
+All text is escaped; figures are embedded, so the page works without a network; a short script shows their values and enlarges them. What would make a page long is folded:
 tables of many rows, and the chapters that begin below `OPEN_HEIGHT`. On paper everything is unfolded, but no table has more
 than `PAPER_ROWS` rows. On a phone a table that is too wide is stacked, every row a few lines of heading and value.
 """
@@ -17,6 +17,7 @@ from io import BytesIO
 from typing import TYPE_CHECKING
 
 from studies.results import Blocks, Chapter, Drawing, Facts, Figure, Part, Result, Sentence, Table
+from studies.results.curves import read_curves
 
 if TYPE_CHECKING:
     from markupsafe import Markup
@@ -49,6 +50,7 @@ class Picture:
     caption: str
     alt: str
     height: float = 400.0  # px, roughly
+    curves: str = ""  # what it shows as JSON, to be read and enlarged by curves.js
 
 
 @dataclass(frozen=True)
@@ -93,7 +95,8 @@ def render_page(title: str, lead: str, chapters: Sequence[Chapter], sources: Seq
     """Return the page as HTML text; chapters without anything to show are left out."""
     from jinja2 import Environment, StrictUndefined
 
-    template = (files("studies.reports") / "templates" / "page.html").read_text(encoding="utf-8")
+    folder = files("studies.reports") / "templates"
+    template, script = ((folder / name).read_text(encoding="utf-8") for name in ("page.html", "curves.js"))
     environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
     environment.filters.update(typeset=typeset, prose=_prose, cell=_cell)
     environment.tests.update(kind=_is_kind, stacked=_stacked)
@@ -105,6 +108,7 @@ def render_page(title: str, lead: str, chapters: Sequence[Chapter], sources: Seq
         lead=lead,
         chapters=[(heading, blocks, fold) for (heading, blocks), fold in zip(made, folded, strict=True)],
         contents=len(made) >= CONTENTS_FROM,
+        script=script if any(isinstance(b, Picture) and b.curves for _, blocks in made for b in blocks) else "",
         long_table=LONG_TABLE,
         long_answer=LONG_ANSWER,
         paper_rows=PAPER_ROWS,
@@ -207,14 +211,18 @@ def _height(block: "Block", answer: bool) -> float:
 
 
 def draw(figure: Drawing, caption: str, alt: str) -> Picture:
-    """Embed a matplotlib figure as SVG."""
+    """Embed a matplotlib figure as SVG, with the numbers of its curves."""
     import matplotlib as mpl
 
     buffer = BytesIO()
     with mpl.rc_context({"svg.hashsalt": caption}):
-        figure.savefig(buffer, format="svg", bbox_inches="tight", metadata={"Date": None})
+        figure.set_dpi(72)  # that of the picture, so that its curves lie where they are drawn
+        figure.draw_without_rendering()
+        shown = figure.get_tightbbox().padded(0.1)
+        figure.savefig(buffer, format="svg", bbox_inches=shown, metadata={"Date": None})
     height = 96 * float(figure.get_figheight())
-    return Picture(_data_uri("image/svg+xml", buffer.getvalue()), caption, alt, height)
+    curves = read_curves(figure, *shown.bounds)
+    return Picture(_data_uri("image/svg+xml", buffer.getvalue()), caption, alt, height, curves)
 
 
 def _data_uri(kind: str, data: bytes) -> str:

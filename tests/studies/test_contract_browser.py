@@ -14,9 +14,10 @@ from PIL import Image
 
 from shell.modes import solve_modes
 from studies.instrument.card import load_card
+from studies.reports import style
 from studies.reports.webgl import view_modes
 from studies.results import Chapter, Sentence
-from studies.results.page import render_page
+from studies.results.page import draw, render_page
 
 BROWSER = next(
     (found for name in ("chromium", "chromium-browser", "google-chrome", "chrome") if (found := shutil.which(name))),
@@ -95,6 +96,38 @@ def page(tmp_path_factory):
     path.write_text(text.replace("</body>", VISIT + "</body>"))
     assert not re.findall(r"""(?:src|href)\s*=\s*["']?(?!data:)(?:https?:)?//""", text)
     return path
+
+
+READ = """
+<script>
+addEventListener("load", () => setTimeout(() => {
+  const canvas = document.querySelector("figure.curves canvas"), at = canvas.getBoundingClientRect(), seen = {};
+  const told = () => document.querySelector(".reading").textContent;
+  const go = (kind, x) => canvas.dispatchEvent(new PointerEvent(kind, {clientX: at.left + x * at.width, clientY: at.top + at.height / 2}));
+  go("pointermove", 0.5); seen.whole = told();
+  go("pointerdown", 0.4); go("pointermove", 0.6); go("pointerup", 0.6); go("pointermove", 0.5); seen.large = told();
+  seen.button = !document.querySelector(".curves button").hidden;
+  document.querySelector(".curves button").click(); go("pointermove", 0.5); seen.again = told();
+  document.title = JSON.stringify(seen);
+}, 200));
+</script>
+"""
+
+
+def test_a_figure_shows_values_under_the_pointer_and_a_part_of_it_enlarged(tmp_path):
+    x = np.linspace(-1.0, 1.0, 2001)
+    with style.figure(x="time (h)", y="bias (°/h)") as (made, axes):
+        axes.plot(x, 3.0 + x**3, label="<b>")
+    text = render_page("T", "lead", [Chapter("C", [draw(made, "caption", "alt")])])
+    path = tmp_path / "page.html"
+    path.write_text(text.replace("</body>", READ + "</body>"))
+    seen = browse(path)
+    assert seen["button"]
+    for said in (seen["whole"], seen["large"], seen["again"]):
+        found = re.fullmatch(r"time \(h\) (−?[\d.]+) · <b> ([\d.]+) °/h", said)
+        at, value = (float(number.replace("−", "-")) for number in found.groups())
+        assert value == pytest.approx(3.0 + at**3, abs=2e-3)
+    assert seen["whole"] == seen["again"]
 
 
 @pytest.fixture(scope="module")

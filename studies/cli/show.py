@@ -1,0 +1,99 @@
+"""`hrg show`: records looked at without a card and without a fit.
+
+With --json one object, schema `hrg.show/1`: `records`, each with `path`, `rows`, `span_s`, `step_s`, `even`, `columns` (range, `missing`,
+`gaps`, `spikes`, `stuck`, `zeros`, `steps`, `noise` as levels of white noise at 1 s, flicker and walk in the column's unit, `line`), `steps`,
+`settled` and `correlations`; and `uses`, each with `command`, `line`, `ready` and `missing`.
+"""
+
+from pathlib import Path
+
+import numpy as np
+
+from studies.cli.output import answers, say
+from studies.errors import InputError
+from studies.record import read_record
+from studies.reports import survey as parts
+from studies.reports.digits import plain
+from studies.results import Chapter, Facts, Result, Sentence
+from studies.survey import Survey, survey_record
+from studies.uses import find_uses
+
+MANY = 100_000  # rows, of which the reading is told
+
+
+@answers("hrg.show/1")
+def show(*runs: str) -> Result:
+    """Look at records: range and faults of every column, steps, settled parts, spectra, noise, and what they can be used for.
+
+    Needs no card and fits no model of the gyro. The page has every column over time and over temperature, spectra and Allan
+    deviations; its figures show values under the pointer and can be enlarged.
+
+    Parameters
+    ----------
+    runs : str
+        Records of one gyro (CSV).
+    """
+    if not runs:
+        raise InputError("no record given: hrg show RUN.csv [RUN.csv ...].")
+    records = [read_record(path) for path in runs]
+    surveys = []
+    for record in records:
+        if len(record) > MANY:
+            say(f"looking at {len(record):,} rows of {record.path}")
+        surveys.append(survey_record(record))
+    told = [parts.tell(survey) for survey in surveys]
+    uses = find_uses(records)
+    payload = {
+        "schema": "hrg.show/1",
+        "records": told,
+        "uses": [{"command": u.command, "line": u.line, "ready": not u.missing, "missing": u.missing} for u in uses],
+    }
+    chapters = [
+        chapter
+        for survey, one in zip(surveys, told, strict=True)
+        for chapter in parts.run_chapters(survey, one, several=len(runs) > 1)
+    ]
+    lead = f"{', '.join(runs)} as recorded: nothing is fitted, and nothing left out."
+    return Result(
+        payload,
+        f"Record {Path(runs[0]).name}" if len(runs) == 1 else f"{len(runs)} records",
+        lead,
+        [
+            *(
+                part
+                for survey, one in zip(surveys, told, strict=True)
+                for part in (Facts(_facts(survey)), parts.columns_table(one))
+            ),
+            *_warnings(surveys),
+            *parts.use_parts(uses),
+            *chapters,
+        ],
+    )
+
+
+def _facts(survey: Survey) -> list[tuple[str, str, str]]:
+    record, span = survey.record, float(np.ptp(survey.record["time_s"]))
+    even = "even" if survey.even else "uneven or with gaps"
+    about = " ".join(filter(None, (record.instrument, record.start.isoformat() if record.start else "")))
+    return [
+        (record.path, f"{len(record):,} rows", about),
+        ("Duration", f"{plain(span / 3600, 4)} h", ""),
+        ("Usual step", f"{plain(survey.step, 4)} s", even),
+    ]
+
+
+def _warnings(surveys: list[Survey]) -> list[Sentence | Chapter]:
+    """Say which readings look wrong, and how to leave them out."""
+    found = [
+        f"{survey.record.path}, {column.name}: {count} {words}"
+        for survey in surveys
+        for column in survey.columns
+        for count, words in (
+            (column.spikes, "spikes"),
+            (column.stuck, "stuck readings"),
+            (column.zeros, "dropouts to 0"),
+        )
+        if count
+    ]
+    mend = "They are still in the record; 'drop' in the map of hrg import turns them into missing values."
+    return [Sentence(f"{'; '.join(found)}. {mend}", "warning")] if found else []

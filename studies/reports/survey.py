@@ -1,0 +1,256 @@
+"""The page of `hrg show`: a record's columns over time and temperature, their spectra, noise and correlation."""
+
+from collections.abc import Sequence
+from math import ceil
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from compensation.noise import FLAT
+from studies.reports import style
+from studies.reports.columns import draw_columns
+from studies.rest import TEMPERATURES
+from studies.results import Chapter, Column, Drawing, Figure, Part, Sentence, Table
+from studies.survey import CONFIDENCE, Survey, average_evenly
+from studies.uses import Use
+
+COLUMNS = (
+    Column("column", "Column"),
+    Column("low", "Minimum", form=".7g"),
+    Column("high", "Maximum", form=".7g"),
+    Column("resolution", "Resolution", digits=2),
+    *(
+        Column(
+            lambda row, key=key: row[key] or None, key.replace("_s", "").replace("_", " ").capitalize(), unit, digits=3
+        )  # type: ignore[misc]
+        for key, unit in (
+            ("missing", ""),
+            ("gaps", ""),
+            ("longest_gap_s", "s"),
+            ("spikes", ""),
+            ("stuck", ""),
+            ("zeros", ""),
+            ("steps", ""),
+        )
+    ),
+)
+NOISE = (
+    Column("column", "Column"),
+    Column("unit", "Unit"),
+    Column("noise.white", "White, at 1 s", error="noise.white_sd"),
+    Column("noise.flicker", "Flicker, flat part", error="noise.flicker_sd"),
+    Column("noise.walk", "Random walk, in 1 s", error="noise.walk_sd"),
+    Column("noise.misfit", "Misfit", digits=2),
+    Column(
+        "noise.instability",
+        "Minimum / 0.664, 90 %",
+        interval=("noise.instability_low", "noise.instability_high"),
+        digits=3,
+    ),
+    Column("line.period_s", "Period of a line", "s", digits=4),
+    Column("line.rms", "Its rms", digits=2),
+)
+NOISE_NOTE = (
+    "White noise, flicker and random walk have the Allan deviations N/√τ, a flat part and K √(τ/3), fitted together. Where they do not explain"
+    " the curve (misfit above 3), as where temperature drives a column, only the white noise is given, from second differences of the rows:"
+    " judge the others on a settled run."
+)
+USES = (
+    Column("command", "Command"),
+    Column("gives", "Gives"),
+    Column("ready", "Possible"),
+    Column("missing", "Missing"),
+)
+STEPS = (
+    Column("column", "Column"),
+    Column("time_s", "At", "s", ".1f"),
+    Column("size", "Size"),
+)
+SETTLED = (
+    Column("start_s", "From", "s", ".0f"),
+    Column("end_s", "To", "s", ".0f"),
+    Column("temperature_degC", "Temperature", "°C", ".3f"),
+    Column("frequency_Hz", "Frequency", "Hz", ".6f"),
+    Column("left_K", "Still to settle, at most", "K", digits=2),
+)
+CORRELATIONS = (
+    Column("one", "Column"),
+    Column("two", "With"),
+    Column("values", "Of values", form="+.3f"),
+    Column("changes", "Of changes", form="+.3f"),
+)
+CORRELATION_NOTE = "Two columns that drift slowly are correlated without a cause; correlated changes (of means over 1/200 of the record) tell more."
+DRIVEN = 3.0  # misfit from which on a column is driven by something, and its curve is not that of noise
+FEW = 1500  # means that are drawn over temperature
+
+
+def use_parts(uses: Sequence[Use]) -> list[Table | Sentence]:
+    """Return what the records can be used for, and the lines to type."""
+    lines = "\n".join(use.line for use in uses if not use.missing)
+    return [
+        Table("Use of these records", uses, USES),
+        Sentence(lines or "No command can use these records as they are.", "source" if lines else "plain"),
+    ]
+
+
+def columns_table(told: dict[str, Any]) -> Table:
+    """Return the table of one record's columns."""
+    note = "Missing values, gaps, spikes, stuck readings, dropouts to 0 and steps are counted where there are any."
+    return Table(f"Columns of {told['path']}", told["columns"], COLUMNS, note)
+
+
+def run_chapters(survey: Survey, told: dict[str, Any], several: bool) -> list[Chapter]:
+    """Return the chapters of one record; `told` is what the payload says of it."""
+    before = f"{Path(survey.record.path).name}: " if several else ""
+    count = len(survey.record)
+    drawn = (
+        f" Of {count:,} rows the least and the largest of every {2 * count // style.MOST_POINTS} are drawn, and a part that is enlarged shows no more."
+        if count > style.MOST_POINTS
+        else ""
+    )
+    noise = [column for column in survey.columns if column.stability is not None]
+    dense = [column for column in survey.columns if column.density is not None]
+    found: dict[str, Sequence[Part]] = {
+        "over time": [
+            Figure(lambda: draw_columns(survey.record.columns), f"All columns. Shaded: no values.{drawn}"),
+        ],
+        "steps and settled parts": [
+            Table("Steps", told["steps"], STEPS, "A step is there within two rows; its time is that between them."),
+            Table("Settled parts", told["settled"], SETTLED),
+        ],
+        "over temperature": _temperature_parts(survey),
+        "noise": [
+            Figure(
+                lambda: _draw_stability(survey),
+                "Overlapping Allan deviation with its 90 % interval, and (dashed) white noise, flicker and random walk fitted together.",
+            ) if noise else Sentence("No column varies over enough rows for an Allan deviation."),
+            Table("Noise", told["columns"], NOISE, NOISE_NOTE) if noise else Sentence("", where="terminal"),
+        ],
+        "spectra": [Figure(lambda: _draw_spectra(survey), _spectrum_words(survey))] if dense else [],
+        "correlation": [Table("Correlation between columns", told["correlations"], CORRELATIONS, CORRELATION_NOTE, "page", sortable=True)],
+    }  # fmt: skip
+    chapters = [Chapter((before + title) if before else title.capitalize(), parts) for title, parts in found.items()]
+    return [chapter for chapter in chapters if chapter.parts]
+
+
+def unit_of(column: str) -> str:
+    """Return the unit that a column's name carries."""
+    ends = {"_degC": "°C", "_Hz": "Hz", "_deg_per_h": "°/h", "_deg_per_s": "°/s", "_V": "V", "_deg": "°", "_counts": "counts"}  # fmt: skip
+    return next((unit for end, unit in ends.items() if column.endswith(end)), "")
+
+
+def _grid(count: int, x: str, log: bool = False) -> Any:
+    rows = ceil(count / 2)
+    return style.figure(rows, 2 if count > 1 else 1, height=2.5 * rows + 0.3, x=x, squeeze=False)
+
+
+def _temperature_parts(survey: Survey) -> list[Figure]:
+    temperature = next(
+        (c.name for T in TEMPERATURES for c in survey.columns if c.name == T and c.high - c.low > 0.1), None
+    )
+    others = [c.name for c in survey.columns if c.name != temperature and c.high > c.low]
+    if temperature is None or not others:
+        return []
+    caption = "Each column over temperature, means over equal times; red: warming, blue: cooling. Two separate lines are a lag or a hysteresis."
+    return [Figure(lambda: _draw_over_temperature(survey, temperature, others), caption)]
+
+
+def _draw_over_temperature(survey: Survey, temperature: str, others: Sequence[str]) -> Drawing:
+    time, T = survey.record["time_s"], survey.record[temperature]
+    with _grid(len(others), f"{temperature.removesuffix('_degC').replace('_', ' ')} (°C)") as (made, axes):
+        for axis, name in zip(axes.flat, others, strict=False):
+            both = np.isfinite(T) & np.isfinite(survey.record[name])
+            x, y = (average_evenly(time[both], values[both], FEW)[1] for values in (T, survey.record[name]))
+            warming = np.gradient(np.convolve(np.pad(x, 7, mode="edge"), np.full(15, 1 / 15), mode="valid")) > 0 if len(x) > 2 else x > 0  # fmt: skip
+            for rows, colour, label in ((warming, style.VERMILION, "warming"), (~warming, style.BLUE, "cooling")):
+                axis.plot(x[rows], y[rows], ".", color=colour, markersize=2, label=label)
+            axis.set_title(name, fontsize=9, loc="left")
+        _blank(axes, len(others))
+        return made
+
+
+def _draw_stability(survey: Survey) -> Drawing:
+    shown = [column for column in survey.columns if column.stability is not None]
+    with _grid(len(shown), "averaging time τ (s)") as (made, axes):
+        for axis, column in zip(axes.flat, shown, strict=False):
+            assert column.stability is not None
+            allan, noise = column.stability.allan, column.stability.noise
+            axis.fill_between(allan.tau, allan.low, allan.high, color=style.SKY, alpha=0.35)
+            axis.loglog(allan.tau, allan.deviation, color=style.BLUE, label="Allan deviation")
+            axis.loglog(
+                allan.tau, noise.deviation(allan.tau), "--", color=style.ORANGE, linewidth=1, label="fitted noise"
+            )
+            _title(axis, column.name)
+        _blank(axes, len(shown))
+        return made
+
+
+def _draw_spectra(survey: Survey) -> Drawing:
+    shown = [column for column in survey.columns if column.density is not None]
+    with _grid(len(shown), "frequency (Hz)") as (made, axes):
+        for axis, column in zip(axes.flat, shown, strict=False):
+            assert column.density is not None
+            axis.loglog(column.density.frequency, np.sqrt(column.density.density), color=style.BLUE, linewidth=1)
+            _title(axis, column.name, "/√Hz")
+        _blank(axes, len(shown))
+        return made
+
+
+def _title(axis: Any, name: str, per: str = "") -> None:
+    unit = unit_of(name)
+    axis.set_title(f"{name}{f' ({unit or 1}{per})' if unit or per else ''}", fontsize=9, loc="left")
+
+
+def _blank(axes: Any, count: int) -> None:
+    for axis in axes.flat[count:]:
+        axis.set_visible(False)
+    if count % 2 and axes.size > 2:
+        axes[-2, 1].set_xlabel(axes[-1, 0].get_xlabel())
+
+
+def _spectrum_words(survey: Survey) -> str:
+    made = [column.density.even for column in survey.columns if column.density is not None]
+    how = "Welch's, of even rows" if all(made) else "Lomb's, since rows are uneven or missing" if not any(made) else "Welch's, and Lomb's of columns with missing rows"  # fmt: skip
+    return f"Amplitude spectral density ({how}), mean and slope taken off."
+
+
+def tell(survey: Survey) -> dict[str, Any]:
+    """Return the payload of one record."""
+    record = survey.record
+    columns = []
+    for column in survey.columns:
+        gaps = column.gaps
+        row: dict[str, Any] = {
+            "column": column.name, "unit": unit_of(column.name), "low": column.low, "high": column.high, "mean": column.mean,
+            "resolution": column.resolution, "missing": column.missing, "gaps": len(gaps),
+            "longest_gap_s": float(np.ptp(gaps, axis=1).max()) if len(gaps) else None,
+            "spikes": column.spikes, "stuck": column.stuck, "zeros": column.zeros, "steps": len(column.steps),
+        }  # fmt: skip
+        if column.stability is not None:
+            noise, (value, low, high) = column.stability.noise, column.stability.allan.bias_instability
+            levels = {
+                "white": noise.noise.white, "white_sd": noise.N_uncertainty,
+                "flicker": noise.noise.flicker, "flicker_sd": FLAT * noise.B_uncertainty,
+                "walk": noise.noise.walk, "walk_sd": noise.K_uncertainty,
+                "instability": value, "instability_low": low, "instability_high": high, "confidence": CONFIDENCE,
+            } if noise.misfit < DRIVEN else {"white": column.white}  # fmt: skip
+            row["noise"] = {**levels, "misfit": noise.misfit}
+        if column.line is not None:
+            row["line"] = {"period_s": column.line.period, "rms": column.line.rms}
+        columns.append(row)
+    steps = [
+        {"column": column.name, "time_s": step.time, "size": step.size, "sd": step.sd}
+        for column in survey.columns
+        for step in column.steps
+    ]
+    settled = [
+        {"start_s": s.start, "end_s": s.end, "temperature_degC": s.temperature_degC, "frequency_Hz": s.frequency_Hz, "left_K": s.left_K}
+        for s in survey.settled
+    ]  # fmt: skip
+    correlations = sorted((vars(one) for one in survey.correlations), key=lambda row: -abs(row["changes"] or 0.0))
+    return {
+        "path": record.path, "instrument": record.instrument, "start": record.start.isoformat() if record.start else None,
+        "rows": len(record), "span_s": float(np.ptp(record["time_s"])), "step_s": survey.step, "even": survey.even,
+        "columns": columns, "steps": steps, "settled": settled, "correlations": correlations,
+    }  # fmt: skip

@@ -1,0 +1,266 @@
+"""A record looked at without a card and without a fit: every column's range, faults, steps, spectrum and noise.
+
+Nothing is changed and nothing is left out of the record: spikes and missing values are left out of spectra and Allan deviations only.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import signal
+
+from compensation.decimation import average_groups
+from compensation.errors import CompensationError
+from compensation.lines import Line, find_line
+from compensation.noise import white_rms
+from compensation.samples import is_regular
+from compensation.spikes import find_dropouts, find_spikes, find_step, find_stuck
+from studies.record import Record
+from studies.reports.columns import find_gaps
+from studies.rest import LEAST_SPIKE
+from studies.settled import find_holds, find_soaks
+from studies.stability import Stability, read_stability, unbroken
+
+Array = NDArray[np.float64]
+CONFIDENCE = 0.9
+FEWEST = 64  # values of a column that has a spectrum and an Allan deviation
+MOST = 20_000  # means that steps, lines and correlations are found in
+SIDE = 25  # means on either side of a step, through which straight lines go
+STANDS_OUT = 8.0  # robust standard deviations of what two such lines differ by elsewhere
+AT_ONCE = 0.6  # of a step, within two rows of it
+SEGMENTS = 8  # of a series, whose periodograms are averaged
+MOST_FREQUENCIES = 4096
+CANDIDATES = 2000  # places where a step is looked for, the likeliest first
+COMMANDED = ("chamber_temperature_degC", "rate_deg_per_s", "drive_amplitude_V", "electrode_bias_V")  # may stand still
+CHANGES = 200  # means of a record, between which changes are correlated
+
+
+@dataclass(frozen=True)
+class Step:
+    """A column that moves at once: when (s), by how much, and one standard deviation of that."""
+
+    time: float
+    size: float
+    sd: float
+
+
+@dataclass(frozen=True)
+class Density:
+    """One-sided spectral density, unit²/Hz, over frequency (Hz); `even`: of even rows (Welch), else of uneven ones (Lomb)."""
+
+    frequency: Array
+    density: Array
+    even: bool
+
+
+@dataclass(frozen=True)
+class ColumnSurvey:
+    """What one column shows; `stability` and `density` are None where it is constant or short.
+
+    `white` is the Allan deviation at 1 s of the white noise that second differences show.
+    """
+
+    name: str
+    low: float
+    high: float
+    mean: float
+    missing: int
+    resolution: float
+    gaps: Array
+    spikes: int
+    stuck: int
+    zeros: int
+    steps: tuple[Step, ...]
+    line: Line | None
+    white: float
+    stability: Stability | None
+    density: Density | None
+
+
+@dataclass(frozen=True)
+class Settled:
+    """A part in which the temperature is held: settled where what is left (K) is known and small, else only held."""
+
+    start: float
+    end: float
+    temperature_degC: float
+    frequency_Hz: float | None = None
+    left_K: float | None = None
+
+
+@dataclass(frozen=True)
+class Correlation:
+    """Two columns: correlation of their values, and of their changes from one two-hundredth of the record to the next."""
+
+    one: str
+    two: str
+    values: float
+    changes: float | None
+
+
+@dataclass(frozen=True)
+class Survey:
+    """What one record shows."""
+
+    record: Record
+    step: float
+    even: bool
+    columns: tuple[ColumnSurvey, ...]
+    settled: tuple[Settled, ...]
+    correlations: tuple[Correlation, ...]
+
+
+def survey_record(record: Record) -> Survey:
+    """Look at every column of a record."""
+    time = record["time_s"]
+    names = [name for name in record.columns if name != "time_s"]
+    step = float(np.median(np.diff(time))) if len(time) > 1 else 0.0
+    columns = tuple(survey_column(name, time, record[name]) for name in names)
+    varying = [column.name for column in columns if column.high > column.low]
+    return Survey(
+        record,
+        step,
+        len(time) > 2 and is_regular(time),
+        columns,
+        _find_settled(record),
+        tuple(_correlate(time, one, record[one], two, record[two]) for one, two in combinations(varying, 2)),
+    )
+
+
+def survey_column(name: str, time: Array, values: Array) -> ColumnSurvey:
+    """Look at one column."""
+    known = np.isfinite(values)
+    if not known.any():
+        return ColumnSurvey(name, np.nan, np.nan, np.nan, len(values), 0.0, find_gaps(time, values), 0, 0, 0, (), None, 0.0, None, None)  # fmt: skip
+    y = values[known]
+    spikes = find_spikes(values, LEAST_SPIKE)
+    stuck = find_stuck(values) if name not in COMMANDED else np.zeros(0)
+    steps: tuple[Step, ...] = ()
+    line = stability = density = None
+    if len(y) >= FEWEST and np.ptp(y) > 0:
+        clean = np.where(spikes, np.nan, values)
+        t, thin, width = average_evenly(time, clean)
+        steps = find_steps(t, thin)
+        line = find_line([(t, thin)], width, float(t[-1] - t[0]) / 20) if is_regular(t) else None
+        try:
+            spacing, series = unbroken(time, {name: clean}, spikes_left_out=True)
+            stability = read_stability(series[name], spacing, CONFIDENCE)
+        except CompensationError:  # too short, or nothing but one value between the gaps
+            stability = None
+        density = find_density(time, clean)
+    return ColumnSurvey(
+        name,
+        float(y.min()),
+        float(y.max()),
+        float(y.mean()),
+        int(np.count_nonzero(~known)),
+        find_step(y[:MOST]),
+        find_gaps(time, values),
+        int(spikes.sum()),
+        int(stuck.sum()),
+        int(find_dropouts(values).sum()),
+        steps,
+        line,
+        white_rms(y) * float(np.sqrt(np.median(np.diff(time[known])))) if len(y) > 2 else 0.0,
+        stability,
+        density,
+    )
+
+
+def average_evenly(time: Array, values: Array, most: int = MOST) -> tuple[Array, Array, float]:
+    """Return known values as they are, or their means over `most` equal parts of the time where there are more; times and width (s)."""
+    known = np.isfinite(values)
+    t, y = time[known], values[known]
+    if len(t) <= most:
+        return t, y, float(np.median(np.diff(t))) if len(t) > 1 else 0.0
+    width = float(t[-1] - t[0]) / most
+    part = np.minimum(((t - t[0]) / width).astype(np.intp), most - 1)
+    filled = np.bincount(part, minlength=most) > 0
+    return average_groups(t, part, most)[filled], average_groups(y, part, most)[filled], width
+
+
+def find_steps(time: Array, values: Array) -> tuple[Step, ...]:
+    """Return where a series moves at once: straight lines through the rows before and after differ there by D.
+
+    A step stands out by 8 robust standard deviations of D over the series, is the largest within `SIDE` rows, is there within two
+    rows, and a line with a bend in it leaves twice the squares. Steps nearer than `SIDE` rows to an end are not seen.
+    """
+    n = SIDE
+    if len(values) < 4 * n:
+        return ()
+    place = np.arange(n) - 0.5 * (n - 1)
+    ahead = 1 / n - place * 0.5 * n / float(
+        place @ place
+    )  # weights of n rows for the value half a row before the first
+    after = np.correlate(values, ahead, mode="valid")[n:]
+    before = np.correlate(values, ahead[::-1], mode="valid")[:-n]
+    D = after - before  # between rows k + n − 1 and k + n
+    near = np.correlate(values, np.r_[-np.ones(3), np.ones(3)] / 3, mode="valid")[n - 3 : n - 3 + len(D)]
+    spread = max(1.4826 * float(np.median(np.abs(D))), 1e-9 * float(np.ptp(values)))
+    x = np.arange(2.0 * n)
+    two_lines = np.column_stack([x < n, x >= n, np.minimum(x - n, 0), np.maximum(x - n, 0)]).astype(float)
+    bends = np.stack([np.column_stack([np.ones(2 * n), x, np.maximum(x - h, 0)]) for h in x[1:-1]])
+    found: list[int] = []
+    for k in map(int, np.argsort(-np.abs(D))[:CANDIDATES]):
+        if abs(D[k]) <= STANDS_OUT * spread:
+            break
+        if near[k] / D[k] > AT_ONCE and all(abs(k - other) > n for other in found):
+            y = values[k : k + 2 * n] - values[k : k + 2 * n].mean()
+            if _left(two_lines[None], y) < 0.5 * _left(bends, y):
+                found.append(k)
+    return tuple(Step(float(time[k + n - 1 : k + n + 1].mean()), float(D[k]), spread) for k in sorted(found))
+
+
+def _left(designs: Array, y: Array) -> float:
+    """Return the least sum of squares that one of several designs (d, m, p) leaves of readings (m,)."""
+    explained = np.einsum("dmp,m->dp", np.linalg.qr(designs)[0], y)
+    return float(y @ y - np.max(np.sum(explained**2, axis=1)))
+
+
+def find_density(time: Array, values: Array) -> Density | None:
+    """Return the spectral density of a column, its mean and slope taken off: Welch's of even rows, Lomb's of uneven ones."""
+    if np.isfinite(values).all() and is_regular(time):
+        step = float(time[-1] - time[0]) / (len(time) - 1)
+        length = max(FEWEST, 2 * len(values) // (SEGMENTS + 1))
+        f, S = signal.welch(values, 1 / step, nperseg=length, detrend=signal.detrend)
+        return _thin_out(f[1:], S[1:], even=True)
+    t, y, step = average_evenly(time, values)
+    if step <= 0:
+        return None
+    y = y - np.polyval(np.polyfit(t - t[0], y, 1), t - t[0])
+    f = np.linspace(1.0, len(y) // 2, min(len(y) // 2, MOST_FREQUENCIES // 2)) / float(t[-1] - t[0])
+    power = signal.lombscargle(t - t[0], y, 2 * np.pi * f)
+    return _thin_out(f, 2 * float(t[-1] - t[0]) / len(y) * power, even=False)
+
+
+def _thin_out(frequency: Array, density: Array, even: bool) -> Density:
+    """Return means over as many parts of the logarithm of the frequency as can be drawn."""
+    part = np.unique(np.round(np.log(frequency / frequency[0]) * 60).astype(np.intp), return_inverse=True)[1]
+    return Density(average_groups(frequency, part), average_groups(density, part), even)
+
+
+def _find_settled(record: Record) -> tuple[Settled, ...]:
+    """Return the settled parts of a record with a frequency, or the parts of one without in which the temperature is held."""
+    column = next((name for name in ("housing_temperature_degC", "chamber_temperature_degC") if name in record), None)
+    if column is None or not np.isfinite(record[column]).any():
+        return ()
+    if "frequency_Hz" in record and np.isfinite(record["frequency_Hz"]).any():
+        return tuple(Settled(s.start, s.end, s.temperature_degC, s.frequency_Hz, s.left_K) for s in find_soaks([record]) if not s.extrapolated_K)  # fmt: skip
+    t, T, _ = average_evenly(record["time_s"], record[column])
+    whole = [rows for rows in find_holds(T) if t[rows[-1]] - t[rows[0]] >= max(600.0, 0.02 * (t[-1] - t[0]))]
+    return tuple(Settled(float(t[rows[0]]), float(t[rows[-1]]), float(T[rows].mean())) for rows in whole)
+
+
+def _correlate(time: Array, one: str, x: Array, two: str, y: Array) -> Correlation:
+    both = np.isfinite(x) & np.isfinite(y)
+    t = time[both]
+    columns: Sequence[Array] = [average_evenly(t, values[both], CHANGES)[1] for values in (x, y)]
+    return Correlation(one, two, _correlation(*columns) or 0.0, _correlation(*map(np.diff, columns)))
+
+
+def _correlation(x: Array, y: Array) -> float | None:
+    x, y = x - x.mean() if len(x) else x, y - y.mean() if len(y) else y
+    size = float(np.sqrt((x @ x) * (y @ y)))
+    return float(x @ y) / size if size > 0 and len(x) > 2 else None

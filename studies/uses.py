@@ -1,0 +1,135 @@
+"""What records can be used for: for each command, what it asks of records and these lack, and the line to type.
+
+Each command's own readers are asked, so that what is said here is what the command would say.
+"""
+
+import shlex
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from compensation.errors import CompensationError
+from studies.acceptance.quantities import QUANTITIES
+from studies.acceptance.runs import sort_records
+from studies.errors import InputError
+from studies.models.kinds.bias import OUTPUTS
+from studies.models.kinds.scale import RAW
+from studies.record import Record
+from studies.rest import TEMPERATURES, choose_column, gather_rest
+
+OUTPUT = "bias_deg_per_h"  # that an acceptance test judges unless another is named
+LEAST_SPAN = 1.0  # K, of a temperature that changes
+STEP_SPAN = 10.0  # K, of a step or ramp that shows a time constant
+
+
+@dataclass(frozen=True)
+class Use:
+    """One command: what it gives, the line to type, and what is missing ("" where nothing is)."""
+
+    command: str
+    gives: str
+    line: str
+    missing: str
+
+    @property
+    def ready(self) -> str:
+        """Whether the records suffice."""
+        return "no" if self.missing else "yes"
+
+
+def find_uses(records: Sequence[Record]) -> tuple[Use, ...]:
+    """Return what can be done with these records of one gyro, and what the others lack."""
+    runs = " ".join(shlex.quote(record.path or "RUN.csv") for record in records)
+    return tuple(
+        Use(command, gives, f"hrg {command} {words.format(runs=runs)}", _missing(check, records))
+        for command, gives, words, check in USES
+    )
+
+
+def _missing(check: Callable[[Sequence[Record]], None], records: Sequence[Record]) -> str:
+    try:
+        check(records)
+    except (InputError, CompensationError) as error:
+        return str(error)
+    return ""
+
+
+def _frequency(records: Sequence[Record]) -> None:
+    from studies.settled import advise_hold, find_soaks, settled_table
+
+    soaks = find_soaks(records)
+    settled_table(soaks, records[0].path, advise_hold(records, 3000.0, 0.05) if len(soaks) < 2 else "")
+
+
+def _bias(records: Sequence[Record]) -> None:
+    from studies.bias import check_lengths, find_output, find_state
+
+    find_output(records)
+    find_state(records)
+    check_lengths(records)
+    _check_span(records, LEAST_SPAN, "a bias over temperature")
+
+
+def _thermal(records: Sequence[Record]) -> None:
+    choose_column(records, ("frequency_Hz",), "a fit of time constants")
+    choose_column(records, TEMPERATURES[::2], "a fit of time constants")
+    _check_span(records, STEP_SPAN, "a fit of time constants")
+
+
+def _cross_damping(records: Sequence[Record]) -> None:
+    gather_rest(records, dict.fromkeys(OUTPUTS, 1.0))
+    for column in ("frequency_Hz", "inverse_q"):
+        choose_column(records, (column,), "the cross-damping")
+    _check_span(records, LEAST_SPAN, "a cross-damping over temperature")
+
+
+def _scale(records: Sequence[Record]) -> None:
+    choose_column(records, RAW, "a fit of the scale")
+    choose_column(records, TEMPERATURES, "a fit of the scale")
+    choose_column(records, ("rate_deg_per_s",), "a fit of the scale")
+    if "scale-factor" not in sort_records(records, OUTPUT)[0]:
+        raise InputError(f"{records[0].path}: no record has several constant rates; run a rate table.")
+
+
+def _whole_angle(records: Sequence[Record]) -> None:
+    choose_column(records, ("pattern_angle_deg",), "a fit of a whole-angle gyro")
+    choose_column(records, tuple(OUTPUTS), "a fit of a whole-angle gyro")
+    if len(records) > 1:
+        raise InputError("one run at a time; show a single record for its line.")
+
+
+def _campaign(records: Sequence[Record]) -> None:
+    from studies.diagnosis.campaign import load_campaign
+
+    load_campaign(records)
+
+
+def _acceptance(records: Sequence[Record]) -> None:
+    served, left = sort_records(records, OUTPUT)
+    if not served:
+        needs = "; ".join(dict.fromkeys(quantity.needs for quantity in QUANTITIES))
+        raise InputError(f"{left[0].path}: serves none of the tests, which need {needs}.")
+
+
+def _check_span(records: Sequence[Record], least: float, purpose: str) -> None:
+    column = choose_column(records, TEMPERATURES, purpose) if any(T in r for r in records for T in TEMPERATURES) else ""
+    known = [record[column][np.isfinite(record[column])] for record in records] if column else []
+    span = max((float(np.ptp(T)) for T in known if T.size), default=np.inf)
+    if span < least:
+        raise InputError(
+            f"{records[0].path}: {column} changes by {span:.2g} K only; {purpose} needs {least:g} K or more: ramp or step the chamber."
+        )
+
+
+USES: tuple[tuple[str, str, str, Callable[[Sequence[Record]], None]], ...] = (
+    ("fit frequency", "f(T) and its inverse", "{runs} --save frequency.toml", _frequency),
+    ("fit bias", "bias over frequency or temperature and their rates", "{runs} --save bias.toml", _bias),
+    ("fit thermal", "thermal time constants", "{runs}", _thermal),
+    ("fit cross-damping", "cross-damping bias over temperature", "{runs} --save cross-damping.toml", _cross_damping),
+    ("fit scale", "bias and scale factor over rate and temperature", "{runs} --save scale.toml", _scale),
+    ("fit whole-angle", "splits, axes and gains", "{runs} --card CARD.toml", _whole_angle),
+    ("calibrate", "values of a card", "CARD.toml {runs} --save CALIBRATED.toml", _campaign),
+    ("diagnose", "effects beyond the usual model", "{runs}", _campaign),
+    ("acceptance", "values against limits (IEEE 1431)", "CARD.toml {runs}", _acceptance),
+)

@@ -1,0 +1,149 @@
+"""`hrg show`: planted steps, faults and noise are found where they are, and the commands that it names do run."""
+
+import json
+import re
+import shlex
+import shutil
+from base64 import b64decode
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from compensation.noise import Noise
+from compensation.spikes import STUCK, find_dropouts, find_stuck
+from studies.cli import main
+from studies.record import Record, write_record
+from studies.reports import style
+from studies.results.page import draw
+from studies.survey import find_density, find_steps, survey_column, survey_record
+
+INPUTS = Path(__file__).parents[1] / "golden" / "inputs"
+T = np.arange(4000.0)
+
+
+@pytest.fixture
+def noise():
+    return np.random.default_rng(5).standard_normal(T.size)
+
+
+def test_planted_steps_are_found_and_bends_are_not(noise):
+    y = noise.copy()
+    y[1500:] += 8.0
+    y[3000:] -= 8.0
+    found = find_steps(T, y)
+    assert [round(step.time) for step in found] == pytest.approx([1500, 3000], abs=1.5)
+    assert [step.size for step in found] == pytest.approx([8.0, -8.0], abs=4 * np.sqrt(8 / 25))
+    assert not find_steps(T, noise)
+    ramp = np.interp(T, [0, 1000, 1100, 4000], [0, 0, 50, 50])
+    assert not find_steps(T, ramp)
+    assert not find_steps(T, ramp + 0.01 * noise)
+    assert not find_steps(T, np.where(T < 1000, 0, 40 * (1 - np.exp(-(T - 1000) / 300))))
+
+
+def test_planted_faults_of_readings_are_counted(noise):
+    y = 4432 + noise
+    y[100:140] = y[100]
+    y[700], y[900], y[901] = 4532.0, 0.0, 0.0
+    column = survey_column("frequency_Hz", T, y)
+    assert (column.stuck, column.zeros) == (40, 2)
+    assert column.spikes >= 1
+    coarse = np.round(np.cumsum(noise) / 200, 1)  # readings that repeat because they are coarse
+    assert not find_stuck(coarse).any()
+    assert find_stuck(np.r_[noise[:50], np.full(STUCK, 1.0), noise[:50]]).sum() == STUCK
+    assert not find_dropouts(np.round(noise)).any()
+
+
+@pytest.mark.parametrize("even", [True, False])
+def test_limits_the_density_of_white_noise_is_twice_variance_times_step(noise, even):
+    time = T if even else np.sort(np.random.default_rng(2).uniform(0, T.size, T.size))
+    found = find_density(time, noise + 3 + 0.01 * time)
+    assert found.even is even
+    upper = found.density[found.frequency > 0.02]
+    assert np.mean(upper) == pytest.approx(2 * noise.var(), rel=0.15)
+
+
+def test_recovery_levels_of_noise_are_read_off():
+    planted = Noise(white=2.0, walk=0.02)
+    y = planted.draw(40_000, 1.0, np.random.default_rng(3))
+    found = survey_column("bias_deg_per_h", np.arange(y.size) * 1.0, y).stability.noise
+    assert found.N == pytest.approx(2.0, abs=4 * found.N_uncertainty)
+    assert found.K == pytest.approx(0.02, abs=4 * found.K_uncertainty)
+
+
+def test_planted_correlation_of_changes_tells_a_cause_from_a_drift():
+    rng = np.random.default_rng(4)
+    drift, driver = T / 400, rng.standard_normal(200).repeat(20)
+    columns = {
+        "time_s": T,
+        "quadrature_V": drift + driver,
+        "drive_amplitude_V": drift + rng.standard_normal(200).repeat(20),
+    }
+    columns["bias_deg_per_h"] = 2 * driver + 0.1 * rng.standard_normal(T.size)
+    pairs = {frozenset((one.one, one.two)): one for one in survey_record(Record(columns)).correlations}
+    assert pairs[frozenset(("quadrature_V", "drive_amplitude_V"))].values > 0.7
+    assert abs(pairs[frozenset(("quadrature_V", "drive_amplitude_V"))].changes) < 0.3
+    assert pairs[frozenset(("quadrature_V", "bias_deg_per_h"))].changes > 0.9
+
+
+def test_contract_what_is_named_possible_runs_and_what_is_missing_is_said(tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    shutil.copy(INPUTS / "cross.csv", tmp_path)
+    assert main(["show", "cross.csv", "--json"]) == 0
+    uses = {use["command"]: use for use in json.loads(capsys.readouterr().out)["uses"]}
+    assert uses["fit cross-damping"]["ready"] or uses["fit cross-damping"]["missing"]
+    assert "pattern_angle_deg" in uses["fit whole-angle"]["missing"]
+    assert "rate_deg_per_s" in uses["fit scale"]["missing"]
+    assert uses["fit bias"]["ready"]
+    assert main(shlex.split(uses["fit bias"]["line"])[1:]) == 0
+    assert Path("bias.toml").is_file()
+
+
+@pytest.mark.slow
+def test_contract_every_line_that_is_named_possible_runs(tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    shutil.copy(INPUTS / "run1.csv", tmp_path)
+    assert main(["show", "run1.csv", "--json"]) == 0
+    for use in json.loads(capsys.readouterr().out)["uses"]:
+        if use["ready"]:
+            assert main(shlex.split(use["line"].replace("CARD.toml", "hrg-30mm"))[1:]) == 0, use["line"]
+
+
+def test_contract_bad_input_is_one_sentence(tmp_path, capsys):
+    assert main(["show"]) == 2
+    write_record(Record({"time_s": np.array([0.0]), "frequency_Hz": np.array([np.nan])}), tmp_path / "short.csv")
+    assert main(["show", str(tmp_path / "short.csv"), "--report", str(tmp_path / "page.html")]) == 0
+    assert main(["show", str(tmp_path / "none.csv")]) == 2
+    assert capsys.readouterr().err.count("Traceback") == 0
+
+
+def test_contract_numbers_of_a_figure_lie_where_the_picture_has_them():
+    x, y = np.linspace(1, 3, 7), np.geomspace(1, 1000, 7)
+    with style.figure(1, 2, x="x <b>", y="y (V)") as (made, axes):
+        axes[0].semilogy(x, y, color="#123456", label="a line")
+        axes[1].imshow(np.eye(3))
+    picture = draw(made, "caption", "alt")
+    (plot,) = json.loads(picture.curves)
+    assert "<" not in picture.curves
+    assert plot["x"]["label"] == "x <b>"
+    (line,) = plot["series"]
+    assert line["x"] == pytest.approx(x)
+    assert line["y"] == pytest.approx(y, rel=1e-5)
+    svg = b64decode(picture.data_uri.split(",", 1)[1]).decode()
+    width, height = map(float, re.search(r'viewBox="0 0 ([\d.]+) ([\d.]+)"', svg).groups())
+    path = re.search(r'<path d="([^"]*)"[^>]*style="fill: none; stroke: #123456', svg)[1]
+    drawn = np.array([[float(v) for v in pair] for pair in re.findall(r"[ML] ([\d.]+) ([\d.]+)", path)])
+    (left, top, wide, high), (low, up) = plot["box"], np.log10(plot["y"]["ends"])
+    ends = plot["x"]["ends"]
+    told_x = (left + wide * (x - ends[0]) / (ends[1] - ends[0])) * width
+    told_y = (top + high * (1 - (np.log10(y) - low) / (up - low))) * height
+    assert drawn[:, 0] == pytest.approx(told_x, abs=0.5)
+    assert drawn[:, 1] == pytest.approx(told_y, abs=0.5)
+
+
+def test_limits_what_is_drawn_of_many_rows_has_every_extreme():
+    y = np.zeros(200_000)
+    y[123_456], y[7] = 5.0, np.nan
+    rows = style.outline_rows(y)
+    assert {0, 7, 123_456, y.size - 1} <= set(rows)
+    assert rows.size <= 2 * style.MOST_POINTS
