@@ -15,25 +15,25 @@ from studies.results import Chapter, Column, Drawing, Figure, Part, Sentence, Ta
 from studies.survey import CONFIDENCE, Survey, average_evenly
 from studies.uses import Use
 
+
+def _count(key: str, unit: str = "") -> Column:
+    """Return a column that is empty where there are none."""
+    heading = key.removesuffix("_s").replace("_", " ").capitalize()
+    return Column(lambda row: row[key] or None, heading, unit, digits=3)
+
+
 COLUMNS = (
     Column("column", "Column"),
     Column("low", "Minimum", form=".7g"),
     Column("high", "Maximum", form=".7g"),
     Column("resolution", "Resolution", digits=2),
-    *(
-        Column(
-            lambda row, key=key: row[key] or None, key.replace("_s", "").replace("_", " ").capitalize(), unit, digits=3
-        )  # type: ignore[misc]
-        for key, unit in (
-            ("missing", ""),
-            ("gaps", ""),
-            ("longest_gap_s", "s"),
-            ("spikes", ""),
-            ("stuck", ""),
-            ("zeros", ""),
-            ("steps", ""),
-        )
-    ),
+    _count("missing"),
+    _count("gaps"),
+    _count("longest_gap_s", "s"),
+    _count("spikes"),
+    _count("stuck"),
+    _count("zeros"),
+    _count("steps"),
 )
 NOISE = (
     Column("column", "Column"),
