@@ -1,6 +1,7 @@
 """The workbench from Python, by the names that the command line uses: cards, profiles and records by path, name or object."""
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -127,11 +128,12 @@ def diagnose_records(
     chamber: "Chamber | None" = None,
     progress: Progress | None = None,
 ) -> "Diagnosis | Inference":
-    """Return what a campaign shows and the simulation lacks; `chamber` limits the run that is suggested next."""
+    """Return what a campaign shows and the simulation lacks; with a `chamber`, the run that should come next in it."""
     from studies.calibration.misreading import bias_of_opposite_sign, check_readings
     from studies.diagnosis.campaign import load_campaign
     from studies.diagnosis.investigate import investigate
     from studies.inference.diagnosis import infer
+    from studies.planning.next_run import suggest
 
     if card is None:
         return investigate(load_campaign(records), progress=progress, chamber=chamber)
@@ -140,7 +142,9 @@ def diagnose_records(
     card.material.check(np.concatenate([run.states.housing for run in campaign.runs]))
     turned = [bias_of_opposite_sign(card, record) for record in records]
     notes = (*campaign.said, *(said for said in turned if said is not None))
-    return infer(card, records, progress or (lambda words: None), notes)
+    tell = progress or (lambda words: None)
+    found = infer(card, records, tell, notes)
+    return found if chamber is None else replace(found, advice=suggest(found, found.verdict, chamber, tell))
 
 
 def _flat(given: Iterable[Any]) -> Iterator[Any]:

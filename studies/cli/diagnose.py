@@ -1,6 +1,9 @@
 """`hrg diagnose`: what the simulation gets wrong, why, and what the repair is worth."""
 
 from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
 
 from studies import workbench
 from studies.cli.output import answers, say
@@ -21,6 +24,7 @@ def diagnose(
     card: str | None = None,
     save: str | None = None,
     plan: list[str] | None = None,
+    next_: Annotated[bool, Parameter(name="--next")] = False,
     chamber: str | None = None,
     device: list[str] | None = None,
     fleet: str | None = None,
@@ -40,8 +44,10 @@ def diagnose(
     plan : list[str]
         Chamber profiles of a planned campaign, as text or as files, one for each run: predict which effects the campaign can
         identify with the gyro of --card, and how small they may be. Further profiles may follow without --plan.
+    next_ : bool
+        Propose the next run: the profile that separates what is still confused, or else sharpens what was found, per hour of chamber.
     chamber : str
-        Limits of the chamber, such as "rate 3 range -40 85" (K/min, °C), for --plan and for the suggested next run.
+        Limits of the chamber, such as "rate 3 range -40 85" (K/min, °C), for --plan and for the next run.
     device : list[str]
         A device of a fleet and its records, such as A=a1.csv,a2.csv; repeat it for each device of the same design. Shows what the
         devices have in common and which one differs.
@@ -61,7 +67,7 @@ def diagnose(
         raise InputError("--save writes an extended card, so it needs --card CARD to extend.")
     tables = [path for path in runs if workbench.is_table(path)]
     if not tables:
-        return _campaign(runs, card, limits, save)
+        return _campaign(runs, card, (limits or Chamber()) if next_ or limits else None, save)
     if len(runs) > 1:
         raise InputError(f"{tables[0]}: a steady-state table must be diagnosed alone; leave out the other files.")
     if save is not None:

@@ -34,6 +34,7 @@ if TYPE_CHECKING:
 
     from studies.diagnosis.verdict import Verdict
     from studies.instrument.card import Instrument
+    from studies.planning.next_run import Advice
 
 Array = NDArray[np.float64]
 Report = Callable[[str], None]
@@ -47,10 +48,11 @@ FAR = 2.0
 
 @dataclass(frozen=True, repr=False)
 class Inference(Inferred, Shown):
-    """What a card and records say together, with its verdict."""
+    """What a card and records say together, with its verdict; `advice`: words about the run that should come next, and the run."""
 
     drawn_by = "studies.reports.diagnosis_pictures:ladder"
     with_card: ClassVar[bool] = True
+    advice: "Advice | None" = None
 
     def __repr__(self) -> str:
         return f"Diagnosis({self.verdict})"
@@ -62,7 +64,10 @@ class Inference(Inferred, Shown):
     @cached_property
     def verdict(self) -> "Verdict":
         """The outcome of the contract."""
-        return judge(self)
+        judged = judge(self)
+        if self.advice is None:
+            return judged
+        return replace(judged, next_experiment=self.advice[0], next_run=self.advice[1])
 
     @property
     def labels(self) -> list[str]:

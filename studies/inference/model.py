@@ -203,17 +203,15 @@ class Background:
         along = ways.transpose(0, 2, 1) @ (moment * units[:, :, None])
         return np.maximum(values, 0.0), ways, along
 
-    def left_of(self, signals: Mapping[str, Array]) -> tuple[dict[str, Array], Array, dict[str, Array]]:
-        """Return what this model cannot absorb of signals, response -> (M, B): whitened rows, their energy (B,), and the rows themselves."""
+    def left_of(self, signals: Mapping[str, Array]) -> tuple[dict[str, Array], Array, Array]:
+        """Return what this model cannot absorb of signals, response -> (M, B): whitened rows, their energy (B,), and the coordinates (p, B) that absorb the rest."""
         base, _, _, R = self._solved
         white = {name: self._whiteners[name](own) for name, own in signals.items()}
         names = list(white)
         taken = np.vstack([base[name] for name in names]).T @ np.vstack([white[name] for name in names])
         energy = np.sum([(own**2).sum(axis=0) for own in white.values()], axis=0) - (taken**2).sum(axis=0)
-        absorbed = scipy.linalg.solve_triangular(R, taken)
-        rows = {n: own - self.linear.columns(self.terms, n) @ absorbed for n, own in signals.items()}
         left = {name: white.get(name, 0.0) - base[name] @ taken for name in base}
-        return left, np.maximum(energy, 0.0), rows
+        return left, np.maximum(energy, 0.0), np.asarray(scipy.linalg.solve_triangular(R, taken))
 
     def with_term(self, term: Term) -> tuple[Term, float]:
         """Return a term at its likeliest scale, and the log evidence that it adds, its scales averaged."""

@@ -114,8 +114,9 @@ class Expectation:
         for one, place in zip(hidden, self.places, strict=True):
             for name, columns in one.signal.items():
                 signals[name][:, place] = columns
-        left, self.energy, self.left = beside.left_of(signals)
+        left, self.energy, absorbed = beside.left_of(signals)
         self.signals = signals
+        self.left = {n: own - search.linear.columns(beside.terms, n) @ absorbed for n, own in signals.items()}
         self._explained: dict[Key, list[tuple[Array, ...]]] = {}
         for own in search.bank:
             units = np.broadcast_to(

@@ -8,7 +8,6 @@ from studies.diagnosis.model import Fit
 from studies.diagnosis.planning.next_run import (
     NOTHING,
     SMALLEST,
-    NextRun,
     Scored,
     as_next_run,
     between_rivals,
@@ -19,6 +18,7 @@ from studies.diagnosis.response import RESPONSES
 from studies.diagnosis.verdict import Cause, Verdict
 from studies.effects import find_effect
 from studies.planning.chamber import Chamber
+from studies.planning.next_run import NextRun
 
 if TYPE_CHECKING:
     from studies.diagnosis.inquiry import Inquiry

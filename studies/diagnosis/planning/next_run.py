@@ -12,7 +12,7 @@ baseline and a any effect of the library at the size at which it would just be n
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, cast
+from typing import cast
 
 import numpy as np
 
@@ -22,13 +22,14 @@ from studies.diagnosis.campaign import Campaign
 from studies.diagnosis.constants import CONSTANTS
 from studies.diagnosis.model import Fit
 from studies.diagnosis.noise import KERNELS, SHARES
-from studies.diagnosis.planning.programme import Programme, Steps, candidates
+from studies.diagnosis.planning.programme import Programme, candidates
 from studies.diagnosis.scan import applicable, scan
 from studies.diagnosis.search import Place
 from studies.diagnosis.terms import Term, term_columns, used
 from studies.effects import library
 from studies.effects.states import FloatArray, States, average
 from studies.planning.chamber import Chamber
+from studies.planning.next_run import NextRun
 
 NOTHING = "nothing"
 MOST_RIVALS = 3
@@ -43,45 +44,6 @@ OFFSET = 1e3
 FRESH = 1.0 / 30.0
 """This part of a signature's energy with the best run is added to every energy: what cannot show today would otherwise
 outweigh everything."""
-
-
-@dataclass(frozen=True)
-class NextRun:
-    """One suggested run.
-
-    Attributes
-    ----------
-    profile : str
-        In words, as `hrg simulate` takes them, or "repeat of FILE".
-    drives : mapping from column to Steps
-    expected_evidence, repeat_evidence : float or None
-        Evidence that would separate the two after this run, and after the best repeat of a recorded run.
-    separates : (str, str) or None
-    hours : float
-        Chamber time.
-    time_h, temperature_degC : arrays
-        The profile, for pictures.
-    """
-
-    profile: str
-    drives: Mapping[str, Steps]
-    expected_evidence: float | None
-    repeat_evidence: float | None
-    separates: tuple[str, str] | None
-    hours: float
-    time_h: FloatArray
-    temperature_degC: FloatArray
-
-    def as_dict(self) -> dict[str, Any]:
-        """Return the object `next_run` of the contract."""
-        return {
-            "profile": self.profile,
-            "drives": {c: {"levels": list(s.levels), "hold_min": s.hold_min} for c, s in self.drives.items()},
-            "expected_evidence": self.expected_evidence,
-            "repeat_evidence": self.repeat_evidence,
-            "separates": None if self.separates is None else list(self.separates),
-            "hours": self.hours,
-        }
 
 
 @dataclass(frozen=True)
@@ -105,12 +67,12 @@ def as_next_run(scored: Scored, repeat: float | None, expected: bool = True) -> 
     return NextRun(
         programme.profile,
         programme.drives,
-        scored.evidence if expected else None,
-        repeat,
-        scored.pair if expected else None,
         programme.hours,
         programme.states.time / 3600.0,
         programme.chamber - zero_Celsius,
+        scored.evidence if expected else None,
+        repeat,
+        scored.pair if expected else None,
     )
 
 

@@ -9,6 +9,7 @@ from shell.constants import zero_Celsius
 from studies.diagnosis.campaign import Campaign
 from studies.effects.states import FloatArray, States, lag
 from studies.planning.chamber import Chamber, limited
+from studies.planning.programme import Steps, words_of
 
 HOUSING_LAG = 600.0
 """The housing behind the chamber's air, s, where the housing is measured."""
@@ -27,17 +28,6 @@ LEVELS = (0.5, 1.0, 0.0, 0.75, 0.25, 0.9)
 """Order of the levels of a stepped drive, from the lowest (0) to the highest (1)."""
 HOLDS = {"voltage_squared": 5, "amplitude_squared": 7, "quadrature": 6, "pattern_angle": 4}
 """Steps of each drive in a run: different numbers, so that no two drives step together."""
-
-
-@dataclass(frozen=True)
-class Steps:
-    """Levels that a drive takes one after the other, in the unit of its column, each for `hold_min` minutes."""
-
-    levels: tuple[float, ...]
-    hold_min: int
-
-    def __str__(self) -> str:
-        return ", ".join(f"{level:g}" for level in self.levels) + f", {self.hold_min} min each"
 
 
 @dataclass(frozen=True)
@@ -73,52 +63,6 @@ class Programme:
     def repeats(self) -> bool:
         """Whether it is a recorded run once more."""
         return self.kind == "repeat"
-
-
-def words_of(low: float, high: float, duration: float) -> dict[str, str]:
-    """Return the family of chamber profiles between two temperatures, °C, each lasting about `duration`, s.
-
-    Staircases up, down and both ways, ramps at two rates, cycles at two periods, step and soak, random steps, quiet.
-    """
-    middle, wide = _short(0.5 * (low + high)), high - low
-    fifth, third = _short(np.floor(2.0 * wide) / 10.0), _short(np.floor(10.0 * wide / 3.0) / 10.0)
-    top, upper = _short(low + 5.0 * fifth), _short(low + 3.0 * third)
-    bottom = _short(low)
-
-    def time(share: float) -> str:
-        return f"{max(1, round(duration * share / 60.0))}min"
-
-    def cycle(count: int) -> str:
-        rate = _short(2 * count * wide / (0.8 * duration / 60.0), 3)
-        return f"cycle {middle} {top} {bottom} {rate} {time(0.1 / count)} {count}"
-
-    fast, slow = _short(wide / (duration / 60.0) * 12.0, 3), _short(wide / (duration / 60.0) * 2.4, 3)
-    part = np.random.default_rng(8).permutation(7) / 6.0
-    jumps = [f"soak {_short(low + p * wide)} {time(share)}" for p, share in zip(part, RANDOM_HOLDS, strict=True)]
-    return {
-        "staircase up": f"staircase {bottom} {top} {fifth} {time(1 / 6)}",
-        "staircase down": f"staircase {top} {bottom} {fifth} {time(1 / 6)}",
-        "staircase both ways": f"staircase {bottom} {upper} {third} {time(1 / 8)}"
-        f" then staircase {upper} {bottom} {third} {time(1 / 8)}",
-        "two rates": f"soak {bottom} {time(0.1)} then ramp {bottom} {top} {slow} then soak {top} {time(0.12)} then "
-        f"ramp {top} {bottom} {fast} then soak {bottom} {time(0.12)} then ramp {bottom} {top} {fast} then soak {top} {time(0.08)}",
-        "slow cycle": cycle(1),
-        "fast cycles": cycle(3),
-        "steps and soaks": f"soak {bottom} {time(0.23)} then soak {top} {time(0.42)} then soak {bottom} {time(0.35)}",
-        "cold step and hot step": f"soak {middle} {time(0.1)} then soak {bottom} {time(0.3)} then soak {middle} {time(0.3)}"
-        f" then soak {top} {time(0.3)}",
-        "random steps": " then ".join(jumps),
-        "quiet": f"soak {middle} {time(1.0)}",
-    }
-
-
-RANDOM_HOLDS = (0.1, 0.18, 0.08, 0.2, 0.12, 0.17, 0.15)
-
-
-def _short(value: float, digits: int = 0) -> float | int:
-    """Return a number that is short in words: a tenth of a kelvin, or so many significant digits."""
-    rounded = float(f"{value:.{digits}g}") if digits else round(value, 1)
-    return int(rounded) if rounded == int(rounded) else rounded
 
 
 DURATIONS = (1.0, 0.5)
