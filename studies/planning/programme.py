@@ -42,7 +42,7 @@ class Steps:
     def at(self, time: Array) -> Array:
         """Return the levels at times (s)."""
         index = np.minimum((time / (60.0 * self.hold_min)).astype(int), len(self.levels) - 1)
-        return np.array(self.levels, dtype=np.float64)[index]
+        return np.asarray(np.array(self.levels, dtype=np.float64)[index])
 
 
 @dataclass(frozen=True)
