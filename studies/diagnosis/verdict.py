@@ -12,7 +12,7 @@ from studies.effects import find_effect
 if TYPE_CHECKING:
     from pandas import DataFrame
 
-    from studies.planning.next_run import NextRun
+    from studies.planning.programme import NextRun
 
 VERDICTS = ("unexplained", "not-identifiable", "explained", "adequate")
 

@@ -9,14 +9,12 @@ that nothing rivals, a run counts by how much narrower it makes the coefficients
 energy of every effect of the library beyond what the card absorbs.
 """
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from shell.constants import zero_Celsius
 from studies.diagnosis.constants import CONSTANTS
 from studies.effects import find_effect, library
 from studies.inference.inferred import Inferred
@@ -24,7 +22,7 @@ from studies.inference.model import Background, Term
 from studies.inference.search import Hypothesis
 from studies.planning.candidate import Candidate, Known, simulate_candidates, unabsorbed
 from studies.planning.chamber import Chamber
-from studies.planning.programme import BY_INPUT, Programme, Steps, candidates
+from studies.planning.programme import BY_INPUT, NextRun, Programme, candidates
 
 if TYPE_CHECKING:
     from studies.diagnosis.verdict import Verdict
@@ -39,50 +37,6 @@ WORTH = 0.8
 UNIT, FRESH = 10.0, 1.0 / 30.0
 """Evidence, today, of the hidden effect for which a run is judged; this part of the energy with the best run is added to every energy,
 for what cannot show today would otherwise outweigh everything."""
-
-
-@dataclass(frozen=True)
-class NextRun:
-    """One suggested run.
-
-    Attributes
-    ----------
-    profile : in words, as `hrg simulate` takes them, or "repeat of FILE"
-    drives : column -> Steps
-    hours : chamber time
-    time_h, temperature_degC : arrays, the profile, for pictures
-    expected_evidence, repeat_evidence : what would separate the two after this run, and after the best repeat of a recorded run
-    separates : the two, "nothing" for a cause against none; None for a run that looks again or sharpens
-    narrows : width of the interval of the causes after this run over today's
-    """
-
-    profile: str
-    drives: Mapping[str, Steps]
-    hours: float
-    time_h: Array
-    temperature_degC: Array
-    expected_evidence: float | None = None
-    repeat_evidence: float | None = None
-    separates: tuple[str, str] | None = None
-    narrows: float | None = None
-
-    @classmethod
-    def of(cls, programme: Programme, **told: Any) -> "NextRun":
-        """Suggest a candidate."""
-        time, value = programme.chamber.time, programme.chamber.value
-        return cls(programme.profile, programme.drives, programme.hours, time / 3600.0, value - zero_Celsius, **told)
-
-    def as_dict(self) -> dict[str, Any]:
-        """Return the object `next_run` of the contract."""
-        return {
-            "profile": self.profile,
-            "drives": {c: {"levels": list(s.levels), "hold_min": s.hold_min} for c, s in self.drives.items()},
-            "expected_evidence": self.expected_evidence,
-            "repeat_evidence": self.repeat_evidence,
-            "separates": None if self.separates is None else list(self.separates),
-            "narrows": self.narrows,
-            "hours": self.hours,
-        }
 
 
 Advice = tuple[str | None, NextRun | None]

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -79,6 +80,50 @@ class Programme:
         )
         profile = f"a {self.profile}" if self.repeats else f"`{self.profile}`"
         return f"{profile} with {stepped}" if stepped else profile
+
+
+@dataclass(frozen=True)
+class NextRun:
+    """One suggested run.
+
+    Attributes
+    ----------
+    profile : in words, as `hrg simulate` takes them, or "repeat of FILE"
+    drives : column -> Steps
+    hours : chamber time
+    time_h, temperature_degC : arrays, the profile, for pictures
+    expected_evidence, repeat_evidence : what would separate the two after this run, and after the best repeat of a recorded run
+    separates : the two, "nothing" for a cause against none; None for a run that looks again or sharpens
+    narrows : width of the interval of the causes after this run over today's
+    """
+
+    profile: str
+    drives: Mapping[str, Steps]
+    hours: float
+    time_h: Array
+    temperature_degC: Array
+    expected_evidence: float | None = None
+    repeat_evidence: float | None = None
+    separates: tuple[str, str] | None = None
+    narrows: float | None = None
+
+    @classmethod
+    def of(cls, programme: Programme, **told: Any) -> "NextRun":
+        """Suggest a candidate."""
+        time, value = programme.chamber.time, programme.chamber.value
+        return cls(programme.profile, programme.drives, programme.hours, time / 3600.0, value - zero_Celsius, **told)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the object `next_run` of the contract."""
+        return {
+            "profile": self.profile,
+            "drives": {c: {"levels": list(s.levels), "hold_min": s.hold_min} for c, s in self.drives.items()},
+            "expected_evidence": self.expected_evidence,
+            "repeat_evidence": self.repeat_evidence,
+            "separates": None if self.separates is None else list(self.separates),
+            "narrows": self.narrows,
+            "hours": self.hours,
+        }
 
 
 def words_of(low: float, high: float, duration: float) -> dict[str, str]:

@@ -6,7 +6,7 @@ import numpy as np
 
 from studies.diagnosis.response import RESPONSES
 from studies.diagnosis.verdict import ResponseResult
-from studies.planning.next_run import NextRun
+from studies.planning.programme import NextRun
 from studies.reports.digits import plain
 from studies.reports.style import BLACK, BLUE, ORANGE, VERMILION, figure
 from studies.results import Drawing

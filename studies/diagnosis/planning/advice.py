@@ -18,7 +18,7 @@ from studies.diagnosis.response import RESPONSES
 from studies.diagnosis.verdict import Cause, Verdict
 from studies.effects import find_effect
 from studies.planning.chamber import Chamber
-from studies.planning.next_run import NextRun
+from studies.planning.programme import NextRun
 
 if TYPE_CHECKING:
     from studies.diagnosis.inquiry import Inquiry

@@ -29,7 +29,7 @@ from studies.diagnosis.terms import Term, term_columns, used
 from studies.effects import library
 from studies.effects.states import FloatArray, States, average
 from studies.planning.chamber import Chamber
-from studies.planning.next_run import NextRun
+from studies.planning.programme import NextRun
 
 NOTHING = "nothing"
 MOST_RIVALS = 3
