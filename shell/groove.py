@@ -25,7 +25,7 @@ from shell.imperfection.pair import WAVE
 from shell.imperfection.place import cut
 from shell.quadrature import Array, gauss
 from shell.resonator import Resonator
-from shell.sparse import Index, assemble_elements, factor_symmetric
+from shell.sparse import Index, assemble_elements, dissect, factor_symmetric
 
 Face: TypeAlias = Literal["edge", "inner", "outer"]
 REACH = {"edge": 16.0, "inner": 4.0, "outer": 4.0}  # wall thicknesses of the piece along the meridian
@@ -104,7 +104,7 @@ def solve_groove(pair: Pair, groove: Groove) -> GrooveSplit:
     for kind in (0, 1):
         free = nodes.free(kind)
         load = (turn.T @ loads[kind])[free]
-        answer = factor_symmetric(K[free][:, free])(load)
+        answer = factor_symmetric(K[free][:, free], is_ordered=True)(load)
         E.append(2 * float(load @ answer))  # the other half of the piece
     norm = 2 * np.pi * pair.scale
     error = RELIEF_ERROR * (E[0] + E[1]) / norm
@@ -189,7 +189,7 @@ class _Nodes:
         self.resonator, self.grid = resonator, grid
         knots = [np.interp(np.arange(2 * len(x) - 1) / 2, np.arange(len(x)), x) for x in (grid.s, grid.theta, grid.eta)]
         shape = tuple(len(x) for x in knots)
-        number = np.arange(np.prod(shape)).reshape(shape)
+        self.shape, number = shape, np.arange(np.prod(shape)).reshape(shape)
         cells = [len(x) - 1 for x in (grid.s, grid.theta, grid.eta)]
         i, j, k = np.meshgrid(*(np.arange(n) for n in cells), indexing="ij")
         a, b, c = np.meshgrid(*3 * [np.arange(3)], indexing="ij")
@@ -217,12 +217,13 @@ class _Nodes:
         self.theta = np.broadcast_to(theta, shape).ravel()
 
     def free(self, kind: int) -> Index:
-        """Unknowns, three a node along the radius, circle and axis, of cos nθ (0) or sin nθ (1), between its mirror planes."""
+        """Unknowns, three a node along the radius, circle and axis, of cos nθ (0) or sin nθ (1), between its mirror planes, dissected."""
         free = np.repeat((self.used & ~self.held)[:, None], 3, axis=1)
         even, odd = self.ends[::-1] if kind else self.ends
         free[even, 1] = False
         free[np.ix_(odd, [0, 2])] = False
-        return np.flatnonzero(free)
+        found = np.flatnonzero(free)
+        return found[dissect(np.stack(np.unravel_index(found // 3, self.shape), axis=1))]
 
     @property
     def turn(self) -> "scipy.sparse.csc_matrix":

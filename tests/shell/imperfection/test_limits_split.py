@@ -59,15 +59,15 @@ def test_a_perfect_dome_on_a_stem_does_not_split_and_even_departures_only_shift(
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["thickness", "outer", "inner", "offset", "density", "modulus", "rim"])
 @pytest.mark.parametrize("n", [1, 2, 3, 4])
-def test_first_order_is_the_limit_of_the_coupled_harmonics(name, n):
+def test_first_order_is_the_limit_of_the_coupled_harmonics(n):
     """They differ by the square of the amplitude; Hadamard's face energies bring the discretisation of the faces."""
     (mode,) = solve_modes(DOME, SILICA, n, tolerance=1e-7)
-    size = 1.0 if name in ("density", "modulus") else H
-    flaw = Imperfection(**{name: wave(2 * n, 1e-4 * size, azimuth=0.3)})
-    first, whole = find_split(Pair(mode), flaw), CoupledHarmonics(mode, SILICA).solve(flaw)
-    assert abs(whole.wave - first.wave) < 1e-5 * 1e-4  # per unit of amplitude, where a split may be a small difference
+    pair, coupled = Pair(mode), CoupledHarmonics(mode, SILICA)
+    for name in ("thickness", "outer", "inner", "offset", "density", "modulus", "rim"):
+        flaw = Imperfection(**{name: wave(2 * n, 1e-4 * (1.0 if name in ("density", "modulus") else H), azimuth=0.3)})
+        gap = abs(coupled.solve(flaw).wave - find_split(pair, flaw).wave)
+        assert gap < 1e-5 * 1e-4, name  # per unit of amplitude, where a split may be a small difference
 
 
 def test_first_order_leaves_the_square_of_the_amplitude(coupled):
