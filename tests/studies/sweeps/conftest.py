@@ -1,11 +1,13 @@
-"""Fixtures of the study tests: user functions in a file, and the command line as a process."""
+"""Fixtures of the study tests: user functions in a file, and the command line, here or as a process."""
 
 import signal
 import subprocess
+import warnings
 from pathlib import Path
 
 import pytest
 
+from studies.cli import main
 from tests.studies.sweeps.processes import FUNCTIONS, environment, words_of
 
 
@@ -17,12 +19,18 @@ def functions(tmp_path: Path) -> Path:
 
 
 @pytest.fixture
-def hrg():
+def hrg(capfd, monkeypatch):
+    """The command line in this process; what it starts are processes."""
+
     def call(*words: object, **more: str) -> subprocess.CompletedProcess[str]:
-        command = words_of(*map(str, words))
-        return subprocess.run(
-            command, capture_output=True, text=True, env=environment(**more), timeout=600, check=False
-        )
+        for name, value in more.items():
+            monkeypatch.setenv(name, str(value))
+        capfd.readouterr()
+        with warnings.catch_warnings(record=True) as told:
+            warnings.simplefilter("default")
+            status = main([str(word) for word in words])
+        out, err = capfd.readouterr()
+        return subprocess.CompletedProcess(words, status, out, err + "".join(f"{one.message}\n" for one in told))
 
     return call
 
