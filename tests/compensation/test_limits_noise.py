@@ -35,14 +35,14 @@ def test_the_allan_variance_of_draws_is_that_of_the_levels(kind, rate):
 
 @pytest.mark.slow
 def test_draws_have_the_covariance_of_the_levels():
-    """Whitened by it, 20 000 runs of 30 rows have the unit matrix: eigenvalues of a sample's are within (1 ± √(30/20 000))²."""
+    """Whitened by it, 8000 runs of 30 rows have the unit matrix: eigenvalues of a sample's are within (1 ± √(30/8000))²."""
     noise, times = Noise(2.0, 0.5, 0.05, 0.7), 20.0 * np.arange(30)
     generator = np.random.default_rng(5)
-    drawn = np.array([noise.draw(30, 0.05, generator) for _ in range(20_000)])
+    drawn = np.array([noise.draw(30, 0.05, generator) for _ in range(8000)])
     L = np.linalg.cholesky(noise.covariance(times, 20.0))
     white = np.linalg.solve(L, drawn.T)
-    ends = np.linalg.eigvalsh(white @ white.T / 20_000)[[0, -1]]
-    edge = np.sqrt(30 / 20_000)
+    ends = np.linalg.eigvalsh(white @ white.T / 8000)[[0, -1]]
+    edge = np.sqrt(30 / 8000)
     assert ends[0] > (1 - edge) ** 2 - 0.01
     assert ends[1] < (1 + edge) ** 2 + 0.01
 

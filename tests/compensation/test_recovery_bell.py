@@ -95,7 +95,7 @@ def test_rough_step_of_two_plateaus_passes_both_means():
 @pytest.mark.slow
 def test_intervals_cover():
     """95 % intervals of every step, given the steps before it, hold what noise-free data would give."""
-    runs, held = 200, {"rough": np.zeros(2), "bias": np.zeros(3), "rate": np.zeros(3), "temperature": np.zeros(3)}
+    runs, held = 100, {"rough": np.zeros(2), "bias": np.zeros(3), "rate": np.zeros(3), "temperature": np.zeros(3)}
     clean = make_runs(np.random.default_rng(0), 0.0, 600, 30)
     clean_null, clean_scale, _ = fit_rough(clean[0])
     for seed in range(runs):
