@@ -1,7 +1,7 @@
 """Sparse matrices: sums of element matrices and their factors, and which raw unknowns are free and which follow others."""
 
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import scipy
@@ -29,7 +29,8 @@ def factor_symmetric(
     """The solution of A x = b as a function of b; an indefinite A needs some `pivoting`, up to 1."""
     from scipy.sparse.linalg import splu
 
-    order, options = "NATURAL" if is_ordered else "MMD_AT_PLUS_A", {"SymmetricMode": True}
+    order: Literal["NATURAL", "MMD_AT_PLUS_A"] = "NATURAL" if is_ordered else "MMD_AT_PLUS_A"
+    options = {"SymmetricMode": True}
     return splu(scipy.sparse.csc_matrix(matrix), permc_spec=order, diag_pivot_thresh=pivoting, options=options).solve
 
 
