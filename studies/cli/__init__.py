@@ -4,6 +4,7 @@ Exit status: 0 done, 1 a fault of the program, 2 unusable input or arguments, 3 
 4 a study finished with failed cases, 130 interrupted and resumable.
 """
 
+import gc
 import os
 import re
 import sys
@@ -246,6 +247,9 @@ def run() -> None:
     """Entry point of the console script: a request to end counts as Ctrl-C, and a terminal shows what it can."""
     try:
         heed()
+        gc.set_threshold(
+            20_000
+        )  # what is imported stays: looking through it again and again takes a tenth of a short command
         for stream in (sys.stdout, sys.stderr):
             if stream is not None and hasattr(stream, "reconfigure"):
                 stream.reconfigure(errors="backslashreplace")
