@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from compensation.constants import zero_Celsius
-from compensation.decimation import average_blocks
+from compensation.decimation import Blocks, average_blocks
 from compensation.derivative import differentiate
 from compensation.errors import CompensationError
 from compensation.memory import NO_MEMORY, Memory, follow_lag, follow_play
@@ -150,28 +150,38 @@ def prepare_run(
     CompensationError
         Too little data, values that cannot be, a constant bias, time that does not increase, a window that is too short.
     """
+    blocks = average_run(time, state, bias, width, variable)
+    lagged = follow_lag(blocks.time, blocks.columns[variable.name], memory.lag)
+    return rate_run(blocks, lagged, window, causal=causal, variable=variable, memory=memory)
+
+
+def average_run(time: ArrayLike, state: ArrayLike, bias: ArrayLike, width: float, variable: Variable) -> Blocks:
+    """Return one run averaged over blocks of `width` (s), the part of `prepare_run` that no memory changes."""
     t = np.asarray(time, dtype=np.float64)
     if np.any(np.asarray(state, dtype=np.float64) <= variable.above):
         raise CompensationError(
             f"a {variable.name} must be above {variable.above:g} {variable.unit}; check the unit of the column."
         )
-    for name, seconds in (("averaging", width), ("window of the rate", window)):
-        if not (np.isfinite(seconds) and seconds > 0):
-            raise CompensationError(f"the {name} must be a positive number of seconds, not {seconds:g}.")
+    _check_seconds("averaging", width)
     width = max(width, float(np.median(np.diff(t)))) if t.size > 1 else width
     blocks = average_blocks(t, {variable.name: state, "bias": bias}, width)
-    f = blocks.columns[variable.name]
-    if f.size < 3:
+    rows = blocks.time.size
+    if rows < 3:
         raise CompensationError(
-            f"averaging over {width:g} s leaves {f.size} rows, but at least three are needed; record longer or average less."
+            f"averaging over {width:g} s leaves {rows} rows, but at least three are needed; record longer or average less."
         )
-    f = follow_lag(blocks.time, f, memory.lag)
-    play = follow_play(f, memory.play) - f
     if np.ptp(blocks.columns["bias"]) <= 1e-13 * np.max(np.abs(blocks.columns["bias"])):
         raise CompensationError(
             f"the bias is constant ({blocks.columns['bias'][0]:g}): there is nothing to fit; check the column."
         )
-    window = max(window, 3 * width, 2.05 * float(np.median(np.diff(blocks.time))))  # three rows, in bursts too
+    return blocks
+
+
+def rate_run(blocks: Blocks, f: Array, window: float, *, causal: bool, variable: Variable, memory: Memory) -> BiasRun:
+    """Return an averaged run with its state f behind the lag of a memory, play, and the rate over `window` (s)."""
+    _check_seconds("window of the rate", window)
+    play = follow_play(f, memory.play) - f
+    window = max(window, 3 * blocks.width, 2.05 * float(np.median(np.diff(blocks.time))))  # three rows, in bursts too
     derivative = differentiate(blocks.time, f, window, causal=causal)
     ok = derivative.complete
     if np.count_nonzero(ok) < 3:
@@ -185,7 +195,7 @@ def prepare_run(
         rate=derivative.slope[ok],
         play=play[ok],
         bias=blocks.columns["bias"][ok],
-        width=width,
+        width=blocks.width,
         window=window,
         lag=derivative.lag,
         missing=blocks.missing,
@@ -193,6 +203,11 @@ def prepare_run(
         variable=variable,
         memory=memory,
     )
+
+
+def _check_seconds(name: str, seconds: float) -> None:
+    if not (np.isfinite(seconds) and seconds > 0):
+        raise CompensationError(f"the {name} must be a positive number of seconds, not {seconds:g}.")
 
 
 def term_columns(

@@ -5,12 +5,13 @@ This is what `hrg fit bias` computes and its page shows.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cache
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from compensation.bias import FREQUENCY, TEMPERATURE, BiasFit, BiasRun, prepare_run
+from compensation.bias import FREQUENCY, TEMPERATURE, BiasFit, BiasRun, average_run, rate_run
 from compensation.bias_selection import (
     HeldOutRows,
     Method,
@@ -22,7 +23,7 @@ from compensation.bias_selection import (
     score_path,
 )
 from compensation.errors import CompensationError
-from compensation.memory import NO_MEMORY, Memory
+from compensation.memory import NO_MEMORY, Memory, follow_lag
 from compensation.stability import allan_deviation, fit_noise
 from studies.errors import InputError, naming
 from studies.models import Model, compensate, source_of
@@ -124,17 +125,23 @@ def study_bias(
     window = 3 * width if window is None else window
     variable = FREQUENCY if column == "frequency_Hz" else TEMPERATURE
 
+    @cache
+    def lagged(lag: float) -> list[Array]:
+        return [follow_lag(blocks.time, blocks.columns[variable.name], lag) for blocks in averaged]
+
     def prepare(memory: Memory) -> list[BiasRun]:
         runs = []
-        for record in records:
-            columns = record["time_s"], record[column], record[output]
+        for record, blocks, state in zip(records, averaged, lagged(memory.lag), strict=True):
             with naming(record.path or "record"):
-                run = prepare_run(*columns, width, window, causal=causal, variable=variable, memory=memory)
-            runs.append(run)
+                runs.append(rate_run(blocks, state, window, causal=causal, variable=variable, memory=memory))
         return runs
 
     rows = sum(len(record) for record in records)
     progress(f"averaging {rows:,} rows over {width:g} s")
+    averaged = []
+    for record in records:
+        with naming(record.path or "record"):
+            averaged.append(average_run(record["time_s"], record[column], record[output], width, variable))
     runs = prepare(NO_MEMORY)
     if variable is TEMPERATURE:
         progress("looking for a lag and a loop between thermometer and bias")
