@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import signal
 
 from compensation.decimation import average_groups
 from compensation.errors import CompensationError
@@ -224,14 +224,14 @@ def find_density(time: Array, values: Array) -> Density | None:
     if np.isfinite(values).all() and is_regular(time):
         step = float(time[-1] - time[0]) / (len(time) - 1)
         length = max(FEWEST, 2 * len(values) // (SEGMENTS + 1))
-        f, S = signal.welch(values, 1 / step, nperseg=length, detrend=signal.detrend)
+        f, S = scipy.signal.welch(values, 1 / step, nperseg=length, detrend=scipy.signal.detrend)
         return _thin_out(f[1:], S[1:], even=True)
     t, y, step = average_evenly(time, values)
     if step <= 0:
         return None
     y = y - np.polyval(np.polyfit(t - t[0], y, 1), t - t[0])
     f = np.linspace(1.0, len(y) // 2, min(len(y) // 2, MOST_FREQUENCIES // 2)) / float(t[-1] - t[0])
-    power = signal.lombscargle(t - t[0], y, 2 * np.pi * f)
+    power = scipy.signal.lombscargle(t - t[0], y, 2 * np.pi * f)
     return _thin_out(f, 2 * float(t[-1] - t[0]) / len(y) * power, even=False)
 
 
