@@ -180,7 +180,7 @@ def fit_noise(allan: AllanDeviation) -> NoiseCoefficients:
     errors = max(1.0, misfit) * np.sqrt(np.diag(root @ _correlation(allan, c) @ root.T))
     values = np.sqrt(c)
     # u(√c) = u(c) / (2 √c); where that linearisation fails, √u(c) bounds what may be hidden.
-    uncertainties = np.minimum(errors / np.maximum(2 * values, 1e-300), np.sqrt(errors))
+    uncertainties = np.minimum(errors / np.maximum(2 * values, 1e-150), np.sqrt(errors))
     N, B, K = values.tolist()
     N_uncertainty, B_uncertainty, K_uncertainty = uncertainties.tolist()
     return NoiseCoefficients(N, B, K, N_uncertainty, B_uncertainty, K_uncertainty, misfit)

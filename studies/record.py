@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 from studies.errors import InputError, nearest
 from studies.files.columns import Columns, read_columns, read_header
+from studies.files.parquet import is_parquet, write_table
 from studies.files.writing import written_whole
 from studies.results import Drawing
 
@@ -39,6 +40,7 @@ COLUMNS = {
 }
 FAR = 0.7  # of ln f from the median of a table: a factor of two
 COMPENSATED = "compensated_"
+COMMANDED = ("chamber_temperature_degC", "rate_deg_per_s", "drive_amplitude_V", "electrode_bias_V")  # may stand still
 RESONATOR = "resonator_temperature_degC"
 LIMITS = {
     # what a column can be, by the end of its name: lowest, highest
@@ -222,25 +224,30 @@ def read_profile(path: str | Path) -> Columns:
 
 
 def write_record(record: Record, path: str | Path, progress: Callable[[int], None] | None = None) -> None:
-    """Write one run, whole or not at all; `progress` is told the number of rows written so far."""
+    """Write one run, whole or not at all, as CSV or (by the end of its name) Parquet; `progress` is told the rows written so far."""
     import numpy as np
 
-    notes = [f"# {note}" for note in record.comments]
-    if record.instrument:
-        notes.append(f"# instrument: {_one_line(record.instrument)}")
-    if record.source:
-        notes.append(f"# source: {_one_line(record.source)}")
-    if record.start:
-        notes.append(f"# start: {record.start.isoformat()}")
-    notes += [f"# resolution {name}: {value!r}" for name, value in record.resolution.items()]
+    notes = header_notes(record)
     with written_whole(path) as file:
-        file.write("".join(f"{note}\n" for note in [*notes, ",".join(record.columns)]).encode())
+        if is_parquet(path):
+            write_table(file, record.columns, notes, path)
+            return
+        file.write("".join(f"{note}\n" for note in [*(f"# {n}" for n in notes), ",".join(record.columns)]).encode())
         for begin in range(0, max(map(len, record.columns.values()), default=0), 100_000):
             part = np.column_stack([values[begin : begin + 100_000] for values in record.columns.values()])
             lines = [",".join([repr(x) if x == x else "" for x in row]) for row in part.tolist()]
             file.write(("\n".join(lines) + "\n").encode())
             if progress is not None:
                 progress(begin + len(part))
+
+
+def header_notes(record: Record) -> list[str]:
+    """Return what the header of a record says of it, a line each."""
+    notes = list(record.comments)
+    notes += [f"instrument: {_one_line(record.instrument)}"] if record.instrument else []
+    notes += [f"source: {_one_line(record.source)}"] if record.source else []
+    notes += [f"start: {record.start.isoformat()}"] if record.start else []
+    return [*notes, *(f"resolution {name}: {value!r}" for name, value in record.resolution.items())]
 
 
 def check_plausible(columns: "Mapping[str, NDArray[np.float64]]", where: Callable[[int], str]) -> None:

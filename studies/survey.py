@@ -17,7 +17,7 @@ from compensation.lines import Line, find_line
 from compensation.noise import white_rms
 from compensation.samples import is_regular
 from compensation.spikes import find_dropouts, find_spikes, find_step, find_stuck
-from studies.record import Record
+from studies.record import COMMANDED, Record
 from studies.reports.columns import find_gaps
 from studies.rest import LEAST_SPIKE
 from studies.settled import find_holds, find_soaks
@@ -33,7 +33,6 @@ AT_ONCE = 0.6  # of a step, within two rows of it
 SEGMENTS = 8  # of a series, whose periodograms are averaged
 MOST_FREQUENCIES = 4096
 CANDIDATES = 2000  # places where a step is looked for, the likeliest first
-COMMANDED = ("chamber_temperature_degC", "rate_deg_per_s", "drive_amplitude_V", "electrode_bias_V")  # may stand still
 CHANGES = 200  # means of a record, between which changes are correlated
 
 

@@ -68,6 +68,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     ),
     "import": ("studies.cli.import_:import_", "Convert laboratory files to the record format."),
     "show": ("studies.cli.show:show", "Look at records: columns, faults, noise, and what they can be used for."),
+    "export": ("studies.cli.export:export", "Write a record for other programs: Parquet, MATLAB, TDMS, MDF, HDF5."),
     "compensate": ("studies.cli.compensate:compensate", "Apply a saved model to a record, or emit it as C code."),
     "temperature": ("studies.cli.temperature:temperature", "Resonator temperature from its frequency."),
     "fit scale": ("studies.cli.fit_scale:fit_scale", "Bias and scale factor of a bell-shaped gyro, step by step."),
@@ -203,7 +204,7 @@ CHAPTERS = {
     # of the list of commands
     "Design a resonator": ("modes", "tcf", "loss", "loop", "compare", "render", "mesh", "study", "derive"),
     "Manufacture": ("scan", "trim", "electrodes"),
-    "Simulate and import": ("simulate", "twin", "thermal", "import", "show"),
+    "Simulate and import": ("simulate", "twin", "thermal", "import", "show", "export"),
     "Calibrate, diagnose and accept": ("calibrate", "diagnose", "effects", "acceptance"),
     "Compensate": ("fit", "compensate", "temperature"),
     "Library and setup": ("cards", "card", "keys", "materials", "reproduce", "doctor"),

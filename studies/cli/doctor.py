@@ -7,6 +7,10 @@ OPTIONAL = (
     # package, extra of pyproject.toml, what it brings
     ("distributed", "cluster", "for studies on several machines"),
     ("openpyxl", "excel", "to import spreadsheets"),
+    ("nptdms", "formats", "for TDMS files"),
+    ("asammdf", "formats", "for MDF files"),
+    ("h5py", "formats", "for HDF5 and MATLAB 7.3 files"),
+    ("pyarrow", "formats", "for Parquet files"),
     ("fmpy", "twin", "to run FMUs from Python"),
 )
 

@@ -52,14 +52,18 @@ def import_(
     record lists every change; --report shows each column over time. Columns that name an axis give one record per axis:
     RUN_x.csv, RUN_y.csv … All keys of a map: hrg keys map.
 
+    The draft of a TDMS, MDF, HDF5, MATLAB or Parquet file lists its groups and channels with their units; channels of another rate
+    are brought onto the times of the first group (mean, nearest, linear or previous). Spikes, stuck readings and dropouts to 0 are
+    counted and left as they are, unless the map says drop. An --out that ends in .parquet is a Parquet file.
+
     Parameters
     ----------
     raw : str
-        Raw files: text with any separator, or Excel workbooks; in the order of the map's [[file]] tables.
+        Raw files: text with any separator, Excel workbooks, TDMS, MDF, HDF5, MATLAB or Parquet files; in the order of the map's [[file]] tables.
     map_ : str
         The map (schema hrg.map/1): columns, units, signs, clocks, resampling.
     out : str
-        The record to write.
+        The record to write (.csv or .parquet).
     draft : str
         Draft a map from the files instead; an existing file is not overwritten.
     """

@@ -16,7 +16,8 @@ from pathlib import Path
 from typing import IO, TYPE_CHECKING, TypeAlias
 
 from studies.errors import InputError, nearest
-from studies.files.reading import opened, read_bytes
+from studies.files.parquet import is_parquet, read_comments_and_names, read_table
+from studies.files.reading import PORTION, opened, read_bytes
 
 if TYPE_CHECKING:
     import numpy as np
@@ -36,8 +37,6 @@ FEW = 400_000
 """Numbers that are read before pandas, which reads faster, is loaded."""
 ROWS_AT_ONCE = 200_000
 """Rows that are parsed at once, so that a large table costs its numbers and little more."""
-PORTION = 1 << 23
-"""Bytes that are looked through at once."""
 
 
 @dataclass(frozen=True)
@@ -76,6 +75,13 @@ def read_columns(
     InputError
         Anything that is not such a table: the message names file, line or column, and the mend.
     """
+    if is_parquet(path):
+        comments, header = read_comments_and_names(path)
+        _check_names(path, header, 0, known, required, prefixes)
+        values, sha256 = read_table(path)
+        columns = Columns(str(path), values, comments, sha256, first_line=1)
+        _check_size(columns)
+        return columns
     comments, header, header_line, start = _read_head(path)
     names = _check_names(path, header, header_line, known, required, prefixes)
     values, sha256 = _parse_fast(path, start, names) or _parse_with_care(path, start, names, header_line + 1)
@@ -86,6 +92,8 @@ def read_columns(
 
 def read_header(path: str | Path) -> list[str]:
     """Return the column names of a table without reading its numbers."""
+    if is_parquet(path):
+        return read_comments_and_names(path)[1]
     _, header, _, _ = _read_head(path)
     return [name.strip() for name in header]
 
@@ -151,7 +159,7 @@ def _check_names(
     prefixes: Collection[str],
 ) -> list[str]:
     names = [name.strip() for name in header]
-    where = f"{path}, line {header_line}"
+    where = f"{path}, line {header_line}" if header_line else str(path)
     if len(names) == 1 and (";" in names[0] or "\t" in names[0]):
         raise InputError(f"{where}: the columns are not separated by commas; 'hrg import' reads such files.")
     if all(_is_number(name) for name in names):

@@ -25,7 +25,9 @@ OUTPUTS = {
 }
 SHIPPED = ("cards", "sweeps/templates")
 STORE, STORE_FILES = "study.store", ("study.store", "lock")
-RECORDS = ("*.csv", "*.toml", "*/*.csv", "*/*.toml")  # of a folder, or of a folder of folders
+RECORDS = tuple(
+    f"{folder}*.{kind}" for folder in ("", "*/") for kind in ("csv", "parquet", "toml")
+)  # of a folder, or of a folder of folders
 LONGEST_TOML = 2**22  # bytes
 
 _read: dict[object, str] = {}

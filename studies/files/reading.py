@@ -11,6 +11,9 @@ from studies.errors import InputError, nearest
 MOST_BYTES = 2 * 1024**3
 """A record at 200 Hz over a month is smaller; a table of numbers takes about as much in memory."""
 
+PORTION = 1 << 23
+"""Bytes that are looked through at once."""
+
 
 def read_bytes(path: str | Path, most: int = MOST_BYTES, first: int = -1) -> bytes:
     """Return the content, or its first bytes, of a file; raise as `opened`."""

@@ -5,8 +5,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from studies.errors import InputError
-from studies.importing.mapping import NUMERIC_TIMES, SECONDS, UNIX, FileMap
-from studies.importing.raw import RawTable, shorten
+from studies.importing.mapping import NUMERIC_TIMES, OWN, SECONDS, UNIX, FileMap
+from studies.importing.raw import shorten
+from studies.importing.tables import RawTable
 from studies.importing.zone import place_in_zone
 
 if TYPE_CHECKING:
@@ -41,13 +42,16 @@ def read_times(table: RawTable, file: "FileMap") -> Times:
     if file.sample_period is not None:
         import numpy as np
 
-        rows = np.arange(len(table.cells), dtype=np.float64)
+        rows = np.arange(table.rows, dtype=np.float64)
         return Times(np.asarray(file.sample_period * rows + file.clock_offset), origin)
     if form in NUMERIC_TIMES and len(file.time) > 1:
         raise InputError(
             f"{table.path}: time_format = '{form}' is a number in one column, but 'time' names {len(file.time)}."
         )
-    if form in SECONDS:
+    if form == OWN:
+        seconds, origin = table.own_clock()
+        origin = file.start or origin
+    elif form in SECONDS:
         seconds = table.numbers(file.time[0]) * SECONDS[form]
     elif form in UNIX:
         seconds, origin = _from_first(table.numbers(file.time[0]) * UNIX[form], _UNIX_EPOCH)
@@ -109,8 +113,10 @@ def _check_span(seconds: "Array", table: RawTable, file: "FileMap") -> None:
     )
 
 
-def drop_repeated(table: RawTable, times: Times, file: "FileMap") -> "tuple[Times, NDArray[np.intp]]":
-    """Return strictly increasing times and the rows that they belong to; rows without a time are left out.
+def drop_repeated(
+    table: RawTable, times: Times, file: "FileMap", repeated: "NDArray[np.bool_]"
+) -> "tuple[Times, NDArray[np.intp]]":
+    """Return strictly increasing times and the rows that they belong to; rows without a time, and those `repeated`, are left out.
 
     Raises
     ------
@@ -121,12 +127,12 @@ def drop_repeated(table: RawTable, times: Times, file: "FileMap") -> "tuple[Time
 
     rule = file.repeated_times
 
-    rows = np.flatnonzero(np.isfinite(times.seconds))
+    rows = np.flatnonzero(np.isfinite(times.seconds) & ~repeated)
     if not len(rows):
         raise InputError(f"{table.path}: no row has a time.")
     t = times.seconds[rows]
     notes = list(times.notes)
-    lost = len(times.seconds) - len(rows)
+    lost = int(np.count_nonzero(~np.isfinite(times.seconds)))
     if lost:
         first = int(np.flatnonzero(~np.isfinite(times.seconds))[0])
         notes.append(f"{lost} rows without a time left out (first: {table.place(first)})")
@@ -139,7 +145,7 @@ def drop_repeated(table: RawTable, times: Times, file: "FileMap") -> "tuple[Time
     same = np.flatnonzero(steps == 0)
     if len(same) and rule == "error":
         raise InputError(
-            f"{table.place(int(rows[same[0] + 1]))}: this line repeats the time of the line before ({len(same)}"
+            f"{table.place(int(rows[same[0] + 1]))}: this {table.row_name} repeats the time of the one before ({len(same)}"
             " such rows); set repeated_times = 'first' or 'spread' in the map."
         )
     if len(same) and rule == "first":
@@ -153,7 +159,7 @@ def drop_repeated(table: RawTable, times: Times, file: "FileMap") -> "tuple[Time
 
 
 def _mend(table: RawTable, file: "FileMap", row: int) -> str:
-    if table.begins_part(row):
+    if row in table.starts():
         return (
             "Give files that continue one another in the order of their times; files whose clocks start anew are imported"
             " one by one."

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from studies.errors import InputError
-from studies.importing.look import Look, as_number, is_stamp, look_at
+from studies.importing.channels import is_container, open_channels, sort_groups
+from studies.importing.look import Look, as_number, is_stamp, look_at, look_at_group
 from studies.importing.mapping import SCHEMA, TABLE_TARGETS, FileMap, ImportMap
 from studies.importing.meaning import Meaning, find_meanings, find_unit
 from studies.importing.offset import estimate_offset
@@ -47,7 +48,7 @@ def draft_map(paths: Sequence[str]) -> Draft:
         '# instrument = "..."',
         '# source = "..."',
     ]
-    if len(paths) == 1 and (table := _draft_table(paths[0])) is not None:
+    if len(paths) == 1 and not is_container(paths[0]) and (table := _draft_table(paths[0])) is not None:
         return Draft("\n".join([*head, 'target = "table"', "", *table]) + "\n", TABLE_TARGETS, ())
     head.append("# step_s = 1.0    # a regular time grid; without it the times of the first file")
     files: list[list[str]] = []
@@ -55,17 +56,30 @@ def draft_map(paths: Sequence[str]) -> Draft:
     left_over: list[str] = []
     groups = _group(paths)
     for group in groups:
-        written, found, others = _draft_file(group[0], mapped)
-        if len(group) > 1:
-            written.insert(
-                2, f"parts = {len(group)}    # CHECK: these continue one another: {', '.join(map(_comment, group))}"
-            )
-        files.append(written)
-        mapped += found
-        left_over += others
+        begun = False
+        for look in _look_at_all(group[0]):
+            written, found, others = _draft_look(group[0], look, mapped)
+            if begun:
+                written.insert(2, "same_file = true")
+            elif len(group) > 1:
+                written.insert(
+                    2, f"parts = {len(group)}    # CHECK: these continue one another: {', '.join(map(_comment, group))}"
+                )
+            begun = begun or bool(found)
+            files.append(written if found or look.group is None else [f"# {line}".rstrip() for line in written])
+            mapped += found
+            left_over += others
     notes = _find_offsets([group[0] for group in groups], files) if len(groups) > 1 else []
     text = "\n".join([*head, *(line for written in files for line in ("", *written))])
     return Draft(text + "\n", tuple(dict.fromkeys(mapped)), tuple(left_over), tuple(notes))
+
+
+def _look_at_all(path: str) -> list[Look]:
+    """Look at a table, or at every group of a file of channels, slow ones first: theirs are the times of the record."""
+    if not is_container(path):
+        return [look_at(path)]
+    with open_channels(path) as channels:
+        return [look_at_group(group) for group in sorted(sort_groups(channels), key=lambda group: group.rows)]
 
 
 def _group(paths: Sequence[str]) -> list[list[str]]:
@@ -170,7 +184,13 @@ def _draft_table(path: str) -> list[str] | None:
 
 def _describe_notation(path: str, look: Look) -> list[str]:
     lines = ["[[file]]", f"# {_comment(path)}"]
-    if not look.excel:
+    if look.group is not None:
+        named, clock = look.group, look.group.clock
+        units = ", ".join(f"{name} [{c.unit}]" if c.unit else name for name, c in named.channels.items())
+        about = f", {clock.step!r} s apart" if clock and clock.step else ", by a clock of their own" if clock else ""
+        said = [f"# {_comment(units)}: {named.rows} rows{about}"]
+        return [*lines, *([f"group = {spell_value(named.name)}"] if named.name else []), *said]
+    if look.kind == "text":
         lines += [
             f"separator = {spell_value(look.separator)}",
             f'decimal = "{look.decimal}"',
@@ -185,7 +205,10 @@ def _lines_above(look: Look) -> list[str]:
 
 
 def _draft_file(path: str, taken: Sequence[str]) -> tuple[list[str], list[str], list[str]]:
-    look = look_at(path)
+    return _draft_look(path, look_at(path), taken)
+
+
+def _draft_look(path: str, look: Look, taken: Sequence[str]) -> tuple[list[str], list[str], list[str]]:
     names = look.names
     above = _lines_above(look)
     body = [row for row in look.rows[look.data :] if any(cell.strip() for cell in row)]
@@ -193,7 +216,9 @@ def _draft_file(path: str, taken: Sequence[str]) -> tuple[list[str], list[str], 
     hints = {name: f"{name} {unit}".strip() for name, unit in zip(names, look.units, strict=True)}
     numbers = {name: [n for c in cells[name] if (n := as_number(c, look.decimal)) is not None] for name in names}
     period = find_period([*above, *names])
-    time, form, unsure = find_time(names, cells, hints, numbers, look.decimal, evenly=period is not None)
+    own = look.group is not None and look.group.clock is not None
+    known = ([], "", "") if own else find_time(names, cells, hints, numbers, look.decimal, evenly=period is not None)
+    time, form, unsure = known
     lines = _describe_notation(path, look)
     markers = _find_markers(names, cells, time, look.decimal)
     if markers:
@@ -201,6 +226,8 @@ def _draft_file(path: str, taken: Sequence[str]) -> tuple[list[str], list[str], 
     if time:
         lines.append(f"time = {spell_value(time[0] if len(time) == 1 else time)}")
         lines.append(f"time_format = {spell_value(form)}{f'    # CHECK: {unsure}' if unsure else ''}")
+    elif own:
+        lines.append('time_format = "own"    # the clock of the file itself')
     else:
         stated = "the lines above the table say so" if period else unsure
         lines.append(f"sample_period_s = {period or 0.0!r}    # CHECK: {stated}")
@@ -218,6 +245,8 @@ def _draft_file(path: str, taken: Sequence[str]) -> tuple[list[str], list[str], 
             guessed = "    # CHECK: guessed from its values" if look.header is None else ""
             nominal = find_nominal([*above, name])
             drafted = _draft_column(name, meanings[name], hints[name], numbers[name], guessed, nominal)
+            if look.group is not None and taken:
+                drafted.append('resample = "mean"    # onto the times of the first [[file]]')
             lines += ["", *drafted]
     return lines, [meaning.target for meaning in meanings.values()], others
 

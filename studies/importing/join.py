@@ -2,6 +2,7 @@
 
 import itertools
 from collections.abc import Sequence
+from contextlib import closing
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -10,8 +11,10 @@ import numpy as np
 from compensation.decimation import average_groups
 from studies.errors import InputError
 from studies.importing.clock import drop_repeated, read_times, seconds_between
-from studies.importing.mapping import TABLE_TARGETS, ColumnMap, FileMap, LoadedMap
-from studies.importing.raw import RawTable, read_parts, read_raw
+from studies.importing.doubtful import drop_doubtful, find_repeats
+from studies.importing.mapping import OWN, TABLE_TARGETS, ColumnMap, FileMap, LoadedMap
+from studies.importing.parts import read_parts
+from studies.importing.tables import RawTable
 from studies.record import Record, check_plausible
 
 if TYPE_CHECKING:
@@ -94,15 +97,16 @@ def import_table(path: str, import_map: LoadedMap) -> "tuple[dict[str, Array], t
     Rows that lack one of the two are left out.
     """
     (file,) = import_map.files
-    table = read_raw(path, file)
-    columns = {column.target: convert(table, column) for column in file.columns}
+    with closing(read_parts([path], file)) as table:
+        columns = {column.target: convert(table, column) for column in file.columns}
+        empty = _report_empty(table, file)
     whole = np.all([np.isfinite(values) for values in columns.values()], axis=0)
     if not whole.any():
         raise InputError(f"{path}: no row has both {' and '.join(columns)}.")
     notes = [
         f"imported with {import_map.path}; every change is listed here",
         f"{_name_files(table)}, {int(whole.sum())} of {len(whole)} rows",
-        *_report_empty(table, file),
+        *empty,
         *(_describe(column, columns[column.target], moved=False) for column in file.columns),
     ]
     notes += [f"source: {import_map.source}"] if import_map.source else []
@@ -112,14 +116,16 @@ def import_table(path: str, import_map: LoadedMap) -> "tuple[dict[str, Array], t
 def share_out(paths: Sequence[str], import_map: LoadedMap) -> list[Sequence[str]]:
     """Return the raw files of each [[file]] of the map: one, `parts` that continue one another, or all of a single one."""
     files = import_map.files
-    counts = [file.parts or (len(paths) if len(files) == 1 else 1) for file in files]
+    alone = sum(not file.same_file for file in files) == 1
+    counts = [0 if file.same_file else file.parts or (len(paths) if alone else 1) for file in files]
     if sum(counts) != len(paths):
         raise InputError(
             f"{import_map.path}: describes {sum(counts)} raw files, but {len(paths)} are given ('parts' in a [[file]] says"
             " how many files continue one another)."
         )
     ends = list(itertools.accumulate(counts))
-    return [paths[end - count : end] for end, count in zip(ends, counts, strict=True)]
+    own = [paths[end - count : end] for end, count in zip(ends, counts, strict=True)]
+    return [own[max(k for k in range(place + 1) if counts[k])] for place in range(len(own))]
 
 
 def _report_gaps(one: ClockedFile) -> list[str]:
@@ -140,14 +146,22 @@ def _report_gaps(one: ClockedFile) -> list[str]:
 
 def read_series(paths: Sequence[str], file: FileMap) -> ClockedFile:
     """Read a raw file, or several that continue one another: clock corrected, columns converted, rows without a time left out."""
-    table = read_parts(paths, file)
-    times, rows = drop_repeated(table, read_times(table, file), file)
-    columns = {(column.target, column.axis): convert(table, column)[rows] for column in file.columns}
+    with closing(read_parts(paths, file)) as table:
+        clock = read_times(table, file)
+        columns = {(column.target, column.axis): convert(table, column) for column in file.columns}
+        empty = _report_empty(table, file)
+    repeated, told = find_repeats(table, clock.seconds, columns)
+    times, rows = drop_repeated(table, clock, file, repeated)
+    for column in file.columns:
+        place = column.target, column.axis
+        columns[place], found = drop_doubtful(column, columns[place][rows])
+        told += found
     _check_lone_values(table, columns, rows)
     notes = (
         f"{_name_files(table)}, {len(rows)} rows {_name_clock(file)}",
         *times.notes,
-        *_report_empty(table, file),
+        *empty,
+        *told,
     )
     return ClockedFile(file, table.path, times.seconds, times.origin, columns, notes)
 
@@ -157,6 +171,8 @@ def _name_files(table: RawTable) -> str:
 
 
 def _name_clock(file: FileMap) -> str:
+    if file.time_format == OWN:
+        return "by the file's own clock"
     if file.sample_period is not None:
         return f"without a time, {file.sample_period!r} s apart"
     return f"from '{' '.join(file.time)}' ({file.time_format})"

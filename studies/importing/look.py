@@ -1,4 +1,4 @@
-"""A first look at a raw file: its encoding, separator, decimal sign, and where the table begins."""
+"""A first look at a raw file: its encoding, separator, decimal sign, and where the table begins; or the channels of a group."""
 
 import csv
 import re
@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from studies.errors import InputError
+from studies.importing.channels import Group, is_container, open_channels, sort_groups
 from studies.importing.mapping import SEPARATORS
 from studies.importing.raw import EXCEL, decode, name_columns, read_filled, read_sheet
 
@@ -23,7 +24,8 @@ class Look:
     header: int | None
     data: int
     decimal: str
-    excel: bool
+    kind: str
+    group: Group | None = None
 
     @property
     def names(self) -> list[str]:
@@ -47,6 +49,9 @@ def look_at(path: str) -> Look:
     InputError
         No rows of numbers were found.
     """
+    if is_container(path):
+        with open_channels(path) as channels:
+            return look_at_group(sort_groups(channels)[0])
     excel = Path(path).suffix.lower() in EXCEL
     if excel:
         rows, encoding, separator = read_sheet(path, None)[:SEEN], "utf-8", ","
@@ -69,7 +74,15 @@ def look_at(path: str) -> Look:
         header = named[-2] if len(named) > 1 and _is_unit_line(rows[named[-1]]) else named[-1] if named else None
     if first is None or width < 2:
         raise InputError(f"{path}: no table with rows of two numbers or more was found; write the map by hand.")
-    return Look(encoding, separator, rows, header, first, decimal, excel)
+    return Look(encoding, separator, rows, header, first, decimal, "excel" if excel else "text")
+
+
+def look_at_group(group: Group) -> Look:
+    """Look at the first values of the channels of a group as at a table of text."""
+    columns = [channel.read(min(SEEN, channel.rows)).tolist() for channel in group.channels.values()]
+    rows = [["" if x != x else repr(x) for x in row] for row in zip(*columns, strict=True)]
+    units = [f"[{channel.unit}]" if channel.unit else "" for channel in group.channels.values()]
+    return Look("", "", [list(group.channels), units, *rows], 0, 2, ".", "channels", group)
 
 
 def _is_unit_line(row: Sequence[str]) -> bool:

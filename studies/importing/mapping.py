@@ -20,7 +20,9 @@ SEPARATORS = {";": ";", ",": ",", "tab": "\t", "|": "|", "space": r"\s+"}
 SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0, "days": 86400.0}
 UNIX = {"unix-s": 1.0, "unix-ms": 1e-3, "unix-us": 1e-6, "unix-ns": 1e-9}
 NUMERIC_TIMES = (*SECONDS, *UNIX, "excel-days")
-TIME_FORMATS = (*NUMERIC_TIMES, "iso")
+OWN = "own"
+"""The clock that a file of channels has itself."""
+TIME_FORMATS = (*NUMERIC_TIMES, "iso", OWN)
 TABLE_TARGETS = ("temperature_degC", "frequency_Hz")
 LAST = 10**9  # line
 
@@ -44,6 +46,10 @@ class ColumnMap(Keys, frozen=True, kw_only=True):
         | None
     ) = msgspec.field(name="resample", default=None)
     axis: Annotated[str, says("one record for each axis, with the columns that have none in all of them")] = ""
+    drop: Annotated[
+        tuple[Literal["spikes", "stuck", "zeros"], ...],
+        says("readings that become missing values; the import counts them"),
+    ] = ()
     clock_Hz: Annotated[float, number("clock that is counted, of unit period-counts", above=0.0)] | None = None
     periods: Annotated[float, number("periods in which it is counted, of unit period-counts", above=0.0)] | None = None
     gate_s: Annotated[float, number("gate in which periods are counted, of unit gate-counts", above=0.0)] | None = None
@@ -110,6 +116,10 @@ class FileMap(Keys, frozen=True, kw_only=True):
     ) = msgspec.field(name="data_line", default=None)
     last_line: Annotated[int, number("what follows is not data", least=1, most=LAST)] | None = None
     sheet: Annotated[str, says("of an Excel workbook")] = ""
+    group: (
+        Annotated[str, says("of a TDMS, MDF, HDF5 or MATLAB file; without it channels are named group/channel")] | None
+    ) = None
+    same_file: Annotated[bool, says("of the [[file]] before: another group of it, or another clock")] = False
     missing: Annotated[tuple[str, ...], says('cells that mean "no value", besides empty ones')] = ()
     time_columns: Annotated[
         str | Annotated[tuple[str, ...], says("", least=1)],
@@ -188,6 +198,8 @@ class ImportMap(Keys, frozen=True, kw_only=True):
     def __post_init__(self) -> None:
         if self.is_table and (len(self.files) > 1 or self.step is not None):
             raise ValueError("target = 'table' needs exactly one [[file]] and no step_s.")
+        if self.files[0].same_file:
+            raise ValueError("[[file]] number 1: there is no file before it; remove same_file.")
         for place, file in enumerate(self.files, 1):
             where, found = f"[[file]] number {place}", [column.target for column in file.columns]
             wrong = [one for one in found if one not in (TABLE_TARGETS if self.is_table else TARGETS)]
@@ -203,7 +215,7 @@ class ImportMap(Keys, frozen=True, kw_only=True):
                 raise ValueError(f"{where}: a table has no time; remove time, time_format and sample_period_s.")
             if not self.is_table and file.sample_period is None:
                 for key in ("time", "time_format"):
-                    if not getattr(file, key):
+                    if not getattr(file, key) and not (key == "time" and file.time_format == OWN):
                         raise ValueError(f"{where}: the key '{key}' is missing; add it.")
         self._check_single()
 

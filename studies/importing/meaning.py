@@ -8,7 +8,7 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from studies.importing.units import units_of
+from studies.importing.units import TARGETS, units_of
 
 BIDS: tuple[tuple[str, str, int], ...] = (
     # (pattern in the lower-case name, column of the record, weight)
@@ -32,6 +32,8 @@ BIDS: tuple[tuple[str, str, int], ...] = (
     (r"counts?\b|\badc\b|\braw\b", "output_counts", 2),
 )  # fmt: skip
 FITTING_UNIT = 2
+OWN_NAME = 100
+"""Weight of a column's name in a record."""
 UNIT_WORDS: tuple[tuple[str, str], ...] = (
     (r"kelvin|(^|[^a-z])k($|[^a-z])", "K"),
     (r"°\s*f|deg ?f\b|fahrenheit", "degF"),
@@ -104,11 +106,16 @@ def find_meanings(hints: Mapping[str, str], taken: Sequence[str] = ()) -> dict[s
 def find_unit(target: str, hint: str) -> str | None:
     """Return the unit that a name states, of those from which the column can be made."""
     units = units_of(target)
+    if hint.strip().lower() == target.lower():
+        return next(iter(units))
     return next((unit for pattern, unit in UNIT_WORDS if unit in units and re.search(pattern, hint.lower())), None)
 
 
 def _bids(hint: str) -> dict[str, int]:
     name = re.sub(r"[\[(][^\])]*[\])]", " ", hint).lower().replace("_", " ").replace(".", " ")
+    exact = next((column for column in TARGETS if name.split() == column.lower().split("_")), None)
+    if exact is not None:
+        return {exact: OWN_NAME}
     bids: dict[str, int] = {}
     for pattern, target, weight in BIDS:
         if not re.search(pattern, name):

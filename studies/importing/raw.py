@@ -4,7 +4,6 @@ import csv
 import hashlib
 import importlib
 import io
-import itertools
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -14,6 +13,7 @@ from typing import TYPE_CHECKING
 from studies.errors import InputError, MissingEnvironment, nearest
 from studies.files.reading import read_bytes
 from studies.importing.mapping import SEPARATORS, FileMap
+from studies.importing.tables import OVERLOAD, Part, RawTable
 
 if TYPE_CHECKING:
     import numpy as np
@@ -23,33 +23,14 @@ if TYPE_CHECKING:
 EXCEL = (".xlsx", ".xlsm")
 OVERFLOW = "(beyond the header)"
 MOST_CELLS = 20_000_000
-OVERLOAD = 1e36
-"""Instruments write 9.9e37 or 1e38 where a reading overloads them."""
 
 
 @dataclass(frozen=True)
-class Part:
-    """One raw file of a table: its path, its digest, the line of its first row, its number of rows."""
+class TextTable(RawTable):
+    """A table whose cells are all text."""
 
-    path: str
-    sha256: str
-    first_line: int
-    rows: int
-
-
-@dataclass(frozen=True)
-class RawTable:
-    """The cells of one raw file, or of several that continue one another, all text, and where they stood."""
-
-    parts: tuple[Part, ...]
     cells: "pd.DataFrame"
     decimal: str
-    missing: tuple[str, ...]
-
-    @property
-    def path(self) -> str:
-        """The first file's path."""
-        return self.parts[0].path
 
     def joined(self, columns: Sequence[str]) -> "pd.Series[str]":
         """Return several columns joined by a blank, such as a date and a time of day."""
@@ -96,43 +77,8 @@ class RawTable:
 
         return int(np.count_nonzero(np.isnan(self.numbers(column)) & ~self.is_empty(self.text(column))))
 
-    def place(self, row: int) -> str:
-        """Return the file and the line on which a row (from 0) stands."""
-        left = int(row)
-        for part in self.parts:
-            if left < part.rows:
-                break
-            left -= part.rows
-        return f"{part.path}, line {part.first_line + left}"
 
-    def begins_part(self, row: int) -> bool:
-        """Tell whether a row is the first of a file that continues another."""
-        starts = itertools.accumulate(part.rows for part in self.parts)
-        return row in list(starts)[:-1]
-
-
-def read_parts(paths: Sequence[str | Path], file: "FileMap") -> RawTable:
-    """Read raw files that continue one another as one table.
-
-    Raises
-    ------
-    InputError
-        Their columns differ.
-    """
-    import pandas as pd
-
-    tables = [read_raw(path, file) for path in paths]
-    first = tables[0]
-    for other in tables[1:]:
-        if list(other.cells) != list(first.cells):
-            raise InputError(
-                f"{other.path}: its columns differ from those of {first.path}; give it a [[file]] table of its own."
-            )
-    cells = pd.concat([table.cells for table in tables], ignore_index=True)
-    return RawTable(tuple(part for table in tables for part in table.parts), cells, first.decimal, first.missing)
-
-
-def read_raw(path: str | Path, file: "FileMap") -> RawTable:
+def read_raw(path: str | Path, file: "FileMap") -> TextTable:
     """Read one raw file as its map describes it.
 
     Raises
@@ -161,7 +107,7 @@ def read_raw(path: str | Path, file: "FileMap") -> RawTable:
     if not len(cells):
         raise InputError(f"{path}: there are no rows from line {file.data_line} on (data_line in the map).")
     part = Part(str(path), hashlib.sha256(data).hexdigest(), file.data_line, len(cells))
-    return RawTable((part,), cells, decimal, file.missing)
+    return TextTable((part,), file.missing, cells, decimal)
 
 
 def read_filled(path: str | Path) -> bytes:

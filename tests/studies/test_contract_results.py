@@ -18,6 +18,7 @@ WITHOUT_REPORT = {
     "study report": "writes a page of its own",
     "reproduce": "writes a page of its own",
     "study export": "computes nothing",
+    "export": "computes nothing",
     "card new": "computes nothing",
     "study new": "computes nothing",
 }

@@ -1,0 +1,85 @@
+"""Tables of numbers as Parquet files (the extra `formats`): columns by name, comment lines in the metadata of the schema."""
+
+import hashlib
+import importlib
+import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import IO, TYPE_CHECKING, Any
+
+from studies.errors import InputError, MissingEnvironment
+from studies.files.reading import PORTION, opened
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    Table = Mapping[str, NDArray[np.float64]]
+
+COMMENTS = b"hrg.comments"
+
+
+def is_parquet(path: str | Path) -> bool:
+    """Tell whether a file is a Parquet file, by the end of its name."""
+    return Path(path).suffix.lower() == ".parquet"
+
+
+def read_comments_and_names(path: str | Path) -> tuple[tuple[str, ...], list[str]]:
+    """Return the comment lines and the names of the columns."""
+    with opened(path):
+        schema = _open(path).schema_arrow
+    try:
+        comments = json.loads((schema.metadata or {}).get(COMMENTS, b"[]"))
+        return tuple(" ".join(str(line).split()) for line in comments), list(schema.names)
+    except (ValueError, TypeError):
+        raise InputError(f"{path}: its comments are not a list of texts; write the file again.") from None
+
+
+def read_table(path: str | Path) -> "tuple[dict[str, NDArray[np.float64]], str]":
+    """Return the columns as numbers, missing ones NaN, and the hash of the file."""
+    import numpy as np
+
+    found = hashlib.sha256()
+    with opened(path) as file:
+        while portion := file.read(PORTION):
+            found.update(portion)
+    parquet, values = _open(path), {}
+    for field in parquet.schema_arrow:
+        if not str(field.type).startswith(("double", "float", "halffloat", "int", "uint")):
+            raise InputError(
+                f"{path}: the column '{field.name}' holds {field.type}, not numbers; 'hrg import' reads such files."
+            )
+        try:
+            values[field.name] = np.array(parquet.read(columns=[field.name]).column(0).to_numpy(), dtype=float)
+        except Exception as error:
+            raise _damaged(path, error) from None
+    if not values or not len(next(iter(values.values()))):
+        raise InputError(f"{path}: the table has no rows.")
+    return values, found.hexdigest()
+
+
+def write_table(file: IO[bytes], columns: "Table", comments: Sequence[str], path: str | Path) -> None:
+    """Write columns of numbers and comment lines."""
+    arrow, parquet = _library("pyarrow", path), _library("pyarrow.parquet", path)
+    table = arrow.table(dict(columns)).replace_schema_metadata({COMMENTS: json.dumps(list(comments)).encode()})
+    parquet.write_table(table, file, compression="zstd")
+
+
+def _open(path: str | Path) -> Any:
+    library = _library("pyarrow.parquet", path)
+    try:
+        return library.ParquetFile(str(path))
+    except Exception as error:  # pyarrow has many kinds
+        raise _damaged(path, error) from None
+
+
+def _damaged(path: str | Path, error: Exception) -> InputError:
+    said = " ".join(str(error).split())[:60]
+    return InputError(f"{path}: is not a Parquet file, or is damaged or cut off ({said}); write it again.")
+
+
+def _library(name: str, path: str | Path) -> Any:
+    try:
+        return importlib.import_module(name)
+    except ImportError:
+        raise MissingEnvironment(f"{path}: Parquet needs pyarrow: pip install 'hrg-workbench[formats]'.") from None

@@ -1,0 +1,242 @@
+"""Files of channels (TDMS, MDF, HDF5, MATLAB, Parquet): groups of numbers with units and clocks, read channel by channel.
+
+The libraries that read them are the extra `formats`. Nothing in a file is executed: pickled objects and MATLAB's own classes are
+refused. The channels of one `[[file]]` of a map become a table.
+"""
+
+import contextlib
+import datetime
+import gc
+import hashlib
+import sys
+import traceback
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from studies.errors import InputError, MissingEnvironment, nearest
+from studies.files.reading import PORTION, opened
+from studies.importing.formats import KINDS, READERS, Channel, Clock
+from studies.importing.mapping import FileMap
+from studies.importing.raw import name_columns, shorten
+from studies.importing.tables import OVERLOAD, Part, RawTable
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Group:
+    """Channels of one group with one clock and one length, by their names in a map."""
+
+    name: str
+    channels: dict[str, Channel]
+
+    @property
+    def rows(self) -> int:
+        """Rows of each channel."""
+        return max(channel.rows for channel in self.channels.values())
+
+    @property
+    def clock(self) -> Clock | None:
+        """The clock of each channel."""
+        return next(iter(self.channels.values())).clock
+
+
+def is_container(path: str | Path) -> bool:
+    """Tell whether a file is one of channels, by the end of its name."""
+    return Path(path).suffix.lower() in KINDS
+
+
+@contextlib.contextmanager
+def plainly(path: str | Path) -> Iterator[None]:
+    """Turn whatever a library raises of a damaged file into one sentence, and keep its half-made objects quiet.
+
+    Raises
+    ------
+    InputError
+        The file cannot be read.
+    """
+    quiet, sys.unraisablehook = sys.unraisablehook, lambda _: None
+    try:
+        yield
+    except (InputError, MissingEnvironment, MemoryError, KeyboardInterrupt):
+        raise
+    except Exception as error:
+        said = f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
+        one: BaseException | None = error
+        while one is not None:
+            traceback.clear_frames(one.__traceback__)
+            one.__traceback__, one = None, one.__context__
+        gc.collect()
+        kind = KINDS.get(Path(path).suffix.lower(), "channel")
+        raise InputError(
+            f"{path}: cannot be read as {kind}: damaged, cut off, or of another format ({shorten(said)}); export it again."
+        ) from None
+    finally:
+        sys.unraisablehook = quiet
+
+
+@contextlib.contextmanager
+def open_channels(path: str | Path) -> Iterator[list[Channel]]:
+    """Give all channels of a file, which is closed afterwards; raise as `read_channels`, also while they are read."""
+    with plainly(path), contextlib.ExitStack() as files:
+        yield read_channels(path, files)
+
+
+def read_channels(path: str | Path, files: contextlib.ExitStack) -> list[Channel]:
+    """Return all channels of a file, which `files` closes.
+
+    Raises
+    ------
+    InputError
+        No such file, a damaged one, or one without a channel of numbers.
+    MissingEnvironment
+        The library that reads it is not installed.
+    """
+    with opened(path) as file:
+        if not file.read(1):
+            raise InputError(f"{path}: the file is empty.")
+    with plainly(path):
+        found = list(READERS[KINDS[Path(path).suffix.lower()]](str(path), files))
+    if not any(channel.rows > 1 and not channel.refused for channel in found):
+        why = next((f" ('{channel.name}' {channel.refused})" for channel in found if channel.refused), "")
+        raise InputError(f"{path}: has no channel of two numbers or more{why}; export the channels as plain numbers.")
+    return found
+
+
+def sort_groups(channels: Sequence[Channel]) -> list[Group]:
+    """Return channels of numbers by group, clock and length, in the order of the file."""
+    sorted_: dict[tuple[str, str, int], list[Channel]] = {}
+    for channel in channels:
+        if channel.rows > 1 and not channel.refused:
+            key = channel.group, channel.clock.key if channel.clock else "", channel.rows
+            sorted_.setdefault(key, []).append(channel)
+    return [
+        Group(name, dict(zip(name_columns([c.name for c in own]), own, strict=True)))
+        for (name, _, _), own in sorted_.items()
+    ]
+
+
+@dataclass(frozen=True)
+class ChannelTable(RawTable):
+    """The channels that one [[file]] of a map reads, of one file or of several that continue one another."""
+
+    channels: tuple[dict[str, Channel], ...]
+    files: contextlib.ExitStack = field(repr=False)
+    _last: dict[str, "Array"] = field(default_factory=dict, repr=False)
+
+    def close(self) -> None:
+        """Close the files."""
+        self.files.close()
+
+    @property
+    def row_name(self) -> str:
+        """What a row is called in messages."""
+        return "row"
+
+    def numbers(self, column: str) -> "Array":
+        """Return a channel as numbers, NaN where a value is missing; of channels only the last one read is kept."""
+        if column not in self._last:
+            self._last.clear()
+            values = self._read(column)
+            for word in self.missing:
+                with contextlib.suppress(ValueError):
+                    values[values == float(word)] = np.nan
+            self._last[column] = values
+        values = self._last[column]
+        return np.where(np.abs(values) >= OVERLOAD, np.nan, values)
+
+    def count_overloads(self, column: str) -> int:
+        """Return how many readings of a channel stand for an overload of the instrument."""
+        self.numbers(column)
+        return int(np.count_nonzero(np.abs(self._last[column]) >= OVERLOAD))
+
+    def own_clock(self) -> "tuple[Array, datetime.datetime | None]":
+        """Return the seconds of every row by the file's own clock, and when the first file started."""
+        times: list[Array] = []
+        start: datetime.datetime | None = None
+        for part, own in zip(self.parts, self.channels, strict=True):
+            channel = next(iter(own.values()))
+            if channel.clock is None:
+                raise InputError(
+                    f"{part.path}: the channel '{channel.name}' has no clock of its own; name a channel with the time ('time'), or the"
+                    " seconds between rows ('sample_period_s'), in the map."
+                )
+            with plainly(part.path):
+                seconds = channel.clock.seconds(channel.rows)
+            if times and start is not None and channel.clock.start is not None:
+                seconds = seconds + (channel.clock.start - start).total_seconds()
+            start = channel.clock.start if not times else start
+            times.append(seconds)
+        return np.concatenate(times), start
+
+    def _read(self, column: str) -> "Array":
+        values = []
+        for part, own in zip(self.parts, self.channels, strict=True):
+            if column not in own:
+                raise InputError(f"{part.path}: there is no channel '{column}'{nearest(column, own)}")
+            channel = own[column]
+            if channel.refused:
+                raise InputError(f"{part.path}: '{channel.name}' {channel.refused}.")
+            with plainly(part.path):
+                values.append(np.array(channel.read(-1), dtype=float))
+            if len(values[-1]) != part.rows:
+                raise InputError(
+                    f"{part.path}: the channel '{column}' has {len(values[-1])} values and the others {part.rows}; give channels of"
+                    " other lengths and clocks a [[file]] table of their own."
+                )
+        return np.concatenate(values)
+
+
+def read_channel_table(paths: Sequence[str | Path], file: FileMap) -> ChannelTable:
+    """Read the channels of one [[file]] of a map.
+
+    Raises
+    ------
+    InputError
+        A group or channel that is not there, or channels of several clocks.
+    """
+    wanted = [*file.time, *(column.source for column in file.columns)]
+    parts, tables = [], []
+    with contextlib.ExitStack() as files:
+        for path in paths:
+            channels = read_channels(path, files)
+            names = dict.fromkeys(channel.group for channel in channels)
+            if file.group is not None and file.group not in names:
+                raise InputError(f"{path}: there is no group '{file.group}'{nearest(file.group, names)}")
+            own = _choose(channels, file.group, wanted)
+            used = [own[name] for name in wanted if name in own]
+            if len({(channel.clock.key if channel.clock else "", channel.rows) for channel in used}) > 1:
+                raise InputError(
+                    f"{path}: {', '.join(repr(channel.name) for channel in used)} have several clocks or lengths; give those of each"
+                    " a [[file]] table of its own (same_file = true)."
+                )
+            tables.append(dict(zip(wanted, used, strict=True)) if len(used) == len(wanted) else own)
+            parts.append(Part(str(path), _digest(path), 1, used[0].rows if used else 0))
+        return ChannelTable(tuple(parts), file.missing, tuple(tables), files.pop_all())
+
+
+def _choose(channels: Sequence[Channel], group: str | None, wanted: Sequence[str]) -> dict[str, Channel]:
+    """Return channels by their names in a map: of the part of a group that has most of those wanted, and by group/name without one."""
+    if group is None:
+        named = {f"{c.group}/{c.name}" if c.group else c.name: c for c in channels}
+        return {**{c.name: c for c in channels}, **named}
+    parts = [one.channels for one in sort_groups([c for c in channels if c.group == group])]
+    refused = {c.name: c for c in channels if c.group == group and c.refused}
+    best = max(parts, key=lambda own: sum(name in own for name in wanted), default={})
+    others = {name: channel for own in parts for name, channel in own.items()}
+    return {**refused, **others, **best}
+
+
+def _digest(path: str | Path) -> str:
+    found = hashlib.sha256()
+    with opened(path) as file:
+        while portion := file.read(PORTION):
+            found.update(portion)
+    return found.hexdigest()

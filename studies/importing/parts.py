@@ -1,0 +1,33 @@
+"""Raw files of any kind as one table: text, sheets or channels, and files that continue one another."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from studies.errors import InputError
+from studies.importing.channels import is_container, read_channel_table
+from studies.importing.mapping import FileMap
+from studies.importing.raw import TextTable, read_raw
+from studies.importing.tables import RawTable
+
+
+def read_parts(paths: Sequence[str | Path], file: FileMap) -> RawTable:
+    """Read raw files that continue one another as one table.
+
+    Raises
+    ------
+    InputError
+        Their columns differ.
+    """
+    if is_container(paths[0]):
+        return read_channel_table(paths, file)
+    import pandas as pd
+
+    tables = [read_raw(path, file) for path in paths]
+    first = tables[0]
+    for other in tables[1:]:
+        if list(other.cells) != list(first.cells):
+            raise InputError(
+                f"{other.path}: its columns differ from those of {first.path}; give it a [[file]] table of its own."
+            )
+    cells = pd.concat([table.cells for table in tables], ignore_index=True)
+    return TextTable(tuple(part for table in tables for part in table.parts), first.missing, cells, first.decimal)

@@ -1,0 +1,228 @@
+"""Files of other laboratories and programs: read to the last digit, damaged ones refused in a sentence, nothing unpickled."""
+
+import json
+import re
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from studies.cli import main
+from studies.record import Record, read_record, write_record
+
+FORMATS = {"parquet": "parquet", "mat": "mat", "tdms": "tdms", "mf4": "mf4", "hdf5": "h5"}
+LIBRARIES = {"parquet": "pyarrow.parquet", "tdms": "nptdms", "mf4": "asammdf", "hdf5": "h5py"}
+
+
+@pytest.fixture(scope="module")
+def record():
+    rng = np.random.default_rng(7)
+    n = 400
+    time = np.cumsum(rng.uniform(0.5, 1.5, n))
+    housing = 20 + 10 * rng.standard_normal(n)
+    frequency = 4432 + rng.standard_normal(n)
+    frequency[[3, 50]] = np.nan
+    columns = {
+        "time_s": time - time[0], "housing_temperature_degC": housing, "frequency_Hz": frequency,
+        "bias_deg_per_h": rng.standard_normal(n), "inverse_q": 1e-7 + 1e-9 * rng.standard_normal(n), "quadrature_V": rng.standard_normal(n),
+        "pattern_angle_deg": 360 * rng.uniform(size=n), "output_counts": rng.integers(0, 2**20, n).astype(float),
+        "measured_rate_deg_per_s": rng.standard_normal(n),
+    }  # fmt: skip
+    return Record(columns, instrument="hrg-30mm", source="a test")
+
+
+def same(one, two):
+    return all(np.array_equal(one.columns[key], two.columns[key], equal_nan=True) for key in one.columns)
+
+
+@pytest.mark.parametrize("kind", FORMATS)
+def test_contract_a_record_comes_back_from_every_format_to_the_last_digit(kind, record, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    write_record(record, "run.csv")
+    out = f"run.{FORMATS[kind]}"
+    assert main(["export", "run.csv", "--to", kind, "--out", out]) == 0
+    assert main(["import", out, "--draft", "map.toml"]) == 0
+    assert main(["import", out, "--map", "map.toml", "--out", "back.csv"]) == 0
+    back = read_record("back.csv")
+    assert set(back.columns) == set(record.columns)
+    assert same(record, back)
+
+
+def test_contract_a_parquet_record_is_accepted_where_a_csv_is(record, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    write_record(record, "run.parquet")
+    again = read_record("run.parquet")
+    assert same(record, again)
+    assert (again.instrument, again.source) == (record.instrument, record.source)
+    assert main(["export", "run.parquet", "--to", "csv", "--out", "run.csv"]) == 0
+    assert same(record, read_record("run.csv"))
+    capsys.readouterr()
+    assert main(["show", "run.parquet", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["records"][0]["rows"] == len(record)
+
+
+def tdms(path, **groups):
+    nptdms = pytest.importorskip("nptdms")
+    with nptdms.TdmsWriter(path) as writer:
+        for group, channels in groups.items():
+            writer.write_segment([nptdms.ChannelObject(group, *channel) for channel in channels])
+
+
+def test_contract_channels_of_two_rates_are_averaged_onto_the_slow_clock(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    fast, slow = np.arange(1000.0), np.linspace(20, 30, 100)
+    start = {"wf_start_time": np.datetime64("2026-03-01T12:00:00"), "wf_start_offset": 0.0}
+    tdms(
+        "run.tdms",
+        Fast=[("f res", 4000 + fast, {"unit_string": "Hz", "wf_increment": 0.1, **start})],
+        Slow=[("T housing", slow + 273.15, {"unit_string": "K", "wf_increment": 1.0, **start})],
+    )
+    assert main(["import", "run.tdms", "--draft", "map.toml"]) == 0
+    text = Path("map.toml").read_text()
+    assert "same_file = true" in text
+    assert "[Hz]: 1000 rows, 0.1 s apart" in text
+    assert main(["import", "run.tdms", "--map", "map.toml", "--out", "run.csv"]) == 0
+    run = read_record("run.csv")
+    assert run["housing_temperature_degC"] == pytest.approx(slow, abs=1e-9)
+    # a mean takes the samples from half a step before to half a step after
+    assert run["frequency_Hz"][1:-1] == pytest.approx(4000 + 10 * np.arange(1, 99) - 0.5)
+    assert run.start.isoformat() == "2026-03-01T12:00:00+00:00"
+    assert any("resampled: mean" in note for note in run.comments)
+
+
+def test_contract_a_channel_without_a_clock_asks_for_one(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    tdms("run.tdms", G=[("f", 4000 + np.cos(np.arange(50.0)), {"unit_string": "Hz"})])
+    assert main(["import", "run.tdms", "--draft", "map.toml"]) == 0
+    assert "sample_period_s = 0.0    # CHECK" in Path("map.toml").read_text()
+    own = re.sub("sample_period_s.*", 'time_format = "own"', Path("map.toml").read_text())
+    Path("map.toml").write_text(own)
+    capsys.readouterr()
+    assert main(["import", "run.tdms", "--map", "map.toml", "--out", "run.csv"]) == 2
+    assert "'f' has no clock of its own" in capsys.readouterr().err
+    Path("map.toml").write_text(own.replace('group = "G"', 'group = "g"'))
+    assert main(["import", "run.tdms", "--map", "map.toml", "--out", "run.csv"]) == 2
+    assert "no group 'g'" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("kind", FORMATS)
+def test_contract_damaged_files_are_refused_in_a_sentence(kind, record, tmp_path, monkeypatch, capfd):
+    monkeypatch.chdir(tmp_path)
+    write_record(record, "run.csv")
+    name = f"run.{FORMATS[kind]}"
+    assert main(["export", "run.csv", "--to", kind, "--out", name]) == 0
+    assert main(["import", name, "--draft", "map.toml"]) == 0
+    whole = Path(name).read_bytes()
+    capfd.readouterr()
+    for size in (0, 3, 40, len(whole) // 3, len(whole) - 20):
+        Path(name).write_bytes(whole[:size])
+        Path("draft.toml").unlink(missing_ok=True)
+        assert main(["import", name, "--draft", "draft.toml"]) == 2, size
+        assert main(["import", name, "--map", "map.toml", "--out", "back.csv"]) == 2, size
+        err = capfd.readouterr().err
+        assert err.count("\n") == 2, err
+        assert name in err
+    rng = np.random.default_rng(1)
+    for _ in range(10):  # whatever bytes are turned: a sentence or an answer, never a fault of the program
+        bad = bytearray(whole)
+        for place in rng.integers(0, len(bad), 30):
+            bad[place] ^= 0xFF
+        Path(name).write_bytes(bytes(bad))
+        assert main(["import", name, "--map", "map.toml", "--out", "back.csv"]) in (0, 2)
+    assert "Traceback" not in capfd.readouterr().err
+
+
+@pytest.mark.parametrize("kind", LIBRARIES)
+def test_contract_a_missing_library_names_the_extra(kind, tmp_path, monkeypatch, capsys, record):
+    monkeypatch.chdir(tmp_path)
+    Path(f"run.{FORMATS[kind]}").write_bytes(b"something")
+    monkeypatch.setitem(sys.modules, LIBRARIES[kind], None)
+    assert main(["import", f"run.{FORMATS[kind]}", "--draft", "map.toml"]) == 3
+    assert "hrg-workbench[formats]" in capsys.readouterr().err
+    write_record(record, "run.csv")
+    assert main(["export", "run.csv", "--to", kind, "--out", f"out.{FORMATS[kind]}"]) == 3
+    assert not Path(f"out.{FORMATS[kind]}").exists()
+
+
+def test_contract_objects_are_never_opened(tmp_path, monkeypatch, capsys):
+    from scipy.io import savemat
+
+    h5py = pytest.importorskip("h5py")
+    monkeypatch.chdir(tmp_path)
+    with h5py.File("run.h5", "w") as file:
+        file.create_dataset("words", data=["a", "b"], dtype=h5py.string_dtype())
+    assert main(["import", "run.h5", "--draft", "map.toml"]) == 2
+    assert "holds objects" in capsys.readouterr().err
+    savemat("run.mat", {"c": np.array(["x", 1.0], dtype=object)})
+    assert main(["import", "run.mat", "--draft", "map.toml"]) == 2
+    assert "holds objects" in capsys.readouterr().err
+
+
+def test_contract_a_matlab_7_3_file_and_matrices_are_channels(tmp_path, monkeypatch):
+    h5py = pytest.importorskip("h5py")
+    monkeypatch.chdir(tmp_path)
+    time, housing = np.arange(30.0), np.linspace(20, 21, 30)
+    with h5py.File("run.mat", "w", userblock_size=512) as file:
+        for name, data in (("t", time[None, :]), ("T_housing", housing[:, None]), ("fs", np.array([[2.0]]))):
+            file.create_dataset(name, data=data).attrs["MATLAB_class"] = np.bytes_("double")
+    raw = bytearray(Path("run.mat").read_bytes())
+    raw[:19] = b"MATLAB 7.3 MAT-file"
+    Path("run.mat").write_bytes(bytes(raw))
+    assert main(["import", "run.mat", "--draft", "map.toml"]) == 0
+    assert main(["import", "run.mat", "--map", "map.toml", "--out", "run.csv"]) == 0
+    assert read_record("run.csv")["housing_temperature_degC"] == pytest.approx(housing, rel=1e-15)
+
+
+MAP = """schema = "hrg.map/1"
+[[file]]
+time = "t"
+time_format = "s"
+[[file.column]]
+from = "f"
+to = "frequency_Hz"
+unit = "Hz"
+"""
+
+
+def raw(path, time, values):
+    Path(path).write_text(
+        "t,f\n" + "".join(f"{t!r},{v!r}\n" for t, v in zip(time.tolist(), values.tolist(), strict=True))
+    )
+
+
+def test_contract_files_that_overlap_are_joined_where_they_agree(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    Path("map.toml").write_text(MAP)
+    time = np.arange(100.0)
+    f = 4000 + np.round(np.random.default_rng(0).standard_normal(100), 6)
+    raw("one.csv", time[:60], f[:60])
+    raw("two.csv", time[50:], f[50:])
+    assert main(["import", "one.csv", "two.csv", "--map", "map.toml", "--out", "run.csv"]) == 0
+    assert "10 rows from two.csv, line 2 on repeat the file before: left out" in capsys.readouterr().out
+    run = read_record("run.csv")
+    assert np.array_equal(run["time_s"], time)
+    assert np.array_equal(run["frequency_Hz"], f)
+    raw("two.csv", time[50:], f[50:] + 1e-3)
+    assert main(["import", "one.csv", "two.csv", "--map", "map.toml", "--out", "run.csv"]) == 2
+    assert "overlaps the one before it by 9 s, and they differ there" in capsys.readouterr().err
+    assert main(["import", "two.csv", "one.csv", "--map", "map.toml", "--out", "run.csv"]) == 2
+    assert "in the order of their times" in capsys.readouterr().err
+
+
+def test_contract_doubtful_readings_are_offered_as_missing_and_never_changed(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    f = 4000 + np.round(np.random.default_rng(0).standard_normal(300), 6)
+    f[100], f[200:230] = 4100.0, f[200]
+    raw("one.csv", np.arange(300.0), f)
+    Path("map.toml").write_text(MAP)
+    assert main(["import", "one.csv", "--map", "map.toml", "--out", "run.csv"]) == 0
+    said = capsys.readouterr().out
+    assert "1 spikes left as they are (drop = ['spikes'] makes them missing)" in said
+    assert "30 readings of a sensor that is stuck left as they are" in said
+    assert np.array_equal(read_record("run.csv")["frequency_Hz"], f)
+    Path("map.toml").write_text(MAP + 'drop = ["spikes", "stuck"]\n')
+    assert main(["import", "one.csv", "--map", "map.toml", "--out", "run.csv"]) == 0
+    kept = read_record("run.csv")["frequency_Hz"]
+    assert np.isnan(kept).sum() == 31
+    assert "1 spikes made missing" in capsys.readouterr().out
