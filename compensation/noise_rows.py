@@ -241,6 +241,6 @@ def estimate_noise(
         first[1:] = np.clip(first[1:], LEAST, MOST)
     bounds = [(-12.0, 12.0), *[(LEAST, MOST)] * len(free)]
     found = scipy.optimize.minimize(
-        objective, first, jac=True, method="L-BFGS-B", bounds=bounds, options={"ftol": 1e-9}
+        objective, first, jac=True, method="L-BFGS-B", bounds=bounds, options={"ftol": 1e-7}
     )
     return levels(found.x)

@@ -16,9 +16,9 @@ from studies.record import Record, read_record
 if TYPE_CHECKING:
     from studies.calibration.calibrate import Calibration
     from studies.comparison import Comparison
-    from studies.diagnosis.investigate import Diagnosis
     from studies.diagnosis.table import TableDiagnosis
     from studies.inference.diagnosis import Inference
+    from studies.inference.unjudged import Unjudged
     from studies.planning.chamber import Chamber
 
 Card = Instrument | str | Path
@@ -95,7 +95,7 @@ def calibrate(
     return find_values(open_card(card), records, settled, left, exact, progress=progress or (lambda _: None))
 
 
-def diagnose(*runs: Run, card: Card | None = None) -> "Diagnosis | Inference | TableDiagnosis":
+def diagnose(*runs: Run, card: Card | None = None) -> "Inference | Unjudged | TableDiagnosis":
     """Return what a campaign shows and the simulation lacks, with its causes: `hrg diagnose`; `.verdict` is the outcome.
 
     Parameters
@@ -127,23 +127,28 @@ def diagnose_records(
     card: Instrument | None = None,
     chamber: "Chamber | None" = None,
     progress: Progress | None = None,
-) -> "Diagnosis | Inference":
+) -> "Inference | Unjudged":
     """Return what a campaign shows and the simulation lacks; with a `chamber`, the run that should come next in it."""
     from studies.calibration.misreading import bias_of_opposite_sign, check_readings
-    from studies.diagnosis.campaign import load_campaign
-    from studies.diagnosis.investigate import investigate
     from studies.inference.diagnosis import infer
+    from studies.inference.polynomial_card import polynomial_card
+    from studies.inference.records import driving, make_ready
+    from studies.inference.unjudged import Unjudged
     from studies.planning.next_run import suggest
 
+    campaign = make_ready(records)
+    if not campaign.records:
+        return Unjudged(campaign, card is not None)
     if card is None:
-        return investigate(load_campaign(records), progress=progress, chamber=chamber)
-    campaign = load_campaign(records, card.reference_temperature - zero_Celsius)
-    check_readings(card, records)
-    card.material.check(np.concatenate([run.states.housing for run in campaign.runs]))
-    turned = [bias_of_opposite_sign(card, record) for record in records]
-    notes = (*campaign.said, *(said for said in turned if said is not None))
+        card = polynomial_card(campaign.records)
+    else:
+        check_readings(card, campaign.records)
+        if card.polynomial is None:
+            card.material.check(np.concatenate([driving(record) for record in campaign.records]) + zero_Celsius)
+        turned = [bias_of_opposite_sign(card, record) for record in campaign.records]
+        campaign = campaign.noting(said for said in turned if said is not None)
     tell = progress or (lambda words: None)
-    found = infer(card, records, tell, notes)
+    found = infer(card, campaign, tell)
     return found if chamber is None else replace(found, advice=suggest(found, found.verdict, chamber, tell))
 
 

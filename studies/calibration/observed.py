@@ -146,7 +146,11 @@ def read_settled(path: str) -> SettledTable:
 
 
 def observe(
-    records: Sequence[Record], responses: Sequence[str] = RESPONSES, *, turning: bool = False
+    records: Sequence[Record],
+    responses: Sequence[str] = RESPONSES,
+    *,
+    turning: bool = False,
+    blocks: int = MOST_BLOCKS,
 ) -> tuple[ObservedRun, ...]:
     """Make runs ready.
 
@@ -155,19 +159,24 @@ def observe(
     responses : names of the columns that are predicted
     turning : whether they are of a whole-angle wave, each row's the mean to the next
 
+    blocks : of a run that are compared, at most
+
     Raises
     ------
     InputError
         A run without a drive or without a response, or too short.
     """
     starts, _ = place_in_time(records)
-    return tuple(_observe(record, start, responses, turning) for record, start in zip(records, starts, strict=True))
+    return tuple(
+        _observe(record, start, responses, turning, blocks) for record, start in zip(records, starts, strict=True)
+    )
 
 
-def _observe(record: Record, start: float, named: Sequence[str], turning: bool) -> ObservedRun:
+def _observe(record: Record, start: float, named: Sequence[str], turning: bool, most: int) -> ObservedRun:
     periods = _periods(record)
-    most_rows = int(np.clip(ROWS_PER_PERIOD * periods, MOST_ROWS, TURNED_MOST * MOST_ROWS))
-    most_blocks = int(np.clip(BLOCKS_PER_PERIOD * periods, MOST_BLOCKS, 3 * MOST_BLOCKS))
+    fewest = min(MOST_ROWS, MOST_ROWS * most // MOST_BLOCKS)
+    most_rows = int(np.clip(ROWS_PER_PERIOD * periods, fewest, TURNED_MOST * fewest))
+    most_blocks = int(np.clip(BLOCKS_PER_PERIOD * periods, most, 3 * most))
     time, columns = _fine_rows(record, (*named, HOUSING), most_rows)
     if len(time) < LEAST_ROWS:
         raise InputError(f"{record.path}: {len(time)} rows are too few; a run needs at least {LEAST_ROWS}.")
@@ -216,7 +225,12 @@ def _fine_rows(record: Record, named: Sequence[str], most: int) -> tuple[Array, 
     for name in names:
         values = record[name]
         keep = np.isfinite(values) & ~find_spikes(values)
-        columns[name] = average_groups(values[keep], group[keep], most)[present]
+        if not keep.any():
+            columns[name] = np.full(len(present), np.nan)
+            continue
+        # what is missing of a group is on the line between its neighbours: else its mean would be of another moment
+        whole = average_groups(np.interp(time, time[keep], values[keep]), group)[present]
+        columns[name] = np.where(np.bincount(group[keep], minlength=most)[present] > 0, whole, np.nan)
     return average_groups(time, group)[present], columns
 
 

@@ -40,7 +40,7 @@ def diagnose(
     card : str
         The gyro's card. The records are compared with its simulation, calibrated within the card's uncertainties.
     save : str
-        Save the extended model as a card (TOML); needs --card. Not saved, with exit status 2, if its calibration does not converge.
+        Save the extended model as a card (TOML): the card with what was found, or without --card a polynomial law ([law]). Not saved, with exit status 2, if its calibration does not converge.
     plan : list[str]
         Chamber profiles of a planned campaign, as text or as files, one for each run: predict which effects the campaign can
         identify with the gyro of --card, and how small they may be. Further profiles may follow without --plan.
@@ -63,8 +63,6 @@ def diagnose(
         return _fleet(device or [], fleet, card)
     if not runs:
         raise InputError("no records given: hrg diagnose RUN.csv [RUN.csv ...].")
-    if save is not None and card is None:
-        raise InputError("--save writes an extended card, so it needs --card CARD to extend.")
     tables = [path for path in runs if workbench.is_table(path)]
     if not tables:
         return _campaign(runs, card, (limits or Chamber()) if next_ or limits else None, save)
@@ -105,7 +103,7 @@ def _campaign(runs: tuple[str, ...], card: str | None, limits: Chamber | None, s
     instrument, records = None if card is None else load_card(card), workbench.open_records(runs)
     with Told("diagnosis") as told:
         found = workbench.diagnose_records(records, instrument, limits, told)
-        extended = extend(found, records, told) if save is not None and isinstance(found, Inference) else None
+        extended = extend(found, told) if save is not None and isinstance(found, Inference) else None
     refused = extended is not None and not extended.fit.converged
     if refused:
         say(f"{save} not saved: the calibration of the extended card did not converge.")

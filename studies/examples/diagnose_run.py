@@ -7,9 +7,9 @@ of 30 min, the frequency its temperature, the bias the frequency and, as the mis
 import numpy as np
 from scipy.signal import lfilter
 
-from studies.diagnosis.campaign import load_campaign
-from studies.diagnosis.investigate import Diagnosis, investigate
+from studies.diagnosis.verdict import Verdict
 from studies.record import Record
+from studies.workbench import diagnose_records
 
 STEP, HOURS, LAG = 20.0, 8, 1800.0  # s between rows, length of a run, s
 RATE_BIAS = 900.0  # deg/h per K/s
@@ -38,15 +38,15 @@ def make_run(chamber: tuple[float, ...], generator: np.random.Generator) -> Reco
     )
 
 
-def diagnose_runs() -> Diagnosis:
+def diagnose_runs() -> Verdict:
     """Ask what the model of the device lacks."""
     generator = np.random.default_rng(3)
     records = [make_run(chamber, generator) for chamber in ((20, -10, 30), (20, 40, 0, 20))]
-    return investigate(load_campaign(records))
+    return diagnose_records(records).verdict
 
 
 if __name__ == "__main__":
-    found = diagnose_runs().verdict
+    found = diagnose_runs()
     print(found.verdict)
     for cause in found.causes:
         print(f"  {cause.effect} in {cause.response}, probability {cause.probability:.2f}: {dict(cause.parameters)}")

@@ -7,7 +7,7 @@ unknowns together, and the search begins again there: values that had gone far t
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,7 +23,9 @@ from studies.inference.held_out import Kept, Model, Rows
 from studies.inference.inferred import Inferred
 from studies.inference.lack_of_fit import generic_bank, look
 from studies.inference.model import Background, Linear
-from studies.inference.search import Outcome, Search
+from studies.inference.records import Campaign
+from studies.inference.relinearise import relinearise
+from studies.inference.search import Hypothesis, Outcome, Search
 from studies.inference.signatures import Signatures
 from studies.inference.verdict import judge
 from studies.record import Record
@@ -38,12 +40,18 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 Report = Callable[[str], None]
-AGAIN = 2
+BLOCKS, BLOCKS_OF_RUN = 800, (100, 400)
+"""Block averages of a campaign, and fewest and most of a run."""
+AGAIN = 4
 """Most linearisations after the first."""
 SAME = 0.3
 """Prior standard deviations by which values may move in a linearisation that is taken as it is."""
 FAR = 2.0
-"""The same, beyond which the columns of all effects are computed anew."""
+"""The same, beyond which the search begins from the card's own values too."""
+STRAIGHT = 1.0
+"""The same, up to which further effects are looked for beside one before the model is linearised anew."""
+SAME_PATH = 0.02
+"""Part of its range by which the resonator's temperature may move before the columns of all effects are computed anew."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -51,7 +59,6 @@ class Inference(Inferred, Shown):
     """What a card and records say together, with its verdict; `advice`: words about the run that should come next, and the run."""
 
     drawn_by = "studies.reports.diagnosis_pictures:ladder"
-    with_card: ClassVar[bool] = True
     advice: "Advice | None" = None
 
     def __repr__(self) -> str:
@@ -60,6 +67,11 @@ class Inference(Inferred, Shown):
     def to_frame(self) -> "DataFrame":
         """Return one row a response."""
         return self.verdict.to_frame()
+
+    @property
+    def with_card(self) -> bool:
+        """Whether the card is a user's, and not made from the records."""
+        return self.card.polynomial is None
 
     @cached_property
     def verdict(self) -> "Verdict":
@@ -93,8 +105,11 @@ class Inference(Inferred, Shown):
         inputs = {
             "resonator temperature (°C)": onto([p.states.resonator - zero_Celsius for p in paths]),
             "rate (K/min)": onto([60.0 * p.states.rate for p in paths]),
-            "frequency (Hz)": onto([np.interp(p.states.time, p.time, p.prediction.columns["frequency_Hz"]) for p in paths]),
         }  # fmt: skip
+        if "frequency_Hz" in problem.responses:
+            inputs["frequency (Hz)"] = onto(
+                [np.interp(p.states.time, p.time, p.prediction.columns["frequency_Hz"]) for p in paths]
+            )
         for label, drive in (("amplitude (V)", "amplitude_squared"), ("electrode voltage (V)", "voltage_squared")):
             own = [getattr(p.states, drive) for p in paths]
             if all(values is not None for values in own):
@@ -128,21 +143,19 @@ def build_problem(card: "Instrument", records: Sequence[Record]) -> CardProblem:
     """Return the problem of a card's values and the starts of runs, driven by the measured temperature."""
     runs = tuple(
         replace(run, outer=None, responses={name: own for name, own in run.responses.items() if name in RESPONSES})
-        for run in observe(records)
+        for run in observe(records, blocks=int(np.clip(BLOCKS / len(records), *BLOCKS_OF_RUN)))
     )
     return CardProblem(card, gather_priors(card), runs, wide_law(card, runs))
 
 
-def infer(
-    card: "Instrument", records: Sequence[Record], progress: Report = lambda _: None, notes: Sequence[str] = ()
-) -> Inference:
-    """Find what records say of a card and of effects that it lacks; `notes` are what reading them had to say."""
-    problem = build_problem(card, records)
+def infer(card: "Instrument", campaign: Campaign, progress: Report = lambda _: None) -> Inference:
+    """Find what records say of a card and of effects that it lacks."""
+    problem = build_problem(card, campaign.records)
     progress("calibration without effects")
     found = fit(problem, progress=progress)
     search, outcome = _from(problem, found, progress)
     values = len(problem.priors.values)
-    if np.abs(problem.priors.standard(found.point[:values])).max(initial=0.0) > FAR:
+    if card.polynomial is None and np.abs(problem.priors.standard(found.point[:values])).max(initial=0.0) > FAR:
         # values may have gone far to do what an effect does: look from the card as shipped too
         progress("again from the card's own values")
         state = problem.evaluate(np.zeros(problem.count))
@@ -162,7 +175,7 @@ def infer(
         seen = search.scan(base, bank)
         best = max((one.gain for one in seen), default=-np.inf)
         unknown.append(base.score + best + CONSTANTS["log_prior_unknown"] - outcome.final.score)
-    return Inference(card, found, search, outcome, left, shipped, calibrated, rows, held, tuple(unknown), tuple(notes))
+    return Inference(card, found, search, outcome, left, shipped, calibrated, rows, held, tuple(unknown), campaign)
 
 
 def _on_all_rows(found: tuple[Search, Outcome]) -> float:
@@ -177,20 +190,29 @@ def _from(problem: CardProblem, start: CardFit, progress: Report) -> tuple[Searc
     progress("all effects in all shapes")
     point = start.point
     search = Search(Linear.of(start), Signatures.at(problem, point), start.noise, progress=progress)
-    outcome = search.run()
-    for _ in range(AGAIN):
-        model = Model(search.linear, search.signatures, outcome.final.terms, outcome.final.noise)
-        moved = model.kept(model.mean()).point
-        if np.abs(moved - point).max() < SAME:
+
+    def moved(final: Hypothesis) -> float:
+        model = Model(search.linear, search.signatures, final.terms, final.noise)
+        return float(np.abs(model.kept(model.mean()).point - point).max(initial=0.0))
+
+    def near(final: Hypothesis) -> bool:
+        return moved(final) < STRAIGHT
+
+    outcome = search.run(near=near)
+    for left in range(AGAIN, 0, -1):
+        final = outcome.final
+        if moved(final) < SAME:
             break
         progress("linearised anew beside the effects")
-        bank = search.bank if np.abs(moved - start.point).max() < FAR else None
-        point, linear = moved, Linear.of(replace(start, state=problem.evaluate(moved)))
-        again = Search(linear, Signatures.at(problem, point), outcome.plain.noise, bank, progress)
-        found = again.run(outcome.final)
-        if found.final.score < outcome.final.score:  # the step went too far
+        linear, signatures, reached = relinearise(
+            start, search.linear, search.signatures, point, final.terms, final.noise
+        )
+        if np.array_equal(reached, point) and left < AGAIN:
             break
-        search, outcome = again, found
+        point = reached
+        bank = search.bank if signatures.away(search.signatures) < SAME_PATH else None
+        search = Search(linear, signatures, outcome.plain.noise, bank, progress)
+        outcome = search.run(final, (lambda _: True) if left == 1 else near)
     return search, outcome
 
 
@@ -200,14 +222,18 @@ def _confirmed(
     """Leave out causes whose model predicts unseen rows no better than the card alone, the weakest first."""
     events = any(term.effect.event for term in outcome.final.terms)
     by_record = len(search.linear.problem.runs) > 1 and not events
-    before = plain.held_out(by_record)
+    before, alone = plain.held_out(by_record), plain.residuals(plain.kept(plain.mean()))
     while True:
         final = outcome.final
         model = Model(search.linear, search.signatures, final.terms, final.noise)
         after = model.held_out(by_record) if final.terms else before
-        weak = [k for k, term in enumerate(final.terms) if _worse(before[term.response], after[term.response])]
+        rows = model.residuals(model.kept(model.mean())) if final.terms else alone
+        weak = [
+            k
+            for k, name in enumerate(term.response for term in final.terms)
+            if _worse(before[name], after[name]) or rows[name].rms > alone[name].rms
+        ]
         if not weak:
-            rows = model.residuals(model.kept(model.mean()) if final.terms else Kept(plain.mean(), ()))
             return outcome, {name: (before[name], after[name]) for name in before}, rows
         gone = min(weak, key=lambda k: final.score - outcome.without[k].score)
         outcome = _left_out(search, outcome, gone)

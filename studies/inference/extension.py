@@ -1,6 +1,6 @@
 """The extended model: the card with the named effects as `[[effect]]` tables, calibrated against the records by the one simulation."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -19,9 +19,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 
-def extend(
-    found: Inference, records: Sequence[Record], progress: Callable[[str], None] = lambda words: None
-) -> "Calibration":
+def extend(found: Inference, progress: Callable[[str], None] = lambda words: None) -> "Calibration":
     """Calibrate the card with the named effects: its instrument predicts what was diagnosed."""
     from studies.calibration.calibrate import calibrate
 
@@ -31,7 +29,7 @@ def extend(
         background = definite(found, background, k)
     named = [entry_of(found, background, k) for k, term in enumerate(background.terms) if not term.effect.once]
     card = found.card.with_table("effect", [*found.card.content.get("effect", []), *named])
-    return calibrate(card, without_events(found, records), profile=False, progress=progress, keep=False)
+    return calibrate(card, without_events(found), profile=False, progress=progress, keep=False)
 
 
 def definite(found: Inference, background: Background, k: int) -> Background:
@@ -70,9 +68,10 @@ def entry_of(found: Inference, background: Background, k: int) -> dict[str, Any]
     return {"name": effect.name, "response": term.response, **numbers}
 
 
-def without_events(found: Inference, records: Sequence[Record]) -> list[Record]:
+def without_events(found: Inference) -> list[Record]:
     """Return the records as they would be had what happens once happened before them all: a jump that stays is there from the start."""
-    problem, out = found.search.linear.problem, list(records)
+    problem, records = found.search.linear.problem, found.campaign.records
+    out = list(records)
     for k, part in enumerate(problem.parts):
         columns: dict[str, Array] = {}
         record, time = records[part.run], problem.runs[part.run].inner.time

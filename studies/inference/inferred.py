@@ -9,6 +9,7 @@ from studies.calibration.fit import CardFit
 from studies.inference.held_out import Kept, Model, Rows
 from studies.inference.lack_of_fit import Leftover
 from studies.inference.model import Background
+from studies.inference.records import Campaign
 from studies.inference.search import Hypothesis, Outcome, Search
 
 if TYPE_CHECKING:
@@ -39,7 +40,7 @@ class Inferred:
     rows: Mapping[str, Rows]
     held_out: Mapping[str, tuple[float | None, float | None]]
     unknown: tuple[float, ...]
-    notes: tuple[str, ...] = ()
+    campaign: Campaign
 
     @property
     def final(self) -> Hypothesis:

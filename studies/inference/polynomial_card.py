@@ -28,7 +28,13 @@ OF_RUN = 0.5
 """Part of the longest run up to which a response that is no thermometer shows a lag."""
 WIDE, BENT = 10.0, 3.0
 """Standard deviations of level and slope, and of each bend, over the covered range, in parts of what the response varies by."""
-LAG_WIDTH = 1.0
+USUAL_LAG, USUAL_SPREAD = 1500.0, 1.5
+"""Median (s) and standard deviation of the logarithm of lags of such resonators, for a record that shows none."""
+START, STEEP, MISFIT = 10.0, 3.0, 0.05
+"""How far the resonator may be from its housing at a start (K); the slope of the first fit over the covered range, and what it leaves, in parts of what the response varies by."""
+ROWS = 120
+"""Block averages of a run that the first fit looks at."""
+LAG_WIDTH = 0.5
 """Standard deviation of the logarithm of the lag."""
 PER_KELVIN = 1e-4
 """Relative slope of a frequency that nobody measured, which then stands for the temperature: 1 Hz for 1 K at 10 kHz."""
@@ -45,7 +51,7 @@ def polynomial_card(records: Sequence[Record], name: str = "") -> "Instrument":
     """
     from studies.instrument.card import SCHEMA, build_instrument
 
-    runs = observe(records)
+    runs = observe(records, blocks=ROWS)
     housing = np.concatenate([run.inner.profile.value for run in runs])
     reference = float(np.round(0.5 * (housing.min() + housing.max()) - zero_Celsius, 1))
     x0, reach = reference + zero_Celsius, max(0.5 * float(np.ptp(housing)), 1e-2)
@@ -122,17 +128,30 @@ def _followed(runs: Sequence[ObservedRun], column: str, tau: float, x0: float) -
     return np.concatenate(value), np.concatenate(excess), np.concatenate(starts)
 
 
-def _fit(runs: Sequence[ObservedRun], column: str, tau: float, x0: float) -> tuple[Array, Array]:
-    """Return the coefficients of a polynomial with starts (and offsets, of a bias) of each run, and what it leaves."""
+def _fit(runs: Sequence[ObservedRun], column: str, tau: float, x0: float) -> tuple[Array, float]:
+    """Return the coefficients of a polynomial with starts (and offsets, of a bias) of each run, and what is left over its noise.
+
+    Starts and bends have the priors of a card: else a single slow run is followed by any lag. What a first fit leaves is no less than
+    `MISFIT` of what the response varies by.
+    """
     y, x, starts = _followed(runs, column, tau, x0)
-    columns = [np.ones_like(x), *(x**power for power in range(1, POWERS[column] + 1)), *starts.T]
+    spread = max(float(np.std(y)), 1e-300)
+    reach = max(*(0.5 * float(np.ptp(run.inner.profile.value)) for run in runs), 1e-2)
+    powers = range(1, POWERS[column] + 1)
+    columns = [np.ones_like(x), *(x**power for power in powers), *starts.T]
+    prior = [np.inf, STEEP * spread / reach, *(BENT * spread / reach**power for power in powers if power > 1)]
+    prior += [START * spread / reach] * starts.shape[1]
     if column == "bias_deg_per_h":
         columns += list((starts[:, 1:] > 0).astype(float).T)
+        prior += [np.inf] * (starts.shape[1] - 1)
     X = np.stack(columns, axis=1)
     size = np.linalg.norm(X, axis=0)
     size[size == 0] = 1.0
-    found = np.linalg.lstsq(X / size, y, rcond=1e-10)[0] / size
-    return found, y - X @ found
+    noise = MISFIT * spread
+    whole = np.vstack([X / size / noise, np.diag(1.0 / (np.array(prior) * size))])
+    target = np.append(y / noise, np.zeros(len(size)))
+    found = np.linalg.lstsq(whole, target, rcond=1e-12)[0]
+    return found / size, float(np.sum((target - whole @ found) ** 2))
 
 
 def _likeliest_lag(runs: Sequence[ObservedRun], column: str, x0: float) -> float:
@@ -140,7 +159,8 @@ def _likeliest_lag(runs: Sequence[ObservedRun], column: str, x0: float) -> float
     most = 1e5 if column == "frequency_Hz" else max(OF_RUN * longest, float(LAGS[1]))
 
     def left(logarithm: float) -> float:
-        return float(np.log(np.sum(_fit(runs, column, float(np.exp(logarithm)), x0)[1] ** 2) + 1e-300))
+        unusual = (logarithm - np.log(USUAL_LAG)) / USUAL_SPREAD
+        return _fit(runs, column, float(np.exp(logarithm)), x0)[1] + float(unusual) ** 2
 
     grid = np.log(LAGS[LAGS <= most])
     best = int(np.argmin([left(one) for one in grid]))

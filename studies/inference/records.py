@@ -1,6 +1,6 @@
 """Records of one gyro made ready for a diagnosis: checked, each once, with the columns that can be used and why others cannot."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -25,18 +25,30 @@ class Campaign:
 
     Attributes
     ----------
-    records : each once, with bias and driving temperature under their usual names
+    paths : of the records that were given, each once
+    records : those with enough rows, bias and driving temperature under their usual names
     numbers : their places among those that were given, from 1
     skipped : response -> why it is not judged
     notes : sentences
     timed : whether every record states its start
     """
 
+    paths: tuple[str, ...]
     records: tuple[Record, ...]
     numbers: tuple[int, ...]
     skipped: dict[str, str] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
     timed: bool = False
+
+    def noting(self, said: Iterable[str]) -> "Campaign":
+        """Return it with further sentences."""
+        return replace(self, notes=(*self.notes, *said))
+
+
+def driving(record: Record) -> Array:
+    """Temperature that drives a record that is ready, °C, without its holes."""
+    own = np.asarray(record[HOUSING if HOUSING in record else CHAMBER])
+    return own[np.isfinite(own)]
 
 
 def make_ready(given: Sequence[Record]) -> Campaign:
@@ -85,7 +97,10 @@ def make_ready(given: Sequence[Record]) -> Campaign:
         if not enough and any(long)
     ]
     chosen = [k for k, enough in enumerate(long) if enough]
-    return Campaign(tuple(out[k] for k in chosen), tuple(numbers[k] for k in chosen), skipped, tuple(notes), timed)
+    paths = tuple(record.path or f"run {number}" for record, number in zip(kept, numbers, strict=True))
+    return Campaign(
+        paths, tuple(out[k] for k in chosen), tuple(numbers[k] for k in chosen), skipped, tuple(notes), timed
+    )
 
 
 def _temperature_source(records: Sequence[Record]) -> str:

@@ -231,8 +231,8 @@ class Search:
                 found.append(self.settle((*now.terms, term), noise, acts))
         return sorted(found, key=lambda h: -h.score)
 
-    def run(self, before: Hypothesis | None = None) -> Outcome:
-        """Grow the model from nothing, or from what was found in another linearisation."""
+    def run(self, before: Hypothesis | None = None, near: Callable[[Hypothesis], bool] = lambda _: True) -> Outcome:
+        """Grow the model from nothing, or from what was found in another linearisation, as long as it is `near` this one."""
         estimated = estimate_noise_of(self.linear, (), self.noise)
         plain = now = Hypothesis((), estimated, Background(self.linear, (), estimated).evidence)
         if before is not None:
@@ -242,6 +242,8 @@ class Search:
             now = self._without_idle(now, plain)
         beside_nothing: list[Hypothesis] = []
         for _ in range(MOST_TERMS - len(now.terms)):
+            if now.terms and not near(now):
+                break
             tried = self.contenders(now)
             beside_nothing = tried if not now.terms else beside_nothing
             if not tried or tried[0].score - now.score < _needed(plain, now):

@@ -22,6 +22,8 @@ from studies.simulation.prediction import Prediction, predict
 from studies.simulation.response import Temperatures, read_out
 
 if TYPE_CHECKING:
+    from scipy.sparse import csr_array
+
     from shell.law import FrequencyLaw
     from studies.instrument.card import Instrument
 
@@ -30,6 +32,22 @@ WARMER, FASTER, LOSSIER = 0.01, 1e-6, 0.01
 """Steps of temperature (K), of its rate (K/s) and of 1/Q (relative) for the slopes of the read-out."""
 VARIES = 1e-3
 """Relative change from which on a drive varies."""
+
+
+DIRECT, WARMED, DAMPED = "direct", "warmed", "damped"
+"""Ways in which an effect reaches a response: by itself, through the temperature, through the anisotropy of damping."""
+
+
+def _gradient(count: int, step: float) -> "csr_array":
+    """Differences of an even grid, as `numpy.gradient` takes them."""
+    from scipy.sparse import csr_array, lil_array
+
+    G = lil_array((count, count))
+    inner = np.arange(1, count - 1)
+    G[inner, inner + 1], G[inner, inner - 1] = 0.5 / step, -0.5 / step
+    for row, (before, after) in ((0, (0, 1)), (count - 1, (count - 2, count - 1))):
+        G[row, before], G[row, after] = -1.0 / step, 1.0 / step
+    return csr_array(G)
 
 
 @dataclass(frozen=True)
@@ -52,6 +70,18 @@ class Path:
         if self.time.shape == self.states.time.shape and np.allclose(self.time, self.states.time, rtol=0.0, atol=1e-6):
             return values
         return np.stack([np.interp(self.time, self.states.time, column) for column in values.T], axis=1)
+
+    @cached_property
+    def interpolation(self) -> "csr_array":
+        """What takes values of the even grid to the predicted rows, linear between them."""
+        from scipy.sparse import csr_array
+
+        even, rows = self.states.time, self.time
+        before = np.clip(np.searchsorted(even, rows, side="right") - 1, 0, len(even) - 2)
+        part = np.clip((rows - even[before]) / self.states.step, 0.0, 1.0)
+        place = np.arange(len(rows))
+        entries = np.concatenate([1.0 - part, part])
+        return csr_array((entries, (np.tile(place, 2), np.concatenate([before, before + 1]))), (len(rows), len(even)))
 
     def changes(self, effect: Effect, own: Array, response: str) -> dict[str, Array]:
         """Return what the columns of an effect on the even grid make of every response at the predicted rows."""
@@ -153,6 +183,13 @@ class Signatures:
             timed=True,
         )
 
+    def away(self, other: "Signatures") -> float:
+        """How far the resonator's temperature is from that of other paths, over its range."""
+        own = np.concatenate([path.states.resonator for path in self.paths])
+        return float(
+            np.abs(own - np.concatenate([p.states.resonator for p in other.paths])).max() / max(np.ptp(own), 1e-3)
+        )
+
     def size(self, effect: Effect, response: str) -> float:
         """Return how large the first coefficient is in strong cases, K or the unit of the response."""
         if effect.thermal or response == "bias_deg_per_h":
@@ -179,14 +216,46 @@ class Signatures:
 
     def columns(self, effect: Effect, shape: tuple[float, ...], response: str) -> dict[str, Array]:
         """Return what the members of an effect make of each response, stacked over its rows."""
-        found: dict[str, list[Array]] = {name: [] for name in self.problem.responses}
-        acting = set()
-        for part, path in zip(self.problem.parts, self.paths, strict=True):
-            changes = path.changes(effect, np.asarray(effect.columns(path.states, shape, response)), response)
+        kinds = dict.fromkeys(self.problem.responses, WARMED) if effect.thermal else {response: DIRECT}
+        if (
+            response == "inverse_q"
+            and not effect.thermal
+            and self._leaks
+            and "bias_deg_per_h" in self.problem.responses
+        ):
+            kinds["bias_deg_per_h"] = DAMPED
+        found: dict[str, list[Array]] = {name: [] for name in kinds}
+        for k, (part, path) in enumerate(zip(self.problem.parts, self.paths, strict=True)):
+            own = np.asarray(effect.columns(path.states, shape, response), dtype=float)
+            for name in kinds:
+                if name in part.responses:
+                    found[name].append(self._operators[k, name, kinds[name]] @ own)
+        return {name: np.concatenate(parts) for name, parts in found.items() if parts}
+
+    @cached_property
+    def _operators(self) -> "dict[tuple[int, str, str], csr_array]":
+        """By part, response and way: what takes a column on the even grid to the means of the blocks."""
+        from scipy.sparse import csr_array, diags_array
+
+        found = {}
+        for k, (part, path) in enumerate(zip(self.problem.parts, self.paths, strict=True)):
+            onto, slope = path.interpolation, _gradient(len(path.states.time), path.states.step)
             for name in part.responses:
-                own = changes.get(name)
-                acting |= set() if own is None else {name}
                 blocks = self.problem.runs[part.run].responses[name]
-                zero = np.zeros((len(blocks.value), effect.spread.size))
-                found[name].append(zero if own is None else blocks.average(own))
-        return {name: np.concatenate(parts) for name, parts in found.items() if name in acting}
+                sizes = np.diff(np.append(blocks.edges, len(blocks.rows)))
+                place = np.repeat(np.arange(len(sizes)), sizes)
+                entries = 1.0 / blocks.counts[place]
+                mean = csr_array((entries, (place, blocks.rows)), (len(sizes), len(path.time)))
+                found[k, name, DIRECT] = csr_array(mean @ onto)
+                warmed = mean @ diags_array(path.by_temperature[name]) @ onto
+                if np.any(path.by_rate[name]):
+                    warmed = warmed + mean @ diags_array(path.by_rate[name]) @ onto @ slope
+                found[k, name, WARMED] = csr_array(warmed)
+                if name == "bias_deg_per_h" and np.any(path.by_loss):
+                    found[k, name, DAMPED] = csr_array(mean @ diags_array(path.by_loss) @ onto)
+        return found
+
+    @cached_property
+    def _leaks(self) -> bool:
+        """Whether 1/Q reaches the bias."""
+        return any(np.any(path.by_loss) for path in self.paths)

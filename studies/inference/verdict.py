@@ -30,11 +30,17 @@ from studies.diagnosis.verdict import (
 from studies.effects import find_effect
 from studies.inference.inferred import Inferred
 from studies.inference.model import Background, Term
+from studies.inference.records import Campaign
 from studies.inference.signatures import Signatures
 
 Array = NDArray[np.float64]
 FAR = 2.0
 """Prior standard deviations beyond which a value of the card is wrong."""
+FEWEST_LAGS = 3.0
+"""Time constants that the records must cover before they confirm a law whose lag is free."""
+MINUTES = 5.0
+"""Times the change within minutes up to which slow noise is usual where no card states it: a random walk of a day."""
+SLOW_THAN = {True: "what the card states of its noise", False: "what noise usually makes of its changes within minutes"}
 NARROW_RANGE = 1.0
 """Kelvin below which a temperature does not vary."""
 STEP, WORTH = 0.03, 0.5
@@ -43,13 +49,22 @@ STEP, WORTH = 0.03, 0.5
 
 def judge(found: Inferred) -> Verdict:
     """Return the verdict."""
-    shifts = find_shifts(found)
+    shifts = find_shifts(found) if found.card.polynomial is None else []
     physics = _merged([_cause(found, k) for k in range(len(found.final.terms))])
     causes = tuple(sorted((*wrong_values(shifts), *physics), key=lambda cause: -cause.evidence))
     results = {name: _result(found, name, causes) for name in found.search.linear.responses}
+    results |= skipped_results(found.campaign)
     verdict = overall([result.verdict for result in results.values()])
     named = tuple(cause for cause in doubted(causes) if cause.probability >= CONSTANTS["member"])
-    return Verdict(verdict, named, results, next_step(named, results), found.notes, calibration=tuple(shifts))
+    return Verdict(verdict, named, results, next_step(named, results), found.campaign.notes, calibration=tuple(shifts))
+
+
+def skipped_results(campaign: Campaign) -> dict[str, ResponseResult]:
+    """Return the results of responses that are not judged, with the reason."""
+    return {
+        name: ResponseResult("not-identifiable", None, (None, None), None, "none", remark=why)
+        for name, why in campaign.skipped.items()
+    }
 
 
 def find_shifts(found: Inferred) -> list[Shift]:
@@ -214,13 +229,25 @@ def _judge(
         return "unexplained", ""
     if slow > CONSTANTS["wander_usual"]:
         return "not-identifiable", (
-            f"the slow part of the residual is {slow:.2g} times what the card states of its noise: these records cannot distinguish"
-            " slow noise from a cause that acts slowly"
+            f"the slow part of the residual is {slow:.2g} times {SLOW_THAN[found.card.polynomial is None]}: these records cannot"
+            " distinguish slow noise from a cause that acts slowly"
         )
+    apart = _apart(found, name)
     if terms:
-        return ("not-identifiable" if any(cause.equivalent for cause in mine) else "explained"), ""
+        return ("not-identifiable" if any(cause.equivalent for cause in mine) else "explained"), apart
     if values:
         return "explained", ""
+    paths = found.search.signatures.paths
+    if found.card.polynomial is not None:
+        lasts = sum(float(np.ptp(path.time)) for path in paths)
+        lag = max(path.states.tau for path in paths)
+        if lasts < FEWEST_LAGS * lag:
+            return (
+                "not-identifiable",
+                f"too short to judge: {lasts:.0f} s, and the resonator may follow the housing with {lag:.0f} s or more",
+            )
+    if apart:
+        return "not-identifiable", apart
     resonator = np.concatenate([path.states.resonator for path in found.search.signatures.paths])
     if np.ptp(resonator) < NARROW_RANGE:
         return (
@@ -230,11 +257,32 @@ def _judge(
     return ("not-identifiable", doubt_of(left.input, left.evidence)) if left.doubtful else ("adequate", "")
 
 
+def _apart(found: Inferred, name: str) -> str:
+    """Return the sentence on runs of a response without turn-on that lie farther apart than what is left within them."""
+    if name == "bias_deg_per_h" or found.card.polynomial is None:
+        return ""
+    apart, rows = float(np.sqrt(np.mean(np.square(_run_shifts(found, name))))), found.rows[name].residual
+    within = float(np.sqrt(np.mean(np.concatenate([own - own.mean() for own in rows]) ** 2)))
+    if apart <= CONSTANTS["wander_usual"] * within:
+        return ""
+    response = RESPONSES[name]
+    text = (
+        f"the runs lie {apart * response.scale:.3g} {response.shown} (rms) apart, {apart / within:.0f} times the residual within them:"
+        " ageing, clock error, handling, or drift between runs"
+    )
+    return text if found.campaign.timed else text + "; start times ('# start' in the records) would show which of these"
+
+
 def _slow(found: Inferred, name: str) -> float:
     """What is left of a response over the scatter of neighbouring rows and what the card states of slow noise."""
+    rows = found.rows[name]
+    if found.card.polynomial is not None:  # nothing is stated: over the changes within minutes
+        level = found.search.linear.rows[name]
+        rest = found.background.residual(name)
+        brief = float(np.hypot(white_rms(*rows.residual), white_rms(*(rest[own] for own in level.slices))))
+        return rows.rms / max(MINUTES * brief, 1e-300)
     stated = stated_noise(found.card.noise, name) or Noise(0.0)
     slow = noise_rms(found.fit, name, replace(stated, white=0.0, offset=0.0))
-    rows = found.rows[name]
     return rows.rms / max(float(np.hypot(white_rms(*rows.residual), slow)), 1e-300)
 
 

@@ -130,9 +130,6 @@ def test_missing_columns_are_named(campaign, capsys, tmp_path):
     assert "frequency_Hz" in err
     status, _, err = run(capsys)
     assert status == 2
-    status, _, err = run(capsys, save(tmp_path, columns_of(records[0])), "--save", tmp_path / "x.toml")
-    assert status == 2
-    assert "--card" in err
 
 
 def verdict_of(capsys, *words):

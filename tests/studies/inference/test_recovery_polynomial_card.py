@@ -1,9 +1,12 @@
 """A card of a polynomial law: simulated, made from records alone, calibrated, written and read."""
 
+import json
+
 import numpy as np
 import pytest
 
 from studies.calibration.calibrate import calibrate
+from studies.cli import main
 from studies.errors import InputError
 from studies.inference.polynomial_card import polynomial_card
 from studies.instrument.card import build_instrument, load_card, save_card
@@ -56,3 +59,28 @@ def test_contract_a_card_has_one_law() -> None:
         build_instrument({**TRUE, "law": {"lag_s": 100.0}})
     with pytest.raises(InputError, match="needs a card with"):
         _ = build_instrument(TRUE).resonator
+
+
+@pytest.mark.slow
+def test_recovery_of_a_hidden_effect_without_a_card_and_of_an_unseen_run(tmp_path, capsys) -> None:
+    hidden = {"name": "rate-bias", "response": "bias_deg_per_h", "coefficient_deg_per_h_per_K_per_s": 600.0}
+    device = build_instrument({**TRUE, "effect": [hidden]})
+    save_card(device, tmp_path / "device.toml")
+    words = ("step 20 -10 3h then ramp -10 30 1 then soak 30 2h", "cycle 20 -15 40 0.5 30min 1")
+    runs = []
+    for k, profile in enumerate(words):
+        runs.append(str(tmp_path / f"run{k}.csv"))
+        simulate = ["simulate", str(tmp_path / "device.toml"), profile, "--row", "20", "--seed", str(k)]
+        assert main([*simulate, "--out", runs[-1]]) == 0
+    capsys.readouterr()
+    saved = tmp_path / "saved.toml"
+    assert main(["diagnose", *runs, "--save", str(saved), "--json"]) == 0
+    verdict = json.loads(capsys.readouterr().out)
+    (cause,) = verdict["causes"]
+    assert "rate-bias" in (cause["effect"], *cause["equivalent"])
+    unseen = load_profile("ramp 25 -5 1 then soak -5 1h then ramp -5 35 2 then soak 35 2h")
+    true, own = (simulate_run(card, unseen, 0.05, noise=False).record for card in (device, load_card(saved)))
+    noise = verdict["responses"]["bias_deg_per_h"]["noise"]
+    for column, size in (("frequency_Hz", 2e-3), ("bias_deg_per_h", noise)):
+        rest = true[column] - own[column]
+        assert np.std(rest) < size, column

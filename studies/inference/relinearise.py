@@ -1,0 +1,78 @@
+"""The point beside effects where a linear model of values, starts and effects holds: Gauss–Newton steps that really leave less.
+
+At values u the effects' coefficients c are linear; what is left at their best,
+
+    Q(u) = min_c |L⁻¹ (r(u) − Σ X_k(u) c_k)|² + |c|² + |u|²,
+
+has to fall with every step of u; a step that does not is shortened.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from compensation.errors import CompensationError
+from compensation.noise import Noise
+from shell.errors import ShellError
+from studies.calibration.fit import CardFit
+from studies.errors import InputError
+from studies.inference.held_out import Model
+from studies.inference.model import Linear, Term, solve_posterior
+from studies.inference.signatures import Signatures
+from thermal.errors import ThermalError
+
+Array = NDArray[np.float64]
+STEPS, PARTS = 6, (1.0, 0.4, 0.15)
+"""Most steps, and the parts of one that are tried."""
+CLOSE = 0.1
+"""Prior standard deviations: a step that is taken as none."""
+
+
+def relinearise(
+    start: CardFit,
+    linear: Linear,
+    signatures: Signatures,
+    point: Array,
+    terms: Sequence[Term],
+    noise: Mapping[str, Noise],
+) -> tuple[Linear, Signatures, Array]:
+    """Return the model linearised where its values are most probable beside some effects, and these values."""
+    problem = start.problem
+    terms, best = tuple(terms), _left(linear, point, terms, noise)
+    for _ in range(STEPS):
+        model = Model(linear, signatures, terms, noise)
+        moved = model.kept(model.mean()).point
+        if np.abs(moved - point).max(initial=0.0) < CLOSE:
+            break
+        for part in PARTS:
+            trial = point + part * (moved - point)
+            try:
+                state, there = problem.evaluate(trial), Signatures.at(problem, trial)
+            except (InputError, ShellError, ThermalError, CompensationError):
+                continue
+            here = Linear.of(replace(start, state=state))
+            fresh = tuple(replace(one, columns=_columns(there, one)) for one in terms)
+            left = _left(here, trial, fresh, noise)
+            if left < best:
+                break
+        else:
+            break
+        linear, signatures, point, terms, best = here, there, trial, fresh, left
+    return linear, signatures, point
+
+
+def _columns(signatures: Signatures, term: Term) -> dict[str, Array]:
+    found = signatures.columns(term.effect, term.shape, term.response)
+    return {name: own[:, list(term.members)] for name, own in found.items()}
+
+
+def _left(linear: Linear, point: Array, terms: Sequence[Term], noise: Mapping[str, Noise]) -> float:
+    """Q at a point where the model is linearised."""
+    X, target, _ = linear.whitened(terms, noise)
+    whole, r = np.vstack(list(X.values())), np.concatenate(list(target.values()))
+    count = linear.count
+    rest, own = r - whole[:, :count] @ point, whole[:, count:]
+    c = solve_posterior(own, rest)[0] if own.shape[1] else np.zeros(0)
+    return float(np.sum((rest - own @ c) ** 2) + c @ c + point @ point)
