@@ -4,8 +4,9 @@ Nothing is changed and nothing is left out of the record: spikes and missing val
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations
+from math import ceil
 
 import numpy as np
 import scipy
@@ -55,27 +56,52 @@ class Density:
 
 
 @dataclass(frozen=True)
+class ColumnRange:
+    """What is in a column: its ends, what its readings were rounded to (0: nothing that shows), missing values and gaps, (k, 2)."""
+
+    name: str
+    low: float
+    high: float
+    resolution: float
+    missing: int
+    gaps: Array
+
+    def as_row(self) -> dict[str, float | int | str | None]:
+        """Return it as a row of a table."""
+        longest = float(np.ptp(self.gaps, axis=1).max()) if len(self.gaps) else None
+        return {
+            "column": self.name, "low": self.low, "high": self.high, "resolution": self.resolution or None,
+            "missing": self.missing, "gaps": len(self.gaps), "longest_gap_s": longest,
+        }  # fmt: skip
+
+
+@dataclass(frozen=True)
 class ColumnSurvey:
     """What one column shows; `stability` and `density` are None where it is constant or short.
 
     `white` is the Allan deviation at 1 s of the white noise that second differences show.
     """
 
-    name: str
-    low: float
-    high: float
-    mean: float
-    missing: int
-    resolution: float
-    gaps: Array
-    spikes: int
-    stuck: int
-    zeros: int
-    steps: tuple[Step, ...]
-    line: Line | None
-    white: float
-    stability: Stability | None
-    density: Density | None
+    range: ColumnRange
+    mean: float = np.nan
+    spikes: int = 0
+    stuck: int = 0
+    zeros: int = 0
+    steps: tuple[Step, ...] = ()
+    line: Line | None = None
+    white: float = 0.0
+    stability: Stability | None = None
+    density: Density | None = None
+
+    @property
+    def name(self) -> str:
+        """The column."""
+        return self.range.name
+
+    @property
+    def varies(self) -> bool:
+        """Whether it has two values."""
+        return self.range.high > self.range.low
 
 
 @dataclass(frozen=True)
@@ -117,7 +143,7 @@ def survey_record(record: Record) -> Survey:
     names = [name for name in record.columns if name != "time_s"]
     step = float(np.median(np.diff(time))) if len(time) > 1 else 0.0
     columns = tuple(survey_column(name, time, record[name]) for name in names)
-    varying = [column.name for column in columns if column.high > column.low]
+    varying = [column.name for column in columns if column.varies]
     return Survey(
         record,
         step,
@@ -128,43 +154,47 @@ def survey_record(record: Record) -> Survey:
     )
 
 
+def find_range(name: str, values: Array, time: Array | None = None) -> ColumnRange:
+    """Look at what is in a column, and over time at its gaps."""
+    y = values[np.isfinite(values)]
+    low, high = (float(y.min()), float(y.max())) if y.size else (np.nan, np.nan)
+    gaps = find_gaps(time, values) if time is not None else np.empty((0, 2))
+    some = y[:MOST]
+    step = find_step(some)
+    places = (some - some[0]) / step if step else some
+    rounded = step > 0 and bool(np.max(np.abs(places - np.round(places))) < 0.01)
+    return ColumnRange(name, low, high, step if rounded else 0.0, values.size - y.size, gaps)
+
+
 def survey_column(name: str, time: Array, values: Array) -> ColumnSurvey:
     """Look at one column."""
-    known = np.isfinite(values)
+    own, known = find_range(name, values, time), np.isfinite(values)
     if not known.any():
-        return ColumnSurvey(name, np.nan, np.nan, np.nan, len(values), 0.0, find_gaps(time, values), 0, 0, 0, (), None, 0.0, None, None)  # fmt: skip
-    y = values[known]
-    spikes = find_spikes(values, LEAST_SPIKE)
-    stuck = find_stuck(values) if name not in COMMANDED else np.zeros(0)
-    steps: tuple[Step, ...] = ()
-    line = stability = density = None
-    if len(y) >= FEWEST and np.ptp(y) > 0:
-        clean = np.where(spikes, np.nan, values)
-        t, thin, width = average_evenly(time, clean)
-        steps = find_steps(t, thin)
-        line = find_line([(t, thin)], width, float(t[-1] - t[0]) / 20) if is_regular(t) else None
-        try:
-            spacing, series = unbroken(time, {name: clean}, spikes_left_out=True)
-            stability = read_stability(series[name], spacing, CONFIDENCE)
-        except CompensationError:  # too short, or nothing but one value between the gaps
-            stability = None
-        density = find_density(time, clean)
-    return ColumnSurvey(
-        name,
-        float(y.min()),
-        float(y.max()),
+        return ColumnSurvey(own)
+    y, spikes = values[known], find_spikes(values, LEAST_SPIKE)
+    found = ColumnSurvey(
+        own,
         float(y.mean()),
-        int(np.count_nonzero(~known)),
-        find_step(y[:MOST]),
-        find_gaps(time, values),
         int(spikes.sum()),
-        int(stuck.sum()),
+        int(find_stuck(values).sum()) if name not in COMMANDED else 0,
         int(find_dropouts(values).sum()),
-        steps,
-        line,
-        white_rms(y) * float(np.sqrt(np.median(np.diff(time[known])))) if len(y) > 2 else 0.0,
-        stability,
-        density,
+    )
+    if len(y) < FEWEST or not found.varies:
+        return found
+    clean = np.where(spikes, np.nan, values)
+    t, thin, width = average_evenly(time, clean)
+    try:
+        spacing, series = unbroken(time, {name: clean}, spikes_left_out=True)
+        stability = read_stability(series[name], spacing, CONFIDENCE)
+    except CompensationError:  # too short, or nothing but one value between the gaps
+        stability = None
+    return replace(
+        found,
+        steps=find_steps(t, thin),
+        line=find_line([(t, thin)], width, float(t[-1] - t[0]) / 20) if is_regular(t) else None,
+        white=white_rms(y) * float(np.sqrt(np.median(np.diff(time[known])))),
+        stability=stability,
+        density=find_density(time, clean),
     )
 
 
@@ -174,6 +204,10 @@ def average_evenly(time: Array, values: Array, most: int = MOST) -> tuple[Array,
     t, y = time[known], values[known]
     if len(t) <= most:
         return t, y, float(np.median(np.diff(t))) if len(t) > 1 else 0.0
+    if is_regular(t):
+        rows = ceil(len(t) / most)
+        t, y = (x[: len(x) // rows * rows].reshape(-1, rows).mean(axis=1) for x in (t, y))
+        return t, y, float(t[1] - t[0])
     width = float(t[-1] - t[0]) / most
     part = np.minimum(((t - t[0]) / width).astype(np.intp), most - 1)
     filled = np.bincount(part, minlength=most) > 0

@@ -41,8 +41,9 @@ class Use:
 def find_uses(records: Sequence[Record]) -> tuple[Use, ...]:
     """Return what can be done with these records of one gyro, and what the others lack."""
     runs = " ".join(shlex.quote(record.path or "RUN.csv") for record in records)
+    missing = {check: _missing(check, records) for check in dict.fromkeys(check for *_, check in USES)}
     return tuple(
-        Use(command, gives, f"hrg {command} {words.format(runs=runs)}", _missing(check, records))
+        Use(command, gives, f"hrg {command} " + words.replace("{runs}", runs), missing[check])
         for command, gives, words, check in USES
     )
 

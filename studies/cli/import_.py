@@ -21,21 +21,14 @@ from studies.importing.draft import draft_map
 from studies.importing.join import import_records, import_table
 from studies.importing.mapping import LoadedMap, load_map
 from studies.record import write_record
-from studies.reports.columns import draw_columns, find_gaps
+from studies.reports.columns import draw_columns
+from studies.reports.survey import COLUMNS
 from studies.results import Chapter, Column, Figure, Result, Sentence, Table, rows_of
+from studies.survey import find_range
 
 Columns = Mapping[str, NDArray[np.float64]]
 
 FIRST_ROWS = 5
-RANGES = (
-    Column("column", "column"),
-    Column("low", "minimum", form=".8g"),
-    Column("high", "maximum", form=".8g"),
-    Column("step", "median step between rows", form=".3g"),
-    Column("missing", "missing values"),
-    Column("gaps", "gaps"),
-    Column("longest_s", "longest gap", "s", ".6g"),
-)
 
 
 @answers("hrg.import/1, with --draft hrg.import-draft/1")
@@ -135,6 +128,7 @@ def _show(records: Mapping[str, Columns], notes: Sequence[str], start: str | Non
     }
     chapters = []
     for name, found in records.items():
+        ranges = [find_range(key, values, found.get("time_s")).as_row() for key, values in found.items()]
         rows = rows_of({key: values[:FIRST_ROWS] for key, values in found.items()})
         caption = "All columns." + (" Shaded: no values." if "time_s" in found else "")
         chapters.append(
@@ -142,7 +136,7 @@ def _show(records: Mapping[str, Columns], notes: Sequence[str], start: str | Non
                 name,
                 [
                     Figure(lambda found=found: draw_columns(found), caption),  # type: ignore[misc]
-                    Table(f"{name}: {len(next(iter(found.values())))} rows", _ranges(found), RANGES),
+                    Table(f"{name}: {len(next(iter(found.values()))):,} rows", ranges, COLUMNS),
                     Table("First rows", rows, [Column(key, key, form=".10g") for key in found], where="page"),
                 ],
             )
@@ -150,20 +144,3 @@ def _show(records: Mapping[str, Columns], notes: Sequence[str], start: str | Non
     chapters.append(Chapter("Changes", [Sentence("\n".join(notes), "source")]))
     lead = "The data as converted. Compare them with what you know about the run before you use them."
     return Result(payload, "Import", lead, chapters)
-
-
-def _ranges(columns: Columns) -> list[dict[str, Any]]:
-    """Range, usual step, missing values and, over time, gaps of each column."""
-    rows = []
-    for name, values in columns.items():
-        known = values[np.isfinite(values)]
-        row: dict[str, Any] = {"column": name, "missing": values.size - known.size}
-        if known.size:
-            row |= {"low": known.min(), "high": known.max()}
-        if known.size > 1:
-            row["step"] = np.median(np.abs(np.diff(known)))
-        if "time_s" in columns:
-            gaps = find_gaps(columns["time_s"], values)
-            row |= {"gaps": len(gaps), "longest_s": float(np.max(np.ptp(gaps, axis=1))) if len(gaps) else None}
-        rows.append(row)
-    return rows

@@ -62,7 +62,7 @@ def show(*runs: str) -> Result:
             *(
                 part
                 for survey, one in zip(surveys, told, strict=True)
-                for part in (Facts(_facts(survey)), parts.columns_table(one))
+                for part in (Facts(_facts(survey)), parts.columns_table(survey.record.path, one["columns"]))
             ),
             *_warnings(surveys),
             *parts.use_parts(uses),

@@ -179,17 +179,11 @@ class ChannelTable(RawTable):
     def _read(self, column: str) -> "Array":
         values = []
         for part, own in zip(self.parts, self.channels, strict=True):
-            if column not in own:
-                raise InputError(f"{part.path}: there is no channel '{column}'{nearest(column, own)}")
-            channel = own[column]
-            if channel.refused:
-                raise InputError(f"{part.path}: '{channel.name}' {channel.refused}.")
             with plainly(part.path):
-                values.append(np.array(channel.read(-1), dtype=float))
+                values.append(np.array(own[column].read(-1), dtype=float))
             if len(values[-1]) != part.rows:
                 raise InputError(
-                    f"{part.path}: the channel '{column}' has {len(values[-1])} values and the others {part.rows}; give channels of"
-                    " other lengths and clocks a [[file]] table of their own."
+                    f"{part.path}: '{column}' has {len(values[-1])} values where {part.rows} are announced; export it again."
                 )
         return np.concatenate(values)
 
@@ -210,15 +204,20 @@ def read_channel_table(paths: Sequence[str | Path], file: FileMap) -> ChannelTab
             names = dict.fromkeys(channel.group for channel in channels)
             if file.group is not None and file.group not in names:
                 raise InputError(f"{path}: there is no group '{file.group}'{nearest(file.group, names)}")
-            own = _choose(channels, file.group, wanted)
-            used = [own[name] for name in wanted if name in own]
+            known = _choose(channels, file.group, wanted)
+            for name in wanted:
+                if name not in known:
+                    raise InputError(f"{path}: there is no channel '{name}'{nearest(name, known)}")
+                if known[name].refused:
+                    raise InputError(f"{path}: '{name}' {known[name].refused}.")
+            used = [known[name] for name in wanted]
             if len({(channel.clock.key if channel.clock else "", channel.rows) for channel in used}) > 1:
                 raise InputError(
                     f"{path}: {', '.join(repr(channel.name) for channel in used)} have several clocks or lengths; give those of each"
                     " a [[file]] table of its own (same_file = true)."
                 )
-            tables.append(dict(zip(wanted, used, strict=True)) if len(used) == len(wanted) else own)
-            parts.append(Part(str(path), _digest(path), 1, used[0].rows if used else 0))
+            tables.append(dict(zip(wanted, used, strict=True)))
+            parts.append(Part(str(path), _digest(path), 1, used[0].rows))
         return ChannelTable(tuple(parts), file.missing, tuple(tables), files.pop_all())
 
 

@@ -19,7 +19,7 @@ from studies.uses import Use
 def _count(key: str, unit: str = "") -> Column:
     """Return a column that is empty where there are none."""
     heading = key.removesuffix("_s").replace("_", " ").capitalize()
-    return Column(lambda row: row[key] or None, heading, unit, digits=3)
+    return Column(lambda row: row.get(key) or None, heading, unit, digits=3)
 
 
 COLUMNS = (
@@ -35,6 +35,7 @@ COLUMNS = (
     _count("zeros"),
     _count("steps"),
 )
+COLUMNS_NOTE = "Missing values, gaps, spikes, stuck readings, dropouts to 0 and steps are counted where there are any."
 NOISE = (
     Column("column", "Column"),
     Column("unit", "Unit"),
@@ -94,10 +95,9 @@ def use_parts(uses: Sequence[Use]) -> list[Table | Sentence]:
     ]
 
 
-def columns_table(told: dict[str, Any]) -> Table:
+def columns_table(path: str, columns: Sequence[dict[str, Any]]) -> Table:
     """Return the table of one record's columns."""
-    note = "Missing values, gaps, spikes, stuck readings, dropouts to 0 and steps are counted where there are any."
-    return Table(f"Columns of {told['path']}", told["columns"], COLUMNS, note)
+    return Table(f"Columns of {path}", columns, COLUMNS, COLUMNS_NOTE)
 
 
 def run_chapters(survey: Survey, told: dict[str, Any], several: bool) -> list[Chapter]:
@@ -147,9 +147,9 @@ def _grid(count: int, x: str, log: bool = False) -> Any:
 
 def _temperature_parts(survey: Survey) -> list[Figure]:
     temperature = next(
-        (c.name for T in TEMPERATURES for c in survey.columns if c.name == T and c.high - c.low > 0.1), None
+        (c.name for T in TEMPERATURES for c in survey.columns if c.name == T and c.range.high - c.range.low > 0.1), None
     )
-    others = [c.name for c in survey.columns if c.name != temperature and c.high > c.low]
+    others = [c.name for c in survey.columns if c.name != temperature and c.varies]
     if temperature is None or not others:
         return []
     caption = "Each column over temperature, means over equal times; red: warming, blue: cooling. Two separate lines are a lag or a hysteresis."
@@ -220,12 +220,9 @@ def tell(survey: Survey) -> dict[str, Any]:
     record = survey.record
     columns = []
     for column in survey.columns:
-        gaps = column.gaps
-        row: dict[str, Any] = {
-            "column": column.name, "unit": unit_of(column.name), "low": column.low, "high": column.high, "mean": column.mean,
-            "resolution": column.resolution, "missing": column.missing, "gaps": len(gaps),
-            "longest_gap_s": float(np.ptp(gaps, axis=1).max()) if len(gaps) else None,
-            "spikes": column.spikes, "stuck": column.stuck, "zeros": column.zeros, "steps": len(column.steps),
+        row: dict[str, Any] = column.range.as_row() | {
+            "unit": unit_of(column.name), "mean": column.mean, "spikes": column.spikes, "stuck": column.stuck,
+            "zeros": column.zeros, "steps": len(column.steps),
         }  # fmt: skip
         if column.stability is not None:
             noise, (value, low, high) = column.stability.noise, column.stability.allan.bias_instability

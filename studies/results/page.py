@@ -218,6 +218,7 @@ def draw(figure: Drawing, caption: str, alt: str) -> Picture:
     with mpl.rc_context({"svg.hashsalt": caption}):
         figure.set_dpi(72)  # that of the picture, so that its curves lie where they are drawn
         figure.draw_without_rendering()
+        figure.set_layout_engine("none")  # laid out once
         shown = figure.get_tightbbox().padded(0.1)
         figure.savefig(buffer, format="svg", bbox_inches=shown, metadata={"Date": None})
     height = 96 * float(figure.get_figheight())

@@ -159,6 +159,21 @@ def test_contract_objects_are_never_opened(tmp_path, monkeypatch, capsys):
     assert "holds objects" in capsys.readouterr().err
 
 
+def test_contract_a_class_of_matlab_is_refused_by_name(tmp_path, monkeypatch, capsys):
+    from scipy.io import loadmat, savemat
+    from scipy.io.matlab import MatlabOpaque
+
+    monkeypatch.chdir(tmp_path)
+    savemat("run.mat", {"t": np.arange(9.0), "T_housing": np.linspace(20, 21, 9)})
+    opaque = np.zeros(1, dtype=[("s0", "O"), ("arr", "O")]).view(MatlabOpaque)
+    monkeypatch.setattr("scipy.io.loadmat", lambda *given, **named: {**loadmat(*given, **named), "when": opaque})
+    assert main(["import", "run.mat", "--draft", "map.toml"]) == 0
+    named = Path("map.toml").read_text().replace('time = "t"', 'time = "when"')
+    Path("map.toml").write_text(named)
+    assert main(["import", "run.mat", "--map", "map.toml", "--out", "run.csv"]) == 2
+    assert "'when' is of a class that only MATLAB reads" in capsys.readouterr().err
+
+
 def test_contract_a_matlab_7_3_file_and_matrices_are_channels(tmp_path, monkeypatch):
     h5py = pytest.importorskip("h5py")
     monkeypatch.chdir(tmp_path)

@@ -671,7 +671,7 @@ def test_dropouts_are_left_empty_counted_and_marked(tmp_path, capsys):
     expected = [[990, 1010], [1990, 2030], [4990, 8600], [8990, 9010]]
     assert find_gaps(record["time_s"], record["frequency_Hz"]).tolist() == expected
     page = (tmp_path / "page.html").read_text()
-    assert "longest gap (s)" in page
+    assert "Longest gap (s)" in page
     assert "3610" in page
     raw.write_text("time_s,frequency_Hz\n0,4430\n1,0\n")
     with pytest.raises(InputError, match=r"line 3.*is not a possible reading"):
